@@ -11,20 +11,20 @@ use dtof_core::{
     PixelAddress, PixelConfig, Statistics, checked,
 };
 
-// Checked when compiled: the paper's rule on 128 bins.
+// Checked at compile time: the paper's rule on 128 bins.
 const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().build());
 
-/// The sending end: two pixels, and a word for each event. A time word goes before it
-/// when one is due.
+/// The sending end: two pixels, and a word for each event, with a time word before it when
+/// one is due.
 fn send(cycles: u64, link: &mut dyn FnMut([u8; 16])) {
-    let mut pixels = [0, 1].map(|address| AsyncPixel::<128>::new(PixelAddress(address)));
+    let mut pixels = [0, 1].map(|address| AsyncPixel::<128>::new(PixelAddress::new(address)));
     let mut statistics = Statistics::new();
     let mut encoder = AerEncoder::new();
     for cycle in 0..cycles {
         for (pixel, bin) in pixels.iter_mut().zip([60, 80]) {
             pixel.count(&CONFIG, bin);
-            pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle(cycle));
-            if let Some(event) = pixel.acknowledge() {
+            pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle::new(cycle));
+            if let Some(event) = pixel.take_event() {
                 let (time, word) = encoder.encode(&event);
                 let words = time.into_iter().chain([word]);
                 words.map(AerWord::to_le_bytes).for_each(&mut *link);
@@ -33,7 +33,7 @@ fn send(cycles: u64, link: &mut dyn FnMut([u8; 16])) {
     }
 }
 
-/// The receiving end. A word that means nothing is an error; the next may be read.
+/// The receiving end. A word that cannot be decoded is an error; the next can be read.
 fn receive(decoder: &mut AerDecoder, bytes: [u8; 16]) -> Result<Option<DepthEvent>, AerError> {
     Ok(match decoder.decode(AerWord::from_le_bytes(bytes))? {
         AerRecord::Event(event) => Some(event),
@@ -48,7 +48,7 @@ fn main() {
         words += 1;
         if let Ok(Some(event)) = receive(&mut decoder, bytes) {
             events += 1;
-            let (pixel, cycle) = (event.pixel.0, event.cycle.0);
+            let (pixel, cycle) = (event.pixel.raw(), event.cycle.raw());
             print_line!("pixel {pixel}, laser cycle {cycle}, bin {}", event.peak_bin);
         }
     });

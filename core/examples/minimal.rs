@@ -11,18 +11,18 @@ use dtof_core::{
     AsyncPixel, LaserCycle, PixelAddress, PixelConfig, RangeScale, Statistics, checked,
 };
 
-// Checked when compiled: the paper's rule on 128 bins of 250 ps.
+// Checked at compile time: the paper's rule on 128 bins of 250 ps.
 const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().x(4).l1(40).l2(2000).build());
 const SCALE: RangeScale = checked!(RangeScale::new(U16F16::lit("250"), I24F8::ZERO));
 
 /// `photons` are the TDC codes of each laser cycle. `show` gets millimetres.
 fn run(photons: &[&[u16]], show: &mut dyn FnMut(I24F8)) {
-    let mut pixel = AsyncPixel::<128>::new(PixelAddress(0));
+    let mut pixel = AsyncPixel::<128>::new(PixelAddress::new(0));
     let mut statistics = Statistics::new();
     for (cycle, codes) in (0..).zip(photons) {
         pixel.count_batch(&CONFIG, codes);
-        pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle(cycle));
-        if let Some(event) = pixel.acknowledge() {
+        pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle::new(cycle));
+        if let Some(event) = pixel.take_event() {
             show(SCALE.range(event.position()));
         }
     }

@@ -1,4 +1,4 @@
-//! A histogram that a sensor has counted by itself, to millimetres:
+//! From a whole histogram of a sensor to millimetres:
 //! `cargo run --package dtof-core --example whole_histogram`.
 
 #![cfg_attr(target_os = "none", no_std, no_main)]
@@ -9,7 +9,7 @@ mod platform;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{Count24, Histogram, PixelConfig, RangeScale, checked};
 
-// Checked when compiled: the paper's rule on 128 bins of 250 ps.
+// Checked at compile time: the paper's rule on 128 bins of 250 ps.
 const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().build());
 const SCALE: RangeScale = checked!(RangeScale::new(U16F16::lit("250"), I24F8::ZERO));
 

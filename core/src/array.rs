@@ -1,9 +1,8 @@
-//! How pixels lie in an array, and which of them make a block.
+//! The layout of an array: pixels, and the blocks they make.
 //!
 //! The address of a pixel is `row · columns + column`. A block of level `k` has 2ᵏ × 2ᵏ
-//! pixels and begins at a row and a column that are multiples of 2ᵏ. Where the array ends
-//! sooner the block has the pixels that are there, so that each pixel is in one block of
-//! each level.
+//! pixels and begins at a row and a column that are multiples of 2ᵏ. At the edges of the
+//! array a block has fewer pixels. So each pixel is in exactly one block of each level.
 //!
 //! ```
 //! use dtof_core::{Array, BlockLevel, PixelAddress};
@@ -11,10 +10,10 @@
 //! let array = Array::new(5, 3).unwrap();
 //! let level = BlockLevel::new(1).unwrap(); // 2 × 2
 //! assert_eq!(array.blocks(level), 3 * 2);
-//! assert_eq!(array.block_of(PixelAddress(13), level), 4); // row 2, column 3
+//! assert_eq!(array.block_of(PixelAddress::new(13), level), 4); // row 2, column 3
 //! let first = array.first_of(4, level);
-//! assert_eq!(first, PixelAddress(12));
-//! let pixels: Vec<u16> = array.pixels_of(first, level).map(|pixel| pixel.0).collect();
+//! assert_eq!(first, PixelAddress::new(12));
+//! let pixels: Vec<u16> = array.pixels_of(first, level).map(|pixel| pixel.raw()).collect();
 //! assert_eq!(pixels, [12, 13]); // there is no row 3
 //! ```
 
@@ -29,7 +28,7 @@ pub struct Array {
 }
 
 impl Array {
-    /// The most pixels of an array: as many as there are addresses.
+    /// The most pixels of an array: one for each address.
     pub const MOST_PIXELS: u32 = 1 << 16;
 
     /// `None` without pixels or with more than [`Self::MOST_PIXELS`].
@@ -66,14 +65,14 @@ impl Array {
         self.blocks_in_a_row(level) * self.rows.div_ceil(1 << level.raw())
     }
 
-    /// The number of the block of `level` that `pixel`, one of the array, is in. Blocks are
-    /// numbered row by row, as pixels are.
+    /// The number of the block of `level` that contains `pixel`, a pixel of the array.
+    /// Blocks are numbered row by row, as pixels are.
     #[inline]
     #[must_use]
     pub fn block_of(&self, pixel: PixelAddress, level: BlockLevel) -> u32 {
         // At least one column.
-        let row = (pixel.0 as u32).checked_div(self.columns).unwrap_or(0);
-        let column = pixel.0 as u32 - row * self.columns;
+        let row = (pixel.raw() as u32).checked_div(self.columns).unwrap_or(0);
+        let column = pixel.raw() as u32 - row * self.columns;
         (row >> level.raw()) * self.blocks_in_a_row(level) + (column >> level.raw())
     }
 
@@ -84,10 +83,10 @@ impl Array {
         let across = self.blocks_in_a_row(level);
         let row = block.checked_div(across).unwrap_or(0);
         let column = block - row * across;
-        PixelAddress(((row.wrapping_mul(self.columns) + column) << level.raw()) as u16)
+        PixelAddress::new(((row.wrapping_mul(self.columns) + column) << level.raw()) as u16)
     }
 
-    /// The pixels of the block of `level` whose first is `first`, row by row. None if no
+    /// The pixels of the block of `level` whose first is `first`, row by row. Empty if no
     /// block of the level begins there.
     pub fn pixels_of(
         &self,
@@ -95,8 +94,8 @@ impl Array {
         level: BlockLevel,
     ) -> impl Iterator<Item = PixelAddress> + use<> {
         let (columns, side) = (self.columns, 1 << level.raw());
-        let row = u32::from(first.0).checked_div(columns).unwrap_or(0);
-        let column = u32::from(first.0) - row * columns;
+        let row = u32::from(first.raw()).checked_div(columns).unwrap_or(0);
+        let column = u32::from(first.raw()) - row * columns;
         let begins = row < self.rows && (row | column) & (side - 1) == 0;
         let across = if begins {
             side.min(columns - column)
@@ -105,7 +104,8 @@ impl Array {
         };
         let rows = row..self.rows.min(row + side);
         #[allow(clippy::cast_possible_truncation, reason = "an address of the array")]
-        let address = move |row: u32, right| PixelAddress((row * columns + column + right) as u16);
+        let address =
+            move |row: u32, right| PixelAddress::new((row * columns + column + right) as u16);
         rows.flat_map(move |row| (0..across).map(move |right| address(row, right)))
     }
 

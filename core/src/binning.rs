@@ -6,46 +6,48 @@
 //! event that holds for all of its pixels. If it stays silent it feeds a block of level 2, and
 //! so on up to level 3, 8 × 8 pixels. A pixel works exactly as it does without blocks.
 //!
-//! Every `patience` laser cycles comes a tick, for all at once. Who has had no event since
-//! the tick before feeds from now on; who reports feeds no more.
+//! All pixels have a tick every `patience` laser cycles. A pixel that had no event since the
+//! last tick begins to feed its block. It stops once it reports.
 //!
 //! ```
-//! use dtof_core::fixed::types::U8F8;
-//! use dtof_core::*;
+//! use dtof_core::binning::{
+//!     Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks,
+//! };
+//! use dtof_core::{Array, BlockLevel, LaserCycle, PixelAddress, PixelConfig, Statistics, checked};
 //!
 //! const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().build());
 //! let level = BlockLevel::new(1).unwrap();
 //! let binning = Binning::new(Array::new(2, 2).unwrap(), level).unwrap();
 //!
-//! let mut feeds: Vec<Feed> = (0..4).map(|pixel| binning.feed_of(PixelAddress(pixel))).collect();
+//! let mut links: Vec<BlockLink> = (0..4).map(|pixel| binning.link_of(PixelAddress::new(pixel))).collect();
 //! let mut blocks: Vec<Block<128>> = binning.blocks().map(Block::new).collect();
-//! feeds.iter_mut().for_each(|feed| feed.tick(false)); // nobody has reported yet: all feed
+//! links.iter_mut().for_each(|link| link.tick(false)); // no pixel has reported: all feed
 //!
 //! let mut statistics = Statistics::default(); // of blocks
 //! for cycle in 0..44 {
 //!     // Each pixel has a photon in every fourth laser cycle.
-//!     count_in_blocks(&mut blocks, &feeds[cycle % 4], &CONFIG, 60);
-//!     end_laser_cycles_of_blocks(&mut blocks, &CONFIG, &mut statistics, LaserCycle(cycle as u64), 1);
+//!     count_in_blocks(&mut blocks, &links[cycle % 4], &CONFIG, 60);
+//!     end_laser_cycles_of_blocks(&mut blocks, &CONFIG, &mut statistics, LaserCycle::new(cycle as u64), 1);
 //! }
-//! let event = blocks[0].acknowledge().unwrap();
-//! assert_eq!((event.pixel, event.level, event.peak_count.raw()), (PixelAddress(0), level, 44));
+//! let event = blocks[0].take_event().unwrap();
+//! assert_eq!((event.pixel, event.level, event.peak_count.raw()), (PixelAddress::new(0), level, 44));
 //! ```
 //!
 //! Cost: a photon of a pixel that feeds is counted once more for each level that it reaches:
 //! on a Cortex-M4 30 instructions for the first and 18 for each other. A look of a block takes
-//! 244 with a window of 3 bins, where that of a pixel takes 191. A block takes as much room
-//! as a pixel and eight bytes more; there is a third as many of them.
+//! 247 with a window of 3 bins, that of a pixel 195. A block takes eight bytes more than a
+//! pixel; there are a third as many.
 //!
 //! The photons of an event of a block may be those of an event of a pixel as well: the two
-//! are not independent. Rejected: pixels that hand their photons over and start anew
-//! (`docs/design.md`).
+//! are not independent. `docs/design.md` says why pixels do not hand their photons over and
+//! start again.
 
 use crate::array::Array;
 use crate::config::PixelConfig;
 use crate::detect::DetectionRule;
 use crate::event::DepthEvent;
 use crate::histogram::counter::Count16;
-use crate::pixel::{AsyncPixel, Decided, Look};
+use crate::pixel::{AsyncPixel, DecisionInput, Look};
 use crate::statistics::Statistics;
 use crate::units::{BlockLevel, LaserCycle, PixelAddress};
 
@@ -66,63 +68,64 @@ pub struct BlockPlace {
     pub first: PixelAddress,
     /// How large it is.
     pub level: BlockLevel,
-    /// The block of the next level that it feeds, while it does.
-    pub feed: Feed,
+    /// The block of the next level, and whether it feeds it.
+    pub link: BlockLink,
 }
 
-/// Whether a pixel or block feeds the block it is in, and which that is.
+/// The block that a pixel or block is in, and whether it feeds it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct Feed {
+pub struct BlockLink {
     block: u16,
-    feeds: bool,
+    links: bool,
     /// Since the last tick.
     has_reported: bool,
 }
 
-impl Feed {
+impl BlockLink {
     const NOWHERE: u16 = u16::MAX;
 
-    /// Into no block.
+    /// To no block.
     pub const NONE: Self = Self::into_block(Self::NOWHERE);
 
-    /// Into the block of this number; not before the first tick.
+    /// To the block of this number; off until the first tick.
     const fn into_block(block: u16) -> Self {
         Self {
             block,
-            feeds: false,
+            links: false,
             has_reported: false,
         }
     }
 
-    /// The block that photons count in as well, if the feed is on.
+    /// The block that counts the photons as well, if the link is on.
     #[inline]
     #[must_use]
     pub const fn block(&self) -> Option<usize> {
-        if self.feeds {
+        if self.links {
             Some(self.block as usize)
         } else {
             None
         }
     }
 
-    /// An event has come: the feed is off.
+    /// There was an event: turns the link off.
     pub const fn reported(&mut self) {
-        self.feeds = false;
+        self.links = false;
         self.has_reported = true;
     }
 
-    /// The patience is over: the feed is on unless an event has come meanwhile, or
-    /// [`AsyncPixel::has_reported`]. One into no block stays off.
+    /// A tick: turns the link on, unless there was an event since the last tick or
+    /// `has_reported` is true, as [`AsyncPixel::has_reported`] gives it. A link to no block
+    /// stays off.
     pub const fn tick(&mut self, has_reported: bool) {
         let is_silent = !has_reported && !self.has_reported;
-        self.feeds = is_silent && self.block != Self::NOWHERE;
+        self.links = is_silent && self.block != Self::NOWHERE;
         self.has_reported = false;
     }
 }
 
 impl Binning {
-    /// Blocks of the levels 1 to `levels`; `None` without any.
+    /// Blocks of the levels 1 to `levels`; `None` if that is 0.
     #[must_use]
     pub const fn new(array: Array, levels: BlockLevel) -> Option<Self> {
         if levels.raw() == 0 {
@@ -147,30 +150,30 @@ impl Binning {
                 BlockPlace {
                     first,
                     level,
-                    feed: binning.feed(first, level),
+                    link: binning.link(first, level),
                 }
             })
         })
     }
 
-    /// The block of level 1 that a pixel feeds; [`Feed::NONE`] of a pixel that is not in the
+    /// The block of level 1 that a pixel feeds; [`BlockLink::NONE`] for a pixel outside the
     /// array.
     #[must_use]
-    pub fn feed_of(&self, pixel: PixelAddress) -> Feed {
-        if u32::from(pixel.0) >= self.array.pixels() {
-            return Feed::NONE;
+    pub fn link_of(&self, pixel: PixelAddress) -> BlockLink {
+        if u32::from(pixel.raw()) >= self.array.pixels() {
+            return BlockLink::NONE;
         }
-        self.feed(pixel, BlockLevel::PIXEL)
+        self.link(pixel, BlockLevel::PIXEL)
     }
 
     /// The block of the next level that one of `level` with the pixel `first` feeds.
-    fn feed(&self, first: PixelAddress, level: BlockLevel) -> Feed {
+    fn link(&self, first: PixelAddress, level: BlockLevel) -> BlockLink {
         if level >= self.levels {
-            return Feed::NONE;
+            return BlockLink::NONE;
         }
         let next = BlockLevel::saturating(level.raw() + 1);
         let number = self.first_number(next.raw()) + self.array.block_of(first, next);
-        Feed::into_block(u16::try_from(number).unwrap_or(Feed::NOWHERE))
+        BlockLink::into_block(u16::try_from(number).unwrap_or(BlockLink::NOWHERE))
     }
 
     /// The number of the first block of `level`.
@@ -189,7 +192,7 @@ impl Binning {
 #[derive(Clone, Debug)]
 pub struct Block<const BINS: usize> {
     pixel: AsyncPixel<BINS, Count16>,
-    feed: Feed,
+    link: BlockLink,
 }
 
 impl<const BINS: usize> Block<BINS> {
@@ -198,27 +201,27 @@ impl<const BINS: usize> Block<BINS> {
     pub const fn new(place: BlockPlace) -> Self {
         Self {
             pixel: AsyncPixel::of_block(place.first, place.level),
-            feed: place.feed,
+            link: place.link,
         }
     }
 
-    /// The patience is over. See [`Feed::tick`].
+    /// A tick: see [`BlockLink::tick`].
     pub const fn tick(&mut self) {
-        self.feed.tick(self.pixel.has_reported());
+        self.link.tick(self.pixel.has_reported());
     }
 
     /// REQ: whether an event waits for the link.
     #[inline]
     #[must_use]
-    pub const fn request(&self) -> bool {
-        self.pixel.request()
+    pub const fn has_event(&self) -> bool {
+        self.pixel.has_event()
     }
 
-    /// ACK: takes the event that waits, so that the block may fire again.
+    /// ACK: takes the event that waits, so that the block can report again.
     #[inline]
     #[must_use = "the event is taken from the slot"]
-    pub const fn acknowledge(&mut self) -> Option<DepthEvent> {
-        self.pixel.acknowledge()
+    pub const fn take_event(&mut self) -> Option<DepthEvent> {
+        self.pixel.take_event()
     }
 
     /// The pixel that counts for all of the block.
@@ -234,25 +237,25 @@ impl<const BINS: usize> AsMut<Self> for Block<BINS> {
     }
 }
 
-/// Counts a photon of a pixel with this feed in the blocks that it reaches.
+/// Counts a photon of a pixel with this link in the blocks that it reaches.
 #[inline]
 pub fn count_in_blocks<const BINS: usize, R: DetectionRule>(
     blocks: &mut [impl AsMut<Block<BINS>>],
-    feed: &Feed,
+    link: &BlockLink,
     config: &PixelConfig<BINS, R>,
     code: u16,
 ) {
-    let mut next = feed.block();
+    let mut next = link.block();
     while let Some(block) = next.and_then(|number| blocks.get_mut(number)) {
         let block = block.as_mut();
         block.pixel.count(config, code);
-        next = block.feed.block();
+        next = block.link.block();
     }
 }
 
 /// Ends `cycles` laser cycles at once for all blocks, as
 /// [`AsyncPixel::end_laser_cycles`] does for a pixel. `statistics` are those of the blocks.
-/// Gives whether one of them has an event.
+/// Returns whether one of them has an event.
 pub fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule>(
     blocks: &mut [impl AsMut<Block<BINS>>],
     config: &PixelConfig<BINS, R>,
@@ -260,29 +263,29 @@ pub fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule>(
     last: LaserCycle,
     cycles: u16,
 ) -> bool {
-    end_laser_cycles_of_blocks_seen(blocks, config, statistics, last, cycles, |_, _| ())
+    end_laser_cycles_of_blocks_with(blocks, config, statistics, last, cycles, |_, _| ())
 }
 
-/// The same, and shows for each event the number of its block among these, and what it is
-/// decided from.
-pub fn end_laser_cycles_of_blocks_seen<const BINS: usize, R: DetectionRule>(
+/// The same with an observer. For each event it gets the number of the block in `blocks` and
+/// what the decision was made from.
+pub fn end_laser_cycles_of_blocks_with<const BINS: usize, R: DetectionRule>(
     blocks: &mut [impl AsMut<Block<BINS>>],
     config: &PixelConfig<BINS, R>,
     statistics: &mut Statistics,
     last: LaserCycle,
     cycles: u16,
-    mut see: impl FnMut(usize, Decided<'_, BINS, Count16>),
+    mut observe: impl FnMut(usize, &DecisionInput<'_, BINS, Count16>),
 ) -> bool {
     let mut fired = false;
     for (number, block) in blocks.iter_mut().enumerate() {
         let block = block.as_mut();
         let look = block
             .pixel
-            .end_laser_cycles_seen(config, statistics, last, cycles, |decided| {
-                see(number, decided);
+            .end_laser_cycles_with(config, statistics, last, cycles, |input| {
+                observe(number, input);
             });
         if look == Look::Event {
-            block.feed.reported();
+            block.link.reported();
             fired = true;
         }
     }

@@ -1,9 +1,9 @@
-//! What is constant is checked when it is compiled.
+//! Constants are checked at compile time.
 
-/// The value of a constant `Result`, checked when compiled. An error is a compile error
+/// The value of a constant `Result`, checked at compile time. An error is a compile error
 /// with its text.
 ///
-/// It takes whatever a `const fn` of this crate returns that may be refused:
+/// It takes the `Result` of any `const fn` of this crate:
 ///
 /// ```
 /// use dtof_core::{PixelConfig, RangeGate, checked};
@@ -32,8 +32,9 @@ macro_rules! checked {
     };
 }
 
-/// Makes an error of a type with a constant text, which [`checked`] says too.
-macro_rules! written_as_its_text {
+/// Implements `Display` and `Error` for a type with a constant `text`, which [`checked`]
+/// shows as well.
+macro_rules! impl_error {
     ($error:ident) => {
         impl core::fmt::Display for $error {
             fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
@@ -45,4 +46,4 @@ macro_rules! written_as_its_text {
     };
 }
 
-pub(crate) use written_as_its_text;
+pub(crate) use impl_error;

@@ -1,19 +1,19 @@
 //! The depth event: what a pixel reports.
 //!
-//! [`Detection::event`](crate::Detection::event) makes it, and nothing else does. The
-//! pixel holds it until the link takes it:
-//! [`AsyncPixel::acknowledge`](crate::AsyncPixel::acknowledge).
+//! [`Detection::event`](crate::Detection::event) makes it. The pixel keeps it until the link
+//! takes it:
+//! [`AsyncPixel::take_event`](crate::AsyncPixel::take_event).
 //!
 //! ```
-//! use dtof_core::*;
+//! use dtof_core::{Histogram, LaserCycle, PixelAddress, PixelConfig, PixelConfigError};
 //!
 //! let config = PixelConfig::<128>::paper().build()?;
 //! let mut histogram = Histogram::<128>::new();
 //! histogram.add_batch(&[60; 9]);
 //! let detection = config.detect(&histogram).expect("nine photons against none");
-//! let event = detection.event(PixelAddress(3), LaserCycle(99), 100);
+//! let event = detection.event(PixelAddress::new(3), LaserCycle::new(99), 100);
 //! assert_eq!(event.position().raw(), 60 * 256 + 128); // 60.5 bins
-//! # Ok::<(), ConfigError>(())
+//! # Ok::<(), PixelConfigError>(())
 //! ```
 //!
 //! Cost: 32 bytes.
@@ -23,17 +23,17 @@ use crate::units::{
     BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,
 };
 
-/// A peak stood clear of the background: what a pixel reports.
+/// A peak that stood clear of the background, as a pixel reports it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DepthEvent {
-    /// Which macropixel; of a block its first, the one of the lowest row and column.
+    /// The macropixel; for a block its first, the one of the lowest row and column.
     pub pixel: PixelAddress,
-    /// Whether it is one pixel that reports, or a block.
+    /// Whether one pixel reports, or a block.
     pub level: BlockLevel,
     /// Which echo of the exposure.
     pub echo: EchoNumber,
-    /// The laser cycle whose end brought the decision.
+    /// The laser cycle at the end of which the pixel decided.
     pub cycle: LaserCycle,
     /// Laser cycles in the histogram the event was decided from (N).
     pub exposure: u16,
@@ -45,7 +45,7 @@ pub struct DepthEvent {
     pub peak_count: Count,
     /// The background a bin, as the detection rule estimates it.
     pub background: Count,
-    /// What is to be said against it.
+    /// What is known to be wrong with it.
     pub flags: Flags,
 }
 

@@ -1,34 +1,33 @@
-//! Flags: every wrong answer that could be known is marked.
+//! Flags: every known error of an event is marked.
 
 use core::fmt;
 use core::ops::{BitOr, BitOrAssign};
 
-/// What is to be said against an event. Five bits. A sixth, for "confirmed by
+/// What is known to be wrong with an event. Five bits. A sixth, for "confirmed by
 /// neighbouring pixels", is reserved: no event has it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Flags(u8);
 
 impl Flags {
-    /// Nothing.
+    /// No flags.
     pub const NONE: Self = Self(0);
     /// Bit 0: the peak's counter is full. The peak may lie in another full
-    /// bin, and the depth is drawn towards the middle of the bin.
+    /// bin, and the depth is biased towards the middle of the bin.
     pub const SATURATED: Self = Self(1);
-    /// Bit 1: the depth window reaches past the range gate, so that the depth is
-    /// drawn into the gate; or the position would lie farther from the peak bin than
-    /// its two bins and is held there.
+    /// Bit 1: the depth window reaches past the range gate, so the depth is biased into
+    /// the gate; or the position is limited to two bins from the peak bin.
     pub const CLIPPED: Self = Self(1 << 1);
-    /// Bit 2: a decision was put off while the slot was full, so that the
-    /// exposure may be longer than the photons asked for.
+    /// Bit 2: a decision was deferred while the slot was full, so the exposure may be
+    /// longer than necessary.
     pub const DEFERRED: Self = Self(1 << 2);
-    /// Bit 3: the TDC takes one hit a laser cycle and took one in more than half of
-    /// the exposure's, so that early photons hide late ones: the depth is drawn
-    /// towards the sensor, and the peak may be no target. See
+    /// Bit 3: the TDC takes one hit a laser cycle and took one in more than half of the
+    /// exposure's, so early photons hide late ones. The depth is biased towards the
+    /// sensor, and the peak may not be a target. See
     /// [`PixelConfig::with_one_hit_tdc`](crate::PixelConfig::with_one_hit_tdc).
     pub const PILE_UP: Self = Self(1 << 3);
 
-    /// Bit 4: the peak lies on the tail of an echo that was reported before in the same
+    /// Bit 4: the peak lies on the tail of an echo that was reported earlier in the same
     /// exposure, and may be a part of it.
     pub const TAIL: Self = Self(1 << 4);
 

@@ -6,11 +6,11 @@
 //!   → Histogram     saturating counters, highest bin kept while counting
 //!   → [every X laser cycles, once L1 < N < L2]
 //!     DetectionRule the peak against the background: PaperRule, AverageRule, WindowRule, AnyRule
-//!     DepthEstimator where in its bins the pulse lies: centroid, CentredWindow
+//!     DepthEstimator the place of the pulse in its bins: centroid, CentredWindow
 //!   → DepthEvent    pixel, laser cycle, exposure, sub-bin depth, counts, flags
 //!   → AerWord       128 bits
 //!
-//! of the events of a pixel: RunningMean, Reflectivity, DynamicDepthEvent
+//! from the events of a pixel: RunningMean, Reflectivity, DynamicDepthEvent
 //! ```
 //!
 //! ## Modules
@@ -19,43 +19,78 @@
 //!
 //! | module | what it has |
 //! |---|---|
-//! | `units`, `flags`, `array` | quantities as types; what is to be said against an event; pixels and blocks |
-//! | `histogram` | counter widths, the range gate, the histogram, bins that are left out |
+//! | `units`, `flags`, `array` | quantities as types; the flags of events; pixels and blocks of an array |
+//! | `histogram` | counter widths, the range gate, the histogram, excluded bins |
 //! | `event` | the depth event |
-//! | `depth` | where in its bins the pulse lies, and how far that is |
-//! | `detect` | whether the peak stands clear: rules, thresholds, one decision |
+//! | `depth` | the place of the pulse in its bins, and its range |
+//! | `detect` | detection rules, thresholds, one decision |
 //! | `config`, `statistics`, `pixel` | one configuration and one statistics, many pixels |
-//! | `binning` | blocks of pixels that decide together |
-//! | `events` | what comes of events: means, changes of depth, reflectivity |
+//! | [`binning`] | blocks of pixels that decide together |
+//! | [`events`] | results from events: running mean, dynamic depth, reflectivity |
 //! | `aer` | events as words |
+//! | [`pixel_processor`] | registers and words of a pixel in programmable logic |
+//! | [`paper`] | the paper's building blocks by themselves |
+//! | [`rule`] | what a detection rule of your own needs |
+//!
+//! The items of the modules without a link are at the root.
+//!
+//! ## Many pixels
+//!
+//! Fill an array in place, with the crates `heapless` and `static_cell`. An array that is
+//! made first, as by `core::array::from_fn`, and then moved needs a stack frame of its size.
+//! On a Cortex-M4F, with pixels of 128 bins:
+//!
+//! | pixels | frame at `opt-level` 3 or "s" | at 0 |
+//! |---|---|---|
+//! | 64 | 22 kB | 84 kB |
+//! | 256 | 85 kB | 336 kB |
+//!
+//! On a Cortex-M0+, `static_cell` needs a feature of `portable-atomic`: `critical-section` or
+//! `unsafe-assume-single-core`.
+//!
+//! ```rust
+//! use dtof_core::{AsyncPixel, PixelAddress};
+//! use heapless::Vec;
+//! use static_cell::ConstStaticCell;
+//!
+//! // Empty, so that it takes no flash.
+//! static PIXELS: ConstStaticCell<Vec<AsyncPixel<128>, 64>> = ConstStaticCell::new(Vec::new());
+//!
+//! let pixels = PIXELS.take();
+//! for address in 0..64 {
+//!     let _ = pixels.push(AsyncPixel::new(PixelAddress::new(address))); // there is room for 64
+//! }
+//! assert_eq!(pixels.len(), 64);
+//! ```
 //!
 //! ## Rules of the crate
 //!
 //! Data flows one way through the pipeline. Configuration and state are separate
-//! types: one configuration, many pixels. Time is an argument. What is lost
+//! types: one configuration, many pixels. Time is an argument. Every lost photon
 //! (saturated, rejected, gated out) is counted. Nothing is logged.
 //!
 //! ## Glossary
 //!
 //! - **Macropixel**: SPADs that share a TDC and a histogram.
 //! - **Laser cycle**: one laser pulse and the listening time after it.
-//! - **TDC code**: the time of a photon in its laser cycle, in bins, as the
-//!   time-to-digital converter gives it; not yet checked.
-//! - **Bin**: one counter of a histogram and the time it stands for.
+//! - **TDC code**: the time of a photon in its laser cycle, in bins, from the
+//!   time-to-digital converter; not checked yet.
+//! - **Bin**: one counter of a histogram, and its interval of time.
 //! - **Exposure (N)**: laser cycles since the histogram was cleared.
 //! - **Look**: the check of N every X laser cycles, with a decision if
 //!   `L1 < N < L2`.
-//! - **Background**: photons that a bin holds without a target.
+//! - **Background**: the photons of a bin without a target.
 //! - **Detection**: a peak that stands clear of the background.
 //! - **False alarm**: a detection without a target.
 //! - **CFAR**: a test with a constant false-alarm rate, whatever the background.
 //! - **Peak event**, here *depth event*: a detection that a pixel reports.
 //! - **Centroid**: the centre of the photons of some bins.
-//! - **Dead time**, **pile-up**: the TDC takes one photon and misses those behind it.
+//! - **Dead time**, **pile-up**: the TDC takes one photon and misses those after it.
 //! - **Dynamic depth**: events of changes of depth only, with a polarity.
 //! - **AER**: address-event representation; REQ and ACK are its handshake, REQ the paper's.
 
 #![no_std]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 #![deny(
     clippy::disallowed_types,
@@ -68,17 +103,19 @@
 
 mod aer;
 mod array;
-mod binning;
+pub mod binning;
 mod check;
 mod config;
 mod depth;
 mod detect;
 mod event;
-mod events;
+pub mod events;
 mod flags;
 mod histogram;
+pub mod paper;
 mod pixel;
-mod pixel_processor;
+pub mod pixel_processor;
+pub mod rule;
 mod statistics;
 mod units;
 
@@ -87,29 +124,17 @@ pub use fixed;
 
 pub use aer::{AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord};
 pub use array::Array;
-pub use binning::{
-    Binning, Block, BlockPlace, Feed, count_in_blocks, end_laser_cycles_of_blocks,
-    end_laser_cycles_of_blocks_seen,
-};
-pub use config::{ConfigError, PixelConfig, PixelConfigBuilder};
-pub use depth::{CentredWindow, Depth, DepthEstimator, RangeScale, RangeScaleError, centroid};
+pub use config::{PixelConfig, PixelConfigBuilder, PixelConfigError};
+pub use depth::{CentredWindow, DepthEstimate, DepthEstimator, RangeScale, RangeScaleError};
 pub use detect::{
-    AnyRule, AverageRule, ComparatorTree, Detection, DetectionRule, HIGHEST_Z, PaperRule,
-    Threshold, Tracking, WindowRule, WindowWidthError, detect, isqrt, quadrant_background,
-    whole_background, z_for, z_for_levels,
+    AnyRule, AverageRule, Detection, DetectionRule, PaperRule, WindowRule, WindowWidthError, z_for,
 };
 pub use event::DepthEvent;
-pub use events::{
-    DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Polarity, Reference, Reflectivity,
-    RunningMean, ZeroThresholdError,
-};
 pub use flags::Flags;
-pub use histogram::counter::{Count10, Count16, Count24, CounterWidth, PhotonCount};
+pub use histogram::counter::{Count10, Count16, Count24, CounterWidth};
 pub use histogram::gate::{GateError, RangeGate};
-pub use histogram::peeled::PeeledBins;
 pub use histogram::{Histogram, Peak};
-pub use pixel::{AsyncPixel, Decided, Look};
-pub use pixel_processor::{ProcessorError, ProcessorEvent, ProcessorSettings};
+pub use pixel::{AsyncPixel, Look};
 pub use statistics::Statistics;
 pub use units::{
     BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,

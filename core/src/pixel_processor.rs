@@ -1,17 +1,18 @@
 //! The pixel processor of an FPGA (`softcore/rtl/pixels`): its settings, and its events.
 //!
-//! It counts and decides in hardware what [`AsyncPixel`](crate::AsyncPixel) does in software,
-//! for macropixels of 128 bins with 10-bit counters and the paper's rule. The same photons
-//! and looks give the same events. `docs/softcore.md` has its registers.
+//! It does in hardware what [`AsyncPixel`](crate::AsyncPixel) does in software, for
+//! macropixels of 128 bins with 10-bit counters and the paper's rule. The same photons and
+//! looks give the same events. `docs/softcore.md` has its registers.
 //!
 //! ```
-//! use dtof_core::*;
+//! use dtof_core::pixel_processor::{ProcessorEvent, ProcessorSettings};
+//! use dtof_core::{AerError, PixelConfig, SubBinOffset, checked};
 //!
 //! const SETTINGS: ProcessorSettings =
 //!     checked!(ProcessorSettings::of(&checked!(PixelConfig::paper().build())));
 //! assert_eq!(SETTINGS.registers()[0], 40 << 16 | 4); // L1 and X
 //!
-//! // Seven words as they were read: macropixel 2, N = 44, bin 60, 9 photons and none around.
+//! // The seven words of an event: macropixel 2, N = 44, bin 60, 9 photons, no neighbours.
 //! let event = ProcessorEvent::from_registers([44 << 16 | 2, 1 << 30 | 60 << 20, 9, 0, 0, 0, 0]);
 //! let event = event.depth_event()?;
 //! assert_eq!((event.peak_bin.raw(), event.peak_count.raw()), (60, 9));
@@ -22,52 +23,55 @@
 //! Cost of an event from the registers to its word: some 60 instructions.
 
 use crate::aer::{AerDecoder, AerEncoder, AerError, AerRecord, AerWord};
-use crate::check::written_as_its_text;
+use crate::check::impl_error;
 use crate::config::PixelConfig;
 use crate::depth::{DepthEstimator, offset_of};
 use crate::event::DepthEvent;
 use crate::histogram::counter::{Count10, CounterWidth};
 use crate::units::{EchoNumber, LaserCycle};
 
-/// What the registers `LOOK` to `GATE_END` hold.
+/// The contents of the registers `LOOK` to `GATE_END`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ProcessorSettings([u32; 5]);
 
-/// The pixel processor cannot do what is configured.
+/// What the pixel processor cannot do.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum ProcessorError {
-    /// It reports one echo of an exposure.
+    /// It reports only one echo of an exposure.
     Echoes,
-    /// It does not track.
+    /// It cannot track.
     Tracking,
-    /// It has three bins for the depth.
+    /// It uses three bins for the depth.
     Estimator,
     /// Its counters hold 1023 photons.
     MinimumCount,
 }
 
 impl ProcessorError {
-    /// What is wrong, in one line.
+    /// The error in one line.
     #[must_use]
     pub const fn text(self) -> &'static str {
         match self {
-            Self::Echoes => "the pixel processor reports one echo",
-            Self::Tracking => "the pixel processor does not track",
-            Self::Estimator => "the pixel processor takes the centroid of three bins",
-            Self::MinimumCount => "no peak of the pixel processor has more than 1023 photons",
+            Self::Echoes => "the pixel processor reports only one echo",
+            Self::Tracking => "the pixel processor cannot track",
+            Self::Estimator => "the pixel processor has only the centroid of three bins",
+            Self::MinimumCount => {
+                "the pixel processor counts to 1023 photons: the minimum count is higher"
+            }
         }
     }
 }
 
-written_as_its_text!(ProcessorError);
+impl_error!(ProcessorError);
 
 impl ProcessorSettings {
     /// The settings of `config`.
     ///
     /// # Errors
-    /// [`ProcessorError`] for what is done in software alone.
+    /// Fails if `config` needs what only the software can do.
     pub const fn of(config: &PixelConfig<128>) -> Result<Self, ProcessorError> {
         if config.echoes().raw() > EchoNumber::FIRST.raw() {
             return Err(ProcessorError::Echoes);
@@ -100,7 +104,7 @@ impl ProcessorSettings {
     }
 }
 
-/// An event as the registers `EVENT` have it.
+/// An event as read from the registers `EVENT`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct ProcessorEvent([u32; 7]);
@@ -112,7 +116,7 @@ impl ProcessorEvent {
         Self(words)
     }
 
-    /// Its AER word: what [`AerWord::depth_event`] makes of [`Self::depth_event`].
+    /// Its AER word: [`AerWord::depth_event`] of [`Self::depth_event`].
     #[inline]
     #[must_use]
     pub fn word(&self) -> AerWord {
@@ -126,12 +130,12 @@ impl ProcessorEvent {
         AerWord::from_le_bytes(concatenated(parts))
     }
 
-    /// The laser cycle whose end brought the decision.
+    /// The laser cycle at the end of which the pixel decided.
     #[inline]
     #[must_use]
     pub const fn cycle(&self) -> LaserCycle {
         let [_, bin, .., high, higher] = self.0;
-        LaserCycle((bin & 0xffff) as u64 | (high as u64) << 16 | (higher as u64) << 48)
+        LaserCycle::new((bin & 0xffff) as u64 | (high as u64) << 16 | (higher as u64) << 48)
     }
 
     /// The word of the event, and the time word to send before it if one is due.
@@ -144,7 +148,7 @@ impl ProcessorEvent {
     /// The event.
     ///
     /// # Errors
-    /// [`AerError`] if the words are not those of an event.
+    /// Fails if the words are not those of an event.
     pub fn depth_event(&self) -> Result<DepthEvent, AerError> {
         let mut decoder = AerDecoder::new();
         decoder.decode(AerWord::time(self.cycle()))?;

@@ -1,18 +1,18 @@
-//! What an array of pixels has done, and what was lost.
+//! Counts of what an array of pixels has done, and of losses.
 //!
 //! One [`Statistics`] serves all pixels. Each pixel adds its photons when an exposure
 //! ends, so the photons of exposures that have not ended are still in the histograms:
 //!
 //! ```
-//! use dtof_core::*;
+//! use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, PixelConfig, Statistics, checked};
 //!
 //! const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().build());
-//! let mut pixels = [0, 1].map(|address| AsyncPixel::<128>::new(PixelAddress(address)));
+//! let mut pixels = [0, 1].map(|address| AsyncPixel::<128>::new(PixelAddress::new(address)));
 //! let mut statistics = Statistics::default();
 //! for cycle in 0..50 {
 //!     for pixel in &mut pixels {
 //!         pixel.count(&CONFIG, 60);
-//!         pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle(cycle));
+//!         pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle::new(cycle));
 //!     }
 //! }
 //! assert_eq!((statistics.events, statistics.photons()), (2, 2 * 44));
@@ -29,17 +29,17 @@ use core::ops::AddAssign;
 use crate::histogram::Histogram;
 use crate::histogram::counter::CounterWidth;
 
-/// What pixels have done since they were made. Photons offered are
-/// `counted + held + saturated + rejected + gated_out` (short of 2³² losses of one
+/// Counts of what pixels have done since they were made. Photons offered are
+/// `counted + excluded + saturated + rejected + gated_out` (short of 2³² losses of one
 /// kind within one exposure).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct Statistics {
     /// Photons counted in a bin.
     pub counted: u64,
-    /// Photons in bins around an echo that was reported, before and after, to the end of
-    /// the exposure.
-    pub held: u64,
+    /// Photons in excluded bins: those around a reported echo, to the end of the exposure.
+    pub excluded: u64,
     /// Photons that met a full counter.
     pub saturated: u64,
     /// Photons with a TDC code past the last bin.
@@ -48,22 +48,21 @@ pub struct Statistics {
     pub gated_out: u64,
     /// Events put into the slot.
     pub events: u64,
-    /// Decisions put off because the slot was full.
+    /// Decisions deferred because the slot was full.
     pub deferred: u64,
     /// Exposures that reached L2 without an event.
     pub expired: u64,
-    /// Of these, exposures with a decision put off: what they would have
-    /// reported is not known.
+    /// Of these, exposures with a deferred decision: they might have had an event.
     pub expired_deferred: u64,
 }
 
 impl Statistics {
-    /// Of nothing done yet.
+    /// All zero.
     #[must_use]
     pub const fn new() -> Self {
         Self {
             counted: 0,
-            held: 0,
+            excluded: 0,
             saturated: 0,
             rejected: 0,
             gated_out: 0,
@@ -77,11 +76,11 @@ impl Statistics {
     /// Photons offered, counted or not.
     #[must_use]
     pub const fn photons(&self) -> u64 {
-        self.counted + self.held + self.saturated + self.rejected + self.gated_out
+        self.counted + self.excluded + self.saturated + self.rejected + self.gated_out
     }
 
-    /// Adds the photons of a histogram, and those that the gate left `gated_out`, as
-    /// [`Histogram::add_frame`] gives them.
+    /// Adds the photons of a histogram, and those outside the gate, as
+    /// [`Histogram::add_frame`] returns them.
     #[inline(always)]
     pub fn add_photons_of<const BINS: usize, W: CounterWidth>(
         &mut self,
@@ -98,11 +97,11 @@ impl Statistics {
     }
 }
 
-/// Those of more pixels.
+/// Adds those of other pixels.
 impl AddAssign for Statistics {
     fn add_assign(&mut self, other: Self) {
         self.counted += other.counted;
-        self.held += other.held;
+        self.excluded += other.excluded;
         self.saturated += other.saturated;
         self.rejected += other.rejected;
         self.gated_out += other.gated_out;

@@ -1,15 +1,14 @@
-//! The quantities of the pipeline, as types: what holds a [`Count`] cannot be
-//! mistaken for a [`BinIndex`].
+//! The quantities of the pipeline as types, so that a [`Count`] cannot be mistaken for a
+//! [`BinIndex`].
 //!
-//! A type whose integer has a narrower range keeps it private and in range, so
-//! that a [`DepthEvent`](crate::DepthEvent) always fits its
-//! [`AerWord`](crate::AerWord). Where a conversion rounds, its name or its
-//! documentation says how.
+//! `new` makes a quantity and `raw` gives its integer. `new` returns `None` out of range,
+//! so that a [`DepthEvent`](crate::DepthEvent) always fits its [`AerWord`](crate::AerWord).
+//! Where a conversion rounds, its name or its documentation says how.
 //!
 //! | type | unit | range | in the AER word |
 //! |---|---|---|---|
 //! | [`PixelAddress`] | macropixel | 0..=65,535 | 16 bits |
-//! | [`LaserCycle`] | laser cycles since the start | 0..=2⁶⁴−1 | 20 bits + time word |
+//! | [`LaserCycle`] | laser cycles since the start | 0..=2⁶⁴−1 | 16 bits + time word |
 //! | [`BinIndex`] | histogram bin | 0..=1,023 | 10 bits |
 //! | [`Count`] | photons | 0..=16,777,215 | 24 bits |
 //! | [`SubBinOffset`] | 1/256 bin from the start of the peak bin | −2..+2 bins | 10 bits |
@@ -19,7 +18,7 @@
 
 use core::fmt;
 
-/// A bounded unsigned newtype: `new` is checked, `raw` gives the integer back.
+/// A bounded unsigned newtype: `new` is checked.
 macro_rules! bounded {
     ($(#[$doc:meta])* $name:ident($raw:ty), max $max:expr) => {
         $(#[$doc])*
@@ -97,7 +96,7 @@ impl BlockLevel {
 pub struct EchoNumber(u8);
 
 impl EchoNumber {
-    /// The only one, unless pixels report more.
+    /// The first, and the only one unless pixels report more.
     pub const FIRST: Self = Self(1);
     /// The last that a pixel can report.
     pub const LAST: Self = Self(4);
@@ -127,15 +126,41 @@ impl fmt::Display for EchoNumber {
     }
 }
 
-/// Which macropixel an event comes from; row-major in an array.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct PixelAddress(pub u16);
+/// An unsigned newtype without bounds: `new` takes every integer.
+macro_rules! unbounded {
+    ($(#[$doc:meta])* $name:ident($raw:ty)) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+        pub struct $name($raw);
 
-/// When: laser cycles since the sensor was started, the first being 0.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct LaserCycle(pub u64);
+        impl $name {
+            /// The quantity.
+            #[inline]
+            #[must_use]
+            pub const fn new(raw: $raw) -> Self {
+                Self(raw)
+            }
+
+            /// The plain integer.
+            #[inline]
+            #[must_use]
+            pub const fn raw(self) -> $raw {
+                self.0
+            }
+        }
+    };
+}
+
+unbounded! {
+    /// Which macropixel an event comes from; row-major in an array.
+    PixelAddress(u16)
+}
+
+unbounded! {
+    /// When: laser cycles since the sensor was started, the first being 0.
+    LaserCycle(u64)
+}
 
 /// Distance from the **start of the peak bin**, in 1/256 bin: −2 bins
 /// inclusive to +2 bins exclusive. A photon spread evenly over the peak bin
@@ -178,7 +203,7 @@ impl SubBinOffset {
 pub struct BinPosition(i32);
 
 impl BinPosition {
-    /// How many fractional bits [`Self::raw`] has.
+    /// The number of fractional bits of [`Self::raw`].
     pub const FRACTIONAL_BITS: u32 = 8;
     /// 1,024 bins and 255/256: the farthest an event can lie.
     pub const MAX: Self = Self::of(BinIndex::MAX, SubBinOffset::MAX);
@@ -200,7 +225,7 @@ impl BinPosition {
     #[inline]
     #[must_use]
     pub const fn of(bin: BinIndex, offset: SubBinOffset) -> Self {
-        // 10 + 8 bits, plus or minus 9: far from overflow.
+        // 10 + 8 bits, plus or minus 9.
         Self(((bin.0 as i32) << Self::FRACTIONAL_BITS) + offset.0 as i32)
     }
 

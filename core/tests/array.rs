@@ -20,16 +20,19 @@ fn check(columns: u32, rows: u32) {
         for block in 0..array.blocks(level) {
             let first = array.first_of(block, level);
             let (left, top) = (block % across * side, block / across * side);
-            assert_eq!(u32::from(first.0), top * columns + left);
+            assert_eq!(u32::from(first.raw()), top * columns + left);
             let mut last = None;
             for pixel in array.pixels_of(first, level) {
-                let (row, column) = (u32::from(pixel.0) / columns, u32::from(pixel.0) % columns);
+                let (row, column) = (
+                    u32::from(pixel.raw()) / columns,
+                    u32::from(pixel.raw()) % columns,
+                );
                 assert!((top..top + side).contains(&row));
                 assert!((left..left + side).contains(&column));
                 assert!(last < Some(pixel), "in order of addresses");
                 last = Some(pixel);
                 assert_eq!(array.block_of(pixel, level), block);
-                seen[usize::from(pixel.0)] += 1;
+                seen[usize::from(pixel.raw())] += 1;
             }
         }
         assert!(
@@ -40,7 +43,7 @@ fn check(columns: u32, rows: u32) {
         for pixel in 0..u16::try_from(columns * (rows + 1)).unwrap_or(u16::MAX) {
             let (row, column) = (u32::from(pixel) / columns, u32::from(pixel) % columns);
             let begins = row < rows && row.is_multiple_of(side) && column.is_multiple_of(side);
-            let first = PixelAddress(pixel);
+            let first = PixelAddress::new(pixel);
             assert_eq!(
                 array.pixels_of(first, level).next(),
                 begins.then_some(first)
@@ -90,7 +93,7 @@ fn nothing_begins_inside_of_a_block_or_beyond_the_array() {
     let array = Array::new(5, 3).unwrap();
     let pixels = |pixel, level| {
         let level = BlockLevel::new(level).unwrap();
-        array.pixels_of(PixelAddress(pixel), level).count()
+        array.pixels_of(PixelAddress::new(pixel), level).count()
     };
     assert_eq!(
         [

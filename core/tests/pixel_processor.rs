@@ -1,10 +1,12 @@
 //! The settings of the pixel processor, and what its events mean.
 
 use dtof_core::fixed::types::{U8F8, U24F8};
+use dtof_core::paper::centroid;
+use dtof_core::pixel_processor::{ProcessorError, ProcessorEvent, ProcessorSettings};
+use dtof_core::rule::Tracking;
 use dtof_core::{
     AerEncoder, AerWord, BinIndex, BlockLevel, Count, DepthEstimator, DepthEvent, EchoNumber,
-    Flags, Histogram, LaserCycle, PaperRule, PixelAddress, PixelConfig, ProcessorError,
-    ProcessorEvent, ProcessorSettings, RangeGate, Tracking, centroid,
+    Flags, Histogram, LaserCycle, PaperRule, PixelAddress, PixelConfig, RangeGate,
 };
 use proptest::prelude::*;
 
@@ -55,10 +57,10 @@ fn what_the_hardware_cannot_do_is_refused() {
 /// The seven registers of an event, from the bits of the register table.
 fn registers(event: &DepthEvent, left: u32, right: u32) -> [u32; 7] {
     let low = |number: u64| u32::try_from(number & 0xffff_ffff).unwrap();
-    let cycle = event.cycle.0;
+    let cycle = event.cycle.raw();
     let background = event.background.raw();
     [
-        u32::from(event.exposure) << 16 | u32::from(event.pixel.0),
+        u32::from(event.exposure) << 16 | u32::from(event.pixel.raw()),
         1 << 30 | u32::from(event.peak_bin.raw()) << 20 | low(cycle & 0xffff),
         (background & 0xff) << 24 | event.peak_count.raw(),
         u32::from(event.flags.bits()) << 26 | background >> 8,
@@ -90,10 +92,10 @@ proptest! {
         };
         let depth = centroid(&histogram, &gate, highest, U24F8::from_bits(background << 8));
         let event = DepthEvent {
-            pixel: PixelAddress(pixel),
+            pixel: PixelAddress::new(pixel),
             level: BlockLevel::PIXEL,
             echo: EchoNumber::FIRST,
-            cycle: LaserCycle(cycle),
+            cycle: LaserCycle::new(cycle),
             exposure,
             peak_bin: highest.bin,
             offset: depth.offset,

@@ -1,11 +1,11 @@
 //! Quantities, flags, errors and statistics: their limits, their text, and how they add up.
 
+use dtof_core::events::ZeroThresholdError;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
-    AsyncPixel, BinIndex, BinPosition, BlockLevel, CentredWindow, ConfigError, DepthEstimator,
-    EchoNumber, Flags, GateError, Histogram, LaserCycle, Look, PixelAddress, PixelConfig,
-    RangeGate, RangeScale, RangeScaleError, Statistics, SubBinOffset, WindowWidthError,
-    ZeroThresholdError, checked,
+    AsyncPixel, BinIndex, BinPosition, BlockLevel, CentredWindow, DepthEstimator, EchoNumber,
+    Flags, GateError, Histogram, LaserCycle, Look, PixelAddress, PixelConfig, PixelConfigError,
+    RangeGate, RangeScale, RangeScaleError, Statistics, SubBinOffset, WindowWidthError, checked,
 };
 
 #[test]
@@ -53,23 +53,23 @@ fn every_error_names_what_is_wrong() {
             "less than 1/512 bin",
         ),
         (
-            ConfigError::ZeroX.text(),
-            ConfigError::ZeroX.to_string(),
+            PixelConfigError::ZeroX.text(),
+            PixelConfigError::ZeroX.to_string(),
             "X must be at least 1",
         ),
         (
-            ConfigError::XAboveL1.text(),
-            ConfigError::XAboveL1.to_string(),
+            PixelConfigError::XAboveL1.text(),
+            PixelConfigError::XAboveL1.to_string(),
             "X must not be greater than L1",
         ),
         (
-            ConfigError::L2NotAboveL1.text(),
-            ConfigError::L2NotAboveL1.to_string(),
+            PixelConfigError::L2NotAboveL1.text(),
+            PixelConfigError::L2NotAboveL1.to_string(),
             "L2 must be greater than L1",
         ),
         (
-            ConfigError::NoLook.text(),
-            ConfigError::NoLook.to_string(),
+            PixelConfigError::NoLook.text(),
+            PixelConfigError::NoLook.to_string(),
             "no multiple of X lies strictly between L1 and L2",
         ),
     ];
@@ -111,17 +111,17 @@ fn every_position_is_its_bin_and_its_offset() {
 fn statistics_add_up_field_by_field() {
     let of = |first: u64, step: u64| {
         let number = |field: u64| first + step * field;
-        Statistics {
-            counted: number(0),
-            held: number(1),
-            saturated: number(2),
-            rejected: number(3),
-            gated_out: number(4),
-            events: number(5),
-            deferred: number(6),
-            expired: number(7),
-            expired_deferred: number(8),
-        }
+        let mut statistics = Statistics::new();
+        statistics.counted = number(0);
+        statistics.excluded = number(1);
+        statistics.saturated = number(2);
+        statistics.rejected = number(3);
+        statistics.gated_out = number(4);
+        statistics.events = number(5);
+        statistics.deferred = number(6);
+        statistics.expired = number(7);
+        statistics.expired_deferred = number(8);
+        statistics
     };
     let mut sum = of(3, 10);
     sum += of(7, 1000);
@@ -134,15 +134,15 @@ fn a_pixel_has_reported_while_its_event_waits_or_its_exposure_goes_on() {
     const ONE: PixelConfig<64> = checked!(PixelConfig::paper().build());
     let two = PixelConfig::<64>::paper().echoes(EchoNumber::LAST, 4);
     for (config, goes_on) in [(ONE, false), (two.build().unwrap(), true)] {
-        let mut pixel = AsyncPixel::<64>::new(PixelAddress(0));
+        let mut pixel = AsyncPixel::<64>::new(PixelAddress::new(0));
         let mut statistics = Statistics::default();
         assert!(!pixel.has_reported());
         (0..50).for_each(|_| pixel.count(&config, 20));
         assert!(!pixel.has_reported());
-        let look = pixel.end_laser_cycles(&config, &mut statistics, LaserCycle(43), 44);
+        let look = pixel.end_laser_cycles(&config, &mut statistics, LaserCycle::new(43), 44);
         assert_eq!(look, Look::Event);
         assert!(pixel.has_reported(), "its event waits");
-        assert!(pixel.acknowledge().is_some());
+        assert!(pixel.take_event().is_some());
         assert_eq!(pixel.has_reported(), goes_on);
     }
 }
@@ -154,19 +154,17 @@ fn every_kind_of_loss_is_counted_beside_the_others() {
     let config = PixelConfig::<64>::paper().gate(gate).build().unwrap();
     for losses in 0..27 {
         let [saturated, rejected, gated_out] = [losses % 3, losses / 3 % 3, losses / 9];
-        let mut pixel = AsyncPixel::<64>::new(PixelAddress(0));
+        let mut pixel = AsyncPixel::<64>::new(PixelAddress::new(0));
         let mut statistics = Statistics::default();
         for (code, photons) in [(20, 1023 + saturated), (64, rejected), (7, gated_out)] {
             (0..photons).for_each(|_| pixel.count(&config, code));
         }
         pixel.add_photons_to(&mut statistics);
-        let expected = Statistics {
-            counted: 1023,
-            saturated,
-            rejected,
-            gated_out,
-            ..Statistics::default()
-        };
+        let mut expected = Statistics::new();
+        expected.counted = 1023;
+        expected.saturated = saturated;
+        expected.rejected = rejected;
+        expected.gated_out = gated_out;
         assert_eq!(statistics, expected);
     }
 }

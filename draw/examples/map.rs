@@ -6,7 +6,7 @@ use dtof_draw::picture::{Map, heat_map};
 const COLUMNS: u16 = 32;
 const ROWS: u16 = 16;
 
-/// Metres to what a pixel sees; nothing in one corner.
+/// The distance of a pixel's surface in metres; none in one corner.
 fn distance(column: u16, row: u16) -> Option<f64> {
     let [across, down] = [(column, 11.5), (row, 7.5)].map(|(at, middle)| f64::from(at) - middle);
     let beside = (across * across + down * down) / 36.0;
@@ -23,7 +23,7 @@ fn main() -> anyhow::Result<()> {
     let svg = heat_map(&Map {
         title: "A ball before a wall",
         unit: "m",
-        sides: ["column", "row"],
+        axis_names: ["column", "row"],
         missing: "no event",
         columns: COLUMNS.into(),
         rows: ROWS.into(),

@@ -1,9 +1,9 @@
-//! Charts as SVG documents, all from one template: what was measured as dots with the
-//! interval it lies in, what was worked out as lines.
+//! Charts as SVG documents: measured points are dots with confidence intervals, calculated
+//! values are lines.
 //!
-//! The title says what the chart shows. A curve has its name at its end, and names that
-//! would collide are moved apart. Labels of an axis never touch. Many curves are drawn as
-//! small multiples: panels with the same axes.
+//! The title states the finding. Each curve has its name at its end; names that would overlap
+//! are moved apart. Axis labels never touch. Many curves are drawn as small multiples: panels
+//! with the same axes.
 
 mod draw;
 mod names;

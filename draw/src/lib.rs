@@ -1,12 +1,12 @@
 #![doc = include_str!("../README.md")]
 //! ## Modules
 //!
-//! | module | what it has |
+//! | module | contents |
 //! |---|---|
-//! | [`chart`] | a chart whose title is its finding and whose curves carry their names |
-//! | [`picture`] | a map: one value a pixel |
-//! | [`palette`] | one look for one thing in all of them |
-//! | [`svg`] | shapes and texts |
+//! | [`chart`] | charts: the title states the finding, curves carry their names |
+//! | [`picture`] | maps: one value per pixel |
+//! | [`palette`] | colours and marks, the same in all pictures |
+//! | [`svg`] | shapes and text |
 
 #![forbid(unsafe_code)]
 

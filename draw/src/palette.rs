@@ -1,14 +1,14 @@
-//! The colours of all pictures: one thing has one colour and one mark in each of them.
+//! The colours of all pictures: one thing has the same colour and mark in each of them.
 //!
-//! Marks tell things apart where colours do not. Every colour has two shades, one for
-//! light paper and one for dark: a style sheet chooses by the reader's scheme.
+//! Marks distinguish things without colour. Every colour has two shades, for a light and a dark
+//! background; the style sheet follows the reader's colour scheme.
 
-/// A colour, counted as in [`SHEET`].
+/// A colour of [`SHEET`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Colour {
-    /// That of texts.
+    /// For text.
     Ink,
-    /// That of what is less important.
+    /// For less important parts.
     Soft,
     /// `c0`.
     Blue,
@@ -46,24 +46,24 @@ impl Colour {
 pub enum Mark {
     /// Round.
     Circle,
-    /// On a side.
+    /// A square.
     Square,
-    /// On a corner.
+    /// A square on its corner.
     Diamond,
-    /// Point up.
+    /// A triangle that points up.
     Up,
-    /// Point down.
+    /// A triangle that points down.
     Down,
-    /// Two strokes.
+    /// Two crossed strokes.
     Cross,
 }
 
-/// What a thing looks like in a chart.
+/// The look of a series in a chart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Pen {
     /// Its colour.
     pub colour: Colour,
-    /// Its dots.
+    /// The shape of its dots.
     pub mark: Mark,
 }
 
@@ -75,17 +75,17 @@ const fn pen(colour: Colour, mark: Mark) -> Pen {
 pub const PAPER: Pen = pen(Colour::Orange, Mark::Square);
 /// The paper's rule over the average of all bins.
 pub const AVERAGE: Pen = pen(Colour::Ink, Mark::Diamond);
-/// Events, where they are held against frames, and what is measured alone.
+/// Events in comparison with frames, and a single measured series.
 pub const EVENTS: Pen = pen(Colour::Blue, Mark::Circle);
-/// The centred window for the pulse there is.
+/// The centred window for the pulse.
 pub const CENTRED: Pen = pen(Colour::Blue, Mark::Circle);
-/// What things are held against: a bound, a frontier, what is wanted.
+/// A reference: a bound, a frontier, a target.
 pub const REFERENCE: Pen = pen(Colour::Soft, Mark::Cross);
 
-/// What has no other of the same kind beside it.
+/// A series without others of its kind.
 pub const NEUTRAL: Pen = pen(Colour::Ink, Mark::Circle);
 
-/// Looks in order, for the values of a parameter, from the least on.
+/// Pens for ascending values of a parameter.
 pub const STEPS: [Pen; 7] = [
     pen(Colour::Gold, Mark::Up),
     pen(Colour::Green, Mark::Diamond),
@@ -96,7 +96,7 @@ pub const STEPS: [Pen; 7] = [
     pen(Colour::Ink, Mark::Diamond),
 ];
 
-/// A window rule or window of so many bins: 1, 2, 3, 5 or 7.
+/// A window rule, or a window, of this many bins: 1, 2, 3, 5 or 7.
 #[must_use]
 pub const fn window(bins: u8) -> Pen {
     STEPS[match bins {
@@ -108,7 +108,7 @@ pub const fn window(bins: u8) -> Pen {
     }]
 }
 
-/// A threshold of the paper's rule: 2, 3, 4, 5, 6 or 8. Its own is 8.
+/// A threshold of the paper's rule: 2, 3, 4, 5, 6 or 8. The paper uses 8.
 #[must_use]
 pub const fn alpha(alpha: u32) -> Pen {
     STEPS[match alpha {
@@ -121,7 +121,7 @@ pub const fn alpha(alpha: u32) -> Pen {
     }]
 }
 
-/// Frames of so many laser cycles: 100, 500, 1000 or 2000.
+/// Frames of this many laser cycles: 100, 500, 1000 or 2000.
 #[must_use]
 pub const fn frames(cycles: u64) -> Pen {
     match cycles {
@@ -147,7 +147,7 @@ const VIRIDIS: [[u8; 3]; 8] = [
 /// The colour of a level of a map: red, green and blue.
 #[must_use]
 pub fn level(level: u8) -> [u8; 3] {
-    // 255 levels between 7 pairs of neighbours, in whole numbers.
+    // Interpolates between 8 colours in integers.
     let place = u32::from(level) * 7;
     let (index, part) = (place / 255, place % 255);
     let at = |index: u32| VIRIDIS[(index as usize).min(VIRIDIS.len() - 1)];
@@ -158,23 +158,23 @@ pub fn level(level: u8) -> [u8; 3] {
     })
 }
 
-/// Pixels without an event.
+/// The colour of pixels without an event.
 pub const NO_EVENT: [u8; 3] = [0x84, 0x89, 0x90];
 
-/// `#rrggbb`.
+/// A colour as `#rrggbb`.
 #[must_use]
 pub fn hex([red, green, blue]: [u8; 3]) -> String {
     format!("#{red:02x}{green:02x}{blue:02x}")
 }
 
-/// The classes of all pictures. The root has the class `dtof`.
+/// The style sheet of all pictures. The root element has the class `dtof`.
 pub const SHEET: &str = include_str!("palette.css");
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    /// Brightness of a colour as the eye sees it, 0 to 1.
+    /// Relative luminance of a colour, 0 to 1.
     fn luminance(hex: &str) -> f64 {
         let channel = |at: usize| {
             let value = u8::from_str_radix(&hex[at..at + 2], 16).unwrap();
@@ -188,9 +188,9 @@ mod tests {
         0.2126 * channel(1) + 0.7152 * channel(3) + 0.0722 * channel(5)
     }
 
-    /// WCAG asks for 3 of lines and dots, and 4.5 of text.
+    /// WCAG requires a contrast of 3 for lines and dots, and 4.5 for text.
     #[test]
-    fn every_colour_is_seen_on_its_paper() {
+    fn every_colour_has_enough_contrast() {
         let (light, dark) = SHEET.split_once("@media").unwrap();
         for (sheet, paper) in [(light, "#ffffff"), (dark, "#0d1117")] {
             assert!(sheet.contains(&format!(".paper{{fill:{paper}}}")));

@@ -1,4 +1,4 @@
-//! Pictures of per-pixel values: heat maps as SVG documents.
+//! Heat maps of one value per pixel as SVG documents.
 
 mod axis;
 mod cells;

@@ -1,15 +1,15 @@
-//! A small writer of SVG documents: shapes and texts whose looks are those of the
+//! A small writer of SVG documents: shapes and text in the styles of the
 //! [palette](crate::palette).
 //!
-//! A document needs nothing beside itself: no font files, scripts or outside style
-//! sheets. It defines no identifiers, so that any number of them fit into one page.
+//! A document is self-contained: no font files, scripts or external style sheets. It defines no
+//! identifiers, so any number of documents can be embedded in one page.
 //! The same calls always give the same bytes.
 
 use std::fmt::{self, Write as _};
 
 use crate::palette::SHEET;
 
-/// Every document has it near its start.
+/// A string near the start of every document.
 pub const MARK: &str = "class=\"dtof\"";
 
 /// Widths of the characters from space to `~` in Helvetica and Arial, in 1/1000 of the
@@ -22,12 +22,12 @@ const WIDTHS: [u16; 95] = [
     333, 556, 556, 500, 556, 556, 278, 556, 556, 222, 222, 500, 222, 833, 556, 556, // to o
     556, 556, 333, 500, 278, 556, 500, 722, 500, 500, 500, 334, 260, 334, 584, // to ~
 ];
-/// Of any other character.
+/// The width of any other character.
 const OTHER: u16 = 620;
-/// By how much other fonts, and bold letters, may be wider.
+/// The factor by which other fonts, and bold letters, may be wider.
 const SLACK: f64 = 1.1;
 
-/// How wide `text` is at most, at a font size of `size`.
+/// An upper estimate of the width of `text` at a font size of `size`.
 #[must_use]
 pub fn text_width(text: &str, size: f64) -> f64 {
     let width = |c: char| {
@@ -38,8 +38,7 @@ pub fn text_width(text: &str, size: f64) -> f64 {
     text.chars().map(width).sum::<f64>() / 1000.0 * size * SLACK
 }
 
-/// `text` in lines of at most `width`, broken between words. A longer word has a line
-/// of its own.
+/// `text` in lines of at most `width`, wrapped between words. A longer word gets its own line.
 #[must_use]
 pub fn wrapped(text: &str, size: f64, width: f64) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
@@ -82,11 +81,11 @@ pub fn escape(text: &str) -> String {
     escaped
 }
 
-/// The room around every picture.
+/// The margin around every picture.
 pub const EDGE: f64 = 14.0;
-/// Size of a title, and the height of its lines.
+/// Font size and line height of a title.
 pub const TITLE: (f64, f64) = (20.0, 25.0);
-/// Size of all other texts.
+/// Font size of all other text.
 pub const TEXT: f64 = 14.5;
 
 /// A coordinate: at most one digit after the point.
@@ -101,14 +100,14 @@ impl fmt::Display for At {
     }
 }
 
-/// Which end of a text its place is.
+/// The part of a text that lies at its position.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Anchor {
-    /// It begins there.
+    /// Its start.
     Start,
-    /// Its middle is there.
+    /// Its middle.
     Middle,
-    /// It ends there.
+    /// Its end.
     End,
 }
 
@@ -119,13 +118,13 @@ pub struct Svg {
 }
 
 impl Svg {
-    /// An element as it is.
+    /// Adds an element verbatim.
     pub fn raw(&mut self, element: &str) {
         self.body.push_str(element);
         self.body.push('\n');
     }
 
-    /// A straight line.
+    /// Adds a straight line.
     pub fn line(&mut self, class: &str, from: (f64, f64), to: (f64, f64)) {
         let [x1, y1, x2, y2] = [from.0, from.1, to.0, to.1].map(At);
         self.raw(&format!(
@@ -133,7 +132,7 @@ impl Svg {
         ));
     }
 
-    /// A line of text, the middle of its small letters at `place`.
+    /// Adds a line of text, vertically centred on `place`.
     pub fn text(&mut self, class: &str, place: (f64, f64), size: f64, anchor: Anchor, text: &str) {
         let [x, y] = [At(place.0), At(place.1 + 0.36 * size)];
         let anchor = match anchor {
@@ -147,7 +146,7 @@ impl Svg {
         ));
     }
 
-    /// Lines of text from `place` on, each `height` below the one before. Gives where they end.
+    /// Adds lines of text from `(x, y)` on, `height` apart. Returns the y below the last.
     pub fn lines(
         &mut self,
         class: &str,
@@ -163,7 +162,7 @@ impl Svg {
         y
     }
 
-    /// The document, of this `size`, and with `title` for those who do not see it.
+    /// The document, with this `size` and `title` (for screen readers).
     #[must_use]
     pub fn document(self, size: (f64, f64), title: &str) -> String {
         let [width, height] = [size.0, size.1].map(|side| At(side.ceil()));

@@ -7,12 +7,13 @@
 
 use core::fmt::{self, Write};
 
+use dtof_core::binning::{Binning, Block, count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::paper::isqrt;
 use dtof_core::{
-    AerDecoder, AerEncoder, AerRecord, AerWord, Array, AsyncPixel, Binning, Block, BlockLevel,
-    Count, DepthEvent, EchoNumber, LaserCycle, PaperRule, PixelAddress, PixelConfig,
-    PixelConfigBuilder, RangeGate, Statistics, WindowRule, checked, count_in_blocks,
-    end_laser_cycles_of_blocks, isqrt,
+    AerDecoder, AerEncoder, AerRecord, AerWord, Array, AsyncPixel, BlockLevel, Count, DepthEvent,
+    EchoNumber, LaserCycle, PaperRule, PixelAddress, PixelConfig, PixelConfigBuilder, RangeGate,
+    Statistics, WindowRule, checked,
 };
 
 /// The last line of a run that came to its end.
@@ -67,7 +68,7 @@ fn stream<const BINS: usize>(
         Ok(config) => config,
         Err(error) => return writeln!(out, "{error}"),
     };
-    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(u16::from(BINS > 8)));
+    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress::new(u16::from(BINS > 8)));
     let mut statistics = Statistics::default();
     let mut random = Random(1);
     // Just before the upper bits of the laser cycle change.
@@ -81,10 +82,10 @@ fn stream<const BINS: usize>(
         if random.below(2) == 0 {
             pixel.count(&config, random.below(bins));
         }
-        pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
+        pixel.end_laser_cycle(&config, &mut statistics, LaserCycle::new(cycle));
         // Now and then the link has no room.
         if cycle % 256 < 160
-            && let Some(event) = pixel.acknowledge()
+            && let Some(event) = pixel.take_event()
         {
             write_event(out, encoder, &event)?;
         }
@@ -114,7 +115,7 @@ fn watched(
         Ok(config) => config,
         Err(error) => return writeln!(out, "{error}"),
     };
-    let mut pixel = AsyncPixel::<128>::new(PixelAddress(2));
+    let mut pixel = AsyncPixel::<128>::new(PixelAddress::new(2));
     let mut statistics = Statistics::default();
     let mut random = Random(1);
     for cycle in 0..400 {
@@ -126,8 +127,8 @@ fn watched(
         if random.below(2) == 0 {
             pixel.count(&config, random.below(128));
         }
-        pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
-        if let Some(event) = pixel.acknowledge() {
+        pixel.end_laser_cycle(&config, &mut statistics, LaserCycle::new(cycle));
+        if let Some(event) = pixel.take_event() {
             write_event(out, encoder, &event)?;
         }
     }
@@ -147,8 +148,8 @@ fn block(out: &mut impl Write, encoder: &mut AerEncoder) -> fmt::Result {
         return writeln!(out, "no such block");
     };
     let mut pixels = [0, 1].map(|address| {
-        let address = PixelAddress(address);
-        (AsyncPixel::<128>::new(address), binning.feed_of(address))
+        let address = PixelAddress::new(address);
+        (AsyncPixel::<128>::new(address), binning.link_of(address))
     });
     let Some(place) = binning.blocks().next() else {
         return writeln!(out, "no such block");
@@ -157,28 +158,28 @@ fn block(out: &mut impl Write, encoder: &mut AerEncoder) -> fmt::Result {
     let [mut statistics, mut of_block] = [Statistics::default(); 2];
     let mut random = Random(1);
     for cycle in 0..400 {
-        let now = LaserCycle(cycle);
-        for (pixel, feed) in &mut pixels {
+        let now = LaserCycle::new(cycle);
+        for (pixel, link) in &mut pixels {
             for (one_in, code) in [(24, 60), (8, random.below(128))] {
                 if random.below(one_in) == 0 {
                     pixel.count(&config, code);
-                    count_in_blocks(&mut blocks, feed, &of_blocks, code);
+                    count_in_blocks(&mut blocks, link, &of_blocks, code);
                 }
             }
             pixel.end_laser_cycle(&config, &mut statistics, now);
-            if let Some(event) = pixel.acknowledge() {
-                feed.reported();
+            if let Some(event) = pixel.take_event() {
+                link.reported();
                 write_event(out, encoder, &event)?;
             }
         }
         if end_laser_cycles_of_blocks(&mut blocks, &of_blocks, &mut of_block, now, 1) {
-            for event in blocks.iter_mut().filter_map(Block::acknowledge) {
+            for event in blocks.iter_mut().filter_map(Block::take_event) {
                 write_event(out, encoder, &event)?;
             }
         }
         if cycle % 40 == 39 {
-            for (pixel, feed) in &mut pixels {
-                feed.tick(pixel.has_reported());
+            for (pixel, link) in &mut pixels {
+                link.tick(pixel.has_reported());
             }
             blocks.iter_mut().for_each(Block::tick);
         }
@@ -200,7 +201,7 @@ fn write_event(out: &mut impl Write, encoder: &mut AerEncoder, event: &DepthEven
         "level {} echo {} cycle {} exposure {} bin {} offset {} count {} background {} flags {}",
         event.level.raw(),
         event.echo,
-        event.cycle.0,
+        event.cycle.raw(),
         event.exposure,
         event.peak_bin.raw(),
         event.offset.raw(),

@@ -1,15 +1,15 @@
 //! A serial port fed by interrupts: two queues between the interrupt handler
 //! and the main loop.
 //!
-//! The interrupt handler holds [`SerialInterrupt`]: it brings every byte
-//! received and asks for every byte to send. The main loop holds [`Serial`],
+//! The interrupt handler has [`SerialInterrupt`]: it delivers every received
+//! byte and fetches every byte to send. The main loop has [`Serial`],
 //! which reads and writes through the traits of `embedded-io`. Neither locks
 //! nor waits for the other. A byte that finds the receive queue full is lost,
-//! and counted ([`Serial::lost`]); the link repeats what it held.
+//! and counted ([`Serial::lost`]); the link repeats its contents.
 //!
 //! [`Read::read`] and [`Write::write`] wait if they must, as their traits say.
 //! They return at once if [`ReadReady::read_ready`] and
-//! [`WriteReady::write_ready`] said so just before: only the main loop empties
+//! [`WriteReady::write_ready`] was true just before: only the main loop empties
 //! the one queue and fills the other. [`Write::flush`] always waits, for the
 //! line.
 //!
@@ -39,12 +39,11 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 use heapless::spsc::{Consumer, Producer, Queue};
 
-/// Bytes that wait to be read on either board: the link's window of four frames
-/// twice over. Should more be on its way, bytes are lost and the link repeats
-/// them.
+/// The receive queue of either board in bytes: twice the link's window of four frames. If more
+/// arrives, bytes are lost and the link repeats them.
 pub const RECEIVE_CAPACITY: usize = 2047;
 
-/// Bytes that wait to be sent on either board.
+/// The transmit queue of either board in bytes.
 pub const TRANSMIT_CAPACITY: usize = 1023;
 
 /// The memory of a port of either board.
@@ -59,12 +58,12 @@ pub struct Buffers<const RECEIVE: usize, const TRANSMIT: usize> {
     line: Line,
 }
 
-/// What the port knows of the program at its other end.
+/// The state of the program at the other end, as far as the port knows.
 struct Line {
-    /// No program has the port open, as far as the port can tell. (All zero at the start: the
-    /// queues beside it take no flash.)
+    /// No program has the port open, as far as the port can tell. (Zero, so that the static
+    /// with the queues takes no flash.)
     is_closed: AtomicBool,
-    /// It was closed since the main loop asked last.
+    /// It was closed since the main loop's last check.
     was_closed: AtomicBool,
 }
 
@@ -113,7 +112,7 @@ impl<const RECEIVE: usize, const TRANSMIT: usize> Default for Buffers<RECEIVE, T
     }
 }
 
-/// The end the interrupt handler holds.
+/// The end of the interrupt handler.
 pub struct SerialInterrupt<'a> {
     received: Producer<'a, u8>,
     sending: Consumer<'a, u8>,
@@ -135,7 +134,7 @@ impl SerialInterrupt<'_> {
     /// came broken.
     #[inline]
     pub fn on_loss(&mut self) {
-        // Nobody else writes it, so that it need not be one step.
+        // Nothing else writes it, so it need not be atomic.
         let lost = self.lost.load(Ordering::Relaxed);
         self.lost.store(lost.saturating_add(1), Ordering::Relaxed);
     }
@@ -158,14 +157,14 @@ impl SerialInterrupt<'_> {
     }
 
     /// The byte that the port sends next, if any. Once there is nothing, the
-    /// handler lets the port rest; `start_sending` makes it ask again.
+    /// handler stops sending; `start_sending` makes it call this again.
     #[inline]
     pub fn next_to_send(&mut self) -> Option<u8> {
         self.sending.dequeue()
     }
 }
 
-/// The end the main loop holds.
+/// The end of the main loop.
 pub struct Serial<'a> {
     to_read: Consumer<'a, u8>,
     to_send: Producer<'a, u8>,
@@ -181,8 +180,8 @@ impl Serial<'_> {
         self.lost.load(Ordering::Relaxed)
     }
 
-    /// Whether a program at the other end has had the port open since this was last asked, and
-    /// has it open now: true where the port cannot tell. What a program sent before it closed the
+    /// Whether a program at the other end has had the port open since the last call, and
+    /// has it open now; true if the port cannot tell. What a program sent before it closed the
     /// port is dropped.
     #[must_use]
     pub fn listens(&mut self) -> bool {

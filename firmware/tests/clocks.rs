@@ -29,12 +29,12 @@ fn session(percent: u32, one_in: u32, seed: u64) -> u32 {
     let mut rng = Pcg32::seed_from_u64(seed);
     let calls = script::script(3_000, &mut rng);
     let events = script::reference(&calls, &script::config(&CONFIGURATION));
-    let wanted = Configuration {
+    let requested = Configuration {
         source: Source::Link,
         ..CONFIGURATION
     };
     let messages = script::messages(&calls).into_iter();
-    let mut to_send = [(message::CONFIGURE, wanted.to_le_bytes().to_vec())]
+    let mut to_send = [(message::CONFIGURE, requested.to_le_bytes().to_vec())]
         .into_iter()
         .chain(messages.map(|body| (message::PHOTONS, body)))
         .chain([(message::STATISTICS_REQUEST, Vec::new())])

@@ -10,7 +10,7 @@ use dtof_firmware::sidecar::Sidecar;
 use dtof_link::endpoint::KEEP_ALIVE_MS;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::{Configuration, Refusal, Source, StopReason, message};
-use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
+use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 use proptest::prelude::*;
 
@@ -28,8 +28,8 @@ struct Laser {
 impl Sensor for Laser {
     type Error = SensorFault;
 
-    fn about(&self) -> About {
-        About::new(8)
+    fn info(&self) -> SensorInfo {
+        SensorInfo::new(8)
     }
 
     fn start(&mut self, _: U16F16) {
@@ -46,7 +46,7 @@ impl Sensor for Laser {
         assert!(self.is_on, "a sensor that is off is polled");
         self.polls += 1;
         if self.polls.is_multiple_of(10) {
-            sink.photon(PixelAddress(0), 40);
+            sink.photon(PixelAddress::new(0), 40);
         }
         sink.end_laser_cycles(1);
         Ok(Polled::Idle)
@@ -62,7 +62,7 @@ fn with_timeout(host_timeout_ms: u16) -> Configuration {
 
 /// A device whose sensor runs for a host that has configured it at `now_ms`.
 fn running(host_timeout_ms: u16, now_ms: u32) -> (Sidecar<'static>, Laser, Host) {
-    let (mut device, mut laser) = (device::<8>(Some(About::new(8))), Laser::default());
+    let (mut device, mut laser) = (device::<8>(Some(SensorInfo::new(8))), Laser::default());
     let mut host = Host::new(1, now_ms);
     host.configure(&mut device, now_ms, &with_timeout(host_timeout_ms));
     device.poll_sensor(&mut laser, now_ms);
@@ -201,13 +201,13 @@ fn other_configurations_and_sessions_stop_the_sensor_and_say_so() {
         source: Source::Link,
         ..CONFIGURATION
     };
-    for (wanted, reason) in [
+    for (requested, reason) in [
         (Some(from_link), StopReason::Configuration),
         (None, StopReason::NewSession),
     ] {
         let (mut device, mut laser, mut host) = running(3_000, 0);
-        match wanted {
-            Some(wanted) => host.configure(&mut device, 1, &wanted),
+        match requested {
+            Some(requested) => host.configure(&mut device, 1, &requested),
             None => host = Host::new(2, 1),
         }
         let report = host.report(&mut device, 1);
@@ -361,7 +361,7 @@ fn a_port_that_fails_keeps_no_sensor_running() {
 
 #[test]
 fn a_sensor_that_may_not_start_says_why() {
-    let (mut device, mut laser) = (device::<8>(Some(About::new(8))), Laser::default());
+    let (mut device, mut laser) = (device::<8>(Some(SensorInfo::new(8))), Laser::default());
     let mut host = Host::new(1, 0);
     device.set_listening(false);
     host.configure(&mut device, 0, &CONFIGURATION);
@@ -375,7 +375,7 @@ fn a_sensor_that_may_not_start_says_why() {
 
 #[test]
 fn after_a_reset_the_sensor_is_off_and_hosts_are_told_why() {
-    let (mut device, mut laser) = (device::<8>(Some(About::new(8))), Laser::default());
+    let (mut device, mut laser) = (device::<8>(Some(SensorInfo::new(8))), Laser::default());
     device.set_stop_reason(Some(StopReason::Watchdog));
     for now_ms in 0..10_000 {
         alone(&mut device, &mut laser, now_ms);
@@ -398,7 +398,7 @@ fn after_a_reset_the_sensor_is_off_and_hosts_are_told_why() {
 
 #[test]
 fn never_is_refused_unless_the_firmware_was_built_for_it() {
-    let (mut device, mut laser) = (device::<8>(Some(About::new(8))), Laser::default());
+    let (mut device, mut laser) = (device::<8>(Some(SensorInfo::new(8))), Laser::default());
     let mut host = Host::new(1, 0);
     let never = with_timeout(0);
     let answer = host.answer(&mut device, 0, message::CONFIGURE, &never.to_le_bytes());
@@ -467,7 +467,7 @@ proptest! {
     fn whatever_happens_the_sensor_runs_only_when_it_may(
         actions in prop::collection::vec(action(), 1..60), begin: u32,
     ) {
-        let (mut device, mut laser) = (device::<8>(Some(About::new(8))), Laser::default());
+        let (mut device, mut laser) = (device::<8>(Some(SensorInfo::new(8))), Laser::default());
         let mut model = Model { is_open: true, ..Model::default() };
         let (mut session, mut time) = (0, 0);
         let mut host = Host::new(session, begin);
@@ -483,8 +483,8 @@ proptest! {
                 }
                 _ if !model.session => {}
                 Action::Configure(source, host_timeout_ms) => {
-                    let wanted = Configuration { source, ..with_timeout(host_timeout_ms) };
-                    host.configure(&mut device, now_ms, &wanted);
+                    let requested = Configuration { source, ..with_timeout(host_timeout_ms) };
+                    host.configure(&mut device, now_ms, &requested);
                     model.timeout = (source == Source::Sensor).then_some(host_timeout_ms.into());
                     model.heard = time;
                 }

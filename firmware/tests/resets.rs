@@ -75,14 +75,16 @@ fn script() -> (Vec<Vec<u8>>, Vec<DepthEvent>) {
 /// Opens a session and configures the device.
 fn begin<'a>(number: u16, device: &mut Sidecar, photons: &'a [Vec<u8>]) -> Session<'a> {
     let mut session = Session::new(number);
-    let wanted = Configuration {
+    let requested = Configuration {
         source: Source::Link,
         ..CONFIGURATION
     };
     while !session.host.endpoint.is_open() {
         session.turn(device, usize::MAX);
     }
-    session.host.ask(message::CONFIGURE, &wanted.to_le_bytes());
+    session
+        .host
+        .ask(message::CONFIGURE, &requested.to_le_bytes());
     while session.host.answers.is_empty() {
         session.turn(device, usize::MAX);
     }

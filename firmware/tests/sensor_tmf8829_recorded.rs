@@ -13,7 +13,7 @@ use std::io::Write;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-use common::mocks::Given;
+use common::mocks::SinkCall;
 use common::mocks::tmf8829::bench::{Bench, settings};
 use dtof_core::{
     Count, Count24, EchoNumber, Histogram, PixelConfig, RangeGate, RangeScale, WindowRule, z_for,
@@ -89,9 +89,9 @@ fn recorded_histograms_come_out_as_recorded_and_give_the_sensors_distances() {
     };
     let frames = Rc::new(frames);
     let of = |frames: &[Frame], measurement: usize, x: usize| (measurement + x) % frames.len();
-    let mut wanted = settings(Zones::Z16x16);
-    wanted.reference = Some(dtof_core::PixelAddress(1000));
-    let mut bench = Bench::<128>::new(wanted);
+    let mut requested = settings(Zones::Z16x16);
+    requested.reference = Some(dtof_core::PixelAddress::new(1000));
+    let mut bench = Bench::<128>::new(requested);
     let recorded = Rc::clone(&frames);
     bench.bus.0.borrow_mut().chip.scene = Rc::new(move |measurement, zone, bins| {
         let measurement = measurement as usize;
@@ -102,9 +102,9 @@ fn recorded_histograms_come_out_as_recorded_and_give_the_sensors_distances() {
     });
     bench.bring_up();
 
-    let about = bench.sensor.about();
-    let scale = RangeScale::new(about.bin_width.unwrap(), about.offset).unwrap();
-    let gate = RangeGate::<128>::new(0, about.bins - 1).unwrap();
+    let info = bench.sensor.info();
+    let scale = RangeScale::new(info.bin_width.unwrap(), info.offset).unwrap();
+    let gate = RangeGate::<128>::new(0, info.bins - 1).unwrap();
     // As in `host-tests/tests/simulations/recorded_echoes.rs`.
     let z = z_for(100, &gate, 4, 40, 2000);
     let rule = WindowRule::new(3, z, Count::saturating(5)).unwrap();
@@ -119,7 +119,7 @@ fn recorded_histograms_come_out_as_recorded_and_give_the_sensors_distances() {
             // The frame, four references, half of the zones.
             assert_eq!(given.len(), 1 + 4 + 128);
             for given in &given[1..] {
-                let Given::Histogram(pixel, counts) = given else {
+                let SinkCall::Histogram(pixel, counts) = given else {
                     panic!("{given:?}");
                 };
                 assert_eq!(counts.len(), 128);
@@ -179,8 +179,8 @@ fn the_reference_pulse_is_where_the_offset_has_time_zero() {
     let Some(frames) = log() else {
         return;
     };
-    let about = Bench::<128>::new(settings(Zones::Z16x16)).sensor.about();
-    let millimetres_per_bin = about.bin_width.unwrap().to_num::<f64>() * 0.149_896_229;
+    let info = Bench::<128>::new(settings(Zones::Z16x16)).sensor.info();
+    let millimetres_per_bin = info.bin_width.unwrap().to_num::<f64>() * 0.149_896_229;
     for counts in frames.iter().flat_map(|frame| &frame.references) {
         let mut sorted = counts[..54].to_vec();
         sorted.sort_unstable();
@@ -193,7 +193,7 @@ fn the_reference_pulse_is_where_the_offset_has_time_zero() {
             moment += signal * (bin as f64 + 0.5);
         }
         let zero = moment / photons * millimetres_per_bin;
-        let offset = about.offset.to_num::<f64>();
+        let offset = info.offset.to_num::<f64>();
         assert!(
             (zero + offset).abs() < 12.0,
             "{zero} mm, offset {offset} mm"

@@ -11,9 +11,8 @@ use std::path::PathBuf;
 use common::host::{CONFIGURATION, configured};
 use common::mocks::tmf882x::{Bench, Counts, packet, packets, settings};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{
-    Count, Count24, DepthEstimator, DepthEvent, Histogram, PaperRule, RangeGate, detect,
-};
+use dtof_core::rule::detect;
+use dtof_core::{Count, Count24, DepthEstimator, DepthEvent, Histogram, PaperRule, RangeGate};
 use dtof_link::Configuration;
 use dtof_sensors::Sensor;
 use serde_json::Value;
@@ -84,11 +83,11 @@ fn the_sidecar_decides_recorded_histograms_as_the_core_does() {
     };
     // The reference is pixel 99, which is none of the sidecar's; the zones are 10
     // to 18, the centre one 14.
-    let wanted = Configuration {
+    let requested = Configuration {
         pixels: 19,
         ..CONFIGURATION
     };
-    let (mut device, mut host) = configured::<19>(&wanted);
+    let (mut device, mut host) = configured::<19>(&requested);
     let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
     let gate = RangeGate::full();
 
@@ -120,15 +119,15 @@ fn the_sidecar_decides_recorded_histograms_as_the_core_does() {
     assert_eq!(report.unaddressed, reference.map(u64::from).sum::<u64>());
 
     // All zones of a capture end with its last laser cycle.
-    let ends = |event: &DepthEvent| (event.cycle.0 + 1).is_multiple_of(537 * 1024);
+    let ends = |event: &DepthEvent| (event.cycle.raw() + 1).is_multiple_of(537 * 1024);
     assert!(host.events.iter().all(ends));
-    let mut events = host.events.iter().filter(|event| event.pixel.0 == 14);
+    let mut events = host.events.iter().filter(|event| event.pixel.raw() == 14);
     for (capture, detection) in (1..).zip(&expected) {
         let Some(detection) = detection else {
             continue;
         };
         let event = events.next().unwrap();
-        assert_eq!(event.cycle.0 + 1, capture * 537 * 1024);
+        assert_eq!(event.cycle.raw() + 1, capture * 537 * 1024);
         assert_eq!(event.peak_bin, detection.peak.bin);
         assert_eq!(event.peak_count, detection.peak.count);
         assert_eq!(event.offset, detection.depth.offset);

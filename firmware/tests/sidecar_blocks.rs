@@ -8,21 +8,22 @@ use std::collections::{BTreeMap, VecDeque};
 use common::host::{CONFIGURATION, Call, Host, Scripted, device_with_blocks, scripted};
 use common::script::{messages, photons};
 use common::sharing::{Expected, configs, expected, script};
+use dtof_core::events::{DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Reference};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
+use dtof_core::rule::{ExcludedBins, detect};
 use dtof_core::{
-    BlockLevel, CentredWindow, Count, Count24, DepthEstimator, DepthEvent, DynamicDepthConfig,
-    DynamicDepthEvent, DynamicDepthPixel, EchoNumber, Flags, Histogram, LaserCycle, PeeledBins,
-    PixelAddress, RangeGate, RangeScale, Reference, WindowRule, detect,
+    BlockLevel, CentredWindow, Count, Count24, DepthEstimator, DepthEvent, EchoNumber, Flags,
+    Histogram, LaserCycle, PixelAddress, RangeGate, RangeScale, WindowRule,
 };
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::message;
 use dtof_link::{AdaptiveBinning, Configuration, DynamicDepth, Report, Source};
-use dtof_sensors::About;
+use dtof_sensors::SensorInfo;
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 
 /// Blocks of three levels, tracking and two echoes, for photons of the link.
-fn wanted(columns: u16, rows: u16) -> Configuration {
+fn requested(columns: u16, rows: u16) -> Configuration {
     let rule = WindowRule::new(3, U4F12::lit("4.5"), Count::saturating(5)).unwrap();
     let centred = CentredWindow::new(U8F8::lit("2.5")).unwrap();
     Configuration {
@@ -37,7 +38,7 @@ fn wanted(columns: u16, rows: u16) -> Configuration {
         }),
         tracking: true,
         echoes: EchoNumber::new(2).unwrap(),
-        peel_reach: 4,
+        echo_guard_bins: 4,
         echo_wait: 8,
         source: Source::Link,
         ..CONFIGURATION
@@ -45,10 +46,10 @@ fn wanted(columns: u16, rows: u16) -> Configuration {
 }
 
 /// A device with room for 8x8 pixels and their blocks, and a host that has configured it.
-fn configured(wanted: &Configuration) -> (Sidecar<'static>, Host) {
-    let mut device = device_with_blocks::<64, 21>(Some(About::new(256)));
+fn configured(requested: &Configuration) -> (Sidecar<'static>, Host) {
+    let mut device = device_with_blocks::<64, 21>(Some(SensorInfo::new(256)));
     let mut host = Host::new(1, 0);
-    host.configure(&mut device, 0, wanted);
+    host.configure(&mut device, 0, requested);
     (device, host)
 }
 
@@ -57,8 +58,8 @@ fn sensor(script: &[Vec<Call>]) -> Scripted<impl Iterator<Item = Option<Vec<Call
 }
 
 /// Photons over the link to a host that takes one message in so many milliseconds.
-fn over_link(wanted: &Configuration, script: &[Vec<Call>], reads_one_in: u32) -> (Host, Report) {
-    let (mut device, mut host) = configured(wanted);
+fn over_link(requested: &Configuration, script: &[Vec<Call>], reads_one_in: u32) -> (Host, Report) {
+    let (mut device, mut host) = configured(requested);
     let mut to_send = VecDeque::from(messages(script));
     let mut now_ms = 0;
     while !to_send.is_empty() {
@@ -87,18 +88,18 @@ fn has_all(expected: &Expected, levels: u8) {
     }
     let second = |event: &&DepthEvent| event.echo.raw() == 2;
     assert!(expected.events.iter().filter(second).count() > 50);
-    assert!(expected.pixels.held > 0 && expected.blocks.held > 0);
+    assert!(expected.pixels.excluded > 0 && expected.blocks.excluded > 0);
 }
 
 #[test]
 fn pixels_and_blocks_report_what_they_do_by_hand_however_seldom_the_host_reads() {
     for (columns, rows, cycles) in [(8, 8, 2_000), (5, 3, 4_000)] {
         let script = script(cycles, columns * rows, &mut Pcg32::seed_from_u64(1));
-        let wanted = wanted(columns, rows);
-        let expected = expected(&script, &wanted);
+        let requested = requested(columns, rows);
+        let expected = expected(&script, &requested);
         has_all(&expected, 3);
         for reads_one_in in [1, 40] {
-            let (host, report) = over_link(&wanted, &script, reads_one_in);
+            let (host, report) = over_link(&requested, &script, reads_one_in);
             assert_eq!(host.events.len(), expected.events.len());
             assert!(host.events == expected.events, "{columns}x{rows}");
             assert_eq!(report.statistics, expected.pixels);
@@ -112,7 +113,7 @@ fn pixels_and_blocks_report_what_they_do_by_hand_however_seldom_the_host_reads()
 #[test]
 fn each_of_the_three_makes_other_events() {
     let script = script(2_000, 15, &mut Pcg32::seed_from_u64(2));
-    let all = wanted(5, 3);
+    let all = requested(5, 3);
     let (of_all, _) = over_link(&all, &script, 1);
     let binning = |levels, patience| {
         let levels = BlockLevel::saturating(levels);
@@ -128,7 +129,7 @@ fn each_of_the_three_makes_other_events() {
         with(&|other| other.binning = binning(3, 53)),
         with(&|other| other.tracking = false),
         with(&|other| other.echoes = EchoNumber::FIRST),
-        with(&|other| other.peel_reach = 5),
+        with(&|other| other.echo_guard_bins = 5),
         with(&|other| other.echo_wait = 2),
         // Three rows of five lie otherwise.
         with(&|other| other.columns = 3),
@@ -154,12 +155,12 @@ fn each_of_the_three_makes_other_events() {
 #[test]
 fn photons_of_a_sensor_reach_blocks_too() {
     let script = script(4_000, 15, &mut Pcg32::seed_from_u64(3));
-    let wanted = Configuration {
+    let requested = Configuration {
         source: Source::Sensor,
-        ..wanted(5, 3)
+        ..requested(5, 3)
     };
-    let expected = expected(&script, &wanted);
-    let (mut device, mut host) = configured(&wanted);
+    let expected = expected(&script, &requested);
+    let (mut device, mut host) = configured(&requested);
     host.run(&mut device, &mut sensor(&script), 0..4_000, 4);
     let report = host.report(&mut device, 4_000);
     assert!(host.events == expected.events && host.events.len() > 500);
@@ -170,11 +171,11 @@ fn photons_of_a_sensor_reach_blocks_too() {
 #[test]
 fn a_host_that_does_not_read_a_sensor_loses_no_event_of_pixels_and_blocks() {
     let script = script(12_000, 15, &mut Pcg32::seed_from_u64(4));
-    let wanted = Configuration {
+    let requested = Configuration {
         source: Source::Sensor,
-        ..wanted(5, 3)
+        ..requested(5, 3)
     };
-    let (mut device, mut host) = configured(&wanted);
+    let (mut device, mut host) = configured(&requested);
     let mut sensor = sensor(&script);
     for (milliseconds, messages) in [(0..2_000, 4), (2_000..8_000, 0), (8_000..12_000, 4)] {
         host.run(&mut device, &mut sensor, milliseconds, messages);
@@ -199,18 +200,18 @@ fn a_host_that_does_not_read_a_sensor_loses_no_event_of_pixels_and_blocks() {
 /// A pixel whose event the host does not take is not silent: nobody feeds the block.
 #[test]
 fn a_pixel_whose_event_waits_feeds_no_block() {
-    let wanted = Configuration {
+    let requested = Configuration {
         l2: 20_000,
         echoes: EchoNumber::FIRST,
         source: Source::Sensor,
-        ..wanted(2, 2)
+        ..requested(2, 2)
     };
     let bright = [
         (0..4).map(|pixel| Call::Photon(pixel, 40)).collect(),
         vec![Call::End(1)],
     ]
     .concat();
-    let (mut device, mut host) = configured(&wanted);
+    let (mut device, mut host) = configured(&requested);
     let mut sensor = scripted((0..5_000).map(|_| Some(bright.clone())));
     host.run(&mut device, &mut sensor, 0..5_000, 0);
     let report = host.report(&mut device, 5_000);
@@ -224,17 +225,17 @@ fn dynamic_depth_follows_the_first_echoes_of_pixels_and_blocks() {
     // A tenth of a bin.
     let threshold_mm = U24F8::lit("4");
     let reference = Reference::Reported;
-    let wanted = Configuration {
+    let requested = Configuration {
         dynamic_depth: Some(DynamicDepth {
             threshold_mm,
             reference,
         }),
-        ..wanted(5, 3)
+        ..requested(5, 3)
     };
     let scale = RangeScale::new(U16F16::from_num(250), I24F8::ZERO).unwrap();
     let config = DynamicDepthConfig::new(threshold_mm, &scale, reference).unwrap();
     let mut observers = BTreeMap::new();
-    let all = expected(&script, &wanted);
+    let all = expected(&script, &requested);
     let first = all.events.iter().filter(|event| event.echo.raw() == 1);
     let changes: Vec<DynamicDepthEvent> = first
         .filter_map(|event| {
@@ -247,7 +248,7 @@ fn dynamic_depth_follows_the_first_echoes_of_pixels_and_blocks() {
         assert!(changes.iter().any(|change| change.level.raw() == level));
     }
     for reads_one_in in [1, 40] {
-        let (host, report) = over_link(&wanted, &script, reads_one_in);
+        let (host, report) = over_link(&requested, &script, reads_one_in);
         assert!(host.changes == changes && host.events.is_empty());
         // Events are counted all the same.
         assert_eq!(report.statistics, all.pixels);
@@ -268,13 +269,13 @@ fn two_peaks(near: usize) -> Box<[u32; 128]> {
 
 #[test]
 fn a_whole_histogram_has_several_echoes_and_no_block() {
-    let wanted = Configuration {
+    let requested = Configuration {
         source: Source::Sensor,
         gate: (10, 99),
-        ..wanted(4, 2)
+        ..requested(4, 2)
     };
-    let [config, _] = configs(&wanted);
-    let (mut device, mut host) = configured(&wanted);
+    let [config, _] = configs(&requested);
+    let (mut device, mut host) = configured(&requested);
     let calls = vec![
         Call::Frame(9),
         Call::Histogram(3, two_peaks(40)),
@@ -295,10 +296,10 @@ fn a_whole_histogram_has_several_echoes_and_no_block() {
         let mut histogram = Histogram::<128, Count24>::new();
         histogram.add_frame(&two_peaks(near), &gate);
         let first = detect(&histogram, &gate, config.rule(), config.estimator()).unwrap();
-        let (pixel, cycle) = (PixelAddress(pixel), LaserCycle(8));
-        let mut peeled = PeeledBins::new(4);
-        peeled.push(first.peak.bin);
-        assert_eq!(peeled.empty(&mut histogram), 70_000 * 49 / 40 + 600);
+        let (pixel, cycle) = (PixelAddress::new(pixel), LaserCycle::new(8));
+        let mut excluded = ExcludedBins::new(4);
+        excluded.push(first.peak.bin);
+        assert_eq!(excluded.empty(&mut histogram), 70_000 * 49 / 40 + 600);
         (first.event(pixel, cycle, 9), histogram.peak())
     };
     let mut events = host.events.iter();
@@ -327,11 +328,11 @@ fn histogram_photons() -> u64 {
 
 #[test]
 fn without_room_for_all_echoes_of_a_histogram_it_is_put_off() {
-    let wanted = Configuration {
+    let requested = Configuration {
         source: Source::Sensor,
-        ..wanted(4, 2)
+        ..requested(4, 2)
     };
-    let (mut device, mut host) = configured(&wanted);
+    let (mut device, mut host) = configured(&requested);
     let mut sensor = scripted((0..1_000).map(|_| Some(vec![Call::Histogram(0, two_peaks(40))])));
     host.run(&mut device, &mut sensor, 0..1_000, 0);
     let report = host.report(&mut device, 1_000);
@@ -360,8 +361,8 @@ fn photons_of_several_pixels_are_no_pile_up_of_their_block() {
         });
         // No pixel has so many, unless it has one in each laser cycle.
         let rule = WindowRule::new(3, U4F12::lit("4.5"), Count::saturating(600)).unwrap();
-        let base = wanted(2, 2);
-        let wanted = Configuration {
+        let base = requested(2, 2);
+        let requested = Configuration {
             rule: rule.into(),
             tracking: false,
             echoes: EchoNumber::FIRST,
@@ -373,7 +374,7 @@ fn photons_of_several_pixels_are_no_pile_up_of_their_block() {
             }),
             ..base
         };
-        let (mut device, mut host) = configured(&wanted);
+        let (mut device, mut host) = configured(&requested);
         let mut sensor = Scripted {
             calls,
             is_one_hit: true,

@@ -12,7 +12,7 @@ use dtof_core::PixelAddress;
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::{Configuration, HistogramHead, NoHistogram, Report, Source, message};
-use dtof_sensors::About;
+use dtof_sensors::SensorInfo;
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -101,12 +101,12 @@ fn split(cycle: &[Call]) -> [Vec<Call>; 2] {
 fn run(cycles: &[Vec<Call>], one_in: u32, seed: u64, asks: bool) -> (Host, Report) {
     let mut device = device::<8>(None);
     let (mut host, mut line) = (Host::new(1, 0), Line::new(one_in, seed));
-    let wanted = Configuration {
+    let requested = Configuration {
         source: Source::Link,
         ..CONFIGURATION
     };
-    let (configure, wanted) = (message::CONFIGURE, wanted.to_le_bytes());
-    line.ask(&mut host, &mut device, configure, &wanted, 1);
+    let (configure, requested) = (message::CONFIGURE, requested.to_le_bytes());
+    line.ask(&mut host, &mut device, configure, &requested, 1);
     for cycle in cycles {
         let [photons, end] = split(cycle);
         for (part, is_end) in [(photons, false), (end, true)] {
@@ -131,8 +131,8 @@ fn run(cycles: &[Vec<Call>], one_in: u32, seed: u64, asks: bool) -> (Host, Repor
 fn kept(answers: &[Answer]) -> u64 {
     let mut exposures = BTreeMap::new();
     for (head, counts) in answers.iter().map(|answer| answer.as_ref().unwrap()) {
-        let began = head.cycle.0 - u64::from(head.exposure);
-        exposures.insert((head.pixel.0, began), counts);
+        let began = head.cycle.raw() - u64::from(head.exposure);
+        exposures.insert((head.pixel.raw(), began), counts);
     }
     let counts = exposures.values().flat_map(|counts| counts.iter());
     counts.map(|&count| u64::from(count)).sum()
@@ -141,13 +141,13 @@ fn kept(answers: &[Answer]) -> u64 {
 /// The photons of a pixel in these laser cycles, and in so many more.
 fn recount(cycles: &[Vec<Call>], head: &HistogramHead, more: u64) -> Vec<u32> {
     let mut counts = vec![0; 128];
-    let began = head.cycle.0 - u64::from(head.exposure);
+    let began = head.cycle.raw() - u64::from(head.exposure);
     let mut cycle = 0;
     for call in cycles.iter().flatten() {
         match *call {
-            Call::Photon(pixel, code) if (began..head.cycle.0 + more).contains(&cycle) => {
+            Call::Photon(pixel, code) if (began..head.cycle.raw() + more).contains(&cycle) => {
                 if let (true, Some(count)) =
-                    (pixel == head.pixel.0, counts.get_mut(usize::from(code)))
+                    (pixel == head.pixel.raw(), counts.get_mut(usize::from(code)))
                 {
                     *count += 1;
                 }
@@ -206,10 +206,10 @@ fn histograms_beside_a_sensor_change_no_event_and_hold_its_photons() {
         match answer {
             Ok((head, counts)) => {
                 whole += 1;
-                assert_eq!(usize::from(head.pixel.0), now_ms % 9);
+                assert_eq!(usize::from(head.pixel.raw()), now_ms % 9);
                 assert_eq!(*counts, recount(&cycles, head, 0), "{head:?}");
             }
-            Err((pixel, NoHistogram::NoPixel)) => assert_eq!(*pixel, PixelAddress(8)),
+            Err((pixel, NoHistogram::NoPixel)) => assert_eq!(*pixel, PixelAddress::new(8)),
             Err(none) => panic!("{none:?}"),
         }
     }
@@ -218,7 +218,7 @@ fn histograms_beside_a_sensor_change_no_event_and_hold_its_photons() {
 
 #[test]
 fn a_device_says_why_there_is_no_histogram() {
-    let mut device = device::<8>(Some(About::new(256)));
+    let mut device = device::<8>(Some(SensorInfo::new(256)));
     let mut host = Host::new(1, 0);
     let reason = refused(&mut device, &mut host, 0);
     assert_eq!(reason, NoHistogram::NoConfiguration);
@@ -281,7 +281,7 @@ proptest! {
             match answer {
                 Ok((head, counts)) => prop_assert_eq!(counts, &recount(&cycles, head, 0)),
                 Err((pixel, reason)) => {
-                    prop_assert!(pixel.0 >= 8 && *reason == NoHistogram::NoPixel);
+                    prop_assert!(pixel.raw() >= 8 && *reason == NoHistogram::NoPixel);
                 }
             }
         }

@@ -6,11 +6,11 @@ use common::host::{CONFIGURATION, Call, Host, Scripted, configured, device};
 use dtof_core::Flags;
 use dtof_core::fixed::types::U16F16;
 use dtof_link::{Configuration, Refusal, SensorRecord, Source, message};
-use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
+use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 /// A sensor that notes what it is told.
 #[derive(Default)]
-struct Told(Vec<Order>);
+struct OrderLog(Vec<Order>);
 
 #[derive(Debug, PartialEq)]
 enum Order {
@@ -19,14 +19,14 @@ enum Order {
     Stop,
 }
 
-impl Sensor for Told {
+impl Sensor for OrderLog {
     type Error = SensorFault;
 
-    fn about(&self) -> About {
-        About {
+    fn info(&self) -> SensorInfo {
+        SensorInfo {
             bin_width: Some(U16F16::lit("160")),
             laser_millihertz: 0x0102_0304_0506_0708,
-            ..About::new(3)
+            ..SensorInfo::new(3)
         }
     }
 
@@ -46,18 +46,18 @@ impl Sensor for Told {
 
 #[test]
 fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
-    let mut sensor = Told::default();
-    let mut device = device::<8>(Some(sensor.about()));
+    let mut sensor = OrderLog::default();
+    let mut device = device::<8>(Some(sensor.info()));
     let mut host = Host::new(1, 0);
     device.poll_sensor(&mut sensor, 0);
-    let wanted = |bin_width: u32, source| Configuration {
+    let requested = |bin_width: u32, source| Configuration {
         bin_width_ps: U16F16::from_num(bin_width),
         source,
         ..CONFIGURATION
     };
     let (link, sensor_of) = (Source::Link, Source::Sensor);
     for (bin_width, source) in [(160, sensor_of), (150, sensor_of), (250, link), (250, link)] {
-        host.configure(&mut device, 0, &wanted(bin_width, source));
+        host.configure(&mut device, 0, &requested(bin_width, source));
         device.poll_sensor(&mut sensor, 0);
         device.poll_sensor(&mut sensor, 1);
     }
@@ -67,7 +67,7 @@ fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
     assert_eq!(sensor.0, expected);
 
     // A new session stops it, too.
-    host.configure(&mut device, 0, &wanted(160, sensor_of));
+    host.configure(&mut device, 0, &requested(160, sensor_of));
     device.poll_sensor(&mut sensor, 2);
     sensor.0.clear();
     let mut next = Host::new(2, 0);
@@ -78,39 +78,39 @@ fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
 
 #[test]
 fn bins_that_are_not_the_sensors_are_refused() {
-    let mut device = device::<8>(Some(Told::default().about()));
+    let mut device = device::<8>(Some(OrderLog::default().info()));
     let mut host = Host::new(1, 0);
     // A sixteenth of 160 ps to either side.
     for (bin_width, taken) in [(149, false), (150, true), (170, true), (171, false)] {
-        let wanted = Configuration {
+        let requested = Configuration {
             bin_width_ps: U16F16::from_num(bin_width),
             source: Source::Sensor,
             ..CONFIGURATION
         };
-        let answer = host.answer(&mut device, 0, message::CONFIGURE, &wanted.to_le_bytes());
+        let answer = host.answer(&mut device, 0, message::CONFIGURE, &requested.to_le_bytes());
         let refusal = [Refusal::BinWidth as u8];
         assert_eq!(answer, refusal[..usize::from(!taken)], "{bin_width} ps");
         // Photons of the link have the bins of whoever sends them.
-        let wanted = Configuration {
+        let requested = Configuration {
             source: Source::Link,
-            ..wanted
+            ..requested
         };
-        host.configure(&mut device, 0, &wanted);
+        host.configure(&mut device, 0, &requested);
     }
 }
 
 #[test]
 fn the_host_is_told_what_the_sensor_is() {
-    let told = Told::default().about();
+    let info = OrderLog::default().info();
     let told_record = SensorRecord {
-        pixels: told.pixels,
-        bin_width: told.bin_width,
-        offset: told.offset,
-        laser_millihertz: told.laser_millihertz,
-        bins: told.bins,
+        pixels: info.pixels,
+        bin_width: info.bin_width,
+        offset: info.offset,
+        laser_millihertz: info.laser_millihertz,
+        bins: info.bins,
     };
     let mut host = Host::new(1, 0);
-    let mut with_one = device::<8>(Some(told));
+    let mut with_one = device::<8>(Some(info));
     let body = host.answer(&mut with_one, 0, message::SENSOR_REQUEST, &[]);
     // Then the range of bin 0, the laser rate, the bins, and what is reserved.
     let rate = [8, 7, 6, 5, 4, 3, 2, 1];

@@ -6,15 +6,16 @@ mod common;
 
 use common::host::{CONFIGURATION, Call, Host, Scripted, configured, device, scripted};
 use common::{scene, script};
+use dtof_core::events::{DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Reference};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
+use dtof_core::rule::detect;
 use dtof_core::{
-    AnyRule, CentredWindow, Count, Count24, DepthEstimator, DepthEvent, DynamicDepthConfig,
-    DynamicDepthEvent, DynamicDepthPixel, Flags, Histogram, LaserCycle, PixelAddress, PixelConfig,
-    RangeGate, RangeScale, Reference, WindowRule, detect,
+    AnyRule, CentredWindow, Count, Count24, DepthEstimator, DepthEvent, Flags, Histogram,
+    LaserCycle, PixelAddress, PixelConfig, RangeGate, RangeScale, WindowRule,
 };
 use dtof_link::frame::WIRE_BYTES;
 use dtof_link::{Configuration, DynamicDepth, FaultRecord, Report, Source, message};
-use dtof_sensors::About;
+use dtof_sensors::SensorInfo;
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 
@@ -27,7 +28,7 @@ fn configurations() -> [(Configuration, PixelConfig<128, AnyRule>); 2] {
         estimator: DepthEstimator::CentredWindow(centred),
         ..CONFIGURATION
     };
-    [CONFIGURATION, with_windows].map(|wanted| (wanted, script::config(&wanted)))
+    [CONFIGURATION, with_windows].map(|requested| (requested, script::config(&requested)))
 }
 
 fn sensor(script: &[Vec<Call>]) -> Scripted<impl Iterator<Item = Option<Vec<Call>>>> {
@@ -37,8 +38,8 @@ fn sensor(script: &[Vec<Call>]) -> Scripted<impl Iterator<Item = Option<Vec<Call
 #[test]
 fn a_host_that_reads_gets_the_events_of_the_pixels() {
     let script = script::script(5_000, &mut Pcg32::seed_from_u64(1));
-    for (wanted, config) in configurations() {
-        let (mut device, mut host) = configured::<8>(&wanted);
+    for (requested, config) in configurations() {
+        let (mut device, mut host) = configured::<8>(&requested);
         host.run(&mut device, &mut sensor(&script), 0..5_000, 4);
         let report = host.report(&mut device, 5_000);
         let expected = script::reference(&script, &config);
@@ -52,26 +53,26 @@ fn a_host_that_reads_gets_the_events_of_the_pixels() {
 #[test]
 fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
     let script = script::script(5_000, &mut Pcg32::seed_from_u64(1));
-    let (wanted, config) = configurations()[0];
+    let (requested, config) = configurations()[0];
     let scale = RangeScale::new(U16F16::from_num(250), I24F8::ZERO).unwrap();
     // A twentieth of a bin, so that there are many.
     let threshold_mm = U24F8::lit("2");
     for reference in [Reference::Previous, Reference::Reported] {
-        let wanted = Configuration {
+        let requested = Configuration {
             dynamic_depth: Some(DynamicDepth {
                 threshold_mm,
                 reference,
             }),
-            ..wanted
+            ..requested
         };
-        let (mut device, mut host) = configured::<8>(&wanted);
+        let (mut device, mut host) = configured::<8>(&requested);
         host.run(&mut device, &mut sensor(&script), 0..5_000, 4);
         let report = host.report(&mut device, 5_000);
         let dynamic_depth = DynamicDepthConfig::new(threshold_mm, &scale, reference).unwrap();
         let mut observers = [const { DynamicDepthPixel::<3>::new() }; 8];
         let events = script::reference(&script, &config);
         let observe = |event: &DepthEvent| {
-            observers[usize::from(event.pixel.0)].observe(&dynamic_depth, event)
+            observers[usize::from(event.pixel.raw())].observe(&dynamic_depth, event)
         };
         let expected: Vec<DynamicDepthEvent> = events.iter().filter_map(observe).collect();
         assert!(expected.len() > 30, "{}", expected.len());
@@ -84,11 +85,11 @@ fn dynamic_depth_sends_what_the_core_makes_of_the_events() {
 #[test]
 fn a_host_that_does_not_read_for_ten_seconds_lengthens_exposures_and_loses_no_event() {
     let script = script::script(20_000, &mut Pcg32::seed_from_u64(1));
-    let wanted = Configuration {
+    let requested = Configuration {
         l2: 60_000,
         ..CONFIGURATION
     };
-    let (mut device, mut host) = configured::<8>(&wanted);
+    let (mut device, mut host) = configured::<8>(&requested);
     let mut sensor = sensor(&script);
     for (milliseconds, messages) in [(0..2_000, 4), (2_000..12_000, 0), (12_000..20_000, 4)] {
         host.run(&mut device, &mut sensor, milliseconds, messages);
@@ -101,11 +102,15 @@ fn a_host_that_does_not_read_for_ten_seconds_lengthens_exposures_and_loses_no_ev
     assert_eq!(report.statistics.expired, 0);
     // Each laser cycle was part of one exposure: no event of any pixel is missing.
     for pixel in 0..8 {
-        let of_pixel = || host.events.iter().filter(|event| event.pixel.0 == pixel);
+        let of_pixel = || {
+            host.events
+                .iter()
+                .filter(|event| event.pixel.raw() == pixel)
+        };
         let mut end = 0;
         for event in of_pixel() {
-            assert_eq!(event.cycle.0 + 1, end + u64::from(event.exposure));
-            end = event.cycle.0 + 1;
+            assert_eq!(event.cycle.raw() + 1, end + u64::from(event.exposure));
+            end = event.cycle.raw() + 1;
         }
         let deferred = of_pixel().filter(|event| event.flags.contains(Flags::DEFERRED));
         let longest = deferred.map(|event| event.exposure).max().unwrap();
@@ -145,7 +150,7 @@ fn questions_are_answered_though_the_sensor_fills_the_link() {
     // No pixel keeps the others from the link.
     let mut counts = [0; 8];
     for event in &host.events {
-        counts[usize::from(event.pixel.0)] += 1;
+        counts[usize::from(event.pixel.raw())] += 1;
     }
     let (least, most) = (counts.iter().min(), counts.iter().max());
     assert!(least.unwrap() * 2 > *most.unwrap(), "{counts:?}");
@@ -154,7 +159,7 @@ fn questions_are_answered_though_the_sensor_fills_the_link() {
 #[test]
 fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
     let script = script::script(10_000, &mut Pcg32::seed_from_u64(1));
-    let mut device = device::<8>(Some(About::new(256)));
+    let mut device = device::<8>(Some(SensorInfo::new(256)));
     let mut unused = sensor(&script);
     let mut wire = [0; WIRE_BYTES];
     for now_ms in 0..10_000 {
@@ -167,11 +172,11 @@ fn without_a_host_nothing_is_counted_or_sent_and_nothing_hangs() {
 
     // A configuration that takes photons from the link keeps the sensor's out.
     let mut host = Host::new(1, 10_000);
-    let wanted = Configuration {
+    let requested = Configuration {
         source: Source::Link,
         ..CONFIGURATION
     };
-    host.configure(&mut device, 10_000, &wanted);
+    host.configure(&mut device, 10_000, &requested);
     device.poll_sensor(&mut unused, 10_000);
     let report = host.report(&mut device, 10_000);
     assert_eq!((report.cycles, report.statistics.photons()), (0, 0));
@@ -222,17 +227,17 @@ fn histogram(bin: usize) -> Box<[u32; 128]> {
 
 #[test]
 fn a_histogram_is_decided_once_within_the_gate() {
-    for (wanted, config) in configurations() {
-        is_decided_once_within_the_gate(wanted, &config);
+    for (requested, config) in configurations() {
+        is_decided_once_within_the_gate(requested, &config);
     }
 }
 
-fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<128, AnyRule>) {
-    let wanted = Configuration {
+fn is_decided_once_within_the_gate(requested: Configuration, config: &PixelConfig<128, AnyRule>) {
+    let requested = Configuration {
         gate: (10, 99),
-        ..wanted
+        ..requested
     };
-    let (mut device, mut host) = configured::<8>(&wanted);
+    let (mut device, mut host) = configured::<8>(&requested);
     let mut outside = histogram(40);
     outside[120] = 100_000;
     let calls = vec![
@@ -264,7 +269,7 @@ fn is_decided_once_within_the_gate(wanted: Configuration, config: &PixelConfig<1
         let mut histogram = Histogram::<128, Count24>::new();
         histogram.add_frame(counts, &gate);
         let detection = detect(&histogram, &gate, config.rule(), config.estimator()).unwrap();
-        detection.event(PixelAddress(3), LaserCycle(cycle), exposure)
+        detection.event(PixelAddress::new(3), LaserCycle::new(cycle), exposure)
     };
     assert_eq!(
         host.events,
@@ -296,12 +301,12 @@ fn the_simulated_scene_comes_over_a_serial_port() {
     // All pixels report, and most of the time the right bins.
     assert!(host.events.len() > 2_000, "{}", host.events.len());
     let right = |event: &&DepthEvent| {
-        let pulse = 20 + 6 * event.pixel.0;
+        let pulse = 20 + 6 * event.pixel.raw();
         (pulse..pulse + 3).contains(&event.peak_bin.raw())
     };
     let (count, all) = (host.events.iter().filter(right).count(), host.events.len());
     assert!(count * 100 > all * 95, "{count} of {all}");
     for pixel in 0..16 {
-        assert!(host.events.iter().any(|event| event.pixel.0 == pixel));
+        assert!(host.events.iter().any(|event| event.pixel.raw() == pixel));
     }
 }

@@ -1,5 +1,5 @@
-//! A simulated sensor that goes by no clock: whatever the host reads, the events are those of
-//! pixels with all the room in the world.
+//! A simulated sensor that is not tied to a clock: however slowly the host reads, the events are those
+//! of pixels with unlimited room.
 
 mod common;
 
@@ -11,13 +11,13 @@ use dtof_sensors::{PhotonSink, Sensor, simulated};
 
 const CYCLES: u16 = 20_000;
 
-/// Writes down what a sensor gives.
+/// Records the calls of a sensor.
 #[derive(Default)]
 struct Calls(Vec<Call>);
 
 impl PhotonSink for Calls {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
-        self.0.push(Call::Photon(pixel.0, code));
+        self.0.push(Call::Photon(pixel.raw(), code));
     }
     fn end_laser_cycles(&mut self, cycles: u16) {
         self.0.push(Call::End(cycles));
@@ -30,26 +30,26 @@ impl PhotonSink for Calls {
     }
 }
 
-/// The host takes `messages` messages every `wait_ms` milliseconds. Gives how often the
-/// sensor had to wait for it.
-fn decides_alike(messages: usize, wait_ms: u32) -> u32 {
-    let wanted = Configuration {
+/// Checks the events if the host takes `messages` messages every `wait_ms` milliseconds. Returns how
+/// often the sensor had to wait for the host.
+fn check_events(messages: usize, wait_ms: u32) -> u32 {
+    let requested = Configuration {
         pixels: 16,
         ..CONFIGURATION
     };
     let mut calls = Calls::default();
     simulated::scene().laser_cycles(CYCLES, &mut calls);
     let calls = [calls.0];
-    let expected = script::reference(&calls, &script::config(&wanted));
+    let expected = script::reference(&calls, &script::config(&requested));
 
     let mut sensor = simulated::scene();
-    let mut device = device::<16>(Some(sensor.about()));
+    let mut device = device::<16>(Some(sensor.info()));
     let mut left = CYCLES.into();
-    // Nothing is made before it counts.
+    // No photons are simulated before the device is configured.
     device.simulate(&mut sensor, &mut left);
     assert_eq!(left, u64::from(CYCLES));
     let mut host = Host::new(1, 0);
-    host.configure(&mut device, 0, &wanted);
+    host.configure(&mut device, 0, &requested);
     let (mut now_ms, mut waits) = (0, 0);
     while left > 0 || host.events.len() < expected.len() {
         now_ms += 1;
@@ -74,20 +74,20 @@ fn decides_alike(messages: usize, wait_ms: u32) -> u32 {
 
 #[test]
 fn the_sensor_waits_for_a_slow_host_and_no_event_changes() {
-    assert_eq!(decides_alike(4, 1), 0);
-    assert!(decides_alike(1, 20) > 1_000);
+    assert_eq!(check_events(4, 1), 0);
+    assert!(check_events(1, 20) > 1_000);
 }
 
 #[test]
-fn photons_that_do_not_count_are_not_made() {
+fn no_photons_are_simulated_while_they_come_from_the_link() {
     let mut sensor = simulated::scene();
-    let mut device = device::<16>(Some(sensor.about()));
+    let mut device = device::<16>(Some(sensor.info()));
     let mut host = Host::new(1, 0);
-    let wanted = Configuration {
+    let requested = Configuration {
         source: Source::Link,
         ..CONFIGURATION
     };
-    host.configure(&mut device, 0, &wanted);
+    host.configure(&mut device, 0, &requested);
     let mut left = 10;
     device.simulate(&mut sensor, &mut left);
     assert_eq!(left, 10);

@@ -9,18 +9,18 @@ use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, LaserCycle, PaperRule, PixelAddress};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::{Configuration, HistogramHead, NoHistogram, Refusal, Source, message};
-use dtof_sensors::About;
+use dtof_sensors::SensorInfo;
 
 /// A sensor of three pixels that gives whole histograms.
-const WHOLE: About = About {
-    is_whole: true,
-    ..About::new(3)
+const WHOLE: SensorInfo = SensorInfo {
+    gives_histograms: true,
+    ..SensorInfo::new(3)
 };
 
-fn with_whole(wanted: &Configuration) -> (Sidecar<'static>, Host) {
+fn with_whole(requested: &Configuration) -> (Sidecar<'static>, Host) {
     let mut device = device::<8>(Some(WHOLE));
     let mut host = Host::new(1, 0);
-    host.configure(&mut device, 0, wanted);
+    host.configure(&mut device, 0, requested);
     (device, host)
 }
 
@@ -64,9 +64,9 @@ fn a_whole_histogram_is_the_next_one_of_its_pixel_to_the_last_photon() {
         let [Ok((head, counts))] = &histograms(&host.answers[before..])[..] else {
             panic!("{:?}", host.answers);
         };
-        let cycle = LaserCycle(u64::from(now_ms) * 70_002 + 70_000);
+        let cycle = LaserCycle::new(u64::from(now_ms) * 70_002 + 70_000);
         let expected = HistogramHead {
-            pixel: PixelAddress(pixel),
+            pixel: PixelAddress::new(pixel),
             is_whole: true,
             cycle,
             exposure: 70_000,
@@ -107,7 +107,7 @@ fn who_waits_for_a_sensor_hears_when_that_fails_or_another_comes_first() {
     host.exchange(&mut device, 0);
     host.read(usize::MAX);
     assert_eq!(host.answers.last().unwrap().0, message::CONFIGURED);
-    let none = |pixel, reason| Err((PixelAddress(pixel), reason));
+    let none = |pixel, reason| Err((PixelAddress::new(pixel), reason));
     let expected = [
         none(1, NoHistogram::GivenUp),
         none(2, NoHistogram::GivenUp),
@@ -143,14 +143,14 @@ fn photons_of_the_link_have_histograms_beside_any_sensor() {
 /// background. Whatever is in them is counted as lost.
 #[test]
 fn the_gate_ends_where_the_bins_of_the_sensor_do() {
-    let narrow = About { bins: 54, ..WHOLE };
+    let narrow = SensorInfo { bins: 54, ..WHOLE };
     let mut device = device::<8>(Some(narrow));
     let mut host = Host::new(1, 0);
-    let wanted = Configuration {
+    let requested = Configuration {
         gate: (0, 127),
         ..CONFIGURATION
     };
-    host.configure(&mut device, 0, &wanted);
+    host.configure(&mut device, 0, &requested);
     let counts = std::array::from_fn(|bin| match bin {
         20 => 1000,
         70 => 5000,

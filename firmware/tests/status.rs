@@ -8,12 +8,13 @@ use common::host::{CONFIGURATION, Host, configured, device_with_blocks};
 use common::mocks::Broken;
 use common::mocks::plug::{Answers, Bus, Tdc, Tmf};
 use common::{plugged, scene};
+use dtof_chips::Chip;
 use dtof_core::{DepthEvent, Statistics};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::message;
 use dtof_link::{Configuration, FaultRecord, Refusal, Source, Token};
-use dtof_sensors::tmf882x::{BootCommand, Command, Waiting};
+use dtof_sensors::tmf882x::{BootCommand, Command, DeviceError, Waiting};
 use dtof_sensors::{Sensor, SensorFault, tdc7200, tmf882x};
 
 /// One that takes photons from the link.
@@ -22,8 +23,8 @@ const GOOD: Configuration = Configuration {
     ..CONFIGURATION
 };
 
-/// From the rule's byte to that of tracking.
-const AVERAGE_TRACKS: [u8; 22] = {
+/// Bytes 25 to 46 of a configuration, from the rule to tracking: the average rule cannot track.
+const AVERAGE_RULE_WITH_TRACKING: [u8; 22] = {
     let mut fields = [0; 22];
     fields[0] = 2;
     fields[21] = 1;
@@ -31,18 +32,18 @@ const AVERAGE_TRACKS: [u8; 22] = {
 };
 
 /// The sensor gives data, is unplugged for a minute, and gives data again.
-fn unplug<Chip: Default>(
+fn unplug<C: Chip + Default>(
     mut sensor: impl Sensor,
-    bus: &Bus<Chip>,
-    how: Answers,
+    bus: &Bus<C>,
+    unplugged: Answers,
     most_a_second: u32,
-    said: FaultRecord,
+    fault: FaultRecord,
 ) {
-    let wanted = Configuration {
+    let requested = Configuration {
         pixels: 9,
         ..CONFIGURATION
     };
-    let (mut device, mut host) = configured::<9>(&wanted);
+    let (mut device, mut host) = configured::<9>(&requested);
     let mut now_ms = 0;
     let mut second = || {
         let report = plugged::second(&mut sensor, bus, &mut device, &mut host, &mut now_ms);
@@ -54,7 +55,7 @@ fn unplug<Chip: Default>(
     assert!(events > 10, "{report:?}");
     assert_eq!((report.sensor_errors, report.last_sensor_error), (0, 0));
 
-    bus.plug(how);
+    bus.set_answers(unplugged);
     let (mut before, mut errors) = (report.statistics, 0);
     for of_the_minute in 0..60 {
         let transfers = bus.transfers();
@@ -62,10 +63,10 @@ fn unplug<Chip: Default>(
         let new = report.sensor_errors - errors;
         errors = report.sensor_errors;
         assert!(new <= most_a_second, "{new} errors");
-        // Until it is noticed that no interrupt comes takes a second at most.
+        // A missing interrupt is noticed within a second.
         if of_the_minute >= 2 {
             assert!(new > 0);
-            assert_eq!(report.last_sensor_error, said as u8);
+            assert_eq!(report.last_sensor_error, fault as u8);
             assert_eq!(report.statistics, before);
         }
         // At most two accesses each time it is brought up.
@@ -73,25 +74,25 @@ fn unplug<Chip: Default>(
         before = report.statistics;
     }
 
-    bus.plug(Answers::Sensor);
+    bus.set_answers(Answers::Sensor);
     let (report, _) = second();
     let errors = report.sensor_errors;
     let (report, after) = second();
     assert!(after > before.events + 10, "{report:?}");
     // What was wrong last is still known, but it is not wrong any more.
     assert_eq!(report.sensor_errors, errors);
-    assert_eq!(report.last_sensor_error, said as u8);
+    assert_eq!(report.last_sensor_error, fault as u8);
 }
 
 #[test]
 fn an_unplugged_tdc7200_is_reported_and_found_again() {
-    for (how, said) in [
+    for (unplugged, fault) in [
         (Answers::Error, FaultRecord::Bus),
         (Answers::Ones, FaultRecord::NoAnswer),
     ] {
         let bus = Bus::<Tdc>::new();
         let sensor = plugged::tdc7200(&bus);
-        unplug(sensor, &bus, how, 200, said);
+        unplug(sensor, &bus, unplugged, 200, fault);
     }
 }
 
@@ -105,7 +106,7 @@ fn an_unplugged_tmf882x_is_reported_and_found_again() {
 #[test]
 fn every_error_of_a_driver_is_of_its_kind() {
     use SensorFault::{
-        Bus, Data, NoAnswer, NoImage, NotTaken, Pin, StuckInterrupt, Timeout, WrongChip,
+        Bus, Data, NoAnswer, NoImage, Pin, Rejected, StuckInterrupt, Timeout, WrongChip,
     };
     type OfTdc = tdc7200::Error<Broken, Broken>;
     type OfTmf = tmf882x::Error<Broken, Broken>;
@@ -124,20 +125,20 @@ fn every_error_of_a_driver_is_of_its_kind() {
         assert_eq!(SensorFault::from(error), kind, "{error}");
     }
     let (command, status) = (Command::Measure, 2);
-    let bootloader = |command, answer| OfTmf::Bootloader { command, answer };
+    let bootloader = |command, answer| OfTmf::Device(DeviceError::Bootloader { command, answer });
     for (error, kind) in [
         (OfTmf::Nack(Broken), NoAnswer),
         (OfTmf::Bus(Broken), Bus),
         (OfTmf::Pin(Broken), Pin),
         (OfTmf::WrongChip { id: 7 }, WrongChip),
         (OfTmf::WrongApplication { id: 7 }, WrongChip),
-        (OfTmf::Timeout(Waiting::Histogram), Timeout),
-        (OfTmf::Timeout(Waiting::PowerUp), NotTaken),
-        (bootloader(BootCommand::WriteRam, [2, 0, 0xFD]), NotTaken),
-        (OfTmf::Refused { command, status }, NotTaken),
+        (OfTmf::Timeout(Waiting::Data), Timeout),
+        (OfTmf::Timeout(Waiting::PowerUp), Rejected),
+        (bootloader(BootCommand::WriteRam, [2, 0, 0xFD]), Rejected),
+        (OfTmf::Refused { command, status }, Rejected),
         (OfTmf::StuckInterrupt { status }, StuckInterrupt),
         (OfTmf::NoImage, NoImage),
-        (OfTmf::WrongSize { size: 1 }, Data),
+        (OfTmf::Device(DeviceError::WrongSize { size: 1 }), Data),
     ] {
         assert_eq!(SensorFault::from(error), kind, "{error}");
     }
@@ -161,10 +162,10 @@ fn device() -> Sidecar<'static> {
     device_with_blocks::<9, 6>(None)
 }
 
-/// A configuration of each kind that cannot be, for eight pixels without a sensor.
+/// An invalid configuration of each kind, for eight pixels without a sensor.
 fn refused() -> Vec<(Vec<u8>, Refusal)> {
     let good = GOOD.to_le_bytes();
-    // From which byte on what stands there, as `docs/link-format.md` numbers them.
+    // The first byte, the bytes written there, and the refusal; numbered as in `docs/link-format.md`.
     let bad: [(usize, &[u8], Refusal); 37] = [
         (24, &[2], Refusal::Unknown),
         (25, &[3], Refusal::Unknown),
@@ -187,7 +188,7 @@ fn refused() -> Vec<(Vec<u8>, Refusal)> {
         (24, &[1], Refusal::NoSensor),
         (25, &[1, 0], Refusal::WindowWidth),
         (25, &[1, 8], Refusal::WindowWidth),
-        // 255 and 1025 of 256 to 1024, before and after the place.
+        // Half widths of 255 and 1025, where 256 to 1024 are allowed: before the place, then after it.
         (29, &[1, 0xff, 0, 0, 1], Refusal::HalfWidth),
         (29, &[1, 1, 4, 0, 1], Refusal::HalfWidth),
         (29, &[1, 0, 1, 0xff, 0], Refusal::HalfWidth),
@@ -206,7 +207,7 @@ fn refused() -> Vec<(Vec<u8>, Refusal)> {
         // The paper's rule, also for blocks, and that with the average of all bins.
         (46, &[1], Refusal::Tracking),
         (43, &[1, 100, 0, 1], Refusal::Tracking),
-        (25, &AVERAGE_TRACKS, Refusal::Tracking),
+        (25, &AVERAGE_RULE_WITH_TRACKING, Refusal::Tracking),
     ];
     // Too short, and as long as that of version 3.
     let mut all = vec![
@@ -214,9 +215,9 @@ fn refused() -> Vec<(Vec<u8>, Refusal)> {
         (good[..39].to_vec(), Refusal::Unknown),
     ];
     for (from, fields, refusal) in bad {
-        let mut wanted = good.to_vec();
-        wanted[from..from + fields.len()].copy_from_slice(fields);
-        all.push((wanted, refusal));
+        let mut requested = good.to_vec();
+        requested[from..from + fields.len()].copy_from_slice(fields);
+        all.push((requested, refusal));
     }
     all
 }
@@ -234,21 +235,21 @@ fn photons() -> Vec<u8> {
 }
 
 #[track_caller]
-fn is_refused(host: &mut Host, device: &mut Sidecar, wanted: &[u8], refusal: Refusal) {
-    let reason = host.answer(device, 0, message::CONFIGURE, wanted);
+fn is_refused(host: &mut Host, device: &mut Sidecar, requested: &[u8], refusal: Refusal) {
+    let reason = host.answer(device, 0, message::CONFIGURE, requested);
     assert_eq!(host.answers.last().unwrap().0, message::REFUSED);
     assert_eq!(reason, [refusal as u8], "{refusal}");
 }
 
-/// Events and counts of photons between which these configurations are asked for.
-fn photons_between(refused: &[(Vec<u8>, Refusal)]) -> (Vec<DepthEvent>, Statistics, u64) {
+/// Sends photons, with these refused configurations in between. Returns events, statistics and laser cycles.
+fn run_with_refusals(refused: &[(Vec<u8>, Refusal)]) -> (Vec<DepthEvent>, Statistics, u64) {
     let mut device = device();
     let mut host = Host::new(1, 0);
     host.configure(&mut device, 0, &GOOD);
     for turn in 0..100 {
         host.ask(message::PHOTONS, &photons());
-        if let Some((wanted, refusal)) = refused.get(turn % refused.len().max(1)) {
-            is_refused(&mut host, &mut device, wanted, *refusal);
+        if let Some((requested, refusal)) = refused.get(turn % refused.len().max(1)) {
+            is_refused(&mut host, &mut device, requested, *refusal);
         }
         host.exchange(&mut device, 0);
         host.read(4);
@@ -264,20 +265,20 @@ fn every_refused_configuration_names_its_reason_and_changes_nothing() {
     let mut numbers: Vec<u8> = all.iter().map(|&(_, refusal)| refusal as u8).collect();
     numbers.sort_unstable();
     numbers.dedup();
-    // 12 takes a sensor.
+    // Refusal 12 needs a sensor.
     assert_eq!(numbers, Vec::from_iter((1..=11).chain(13..=18)));
 
-    let undisturbed = photons_between(&[]);
+    let undisturbed = run_with_refusals(&[]);
     assert_eq!((undisturbed.0.len(), undisturbed.2), (2 * 25, 600));
-    assert_eq!(photons_between(&all), undisturbed);
+    assert_eq!(run_with_refusals(&all), undisturbed);
 }
 
 #[test]
 fn a_device_that_has_refused_its_first_configuration_waits_for_a_better_one() {
     let mut device = device();
     let mut host = Host::new(1, 0);
-    for (wanted, refusal) in refused() {
-        is_refused(&mut host, &mut device, &wanted, refusal);
+    for (requested, refusal) in refused() {
+        is_refused(&mut host, &mut device, &requested, refusal);
     }
     // There are no pixels for photons yet.
     host.ask(message::PHOTONS, &photons());

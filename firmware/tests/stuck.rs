@@ -13,13 +13,14 @@ use std::convert::Infallible;
 use common::host::{CONFIGURATION, Host, configured, device};
 use common::mocks::plug::{Answers, Bus, Tdc, Tmf};
 use common::{plugged, script};
+use dtof_chips::Chip;
 use dtof_core::DepthEvent;
 use dtof_firmware::serial::{Buffers, Serial, SerialInterrupt};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::frame::WIRE_BYTES;
 use dtof_link::{Configuration, FaultRecord, Source, message};
 use dtof_sensors::simulated;
-use dtof_sensors::{About, Sensor};
+use dtof_sensors::{Sensor, SensorInfo};
 use embedded_io::{ErrorType, Read, ReadReady, Write, WriteReady};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -49,13 +50,13 @@ struct Port<'a, 'b> {
     serial: &'a mut Serial<'b>,
     interrupt: &'a RefCell<SerialInterrupt<'b>>,
     flood: Option<&'a mut Pcg32>,
-    asked: u32,
+    reads: u32,
 }
 
 impl Port<'_, '_> {
     fn ask(&mut self) {
-        self.asked += 1;
-        assert!(self.asked < 1_000, "a turn without end");
+        self.reads += 1;
+        assert!(self.reads < 1_000, "a turn without end");
         if let Some(rng) = &mut self.flood {
             flood(self.interrupt, self.serial, rng);
         }
@@ -156,11 +157,11 @@ impl<'a> Bench<'a> {
             serial: &mut self.serial,
             interrupt: &self.interrupt,
             flood: (interrupts == Flood).then_some(&mut self.rng),
-            asked: 0,
+            reads: 0,
         };
         // Never an error, and never a wait: this would not end.
         let Ok(()) = self.device.poll_with(sensor, &mut port, lost, self.now_ms);
-        self.most = self.most.max(port.asked);
+        self.most = self.most.max(port.reads);
         if matches!(interrupts, All | NoReceive | Flood) {
             let mut interrupt = self.interrupt.borrow_mut();
             let sent = std::iter::from_fn(|| interrupt.next_to_send());
@@ -171,11 +172,11 @@ impl<'a> Bench<'a> {
         self.now_ms += 1;
     }
 
-    fn configure(&mut self, wanted: &Configuration, sensor: &mut impl Sensor) {
+    fn configure(&mut self, requested: &Configuration, sensor: &mut impl Sensor) {
         while !self.host.endpoint.is_open() {
             self.turn(Interrupts::All, sensor);
         }
-        self.host.ask(message::CONFIGURE, &wanted.to_le_bytes());
+        self.host.ask(message::CONFIGURE, &requested.to_le_bytes());
         while self.host.answers.is_empty() {
             self.turn(Interrupts::All, sensor);
         }
@@ -188,7 +189,7 @@ impl<'a> Bench<'a> {
 fn serial_interrupts_that_never_come_again_lose_nothing_until_they_do() {
     let calls = script::script(3_000, &mut Pcg32::seed_from_u64(3));
     let events = script::reference(&calls, &script::config(&CONFIGURATION));
-    let wanted = Configuration {
+    let requested = Configuration {
         source: Source::Link,
         ..CONFIGURATION
     };
@@ -201,7 +202,7 @@ fn serial_interrupts_that_never_come_again_lose_nothing_until_they_do() {
         let mut buffers = Buffers::new();
         let mut bench = Bench::new(&mut buffers, device::<8>(None));
         let mut sensor = simulated::scene();
-        bench.configure(&wanted, &mut sensor);
+        bench.configure(&requested, &mut sensor);
         let mut photons = script::messages(&calls).into_iter();
         let (mut silent_ms, mut before) = (0, 0);
         while bench.host.events.len() < events.len() {
@@ -250,15 +251,15 @@ fn serial_interrupts_that_never_come_again_lose_nothing_until_they_do() {
 #[test]
 fn a_flood_of_interrupts_keeps_neither_the_sensor_nor_the_host_waiting() {
     let mut buffers = Buffers::new();
-    let mut bench = Bench::new(&mut buffers, device::<16>(Some(About::new(256))));
+    let mut bench = Bench::new(&mut buffers, device::<16>(Some(SensorInfo::new(256))));
     let mut sensor = simulated::scene();
-    let wanted = Configuration {
+    let requested = Configuration {
         pixels: 16,
         l1: 100,
         l2: 2_000,
         ..CONFIGURATION
     };
-    bench.configure(&wanted, &mut sensor);
+    bench.configure(&requested, &mut sensor);
     let mut events = [0; 3];
     for interrupts in [Interrupts::All, Interrupts::Flood, Interrupts::All] {
         for _ in 0..2_000 {
@@ -271,7 +272,7 @@ fn a_flood_of_interrupts_keeps_neither_the_sensor_nor_the_host_waiting() {
     }
     assert!(events[0] > 500 && events[2] > events[1] + 500, "{events:?}");
     let is_right = |event: &&DepthEvent| {
-        let bin = 20 + 6 * event.pixel.0;
+        let bin = 20 + 6 * event.pixel.raw();
         (bin - 1..=bin + 3).contains(&event.peak_bin.raw())
     };
     let right = bench.host.events.iter().filter(is_right).count();
@@ -294,18 +295,18 @@ fn a_flood_of_interrupts_keeps_neither_the_sensor_nor_the_host_waiting() {
 }
 
 /// The sensor gives data, its line is stuck for ten seconds, and it gives data again.
-fn stuck<Chip: Default>(
+fn stuck<C: Chip + Default>(
     mut sensor: impl Sensor,
-    bus: &Bus<Chip>,
+    bus: &Bus<C>,
     level: bool,
-    said: FaultRecord,
+    fault: FaultRecord,
     bin: u16,
 ) {
-    let wanted = Configuration {
+    let requested = Configuration {
         pixels: 9,
         ..CONFIGURATION
     };
-    let (mut device, mut host) = configured::<9>(&wanted);
+    let (mut device, mut host) = configured::<9>(&requested);
     let mut now_ms = 0;
     let mut seconds = |count: u32| {
         // The device answers at once, whatever its sensor does.
@@ -317,20 +318,20 @@ fn stuck<Chip: Default>(
     };
     let (report, before) = seconds(1);
     assert!(before > 5 && report.sensor_errors == 0, "{report:?}");
-    bus.plug(Answers::Stuck(level));
+    bus.set_answers(Answers::Stuck(level));
     bus.interrupt.set(level);
     let (_, at) = seconds(1);
     let (report, while_stuck) = seconds(9);
     assert_eq!(while_stuck, at, "events out of nothing");
     assert!(report.sensor_errors >= 8, "{report:?}");
-    assert_eq!(report.last_sensor_error, said as u8);
-    bus.plug(Answers::Sensor);
+    assert_eq!(report.last_sensor_error, fault as u8);
+    bus.set_answers(Answers::Sensor);
     let errors = report.sensor_errors;
     seconds(2);
     let (report, after) = seconds(1);
     assert!(after > while_stuck + 5, "{report:?}");
     println!(
-        "faults: the line of a sensor stuck at {} for 10 s: {errors} errors ({said}), 0 events, then {} again",
+        "faults: the line of a sensor stuck at {} for 10 s: {errors} errors ({fault}), 0 events, then {} again",
         u8::from(level),
         after - while_stuck
     );
@@ -338,16 +339,16 @@ fn stuck<Chip: Default>(
 
 #[test]
 fn a_line_that_is_stuck_is_named_and_the_device_answers() {
-    for (level, said) in [
+    for (level, fault) in [
         (false, FaultRecord::StuckInterrupt),
         (true, FaultRecord::Timeout),
     ] {
         let bus = Bus::<Tdc>::new();
         let sensor = plugged::tdc7200(&bus);
-        stuck(sensor, &bus, level, said, 28);
+        stuck(sensor, &bus, level, fault, 28);
 
         let bus = Bus::<Tmf>::new();
         let sensor = plugged::tmf882x(&bus);
-        stuck(sensor, &bus, level, said, 40);
+        stuck(sensor, &bus, level, fault, 40);
     }
 }

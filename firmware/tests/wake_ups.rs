@@ -1,10 +1,10 @@
-//! No byte waits without an interrupt to come, and the main loop does not sleep while it has work:
-//! every order of events at one processor, tried one after the other.
+//! Every byte is sent, and the main loop does not sleep while it has work: a test of every
+//! interleaving of main loop, interrupts and serial line on one processor.
 //!
-//! The code is that of the boards: `Serial`, `transmit`, `turn`. Here are the registers, the
-//! interrupt controller, and what may happen between two of their accesses. The main loop is
-//! interrupted between two calls of `Serial`, and before and after `start_sending`, but not between
-//! two bytes of one write, which come before the same `start_sending`.
+//! The code under test is that of the boards: `Serial`, `transmit`, `turn`. This file simulates the
+//! registers and the interrupt controller. The main loop is interrupted between two calls of `Serial`,
+//! and before and after `start_sending`, but not between two bytes of one write, which come before the
+//! same `start_sending`.
 
 use std::cell::{Cell, RefCell};
 
@@ -12,33 +12,33 @@ use dtof_firmware::board::{Board, Transmitter, transmit, turn};
 use dtof_firmware::serial::{Buffers, Serial, SerialInterrupt};
 use embedded_io::{Read, Write, WriteReady};
 
-/// One order of events after another: each run makes the same choices as the last, but for the
-/// latest that has another way to go.
+/// Goes through all interleavings, depth first. Each run repeats the choices of the last one, except
+/// for the last choice that has an alternative left.
 #[derive(Default)]
-struct Orders {
-    /// Of each choice: which way, and of how many.
+struct Interleavings {
+    /// The alternative taken at each choice, and how many there are.
     chosen: Vec<(usize, usize)>,
     next: usize,
 }
 
-impl Orders {
-    fn choose(&mut self, ways: usize) -> usize {
+impl Interleavings {
+    fn choose(&mut self, alternatives: usize) -> usize {
         if self.next == self.chosen.len() {
-            self.chosen.push((0, ways));
+            self.chosen.push((0, alternatives));
         }
-        let (way, of) = self.chosen[self.next];
-        assert_eq!(of, ways, "a run depends on more than its choices");
+        let (taken, of) = self.chosen[self.next];
+        assert_eq!(of, alternatives, "a run depends on more than its choices");
         self.next += 1;
-        way
+        taken
     }
 
-    /// Whether there is another order.
-    fn turn_over(&mut self) -> bool {
+    /// Prepares the next run. Returns false after the last interleaving.
+    fn next_interleaving(&mut self) -> bool {
         assert_eq!(self.next, self.chosen.len());
         self.next = 0;
-        while let Some((way, ways)) = self.chosen.pop() {
-            if way + 1 < ways {
-                self.chosen.push((way + 1, ways));
+        while let Some((taken, alternatives)) = self.chosen.pop() {
+            if taken + 1 < alternatives {
+                self.chosen.push((taken + 1, alternatives));
                 return true;
             }
         }
@@ -49,77 +49,77 @@ impl Orders {
 /// How a transmitter interrupts.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
-    /// While it has room and was told to wake: STM32.
+    /// While it has room and its interrupt is enabled: STM32.
     Level,
-    /// When a byte leaves it, until the handler clears that: CMSDK.
+    /// After a byte was sent, until the handler clears the flag: CMSDK.
     Latch,
 }
 
-/// What lies beside the processor.
+/// The serial port and its interrupts.
 #[derive(Default)]
-struct World {
+struct Hardware {
     /// The byte in the transmitter.
-    holds: Option<u8>,
-    /// `Level`: it is to interrupt.
-    wakes: bool,
-    /// `Latch`: a byte has left it.
-    latch: bool,
-    /// Its interrupt is pending: software has said so.
+    sending: Option<u8>,
+    /// `Level`: the transmitter's interrupt is enabled.
+    interrupt_enabled: bool,
+    /// `Latch`: the flag that a byte was sent.
+    byte_left: bool,
+    /// Software has set the transmitter's interrupt pending.
     pending: bool,
     sent: Vec<u8>,
-    /// Bytes that will come, and the one that has.
-    to_come: Vec<u8>,
-    came: Option<u8>,
+    /// Bytes that will arrive, and the one that has arrived.
+    incoming: Vec<u8>,
+    received: Option<u8>,
     /// How often a handler ran.
-    handled: u32,
+    handler_runs: u32,
 }
 
 thread_local! {
-    // `start_sending` is a function without an environment.
-    static WORLD: RefCell<World> = RefCell::default();
-    static ORDERS: RefCell<Orders> = RefCell::default();
+    // Thread-local, because `start_sending` is a plain function.
+    static HARDWARE: RefCell<Hardware> = RefCell::default();
+    static INTERLEAVINGS: RefCell<Interleavings> = RefCell::default();
     static KIND: Cell<Kind> = const { Cell::new(Kind::Level) };
     static PORT: RefCell<Option<SerialInterrupt<'static>>> = const { RefCell::new(None) };
-    /// Interrupt handlers do not run.
-    static HELD: Cell<bool> = const { Cell::new(false) };
-    /// The main loop sleeps, and no interrupt is there to end that.
+    /// Whether interrupts are held, so that handlers do not run.
+    static INTERRUPTS_HELD: Cell<bool> = const { Cell::new(false) };
+    /// Whether the main loop sleeps without an interrupt to wake it.
     static SLEPT: Cell<bool> = const { Cell::new(false) };
 }
 
-fn choose(ways: usize) -> usize {
-    ORDERS.with_borrow_mut(|orders| orders.choose(ways))
+fn choose(alternatives: usize) -> usize {
+    INTERLEAVINGS.with_borrow_mut(|interleavings| interleavings.choose(alternatives))
 }
 
-impl World {
-    /// Whether the handler of the transmitter is to run.
-    fn interrupts(&self) -> bool {
+impl Hardware {
+    /// Whether the transmitter requests its interrupt.
+    fn transmitter_interrupts(&self) -> bool {
         let port = match KIND.get() {
-            Kind::Level => self.wakes && self.holds.is_none(),
-            Kind::Latch => self.latch,
+            Kind::Level => self.interrupt_enabled && self.sending.is_none(),
+            Kind::Latch => self.byte_left,
         };
         self.pending || port
     }
 
-    /// A byte leaves the transmitter.
-    fn leave(&mut self) {
-        if let Some(byte) = self.holds.take() {
+    /// The byte in the transmitter has been sent.
+    fn finish_byte(&mut self) {
+        if let Some(byte) = self.sending.take() {
             self.sent.push(byte);
-            self.latch = true;
+            self.byte_left = true;
         }
     }
 
-    /// A byte comes in, as fast as the one before was fetched.
-    fn come(&mut self) {
-        if self.came.is_none() && !self.to_come.is_empty() {
-            self.came = Some(self.to_come.remove(0));
+    /// The next byte arrives, once the one before was fetched.
+    fn receive_byte(&mut self) {
+        if self.received.is_none() && !self.incoming.is_empty() {
+            self.received = Some(self.incoming.remove(0));
         }
     }
 }
 
-/// The line goes on, or does not, between two steps of the handler.
-fn line_goes_on() {
-    if WORLD.with_borrow(|world| world.holds.is_some()) && choose(2) == 1 {
-        WORLD.with_borrow_mut(World::leave);
+/// Between two steps of the handler, the byte in the transmitter is sent, or not.
+fn maybe_finish_byte() {
+    if HARDWARE.with_borrow(|hardware| hardware.sending.is_some()) && choose(2) == 1 {
+        HARDWARE.with_borrow_mut(Hardware::finish_byte);
     }
 }
 
@@ -128,80 +128,83 @@ struct Registers;
 
 impl Transmitter for Registers {
     fn acknowledge(&mut self) {
-        WORLD.with_borrow_mut(|world| world.latch = false);
-        line_goes_on();
+        HARDWARE.with_borrow_mut(|hardware| hardware.byte_left = false);
+        maybe_finish_byte();
     }
 
     fn has_room(&mut self) -> bool {
-        let has_room = WORLD.with_borrow(|world| world.holds.is_none());
-        line_goes_on();
+        let has_room = HARDWARE.with_borrow(|hardware| hardware.sending.is_none());
+        maybe_finish_byte();
         has_room
     }
 
     fn send(&mut self, byte: u8) {
-        WORLD.with_borrow_mut(|world| assert_eq!(world.holds.replace(byte), None));
-        line_goes_on();
+        HARDWARE.with_borrow_mut(|hardware| assert_eq!(hardware.sending.replace(byte), None));
+        maybe_finish_byte();
     }
 
     fn wake(&mut self) {
-        WORLD.with_borrow_mut(|world| world.wakes = true);
-        line_goes_on();
+        HARDWARE.with_borrow_mut(|hardware| hardware.interrupt_enabled = true);
+        maybe_finish_byte();
     }
 
     fn rest(&mut self) {
-        WORLD.with_borrow_mut(|world| world.wakes = false);
+        HARDWARE.with_borrow_mut(|hardware| hardware.interrupt_enabled = false);
     }
 }
 
-/// The interrupt handler. The main loop stands still meanwhile. `Level` has one for both ways,
-/// `Latch` one for each, the receiver's first.
-fn handle() {
-    WORLD.with_borrow_mut(|world| {
-        world.handled += 1;
-        assert!(world.handled < 100, "an interrupt without end");
+/// The interrupt handler, which pauses the main loop. `Level` has one for both directions, `Latch` one
+/// for each, the receiver's first.
+fn run_handler() {
+    HARDWARE.with_borrow_mut(|hardware| {
+        hardware.handler_runs += 1;
+        assert!(hardware.handler_runs < 100, "an interrupt without end");
     });
     PORT.with_borrow_mut(|port| {
         let port = port.as_mut().expect("the board is started");
-        let came = WORLD.with_borrow_mut(|world| world.came.take());
-        if let Some(byte) = came {
+        let received = HARDWARE.with_borrow_mut(|hardware| hardware.received.take());
+        if let Some(byte) = received {
             port.on_receive(byte);
         }
-        if came.is_none() || KIND.get() == Kind::Level {
-            // The interrupt controller has done so when the handler begins.
-            WORLD.with_borrow_mut(|world| world.pending = false);
+        if received.is_none() || KIND.get() == Kind::Level {
+            // The interrupt controller clears this when the handler begins.
+            HARDWARE.with_borrow_mut(|hardware| hardware.pending = false);
             transmit(port, &mut Registers);
         }
     });
 }
 
 fn is_interrupted() -> bool {
-    WORLD.with_borrow(|world| world.interrupts() || world.came.is_some())
+    HARDWARE
+        .with_borrow(|hardware| hardware.transmitter_interrupts() || hardware.received.is_some())
 }
 
-/// What may happen to the main loop now.
-fn ways() -> Vec<fn()> {
-    WORLD.with_borrow(|world| {
-        let mut ways: Vec<fn()> = Vec::new();
-        if world.holds.is_some() {
-            ways.push(|| WORLD.with_borrow_mut(World::leave));
+/// The steps of line and interrupts that are possible now.
+fn possible_steps() -> Vec<fn()> {
+    HARDWARE.with_borrow(|hardware| {
+        let mut steps: Vec<fn()> = Vec::new();
+        if hardware.sending.is_some() {
+            steps.push(|| HARDWARE.with_borrow_mut(Hardware::finish_byte));
         }
-        if world.came.is_none() && !world.to_come.is_empty() {
-            ways.push(|| WORLD.with_borrow_mut(World::come));
+        if hardware.received.is_none() && !hardware.incoming.is_empty() {
+            steps.push(|| HARDWARE.with_borrow_mut(Hardware::receive_byte));
         }
-        if !HELD.get() && (world.interrupts() || world.came.is_some()) {
-            ways.push(handle);
+        if !INTERRUPTS_HELD.get()
+            && (hardware.transmitter_interrupts() || hardware.received.is_some())
+        {
+            steps.push(run_handler);
         }
-        ways
+        steps
     })
 }
 
-/// Anything may happen between two steps of the main loop, or nothing.
-fn anything() {
+/// Runs any number of possible steps between two steps of the main loop.
+fn run_any_steps() {
     loop {
-        let ways = ways();
-        match choose(ways.len() + 1) {
+        let steps = possible_steps();
+        match choose(steps.len() + 1) {
             0 => return,
-            way => ways[way - 1](),
+            step => steps[step - 1](),
         }
     }
 }
@@ -210,13 +213,16 @@ fn anything() {
 fn write_all(serial: &mut Serial<'_>, mut bytes: &[u8]) {
     while !bytes.is_empty() {
         while !serial.write_ready().unwrap() {
-            let ways = ways();
-            assert!(!ways.is_empty(), "no interrupt to come, and a full queue");
-            ways[choose(ways.len())]();
+            let steps = possible_steps();
+            assert!(
+                !steps.is_empty(),
+                "a full queue without an interrupt to empty it"
+            );
+            steps[choose(steps.len())]();
         }
         let written = serial.write(bytes).unwrap();
         bytes = &bytes[written..];
-        anything();
+        run_any_steps();
     }
 }
 
@@ -228,58 +234,60 @@ impl Board for Model {
     }
 
     fn start_sending() {
-        anything();
-        WORLD.with_borrow_mut(|world| world.pending = true);
-        anything();
+        run_any_steps();
+        HARDWARE.with_borrow_mut(|hardware| hardware.pending = true);
+        run_any_steps();
     }
 
     fn hold_interrupts(&mut self, work: impl FnOnce(&mut Self)) {
-        anything();
-        HELD.set(true);
+        run_any_steps();
+        INTERRUPTS_HELD.set(true);
         SLEPT.set(false);
         work(self);
-        HELD.set(false);
+        INTERRUPTS_HELD.set(false);
     }
 
     fn sleep(&mut self) {
-        anything();
+        run_any_steps();
         SLEPT.set(!is_interrupted());
     }
 }
 
-/// Runs a program in every order of events, and says how many there are.
-fn every_order<const TRANSMIT: usize>(
+/// Runs a program in every interleaving. Returns their number.
+fn every_interleaving<const TRANSMIT: usize>(
     kind: Kind,
-    to_come: &[u8],
+    incoming: &[u8],
     program: impl Fn(&mut Serial<'static>),
 ) -> usize {
-    let mut orders = 0;
+    let mut count = 0;
     KIND.set(kind);
-    ORDERS.take();
+    INTERLEAVINGS.take();
     loop {
-        let world = World {
-            to_come: to_come.to_vec(),
-            ..World::default()
+        let hardware = Hardware {
+            incoming: incoming.to_vec(),
+            ..Hardware::default()
         };
-        WORLD.set(world);
+        HARDWARE.set(hardware);
         let buffers = Box::leak(Box::new(Buffers::<4, TRANSMIT>::new()));
         let (interrupt, mut serial) = buffers.split(Model::start_sending);
         PORT.set(Some(interrupt));
         program(&mut serial);
-        orders += 1;
-        if !ORDERS.with_borrow_mut(Orders::turn_over) {
-            return orders;
+        count += 1;
+        if !INTERLEAVINGS.with_borrow_mut(Interleavings::next_interleaving) {
+            return count;
         }
     }
 }
 
-/// Nothing but the line and its interrupts from here on.
+/// Runs only the line and its interrupts until all bytes are sent.
 fn settle() {
-    while WORLD.with_borrow(|world| world.holds.is_some() || world.interrupts()) {
+    while HARDWARE
+        .with_borrow(|hardware| hardware.sending.is_some() || hardware.transmitter_interrupts())
+    {
         if is_interrupted() {
-            handle();
+            run_handler();
         } else {
-            WORLD.with_borrow_mut(World::leave);
+            HARDWARE.with_borrow_mut(Hardware::finish_byte);
         }
     }
 }
@@ -290,49 +298,51 @@ fn four_bytes(serial: &mut Serial<'static>) {
         write_all(serial, bytes);
     }
     settle();
-    WORLD.with_borrow(|world| assert_eq!(world.sent, [1, 2, 3, 4]));
+    HARDWARE.with_borrow(|hardware| assert_eq!(hardware.sent, [1, 2, 3, 4]));
 }
 
 #[test]
 fn no_byte_is_left_without_an_interrupt_to_come() {
-    let orders = [Kind::Level, Kind::Latch].map(|kind| every_order::<8>(kind, &[], four_bytes));
+    let counts =
+        [Kind::Level, Kind::Latch].map(|kind| every_interleaving::<8>(kind, &[], four_bytes));
     println!(
-        "faults: a queue with room: {orders:?} orders of a level and of a latch, no byte left"
+        "faults: a queue with room: {counts:?} orders of a level and of a latch, no byte left"
     );
-    assert_eq!(orders, [396_559, 1_466_799]);
+    assert_eq!(counts, [396_559, 1_466_799]);
 }
 
 #[test]
 fn no_byte_is_left_in_a_full_queue() {
-    // It holds one byte.
-    let orders = [Kind::Level, Kind::Latch].map(|kind| every_order::<2>(kind, &[], four_bytes));
-    println!("faults: a full queue: {orders:?} orders of a level and of a latch, no byte left");
-    assert_eq!(orders, [491_127, 4_391_434]);
+    // The queue holds one byte.
+    let counts =
+        [Kind::Level, Kind::Latch].map(|kind| every_interleaving::<2>(kind, &[], four_bytes));
+    println!("faults: a full queue: {counts:?} orders of a level and of a latch, no byte left");
+    assert_eq!(counts, [491_127, 4_391_434]);
 }
 
 #[test]
 fn the_main_loop_does_not_sleep_while_a_byte_waits() {
-    let orders = [Kind::Level, Kind::Latch].map(|kind| {
-        every_order::<8>(kind, &[1, 2], |serial| {
+    let counts = [Kind::Level, Kind::Latch].map(|kind| {
+        every_interleaving::<8>(kind, &[1, 2], |serial| {
             let mut read = Vec::new();
             for _ in 0..2 {
                 turn(&mut Model, serial, |serial, _| {
-                    anything();
+                    run_any_steps();
                     while serial.has_received() {
                         let mut byte = [0];
                         assert_eq!(serial.read(&mut byte), Ok(1));
                         read.push(byte[0]);
                         write_all(serial, &byte);
                     }
-                    anything();
+                    run_any_steps();
                 });
                 assert!(!SLEPT.get() || !serial.has_received(), "asleep");
             }
             settle();
-            WORLD.with_borrow(|world| assert_eq!(world.sent, read));
+            HARDWARE.with_borrow(|hardware| assert_eq!(hardware.sent, read));
             assert!([1, 2].starts_with(&read));
         })
     });
-    println!("faults: the main loop: {orders:?} orders of a level and of a latch, never asleep");
-    assert_eq!(orders, [232_561, 1_072_410]);
+    println!("faults: the main loop: {counts:?} orders of a level and of a latch, never asleep");
+    assert_eq!(counts, [232_561, 1_072_410]);
 }

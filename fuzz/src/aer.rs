@@ -25,6 +25,7 @@ pub fn aer(data: &[u8]) {
                 assert_eq!(AerWord::end(*events, *checksum).to_le_bytes(), *bytes);
                 continue;
             }
+            other => panic!("no test for {other:?}"),
         };
         assert!(began.is_some(), "an event without a time");
         assert_eq!(word.to_le_bytes(), *bytes);

@@ -2,8 +2,8 @@
 
 use std::fs;
 
-use dtof_photons::medium::Medium;
-use dtof_photons::open::{Opening, counts, open};
+use dtof_photons::input::Input as Recorded;
+use dtof_photons::open::{ReadOptions, counts, open};
 
 use crate::{Input, folder, is_one_line};
 
@@ -23,16 +23,16 @@ const FORMATS: [(&str, &[u8]); 8] = [
 const CYCLES: u16 = 300;
 
 /// What a user says of a recording: nothing, mostly.
-fn opening(choice: u8) -> Opening {
+fn opening(choice: u8) -> ReadOptions {
     let is = |bit: u8| choice >> bit & 1 == 1;
-    Opening {
+    ReadOptions {
         cycles: CYCLES.into(),
         rebin: if is(0) { 2 } else { 1 },
         columns: is(1).then_some(2),
         bins: is(2).then_some(8),
         axes: is(3).then(|| "bins,captures,columns".parse().expect("axes")),
         masked: if is(4) { vec![0] } else { Vec::new() },
-        ..Opening::default()
+        ..ReadOptions::default()
     }
 }
 
@@ -45,9 +45,9 @@ pub fn recordings(data: &[u8]) {
     let folder = folder();
     let path = folder.path().join(name);
     fs::write(&path, [head, input.left].concat()).expect("a file");
-    let medium = Medium::File(path);
+    let recorded = Recorded::File(path);
     let opening = opening(choice >> 3);
-    let mut recording = match open(&medium, &opening) {
+    let mut recording = match open(&recorded, &opening) {
         Ok(recording) => recording,
         Err(error) => return is_one_line(&error),
     };
@@ -66,19 +66,19 @@ pub fn recordings(data: &[u8]) {
             let mut of_pixel = pixel.photons.iter();
             assert!(pixel.photons.is_sorted_by_key(|photon| photon.cycle));
             assert!(of_pixel.all(|photon| {
-                photon.cycle < pixel.cycles && usize::from(photon.code) < recording.known.bins
+                photon.cycle < pixel.cycles && usize::from(photon.code) < recording.metadata.bins
             }));
             photons += pixel.photons.len() as u64;
         }
         done += 100;
     }
-    let all = match counts(&medium, &opening) {
+    let all = match counts(&recorded, &opening) {
         Ok(all) => all,
         Err(error) => return is_one_line(&error),
     };
     let counted: u64 = all.captures.iter().flatten().flatten().sum();
     // Of a list the laser cycles that are read are counted, of histograms all.
-    let left = if recording.known.is_list {
+    let left = if recording.metadata.is_list {
         0
     } else {
         source.not_replayed()

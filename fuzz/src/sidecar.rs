@@ -11,7 +11,7 @@ use dtof_link::endpoint::{BODY_BYTES, Endpoint};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
 use dtof_link::{Configuration, Report, Source, Token};
-use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
+use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 use crate::Input;
 
@@ -20,7 +20,7 @@ use crate::Input;
 pub fn sidecar(data: &[u8]) {
     let mut pixels = heapless::Vec::<Pixel, 16>::new();
     let mut blocks = heapless::Vec::<Block, 4>::new();
-    let mut device = Sidecar::new(&mut pixels, &mut blocks, Some(About::new(16)));
+    let mut device = Sidecar::new(&mut pixels, &mut blocks, Some(SensorInfo::new(16)));
     let mut host = Host::new(1, 0);
     let mut input = Input::new(data);
     let mut now = 0;
@@ -129,8 +129,8 @@ struct Laser {
 impl Sensor for Laser {
     type Error = SensorFault;
 
-    fn about(&self) -> About {
-        About::new(16)
+    fn info(&self) -> SensorInfo {
+        SensorInfo::new(16)
     }
 
     fn start(&mut self, _: U16F16) {
@@ -157,7 +157,7 @@ struct Host {
     events: u64,
     /// What was sent and is not answered yet: configurations, requests of statistics, and of
     /// messages of photons how many they hold.
-    asked: VecDeque<(u8, u64)>,
+    requests: VecDeque<(u8, u64)>,
     /// The configurations among them.
     configurations: VecDeque<Option<Configuration>>,
     /// Photons of the link since the configuration, if there is one.
@@ -185,7 +185,7 @@ impl Host {
             down: Deframer::new(),
             decoder: AerDecoder::new(),
             events: 0,
-            asked: VecDeque::new(),
+            requests: VecDeque::new(),
             configurations: VecDeque::new(),
             photons: None,
             takes_link: false,
@@ -234,7 +234,7 @@ impl Host {
             message::STATISTICS_REQUEST,
         ];
         if kinds.contains(&kind) {
-            self.asked.push_back((kind, photons));
+            self.requests.push_back((kind, photons));
         }
         if kind == message::CONFIGURE {
             let configuration = Configuration::from_le_bytes(body);
@@ -244,7 +244,7 @@ impl Host {
 
     /// What was asked before this answer is done.
     fn answered(&mut self, question: u8) {
-        while let Some((kind, photons)) = self.asked.pop_front() {
+        while let Some((kind, photons)) = self.requests.pop_front() {
             if let Some(all) = self.photons.as_mut().filter(|_| self.takes_link) {
                 *all += photons;
             }
@@ -317,7 +317,7 @@ impl Host {
                     match record.expect("words of a device mean something") {
                         AerRecord::Event(_) | AerRecord::DynamicDepth(_) => self.events += 1,
                         AerRecord::Time(_) => {}
-                        AerRecord::End { .. } => panic!("a device does not end"),
+                        other => panic!("a device does not send {other:?}"),
                     }
                 }
             }
@@ -343,7 +343,7 @@ impl Host {
                 let events = report.statistics.events + report.blocks.events;
                 assert!(self.events <= events, "events that none has decided");
                 let of = &report.statistics;
-                let kept = of.counted + of.held;
+                let kept = of.counted + of.excluded;
                 let lost = of.saturated + of.rejected + of.gated_out + report.unaddressed;
                 assert_eq!(self.photons.unwrap_or(0), kept + lost, "photons");
             }

@@ -1,4 +1,4 @@
-//! Inputs that are kept: what a fuzzer found once holds for ever.
+//! Kept inputs: a finding of the fuzzer stays a test.
 
 #![cfg(feature = "host")]
 

@@ -1,4 +1,4 @@
-"""AER files as docs/aer-format.md describes them: written, and read again."""
+"""Writes and reads AER files by docs/aer-format.md."""
 
 import struct
 import zlib

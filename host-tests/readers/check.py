@@ -21,7 +21,7 @@ POINTS = ("csv", "pcd", "ply", "mcap", "ros2")
 
 
 def export(dtof, name, format, options=(), damaged=None):
-    """Exports NAME.aer; it must fail and name the byte of the damage if there is any."""
+    """Exports NAME.aer. For a damaged file it must fail and name the damaged byte."""
     out = f"{name}{ENDINGS[format]}"
     done = subprocess.run(
         [dtof, "export", f"{name}.aer", "--format", format, "--out", out, "--quiet", *options],
@@ -36,7 +36,7 @@ def export(dtof, name, format, options=(), damaged=None):
 
 
 def slice_ns(events, laser_hz, slice_us):
-    """The length of a slice, and where the last one ends, at the latest."""
+    """The length of a slice, and the latest end of the last one."""
     latest = max((event.cycle for event in events), default=0)
     end = (latest + 1) * 10**9 // laser_hz
     if slice_us is not None:
@@ -61,7 +61,7 @@ def check_points(header, events, name, laser_hz, fov, decoded, slice_us=None):
     error = np.abs(point - ray * metres[:, None]).max(initial=0)
     assert error < 1.1e-5, error
 
-    wanted = expected.records(header, events, laser_hz)
+    expected_records = expected.records(header, events, laser_hz)
     fields = ["x", "y", "z", "intensity", "pixel", "flags", "level", "echo", "t_ns"]
     if events and isinstance(events[0], aer.Dynamic):
         fields[3] = "change"
@@ -70,10 +70,10 @@ def check_points(header, events, name, laser_hz, fov, decoded, slice_us=None):
         assert len(array) == len(order), (len(array), len(order))
         for index, axis in enumerate("xyz"):
             assert np.array_equal(array[axis], point[order, index])
-        value = [wanted[event][0] for event in order]
+        value = [expected_records[event][0] for event in order]
         assert np.allclose(array[fields[3]], value, rtol=0, atol=1e-5)
         for index, field in enumerate(fields[4:], start=1):
-            assert array[field].tolist() == [wanted[event][index] for event in order], field
+            assert array[field].tolist() == [expected_records[event][index] for event in order], field
 
     in_file = list(range(len(events)))
     for names, array in (read.from_pcd(f"{name}.pcd"), read.from_ply(f"{name}.ply")):
@@ -85,34 +85,34 @@ def check_points(header, events, name, laser_hz, fov, decoded, slice_us=None):
     length, end = slice_ns(events, laser_hz, slice_us)
     slices = {}
     for index in in_time:
-        slices.setdefault(wanted[index][-1] // length, []).append(index)
+        slices.setdefault(expected_records[index][-1] // length, []).append(index)
     start = header.start_us * 1000
     assert [time for time, _ in clouds] == [start + number * length for number in slices]
     assert [time for time, _ in statistics] == [time for time, _ in clouds]
     so_far = 0
-    for (time, cloud), (_, said), order in zip(clouds, statistics, slices.values()):
+    for (time, cloud), (_, counts), order in zip(clouds, statistics, slices.values()):
         assert cloud.frame_id == "dtof_optical" and cloud.pose.orientation.w == 1
         assert cloud.timestamp.seconds * 10**9 + cloud.timestamp.nanos == time
         assert [field.name for field in cloud.fields] == fields
         compare(read.points_of(cloud), order)
         so_far += len(order)
-        flags = [wanted[index][2] for index in order]
+        flags = [expected_records[index][2] for index in order]
         duration_s = (min(time - start + length, end) - (time - start)) / 1e9
-        assert said == {
+        assert counts == {
             "timestamp": {"sec": time // 10**9, "nsec": time % 10**9},
             "duration_s": duration_s,
             "events": len(order),
             "events_per_s": len(order) / duration_s,
-            "pixels": len({wanted[index][1] for index in order}),
+            "pixels": len({expected_records[index][1] for index in order}),
             "flagged": sum(flag != 0 for flag in flags),
             "saturated": sum(flag & 1 for flag in flags),
             "clipped": sum(flag >> 1 & 1 for flag in flags),
             "deferred": sum(flag >> 2 & 1 for flag in flags),
             "pile_up": sum(flag >> 3 & 1 for flag in flags),
             "tail": sum(flag >> 4 & 1 for flag in flags),
-            "blocks": sum(wanted[index][3] > 0 for index in order),
+            "blocks": sum(expected_records[index][3] > 0 for index in order),
             "events_so_far": so_far,
-        }, said
+        }, counts
     check_ros2(f"{name}-ros2.mcap", fields, clouds)
 
 
@@ -131,12 +131,12 @@ def check_ros2(path, fields, clouds):
 
 
 def check_evt2(header, events, name, laser_hz, threshold_mm=100, reference="previous"):
-    wanted = expected.changes(header, events, laser_hz, threshold_mm, reference)
-    assert wanted, f"{name}: no change of depth, nothing is tested"
+    changes = expected.changes(header, events, laser_hz, threshold_mm, reference)
+    assert changes, f"{name}: no change of depth, nothing is tested"
     for reader in read.EVT2_READERS:
         found = reader(f"{name}.raw", (header.columns, header.rows))
-        assert found == wanted, f"{reader.__name__}: {name}: {len(found)} of {len(wanted)} events"
-    return len(wanted)
+        assert found == changes, f"{reader.__name__}: {name}: {len(found)} of {len(changes)} events"
+    return len(changes)
 
 
 def check(dtof, name, laser_hz=10_000_000, fov=None, evt2=(), damaged=None):
@@ -161,7 +161,7 @@ def check(dtof, name, laser_hz=10_000_000, fov=None, evt2=(), damaged=None):
 
 
 def check_rate(dtof):
-    """A steady rate is the same in every slice, also in the last, which the run does not fill."""
+    """A steady rate is the same in every slice, including the last, which is not full."""
     array = aer.Header(bins=128, columns=64, rows=32, bin_width_ps=250.0, offset_mm=0.0)
     # An event every 2 µs for 25 ms, each at the end of them.
     events = [aer.Depth(20 * number + 19, number % 2048, 40 * 256) for number in range(12_500)]
@@ -174,11 +174,11 @@ def check_rate(dtof):
         check_points(header, events, "rate", 10_000_000, None, None, slice_us)
         _, statistics = read.from_mcap("rate.mcap")
         assert len(statistics) == slices
-        assert all(said["events_per_s"] == 500_000 for _, said in statistics), statistics
+        assert all(counts["events_per_s"] == 500_000 for _, counts in statistics), statistics
 
 
 def check_empty(dtof):
-    """Files without events, but for expelliarmus, which reads none."""
+    """Files without events, except for expelliarmus, which cannot read them."""
     array = aer.Header(bins=128, columns=64, rows=32, bin_width_ps=250.0, offset_mm=0.0)
     aer.write("empty.aer", array, [])
     for format in ENDINGS:
@@ -207,17 +207,17 @@ def check_calibration(dtof, name):
 
 
 def late_events(dynamic):
-    """Times up to the last that EVT2 holds, a few events a little out of order."""
+    """Times up to the last of EVT2, with a few events out of order."""
     rng = random.Random(1)
     cycles = [1, 64 * 10, 2**28 * 10 - 1, 2**28 * 10, 2**28 * 10 + 70, 2**30 * 10, 2**33 * 10]
     cycles += [2**28 * 10 + 700 * step for step in range(200)]
     cycles = sorted(cycles) + [2**34 * 10 - 1]
-    # An event may wait while others overtake it.
+    # Later events may overtake an event.
     for at in range(2, len(cycles) - 2, 7):
         cycles[at], cycles[at + 1] = cycles[at + 1], cycles[at]
     events = []
     for cycle in cycles:
-        # Of 1280 x 51 pixels; some of the blocks are cut by the last row.
+        # 1280 x 51 pixels; the last row cuts some of the blocks.
         pixel, levels = rng.choice([(0, 4), (1279, 1), (1280 * 48, 4), (1280 * 50, 2), (1280 * 51 - 1, 1)])
         level = rng.randrange(levels)
         position = rng.randrange(10 * 256, 118 * 256)
@@ -232,7 +232,7 @@ def late_events(dynamic):
 
 
 def snippets(docs):
-    """Runs the Python of the documentation as it stands there."""
+    """Runs the Python code of the documentation."""
     texts = re.findall(r"^```python\n(.*?)^```$", Path(docs).read_text(), re.MULTILINE | re.DOTALL)
     assert len(texts) == 6, f"{docs}: {len(texts)} snippets, one a format should be there"
     for text in texts:

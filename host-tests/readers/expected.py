@@ -1,4 +1,4 @@
-"""What an export must hold, worked out here from the AER file alone."""
+"""The expected contents of an export, computed from the AER file alone."""
 
 from collections import defaultdict, deque
 from math import floor
@@ -26,7 +26,7 @@ def pinhole(header, fov):
 
 
 def block(header, event):
-    """The pixels that an event stands for, row by row."""
+    """The pixels of an event, row by row."""
     side = 1 << event.level
     row, column = divmod(event.pixel, header.columns)
     assert row % side == 0 and column % side == 0
@@ -97,5 +97,5 @@ def changes(header, events, laser_hz, threshold_mm, reference):
         for pixel in block(header, event):
             row, column = divmod(pixel, header.columns)
             found.append((microseconds(event, laser_hz), column, row, int(moved > 0)))
-    # Events of one microsecond stay in the order they came in.
+    # Events of one microsecond keep their order.
     return sorted(found, key=lambda change: change[0])

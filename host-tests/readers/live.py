@@ -24,14 +24,14 @@ TOPICS = {"/events", "/statistics", "/losses", "/range", "/rate", "/reflectivity
 
 
 def decoder(channel):
-    """How messages of a channel are decoded, as it says itself."""
+    """The decoder of a channel, from its own schema."""
     if channel["encoding"] == "json":
         schema = json.loads(channel["schema"])
         assert channel["schemaEncoding"] == "jsonschema" and schema["type"] == "object"
 
         def decode(data):
             message = json.loads(data)
-            # Without a device there are no counts of it.
+            # Without a device it has no counts.
             assert message.keys() <= schema["properties"].keys(), message
             for key, value in message.items():
                 kind = {"integer": int, "number": (int, float), "string": str, "object": dict}
@@ -69,7 +69,7 @@ def client(address):
         while not any(topic == "/log" and message.message == "ended" for topic, _, message in messages):
             data = socket.recv(timeout=60)
             if isinstance(data, str):
-                # The recording began after the client had come.
+                # The recording began after the client had connected.
                 assert json.loads(data)["op"] == "serverInfo", data
                 continue
             opcode, subscription, stamp = struct.unpack_from("<BIQ", data)
@@ -101,9 +101,9 @@ def check(header, events, messages, laser_hz):
     clouds = [read.points_of(message) for _, _, message in of["/events"]]
     cloud = np.concatenate(clouds)
     order = sorted(range(len(events)), key=lambda index: events[index].cycle)
-    wanted = expected.records(header, events, laser_hz)
+    expected_records = expected.records(header, events, laser_hz)
     for column, field in enumerate(["intensity", "pixel", "flags", "level", "echo", "t_ns"]):
-        assert cloud[field].tolist() == [wanted[index][column] for index in order], field
+        assert cloud[field].tolist() == [expected_records[index][column] for index in order], field
     point = np.stack([cloud[axis] for axis in "xyz"], axis=1)
     ray = expected.rays(header, None, events)[order]
     metres = np.array([expected.range_mm(header, events[index]) / 1000 for index in order])
@@ -113,7 +113,7 @@ def check(header, events, messages, laser_hz):
     assert statistics[-1]["events_so_far"] == len(events) == of["/losses"][-1][2]["events"]
     assert sum(s["flagged"] for s in statistics) == sum(event.flags != 0 for event in events)
 
-    # The last range of each pixel. Of echoes the first counts; blocks stand for several pixels.
+    # The last range of each pixel: the first echo counts, and a block sets several pixels.
     ranges = image(of["/range"][-1][2]).reshape(-1)
     assert len(ranges) == header.columns * header.rows
     assert all(event.level == 0 for event in events), "blocks: not compared here"
@@ -128,7 +128,7 @@ def check(header, events, messages, laser_hz):
 
 
 def serve(dtof, path, seconds, laser_hz, check_with):
-    """Plays a file in about so many seconds."""
+    """Plays a file in about this many seconds."""
     header, events = aer.read(path)
     length = max(event.cycle for event in events) / laser_hz
     options = ["--speed", str(length / seconds), "--laser-hz", str(laser_hz), "--foxglove=0"]
@@ -143,7 +143,7 @@ def serve(dtof, path, seconds, laser_hz, check_with):
 
 
 def documented(docs):
-    """The Python of docs/view.md, in which the address is another."""
+    """Runs the Python code of docs/view.md with another address."""
     return re.search(r"```python\n(.*?)```", open(docs).read(), re.S)[1]
 
 

@@ -1,4 +1,4 @@
-"""Exports as the readers of other projects see them, one function a reader."""
+"""Reads exports with other projects' readers, one function for each."""
 
 import csv
 import json

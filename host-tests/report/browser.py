@@ -1,4 +1,4 @@
-"""A report in a real browser, and what is checked of it."""
+"""A report in a real browser, and checks of it."""
 
 import sys
 
@@ -10,16 +10,16 @@ def check(what, holds):
 
 
 class Report:
-    """A report in a window of its own, and everything it complained of or asked for."""
+    """A report in its own window, with its errors and requests."""
 
     def __init__(self, browser, path, width=1100, height=900, **options):
         size = {"width": width, "height": height}
         self.address = path.resolve().as_uri()
-        self.complaints, self.requests = [], []
+        self.errors, self.requests = [], []
         self.window = browser.new_context(viewport=size, **options)
         self.page = self.window.new_page()
-        self.page.on("console", lambda message: self.complaints.append(message.text))
-        self.page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        self.page.on("console", lambda message: self.errors.append(message.text))
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.goto(self.address)
         self.settle()
@@ -29,7 +29,7 @@ class Report:
 
     def __exit__(self, *error):
         if error[0] is None:
-            check(f"no complaint {self.complaints}", not self.complaints)
+            check(f"no errors {self.errors}", not self.errors)
             check("no request beside the file", self.requests == [self.address])
         self.window.close()
 
@@ -37,18 +37,18 @@ class Report:
         return self.page.evaluate(script)
 
     def settle(self):
-        """Waits until what was asked for is drawn."""
+        """Waits until the page is drawn."""
         if self.run("Boolean(document.querySelector('#interactive:not([hidden])'))"):
             twice = "requestAnimationFrame(() => requestAnimationFrame(done))"
             self.run(f"new Promise((done) => {twice})")
 
     def picture(self):
-        """What the point cloud shows."""
+        """The picture of the point cloud."""
         self.settle()
         return self.run("document.getElementById('cloud').toDataURL()")
 
     def colours(self):
-        """How many colours are drawn."""
+        """The number of colours drawn."""
         return self.run(
             """(() => {
                 const { width, height } = document.getElementById("cloud");
@@ -59,7 +59,7 @@ class Report:
         )
 
     def changes(self, what, act):
-        """Whether the picture is another one after `act`."""
+        """Checks that `act` changes the picture."""
         before = self.picture()
         act()
         check(f"{what} changes the picture", self.picture() != before)

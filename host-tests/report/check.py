@@ -79,9 +79,9 @@ def moves_in_time(report):
     report.changes("a window of time", lambda: page.select_option("#width", index=3))
     report.changes("the slider", lambda: page.locator("#start").fill("100"))
     page.locator("#start").focus()
-    said = status.evaluate("e => e.value")
+    text = status.evaluate("e => e.value")
     report.changes("a key on the slider", lambda: page.keyboard.press("ArrowRight"))
-    check("the text says what is shown", status.evaluate("e => e.value") != said)
+    check("the text describes the view", status.evaluate("e => e.value") != text)
 
     def play():
         page.locator("#play").click()
@@ -100,8 +100,8 @@ def shows_spikes(report):
     page.locator("#line").fill("3")
     page.keyboard.press("Enter")
     check("a pixel by its place", "column 7, row 3: " in lanes.first.inner_text())
-    said = page.locator("#status").evaluate("e => e.value")
-    check("the text says so", "Spikes of column 7, row 3: " in said)
+    text = page.locator("#status").evaluate("e => e.value")
+    check("the text names the pixel", "Spikes of column 7, row 3: " in text)
     page.locator("[data-view=front]").click()
     report.settle()
     page.locator("#cloud").scroll_into_view_if_needed()
@@ -110,7 +110,7 @@ def shows_spikes(report):
     report.settle()
     chosen = page.locator("#status").evaluate("e => e.value")
     name = lanes.first.locator("span").inner_text().split(":")[0]
-    # An event of the pixel, or of a block from it on.
+    # An event of the pixel, or of a block that begins with it.
     picked = chosen.partition("Chosen: ")[2].partition(" mm")[0]
     check("a click chooses an event", f"{name}," in picked)
     count = lanes.count()
@@ -137,7 +137,7 @@ def is_named(report):
 
 
 def is_closed(report):
-    """What is not the page's own script does not run, and nothing is loaded."""
+    """Foreign scripts do not run, and nothing is loaded."""
     report.run(
         """(() => {
             const script = document.createElement("script");
@@ -148,12 +148,12 @@ def is_closed(report):
     check("no other script runs", report.run("window.foreign === undefined"))
     fetched = "fetch('data:,x').then(() => true, () => false)"
     check("nothing is fetched", report.run(fetched) is False)
-    check("the policy said so", len(report.complaints) >= 2)
-    report.complaints.clear()
+    check("the policy reported them", len(report.errors) >= 2)
+    report.errors.clear()
 
 
 def packed(numbers):
-    """Numbers as the page reads them: digits of three bits, the lowest first, two a byte."""
+    """Encodes numbers for the page: digits of three bits, the lowest first, two per byte."""
     digits = []
     for number in numbers:
         while number > 7:
@@ -179,7 +179,7 @@ def page_of(browser, data, events):
 
 
 def places_are_true(browser):
-    """Ranges beyond the colours, too: the axis is linear over all of them."""
+    """The axis is linear, also for ranges beyond the colours."""
     ranges = [500, 1000, 2000, 9000]
     events = [(1 if at > 0 else 0, 0, 0, 1, mm) for at, mm in enumerate(ranges)]
     data = {"columns": 1, "rows": 1, "cycles": 4, "oneOf": 1, "low": 1000, "high": 2000}
@@ -251,7 +251,7 @@ def main(chromium, pictures, *reports):
         check("smaller than 5 MB", static.stat().st_size < MOST_BYTES)
         with Report(browser, static, has_touch=True) as report:
             check("drawn in colours", report.colours() > 50)
-            check("no word on scripting", not report.page.locator("#unscripted").is_visible())
+            check("no note on scripting", not report.page.locator("#unscripted").is_visible())
             turns(report)
             moves_in_time(report)
             shows_spikes(report)
@@ -339,8 +339,8 @@ def main(chromium, pictures, *reports):
         print("no scripting")
         with Report(browser, static, java_script_enabled=False) as report:
             page = report.page
-            check("says so", page.locator("#unscripted").is_visible())
-            check("nothing that does nothing", not page.locator("#interactive").is_visible())
+            check("note on scripting", page.locator("#unscripted").is_visible())
+            check("no dead controls", not page.locator("#interactive").is_visible())
             check("all maps", page.locator("figure svg").count() == 4)
             check("maps are seen", page.locator("figure svg").last.is_visible())
         browser.close()

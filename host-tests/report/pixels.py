@@ -7,7 +7,7 @@ from browser import check
 
 
 def opened(path):
-    """The same report beside it, its script not a module: what it knows can be asked for."""
+    """Writes the report again with a plain script instead of a module, so that its variables are readable."""
     text = path.read_text()
     policy, rest = text.split("<meta http-equiv=", 1)
     copy = path.with_name("opened.html")
@@ -22,7 +22,7 @@ def rows_of(path):
 
 
 def tenths(number):
-    """A number as the page writes it: away from zero where both are as near."""
+    """A number as the page writes it: ties are rounded away from zero."""
     return f"{math.floor(number * 10 + 0.5) / 10:,.1f}"
 
 
@@ -65,7 +65,7 @@ def shows_a_pixel(report, path, columns, pixels):
         check("the background is the event's", abs(shot["look"]["background"] - row["background"]) <= 0.5)
         note = page.locator("#histogram-note").inner_text()
         text = f"{tenths(row['range_mm'])} mm. Peak: {photons:,.0f} photons in bin {bin};"
-        check(f"the text says so: {text}", text in note)
+        check(f"the text has {text}", text in note)
         first = page.locator("#events tbody tr").first.locator("td").all_inner_texts()
         check(f"the table begins with it {first}", first[1] == f"{int(last):,}")
 
@@ -93,8 +93,8 @@ def chooses_pixels(report):
 
 
 def last_map(path):
-    """The range of each pixel's last event, by the events alone: one of a block stands for
-    those of its pixels that reported no finer one in its exposure, and the first echo counts."""
+    """The range of each pixel's last event, from the events alone: the event of a block sets the pixels
+    without a finer event in its exposure, and the first echo counts."""
     ranges, ends = {}, {}
     for row in rows_of(path):
         if row["echo"] > 1:
@@ -109,7 +109,7 @@ def last_map(path):
 
 
 def maps_time(report, path):
-    """The map at the end is that of the events; before, that of the time."""
+    """The last map shows the last events; earlier maps show those of their time."""
     expected = last_map(path)
     found = report.run("(mapUntil(data.cycles), [...pixels.range].map((mm) => (isNaN(mm) ? null : mm)))")
     off = [pixel for pixel, mm in enumerate(found) if abs((mm or 0) - expected.get(pixel, 0)) > 0.01]
@@ -121,7 +121,7 @@ def maps_time(report, path):
 
 
 def plays_a_move(report, path, columns):
-    """While it plays, map, plots and text have the range of the time."""
+    """During playback map, plots and text show the range of that time."""
     page = report.page
     report.run("choose(0)")
     expected = events_of(rows_of(path), 0, columns)
@@ -156,7 +156,7 @@ def shows_few(report, path, columns, count):
     check("a click chooses a pixel", report.run("chosen.pixel") == 1)
     page.keyboard.press("ArrowDown")
     check("an arrow key the one below", report.run("chosen.pixel") == 1 + columns)
-    check("its plot says so", plots.nth(1 + columns).get_attribute("aria-pressed") == "true")
+    check("its plot is pressed", plots.nth(1 + columns).get_attribute("aria-pressed") == "true")
     texts = plots.all_inner_texts()
     rows = rows_of(path)
     counts = [len(events_of(rows, pixel, columns)) for pixel in range(count)]

@@ -1,5 +1,5 @@
-//! What the integer code answers to: the paper in floating point, written from
-//! the paper and not from `dtof-core`.
+//! The reference for the integer code: the paper in floating point, written from the paper and not from
+//! `dtof-core`.
 
 pub mod reference;
 

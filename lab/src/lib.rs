@@ -2,7 +2,7 @@
 //! figures and result pages made from them.
 //!
 //! ```text
-//! studies    points, trials, and what they come to
+//! studies    points, trials, and results
 //!   → sweep  trials of a range of seeds, as a part; parts add up bit for bit
 //!   → pages  figures, captions, verdicts: docs/figures and docs/results
 //! ```

@@ -18,7 +18,7 @@ struct Cli {
 enum Command {
     /// Run Monte-Carlo trials of a study into a part, or list the studies.
     Sweep(command::sweep::Sweep),
-    /// Add up parts of a sweep.
+    /// Merge parts of a sweep.
     Merge(command::sweep::Merge),
     /// Make the figures and result pages of the documentation.
     Figures(command::figures::Figures),

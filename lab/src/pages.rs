@@ -1,9 +1,8 @@
-//! The documents that studies make: figures, their captions, and the verdicts on
-//! the paper's claims.
+//! The documents made from the studies: figures, captions, and the verdicts on the paper's claims.
 //!
-//! Of every study the seeds of a quick look and the rest are kept apart in
-//! `docs/results/data`. So a quick look that is taken again must give the kept numbers
-//! bit for bit, and together with the kept rest every document.
+//! `docs/results/data` has the data of every study in two files: the seeds of a quick look, and the
+//! rest. So a new quick look must reproduce its file bit for bit, and with the rest it yields every
+//! document.
 
 mod bus;
 pub mod failures;
@@ -25,25 +24,25 @@ use std::path::{Path, PathBuf};
 const FIGURES: &str = include_str!("pages/figures.md");
 const CLAIMS: &str = include_str!("pages/paper-claims.md");
 
-/// What is done anew.
+/// Which trials run again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Anew {
-    /// The seeds of a quick look: minutes.
-    Few,
+pub enum Rerun {
+    /// The seeds of a quick look, which takes minutes.
+    Quick,
     /// All seeds.
     All,
-    /// None: documents are drawn again from what is kept.
+    /// None: documents are drawn from the stored data.
     None,
 }
 
-/// Works out the seeds and gives every document below `docs` with its content.
-/// `progress` is told which study comes next.
+/// Runs the trials and returns every document below `docs` with its content. Calls `progress`
+/// before each study.
 ///
 /// # Errors
-/// If a trial fails or what is kept cannot be read.
+/// Fails if a trial fails or the stored data cannot be read.
 pub fn documents(
     docs: &Path,
-    anew: Anew,
+    rerun: Rerun,
     mut progress: impl FnMut(&Study),
 ) -> Result<Vec<(PathBuf, String)>> {
     let mut documents = Vec::new();
@@ -60,20 +59,20 @@ pub fn documents(
         let mut taken = |which, seeds, is_anew| {
             let kept = format!("results/data/{name}.{which}.json");
             let part = if is_anew {
-                sweep::work_out(study, seeds)?
+                sweep::run_seeds(study, seeds)?
             } else {
                 Part::load(&docs.join(&kept))?
             };
             documents.push((kept.into(), part.to_json()?));
             anyhow::Ok(part)
         };
-        let mut part = taken("few", 0..few_seeds, anew != Anew::None)?;
-        let rest = taken("rest", few_seeds..all_seeds, anew == Anew::All)?;
+        let mut part = taken("few", 0..few_seeds, rerun != Rerun::None)?;
+        let rest = taken("rest", few_seeds..all_seeds, rerun == Rerun::All)?;
         part.add(&rest)
-            .with_context(|| format!("{name}: the kept rest"))?;
+            .with_context(|| format!("{name}: the stored rest"))?;
         ensure!(
             part.seeds() == [(0, all_seeds)],
-            "{name}: the kept rest is not of the seeds {few_seeds}..{all_seeds}"
+            "{name}: the stored rest does not have the seeds {few_seeds}..{all_seeds}"
         );
         let results = (study.results)(&part).context(name)?;
         all.push((study, results));
@@ -84,7 +83,7 @@ pub fn documents(
     let wrong: Vec<&str> = wrong.map(|figure| figure.name).collect();
     ensure!(
         wrong.is_empty(),
-        "the data no longer show what these titles say: {}",
+        "the data no longer support these titles: {}",
         wrong.join(", ")
     );
     for (_, results) in &all {
@@ -148,12 +147,12 @@ pub fn documents(
     Ok(documents)
 }
 
-/// Writes documents below `docs` and gives those that changed.
+/// Writes documents below `docs` and returns those that changed.
 ///
 /// # Errors
-/// If one cannot be written.
+/// Fails if one cannot be written.
 pub fn write(docs: &Path, documents: &[(PathBuf, String)]) -> Result<Vec<PathBuf>> {
-    let changed = different(docs, documents);
+    let changed = outdated(docs, documents);
     for (path, content) in documents {
         let path = docs.join(path);
         let name = || path.display().to_string();
@@ -168,9 +167,9 @@ pub fn write(docs: &Path, documents: &[(PathBuf, String)]) -> Result<Vec<PathBuf
     Ok(changed)
 }
 
-/// Documents that are not below `docs` as they should be.
+/// Documents below `docs` that are missing or differ.
 #[must_use]
-pub fn different(docs: &Path, documents: &[(PathBuf, String)]) -> Vec<PathBuf> {
+pub fn outdated(docs: &Path, documents: &[(PathBuf, String)]) -> Vec<PathBuf> {
     let differs = |(path, content): &&(PathBuf, String)| {
         fs::read(docs.join(path)).ok().as_deref() != Some(content.as_bytes())
     };

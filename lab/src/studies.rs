@@ -1,4 +1,4 @@
-//! The studies there are.
+//! All studies.
 
 pub mod analysis;
 pub mod beyond;
@@ -18,7 +18,7 @@ use self::scenes::{
 };
 use crate::sweep::Study;
 
-/// In the order of the paper; then what it does not have.
+/// In the order of the paper, then beyond the paper.
 pub const ALL: &[Study] = &[
     hit_rate::STUDY,
     gaussian_error::STUDY,
@@ -45,10 +45,10 @@ pub const ALL: &[Study] = &[
     failures::STUDY,
 ];
 
-/// The study of that name.
+/// The study named `name`.
 ///
 /// # Errors
-/// If there is none.
+/// Fails if there is no such study.
 pub fn named(name: &str) -> Result<&'static Study> {
     let found = ALL.iter().find(|study| study.name == name);
     found.with_context(|| format!("no study `{name}`: `cargo lab sweep` lists them"))

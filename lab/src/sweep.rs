@@ -1,10 +1,8 @@
-//! Monte-Carlo sweeps: many trials at every point of a grid of parameters, in
-//! parts that add up.
+//! Monte-Carlo sweeps: many trials at every point of a parameter grid, in parts that can be merged.
 //!
-//! A [`Study`] has points, and for each point and seed one trial. A trial depends
-//! on nothing but those two and gives whole numbers, so that the tallies of any
-//! seeds can be added in any order: a sweep split over machines and merged is the
-//! single run, bit for bit.
+//! A [`Study`] has points, and one trial for each point and seed. A trial depends only on these two
+//! and returns integers, so tallies can be added in any order: a sweep that is split over machines
+//! and merged equals a single run, bit for bit.
 //!
 //! ```text
 //! Study, seeds   [`run`]
@@ -27,25 +25,25 @@ use rand_pcg::Pcg64;
 use self::results::Results;
 
 pub use self::part::{Part, PointTally, merge};
-pub use self::run::{run, work_out};
+pub use self::run::{run, run_seeds};
 
 /// The parameters of a point, by name.
 pub type Point = BTreeMap<String, f64>;
 
-/// Counts of a point, by name. They add up without rounding.
+/// Counts of a point, by name. Addition is exact.
 pub type Tally = BTreeMap<String, u64>;
 
 /// The trials of one seed at one point.
 pub type Trial = fn(&Point, &mut Pcg64) -> Result<Tally>;
 
-/// What is swept.
+/// A Monte-Carlo study.
 #[derive(Clone, Copy)]
 pub struct Study {
     /// Its name on the command line.
     pub name: &'static str,
-    /// What it finds out, in one line.
+    /// The subject, in one line.
     pub about: &'static str,
-    /// Grows when a trial changes: parts of different revisions do not add up.
+    /// Increases when a trial changes: parts of different revisions cannot be merged.
     pub revision: u32,
     /// Seeds of a quick look, from 0.
     pub few_seeds: u64,
@@ -55,13 +53,13 @@ pub struct Study {
     pub points: fn() -> Vec<Point>,
     /// The trials of one seed at one point.
     pub trial: Trial,
-    /// What all seeds come to.
+    /// Computes the results from all seeds.
     pub results: fn(&Part) -> Result<Results>,
 }
 
 impl Study {
-    /// The random numbers of a seed at a point: independent of those of every other
-    /// study, point and seed, and of a simulated pixel's.
+    /// The random number generator of a seed at a point, independent of those of other studies,
+    /// points and seeds, and of simulated pixels.
     fn rng(&self, point: usize, seed: u64) -> Pcg64 {
         // FNV-1a.
         let name = self.name.bytes().fold(0xcbf2_9ce4_8422_2325, |hash, byte| {
@@ -71,7 +69,7 @@ impl Study {
     }
 }
 
-/// The finaliser of `SplitMix64`: each bit in changes half of the bits out.
+/// The finaliser of `SplitMix64`: each input bit changes half of the output bits.
 const fn mixed(mut bits: u64) -> u64 {
     bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -79,7 +77,7 @@ const fn mixed(mut bits: u64) -> u64 {
     bits ^ (bits >> 31)
 }
 
-/// A point of these parameters.
+/// A point with these parameters.
 #[must_use]
 pub fn point<const N: usize>(parameters: [(&str, f64); N]) -> Point {
     parameters
@@ -87,7 +85,7 @@ pub fn point<const N: usize>(parameters: [(&str, f64); N]) -> Point {
         .into()
 }
 
-/// Every point of the grid of these values, those of the last parameter one after the other.
+/// Every point of the grid of these values. The last parameter varies fastest.
 #[must_use]
 pub fn grid<const N: usize>(parameters: [(&str, &[f64]); N]) -> Vec<Point> {
     let mut points = vec![Point::new()];
@@ -116,7 +114,7 @@ pub fn whole(point: &Point, name: &str) -> u16 {
     point[name] as u16
 }
 
-/// A tally of these counts.
+/// A tally with these counts.
 #[must_use]
 pub fn tally<const N: usize>(counts: [(&str, u64); N]) -> Tally {
     counts.map(|(name, count)| (name.to_owned(), count)).into()

@@ -1,22 +1,22 @@
-//! What the study of failures finds, on a few seeds.
+//! The results of the study of failures, on a few seeds.
 
 use dtof_lab::studies::failures::{Case, Outcome, Rule, STUDY, Verdict, Warning, outcomes};
 use dtof_lab::sweep;
 
-/// Those of a case, whose name starts with `name`.
+/// The outcomes of the case whose name starts with `name`.
 fn of<'a>(all: &'a [(Case, Vec<Outcome>)], name: &str) -> &'a [Outcome] {
     let found = all.iter().find(|(case, _)| case.name.starts_with(name));
     &found.unwrap_or_else(|| panic!("no case {name}")).1
 }
 
-/// The smallest share of false alarms that the interval allows.
+/// The lower end of the interval of false alarms.
 fn surely_false(outcome: &Outcome) -> f64 {
     outcome.false_share.map_or(0.0, |share| share.interval.0)
 }
 
 #[test]
 fn a_few_seeds_show_what_fails_and_what_is_flagged() {
-    let all = outcomes(&sweep::work_out(&STUDY, 0..5).unwrap()).unwrap();
+    let all = outcomes(&sweep::run_seeds(&STUDY, 0..5).unwrap()).unwrap();
     let check = |names: &[&str], holds: fn(&Outcome) -> bool| {
         for name in names {
             for outcome in of(&all, name) {
@@ -24,7 +24,7 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
             }
         }
     };
-    // The cover glass is the brightest: nothing says so. A gate helps.
+    // The cover glass is the brightest pulse, and no flag shows it. A gate helps.
     let good = ["plain", "cover glass 10 × the signal, gate"];
     check(&good, |of| {
         surely_false(of) < 0.02 && of.without.value < 0.1 && of.verdict != Verdict::Fails
@@ -40,43 +40,44 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     check(&[good, full, at_ends].concat(), |of| {
         of.warning != Warning::Silent
     });
-    // With light in each quadrant the paper's rule has no background left; the mean has.
+    // With light in each quadrant the paper's rule has no background estimate; the mean of all bins
+    // works.
     check(&["a pulse in each quadrant"], |of| match of.method.rule {
         Rule::Window | Rule::Average(_) => of.without.value < 0.1,
         Rule::Paper(_) => of.without.value > 0.3,
     });
-    // Of the photons of a cycle only the first counts: the slope is taken for the peak,
-    // and every event says so.
+    // Only the first photon of a cycle counts: the rising edge becomes the peak, and every event is
+    // flagged.
     check(&["one hit, 6 photons"], |of| {
         surely_false(of) > 0.8 && of.piled_up > 0.999 && of.warning == Warning::Flagged
     });
     check(&["one hit, 1.5 photons", "one hit, 2 photons"], |of| {
         of.piled_up > 0.95
     });
-    // At half of the laser cycles nothing is false yet, and the flag begins.
+    // With a hit in half of the laser cycles nothing is false yet, and the flag begins.
     check(&["one hit, 0.7 photons"], |of| {
         let flag_begins = (0.1..0.9).contains(&of.piled_up);
         surely_false(of) < 0.02 && of.verdict != Verdict::Fails && flag_begins
     });
-    // A bright pulse hides its own end. An event's error is 0.3 bins.
+    // A bright pulse hides its own end. The error of an event is 0.3 bins.
     check(&["one hit, a pulse of 0.7 photons"], |of| {
         (-0.35..-0.08).contains(&of.mean_error)
     });
     check(&["one hit, a pulse of 3 photons"], |of| {
         (-0.95..-0.6).contains(&of.mean_error) && of.piled_up > 0.999
     });
-    // Without a target there is little to report, and it is false.
+    // Without a target there are few events, all false.
     check(&["no target"], |of| {
         of.verdict == Verdict::Survives && of.false_share.is_some()
     });
     check(&["hot pixel"], |of| of.without.value > 0.8);
-    // A background that changes within the exposure makes no false alarms.
+    // A background that changes within the exposure causes no false alarms.
     let changing = ["weak signal, background × 4", "weak signal, background / 4"];
     check(&changing, |of| surely_false(of) < 0.02);
     let steps = ["background × 4 at 20", "background / 4 at 20"];
     check(&steps, |of| surely_false(of) < 0.02);
-    // A pulse that stays is a target, and no flag says that it is not the own; nor does one
-    // tell a veil. A random time from pulse to pulse spreads that pulse.
+    // A pulse that stays looks like a target, and no flag distinguishes it; the same holds for a
+    // veil. Random pulse times spread the other laser's pulse.
     check(&["another LiDAR, clock"], |of| {
         surely_false(of) > 0.1 && of.warning == Warning::Silent
     });
@@ -88,7 +89,7 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     check(&[spread, rain].concat(), |of| {
         surely_false(of) < 0.02 && of.verdict != Verdict::Fails
     });
-    // A target that moves while it is exposed is reported where it was.
+    // A target that moves during the exposure is reported at an earlier position.
     let still = of(&all, "weak signal").iter();
     for (still, drifting) in still.zip(of(&all, "weak signal, the same drift")) {
         if still.method.rule == Rule::Window {
@@ -99,7 +100,7 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
 
 #[test]
 fn the_page_has_a_row_for_every_case() {
-    let part = sweep::work_out(&STUDY, 7..8).unwrap();
+    let part = sweep::run_seeds(&STUDY, 7..8).unwrap();
     let values = dtof_lab::pages::failures::tables(&part).unwrap();
     let text = values.fill("{table}{reports}{silent}{advice}").unwrap();
     assert!(!text.contains("NaN"), "{text}");
@@ -111,11 +112,11 @@ fn the_page_has_a_row_for_every_case() {
         let mut cells = row.split('|').skip(2).take(8);
         assert!(cells.all(|cell| cell.chars().count() < 40), "{row}");
     }
-    // Where no flag tells, the page says why.
+    // Where no flag helps, the page explains why.
     for (case, outcomes) in outcomes(&part).unwrap() {
         let is_silent = |outcome: &Outcome| outcome.warning == Warning::Silent;
-        let is_told = case.silence.is_some() || !outcomes.iter().any(is_silent);
-        assert!(is_told, "{}", case.name);
+        let is_explained = case.silence.is_some() || !outcomes.iter().any(is_silent);
+        assert!(is_explained, "{}", case.name);
     }
     assert!(!text.contains("not known"));
 }

@@ -1,7 +1,6 @@
-//! Recorded photons with ground truth, decided by the paper's rule and by window
-//! rules at equal rates of false alarms: how many photons an event takes, and how far
-//! off it is. Needs the public TMF8820 capture log, as `recorded.rs` does, prints a
-//! table, and holds it against `docs/results/data/recorded_rules.csv`.
+//! Recorded photons with ground truth: photons per event and depth error of the paper's rule and of
+//! window rules, at equal rates of false alarms. Needs the public TMF8820 capture log, as
+//! `recorded.rs` does. Prints a table and compares it with `docs/results/data/recorded_rules.csv`.
 
 #[path = "../../host-tests/tests/simulations/capture_log.rs"]
 mod capture_log;
@@ -14,8 +13,8 @@ use dtof_core::{
     AnyRule, AsyncPixel, CentredWindow, DepthEstimator, LaserCycle, PixelAddress, PixelConfig,
     RangeScale, Statistics,
 };
-use dtof_lab::studies::methods::passage::{Ladder, Method, Passage, count_false};
-use dtof_photons::open::{Opening, counts};
+use dtof_lab::studies::methods::passage::{Ladder, Passage, Rule, count_false};
+use dtof_photons::open::{ReadOptions, counts};
 use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_photons::tmf8820::{self, BINS};
@@ -33,28 +32,28 @@ const CYCLES: u16 = 10_000;
 const DISTANCES: usize = 149;
 /// Photons a laser cycle in the brightest zone.
 const PHOTONS: f64 = 0.5;
-/// How the pixels operate: L1 does not hold them back.
+/// Settings of the pixels; L1 is too short to delay events.
 const X: u16 = 4;
 const L1: u16 = 4;
 const L2: u16 = 2000;
 /// The fewest photons of an event, in the peak or in the window.
 const MINIMUM: u32 = 5;
-/// Background photons a bin and laser cycle of the brightest recording: the median over
-/// the bins of each, the highest of all.
+/// Background photons a bin and laser cycle: the highest, over all captures, of the median over the
+/// bins.
 const RECORDED: f64 = 0.0003;
 /// Background that is added to the recorded photons.
 const ADDED: [f64; 3] = [0.0, 0.01, 0.05];
-/// False alarms an exposure without a target to which all rules are set.
-const WANTED: f64 = 0.01;
-/// Exposures without a target they are set by.
+/// False alarms per exposure without a target, equal for all rules.
+const FALSE_ALARM_SHARE: f64 = 0.01;
+/// Exposures without a target that determine the thresholds.
 const EXPOSURES: u64 = 3000;
-/// What is kept of it.
+/// The stored table.
 const CSV: &str = concat!(
     env!("CARGO_MANIFEST_DIR"),
     "/../docs/results/data/recorded_rules.csv"
 );
 
-/// What the centre zone reports over all captures from 30 to 400 mm.
+/// The reports of the centre zone over all captures from 30 to 400 mm.
 #[derive(Clone, Copy, Debug, Default)]
 struct Outcome {
     events: usize,
@@ -66,8 +65,8 @@ struct Outcome {
     beyond_50: usize,
 }
 
-impl Recording<'_> {
-    /// What the centre zone reports; the added photons are the same for every rule.
+impl NoisyRecording<'_> {
+    /// Replays the centre zone; the added photons are the same for every rule.
     fn replay(&self, config: &PixelConfig<BINS, AnyRule>) -> Outcome {
         let scale = RangeScale::new(tmf8820::BIN_WIDTH_PS, tmf8820::OFFSET_MM).unwrap();
         let added = self.added;
@@ -80,7 +79,7 @@ impl Recording<'_> {
                 continue;
             }
             let mut rng = Pcg64::seed_from_u64(capture);
-            let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
+            let mut pixel = AsyncPixel::<BINS>::new(PixelAddress::new(0));
             let mut statistics = Statistics::new();
             let mut left = pixels[CENTRE].photons.iter().peekable();
             let before = errors.len();
@@ -93,9 +92,9 @@ impl Recording<'_> {
                     pixel.count(config, bins.sample(&mut rng));
                     more -= 1.0;
                 }
-                let now = LaserCycle(cycle.into());
+                let now = LaserCycle::new(cycle.into());
                 let _ = pixel.end_laser_cycle(config, &mut statistics, now);
-                if let Some(event) = pixel.acknowledge() {
+                if let Some(event) = pixel.take_event() {
                     errors.push(scale.range(event.position()).to_num::<f64>() - truth);
                 }
             }
@@ -103,7 +102,7 @@ impl Recording<'_> {
             photons += statistics.photons();
             distances += usize::from(errors.len() > before);
         }
-        // One constant offset is allowed for.
+        // A constant offset is removed.
         errors.sort_by(f64::total_cmp);
         let Some(&offset) = errors.get(errors.len() / 2) else {
             return Outcome::default();
@@ -121,21 +120,21 @@ impl Recording<'_> {
     }
 }
 
-/// For each method the least threshold with no more false alarms than wanted, in
-/// simulated exposures to a background and nothing else, and their share there.
-fn calibrated(methods: &[Method], background: f64) -> Vec<(f64, f64)> {
+/// For each rule: the smallest threshold with a share of at most [`FALSE_ALARM_SHARE`] in simulated
+/// exposures without a target, and that share.
+fn calibrated(rules: &[Rule], background: f64) -> Vec<(f64, f64)> {
     let rates = Rates::without_target(background);
-    let ladder = |&method: &Method| match method {
-        Method::Average => Ladder::new(method, 0, 160, 8),
-        _ => Ladder::new(method, 0, 56, 8),
+    let ladder = |&rule: &Rule| match rule {
+        Rule::Average => Ladder::new(rule, 0, 160, 8),
+        _ => Ladder::new(rule, 0, 56, 8),
     };
-    let ladders: Vec<Ladder> = methods.iter().map(ladder).collect();
+    let ladders: Vec<Ladder> = rules.iter().map(ladder).collect();
     let exposures = Exposures::new(&rates, 128, Looks::new(X, L1, L2)).unwrap();
     let mut passage = Passage::new(&ladders, exposures, None).unwrap();
     let tally = count_false(&mut passage, EXPOSURES, &mut trial_rng(9, 0));
     let of = |ladder: &Ladder| {
         let share = |index| tally[&ladder.key(index, "false")] as f64 / EXPOSURES as f64;
-        let index = (0..ladder.thresholds.len()).find(|&index| share(index) <= WANTED);
+        let index = (0..ladder.thresholds.len()).find(|&index| share(index) <= FALSE_ALARM_SHARE);
         let index = index.expect("a threshold is high enough");
         (ladder.thresholds[index], share(index))
     };
@@ -151,18 +150,18 @@ impl Outcome {
     }
 }
 
-/// The recorded photons, with background of a rate added.
-struct Recording<'a> {
+/// The recorded photons, with added background.
+struct NoisyRecording<'a> {
     slice: &'a Slice,
     truth: &'a [f64],
     added: f64,
 }
 
-/// How the depth is found.
+/// The depth estimator.
 #[derive(Clone, Copy, PartialEq)]
 enum Depth {
     Centroid,
-    /// A window for a pulse of a bin.
+    /// A centred window for a pulse of one bin.
     Centred,
     /// The half widths that `dtof calibrate` finds for this log.
     Skew,
@@ -189,25 +188,28 @@ impl Depth {
     }
 }
 
-/// A rule and how it finds the depth.
+/// A rule with a depth estimator.
 #[derive(Clone, Copy)]
-struct Setting {
-    method: Method,
+struct Method {
+    rule: Rule,
     threshold: f64,
     minimum: u32,
     depth: Depth,
 }
 
-impl Setting {
-    fn replay(self, recording: &Recording) -> Outcome {
-        let rule = self.method.rule(self.threshold, self.minimum).unwrap();
+impl Method {
+    fn replay(self, recording: &NoisyRecording) -> Outcome {
+        let rule = self
+            .rule
+            .with_threshold(self.threshold, self.minimum)
+            .unwrap();
         let estimator = self.depth.estimator();
         let config = PixelConfig::with_rule(rule).x(X).l1(L1).l2(L2);
         recording.replay(&config.estimator(estimator).build().unwrap())
     }
 
-    /// With the largest minimum that takes no more than so many photons an event.
-    fn spending(self, recording: &Recording, photons: f64) -> Self {
+    /// With the largest minimum count that needs at most `photons` per event.
+    fn spending(self, recording: &NoisyRecording, photons: f64) -> Self {
         let of = |minimum| Self { minimum, ..self };
         let (mut low, mut high) = (MINIMUM, 1023);
         while low < high {
@@ -229,7 +231,7 @@ fn window_rules_need_fewer_photons_than_the_papers() {
         return;
     };
     let truth = ground_truth(&log);
-    let recorded = counts(&log, &Opening::default()).unwrap();
+    let recorded = counts(&log, &ReadOptions::default()).unwrap();
     let mut photons = RecordedHistograms::new(
         recorded.array,
         &recorded.captures,
@@ -248,35 +250,30 @@ fn window_rules_need_fewer_photons_than_the_papers() {
         // To the nearest photon.
         assert!(f64::from(counts[BINS / 2]) < RECORDED * f64::from(CYCLES) + 0.5);
     }
-    let methods = [
-        Method::Paper,
-        Method::Window(2),
-        Method::Window(3),
-        Method::Average,
-    ];
+    let rules = [Rule::Paper, Rule::Window(2), Rule::Window(3), Rule::Average];
     let mut csv = "added_background,rule,threshold,minimum,false_share,estimator,events,photons_an_event,median_mm,\
                    within_95_mm,beyond_50_mm,as_good_as_the_papers\n"
         .to_owned();
     for added in ADDED {
-        let recording = Recording {
+        let recording = NoisyRecording {
             slice: &slice,
             truth: &truth,
             added,
         };
         let mut papers_own = None;
-        let mut row = |setting: Setting, share: f64| {
-            let outcome = setting.replay(&recording);
+        let mut row = |method: Method, share: f64| {
+            let outcome = method.replay(&recording);
             // The first is the paper's rule with its centre of mass.
             let papers = *papers_own.get_or_insert(outcome);
             assert_eq!(outcome.distances, DISTANCES, "a distance without an event");
             let is_as_good = outcome.is_as_good_as(&papers);
-            let estimator = setting.depth.label();
+            let estimator = method.depth.label();
             writeln!(
                 csv,
                 "{added},{},{},{},{share:.4},{estimator},{},{:.1},{:.2},{:.2},{},{is_as_good}",
-                setting.method.label(),
-                setting.threshold,
-                setting.minimum,
+                method.rule.label(),
+                method.threshold,
+                method.minimum,
                 outcome.events,
                 outcome.photons,
                 outcome.median,
@@ -286,22 +283,22 @@ fn window_rules_need_fewer_photons_than_the_papers() {
             .unwrap();
             (outcome, is_as_good)
         };
-        // Each by exposures of its own.
-        let (first, average) = methods.split_at(3);
+        // Separate exposures for the average.
+        let (first, average) = rules.split_at(3);
         let mut thresholds = calibrated(first, added + RECORDED);
         thresholds.extend(calibrated(average, added + RECORDED));
         let mut even = Outcome::default();
         for depth in [Depth::Centroid, Depth::Centred, Depth::Skew] {
             let mut papers = Outcome::default();
-            for (&method, &(threshold, share)) in methods.iter().zip(&thresholds) {
-                let setting = Setting {
-                    method,
+            for (&rule, &(threshold, share)) in rules.iter().zip(&thresholds) {
+                let method = Method {
+                    rule,
                     threshold,
                     minimum: MINIMUM,
                     depth,
                 };
-                let (outcome, _) = row(setting, share);
-                if method == Method::Paper {
+                let (outcome, _) = row(method, share);
+                if rule == Rule::Paper {
                     papers = outcome;
                     // Two half widths suit this pulse better than equal ones.
                     if depth == Depth::Skew {
@@ -311,16 +308,16 @@ fn window_rules_need_fewer_photons_than_the_papers() {
                     even = outcome;
                     continue;
                 }
-                if method == Method::Average {
+                if rule == Rule::Average {
                     continue;
                 }
-                // It fires sooner, and so with fewer photons for the depth.
+                // It fires sooner, so the depth has fewer photons.
                 assert!(outcome.photons < 0.75 * papers.photons);
-                let spending = setting.spending(&recording, papers.photons);
+                let spending = method.spending(&recording, papers.photons);
                 let (outcome, is_as_good) = row(spending, share);
-                // With the centred window it is better than the paper's own for no more
-                // photons, whatever the background, and not worse than the paper's rule
-                // with the same window but for 4 % of the median.
+                // With the centred window it is better than the paper's method with no more
+                // photons, at any background. It is at most 4 % worse than the paper's rule with
+                // the same window.
                 if depth != Depth::Centroid {
                     assert!(is_as_good, "{added}: {outcome:?}");
                     assert!(outcome.median < 1.04 * papers.median);

@@ -1,4 +1,4 @@
-//! The table of recorded photons in the README is that of the results file.
+//! The table of recorded photons in the README agrees with the results file.
 
 use std::fs;
 use std::path::Path;

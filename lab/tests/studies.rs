@@ -1,4 +1,4 @@
-//! Every study: its trials are pure, and one seed is enough for results.
+//! Every study: trials are pure functions, and one seed is enough for results.
 
 use std::collections::BTreeSet;
 
@@ -9,13 +9,13 @@ use dtof_lab::sweep;
 fn one_seed_of_every_study_gives_figures_and_claims() {
     let mut names = BTreeSet::new();
     for study in studies::ALL {
-        let results = (study.results)(&sweep::work_out(study, 0..1).unwrap()).unwrap();
+        let results = (study.results)(&sweep::run_seeds(study, 0..1).unwrap()).unwrap();
         assert!(!results.figures.is_empty(), "{}", study.name);
         for figure in &results.figures {
             assert!(names.insert(figure.name), "{} twice", figure.name);
             let svg = figure.svg.trim_end();
             assert!(svg.starts_with("<svg") && svg.ends_with("</svg>"), "{svg}");
-            // At least one dot or line beside axes and legend.
+            // At least one dot or line besides axes and legend.
             let is_drawn = ["<circle", "<polyline"].map(|shape| svg.contains(shape));
             assert_ne!(is_drawn, [false; 2], "{svg}");
         }
@@ -35,7 +35,7 @@ fn a_trial_depends_on_its_point_and_random_numbers_only() {
     for study in studies::ALL {
         let points = (study.points)();
         assert_eq!(points, (study.points)(), "{}", study.name);
-        // A few points all over the grid, in either order.
+        // A few points across the grid, in both orders.
         let some: Vec<_> = points.iter().step_by(points.len().div_ceil(4)).collect();
         let trials = |seed| {
             let trial =
@@ -51,7 +51,7 @@ fn a_trial_depends_on_its_point_and_random_numbers_only() {
 }
 
 #[test]
-fn names_are_told_apart() {
+fn names_are_unique() {
     let names: BTreeSet<_> = studies::ALL.iter().map(|study| study.name).collect();
     assert_eq!(names.len(), studies::ALL.len());
     for study in studies::ALL {

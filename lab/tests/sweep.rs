@@ -1,5 +1,4 @@
-//! Sweeps in parts: what is split and merged is the single run bit for bit, and
-//! nothing counts twice.
+//! Sweeps in parts: merged parts equal the single run bit for bit, and no seed counts twice.
 
 mod common;
 
@@ -27,7 +26,7 @@ impl Scratch {
         self.written(&output, out)
     }
 
-    /// The part of a run that must have succeeded.
+    /// Checks that a run succeeded, and returns its part.
     #[track_caller]
     fn written(&self, output: &Output, out: &str) -> String {
         let error = String::from_utf8_lossy(&output.stderr);
@@ -44,18 +43,18 @@ fn parts_in_any_order_merge_into_the_single_run() {
     scratch.swept("1..4", "b");
     scratch.swept("4..7", "c");
     assert_eq!(scratch.merged(&["c", "a", "b"], "abc"), single);
-    // Also by way of a part that has a gap.
+    // Also through a part with a gap.
     scratch.merged(&["c", "a"], "ac");
     assert_eq!(scratch.merged(&["b", "ac"], "bac"), single);
     assert_eq!(scratch.merged(&["single"], "same"), single);
-    // Other seeds are other photons.
+    // Other seeds give other photons.
     assert_ne!(
         scratch.swept("7..14", "other").replace("7", "0"),
         single.replace("7", "0")
     );
 }
 
-/// Nor is a part that is merged taken for the result.
+/// Not even one of the merged parts.
 #[test]
 fn a_merge_replaces_nothing() {
     let scratch = Scratch::new();
@@ -63,12 +62,12 @@ fn a_merge_replaces_nothing() {
     scratch.swept("1..2", "b");
     for parts in [&["a", "b"][..], &["b"]] {
         let output = scratch.lab(&[&["merge", "--out", "a"], parts].concat());
-        Scratch::refused(&output, &["a: is there already"]);
+        Scratch::refused(&output, &["a: already exists"]);
         assert_eq!(scratch.read("a"), part);
     }
 }
 
-/// A part may be read by whoever may read any other new file.
+/// A part has the permissions of any new file.
 #[cfg(unix)]
 #[test]
 fn a_part_has_ordinary_permissions() {
@@ -82,7 +81,7 @@ fn a_part_has_ordinary_permissions() {
 }
 
 #[test]
-fn a_part_that_was_begun_is_gone_on_with() {
+fn an_unfinished_part_is_resumed() {
     let scratch = Scratch::new();
     let single = scratch.swept("0..6", "single");
     scratch.swept("2..4", "part");
@@ -90,12 +89,12 @@ fn a_part_that_was_begun_is_gone_on_with() {
     // Complete: nothing is added.
     assert_eq!(scratch.swept("0..6", "part"), single);
     let output = scratch.sweep("1..6", "part");
-    Scratch::refused(&output, &["part", "seeds that are not asked for"]);
+    Scratch::refused(&output, &["part", "seeds outside the requested range"]);
     assert_eq!(scratch.read("part"), single);
 }
 
 #[test]
-fn a_part_that_was_killed_is_gone_on_with() {
+fn a_killed_run_is_resumed() {
     let scratch = Scratch::new();
     let part = scratch.path("part");
     let mut killed = Command::new(env!("CARGO_BIN_EXE_dtof-lab"))
@@ -122,7 +121,7 @@ fn a_part_that_was_killed_is_gone_on_with() {
 }
 
 #[test]
-fn what_does_not_add_up_is_refused() {
+fn incompatible_parts_are_refused() {
     let scratch = Scratch::new();
     let part = scratch.swept("0..4", "part");
     scratch.swept("3..5", "shares");
@@ -138,7 +137,7 @@ fn what_does_not_add_up_is_refused() {
         (
             "study",
             &part.replace(STUDY, "other"),
-            "other (revision 2) does not add to hit-rate",
+            "other (revision 2) cannot be added to hit-rate",
         ),
         (
             "revision",
@@ -159,7 +158,7 @@ fn what_does_not_add_up_is_refused() {
         scratch.file(name, text);
         Scratch::refused(&merge(&["part", name]), &[name, reason]);
     }
-    // Nor is one taken alone that is of no study, or not of its points.
+    // A single part must also be of a known study and its points.
     for (name, reason) in [
         ("study", "no study `other`"),
         ("revision", "revision 3"),

@@ -14,7 +14,7 @@ use dtof_link::message::{EVENTS, PHOTONS, greeting};
 
 const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().build());
 
-/// Carries what one end has to say to the other, and says whether that was anything.
+/// Carries one frame from one end to the other. Returns whether there was one.
 fn carry(from: &mut Endpoint, to: &mut Endpoint, deframer: &mut Deframer, now_ms: u32) -> bool {
     let mut wire = [0; WIRE_BYTES];
     let length = from.transmit(now_ms, &mut wire);
@@ -30,7 +30,7 @@ fn main() -> Result<(), Full> {
     let mut host = Endpoint::host(1, greeting(0, 0), 0);
     let mut device = Endpoint::device(greeting(128, 1));
     let (mut down, mut up) = (Deframer::new(), Deframer::new());
-    let mut pixel = AsyncPixel::<128>::new(PixelAddress(0));
+    let mut pixel = AsyncPixel::<128>::new(PixelAddress::new(0));
     let mut statistics = Statistics::new();
     let (mut encoder, mut decoder) = (AerEncoder::new(), AerDecoder::new());
     let (mut cycle, mut events) = (0, 0);
@@ -41,14 +41,14 @@ fn main() -> Result<(), Full> {
             let body: Vec<u8> = tokens.iter().flat_map(|token| token.to_bytes()).collect();
             host.offer(PHOTONS, &body)?;
         }
-        // The device: takes photons, and gives the event once there is one.
+        // The device: takes photons, and sends an event once there is one.
         while let Some(message) = device.take() {
             let mut left = &message.body[..];
             while let Some((token, rest)) = Token::split_first(left) {
                 match token {
                     Token::Photon { code } => pixel.count(&CONFIG, code),
                     Token::EndOfCycles { .. } => {
-                        pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle(cycle));
+                        pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle::new(cycle));
                         cycle += 1;
                     }
                     Token::Advance { .. } => {}
@@ -57,7 +57,7 @@ fn main() -> Result<(), Full> {
             }
         }
         if device.has_room()
-            && let Some(event) = pixel.acknowledge()
+            && let Some(event) = pixel.take_event()
         {
             let (time, word) = encoder.encode(&event);
             let words = time.into_iter().chain([word]);
@@ -66,7 +66,7 @@ fn main() -> Result<(), Full> {
                 &words.flat_map(AerWord::to_le_bytes).collect::<Vec<_>>(),
             )?;
         }
-        // The wire, until both have said everything.
+        // The wire, until neither end has a frame.
         while carry(&mut host, &mut device, &mut down, now_ms)
             | carry(&mut device, &mut host, &mut up, now_ms)
         {}

@@ -1,19 +1,19 @@
-//! How pixels are counted together.
+//! The options of adaptive binning.
 
 use dtof_core::BlockLevel;
 
-/// The options of adaptive binning: see `dtof_core::Binning`.
+/// The options of adaptive binning: see `dtof_core::binning::Binning`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct AdaptiveBinning {
     /// The largest blocks, of level 1 to 3.
     pub levels: BlockLevel,
-    /// Laser cycles between ticks; not 0. Counted from look to look, so that it is rounded up
-    /// to a multiple of X.
+    /// Laser cycles between ticks; not 0. Rounded up to a multiple of X, the laser cycles
+    /// between looks.
     pub patience: u16,
 }
 
 impl AdaptiveBinning {
-    /// The patience unless said otherwise. Measured in `docs/results/figures.md`.
+    /// The default patience. Measured in `docs/results/figures.md`.
     pub const PATIENCE: u16 = 64;
 }

@@ -1,9 +1,11 @@
-//! How the host wants the pixels to operate.
+//! The configuration that a host sends to a device.
 
+use dtof_core::events::Reference;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
+use dtof_core::paper::Threshold;
 use dtof_core::{
     AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule,
-    Reference, Threshold, WindowRule,
+    WindowRule,
 };
 
 use crate::adaptive_binning::AdaptiveBinning;
@@ -20,14 +22,15 @@ pub enum Source {
     Sensor,
 }
 
-/// How the pixels are to operate. Rule and estimator are valid by construction. The
-/// device checks the rest, which depends on what it has.
+/// How the pixels of a device operate. Rule and estimator are valid by construction. The
+/// device checks the rest, which depends on its pixels and its sensor. `x`, `l1` and `l2` are the
+/// paper's names (section II-B).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Configuration {
-    /// What decides whether a peak stands clear.
+    /// The detection rule.
     pub rule: AnyRule,
-    /// What finds its depth.
+    /// The depth estimator.
     pub estimator: DepthEstimator,
     /// Laser cycles between looks.
     pub x: u16,
@@ -37,11 +40,11 @@ pub struct Configuration {
     pub l2: u16,
     /// First and last bin that may hold the peak, both inclusive.
     pub gate: (u16, u16),
-    /// Whether the TDC takes one photon a laser cycle, so that events say when it piles up.
+    /// Whether the TDC takes one photon a laser cycle, so that events are flagged for pile-up.
     pub one_hit_tdc: bool,
-    /// Pixels, addresses 0 up.
+    /// The number of pixels; their addresses begin at 0.
     pub pixels: u16,
-    /// How many of them are a row of the array.
+    /// Pixels in a row of the array.
     pub columns: u16,
     /// Blocks of pixels that decide together.
     pub binning: Option<AdaptiveBinning>,
@@ -49,10 +52,10 @@ pub struct Configuration {
     pub tracking: bool,
     /// The last echo that a pixel reports in an exposure.
     pub echoes: EchoNumber,
-    /// Bins to either side of an echo's peak that are left out once it is reported.
-    pub peel_reach: u8,
-    /// An exposure ends once it is so many times as long as it was at its last echo; with 255
-    /// at L2.
+    /// Bins to either side of an echo's peak that are excluded once it is reported.
+    pub echo_guard_bins: u8,
+    /// An exposure with an echo ends when it is this many times as long as it was at its last
+    /// echo; with 255, at L2.
     pub echo_wait: u8,
     /// Picoseconds a bin.
     pub bin_width_ps: U16F16,
@@ -62,13 +65,13 @@ pub struct Configuration {
     pub source: Source,
     /// Changes of depth that are sent in place of depth events.
     pub dynamic_depth: Option<DynamicDepth>,
-    /// The sensor stops once no frame of the host has come for so many milliseconds:
-    /// [`Self::HOST_TIMEOUTS_MS`]. With 0 it never does, which a device refuses unless its
-    /// firmware was built for that.
+    /// The sensor stops if no frame of the host arrives for this many milliseconds:
+    /// [`Self::HOST_TIMEOUTS_MS`]. With 0 it never does. A device refuses 0 unless its
+    /// firmware was built for it.
     pub host_timeout_ms: u16,
 }
 
-// What the choices are on the wire.
+// The choices as bytes.
 const FROM_LINK: u8 = 0;
 const FROM_SENSOR: u8 = 1;
 const PAPER_RULE: u8 = 0;
@@ -88,14 +91,14 @@ const TRACKING: u8 = 1;
 impl Configuration {
     /// Bytes of the record.
     pub const BYTES: usize = 67;
-    /// What the host timeout may be, in milliseconds. A host sends a frame every 50 ms.
+    /// The range of the host timeout, in milliseconds. A host sends a frame every 50 ms.
     pub const HOST_TIMEOUTS_MS: core::ops::RangeInclusive<u16> = 200..=60_000;
-    /// The host timeout unless another is configured, in milliseconds.
+    /// The default host timeout, in milliseconds.
     pub const HOST_TIMEOUT_MS: u16 = 3_000;
-    /// What a minimum count may be: photons that a counter of 10 bits holds.
+    /// The range of the minimum count, for counters of 10 bits.
     const MINIMUM_COUNTS: core::ops::RangeInclusive<u16> = 1..=1023;
 
-    /// As it is sent.
+    /// The bytes to send.
     #[must_use]
     pub fn to_le_bytes(&self) -> [u8; Self::BYTES] {
         let with_alpha = |rule, threshold: &Threshold| {
@@ -143,7 +146,7 @@ impl Configuration {
 
         let first = [
             alpha.to_bits(),
-            // More than the field holds is more than a device takes.
+            // A count that does not fit is refused by every device.
             u16::try_from(minimum_count.raw()).unwrap_or(u16::MAX),
             self.x,
             self.l1,
@@ -168,7 +171,12 @@ impl Configuration {
             .chain(self.columns.to_le_bytes())
             .chain([binning.levels.raw()])
             .chain(binning.patience.to_le_bytes())
-            .chain([tracking, self.echoes.raw(), self.peel_reach, self.echo_wait])
+            .chain([
+                tracking,
+                self.echoes.raw(),
+                self.echo_guard_bins,
+                self.echo_wait,
+            ])
             // The bytes after it are reserved.
             .chain(self.host_timeout_ms.to_le_bytes());
         let mut bytes = [0; Self::BYTES];
@@ -178,10 +186,10 @@ impl Configuration {
         bytes
     }
 
-    /// As it was received. Fields of another rule, estimator or output are not looked at.
+    /// Reads the record. Fields of another rule, estimator or output are ignored.
     ///
     /// # Errors
-    /// The first thing about it that no device takes.
+    /// Fails at the first field that every device refuses.
     pub fn from_le_bytes(bytes: &[u8]) -> Result<Self, Refusal> {
         let bytes: &[u8; Self::BYTES] = bytes.try_into().map_err(|_| Refusal::Unknown)?;
         let mut fields = Fields(bytes);
@@ -206,7 +214,7 @@ impl Configuration {
         let columns = u16::from_le_bytes(fields.next()?);
         let [levels] = fields.next()?;
         let patience = u16::from_le_bytes(fields.next()?);
-        let [tracking, echoes, peel_reach, echo_wait] = fields.next()?;
+        let [tracking, echoes, echo_guard_bins, echo_wait] = fields.next()?;
         let host_timeout_ms = u16::from_le_bytes(fields.next()?);
         let Fields(reserved) = fields;
 
@@ -260,7 +268,7 @@ impl Configuration {
                 _ => return Err(Refusal::Unknown),
             },
             echoes: EchoNumber::new(echoes).ok_or(Refusal::Unknown)?,
-            peel_reach,
+            echo_guard_bins,
             echo_wait,
             bin_width_ps,
             offset_mm,
@@ -280,7 +288,7 @@ impl Configuration {
     }
 }
 
-/// What is left of a record.
+/// The fields that are not read yet.
 struct Fields<'a>(&'a [u8]);
 
 impl Fields<'_> {

@@ -1,20 +1,21 @@
-//! Which changes of depth are wanted.
+//! The options of dynamic depth.
 
+use dtof_core::RangeScale;
+use dtof_core::events::{DynamicDepthConfig, Reference, ZeroThresholdError};
 use dtof_core::fixed::types::U24F8;
-use dtof_core::{DynamicDepthConfig, RangeScale, Reference, ZeroThresholdError};
 
 /// Dynamic depth of the mean of [`Self::MEAN_OF`] events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DynamicDepth {
-    /// Millimetres that a mean has to move by more than.
+    /// A mean that moves by more than this many millimetres is reported.
     pub threshold_mm: U24F8,
-    /// From what.
+    /// The mean to compare with.
     pub reference: Reference,
 }
 
 impl Default for DynamicDepth {
-    /// The paper's: 0.1 m between the means of adjacent events.
+    /// As in the paper: 0.1 m between the means of adjacent events.
     fn default() -> Self {
         Self {
             threshold_mm: const { U24F8::lit("100") },
@@ -24,13 +25,13 @@ impl Default for DynamicDepth {
 }
 
 impl DynamicDepth {
-    /// Events of a mean: the paper's.
+    /// Events in a mean, as in the paper.
     pub const MEAN_OF: usize = 3;
 
-    /// The same for the core.
+    /// The core's configuration.
     ///
     /// # Errors
-    /// If the threshold is less than half of 1/256 bin.
+    /// Fails if the threshold is less than half of 1/256 bin.
     pub const fn config(
         &self,
         scale: &RangeScale,

@@ -2,8 +2,7 @@
 //! after it.
 //!
 //! COBS makes a frame of at most 254 bytes one byte longer and leaves no zero
-//! byte in it. Whatever happened to the bytes before, a receiver is in step
-//! again after the next zero byte.
+//! byte in it. After any damage a receiver is in step again at the next zero byte.
 
 use crc::{CRC_32_ISO_HDLC, Crc};
 
@@ -17,9 +16,8 @@ pub const PAYLOAD_BYTES: usize = FRAME_BYTES - CHECKSUM_BYTES;
 const CHECKSUM_BYTES: usize = 4;
 static CRC_32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
-/// Puts `parts`, one after the other and at most [`PAYLOAD_BYTES`] together,
-/// into `wire`; gives the number of bytes to send. What is beyond
-/// [`PAYLOAD_BYTES`] is a mistake of the caller and left out.
+/// Writes a frame with `parts`, one after the other, into `wire`. Returns the number of
+/// bytes to send. The parts have at most [`PAYLOAD_BYTES`] together; any more are cut off.
 #[must_use]
 pub fn encode(parts: [&[u8]; 2], wire: &mut [u8; WIRE_BYTES]) -> usize {
     let mut frame = heapless::Vec::<u8, FRAME_BYTES>::new();
@@ -40,9 +38,10 @@ pub fn encode(parts: [&[u8]; 2], wire: &mut [u8; WIRE_BYTES]) -> usize {
     length + 1
 }
 
-/// Why bytes between two zero bytes are no frame.
+/// Why bytes between two zero bytes are not a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum FrameError {
     /// More bytes than a frame can have.
     Oversized,
@@ -69,8 +68,8 @@ impl Deframer {
         }
     }
 
-    /// Takes the next byte. If it ends a frame, what the frame carries; if it
-    /// ends something that is no frame, why.
+    /// Takes the next byte. If it ends a frame, returns the payload, or why this is not a
+    /// frame.
     pub fn push(&mut self, byte: u8) -> Option<Result<&[u8], FrameError>> {
         if core::mem::take(&mut self.ended) {
             self.bytes.clear();

@@ -1,7 +1,7 @@
-//! The histogram of a pixel, in as many messages as it takes.
+//! The histogram of a pixel, in one or more messages.
 //!
 //! Eight counts of `width` bits are `width` bytes, lowest bits first. All counts of a histogram
-//! have the same width, the smallest that holds them, and a message has as many eights as fit:
+//! have the same width, the smallest that fits, and a message has as many eights as fit:
 //! 128 counts of up to 14 bits are one message, wider ones two.
 //!
 //! ```
@@ -9,9 +9,9 @@
 //! use dtof_link::{HistogramHead, HistogramPart};
 //!
 //! let head = HistogramHead {
-//!     pixel: PixelAddress(3),
+//!     pixel: PixelAddress::new(3),
 //!     is_whole: false,
-//!     cycle: LaserCycle(1000),
+//!     cycle: LaserCycle::new(1000),
 //!     exposure: 40,
 //! };
 //! let mut counts = [1; 128];
@@ -36,21 +36,22 @@ use crate::numbered::numbered;
 const HEAD_BYTES: usize = 19;
 /// Counts that are packed together.
 const EIGHT: usize = 8;
-/// No count is wider; a larger one is sent as the largest.
+/// The most bits of a count; a larger count is sent as the largest.
 const WIDEST: u32 = 24;
 const LARGEST: u32 = (1 << WIDEST) - 1;
 
-/// What a histogram is of.
+/// What a histogram belongs to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct HistogramHead {
     /// The pixel.
     pub pixel: PixelAddress,
-    /// It came whole from the sensor. Otherwise it is the exposure that the pixel is in, so far.
+    /// Whether the sensor gave it complete. Otherwise it has the photons of the pixel's current
+    /// exposure so far.
     pub is_whole: bool,
     /// Laser cycles that had ended when it was taken.
     pub cycle: LaserCycle,
-    /// Its own laser cycles: it began at `cycle - exposure`.
+    /// Laser cycles of the histogram: it began at `cycle - exposure`.
     pub exposure: u32,
 }
 
@@ -70,7 +71,7 @@ numbered! {
 }
 
 impl HistogramHead {
-    /// The messages that carry `counts`, a multiple of 8 of them: a rest is left out.
+    /// The messages that carry `counts`. Their number is a multiple of 8; any more are cut off.
     #[must_use]
     pub fn messages(
         self,
@@ -110,9 +111,9 @@ impl HistogramMessage<'_> {
         let mut put = |bytes: &[u8]| {
             let _ = body.extend_from_slice(bytes);
         };
-        put(&head.pixel.0.to_le_bytes());
+        put(&head.pixel.raw().to_le_bytes());
         put(&[0, head.is_whole.into()]);
-        put(&head.cycle.0.to_le_bytes());
+        put(&head.cycle.raw().to_le_bytes());
         put(&head.exposure.to_le_bytes());
         put(&self.first_bin.to_le_bytes());
         put(&[self.width]);
@@ -139,13 +140,13 @@ pub struct HistogramPart<'a> {
 }
 
 impl<'a> HistogramPart<'a> {
-    /// Reads a message: part of a histogram, or why there is none of which pixel. `None` if the
-    /// body is neither.
+    /// Reads a message: part of a histogram, or a pixel and why it has none. `None` if the body
+    /// is neither.
     #[must_use]
     #[allow(clippy::type_complexity)]
     pub fn from_le_bytes(body: &'a [u8]) -> Option<Result<Self, (PixelAddress, NoHistogram)>> {
         let (&[a, b, reason], rest) = body.split_first_chunk()?;
-        let pixel = PixelAddress(u16::from_le_bytes([a, b]));
+        let pixel = PixelAddress::new(u16::from_le_bytes([a, b]));
         if reason != 0 {
             let reason = NoHistogram::from_number(reason)?;
             return rest.is_empty().then_some(Err((pixel, reason)));
@@ -161,7 +162,7 @@ impl<'a> HistogramPart<'a> {
             head: HistogramHead {
                 pixel,
                 is_whole: whole == 1,
-                cycle: LaserCycle(u64::from_le_bytes(cycle)),
+                cycle: LaserCycle::new(u64::from_le_bytes(cycle)),
                 exposure: u32::from_le_bytes(exposure),
             },
             first_bin: u16::from_le_bytes([c, d]),
@@ -170,7 +171,7 @@ impl<'a> HistogramPart<'a> {
         }))
     }
 
-    /// What it is of.
+    /// What the histogram belongs to.
     #[must_use]
     pub const fn head(&self) -> HistogramHead {
         self.head
@@ -200,10 +201,10 @@ impl<'a> HistogramPart<'a> {
 }
 
 impl NoHistogram {
-    /// The body of the message that says so of `pixel`.
+    /// The body of the message with this reason for `pixel`.
     #[must_use]
     pub fn message(self, pixel: PixelAddress) -> Vec<u8, BODY_BYTES> {
-        let [a, b] = pixel.0.to_le_bytes();
+        let [a, b] = pixel.raw().to_le_bytes();
         [a, b, self as u8].into_iter().collect()
     }
 }

@@ -3,9 +3,10 @@
 //!
 //! [`message`] has the kinds of messages; [`Configuration`], [`Token`], [`Refusal`],
 //! [`Report`], [`StopReason`], [`SensorRecord`] and [`HistogramPart`] are their bodies. [`endpoint`] is
-//! one end, [`frame`] what lies between them.
+//! one end of the link, [`frame`] the bytes between the ends.
 
 #![no_std]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 #![deny(
     clippy::expect_used,

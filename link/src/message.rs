@@ -29,21 +29,21 @@ pub const LINK_VERSION: u16 = 6;
 pub const CONFIGURE: u8 = 0x01;
 /// Host to device: [`Token`](crate::Token) after [`Token`](crate::Token).
 pub const PHOTONS: u8 = 0x02;
-/// Host to device: answer when all before it is done.
+/// Host to device: answer when everything before it is done.
 pub const SYNCHRONISE: u8 = 0x03;
 /// Host to device: send a [`Report`](crate::Report).
 pub const STATISTICS_REQUEST: u8 = 0x04;
-/// Host to device: say what the sensor is.
+/// Host to device: send a [`SensorRecord`](crate::SensorRecord).
 pub const SENSOR_REQUEST: u8 = 0x05;
 /// Host to device: send the histogram of a pixel.
 pub const HISTOGRAM_REQUEST: u8 = 0x06;
 /// Device to host: the configuration is in force.
 pub const CONFIGURED: u8 = 0x81;
-/// Device to host: the configuration is not; a [`Refusal`](crate::Refusal).
+/// Device to host: the configuration is refused, with a [`Refusal`](crate::Refusal).
 pub const REFUSED: u8 = 0x82;
 /// Device to host: AER words.
 pub const EVENTS: u8 = 0x83;
-/// Device to host: all before is done; the body of the question.
+/// Device to host: everything before it is done. It has the body of the request.
 pub const SYNCHRONISED: u8 = 0x84;
 /// Device to host: a [`Report`](crate::Report).
 pub const STATISTICS: u8 = 0x85;

@@ -1,12 +1,13 @@
-//! Enums that go over the link as a number.
+//! Enums that are sent as a number.
 
-/// Makes an enum whose variants have numbers from 1 on, and a text each.
+/// Makes an enum whose variants have a number from 1 on and a text.
 macro_rules! numbered {
     ($(#[$of_all:meta])* $name:ident { $($(#[$of_one:meta])* $variant:ident = $number:literal: $text:expr,)+ }) => {
         $(#[$of_all])*
         #[derive(Clone, Copy, Debug, PartialEq, Eq)]
         #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         #[repr(u8)]
+        #[non_exhaustive]
         pub enum $name {
             $($(#[$of_one])* $variant = $number,)+
         }

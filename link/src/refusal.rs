@@ -1,23 +1,24 @@
-//! Why a device does not take a configuration.
+//! Why a device refuses a configuration.
 
-use dtof_core::{ConfigError, GateError, RangeScaleError, WindowWidthError, ZeroThresholdError};
+use dtof_core::events::ZeroThresholdError;
+use dtof_core::{GateError, PixelConfigError, RangeScaleError, WindowWidthError};
 
 use crate::numbered::numbered;
 
 numbered! {
-    /// Why a configuration is not taken.
+    /// Why a configuration is refused.
     Refusal {
-        /// Not as long as the record, or of an unknown source, rule, estimator, output,
+        /// The record has the wrong length, or an unknown source, rule, estimator, output,
         /// reference, number of hits, levels, tracking or number of echoes.
         Unknown = 1: "the configuration is not one this device knows",
         /// X is 0.
-        ZeroX = 2: ConfigError::ZeroX.text(),
+        ZeroX = 2: PixelConfigError::ZeroX.text(),
         /// X is greater than L1.
-        XAboveL1 = 3: ConfigError::XAboveL1.text(),
+        XAboveL1 = 3: PixelConfigError::XAboveL1.text(),
         /// L2 is not greater than L1.
-        L2NotAboveL1 = 4: ConfigError::L2NotAboveL1.text(),
+        L2NotAboveL1 = 4: PixelConfigError::L2NotAboveL1.text(),
         /// No look falls between L1 and L2.
-        NoLook = 5: ConfigError::NoLook.text(),
+        NoLook = 5: PixelConfigError::NoLook.text(),
         /// The gate ends past the last bin.
         GatePastLastBin = 6: GateError::PastLastBin.text(),
         /// The gate leaves fewer than 8 bins.
@@ -30,7 +31,7 @@ numbered! {
         MinimumCount = 10: "the minimum peak count must be from 1 to 1023",
         /// The device has no sensor.
         NoSensor = 11: "the device has no sensor",
-        /// The bins of the sensor are not as wide as that.
+        /// The bins of the sensor have another width.
         BinWidth = 12: "the bins of the sensor are not as wide as that",
         /// The window of the rule is not 1 to 7 bins wide.
         WindowWidth = 13: WindowWidthError.text(),
@@ -40,24 +41,26 @@ numbered! {
         ZeroThreshold = 15: ZeroThresholdError.text(),
         /// The patience of adaptive binning is 0.
         Patience = 16: "the patience of adaptive binning must be at least 1",
-        /// There is no room for so many blocks of pixels, or no column.
+        /// There is no room for that many blocks of pixels, or there are no columns.
         Blocks = 17: "the device has no room for the blocks of pixels",
-        /// Tracking with a rule that has none.
+        /// Tracking with a rule other than the window rule.
         Tracking = 18: "tracking needs the window rule",
-        /// The host timeout is not 200 ms to 60 s, or 0, which takes a firmware of its own.
+        /// The host timeout is not 200 ms to 60 s, or it is 0 and the firmware was not built
+        /// for that.
         HostTimeout = 19: "the host timeout must be 200 to 60000 ms",
-        /// A field that has no meaning yet is not 0.
+        /// A reserved field is not 0.
         Reserved = 20: "a reserved field is not 0",
     }
 }
 
-impl From<ConfigError> for Refusal {
-    fn from(error: ConfigError) -> Self {
+impl From<PixelConfigError> for Refusal {
+    fn from(error: PixelConfigError) -> Self {
         match error {
-            ConfigError::ZeroX => Self::ZeroX,
-            ConfigError::XAboveL1 => Self::XAboveL1,
-            ConfigError::L2NotAboveL1 => Self::L2NotAboveL1,
-            ConfigError::NoLook => Self::NoLook,
+            PixelConfigError::ZeroX => Self::ZeroX,
+            PixelConfigError::XAboveL1 => Self::XAboveL1,
+            PixelConfigError::L2NotAboveL1 => Self::L2NotAboveL1,
+            PixelConfigError::NoLook => Self::NoLook,
+            _ => Self::Unknown,
         }
     }
 }
@@ -67,6 +70,7 @@ impl From<GateError> for Refusal {
         match error {
             GateError::PastLastBin => Self::GatePastLastBin,
             GateError::TooNarrow => Self::GateTooNarrow,
+            _ => Self::Unknown,
         }
     }
 }

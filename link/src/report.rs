@@ -12,27 +12,27 @@ use crate::endpoint::LinkCounters;
 pub struct Report {
     /// Laser cycles that have ended.
     pub cycles: u64,
-    /// All pixels and whole histograms together; of events those sent before
-    /// the report.
+    /// Of all pixels and whole histograms; it counts the events sent before the
+    /// report.
     pub statistics: Statistics,
-    /// The same of all blocks of pixels. Their photons are those of pixels, counted again.
+    /// Of all blocks of pixels. Their photons are those of pixels, counted again.
     pub blocks: Statistics,
-    /// Photons of pixels the device does not have.
+    /// Photons for pixels that the device does not have.
     pub unaddressed: u64,
-    /// Bytes the receive queue had no room for.
+    /// Bytes that did not fit the receive queue.
     pub overrun: u32,
     /// Messages with a kind or a body that the device does not know.
     pub unknown: u32,
     /// Errors of the sensor.
     pub sensor_errors: u32,
-    /// The last of them: the number of a
-    /// [`FaultRecord`](crate::FaultRecord), 0 before the first.
+    /// The last error: the number of a [`FaultRecord`](crate::FaultRecord), 0 before
+    /// the first.
     pub last_sensor_error: u8,
     /// How often the sensor was started, since the device was switched on or reset.
     pub sensor_starts: u32,
-    /// How often it was stopped.
+    /// How often the sensor was stopped.
     pub sensor_stops: u32,
-    /// Why it stopped last: the number of a [`StopReason`](crate::StopReason), 0 if it has not.
+    /// Why the sensor stopped last: the number of a [`StopReason`](crate::StopReason), 0 if it has not.
     pub stop_reason: u8,
     /// The device's end of the link.
     pub link: LinkCounters,
@@ -46,7 +46,7 @@ impl Report {
     /// Numbers of 4 bytes.
     const NARROW: usize = 12;
 
-    /// Its numbers in the order they are sent: those of 8 bytes, then those of 4.
+    /// The numbers in the order of the record: those of 8 bytes, then those of 4.
     const fn numbers(&mut self) -> ([&mut u64; Self::WIDE], [&mut u32; Self::NARROW]) {
         let (pixels, blocks) = (&mut self.statistics, &mut self.blocks);
         let link = &mut self.link;
@@ -55,7 +55,7 @@ impl Report {
                 &mut self.cycles,
                 &mut self.unaddressed,
                 &mut pixels.counted,
-                &mut pixels.held,
+                &mut pixels.excluded,
                 &mut pixels.saturated,
                 &mut pixels.rejected,
                 &mut pixels.gated_out,
@@ -64,7 +64,7 @@ impl Report {
                 &mut pixels.expired,
                 &mut pixels.expired_deferred,
                 &mut blocks.counted,
-                &mut blocks.held,
+                &mut blocks.excluded,
                 &mut blocks.saturated,
                 &mut blocks.rejected,
                 &mut blocks.gated_out,
@@ -99,7 +99,7 @@ impl Report {
         let narrow = narrow.into_iter().flat_map(|number| number.to_le_bytes());
         let mut bytes = Vec::new();
         for byte in wide.chain(narrow).chain(last) {
-            // There is room for each. `collect` would panic otherwise.
+            // There is room for each. `collect` could panic.
             let _ = bytes.push(byte);
         }
         bytes

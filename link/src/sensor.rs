@@ -8,12 +8,11 @@ use crate::numbered::numbered;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct SensorRecord {
-    /// Its pixels have addresses below this.
+    /// The number of pixels; their addresses begin at 0.
     pub pixels: u16,
-    /// How wide its bins are, in picoseconds; `None` if as wide as the
-    /// configuration says.
+    /// The width of its bins in picoseconds; `None` if the configuration sets it.
     pub bin_width: Option<U16F16>,
-    /// The range of the start of bin 0 in millimetres, as far as it is known.
+    /// The range of the start of bin 0 in millimetres, if it is known, else 0.
     pub offset: I24F8,
     /// Laser cycles a second in thousandths, 0 if that is not known.
     pub laser_millihertz: u64,
@@ -45,7 +44,7 @@ impl SensorRecord {
         bytes
     }
 
-    /// Reads the record: the sensor, or that there is none. `None` if the length is
+    /// Reads the record: `Some(None)` if the device has no sensor, `None` if the length is
     /// wrong or a reserved byte is not 0.
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Option<Self>> {
@@ -69,27 +68,27 @@ impl SensorRecord {
 }
 
 numbered! {
-    /// The kind of a sensor's error. The drivers' own errors say more; each is of one
+    /// The kind of a sensor's error. The drivers' own errors have more detail; each has one
     /// of these kinds.
     FaultRecord {
-        /// Nobody is on the bus: unplugged, without power, or another address.
+        /// No chip answers on the bus: unplugged, without power, or at another address.
         NoAnswer = 1: "no answer",
-        /// The bus failed otherwise.
+        /// Another error of the bus.
         Bus = 2: "bus error",
         /// A pin failed.
         Pin = 3: "pin error",
-        /// Another chip, or another program on it, than the driver is for.
+        /// The driver is for another chip, or for another program on it.
         WrongChip = 4: "wrong chip or program",
-        /// The sensor does not take a command or a setting, or is never done with it.
-        NotTaken = 5: "command or setting not taken",
-        /// No data in time: the laser or its START does not come, or the sensor is
-        /// gone.
+        /// The sensor rejects a command or a setting, or never completes it.
+        Rejected = 5: "command or setting not taken",
+        /// No data in time: the laser or its START signal is missing, or the sensor is
+        /// unplugged.
         Timeout = 6: "no data in time",
-        /// The interrupt pin stays active for no reason the sensor names.
+        /// The interrupt pin stays active, and the sensor reports no reason.
         StuckInterrupt = 7: "stuck interrupt",
-        /// The sensor has to be loaded with its program, and there is none.
+        /// The sensor needs its program, and the firmware has none.
         NoImage = 8: "no image to load",
-        /// Data that cannot be. They are given up.
+        /// Impossible data, which are dropped.
         Data = 9: "damaged data",
     }
 }

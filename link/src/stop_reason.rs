@@ -1,20 +1,20 @@
-//! Why a device's sensor, and with it the laser, does not run.
+//! Why a device's sensor, and with it the laser, has stopped.
 
 use crate::numbered::numbered;
 
 numbered! {
     /// Why the sensor stopped last. Reasons from [`Self::Panic`] on are those of a reset: the
-    /// device has been started anew since, and its sensor is off until a host configures it.
+    /// device has restarted, and its sensor is off until a host configures it.
     StopReason {
-        /// A configuration took its place, or takes photons from the link.
+        /// Another configuration, possibly one with photons from the link.
         Configuration = 1: "another configuration",
-        /// A host began another session.
+        /// A host began a new session.
         NewSession = 2: "a new session",
         /// The host ended its session.
         EndOfSession = 3: "the host ended its session",
-        /// No frame of the host came for as long as the configuration allows.
+        /// No frame of the host arrived within the host timeout.
         Silence = 4: "the host was silent",
-        /// USB says that no program has the port open, or that the cable is unplugged.
+        /// No program has the USB port open, or the cable is unplugged.
         NotListening = 5: "the host closed the USB port",
         /// The firmware panicked.
         Panic = 6: "the firmware panicked",

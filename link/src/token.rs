@@ -3,30 +3,30 @@
 use heapless::Vec;
 
 /// One part of a photons message. Each message begins at pixel 0, and so does each
-/// laser cycle. No token reaches over the end of a message.
+/// laser cycle. A token never spans two messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Token {
-    /// A photon of the present pixel in the present laser cycle: one byte for
+    /// A photon of the current pixel in the current laser cycle: one byte for
     /// codes below 128, three for others.
     Photon {
         /// Its TDC code.
         code: u16,
     },
-    /// The present pixel is one farther on by `pixels`, 1 to 64: one byte.
+    /// Moves the current pixel on by `pixels`, 1 to 64: one byte.
     Advance {
-        /// How many.
+        /// The number of pixels.
         pixels: u8,
     },
-    /// The present laser cycle ends, and `cycles - 1` empty ones after it:
+    /// The current laser cycle ends, and `cycles - 1` empty ones after it:
     /// three bytes.
     EndOfCycles {
-        /// How many; none if 0.
+        /// The number of laser cycles; 0 ends none.
         cycles: u16,
     },
 }
 
 impl Token {
-    /// Bytes of the longest.
+    /// Bytes of the longest token.
     pub const MAX_BYTES: usize = 3;
     const ADVANCE: u8 = 0x80;
     const PHOTON: u8 = 0xc0;
@@ -49,8 +49,8 @@ impl Token {
         Vec::from_iter([first, low, high])
     }
 
-    /// The first token of `bytes` and the bytes after it; `None` if there is
-    /// none.
+    /// The first token of `bytes` and the bytes after it; `None` if `bytes` does not begin
+    /// with one.
     #[must_use]
     pub fn split_first(bytes: &[u8]) -> Option<(Self, &[u8])> {
         let (&first, rest) = bytes.split_first()?;

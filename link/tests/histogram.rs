@@ -12,9 +12,9 @@ mod common;
 use common::golden;
 
 const HEAD: HistogramHead = HistogramHead {
-    pixel: PixelAddress(3),
+    pixel: PixelAddress::new(3),
     is_whole: false,
-    cycle: LaserCycle(1000),
+    cycle: LaserCycle::new(1000),
     exposure: 40,
 };
 
@@ -85,7 +85,7 @@ fn the_ends_send_the_golden_frames() {
     let [histogram] = &bodies(HEAD, &[0, 1, 2, 5, 7, 2, 1, 0])[..] else {
         panic!("more than one message");
     };
-    let none = NoHistogram::NoPixel.message(PixelAddress(300));
+    let none = NoHistogram::NoPixel.message(PixelAddress::new(300));
     device.offer(HISTOGRAM, histogram).unwrap();
     device.offer(HISTOGRAM, &none).unwrap();
     let sent = [next(&mut host), next(&mut device), next(&mut device)];
@@ -102,7 +102,7 @@ proptest! {
         width in 1u32..=24, seed: u64,
     ) {
         let head = HistogramHead {
-            pixel: PixelAddress(pixel), is_whole, cycle: LaserCycle(cycle), exposure,
+            pixel: PixelAddress::new(pixel), is_whole, cycle: LaserCycle::new(cycle), exposure,
         };
         let mut random = seed;
         let counts: Vec<u32> = (0..8 * eights)

@@ -1,10 +1,11 @@
 //! The golden frames of `docs/link-format.md`, and what a receiver makes of
 //! bytes that are no frames.
 
+use dtof_core::events::Reference;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
     AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule,
-    Reference, WindowRule,
+    WindowRule,
 };
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, FrameError, PAYLOAD_BYTES, WIRE_BYTES, encode};
@@ -93,7 +94,7 @@ fn a_host_configures_with_the_golden_frame() {
         }),
         tracking: true,
         echoes: EchoNumber::new(2).unwrap(),
-        peel_reach: 4,
+        echo_guard_bins: 4,
         echo_wait: 8,
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::lit("-179.5"),
@@ -143,7 +144,7 @@ fn what_is_too_long_is_named_so() {
     assert_eq!(found, Some(Some(FrameError::Oversized)));
 }
 
-/// Every choice with any numbers; x, gate and the like are checked by the device.
+/// Any rule, estimator and source with any numbers. Only a device checks numbers such as X and the gate.
 fn configuration() -> impl Strategy<Value = Configuration> {
     let count = || (1u32..=1023).prop_map(Count::saturating);
     let paper = (any::<u16>(), count())
@@ -184,10 +185,20 @@ fn configuration() -> impl Strategy<Value = Configuration> {
         ),
     )
         .prop_map(
-            |(rule, estimator, dynamic_depth, source, binning, echoes, plain, words, range)| {
-                let [x, l1, l2, first, last, pixels, columns] = words;
-                let (one_hit_tdc, tracking, [peel_reach, echo_wait]) = plain;
-                let (width, offset, host_timeout_ms) = range;
+            |(
+                rule,
+                estimator,
+                dynamic_depth,
+                source,
+                binning,
+                echoes,
+                flags_and_bytes,
+                numbers,
+                wide_numbers,
+            )| {
+                let [x, l1, l2, first, last, pixels, columns] = numbers;
+                let (one_hit_tdc, tracking, [echo_guard_bins, echo_wait]) = flags_and_bytes;
+                let (width, offset, host_timeout_ms) = wide_numbers;
                 Configuration {
                     rule,
                     estimator,
@@ -201,7 +212,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                     binning,
                     tracking,
                     echoes,
-                    peel_reach,
+                    echo_guard_bins,
                     echo_wait,
                     bin_width_ps: U16F16::from_bits(width),
                     offset_mm: I24F8::from_bits(offset),
@@ -254,9 +265,9 @@ proptest! {
     ) {
         let mut bytes = numbers;
         bytes[2..4].copy_from_slice(&minimum_count.to_le_bytes());
-        let [source, estimator, output, reference, hits, tracking] = choices;
+        let [source, estimator, dynamic_depth, reference, hits, tracking] = choices;
         for (at, value) in [
-            (24, source), (25, rule), (26, width), (29, estimator), (34, output),
+            (24, source), (25, rule), (26, width), (29, estimator), (34, dynamic_depth),
             (35, reference), (40, hits), (43, levels), (46, tracking), (47, echoes),
         ] {
             bytes[at] = value;
@@ -271,8 +282,8 @@ proptest! {
         }
         let found = Configuration::from_le_bytes(&bytes);
         let is_off_limits = host_timeout != 0 && !(200..=60_000).contains(&host_timeout);
-        let unknown = source == 2 || rule == 3 || estimator == 2 || output == 2 || hits == 2
-            || (output == 1 && reference == 2)
+        let unknown = source == 2 || rule == 3 || estimator == 2 || dynamic_depth == 2 || hits == 2
+            || (dynamic_depth == 1 && reference == 2)
             || levels == 4 || tracking == 2 || !(1..=4).contains(&echoes);
         prop_assert_eq!(
             found.is_err(),

@@ -47,16 +47,18 @@ fn the_readme_says_what_a_message_takes() {
 
 #[test]
 fn a_report_lies_as_the_document_says() {
-    let statistics = |first| Statistics {
-        counted: first,
-        held: first + 1,
-        saturated: first + 2,
-        rejected: first + 3,
-        gated_out: first + 4,
-        events: first + 5,
-        deferred: first + 6,
-        expired: first + 7,
-        expired_deferred: first + 8,
+    let statistics = |first| {
+        let mut statistics = Statistics::new();
+        statistics.counted = first;
+        statistics.excluded = first + 1;
+        statistics.saturated = first + 2;
+        statistics.rejected = first + 3;
+        statistics.gated_out = first + 4;
+        statistics.events = first + 5;
+        statistics.deferred = first + 6;
+        statistics.expired = first + 7;
+        statistics.expired_deferred = first + 8;
+        statistics
     };
     let report = Report {
         cycles: 1,

@@ -22,7 +22,7 @@ use dtof_sensors::{PhotonSink, Sensor};
 const BIN_WIDTH: U16F16 = U16F16::lit("250");
 const SENSOR: Config = checked!(Config::new(Settings {
     first_bin_ps: 240_000,
-    ..Settings::new(PixelAddress(0), 8_000, BIN_WIDTH)
+    ..Settings::new(PixelAddress::new(0), 8_000, BIN_WIDTH)
 }));
 const PIXEL: PixelConfig<128> = checked!(PixelConfig::paper().one_hit_tdc(true).build());
 
@@ -43,10 +43,10 @@ impl PhotonSink for Macropixel {
 
     fn end_laser_cycles(&mut self, cycles: u16) {
         self.cycle += u64::from(cycles);
-        let last = LaserCycle(self.cycle - 1);
+        let last = LaserCycle::new(self.cycle - 1);
         let statistics = &mut self.statistics;
         (self.pixel).end_laser_cycles(&PIXEL, statistics, last, cycles);
-        if let Some(event) = self.pixel.acknowledge() {
+        if let Some(event) = self.pixel.take_event() {
             self.range = Some(self.scale.range(event.position()));
         }
     }
@@ -59,9 +59,9 @@ impl PhotonSink for Macropixel {
 fn main() {
     let bus = chip::Chip::default();
     let mut sensor = Tdc7200::<_, _, _>::new(bus, pin::Low, pin::Low, SENSOR);
-    let scale = RangeScale::new(BIN_WIDTH, sensor.about().offset);
+    let scale = RangeScale::new(BIN_WIDTH, sensor.info().offset);
     let mut sink = Macropixel {
-        pixel: AsyncPixel::new(PixelAddress(0)),
+        pixel: AsyncPixel::new(PixelAddress::new(0)),
         statistics: Statistics::new(),
         cycle: 0,
         scale: scale.expect("128 bins of 250 ps fit"),

@@ -18,7 +18,10 @@ use dtof_sensors::{PhotonSink, Sensor, Target};
 
 // Checked when compiled: the zones are pixels 0 to 63, each decided by the paper's rule in the bins
 // that this preset measures.
-const SENSOR: Config = checked!(Config::new(Settings::new(PixelAddress(0), Zones::Z8x8)));
+const SENSOR: Config = checked!(Config::new(Settings::new(
+    PixelAddress::new(0),
+    Zones::Z8x8
+)));
 const MEASURED: RangeGate<128> = checked!(RangeGate::new(0, 53));
 const ZONE: PixelConfig<128> = checked!(PixelConfig::paper().gate(MEASURED).build());
 
@@ -48,22 +51,22 @@ impl PhotonSink for Seen {
         let mut histogram = Histogram::<128, Count24>::new();
         histogram.add_frame(counts, ZONE.gate());
         let detection = ZONE.detect(&histogram);
-        let zone = &mut self.zones[usize::from(pixel.0)];
+        let zone = &mut self.zones[usize::from(pixel.raw())];
         zone.range = detection.map(|found| self.scale.range(found.position()));
     }
 
     fn target(&mut self, pixel: PixelAddress, target: &Target) {
-        self.zones[usize::from(pixel.0)].of_sensor = Some(target.distance);
+        self.zones[usize::from(pixel.raw())].of_sensor = Some(target.distance);
     }
 }
 
 fn main() {
     let bus = chip::Chip::default();
     let mut sensor = Tmf8829::<_, _, _>::new(bus, pin::Low, pin::Low, PROGRAM, SENSOR);
-    let about = sensor.about();
-    assert_eq!(about.bins, 54);
-    let bin_width = about.bin_width.expect("the sensor has bins of its own");
-    let scale = RangeScale::new(bin_width, about.offset).expect("its ranges fit");
+    let info = sensor.info();
+    assert_eq!(info.bins, 54);
+    let bin_width = info.bin_width.expect("the sensor has bins of its own");
+    let scale = RangeScale::new(bin_width, info.offset).expect("its ranges fit");
     let none = || Zone {
         range: None,
         of_sensor: None,

@@ -17,7 +17,7 @@ use dtof_sensors::tmf882x::{Config, Settings, Tmf882x};
 use dtof_sensors::{PhotonSink, Sensor};
 
 // Checked when compiled: the zones are pixels 0 to 8, each decided by the paper's rule.
-const SENSOR: Config = checked!(Config::new(Settings::new(PixelAddress(0))));
+const SENSOR: Config = checked!(Config::new(Settings::new(PixelAddress::new(0))));
 const ZONE: PixelConfig<128> = checked!(PixelConfig::paper().build());
 
 /// The vendor's program for the sensor, which the driver loads after power-up. The
@@ -42,7 +42,7 @@ impl PhotonSink for Zones {
         let mut histogram = Histogram::<128, Count24>::new();
         histogram.add_frame(counts, ZONE.gate());
         let detection = ZONE.detect(&histogram);
-        self.ranges[usize::from(pixel.0)] =
+        self.ranges[usize::from(pixel.raw())] =
             detection.map(|found| self.scale.range(found.position()));
     }
 }
@@ -50,14 +50,14 @@ impl PhotonSink for Zones {
 fn main() {
     let bus = chip::Chip::default();
     let mut sensor = Tmf882x::<_, _, _>::new(bus, pin::Low, pin::Low, PROGRAM, SENSOR);
-    let about = sensor.about();
-    let bin_width = about.bin_width.expect("the sensor has bins of its own");
-    let scale = RangeScale::new(bin_width, about.offset).expect("its ranges fit");
+    let info = sensor.info();
+    let bin_width = info.bin_width.expect("the sensor has bins of its own");
+    let scale = RangeScale::new(bin_width, info.offset).expect("its ranges fit");
     let mut sink = Zones {
         scale,
         ranges: [None; 9],
     };
-    // As a main loop that a timer wakes each millisecond, and INT as well.
+    // A main loop would poll each millisecond and after each edge of INT.
     for now_ms in 0..100 {
         if let Err(error) = sensor.poll(now_ms, &mut sink) {
             print_line!("{error}");

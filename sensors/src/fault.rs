@@ -2,29 +2,29 @@
 
 use core::convert::Infallible;
 
-/// The kind of a sensor's error. The drivers' own errors say more; each is of one
-/// of these kinds.
+/// The kind of a sensor's error. The error of a driver has more detail.
+///
+/// It is exhaustive on purpose: a program that reports faults has to name each of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum SensorFault {
-    /// Nobody is on the bus: unplugged, without power, or another address.
+    /// No device answers: it is unplugged, has no power, or has another address.
     NoAnswer,
     /// The bus failed otherwise.
     Bus,
     /// A pin failed.
     Pin,
-    /// Another chip, or another program on it, than the driver is for.
+    /// The chip, or the program on it, is not one that the driver supports.
     WrongChip,
-    /// The sensor does not take a command or a setting, or is never done with it.
-    NotTaken,
-    /// No data in time: the laser or its START does not come, or the sensor is
-    /// gone.
+    /// The sensor rejects a command or a setting, or never completes it.
+    Rejected,
+    /// No data in time: the laser or its START is missing, or the sensor is gone.
     Timeout,
-    /// The interrupt pin stays active for no reason the sensor names.
+    /// The interrupt pin stays active, but the status register names no reason.
     StuckInterrupt,
-    /// The sensor has to be loaded with its program, and there is none.
+    /// The sensor needs a program image, and the driver has none.
     NoImage,
-    /// Data that cannot be. They are given up.
+    /// The data are invalid and were dropped.
     Data,
 }
 

@@ -1,10 +1,9 @@
 //! An I²C bus on two pins, made by software, which never waits without a limit.
 //!
-//! The drivers of chip crates wait for a bus that nothing pulls up for as long
-//! as the sensor is unplugged; here every wait ends. Any two open-drain pins that
-//! can be read back will do. The processor has nothing else to do while a byte is
-//! on the wire, as with a blocking driver of a peripheral; interrupts only make
-//! the clock slower, which I²C allows.
+//! The I²C drivers of chip crates wait without end on a bus that nothing pulls up, which is the case
+//! while the sensor is unplugged. Here every wait ends. Any two open-drain pins that can be read
+//! back will do. The processor is busy while a byte is on the wire, as with any blocking driver.
+//! Interrupts only make the clock slower, which I²C allows.
 //!
 //! The times are those of fast mode in NXP's UM10204, table 10: at most 400 kHz,
 //! SCL low for at least 1.3 µs.
@@ -23,18 +22,16 @@ const HOLD_NS: u32 = 300;
 /// SCL high; with `LOW_NS` the period of 400 kHz. Hold and set-up times of START
 /// and STOP are shorter.
 const HIGH_NS: u32 = 1200;
-/// SCL rises as fast as its resistor charges the wire; it is looked at this often
-/// until it is high, and its time high counts from then on.
-const RISE_LOOK_NS: u32 = 100;
-/// After so many looks, a microsecond, a device holds it: one that is not ready.
-/// Then it is looked at after each `LOW_NS`.
-const RISE_LOOKS: u32 = 10;
-/// The time that devices may hold SCL low in a transaction, all bits together. `SMBus`
-/// allows as much in a message (`T_LOW:SEXT`). The pauses are counted, not the looks
-/// between them.
-const HELD_NS: u32 = 25_000_000;
-/// Clocks after which a device that was interrupted while it sent has let go of
-/// SDA (UM10204, section 3.1.16 "Bus clear").
+/// The pull-up resistor decides how fast SCL rises. It is read at this interval until it is high;
+/// its high time begins then.
+const RISE_POLL_NS: u32 = 100;
+/// After so many reads, a microsecond, a device is stretching the clock. From then on SCL is read
+/// every `LOW_NS`.
+const RISE_POLLS: u32 = 10;
+/// The longest time that devices may stretch the clock in a transaction, all bits together: the
+/// `T_LOW:SEXT` of `SMBus`. Only the pauses count, not the reads between them.
+const STRETCH_NS: u32 = 25_000_000;
+/// Clocks after which an interrupted device has released SDA (UM10204, section 3.1.16 "Bus clear").
 const CLEAR: u32 = 9;
 
 /// A bus with one controller. `SCL` and `SDA` are open-drain outputs that can be
@@ -44,24 +41,24 @@ pub struct SoftwareI2c<SCL, SDA, D> {
     scl: SCL,
     sda: SDA,
     delay: D,
-    /// The rest of `HELD_NS` in this transaction.
-    held_left_ns: u32,
+    /// The rest of `STRETCH_NS` in this transaction.
+    stretch_left_ns: u32,
 }
 
 /// An error of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Error {
     /// No device acknowledges its address.
     NoDevice,
     /// The device does not acknowledge a byte.
-    NotTaken,
-    /// SCL stays low: devices have held it for 25 ms of a transaction, or nothing
-    /// pulls it up.
+    NotAcknowledged,
+    /// SCL stays low: devices have stretched the clock for 25 ms of a transaction, or nothing pulls
+    /// it up.
     ClockLow,
-    /// SDA stays low: a device holds it through a bus clear or does not give it
-    /// free for START or STOP, or nothing pulls it up. Bytes read before are not
-    /// the device's.
+    /// SDA stays low: a device holds it through a bus clear or does not release it for START or
+    /// STOP, or nothing pulls it up. Bytes read before are invalid.
     DataLow,
     /// A pin failed.
     Pin,
@@ -71,7 +68,7 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::NoDevice => "no device acknowledges its address",
-            Self::NotTaken => "a byte is not acknowledged",
+            Self::NotAcknowledged => "a byte is not acknowledged",
             Self::ClockLow => "SCL stays low",
             Self::DataLow => "SDA stays low",
             Self::Pin => "a pin failed",
@@ -85,7 +82,7 @@ impl i2c::Error for Error {
     fn kind(&self) -> i2c::ErrorKind {
         match self {
             Self::NoDevice => i2c::ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address),
-            Self::NotTaken => i2c::ErrorKind::NoAcknowledge(NoAcknowledgeSource::Data),
+            Self::NotAcknowledged => i2c::ErrorKind::NoAcknowledge(NoAcknowledgeSource::Data),
             Self::ClockLow | Self::DataLow => i2c::ErrorKind::Bus,
             Self::Pin => i2c::ErrorKind::Other,
         }
@@ -100,13 +97,13 @@ where
     SDA: InputPin + OutputPin,
     D: DelayNs,
 {
-    /// A bus that is not touched yet; both pins are high.
+    /// A bus that is not in use yet; both pins are high.
     pub const fn new(scl: SCL, sda: SDA, delay: D) -> Self {
         Self {
             scl,
             sda,
             delay,
-            held_left_ns: HELD_NS,
+            stretch_left_ns: STRETCH_NS,
         }
     }
 
@@ -123,21 +120,21 @@ where
         self.sda.is_high().map_err(|_| Error::Pin)
     }
 
-    /// The rest of SCL's time low before, its time high after.
-    // Once in an image, not once a bit, byte and access: it takes its time anyhow.
+    /// Waits for the rest of SCL's low time, raises it, and waits for its high time.
+    // Not inlined to save flash: its speed does not matter.
     #[inline(never)]
     fn raise_scl(&mut self) -> Result {
         self.delay.delay_ns(LOW_NS - HOLD_NS);
         self.scl.set_high().map_err(|_| Error::Pin)?;
-        let mut looks = 0;
+        let mut polls = 0;
         while self.scl.is_low().map_err(|_| Error::Pin)? {
-            let mut pause_ns = RISE_LOOK_NS;
-            if looks == RISE_LOOKS {
+            let mut pause_ns = RISE_POLL_NS;
+            if polls == RISE_POLLS {
                 pause_ns = LOW_NS;
-                let left = self.held_left_ns.checked_sub(pause_ns);
-                self.held_left_ns = left.ok_or(Error::ClockLow)?;
+                let left = self.stretch_left_ns.checked_sub(pause_ns);
+                self.stretch_left_ns = left.ok_or(Error::ClockLow)?;
             } else {
-                looks += 1;
+                polls += 1;
             }
             self.delay.delay_ns(pause_ns);
         }
@@ -152,7 +149,7 @@ where
         Ok(())
     }
 
-    /// SDA is to be high: nobody else drives it here.
+    /// Fails if SDA is low where no device may drive it.
     fn check_sda(&mut self) -> Result {
         if self.sda()? {
             Ok(())
@@ -170,7 +167,7 @@ where
         Ok(bit)
     }
 
-    /// START on a bus that is free, or is cleared.
+    /// START, with a bus clear if SDA is low.
     fn start(&mut self) -> Result {
         self.set_sda(true)?;
         self.raise_scl()?;
@@ -219,7 +216,7 @@ where
         Ok(!self.clock()?)
     }
 
-    /// The last byte is not acknowledged, so that the device gives SDA free.
+    /// Does not acknowledge the last byte, so that the device releases SDA.
     fn read_byte(&mut self, is_last: bool) -> Result<u8> {
         self.set_sda(true)?;
         let mut byte = 0;
@@ -239,12 +236,12 @@ where
         }
     }
 
-    /// Operations of one kind after another need no START between them.
+    /// Runs the operations. Those of the same kind need no START between them.
     #[inline(never)]
     fn run(&mut self, address: u8, operations: &mut [Operation<'_>]) -> Result {
         let mut before = None;
         let mut rest = operations.iter_mut().filter(|operation| {
-            // Nothing to read is nothing to do; nothing to write asks for a device.
+            // An empty read does nothing. An empty write tests whether the device answers.
             !matches!(operation, Operation::Read(buffer) if buffer.is_empty())
         });
         let mut next = rest.next();
@@ -264,7 +261,7 @@ where
                 Operation::Write(bytes) => {
                     for &byte in *bytes {
                         if !self.write_byte(byte)? {
-                            return Err(Error::NotTaken);
+                            return Err(Error::NotAcknowledged);
                         }
                     }
                 }
@@ -295,13 +292,13 @@ where
     SDA: InputPin + OutputPin,
     D: DelayNs,
 {
-    /// An operation that reads nothing is left out. After an error the bus is
-    /// free again, if it can be. The error is the first, whatever comes of that.
+    /// Skips operations that read nothing. After an error it releases the bus, and returns the
+    /// first error even if that fails.
     fn transaction(&mut self, address: u8, operations: &mut [Operation<'_>]) -> Result {
-        self.held_left_ns = HELD_NS;
+        self.stretch_left_ns = STRETCH_NS;
         let done = self.run(address, operations);
         let ended = match done {
-            Err(Error::NoDevice | Error::NotTaken) => self.stop(),
+            Err(Error::NoDevice | Error::NotAcknowledged) => self.stop(),
             _ => done,
         };
         if ended.is_err() {

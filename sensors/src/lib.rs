@@ -1,12 +1,13 @@
 #![doc = include_str!("../README.md")]
 //! ## After an error
 //!
-//! Each [`Sensor::poll`] keeps in the driver's state what it waits for; the time is an
-//! argument. So a sensor that is unplugged or hangs costs its own error every few
-//! milliseconds and nobody else's time. Every error leaves the driver usable: the next
+//! A driver keeps in its state what it waits for, and the time is an argument of
+//! [`Sensor::poll`]. A sensor that is unplugged or hangs therefore costs one error every few
+//! milliseconds and blocks nothing else. Every error leaves the driver usable: the next
 //! polls bring the sensor up again.
 
 #![no_std]
+#![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 #![deny(
     clippy::expect_used,
@@ -22,6 +23,7 @@ pub mod protocol;
 pub mod simulated;
 pub mod tdc7200;
 mod timer;
+pub mod tmf;
 pub mod tmf8829;
 pub mod tmf882x;
 
@@ -36,94 +38,93 @@ pub trait PhotonSink {
     fn photon(&mut self, pixel: PixelAddress, code: u16);
     /// The present laser cycle and `cycles - 1` empty ones after it have ended.
     fn end_laser_cycles(&mut self, cycles: u16);
-    /// `cycles` laser cycles have ended, at least one, and the sensor has integrated them:
-    /// the histograms that follow are of them.
+    /// The sensor has integrated `cycles` laser cycles, at least one. The histograms that follow
+    /// are of these cycles.
     fn begin_frame(&mut self, cycles: u32);
-    /// A whole histogram of `pixel`, of the frame that was begun last.
+    /// A whole histogram of `pixel` of the frame that began last.
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]);
-    /// What the sensor itself takes for a target of `pixel`, to compare with. Only some sensors
-    /// say it.
+    /// A target of `pixel` that the sensor itself has found, for comparison. Only some sensors
+    /// report targets.
     fn target(&mut self, _pixel: PixelAddress, _target: &Target) {}
 }
 
-/// A target as a sensor's own program sees it.
+/// A target that the sensor's own program has found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Target {
-    /// Of the targets of its pixel, from 0 on.
+    /// Its number among the targets of its pixel, from 0.
     pub number: u8,
     /// Millimetres along the ray.
     pub distance: I24F8,
-    /// How sure the sensor is, as it says it.
+    /// The sensor's confidence, on its own scale.
     pub confidence: u8,
-    /// Photons of the target, if that is said.
+    /// Photons of the target, if the sensor reports them.
     pub signal: Option<u32>,
-    /// Photons of a bin without one.
+    /// Photons of a bin without a target, if reported.
     pub noise: Option<u32>,
-    /// Photons of the crosstalk.
+    /// Photons of the crosstalk, if reported.
     pub crosstalk: Option<u32>,
 }
 
-/// A sensor that is asked when its interrupt pin (or a timer) says so; never
-/// blocks longer than its bus transfers.
+/// A sensor that is polled. A poll never blocks longer than its bus transfers.
 ///
-/// Ask on every edge of the interrupt pin and once a millisecond besides:
-/// bringing a sensor up and noticing that it is gone take the timer. Ask again
-/// at once while the answer is not [`Polled::Idle`], but not without a bound: a
-/// fast sensor may always have more.
+/// Poll on every edge of the interrupt pin and also once a millisecond: the timer brings a sensor
+/// up and notices that it is gone. Poll again at once while the answer is not [`Polled::Idle`], up
+/// to a limit: a fast sensor may always have more.
 pub trait Sensor {
-    /// The driver's error, with that of the bus inside. A host is told the kind.
+    /// The driver's error, which contains that of the bus. The host receives its kind.
     type Error: Into<SensorFault>;
 
     /// The description for a host.
-    fn about(&self) -> About;
+    fn info(&self) -> SensorInfo;
 
-    /// Whether it gives the first photon of a laser cycle only, so that at high rates
-    /// early photons hide late ones. Events then say so:
+    /// Whether it gives only the first photon of a laser cycle, so that at high rates
+    /// early photons hide late ones. Events then carry a flag:
     /// [`PixelConfig::with_one_hit_tdc`](dtof_core::PixelConfig::with_one_hit_tdc).
     fn is_one_hit(&self) -> bool {
         false
     }
 
-    /// A configuration comes into force: whatever is under way is given up, and
-    /// what the next polls give begins anew. A sensor that measures times makes its
-    /// TDC codes `bin_width` picoseconds wide, which is above 0; for one with bins
-    /// of its own it is about theirs.
+    /// Starts with a new configuration. The driver abandons the present measurement and begins
+    /// again. A sensor that measures times makes its TDC codes `bin_width` picoseconds wide, which
+    /// is above 0. A sensor with bins of its own ignores it.
     fn start(&mut self, bin_width: U16F16);
 
-    /// Nothing is asked before the next [`Self::start`]: as far as it can at once
-    /// and without an answer, the sensor rests.
+    /// Stops the sensor, as far as that is possible at once and without an answer. It is not polled
+    /// before the next [`Self::start`].
     fn stop(&mut self);
 
     /// Takes the next step. `now_ms` counts milliseconds and may wrap.
     ///
     /// # Errors
-    /// The error of this step. The next polls bring the sensor up again.
+    /// Fails if this step fails. The next polls bring the sensor up again.
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Self::Error>;
 }
 
 /// The description of a sensor for a host.
+///
+/// Exhaustive, because drivers in other crates build it from its fields.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct About {
+pub struct SensorInfo {
     /// Its pixels have addresses below this.
     pub pixels: u16,
-    /// How wide its bins are, in picoseconds; `None` if as wide as the
-    /// configuration says.
+    /// The width of its bins in picoseconds; `None` if the configuration sets it.
     pub bin_width: Option<U16F16>,
-    /// Bins that can hold photons. Those behind them are not measured.
+    /// Bins that can hold photons. Later bins are not measured.
     pub bins: u16,
-    /// The range of the start of bin 0 in millimetres, as far as it is known.
+    /// The range of the start of bin 0 in millimetres; 0 if unknown.
     pub offset: I24F8,
     /// It gives whole histograms, not photons.
-    pub is_whole: bool,
-    /// Laser cycles that it gives in a thousand seconds; 0 if that is not known. Of a sensor
-    /// that pauses between measurements it is the mean: laser cycle ÷ rate is a time.
+    pub gives_histograms: bool,
+    /// Laser cycles in a thousand seconds; 0 if unknown. If the sensor pauses between measurements
+    /// this is the mean rate, so that laser cycle ÷ rate is a time.
     pub laser_millihertz: u64,
 }
 
-impl About {
-    /// Bins of any width, from the laser pulse on, of a laser whose rate is not known.
+impl SensorInfo {
+    /// A sensor of photons with 128 bins of any width from the laser pulse on and an unknown laser
+    /// rate.
     #[must_use]
     pub const fn new(pixels: u16) -> Self {
         Self {
@@ -131,13 +132,13 @@ impl About {
             bin_width: None,
             bins: 128,
             offset: I24F8::ZERO,
-            is_whole: false,
+            gives_histograms: false,
             laser_millihertz: 0,
         }
     }
 
-    /// Whether bins of the width of a configuration are this sensor's: within a
-    /// sixteenth, which leaves room for a calibration.
+    /// Whether `bin_width` is the width of this sensor's bins, within a sixteenth. This leaves room
+    /// for a calibration.
     #[must_use]
     pub fn has_bins_of(&self, bin_width: U16F16) -> bool {
         self.bin_width

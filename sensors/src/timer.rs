@@ -14,8 +14,8 @@ impl Since {
         now_ms.wrapping_sub(self.0)
     }
 
-    /// Whether `wait` milliseconds are certainly over. The clock may have
-    /// ticked right after the beginning, so one tick more is waited for.
+    /// Whether `wait` milliseconds have certainly passed. The clock may have ticked right after the
+    /// beginning, so this takes one tick more.
     pub(crate) const fn is_over(self, wait: u32, now_ms: u32) -> bool {
         self.elapsed(now_ms) > wait
     }

@@ -9,10 +9,11 @@ use std::rc::Rc;
 use std::task::{Context, Poll, Waker};
 
 use common::tmf8828;
-use common::tmf8829::Chip;
-use common::tmf8829::bench::{IMAGE, settings, some};
+use common::tmf8829::bench::{IMAGE, settings};
 use common::tmf8829::bus::{Bus, Fault};
-use common::{Given, Notes};
+use common::{RecordingSink, SinkCall};
+use dtof_chips::tmf8829::varied_counts;
+use dtof_chips::{Chip as _, Tmf8829 as Chip};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::tmf882x::{self, Tmf882x};
@@ -64,7 +65,7 @@ fn run<T>(future: impl Future<Output = T>) -> (T, u32) {
 #[test]
 fn an_awaited_tmf8829_makes_the_same_transfers() {
     let config = Config::new(settings(Zones::Z8x8)).unwrap();
-    let buses = [(); 2].map(|()| Bus::new(Chip::new(&IMAGE, some())));
+    let buses = [(); 2].map(|()| Bus::new(Chip::new(&IMAGE, varied_counts())));
     let [blocking, waiting] = &buses;
     let pins = |bus: &Bus| (bus.clone(), bus.clone());
     let (interrupt, enable) = pins(blocking);
@@ -72,7 +73,7 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
     let (interrupt, enable) = pins(waiting);
     let slow = Slow(waiting.clone());
     let mut awaited = Tmf8829::<_, _, _>::new(slow, interrupt, enable, &IMAGE, config);
-    let mut sinks = [(); 2].map(|()| Notes::default());
+    let mut sinks = [(); 2].map(|()| RecordingSink::default());
     let mut data = 0;
     for now_ms in 0..3000 {
         // Each fault on the way up and while it measures.
@@ -115,10 +116,10 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
 #[test]
 fn a_poll_that_is_dropped_costs_its_frame() {
     let config = Config::new(settings(Zones::Z8x8)).unwrap();
-    let bus = Bus::new(Chip::new(&IMAGE, some()));
+    let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
     let slow = Slow(bus.clone());
     let mut sensor = Tmf8829::<_, _, _>::new(slow, bus.clone(), bus.clone(), &IMAGE, config);
-    let mut sink = Notes::default();
+    let mut sink = RecordingSink::default();
     let mut dropped = 0;
     for now_ms in 0..3000 {
         if now_ms % 400 == 399 {
@@ -138,12 +139,12 @@ fn a_poll_that_is_dropped_costs_its_frame() {
     let measurements = bus.0.borrow().chip.sent.len() / 3 + 1;
     let mut histograms = 0;
     for given in sink.take() {
-        let Given::Histogram(pixel, counts) = given else {
+        let SinkCall::Histogram(pixel, counts) = given else {
             continue;
         };
         let zone = usize::from(pixel - 10);
         let is_right = |measurement| {
-            let scene = some()(measurement, Some((zone % 8, zone / 8)), 256);
+            let scene = varied_counts()(measurement, Some((zone % 8, zone / 8)), 256);
             scene[..128] == counts
         };
         let measurements = u32::try_from(measurements).unwrap();
@@ -155,14 +156,14 @@ fn a_poll_that_is_dropped_costs_its_frame() {
 
 #[test]
 fn an_awaited_tmf8828_gives_the_same() {
-    let config = tmf882x::Config::new(tmf882x::Settings::of_8x8(PixelAddress(10))).unwrap();
+    let config = tmf882x::Config::new(tmf882x::Settings::of_8x8(PixelAddress::new(10))).unwrap();
     let chips = [(); 2].map(|()| Rc::new(RefCell::new(tmf8828::Chip::new(0))));
     let [one, other] = [0, 1].map(|at: usize| tmf8828::Bus(Rc::clone(&chips[at])));
     let (interrupt, enable) = (one.clone(), one.clone());
     let mut sensor = Tmf882x::<_, _, _>::new(one, interrupt, enable, &[], config);
     let (interrupt, enable) = (other.clone(), other.clone());
     let mut awaited = Tmf882x::<_, _, _>::new(Slow(other), interrupt, enable, &[], config);
-    let mut sinks = [(); 2].map(|()| Notes::default());
+    let mut sinks = [(); 2].map(|()| RecordingSink::default());
     let mut histograms = 0;
     for now_ms in 0..1000 {
         for chip in &chips {
@@ -176,7 +177,7 @@ fn an_awaited_tmf8828_gives_the_same() {
         assert_eq!(pending, 3 * (chips[1].borrow().transfers - before));
         let given = first.take();
         assert_eq!(given, second.take());
-        let is_histogram = |given: &&Given| matches!(given, Given::Histogram(..));
+        let is_histogram = |given: &&SinkCall| matches!(given, SinkCall::Histogram(..));
         histograms += given.iter().filter(is_histogram).count();
     }
     assert!(histograms > 100, "{histograms}");

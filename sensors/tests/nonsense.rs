@@ -4,11 +4,11 @@
 
 mod common;
 
-use std::cell::{Cell, RefCell};
+use std::cell::{Cell, RefCell, RefMut};
 use std::rc::Rc;
 
-use common::chips::{tdc7200::Chip as TdcChip, tmf882x::Chip as TmfChip};
-use common::{Given, Line, Notes};
+use common::{Line, RecordingSink, SinkCall};
+use dtof_chips::{Chip, Tdc7200 as TdcChip, Tmf882x as TmfChip};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::tdc7200::{self, Calibration, CalibrationPeriods, Tdc7200};
@@ -26,26 +26,37 @@ type Seen = (u8, Option<Vec<u8>>);
 /// A bus with a sensor that answers nonsense once in so many transfers, never if 0. Clones are
 /// the same bus.
 #[derive(Clone)]
-struct Bus<Chip> {
-    chip: Rc<RefCell<Chip>>,
+struct Bus<C> {
+    chip: Rc<RefCell<C>>,
     rng: Rc<RefCell<Pcg32>>,
     one_in: Rc<Cell<u32>>,
     interrupt: Line,
+    enable: Line,
     /// Of this poll.
     seen: Rc<RefCell<Vec<Seen>>>,
     transfers: Rc<Cell<u32>>,
 }
 
-impl<Chip: Default> Bus<Chip> {
+impl<C: Chip + Default> Bus<C> {
     fn new(seed: u64, one_in: u32) -> Self {
         Self {
             chip: Rc::default(),
             rng: Rc::new(RefCell::new(Pcg32::seed_from_u64(seed))),
             one_in: Rc::new(Cell::new(one_in)),
             interrupt: Line::new(true),
+            enable: Line::new(false),
             seen: Rc::default(),
             transfers: Rc::default(),
         }
+    }
+
+    /// The chip. It forgets everything when ENABLE was low since the last transfer.
+    fn chip(&self) -> RefMut<'_, C> {
+        let mut chip = self.chip.borrow_mut();
+        if self.enable.driven.take().contains(&false) {
+            chip.reset();
+        }
+        chip
     }
 
     fn chance(&self, one_in: u32) -> bool {
@@ -98,13 +109,16 @@ impl spi::SpiDevice for Bus<TdcChip> {
         &mut self,
         operations: &mut [spi::Operation<'_, u8>],
     ) -> Result<(), spi::ErrorKind> {
-        let is_low = self.chip.borrow_mut().answer(operations);
         let (register, answer) = match operations {
-            [spi::Operation::Write([register, ..])] => (*register, None),
+            [spi::Operation::Write(bytes)] => {
+                self.chip().write(bytes);
+                (bytes[0], None)
+            }
             [
                 spi::Operation::Write([register]),
                 spi::Operation::Read(bytes),
             ] => {
+                self.chip().read(*register, bytes);
                 for word in bytes
                     .chunks_mut(3)
                     .filter(|word| word.len() == 3 && is_odd(word))
@@ -115,6 +129,7 @@ impl spi::SpiDevice for Bus<TdcChip> {
             }
             other => panic!("{other:?}"),
         };
+        let is_low = self.chip.borrow().interrupts();
         let is_right = self.exchange(register, answer, is_low);
         is_right.then_some(()).ok_or(spi::ErrorKind::Other)
     }
@@ -130,23 +145,21 @@ impl i2c::I2c for Bus<TmfChip> {
         _: u8,
         operations: &mut [i2c::Operation<'_>],
     ) -> Result<(), i2c::ErrorKind> {
-        // The model knows no bootloader, into which nonsense can lead.
-        let is_known = match operations {
-            [
-                i2c::Operation::Write([0x08, ..]),
-                i2c::Operation::Read(bytes),
-            ] => bytes.len() == 1,
-            _ => true,
-        };
-        let is_low = is_known && self.chip.borrow_mut().answer(operations);
         let (register, answer) = match operations {
-            [i2c::Operation::Write([register, ..])] => (*register, None),
+            [i2c::Operation::Write(bytes)] => {
+                self.chip().write(bytes);
+                (bytes[0], None)
+            }
             [
                 i2c::Operation::Write([register]),
                 i2c::Operation::Read(bytes),
-            ] => (*register, Some(&mut **bytes)),
+            ] => {
+                self.chip().read(*register, bytes);
+                (*register, Some(&mut **bytes))
+            }
             other => panic!("{other:?}"),
         };
+        let is_low = self.chip.borrow().interrupts();
         let is_right = self.exchange(register, answer, is_low);
         is_right.then_some(()).ok_or(i2c::ErrorKind::Other)
     }
@@ -154,22 +167,22 @@ impl i2c::I2c for Bus<TmfChip> {
 
 /// What may be given of what was seen in a poll that ended so.
 trait Oracle {
-    fn expects(&mut self, seen: &[Seen], error: Option<SensorFault>) -> Vec<Given>;
+    fn expects(&mut self, seen: &[Seen], error: Option<SensorFault>) -> Vec<SinkCall>;
 }
 
 /// Polls with nonsense, then without. `most` transfers may a poll have; `sane` is all that is
 /// given in the end. Gives how many errors there were.
-fn survive<Chip: Default, S: Sensor>(
+fn survive<C: Chip + Default, S: Sensor>(
     sensor: &mut S,
-    bus: &Bus<Chip>,
+    bus: &Bus<C>,
     mut oracle: impl Oracle,
     most: u32,
-    sane: impl Fn(&Given) -> bool,
+    sane: impl Fn(&SinkCall) -> bool,
 ) -> u32
 where
     S::Error: Into<SensorFault>,
 {
-    let (mut sink, mut errors) = (Notes::default(), 0);
+    let (mut sink, mut errors) = (RecordingSink::default(), 0);
     sensor.start(U16F16::lit("250"));
     for now_ms in 0..3000 {
         if bus.chance(bus.one_in.get()) {
@@ -212,7 +225,7 @@ struct OfTdc {
 }
 
 impl Oracle for OfTdc {
-    fn expects(&mut self, seen: &[Seen], _: Option<SensorFault>) -> Vec<Given> {
+    fn expects(&mut self, seen: &[Seen], _: Option<SensorFault>) -> Vec<SinkCall> {
         let read = |register| {
             let seen = seen.iter().find(|(at, _)| *at == register);
             seen.and_then(|(_, bytes)| bytes.as_deref())
@@ -230,12 +243,12 @@ impl Oracle for OfTdc {
         let value = |word: &[u8]| u32::from_be_bytes([0, word[0], word[1], word[2]]) & 0x7f_ffff;
         let [time, first, second] = [0, 1, 2].map(|at| value(&words[3 * at..]));
         if time == 0 {
-            return vec![Given::End(1)];
+            return vec![SinkCall::End(1)];
         }
         let calibration = Calibration::new(8_000, CalibrationPeriods::Ten, first, second);
         calibration.map_or(Vec::new(), |calibration| {
             let code = self.config.code(calibration.mode_1(time));
-            vec![Given::Photon(0, code), Given::End(1)]
+            vec![SinkCall::Photon(0, code), SinkCall::End(1)]
         })
     }
 }
@@ -245,7 +258,7 @@ impl Oracle for OfTdc {
 struct OfTmf(Vec<Vec<u8>>);
 
 impl Oracle for OfTmf {
-    fn expects(&mut self, seen: &[Seen], error: Option<SensorFault>) -> Vec<Given> {
+    fn expects(&mut self, seen: &[Seen], error: Option<SensorFault>) -> Vec<SinkCall> {
         let packets = seen.iter().filter_map(|(register, bytes)| {
             let bytes = bytes.as_ref().filter(|bytes| bytes.len() == 135);
             bytes.filter(|_| *register == 0x20)
@@ -265,7 +278,7 @@ impl Oracle for OfTmf {
             }
             self.0.push(packet.clone());
             if number == 0 {
-                given.push(Given::Frame(537 * 1024));
+                given.push(SinkCall::Frame(537 * 1024));
             }
             if let (20.., Some(channel)) = (number, (number % 10).checked_sub(1)) {
                 let byte = |packet: usize, bin: usize| u32::from(self.0[packet][7 + bin]);
@@ -275,7 +288,7 @@ impl Oracle for OfTmf {
                     low + (middle << 8) + (high << 16)
                 };
                 let channel = u16::try_from(channel).unwrap();
-                given.push(Given::Histogram(channel, (0..128).map(count).collect()));
+                given.push(SinkCall::Histogram(channel, (0..128).map(count).collect()));
             }
             if number == 29 {
                 self.0.clear();
@@ -321,13 +334,13 @@ fn a_tdc7200_that_answers_nonsense() {
         let settings = tdc7200::Settings {
             first_bin_ps: 240_000,
             parity,
-            ..tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"))
+            ..tdc7200::Settings::new(PixelAddress::new(0), 8_000, U16F16::lit("250"))
         };
         let config = tdc7200::Config::new(settings).unwrap();
-        let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
+        let (interrupt, enable) = (bus.interrupt.clone(), bus.enable.clone());
         let mut sensor: Tdc7200<_, _, _> = Tdc7200::new(bus.clone(), interrupt, enable, config);
-        let sane = [Given::Photon(0, 28), Given::End(1)];
-        let is_sane = |given: &Given| sane.contains(given);
+        let sane = [SinkCall::Photon(0, 28), SinkCall::End(1)];
+        let is_sane = |given: &SinkCall| sane.contains(given);
         survive(&mut sensor, &bus, OfTdc { config }, 19, is_sane)
     });
 }
@@ -338,14 +351,14 @@ fn a_tmf882x_that_answers_nonsense() {
     let sane: Vec<u32> = (0..128).map(count).collect();
     all("TMF8820", |seed, one_in, _| {
         let bus = Bus::<TmfChip>::new(seed, one_in);
-        let settings = tmf882x::Settings::new(PixelAddress(0));
+        let settings = tmf882x::Settings::new(PixelAddress::new(0));
         let config = tmf882x::Config::new(settings).unwrap();
-        let (interrupt, enable) = (bus.interrupt.clone(), Line::new(false));
+        let (interrupt, enable) = (bus.interrupt.clone(), bus.enable.clone());
         let mut sensor: Tmf882x<'_, _, _, _> =
             Tmf882x::new(bus.clone(), interrupt, enable, &[1, 2, 3], config);
-        let is_sane = |given: &Given| match given {
-            Given::Frame(cycles) => *cycles == 537 * 1024,
-            Given::Histogram(pixel, counts) => *pixel < 9 && *counts == sane,
+        let is_sane = |given: &SinkCall| match given {
+            SinkCall::Frame(cycles) => *cycles == 537 * 1024,
+            SinkCall::Histogram(pixel, counts) => *pixel < 9 && *counts == sane,
             _ => false,
         };
         survive(&mut sensor, &bus, OfTmf::default(), 6, is_sane)

@@ -152,7 +152,7 @@ fn nobody_there_is_said_at_the_address_and_stops() {
 fn a_byte_not_taken_ends_the_transaction() {
     let (mut bus, wires) = bus();
     wires.borrow_mut().takes = 2;
-    assert_eq!(bus.write(ADDRESS, &[1, 2, 3]), Err(Error::NotTaken));
+    assert_eq!(bus.write(ADDRESS, &[1, 2, 3]), Err(Error::NotAcknowledged));
     let seen = wires.borrow().seen.clone();
     assert_eq!(seen[2..], [Seen::Written(1), Seen::Written(2), Seen::Stop]);
 }
@@ -195,7 +195,10 @@ fn a_device_that_holds_the_clock_at_every_byte_is_given_up_after_25_ms() {
 #[test]
 fn an_error_of_the_stop_after_an_error_hides_nothing_and_drives_nothing() {
     for wire in [SCL, SDA] {
-        for (address, bytes, error) in [(0x42, 1, Error::NoDevice), (ADDRESS, 2, Error::NotTaken)] {
+        for (address, bytes, error) in [
+            (0x42, 1, Error::NoDevice),
+            (ADDRESS, 2, Error::NotAcknowledged),
+        ] {
             let (mut bus, wires) = bus();
             wires.borrow_mut().takes = 1;
             // START, and the bytes with the bit that acknowledges them.

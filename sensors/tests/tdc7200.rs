@@ -9,7 +9,7 @@ use common::tdc7200::{
     ARM_1, Access, Bench, CALIBRATIONS, MODE_1, configure, example, mode_1, over, read,
     read_results, write, writes,
 };
-use common::{Broken, Given, Line, Notes};
+use common::{Broken, Line, RecordingSink, SinkCall};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_sensors::tdc7200::{
@@ -47,7 +47,10 @@ fn each_start_brings_it_up_with_bins_of_its_width() {
         assert!(!bench.sensor.is_armed());
         bench.bring_up(MODE_1, ARM_1);
         assert_eq!(bench.serve(&example()), Ok(Polled::Data));
-        assert_eq!(bench.sink.take(), [Given::Photon(7, code), Given::End(1)]);
+        assert_eq!(
+            bench.sink.take(),
+            [SinkCall::Photon(7, code), SinkCall::End(1)]
+        );
         bench.interrupt.set(true);
     }
 }
@@ -67,15 +70,15 @@ fn stopped_it_is_off_until_it_is_started() {
 fn it_says_where_its_bins_start() {
     let bench = armed();
     assert!(bench.sensor.is_one_hit());
-    let about = bench.sensor.about();
-    assert_eq!((about.pixels, about.bin_width), (8, None));
-    assert_eq!(about.offset, I24F8::from_num(240_000.0 * 0.149_896_229));
+    let info = bench.sensor.info();
+    assert_eq!((info.pixels, info.bin_width), (8, None));
+    assert_eq!(info.offset, I24F8::from_num(240_000.0 * 0.149_896_229));
 }
 
 #[test]
 fn times_that_mode_1_does_not_measure_are_rejected() {
     let config = |mode| {
-        let settings = Settings::new(PixelAddress(0), 8_000, U16F16::lit("8000"));
+        let settings = Settings::new(PixelAddress::new(0), 8_000, U16F16::lit("8000"));
         Config::new(Settings { mode, ..settings }).unwrap()
     };
     let codes = |mode| [11_999, 12_000, 500_000, 500_001].map(|ps| config(mode).code(ps));
@@ -142,9 +145,9 @@ fn reads_in_chunks_and_gives_the_stops_that_came() {
         assert_eq!(bench.poll(&accesses), Ok(Polled::Data));
         // 1000, 2000 and -1000 counts, and 8, 9 and 200 periods of 125 ns.
         let bins = [1_059_176 / 250, 1_243_353 / 250, 24_940_824 / 250];
-        let photons = bins.map(|bin| Given::Photon(7, u16::try_from(bin).unwrap_or(u16::MAX)));
+        let photons = bins.map(|bin| SinkCall::Photon(7, u16::try_from(bin).unwrap_or(u16::MAX)));
         let [a, b, c] = photons;
-        assert_eq!(bench.sink.take(), [a, b, c, Given::End(1)]);
+        assert_eq!(bench.sink.take(), [a, b, c, SinkCall::End(1)]);
         let counts = bench.sensor.counts();
         assert_eq!((counts.photons, counts.overflowed), (3, 1));
     }
@@ -166,8 +169,8 @@ fn a_bin_past_the_histogram_is_passed_on_and_one_before_it_is_rejected() {
     let results = over(0x19, &[4000, 0, 8_000, 0, 0x7f_ffff], CALIBRATIONS);
     let accesses = [results, write(0x00, ARM_1)].concat();
     assert_eq!(bench.serve(&accesses), Ok(Polled::Data));
-    let [a, b, c] = [u16::MAX, 933, u16::MAX].map(|code| Given::Photon(7, code));
-    assert_eq!(bench.sink.take(), [a, b, c, Given::End(1)]);
+    let [a, b, c] = [u16::MAX, 933, u16::MAX].map(|code| SinkCall::Photon(7, code));
+    assert_eq!(bench.sink.take(), [a, b, c, SinkCall::End(1)]);
 }
 
 #[test]
@@ -175,7 +178,7 @@ fn a_laser_cycle_without_a_stop_is_empty_and_needs_no_calibration() {
     let mut bench = armed();
     let accesses = [over(0x0a, &[0], [0; 2]), write(0x00, ARM_1)].concat();
     assert_eq!(bench.serve(&accesses), Ok(Polled::Data));
-    assert_eq!(bench.sink.take(), [Given::End(1)]);
+    assert_eq!(bench.sink.take(), [SinkCall::End(1)]);
     let counts = Counts {
         cycles: 1,
         empty: 1,
@@ -199,7 +202,10 @@ fn parity_is_not_part_of_the_value_and_is_checked() {
     let right = over(0x19, &[even(4175)], CALIBRATIONS.map(even));
     let accesses = [right, write(0x00, arm)].concat();
     assert_eq!(bench.serve(&accesses), Ok(Polled::Data));
-    assert_eq!(bench.sink.take(), [Given::Photon(7, 28), Given::End(1)]);
+    assert_eq!(
+        bench.sink.take(),
+        [SinkCall::Photon(7, 28), SinkCall::End(1)]
+    );
 
     let calibrations = [even(2110), even(21121) ^ 0x80_0000];
     let polled = bench.poll(&over(0x19, &[even(4175)], calibrations));
@@ -243,7 +249,7 @@ fn a_register_that_does_not_take_its_value_is_an_error() {
         read(0x03, &[0x07]),
         read(0x04, &[0xfe]),
     ];
-    let error = Error::NotTaken {
+    let error = Error::NotWritten {
         register: 0x04,
         wrote: 0xff,
         read: 0xfe,
@@ -305,9 +311,9 @@ fn stops_without_a_calibration_are_an_error() {
 fn an_error_of_the_bus_is_inside() {
     let mut bench = armed();
     bench.interrupt.set(false);
-    bench.spi.out.set(true);
+    bench.spi.is_unplugged.set(true);
     assert_eq!(bench.poll(&[]), Err(Error::Bus(ErrorKind::Other)));
-    bench.spi.out.set(false);
+    bench.spi.is_unplugged.set(false);
     bench.recover();
 }
 
@@ -355,7 +361,7 @@ fn two_sensors_share_a_bus() {
         let enable = Line::new(false);
         Tdc7200::<_, _, _>::new(device, interrupts[index].clone(), enable, config)
     });
-    let mut sink = Notes::default();
+    let mut sink = RecordingSink::default();
 
     // What the bus sees: no transactions, but a flush at the end of each.
     let plain = |accesses: Vec<Access>| -> Vec<Access> {
@@ -386,7 +392,7 @@ fn two_sensors_share_a_bus() {
         interrupt.set(false);
         bus.update_expectations(&plain(example()));
         assert_eq!(sensor.poll(7, &mut sink).unwrap(), Polled::Data);
-        assert_eq!(sink.take(), [Given::Photon(7, 28), Given::End(1)]);
+        assert_eq!(sink.take(), [SinkCall::Photon(7, 28), SinkCall::End(1)]);
         bus.done();
     }
 }

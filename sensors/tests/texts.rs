@@ -64,7 +64,7 @@ fn every_error_of_a_poll_says_what_happened() {
             "TMF882x: I2C: \"cut\"",
         ),
         (
-            Tmf882x::<Bus, Bus>::WrongMode { mode: 8 }.to_string(),
+            Tmf882x::<Bus, Bus>::Device(tmf882x::DeviceError::WrongMode { mode: 8 }).to_string(),
             "TMF882x: is in the wrong mode, 0x08",
         ),
         (
@@ -72,10 +72,10 @@ fn every_error_of_a_poll_says_what_happened() {
             "TMF8829: not acknowledged: \"cut\"",
         ),
         (
-            Tmf8829::<Bus, Bus>::Missed {
+            Tmf8829::<Bus, Bus>::Device(tmf8829::DeviceError::Missed {
                 expected: 3,
                 found: 5,
-            }
+            })
             .to_string(),
             "TMF8829: frame 5 came, not 3",
         ),

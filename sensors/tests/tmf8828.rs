@@ -6,38 +6,38 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use common::tmf8828::{Bus, Chip, MAP, count, zone};
-use common::{Broken, Given, Notes};
+use common::{Broken, RecordingSink, SinkCall};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_sensors::tmf882x::{Config, Error, Settings, Tmf882x};
+use dtof_sensors::tmf882x::{Config, DeviceError, Error, Settings, Tmf882x};
 use dtof_sensors::{Polled, Sensor};
 use embedded_hal::i2c::ErrorKind;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-type Of = Error<ErrorKind, Broken>;
+type DriverError = Error<ErrorKind, Broken>;
 
 struct Bench {
     sensor: Tmf882x<'static, Bus, Bus, Bus, 128>,
     chip: Rc<RefCell<Chip>>,
-    sink: Notes,
+    sink: RecordingSink,
     now_ms: u32,
 }
 
 fn bench(number: u8) -> Bench {
     let chip = Rc::new(RefCell::new(Chip::new(number)));
     let bus = Bus(Rc::clone(&chip));
-    let config = Config::new(Settings::of_8x8(PixelAddress(10))).unwrap();
+    let config = Config::new(Settings::of_8x8(PixelAddress::new(10))).unwrap();
     Bench {
         sensor: Tmf882x::new(bus.clone(), bus.clone(), bus, &[], config),
         chip,
-        sink: Notes::default(),
+        sink: RecordingSink::default(),
         now_ms: 0,
     }
 }
 
 impl Bench {
-    fn poll(&mut self) -> Result<Polled, Of> {
+    fn poll(&mut self) -> Result<Polled, DriverError> {
         self.now_ms += 1;
         self.sensor.poll(self.now_ms, &mut self.sink)
     }
@@ -52,19 +52,19 @@ impl Bench {
         panic!("it does not come up");
     }
 
-    /// Takes so many packets or results.
+    /// Polls once for each of so many packets or results.
     fn take(&mut self, packets: u32) {
         for _ in 0..packets {
             let _ = self.poll().unwrap();
         }
     }
 
-    /// The packet or result that stands ready is lost.
+    /// Loses the next packet or result.
     fn lose(&self) {
         self.chip.borrow_mut().next();
     }
 
-    fn error(&mut self) -> Of {
+    fn error(&mut self) -> DriverError {
         for _ in 0..300 {
             if let Err(error) = self.poll() {
                 return error;
@@ -74,15 +74,15 @@ impl Bench {
     }
 }
 
-/// The histograms of a capture, by pixel, as the chip has them.
-fn histogram(zone: u16) -> Given {
+/// The histogram of a zone that the sink must get.
+fn histogram(zone: u16) -> SinkCall {
     let counts = (0..128).map(|bin| count(Some(zone), bin));
-    Given::Histogram(10 + zone, counts.collect())
+    SinkCall::Histogram(10 + zone, counts.collect())
 }
 
-/// The formula of the vendor's filter, beside the map of its viewer.
+/// Compares the map of the vendor's viewer with the formula of the vendor's filter.
 #[test]
-fn the_map_is_that_of_the_formula() {
+fn the_map_follows_the_formula() {
     for capture in 0..4u8 {
         for half in 0..2u8 {
             for (channel, first) in (0..).zip([56u16, 60, 40, 44, 24, 28, 8, 12]) {
@@ -106,28 +106,28 @@ fn each_of_64_zones_comes_once_in_four_captures() {
         bench.bring_up();
         assert_eq!(bench.chip.borrow().page[0x34..0x36], [15, 0x84]);
         assert_eq!(bench.chip.borrow().page[0x39], 1);
-        // Which capture is the first one is not known before its result.
+        // The driver does not know the number of the first capture before its result.
         bench.take(61);
         let given = bench.sink.take();
         assert_eq!(
             given[..2],
-            [Given::Frame(537 * 1024), Given::Frame(537 * 1024)]
+            [SinkCall::Frame(537 * 1024), SinkCall::Frame(537 * 1024)]
         );
         assert!(
             given[2..]
                 .iter()
-                .all(|given| matches!(given, Given::Target(..)))
+                .all(|given| matches!(given, SinkCall::Target(..)))
         );
         assert_eq!(bench.sensor.counts().left_out, 16);
         bench.take(4 * 61);
         let given = bench.sink.take();
-        let mut histograms: Vec<(u16, &Given)> = Vec::new();
+        let mut histograms: Vec<(u16, &SinkCall)> = Vec::new();
         let mut targets = Vec::new();
         let mut frames = 0;
         for given in &given {
             match given {
-                Given::Histogram(pixel, _) => histograms.push((pixel - 10, given)),
-                Given::Target(pixel, target) => targets.push((pixel - 10, target.distance)),
+                SinkCall::Histogram(pixel, _) => histograms.push((pixel - 10, given)),
+                SinkCall::Target(pixel, target) => targets.push((pixel - 10, target.distance)),
                 _ => frames += 1,
             }
         }
@@ -137,8 +137,8 @@ fn each_of_64_zones_comes_once_in_four_captures() {
         for (zone, (at, given)) in (0..64).zip(&histograms) {
             assert_eq!((*at, *given), (zone, &histogram(zone)));
         }
-        let wanted = (0..64).map(|zone| (zone, I24F8::from_num(1000 + zone)));
-        assert_eq!(targets, wanted.collect::<Vec<_>>());
+        let expected = (0..64).map(|zone| (zone, I24F8::from_num(1000 + zone)));
+        assert_eq!(targets, expected.collect::<Vec<_>>());
         assert_eq!(frames, 8);
         assert_eq!(bench.sensor.counts().errors, 0);
     }
@@ -147,17 +147,17 @@ fn each_of_64_zones_comes_once_in_four_captures() {
 #[test]
 fn it_is_described_as_64_pixels() {
     let bench = bench(0);
-    let about = bench.sensor.about();
+    let info = bench.sensor.info();
     assert_eq!(
-        (about.pixels, about.bins, about.laser_millihertz),
+        (info.pixels, info.bins, info.laser_millihertz),
         (74, 128, 0)
     );
     // 57 mm a bin.
-    let mm = about.bin_width.unwrap().to_num::<f64>() * 0.149_896_229;
+    let mm = info.bin_width.unwrap().to_num::<f64>() * 0.149_896_229;
     assert!((mm - 57.0).abs() < 0.1, "{mm}");
-    let mut settings = Settings::of_8x8(PixelAddress(u16::MAX - 62));
+    let mut settings = Settings::of_8x8(PixelAddress::new(u16::MAX - 62));
     assert!(Config::new(settings).is_err());
-    settings.first_pixel = PixelAddress(u16::MAX - 63);
+    settings.first_pixel = PixelAddress::new(u16::MAX - 63);
     assert!(Config::new(settings).is_ok());
 }
 
@@ -165,7 +165,10 @@ fn it_is_described_as_64_pixels() {
 fn a_sensor_without_8x8_zones_is_an_error() {
     let mut bench = bench(0);
     bench.chip.borrow_mut().is_fixed = true;
-    assert_eq!(bench.error(), Error::WrongMode { mode: 0 });
+    assert_eq!(
+        bench.error(),
+        Error::Device(DeviceError::WrongMode { mode: 0 })
+    );
     bench.chip.borrow_mut().is_fixed = false;
     bench.bring_up();
 }
@@ -180,15 +183,18 @@ fn a_lost_packet_costs_its_capture() {
     bench.lose();
     assert_eq!(
         bench.error(),
-        Error::OutOfOrder {
+        Error::Device(DeviceError::OutOfOrder {
             expected: 29,
             found: 30
-        }
+        })
     );
     let before = bench.sink.take();
     bench.take(60 - 31 + 1);
     let rest = bench.sink.take();
-    assert!(rest.iter().all(|given| matches!(given, Given::Target(..))));
+    assert!(
+        rest.iter()
+            .all(|given| matches!(given, SinkCall::Target(..)))
+    );
     // Eight zones of the first half had come, the ninth channel is empty.
     assert_eq!(before.len(), 2 + 8);
     bench.take(61);
@@ -201,7 +207,7 @@ fn a_lost_packet_costs_its_capture() {
     assert_eq!(bench.sensor.counts().errors, 1);
 }
 
-/// Nothing is given to zones that are not known.
+/// The driver drops histograms whose zones it does not know.
 #[test]
 fn a_lost_result_costs_the_next_capture() {
     let mut bench = bench(0);
@@ -210,13 +216,13 @@ fn a_lost_result_costs_the_next_capture() {
     bench.lose();
     bench.sink.take();
     let left_out = bench.sensor.counts().left_out;
-    let lost = Error::OutOfOrder {
+    let lost = Error::Device(DeviceError::OutOfOrder {
         expected: 60,
         found: 0,
-    };
+    });
     assert_eq!(bench.poll(), Err(lost));
     bench.take(60);
-    let is_histogram = |given: &Given| matches!(given, Given::Histogram(..));
+    let is_histogram = |given: &SinkCall| matches!(given, SinkCall::Histogram(..));
     assert!(!bench.sink.take().iter().any(is_histogram));
     assert_eq!(bench.sensor.counts().left_out, left_out + 16);
     bench.take(61);
@@ -225,15 +231,15 @@ fn a_lost_result_costs_the_next_capture() {
 }
 
 #[test]
-fn a_lost_capture_is_told_by_the_next_result() {
+fn the_next_result_reveals_a_lost_capture() {
     let mut bench = bench(0);
     bench.bring_up();
     bench.take(61);
     bench.chip.borrow_mut().number = 2;
-    let expected = Error::WrongCapture {
+    let expected = Error::Device(DeviceError::WrongCapture {
         expected: 1,
         found: 2,
-    };
+    });
     assert_eq!(bench.error(), expected);
     assert!(bench.sensor.is_measuring());
     bench.sink.take();
@@ -246,10 +252,10 @@ fn a_lost_capture_is_told_by_the_next_result() {
     );
 }
 
-/// Lost packets, results and captures, errors of the bus, and the sensor starting anew: a
-/// histogram that is given is that of its zone, unless the next result says that it is not.
+/// Lost packets, results and captures, errors of the bus, and restarts of the sensor: a histogram
+/// goes to another zone only if the next result reports it.
 #[test]
-fn faults_put_no_histogram_into_another_zone_unsaid() {
+fn no_fault_puts_a_histogram_into_another_zone_unreported() {
     let (mut faults, mut errors, mut histograms) = (0, 0, 0);
     for seed in 0..50 {
         let mut rng = Pcg32::seed_from_u64(seed);
@@ -264,27 +270,30 @@ fn faults_put_no_histogram_into_another_zone_unsaid() {
                     0 => chip.next(),
                     1 => chip.nack = true,
                     2 => chip.number = chip.number.wrapping_add(1),
-                    _ => (chip.at, chip.mode) = (0, 0),
+                    _ => (chip.packets_sent, chip.mode) = (0, 0),
                 }
             }
             let before = bench.chip.borrow().transfers;
             let polled = bench.poll();
             assert!(bench.chip.borrow().transfers - before <= 7);
             for given in bench.sink.take() {
-                let Given::Histogram(pixel, _) = given else {
+                let SinkCall::Histogram(pixel, _) = given else {
                     continue;
                 };
                 histograms += 1;
                 wrong += u32::from(given != histogram(pixel - 10));
             }
             match polled {
-                // Both say that the zones of the capture before are not sure.
-                Err(Error::WrongCapture { .. } | Error::OutOfOrder { found: 0, .. }) => {
+                // Both report that the zones of the last capture are not certain.
+                Err(
+                    Error::Device(DeviceError::WrongCapture { .. })
+                    | Error::Device(DeviceError::OutOfOrder { found: 0, .. }),
+                ) => {
                     (wrong, errors) = (0, errors + 1);
                 }
                 Err(error) => {
                     errors += 1;
-                    // The measurement begins anew, and the next result is not of this one.
+                    // The measurement starts again; its results say nothing about the last one.
                     if !bench.sensor.is_measuring() {
                         wrong = 0;
                     }
@@ -304,19 +313,22 @@ fn faults_put_no_histogram_into_another_zone_unsaid() {
     );
     println!(
         "faults: TMF8828 with 8x8 zones, {faults} faults: {errors} errors counted, {histograms} \
-         histograms, 0 of another zone unsaid"
+         histograms, 0 of another zone unreported"
     );
 }
 
-/// With nine zones its packets would be taken for other zones.
+/// Its packets would be taken for those of other zones.
 #[test]
 fn a_sensor_left_in_its_8x8_mode_is_switched_off_for_nine_zones() {
     let mut bench = bench(0);
     bench.bring_up();
     let bus = Bus(Rc::clone(&bench.chip));
-    let config = Config::new(Settings::new(PixelAddress(10))).unwrap();
+    let config = Config::new(Settings::new(PixelAddress::new(10))).unwrap();
     bench.sensor = Tmf882x::new(bus.clone(), bus.clone(), bus, &[], config);
-    assert_eq!(bench.error(), Error::WrongMode { mode: 8 });
+    assert_eq!(
+        bench.error(),
+        Error::Device(DeviceError::WrongMode { mode: 8 })
+    );
     assert_eq!(bench.sink.take(), []);
     bench.bring_up();
     assert_eq!(bench.chip.borrow().mode, 0);

@@ -9,7 +9,7 @@ use common::tmf882x::{
     Bench, Counts, IMAGE, NACK, measure, measuring, packet, packets, page, read, settings,
     some_counts, write,
 };
-use common::{Line, Notes};
+use common::{Line, RecordingSink};
 use dtof_core::PixelAddress;
 use dtof_sensors::tmf882x::{Config, ConfigError, Error, Settings, SpadMap, Tmf882x, Zones};
 use dtof_sensors::{Polled, Sensor};
@@ -153,10 +153,10 @@ fn settings_that_cannot_be_are_refused() {
     assert_eq!(refused(|bad| bad.address = 0xFF), ConfigError::Address);
     let zero = refused(|bad| bad.kilo_iterations = 0);
     assert_eq!(zero, ConfigError::ZeroIterations);
-    let pixels = refused(|bad| bad.first_pixel = PixelAddress(u16::MAX - 7));
+    let pixels = refused(|bad| bad.first_pixel = PixelAddress::new(u16::MAX - 7));
     assert_eq!(pixels, ConfigError::Pixels);
     let reference = refused(|bad| {
-        bad.reference = Some(PixelAddress(bad.first_pixel.0 + 8));
+        bad.reference = Some(PixelAddress::new(bad.first_pixel.raw() + 8));
     });
     assert_eq!(reference, ConfigError::Reference);
     assert_eq!(refused(|bad| bad.period_ms = 1000), ConfigError::Timeout);
@@ -216,7 +216,7 @@ fn two_sensors_share_a_bus() {
 
     let mut bus = Mock::new(&[]);
     let shared = RefCell::new(bus.clone());
-    let mut sink = Notes::default();
+    let mut sink = RecordingSink::default();
     let addresses = [0x42, 0x43];
     let interrupts = [Line::new(true), Line::new(true)];
     let mut sensors = [0, 1].map(|index: usize| {
@@ -277,13 +277,13 @@ fn the_laser_rate_is_the_mean_over_a_period() {
         let mut bench = Bench::<128>::new(settings, IMAGE);
         bench.i2c.done();
         // Zones are pixels 10 to 18, the reference is pixel 99.
-        assert_eq!(bench.sensor.about().pixels, 100);
-        bench.sensor.about().laser_millihertz
+        assert_eq!(bench.sensor.info().pixels, 100);
+        bench.sensor.info().laser_millihertz
     };
     // 549,888 pulses in 132 ms: 4,165,818.18 Hz.
     assert_eq!(rate(537, 132), 4_165_818_181);
     assert_eq!(rate(1, 500), 2_048_000);
     assert_eq!(rate(537, 0), 0);
-    let config = Settings::new(PixelAddress(0));
+    let config = Settings::new(PixelAddress::new(0));
     assert_eq!((config.kilo_iterations, config.period_ms), (537, 132));
 }

@@ -7,8 +7,8 @@ use common::tmf882x::{
     Bench, IMAGE, NACK, measure, measuring, packet, packets, page, read, settings, some_counts,
     write,
 };
-use common::{Broken, Given};
-use dtof_sensors::tmf882x::{BootCommand, Command, Error, Waiting};
+use common::{Broken, SinkCall};
+use dtof_sensors::tmf882x::{BootCommand, Command, DeviceError, Error, Waiting};
 use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::Transaction as Access;
@@ -17,7 +17,7 @@ use embedded_hal_mock::eh1::i2c::Transaction as Access;
 fn stops_measuring(bench: &mut Bench<128>, polled: Result<Polled, Error<ErrorKind, Broken>>) {
     assert!(polled.is_err());
     assert!(!bench.sensor.is_measuring());
-    let is_frame = |given: &Given| matches!(given, Given::Frame(_));
+    let is_frame = |given: &SinkCall| matches!(given, SinkCall::Frame(_));
     assert!(bench.sink.take().iter().all(is_frame));
     bench.interrupt.set(true);
     bench.bring_up_running();
@@ -78,7 +78,7 @@ fn only_an_address_not_acknowledged_is_no_answer() {
 fn an_unplugged_sensor_says_so_again_and_again_and_is_found_when_it_is_back() {
     let mut bench = measuring();
     bench.set(&some_counts());
-    times_out(&mut bench, 1000, &[], Waiting::Histogram);
+    times_out(&mut bench, 1000, &[], Waiting::Data);
     for reset in [false, true, true] {
         bench.switch_on(reset);
         let polled = bench.poll(&[read(0x41, 0xE0, &[0]).with_error(NACK)]);
@@ -181,7 +181,10 @@ fn a_bootloader_that_refuses_or_never_ends() {
     for (answer, reset) in answers.into_iter().zip([false, true, true]) {
         begin(&mut bench, reset);
         let polled = bench.poll(&[read(0x41, 0x08, &answer)]);
-        assert_eq!(polled, Err(Error::Bootloader { command, answer }));
+        assert_eq!(
+            polled,
+            Err(Error::Device(DeviceError::Bootloader { command, answer }))
+        );
     }
     begin(&mut bench, true);
     let busy = [read(0x41, 0x08, &[0x14, 0x00, 0xEB])];
@@ -265,7 +268,7 @@ fn a_result_is_cleared_and_results_alone_are_an_error() {
 
     bench.wait(1001);
     let polled = bench.serve(&result[..1]);
-    assert_eq!(polled, Err(Error::Timeout(Waiting::Histogram)));
+    assert_eq!(polled, Err(Error::Timeout(Waiting::Data)));
     stops_measuring(&mut bench, polled);
 }
 
@@ -279,14 +282,14 @@ fn packets_that_make_no_set_time_out() {
     assert_eq!(bench.packet(&good[7]), Ok(Polled::Idle));
     bench.wait(1);
     let polled = bench.packet(&good[7]);
-    assert_eq!(polled, Err(Error::Timeout(Waiting::Histogram)));
+    assert_eq!(polled, Err(Error::Timeout(Waiting::Data)));
     assert_eq!(bench.sensor.counts().left_out, 3);
     // It has given none that is good: to stop it does not help.
     bench.interrupt.set(true);
     starts_over(&mut bench);
     bench.wait(1001);
     let polled = bench.poll(&[]);
-    assert_eq!(polled, Err(Error::Timeout(Waiting::Histogram)));
+    assert_eq!(polled, Err(Error::Timeout(Waiting::Data)));
     stops_measuring(&mut bench, polled);
 }
 
@@ -302,10 +305,22 @@ fn a_wrong_packet_costs_its_set() {
     };
     let cases = [
         // The calibration's histograms, and a result.
-        (broken(12, 0, 0x82), Error::ForeignResult { result: 0x82 }),
-        (broken(12, 0, 0x10), Error::ForeignResult { result: 0x10 }),
-        (broken(12, 5, 100), Error::WrongSize { size: 100 }),
-        (broken(12, 5, 0), Error::WrongSize { size: 0 }),
+        (
+            broken(12, 0, 0x82),
+            Error::Device(DeviceError::ForeignResult { result: 0x82 }),
+        ),
+        (
+            broken(12, 0, 0x10),
+            Error::Device(DeviceError::ForeignResult { result: 0x10 }),
+        ),
+        (
+            broken(12, 5, 100),
+            Error::Device(DeviceError::WrongSize { size: 100 }),
+        ),
+        (
+            broken(12, 5, 0),
+            Error::Device(DeviceError::WrongSize { size: 0 }),
+        ),
         // One missing, one doubled, one of another plane, one that cannot be.
         (good[13].clone(), out_of_order(12, 13)),
         (good[11].clone(), out_of_order(12, 11)),
@@ -325,7 +340,7 @@ fn a_wrong_packet_costs_its_set() {
             assert_eq!(bench.packet(bytes), Ok(Polled::Idle));
         }
         // Its laser cycles are over all the same.
-        assert_eq!(bench.sink.take(), [Given::Frame(537 * 1024)]);
+        assert_eq!(bench.sink.take(), [SinkCall::Frame(537 * 1024)]);
         assert_eq!(bench.sensor.counts().left_out, 17);
         bench.set(&some_counts());
     }
@@ -349,7 +364,7 @@ fn a_set_that_begins_too_early_is_kept() {
 }
 
 fn out_of_order(expected: u8, found: u8) -> Error<ErrorKind, Broken> {
-    Error::OutOfOrder { expected, found }
+    Error::Device(DeviceError::OutOfOrder { expected, found })
 }
 
 #[test]

@@ -2,7 +2,7 @@
 // left, right <= peak and background < peak. An event's word comes once, after a time word if
 // and only if that is due, and stays until it is taken.
 //
-// It begins in any state, so that what came before does not matter.
+// It begins in any state, so that the history does not matter.
 module top (
     input         clk,
     input         reset,
@@ -54,7 +54,7 @@ module top (
     // The offset is 128 + q or 128 - q.
     wire [9:0] offset = packed_word[121:112];
     wire [9:0] q = above_r >= above_l ? offset - 10'd128 : 10'd128 - offset;
-    // 512 * distance + sum is 2 * sum * q and what is left of it. As the solver knows nothing of
+    // 512 * distance + sum is 2 * sum * q and the remainder. As the solver knows nothing of
     // multiplication, the product grows with each bit of q, from the highest down: for each clock
     // of the division it is what was subtracted so far.
     wire [2:0] state;      // probe dut.state

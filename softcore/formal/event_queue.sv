@@ -14,7 +14,7 @@ module top (
         .waiting(waiting), .is_last(is_last)
     );
 
-    // How many are in it; of any one, what it is and how many are before it.
+    // The number of entries; for any entry, its value and the number before it.
     reg [2:0] many, before;
     reg [3:0] one;
     reg is_marked = 0, is_first = 1;

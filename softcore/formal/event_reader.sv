@@ -1,8 +1,8 @@
 // The neighbours of an event are the counts at its look, though photons came since.
 //
 // From any state in which the event is at the head of the queue. Of `bin_counter` it is known
-// that the ended histogram has what came by the look and since, up to 1536, and the other one
-// what came since, which is fewer than 512. The settings and `live` of the macropixel stay.
+// that the ended histogram has the counts up to the look and later ones, up to 1536, and the other one
+// only the later ones, which are fewer than 512. The settings and `live` of the macropixel stay.
 module top (
     input        clk,
     input        found, found_pixel, host_asks,

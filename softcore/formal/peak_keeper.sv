@@ -70,7 +70,7 @@ module top (
     assign {e_count[1], e_count[0]} = {e_count1, e_count0};
     wire [1:0] e_full = {e_full1, e_full0};
 
-    // What the module holds: `kept` is what it knows after the photon that was in F.
+    // The invariant: `kept` is the state after the photon that was in F.
     wire [1:0] valid0;        // probe dut.kept[0].valid
     wire [1:0] valid1;        // probe dut.kept[1].valid
     wire [1:0] seen0;         // probe dut.kept[0].seen

@@ -1,5 +1,5 @@
 // The paper's processing channel (section IV-B): a decision about one histogram of 128 bins
-// of 10 bits, in two stages that work beside each other. It is reference hardware, the
+// of 10 bits, in two stages that work in parallel. It is reference hardware, the
 // circuit to which core/src/detect/comparator_tree.rs is the model.
 //
 // First stage: all bins are read from a block RAM, whose word has LANES bins. With eight
@@ -13,7 +13,7 @@
 // peak. Its square root takes five clocks, one bit each. The peak must exceed background +
 // alpha * root, and have the least count.
 //
-// The paper does not say how many bins it reads a clock, how the tree is cut into clocks,
+// The paper does not state how many bins it reads a clock, how the tree is cut into clocks,
 // or how many clocks it takes but for the root.
 //
 // `start` is high for one clock, 128 / LANES clocks after the last or later. `done` is high

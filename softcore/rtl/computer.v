@@ -2,7 +2,7 @@
 //
 // Addresses
 //   0x0000_0000  RAM, 4 bytes << RAM_BITS. Execution starts at 0.
-//   0xE000_0000  the Wishbone bus, 256 words. An access takes as long as it takes.
+//   0xE000_0000  the Wishbone bus, 256 words. An access ends with its ACK.
 //   0xF000_0000  PRINT       write: the low byte is printed           } in simulation;
 //   0xF000_0004  MARK        write: a number, logged with the clock   } nothing on an
 //   0xF000_0008  EXIT        write: the run ends, 0 is success        } FPGA
@@ -114,7 +114,7 @@ module computer #(
         if (ram_strobe[3]) ram[ram_address][31:24] <= data_write[31:24];
     end
 
-    // The bus. The processor asks until it is answered, here as elsewhere.
+    // The bus. The processor holds a request until it is answered, as everywhere.
     wire bus_done = wb_cyc && wb_ack;
     assign wb_stb = wb_cyc;
 

@@ -2,7 +2,7 @@
 //
 // What is put is a photon, or with bit 31 set the end of one laser cycle, whatever
 // the other bits. What is taken is a photon, bit 31 clear, or with bit 31 set the
-// end of as many laser cycles as bits 15..0 say: an end that follows an end takes no
+// end of as many laser cycles as in bits 15..0: an end that follows an end takes no
 // place of its own, the number of the newest word grows by one. One place is kept
 // for an end, so a laser cycle is never lost, only photons (up to 65535 laser cycles
 // after the last photon).
@@ -49,7 +49,7 @@ module photon_fifo #(
     wire stored = put && !joins && room;
 
     // The oldest word is read one clock cycle ahead. If it is written in that same
-    // cycle, what is read is not it.
+    // cycle, the read returns another word.
     wire moves = stored && newest_stays;
     wire [DEPTH_LOG2-1:0] next_first = taken && !one ? first + 1'b1 : first;
     reg [31:0] oldest, moved;

@@ -1,7 +1,7 @@
 // Ibex: two-stage pipeline, RV32IMC, its configuration "small" (multiplication
 // in three cycles, no instruction cache) with the register file for FPGAs.
 //
-// A load or a store takes 2 cycles: RAM answers the cycle after it is asked.
+// A load or a store takes 2 cycles: RAM answers one cycle after the request.
 // Instructions are fetched ahead, one word a cycle, so an addition takes 1.
 //
 // It starts at 0x80, an offset from its boot address that is fixed.

@@ -2,7 +2,7 @@
 // with the macro RV32I. Its other options are as published: two-stage shifter,
 // no barrel shifter, multiplication bit by bit.
 //
-// Its look-ahead port tells an address one cycle early, so RAM answers without
+// Its look-ahead port gives an address one cycle early, so RAM answers without
 // a wait: an addition takes 3 cycles with its fetch, a load or a store 5.
 //
 // It has no trap handler of the RISC-V kind: an illegal instruction, or an access

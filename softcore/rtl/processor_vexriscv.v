@@ -36,7 +36,7 @@ module processor (
     wire [2:0] fetch_type, data_type;
     wire [3:0] data_bytes;
 
-    // While one word of a burst is answered the next is asked for. It lies in the same line
+    // The next word of a burst is requested while one is answered. It lies in the same line
     // of eight words.
     assign fetch_valid = fetch_stb && (!fetch_ready || fetch_type == BURST);
     assign fetch_address = {fetch_word[29:3], fetch_word[2:0] + {2'd0, fetch_ready}, 2'b00};

@@ -6,7 +6,7 @@
 // answered in the next cycle with `ready` high and the data read, or with
 // `error` high beside it where nothing is mapped. A new access may be made in
 // every cycle. This is the timing of a dual-port block RAM of an FPGA.
-// What an access costs a program is told in each processor's file.
+// Each processor's file states the cost of an access.
 //
 // Addresses
 //   0x0000_0000  RAM, 256 KiB. Execution starts at 0, on Ibex at 0x80.
@@ -18,7 +18,7 @@
 //                              bits 31..16 how many words wait
 //   0xF000_0014  PHOTON        read: takes the oldest word. Bits 15..0 TDC
 //                              code, 23..16 pixel; bit 31: as many laser cycles
-//                              end as bits 15..0 say; 0xffff_ffff when none
+//                              end as in bits 15..0; 0xffff_ffff when none
 //                              waits, 0xffff_fffe when none will come
 //   0xF000_0018  EVENT_DATA    write: 32 bits of a 128-bit event word, least
 //                              significant first; the last four are kept. Not to
@@ -65,8 +65,8 @@ module soc #(
     output              retired,        // an instruction was completed
     output              fetch_filled,   // the instruction cache began to fill a line
     output              data_filled,    // the data cache did
-    output              stopped,        // the processor cannot go on
-    output              unmapped        // nor can it say that nothing is mapped there
+    output              stopped,        // the processor has stopped for good
+    output              unmapped        // it accessed an unmapped address and cannot report it
 );
     // Instruction port.
     wire        fetch_valid;

@@ -1,4 +1,4 @@
-// What a simulation is told, and what it tells, for a program at the other ends of the pipes:
+// The commands of a simulation and its answers, for a program at the other ends of the pipes:
 // softcore/runner/src/pixels/command.rs.
 //
 // Standard input, words of 32 bits, little-endian: one a clock,

@@ -3,7 +3,7 @@
 // Argument: a file with a decision a line, of 130 numbers: alpha in 1/256, the least count,
 // 128 counts. Standard output: a line a decision, of peak bin, peak count, the four
 // quadrants' maxima, background, root, event (0 or 1), clocks from start to done at the
-// tree's own ports. Each is asked twice, as fast after each other as the tree may be. Status
+// tree's own ports. Each is presented twice, as close together as the tree allows. Status
 // 1 if it then decides otherwise, 3 for a bad argument or file.
 
 #include <cstdint>

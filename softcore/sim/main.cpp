@@ -30,7 +30,7 @@ constexpr size_t RAM_BYTES = 256 * 1024;
 constexpr int TRAP = 250;
 constexpr int LIMIT = 2;
 constexpr uint32_t END_OF_CYCLE = 0x80000001; // one laser cycle
-constexpr size_t PARTS = 10;                  // of a stream, to tell of each how full the FIFO was
+constexpr size_t PARTS = 10;                  // of a stream; the fill of the FIFO is reported for each
 
 [[noreturn]] void fail(const std::string &message) {
     std::fprintf(stderr, "%s\n", message.c_str());

@@ -1,7 +1,7 @@
 // The whole system with a program, clock by clock, as commands.h has it. Commands begin when
 // the program makes its first mark. What the program prints goes to standard error.
 //
-// The receiver of the AER port answers at once. A word is told when it is complete, with the
+// The receiver of the AER port answers at once. A word is reported when it is complete, with the
 // clock in which REQ rose for its first half word.
 
 #include "Vsystem.h"

@@ -2,7 +2,7 @@
 //! registers of the testbench or of QEMU's `virt`, and the programs' parts.
 //!
 //! The programs are in `src/bin`; `cargo softcore` builds and runs them, and
-//! `docs/softcore.md` says what to take from here for a design of one's own.
+//! `docs/softcore.md` lists the parts to reuse in a design of your own.
 
 #![no_std]
 

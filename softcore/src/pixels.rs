@@ -4,7 +4,8 @@
 //! and hands those to the link. The program can do what the hardware cannot: average events,
 //! leave some out, send them elsewhere.
 
-use dtof_core::{AerEncoder, ProcessorEvent, ProcessorSettings};
+use dtof_core::AerEncoder;
+use dtof_core::pixel_processor::{ProcessorEvent, ProcessorSettings};
 
 use crate::{io, stream};
 
@@ -15,7 +16,7 @@ const LOOK: usize = 0x01;
 const WAITING: usize = 0x08;
 const EVENT: usize = 0x09;
 
-/// Who packs the events.
+/// Whether hardware or program packs the events.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Packer {
     /// The pixel processor.
@@ -43,7 +44,7 @@ fn read(register: usize) -> u32 {
     unsafe { registers.add(register).read_volatile() }
 }
 
-/// Configures the pixel processor as [`stream::config`] says, and starts it. The program's
+/// Configures the pixel processor with [`stream::config`] and starts it. The program's
 /// part never ends; `false` if the configuration is refused.
 #[must_use]
 pub fn run(packer: Packer) -> bool {

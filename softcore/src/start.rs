@@ -8,7 +8,7 @@ use crate::{io, println};
 /// The paint that the start lays over the stack.
 const PAINT: u32 = 0xcccc_cccc;
 
-/// The run failed: the program said so, or panicked.
+/// The run failed: the program reported it, or panicked.
 const FAILED: u32 = 1;
 /// The run ended in a trap: less its cause.
 const TRAP: u32 = 0xfa00;

@@ -14,7 +14,8 @@
 use core::fmt::{self, Write};
 
 use dtof_core::{
-    AerEncoder, AerWord, AsyncPixel, ConfigError, LaserCycle, PixelAddress, PixelConfig, Statistics,
+    AerEncoder, AerWord, AsyncPixel, LaserCycle, PixelAddress, PixelConfig, PixelConfigError,
+    Statistics,
 };
 
 use crate::io;
@@ -39,7 +40,7 @@ pub const FEW: u32 = 1;
 ///
 /// # Errors
 /// None: the configuration is valid.
-pub const fn config() -> Result<PixelConfig<BINS>, ConfigError> {
+pub const fn config() -> Result<PixelConfig<BINS>, PixelConfigError> {
     PixelConfig::paper().x(X).l1(L1).l2(L2).build()
 }
 
@@ -66,7 +67,7 @@ impl Mark {
     pub const fn to_raw(self) -> u32 {
         match self {
             Self::Look(cycles) => cycles as u32 & !Self::TAKEN,
-            Self::Taken(pixel) => pixel.0 as u32 | Self::TAKEN,
+            Self::Taken(pixel) => pixel.raw() as u32 | Self::TAKEN,
         }
     }
 
@@ -77,7 +78,7 @@ impl Mark {
         if raw & Self::TAKEN == 0 {
             Self::Look(raw as u64)
         } else {
-            Self::Taken(PixelAddress(raw as u16))
+            Self::Taken(PixelAddress::new(raw as u16))
         }
     }
 }
@@ -93,7 +94,7 @@ pub struct Pixels<const N: usize> {
     now: u64,
     turn: usize,
     looks: u32,
-    /// How often the FIFO had lost photons when it was asked.
+    /// How often a status read found that the FIFO had lost photons.
     losses: u32,
     /// Photons of macropixels that there are not.
     strays: u32,
@@ -109,16 +110,16 @@ impl<const N: usize> Pixels<N> {
     ///
     /// # Errors
     /// None: the configuration is valid.
-    pub const fn new() -> Result<Self, ConfigError> {
+    pub const fn new() -> Result<Self, PixelConfigError> {
         let config = match config() {
             Ok(config) => config,
             Err(error) => return Err(error),
         };
-        let mut pixels = [const { AsyncPixel::new(PixelAddress(0)) }; N];
+        let mut pixels = [const { AsyncPixel::new(PixelAddress::new(0)) }; N];
         let mut index = 0;
         while index < N {
             #[allow(clippy::cast_possible_truncation, reason = "there are 2¹⁶ addresses")]
-            let address = PixelAddress(index as u16);
+            let address = PixelAddress::new(index as u16);
             pixels[index] = AsyncPixel::new(address);
             index += 1;
         }
@@ -177,14 +178,14 @@ impl<const N: usize> Pixels<N> {
         self.turn = if index + 1 < N { index + 1 } else { 0 };
         self.looks += 1;
         let passed = u16::try_from(passed).unwrap_or(u16::MAX);
-        let last = LaserCycle(self.now - 1);
+        let last = LaserCycle::new(self.now - 1);
         io::mark(Mark::Look(self.now).to_raw());
         let _ = pixel.end_laser_cycles(&self.config, &mut self.statistics, last, passed);
         self.link(index);
     }
 
     /// Hands the event that a macropixel holds to the link, if that is free. If not, the
-    /// macropixel keeps it, counts on, and counts what it puts off.
+    /// macropixel keeps it, counts on, and counts the decisions it defers.
     fn link(&mut self, index: usize) {
         if self.is_requesting && io::is_acknowledged() {
             self.is_requesting = false;
@@ -194,7 +195,7 @@ impl<const N: usize> Pixels<N> {
         }
         // The word after a time word comes before all others.
         let word = self.next.take().or_else(|| {
-            let event = self.pixels.get_mut(index)?.acknowledge()?;
+            let event = self.pixels.get_mut(index)?.take_event()?;
             io::mark(Mark::Taken(event.pixel).to_raw());
             let (time, word) = self.encoder.encode(&event);
             self.next = time.and(Some(word));
@@ -216,7 +217,7 @@ impl<const N: usize> Pixels<N> {
     }
 
     fn holds_event(&self, index: usize) -> bool {
-        self.pixels.get(index).is_some_and(AsyncPixel::request)
+        self.pixels.get(index).is_some_and(AsyncPixel::has_event)
     }
 
     /// Writes what was done: laser cycles, looks, losses, strays, and of all macropixels
@@ -244,7 +245,7 @@ impl<const N: usize> Pixels<N> {
     }
 }
 
-/// Defines the program that runs so many macropixels.
+/// Defines the program that runs this many macropixels.
 #[macro_export]
 macro_rules! stream_program {
     ($pixels:literal) => {
@@ -278,7 +279,7 @@ mod tests {
         for mark in [
             Mark::Look(0),
             Mark::Look((1 << 31) - 1),
-            Mark::Taken(PixelAddress(u16::MAX)),
+            Mark::Taken(PixelAddress::new(u16::MAX)),
         ] {
             assert_eq!(Mark::from_raw(mark.to_raw()), mark);
         }

@@ -1,9 +1,9 @@
-//! Settings for a wanted rate of false alarms:
+//! Settings for a required rate of false alarms:
 //! `cargo run --release --package dtof-theory --example tune`.
 
 use dtof_core::BlockLevel;
 use dtof_theory::looks::table::Table;
-use dtof_theory::tune::{Request, Wanted, tune};
+use dtof_theory::tune::{FalseAlarmLimit, Request, tune};
 
 fn main() -> anyhow::Result<()> {
     let request = Request {
@@ -15,13 +15,13 @@ fn main() -> anyhow::Result<()> {
         x: 4,
         l1: None,
         l2: 2000,
-        wanted: Wanted::PerExposure(0.01),
+        limit: FalseAlarmLimit::PerExposure(0.01),
         levels: BlockLevel::PIXEL,
         seed: 1,
     };
-    let tuned = tune(&request, &Table::kept()?)?;
+    let tuned = tune(&request, &Table::load()?)?;
     println!("α = {}, L1 = {}", tuned.alpha, tuned.l1);
     println!("false alarms an exposure: {:.4}", tuned.false_alarms);
-    assert!(tuned.false_alarms <= tuned.wanted);
+    assert!(tuned.false_alarms <= tuned.limit);
     Ok(())
 }

@@ -1,10 +1,10 @@
 //! The paper's analysis with Gaussian counts (Eq. 4, 5, 7 to 11).
 //!
 //! A larger α lowers the true and the false positive rate, as Eq. 8 and 10 say;
-//! the sentence on the ROC figure in the text says the opposite.
+//! the paper's sentence on its ROC figure says the opposite.
 //!
-//! The counts of a bin are taken as normal with variance = mean (Eq. 4), which
-//! is wrong below some 30 photons; [`known_background`](crate::known_background)
+//! The counts of a bin are modelled as normal with variance = mean (Eq. 4), which
+//! is inaccurate below some 30 photons; [`known_background`](crate::known_background)
 //! has the same quantities with Poisson counts.
 
 use crate::counts::normal;
@@ -35,16 +35,16 @@ impl MeanCounts {
     }
 
     /// Eq. 7: the probability that the peak bin exceeds all background bins.
-    /// Integrated from 0 as printed, so that what a Gaussian has below 0 is
-    /// missing. Background above 0.
+    /// Integrated from 0 as printed, so the Gaussian's part below 0 is missing.
+    /// The background must be above 0.
     #[must_use]
     pub fn hit_probability(&self) -> f64 {
         let (mean, deviation) = (self.peak(), self.peak().sqrt());
-        // What lies beyond ten standard deviations is less than 1e-22.
+        // Less than 1e-22 lies beyond ten standard deviations.
         let from = (mean - 10.0 * deviation).max(0.0);
         integral(from, mean + 10.0 * deviation, 40, |x| {
             let z = (x - self.background) / self.background.sqrt();
-            // Φ to the power M_B, by its logarithm.
+            // Φ to the power of M_B, through its logarithm.
             let highest_below = (f64::from(self.background_bins) * normal::ln_below(z)).exp();
             highest_below * pulse_density(x, mean, deviation)
         })
@@ -64,11 +64,11 @@ impl MeanCounts {
     }
 
     /// Eq. 9: the largest α with which [`Self::true_positive_rate`] is at least
-    /// `true_positive_rate`; `None` if that is not below the hit probability,
+    /// `true_positive_rate`; `None` if that rate is not below the hit probability,
     /// which no α reaches.
     ///
-    /// This is its first line. The second holds if its `h_i*` is read as the
-    /// peak bin's share of the signal, not as the count of Eq. 6.
+    /// This is the first line of Eq. 9. The second line holds if its `h_i*` is the
+    /// peak bin's share of the signal, not the count of Eq. 6.
     #[must_use]
     pub fn alpha_max(&self, true_positive_rate: f64) -> Option<f64> {
         let pass = true_positive_rate / self.hit_probability();
@@ -79,7 +79,7 @@ impl MeanCounts {
     }
 
     /// The receiver operating characteristic: false and true positive rate at
-    /// each of `alphas`, both falling with α.
+    /// each of `alphas`. Both fall with α.
     #[must_use]
     pub fn roc(&self, alphas: &[f64]) -> Vec<(f64, f64)> {
         let hit = self.hit_probability();
@@ -124,7 +124,7 @@ mod tests {
 
     #[test]
     fn with_one_background_bin_the_hit_probability_has_a_closed_form() {
-        // The difference of two Gaussians is one.
+        // The difference of two Gaussians is a Gaussian.
         for (background, signal) in [(100.0, 1.0), (100.0, 30.0), (400.0, 90.0)] {
             let counts = MeanCounts {
                 background,
@@ -148,10 +148,10 @@ mod tests {
 
     #[test]
     fn alpha_max_is_the_inverse_of_equation_8() {
-        for wanted in [1e-9, 1e-3, 0.1, 0.5, 0.9] {
-            let alpha = COUNTS.alpha_max(wanted).unwrap();
+        for expected in [1e-9, 1e-3, 0.1, 0.5, 0.9] {
+            let alpha = COUNTS.alpha_max(expected).unwrap();
             let found = COUNTS.true_positive_rate(alpha);
-            assert!((found / wanted - 1.0).abs() < 1e-9, "{wanted}: {found}");
+            assert!((found / expected - 1.0).abs() < 1e-9, "{expected}: {found}");
         }
         assert_eq!(COUNTS.alpha_max(COUNTS.hit_probability()), None);
     }
@@ -171,9 +171,9 @@ mod tests {
     fn alpha_min_is_the_inverse_of_equation_10() {
         for bins in [1, 7, 127, 1023] {
             for exponent in 1..200 {
-                let wanted = 10f64.powi(-exponent);
-                let found = false_positive_rate(alpha_min(wanted, bins), bins);
-                assert!((found / wanted - 1.0).abs() < 1e-9, "{bins} {wanted}");
+                let expected = 10f64.powi(-exponent);
+                let found = false_positive_rate(alpha_min(expected, bins), bins);
+                assert!((found / expected - 1.0).abs() < 1e-9, "{bins} {expected}");
             }
         }
     }
@@ -186,7 +186,7 @@ mod tests {
         for pair in rates.windows(2) {
             assert!(pair[1].0 < pair[0].0 && pair[1].1 < pair[0].1, "{pair:?}");
         }
-        // And the true positive rate stays below the hit probability.
+        // The true positive rate stays below the hit probability.
         assert!(COUNTS.roc(&[0.0])[0].1 < COUNTS.hit_probability());
     }
 }

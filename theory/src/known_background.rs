@@ -1,8 +1,7 @@
 //! The quantities of [`gaussian`](crate::gaussian) with Poisson counts, exact
-//! for a background that is known and counters that are not full.
+//! as long as the background is known and no counter is full.
 //!
-//! The peak is the bin the core takes: the highest, the lowest index winning a
-//! tie.
+//! The peak is the highest bin, as in the core; the lowest index wins a tie.
 
 use crate::counts::poisson::Poisson;
 use crate::gaussian::threshold;
@@ -53,23 +52,23 @@ pub fn lowest_above(level: f64) -> u32 {
 /// The probability that bin `target` is the peak and holds `lowest` or more.
 fn peak_at_least(means: &[f64], target: usize, lowest: u32) -> Option<f64> {
     let target_law = Poisson::new(*means.get(target)?);
-    // Equal bins share a law; with each how many lie before and after the target.
+    // Bins of equal mean share a law: (mean, law, bins before the target, bins after).
     let mut others: Vec<(f64, Poisson, u32, u32)> = Vec::new();
     for (bin, &mean) in means.iter().enumerate() {
         if bin == target {
             continue;
         }
         let (before, after) = if bin < target { (1, 0) } else { (0, 1) };
-        if let Some(known) = others.iter_mut().find(|known| known.0 == mean) {
-            known.2 += before;
-            known.3 += after;
+        if let Some(same) = others.iter_mut().find(|other| other.0 == mean) {
+            same.2 += before;
+            same.3 += after;
         } else {
             others.push((mean, Poisson::new(mean), before, after));
         }
     }
     let ln_lower = |count: u32| -> f64 {
         let one = |(_, law, before, after): &(f64, Poisson, u32, u32)| {
-            // A bin before the target wins a tie. Zero bins of ln 0 count nothing.
+            // A bin before the target wins a tie. 0 · ln 0 counts as 0.
             let times = |bins: u32, ln: f64| if bins == 0 { 0.0 } else { f64::from(bins) * ln };
             times(*before, law.ln_below(count)) + times(*after, law.ln_below(count + 1))
         };
@@ -89,7 +88,7 @@ mod tests {
         let hit = |target| hit_probability(&means, target).unwrap();
         let sum: f64 = (0..means.len()).map(hit).sum();
         assert!((sum - 1.0).abs() < 1e-12, "{sum}");
-        // Among equals the lower one wins ties.
+        // The lower bin wins a tie.
         assert!(hit(1) > hit(2) && hit(2) > hit(4));
         assert_eq!(hit_probability(&means, 8), None);
     }

@@ -1,20 +1,20 @@
 #![doc = include_str!("../README.md")]
 //! ## Modules
 //!
-//! | module | what | source |
+//! | module | contents | source |
 //! |---|---|---|
 //! | [`rates`] | photons a bin | Eq. 1 to 3, 6 |
 //! | [`gaussian`] | threshold, hit rate, true and false positive rate, limits of α, ROC | Eq. 4, 5, 7 to 11 |
-//! | [`known_background`] | the same with Poisson counts | exact |
+//! | [`known_background`] | the same rates with Poisson counts | exact |
 //! | [`looks::single_look`] | false alarms of one look with the quadrant background | exact |
 //! | [`looks::repeated_looks`] | false alarms of an exposure | bounds, exact |
-//! | [`looks::table`] | what lies between the bounds | simulation |
-//! | [`looks::exposure`] | exposures, from look to look | simulation |
+//! | [`looks::table`] | the probability between those bounds | simulation |
+//! | [`looks::exposure`] | exposures, one look after the other | simulation |
 //! | [`looks::detections`] | the time to a detection | simulation |
-//! | [`bounds::likelihood_ratio`] | the fastest a rule can be that knows the scene | exact |
+//! | [`bounds::likelihood_ratio`] | the fastest possible detection, with the scene known | exact |
 //! | [`bounds::cramer_rao`] | the smallest error of a pulse's position | exact |
 //! | [`counts`] | Poisson, normal and binomial laws | exact |
-//! | [`tune`] | settings for a wanted false-alarm rate | all of these |
+//! | [`tune`] | settings for a required false-alarm rate | all of these |
 //! | [`random`] | random numbers of a pixel or a trial | |
 
 #![forbid(unsafe_code)]

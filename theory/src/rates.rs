@@ -4,21 +4,21 @@ use std::f64::consts::PI;
 
 use crate::counts::normal;
 
-/// What one pixel receives in a laser cycle.
+/// The mean photons of one pixel in a laser cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rates {
     /// Background photons a bin (B).
     pub background: f64,
     /// Signal photons (A).
     pub signal: f64,
-    /// Where the pulse lies, in bins from the start of bin 0 (µ).
+    /// Position of the pulse, in bins from the start of bin 0 (µ).
     pub position: f64,
-    /// Its standard deviation in bins (σ).
+    /// Standard deviation of the pulse in bins (σ).
     pub sigma: f64,
 }
 
 impl Rates {
-    /// Without a target: `background` photons a bin, and no pulse.
+    /// `background` photons a bin, and no pulse.
     #[must_use]
     pub const fn without_target(background: f64) -> Self {
         Self {
@@ -30,12 +30,12 @@ impl Rates {
     }
 }
 
-/// What one object returns.
+/// The light that one object returns.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Reflection {
     /// Signal photons detected a laser cycle (`A_k`).
     pub photons: f64,
-    /// Where the pulse lies, in bins from the start of bin 0 (`µ_k`).
+    /// Position of the pulse, in bins from the start of bin 0 (`µ_k`).
     pub position: f64,
 }
 
@@ -55,7 +55,7 @@ pub fn pulse_density(t: f64, position: f64, sigma: f64) -> f64 {
 }
 
 /// The integral in Eq. 3 and 6: the share of a pulse that falls into bin
-/// `bin`. To full relative precision far from the pulse, too. With `sigma` 0
+/// `bin`, to full relative precision even far from the pulse. With a `sigma` of 0
 /// all of it falls into the bin of `position`.
 #[must_use]
 pub fn bin_share(bin: u32, position: f64, sigma: f64) -> f64 {
@@ -81,11 +81,11 @@ pub fn signal_mean(bin: u32, cycles: f64, reflections: &[Reflection], sigma: f64
 }
 
 /// Eq. 6: the bin that holds most of a pulse (`i*`, the lower of two equal
-/// ones) and its share of it. `h_i*` is this share times `N·A`.
+/// ones) and its share of the pulse. `h_i*` is this share times `N·A`.
 #[must_use]
 pub fn peak_share(bins: u32, position: f64, sigma: f64) -> (u32, f64) {
     let shares = (0..bins).map(|bin| (bin, bin_share(bin, position, sigma)));
-    // On an edge the two shares differ by rounding only.
+    // On an edge the two shares differ only by rounding.
     let higher = |best: (u32, f64), next: (u32, f64)| {
         if next.1 > best.1 * (1.0 + 1e-12) {
             next
@@ -96,9 +96,9 @@ pub fn peak_share(bins: u32, position: f64, sigma: f64) -> (u32, f64) {
     shares.fold((0, 0.0), higher)
 }
 
-/// The SNR of a histogram as the paper defines it: `N·A / √(N·B)`, from signal
-/// photons `signal` (A) and background photons a bin `background` (B) of a
-/// laser cycle, after `cycles` (N).
+/// The SNR of a histogram as the paper defines it: `N·A / √(N·B)`, with `signal`
+/// photons (A) and `background` photons a bin (B) in a laser cycle, after
+/// `cycles` laser cycles (N).
 #[must_use]
 pub fn snr(signal: f64, background: f64, cycles: f64) -> f64 {
     cycles * signal / (cycles * background).sqrt()

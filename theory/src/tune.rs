@@ -1,13 +1,11 @@
-//! Settings for a wanted rate of false alarms: α and L1, and what to expect of
-//! them.
+//! Settings for a required rate of false alarms: α and L1, and the performance to expect.
 //!
-//! α is the smallest whose probability of a false alarm in an exposure is not
-//! above the wanted one. That probability comes from the simulated [`Table`]; its
-//! upper limit has to be below by the table's [`MARGIN`]; where the table saw no events,
-//! or was not made for the settings, from the sum over looks of the exact
-//! single-look probability, which it cannot exceed. Of all L1 the one with the shortest mean
-//! time to an event is taken, found by simulating exposures ([`average`] and [`window`] do
-//! the same for the other rules).
+//! α is the smallest value that keeps the probability of a false alarm in an exposure within
+//! the limit. The probability comes from the simulated [`Table`]: its upper confidence limit
+//! times [`MARGIN`] must not exceed the limit. Where the table has no events or does not cover
+//! the settings, the sum of the exact single-look probabilities is used, an upper bound.
+//! Of all L1, simulated exposures choose the one with the shortest mean time to an event.
+//! [`average`] and [`window`] do the same for the other rules.
 
 pub mod average;
 mod shortest;
@@ -15,30 +13,29 @@ pub mod window;
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{
-    BlockLevel, Count, Count10, CounterWidth, DepthEstimator, PaperRule, PixelConfig, Threshold,
-};
+use dtof_core::paper::Threshold;
+use dtof_core::{BlockLevel, Count, Count10, CounterWidth, DepthEstimator, PaperRule, PixelConfig};
 
 use self::shortest::shortest;
 use crate::counts::poisson::Poisson;
-use crate::looks::detections::{Decisions, Detections};
+use crate::looks::detections::{DetectionSettings, Detections};
 use crate::looks::exposure::Looks;
 use crate::looks::repeated_looks::{BINS, Bounds, MINIMUM_COUNT, RepeatedLooks, single_looks};
 use crate::looks::single_look::SingleLook;
 use crate::looks::table::{MARGIN, Table};
 
-/// The wanted limit on false alarms of a pixel without a target.
+/// The limit on false alarms of a pixel without a target, as a probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Wanted {
+pub enum FalseAlarmLimit {
     /// In one exposure.
     PerExposure(f64),
     /// In one laser cycle.
     PerCycle(f64),
 }
 
-impl Wanted {
+impl FalseAlarmLimit {
     /// As a probability for one exposure.
-    fn in_an_exposure(self, looks: Looks) -> f64 {
+    fn per_exposure(self, looks: Looks) -> f64 {
         match self {
             Self::PerExposure(probability) => probability,
             // An exposure without an event lasts until it expires, one with an
@@ -51,7 +48,7 @@ impl Wanted {
     }
 }
 
-/// What is to be tuned.
+/// The scene and the settings to tune.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Request {
     /// Background photons a bin and laser cycle (B), above 0.
@@ -62,65 +59,65 @@ pub struct Request {
     pub sigma: f64,
     /// Bins of a histogram: a power of two from 8 to 1024.
     pub bins: u16,
-    /// Photons a reported peak holds at least.
+    /// The fewest photons of a reported peak.
     pub minimum_count: u16,
     /// Laser cycles between looks.
     pub x: u16,
-    /// L1, if it is given.
+    /// L1, if it is fixed.
     pub l1: Option<u16>,
-    /// The exposure at which a pixel starts over without an event.
+    /// L2: laser cycles after which an exposure without an event expires.
     pub l2: u16,
     /// The limit on false alarms.
-    pub wanted: Wanted,
-    /// With a window rule: the largest blocks of adaptive binning, which share that limit with
-    /// the pixels.
+    pub limit: FalseAlarmLimit,
+    /// With a window rule: the largest blocks of adaptive binning. Blocks and pixels share the
+    /// limit.
     pub levels: BlockLevel,
     /// Seed of the simulated exposures.
     pub seed: u64,
 }
 
-/// Where a probability comes from.
+/// The origin of a probability.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Source {
     /// Interpolated from the simulated table.
     Table,
-    /// Not above this, the least the simulated table saw.
+    /// An upper bound: the smallest probability in the simulated table.
     TableAtMost,
-    /// Not above this: the sum of the exact single-look probabilities.
+    /// An upper bound: the sum of the exact single-look probabilities.
     Bound,
 }
 
-/// The settings and what to expect of them.
+/// The settings and the performance to expect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tuned {
     /// α.
     pub alpha: U8F8,
     /// L1.
     pub l1: u16,
-    /// The looks that L1, L2 and X come to.
+    /// The looks that follow from L1, L2 and X.
     pub looks: Looks,
-    /// The wanted probability of a false alarm in an exposure.
-    pub wanted: f64,
+    /// The limit on the probability of a false alarm in an exposure.
+    pub limit: f64,
     /// The probability with this α.
     pub false_alarms: f64,
-    /// Where it comes from.
+    /// Where that probability comes from.
     pub source: Source,
-    /// Between what it lies, exactly.
+    /// Exact bounds of that probability.
     pub bounds: Bounds,
     /// Exposures simulated with the target.
     pub detections: Detections,
 }
 
-/// The chance that one of the counters is full at the last look.
-const MOST_SATURATED: f64 = 0.01;
+/// The highest probability that a counter is full at the last look.
+const MAX_SATURATED: f64 = 0.01;
 
-/// Looks of an exposure: half a minute's work.
-const MOST_LOOKS: u16 = 5000;
+/// The most looks of an exposure: they take half a minute.
+const MAX_LOOKS: u16 = 5000;
 
 /// Finds α and L1.
 ///
 /// # Errors
-/// What about the request cannot be met, in one line.
+/// Fails if the request is invalid or cannot be met; the message is one line.
 pub fn tune(request: &Request, table: &Table) -> Result<Tuned> {
     check(request)?;
     let mean_a_step = request.background * f64::from(request.x);
@@ -128,17 +125,17 @@ pub fn tune(request: &Request, table: &Table) -> Result<Tuned> {
     let steps = single_looks(request.bins.into(), mean_a_step, last);
 
     let minimum_count = Count::saturating(request.minimum_count.into());
-    let all: Vec<(Decisions, Tuned)> = candidates(request)
+    let all: Vec<(DetectionSettings, Tuned)> = candidates(request)
         .into_iter()
         .filter_map(|l1| {
             let looks = Looks::new(request.x, l1, request.l2);
             let tuned = calibrated(request, table, &steps, l1, looks)?;
-            let decisions = Decisions {
+            let settings = DetectionSettings {
                 looks,
                 rule: PaperRule::new(tuned.alpha, minimum_count).into(),
                 estimator: DepthEstimator::Centroid3,
             };
-            Some((decisions, tuned))
+            Some((settings, tuned))
         })
         .collect();
     ensure!(
@@ -153,7 +150,7 @@ pub fn tune(request: &Request, table: &Table) -> Result<Tuned> {
     })
 }
 
-/// Refuses what cannot work.
+/// Checks the request.
 fn check(request: &Request) -> Result<()> {
     let &Request {
         background,
@@ -181,16 +178,16 @@ fn check(request: &Request) -> Result<()> {
     }
     let looks = (l2 - 1) / x;
     ensure!(
-        looks <= MOST_LOOKS,
-        "--x {x} --l2 {l2}: {looks} looks an exposure, at most {MOST_LOOKS} looks are calculated; \
+        looks <= MAX_LOOKS,
+        "--x {x} --l2 {l2}: {looks} looks an exposure, at most {MAX_LOOKS} looks are calculated; \
          raise --x"
     );
     let last = f64::from(looks * x);
-    // A mean that is far too high need not be tabulated to say so.
+    // Limits the size of the Poisson table; such a mean is far too high anyway.
     let mean = (background * last).min(5000.0);
     let full = Poisson::new(mean).highest_at_least(Count10::MAX, bins.into());
-    if full > MOST_SATURATED {
-        // A mean of 860 at the last look leaves them room.
+    if full > MAX_SATURATED {
+        // With a mean of 860 at the last look, counters rarely fill.
         let fits = (860.0 / background).floor();
         let least = request.l1.map_or(2.0 * f64::from(x), f64::from);
         let way_out = if fits > least {
@@ -209,10 +206,10 @@ fn check(request: &Request) -> Result<()> {
         "a signal of {} photons fills a 10-bit counter within a laser cycle",
         short(signal)
     );
-    let (Wanted::PerExposure(wanted) | Wanted::PerCycle(wanted)) = request.wanted;
+    let (FalseAlarmLimit::PerExposure(limit) | FalseAlarmLimit::PerCycle(limit)) = request.limit;
     ensure!(
-        wanted > 0.0 && wanted < 1.0,
-        "the wanted false alarms must be more than 0 and less than 1 an exposure or laser cycle"
+        limit > 0.0 && limit < 1.0,
+        "the limit on false alarms must be more than 0 and less than 1 an exposure or laser cycle"
     );
     Ok(())
 }
@@ -226,14 +223,14 @@ fn short(value: f64) -> String {
     }
 }
 
-/// The L1 to compare: the one given, or from X on, each half as much again.
+/// The L1 to compare: the fixed one, or values from X on that grow by half.
 fn candidates(request: &Request) -> Vec<u16> {
     if let Some(l1) = request.l1 {
         return vec![l1];
     }
     let mut candidates = Vec::new();
     let mut steps = 1;
-    // Half of the exposure at most, and at least one.
+    // Up to half of the exposure, at least one value.
     while steps == 1 || u32::from(steps) * 2 * u32::from(request.x) < u32::from(request.l2) {
         candidates.push(steps * request.x);
         steps += (steps / 2).max(1);
@@ -241,7 +238,7 @@ fn candidates(request: &Request) -> Vec<u16> {
     candidates
 }
 
-/// The smallest α that keeps false alarms down, or `None` if none does.
+/// The smallest α that keeps false alarms within the limit; `None` if none does.
 fn calibrated(
     request: &Request,
     table: &Table,
@@ -249,11 +246,11 @@ fn calibrated(
     l1: u16,
     looks: Looks,
 ) -> Option<Tuned> {
-    let wanted = request.wanted.in_an_exposure(looks);
+    let limit = request.limit.per_exposure(looks);
     let repeated = RepeatedLooks::new(steps, looks.first, looks.last);
     let first_mean = request.background * f64::from(looks.first * looks.x);
     let tabulated = usize::from(request.bins) == BINS && request.minimum_count == MINIMUM_COUNT;
-    // It, what it may be at most, and where it comes from.
+    // The probability, its upper limit, and where it comes from.
     let probability = |alpha: u16| {
         let minimum_count = Count::saturating(request.minimum_count.into());
         let threshold = Threshold::new(U8F8::from_bits(alpha), minimum_count);
@@ -263,31 +260,31 @@ fn calibrated(
         } else {
             None
         };
-        // Never below what one look alone gives.
+        // Never below the probability of one look alone.
         match found {
             Some(found) if found.probability < bounds.sum => {
-                let source = if found.seen {
+                let source = if found.is_observed {
                     Source::Table
                 } else {
                     Source::TableAtMost
                 };
-                let [probability, at_most] =
-                    [found.probability, found.at_most].map(|found| found.max(bounds.worst_look));
-                // Whatever the table is off by, not above the bound.
-                let most = (at_most * MARGIN).min(bounds.sum);
-                (probability, most, source, bounds)
+                let [probability, upper_limit] = [found.probability, found.upper_limit]
+                    .map(|found| found.max(bounds.worst_look));
+                // The bound holds despite the interpolation error.
+                let upper_limit = (upper_limit * MARGIN).min(bounds.sum);
+                (probability, upper_limit, source, bounds)
             }
             _ => (bounds.sum, bounds.sum, Source::Bound, bounds),
         }
     };
-    let kept = |alpha: u16| probability(alpha).1 <= wanted;
+    let is_within_limit = |alpha: u16| probability(alpha).1 <= limit;
     let (mut low, mut high) = (0u16, u16::MAX);
-    if !kept(high) {
+    if !is_within_limit(high) {
         return None;
     }
     while low < high {
         let middle = low + (high - low) / 2;
-        if kept(middle) {
+        if is_within_limit(middle) {
             high = middle;
         } else {
             low = middle + 1;
@@ -298,7 +295,7 @@ fn calibrated(
         alpha: U8F8::from_bits(high),
         l1,
         looks,
-        wanted,
+        limit,
         false_alarms,
         source,
         bounds,

@@ -1,10 +1,10 @@
-//! The theory of `dtof` against Monte-Carlo, and against the core itself.
+//! The laws against Monte-Carlo simulation and against the core.
 //!
-//! Every comparison is of a count with an exact binomial interval. The level of
-//! a test is divided by the comparisons it makes: one run in a thousand may fail
-//! for another seed.
+//! Every comparison tests a count with an exact binomial interval. The level of a test is
+//! divided by the number of its comparisons: with another seed, one run in a thousand may fail.
 
-use dtof_core::{Count, DepthEstimator, Histogram, PaperRule, RangeGate, detect};
+use dtof_core::rule::detect;
+use dtof_core::{Count, DepthEstimator, Histogram, PaperRule, RangeGate};
 use dtof_theory::counts::binomial::plausible;
 use dtof_theory::gaussian::{self, MeanCounts};
 use dtof_theory::known_background;
@@ -14,13 +14,13 @@ use dtof_theory::rates::{bin_share, peak_share, signal_for_snr};
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 
-/// The chance that a test fails for nothing.
+/// The probability that a test fails by chance.
 const LEVEL: f64 = 1e-3;
 
-/// Mean counts from far too few for a Gaussian to ten times what it needs.
+/// Mean counts, from far too few for a Gaussian to ten times enough.
 const MEANS: [f64; 8] = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0];
 
-/// One count a bin.
+/// Draws one count a bin.
 fn draw(laws: &[Poisson<f64>], rng: &mut Pcg64) -> Vec<f64> {
     laws.iter().map(|law| law.sample(rng)).collect()
 }
@@ -33,7 +33,7 @@ fn is_peak(counts: &[f64], target: usize) -> bool {
 }
 
 /// The paper's setting: 8 bins, B = 0.05, σ = 1.5 bins, the pulse on a bin
-/// edge; one bin with signal, as Eq. 7 has it.
+/// edge. One bin has signal, as in Eq. 7.
 fn paper_counts(cycles: f64, snr: f64) -> MeanCounts {
     let (_, share) = peak_share(8, 4.0, 1.5);
     MeanCounts {
@@ -89,7 +89,7 @@ const GAUSSIAN_ERRORS: [(f64, f64, f64, f64); 8] = [
 fn what_the_gaussian_gets_wrong() {
     let snrs = || (0..=60).map(|step| f64::from(step) / 2.0);
     let alphas = || (0..=16).map(|step| f64::from(step) / 2.0);
-    // Eq. 10 says this whatever the background is.
+    // Eq. 10 does not depend on the background.
     let equation_10 = gaussian::false_positive_rate(4.0, 127);
     assert!((equation_10 - 0.0040).abs() < 5e-5, "{equation_10}");
     for (mean, hit_error, pass_error, false_positive) in GAUSSIAN_ERRORS {
@@ -140,9 +140,8 @@ fn ninety_nine_percent_hit_rate_needs_an_snr_near_18() {
 
 #[test]
 fn a_pulse_on_an_edge_hits_either_of_two_bins() {
-    // What Eq. 7 leaves out: the other bins of the pulse. At an SNR where it has
-    // 99 %, the peak is the lower of the two equal bins in 45 % of histograms,
-    // one of the two in 88 %.
+    // Eq. 7 leaves out the other bins of the pulse. At the SNR where it gives 99 %, the peak
+    // is the lower of the two equal bins in 45 % of histograms, and one of the two in 88 %.
     let background: f64 = 100.0;
     let signal = 18.4 * background.sqrt();
     let means = paper_pulse(background, signal);
@@ -213,7 +212,7 @@ fn poisson_forms_against_monte_carlo_from_a_tenth_to_300_counts() {
     }
 }
 
-/// Background only, the core's decision.
+/// Decisions of the core on background only.
 fn false_alarms<const BINS: usize>(
     mean: f64,
     rules: &[PaperRule],
@@ -245,7 +244,7 @@ fn the_quadrant_law_is_that_of_the_core() {
             [1, 5].map(|count| PaperRule::new(alpha.parse().unwrap(), Count::saturating(count)))
         })
         .collect();
-    // Beyond 1000 counters are full.
+    // Beyond 1000 the counters saturate.
     let means = [0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 990.0];
     let comparisons = 3 * means.len() * rules.len();
     let level = LEVEL / f64::from(u32::try_from(comparisons).unwrap());

@@ -1,6 +1,6 @@
-// An RP2040 with an image in its flash: rp2040js, and what it lacks.
+// An RP2040 with an image in its flash: rp2040js and the parts that it lacks.
 //
-// - A handler would run at an odd address, as its vector is, and read tables beside its code wrongly.
+// - A handler would run at an odd address, as its vector is, and read tables next to its code wrongly.
 // - There is no fault. Here an access outside the address map, an access that is not aligned, an
 //   undefined instruction (UDF) and a breakpoint raise HardFault. A fault in the handler of
 //   HardFault, or while the registers of an exception are saved, locks the core up.
@@ -65,7 +65,7 @@ const PSM_PROC0 = 1 << 15;
 const NO_FUNCTION = 0x1f;
 const PAD_AT_RESET = 0b0110110;
 
-/** An access that the bus does not answer, or an instruction that is none. */
+/** An access that the bus does not answer, or an undefined instruction. */
 class Fault extends Error {}
 
 /** The core has stopped for good. */
@@ -290,7 +290,7 @@ export class Chip {
     }
   }
 
-  /** Of an error that is none of the core's, nothing is kept back. */
+  /** Errors that are not faults of the core are thrown on. */
   lockUp(error) {
     if (!(error instanceof Lockup)) {
       throw error;

@@ -16,7 +16,7 @@ const PANIC_FILE = 'planted.rs';
  * Each is called before every instruction, once it is due, until it gives true.
  */
 export const FAULTS = {
-  /** The next instruction is none: HardFault. */
+  /** The next instruction is undefined: HardFault. */
   fault: (machine) => isAtWork(machine) && patch(machine, UDF),
   /** The next instruction is a loop; interrupts go on. */
   hang: (machine) => isAtWork(machine) && patch(machine, BRANCH_TO_ITSELF),
@@ -86,7 +86,7 @@ function patch({ rp2040 }, opcode) {
   return true;
 }
 
-/** A function that panics, and what it takes before the `Location`. */
+/** A function that panics, and its arguments before the `Location`. */
 function panicFunction({ elf }) {
   const candidates = [
     // An index and a length.

@@ -1,5 +1,5 @@
 // The host at the other end of the USB: it sets the device up, and opens and closes its serial
-// port as a kernel does, which says so by DTR and RTS.
+// port as a kernel does, which sets DTR and RTS.
 
 import { createSetupPacket, DataDirection, SetupRecipient, SetupType, USBCDC } from 'rp2040js';
 
@@ -35,8 +35,8 @@ export class Host {
     const device = new USBCDC(usb);
     this.device = device;
     /** The endpoint that waits for a packet of the host, and its most bytes. */
-    this.wanted = null;
-    /** Line states that the device has not been told, and whether it is about to answer one. */
+    this.pendingRead = null;
+    /** Line states that the device has not received, and whether it is about to answer one. */
     this.lines = this.isOpen ? [DTR_AND_RTS] : [];
     this.isAsking = false;
     device.onSerialData = (bytes) => this.onBytes(bytes);
@@ -49,9 +49,9 @@ export class Host {
       this.begin();
       usb.resetDevice();
     };
-    // Its own forgets a packet that is wanted before it knows the device.
+    // The library forgets a read request that comes before the device is known.
     usb.onEndpointRead = (endpoint, size) => {
-      this.wanted = endpoint > 0 ? { endpoint, size } : this.wanted;
+      this.pendingRead = endpoint > 0 ? { endpoint, size } : this.pendingRead;
     };
     const { onEndpointWrite } = usb;
     usb.onEndpointWrite = (endpoint, bytes) => {
@@ -108,11 +108,11 @@ export class Host {
 
   /** Gives the device a packet of `input`, if it waits for one. Gives whether it has. */
   send(input) {
-    if (!this.isReady || this.wanted === null) {
+    if (!this.isReady || this.pendingRead === null) {
       return false;
     }
-    const { endpoint, size } = this.wanted;
-    this.wanted = null;
+    const { endpoint, size } = this.pendingRead;
+    this.pendingRead = null;
     this.usb.endpointReadDone(endpoint, Uint8Array.from(input.splice(0, size)));
     return true;
   }

@@ -1,5 +1,5 @@
 // A Raspberry Pi Pico with an image: its clock, its resets, its serial port, and the record of
-// what its laser's pin does. `chip.js` says what of the chip is there.
+// what its laser's pin does. `chip.js` lists the emulated parts of the chip.
 //
 // It runs rp2040js, which leaves this to its caller:
 //
@@ -14,7 +14,7 @@
 //   the core never sleeps for long: this file knows that it does.
 //
 // Resets. The watchdog, when it is triggered or its timer has run out, resets the chip: all
-// begins anew but memory, the watchdog's scratch registers, its reason, and what this file has
+// starts again except memory, the watchdog's scratch registers, its reason, and what this file has
 // recorded. A write of AIRCR.SYSRESETREQ resets the core alone: PIO, DMA, pins and peripherals go on,
 // until the image resets them. The flash is the image's file again after either. Clocks are counted
 // from power-on.
@@ -33,7 +33,7 @@ const CLOCKS_A_BYTE = 1250;
 const CLOCKS_A_MS = 125_000;
 const PAINT = 0xcccccccc;
 const BRANCH_TO_ITSELF = 0xe7fe;
-/** What REASON of the watchdog says after a reset of the chip. */
+/** The value of REASON of the watchdog after a reset of the chip. */
 const REASONS = { watchdog: 1, forced: 2 };
 /** Functions that only a panic reaches. */
 const PANIC_HANDLERS = /on_panic|rust_begin_unwind/;
@@ -82,7 +82,7 @@ export class Machine {
     this.onOutput = () => {};
     /** The device of the USB has gone from the host, which had its port open. */
     this.onGone = () => {};
-    /** Clocks of what has happened. */
+    /** Clocks of events. */
     this.lastInput = null;
     this.dtrLow = null;
     this.planted = null;
@@ -140,7 +140,7 @@ export class Machine {
 
   boot(reason) {
     this.asleep = false;
-    /** The reset that has been asked for. */
+    /** The requested reset. */
     this.request = null;
     if (this.boots.length === this.mostBoots) {
       return this.end(1, `the image has booted ${this.mostBoots} times`);
@@ -206,7 +206,7 @@ export class Machine {
     this.levels = this.rp2040.gpio.reduce((sum, gpio, index) => sum | (gpio.inputValue ? 1 << index : 0), 0);
   }
 
-  /** Runs for about so many clocks, or until the image ends. */
+  /** Runs for about this many clocks, or until the image ends. */
   run(clocks) {
     const until = this.clocks + clocks;
     while (this.clocks < until && this.ended === null) {

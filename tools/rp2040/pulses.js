@@ -4,7 +4,7 @@ import { CLOCK_NS } from './edges.js';
 
 const NS_A_MS = 1e6;
 
-/** Milliseconds of so many clocks. */
+/** Clocks in milliseconds. */
 export function milliseconds(clocks) {
   return (clocks * CLOCK_NS) / NS_A_MS;
 }

@@ -12,7 +12,7 @@ const HELP = `\
 node run.js IMAGE [options]
 
   --port N        put the serial port on this TCP port of this computer
-  --edges FILE    change pins as the file says: lines of \`nanoseconds pin level\`
+  --edges FILE    change pins as in the file: lines of \`nanoseconds pin level\`
   --from PIN      count the file's time from the first clock in which this pin is high, and
                   record the pulses of this pin; without it those of pin 2, the laser's
   --usb           put the serial port of the USB there, not the UART. A client that connects
@@ -143,7 +143,7 @@ function serve(machine, port, forMs, done) {
   const start = performance.now();
   const turn = () => {
     if (client === null && machine.input.length === 0) {
-      // As a kernel, which sends what has been written first.
+      // Like a kernel, which first sends the data already written.
       machine.host?.close();
     }
     machine.run(SLICE);

@@ -1,4 +1,4 @@
-// What an image asks of its debugger: Arm's semihosting, as far as the images use it.
+// Arm's semihosting: an image's requests to its debugger, as far as the images use them.
 
 import { writeSync } from 'node:fs';
 

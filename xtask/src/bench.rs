@@ -1,5 +1,5 @@
-//! `cargo xtask bench`: how many instructions the operations of the core take on
-//! the targets, counted by emulators.
+//! `cargo xtask bench`: instruction counts of the core's operations on the targets, counted in
+//! emulators.
 
 mod laser_rates;
 
@@ -12,12 +12,12 @@ use anyhow::{Context, Result, ensure};
 use crate::emulator;
 use crate::firmware::Board;
 
-/// A processor, by the board that has it in an emulator.
+/// A processor, and the emulated board that has it.
 struct Processor {
     name: &'static str,
     board: Board,
     file: &'static str,
-    /// Lets the emulator count: see `firmware/src/bin/bench/counter.rs`.
+    /// Emulator arguments that make it count: see `firmware/src/bin/bench/counter.rs`.
     count: &'static [&'static str],
 }
 
@@ -39,10 +39,10 @@ const PROCESSORS: [Processor; 2] = [
 
 const HEADER: &str = "operation,variant,opt,instructions";
 
-/// A figure may grow or fall by one fiftieth before [`check`] fails.
+/// [`check`] fails if a figure changes by more than one part in so many.
 const TOLERANCE: u64 = 50;
 
-/// Of the names when printed.
+/// The printed width of names.
 const WIDTH: usize = 62;
 
 /// One figure.
@@ -50,7 +50,7 @@ const WIDTH: usize = 62;
 pub struct Row {
     /// Operation, variant and optimisation level, with commas between.
     name: String,
-    /// Instructions, in hundredths.
+    /// Instructions in hundredths.
     hundredths: u64,
 }
 
@@ -79,9 +79,9 @@ pub fn check(root: &Path) -> Result<()> {
         }
         ensure!(
             differences.is_empty(),
-            "not what {file} says, see above; `cargo xtask bench` writes it"
+            "differs from {file}, see above; `cargo xtask bench` writes it"
         );
-        println!("{file}: all {} figures hold", committed.len());
+        println!("{file}: all {} figures are up to date", committed.len());
     }
     Ok(())
 }
@@ -99,8 +99,8 @@ impl Processor {
         Ok(rows)
     }
 
-    /// One line an operation, the levels beside each other; and the table of `README.md`, which
-    /// is of the first processor.
+    /// Prints a line for each operation, with both levels, and for the first processor the table of
+    /// `README.md`.
     fn print(&self, rows: &[Row]) -> Result<()> {
         let title = format!("instructions, {}", self.name);
         println!("{title:<WIDTH$} {:>10} {:>10}", "O3", "Os");
@@ -120,14 +120,14 @@ impl Processor {
     }
 }
 
-/// The figures that an image printed.
+/// Parses the figures that an image printed.
 pub fn rows(output: &str, level: &str) -> Result<Vec<Row>> {
-    let row = |line| measured(line, level).with_context(|| format!("what is `{line}`?"));
+    let row = |line| measured(line, level).with_context(|| format!("not understood: `{line}`"));
     output.lines().map(row).collect()
 }
 
-/// A table of figures of a real board and, beside them, those of `board` in the emulator, if it
-/// has some, or else of the board with a processor of the same instructions.
+/// A table of clock cycles on a real board, beside the instructions of `board` in the emulator, or
+/// of an emulated board with the same instruction set.
 pub fn beside(root: &Path, board: Board, rows: &[Row]) -> Result<String> {
     let like = match board {
         Board::Pico => Board::Pico,
@@ -161,7 +161,7 @@ fn measured(line: &str, level: &str) -> Option<Row> {
     })
 }
 
-/// Figures that are missing on one side, or more than a little apart.
+/// Figures that are missing on one side, or differ by more than the tolerance.
 fn differences(committed: &[Row], rows: &[Row]) -> Vec<String> {
     let mut lines = Vec::new();
     for Row { name, hundredths } in committed {
@@ -204,7 +204,7 @@ fn parse(text: &str) -> Result<Vec<Row>> {
         })
     };
     lines
-        .map(|line| row(line).with_context(|| format!("no figure: `{line}`")))
+        .map(|line| row(line).with_context(|| format!("not a figure: `{line}`")))
         .collect()
 }
 

@@ -9,11 +9,11 @@ use crate::emulator;
 use crate::firmware::{Board, Build};
 use crate::tools::DEFMT_PRINT;
 
-/// Where the serial port is unless said otherwise.
+/// The default TCP port of the serial port.
 const PORT: u16 = 5386;
 
-/// Runs the sidecar in the emulator of `board` until it ends or is interrupted. `end` is
-/// how it is to end by itself, in QEMU.
+/// Runs the sidecar in the emulator of `board` until it ends or is interrupted. In QEMU, `end` is
+/// the way it ends by itself.
 pub fn emulate(root: &Path, board: Board, port: Option<u16>, end: Option<&str>) -> Result<()> {
     let port = port.unwrap_or(PORT);
     if let Some(reason) = emulator::cannot_run(board)? {
@@ -22,21 +22,21 @@ pub fn emulate(root: &Path, board: Board, port: Option<u16>, end: Option<&str>) 
     let image = board.build_for_emulator(root, Build::Sidecar, &[])?;
     let mut command = emulator::command(board, &image, Some(port), end);
     println!("the serial port is tcp:127.0.0.1:{port}; Ctrl-C ends");
-    println!("what the board sends while nobody is connected is lost");
-    // rp2040js has no probe that reads a log.
+    println!("bytes that the board sends without a connection are lost");
+    // rp2040js has no debug probe for the log.
     let logs = board != Board::Pico;
-    let decoded = logs && DEFMT_PRINT.is_there();
+    let decoded = logs && DEFMT_PRINT.is_installed();
     if decoded {
         command.stdout(Stdio::piped());
     } else if logs {
-        println!("the log comes as it is: {}", DEFMT_PRINT.missing());
+        println!("the log is not decoded: {}", DEFMT_PRINT.missing());
     }
     let mut emulator = command.spawn().context("the emulator does not start")?;
     if let Some(log) = emulator.stdout.take() {
         let mut decoder = Command::new(DEFMT_PRINT.program);
         let status = decoder.arg("-e").arg(&image).stdin(log).status();
         if !status.as_ref().is_ok_and(|status| status.success()) {
-            // Nobody reads the log, and so nobody sees when it is over.
+            // Nothing reads the log, so its end would go unnoticed.
             emulator.kill()?;
         }
         let status = status.with_context(|| format!("{} does not start", DEFMT_PRINT.program))?;

@@ -1,4 +1,4 @@
-//! The emulators, with an image: QEMU, and for the Pico rp2040js in Node.js.
+//! Runs images in emulators: QEMU, and for the Pico rp2040js in Node.js.
 
 use std::io::Read;
 use std::path::Path;
@@ -12,20 +12,19 @@ use crate::firmware::Board;
 use crate::tools::{NODE, NPM, QEMU};
 use crate::{root, succeed};
 
-/// Far more than any image takes that ends.
+/// Far longer than an image runs.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-/// The QEMU that is known to run `stm32f405`: QEMU 10, for one, ends at a reset of
-/// the clocks.
+/// The QEMU that runs `stm32f405`. QEMU 10, for instance, ends at a reset of the clocks.
 const KNOWN: &str = "version 7.2.";
 
-/// Where the runner of the Pico's images is, and what it needs.
+/// The folder of the runner for the Pico's images, with its packages.
 const RP2040: &str = "tools/rp2040";
 
-/// Installs what the runner of the Pico's images needs, if it is not there.
+/// Installs the packages of the runner for the Pico's images, unless they are installed.
 pub fn install_rp2040js() -> Result<()> {
     let folder = root()?.join(RP2040);
-    // Written by npm last.
+    // npm writes it last.
     if folder.join("node_modules/.package-lock.json").exists() {
         return Ok(());
     }
@@ -36,7 +35,7 @@ pub fn install_rp2040js() -> Result<()> {
     succeed(npm.current_dir(folder))
 }
 
-/// Why the emulator does not run the images of `board`, if so.
+/// The reason to skip the emulator of `board`, if there is one.
 pub fn cannot_run(board: Board) -> Result<Option<String>> {
     if board == Board::Pico {
         install_rp2040js()?;
@@ -50,7 +49,7 @@ pub fn cannot_run(board: Board) -> Result<Option<String>> {
     }))
 }
 
-/// How to start an image. `word` is what it finds on its command line, in QEMU.
+/// The command that starts an image. In QEMU, `word` is its command line.
 pub fn command(board: Board, image: &Path, port: Option<u16>, word: Option<&str>) -> Command {
     match board {
         Board::Pico => rp2040js(image, port),
@@ -84,7 +83,7 @@ fn qemu(board: Board, image: &Path, port: Option<u16>, word: Option<&str>) -> Co
     let mut command = Command::new(QEMU.program);
     command.args(["-display", "none", "-monitor", "none"]);
     if board == Board::Stm32F405 {
-        // The first is USART1, ours USART2.
+        // The first serial port is USART1, ours is USART2.
         command.args(["-machine", "netduinoplus2", "-serial", "null"]);
     } else {
         command.args(["-machine", "mps2-an386"]);
@@ -95,8 +94,8 @@ fn qemu(board: Board, image: &Path, port: Option<u16>, word: Option<&str>) -> Co
     command
 }
 
-/// Runs an image that ends, with these arguments more for the emulator; gives how it ended and
-/// what it printed.
+/// Runs an image that ends, with additional arguments for the emulator. Returns its exit status and
+/// its output.
 pub fn run(board: Board, image: &Path, arguments: &[&str]) -> Result<(ExitStatus, String)> {
     if board == Board::Pico {
         install_rp2040js()?;
@@ -116,7 +115,7 @@ pub fn run(board: Board, image: &Path, arguments: &[&str]) -> Result<(ExitStatus
         .context("no output of the emulator")?;
     let output = thread::spawn(move || {
         let mut bytes = Vec::new();
-        // The text before an error is kept.
+        // Keeps the text before an error.
         let _ = stdout.read_to_end(&mut bytes);
         bytes
     });
@@ -128,7 +127,7 @@ pub fn run(board: Board, image: &Path, arguments: &[&str]) -> Result<(ExitStatus
         if start.elapsed() > PATIENCE {
             emulator.kill()?;
             emulator.wait()?;
-            bail!("the image does not end after {PATIENCE:?}");
+            bail!("the image did not end within {PATIENCE:?}");
         }
         thread::sleep(Duration::from_millis(5));
     };

@@ -1,4 +1,4 @@
-//! The images a board runs: `cargo xtask image`.
+//! `cargo xtask image`: builds the images of boards.
 
 use std::env;
 use std::fs;
@@ -25,7 +25,7 @@ pub enum Board {
 impl Board {
     pub const ALL: [Self; 3] = [Self::Mps2An386, Self::Pico, Self::Stm32F405];
 
-    /// Its name and that of its feature.
+    /// The name of the board and of its feature.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mps2An386 => "mps2-an386",
@@ -34,7 +34,7 @@ impl Board {
         }
     }
 
-    /// What its processor is to the compiler.
+    /// The compilation target of its processor.
     fn target(self) -> &'static str {
         match self {
             Self::Mps2An386 | Self::Stm32F405 => "thumbv7em-none-eabihf",
@@ -48,15 +48,15 @@ impl Board {
         found.with_context(|| format!("no board `{name}`: {names}"))
     }
 
-    /// The one that the first word names, or `default`; and the other words.
+    /// The board that the first word names, or `default`, and the other words.
     pub fn chosen<'a>(words: &'a [&'a str], default: Self) -> (Self, &'a [&'a str]) {
         let named = words.split_first();
         let named = named.and_then(|(name, rest)| Some((Self::named(name).ok()?, rest)));
         named.unwrap_or((default, words))
     }
 
-    /// Builds an image as it goes onto the board; that of a TMF8820/21/28 or TMF8829 has the
-    /// sensor's own program in it, which `TMF882X_IMAGE` or `TMF8829_IMAGE` names.
+    /// Builds an image for the board. An image for a TMF8820/21/28 or TMF8829 contains the sensor's
+    /// own program, the file in `TMF882X_IMAGE` or `TMF8829_IMAGE`.
     pub fn build(self, root: &Path, what: Build, risks: &[Risk]) -> Result<PathBuf> {
         let program = match what {
             Build::With(sensor) => sensor.program()?,
@@ -65,12 +65,12 @@ impl Board {
         self.link(root, what, &features(what, risks)?, program.as_ref())
     }
 
-    /// The same without the sensor's own program, and without risks.
+    /// Builds an image without the sensor's own program, and without risks.
     pub fn build_bare(self, root: &Path, what: Build) -> Result<PathBuf> {
         self.link(root, what, &[], None)
     }
 
-    /// The same for QEMU, whose `stm32f405` has no PLL.
+    /// Builds an image for QEMU, whose `stm32f405` has no PLL.
     pub fn build_for_emulator(self, root: &Path, what: Build, risks: &[Risk]) -> Result<PathBuf> {
         let mut features = features(what, risks)?;
         if self == Self::Stm32F405 {
@@ -79,7 +79,7 @@ impl Board {
         self.link(root, what, &features, None)
     }
 
-    /// Builds the image that counts instructions, `small` or fast.
+    /// Builds the image that counts instructions, for size if `small`, else for speed.
     pub fn bench(self, root: &Path, small: bool) -> Result<PathBuf> {
         let profile = if small { SMALL_PROFILE } else { PROFILE };
         let features = [self.name(), "bench"];
@@ -106,13 +106,13 @@ impl Board {
             eprintln!("{}", laser.text());
         }
         if self == Self::Pico {
-            eprintln!("for its drive: {}", uf2::write(&image)?.display());
+            eprintln!("to copy onto the board: {}", uf2::write(&image)?.display());
         }
         Ok(image)
     }
 }
 
-/// What an image is built with only on request, as a laser may be on for longer then.
+/// An option that lets the laser be on for longer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Risk {
     /// The photon timer may have pulses over 1 µs and over 2 % of the time.
@@ -122,7 +122,7 @@ pub enum Risk {
 }
 
 impl Risk {
-    /// The option of `cargo xtask image` and `flash`, and the feature.
+    /// The name of the option of `cargo xtask image` and `flash`, and of the feature.
     pub fn name(self) -> &'static str {
         match self {
             Self::LaserBeyondLimits => "laser-beyond-limits",
@@ -140,15 +140,15 @@ impl Risk {
     }
 }
 
-/// The features of `risks` for an image, after a warning of each.
+/// The features of `risks` for an image. Warns of each.
 fn features(what: Build, risks: &[Risk]) -> Result<Vec<&'static str>> {
     for &risk in risks {
-        let concerns = match risk {
+        let applies = match risk {
             Risk::LaserBeyondLimits => what == Build::With(Sensor::PhotonTimer),
             Risk::LaserOnWithoutHost => what != Build::SelfTest,
         };
         let name = risk.name();
-        ensure!(concerns, "--{name} is not for this image");
+        ensure!(applies, "--{name} does not apply to this image");
         eprintln!("warning: --{name}: {}", risk.warning());
     }
     Ok(risks.iter().map(|risk| risk.name()).collect())
@@ -159,13 +159,13 @@ fn features(what: Build, risks: &[Risk]) -> Result<Vec<&'static str>> {
 pub enum Build {
     /// The sidecar with simulated photons.
     Sidecar,
-    /// The sidecar with those of a sensor.
+    /// The sidecar with the photons of a sensor.
     With(Sensor),
     SelfTest,
 }
 
 impl Build {
-    /// The sidecar of a board with simulated photons, unless another is named.
+    /// The image of this name; without a name, the sidecar with simulated photons.
     pub fn named(board: Board, name: Option<&str>) -> Result<Self> {
         let build = match name {
             None => Self::Sidecar,
@@ -176,7 +176,10 @@ impl Build {
             Some("tmf8829") => Self::With(Sensor::Tmf8829),
             Some("tmf882x" | "tmf8820" | "tmf8821") => Self::With(Sensor::Tmf882x),
             Some("tmf8828") => bail!("`tmf882x` for its 9 zones, or `tmf8828-8x8` for its 64?"),
-            Some(name) => bail!("what is `{name}`? {}", Self::names(board)),
+            Some(name) => bail!(
+                "unknown image `{name}` of this board: {}",
+                Self::names(board)
+            ),
         };
         match build {
             Self::With(sensor) if !Sensor::of(board).contains(&sensor) => {
@@ -189,9 +192,9 @@ impl Build {
             }
             Self::With(Sensor::PhotonTimer) => {
                 for variable in ["LASER_HZ", "LASER_PULSE_NS"] {
-                    let said = env::var(variable).unwrap_or_else(|_| "1".into());
-                    let number = said.parse::<u32>();
-                    number.with_context(|| format!("{variable}={said}: is no whole number"))?;
+                    let value = env::var(variable).unwrap_or_else(|_| "1".into());
+                    let number = value.parse::<u32>();
+                    number.with_context(|| format!("{variable}={value}: not a whole number"))?;
                 }
                 Ok(build)
             }
@@ -199,7 +202,7 @@ impl Build {
         }
     }
 
-    /// The images of a board, as they are named.
+    /// The names of the images of a board.
     fn names(board: Board) -> String {
         let sensors = Sensor::of(board).iter();
         let mut names: Vec<&str> = sensors.map(|sensor| sensor.name()).collect();
@@ -208,19 +211,19 @@ impl Build {
     }
 }
 
-/// The sensor on a real board.
+/// The sensor of a real board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensor {
     PhotonTimer,
     Tdc7200,
     Tmf8829,
     Tmf882x,
-    /// The same with 8×8 zones.
+    /// A TMF8828 with 8×8 zones.
     Tmf8828,
 }
 
 impl Sensor {
-    /// Those of a board.
+    /// The sensors of a board.
     pub fn of(board: Board) -> &'static [Self] {
         match board {
             Board::Mps2An386 => &[],
@@ -243,8 +246,8 @@ impl Sensor {
         self.feature().trim_start_matches("sensor-")
     }
 
-    /// The variable that names its own program to `firmware/build.rs`, and the most bytes of that:
-    /// the bootloader of a TMF8820/21/28 counts them in 16 bits, that of a TMF8829 4,096 words.
+    /// The variable with the path of the sensor's own program, for `firmware/build.rs`, and the most
+    /// bytes: the bootloader of a TMF8820/21/28 takes 65,536 bytes, that of a TMF8829 4,096 words.
     fn image(self) -> Option<(&'static str, usize)> {
         match self {
             Self::PhotonTimer | Self::Tdc7200 => None,
@@ -253,14 +256,14 @@ impl Sensor {
         }
     }
 
-    /// The variable and what it says, if the sensor has a program of its own.
+    /// The program of the sensor, `None` if it needs none.
     fn program(self) -> Result<Option<Program>> {
         let Some((variable, most)) = self.image() else {
             return Ok(None);
         };
         let path = env::var_os(variable).map(PathBuf::from);
         let path = path.with_context(|| {
-            format!("{variable} has to name the sensor's program, raw bytes from its vendor")
+            format!("set {variable} to the file of the sensor's program, raw bytes from its vendor")
         })?;
         let name = || format!("{variable}={}", path.display());
         check_program(&fs::read(&path).with_context(name)?, most).with_context(name)?;
@@ -270,28 +273,28 @@ impl Sensor {
     }
 }
 
-/// The program of a sensor, and the variable that names it.
+/// The program of a sensor, and the variable with its path.
 struct Program {
     variable: &'static str,
     path: PathBuf,
 }
 
-/// Whether this may be a program of a sensor that takes so many bytes.
+/// Fails if the bytes cannot be the program of a sensor that takes `most` bytes.
 fn check_program(bytes: &[u8], most: usize) -> Result<()> {
     ensure!(!bytes.is_empty(), "an empty file");
     ensure!(
         bytes.len() <= most,
-        "{} bytes: more than the {most} that the sensor holds",
+        "{} bytes: the sensor takes at most {most}",
         bytes.len()
     );
     ensure!(
         !bytes.is_ascii(),
-        "a text file, not raw bytes; of a HEX file `objcopy -I ihex -O binary` makes them"
+        "a text file, not raw bytes; `objcopy -I ihex -O binary` converts a HEX file"
     );
     Ok(())
 }
 
-/// Links one image and gives the path of a copy that no other image replaces.
+/// Links one image. Returns the path of a copy that no other image replaces.
 fn link(
     root: &Path,
     target: &str,
@@ -339,7 +342,7 @@ fn link(
     Ok(kept)
 }
 
-/// Whether the folder has an image of this name. The numbers of a laser follow it.
+/// Whether the folder has an image of this name. The numbers of its laser may follow the name.
 fn is_kept(folder: &Path, name: &str) -> bool {
     let is_it = |file: &str| {
         let rest = file.strip_prefix(name);

@@ -1,4 +1,4 @@
-//! `cargo xtask flash`: an image onto a board.
+//! `cargo xtask flash`: writes an image to a board.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail, ensure};
 use crate::firmware::{Board, Build, Risk};
 use crate::tools::PROBE_RS;
 
-/// The controller of a board, as probe-rs calls it: that of the Discovery.
+/// The probe-rs name of a board's controller: that of the Discovery.
 pub fn chip(board: Board) -> Result<&'static str> {
     match board {
         Board::Mps2An386 => bail!("{} is emulated only", board.name()),
@@ -17,7 +17,7 @@ pub fn chip(board: Board) -> Result<&'static str> {
     }
 }
 
-/// Writes an image onto the board and shows what it logs until interrupted.
+/// Writes an image to the board and shows its log until interrupted.
 pub fn flash(
     root: &Path,
     board: Board,
@@ -25,7 +25,7 @@ pub fn flash(
     what: Build,
     risks: &[Risk],
 ) -> Result<()> {
-    // Before anything is built.
+    // Before the build.
     PROBE_RS.require()?;
     let chip = named.map_or_else(|| chip(board), Ok)?;
     let image = board.build(root, what, risks)?;

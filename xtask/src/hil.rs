@@ -1,5 +1,5 @@
-//! `cargo xtask hil`: a real board, tried with all that emulators are tried with, and what it did
-//! as one file.
+//! `cargo xtask hil`: tests a real board as the emulators are tested, and writes the results to one
+//! file.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -16,12 +16,12 @@ use crate::self_test::{self, EXPECTED};
 use crate::tools::PROBE_RS;
 use crate::{cargo, succeed};
 
-/// The array whose photons are sent to the board, and how long.
+/// The array and the laser cycles of the photons that are sent to the board.
 const ARRAY: &str = "8x8";
 const CYCLES: &str = "1000";
 
-/// What needs a person: the step, what to do, and what is to be seen in the log of
-/// `cargo xtask flash`. The results say that it was not tried; whoever tries it changes the line.
+/// Steps that need a person: the name, what to do, and what the log of `cargo xtask flash` then
+/// shows. The results list them as not tried, until the person edits the line.
 const BY_HAND: [(&str, &str, &str); 3] = [
     (
         "Stack overflow",
@@ -46,24 +46,24 @@ const BY_HAND: [(&str, &str, &str); 3] = [
 pub struct Rig {
     root: &'static Path,
     board: Board,
-    /// Its controller, as probe-rs calls it.
+    /// The probe-rs name of its controller.
     chip: String,
-    /// Its serial line, as `dtof` takes it.
+    /// Its serial line, as an argument for `dtof --device`.
     device: String,
-    /// The folder of its results.
+    /// The folder for the results.
     out: PathBuf,
 }
 
-/// What a part of the trial found: a line, and what is to be seen of it.
+/// The result of a part: a line of text, and more lines below it.
 type Found = Result<(String, String)>;
 
-/// A part of the trial.
+/// A part of the test.
 type Part = fn(&Rig) -> Found;
 
-/// Tries a board and writes the file, whatever is found.
+/// Tests a board and writes the file, even if a part fails.
 ///
 /// # Errors
-/// If a part fails; the file says why.
+/// Fails if a part fails; the file has the reason.
 pub fn run(rig: &Rig) -> Result<()> {
     let version = PROBE_RS.require()?;
     fs::create_dir_all(&rig.out).with_context(|| rig.out.display().to_string())?;
@@ -101,11 +101,10 @@ pub fn run(rig: &Rig) -> Result<()> {
 }
 
 impl Rig {
-    /// A board with its usual controller, unless another is named, and results in `out/hil`
-    /// likewise.
+    /// A board. The defaults are its usual controller and the folder `out/hil`.
     ///
     /// # Errors
-    /// If it is no real board, or has no serial line.
+    /// Fails if the board is emulated only, or `device` is missing.
     pub fn new(
         root: &'static Path,
         board: Board,
@@ -117,7 +116,8 @@ impl Rig {
             root,
             board,
             chip: named.map_or_else(|| Ok(chip(board)?.into()), anyhow::Ok)?,
-            device: device.context("which serial line? `--device /dev/ttyUSB0`, for one")?,
+            device: device
+                .context("the serial line is missing, for example `--device /dev/ttyUSB0`")?,
             out: match out {
                 Some(out) => std::path::absolute(out)?,
                 None => root.join("out/hil"),
@@ -125,7 +125,7 @@ impl Rig {
         })
     }
 
-    /// Writes an image, runs it until it ends, and gives what it printed.
+    /// Writes an image and runs it until it ends. Returns its output.
     fn output(&self, image: &Path) -> Result<String> {
         let mut probe = self.probe("run");
         let output = probe.arg(image).stderr(Stdio::inherit()).output();
@@ -164,15 +164,15 @@ impl Rig {
     fn bench(&self) -> Found {
         let image = self.board.bench(self.root, false)?;
         let rows = bench::rows(&self.output(&image)?, "3")?;
-        ensure!(!rows.is_empty(), "it counted nothing");
+        ensure!(!rows.is_empty(), "the image counted nothing");
         let line = format!(
-            "Of {} operations, beside instructions in the emulator.",
+            "{} operations, with their instructions in the emulator.",
             rows.len()
         );
         Ok((line, bench::beside(self.root, self.board, &rows)?))
     }
 
-    /// The board decides on the photons of the demo as this computer does.
+    /// The board and this computer find the same events in the photons of the demo.
     fn stream(&self) -> Found {
         let image = self.board.build_bare(self.root, Build::Sidecar)?;
         succeed(self.probe("download").arg(&image))?;
@@ -200,7 +200,7 @@ impl Rig {
         Ok((line, String::new()))
     }
 
-    /// Runs the demo; gives the folder of its results.
+    /// Runs the demo. Returns the folder of its results.
     fn demo(&self, name: &str, arguments: &[&str]) -> Result<PathBuf> {
         let out = self.out.join(name);
         let mut cargo = cargo();
@@ -216,7 +216,7 @@ impl Rig {
     }
 }
 
-/// The commit of the sources, and whether they have changed since.
+/// The commit of the sources, with `-dirty` if they have changed since.
 fn commit(root: &Path) -> Option<String> {
     let mut git = Command::new("git");
     let git = git.args(["describe", "--always", "--dirty", "--abbrev=40"]);

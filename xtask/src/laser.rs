@@ -1,4 +1,4 @@
-//! What an image of the photon timer does with the laser, as the image itself says.
+//! The laser pulses of an image for the photon timer, read from the image.
 
 use std::fs;
 use std::path::Path;
@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 use object::{Object, ObjectSection, ObjectSymbol};
 
-/// In the image: the clock in Hz, and of its clocks those of a laser cycle and of the laser's
+/// A symbol of the image: its clock in Hz, the clocks per laser cycle and the clocks per laser
 /// pulse.
 const SYMBOL: &str = "LASER_CLOCKS";
 
@@ -19,7 +19,7 @@ pub struct Laser {
 }
 
 impl Laser {
-    /// That of an image; `None` if it drives none by itself.
+    /// The laser pulses of an image; `None` if it does not drive a laser.
     pub fn read(image: &Path) -> Result<Option<Self>> {
         let name = || image.display().to_string();
         let bytes = fs::read(image).with_context(name)?;
@@ -39,7 +39,7 @@ impl Laser {
         let words = words.iter().map(|word| u32::from_le_bytes(*word).into());
         let words: Vec<u64> = words.collect();
         let (&[clock_hz, period, pulse], []) = (&*words, rest) else {
-            anyhow::bail!("{SYMBOL} are not three words");
+            anyhow::bail!("{SYMBOL} has not three words");
         };
         ensure!(
             clock_hz > 0 && period > 0,
@@ -52,29 +52,29 @@ impl Laser {
         })
     }
 
-    /// Of the pulse.
+    /// Length of the pulse.
     fn nanoseconds(self) -> String {
         decimal(self.pulse * 1_000_000_000, self.clock_hz, 3, true)
     }
 
-    /// Of the rate.
+    /// Pulse rate.
     fn kilohertz(self) -> String {
         decimal(self.clock_hz, self.period * 1000, 3, false)
     }
 
-    /// Of the time that the laser is on.
+    /// Share of the time that the laser is on.
     fn percent(self) -> String {
         decimal(self.pulse * 100, self.period, 2, false)
     }
 
-    /// For the name of a file.
+    /// As a part of a file name.
     pub fn file_name(self) -> String {
         let [ns, khz, percent] = [self.nanoseconds(), self.kilohertz(), self.percent()];
         format!("{ns}ns+{khz}kHz+{percent}pct")
     }
 
-    /// For people. Peak power in watts times nanoseconds are nanojoules; times the share of the
-    /// time, watts on average.
+    /// As text. Peak power in watts times the pulse length in nanoseconds is the energy in
+    /// nanojoules; times the duty cycle it is the average power.
     pub fn text(self) -> String {
         let [ns, khz, percent] = [self.nanoseconds(), self.kilohertz(), self.percent()];
         let milliwatts = decimal(self.pulse * 1000, self.period, 2, false);
@@ -85,7 +85,7 @@ impl Laser {
     }
 }
 
-/// A fraction, rounded to so many digits after the point; these are left out if `short` and 0.
+/// A fraction rounded to `digits` decimals, which are left out if they are 0 and `short` is set.
 fn decimal(numerator: u64, denominator: u64, digits: usize, short: bool) -> String {
     let scale = 10_u64.pow(u32::try_from(digits).unwrap_or(0));
     let scaled = (numerator * scale + denominator / 2) / denominator;
@@ -123,7 +123,7 @@ mod tests {
         assert_eq!(fast.file_name(), "16ns+801.282kHz+1.28pct");
         let slow = laser(125_000_000, 125_000_000, 2).unwrap();
         assert_eq!(slow.file_name(), "16ns+0.001kHz+0.00pct");
-        // Half a nanosecond more.
+        // Longer by half a nanosecond.
         let other = laser(133_000_000, 1330, 13).unwrap();
         assert_eq!(other.file_name(), "97.744ns+100.000kHz+0.98pct");
     }

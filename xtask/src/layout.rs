@@ -1,5 +1,5 @@
-//! Where an image has its stack: an overflow has to leave the RAM, and its fault needs a
-//! handler with a stack of its own.
+//! Checks the stack of an image: an overflow must leave the RAM, and the handler of its fault must
+//! reset the stack pointer.
 
 use std::fs;
 use std::path::Path;
@@ -13,7 +13,7 @@ use object::{Endianness, Object, ObjectSection, ObjectSymbol, SectionKind};
 pub const RAM: u64 = 0x2000_0000;
 
 /// Fails unless the stack of an image is lowest in RAM, below all statics, and its hard fault
-/// starts the stack anew. One that `drives_nothing` may have another hard fault.
+/// resets the stack pointer. An image that `drives_nothing` may have another hard fault.
 pub fn check(image: &Path, drives_nothing: bool) -> Result<()> {
     let name = || image.display().to_string();
     let bytes = fs::read(image).with_context(name)?;
@@ -22,7 +22,7 @@ pub fn check(image: &Path, drives_nothing: bool) -> Result<()> {
     if drives_nothing {
         return Ok(());
     }
-    fault_starts_anew(&file).with_context(name)
+    fault_resets_stack(&file).with_context(name)
 }
 
 fn stack_is_lowest(file: &ElfFile32<'_>) -> Result<()> {
@@ -44,8 +44,9 @@ fn stack_is_lowest(file: &ElfFile32<'_>) -> Result<()> {
     Ok(())
 }
 
-/// The code of `HardFault` ends with the constants it loads: where the stack starts has to be one.
-fn fault_starts_anew(file: &ElfFile32<'_>) -> Result<()> {
+/// The code of `HardFault` ends with the constants it loads, which must include the start of the
+/// stack.
+fn fault_resets_stack(file: &ElfFile32<'_>) -> Result<()> {
     let start = u32::try_from(address(file, "_stack_start")?)?;
     let fault = file.symbol_by_name("HardFault").context("no HardFault")?;
     let first = fault.address() & !1;
@@ -56,12 +57,12 @@ fn fault_starts_anew(file: &ElfFile32<'_>) -> Result<()> {
     let mut words = code.context("no code of HardFault")?.windows(4);
     ensure!(
         words.any(|word| word == start.to_le_bytes()),
-        "HardFault does not load `_stack_start`: it would push onto a stack that is full"
+        "HardFault does not load `_stack_start`: it would push onto a full stack"
     );
     Ok(())
 }
 
-/// Where a symbol is.
+/// The address of a symbol.
 fn address(file: &ElfFile32<'_>, name: &str) -> Result<u64> {
     let symbol = file.symbol_by_name(name);
     Ok(symbol
@@ -99,7 +100,7 @@ mod tests {
         MEMORY { FLASH : ORIGIN = 0, LENGTH = 1K  RAM : ORIGIN = 0x20000400, LENGTH = 1K }
         _stack_end = 0x20000000; _stack_start = 0x20000400;
     ";
-    /// As cortex-m-rt has it, unless told otherwise.
+    /// The default layout of cortex-m-rt.
     const ABOVE: &str = "
         MEMORY { FLASH : ORIGIN = 0, LENGTH = 1K  RAM : ORIGIN = 0x20000000, LENGTH = 2K }
         _stack_end = ADDR(.bss) + SIZEOF(.bss); _stack_start = 0x20000800;
@@ -110,7 +111,7 @@ mod tests {
         _stack_end = 0x20000000; _stack_start = 0x20000400;
     ";
 
-    /// What is wrong with an image of such memory, whose hard fault loads such an address.
+    /// Links an image with the memory, whose hard fault loads the address. Returns its problem.
     fn linked(name: &str, memory: &str, loaded: &str) -> Result<()> {
         let folder = env::temp_dir().join(format!("dtof-layout-{}-{name}", std::process::id()));
         fs::create_dir_all(&folder)?;

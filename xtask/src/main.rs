@@ -1,4 +1,4 @@
-//! `cargo xtask`: what set-up, images and their checks need beyond cargo itself.
+//! `cargo xtask`: set-up, images and their checks.
 
 mod bench;
 mod c_bindings;
@@ -30,32 +30,34 @@ use firmware::{Board, Build, Risk};
 const HELP: &str = "\
 cargo xtask <command>
 
-  setup         install the missing parts of rust-toolchain.toml, and the emulators,
-                Verilator and the other tools if that needs no question
+  setup         install the missing parts of rust-toolchain.toml, and the other tools
+                (emulators, Verilator, compilers); prints the command for those that
+                need an administrator, and fails if a tool is still missing
   image BOARD [SENSOR | self-test] [--emulator] [LASER]
                 build an image and print its path: the sidecar or the self-test.
                 BOARD is mps2-an386, pico or stm32f405. SENSOR is tdc7200, tmf8829,
-                tmf882x or tmf8828-8x8 on stm32f405, photon-timer on pico. For pico a
-                .uf2 lies beside it, to be copied onto the board without a probe.
-                --emulator builds for QEMU, with its slower clock and without the
-                sensor's own program. LASER is --laser-beyond-limits (the photon timer may
-                have pulses over 1 us and over 2 % of the time) or --laser-on-without-host
-                (a host may let the laser go on after it falls silent)
+                tmf882x or tmf8828-8x8 on stm32f405, photon-timer on pico. For pico it also
+                writes a .uf2, to copy onto the board without a probe. --emulator builds for
+                QEMU, with its slower clock and without the sensor's own program. LASER is
+                --laser-beyond-limits (the photon timer may have pulses over 1 us and a duty
+                cycle over 2 %) or --laser-on-without-host (a host may let the laser stay on
+                after it falls silent)
   flash [--chip CHIP] [BOARD] [SENSOR | self-test] [LASER]
                 write an image onto a board (stm32f405) with a debug probe, and show its
-                log. CHIP is the name in probe-rs, by default that of the Discovery
+                log. CHIP is the probe-rs name, by default that of the Discovery
   hil --device DEVICE [--chip CHIP] [--out DIR] [BOARD]
-                try a board (stm32f405) with a debug probe and its serial line at DEVICE:
-                the self-test, the clock cycles of the core's operations, and the demo's
-                photons, decided as on this computer. Writes BOARD.md into DIR, out/hil
-                without it
+                test a board (stm32f405) with a debug probe and its serial line at DEVICE:
+                the self-test, the clock cycles of the core's operations, and the events of
+                the demo against this computer's. Writes BOARD.md to DIR, by default out/hil
   emulate [--port PORT] [BOARD] [exit | panic | fault | overflow]
-                run the sidecar of a board (mps2-an386) in its emulator, its serial port on
-                a TCP port (5386). A last word ends mps2-an386 in that way
+                run the sidecar of a board (mps2-an386) in its emulator, with its serial
+                port on a TCP port (5386). The last word makes mps2-an386 end that way
   sizes         print flash, RAM and stack of each image
   check-image [--all]
                 link dtof-core for every target: no panic, float or allocation.
-                --all: both for speed and for size, not for Cortex-M4F alone
+                Check the stack frames of pixel_array, an example of dtof-core: at most 1 kB
+                in the images for speed and for size, 2.5 kB without optimisation.
+                --all: every target both for speed and for size, not only the Cortex-M4F
   self-test [--bless]
                 run the self-test in emulators and compare its lines with
                 firmware/self-test.out; --bless writes the file
@@ -66,8 +68,8 @@ cargo xtask <command>
   c-bindings [--bless]
                 build bindings/c and its examples, run them here and in QEMU, and compare
                 them with Rust; --bless writes the header and the figures of its README
-  python FILE   install the packages of a requirements file below the build folder
-                and print the path of a Python that has them
+  python FILE   install the packages of a requirements file in the build folder and print
+                the path of a Python that has them
   wheel         build the Python package and print the path of its wheel, which installs
                 without a compiler on computers with the same system";
 
@@ -101,7 +103,7 @@ fn run() -> Result<()> {
         Some(Value(command)) => command.string()?,
         Some(Short('h') | Long("help")) => "help".to_owned(),
         Some(other) => return Err(other.unexpected().into()),
-        None => bail!("which command? `cargo xtask help` lists them"),
+        None => bail!("a command is missing: `cargo xtask help` lists them"),
     };
     let mut options = Options::default();
     let mut words = Vec::new();
@@ -123,7 +125,7 @@ fn run() -> Result<()> {
             ("emulate", Long("port")) => {
                 let number = parser.value()?.string()?;
                 let port = number.parse();
-                options.port = Some(port.with_context(|| format!("no port: `{number}`"))?);
+                options.port = Some(port.with_context(|| format!("not a port: `{number}`"))?);
             }
             (_, Short('h') | Long("help")) => {
                 println!("{HELP}");
@@ -139,11 +141,11 @@ fn run() -> Result<()> {
         ("help", []) => println!("{HELP}"),
         ("setup", []) => {
             toolchain::set_up(root)?;
-            tools::set_up();
-            // What needs it says so itself.
-            if let Err(error) = emulator::install_rp2040js() {
-                println!("rp2040js: {error:#}");
-            }
+            let tools = tools::set_up();
+            let rp2040js = emulator::install_rp2040js().context("rp2040js");
+            // Both are tried. The list of missing tools comes first: npm may be one of them.
+            tools?;
+            rp2040js?;
         }
         ("image", [board, what @ ..]) if what.len() < 2 => {
             firmware::image(
@@ -162,7 +164,7 @@ fn run() -> Result<()> {
         }
         ("hil", words) => {
             let (board, []) = Board::chosen(words, Board::Stm32F405) else {
-                bail!("what is `{}`? hil takes a board", words.join(" "));
+                bail!("`{}` is not a board", words.join(" "));
             };
             hil::run(&hil::Rig::new(
                 root,
@@ -177,7 +179,7 @@ fn run() -> Result<()> {
             let end = match (board, end) {
                 (_, []) => None,
                 (Board::Mps2An386, &[end @ ("exit" | "panic" | "fault" | "overflow")]) => Some(end),
-                _ => bail!("what is `{}`? `cargo xtask help` says", end.join(" ")),
+                _ => bail!("`{}` is not an end: see `cargo xtask help`", end.join(" ")),
             };
             emulate::emulate(root, board, options.port, end)?;
         }
@@ -193,7 +195,7 @@ fn run() -> Result<()> {
         }
         ("wheel", []) => println!("{}", python::wheel(root)?.display()),
         _ => bail!(
-            "no command `{}`: `cargo xtask help` lists them",
+            "unknown command `{}`: `cargo xtask help` lists all",
             [&[&*command], &words[..]].concat().join(" ")
         ),
     }
@@ -204,16 +206,16 @@ fn run() -> Result<()> {
 fn root() -> Result<&'static Path> {
     Path::new(env!("CARGO_MANIFEST_DIR"))
         .parent()
-        .context("xtask lies in no workspace")
+        .context("xtask is not in a workspace")
 }
 
-/// Where cargo builds.
+/// The build folder of cargo.
 fn target_folder(root: &Path) -> PathBuf {
     let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
     root.join(folder)
 }
 
-/// Runs a command that must succeed and may not ask.
+/// Runs a command that must succeed. Its input is empty, so it cannot ask.
 fn succeed(command: &mut Command) -> Result<()> {
     let name = command.get_program().display().to_string();
     let status = command.stdin(Stdio::null()).status();

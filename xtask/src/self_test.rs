@@ -1,5 +1,5 @@
-//! `cargo xtask self-test`: what the core works out on the target. That it is what the
-//! host works out is a test of `dtof-firmware`.
+//! `cargo xtask self-test`: the results of the core on the targets. A test of `dtof-firmware`
+//! compares them with the host's.
 
 use std::fs;
 use std::path::Path;
@@ -35,7 +35,7 @@ pub fn check(root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Writes the lines as the target works them out.
+/// Writes the lines that the target prints.
 pub fn bless(root: &Path) -> Result<()> {
     let lines = lines(Board::Mps2An386, root)?;
     fs::write(root.join(EXPECTED), lines).context(EXPECTED)?;
@@ -43,7 +43,7 @@ pub fn bless(root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The lines that a board's image prints.
+/// The lines that the image of a board prints.
 fn lines(board: Board, root: &Path) -> Result<String> {
     let image = board.build_bare(root, Build::SelfTest)?;
     let (status, output) = emulator::run(board, &image, &[])?;
@@ -52,7 +52,7 @@ fn lines(board: Board, root: &Path) -> Result<String> {
     Ok(output)
 }
 
-/// Lines that differ, each as it should be and as it is.
+/// Lines that differ, each as expected and as found.
 pub fn differences(expected: &str, found: &str) -> Vec<String> {
     let (mut expected_lines, mut found_lines) = (expected.lines(), found.lines());
     let mut differences = Vec::new();

@@ -1,4 +1,4 @@
-//! `cargo xtask sizes`: what each image takes of its board.
+//! `cargo xtask sizes`: flash, RAM and stack of each image.
 
 use std::fs;
 use std::path::Path;
@@ -11,7 +11,7 @@ use object::{Object, ObjectSymbol};
 use crate::firmware::{Board, Build, Sensor};
 use crate::layout;
 
-/// Macropixels and blocks of them the sidecar has room for.
+/// The macropixels and blocks that the sidecar has room for.
 const MOST_PIXELS: u64 = 256;
 const MOST_BLOCKS: u64 = 42;
 /// Macropixels, and blocks: none, those of 8 x 8 and of 16 x 8 in two levels, all.
@@ -24,20 +24,19 @@ const ARRAYS: [(u64, u64); 7] = [
     (128, MOST_BLOCKS),
     (MOST_PIXELS, MOST_BLOCKS),
 ];
-/// What the sidecar may take of the real board: 68 KiB of its flash, 16 KiB more with
-/// the driver of a sensor, and of its 128 KiB of RAM what leaves the stack its reserve.
-/// Decisions take most of it. They are there for the 10-bit counters of pixels, for the
-/// 16-bit ones of blocks, and with a TMF8820/21/28 for histograms of 24 bits.
+/// The most that the sidecar may take of the real board: 68 KiB of flash, 16 KiB more with the
+/// driver of a sensor, and its 128 KiB of RAM less the reserve for the stack. Decisions take most
+/// of the flash: they are compiled for the 10-bit counters of pixels, the 16-bit counters of blocks
+/// and, with a TMF8820/21/28, the 24-bit counters of its histograms.
 const MOST_FLASH: u64 = 68 * 1024;
 const MOST_FLASH_WITH_SENSOR: u64 = 84 * 1024;
 const MOST_RAM: u64 = 128 * 1024 - STACK_RESERVE;
-/// Bytes of its RAM that each linker script gives to the stack.
+/// Bytes of RAM that each linker script reserves for the stack.
 const STACK_RESERVE: u64 = 19 * 1024;
-/// Bytes of them that an image may need; the rest is for the report of a panic.
+/// Bytes of the reserve that an image may need; the rest is for the report of a panic.
 const MOST_STACK: u64 = 12 * 1024;
 
-/// Builds and measures every image. The vendor's program of a TMF8820/21/28 comes
-/// on top of its image.
+/// Builds and measures every image. The vendor's program of a TMF8820/21/28 is not included.
 pub fn print(root: &Path) -> Result<()> {
     println!("{:<24} {:>8} {:>8} {:>8}", "image", "flash", "RAM", "stack");
     let mut of_pixels = None;
@@ -80,7 +79,7 @@ pub fn print(root: &Path) -> Result<()> {
         }
         let name = format!("self-test {}", board.name());
         let Sizes { flash, ram } = Sizes::read(&board.build_bare(root, Build::SelfTest)?)?;
-        // It writes through tables of functions; its stack has no bound.
+        // It calls through function pointers, so its stack has no known bound.
         println!("{name:<24} {flash:>8} {ram:>8} {:>8}", "-");
     }
     println!(
@@ -99,7 +98,7 @@ pub fn print(root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Where a symbol of an image is.
+/// The address of a symbol of an image.
 fn address(path: &Path, name: &str) -> Result<u64> {
     let bytes = fs::read(path).with_context(|| path.display().to_string())?;
     let file = object::File::parse(&*bytes)?;
@@ -108,17 +107,17 @@ fn address(path: &Path, name: &str) -> Result<u64> {
     Ok(symbol.address())
 }
 
-/// Bytes of the sidecar's memory of such a name.
+/// The bytes of the sidecar's memory called `name`.
 fn memory(path: &Path, name: &str) -> Result<u64> {
     let bytes = fs::read(path).with_context(|| path.display().to_string())?;
     let file = object::File::parse(&*bytes)?;
     let mut symbols = file.symbols();
     let memory = symbols.find(|symbol| symbol.name().is_ok_and(|found| found.contains(name)));
-    let memory = memory.with_context(|| format!("no memory called {name} in the image"))?;
+    let memory = memory.with_context(|| format!("no memory {name} in the image"))?;
     Ok(memory.size())
 }
 
-/// Bytes an image takes.
+/// The sizes of an image in bytes.
 #[derive(Default)]
 pub struct Sizes {
     pub flash: u64,
@@ -126,7 +125,7 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// Those of an image.
+    /// Reads an image.
     pub fn read(path: &Path) -> Result<Self> {
         let bytes = fs::read(path).with_context(|| path.display().to_string())?;
         let file = ElfFile32::<object::Endianness>::parse(&*bytes)
@@ -148,7 +147,7 @@ impl Sizes {
     /// A section at `address` when the image runs, which does or does not have
     /// content.
     fn add(&mut self, address: u64, size: u64, has_content: bool) {
-        // No image uses what lies elsewhere.
+        // No image uses other memory.
         let in_ram = address >= layout::RAM;
         if in_ram {
             self.ram += size;

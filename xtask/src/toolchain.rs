@@ -1,8 +1,7 @@
 //! `cargo xtask setup`: the pinned toolchain with its targets and components.
 //!
-//! rustup does this by itself when cargo is first called, unless that is
-//! switched off (`RUSTUP_AUTO_INSTALL=0`); and it does not add a target to a
-//! toolchain that is already there.
+//! rustup installs a missing toolchain by itself, unless `RUSTUP_AUTO_INSTALL=0`. It does not add
+//! a target to an installed toolchain.
 
 use std::fs;
 use std::io::ErrorKind;
@@ -34,7 +33,7 @@ impl Toolchain {
             let names = names.with_context(|| format!("no `{key}`"))?.iter();
             let names = names.map(|name| name.as_str().map(str::to_owned));
             let names: Option<Vec<_>> = names.collect();
-            names.with_context(|| format!("`{key}` is no list of names"))
+            names.with_context(|| format!("`{key}` is not a list of names"))
         };
         let channel = toolchain.get("channel").and_then(Value::as_str);
         Ok(Self {
@@ -44,34 +43,33 @@ impl Toolchain {
         })
     }
 
-    /// The `wanted` names that are not in `installed`, a list of rustup's. Most
-    /// components are listed with the name of the host after theirs.
-    fn missing<'a>(wanted: &'a [String], installed: &str) -> Vec<&'a str> {
-        let is_there = |name: &str| {
+    /// The `required` names that are not in `installed`, a list from rustup. It lists most components
+    /// as their name and the name of the host.
+    fn missing<'a>(required: &'a [String], installed: &str) -> Vec<&'a str> {
+        let is_installed = |name: &str| {
             installed.lines().any(|line| {
                 let rest = line.trim().strip_prefix(name);
                 rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
             })
         };
-        let wanted = wanted.iter().map(String::as_str);
-        wanted.filter(|name| !is_there(name)).collect()
+        let required = required.iter().map(String::as_str);
+        required.filter(|name| !is_installed(name)).collect()
     }
 }
 
-/// Installs what is missing; calls nothing that needs a network when nothing
-/// is.
+/// Installs missing components and targets. Needs no network if none is missing.
 pub fn set_up(root: &Path) -> Result<()> {
     let toolchain = Toolchain::read(root)?;
     let channel = &toolchain.channel;
 
-    // Either list fails if the toolchain itself is missing, and then all is.
+    // Both lists fail if the toolchain is not installed: then everything is missing.
     let list = |what: &str| rustup(&[what, "list", "--installed", "--toolchain", channel]);
     let components = list("component")?.unwrap_or_default();
     let targets = list("target")?.unwrap_or_default();
     let mut missing = Toolchain::missing(&toolchain.components, &components);
     missing.extend(Toolchain::missing(&toolchain.targets, &targets));
     if missing.is_empty() {
-        println!("{channel}: every component and target is there");
+        println!("{channel}: every component and target is installed");
         return Ok(());
     }
 
@@ -90,11 +88,11 @@ pub fn set_up(root: &Path) -> Result<()> {
     }
 }
 
-/// The output of rustup, or `None` if it fails. Never asks.
+/// The output of rustup, or `None` if it fails. Its input is empty, so it cannot ask.
 fn rustup(arguments: &[&str]) -> Result<Option<String>> {
     let output = Command::new("rustup")
         .args(arguments)
-        // Set by the cargo that runs this program; the file is to decide.
+        // The cargo that runs this program sets it; rust-toolchain.toml must decide.
         .env_remove("RUSTUP_TOOLCHAIN")
         .stdin(Stdio::null())
         .stderr(Stdio::inherit())
@@ -142,9 +140,9 @@ mod tests {
     #[test]
     fn finds_what_is_missing() {
         let installed = "clippy-x86_64-unknown-linux-gnu\nrust-src\nriscv32imc-unknown-none-elf\n";
-        let wanted = ["clippy", "rustfmt", "rust-src", "riscv32i-unknown-none-elf"];
+        let required = ["clippy", "rustfmt", "rust-src", "riscv32i-unknown-none-elf"];
         assert_eq!(
-            Toolchain::missing(&wanted.map(Into::into), installed),
+            Toolchain::missing(&required.map(Into::into), installed),
             ["rustfmt", "riscv32i-unknown-none-elf"]
         );
     }

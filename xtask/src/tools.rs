@@ -1,24 +1,24 @@
-//! Programs that are used if they are there.
+//! The tools that xtask calls, and how to install them.
 
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
-/// A program, and the one line that installs it.
+/// A program, and how to install it.
 pub struct Tool {
     pub program: &'static str,
-    /// Arguments with which it prints its version, if it is there.
-    ask: &'static [&'static str],
+    /// Arguments that print its version.
+    version: &'static [&'static str],
     install: Install,
 }
 
 enum Install {
-    /// Packages of Debian's.
+    /// Debian packages.
     Packages(&'static str),
     /// A crate.
     Crate(&'static str),
-    /// The same, but it takes so long that only a user starts it.
+    /// A crate that takes long to build, so it is left to the user.
     LargeCrate(&'static str),
 }
 
@@ -27,7 +27,7 @@ use Install::{Crate, LargeCrate, Packages};
 const fn tool(program: &'static str, install: Install) -> Tool {
     Tool {
         program,
-        ask: &["--version"],
+        version: &["--version"],
         install,
     }
 }
@@ -45,10 +45,10 @@ pub const CXX: Tool = tool("g++", Packages("g++"));
 pub const CMAKE: Tool = tool("cmake", Packages("cmake make"));
 pub const ARM_GCC: Tool = tool("arm-none-eabi-gcc", Packages("gcc-arm-none-eabi"));
 
-/// For the readers of exported files: with what makes virtual environments, and the headers
-/// that a package may be compiled with, which Debian has apart.
+/// For the readers of exported files. Debian packages virtual environments and the headers of
+/// Python separately.
 pub const PYTHON: Tool = Tool {
-    ask: &[
+    version: &[
         "-c",
         "import ensurepip, platform, venv; print('Python', platform.python_version())",
     ],
@@ -61,16 +61,16 @@ const ALL: [Tool; 13] = [
     CXX,
     CMAKE,
     ARM_GCC,
-    // For `cargo softcore`, the last for whether a memory becomes block RAM.
+    // For `cargo softcore`; yosys shows which memories become block RAM.
     tool("qemu-system-riscv32", Packages("qemu-system-misc")),
     tool("verilator", Packages("verilator g++ make")),
     Tool {
-        ask: &["-V"],
+        version: &["-V"],
         ..tool("yosys", Packages("yosys"))
     },
-    // For sweeps in parts, as `docs/sweeps.md` has them.
+    // For sweeps in parts, see `docs/sweeps.md`.
     tool("parallel", Packages("parallel")),
-    // For the reports, as readers see them.
+    // Renders the reports.
     tool("chromium", Packages("chromium")),
     PYTHON,
     NODE,
@@ -79,10 +79,10 @@ const ALL: [Tool; 13] = [
 ];
 
 impl Tool {
-    /// Its version, if it is there.
+    /// Its version, if it is installed.
     pub fn version(&self) -> Option<String> {
         let output = Command::new(self.program)
-            .args(self.ask)
+            .args(self.version)
             .stdin(Stdio::null())
             .stderr(Stdio::null())
             .output()
@@ -92,11 +92,11 @@ impl Tool {
         output.status.success().then(|| line.to_owned())
     }
 
-    pub fn is_there(&self) -> bool {
+    pub fn is_installed(&self) -> bool {
         self.version().is_some()
     }
 
-    /// Says how to install it.
+    /// The message for a missing tool: how to install it.
     pub fn missing(&self) -> String {
         let install = match self.install {
             Packages(names) => format!("sudo apt-get install --yes {names}"),
@@ -105,7 +105,7 @@ impl Tool {
         format!("{} is missing: {install}", self.program)
     }
 
-    /// A command that installs it without a question.
+    /// A command that installs it without asking anything.
     fn installer(&self) -> Option<Command> {
         match self.install {
             Packages(names) => debian(names),
@@ -118,38 +118,48 @@ impl Tool {
         }
     }
 
-    /// Its version, or an error that says how to install it.
+    /// Its version.
+    ///
+    /// # Errors
+    /// Fails if it is not installed; the error tells how to install it.
     pub fn require(&self) -> Result<String> {
         self.version().with_context(|| self.missing())
     }
 }
 
-/// Installs what is missing if that needs no question; else says what to type. What
-/// needs a tool says so itself, so that this never fails.
-pub fn set_up() {
+/// Installs the missing tools where that needs no answer from the user; prints the command for the
+/// others.
+///
+/// # Errors
+/// Fails if a tool is still missing.
+pub fn set_up() -> Result<()> {
+    let mut missing = Vec::new();
     for tool in ALL {
         if let Some(version) = tool.version() {
-            println!("{version}: there");
+            println!("{version}: installed");
             continue;
         }
         if let Some(mut command) = tool.installer() {
             println!("{}: installing", tool.program);
-            // A failure shows when the tool is still missing.
+            // The check below finds a failure.
             let _ = command.stdin(Stdio::null()).status();
         }
-        if !tool.is_there() {
+        if !tool.is_installed() {
             println!("{}", tool.missing());
+            missing.push(tool.program);
         }
     }
+    ensure!(missing.is_empty(), "missing: {}", missing.join(", "));
+    Ok(())
 }
 
-/// How root installs packages on Debian.
+/// The command that installs packages as root on Debian.
 fn debian(names: &str) -> Option<Command> {
     let is_root = Command::new("id").arg("-u").output().ok()?.stdout == b"0\n";
     if !(is_root && Path::new("/etc/debian_version").exists()) {
         return None;
     }
-    // A new machine may never have heard of its packages.
+    // A new machine may have no package lists yet.
     let install = format!(
         "apt-get update --quiet && \
          apt-get install --yes --quiet --no-install-recommends {names}"

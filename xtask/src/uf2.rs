@@ -1,4 +1,4 @@
-//! An image as UF2, which a Pico takes as a file: <https://github.com/microsoft/uf2>.
+//! Converts an image to UF2, the format in which a Pico takes files: <https://github.com/microsoft/uf2>.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -8,15 +8,15 @@ use anyhow::{Context, Result, ensure};
 use object::read::elf::{ElfFile32, ProgramHeader};
 use object::{Endianness, elf};
 
-/// Bytes of flash that a block is for: what the chip writes at once.
+/// Bytes of flash per block: a flash page.
 const PAGE: u32 = 256;
-/// The family of RP2040.
+/// The family ID of the RP2040.
 const FAMILY: u32 = 0xe48b_ff56;
-/// The field after the sizes is the family's.
+/// Flag: the field after the sizes is the family ID.
 const HAS_FAMILY: u32 = 0x2000;
 const FLASH: std::ops::Range<u32> = 0x1000_0000..0x1100_0000;
 
-/// Writes `IMAGE.uf2` beside an image; gives its path.
+/// Writes `IMAGE.uf2` beside an image. Returns its path.
 pub fn write(image: &Path) -> Result<PathBuf> {
     let name = || image.display().to_string();
     let bytes = fs::read(image).with_context(name)?;
@@ -34,10 +34,10 @@ pub fn write(image: &Path) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// Puts bytes at an address of the flash into its pages.
+/// Copies bytes for an address of the flash into its pages.
 fn add(pages: &mut BTreeMap<u32, [u8; PAGE as usize]>, address: u32, bytes: &[u8]) -> Result<()> {
     for (address, &byte) in (address..).zip(bytes) {
-        ensure!(FLASH.contains(&address), "{address:#x} is no flash");
+        ensure!(FLASH.contains(&address), "{address:#x} is not in the flash");
         let page = pages.entry(address / PAGE * PAGE).or_insert([0; _]);
         page[(address % PAGE) as usize] = byte;
     }

@@ -1,12 +1,12 @@
 /* A device with a simulated sensor, for `dtof monitor --device tcp:127.0.0.1:PORT`:
  *
- *     device [PORT]     0 or none: a free port, which it prints
+ *     device [PORT]     default: a free port, which it prints
  *
- * On a microcontroller a UART takes the place of the socket, and a TDC that of `simulate`. It
- * ends when the host has gone.
+ * On a microcontroller a UART replaces the socket, and a TDC replaces `simulate`. The program ends
+ * when the host disconnects.
  *
- * The sensor stands for a laser: it is off unless a host that is alive has configured it. Each
- * start and stop is a line of the output. */
+ * The sensor stands for a laser: it is off unless a live host has configured it. Each start and
+ * stop prints a line. */
 #define _POSIX_C_SOURCE 200809L
 #include <errno.h>
 #include <poll.h>
@@ -33,26 +33,26 @@ static dtof_statistics_t statistics;
 static dtof_aer_encoder_t encoder;
 static dtof_report_t report;
 static int is_configured, sensor_runs;
-/* Of the configuration: how long the host may be silent. */
+/* From the configuration: how long the host may be silent. */
 static uint16_t host_timeout_ms;
 
 /* Words that wait for the link. */
 static uint8_t words[15 * DTOF_WORD_BYTES];
 static size_t filled;
 
-/* An answer that waits for the link; nothing else is done before it. */
+/* An answer that waits for the link. It goes out before anything else is done. */
 static uint8_t answer_kind, answer[DTOF_BODY_BYTES];
 static size_t answer_length;
 static int has_answer;
 
-/* The histogram that the host asks for goes part by part. */
+/* A requested histogram is sent in parts. */
 static uint16_t histogram_of;
 static size_t histogram_part;
 static int sends_histogram;
 
 static void fail(const char *where, const char *why)
 {
-    /* A board switches its laser off here, before all else. */
+    /* A board switches its laser off here, before anything else. */
     sensor_runs = 0;
     fprintf(stderr, "error: %s: %s\n", where, why);
     exit(EXIT_FAILURE);
@@ -74,20 +74,20 @@ static uint32_t now_ms(void)
 
 static void start_sensor(void)
 {
-    /* Here your laser goes on, and nowhere else. */
+    /* Switch your laser on here, and nowhere else. */
     sensor_runs = 1;
     report.sensor_starts++;
     printf("sensor on\n");
     fflush(stdout);
 }
 
-/* Only a further configuration starts it again. The host hears the reason. */
+/* Only another configuration starts it again. The host gets the reason. */
 static void stop_sensor(uint8_t reason)
 {
     if (!sensor_runs) {
         return;
     }
-    /* Here your laser goes off, before anything else is done. */
+    /* Switch your laser off here, before anything else. */
     sensor_runs = 0;
     report.sensor_stops++;
     report.stop_reason = reason;
@@ -96,43 +96,43 @@ static void stop_sensor(uint8_t reason)
     fflush(stdout);
 }
 
-/* Takes the host's configuration on, or says why not. The one before stays then. */
+/* Applies the host's configuration. After an error the one before stays in force. */
 static dtof_status_t configure(const dtof_message_t *message)
 {
-    dtof_device_config_t wanted;
+    dtof_device_config_t requested;
     dtof_checked_config_t checked;
     dtof_scale_t scale;
-    dtof_status_t status = dtof_device_config_read(message->body, message->length, &wanted);
-    if (status == DTOF_OK && (wanted.pixels == 0 || wanted.pixels > PIXELS)) {
+    dtof_status_t status = dtof_device_config_read(message->body, message->length, &requested);
+    if (status == DTOF_OK && (requested.pixels == 0 || requested.pixels > PIXELS)) {
         status = DTOF_ERROR_PIXELS;
     }
-    if (status == DTOF_OK && wanted.source == DTOF_SOURCE_SENSOR
-        && wanted.bin_width_ps_q16 != BIN_WIDTH_PS_Q16) {
+    if (status == DTOF_OK && requested.source == DTOF_SOURCE_SENSOR
+        && requested.bin_width_ps_q16 != BIN_WIDTH_PS_Q16) {
         status = DTOF_ERROR_BIN_WIDTH;
     }
-    /* A host that would never be silent for too long. */
-    if (status == DTOF_OK && wanted.host_timeout_ms == 0) {
+    /* 0 would switch the timeout off. */
+    if (status == DTOF_OK && requested.host_timeout_ms == 0) {
         status = DTOF_ERROR_HOST_TIMEOUT;
     }
     if (status == DTOF_OK) {
-        status = dtof_scale_init(&scale, wanted.bin_width_ps_q16, wanted.offset_mm_q8);
+        status = dtof_scale_init(&scale, requested.bin_width_ps_q16, requested.offset_mm_q8);
     }
     if (status == DTOF_OK) {
-        status = dtof_config_check(&wanted.pixel, &checked);
+        status = dtof_config_check(&requested.pixel, &checked);
     }
     if (status != DTOF_OK) {
         return status;
     }
     stop_sensor(DTOF_STOP_CONFIGURATION);
     config = checked;
-    host_timeout_ms = wanted.host_timeout_ms;
+    host_timeout_ms = requested.host_timeout_ms;
     for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
         check("pixel", dtof_pixel_init(&pixels[pixel], sizeof pixels[pixel], pixel));
     }
-    memset(&statistics, 0, sizeof statistics);
+    check("statistics", dtof_statistics_init(&statistics));
     report.cycles = 0;
     is_configured = 1;
-    if (wanted.source == DTOF_SOURCE_SENSOR) {
+    if (requested.source == DTOF_SOURCE_SENSOR) {
         start_sensor();
     }
     return DTOF_OK;
@@ -144,7 +144,7 @@ static void not_understood(void)
     has_answer = 0;
 }
 
-/* Works on a message of the host; its answer waits. */
+/* Handles a message of the host and prepares the answer. */
 static void act(const dtof_message_t *message)
 {
     has_answer = 1;
@@ -201,7 +201,7 @@ static void act(const dtof_message_t *message)
     }
 }
 
-/* The next part of the histogram becomes the answer that waits; 0 if there is none. */
+/* Makes the next part of the histogram the answer: 0 if there is none. */
 static int next_part(void)
 {
     if (!sends_histogram) {
@@ -216,7 +216,7 @@ static int next_part(void)
     return has_answer;
 }
 
-/* Offers a message: 1 if the link has taken it. */
+/* Offers a message: 1 if the link took it. */
 static int offer(uint8_t kind, const uint8_t *body, size_t length)
 {
     dtof_status_t status = dtof_link_offer(&link_to_host, kind, body, length);
@@ -227,8 +227,8 @@ static int offer(uint8_t kind, const uint8_t *body, size_t length)
     return 1;
 }
 
-/* Events from the pixels' slots into messages, as far as there is room: 1 if none is left. An
- * event that has no room stays in its slot. */
+/* Moves events from the pixels' slots to messages while there is room: 1 if none is left. An
+ * event without room stays in its slot. */
 static int send_events(void)
 {
     for (size_t pixel = 0; pixel < PIXELS && is_configured; pixel++) {
@@ -255,7 +255,7 @@ static int send_events(void)
     return 1;
 }
 
-/* All that can be done without waiting. A question is answered after the events before it. */
+/* Does everything that needs no waiting. A request is answered after the events before it. */
 static void work(void)
 {
     dtof_message_t message;
@@ -274,7 +274,7 @@ static void work(void)
     }
 }
 
-/* A laser cycle: a target in each pixel, two bins a row farther, and background. */
+/* A laser cycle: a target in each pixel, two bins farther per row, and background. */
 static void simulate(void)
 {
     static uint32_t drawn = 1;
@@ -292,7 +292,7 @@ static void simulate(void)
     report.cycles++;
 }
 
-/* A session has begun or ended: nothing is left of it, or of the one before. */
+/* A session has begun or ended: discards the state of the one before. */
 static void start_over(uint8_t session)
 {
     stop_sensor(session == DTOF_SESSION_ENDED ? DTOF_STOP_END_OF_SESSION : DTOF_STOP_NEW_SESSION);
@@ -301,8 +301,8 @@ static void start_over(uint8_t session)
     check("encoder", dtof_aer_encoder_init(&encoder));
 }
 
-/* Stops the sensor of a host that is silent. */
-static void look_after_host(void)
+/* Stops the sensor if the host is silent. */
+static void check_host(void)
 {
     uint32_t silent_ms;
     check("silence", dtof_link_silent_ms(&link_to_host, now_ms(), &silent_ms));
@@ -311,7 +311,7 @@ static void look_after_host(void)
     }
 }
 
-/* Waits for the host: a socket that is connected. */
+/* Waits for the host. Returns a connected socket. */
 static int connected(uint16_t port)
 {
     struct sockaddr_in address = {.sin_family = AF_INET, .sin_port = htons(port)};
@@ -333,8 +333,8 @@ static int connected(uint16_t port)
     return host;
 }
 
-/* Whether all of a frame has gone. It does not wait for a silent host: until its timeout, less is
- * sent than a socket holds. */
+/* Sends a frame: 1 if all of it was sent. It does not block on a silent host: before the timeout, the
+ * device sends less than the socket's buffer holds. */
 static int sent(int host, const uint8_t *bytes, size_t length)
 {
     while (length > 0) {
@@ -356,6 +356,7 @@ int main(int arguments, char **argument)
         fail("usage", "device [PORT]");
     }
     check("link", dtof_link_init(&link_to_host, sizeof link_to_host, PIXELS));
+    check("statistics", dtof_statistics_init(&statistics));
     int host = connected((uint16_t)port);
     uint32_t simulated_ms = now_ms();
     for (;;) {
@@ -373,9 +374,9 @@ int main(int arguments, char **argument)
         if (session != DTOF_SESSION_UNCHANGED) {
             start_over(session);
         }
-        look_after_host();
+        check_host();
         for (uint32_t now = now_ms(); simulated_ms != now; simulated_ms++) {
-            /* A histogram stays as it is until all of it has gone. */
+            /* The histogram must not change until all parts are sent. */
             if (sensor_runs && !sends_histogram) {
                 simulate();
             }

@@ -1,8 +1,7 @@
 /* Photons to an AER file, which `dtof decode` reads:
  *
- *     events OUT.aer                  photons of a small generator
- *     events OUT.aer < PHOTONS.csv    with the word `-` behind OUT.aer: pixel,cycle,bin lines,
- *                                     laser cycles in order
+ *     events OUT.aer                  generated photons
+ *     events OUT.aer - < PHOTONS.csv  lines of pixel,cycle,bin, with laser cycles in order
  */
 #include <errno.h>
 #include <stdio.h>
@@ -20,7 +19,7 @@ static dtof_checked_config_t config;
 static dtof_statistics_t statistics;
 static dtof_aer_encoder_t encoder;
 
-/* The file, and what of it was written. */
+/* The file, with the checksum and the number of its events. */
 static FILE *file;
 static const char *file_name;
 static uint32_t checksum;
@@ -88,7 +87,7 @@ static void end_laser_cycles(uint64_t *cycle, uint64_t next)
     }
 }
 
-/* A target in each pixel, three bins a row farther, and as much background. */
+/* A target in each pixel, three bins farther per row, and as much background. */
 static void generate(void)
 {
     uint32_t drawn = 1;
@@ -153,11 +152,12 @@ int main(int arguments, char **argument)
     check("settings", dtof_config_paper(&settings));
     check("settings", dtof_config_check(&settings, &config));
     check("encoder", dtof_aer_encoder_init(&encoder));
+    check("statistics", dtof_statistics_init(&statistics));
     for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
         check("pixel", dtof_pixel_init(&pixels[pixel], sizeof pixels[pixel], pixel));
     }
 
-    /* Never in place of a file that is there. */
+    /* Does not overwrite a file. */
     file = fopen(file_name, "wbx");
     if (file == NULL) {
         fail(file_name, strerror(errno));

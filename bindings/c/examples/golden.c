@@ -1,5 +1,5 @@
-/* Golden vectors: the same photons as firmware/src/self_test.rs has, through the C functions.
- * Its lines are those of firmware/self-test.out, as far as the library has what they need. */
+/* Golden vectors: the photons of firmware/src/self_test.rs, through the C functions. It prints the
+ * lines of firmware/self-test.out that need nothing else than this library. */
 #include <dtof.h>
 
 #include "platform.h"
@@ -8,7 +8,7 @@ static dtof_pixel_t pixel;
 static dtof_checked_config_t checked;
 static dtof_aer_encoder_t encoder;
 
-/* A generator good enough here: multiplier and increment are those of Numerical Recipes. */
+/* A simple generator, with the multiplier and increment of Numerical Recipes. */
 static uint32_t drawn;
 
 static uint16_t below(uint32_t limit)
@@ -17,7 +17,7 @@ static uint16_t below(uint32_t limit)
     return (uint16_t)(((drawn >> 16) * limit) >> 16);
 }
 
-/* Says what went wrong, and where. */
+/* Prints the error and where it happened. */
 static int failed(const char *where, dtof_status_t status)
 {
     print(where);
@@ -73,7 +73,7 @@ static int print_event(const dtof_event_t *event)
     return 0;
 }
 
-/* Ends a laser cycle, and prints the event if one waits and the link has room. */
+/* Ends a laser cycle. Prints an event if there is one and the link has room. */
 static int end(dtof_statistics_t *statistics, uint64_t cycle, int has_room)
 {
     dtof_event_t event;
@@ -97,7 +97,7 @@ static int print_statistics(dtof_statistics_t *statistics)
     TRY(dtof_pixel_add_photons(&pixel, statistics));
     TRY(dtof_statistics_read(statistics, &counts));
     print_field("Statistics { counted: ", (int64_t)counts.counted);
-    print_field(", held: ", (int64_t)counts.held);
+    print_field(", excluded: ", (int64_t)counts.excluded);
     print_field(", saturated: ", (int64_t)counts.saturated);
     print_field(", rejected: ", (int64_t)counts.rejected);
     print_field(", gated_out: ", (int64_t)counts.gated_out);
@@ -109,15 +109,16 @@ static int print_statistics(dtof_statistics_t *statistics)
     return 0;
 }
 
-/* A macropixel that sees a target between two bins, with as much background. */
+/* A macropixel that sees a target between two bins, and as much background. */
 static int stream(void)
 {
     const uint16_t target = 60;
     const uint64_t first = (1 << 16) - 400;
-    dtof_statistics_t statistics = {0};
+    dtof_statistics_t statistics;
     dtof_config_t config;
 
     print("stream of 128 bins\n");
+    TRY(dtof_statistics_init(&statistics));
     TRY(dtof_config_paper(&config));
     config.x = 10;
     TRY(dtof_config_check(&config, &checked));
@@ -130,7 +131,7 @@ static int stream(void)
         if (below(2) == 0) {
             TRY(dtof_pixel_count(&pixel, &checked, below(DTOF_BINS)));
         }
-        /* Now and then the link has no room. */
+        /* Sometimes the link has no room. */
         if (end(&statistics, cycle, cycle % 256 < 160)) {
             return 1;
         }
@@ -138,16 +139,17 @@ static int stream(void)
     return print_statistics(&statistics);
 }
 
-/* A macropixel with a rule of windows that sees a surface at bin 30 and one at bin 60, with a
- * photon in one of so many laser cycles, or none. */
+/* A macropixel with the window rule that sees surfaces at bins 30 and 60, each with a photon in one
+ * of `one_in` laser cycles, or none. */
 static int watched(const char *name, const dtof_config_t *config, const uint16_t one_in[2])
 {
     static const uint16_t targets[2] = {30, 60};
-    dtof_statistics_t statistics = {0};
+    dtof_statistics_t statistics;
 
     print("stream with ");
     print(name);
     print("\n");
+    TRY(dtof_statistics_init(&statistics));
     TRY(dtof_config_check(config, &checked));
     TRY(dtof_pixel_init(&pixel, sizeof pixel, 2));
     drawn = 1;

@@ -1,16 +1,16 @@
-/* What the examples need of the platform: host.c, and cortex-m4/start.c. */
+/* The functions that host.c and cortex-m4/start.c provide for the examples. */
 #ifndef PLATFORM_H
 #define PLATFORM_H
 
 #include <stdint.h>
 
-/* Text to where a reader sees it. */
+/* Prints text. */
 void print(const char *text);
 
-/* A whole number in decimals. */
+/* Prints a whole number. */
 void print_number(int64_t number);
 
-/* The example. What is not 0 is a failure. */
+/* Runs the example: 0 if it succeeds. */
 int run(void);
 
 #endif

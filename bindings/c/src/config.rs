@@ -1,4 +1,4 @@
-//! Settings, and the configuration that is made of them.
+//! Settings, and the configuration built from them.
 
 use core::mem::MaybeUninit;
 
@@ -8,7 +8,7 @@ use dtof_core::{
     RangeGate, WindowRule, z_for,
 };
 
-use crate::memory::{Tagged, holds, initialise, plain, put, status};
+use crate::memory::{data_ref, initialise, object, put, status};
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{
     DTOF_ERROR_ECHOES, DTOF_ERROR_ESTIMATOR, DTOF_ERROR_HALF_WIDTH, DTOF_ERROR_MINIMUM_COUNT,
@@ -25,36 +25,35 @@ pub const DTOF_RULE_AVERAGE: u8 = 2;
 
 /// The paper's depth: the centroid of three bins.
 pub const DTOF_ESTIMATOR_CENTROID: u8 = 0;
-/// The centroid of a window that lies about the pulse.
+/// The centroid of a window centred on the pulse.
 pub const DTOF_ESTIMATOR_CENTRED_WINDOW: u8 = 1;
 
-/// How pixels operate, as a program writes it down. Fill it in with dtof_config_paper, change
-/// what you want, and check it with dtof_config_check. Fields of another rule or estimator are
-/// not looked at.
+/// The settings of pixels. Fill them in with dtof_config_paper, change some, and check them with
+/// dtof_config_check. Fields of a rule or estimator that is not selected are ignored.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct dtof_config_t {
-    /// The fewest photons in a reported peak, with the window rule in the window: 1 to
-    /// 16,777,215. The counters of pixels hold 1023.
+    /// The fewest photons in a reported peak (window rule: in its window): 1 to 16,777,215. The
+    /// counters of pixels hold 1023.
     pub minimum_count: u32,
-    /// Standard deviations above the background, in 1/256. Of the rules paper and average.
+    /// Standard deviations above the background, in 1/256. For the rules paper and average.
     pub alpha_q8: u16,
-    /// Standard deviations above the background, in 1/4096. Of the window rule.
+    /// Standard deviations above the background, in 1/4096. For the window rule.
     pub z_q12: u16,
     /// Laser cycles between looks: at least 1.
     pub x: u16,
     /// The exposure that a decision must exceed, in laser cycles: at least X.
     pub l1: u16,
-    /// The exposure at which a pixel starts over, in laser cycles: above L1, and a multiple of X
-    /// lies strictly between the two.
+    /// The exposure at which a pixel starts over, in laser cycles: above L1, with a multiple of X
+    /// strictly between the two.
     pub l2: u16,
     /// The first bin that may hold the peak.
     pub gate_first: u16,
-    /// The last bin that may hold the peak: at least 7 more, below DTOF_BINS.
+    /// The last bin that may hold the peak: at least gate_first + 7, below DTOF_BINS.
     pub gate_last: u16,
-    /// How far the centred window reaches before its place, in 1/256 bin: 256 to 1024.
+    /// How far the centred window reaches before its centre, in 1/256 bin: 256 to 1024.
     pub before_q8: u16,
-    /// How far it reaches after its place, in 1/256 bin: 256 to 1024.
+    /// How far the centred window reaches after its centre, in 1/256 bin: 256 to 1024.
     pub after_q8: u16,
     /// DTOF_RULE_...
     pub rule: u8,
@@ -62,16 +61,15 @@ pub struct dtof_config_t {
     pub window: u8,
     /// DTOF_ESTIMATOR_...
     pub estimator: u8,
-    /// Not 0: the TDC takes one photon a laser cycle, and events say when it piles up.
+    /// Not 0: the TDC takes one photon per laser cycle, and events have the flag for pile-up.
     pub one_hit_tdc: u8,
-    /// Not 0: pixels expect their next event where the last was. With the window rule.
+    /// Not 0: pixels expect the next event at the bin of the last. Needs the window rule.
     pub tracking: u8,
     /// The last echo that a pixel reports in an exposure: 1 to 4.
     pub echoes: u8,
-    /// Bins to either side of an echo's peak that are left out once it is reported: any.
+    /// Bins excluded to either side of a reported echo's peak: 0 to 255.
     pub peel_reach: u8,
-    /// An exposure ends once it is so many times as long as it was at its last echo; with 255
-    /// at L2.
+    /// An exposure ends once it is this many times as long as at its last echo; 255: at L2.
     pub echo_wait: u8,
 }
 
@@ -82,8 +80,8 @@ pub const DTOF_CHECKED_CONFIG_WORDS: usize = DTOF_CHECKED_CONFIG_SIZE / 8;
 /// Its alignment.
 pub const DTOF_CHECKED_CONFIG_ALIGN: usize = 8;
 
-/// A configuration that was checked: dtof_config_check makes it. It is read only from then on,
-/// so that any number of threads may use it at once. It may be copied.
+/// A checked configuration: dtof_config_check makes it. Other functions only read it, so any number
+/// of threads may use it at once. It may be copied.
 #[repr(C)]
 pub struct dtof_checked_config_t {
     opaque: [MaybeUninit<u64>; DTOF_CHECKED_CONFIG_WORDS],
@@ -92,15 +90,15 @@ pub struct dtof_checked_config_t {
 /// The configuration of this library's pixels.
 pub(crate) type Config = PixelConfig<DTOF_BINS, AnyRule>;
 
-holds!(dtof_checked_config_t, Tagged<Config, 0xd6>,
-    size DTOF_CHECKED_CONFIG_SIZE, align DTOF_CHECKED_CONFIG_ALIGN, waste 8);
+object!(dtof_checked_config_t, Config, tag 0xd6,
+    size DTOF_CHECKED_CONFIG_SIZE, align DTOF_CHECKED_CONFIG_ALIGN, unused_below 8);
 
-/// Fills in the paper's settings: its rule with an alpha of 4 and at least 5 photons, its depth,
-/// X = 4, L1 = 40, L2 = 2000, all bins, one echo. Those of the other rules are z = 4.47 and a
-/// window of 3 bins; of the centred window 2.5 bins to either side.
+/// Fills in the paper's settings: its rule with an alpha of 4 and at least 5 photons, its depth
+/// estimator, X = 4, L1 = 40, L2 = 2000, all bins, one echo. The window rule gets z = 4.47 and a
+/// window of 3 bins, and the centred window 2.5 bins to either side.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
-/// Threads: nobody else uses `config` meanwhile.
+/// Threads: no other thread uses `config` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_config_paper(config: *mut dtof_config_t) -> dtof_status_t {
     #[allow(clippy::cast_possible_truncation, reason = "at most 256")]
@@ -128,12 +126,11 @@ pub unsafe extern "C" fn dtof_config_paper(config: *mut dtof_config_t) -> dtof_s
     status(|| unsafe { put(config, settings) })
 }
 
-/// Sets the window rule's width and the centred window to a pulse whose standard deviation is
-/// `sigma_q8`, in 1/256 bin. It suits pulses of 0.4 to 1.75 bins. It does not choose the rule or
-/// the estimator.
+/// Fits the window rule's width and the centred window to a pulse with a standard deviation of
+/// `sigma_q8`, in 1/256 bin, best 0.4 to 1.75 bins. It does not select the rule or the estimator.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
-/// Threads: nobody else uses `config` meanwhile.
+/// Threads: no other thread uses `config` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_config_for_pulse(
     config: *mut dtof_config_t,
@@ -143,7 +140,7 @@ pub unsafe extern "C" fn dtof_config_for_pulse(
         let sigma = U8F8::from_bits(sigma_q8);
         let window = CentredWindow::for_pulse(sigma);
         // SAFETY: the caller's promise, see the crate.
-        let settings = *unsafe { plain(config)? };
+        let settings = *unsafe { data_ref(config)? };
         let settings = dtof_config_t {
             window: WindowRule::width_for_pulse(sigma),
             before_q8: window.before().to_bits(),
@@ -155,13 +152,12 @@ pub unsafe extern "C" fn dtof_config_for_pulse(
     })
 }
 
-/// Sets the window rule's z so that one in `one_in` exposures without a target brings a false
-/// alarm: 100 for 1 %. It goes by the gate, X, L1 and L2 of `config`, so set these before. z gets
-/// 2.15 to 6.44.
+/// Sets the window rule's z for one false alarm in `one_in` exposures without a target: 100 for
+/// 1 %. z depends on the gate, X, L1 and L2 of `config`, so set these before. z is 2.15 to 6.44.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_ZERO_X,
 /// DTOF_ERROR_GATE_PAST_LAST_BIN, DTOF_ERROR_GATE_TOO_NARROW.
-/// Threads: nobody else uses `config` meanwhile.
+/// Threads: no other thread uses `config` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_config_false_alarms(
     config: *mut dtof_config_t,
@@ -169,7 +165,7 @@ pub unsafe extern "C" fn dtof_config_false_alarms(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let settings = *unsafe { plain(config)? };
+        let settings = *unsafe { data_ref(config)? };
         if settings.x == 0 {
             return Err(DTOF_ERROR_ZERO_X);
         }
@@ -181,11 +177,11 @@ pub unsafe extern "C" fn dtof_config_false_alarms(
     })
 }
 
-/// Checks settings and makes the configuration of them.
+/// Checks settings and builds the configuration from them.
 ///
 /// Errors: each of DTOF_ERROR_RULE to DTOF_ERROR_ECHOES, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
-/// `checked` stays as it was.
-/// Threads: nobody else uses `checked` meanwhile.
+/// After an error `checked` is unchanged.
+/// Threads: no other thread uses `checked` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_config_check(
     config: *const dtof_config_t,
@@ -193,9 +189,9 @@ pub unsafe extern "C" fn dtof_config_check(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let config = config_of(unsafe { plain(config)? })?;
+        let config = config_of(unsafe { data_ref(config)? })?;
         // SAFETY: the same promise.
-        unsafe { initialise(checked, DTOF_CHECKED_CONFIG_SIZE, Tagged::new(config)) }
+        unsafe { initialise(checked, DTOF_CHECKED_CONFIG_SIZE, config) }
     })
 }
 

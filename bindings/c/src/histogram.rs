@@ -1,4 +1,4 @@
-//! Histograms that a sensor has counted by itself.
+//! Histograms counted by the sensor.
 
 use core::mem::MaybeUninit;
 
@@ -7,7 +7,7 @@ use dtof_core::{Count24, DepthEvent, Histogram, LaserCycle, PixelAddress};
 use crate::config::dtof_checked_config_t;
 use crate::event::dtof_event_t;
 use crate::memory::{
-    all_plain, array_mut, check, exclusive, holds, initialise, put, status, tagged,
+    array_mut, check, data_slice, initialise, object, object_mut, object_ref, put, status,
 };
 use crate::statistics::dtof_statistics_t;
 use crate::status::dtof_status_t;
@@ -15,34 +15,34 @@ use crate::status::dtof_status_t::DTOF_ERROR_LENGTH;
 use crate::version::DTOF_BINS;
 
 /// Bytes of a dtof_histogram_t.
-pub const DTOF_HISTOGRAM_SIZE: usize = 16 + 4 * DTOF_BINS;
+pub const DTOF_HISTOGRAM_SIZE: usize = 20 + 4 * DTOF_BINS;
 /// The same in words of 32 bits.
 pub const DTOF_HISTOGRAM_WORDS: usize = DTOF_HISTOGRAM_SIZE / 4;
 /// Its alignment.
 pub const DTOF_HISTOGRAM_ALIGN: usize = 4;
 
-/// Echoes of one histogram or exposure, at most.
+/// The most echoes of one histogram or exposure.
 pub const DTOF_ECHOES: usize = 4;
 
-/// Room for one histogram of DTOF_BINS counters of 24 bits. dtof_histogram_fill makes it, again
-/// and again. One thread or interrupt at a time may use it.
+/// A histogram of DTOF_BINS counters of 24 bits. Each call of dtof_histogram_fill initialises it
+/// anew. One thread or interrupt at a time may use it.
 #[repr(C)]
 pub struct dtof_histogram_t {
     opaque: [MaybeUninit<u32>; DTOF_HISTOGRAM_WORDS],
 }
 
-type Whole = Histogram<DTOF_BINS, Count24>;
+type Counted = Histogram<DTOF_BINS, Count24>;
 
-// Any bytes are a histogram: all of its fields are integers.
-holds!(dtof_histogram_t, Whole, size DTOF_HISTOGRAM_SIZE, align DTOF_HISTOGRAM_ALIGN, waste 1);
+object!(dtof_histogram_t, Counted, tag 0xd9,
+    size DTOF_HISTOGRAM_SIZE, align DTOF_HISTOGRAM_ALIGN, unused_below 1);
 
-/// Takes `counts`, DTOF_BINS numbers of photons, as far as they are in the gate. Adds the
-/// photons to `statistics`, those outside the gate as gated out, those above 16,777,215 a bin as
-/// saturated. `size` is `sizeof *histogram`.
+/// Fills a histogram with `counts`, the photons of DTOF_BINS bins, and adds them to `statistics`:
+/// photons outside the gate as gated out, those above 16,777,215 in a bin as saturated. `size` is
+/// `sizeof *histogram`.
 ///
 /// Errors: DTOF_ERROR_SIZE if the library was built for another number of bins,
-/// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED (of `config`).
-/// Threads: nobody else uses `histogram` or `statistics` meanwhile.
+/// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread uses `histogram` or `statistics` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_histogram_fill(
     histogram: *mut dtof_histogram_t,
@@ -52,26 +52,28 @@ pub unsafe extern "C" fn dtof_histogram_fill(
     counts: *const u32,
 ) -> dtof_status_t {
     status(|| {
-        // SAFETY: the caller's promise, see the crate; any bytes are statistics.
-        let (config, statistics) = unsafe { (tagged(config)?, exclusive(statistics)?) };
+        // SAFETY: the caller's promise, see the crate.
+        let (config, statistics) = unsafe { (object_ref(config)?, object_mut(statistics)?) };
         // SAFETY: the same promise.
-        unsafe { initialise(histogram, size, Whole::new())? };
-        // SAFETY: the same promise.
-        let (histogram, counts) = unsafe { (exclusive(histogram)?, all_plain(counts, DTOF_BINS)?) };
+        let counts = unsafe { data_slice(counts, DTOF_BINS)? };
         let counts = counts.as_array().ok_or(DTOF_ERROR_LENGTH)?;
+        // SAFETY: the same promise.
+        unsafe { initialise(histogram, size, Counted::new())? };
+        // SAFETY: the same promise.
+        let histogram = unsafe { object_mut(histogram)? };
         let gated_out = histogram.add_frame(counts, config.gate());
         statistics.add_photons_of(histogram, gated_out);
         Ok(())
     })
 }
 
-/// Decides on a filled histogram, once, whatever X, L1 and L2 are. `events` has room for
-/// DTOF_ECHOES of them; `found` gets how many there are, up to the echoes of `config`. `pixel`,
-/// `cycle` and `exposure` (laser cycles) are those of the events. With several echoes the bins
-/// around all but the last are emptied, so fill it again before the next decision.
+/// Looks for events in a filled histogram. X, L1 and L2 have no effect here. `events` has room
+/// for DTOF_ECHOES events; `found` gets their number, at most the echoes of `config`. `pixel`,
+/// `cycle` and `exposure` (laser cycles) are copied into the events. With several echoes, the bins
+/// around all but the last are emptied, so fill the histogram again before the next call.
 ///
-/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED (of `config`).
-/// Threads: nobody else uses `histogram` or `statistics` meanwhile.
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread uses `histogram` or `statistics` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_histogram_detect(
     histogram: *mut dtof_histogram_t,
@@ -85,16 +87,20 @@ pub unsafe extern "C" fn dtof_histogram_detect(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let (histogram, config) = unsafe { (exclusive(histogram)?, tagged(config)?) };
-        // SAFETY: the same promise; any bytes are statistics, and events.
-        let (statistics, events) =
-            unsafe { (exclusive(statistics)?, array_mut::<_, DTOF_ECHOES>(events)?) };
-        // Before an echo is taken out of the histogram.
+        let (histogram, config) = unsafe { (object_mut(histogram)?, object_ref(config)?) };
+        // SAFETY: the same promise.
+        let (statistics, events) = unsafe {
+            (
+                object_mut(statistics)?,
+                array_mut::<_, DTOF_ECHOES>(events)?,
+            )
+        };
+        // Before the histogram changes.
         check(found)?;
         let mut places = events.iter_mut();
         let mut number = 0;
         config.detect_echoes(histogram, |echo, detection| {
-            let event = detection.event(PixelAddress(pixel), LaserCycle(cycle), exposure);
+            let event = detection.event(PixelAddress::new(pixel), LaserCycle::new(cycle), exposure);
             if let Some(place) = places.next() {
                 *place = (&DepthEvent { echo, ..event }).into();
                 number += 1;

@@ -1,11 +1,11 @@
-//! The histogram of a pixel, as a host asks for it.
+//! Histograms as messages to the host.
 
 use dtof_core::{LaserCycle, PixelAddress};
 use dtof_link::endpoint::BODY_BYTES;
 use dtof_link::{HistogramHead, NoHistogram};
 use heapless::Vec;
 
-use crate::memory::{all_plain, array_mut, check, put, shared, status};
+use crate::memory::{array_mut, check, data_slice, object_ref, put, status};
 use crate::pixel::dtof_pixel_t;
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{DTOF_ERROR_LENGTH, DTOF_ERROR_REASON};
@@ -13,11 +13,11 @@ use crate::version::DTOF_BINS;
 
 /// There is no histogram: no configuration is in force.
 pub const DTOF_NO_HISTOGRAM_CONFIGURATION: u8 = 1;
-/// There is none: the device has no such pixel.
+/// There is no histogram: the device has no such pixel.
 pub const DTOF_NO_HISTOGRAM_PIXEL: u8 = 2;
-/// There is none: another request came before the answer.
+/// There is no histogram: another request came before the answer.
 pub const DTOF_NO_HISTOGRAM_GIVEN_UP: u8 = 3;
-/// There is none: the sensor failed.
+/// There is no histogram: the sensor failed.
 pub const DTOF_NO_HISTOGRAM_SENSOR: u8 = 4;
 const _: () = assert!(
     DTOF_NO_HISTOGRAM_CONFIGURATION == NoHistogram::NoConfiguration as u8
@@ -26,12 +26,12 @@ const _: () = assert!(
         && DTOF_NO_HISTOGRAM_SENSOR == NoHistogram::Sensor as u8
 );
 
-/// Writes a body of HISTOGRAM: the exposure that a pixel is in, so far. `cycles` is how many
-/// laser cycles have ended, `part` counts from 0. `body` has room for DTOF_BODY_BYTES; `length`
-/// gets how many there are, 0 after the last part. No photon may come between two parts.
+/// Writes a body of HISTOGRAM with the present exposure of a pixel. `cycles` is the number of laser
+/// cycles that have ended, `part` counts from 0. `body` has room for DTOF_BODY_BYTES; `length` gets
+/// the number of bytes, 0 after the last part. Count no photon between two parts.
 ///
-/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
-/// Threads: nobody else changes `pixel` meanwhile.
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread changes `pixel` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_pixel_histogram_write(
     pixel: *const dtof_pixel_t,
@@ -42,11 +42,11 @@ pub unsafe extern "C" fn dtof_pixel_histogram_write(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let pixel = unsafe { shared(pixel)? };
+        let pixel = unsafe { object_ref(pixel)? };
         let head = HistogramHead {
             pixel: pixel.address(),
             is_whole: false,
-            cycle: LaserCycle(cycles),
+            cycle: LaserCycle::new(cycles),
             exposure: pixel.exposure().into(),
         };
         let counts = pixel.histogram().counts().map(u32::from);
@@ -55,9 +55,8 @@ pub unsafe extern "C" fn dtof_pixel_histogram_write(
     })
 }
 
-/// The same of a histogram that came whole from the sensor, which integrated `exposure` laser
-/// cycles for it: `counts` are DTOF_BINS numbers of photons. A count above 16,777,215 is written
-/// as that.
+/// Writes a body of HISTOGRAM with a histogram that the sensor counted over `exposure` laser
+/// cycles: `counts` has the photons of DTOF_BINS bins. A greater count is written as 16,777,215.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
 /// Threads: any.
@@ -73,12 +72,12 @@ pub unsafe extern "C" fn dtof_counts_write(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let counts = unsafe { all_plain(counts, DTOF_BINS)? };
+        let counts = unsafe { data_slice(counts, DTOF_BINS)? };
         let counts: &[u32; DTOF_BINS] = counts.as_array().ok_or(DTOF_ERROR_LENGTH)?;
         let head = HistogramHead {
-            pixel: PixelAddress(pixel),
+            pixel: PixelAddress::new(pixel),
             is_whole: true,
-            cycle: LaserCycle(cycles),
+            cycle: LaserCycle::new(cycles),
             exposure,
         };
         // SAFETY: the same promise.
@@ -86,8 +85,8 @@ pub unsafe extern "C" fn dtof_counts_write(
     })
 }
 
-/// Writes a body of HISTOGRAM that says why there is none: `reason` is one of
-/// DTOF_NO_HISTOGRAM_... `body` has room for DTOF_BODY_BYTES; `length` gets how many there are.
+/// Writes a body of HISTOGRAM that tells why there is no histogram: `reason` is one of
+/// DTOF_NO_HISTOGRAM_... `body` has room for DTOF_BODY_BYTES; `length` gets the number of bytes.
 ///
 /// Errors: DTOF_ERROR_REASON, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
 /// Threads: any.
@@ -101,12 +100,12 @@ pub unsafe extern "C" fn dtof_no_histogram_write(
     status(|| {
         let reason = NoHistogram::from_number(reason).ok_or(DTOF_ERROR_REASON)?;
         // SAFETY: the caller's promise, see the crate.
-        unsafe { put_bytes(&reason.message(PixelAddress(pixel)), body, length) }
+        unsafe { put_bytes(&reason.message(PixelAddress::new(pixel)), body, length) }
     })
 }
 
 /// # Safety
-/// As those of C's functions.
+/// As for every function that C calls: see the crate.
 unsafe fn part_of(
     head: HistogramHead,
     counts: &[u32; DTOF_BINS],
@@ -123,7 +122,7 @@ unsafe fn part_of(
 }
 
 /// # Safety
-/// As those of C's functions.
+/// As for every function that C calls: see the crate.
 unsafe fn put_bytes(bytes: &[u8], body: *mut u8, length: *mut usize) -> Result<(), dtof_status_t> {
     check(length)?;
     // SAFETY: the same promise.

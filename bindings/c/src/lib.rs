@@ -1,33 +1,36 @@
 //! The detector and the link for firmware in C.
 //!
-//! `include/dtof.h` is made of this crate; `bindings/c/README.md` says how to use it. Names
-//! here are those of the header. State lies in the caller's memory, nothing is allocated, and
-//! nothing panics. Each function checks its pointers and its numbers, calls `dtof-core` or
-//! `dtof-link`, and returns a [`dtof_status_t`].
+//! cbindgen generates `include/dtof.h` from this crate; `bindings/c/README.md` shows how to use it.
+//! State lies in the caller's memory, nothing is allocated, and nothing panics. Each function
+//! checks its pointers and its numbers, calls `dtof-core` or `dtof-link`, and returns a
+//! [`dtof_status_t`].
 //!
-//! What is left out: blocks of pixels, dynamic depth, running means, reflectivity, and rules of
-//! one's own.
+//! Not included: blocks of pixels, dynamic depth, running means, reflectivity, and custom rules.
 //!
 //! # Safety
 //!
-//! A function that takes pointers is safe to call if each points to memory of its type, as long
-//! as said, that nobody else writes meanwhile. No two of them overlap unless both are `const`.
-//! Null, misalignment and memory that was never initialised are answered by an error where they
-//! can be seen.
+//! A function that takes pointers is safe to call if each points to memory of its type, of the
+//! documented length, that no other thread writes during the call. No two of them overlap unless
+//! both are `const`. Null, misaligned pointers and objects without the tag of their type get an
+//! error.
 //!
-//! | module | what it has |
+//! Memory that a function reads must be initialised, with any value: Rust may not read an object
+//! that was never written, not even its tag. Memory that a function only writes need not be. If an
+//! object has the tag of its type, the initialiser of that type wrote it.
+//!
+//! | module | contents |
 //! |---|---|
-//! | `version` | of the library, and its number of bins |
+//! | `version` | the version of the library, and its number of bins |
 //! | `status` | every error |
-//! | `memory` | pointers of C's, checked |
-//! | `config` | settings, and the configuration that is made of them |
+//! | `memory` | checks of pointers and objects |
+//! | `config` | settings, and the configuration built from them |
 //! | `event`, `statistics`, `range` | plain values, counts, millimetres |
-//! | `pixel`, `histogram` | pixels, and histograms that arrive whole |
+//! | `pixel`, `histogram` | pixels, and histograms counted by the sensor |
 //! | `aer` | events as words of 16 bytes |
 //! | `link`, `records`, `histogram_message` | the device's end of the link, and the bodies of its messages |
 
 #![cfg_attr(target_os = "none", no_std)]
-#![allow(unsafe_code, reason = "pointers of C's")]
+#![allow(unsafe_code, reason = "pointers from C")]
 #![allow(non_camel_case_types, reason = "the names of the header")]
 #![allow(clippy::missing_safety_doc, reason = "the same for all: see above")]
 #![allow(clippy::doc_markdown, reason = "the header is plain text")]
@@ -66,7 +69,7 @@ pub use statistics::*;
 pub use status::*;
 pub use version::*;
 
-/// Nothing panics; a library without an operating system must have this all the same.
+/// Never called, but required without an operating system.
 #[cfg(all(target_os = "none", not(test)))]
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {

@@ -7,7 +7,7 @@ use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::{StopReason, message};
 
 use crate::memory::{
-    Tagged, all_plain, array_mut, check, holds, initialise, put, status, tagged, tagged_mut,
+    array_mut, check, data_slice, initialise, object, object_mut, object_ref, put, status,
 };
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{
@@ -16,40 +16,40 @@ use crate::status::dtof_status_t::{
 };
 use crate::version::dtof_bins;
 
-/// Bytes of a frame on the wire, at most.
+/// The most bytes of a frame on the wire.
 pub const DTOF_WIRE_BYTES: usize = 256;
 const _: () = assert!(DTOF_WIRE_BYTES == WIRE_BYTES);
-/// Bytes of a message, at most: 15 words of events.
+/// The most bytes of the body of a message.
 pub const DTOF_BODY_BYTES: usize = 244;
 const _: () = assert!(DTOF_BODY_BYTES == BODY_BYTES);
 
 /// From the host: a configuration, for dtof_device_config_read. Answer it with CONFIGURED or
 /// REFUSED.
 pub const DTOF_MESSAGE_CONFIGURE: u8 = 0x01;
-/// From the host: photons. A device with a sensor has no use for them.
+/// From the host: photons. A device with a sensor ignores them.
 pub const DTOF_MESSAGE_PHOTONS: u8 = 0x02;
 /// From the host: answer it with SYNCHRONISED and the same body, after all events before it.
 pub const DTOF_MESSAGE_SYNCHRONISE: u8 = 0x03;
-/// From the host: answer it with STATISTICS and what dtof_report_write gives.
+/// From the host: answer it with STATISTICS and a body of dtof_report_write.
 pub const DTOF_MESSAGE_STATISTICS_REQUEST: u8 = 0x04;
-/// From the host: answer it with SENSOR and what dtof_sensor_write gives.
+/// From the host: answer it with SENSOR and a body of dtof_sensor_write.
 pub const DTOF_MESSAGE_SENSOR_REQUEST: u8 = 0x05;
-/// From the host: the address of a pixel, 2 bytes, the lower first. Answer it with HISTOGRAM.
+/// From the host: the address of a pixel, 2 bytes, little-endian. Answer it with HISTOGRAM.
 pub const DTOF_MESSAGE_HISTOGRAM_REQUEST: u8 = 0x06;
 /// To the host: the configuration is in force. No body.
 pub const DTOF_MESSAGE_CONFIGURED: u8 = 0x81;
-/// To the host: it is not. One byte, from dtof_refusal_of.
+/// To the host: the configuration is refused. One byte, from dtof_refusal_of.
 pub const DTOF_MESSAGE_REFUSED: u8 = 0x82;
 /// To the host: words of 16 bytes, up to 15 of them, as dtof_aer_encode gives them.
 pub const DTOF_MESSAGE_EVENTS: u8 = 0x83;
-/// To the host: all before is done.
+/// To the host: all events before SYNCHRONISE have been sent.
 pub const DTOF_MESSAGE_SYNCHRONISED: u8 = 0x84;
 /// To the host: statistics.
 pub const DTOF_MESSAGE_STATISTICS: u8 = 0x85;
-/// To the host: what the sensor is.
+/// To the host: a description of the sensor.
 pub const DTOF_MESSAGE_SENSOR: u8 = 0x86;
-/// To the host: what dtof_pixel_histogram_write, dtof_counts_write or dtof_no_histogram_write
-/// gives.
+/// To the host: a body of dtof_pixel_histogram_write, dtof_counts_write or
+/// dtof_no_histogram_write.
 pub const DTOF_MESSAGE_HISTOGRAM: u8 = 0x87;
 const _: () = assert!(
     DTOF_MESSAGE_CONFIGURE == message::CONFIGURE
@@ -67,7 +67,7 @@ const _: () = assert!(
         && DTOF_MESSAGE_HISTOGRAM == message::HISTOGRAM
 );
 
-/// The kinds of a device's messages. Those below are a host's, those above no messages.
+/// The kinds of messages to the host. Lower kinds come from the host; higher ones are reserved.
 const OF_DEVICE: core::ops::Range<u8> = 0x80..0xf0;
 
 /// No session has begun or ended.
@@ -77,7 +77,7 @@ pub const DTOF_SESSION_BEGAN: u8 = 1;
 /// The host has ended its session.
 pub const DTOF_SESSION_ENDED: u8 = 2;
 
-/// The sensor has not stopped since the device was switched on.
+/// The sensor has not stopped since power-on.
 pub const DTOF_STOP_NONE: u8 = 0;
 /// The sensor stopped for another configuration.
 pub const DTOF_STOP_CONFIGURATION: u8 = 1;
@@ -89,7 +89,7 @@ pub const DTOF_STOP_END_OF_SESSION: u8 = 3;
 pub const DTOF_STOP_SILENCE: u8 = 4;
 /// Because no program has the USB port open, or the cable is unplugged.
 pub const DTOF_STOP_NOT_LISTENING: u8 = 5;
-/// Before this start the firmware gave up, as on a failed assertion.
+/// Before this start the firmware panicked, for instance on a failed assertion.
 pub const DTOF_STOP_PANIC: u8 = 6;
 /// Before this start there was a hard fault, a stack overflow included.
 pub const DTOF_STOP_FAULT: u8 = 7;
@@ -127,16 +127,16 @@ pub struct dtof_link_t {
     opaque: [MaybeUninit<u64>; DTOF_LINK_WORDS],
 }
 
-/// What a dtof_link_t holds.
+/// The value of a dtof_link_t.
 pub(crate) struct Link {
     pub(crate) endpoint: Endpoint,
     deframer: Deframer,
 }
 
-// Of 32 bits it is smaller.
-holds!(dtof_link_t, Tagged<Link, 0xd7>, size DTOF_LINK_SIZE, align DTOF_LINK_ALIGN, waste 160);
+// On 32 bits it is smaller.
+object!(dtof_link_t, Link, tag 0xd7, size DTOF_LINK_SIZE, align DTOF_LINK_ALIGN, unused_below 160);
 
-/// A message of the host.
+/// A message from the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(C)]
 pub struct dtof_message_t {
@@ -144,11 +144,11 @@ pub struct dtof_message_t {
     pub kind: u8,
     /// Bytes of the body.
     pub length: u8,
-    /// The body; 0 after its end.
+    /// The body, filled up with 0.
     pub body: [u8; DTOF_BODY_BYTES],
 }
 
-/// How a link is. The counters are since it was made.
+/// The state of a link. The counters start at its initialisation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct dtof_link_state_t {
@@ -160,7 +160,7 @@ pub struct dtof_link_state_t {
     pub oversized: u32,
     /// Frames of another session.
     pub foreign: u32,
-    /// Messages dropped because one before them is missing; they come again.
+    /// Messages dropped because an earlier one is missing; the host sends them again.
     pub out_of_order: u32,
     /// Messages that had arrived before.
     pub duplicate: u32,
@@ -170,14 +170,15 @@ pub struct dtof_link_state_t {
     pub is_open: u8,
     /// 1 if dtof_link_offer has room.
     pub has_room: u8,
-    /// 1 if the host has everything that was offered.
+    /// 1 if the host has received all that was offered.
     pub is_settled: u8,
 }
 
-/// Waits for a host. `pixels` is how many this device has room for. `size` is `sizeof *link`.
+/// Initialises a link that waits for a host. `pixels` is the number of pixels of this device.
+/// `size` is `sizeof *link`.
 ///
 /// Errors: DTOF_ERROR_SIZE, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
-/// Threads: nobody else uses `link` meanwhile.
+/// Threads: no other thread uses `link` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_link_init(
     link: *mut dtof_link_t,
@@ -190,17 +191,16 @@ pub unsafe extern "C" fn dtof_link_init(
             deframer: Deframer::new(),
         };
         // SAFETY: the caller's promise, see the crate.
-        unsafe { initialise(link, size, Tagged::new(made)) }
+        unsafe { initialise(link, size, made) }
     })
 }
 
-/// Takes `length` bytes that have come over the wire. `now_ms` is a clock of milliseconds that
-/// may wrap. `session` gets one of DTOF_SESSION_...: after DTOF_SESSION_BEGAN and
-/// DTOF_SESSION_ENDED switch the laser off, and forget configuration, events and statistics of
-/// the session before.
+/// Takes `length` received bytes. `now_ms` is a clock of milliseconds that may wrap. `session` gets
+/// one of DTOF_SESSION_...: after DTOF_SESSION_BEGAN and DTOF_SESSION_ENDED switch the laser off,
+/// and discard the configuration, events and statistics of the session before.
 ///
 /// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
-/// Threads: nobody else uses `link` meanwhile.
+/// Threads: no other thread uses `link` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_link_receive(
     link: *mut dtof_link_t,
@@ -211,15 +211,15 @@ pub unsafe extern "C" fn dtof_link_receive(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let (link, bytes) = unsafe { (tagged_mut(link)?, all_plain(bytes, length)?) };
-        // Before a byte is taken.
+        let (link, bytes) = unsafe { (object_mut(link)?, data_slice(bytes, length)?) };
+        // Before the first byte is consumed.
         check(session)?;
         for &byte in bytes {
             if let Some(frame) = link.deframer.push(byte) {
                 link.endpoint.receive(frame, now_ms);
             }
         }
-        // What happened last: of the two the link keeps one.
+        // The later of the two: the link keeps one.
         let change = if link.endpoint.take_began() {
             DTOF_SESSION_BEGAN
         } else if link.endpoint.take_ended() {
@@ -232,11 +232,11 @@ pub unsafe extern "C" fn dtof_link_receive(
     })
 }
 
-/// The next bytes to put on the wire: `wire` has room for DTOF_WIRE_BYTES, `length` gets how
-/// many there are, 0 if none are due. Call it until then, and again at least every 10 ms.
+/// Gets the next bytes to send. `wire` has room for DTOF_WIRE_BYTES; `length` gets the number of
+/// bytes, 0 if none are due. Repeat the call until it gives 0, and at least every 10 ms.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
-/// Threads: nobody else uses `link` meanwhile.
+/// Threads: no other thread uses `link` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_link_transmit(
     link: *mut dtof_link_t,
@@ -246,8 +246,8 @@ pub unsafe extern "C" fn dtof_link_transmit(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let (link, wire) = unsafe { (tagged_mut(link)?, array_mut(wire)?) };
-        // Before a frame is taken for sent.
+        let (link, wire) = unsafe { (object_mut(link)?, array_mut(wire)?) };
+        // Before a frame counts as sent.
         check(length)?;
         let number = link.endpoint.transmit(now_ms, wire);
         // SAFETY: the same promise.
@@ -255,26 +255,26 @@ pub unsafe extern "C" fn dtof_link_transmit(
     })
 }
 
-/// The kind of the host's next message, which stays where it is.
+/// Gets the kind of the host's next message without taking it.
 ///
 /// Errors: DTOF_ERROR_NO_MESSAGE, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
 /// DTOF_ERROR_NOT_INITIALISED.
-/// Threads: nobody else uses `link` meanwhile.
+/// Threads: no other thread uses `link` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_link_peek(link: *const dtof_link_t, kind: *mut u8) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let next = unsafe { tagged(link)? }.endpoint.peek();
+        let next = unsafe { object_ref(link)? }.endpoint.peek();
         // SAFETY: the same promise.
         unsafe { put(kind, next.ok_or(DTOF_ERROR_NO_MESSAGE)?.kind) }
     })
 }
 
-/// Takes the host's next message. The host sends no more than four that are not taken.
+/// Takes the host's next message. The host sends at most four that are not taken.
 ///
 /// Errors: DTOF_ERROR_NO_MESSAGE, DTOF_ERROR_NULL, DTOF_ERROR_NOT_INITIALISED,
 /// DTOF_ERROR_ALIGNMENT.
-/// Threads: nobody else uses `link` meanwhile.
+/// Threads: no other thread uses `link` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_link_take(
     link: *mut dtof_link_t,
@@ -282,7 +282,7 @@ pub unsafe extern "C" fn dtof_link_take(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let link = unsafe { tagged_mut(link)? };
+        let link = unsafe { object_mut(link)? };
         let next = link.endpoint.peek().ok_or(DTOF_ERROR_NO_MESSAGE)?;
         let mut taken = dtof_message_t {
             kind: next.kind,
@@ -299,12 +299,12 @@ pub unsafe extern "C" fn dtof_link_take(
     })
 }
 
-/// Sends a message, sooner or later, whole, once and in order. `kind` is one of those
-/// DTOF_MESSAGE_... that go to the host, `body` has `length` bytes, up to DTOF_BODY_BYTES.
+/// Queues a message, which arrives whole, once and in order. `kind` is one of the DTOF_MESSAGE_...
+/// to the host; `body` has `length` bytes, up to DTOF_BODY_BYTES.
 ///
-/// Errors: DTOF_ERROR_FULL if four are under way: offer it again later. DTOF_ERROR_MESSAGE_KIND,
+/// Errors: DTOF_ERROR_FULL if four are queued: offer it again later. DTOF_ERROR_MESSAGE_KIND,
 /// DTOF_ERROR_MESSAGE_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
-/// Threads: nobody else uses `link` meanwhile.
+/// Threads: no other thread uses `link` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_link_offer(
     link: *mut dtof_link_t,
@@ -320,15 +320,15 @@ pub unsafe extern "C" fn dtof_link_offer(
             return Err(DTOF_ERROR_MESSAGE_LENGTH);
         }
         // SAFETY: the caller's promise, see the crate.
-        let (link, body) = unsafe { (tagged_mut(link)?, all_plain(body, length)?) };
+        let (link, body) = unsafe { (object_mut(link)?, data_slice(body, length)?) };
         link.endpoint.offer(kind, body).map_err(|_| DTOF_ERROR_FULL)
     })
 }
 
-/// How the link is.
+/// Gets the state of the link.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
-/// Threads: nobody else uses `link` meanwhile.
+/// Threads: no other thread uses `link` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_link_state(
     link: *const dtof_link_t,
@@ -336,7 +336,7 @@ pub unsafe extern "C" fn dtof_link_state(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let endpoint = &unsafe { tagged(link)? }.endpoint;
+        let endpoint = &unsafe { object_ref(link)? }.endpoint;
         let LinkCounters {
             frames,
             corrupt,
@@ -363,15 +363,15 @@ pub unsafe extern "C" fn dtof_link_state(
     })
 }
 
-/// How long the host of the session has not been heard, in milliseconds: no whole frame of it has
-/// come. `now_ms` is the clock of dtof_link_receive, and not before its last time. Without a
-/// session it is 4,294,967,295.
+/// Gets the milliseconds since the last whole frame from the host of the session, or 4,294,967,295
+/// without a session. `now_ms` is the clock of dtof_link_receive, not earlier than in its last
+/// call.
 ///
-/// While the sensor runs, call it at least every 10 ms. Switch the laser off once it gives
-/// `host_timeout_ms` of the configuration or more.
+/// While the sensor runs, call it at least every 10 ms. Switch the laser off once the time reaches
+/// `host_timeout_ms` of the configuration.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
-/// Threads: nobody else changes `link` meanwhile.
+/// Threads: no other thread changes `link` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_link_silent_ms(
     link: *const dtof_link_t,
@@ -380,7 +380,7 @@ pub unsafe extern "C" fn dtof_link_silent_ms(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let endpoint = &unsafe { tagged(link)? }.endpoint;
+        let endpoint = &unsafe { object_ref(link)? }.endpoint;
         let silent = if endpoint.is_open() {
             endpoint.silent_ms(now_ms)
         } else {
@@ -391,12 +391,12 @@ pub unsafe extern "C" fn dtof_link_silent_ms(
     })
 }
 
-/// Why the sensor stopped last: one of DTOF_STOP_..., but not DTOF_STOP_NONE. A host whose session
-/// the device has forgotten is told it. Call it when the sensor stops, and after a reset with
-/// the cause of that.
+/// Sets the reason of the last stop of the sensor: one of DTOF_STOP_..., but not DTOF_STOP_NONE. A
+/// host whose session has ended gets it. Call it when the sensor stops, and after a reset with the
+/// cause of the reset.
 ///
 /// Errors: DTOF_ERROR_REASON, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
-/// Threads: nobody else uses `link` meanwhile.
+/// Threads: no other thread uses `link` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_link_set_stop_reason(
     link: *mut dtof_link_t,
@@ -405,7 +405,7 @@ pub unsafe extern "C" fn dtof_link_set_stop_reason(
     status(|| {
         let reason = StopReason::from_number(reason).ok_or(DTOF_ERROR_REASON)?;
         // SAFETY: the caller's promise, see the crate.
-        unsafe { tagged_mut(link)? }
+        unsafe { object_mut(link)? }
             .endpoint
             .set_stop_reason(reason);
         Ok(())

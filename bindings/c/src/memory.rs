@@ -1,11 +1,10 @@
-//! Pointers of C's, checked.
+//! Checks pointers that come from C.
 //!
-//! A type of the header whose fields are nobody's business holds one of Rust's. [`holds`] says
-//! which, and does not compile if that does not fit. Its words are [`MaybeUninit`]: some bytes are
-//! padding of what it holds, and were never written.
-//!
-//! [`MaybeUninit`]: core::mem::MaybeUninit
+//! Each opaque type of the header holds a tag and a Rust value. [`object`] names the value and
+//! checks at compile time that it fits. The opaque words are [`MaybeUninit`], because a value may
+//! contain padding.
 
+use core::mem::MaybeUninit;
 use core::{hint, slice};
 
 use crate::status::dtof_status_t;
@@ -14,61 +13,50 @@ use crate::status::dtof_status_t::{
     DTOF_ERROR_SIZE, DTOF_OK,
 };
 
-/// A type of the header, and what lies in its memory.
-pub(crate) trait Holds: Sized {
-    type Inside;
+/// An opaque type of the header.
+pub(crate) trait Object: Sized {
+    type Value;
+    /// Its initialiser writes the tag. Each type has another one, and neither zeroed nor erased
+    /// memory has one. Four equal bytes are one instruction.
+    const TAG: u32;
 }
 
-/// Says what a type of the header holds. Checked when compiled: it is as large and as aligned,
-/// and wastes less than `waste` bytes.
-macro_rules! holds {
-    ($outside:ty, $inside:ty, size $size:expr, align $align:expr, waste $waste:expr) => {
-        impl $crate::memory::Holds for $outside {
-            type Inside = $inside;
+/// What lies in an [`Object`]'s memory once it is initialised.
+#[repr(C)]
+pub(crate) struct Tagged<T> {
+    tag: u32,
+    pub(crate) value: T,
+}
+
+/// Implements [`Object`], and checks size and alignment at compile time: fewer than `unused_below`
+/// bytes of the object are unused.
+macro_rules! object {
+    ($object:ty, $value:ty, tag $tag:expr, size $size:expr, align $align:expr, unused_below $unused_below:expr) => {
+        impl $crate::memory::Object for $object {
+            type Value = $value;
+            const TAG: u32 = u32::from_ne_bytes([$tag; 4]);
         }
         const _: () = {
-            let (outside, inside) = (size_of::<$outside>(), size_of::<$inside>());
-            assert!(outside == $size && inside <= outside && outside - inside < $waste);
-            assert!(align_of::<$inside>() <= align_of::<$outside>());
-            assert!(align_of::<$outside>() <= $align);
+            type Tagged = $crate::memory::Tagged<$value>;
+            assert!($tag != 0 && $tag != u8::MAX);
+            assert!(size_of::<$object>() == $size);
+            assert!(size_of::<Tagged>() <= $size && $size - size_of::<Tagged>() < $unused_below);
+            assert!(align_of::<Tagged>() <= align_of::<$object>());
+            assert!(align_of::<$object>() <= $align);
         };
     };
 }
 
-pub(crate) use holds;
+pub(crate) use object;
 
-/// A value that is only valid if it was written as a whole: its memory may hold anything before.
-/// Each type of the header has a `KIND` of its own, so that none is taken for another.
-#[repr(C)]
-pub(crate) struct Tagged<T, const KIND: u8> {
-    tag: u32,
-    value: T,
-}
-
-impl<T, const KIND: u8> Tagged<T, KIND> {
-    /// Stands in memory that was initialised. Zeroed or erased memory does not have it. Four equal
-    /// bytes are one instruction.
-    const TAG: u32 = {
-        assert!(KIND != 0 && KIND != u8::MAX);
-        u32::from_ne_bytes([KIND; 4])
-    };
-
-    pub(crate) const fn new(value: T) -> Self {
-        Self {
-            tag: Self::TAG,
-            value,
-        }
-    }
-}
-
-/// An error, by a way that costs the usual one nothing: the compiler puts it elsewhere.
+/// Keeps errors out of the usual path: the compiler moves a cold call elsewhere.
 #[cold]
 #[inline(never)]
 fn refused(error: dtof_status_t) -> dtof_status_t {
     hint::black_box(error)
 }
 
-/// Whether a value may lie there.
+/// Fails if the pointer is null or misaligned.
 #[inline(always)]
 pub(crate) fn check<T>(pointer: *const T) -> Result<(), dtof_status_t> {
     if pointer.is_null() {
@@ -80,54 +68,6 @@ pub(crate) fn check<T>(pointer: *const T) -> Result<(), dtof_status_t> {
     Ok(())
 }
 
-/// What `pointer` leads to, to read. For types that any bytes are a value of.
-///
-/// # Safety
-/// `pointer` is null, misaligned, or leads to readable memory of its type.
-#[inline(always)]
-pub(crate) unsafe fn shared<'a, C: Holds>(
-    pointer: *const C,
-) -> Result<&'a C::Inside, dtof_status_t> {
-    let inside = pointer.cast::<C::Inside>();
-    check(inside)?;
-    // SAFETY: neither null nor misaligned, and so memory of that type, by the promise.
-    Ok(unsafe { &*inside })
-}
-
-/// The same, to write.
-///
-/// # Safety
-/// As [`shared`]'s, and nobody else reads or writes it meanwhile.
-#[inline(always)]
-pub(crate) unsafe fn exclusive<'a, C: Holds>(
-    pointer: *mut C,
-) -> Result<&'a mut C::Inside, dtof_status_t> {
-    let inside = pointer.cast::<C::Inside>();
-    check(inside)?;
-    // SAFETY: neither null nor misaligned, and so memory of that type, by the promise.
-    Ok(unsafe { &mut *inside })
-}
-
-/// The same for several in a row.
-///
-/// # Safety
-/// As [`exclusive`]'s, for `number` of them.
-#[inline(always)]
-pub(crate) unsafe fn all_exclusive<'a, C: Holds>(
-    pointer: *mut C,
-    number: usize,
-) -> Result<&'a mut [C::Inside], dtof_status_t> {
-    const { assert!(size_of::<C>() == size_of::<C::Inside>()) };
-    let inside = pointer.cast::<C::Inside>();
-    check_number::<C>(number)?;
-    if number == 0 {
-        return Ok(&mut []);
-    }
-    check(inside)?;
-    // SAFETY: as above, and not longer than memory is.
-    Ok(unsafe { slice::from_raw_parts_mut(inside, number) })
-}
-
 fn check_number<T>(number: usize) -> Result<(), dtof_status_t> {
     let bytes = number.checked_mul(size_of::<T>());
     if bytes.is_none_or(|bytes| isize::try_from(bytes).is_err()) {
@@ -136,43 +76,73 @@ fn check_number<T>(number: usize) -> Result<(), dtof_status_t> {
     Ok(())
 }
 
-/// What lies in initialised memory, to read.
+/// The value of an initialised object, to read.
 ///
 /// # Safety
-/// As [`shared`]'s.
+/// `pointer` is null, misaligned, or leads to readable memory of its type. Its first four bytes are
+/// initialised, with any value: zeroed, erased, or part of another type. If they are the type's tag,
+/// [`initialise`] wrote the object.
 #[inline(always)]
-pub(crate) unsafe fn tagged<'a, T: 'a, const KIND: u8, C: Holds<Inside = Tagged<T, KIND>>>(
+pub(crate) unsafe fn object_ref<'a, C: Object>(
     pointer: *const C,
-) -> Result<&'a T, dtof_status_t> {
-    let inside = pointer.cast::<Tagged<T, KIND>>();
-    check(inside)?;
-    // SAFETY: as in `shared`; only the tag is read, which any bytes are a value of.
-    if unsafe { (&raw const (*inside).tag).read() } != Tagged::<T, KIND>::TAG {
+) -> Result<&'a C::Value, dtof_status_t> {
+    let object = pointer.cast::<Tagged<C::Value>>();
+    check(object)?;
+    // SAFETY: neither null nor misaligned, and so memory of that type, by the promise. Only the
+    // tag is read, and its bytes are initialised.
+    if unsafe { (&raw const (*object).tag).read() } != C::TAG {
         return Err(refused(DTOF_ERROR_NOT_INITIALISED));
     }
-    // SAFETY: with its tag the whole value was written.
-    Ok(unsafe { &(*inside).value })
+    // SAFETY: the tag shows that the whole value was written, by the promise.
+    Ok(unsafe { &(*object).value })
 }
 
-/// The same, to write.
+/// The value of an initialised object, to write.
 ///
 /// # Safety
-/// As [`exclusive`]'s.
+/// As [`object_ref`]'s, and no other thread reads or writes it during the call.
 #[inline(always)]
-pub(crate) unsafe fn tagged_mut<'a, T: 'a, const KIND: u8, C: Holds<Inside = Tagged<T, KIND>>>(
+pub(crate) unsafe fn object_mut<'a, C: Object + 'a>(
     pointer: *mut C,
-) -> Result<&'a mut T, dtof_status_t> {
+) -> Result<&'a mut C::Value, dtof_status_t> {
     // SAFETY: the same promise.
-    unsafe { tagged(pointer)? };
-    // SAFETY: checked in the line before; nobody else has it, by the promise.
-    Ok(unsafe { &mut (*pointer.cast::<Tagged<T, KIND>>()).value })
+    unsafe { object_ref(pointer)? };
+    // SAFETY: checked in the line before; no other thread has it, by the promise.
+    Ok(unsafe { &mut (*pointer.cast::<Tagged<C::Value>>()).value })
 }
 
-/// Puts a value into memory that may hold anything.
+/// An array of `number` initialised objects, to write.
 ///
 /// # Safety
-/// `pointer` is null, misaligned, or leads to writable memory of its type that nobody else
-/// reads or writes meanwhile.
+/// As [`object_mut`]'s, for `number` of them.
+#[inline(always)]
+pub(crate) unsafe fn objects_mut<'a, C: Object + 'a>(
+    pointer: *mut C,
+    number: usize,
+) -> Result<&'a mut [Tagged<C::Value>], dtof_status_t> {
+    const { assert!(size_of::<C>() == size_of::<Tagged<C::Value>>()) };
+    check_number::<C>(number)?;
+    if number == 0 {
+        return Ok(&mut []);
+    }
+    let objects = pointer.cast::<Tagged<C::Value>>();
+    check(objects)?;
+    // SAFETY: as in `object_ref`, for each of them, and not longer than memory is. Only the tags need
+    // be initialised.
+    let unchecked: &[Tagged<MaybeUninit<C::Value>>] =
+        unsafe { slice::from_raw_parts(objects.cast(), number) };
+    if unchecked.iter().any(|object| object.tag != C::TAG) {
+        return Err(refused(DTOF_ERROR_NOT_INITIALISED));
+    }
+    // SAFETY: the tags show that all were written, by the promise; not longer than memory is.
+    Ok(unsafe { slice::from_raw_parts_mut(objects, number) })
+}
+
+/// Writes a value to memory that need not be initialised.
+///
+/// # Safety
+/// `pointer` is null, misaligned, or leads to writable memory of its type that no other
+/// thread reads or writes during the call.
 #[inline(always)]
 pub(crate) unsafe fn put<T>(pointer: *mut T, value: T) -> Result<(), dtof_status_t> {
     check(pointer)?;
@@ -181,41 +151,43 @@ pub(crate) unsafe fn put<T>(pointer: *mut T, value: T) -> Result<(), dtof_status
     Ok(())
 }
 
-/// The same for a type of the header that holds another, unless `size`, which the header says,
-/// is not its size here.
+/// Initialises an object. `size` is what the header says: [`DTOF_ERROR_SIZE`] if the type has
+/// another size here.
 ///
 /// # Safety
 /// As [`put`]'s.
 #[inline(always)]
-pub(crate) unsafe fn initialise<C: Holds>(
+pub(crate) unsafe fn initialise<C: Object>(
     pointer: *mut C,
     size: usize,
-    value: C::Inside,
+    value: C::Value,
 ) -> Result<(), dtof_status_t> {
     if size != size_of::<C>() {
         return Err(DTOF_ERROR_SIZE);
     }
+    let tag = C::TAG;
     // SAFETY: the same promise.
-    unsafe { put(pointer.cast(), value) }
+    unsafe { put(pointer.cast(), Tagged { tag, value }) }
 }
 
-/// A plain value, to read.
+/// A value without a tag, such as a number or a `repr(C)` record, to read.
 ///
 /// # Safety
-/// As [`shared`]'s, and any bytes are a value of the type.
+/// `pointer` is null, misaligned, or leads to readable, initialised memory of its type, and any bytes
+/// are a value of the type.
 #[inline(always)]
-pub(crate) unsafe fn plain<'a, T>(pointer: *const T) -> Result<&'a T, dtof_status_t> {
+pub(crate) unsafe fn data_ref<'a, T>(pointer: *const T) -> Result<&'a T, dtof_status_t> {
     check(pointer)?;
     // SAFETY: neither null nor misaligned, and so memory of that type, by the promise.
     Ok(unsafe { &*pointer })
 }
 
-/// So many plain values, to read. None may have any pointer.
+/// An array of values without tags, to read. The pointer of an empty array may be anything.
 ///
 /// # Safety
-/// As [`plain`]'s, for `number` of them.
+/// As [`data_ref`]'s, for `number` of them.
 #[inline(always)]
-pub(crate) unsafe fn all_plain<'a, T>(
+pub(crate) unsafe fn data_slice<'a, T>(
     pointer: *const T,
     number: usize,
 ) -> Result<&'a [T], dtof_status_t> {
@@ -228,10 +200,10 @@ pub(crate) unsafe fn all_plain<'a, T>(
     Ok(unsafe { slice::from_raw_parts(pointer, number) })
 }
 
-/// An array of a known number of plain values, to write.
+/// An array of `N` values without tags, which the caller only writes: it need not be initialised.
 ///
 /// # Safety
-/// As [`exclusive`]'s, and any bytes are a value of the type.
+/// As [`put`]'s, for `N` of them, and any bytes are a value of the type.
 #[inline(always)]
 pub(crate) unsafe fn array_mut<'a, T, const N: usize>(
     pointer: *mut T,
@@ -241,7 +213,7 @@ pub(crate) unsafe fn array_mut<'a, T, const N: usize>(
     Ok(unsafe { &mut *pointer.cast() })
 }
 
-/// What a function returns.
+/// Turns a result into the status that C gets.
 #[inline(always)]
 pub(crate) fn status(body: impl FnOnce() -> Result<(), dtof_status_t>) -> dtof_status_t {
     match body() {

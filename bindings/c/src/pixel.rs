@@ -7,7 +7,7 @@ use dtof_core::{AsyncPixel, LaserCycle, Look, PixelAddress};
 use crate::config::dtof_checked_config_t;
 use crate::event::dtof_event_t;
 use crate::memory::{
-    all_exclusive, all_plain, check, exclusive, holds, initialise, put, shared, status, tagged,
+    check, data_slice, initialise, object, object_mut, object_ref, objects_mut, put, status,
 };
 use crate::statistics::dtof_statistics_t;
 use crate::status::dtof_status_t;
@@ -15,7 +15,7 @@ use crate::status::dtof_status_t::{DTOF_ERROR_LENGTH, DTOF_ERROR_NO_EVENT};
 use crate::version::DTOF_BINS;
 
 /// Bytes of a dtof_pixel_t.
-pub const DTOF_PIXEL_SIZE: usize = 72 + 2 * DTOF_BINS;
+pub const DTOF_PIXEL_SIZE: usize = 80 + 2 * DTOF_BINS;
 /// The same in words of 64 bits.
 pub const DTOF_PIXEL_WORDS: usize = DTOF_PIXEL_SIZE / 8;
 /// Its alignment.
@@ -32,10 +32,10 @@ pub struct dtof_pixel_t {
 
 type Pixel = AsyncPixel<DTOF_BINS>;
 
-// Any bytes are a pixel: all of its fields are integers.
-holds!(dtof_pixel_t, Pixel, size DTOF_PIXEL_SIZE, align DTOF_PIXEL_ALIGN, waste 1);
+object!(dtof_pixel_t, Pixel, tag 0xd8,
+    size DTOF_PIXEL_SIZE, align DTOF_PIXEL_ALIGN, unused_below 1);
 
-/// What the end of laser cycles brought.
+/// The outcome of dtof_pixel_end_laser_cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum dtof_look_t {
@@ -43,15 +43,15 @@ pub enum dtof_look_t {
     DTOF_LOOK_NOT_DUE = 0,
     /// The exposure has not exceeded L1.
     DTOF_LOOK_TOO_EARLY = 1,
-    /// The peak does not stand clear; the exposure goes on.
+    /// The peak does not exceed the threshold; the exposure goes on.
     DTOF_LOOK_NO_PEAK = 2,
-    /// The slot still holds an event: the decision is put off by X laser cycles.
+    /// The slot still holds an event: the decision is deferred by X laser cycles.
     DTOF_LOOK_DEFERRED = 3,
     /// An event is in the slot.
     DTOF_LOOK_EVENT = 4,
     /// The exposure reached L2 without an event: a new one begins.
     DTOF_LOOK_EXPIRED = 5,
-    /// The pixel has waited for another echo long enough: a new exposure begins.
+    /// The wait for another echo is over: a new exposure begins.
     DTOF_LOOK_ENDED = 6,
 }
 
@@ -70,11 +70,11 @@ impl From<Look> for dtof_look_t {
     }
 }
 
-/// Makes an empty pixel at the beginning of its first exposure. `size` is `sizeof *pixel`.
+/// Initialises an empty pixel at the beginning of its first exposure. `size` is `sizeof *pixel`.
 ///
 /// Errors: DTOF_ERROR_SIZE if the library was built for another number of bins,
 /// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
-/// Threads: nobody else uses `pixel` meanwhile.
+/// Threads: no other thread uses `pixel` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_pixel_init(
     pixel: *mut dtof_pixel_t,
@@ -82,15 +82,15 @@ pub unsafe extern "C" fn dtof_pixel_init(
     address: u16,
 ) -> dtof_status_t {
     // SAFETY: the caller's promise, see the crate.
-    status(|| unsafe { initialise(pixel, size, Pixel::new(PixelAddress(address))) })
+    status(|| unsafe { initialise(pixel, size, Pixel::new(PixelAddress::new(address))) })
 }
 
-/// Counts one photon of the present laser cycle. `code` is its bin, as the TDC gives it. One of
-/// DTOF_BINS or more is counted as rejected, one outside the gate as gated out, one that meets a
-/// full counter as saturated.
+/// Counts one photon of the present laser cycle. `code` is its bin, as the TDC gives it. A photon
+/// with a code of DTOF_BINS or more counts as rejected, one outside the gate as gated out, and one
+/// that meets a full counter as saturated.
 ///
-/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED (of `config`).
-/// Threads: nobody else uses `pixel` meanwhile.
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread uses `pixel` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_pixel_count(
     pixel: *mut dtof_pixel_t,
@@ -99,7 +99,7 @@ pub unsafe extern "C" fn dtof_pixel_count(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let (pixel, config) = unsafe { (exclusive(pixel)?, tagged(config)?) };
+        let (pixel, config) = unsafe { (object_mut(pixel)?, object_ref(config)?) };
         pixel.count(config, code);
         Ok(())
     })
@@ -108,8 +108,8 @@ pub unsafe extern "C" fn dtof_pixel_count(
 /// Counts `number` photons as dtof_pixel_count does, in a third of the time.
 ///
 /// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
-/// DTOF_ERROR_NOT_INITIALISED (of `config`). `codes` may be null if `number` is 0.
-/// Threads: nobody else uses `pixel` meanwhile.
+/// DTOF_ERROR_NOT_INITIALISED. `codes` may be null if `number` is 0.
+/// Threads: no other thread uses `pixel` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_pixel_count_batch(
     pixel: *mut dtof_pixel_t,
@@ -119,19 +119,19 @@ pub unsafe extern "C" fn dtof_pixel_count_batch(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let (pixel, config) = unsafe { (exclusive(pixel)?, tagged(config)?) };
+        let (pixel, config) = unsafe { (object_mut(pixel)?, object_ref(config)?) };
         // SAFETY: the same promise.
-        let codes = unsafe { all_plain(codes, number)? };
+        let codes = unsafe { data_slice(codes, number)? };
         pixel.count_batch(config, codes);
         Ok(())
     })
 }
 
-/// Counts a histogram over one or more laser cycles: `counts` are DTOF_BINS numbers of photons.
-/// End as many laser cycles after it.
+/// Counts a histogram of one or more laser cycles: `counts` has the photons of DTOF_BINS bins.
+/// Then end the same number of laser cycles.
 ///
-/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED (of `config`).
-/// Threads: nobody else uses `pixel` meanwhile.
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread uses `pixel` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_pixel_count_frame(
     pixel: *mut dtof_pixel_t,
@@ -140,21 +140,21 @@ pub unsafe extern "C" fn dtof_pixel_count_frame(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let (pixel, config) = unsafe { (exclusive(pixel)?, tagged(config)?) };
+        let (pixel, config) = unsafe { (object_mut(pixel)?, object_ref(config)?) };
         // SAFETY: the same promise.
-        let counts = unsafe { all_plain(counts, DTOF_BINS)? };
+        let counts = unsafe { data_slice(counts, DTOF_BINS)? };
         let counts = counts.as_array().ok_or(DTOF_ERROR_LENGTH)?;
         pixel.count_frame(config, counts);
         Ok(())
     })
 }
 
-/// Ends `cycles` laser cycles of a pixel, the last of which is number `last`, and looks at its
-/// histogram if X or more have passed since the last look. `look` gets what that brought; it may
-/// be null.
+/// Ends `cycles` laser cycles of a pixel; `last` is the number of the last one. The pixel looks at
+/// its histogram if X or more laser cycles have passed since the last look. `look` gets the
+/// outcome; it may be null.
 ///
-/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED (of `config`).
-/// Threads: nobody else uses `pixel` or `statistics` meanwhile.
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread uses `pixel` or `statistics` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_pixel_end_laser_cycles(
     pixel: *mut dtof_pixel_t,
@@ -166,24 +166,24 @@ pub unsafe extern "C" fn dtof_pixel_end_laser_cycles(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let (pixel, config) = unsafe { (exclusive(pixel)?, tagged(config)?) };
-        // SAFETY: the same promise; any bytes are statistics.
-        let statistics = unsafe { exclusive(statistics)? };
-        let brought = pixel.end_laser_cycles(config, statistics, LaserCycle(last), cycles);
+        let (pixel, config) = unsafe { (object_mut(pixel)?, object_ref(config)?) };
+        // SAFETY: the same promise.
+        let statistics = unsafe { object_mut(statistics)? };
+        let outcome = pixel.end_laser_cycles(config, statistics, LaserCycle::new(last), cycles);
         if look.is_null() {
             return Ok(());
         }
         // SAFETY: the same promise.
-        unsafe { put(look, brought.into()) }
+        unsafe { put(look, outcome.into()) }
     })
 }
 
-/// The same for `number` pixels in a row: checks once for all of them. `fired` gets how many
-/// have a new event in their slot; it may be null.
+/// Does the same for an array of `number` pixels, with fewer instructions per pixel. `fired` gets
+/// the number of pixels with a new event in their slot; it may be null.
 ///
 /// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
-/// DTOF_ERROR_NOT_INITIALISED (of `config`).
-/// Threads: nobody else uses the pixels or `statistics` meanwhile.
+/// DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread uses the pixels or `statistics` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_pixels_end_laser_cycles(
     pixels: *mut dtof_pixel_t,
@@ -196,12 +196,19 @@ pub unsafe extern "C" fn dtof_pixels_end_laser_cycles(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let (pixels, config) = unsafe { (all_exclusive(pixels, number)?, tagged(config)?) };
-        // SAFETY: the same promise; any bytes are statistics.
-        let statistics = unsafe { exclusive(statistics)? };
+        let (pixels, config) = unsafe { (objects_mut(pixels, number)?, object_ref(config)?) };
+        // SAFETY: the same promise.
+        let statistics = unsafe { object_mut(statistics)? };
+        // Checked before any pixel changes.
+        if !fired.is_null() {
+            check(fired)?;
+        }
         let mut events = 0;
         for pixel in pixels {
-            let look = pixel.end_laser_cycles(config, statistics, LaserCycle(last), cycles);
+            let look =
+                pixel
+                    .value
+                    .end_laser_cycles(config, statistics, LaserCycle::new(last), cycles);
             events += usize::from(look == Look::Event);
         }
         if fired.is_null() {
@@ -212,32 +219,33 @@ pub unsafe extern "C" fn dtof_pixels_end_laser_cycles(
     })
 }
 
-/// Takes the event that waits in the slot, so that the pixel may fire again. Until then the
-/// pixel counts on and puts its decisions off.
+/// Takes the event from the slot, so that the pixel can report the next one. Until then the pixel
+/// counts on and defers its decisions.
 ///
-/// Errors: DTOF_ERROR_NO_EVENT, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
-/// Threads: nobody else uses `pixel` meanwhile.
+/// Errors: DTOF_ERROR_NO_EVENT, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
+/// DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread uses `pixel` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_pixel_take_event(
     pixel: *mut dtof_pixel_t,
     event: *mut dtof_event_t,
 ) -> dtof_status_t {
     status(|| {
-        // Before an event is taken.
+        // Checked before the event leaves its slot.
         check(event)?;
         // SAFETY: the caller's promise, see the crate.
-        let pixel = unsafe { exclusive(pixel)? };
-        let taken = pixel.acknowledge().ok_or(DTOF_ERROR_NO_EVENT)?;
+        let pixel = unsafe { object_mut(pixel)? };
+        let taken = pixel.take_event().ok_or(DTOF_ERROR_NO_EVENT)?;
         // SAFETY: the same promise.
         unsafe { put(event, (&taken).into()) }
     })
 }
 
-/// Adds the photons of the present exposure to `statistics`: those of exposures that have ended
-/// are there already. Do that in a copy, or once at the very end.
+/// Adds the photons of the present exposure to `statistics`, which has only those of exposures that
+/// have ended. Use a copy of the statistics, or call it once at the very end.
 ///
-/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
-/// Threads: nobody else uses `pixel` or `statistics` meanwhile.
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread uses `pixel` or `statistics` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_pixel_add_photons(
     pixel: *const dtof_pixel_t,
@@ -245,7 +253,7 @@ pub unsafe extern "C" fn dtof_pixel_add_photons(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let (pixel, statistics) = unsafe { (shared(pixel)?, exclusive(statistics)?) };
+        let (pixel, statistics) = unsafe { (object_ref(pixel)?, object_mut(statistics)?) };
         pixel.add_photons_to(statistics);
         Ok(())
     })

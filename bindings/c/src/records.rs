@@ -1,7 +1,8 @@
 //! The bodies of messages: configuration, sensor, statistics.
 
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{AnyRule, DepthEstimator, Threshold};
+use dtof_core::paper::Threshold;
+use dtof_core::{AnyRule, DepthEstimator};
 use dtof_link::{Configuration, Refusal, Report, SensorRecord, Source};
 
 use crate::config::{
@@ -9,7 +10,7 @@ use crate::config::{
     DTOF_RULE_WINDOW, dtof_config_t,
 };
 use crate::link::dtof_link_t;
-use crate::memory::{all_plain, array_mut, plain, put, shared, status, tagged};
+use crate::memory::{array_mut, data_ref, data_slice, object_ref, put, status};
 use crate::statistics::dtof_statistics_t;
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::DTOF_ERROR_BLOCKS;
@@ -26,35 +27,35 @@ pub const DTOF_SOURCE_LINK: u8 = 0;
 /// Photons come from the sensor.
 pub const DTOF_SOURCE_SENSOR: u8 = 1;
 
-/// What the host wants. Check `pixel` with dtof_config_check, and the rest against what your
-/// device has.
+/// The configuration that the host requests. Check `pixel` with dtof_config_check, and compare
+/// the other fields with your device.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct dtof_device_config_t {
-    /// How pixels are to operate.
+    /// The settings of the pixels.
     pub pixel: dtof_config_t,
     /// The width of a bin, in 1/65536 ps, for dtof_scale_init.
     pub bin_width_ps_q16: u32,
-    /// Millimetres added to every range, in 1/256 mm.
+    /// The offset added to every range, in 1/256 mm.
     pub offset_mm_q8: i32,
-    /// Pixels, with addresses from 0.
+    /// The number of pixels, with addresses from 0.
     pub pixels: u16,
-    /// The laser goes off once the host has been silent for so many milliseconds: 200 to 60,000.
-    /// 0 means never. Refuse that with DTOF_ERROR_HOST_TIMEOUT, unless your laser may run
+    /// Switch the laser off after the host has been silent for this many milliseconds: 200 to
+    /// 60,000. 0 means never: refuse it with DTOF_ERROR_HOST_TIMEOUT, unless your laser may run
     /// without a host.
     pub host_timeout_ms: u16,
     /// DTOF_SOURCE_...
     pub source: u8,
 }
 
-/// Reads the body of CONFIGURE. What this library does not have is refused: blocks of pixels
-/// and dynamic depth.
+/// Reads the body of CONFIGURE. Blocks of pixels and dynamic depth are refused, as this library
+/// has neither.
 ///
-/// Errors: DTOF_ERROR_CONFIGURATION if it is not one this library knows, DTOF_ERROR_BLOCKS,
+/// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_BLOCKS,
 /// DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
 /// DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT, DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH,
-/// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT. dtof_refusal_of makes each the answer to the host.
-/// Threads: nobody else uses `config` meanwhile.
+/// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT. dtof_refusal_of gives the answer to the host for each.
+/// Threads: no other thread uses `config` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_device_config_read(
     body: *const u8,
@@ -63,21 +64,21 @@ pub unsafe extern "C" fn dtof_device_config_read(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let body = unsafe { all_plain(body, length)? };
-        let wanted = Configuration::from_le_bytes(body)?;
-        if wanted.binning.is_some() {
+        let body = unsafe { data_slice(body, length)? };
+        let requested = Configuration::from_le_bytes(body)?;
+        if requested.binning.is_some() {
             return Err(DTOF_ERROR_BLOCKS);
         }
-        if wanted.dynamic_depth.is_some() {
+        if requested.dynamic_depth.is_some() {
             return Err(Refusal::Unknown.into());
         }
         let read = dtof_device_config_t {
-            pixel: settings_of(&wanted),
-            bin_width_ps_q16: wanted.bin_width_ps.to_bits(),
-            offset_mm_q8: wanted.offset_mm.to_bits(),
-            pixels: wanted.pixels,
-            host_timeout_ms: wanted.host_timeout_ms,
-            source: match wanted.source {
+            pixel: settings_of(&requested),
+            bin_width_ps_q16: requested.bin_width_ps.to_bits(),
+            offset_mm_q8: requested.offset_mm.to_bits(),
+            pixels: requested.pixels,
+            host_timeout_ms: requested.host_timeout_ms,
+            source: match requested.source {
                 Source::Link => DTOF_SOURCE_LINK,
                 Source::Sensor => DTOF_SOURCE_SENSOR,
             },
@@ -87,20 +88,20 @@ pub unsafe extern "C" fn dtof_device_config_read(
     })
 }
 
-/// The settings of pixels that the host wants.
-fn settings_of(wanted: &Configuration) -> dtof_config_t {
+/// The settings of the pixels in a configuration.
+fn settings_of(requested: &Configuration) -> dtof_config_t {
     let mut settings = dtof_config_t {
-        x: wanted.x,
-        l1: wanted.l1,
-        l2: wanted.l2,
-        gate_first: wanted.gate.0,
-        gate_last: wanted.gate.1,
+        x: requested.x,
+        l1: requested.l1,
+        l2: requested.l2,
+        gate_first: requested.gate.0,
+        gate_last: requested.gate.1,
         estimator: DTOF_ESTIMATOR_CENTROID,
-        one_hit_tdc: wanted.one_hit_tdc.into(),
-        tracking: wanted.tracking.into(),
-        echoes: wanted.echoes.raw(),
-        peel_reach: wanted.peel_reach,
-        echo_wait: wanted.echo_wait,
+        one_hit_tdc: requested.one_hit_tdc.into(),
+        tracking: requested.tracking.into(),
+        echoes: requested.echoes.raw(),
+        peel_reach: requested.echo_guard_bins,
+        echo_wait: requested.echo_wait,
         ..dtof_config_t::default()
     };
     let mut with_alpha = |rule, threshold: &Threshold| {
@@ -108,7 +109,7 @@ fn settings_of(wanted: &Configuration) -> dtof_config_t {
         settings.alpha_q8 = threshold.alpha().to_bits();
         settings.minimum_count = threshold.minimum_count().raw();
     };
-    match &wanted.rule {
+    match &requested.rule {
         AnyRule::Paper(rule) => with_alpha(DTOF_RULE_PAPER, rule.threshold()),
         AnyRule::Average(rule) => with_alpha(DTOF_RULE_AVERAGE, rule.threshold()),
         AnyRule::Window(rule) => {
@@ -118,7 +119,7 @@ fn settings_of(wanted: &Configuration) -> dtof_config_t {
             settings.minimum_count = rule.minimum_count().raw();
         }
     }
-    if let DepthEstimator::CentredWindow(window) = &wanted.estimator {
+    if let DepthEstimator::CentredWindow(window) = &requested.estimator {
         settings.estimator = DTOF_ESTIMATOR_CENTRED_WINDOW;
         settings.before_q8 = window.before().to_bits();
         settings.after_q8 = window.after().to_bits();
@@ -126,10 +127,12 @@ fn settings_of(wanted: &Configuration) -> dtof_config_t {
     settings
 }
 
-/// Writes the body of SENSOR, DTOF_SENSOR_BYTES: the pixels of the sensor, 0 if there is none; how
-/// many bins it measures, up to DTOF_BINS; the width of its bins in 1/65536 ps, 0 if as wide as the
-/// host says; laser cycles a second in thousandths, 0 if not known; the range of the start of bin 0
-/// in 1/256 mm.
+/// Writes the body of SENSOR, DTOF_SENSOR_BYTES:
+/// - `pixels`: pixels of the sensor, 0 without a sensor
+/// - `bins`: bins that the sensor measures, up to DTOF_BINS
+/// - `bin_width_ps_q16`: 0 if the host sets the width
+/// - `laser_millihertz`: 0 if unknown
+/// - `offset_mm_q8`: the range of the start of bin 0
 ///
 /// Errors: DTOF_ERROR_NULL.
 /// Threads: any.
@@ -157,36 +160,36 @@ pub unsafe extern "C" fn dtof_sensor_write(
     })
 }
 
-/// What a device counts beside its pixels.
+/// The counts that a device keeps beside its statistics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct dtof_report_t {
     /// Laser cycles that have ended since the configuration.
     pub cycles: u64,
-    /// Photons of pixels that the device does not have.
+    /// Photons with the address of a pixel that the device does not have.
     pub unaddressed: u64,
-    /// Bytes that were lost before dtof_link_receive got them.
+    /// Bytes lost before dtof_link_receive got them.
     pub overrun: u32,
-    /// Messages that were not understood.
+    /// Messages that the device did not understand.
     pub unknown: u32,
     /// Errors of the sensor.
     pub sensor_errors: u32,
-    /// How often the sensor, and with it the laser, was started since the device was switched on.
+    /// Starts of the sensor, and with it the laser, since power-on.
     pub sensor_starts: u32,
-    /// How often it was stopped.
+    /// Stops of the sensor since power-on.
     pub sensor_stops: u32,
-    /// The last of its errors, as docs/link-format.md numbers them: 0 if there was none.
+    /// The last error of the sensor, by its number in docs/link-format.md: 0 without an error.
     pub last_sensor_error: u8,
-    /// Why it stopped last: DTOF_STOP_...
+    /// Why the sensor stopped last: DTOF_STOP_...
     pub stop_reason: u8,
 }
 
-/// Writes the body of STATISTICS, DTOF_REPORT_BYTES. Of `statistics` the events must be those
-/// that were sent before, so send all that wait first. Add the photons of present exposures with
-/// dtof_pixel_add_photons to a copy.
+/// Writes the body of STATISTICS, DTOF_REPORT_BYTES. First send all waiting events: the host
+/// compares the events in `statistics` with those it has received. Add the photons of present
+/// exposures to a copy of the statistics, with dtof_pixel_add_photons.
 ///
-/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED (of `link`).
-/// Threads: nobody else uses `link` or `statistics` meanwhile.
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread uses `link` or `statistics` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_report_write(
     report: *const dtof_report_t,
@@ -196,9 +199,9 @@ pub unsafe extern "C" fn dtof_report_write(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let (report, statistics) = unsafe { (plain(report)?, shared(statistics)?) };
+        let (report, statistics) = unsafe { (data_ref(report)?, object_ref(statistics)?) };
         // SAFETY: the same promise.
-        let (link, body) = unsafe { (tagged(link)?, array_mut::<_, DTOF_REPORT_BYTES>(body)?) };
+        let (link, body) = unsafe { (object_ref(link)?, array_mut::<_, DTOF_REPORT_BYTES>(body)?) };
         let record = Report {
             cycles: report.cycles,
             statistics: *statistics,

@@ -2,10 +2,10 @@
 
 use core::ffi::{CStr, c_char};
 
-use dtof_core::{AerError, ConfigError, GateError, RangeScaleError, WindowWidthError};
+use dtof_core::{AerError, GateError, PixelConfigError, RangeScaleError, WindowWidthError};
 use dtof_link::Refusal;
 
-/// What a function returns. All but DTOF_OK are errors: nothing was done.
+/// The result of a function. All but DTOF_OK are errors: nothing was done.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub enum dtof_status_t {
@@ -13,19 +13,19 @@ pub enum dtof_status_t {
     DTOF_OK = 0,
     /// A pointer is null.
     DTOF_ERROR_NULL = 1,
-    /// A pointer is not aligned as its type must be.
+    /// A pointer is not aligned for its type.
     DTOF_ERROR_ALIGNMENT = 2,
-    /// The memory was not initialised by the function for it.
+    /// An object was not initialised, or is of another type.
     DTOF_ERROR_NOT_INITIALISED = 3,
-    /// The memory has another size than the library expects: it was built for another number
-    /// of bins than the header says.
+    /// An object has another size than the library expects: the header and the library have
+    /// different numbers of bins.
     DTOF_ERROR_SIZE = 4,
-    /// A number of elements is greater than memory can hold.
+    /// An array is longer than memory can hold.
     DTOF_ERROR_LENGTH = 5,
 
-    /// The rule is none of DTOF_RULE_...
+    /// The rule is not one of DTOF_RULE_...
     DTOF_ERROR_RULE = 10,
-    /// The estimator is none of DTOF_ESTIMATOR_...
+    /// The estimator is not one of DTOF_ESTIMATOR_...
     DTOF_ERROR_ESTIMATOR = 11,
     /// X is 0.
     DTOF_ERROR_ZERO_X = 12,
@@ -57,7 +57,7 @@ pub enum dtof_status_t {
     /// The position is farther than 2 bins before bin 0, or past bin 1025.
     DTOF_ERROR_POSITION = 32,
 
-    /// No event waits.
+    /// The slot has no event.
     DTOF_ERROR_NO_EVENT = 40,
     /// A field of the event is out of its range.
     DTOF_ERROR_EVENT = 41,
@@ -68,29 +68,29 @@ pub enum dtof_status_t {
     DTOF_ERROR_AER_CONTROL = 51,
     /// Bits of the word that are reserved are set.
     DTOF_ERROR_AER_RESERVED = 52,
-    /// A field of the word holds what cannot be.
+    /// A field of the word is out of range.
     DTOF_ERROR_AER_OUT_OF_RANGE = 53,
     /// An event before any time word.
     DTOF_ERROR_AER_MISSING_TIME = 54,
 
-    /// As many messages are under way as may be: offer it again later.
+    /// The send queue is full: offer the message again later.
     DTOF_ERROR_FULL = 60,
-    /// No message has come.
+    /// No message has arrived.
     DTOF_ERROR_NO_MESSAGE = 61,
     /// A message holds 244 bytes at most.
     DTOF_ERROR_MESSAGE_LENGTH = 62,
     /// The kind of a message to the host is 128 to 239.
     DTOF_ERROR_MESSAGE_KIND = 63,
-    /// The reason is none of DTOF_NO_HISTOGRAM_..., or none of DTOF_STOP_...
+    /// The reason is not one of DTOF_NO_HISTOGRAM_... or DTOF_STOP_...
     DTOF_ERROR_REASON = 64,
 
-    /// The configuration of the host is not one this library knows.
+    /// The library does not know the configuration of the host.
     DTOF_ERROR_CONFIGURATION = 70,
     /// The device does not have that many pixels.
     DTOF_ERROR_PIXELS = 71,
     /// The device has no sensor.
     DTOF_ERROR_NO_SENSOR = 72,
-    /// The bins of the sensor are not as wide as that.
+    /// The bins of the sensor have another width.
     DTOF_ERROR_BIN_WIDTH = 73,
     /// The threshold of dynamic depth is less than half of 1/256 bin.
     DTOF_ERROR_ZERO_THRESHOLD = 74,
@@ -100,19 +100,20 @@ pub enum dtof_status_t {
     DTOF_ERROR_BLOCKS = 76,
     /// The host timeout is not 200 to 60,000 ms.
     DTOF_ERROR_HOST_TIMEOUT = 77,
-    /// A field of the configuration that has no meaning yet is not 0.
+    /// A reserved field of the configuration is not 0.
     DTOF_ERROR_RESERVED_FIELD = 78,
 }
 
 use dtof_status_t::*;
 
-impl From<ConfigError> for dtof_status_t {
-    fn from(error: ConfigError) -> Self {
+impl From<PixelConfigError> for dtof_status_t {
+    fn from(error: PixelConfigError) -> Self {
         match error {
-            ConfigError::ZeroX => DTOF_ERROR_ZERO_X,
-            ConfigError::XAboveL1 => DTOF_ERROR_X_ABOVE_L1,
-            ConfigError::L2NotAboveL1 => DTOF_ERROR_L2_NOT_ABOVE_L1,
-            ConfigError::NoLook => DTOF_ERROR_NO_LOOK,
+            PixelConfigError::ZeroX => DTOF_ERROR_ZERO_X,
+            PixelConfigError::XAboveL1 => DTOF_ERROR_X_ABOVE_L1,
+            PixelConfigError::L2NotAboveL1 => DTOF_ERROR_L2_NOT_ABOVE_L1,
+            PixelConfigError::NoLook => DTOF_ERROR_NO_LOOK,
+            _ => DTOF_ERROR_CONFIGURATION,
         }
     }
 }
@@ -122,6 +123,7 @@ impl From<GateError> for dtof_status_t {
         match error {
             GateError::PastLastBin => DTOF_ERROR_GATE_PAST_LAST_BIN,
             GateError::TooNarrow => DTOF_ERROR_GATE_TOO_NARROW,
+            _ => DTOF_ERROR_CONFIGURATION,
         }
     }
 }
@@ -137,6 +139,7 @@ impl From<RangeScaleError> for dtof_status_t {
         match error {
             RangeScaleError::ZeroBinWidth => DTOF_ERROR_ZERO_BIN_WIDTH,
             RangeScaleError::OutOfRange => DTOF_ERROR_RANGE,
+            _ => DTOF_ERROR_CONFIGURATION,
         }
     }
 }
@@ -144,16 +147,17 @@ impl From<RangeScaleError> for dtof_status_t {
 impl From<AerError> for dtof_status_t {
     fn from(error: AerError) -> Self {
         match error {
-            AerError::UnknownKind => DTOF_ERROR_AER_KIND,
             AerError::UnknownControl => DTOF_ERROR_AER_CONTROL,
             AerError::ReservedBits => DTOF_ERROR_AER_RESERVED,
             AerError::OutOfRange => DTOF_ERROR_AER_OUT_OF_RANGE,
             AerError::MissingTime => DTOF_ERROR_AER_MISSING_TIME,
+            // `UnknownKind`, and what this header has no name for.
+            _ => DTOF_ERROR_AER_KIND,
         }
     }
 }
 
-/// The reasons of the link, and the errors that stand for them.
+/// Each refusal of the link with its errors.
 const REFUSALS: [(Refusal, dtof_status_t); 21] = [
     (Refusal::Unknown, DTOF_ERROR_CONFIGURATION),
     (Refusal::ZeroX, DTOF_ERROR_ZERO_X),
@@ -186,8 +190,8 @@ impl From<Refusal> for dtof_status_t {
     }
 }
 
-/// What goes into a message DTOF_MESSAGE_REFUSED when a configuration is refused for the error
-/// `status`: 1 to 20. For errors that the link has no number for it is 1, "not known".
+/// The body of DTOF_MESSAGE_REFUSED for a configuration that was refused with the error `status`:
+/// 1 to 20. Errors without a number of their own give 1, "not known".
 ///
 /// Threads: any.
 #[unsafe(no_mangle)]
@@ -197,7 +201,7 @@ pub extern "C" fn dtof_refusal_of(status: u8) -> u8 {
     pair.map_or(Refusal::Unknown, |(refusal, _)| *refusal) as u8
 }
 
-/// What `status` means, in a few words of ASCII. Of a number that is no status "unknown status".
+/// The meaning of `status` in a few words of ASCII, "unknown status" if the number is no status.
 ///
 /// Threads: any.
 #[unsafe(no_mangle)]
@@ -207,17 +211,20 @@ pub extern "C" fn dtof_status_text(status: u8) -> *const c_char {
     text.map_or(c"unknown status", |(_, text)| *text).as_ptr()
 }
 
-/// Every status. A test reads the enum and finds none missing.
+/// The text of every status. A test compares it with the enum.
 const TEXTS: [(dtof_status_t, &CStr); 43] = [
     (DTOF_OK, c"done"),
     (DTOF_ERROR_NULL, c"a pointer is null"),
     (DTOF_ERROR_ALIGNMENT, c"a pointer is not aligned"),
-    (DTOF_ERROR_NOT_INITIALISED, c"memory was not initialised"),
+    (DTOF_ERROR_NOT_INITIALISED, c"an object was not initialised"),
     (
         DTOF_ERROR_SIZE,
         c"the library was built for another number of bins",
     ),
-    (DTOF_ERROR_LENGTH, c"more elements than memory can hold"),
+    (
+        DTOF_ERROR_LENGTH,
+        c"an array is longer than memory can hold",
+    ),
     (DTOF_ERROR_RULE, c"unknown rule"),
     (DTOF_ERROR_ESTIMATOR, c"unknown estimator"),
     (DTOF_ERROR_ZERO_X, c"X must be at least 1"),
@@ -252,7 +259,7 @@ const TEXTS: [(dtof_status_t, &CStr); 43] = [
     (DTOF_ERROR_ZERO_BIN_WIDTH, c"the bin width is zero"),
     (DTOF_ERROR_RANGE, c"ranges would lie beyond 8388 m"),
     (DTOF_ERROR_POSITION, c"the position is out of range"),
-    (DTOF_ERROR_NO_EVENT, c"no event waits"),
+    (DTOF_ERROR_NO_EVENT, c"the slot has no event"),
     (
         DTOF_ERROR_EVENT,
         c"a field of the event is out of its range",
@@ -265,8 +272,8 @@ const TEXTS: [(dtof_status_t, &CStr); 43] = [
         DTOF_ERROR_AER_MISSING_TIME,
         c"an event before any time word",
     ),
-    (DTOF_ERROR_FULL, c"as many messages are under way as may be"),
-    (DTOF_ERROR_NO_MESSAGE, c"no message has come"),
+    (DTOF_ERROR_FULL, c"the send queue is full"),
+    (DTOF_ERROR_NO_MESSAGE, c"no message has arrived"),
     (
         DTOF_ERROR_MESSAGE_LENGTH,
         c"a message holds 244 bytes at most",
@@ -278,7 +285,7 @@ const TEXTS: [(dtof_status_t, &CStr); 43] = [
     (DTOF_ERROR_REASON, c"unknown reason"),
     (
         DTOF_ERROR_CONFIGURATION,
-        c"the configuration is not one this library knows",
+        c"the library does not know the configuration",
     ),
     (
         DTOF_ERROR_PIXELS,
@@ -287,7 +294,7 @@ const TEXTS: [(dtof_status_t, &CStr); 43] = [
     (DTOF_ERROR_NO_SENSOR, c"the device has no sensor"),
     (
         DTOF_ERROR_BIN_WIDTH,
-        c"the bins of the sensor are not as wide as that",
+        c"the bins of the sensor have another width",
     ),
     (
         DTOF_ERROR_ZERO_THRESHOLD,

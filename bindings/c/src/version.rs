@@ -1,15 +1,15 @@
-//! What this library was built as.
+//! The version of the library, and its number of bins.
 
 use core::ffi::c_char;
 
-/// Bins of every histogram: 128, or what the environment variable `DTOF_BINS` said when the
-/// library was built. A power of two from 8 to 256: whole histograms have no room for more.
+/// Bins of every histogram: 128, or the environment variable `DTOF_BINS` at build time. A power
+/// of two from 8 to 256: messages with histograms have no room for more.
 pub const DTOF_BINS: usize = match option_env!("DTOF_BINS") {
     Some(text) => number(text.as_bytes()),
     None => 128,
 };
 
-/// A decimal number. Anything else becomes 0, which is no number of bins.
+/// Reads a decimal number. Other text gives 0, which the assertion below refuses.
 const fn number(mut digits: &[u8]) -> usize {
     let mut number = 0usize;
     while let [digit, rest @ ..] = digits {
@@ -29,7 +29,7 @@ const _: () = assert!(
     "DTOF_BINS must be a power of two from 8 to 256"
 );
 
-/// The version of the library: major, minor and patch, with a dot between them.
+/// The version of the library as `major.minor.patch`.
 ///
 /// Threads: any.
 #[unsafe(no_mangle)]
@@ -38,7 +38,7 @@ pub extern "C" fn dtof_version() -> *const c_char {
     VERSION.as_ptr().cast()
 }
 
-/// Bins that the library was built for. They must be those of this header, DTOF_BINS.
+/// The number of bins the library was built for. It must equal the DTOF_BINS of this header.
 ///
 /// Threads: any.
 #[unsafe(no_mangle)]

@@ -1,4 +1,4 @@
-//! The header is that of the sources, and its sizes are those of the types.
+//! The committed header is what cbindgen generates from the sources.
 
 use std::env;
 use std::fs;
@@ -21,7 +21,8 @@ const SOURCES: [&str; 12] = [
     "records",
     "histogram_message",
 ];
-fn made() -> String {
+
+fn generated() -> String {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let config = Config::from_file(here.join("cbindgen.toml")).unwrap();
     let mut builder = Builder::new().with_config(config);
@@ -34,16 +35,16 @@ fn made() -> String {
 }
 
 #[test]
-fn the_header_is_made_of_the_sources() {
+fn the_header_matches_the_sources() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("include/dtof.h");
-    let made = made();
+    let generated = generated();
     if env::var_os("DTOF_BLESS").is_some() {
-        fs::write(&path, made).unwrap();
+        fs::write(&path, generated).unwrap();
         return;
     }
     let committed = fs::read_to_string(&path).unwrap();
     assert!(
-        committed == made,
-        "include/dtof.h is not that of src: `cargo xtask c-bindings --bless` writes it"
+        committed == generated,
+        "include/dtof.h is out of date: `cargo xtask c-bindings --bless` writes it"
     );
 }

@@ -1,11 +1,11 @@
-"""How fast two workers are against one: photons a second of many recordings, and of one in parts.
+"""The speed of two workers relative to one, with many recordings and with one in parts.
 
     python bench/cluster.py [PHOTONS]
 
-PHOTONS is how many there are in all (100 million). A worker has one thread. Many recordings leave
-their events in a folder; those of one in parts, 48 bytes for 40 photons here, come back to the client,
+PHOTONS is the total number (100 million). A worker has one thread. Events of many recordings are
+written to a folder. Those of one recording in parts, 48 bytes for 40 photons here, return to the client
 through the scheduler. The fastest of three runs counts. Fails if two workers have less than 1.6 times
-the speed of one with many recordings, or 1.3 times with one. Needs two cores that nobody else uses.
+the speed of one with many recordings, or 1.3 times with one. Needs two idle cores.
 """
 
 import sys
@@ -19,7 +19,7 @@ from distributed import Client, LocalCluster
 from dtof import cluster
 
 FILES, PIXELS, BINS = 16, (32, 32), 128
-LEAST = {"many recordings": 1.6, "one in parts": 1.3}
+MIN_RATIO = {"many recordings": 1.6, "one in parts": 1.3}
 
 
 def recordings(folder, photons):
@@ -42,7 +42,7 @@ def speeds(workers, files, one, folder):
     found = []
 
     def many():
-        # Nothing of an earlier run is kept.
+        # A new folder: no results are reused.
         with tempfile.TemporaryDirectory(dir=folder) as out:
             return cluster.recordings(client, files, out=out, **options).totals
 
@@ -62,10 +62,10 @@ def speeds(workers, files, one, folder):
 def main():
     photons = int(float(sys.argv[1])) if len(sys.argv) > 1 else 100_000_000
     with tempfile.TemporaryDirectory() as folder:
-        given = recordings(folder, photons)
-        one, two = (speeds(workers, *given, folder) for workers in (1, 2))
+        inputs = recordings(folder, photons)
+        one, two = (speeds(workers, *inputs, folder) for workers in (1, 2))
     failed = False
-    for (name, least), alone, both in zip(LEAST.items(), one, two):
+    for (name, least), alone, both in zip(MIN_RATIO.items(), one, two):
         failed |= both / alone < least
         print(f"{name}: one worker {alone / 1e6:.1f}, two {both / 1e6:.1f} million photons a second, "
               f"ratio {both / alone:.2f}")

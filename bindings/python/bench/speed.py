@@ -1,8 +1,9 @@
-"""How fast the package is, against the program: 100 million photons, listed and as histograms.
+"""The speed of the package relative to the program, with a photon list and with histograms.
 
     python bench/speed.py PROGRAM [PHOTONS]
 
-Fails below 0.8 of the program's speed. Both have all cores; the faster of three runs counts.
+PHOTONS is 100 million by default. Fails below 0.8 of the program's speed. Both use all cores; the
+fastest of three runs counts.
 """
 
 import subprocess
@@ -16,7 +17,7 @@ import numpy
 import dtof
 
 PIXELS, BINS = 64 * 64, 128
-LEAST = 0.8
+MIN_RATIO = 0.8
 
 
 def fastest(run):
@@ -59,15 +60,15 @@ def main():
             command = [program, "replay", "--input", file, "--out", Path(folder) / "out",
                        "--no-csv", "--quiet", *texts]
             theirs = fastest(lambda: subprocess.run(command, check=True))
-            ways = {"array": lambda: dtof.replay(array, **options)}
+            calls = {"array": lambda: dtof.replay(array, **options)}
             if name == "photon list":
                 columns = [array[field].copy() for field in ("pixel", "cycle", "bin")]
-                ways["columns"] = lambda: dtof.photons(*columns, **options)
-            for way, run in ways.items():
+                calls["columns"] = lambda: dtof.photons(*columns, **options)
+            for call, run in calls.items():
                 ours = fastest(run)
                 ratio = theirs / ours
-                failed |= ratio < LEAST
-                print(f"{name} ({way}): program {theirs:.2f} s, package {ours:.2f} s, "
+                failed |= ratio < MIN_RATIO
+                print(f"{name} ({call}): program {theirs:.2f} s, package {ours:.2f} s, "
                       f"{ratio:.2f} of its speed", flush=True)
     sys.exit(failed)
 

@@ -7,28 +7,28 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail};
 use dtof_core::RangeScale;
 use dtof_events::aer_file::{Event, Reader, Writer};
-use dtof_options::files::{aside, place_of};
+use dtof_options::files::{destination, temporary_file};
 use dtof_options::progress::Progress;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyByteArray;
 
 use crate::events::{Array, events, push};
-use crate::work::{Watch, work};
+use crate::work::{Control, work};
 
-/// Events a look at whether anybody wants the rest.
-const AT_ONCE: usize = 1 << 16;
+/// Events between reports of progress, which may stop the work.
+const PROGRESS_INTERVAL: usize = 1 << 16;
 
-/// The depth events of a file, and the array they come from.
+/// The depth events of a file, and their array.
 #[pyfunction]
 pub fn read_events(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyByteArray>, Array)> {
-    let (records, array) = work(py, None, move |watch| {
-        read(&path, watch).with_context(|| path.display().to_string())
+    let (records, array) = work(py, None, move |control| {
+        read(&path, control).with_context(|| path.display().to_string())
     })?;
     Ok((PyByteArray::new(py, &records), array))
 }
 
-fn read(path: &Path, mut watch: &Watch) -> Result<(Vec<u8>, Array)> {
+fn read(path: &Path, mut control: &Control) -> Result<(Vec<u8>, Array)> {
     let mut reader = Reader::new(BufReader::new(File::open(path)?))?;
     let header = *reader.header();
     let scale = RangeScale::new(header.bin_width_ps, header.offset_mm)?;
@@ -41,8 +41,8 @@ fn read(path: &Path, mut watch: &Watch) -> Result<(Vec<u8>, Array)> {
             }
         }
         read += 1;
-        if read.is_multiple_of(AT_ONCE) {
-            watch.at(read as u64)?;
+        if read.is_multiple_of(PROGRESS_INTERVAL) {
+            control.at(read as u64)?;
         }
     }
     Ok((records, Array::of(&header)))
@@ -64,8 +64,8 @@ pub fn write_events(
 fn write(path: &Path, records: &[u8], array: &Array) -> Result<()> {
     let header = array.header()?;
     let events = events(records, &header)?;
-    let place = place_of(path, &[])?;
-    let file = BufWriter::new(aside(&place.folder, ".dtof-")?);
+    let place = destination(path, &[])?;
+    let file = BufWriter::new(temporary_file(&place.folder, ".dtof-")?);
     let mut writer = Writer::new(file, &header)?;
     for event in &events {
         writer.write(event)?;

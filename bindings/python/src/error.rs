@@ -1,4 +1,4 @@
-//! Every error is one line, as the program prints it, with keywords in place of flags.
+//! Errors in one line, as the program prints them, with keywords in place of flags.
 
 use std::any::Any;
 use std::ffi::OsString;
@@ -23,8 +23,8 @@ pub fn raised(error: &anyhow::Error) -> PyErr {
     Error::new_err(line.join(" "))
 }
 
-/// What `job` gives. A panic in it becomes an error, which says that it is none of the caller's.
-pub fn guarded<T>(job: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
+/// Runs `job`. A panic in it becomes an error, which says that it is a fault of `dtof`.
+pub fn catch_panics<T>(job: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Result<T> {
     catch_unwind(AssertUnwindSafe(job)).unwrap_or_else(|panic| Err(of_panic(panic.as_ref())))
 }
 
@@ -36,9 +36,9 @@ pub fn options<O: Options>(keywords: Keywords) -> PyResult<O> {
 /// Keywords and their values as texts.
 pub type Keywords = Vec<(String, OsString)>;
 
-/// The same, as an exception.
+/// Runs `job`; an error or a panic becomes an exception.
 pub fn checked<T>(job: impl FnOnce() -> anyhow::Result<T>) -> PyResult<T> {
-    guarded(job).map_err(|error| raised(&error))
+    catch_panics(job).map_err(|error| raised(&error))
 }
 
 fn of_panic(panic: &(dyn Any + Send)) -> anyhow::Error {

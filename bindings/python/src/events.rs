@@ -12,18 +12,18 @@ use dtof_events::events_csv::range_mm;
 use dtof_options::numbers::bins_of;
 use pyo3::prelude::*;
 
-/// Bytes of a record: that of `dtof.EVENT`, little-endian, with gaps.
+/// Bytes of a record of `dtof.EVENT`: little-endian, with padding.
 pub const RECORD: usize = 48;
 
 /// Appends the record of `event`.
 pub fn push(records: &mut Vec<u8>, event: &DepthEvent, scale: &RangeScale) {
     let mut record = [0; RECORD];
     let mut put = |at: usize, bytes: &[u8]| record[at..at + bytes.len()].copy_from_slice(bytes);
-    // 18 bits, a multiple of 1/256: exact.
+    // 18 bits, a multiple of 1/256: exact as f32.
     #[allow(clippy::cast_precision_loss, reason = "18 bits")]
     let depth_bins = event.position().raw() as f32 / 256.0;
-    put(0, &event.cycle.0.to_le_bytes());
-    put(8, &event.pixel.0.to_le_bytes());
+    put(0, &event.cycle.raw().to_le_bytes());
+    put(8, &event.pixel.raw().to_le_bytes());
     put(10, &event.exposure.to_le_bytes());
     put(12, &event.peak_bin.raw().to_le_bytes());
     put(16, &depth_bins.to_le_bytes());
@@ -37,7 +37,7 @@ pub fn push(records: &mut Vec<u8>, event: &DepthEvent, scale: &RangeScale) {
     records.extend(record);
 }
 
-/// The array that events come from, as Python has it.
+/// The array of events, as Python has it.
 #[derive(FromPyObject, IntoPyObject, Clone, Copy, Debug)]
 pub struct Array {
     pub bins: u32,
@@ -62,10 +62,10 @@ impl Array {
         }
     }
 
-    /// As the header of a file of events.
+    /// The header of an AER file.
     ///
     /// # Errors
-    /// If no array is so.
+    /// Fails if the size or a number is out of range.
     pub fn header(&self) -> Result<Header> {
         let (columns, rows) = (self.columns, self.rows);
         let array = dtof_core::Array::new(columns, rows).with_context(|| {
@@ -73,8 +73,8 @@ impl Array {
         })?;
         let (width, offset) = (self.bin_width_ps, self.offset_mm);
         let bins = u16::try_from(self.bins).unwrap_or(u16::MAX);
-        let known = bins_of(bins).map_err(Error::msg);
-        known.with_context(|| format!("bins {}", self.bins))?;
+        let valid = bins_of(bins).map_err(Error::msg);
+        valid.with_context(|| format!("bins {}", self.bins))?;
         let header = Header {
             bins: self.bins,
             array,
@@ -91,16 +91,16 @@ impl Array {
     }
 }
 
-/// `number` as fixed point, if that is the same number.
+/// `number` in fixed point, if that is exact.
 fn exact<T: Fixed>(number: f64) -> Option<T> {
     let finite = Some(number).filter(|number| number.is_finite())?;
     T::checked_from_num(finite).filter(|fixed| *fixed == finite)
 }
 
-/// The events of records, each of which an array with this header can have sent.
+/// The events of `records`, from an array with this header.
 ///
 /// # Errors
-/// Which is none, and why.
+/// Returns the index of an invalid event, and the reason.
 pub fn events(records: &[u8], header: &Header) -> Result<Vec<Event>> {
     let (records, rest) = records.as_chunks::<RECORD>();
     ensure!(rest.is_empty(), "not whole records of events");
@@ -138,11 +138,11 @@ fn event(record: &[u8; RECORD]) -> Result<DepthEvent> {
     let cycle =
         u64::from(u32::from_le_bytes(four(0))) | u64::from(u32::from_le_bytes(four(4))) << 32;
     Ok(DepthEvent {
-        pixel: PixelAddress(two(8)),
+        pixel: PixelAddress::new(two(8)),
         level: BlockLevel::new(level)
             .with_context(|| format!("level {level}: must be 0 to {}", BlockLevel::MAX))?,
         echo: EchoNumber::new(echo).with_context(|| format!("echo {echo}: must be 1 to 4"))?,
-        cycle: LaserCycle(cycle),
+        cycle: LaserCycle::new(cycle),
         exposure: two(10),
         peak_bin: BinIndex::new(peak_bin)
             .with_context(|| format!("peak_bin {peak_bin}: must be 0 to {}", BinIndex::MAX))?,

@@ -1,28 +1,28 @@
-//! Settings that suit a recording, a scene or a wanted rate of false alarms.
+//! Settings for a recording, a scene or a rate of false alarms.
 
 use std::path::PathBuf;
 
 use dtof_calibrate::{remarks, report};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::rows::Row;
-use dtof_photons::medium::Medium;
-use dtof_run::calibrate::{Calibrated, Options as CalibrateOptions};
-use dtof_run::compare::{Compared, Input, Options as CompareOptions, Told};
+use dtof_photons::input::Input;
+use dtof_run::calibrate::{CalibrateResult, Options as CalibrateOptions};
+use dtof_run::compare::{Callbacks, CompareInput, CompareResult, Options as CompareOptions};
 use dtof_run::tune::Options as TuneOptions;
 use pyo3::prelude::*;
 use std::sync::Mutex;
 
 use crate::error::{Keywords, options};
-use crate::medium::Given;
-use crate::run::SceneGiven;
+use crate::input::PyInput;
+use crate::run::SceneInput;
 use crate::work::work;
 
-/// What a calibration found.
+/// The result of a calibration.
 #[derive(IntoPyObject)]
 pub struct Found {
     toml: String,
     settings: String,
-    /// What was found, a row each; what has changed since older settings; what to know of it.
+    /// Findings, changes since older settings, and remarks, one a row.
     rows: Vec<Row>,
     changes: Vec<Row>,
     remarks: Vec<Row>,
@@ -34,21 +34,21 @@ pub struct Found {
 #[pyfunction]
 pub fn calibrate(
     py: Python,
-    input: Given,
+    input: PyInput,
     older: Option<PathBuf>,
     keywords: Keywords,
 ) -> PyResult<Found> {
     let options: CalibrateOptions = options(keywords)?;
-    let input = Medium::from(input);
+    let input = Input::from(input);
     work(py, None, move |_| {
         let older = older.as_deref().map(SettingsFile::read).transpose()?;
-        let said = options.said(older.as_ref())?;
-        let calibrated = options.calibrate(&input, said.clone());
-        let Calibrated {
+        let requested = options.requested(older.as_ref())?;
+        let calibrated = options.calibrate(&input, requested.clone());
+        let CalibrateResult {
             found,
             settings,
             warnings,
-        } = calibrated.map_err(|error| said.blame(error))?;
+        } = calibrated.map_err(|error| requested.add_file_name(error))?;
         let changes = older.map_or(Vec::new(), |older| report::changes(&settings, &older));
         Ok(Found {
             toml: settings.to_toml()?,
@@ -62,30 +62,30 @@ pub fn calibrate(
     })
 }
 
-/// What a comparison found.
+/// The result of a comparison.
 #[derive(IntoPyObject)]
 pub struct Answer {
-    /// The settings of the method to take.
+    /// Settings of the method to take.
     toml: Option<String>,
     settings: Option<String>,
     rows: Vec<Row>,
     able: Vec<Row>,
-    /// As `methods.csv`, `stress.csv` and `methods.svg`.
+    /// The content of `methods.csv`, `stress.csv` and `compare.svg`.
     table: String,
     stress: String,
     chart: String,
     warnings: Vec<String>,
 }
 
-/// What is compared, as Python gives it.
+/// The input of a comparison, as Python gives it.
 #[derive(FromPyObject)]
 pub struct Photons {
-    recording: Option<Given>,
-    truth: Option<Given>,
-    scene: Option<SceneGiven>,
+    recording: Option<PyInput>,
+    truth: Option<PyInput>,
+    scene: Option<SceneInput>,
 }
 
-/// Tries all methods on a recording or a scene.
+/// Compares all methods on a recording or a scene.
 #[pyfunction]
 pub fn compare(
     py: Python,
@@ -94,34 +94,34 @@ pub fn compare(
     progress: Option<Bound<PyAny>>,
 ) -> PyResult<Answer> {
     let options: CompareOptions = options(keywords)?;
-    work(py, progress, move |watch| {
-        let said = options.said(photons.scene.is_some())?;
+    work(py, progress, move |control| {
+        let requested = options.requested(photons.scene.is_some())?;
         let input = match (photons.recording, &photons.scene) {
             (Some(recording), None) => {
-                Input::Recording(recording.into(), photons.truth.map(Medium::from))
+                CompareInput::Recording(recording.into(), photons.truth.map(Input::from))
             }
-            (None, Some(scene)) => Input::Scene(Box::new(scene.read()?), scene.name()),
+            (None, Some(scene)) => CompareInput::Scene(Box::new(scene.read()?), scene.name()),
             _ => anyhow::bail!("a recording or a scene is needed"),
         };
         let warnings = Mutex::new(Vec::new());
-        let told = Told {
+        let callbacks = Callbacks {
             warning: &|warning| {
                 if let Ok(mut warnings) = warnings.lock() {
                     warnings.push(warning);
                 }
             },
-            step: &|step| watch.step(step),
+            step: &|step| control.step(step),
         };
-        let Compared {
+        let CompareResult {
             comparison,
             settings,
-        } = options.compare(input, &said, &told)?;
+        } = options.compare(input, &requested, &callbacks)?;
         let toml = settings.as_ref().map(SettingsFile::to_toml).transpose()?;
         Ok(Answer {
             toml,
             settings: settings.map(|of| serde_json::to_string(&of)).transpose()?,
             rows: comparison.rows(),
-            able: comparison.able_rows(),
+            able: comparison.candidate_rows(),
             table: comparison.table(),
             stress: comparison.stress_table(),
             chart: comparison.chart()?,
@@ -130,7 +130,7 @@ pub fn compare(
     })
 }
 
-/// The threshold and L1 for a wanted rate of false alarms, as JSON, and the options that say so.
+/// Threshold and L1 for a rate of false alarms, as JSON, and the options for them.
 #[pyfunction]
 pub fn tune(py: Python, keywords: Keywords) -> PyResult<(String, String)> {
     let options: TuneOptions = options(keywords)?;

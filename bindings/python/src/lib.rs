@@ -1,15 +1,15 @@
 //! The native part of the Python package `dtof`.
 //!
-//! Options come as those of the command line, arrays as bytes, results go back as bytes and JSON.
-//! `python/dtof` makes arrays and keyword arguments of them.
+//! Options come as key and text, arrays as bytes; results are bytes and JSON. `python/dtof` wraps them in
+//! keyword arguments and numpy arrays.
 
 mod aer;
 mod error;
 mod events;
 mod find;
+mod input;
 mod load;
 mod maps;
-mod medium;
 mod part;
 mod pixel;
 mod run;
@@ -30,7 +30,7 @@ fn _native(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(find::tune, module)?)?;
     module.add_function(wrap_pyfunction!(part::check_options, module)?)?;
     module.add_function(wrap_pyfunction!(part::cover_glass, module)?)?;
-    module.add_function(wrap_pyfunction!(part::use_threads, module)?)?;
+    module.add_function(wrap_pyfunction!(work::use_threads, module)?)?;
     module.add_function(wrap_pyfunction!(aer::read_events, module)?)?;
     module.add_function(wrap_pyfunction!(aer::write_events, module)?)?;
     module.add_function(wrap_pyfunction!(maps::maps, module)?)?;

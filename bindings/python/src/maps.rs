@@ -1,11 +1,11 @@
-//! What events say of each pixel, and where they are in space.
+//! Maps of pixels from events, and events as points.
 
 use dtof_core::{EchoNumber, RangeScale};
 use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::Event;
-use dtof_events::echoes::{Echo, Selection};
-use dtof_events::maps::Maps;
-use dtof_export::Projected;
+use dtof_events::echoes::{Echo, EchoSelection};
+use dtof_events::histories::{PixelHistories, PixelHistory};
+use dtof_export::ProjectionOptions;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyByteArray;
@@ -14,9 +14,9 @@ use crate::error::{Keywords, options};
 use crate::events::{Array, events};
 use crate::work::work;
 
-/// Numbers of each pixel, row by row; NaN where there is none.
+/// Maps row by row; NaN where a pixel has no value.
 #[derive(IntoPyObject)]
-pub struct OfPixels {
+pub struct PixelMaps {
     last_mm: Vec<f64>,
     mean_mm: Vec<f64>,
     reflectivity_of_events: Vec<f64>,
@@ -24,43 +24,39 @@ pub struct OfPixels {
     events: Vec<u64>,
 }
 
-/// What events say of each pixel, as the maps of a run have it.
+/// The maps of events, as a run draws them.
 #[pyfunction]
 pub fn maps(
     py: Python,
     records: PyBackedBytes,
     array: Array,
     keywords: Keywords,
-) -> PyResult<OfPixels> {
-    let options: Projected = options(keywords)?;
+) -> PyResult<PixelMaps> {
+    let options: ProjectionOptions = options(keywords)?;
     work(py, None, move |_| {
         let header = array.header()?;
         let scale = RangeScale::new(header.bin_width_ps, header.offset_mm)?;
-        let mut maps = Maps::new(header.array);
-        for event in chosen(events(&records, &header)?, options.echo) {
+        let mut maps = PixelHistories::new(header.array);
+        for event in select(events(&records, &header)?, options.echo) {
             if let Event::Depth(event) = event {
                 maps.add(&event, &scale);
             }
         }
-        let pixels = maps.pixels.iter();
-        let number = |of: Option<f64>| of.unwrap_or(f64::NAN);
-        Ok(OfPixels {
-            last_mm: pixels.clone().map(|of| number(of.last_mm())).collect(),
-            mean_mm: pixels.clone().map(|of| number(of.mean_mm())).collect(),
-            reflectivity_of_events: pixels
-                .clone()
-                .map(|of| number(of.reflectivity_of_events()))
-                .collect(),
-            reflectivity_of_signal: pixels
-                .clone()
-                .map(|of| number(of.reflectivity_of_signal()))
-                .collect(),
-            events: pixels.map(|of| of.events).collect(),
+        let all = |value: fn(&PixelHistory) -> Option<f64>| {
+            let values = maps.pixels.iter().map(value);
+            values.map(|value| value.unwrap_or(f64::NAN)).collect()
+        };
+        Ok(PixelMaps {
+            last_mm: all(PixelHistory::last_mm),
+            mean_mm: all(PixelHistory::mean_mm),
+            reflectivity_of_events: all(PixelHistory::reflectivity_of_events),
+            reflectivity_of_signal: all(PixelHistory::reflectivity_of_signal),
+            events: maps.pixels.iter().map(|pixel| pixel.events).collect(),
         })
     })
 }
 
-/// Events as points: records of `dtof.POINT`.
+/// Events as points, records of `dtof.POINT`.
 #[pyfunction]
 pub fn points<'py>(
     py: Python<'py>,
@@ -68,24 +64,24 @@ pub fn points<'py>(
     array: Array,
     keywords: Keywords,
 ) -> PyResult<Bound<'py, PyByteArray>> {
-    let options: Projected = options(keywords)?;
+    let options: ProjectionOptions = options(keywords)?;
     let points = work(py, None, move |_| {
         let header = array.header()?;
-        let events = chosen(events(&records, &header)?, options.echo.or(Some(Echo::All)));
-        let options = options.options(&SettingsFile::default())?;
+        let events = select(events(&records, &header)?, options.echo.or(Some(Echo::All)));
+        let options = options.options(SettingsFile::default())?;
         dtof_export::points(&events, &header, &options)
     })?;
     Ok(PyByteArray::new(py, &points))
 }
 
-/// The strongest echo of each exposure unless said otherwise.
-fn chosen(events: Vec<Event>, echo: Option<Echo>) -> Vec<Event> {
+/// Selects one echo of each exposure: the strongest by default.
+fn select(events: Vec<Event>, echo: Option<Echo>) -> Vec<Event> {
     let echo = echo.unwrap_or(Echo::Strongest);
     let is_single = |event: &Event| event.echo() == EchoNumber::FIRST;
     if echo == Echo::All || events.iter().all(is_single) {
         return events;
     }
-    let mut selection = Selection::new(echo, EchoNumber::LAST, u16::MAX);
+    let mut selection = EchoSelection::new(echo, EchoNumber::LAST, u16::MAX);
     for event in events {
         if let Event::Depth(event) = event {
             selection.push(event);

@@ -15,7 +15,7 @@ use crate::error::{Keywords, checked};
 use crate::events::push;
 
 /// A pixel of any number of bins.
-trait Steps: Send + Sync {
+trait AnyPixel: Send + Sync {
     fn count(&mut self, bins: &[u16]);
     fn end(&mut self, last: LaserCycle, cycles: u16) -> Option<DepthEvent>;
     fn counts(&self) -> Vec<u32>;
@@ -23,14 +23,14 @@ trait Steps: Send + Sync {
     fn statistics(&self) -> Statistics;
 }
 
-struct OfBins<const BINS: usize> {
+struct PixelOf<const BINS: usize> {
     config: PixelConfig<BINS, AnyRule>,
     pixel: AsyncPixel<BINS>,
     statistics: Statistics,
 }
 
-impl<const BINS: usize> OfBins<BINS> {
-    fn boxed(settings: &Settings, address: PixelAddress) -> Result<Box<dyn Steps>> {
+impl<const BINS: usize> PixelOf<BINS> {
+    fn boxed(settings: &Settings, address: PixelAddress) -> Result<Box<dyn AnyPixel>> {
         Ok(Box::new(Self {
             config: settings.config()?,
             pixel: AsyncPixel::new(address),
@@ -39,7 +39,7 @@ impl<const BINS: usize> OfBins<BINS> {
     }
 }
 
-impl<const BINS: usize> Steps for OfBins<BINS> {
+impl<const BINS: usize> AnyPixel for PixelOf<BINS> {
     fn count(&mut self, bins: &[u16]) {
         self.pixel.count_batch(&self.config, bins);
     }
@@ -48,7 +48,7 @@ impl<const BINS: usize> Steps for OfBins<BINS> {
         let statistics = &mut self.statistics;
         self.pixel
             .end_laser_cycles(&self.config, statistics, last, cycles);
-        self.pixel.acknowledge()
+        self.pixel.take_event()
     }
 
     fn counts(&self) -> Vec<u32> {
@@ -71,7 +71,7 @@ impl<const BINS: usize> Steps for OfBins<BINS> {
 /// One pixel, as firmware has it.
 #[pyclass(module = "dtof._native")]
 pub struct Pixel {
-    steps: Box<dyn Steps>,
+    pixel: Box<dyn AnyPixel>,
     scale: RangeScale,
     settings: String,
     /// Laser cycles that have ended.
@@ -83,14 +83,14 @@ pub struct Pixel {
 impl Pixel {
     #[new]
     fn new(bins: usize, address: u16, keywords: Keywords) -> PyResult<Self> {
-        checked(|| Self::of(bins, address, keywords))
+        checked(|| Self::create(bins, address, keywords))
     }
 
     /// Counts photons by their bins.
     #[allow(clippy::needless_pass_by_value, reason = "Python's list becomes one")]
     fn count(&mut self, bins: Vec<u16>) -> PyResult<()> {
         checked(|| {
-            self.steps.count(&bins);
+            self.pixel.count(&bins);
             Ok(())
         })
     }
@@ -105,7 +105,7 @@ impl Pixel {
             ensure!(cycles > 0, "cycles 0: must be at least 1");
             let end = self.cycle.checked_add(cycles.into());
             self.cycle = end.context("more laser cycles than can be counted")?;
-            Ok(self.steps.end(LaserCycle(self.cycle - 1), cycles))
+            Ok(self.pixel.end(LaserCycle::new(self.cycle - 1), cycles))
         })?;
         Ok(event.map(|event| {
             let mut record = Vec::new();
@@ -116,22 +116,22 @@ impl Pixel {
 
     /// The photons of each bin.
     fn counts(&self) -> Vec<u32> {
-        self.steps.counts()
+        self.pixel.counts()
     }
 
     /// Laser cycles since the histogram was cleared.
     #[getter]
     fn exposure(&self) -> u16 {
-        self.steps.exposure()
+        self.pixel.exposure()
     }
 
-    /// What the pixel has done, by name.
+    /// Statistics of the pixel by name.
     fn statistics(&self) -> Vec<(&'static str, u64)> {
-        let of = self.steps.statistics();
+        let of = self.pixel.statistics();
         vec![
             ("photons", of.photons()),
             ("counted", of.counted),
-            ("held", of.held),
+            ("held", of.excluded),
             ("saturated", of.saturated),
             ("rejected", of.rejected),
             ("gated_out", of.gated_out),
@@ -140,7 +140,7 @@ impl Pixel {
         ]
     }
 
-    /// How it operates, as JSON.
+    /// The settings as JSON.
     #[getter]
     fn settings(&self) -> &str {
         &self.settings
@@ -148,36 +148,30 @@ impl Pixel {
 }
 
 impl Pixel {
-    fn of(bins: usize, address: u16, keywords: Keywords) -> Result<Self> {
+    fn create(bins: usize, address: u16, keywords: Keywords) -> Result<Self> {
         let options: Operation = dtof_options::read(keywords)?;
-        let said = options.given.merged()?;
-        let made = || {
-            let settings = said.settings(bins)?;
-            ensure!(
-                settings.binning.is_none(),
-                Refused::new("binning", "is for arrays of pixels")
-            );
-            ensure!(
-                settings.frame.is_none(),
-                Refused::new("frame", "is for arrays of pixels")
-            );
-            ensure!(
-                settings.masked.is_empty(),
-                Refused::new("masked", "is for arrays of pixels")
-            );
-            let steps = steps(&settings, PixelAddress(address))?;
-            Ok((steps, settings))
+        let requested = options.given.merged()?;
+        let create = || {
+            let settings = requested.settings(bins)?;
+            let of_arrays = [
+                ("binning", settings.binning.is_some()),
+                ("frame", settings.frame.is_some()),
+                ("masked", !settings.masked.is_empty()),
+            ];
+            for (key, is_given) in of_arrays {
+                ensure!(!is_given, Refused::new(key, "is for arrays of pixels"));
+            }
+            let address = PixelAddress::new(address);
+            let pixel =
+                with_bins!(settings.bins, BINS => PixelOf::<BINS>::boxed(&settings, address))??;
+            Ok((pixel, settings))
         };
-        let (steps, settings) = made().map_err(|error| said.blame(error))?;
+        let (pixel, settings) = create().map_err(|error| requested.add_file_name(error))?;
         Ok(Self {
-            steps,
+            pixel,
             scale: settings.range_scale()?,
-            settings: serde_json::to_string(&said.with(&settings))?,
+            settings: serde_json::to_string(&requested.with_settings(&settings))?,
             cycle: 0,
         })
     }
-}
-
-fn steps(settings: &Settings, address: PixelAddress) -> Result<Box<dyn Steps>> {
-    with_bins!(settings.bins, BINS => OfBins::<BINS>::boxed(settings, address))?
 }

@@ -6,88 +6,89 @@ use anyhow::{Context, Result};
 use dtof_core::{DepthEvent, RangeScale};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_photons::medium::Medium;
-use dtof_photons::recorded::Whole;
+use dtof_photons::input::Input;
+use dtof_photons::recorded::Layout;
 use dtof_photons::source::{PhotonSource, Slice};
-use dtof_run::Sink;
 use dtof_run::output::header;
-use dtof_run::recording::{opening, warnings};
+use dtof_run::recording::{read_options, warnings};
 use dtof_run::replay::Options;
 use dtof_run::simulate::Options as SimulateOptions;
+use dtof_run::{RunResult, Sink};
 use dtof_simulate::scene::Scene;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
 use crate::error::{Keywords, checked, options};
 use crate::events::{Array, RECORD, push};
-use crate::medium::Given;
-use crate::part::WholeGiven;
-use crate::work::{Watch, work};
+use crate::input::PyInput;
+use crate::part::PyLayout;
+use crate::work::{Control, work};
 
-/// What came of a run.
+/// The result of a run, as Python gets it.
 #[derive(IntoPyObject)]
-pub struct Ran<'py> {
-    /// Records, of `dtof.EVENT`.
+pub struct PyRunResult<'py> {
+    /// Records of `dtof.EVENT`.
     events: Bound<'py, PyByteArray>,
-    /// As in `summary.json`.
+    /// The content of `summary.json`.
     summary: String,
-    /// As in `dtof.toml`, and the same as JSON.
+    /// The content of `dtof.toml`, and the same as JSON.
     toml: String,
     settings: String,
     array: Array,
     warnings: Vec<String>,
-    /// Photons bin by bin, where the cover glass is watched.
+    /// Photons bin by bin, if the settings have crosstalk of the cover glass.
     bins: Option<Vec<u64>>,
 }
 
-/// The same, before Python has it.
-struct Done {
+/// The same before the conversion.
+struct Finished {
     records: Records,
-    ran: dtof_run::Ran,
-    said: SettingsFile,
+    result: RunResult,
+    requested: SettingsFile,
     warnings: Vec<String>,
 }
 
-/// Replays a recording, a file or an array; one that is a part as it is replayed in the whole.
-/// `cycles` are those of a recording that is replayed to its end unless said otherwise.
+/// Replays a recording, a file or an array. One with a `layout` is replayed as a part of the whole.
+/// `cycles` are the laser cycles of a recording that is replayed to its end by default.
 #[pyfunction]
-#[pyo3(signature = (input, keywords, progress, whole, cycles=None))]
+#[pyo3(signature = (input, keywords, progress, layout, cycles=None))]
 pub fn replay<'py>(
     py: Python<'py>,
-    input: Given,
+    input: PyInput,
     keywords: Keywords,
     progress: Option<Bound<'py, PyAny>>,
-    whole: Option<WholeGiven>,
+    layout: Option<PyLayout>,
     cycles: Option<u64>,
-) -> PyResult<Ran<'py>> {
+) -> PyResult<PyRunResult<'py>> {
     let options: Options = options(keywords)?;
-    let input = Medium::from(input);
-    let done = work(py, progress, move |watch| {
-        let mut said = options.said()?;
-        // Fewer than are replayed anyhow need not be said.
-        let cycles = cycles.filter(|&cycles| cycles > opening(&said).cycles);
-        said.run.cycles = said.run.cycles.or(cycles);
-        let whole = whole.map(|whole| whole.read(&input)).transpose()?;
-        replayed(&options, &input, &said, whole, watch).map_err(|error| said.blame(error))
+    let input = Input::from(input);
+    let finished = work(py, progress, move |control| {
+        let mut requested = options.requested()?;
+        // Only more than the default replays.
+        let cycles = cycles.filter(|&cycles| cycles > read_options(&requested).cycles);
+        requested.run.cycles = requested.run.cycles.or(cycles);
+        let layout = layout.map(|layout| layout.read(&input)).transpose()?;
+        run_replay(&options, &input, &requested, layout, control)
+            .map_err(|error| requested.add_file_name(error))
     })?;
-    done.into_python(py)
+    finished.into_python(py)
 }
 
-fn replayed(
+fn run_replay(
     options: &Options,
-    input: &Medium,
-    said: &SettingsFile,
-    whole: Option<Whole>,
-    watch: &Watch,
-) -> Result<Done> {
-    let mut replay = options.open_part(input, said, whole)?;
+    input: &Input,
+    requested: &SettingsFile,
+    layout: Option<Layout>,
+    control: &Control,
+) -> Result<Finished> {
+    let mut replay = options.open_part(input, requested, layout)?;
     let mut records = Records::of(&replay.settings, &replay.photons)?;
-    let ran = replay.run(input, &mut records, &mut { watch })?;
-    Ok(Done {
+    let result = replay.run(input, &mut records, &mut { control })?;
+    Ok(Finished {
         records,
-        ran,
-        said: replay.said.with(&replay.settings),
-        warnings: warnings(&replay.known).collect(),
+        result,
+        requested: replay.requested.with_settings(&replay.settings),
+        warnings: warnings(&replay.metadata).collect(),
     })
 }
 
@@ -95,49 +96,49 @@ fn replayed(
 #[pyfunction]
 pub fn simulate<'py>(
     py: Python<'py>,
-    scene: SceneGiven,
+    scene: SceneInput,
     keywords: Keywords,
     progress: Option<Bound<'py, PyAny>>,
-) -> PyResult<Ran<'py>> {
+) -> PyResult<PyRunResult<'py>> {
     let options: SimulateOptions = options(keywords)?;
-    let done = work(py, progress, move |watch| {
-        let said = options.said()?;
-        let simulated = simulated(&options, &scene, said.clone(), watch);
-        simulated.map_err(|error| said.blame(error))
+    let finished = work(py, progress, move |control| {
+        let requested = options.requested()?;
+        let finished = run_simulation(&options, &scene, requested.clone(), control);
+        finished.map_err(|error| requested.add_file_name(error))
     })?;
-    done.into_python(py)
+    finished.into_python(py)
 }
 
-fn simulated(
+fn run_simulation(
     options: &SimulateOptions,
-    scene: &SceneGiven,
-    said: SettingsFile,
-    watch: &Watch,
-) -> Result<Done> {
-    let mut simulation = options.open(scene.read()?, &scene.name(), said)?;
+    scene: &SceneInput,
+    requested: SettingsFile,
+    control: &Control,
+) -> Result<Finished> {
+    let mut simulation = options.open(scene.read()?, &scene.name(), requested)?;
     let (photons, settings) = (&simulation.photons, &simulation.settings);
     let mut engine = host_engine(settings, photons.array(), &photons.addresses())?;
     let mut records = Records::of(settings, photons)?;
-    let ran = simulation.run(engine.as_mut(), &mut records, &mut { watch })?;
-    Ok(Done {
+    let result = simulation.run(engine.as_mut(), &mut records, &mut { control })?;
+    Ok(Finished {
         records,
-        ran,
-        said: simulation.said.with(&simulation.settings),
+        result,
+        requested: simulation.requested.with_settings(&simulation.settings),
         warnings: Vec::new(),
     })
 }
 
 /// A scene as Python gives it.
 #[derive(FromPyObject)]
-pub enum SceneGiven {
+pub enum SceneInput {
     /// The name of a file.
     File(PathBuf),
-    /// Its name for errors, and its text.
+    /// The name of a scene for errors, and its text.
     Text(String, String),
 }
 
-impl SceneGiven {
-    /// As errors call it.
+impl SceneInput {
+    /// Its name for errors.
     pub fn name(&self) -> String {
         match self {
             Self::File(path) => path.display().to_string(),
@@ -145,10 +146,10 @@ impl SceneGiven {
         }
     }
 
-    /// The scene.
+    /// Reads the scene.
     ///
     /// # Errors
-    /// What is wrong with it, its name first.
+    /// Fails if it cannot be read; the error begins with its name.
     pub fn read(&self) -> Result<Scene> {
         match self {
             Self::File(path) => Scene::read(path),
@@ -161,7 +162,7 @@ impl SceneGiven {
 struct Records {
     scale: RangeScale,
     array: Array,
-    /// Those of some slices each.
+    /// One vector for each slice.
     events: Vec<Vec<u8>>,
 }
 
@@ -186,8 +187,8 @@ impl Sink for Records {
     }
 }
 
-impl Done {
-    fn into_python(self, py: Python) -> PyResult<Ran> {
+impl Finished {
+    fn into_python(self, py: Python) -> PyResult<PyRunResult> {
         let all_records = self.records.events;
         let bytes = all_records.iter().map(Vec::len).sum();
         let events = PyByteArray::new_with(py, bytes, |mut all| {
@@ -200,19 +201,19 @@ impl Done {
         })?;
         let (summary, toml, settings) = checked(|| {
             Ok((
-                serde_json::to_string(&self.ran.summary)?,
-                self.said.to_toml()?,
-                serde_json::to_string(&self.said)?,
+                serde_json::to_string(&self.result.summary)?,
+                self.requested.to_toml()?,
+                serde_json::to_string(&self.requested)?,
             ))
         })?;
-        Ok(Ran {
+        Ok(PyRunResult {
             events,
             summary,
             toml,
             settings,
             array: self.records.array,
             warnings: self.warnings,
-            bins: self.ran.bins,
+            bins: self.result.bins,
         })
     }
 }

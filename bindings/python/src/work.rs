@@ -1,5 +1,5 @@
-//! Long work, on a thread of its own: the interpreter is free meanwhile, Ctrl-C ends it, and
-//! progress is told by the thread that called.
+//! Long work on a thread of its own: the interpreter is free meanwhile, Ctrl-C stops the work, and the
+//! calling thread reports progress.
 
 use std::mem;
 use std::process;
@@ -14,61 +14,60 @@ use dtof_options::progress::Progress;
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::error::{Error, guarded, raised};
+use crate::error::{Error, catch_panics, raised};
 
-/// How long a signal or progress may wait.
-const PATIENCE: Duration = Duration::from_millis(50);
+/// The interval for signals and progress.
+const POLL_INTERVAL: Duration = Duration::from_millis(50);
 
-/// How far work is.
+/// Progress of work, and whether it has to stop.
 #[derive(Debug, Default)]
-pub struct Watch {
+pub struct Control {
     is_stopped: AtomicBool,
     done: AtomicU64,
     total: AtomicU64,
     steps: Mutex<Vec<String>>,
 }
 
-impl Watch {
-    /// What comes next.
+impl Control {
+    /// Reports the next step.
     ///
     /// # Errors
-    /// If nobody wants it.
+    /// Fails if the work was cancelled.
     pub fn step(&self, step: &str) -> Result<()> {
         locked(&self.steps).push(step.to_owned());
-        self.go_on()
+        self.check_running()
     }
 
-    fn go_on(&self) -> Result<()> {
+    fn check_running(&self) -> Result<()> {
         ensure!(!self.is_stopped.load(Ordering::Relaxed), "stopped");
         Ok(())
     }
 }
 
-/// A run tells it what has been done.
-impl Progress for &Watch {
+impl Progress for &Control {
     fn begin(&mut self, total: u64, _unit: &str) {
         self.total.store(total, Ordering::Relaxed);
     }
 
     fn at(&mut self, done: u64) -> Result<()> {
         self.done.store(done, Ordering::Relaxed);
-        self.go_on()
+        self.check_running()
     }
 
     fn end(&mut self) {}
 }
 
-/// What a program is told of its work.
-struct Told<'py> {
+/// Reports progress to the callback of a Python program.
+struct Reporter<'py> {
     progress: Option<Bound<'py, PyAny>>,
     last: (u64, u64),
 }
 
-impl Told<'_> {
-    /// Steps as text, the rest as two numbers.
-    fn tell(&mut self, watch: &Watch) -> PyResult<()> {
-        let steps = mem::take(&mut *locked(&watch.steps));
-        let [done, total] = [&watch.done, &watch.total].map(|of| of.load(Ordering::Relaxed));
+impl Reporter<'_> {
+    /// Calls it with each step as text, then with done and total if they have changed.
+    fn report(&mut self, control: &Control) -> PyResult<()> {
+        let steps = mem::take(&mut *locked(&control.steps));
+        let [done, total] = [&control.done, &control.total].map(|of| of.load(Ordering::Relaxed));
         let Some(progress) = &self.progress else {
             return Ok(());
         };
@@ -83,38 +82,38 @@ impl Told<'_> {
     }
 }
 
-/// Does `job`. `progress` is called with what [`Watch`] is told.
+/// Runs `job`. `progress` is called with the progress of its [`Control`].
 ///
 /// # Errors
-/// Those of `job`, of `progress`, and an interrupt. Work that does not look at its [`Watch`] ends
-/// by itself then, and what comes of it is dropped.
+/// Fails if `job` or `progress` fails, or on an interrupt. A `job` that does not check its [`Control`] then
+/// runs on in the background, and its result is dropped.
 pub fn work<T: Send + 'static>(
     py: Python,
     progress: Option<Bound<PyAny>>,
-    job: impl FnOnce(&Watch) -> Result<T> + Send + 'static,
+    job: impl FnOnce(&Control) -> Result<T> + Send + 'static,
 ) -> PyResult<T> {
     let pool = pool().map_err(|error| raised(&error))?;
-    let watch = Arc::new(Watch::default());
+    let control = Arc::new(Control::default());
     let (send, done) = channel();
     let done = Mutex::new(done);
-    let of_job = Arc::clone(&watch);
+    let for_job = Arc::clone(&control);
     let thread = thread::Builder::new()
         .name("dtof".to_owned())
         .spawn(move || {
-            let result = pool.install(|| guarded(|| job(&of_job)));
-            // Nobody may be there any more.
+            let result = pool.install(|| catch_panics(|| job(&for_job)));
+            // After an interrupt there is no receiver.
             let _ = send.send(result);
         });
     thread.map_err(|error| Error::new_err(format!("no thread to work on: {error}")))?;
-    let mut told = Told {
+    let mut reporter = Reporter {
         progress,
         last: (0, 0),
     };
     loop {
-        let result = py.detach(|| locked(&done).recv_timeout(PATIENCE));
-        let checked = py.check_signals().and_then(|()| told.tell(&watch));
+        let result = py.detach(|| locked(&done).recv_timeout(POLL_INTERVAL));
+        let checked = py.check_signals().and_then(|()| reporter.report(&control));
         if let Err(error) = checked {
-            watch.is_stopped.store(true, Ordering::Relaxed);
+            control.is_stopped.store(true, Ordering::Relaxed);
             return Err(error);
         }
         match result {
@@ -129,43 +128,44 @@ pub fn work<T: Send + 'static>(
     }
 }
 
-/// How many threads a process has, if that was said.
+/// The requested number of threads, 0 for one a core.
 static THREADS: AtomicUsize = AtomicUsize::new(0);
 
 /// The threads of a process.
 struct Pool {
     process: u32,
-    asked: usize,
+    requested: usize,
     threads: Arc<ThreadPool>,
 }
 
-/// From now on this process has so many threads, 0 for one a core. Work that has begun keeps its own.
+/// Sets the number of threads of this process, 0 for one a core. Work that has begun keeps its own.
+#[pyfunction]
 pub fn use_threads(threads: usize) {
     THREADS.store(threads, Ordering::Relaxed);
 }
 
-/// The threads of this process. A process that was forked has none of its parent's.
+/// The threads of this process. A forked process has none of the threads of its parent.
 fn pool() -> Result<Arc<ThreadPool>> {
     static POOL: Mutex<Option<Pool>> = Mutex::new(None);
-    let mut known = locked(&POOL);
-    let (process, asked) = (process::id(), THREADS.load(Ordering::Relaxed));
-    if let Some(pool) = &*known
-        && (pool.process, pool.asked) == (process, asked)
+    let mut current = locked(&POOL);
+    let (process, requested) = (process::id(), THREADS.load(Ordering::Relaxed));
+    if let Some(pool) = &*current
+        && (pool.process, pool.requested) == (process, requested)
     {
         return Ok(Arc::clone(&pool.threads));
     }
-    let builder = ThreadPoolBuilder::new().num_threads(asked);
+    let builder = ThreadPoolBuilder::new().num_threads(requested);
     let builder = builder.thread_name(|number| format!("dtof-{number}"));
     let threads = Arc::new(builder.build()?);
     let pool = Pool {
         process,
-        asked,
+        requested,
         threads: Arc::clone(&threads),
     };
-    if let Some(before) = known.replace(pool)
+    if let Some(before) = current.replace(pool)
         && before.process != process
     {
-        // The threads of the parent are not here: to wait for their end would take for ever.
+        // The threads of the parent do not exist here: dropping the pool would wait for them forever.
         mem::forget(before);
     }
     Ok(threads)

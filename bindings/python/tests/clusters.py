@@ -1,5 +1,5 @@
-"""A scheduler and two worker processes, started by the commands of docs/clusters.md, and what tests
-of them need."""
+"""A scheduler and two worker processes, started by the commands of docs/clusters.md, and helpers for
+tests."""
 
 import os
 import re
@@ -22,7 +22,7 @@ README = ROOT / "bindings" / "python" / "README.md"
 
 
 def blocks(language, page=PAGE):
-    """The blocks of a page, as they stand."""
+    """The code blocks of a page in a language."""
     return re.findall(rf"^```{language}\n(.*?)^```$", page.read_text(), re.M | re.S)
 
 
@@ -32,7 +32,7 @@ class Cluster:
     def __init__(self, folder):
         self.folder = folder
         path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-        # Nobody waits long for a worker that was killed.
+        # Do not wait long for a killed worker.
         options = {"DASK_DISTRIBUTED__COMM__TIMEOUTS__CONNECT": "2s"}
         self._env = {**os.environ, "PATH": path, **options}
         self._env.pop("RAYON_NUM_THREADS", None)
@@ -55,25 +55,25 @@ class Cluster:
             command, cwd=self.folder, env=self._env, stdout=log, stderr=log, start_new_session=True
         )
 
-    def kill_one(self, that_works=True):
-        """Kills a worker process, while it has a task if wanted. Its nanny starts another."""
+    def kill_one(self, busy=True):
+        """Kills a worker process, by default while it has a task. Its nanny starts another."""
         pids = self.client.run(os.getpid)
         until = time.monotonic() + 5
         while time.monotonic() < until:
             ready = [worker for worker, tasks in self.client.processing().items() if tasks]
-            ready = ready if that_works else list(pids)
+            ready = ready if busy else list(pids)
             if ready:
                 os.kill(pids[ready[0]], signal.SIGKILL)
                 return pids[ready[0]]
         raise AssertionError("no worker has a task")
 
-    def all_there(self):
+    def wait_for_workers(self):
         self.client.wait_for_workers(2, timeout=60)
 
     def close(self):
         self.client.close()
         for process in self.processes:
-            # With what it has started.
+            # With its child processes.
             os.killpg(process.pid, signal.SIGKILL)
             process.wait()
 
@@ -107,7 +107,7 @@ def are_equal(run, expected, by_another_name=False):
 
 
 def contents(folder):
-    """All files, less those that a killed process left."""
+    """All files, except temporary files of a killed process."""
     files = (path for path in sorted(folder.rglob("*")) if path.is_file())
     return {
         str(path.relative_to(folder)): path.read_bytes()

@@ -1,4 +1,4 @@
-"""The program that the package is compared with, and the recordings of the public."""
+"""The program that the package is compared with, and public recordings."""
 
 import json
 import os
@@ -12,7 +12,7 @@ DATA = ROOT.parent / "shared" / "data"
 
 
 def built():
-    """The program, built if it is not."""
+    """Builds the program; returns its path."""
     done = subprocess.run(
         ["cargo", "build", "--release", "--package", "dtof", "--message-format", "json"],
         cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True,
@@ -24,7 +24,7 @@ def built():
 
 @pytest.fixture(scope="session")
 def program():
-    """Runs the program; gives what it prints, and fails as it fails."""
+    """Runs the program; returns its output, and fails if it fails."""
     name = os.environ.get("DTOF_PROGRAM") or built()
 
     def run(*arguments, check=True):
@@ -38,7 +38,7 @@ def program():
 
 @pytest.fixture
 def recorded(capsys):
-    """The place of a public recording; the test is skipped, and says so, where there is none."""
+    """The path of a public recording; the test is skipped, with a message, without it."""
 
     def place(name):
         path = DATA / name
@@ -52,17 +52,17 @@ def recorded(capsys):
 
 
 @pytest.fixture(scope="session")
-def running(tmp_path_factory):
+def dask_cluster(tmp_path_factory):
     """A Dask cluster."""
     from clusters import Cluster
 
-    running = Cluster(tmp_path_factory.mktemp("cluster"))
-    yield running
-    running.close()
+    cluster = Cluster(tmp_path_factory.mktemp("cluster"))
+    yield cluster
+    cluster.close()
 
 
 @pytest.fixture
-def client(running):
-    """A client of it, with all workers there."""
-    running.all_there()
-    return running.client
+def client(dask_cluster):
+    """A client of it, with all workers ready."""
+    dask_cluster.wait_for_workers()
+    return dask_cluster.client

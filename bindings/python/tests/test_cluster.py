@@ -48,7 +48,7 @@ def test_errors_of_all_seeds_are_those_of_all_events(client):
     truth = trials.against_truth
     assert truth["false_alarms"] == 0 and truth["events"] == sum(map(len, ranges)) > 500
     assert truth["surfaces"] == [{"name": "wall", **{k: v for k, v in truth.items() if k != "surfaces"}}]
-    # Pixels see the wall at their slant; the spread is that of one seed's.
+    # Pixels see the wall at their angle; the spread is that of one seed.
     one = trials.statistics[0]["against_truth"]
     assert abs(truth["rms_mm"] / one["rms_mm"] - 1) < 0.2
     rms = [run["against_truth"]["rms_mm"] ** 2 for run in trials.statistics]
@@ -57,14 +57,14 @@ def test_errors_of_all_seeds_are_those_of_all_events(client):
     assert truth["bias_mm"] == pytest.approx(numpy.average(bias, weights=list(map(len, ranges))))
 
 
-def test_what_are_no_seeds(client):
+def test_invalid_seeds(client):
     seeds = cluster.seeds
     refused(lambda: seeds(client, SCENE, []), "there are none")
     refused(lambda: seeds(client, SCENE, [1, 2, 1]), "seed 1", "twice")
     refused(lambda: seeds(client, SCENE, [1.5]), "whole numbers")
     refused(lambda: seeds(client, SCENE, 3), "whole numbers")
     refused(lambda: seeds(client, SCENE, [-1]), "seed -1: ")
-    refused(lambda: seeds(client, SCENE, [1], seed=3), "say seeds")
+    refused(lambda: seeds(client, SCENE, [1], seed=3), "give seeds")
     refused(lambda: seeds(client, "none.toml", [1]), "none.toml")
     refused(lambda: seeds(client, "columns = x\n", [1]), "the scene")
     one, two = (seeds(client, SCENE, [1], **{**SMALL, "alpha": alpha}) for alpha in (8, 9))
@@ -72,8 +72,8 @@ def test_what_are_no_seeds(client):
     refused(lambda: one + cluster.Seeds([2], two.statistics, one.scene_sha256), "alpha differs")
 
 
-def test_runs_of_different_scenes_do_not_add_up(client):
-    """Nor of different options that no summary tells apart."""
+def test_runs_of_different_scenes_cannot_be_added(client):
+    """Nor runs of different options that summaries do not show."""
     scene = "columns = 4\nrows = 2\nbackground = 0.02\n"
     scene += "[[surface]]\nname = 'wall'\nrange_mm = 1500\nreflectivity = 0.5\n"
     one = cluster.seeds(client, scene, [1], cycles=300)
@@ -134,19 +134,19 @@ def test_workers_without_dtof_or_of_another_version(client, tmp_path):
         change("")
     for call in calls:
         call()
-    # A worker that comes later looks by itself.
+    # A worker that joins later checks its own version.
     refused(client.submit(begin, "0.0.9", pure=False).result, "has dtof", "not 0.0.9")
 
 
-def test_a_cluster_listens_on_this_computer_alone(running, client):
+def test_a_cluster_listens_on_this_computer_alone(dask_cluster, client):
     import psutil
 
     addresses = []
-    for started in running.processes:
+    for started in dask_cluster.processes:
         process = psutil.Process(started.pid)
         for one in [process, *process.children(recursive=True)]:
             sockets = one.net_connections(kind="inet")
-            addresses += [known.laddr.ip for known in sockets if known.status == psutil.CONN_LISTEN]
+            addresses += [socket.laddr.ip for socket in sockets if socket.status == psutil.CONN_LISTEN]
     # A scheduler, and two workers with a nanny each.
     assert len(addresses) >= 5
     assert set(addresses) == {"127.0.0.1"}
@@ -157,10 +157,10 @@ def test_a_cluster_listens_on_this_computer_alone(running, client):
 
 
 @pytest.fixture
-def desk(running, client, tmp_path, monkeypatch):
-    """A folder with all that the pages name."""
+def namespace(dask_cluster, client, tmp_path, monkeypatch):
+    """Names for the code of the pages, in a folder with all files that they use."""
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "scheduler.json").write_text((running.folder / "scheduler.json").read_text())
+    (tmp_path / "scheduler.json").write_text((dask_cluster.folder / "scheduler.json").read_text())
     files = [saved(tmp_path, f"recordings/{i}.npy", counts(i)) for i in range(3)]
     saved(tmp_path, "large.npy", counts(rows=40))
     large = dask.array.from_array(counts(rows=40), chunks=(16, -1, -1))
@@ -174,11 +174,11 @@ def desk(running, client, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize("page", [PAGE, README], ids=["page", "readme"])
-def test_pages_run_as_they_stand(desk, page):
+def test_pages_run_unchanged(namespace, page):
     for block in blocks("python", page):
         if page == PAGE or "cluster" in block:
-            exec(block, desk)
-    assert len(desk["many"].results) == 3 and not desk["many"].failed
+            exec(block, namespace)
+    assert len(namespace["many"].results) == 3 and not namespace["many"].failed
     assert Path("results/2/events.aer").exists()
-    are_equal(desk["run"], dtof.replay(Path("large.npy").absolute(), bin_width_ps=250), page == PAGE)
-    assert desk["trials"].totals["events"] > 500
+    are_equal(namespace["run"], dtof.replay(Path("large.npy").absolute(), bin_width_ps=250), page == PAGE)
+    assert namespace["trials"].totals["events"] > 500

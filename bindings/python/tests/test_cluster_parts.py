@@ -1,4 +1,4 @@
-"""One recording in parts: the whole, byte for byte."""
+"""One recording in parts equals the whole, byte for byte."""
 
 import numpy
 import pytest
@@ -43,8 +43,8 @@ def test_parts_are_the_whole(client, tmp_path, name):
     are_equal(cluster.replay(client, file, **options), dtof.replay(file, **options))
 
 
-def test_the_one_warning_that_parts_cannot_make(client):
-    """That of the axes. All else is the same, and so are other warnings."""
+def test_the_warning_that_parts_cannot_give(client):
+    """The warning about axes. Everything else is the same, including other warnings."""
     array = numpy.moveaxis(counts(rows=16, columns=12), -1, 0)
     with pytest.warns(UserWarning) as warned:
         expected = dtof.replay(array, bin_width_ps=0.25)
@@ -89,7 +89,7 @@ def test_parts_of_any_length_are_the_whole(client, tmp_path):
     assert told == [(done, 6) for done in range(1, 7)]
 
 
-def test_what_is_surely_wrong_is_told_of_the_whole(client, tmp_path):
+def test_warnings_are_about_the_whole_recording(client, tmp_path):
     empty = numpy.zeros((4, 2, 16), dtype=int)
     with pytest.warns(UserWarning, match="no photons: all 8 histograms are empty"):
         run = cluster.replay(client, dask.array.from_array(empty, chunks=(2, -1, -1)))
@@ -102,7 +102,7 @@ def test_what_is_surely_wrong_is_told_of_the_whole(client, tmp_path):
     assert run.statistics["warnings"] == []
 
 
-def test_a_cover_glass_is_watched_over_all_parts(client, tmp_path):
+def test_a_cover_glass_is_monitored_over_all_parts(client, tmp_path):
     settings = tmp_path / "dtof.toml"
     settings.write_text(GLASS)
     array = counts(rows=8, bins=128)
@@ -114,7 +114,7 @@ def test_a_cover_glass_is_watched_over_all_parts(client, tmp_path):
     assert expected.statistics["cover_glass"][0] > 2
 
 
-def test_a_killed_worker_changes_no_part(running, client, tmp_path):
+def test_a_killed_worker_changes_no_part(dask_cluster, client, tmp_path):
     file = saved(tmp_path, "counts.npy", counts(1, 128, 16, 64, 2000))
     options = {"cycles": 20_000, "photons_per_cycle": 0.5}
     killed = []
@@ -122,14 +122,14 @@ def test_a_killed_worker_changes_no_part(running, client, tmp_path):
     def kill(done, _):
         # Of 16 parts: when some are counted, and while they are replayed.
         if done in (5, 18):
-            killed.append(running.kill_one(that_works=done > 16))
+            killed.append(dask_cluster.kill_one(busy=done > 16))
 
     run = cluster.replay(client, file, rows=8, progress=kill, **options)
     are_equal(run, dtof.replay(file, **options))
     assert len(killed) == 2
 
 
-def test_what_is_no_recording_in_parts(client, tmp_path):
+def test_invalid_recordings_in_parts(client, tmp_path):
     array, replay = counts(rows=8), cluster.replay
 
     def chunked(*chunks, of=array):
@@ -166,7 +166,7 @@ def test_what_is_no_recording_in_parts(client, tmp_path):
     refused(lambda: replay(client, saved(tmp_path, "p.npy", photons)), "holds photons")
 
 
-def test_a_recording_that_changes_meanwhile_is_refused(client, tmp_path):
+def test_a_recording_that_changes_during_a_run_is_refused(client, tmp_path):
     file = saved(tmp_path, "counts.npy", counts(rows=8))
 
     def change(done, _):

@@ -1,4 +1,4 @@
-"""Many recordings on many machines: what each gives by itself, whatever is lost."""
+"""Many recordings on many machines: the same results as one by one, even if workers are lost."""
 
 import json
 import os
@@ -20,10 +20,10 @@ from dtof.cluster._folder import Folder  # noqa: E402
 def test_recordings_come_in_order_and_their_totals_are_sums(client, tmp_path):
     # The first takes the longest.
     files = [saved(tmp_path, f"{i}.npy", counts(i, rows=40 if i == 0 else 4)) for i in range(5)]
-    told = []
+    messages = []
     options = {"photons_per_cycle": 0.5, "mask": [2], "gate": (5, 60), "cycles": 300, "bins": 64}
     with pytest.warns(UserWarning, match="4.npy: .* photons in bins that were cut off"):
-        many = cluster.recordings(client, files, progress=lambda *at: told.append(at), **options)
+        many = cluster.recordings(client, files, progress=lambda *at: messages.append(at), **options)
         runs = [dtof.replay(file, **options) for file in files]
     assert [one.file for one in many.results] == list(map(str, files)) and not many.failed
     for one, run in zip(many.results, runs):
@@ -31,10 +31,10 @@ def test_recordings_come_in_order_and_their_totals_are_sums(client, tmp_path):
     for name, total in many.totals.items():
         assert total == sum(run.statistics[name] for run in runs), name
     assert min(many.totals[key] for key in ("photons", "masked", "not_replayed", "cut_off")) > 0
-    # Nothing is lost that is not counted.
+    # Every loss is counted.
     offered = sum(many.totals[key] for key in ("photons", "masked", "not_replayed", "cut_off"))
     assert offered == sum(numpy.load(file).sum() for file in files)
-    assert told == [(done, 5) for done in range(1, 6)]
+    assert messages == [(done, 5) for done in range(1, 6)]
     with pytest.warns(UserWarning):
         assert cluster.recordings(client, files[::-1], **options).totals == many.totals
 
@@ -70,7 +70,7 @@ def test_folders_hold_what_the_program_writes(program, client, tmp_path):
     assert summary.pop("request")["options"] == ["--alpha=5"]
     del expected["export_with"], summary["export_with"]
     assert summary == expected
-    # Its tables and pictures do not stay beside other events, whichever of them is there.
+    # A folder with any table or picture of another run is refused.
     more = {path.name for path in theirs.iterdir()} - {path.name for path in ours.iterdir()}
     assert {"events.csv", "report.html", "depth-mean.svg"} < more
     before = contents(theirs)
@@ -87,7 +87,7 @@ def test_folders_hold_what_the_program_writes(program, client, tmp_path):
     assert contents(theirs) == before
 
 
-def test_what_is_finished_is_not_done_again(client, tmp_path):
+def test_results_of_an_earlier_run_are_kept(client, tmp_path):
     files = [saved(tmp_path, f"in/{i}.npy", counts(i)) for i in range(3)]
     out = tmp_path / "out"
     out.mkdir()
@@ -104,7 +104,7 @@ def test_what_is_finished_is_not_done_again(client, tmp_path):
     assert kept() == [False] * 3
     before = contents(out)
     assert kept() == [True] * 3 and contents(out) == before
-    # Whatever an interrupted run can leave.
+    # Everything an interrupted run can leave.
     (out / "0" / "summary.json").unlink()
     events = (out / "1" / "events.aer").read_bytes()
     (out / "1" / "events.aer").write_bytes(events[:-16])
@@ -133,13 +133,13 @@ def test_events_may_be_arrays(client, tmp_path):
     many = cluster.recordings(client, [file], out=tmp_path, events="npy")
     events = numpy.load(tmp_path / "a" / "events.npy")
     assert events.tobytes() == dtof.replay(file).events.tobytes() and not many.results[0].is_kept
-    # Events of other settings do not stay beside it.
+    # The events in the other format are removed.
     assert not (tmp_path / "a" / "events.aer").exists()
     assert cluster.recordings(client, [file], out=tmp_path, events="npy").results[0].is_kept
     assert not cluster.recordings(client, [file], out=tmp_path).results[0].is_kept
 
 
-def test_what_is_kept_is_checked_whatever_its_kind(client, tmp_path):
+def test_kept_files_are_checked_in_both_formats(client, tmp_path):
     file = saved(tmp_path, "in/a.npy", counts())
     first = cluster.recordings(client, [file], out=tmp_path, events="npy").results[0]
     place = tmp_path / "a" / "events.npy"
@@ -149,18 +149,18 @@ def test_what_is_kept_is_checked_whatever_its_kind(client, tmp_path):
     assert not first.is_kept and not again.is_kept and place.read_bytes() == events
 
 
-def test_what_is_kept_warns_again(client, tmp_path):
+def test_kept_results_repeat_their_warnings(client, tmp_path):
     empty = saved(tmp_path, "in/empty.npy", counts() * 0)
     files = [saved(tmp_path, "in/cut.npy", counts()), empty]
-    told = []
+    messages = []
     for _ in range(2):
         with pytest.warns(UserWarning) as warned:
             many = cluster.recordings(client, files, out=tmp_path, bins=64)
-        told.append([str(warning.message) for warning in warned])
-    assert all(one.is_kept for one in many.results) and told[0] == told[1]
+        messages.append([str(warning.message) for warning in warned])
+    assert all(one.is_kept for one in many.results) and messages[0] == messages[1]
     cut_off = f"{many.results[0].statistics['cut_off']:,}"
-    assert "," in cut_off and f"{cut_off} photons in bins" in told[0][0]
-    assert "histograms are empty" in told[0][1]
+    assert "," in cut_off and f"{cut_off} photons in bins" in messages[0][0]
+    assert "histograms are empty" in messages[0][1]
 
 
 def test_no_file_of_others_is_replaced(client, tmp_path):
@@ -176,16 +176,16 @@ def test_no_file_of_others_is_replaced(client, tmp_path):
         assert name in many.results[0].error and "move it away" in many.results[0].error
         assert contents(out) == {f"a/{name}": text}
         (out / "a" / name).unlink()
-    # Nor one that is read.
+    # Nor an input file.
     settings = out / "a" / "dtof.toml"
     settings.write_text(dtof.replay(file).toml)
     before = contents(out)
     many = cluster.recordings(client, [file], out=out, settings=settings)
-    assert "is a file that is read" in many.results[0].error and contents(out) == before
+    assert "is an input file" in many.results[0].error and contents(out) == before
 
 
-def test_a_worker_that_is_killed_changes_nothing(running, client, tmp_path):
-    """Killed at its work, half-way: its files come from another worker."""
+def test_a_worker_that_is_killed_changes_nothing(dask_cluster, client, tmp_path):
+    """Killed halfway through a task: its files come from another worker."""
     files = [saved(tmp_path, f"in/{i}.npy", counts(i, 16, 16, 64, 2000)) for i in range(8)]
     options = {"cycles": 20_000, "photons_per_cycle": 0.5}
     folders = [tmp_path / "whole", tmp_path / "lost"]
@@ -196,12 +196,12 @@ def test_a_worker_that_is_killed_changes_nothing(running, client, tmp_path):
 
     def kill(done, _):
         if done == 3:
-            killed.append(running.kill_one())
+            killed.append(dask_cluster.kill_one())
 
     many = cluster.recordings(client, files, out=folders[1], progress=kill, **options)
     assert len(killed) == 1 and not many.failed
     assert contents(folders[1]) == contents(folders[0]) and len(contents(folders[0])) == 24
-    running.all_there()
+    dask_cluster.wait_for_workers()
     assert killed[0] not in client.run(os.getpid).values()
     run = dtof.replay(files[5], **options)
     dtof.write_events(tmp_path / "single.aer", run.events, run.array)
@@ -209,15 +209,15 @@ def test_a_worker_that_is_killed_changes_nothing(running, client, tmp_path):
 
 
 def test_an_interrupted_run_is_continued(client, tmp_path):
-    class Enough(Exception):
+    class Stop(Exception):
         pass
 
     def stop(done, _):
         if done == 2:
-            raise Enough
+            raise Stop
 
     files = [saved(tmp_path, f"in/{i}.npy", counts(i)) for i in range(40)]
-    with pytest.raises(Enough):
+    with pytest.raises(Stop):
         cluster.recordings(client, files, out=tmp_path, progress=stop)
     many = cluster.recordings(client, files, out=tmp_path)
     kept = sum(one.is_kept for one in many.results)
@@ -242,10 +242,10 @@ def test_a_task_that_runs_twice_at_a_time_is_no_error(tmp_path, monkeypatch):
 
     monkeypatch.setattr(os, "remove", after_the_other)
     ours.write(run)
-    assert removed == ["summary.json", "events.npy"] and ours.kept() == run.statistics
+    assert removed == ["summary.json", "events.npy"] and ours.kept_statistics() == run.statistics
 
 
-def test_what_is_no_list_of_recordings(client, tmp_path):
+def test_invalid_lists_of_recordings(client, tmp_path):
     file = saved(tmp_path, "in/a.npy", counts())
     (tmp_path / "in" / "link.npy").symlink_to(file)
     other = saved(tmp_path, "other/a.npy", counts())
@@ -259,7 +259,7 @@ def test_what_is_no_list_of_recordings(client, tmp_path):
     refused(lambda: recordings(client, [file, other], out=tmp_path, names=["a"]), "1 for 2")
     for name in ("..", "", "/a", "a/../b", "a//b", "a\0", "..\\b", "a\\..\\..\\b"):
         refused(lambda: recordings(client, [file], out=tmp_path, names=[name]), "names")
-    refused(lambda: recordings(client, [file], names=["a"]), "say out")
+    refused(lambda: recordings(client, [file], names=["a"]), "give out")
     refused(lambda: recordings(client, [file], out=tmp_path / "none"), "none", "no such folder")
     refused(lambda: recordings(client, [file], events="csv"), "'csv'", "aer, npy")
     refused(lambda: recordings(client, [file], alpha=300), "alpha 300: ")

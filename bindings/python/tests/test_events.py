@@ -26,8 +26,8 @@ def counts(rows=4, columns=6, bins=100):
     return counts
 
 
-def said(options):
-    """Keywords as options, by a way of its own."""
+def flags_of(options):
+    """Keywords as flags, independently of the package."""
     texts = []
     for key, value in options.items():
         if key == "gate":
@@ -38,8 +38,8 @@ def said(options):
     return [text for text in texts if text != "True"]
 
 
-def is_the_programs(run, folder, path):
-    """Checks everything that came out against the folder of the program's results."""
+def equals_the_program(run, folder, path):
+    """Compares all results with the folder of the program."""
     dtof.write_events(path, run.events, run.array)
     assert path.read_bytes() == (folder / "events.aer").read_bytes()
     with open(folder / "events.csv") as file:
@@ -61,10 +61,10 @@ def test_histograms(program, tmp_path, name):
     numpy.save(tmp_path / "counts.npy", array)
     options = OPTIONS[name]
     out = tmp_path / "out"
-    program("replay", "--input", tmp_path / "counts.npy", "--out", out, "--quiet", *said(options))
-    is_the_programs(dtof.replay(array, **options), out, tmp_path / "array.aer")
+    program("replay", "--input", tmp_path / "counts.npy", "--out", out, "--quiet", *flags_of(options))
+    equals_the_program(dtof.replay(array, **options), out, tmp_path / "array.aer")
     run = dtof.replay(tmp_path / "counts.npy", **options)
-    is_the_programs(run, out, tmp_path / "file.aer")
+    equals_the_program(run, out, tmp_path / "file.aer")
     assert run.events.size >= 24
 
 
@@ -129,11 +129,11 @@ def test_photons(program, tmp_path, options):
     records["pixel"], records["cycle"], records["bin"] = pixel, cycle, bin
     numpy.save(tmp_path / "photons.npy", records)
     out = tmp_path / "out"
-    program("replay", "--input", tmp_path / "photons.npy", "--out", out, "--quiet", *said(options))
-    is_the_programs(dtof.replay(records, **options), out, tmp_path / "records.aer")
+    program("replay", "--input", tmp_path / "photons.npy", "--out", out, "--quiet", *flags_of(options))
+    equals_the_program(dtof.replay(records, **options), out, tmp_path / "records.aer")
     run = dtof.photons(pixel, cycle, bin, **options)
     run.statistics["recording"].setdefault("fields not read", "extra")  # there are none
-    is_the_programs(run, out, tmp_path / "columns.aer")
+    equals_the_program(run, out, tmp_path / "columns.aer")
 
 
 def test_one_number_may_stand_for_all_photons():
@@ -152,7 +152,7 @@ def test_photons_are_replayed_to_the_last(tmp_path):
     given = [1, 1, 1], [1, 20_000, 30_000], [3, 3, 3]
     run = dtof.photons(*given)
     assert run.statistics["photons"] == 3 and run.statistics["not_replayed"] == 0
-    # Its settings repeat it, and may say less.
+    # Its settings repeat the run, and may request fewer cycles.
     toml = tmp_path / "dtof.toml"
     toml.write_text(run.toml)
     numpy.save(tmp_path / "photons.npy", numpy.array(
@@ -169,9 +169,9 @@ def test_the_tmf8820_log(program, tmp_path, recorded):
     log = recorded("tmf8820_plane_gt/distance_data.json")
     options = {"photons_per_cycle": 0.5, "rule": "window", "sigma_bins": 0.75, "l1": 4}
     out = tmp_path / "out"
-    program("replay", "--input", log, "--out", out, "--quiet", *said(options))
+    program("replay", "--input", log, "--out", out, "--quiet", *flags_of(options))
     run = dtof.replay(log, **options)
-    is_the_programs(run, out, tmp_path / "log.aer")
+    equals_the_program(run, out, tmp_path / "log.aer")
     assert run.events.size > 100_000
     loaded = dtof.load(log)
     assert loaded.counts.shape == (159, 1, 9, 128) and loaded.bin_width_ps == pytest.approx(92.1, 1e-5)
@@ -187,7 +187,7 @@ def test_the_tmf8829_log(program, tmp_path, recorded):
     log = recorded("tmf8829_log/tmf8829_log.json.gz")
     out = tmp_path / "out"
     program("replay", "--input", log, "--out", out, "--quiet")
-    is_the_programs(dtof.replay(log), out, tmp_path / "log.aer")
+    equals_the_program(dtof.replay(log), out, tmp_path / "log.aer")
 
 
 def test_a_scene(program, tmp_path):
@@ -199,7 +199,7 @@ def test_a_scene(program, tmp_path):
     texts = ["--cycles", "3000", "--array", "8x6", "--alpha", "8", "--seed", "2"]
     program("simulate", "--scene", scene, "--out", out, "--quiet", *texts)
     run = dtof.simulate(scene, **options)
-    is_the_programs(run, out, tmp_path / "file.aer")
+    equals_the_program(run, out, tmp_path / "file.aer")
     text = dtof.simulate(scene.read_text(), **options)
     assert text.events.tobytes() == run.events.tobytes()
     assert dtof.simulate(scene, laser_off=True, **options).events.size < run.events.size
@@ -233,11 +233,11 @@ def test_events_have_one_layout_on_every_machine():
     fields = [dtof.EVENT.fields[name] for name in dtof.EVENT.names]
     assert [at for _, at in fields] == [0, 8, 10, 12, 16, 24, 32, 36, 40, 41, 42]
     assert dtof.EVENT.itemsize == 48
-    # Said, and not left to what a compiler aligns to.
+    # Explicit, independent of the alignment of a compiler.
     assert not dtof.EVENT.isalignedstruct
 
 
-def test_what_was_lost_is_counted():
+def test_every_loss_is_counted():
     array = counts()
     statistics = dtof.replay(array, bins=64, gate=(10, 60), mask=[1], cycles=50).statistics
     offered = sum(statistics[key] for key in ("photons", "masked", "not_replayed", "cut_off"))
@@ -245,7 +245,7 @@ def test_what_was_lost_is_counted():
     assert min(statistics[key] for key in ("gated_out", "masked", "not_replayed", "cut_off")) > 0
 
 
-def test_what_is_surely_wrong_is_a_warning():
+def test_suspicious_recordings_give_a_warning():
     with pytest.warns(UserWarning, match="no photons: all 2 histograms are empty"):
         dtof.replay(numpy.zeros((2, 16), dtype=int))
     with pytest.warns(UserWarning, match="bins of 0.250 ps"):
@@ -262,7 +262,7 @@ def test_a_warning_names_the_line_that_called(name, options):
     assert {warning.filename for warning in warned} == {__file__}
 
 
-def test_a_cover_glass_that_has_become_brighter_is_told(program, tmp_path):
+def test_a_brighter_cover_glass_is_reported(program, tmp_path):
     (tmp_path / "dtof.toml").write_text(
         "[sensor]\ngate = [10, 127]\nglass = 0.1\nglass_bins = [0.0, 0.0, 0.05, 0.05, 0, 0, 0, 0, 0, 0]\n"
     )
@@ -271,7 +271,7 @@ def test_a_cover_glass_that_has_become_brighter_is_told(program, tmp_path):
     numpy.save(tmp_path / "counts.npy", array)
     options = {"recorded_cycles": 10_000, "settings": tmp_path / "dtof.toml"}
     out = tmp_path / "out"
-    program("replay", "--input", tmp_path / "counts.npy", "--out", out, "--quiet", *said(options))
+    program("replay", "--input", tmp_path / "counts.npy", "--out", out, "--quiet", *flags_of(options))
     run = dtof.replay(array, **options)
-    is_the_programs(run, out, tmp_path / "a.aer")
+    equals_the_program(run, out, tmp_path / "a.aer")
     assert run.statistics["cover_glass"][0] > 2

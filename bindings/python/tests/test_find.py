@@ -34,7 +34,7 @@ def test_calibrate(program, tmp_path, counts):
     assert from_file.report == out.with_suffix(".html").read_text()
     assert found.settings["sensor"]["sigma_bins"] == pytest.approx(0.8, abs=0.1)
     assert found.found["hot pixels"] and dict(found.remarks)
-    # What is saved is taken, and is not replaced.
+    # Saved settings are accepted, and not overwritten.
     found.save(tmp_path / "mine.toml")
     assert dtof.replay(counts, settings=tmp_path / "mine.toml").events.size > 0
     with pytest.raises(dtof.Error, match="mine.toml"):
@@ -82,7 +82,7 @@ def test_tune(program, rule):
     options = {"background": 0.05, "signal": 0.4, "sigma_bins": 0.8, "rule": rule}
     texts = [f"--{key.replace('_', '-')}={value}" for key, value in options.items()]
     found = dtof.tune(**options)
-    said = found.pop("options")
+    flags = found.pop("options")
     assert found == json.loads(program("tune", "--json", *texts))
-    assert said == program("tune", *texts).splitlines()[-1]
-    assert shlex.split(said)[0] in ("--alpha", "--rule")
+    assert flags == program("tune", *texts).splitlines()[-1]
+    assert shlex.split(flags)[0] in ("--alpha", "--rule")

@@ -1,4 +1,4 @@
-"""The five lines of the page for each format of others, as they stand there."""
+"""The code of the page for each foreign format."""
 
 import os
 import re

@@ -1,4 +1,4 @@
-"""Maps and points, against the program's exports and against what the events themselves say."""
+"""Maps and points, compared with the program's exports and with the events."""
 
 import numpy
 import pytest
@@ -41,7 +41,7 @@ def test_reflectivity_follows_its_formulas(run):
         own = events[events["pixel"] == pixel]
         expected = own.size * mean.flat[pixel] ** 2
         assert by_events.flat[pixel] == pytest.approx(expected, rel=1e-3)
-    # The brighter a column is the more it reflects.
+    # Brighter columns have a higher reflectivity.
     assert numpy.corrcoef(by_signal.mean(axis=0), numpy.arange(8))[0, 1] > 0.8
 
 

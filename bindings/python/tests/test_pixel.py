@@ -1,4 +1,4 @@
-"""One pixel, step by step, is a pixel of a replay."""
+"""A single pixel behaves like a pixel of a replay."""
 
 import doctest
 
@@ -51,7 +51,7 @@ def test_the_examples_of_the_help():
         assert failed == 0 and tried > 0
 
 
-def test_the_stubs_name_all_that_is_there():
+def test_the_stubs_are_complete():
     import ast
     from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Whatever is wrong is one line of `dtof.Error`, never a crash."""
+"""Invalid input is a `dtof.Error` of one line, never a crash."""
 
 import os
 from datetime import datetime
@@ -32,12 +32,12 @@ def counts_with(value, dtype=float):
 
 @pytest.mark.parametrize("value,why", [
     (-1.0, "element [1, 2, 5] is negative: -1"),
-    (0.5, "element [1, 2, 5] is 0.5, which is no count of photons"),
+    (0.5, "element [1, 2, 5] is 0.5, which is not a number of photons"),
     (numpy.nan, "element [1, 2, 5] is NaN"),
     (numpy.inf, "element [1, 2, 5] is inf"),
     (2.0**60, "element [1, 2, 5] is"),
 ])
-def test_counts_that_are_none(value, why):
+def test_invalid_counts(value, why):
     refused(lambda: dtof.replay(counts_with(value)), "the array: ", why)
     refused(lambda: dtof.load(counts_with(value)), why)
     refused(lambda: dtof.calibrate(counts_with(value)), why)
@@ -69,7 +69,7 @@ def test_counts_that_are_none(value, why):
     [[1, 2], [3]],
     None, 5, object(), {"counts": 1}, [], b"counts.npy",
 ])
-def test_arrays_that_are_none(array):
+def test_invalid_arrays(array):
     refused(lambda: dtof.replay(array))
     refused(lambda: dtof.load(array))
 
@@ -111,12 +111,12 @@ def test_arrays_that_are_none(array):
     ({"half_widths": (9, 9)}, ["half_widths 9,9: "]),
     ({"columns": 4}, ["columns 4: "]),
 ])
-def test_options_that_cannot_be(options, words):
+def test_invalid_options(options, words):
     refused(lambda: dtof.replay(GOOD, **options), *words)
 
 
 def test_the_line_is_that_of_the_program(program, tmp_path):
-    """With keywords where that has flags."""
+    """With keywords instead of flags."""
     numpy.save(tmp_path / "counts.npy", counts_with(-1.0))
     for options in [{}, {"alpha": 300}, {"l1": 50, "l2": 20}, {"rule": "best"}, {"gate": "3"},
                     {"echo_wait": 3}, {"false_alarm": 0.01, "z": 4}]:
@@ -137,7 +137,8 @@ def test_the_line_is_that_of_the_program(program, tmp_path):
     ({"rule": "window", "z": 4, "false_alarm": 0.01}, "z cannot be used with false_alarm"),
     ({"alfa": 4}, "alfa is unknown; is it alpha?"),
     ({"rule": "window"}, "rule window needs window or sigma_bins"),
-    ({"bin_width_ps": "0.25ns"}, "bin_width_ps 0.25ns: must be a number from 0 to 65535.99998"),
+    ({"bin_width_ps": "0.25ns"},
+     "bin_width_ps 0.25ns: must be a number from 0 to 65535.99998; write it without a unit"),
 ])
 def test_a_mistake_is_the_line_of_the_program_with_keywords(options, line):
     """The test of the program's flags and files, `mistakes`, has the same."""
@@ -159,11 +160,11 @@ def test_a_mistake_is_the_line_of_the_program_with_keywords(options, line):
     ((None, None, None), ["pixel"]),
     ((numpy.ma.masked_array([1], [True]), [1], [1]), ["masked"]),
 ])
-def test_photons_that_cannot_be(photons, words):
+def test_invalid_photons(photons, words):
     refused(lambda: dtof.photons(*photons), *words)
 
 
-def test_files_that_cannot_be(tmp_path):
+def test_invalid_files(tmp_path):
     for name, bytes in [("a.npy", b""), ("b.npy", b"\x93NUMPY"), ("c.json", b"{"), ("d.csv", b"x"),
                         ("e.npz", b"PK"), ("f.txt", b""), ("g.json.gz", b"\x1f\x8b")]:
         (tmp_path / name).write_bytes(bytes)
@@ -181,7 +182,7 @@ def test_files_that_cannot_be(tmp_path):
     refused(lambda: dtof.tune(), "background, signal or snr, sigma_bins or sigma_ps are needed")
 
 
-def test_events_that_cannot_be(tmp_path):
+def test_invalid_events(tmp_path):
     run = dtof.replay(numpy.full((2, 2, 16), 3) + 60 * (numpy.arange(16) == 8))
     path = tmp_path / "a.aer"
     assert run.events.size > 1
@@ -219,7 +220,7 @@ def test_events_that_cannot_be(tmp_path):
     assert os.listdir(tmp_path) == []
 
 
-def test_steps_that_cannot_be():
+def test_invalid_steps():
     pixel = dtof.Pixel()
     for bin in (-1, 70_000, 1.5, "a", [[1]], None, numpy.nan):
         refused(lambda: pixel.count(bin))

@@ -1,4 +1,4 @@
-"""What dtof is compared with is right, and the page says what is kept."""
+"""The numpy methods are correct, and the page agrees with the stored tables."""
 
 import inspect
 import sys
@@ -10,10 +10,10 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench" / "side_by_side"))
 
-import kept
+import stored
 import measure
 import methods
-import numpy_way
+import with_numpy
 import page
 import photons
 
@@ -35,7 +35,7 @@ def counted(rows):
     return photons.Photons((of // rows.shape[1]).astype("u2"), cycle, of % rows.shape[1], 4)
 
 
-def test_drawn_photons_are_where_they_were_asked_for():
+def test_drawn_photons_are_where_requested():
     random = np.random.default_rng(1)
     background, signal = np.array([0.0, 0.01, 0.0]), np.array([0.5, 0.0, 0.0])
     drawn = photons.draw(random, background, 10_000, 64, signal, np.array([20.25, 0, 0]), 1.5)
@@ -73,7 +73,7 @@ def test_the_centroid_of_known_counts():
     counts[0, 9:12] += [10, 20, 10]  # in the middle of bin 10
     counts[1, 9:12] += [0, 30, 10]  # a quarter of a bin later
     counts[2, 0] += 8  # the window is cut off
-    found = numpy_way.centroid(counts, np.array([10, 10, 0]), np.full(3, 2.0), 2)
+    found = with_numpy.centroid(counts, np.array([10, 10, 0]), np.full(3, 2.0), 2)
     assert found == pytest.approx([10.5, 10.75, 0.5])
 
 
@@ -81,7 +81,7 @@ def test_the_highest_three_bins_and_their_background():
     counts = np.full((2, 32), 2)
     counts[0, 9:12] += [10, 20, 10]
     counts[1, 30] += 7
-    peak, height, background = numpy_way.highest(counts)
+    peak, height, background = with_numpy.highest(counts)
     assert peak.tolist() == [10, 29] and height.tolist() == [46, 13]  # the first of equal ones
     assert background == pytest.approx([2, 2])
 
@@ -89,13 +89,13 @@ def test_the_highest_three_bins_and_their_background():
 def test_a_poisson_threshold_is_the_share_of_cases():
     random = np.random.default_rng(2)
     drawn = random.poisson(2.0, 1_000_000)
-    share = numpy_way.stands_clear(drawn, 2.0, 3).mean()
+    share = with_numpy.stands_clear(drawn, 2.0, 3).mean()
     assert 0.1e-3 < share < 1e-3  # counts are whole: not exactly one in a thousand
-    assert numpy_way.stands_clear(np.array([1, 0]), np.array([5e-4, 1.0]), 3).tolist() == [True, False]
+    assert with_numpy.stands_clear(np.array([1, 0]), np.array([5e-4, 1.0]), 3).tolist() == [True, False]
 
 
 @pytest.mark.parametrize("method", methods.METHODS[:3], ids=lambda method: method.name)
-def test_each_way_of_numpy_finds_a_peak_and_nothing_else(method, bright):
+def test_each_numpy_method_finds_a_peak_and_nothing_else(method, bright):
     rows = np.zeros((48, 128), int)
     rows[7, 60:63] = [100, 200, 100]
     rows[:, ::8] += 1
@@ -115,23 +115,23 @@ def test_frames_of_every_length_have_a_threshold_and_are_right(method, bright):
 
 
 @pytest.mark.parametrize("method", methods.METHODS[:3], ids=lambda method: method.name)
-def test_a_peak_needs_its_least_photons(method, bright):
-    given = {**method.arguments(bright), "least": 6, "exposure": 4, "k": 0.0, "z": 0.0}
-    names = inspect.signature(method.way).parameters
+def test_a_peak_needs_a_minimum_of_photons(method, bright):
+    given = {**method.arguments(bright), "min_photons": 6, "exposure": 4, "k": 0.0, "z": 0.0}
+    names = inspect.signature(method.function).parameters
     given = {name: value for name, value in given.items() if name in names}
     rows = np.zeros((48, 128), int)
     rows[7, 59:62], rows[9, 59:62], rows[11, 58:63] = [1, 4, 1], [1, 3, 1], [3, 1, 3, 1, 1]
     rows[:, 0] = 1  # some background
-    assert method.way(counted(rows), **given)[0].tolist() == [7, 11]
+    assert method.function(counted(rows), **given)[0].tolist() == [7, 11]
 
 
 @pytest.mark.parametrize("method", FRAMES, ids=lambda method: method.name)
-def test_the_shortest_frames_have_no_threshold_without_least_photons(method, bright):
-    without = replace(bright, least_of_frames=(0, 0))
+def test_the_shortest_frames_have_no_threshold_without_a_minimum_of_photons(method, bright):
+    without = replace(bright, find_peaks_min_photons=0, frames_min_photons=0)
     for setting in methods.EXPOSURES[:2]:
         with np.errstate(invalid="ignore"):  # a centroid of nothing
-            assert measure.least_threshold(method, without, setting) is None
-        assert measure.least_threshold(method, bright, setting) is not None
+            assert measure.lowest_threshold(method, without, setting) is None
+        assert measure.lowest_threshold(method, bright, setting) is not None
 
 
 def test_frames_with_and_without_find_peaks_agree(bright):
@@ -156,11 +156,11 @@ def test_a_pixel_starts_over_after_a_report_and_at_l2():
     # Two bursts of ten photons in bin 5, and single ones too far apart for a report.
     cycle = np.array([0] * 10 + [8] * 10 + [2500 + 100 * i for i in range(4)] + [4100])
     given = photons.Photons(np.zeros(cycle.size, int), cycle, np.full(cycle.size, 5), 6000)
-    pixel, cycle, position = numpy_way.asynchronous(given, 1, 16, 5, 3.0, 2)
+    pixel, cycle, position = with_numpy.asynchronous(given, 1, 16, 5, 3.0, 2)
     assert cycle.tolist() == [4, 12] and position == pytest.approx([5.5, 5.5])
 
 
-def test_scores_of_reports_that_are_known(bright):
+def test_scores_of_known_reports(bright):
     truth = bright.truth_mm / bright.mm_per_bin
     pixel = np.array([0, 1, 0, 2, 2])
     cycle = np.array([10, 20, 30, 40, 50])
@@ -176,8 +176,8 @@ def test_scores_of_reports_that_are_known(bright):
 
 
 @pytest.mark.parametrize("method", methods.METHODS, ids=lambda method: method.name)
-def test_thresholds_are_the_lowest_that_are_allowed(method, bright):
-    threshold = measure.least_threshold(method, bright, method.settings[-2])
+def test_thresholds_are_the_lowest_allowed(method, bright):
+    threshold = measure.lowest_threshold(method, bright, method.settings[-2])
     below = method.thresholds[max(method.thresholds.index(threshold) - 1, 0)]
     of = lambda threshold: measure.alarms(method, bright, bright.empty, method.settings[-2], threshold)
     assert of(threshold) <= 1 < of(below) or threshold == method.thresholds[0]
@@ -195,20 +195,20 @@ def test_lines_are_counted_without_comments_and_docstrings():
         return a, b, text  # but this
 
     assert methods.lines_of(function) == 5
-    names = {function.__name__ for function in methods.needed(numpy_way.frames)}
+    names = {function.__name__ for function in methods.needed(with_numpy.frames)}
     assert {"frames", "highest", "stands_clear", "joined"} <= names and "asynchronous" not in names
 
 
-def test_the_page_says_what_is_kept():
-    rows, speeds = kept.read(kept.ROWS, measure.Row), kept.read(kept.SPEEDS, kept.Speed)
-    assert kept.PAGE.read_text(encoding="utf-8") == page.text(rows, speeds)
+def test_the_page_agrees_with_the_tables():
+    rows, speeds = stored.read(stored.ROWS, measure.Row), stored.read(stored.SPEEDS, stored.Speed)
+    assert stored.PAGE.read_text(encoding="utf-8") == page.text(rows, speeds)
 
 
-def test_what_the_picture_says_is_so():
-    rows = kept.read(kept.ROWS, measure.Row)
+def test_the_title_of_the_chart_holds():
+    rows = stored.read(stored.ROWS, measure.Row)
 
     def times(scene, within):
-        """The mean times of frames and of events, those of numpy first."""
+        """The mean times of frames and of events, numpy first."""
         found = [measure.times_at(page.of(rows, scene, method.name), within)[0] for method in methods.METHODS]
         return found[:2], found[2:]
 
@@ -220,19 +220,19 @@ def test_what_the_picture_says_is_so():
         assert max(frames + events) < 1.2 * min(frames + events)
 
 
-def test_measured_scenes_replace_those_that_are_kept(tmp_path):
-    rows = kept.read(kept.ROWS, measure.Row)
+def test_measured_scenes_replace_stored_ones(tmp_path):
+    rows = stored.read(stored.ROWS, measure.Row)
     names = list(page.SCENES)
     new = [row for row in rows if row.scene == "outdoor"][:2]
     new[0].mean = 17.0
-    kept.write(tmp_path / "rows.csv", kept.with_others(kept.ROWS, new, names))
-    found = kept.read(tmp_path / "rows.csv", measure.Row)
+    stored.write(tmp_path / "rows.csv", stored.with_others(stored.ROWS, new, names))
+    found = stored.read(tmp_path / "rows.csv", measure.Row)
     assert found == [row for row in rows if row.scene != "outdoor" or row in new]
 
 
 def test_a_changed_figure_is_found(tmp_path, monkeypatch):
-    rows = kept.read(kept.ROWS, measure.Row)
-    assert kept.differences(rows, {row.scene for row in rows}) == []
+    rows = stored.read(stored.ROWS, measure.Row)
+    assert stored.differences(rows, {row.scene for row in rows}) == []
     rows[3].error_bins *= 1.001
-    (line,) = kept.differences(rows, {row.scene for row in rows})
+    (line,) = stored.differences(rows, {row.scene for row in rows})
     assert "error_bins" in line and rows[3].method in line

@@ -13,7 +13,7 @@ import dtof
 
 
 def long_work(progress=None):
-    """Takes minutes if nobody ends it."""
+    """Takes minutes unless it is interrupted."""
     counts = numpy.full((64, 64, 128), 200_000, dtype="u4")
     return dtof.replay(counts, cycles=1_000_000, photons_per_cycle=2, progress=progress)
 
@@ -47,7 +47,7 @@ def test_ctrl_c_ends_every_kind_of_work(long):
     assert time.monotonic() - begun < 1.3
 
 
-def test_progress_is_told_by_the_thread_that_called_and_reaches_its_end():
+def test_progress_is_called_in_the_calling_thread_until_the_end():
     told = []
     counts = numpy.full((16, 16, 64), 50)
     dtof.replay(counts, progress=lambda *at: told.append((at, threading.get_ident())))
@@ -63,23 +63,23 @@ def test_progress_is_told_by_the_thread_that_called_and_reaches_its_end():
     assert all(isinstance(step, str) for step in steps)
 
 
-def test_what_progress_raises_ends_the_work():
-    class Enough(Exception):
+def test_an_exception_in_progress_ends_the_work():
+    class Stop(Exception):
         pass
 
     def progress(done, total):
         if done:
-            raise Enough
+            raise Stop
 
     begun = time.monotonic()
-    with pytest.raises(Enough):
+    with pytest.raises(Stop):
         long_work(progress)
     assert time.monotonic() - begun < 20
     with pytest.raises(TypeError):
         dtof.replay(numpy.full((2, 16), 9), progress=3)
 
 
-def test_other_threads_go_on_meanwhile():
+def test_other_threads_continue():
     turns = []
     stop = threading.Event()
 
@@ -108,7 +108,7 @@ def test_threads_and_processes_give_the_same_events():
     for thread in threads:
         thread.join()
     assert results == [expected] * 4
-    # After a fork the threads of the parent are not there.
+    # After a fork the threads of the parent are gone.
     for method in ("fork", "spawn"):
         with multiprocessing.get_context(method).Pool(2) as pool:
             assert pool.map_async(_events, [0, 1]).get(timeout=60) == [expected] * 2

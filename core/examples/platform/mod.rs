@@ -1,7 +1,7 @@
-//! What the examples need of the platform: a line of output, and without an operating
-//! system a start and a panic handler.
+//! The platform of the examples: a line of output, and without an operating system an
+//! entry and a panic handler.
 
-/// Prints a line; without an operating system it goes nowhere.
+/// Prints a line; does nothing without an operating system.
 #[cfg(not(target_os = "none"))]
 macro_rules! print_line {
     ($($text:tt)*) => { println!($($text)*) };

@@ -6,7 +6,7 @@
 pub struct Field {
     /// The place of its lowest bit.
     pub shift: u32,
-    /// How many it has.
+    /// How many bits it has.
     pub bits: u32,
 }
 
@@ -19,18 +19,18 @@ impl Field {
         u32::MAX >> (u32::BITS - self.bits)
     }
 
-    /// Of a value that fits.
+    /// The field's bits of a value that fits.
     pub const fn put(self, value: u32) -> u32 {
         debug_assert!(value <= self.mask());
         value << self.shift
     }
 
-    /// The lowest bits of a value that may not fit.
+    /// The field's bits of the lowest bits of a value that may not fit.
     pub const fn put_low(self, value: u32) -> u32 {
         (value & self.mask()) << self.shift
     }
 
-    /// What a part holds in it.
+    /// The value of the field in a part.
     pub const fn get(self, part: u32) -> u32 {
         (part >> self.shift) & self.mask()
     }
@@ -44,17 +44,17 @@ pub const EXPOSURE: Field = field(16, 16);
 // The second.
 pub const CYCLE_LOW: Field = field(0, 16);
 pub const LEVEL: Field = field(16, 2);
-/// The number of the echo, less 1.
+/// The number of the echo, minus 1.
 pub const ECHO: Field = field(18, 2);
 pub const PEAK_BIN: Field = field(20, 10);
 // The third, and the fourth.
 pub const PEAK_COUNT: Field = field(0, 24);
-/// The low bits of the background, and the others in the fourth part.
+/// The low bits of the background; the others are in the fourth part.
 pub const BACKGROUND_LOW: Field = field(24, 8);
 pub const BACKGROUND_HIGH: Field = field(0, 16);
 pub const OFFSET: Field = field(16, 10);
 pub const FLAGS: Field = field(26, 5);
-/// Where a sixth flag would be.
+/// The place of a sixth flag.
 pub const RESERVED_FLAG: Field = field(31, 1);
 // The second part of a dynamic depth event; its pixel, cycle and level are where those of a
 // depth event are. The third is the position, the fourth the change.

@@ -4,18 +4,20 @@
 //! first. The layout, its golden vectors and what will not change are in
 //! `docs/aer-format.md`. A word carries the low 16 bits of its laser cycle; a
 //! time word carries the rest and precedes the first event and every event
-//! whose upper bits differ from those of the event before. It is absolute, so
-//! that a receiver which joins late, or has lost words, is right again at the
-//! next.
+//! whose upper bits differ from those of the event before. It is absolute: a
+//! receiver that joins late or loses words is right again after the next one.
 //!
 //! ```
-//! use dtof_core::*;
+//! use dtof_core::{
+//!     AerDecoder, AerEncoder, AerError, AerRecord, BinIndex, BlockLevel, Count, DepthEvent,
+//!     EchoNumber, Flags, LaserCycle, PixelAddress, SubBinOffset,
+//! };
 //!
 //! let event = DepthEvent {
-//!     pixel: PixelAddress(2047),
+//!     pixel: PixelAddress::new(2047),
 //!     level: BlockLevel::PIXEL,
 //!     echo: EchoNumber::FIRST,
-//!     cycle: LaserCycle(5_000_000),
+//!     cycle: LaserCycle::new(5_000_000),
 //!     exposure: 110,
 //!     peak_bin: BinIndex::saturating(40),
 //!     offset: SubBinOffset::CENTRE,
@@ -82,8 +84,8 @@ impl AerWord {
         ((high as u128) << 64 | low as u128).to_le_bytes()
     }
 
-    /// A word as it was received. Any bytes make a word; whether it means
-    /// anything is for [`AerDecoder::decode`] to say.
+    /// A word as it was received. Any bytes make a word;
+    /// [`AerDecoder::decode`] checks it.
     #[inline]
     #[must_use]
     pub const fn from_le_bytes(bytes: [u8; Self::BYTES]) -> Self {
@@ -107,9 +109,9 @@ impl AerWord {
         let background = event.background.raw();
         Self {
             parts: [
-                PIXEL.put(event.pixel.0 as u32) | EXPOSURE.put(event.exposure as u32),
+                PIXEL.put(event.pixel.raw() as u32) | EXPOSURE.put(event.exposure as u32),
                 KIND.put(KIND_DEPTH_EVENT)
-                    | CYCLE_LOW.put_low(split(event.cycle.0)[0])
+                    | CYCLE_LOW.put_low(split(event.cycle.raw())[0])
                     | LEVEL.put(event.level.raw() as u32)
                     | ECHO.put(event.echo.raw() as u32 - 1)
                     | PEAK_BIN.put(event.peak_bin.raw() as u32),
@@ -127,9 +129,9 @@ impl AerWord {
     pub const fn dynamic_depth(event: &DynamicDepthEvent) -> Self {
         Self {
             parts: [
-                PIXEL.put(event.pixel.0 as u32),
+                PIXEL.put(event.pixel.raw() as u32),
                 KIND.put(KIND_DYNAMIC_DEPTH)
-                    | CYCLE_LOW.put_low(split(event.cycle.0)[0])
+                    | CYCLE_LOW.put_low(split(event.cycle.raw())[0])
                     | LEVEL.put(event.level.raw() as u32)
                     | CHANGE_FLAGS.put(event.flags.bits() as u32),
                 event.position.raw().cast_unsigned(),
@@ -142,7 +144,7 @@ impl AerWord {
     #[inline]
     #[must_use]
     pub const fn time(cycle: LaserCycle) -> Self {
-        let [low, high] = split(cycle.0 >> CYCLE_LOW.bits);
+        let [low, high] = split(cycle.raw() >> CYCLE_LOW.bits);
         Self {
             parts: [
                 0,
@@ -186,7 +188,7 @@ impl AerEncoder {
         (self.time(event.cycle), AerWord::depth_event(event))
     }
 
-    /// The same for a dynamic depth event.
+    /// Packs a dynamic depth event, as [`Self::encode`] does a depth event.
     #[inline]
     #[must_use = "without the time word the events that follow have a wrong laser cycle"]
     pub const fn encode_dynamic_depth(
@@ -199,7 +201,7 @@ impl AerEncoder {
     /// The time word that is due before an event of this laser cycle.
     #[inline]
     pub(crate) const fn time(&mut self, cycle: LaserCycle) -> Option<AerWord> {
-        let high = cycle.0 >> CYCLE_LOW.bits;
+        let high = cycle.raw() >> CYCLE_LOW.bits;
         let time = match self.cycle_high {
             Some(sent) if sent == high => None,
             _ => Some(AerWord::time(cycle)),
@@ -209,9 +211,10 @@ impl AerEncoder {
     }
 }
 
-/// What a word means.
+/// A decoded word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum AerRecord {
     /// A depth event with its whole laser cycle.
     Event(DepthEvent),
@@ -229,17 +232,18 @@ pub enum AerRecord {
     },
 }
 
-/// A word that means nothing.
+/// Why a word cannot be decoded.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum AerError {
-    /// The kind is none of this version.
+    /// This version has no such kind.
     UnknownKind,
-    /// The control code is none of this version.
+    /// This version has no such control code.
     UnknownControl,
     /// Bits that are zero in this version are set.
     ReservedBits,
-    /// A field holds what cannot be: a dynamic depth event without a change, or a
+    /// A field has an impossible value: a dynamic depth event without a change, or a
     /// position outside the histogram.
     OutOfRange,
     /// An event before any time word, so that its laser cycle is unknown.
@@ -273,11 +277,11 @@ impl AerDecoder {
         Self { cycle_high: None }
     }
 
-    /// What the next word means.
+    /// Decodes the next word.
     ///
     /// # Errors
-    /// [`AerError`] if it means nothing. The decoder stays as it was and may be
-    /// given the next word.
+    /// Fails if the word cannot be decoded. The decoder does not change; the next
+    /// word can follow.
     #[inline]
     pub fn decode(&mut self, word: AerWord) -> Result<AerRecord, AerError> {
         match KIND.get(word.parts[1]) {
@@ -302,7 +306,7 @@ impl AerDecoder {
         let number = join(low, high);
         match CONTROL.get(control) {
             CONTROL_TIME => {
-                let cycle = LaserCycle(number << CYCLE_LOW.bits);
+                let cycle = LaserCycle::new(number << CYCLE_LOW.bits);
                 if word != AerWord::time(cycle) {
                     return Err(AerError::ReservedBits);
                 }
@@ -325,7 +329,7 @@ impl AerDecoder {
 
 /// The whole laser cycle of an event.
 fn cycle(second: u32, cycle_high: u64) -> LaserCycle {
-    LaserCycle(cycle_high << CYCLE_LOW.bits | u64::from(CYCLE_LOW.get(second)))
+    LaserCycle::new(cycle_high << CYCLE_LOW.bits | u64::from(CYCLE_LOW.get(second)))
 }
 
 /// An event from its word and the upper bits of its laser cycle.
@@ -335,11 +339,11 @@ fn cycle(second: u32, cycle_high: u64) -> LaserCycle {
 )]
 fn unpack(word: AerWord, cycle_high: u64) -> DepthEvent {
     let [first, second, third, fourth] = word.parts;
-    // The sign of the offset's ten bits is moved to the top and drawn down.
+    // Sign-extends the ten bits of the offset.
     let offset = ((OFFSET.get(fourth) << 6) as u16).cast_signed() >> 6;
     let background = BACKGROUND_LOW.get(third) | BACKGROUND_HIGH.get(fourth) << BACKGROUND_LOW.bits;
     DepthEvent {
-        pixel: PixelAddress(PIXEL.get(first) as u16),
+        pixel: PixelAddress::new(PIXEL.get(first) as u16),
         level: BlockLevel::saturating(LEVEL.get(second) as u8),
         echo: EchoNumber::new(ECHO.get(second) as u8 + 1).unwrap_or(EchoNumber::LAST),
         cycle: cycle(second, cycle_high),
@@ -352,12 +356,12 @@ fn unpack(word: AerWord, cycle_high: u64) -> DepthEvent {
     }
 }
 
-/// The same for a dynamic depth event, whose fields are narrower than their bits.
+/// A dynamic depth event, whose values do not use all bits of their fields.
 #[allow(clippy::cast_possible_truncation, reason = "fields of up to 16 bits")]
 fn unpack_dynamic_depth(word: AerWord, cycle_high: u64) -> Result<DynamicDepthEvent, AerError> {
     let [first, second, third, fourth] = word.parts;
     let event = DynamicDepthEvent::new(
-        PixelAddress(PIXEL.get(first) as u16),
+        PixelAddress::new(PIXEL.get(first) as u16),
         BlockLevel::saturating(LEVEL.get(second) as u8),
         cycle(second, cycle_high),
         BinPosition::new(third.cast_signed()).ok_or(AerError::OutOfRange)?,

@@ -1,41 +1,40 @@
 //! Sub-bin depth from a window that lies evenly about the pulse.
 //!
-//! A centroid of whole bins around the peak bin is drawn towards that bin. The window
-//! then holds more of one flank of the pulse than of the other. Here the window is as
-//! wide as the pulse. It lies where the photons in it balance: the sum of their distances
-//! from its middle, the moment, is 0. A bin at its end counts with the part that is
-//! inside, at the middle of that part.
+//! A centroid of whole bins around the peak bin is biased towards that bin, because those
+//! bins hold more of one flank of the pulse than of the other. Here the window is as wide as
+//! the pulse, and it moves until its photons balance: the sum of their distances from its
+//! middle, the moment, is 0. A bin at the end of the window counts with the part inside, at
+//! the middle of that part.
 //!
-//! The moment is taken about the middle of the peak bin, and from there in half bins
-//! towards the photons, until it changes its sign. A straight line between the last two
-//! gives the place:
+//! The moment is computed about the middle of the peak bin, and from there in steps of half
+//! a bin towards the photons, until it changes its sign. A straight line between the last
+//! two moments gives the place:
 //!
 //! ```text
 //! moment(x) = Σ n · ∫ u du     over the part of each bin from x - h to x + h, u from x on
 //! place     = x + 1/2 bin · moment(x) / (moment(x) - moment(x + 1/2 bin))
 //! ```
 //!
-//! with the half width `h` and `n` the photons of a bin. So there is one division, and no
-//! background is needed: an even background has no moment. Moments about the middle of a
-//! bin have a gain that makes up for the straight line, found for a Gaussian pulse of the
-//! width that suits the window (`window_weights`).
+//! with the half width `h` and `n` the photons of a bin. There is one division, and no
+//! background is needed: a flat background has no moment. Moments about the middle of a bin
+//! have a gain that corrects for the straight line, computed for a Gaussian pulse of the width
+//! that suits the window (`window_weights`).
 //!
 //! With `h` = 2σ + 1/2 bins for a pulse of standard deviation σ the error is within 1.2 of
 //! the Cramér–Rao bound, on average within 1.1: `core/tests/depth/error.rs` prints
-//! and holds the table.
+//! and checks the table.
 //!
 //! A pulse that falls more slowly than it rises, as many do, has a wider window after the
 //! place than before it ([`CentredWindow::with_sides`]). Photons of the wider side count
-//! less, by the square of how much wider it is. So both sides of an even background still
-//! balance. That place in the pulse depends on both half widths, and so does the offset of
-//! ranges.
+//! less, by the square of how much wider it is, so that a flat background still balances.
+//! The place in the pulse depends on both half widths, and so does the range offset.
 //!
 //! ```
 //! use dtof_core::fixed::types::{U8F8, U24F8};
 //! use dtof_core::{CentredWindow, Histogram, RangeGate};
 //!
 //! let mut histogram = Histogram::<128>::new();
-//! histogram.add_batch(&[40, 40, 40, 41, 41, 41]); // evenly about 41.0
+//! histogram.add_batch(&[40, 40, 40, 41, 41, 41]); // symmetric about 41.0
 //! let window = CentredWindow::for_pulse(const { U8F8::lit("0.75") });
 //! let gate = RangeGate::full();
 //! let depth = window.estimate(&histogram, &gate, histogram.peak(), U24F8::ZERO);
@@ -46,12 +45,12 @@
 
 use fixed::types::{U8F8, U24F8};
 
-use super::estimate::Depth;
+use super::estimate::DepthEstimate;
 use super::window_weights::Weights;
 use crate::flags::Flags;
 use crate::histogram::counter::CounterWidth;
+use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
-use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak, mean};
 use crate::units::{BinIndex, Count, SubBinOffset};
 
@@ -65,13 +64,13 @@ pub struct CentredWindow {
 }
 
 /// Bins that a window can reach, from [`PEAK`] before the peak bin on: an offset of -2
-/// to 2 bins, less or plus 4.
+/// to 2 bins, and 4 more on each side.
 const REACH: usize = 2 * PEAK;
-/// Which of these is the peak bin.
+/// The index of the peak bin among them.
 const PEAK: usize = 6;
-/// The same of bins of the histogram.
+/// The same as a number of bins of the histogram.
 const BEFORE: u16 = 6;
-/// Where a window ends that moves on: the start of the bin two before the peak bin, and two after it.
+/// A window moves no farther than the start of the bin two before the peak bin, or two after.
 const ENDS: [usize; 2] = [PEAK - 2, PEAK + 2];
 
 /// The counters that a window can reach.
@@ -84,7 +83,7 @@ impl CentredWindow {
     pub const MAX: U8F8 = U8F8::lit("4");
     /// The widest pulse that a window suits, as a standard deviation in bins.
     pub const WIDEST_PULSE: U8F8 = U8F8::lit("1.75");
-    /// What the half width is above twice the pulse's standard deviation.
+    /// The half width minus twice the pulse's standard deviation.
     const MARGIN: U8F8 = U8F8::lit("0.5");
 
     /// From half the width in bins; `None` outside [`Self::MIN`]..=[`Self::MAX`].
@@ -123,7 +122,7 @@ impl CentredWindow {
         }
     }
 
-    // Not with the rest of a program that learns its settings when it runs.
+    // Out of line, for programs that get their settings at run time.
     #[inline(never)]
     const fn with_weights(before: U8F8, after: U8F8) -> Self {
         Self {
@@ -145,7 +144,7 @@ impl CentredWindow {
         self.after
     }
 
-    /// The first and the last of the bins about `bin` that are no farther from it than a half width, within the gate.
+    /// The first and the last gated bin that is no farther from `bin` than a half width.
     #[inline(always)]
     pub(super) fn inside<const BINS: usize>(&self, gate: &RangeGate<BINS>, bin: u16) -> (u16, u16) {
         let (before, after) = (self.before.to_bits(), self.after.to_bits());
@@ -156,10 +155,9 @@ impl CentredWindow {
 
     /// The mean of the gated bins farther from the peak bin than a half width, in 1/256
     /// rounded down; `None` if there are none, or the peak is not in the gate. Of these,
-    /// `left_out` bins are empty and do not count.
+    /// `left_out` bins are excluded: they are empty and do not count.
     #[inline(never)]
-    #[must_use]
-    pub fn background_outside<const BINS: usize, W: CounterWidth>(
+    fn background_outside<const BINS: usize, W: CounterWidth>(
         &self,
         histogram: &Histogram<BINS, W>,
         gate: &RangeGate<BINS>,
@@ -185,10 +183,10 @@ impl CentredWindow {
 
     /// The depth of the pulse around `peak`.
     ///
-    /// Of counts past 10 bits the lowest are dropped, as many as bring the peak within 10.
-    /// A bin outside the gate counts as `background`; [`Flags::CLIPPED`] tells that the
-    /// window reaches there, or that the offset is at the end of what [`SubBinOffset`] holds,
-    /// and [`Flags::SATURATED`] that the counter of the peak bin is full.
+    /// Counts of more than 10 bits lose their lowest bits, as many as bring the peak to 10.
+    /// A bin outside the gate counts as `background`. [`Flags::CLIPPED`] marks a window that
+    /// reaches there, or an offset at the limit of [`SubBinOffset`]; [`Flags::SATURATED`] a
+    /// full counter of the peak bin.
     #[must_use]
     pub fn estimate<const BINS: usize, W: CounterWidth>(
         &self,
@@ -196,15 +194,15 @@ impl CentredWindow {
         gate: &RangeGate<BINS>,
         peak: Peak,
         background: U24F8,
-    ) -> Depth {
+    ) -> DepthEstimate {
         match bins_within(histogram, gate, peak.bin) {
             Some(bins) => self.depth::<W>(bins, peak.count),
             None => self.at_the_gate(histogram, gate, peak, background),
         }
     }
 
-    /// The same where some bins are left out. The background is the mean outside if there are
-    /// bins for it.
+    /// The same with excluded bins. The background is the mean outside if there are bins for
+    /// it.
     #[inline(always)]
     pub(super) fn estimate_without<const BINS: usize, W: CounterWidth>(
         &self,
@@ -212,11 +210,11 @@ impl CentredWindow {
         gate: &RangeGate<BINS>,
         peak: Peak,
         background: U24F8,
-        peeled: &PeeledBins,
-    ) -> Depth {
+        excluded: &ExcludedBins,
+    ) -> DepthEstimate {
         match bins_within(histogram, gate, peak.bin) {
             Some(bins) => self.depth::<W>(bins, peak.count),
-            None => self.at_the_gate_without(histogram, gate, peak, background, peeled),
+            None => self.at_the_gate_without(histogram, gate, peak, background, excluded),
         }
     }
 
@@ -228,19 +226,19 @@ impl CentredWindow {
         gate: &RangeGate<BINS>,
         peak: Peak,
         background: U24F8,
-        peeled: &PeeledBins,
-    ) -> Depth {
+        excluded: &ExcludedBins,
+    ) -> DepthEstimate {
         let mut left_out = 0;
-        if peeled.echoes() > 0 {
+        if excluded.echoes() > 0 {
             let (first, last) = self.inside(gate, peak.bin.raw());
             left_out =
-                peeled.bins_among(gate.first()..=gate.last()) - peeled.bins_among(first..=last);
+                excluded.bins_among(gate.first()..=gate.last()) - excluded.bins_among(first..=last);
         }
         let outside = self.background_outside(histogram, gate, peak, left_out);
         self.at_the_gate(histogram, gate, peak, outside.unwrap_or(background))
     }
 
-    /// With the `background` where a bin is outside the gate.
+    /// The depth if the window reaches past the gate. Bins there count as `background`.
     #[inline(never)]
     fn at_the_gate<const BINS: usize, W: CounterWidth>(
         &self,
@@ -248,7 +246,7 @@ impl CentredWindow {
         gate: &RangeGate<BINS>,
         peak: Peak,
         background: U24F8,
-    ) -> Depth {
+    ) -> DepthEstimate {
         let background = (background.to_bits().saturating_add(128) >> 8).min(W::MAX);
         let mut bins = [W::counter(background); REACH];
         let first = peak.bin.raw().wrapping_sub(BEFORE);
@@ -268,11 +266,11 @@ impl CentredWindow {
         depth
     }
 
-    /// Where the photons of `bins` balance.
+    /// The place where the photons of `bins` balance.
     // Most looks end without an event.
     #[cold]
     #[inline(never)]
-    fn depth<W: CounterWidth>(&self, bins: &Bins<W>, peak: Count) -> Depth {
+    fn depth<W: CounterWidth>(&self, bins: &Bins<W>, peak: Count) -> DepthEstimate {
         let excess = if W::BITS > 10 {
             22u32.saturating_sub(peak.raw().leading_zeros())
         } else {
@@ -304,10 +302,11 @@ impl CentredWindow {
                 }
             }
         };
-        Depth { offset, flags }
+        DepthEstimate { offset, flags }
     }
 
-    /// Where they balance if that lies farther than the start of `edge`, with the moment `there`.
+    /// The place where they balance if it lies beyond the start of `edge`, where the moment is
+    /// `there`.
     #[inline(never)]
     fn farther<W: CounterWidth>(
         &self,
@@ -348,13 +347,13 @@ fn bins_within<'a, const BINS: usize, W: CounterWidth>(
     histogram.counts().get(usize::from(first)..)?.first_chunk()
 }
 
-/// Whether a moment is 0, or has not the sign of the one before.
+/// Whether a moment is 0, or has another sign than the one before.
 #[inline(always)]
 const fn has_crossed(before: i32, moment: i32) -> bool {
     moment == 0 || (before ^ moment) < 0
 }
 
-/// Of one of the [`Bins`], in 1/256 bin from the start of the peak bin.
+/// The start of one of the [`Bins`], in 1/256 bin from the start of the peak bin.
 #[inline(always)]
 #[allow(
     clippy::cast_possible_truncation,

@@ -1,7 +1,7 @@
 //! The paper's depth: the centroid of three bins.
 //!
-//! The background is taken off first. With `l`, `c`, `r` the counts of the peak bin's
-//! left neighbour, itself and its right neighbour, less the background and not
+//! The background is subtracted first. With `l`, `c`, `r` the counts of the peak bin's
+//! left neighbour, itself and its right neighbour, minus the background and not
 //! below 0, the pulse lies
 //!
 //! ```text
@@ -13,7 +13,8 @@
 //!
 //! ```
 //! use dtof_core::fixed::types::U24F8;
-//! use dtof_core::{Histogram, RangeGate, centroid};
+//! use dtof_core::{Histogram, RangeGate};
+//! use dtof_core::paper::centroid;
 //!
 //! let mut histogram = Histogram::<128>::new();
 //! histogram.add_batch(&[40, 40, 40, 41]);
@@ -21,26 +22,27 @@
 //! assert_eq!(depth.offset.raw(), 128 + 64); // 40.75 bins
 //! ```
 //!
-//! Cost on a Cortex-M4: 68 instructions, on a Cortex-M0+, which does not divide, 161. It suits pulses of up to 0.5 bins (σ); wider
-//! ones are drawn to the middle of the peak bin.
+//! Cost on a Cortex-M4: 68 instructions; on a Cortex-M0+, which has no division, 161. It
+//! suits pulses of up to 0.5 bins (σ). The depth of wider ones is biased towards the middle
+//! of the peak bin.
 //!
-//! Source: the paper's section III-A names the centre of mass around the peak (CMM). That
-//! it is of three bins, and less the background, is our choice.
+//! Source: the paper's section III-A names the centre of mass around the peak (CMM). The
+//! three bins and the subtracted background are our choice.
 
 use fixed::types::U24F8;
 
-use super::estimate::Depth;
+use super::estimate::DepthEstimate;
 use crate::flags::Flags;
 use crate::histogram::counter::CounterWidth;
 use crate::histogram::gate::RangeGate;
 use crate::histogram::{Histogram, Peak};
 use crate::units::SubBinOffset;
 
-/// Three-bin centroid around `peak`, less the `background` a bin.
+/// Three-bin centroid around `peak`, minus the `background` a bin.
 ///
 /// Within 1/512 bin of the real-valued formula for 10- and 16-bit counters,
-/// within 1/256 bin for 24-bit ones. With nothing above the background the
-/// middle of the peak bin. A neighbour outside the gate counts as empty.
+/// within 1/256 bin for 24-bit ones. It is the middle of the peak bin if no count
+/// exceeds the background. A neighbour outside the gate counts as empty.
 #[inline(always)]
 #[must_use]
 pub fn centroid<const BINS: usize, W: CounterWidth>(
@@ -48,7 +50,7 @@ pub fn centroid<const BINS: usize, W: CounterWidth>(
     gate: &RangeGate<BINS>,
     peak: Peak,
     background: U24F8,
-) -> Depth {
+) -> DepthEstimate {
     let neighbour = |bin: u16| {
         if gate.contains(bin) {
             histogram.count(bin.into())
@@ -71,21 +73,21 @@ pub fn centroid<const BINS: usize, W: CounterWidth>(
     let left = above(left.unwrap_or(0));
     let centre = above(peak.count.raw());
     let right = above(right.unwrap_or(0));
-    // Only their ratio counts, so that what is past 22 bits, 14 of them whole counts,
-    // may lose its last to keep the 256-fold numerator within 32.
+    // Only their ratio matters. Values of more than 22 bits, 14 of them whole counts, lose
+    // their lowest bits, so that 256 times the numerator fits 32 bits.
     let excess = if W::BITS > 14 {
         10u32.saturating_sub((left | centre | right).leading_zeros())
     } else {
         0
     };
     let (left, centre, right) = (left >> excess, centre >> excess, right >> excess);
-    Depth {
+    DepthEstimate {
         offset: offset_of(left, centre, right),
         flags,
     }
 }
 
-/// Where the pulse lies, of counts above the background, in the same unit each.
+/// The place of the pulse from counts above the background, all in the same unit.
 #[inline(always)]
 pub(crate) fn offset_of(left: u32, centre: u32, right: u32) -> SubBinOffset {
     let sum = left + centre + right;
@@ -95,7 +97,7 @@ pub(crate) fn offset_of(left: u32, centre: u32, right: u32) -> SubBinOffset {
     SubBinOffset::new(SubBinOffset::CENTRE.raw() + shift).unwrap_or(SubBinOffset::CENTRE)
 }
 
-/// Whether the processor divides: all but the smallest do.
+/// Whether the processor has a division instruction: all but the smallest do.
 const HAS_DIVISION: bool = cfg!(any(
     all(target_arch = "arm", target_has_atomic = "32"),
     all(target_arch = "riscv32", target_feature = "m"),
@@ -118,8 +120,8 @@ fn share_by_division(part: u32, whole: u32) -> u32 {
     share.unwrap_or(0)
 }
 
-/// The same in half the time of a division without an instruction for it.
-// Not with the looks that end without an event.
+/// The same in half the time of a division in software.
+// Out of line: most looks end without an event.
 #[inline(never)]
 const fn share_bit_by_bit(part: u32, whole: u32) -> u32 {
     if whole == 0 {
@@ -143,7 +145,7 @@ const fn share_bit_by_bit(part: u32, whole: u32) -> u32 {
 mod tests {
     use super::{share_bit_by_bit, share_by_division};
 
-    /// To the last bit, small ones all, and the largest.
+    /// All small numbers and the largest ones.
     #[test]
     fn both_ways_share_alike() {
         let check = |part: u32, whole: u32| {

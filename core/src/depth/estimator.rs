@@ -1,4 +1,4 @@
-//! Which depth estimator: chosen when configured, to the width of the pulse.
+//! The choice of a depth estimator, by the width of the pulse.
 //!
 //! ```
 //! use dtof_core::fixed::types::U8F8;
@@ -15,13 +15,15 @@ use fixed::types::{U8F8, U24F8};
 
 use super::centred_window::CentredWindow;
 use super::centroid::centroid;
-use super::estimate::Depth;
+use super::estimate::DepthEstimate;
 use crate::histogram::counter::CounterWidth;
+use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
-use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak};
 
-/// How the place of the pulse in its bins is found.
+/// How the place of the pulse within its bins is estimated.
+///
+/// Exhaustive, because the link and the C header number each estimator.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum DepthEstimator {
@@ -33,15 +35,15 @@ pub enum DepthEstimator {
 }
 
 impl DepthEstimator {
-    /// What suits a pulse of the standard deviation `sigma` in bins: a
+    /// The estimator for a pulse of the standard deviation `sigma` in bins: a
     /// [`CentredWindow::for_pulse`].
     #[must_use]
     pub const fn for_pulse(sigma: U8F8) -> Self {
         Self::CentredWindow(CentredWindow::for_pulse(sigma))
     }
 
-    /// The depth of `peak`, less the `background` a bin, which is that of the rule. A
-    /// [`CentredWindow`] has its own, if the gate leaves a bin for it.
+    /// The depth of `peak`. `background` is the rule's, a bin. A [`CentredWindow`] uses its own
+    /// if the gate leaves a bin for it.
     #[inline(always)]
     #[must_use]
     pub fn estimate<const BINS: usize, W: CounterWidth>(
@@ -50,30 +52,29 @@ impl DepthEstimator {
         gate: &RangeGate<BINS>,
         peak: Peak,
         background: U24F8,
-    ) -> Depth {
-        self.estimate_without(histogram, gate, peak, background, &PeeledBins::NONE)
+    ) -> DepthEstimate {
+        self.estimate_without(histogram, gate, peak, background, &ExcludedBins::NONE)
     }
 
-    /// The same where some bins are left out, which are empty.
+    /// The same with excluded bins, which are empty.
     #[inline(always)]
-    #[must_use]
-    pub fn estimate_without<const BINS: usize, W: CounterWidth>(
+    pub(crate) fn estimate_without<const BINS: usize, W: CounterWidth>(
         &self,
         histogram: &Histogram<BINS, W>,
         gate: &RangeGate<BINS>,
         peak: Peak,
         background: U24F8,
-        peeled: &PeeledBins,
-    ) -> Depth {
+        excluded: &ExcludedBins,
+    ) -> DepthEstimate {
         match self {
             Self::Centroid3 => centroid(histogram, gate, peak, background),
             Self::CentredWindow(window) => {
-                window.estimate_without(histogram, gate, peak, background, peeled)
+                window.estimate_without(histogram, gate, peak, background, excluded)
             }
         }
     }
 
-    /// How far from the peak bin it looks for photons of the pulse, in bins.
+    /// How many bins to either side of the peak bin it uses.
     #[must_use]
     pub const fn reach(&self) -> u16 {
         match self {

@@ -1,11 +1,11 @@
-//! Where in its bins the pulse lies, and how far that is.
+//! The place of the pulse within its bins, and its range.
 //!
 //! | module | what it has |
 //! |---|---|
-//! | `estimate` | what an estimator finds |
+//! | `estimate` | the result of an estimator |
 //! | `centroid` | the paper's estimator, of three bins |
 //! | `centred_window` | a window that moves onto the pulse |
-//! | `window_weights` | what photons of each bin count for it |
+//! | `window_weights` | the weights of its bins |
 //! | `estimator` | the choice of one |
 //! | `range_scale` | from bins to millimetres |
 
@@ -19,6 +19,6 @@ mod window_weights;
 pub use centred_window::CentredWindow;
 pub use centroid::centroid;
 pub(crate) use centroid::offset_of;
-pub use estimate::Depth;
+pub use estimate::DepthEstimate;
 pub use estimator::DepthEstimator;
 pub use range_scale::{RangeScale, RangeScaleError};

@@ -15,7 +15,7 @@
 
 use fixed::types::{I24F8, I56F8, U16F16, U24F8};
 
-use crate::check::written_as_its_text;
+use crate::check::impl_error;
 use crate::units::BinPosition;
 
 /// From bins to millimetres: bin width and range offset.
@@ -30,6 +30,7 @@ pub struct RangeScale {
 /// A bin width or offset that cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum RangeScaleError {
     /// The bin width is zero, or so small that a bin rounds to 0 mm.
     ZeroBinWidth,
@@ -39,7 +40,7 @@ pub enum RangeScaleError {
 }
 
 impl RangeScaleError {
-    /// What is wrong, in one line.
+    /// The error in one line.
     #[must_use]
     pub const fn text(self) -> &'static str {
         match self {
@@ -49,7 +50,7 @@ impl RangeScaleError {
     }
 }
 
-written_as_its_text!(RangeScaleError);
+impl_error!(RangeScaleError);
 
 impl RangeScale {
     /// Half the speed of light in m/s: 0.149896229 mm a picosecond, exactly.
@@ -59,8 +60,8 @@ impl RangeScale {
     /// every range. The millimetres a bin are rounded to the nearest 1/65,536 mm.
     ///
     /// # Errors
-    /// [`RangeScaleError`] if the bin width is zero or a position could lie
-    /// beyond what the range format holds.
+    /// Fails if the bin width is zero or a position could lie beyond what the
+    /// range format holds.
     #[allow(
         clippy::cast_possible_truncation,
         reason = "millimetres a bin are less than a sixth of the picoseconds"
@@ -93,7 +94,7 @@ impl RangeScale {
     }
 
     /// How far apart two positions are, from 1/256 bins to millimetres, rounded to the
-    /// nearest 1/256 mm. The range offset has no part in it.
+    /// nearest 1/256 mm. The range offset cancels out.
     #[inline]
     #[must_use]
     pub const fn distance(&self, bins: i32) -> I56F8 {
@@ -116,8 +117,7 @@ impl RangeScale {
 
     /// In 1/256 mm, before it is narrowed.
     const fn raw_range(&self, position: BinPosition) -> i64 {
-        // 19 bits times 32 bits, 24 fractional bits; half of the last place
-        // that stays is added before the rest is shifted out.
+        // 19 bits times 32 bits, 24 fractional bits, rounded to the nearest.
         let range = position.raw() as i64 * self.bin as i64;
         ((range + (1 << 15)) >> 16) + self.offset.to_bits() as i64
     }

@@ -1,20 +1,20 @@
-//! What a photon of each bin counts for the moment of a window.
+//! The weights of the bins in the moment of a window.
 //!
 //! About the start of a bin, and about its middle, the weight of a bin is fixed: a bin from
-//! `a` to `b` after the place counts `(b² - a²) / h²`, with neither past the half width `h`.
-//! Before the place it counts as much below 0. Each side has the sum 1, so that an even
-//! background balances whatever the half widths are.
+//! `a` to `b` after the place counts `(b² - a²) / h²`, with both limited to the half width `h`.
+//! Before the place the weight is negative. The weights of each side add up to 1, so that a
+//! flat background balances whatever the half widths are.
 //!
-//! Between the two the moment is no straight line. For the pulse that the window suits it is
-//! steeper about the one than about the other. The weights about the middle have a gain for
-//! that: with it a straight line finds a pulse exactly that lies a quarter of a bin from the
-//! middle. The error in between is small.
+//! Between the two the moment is not a straight line: for the pulse that the window suits it
+//! is steeper about the one than about the other. So the weights about the middle have a
+//! gain. With it a straight line is exact for a pulse a quarter of a bin from the middle, and
+//! nearly so in between.
 //!
 //! Weights are whole numbers of 1/4096. Cost: 68 bytes a window.
 
 use crate::histogram::counter::CounterWidth;
 
-/// So many bins before and after a place count.
+/// Bins that count before a place, and after it.
 const REACH: usize = 4;
 /// The same in 1/256 bin.
 const FARTHEST: i32 = 1024;
@@ -27,13 +27,13 @@ pub(super) struct Weights {
     middle: [i32; REACH * 2 + 1],
 }
 
-/// What the sum of the weights of a side is about the start of a bin.
+/// The sum of the weights of a side about the start of a bin.
 const WHOLE: u32 = 1 << 12;
 
 /// The gain for half widths from 1 to 4 bins, each 1/16 more, times [`WHOLE`]: the moment about
 /// the start of the next bin over that about the middle, for a Gaussian pulse of the standard
-/// deviation `(h - 1/2) / 2` a quarter of a bin after the middle. `core/tests/depth/formula.rs` works
-/// it out again.
+/// deviation `(h - 1/2) / 2` a quarter of a bin after the middle. `core/tests/depth/formula.rs`
+/// computes it again.
 const GAINS: [u16; 49] = [
     23_655, 15_838, 11_295, 8_461, 6_604, 5_346, 4_478, 3_874, 3_456, 3_462, 3_530, 3_648, 3_805,
     3_987, 4_184, 4_382, 4_571, 4_506, 4_422, 4_325, 4_219, 4_112, 4_006, 3_906, 3_815, 3_860,
@@ -88,8 +88,8 @@ fn moment<W: CounterWidth, const N: usize>(
     })
 }
 
-/// Of the bins about a place that lies `place` after the start of a bin, in 1/256 bin. The weights
-/// of each side have the sum `whole`.
+/// The weights of the bins about a place that lies `place` after the start of a bin, in 1/256 bin.
+/// Those of each side add up to `whole`.
 const fn weights<const N: usize>(place: i32, before: u16, after: u16, whole: u32) -> [i32; N] {
     let mut weights = [0; N];
     let mut left: &mut [i32] = &mut weights;
@@ -121,7 +121,7 @@ const fn below(distance: i32, half: u16, whole: u32) -> i32 {
     ((((share * share) >> 15) * whole) >> 15).cast_signed()
 }
 
-/// That of the narrower side.
+/// The gain for the narrower side.
 const fn gain(before: u16, after: u16) -> u32 {
     let narrow = if before < after { before } else { after } - 256;
     let (row, rest) = ((narrow / 16) as usize, (narrow % 16) as u32);

@@ -1,7 +1,6 @@
-//! A detection rule that is chosen when the program runs.
+//! A detection rule that is chosen at run time.
 //!
-//! A program that knows its rule when it is compiled takes the rule itself. It then has
-//! the code of no other.
+//! A program with one rule uses that rule's type. It then contains the code of no other.
 //!
 //! ```
 //! use dtof_core::fixed::types::{U4F12, U8F8};
@@ -31,12 +30,14 @@ use super::rule::DetectionRule;
 use super::tracking::Tracking;
 use super::window::WindowRule;
 use crate::histogram::counter::CounterWidth;
+use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
-use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak};
 use crate::units::BlockLevel;
 
-/// One of the rules; decides as the one it holds.
+/// One of the rules.
+///
+/// Exhaustive, because the link and the C header number each rule.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum AnyRule {
@@ -49,7 +50,7 @@ pub enum AnyRule {
 }
 
 impl AnyRule {
-    /// The rules of a pixel that tracks; `None` but for the window rule.
+    /// The rules of a pixel that tracks; `None` for all but the window rule.
     #[must_use]
     pub fn tracking<const BINS: usize>(&self, gate: &RangeGate<BINS>) -> Option<Tracking<Self>> {
         let Self::Window(rule) = self else {
@@ -63,7 +64,7 @@ impl AnyRule {
         ))
     }
 
-    /// The rule of blocks of pixels with this rule: the same but for the window rule.
+    /// The rule for blocks of pixels with this rule. Only the window rule's differs.
     #[must_use]
     pub fn of_blocks(&self, levels: BlockLevel) -> Self {
         match self {
@@ -98,39 +99,27 @@ impl DetectionRule for AnyRule {
         histogram: &Histogram<BINS, W>,
         gate: &RangeGate<BINS>,
         peak: Peak,
+        excluded: &ExcludedBins,
     ) -> Option<U24F8> {
         match self {
-            // The looks of a pixel with the default rule stay as fast as they are.
-            Self::Paper(rule) if W::BITS <= 10 => rule.detect(histogram, gate, peak),
-            _ => self.detect_without(histogram, gate, peak, &PeeledBins::NONE),
-        }
-    }
-
-    #[inline(always)]
-    fn detect_without<const BINS: usize, W: CounterWidth>(
-        &self,
-        histogram: &Histogram<BINS, W>,
-        gate: &RangeGate<BINS>,
-        peak: Peak,
-        peeled: &PeeledBins,
-    ) -> Option<U24F8> {
-        match self {
-            Self::Paper(rule) => once(rule, histogram, gate, peak, peeled),
-            Self::Average(rule) => once(rule, histogram, gate, peak, peeled),
-            Self::Window(rule) => once(rule, histogram, gate, peak, peeled),
+            // Inlined, for fast looks with the default rule.
+            Self::Paper(rule) if W::BITS <= 10 => rule.detect(histogram, gate, peak, excluded),
+            Self::Paper(rule) => once(rule, histogram, gate, peak, excluded),
+            Self::Average(rule) => once(rule, histogram, gate, peak, excluded),
+            Self::Window(rule) => once(rule, histogram, gate, peak, excluded),
         }
     }
 }
 
-/// The code of the rule is there once, not once with a gate and once without: a look
-/// takes some instructions more than with the rule itself.
+/// Keeps one copy of the rule's code for looks with a gate and without. A look takes some
+/// instructions more than with the rule's own type.
 #[inline(never)]
 fn once<const BINS: usize, W: CounterWidth>(
     rule: &impl DetectionRule,
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
     peak: Peak,
-    peeled: &PeeledBins,
+    excluded: &ExcludedBins,
 ) -> Option<U24F8> {
-    rule.detect_without(histogram, gate, peak, peeled)
+    rule.detect(histogram, gate, peak, excluded)
 }

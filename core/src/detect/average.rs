@@ -10,16 +10,17 @@
 //! in whole numbers, exact, without a division or a root. The total is kept while counting,
 //! so the rule takes no pass over the bins.
 //!
-//! The average holds the photons of the pulse as well, which matters with few bins. A strong
-//! pulse raises its own threshold: with 8 bins and α = 8 one in a single bin needs 11 photons
-//! even without any background. The background of an event is too high by the pulse's photons
-//! over B, and the centroid, which takes it off, errs more: with 8 bins and a pulse of 0.33 bins
-//! by up to 0.12 bins instead of 0.03. [`CentredWindow`](crate::CentredWindow) has a background
-//! of its own. [`PaperRule`](crate::PaperRule) leaves the half with the peak out.
+//! The average includes the photons of the pulse, which matters with few bins. A strong
+//! pulse raises its own threshold: with 8 bins and α = 8, a pulse in a single bin needs 11
+//! photons even without background. The background of an event is too high by the pulse's
+//! photons divided by B. The centroid subtracts it and errs more: with 8 bins and a pulse of
+//! 0.33 bins by up to 0.12 bins instead of 0.03. [`CentredWindow`](crate::CentredWindow) has a
+//! background of its own. [`PaperRule`](crate::PaperRule) leaves out the half with the peak.
 //!
 //! ```
 //! use dtof_core::fixed::types::U8F8;
-//! use dtof_core::{AverageRule, Count, DepthEstimator, Histogram, RangeGate, detect};
+//! use dtof_core::{AverageRule, Count, DepthEstimator, Histogram, RangeGate};
+//! use dtof_core::rule::detect;
 //!
 //! let rule = AverageRule::new(const { U8F8::lit("4") }, Count::saturating(5));
 //! let mut histogram = Histogram::<8>::new();
@@ -39,8 +40,8 @@ use fixed::types::{U8F8, U24F8};
 use super::rule::DetectionRule;
 use super::threshold::Threshold;
 use crate::histogram::counter::CounterWidth;
+use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
-use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak, mean};
 use crate::units::Count;
 
@@ -74,22 +75,12 @@ impl DetectionRule for AverageRule {
         histogram: &Histogram<BINS, W>,
         gate: &RangeGate<BINS>,
         peak: Peak,
-    ) -> Option<U24F8> {
-        self.detect_without(histogram, gate, peak, &PeeledBins::NONE)
-    }
-
-    #[inline(always)]
-    fn detect_without<const BINS: usize, W: CounterWidth>(
-        &self,
-        histogram: &Histogram<BINS, W>,
-        gate: &RangeGate<BINS>,
-        peak: Peak,
-        peeled: &PeeledBins,
+        excluded: &ExcludedBins,
     ) -> Option<U24F8> {
         if peak.count < self.threshold.minimum_count() {
             return None;
         }
-        let bins = peeled.bins_left(gate)?;
+        let bins = excluded.bins_left(gate)?;
         let total = histogram.total();
         // A peak key fits 32 bits, so B times the highest count does.
         let above = bins.wrapping_mul(peak.count.raw()).saturating_sub(total);

@@ -2,14 +2,15 @@
 //!
 //! Take the half of the histogram without the peak, and split it into two quadrants. The
 //! background is the smaller of the two quadrants' maxima. That needs no division. A
-//! pulse that straddles the middle spoils at most one quadrant.
+//! pulse across the middle affects at most one quadrant.
 //!
 //! It is a *maximum* of a quarter of the bins, so it lies above the mean: about two
-//! standard deviations for 32 bins. The α that gives a wanted false-alarm rate is
-//! therefore lower than the paper's Eq. 11 has it.
+//! standard deviations for 32 bins. The α for a given false-alarm rate is therefore
+//! lower than in the paper's Eq. 11.
 //!
 //! ```
-//! use dtof_core::{BinIndex, RangeGate, quadrant_background};
+//! use dtof_core::{BinIndex, RangeGate};
+//! use dtof_core::paper::quadrant_background;
 //!
 //! // Peak in the upper half, so bins 0..=3 count: maxima 5 and 4, the smaller is 4.
 //! let counts = [5u16, 1, 4, 2, 0, 9, 3, 0];
@@ -19,20 +20,20 @@
 //!
 //! Cost: one pass over half of the gated bins.
 //!
-//! Source: the paper's section IV-B, which has it in place of the average of all bins:
+//! Source: the paper's section IV-B, which uses it instead of the average of all bins:
 //! [`AverageRule`](crate::AverageRule).
 
 use core::ops::Range;
 
 use crate::histogram::counter::PhotonCount;
+use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
-use crate::histogram::peeled::PeeledBins;
 use crate::units::{BinIndex, Count};
 
 /// The paper's quadrant estimate over the gated bins.
 ///
 /// Counts beyond [`Count::MAX`] are taken as [`Count::MAX`].
-// Kept apart from the looks that end without it.
+// Out of line: most looks end without it.
 #[inline(never)]
 #[must_use]
 pub fn quadrant_background<C: PhotonCount, const BINS: usize>(
@@ -46,7 +47,7 @@ pub fn quadrant_background<C: PhotonCount, const BINS: usize>(
 
 /// Whether [`quadrant_background`] is `level` or more.
 ///
-/// Costs less: it ends at the first such count of each quadrant.
+/// Cheaper: it stops at the first such count of each quadrant.
 #[inline(always)]
 pub(super) fn background_reaches<C: PhotonCount, const BINS: usize>(
     counts: &[C; BINS],
@@ -58,14 +59,14 @@ pub(super) fn background_reaches<C: PhotonCount, const BINS: usize>(
     C::any_reaches(lower, level) && C::any_reaches(upper, level)
 }
 
-/// [`quadrant_background`] where the bins of some echoes are empty: a quadrant of which more
-/// than half is empty is left out. `None` if no quadrant is left.
+/// [`quadrant_background`] with excluded bins: a quadrant of which more than half is excluded
+/// does not count. `None` if no quadrant is left.
 #[inline(never)]
 pub(super) fn background_without<C: PhotonCount, const BINS: usize>(
     counts: &[C; BINS],
     gate: &RangeGate<BINS>,
     peak: BinIndex,
-    peeled: &PeeledBins,
+    excluded: &ExcludedBins,
 ) -> Option<Count> {
     let [start, lower, middle, upper, end] = gate.quadrant_starts();
     let quadrants = if peak.raw() < middle {
@@ -75,7 +76,7 @@ pub(super) fn background_without<C: PhotonCount, const BINS: usize>(
     };
     let highest = |bins: Range<u16>| {
         let (first, last) = (bins.start, bins.end.saturating_sub(1));
-        let is_kept = 2 * peeled.bins_among(first..=last) <= u32::from(bins.end - bins.start);
+        let is_kept = 2 * excluded.bins_among(first..=last) <= u32::from(bins.end - bins.start);
         let bins = usize::from(bins.start)..usize::from(bins.end);
         is_kept.then(|| C::highest(counts.get(bins).unwrap_or_default()))
     };
@@ -99,7 +100,7 @@ fn quadrants_without<'a, C, const BINS: usize>(
     halves(if in_lower { upper } else { lower })
 }
 
-/// Of an odd number the second has one more; halved twice this gives `n/4`, `n/2`
+/// With an odd number the second half has one more. Halving twice gives `n/4`, `n/2`
 /// and `3n/4`, each rounded down.
 #[inline(always)]
 fn halves<C>(bins: &[C]) -> [&[C]; 2] {

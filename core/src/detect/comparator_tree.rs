@@ -1,11 +1,12 @@
-//! The paper's search for the peak: eight groups, then one 8-to-1 comparator.
+//! The paper's search for the peak (section IV-B; the README names the paper): eight groups, then one
+//! 8-to-1 comparator.
 //!
-//! [`Histogram::peak`](crate::Histogram::peak) keeps the peak while counting. The tree
-//! is the model of the hardware that it is checked against. Both give the same bin and
-//! count for every histogram.
+//! [`Histogram`](crate::Histogram) tracks its peak while counting. The tree models the
+//! hardware and is what that peak is tested against. Both give the same bin and count for
+//! every histogram.
 //!
 //! ```
-//! use dtof_core::ComparatorTree;
+//! use dtof_core::paper::ComparatorTree;
 //!
 //! let tree = ComparatorTree::of(&[3u16, 9, 1, 0, 9, 2, 2, 2]);
 //! assert_eq!((tree.peak().bin.raw(), tree.peak().count.raw()), (1, 9));
@@ -60,8 +61,7 @@ impl ComparatorTree {
         comparator(self.groups)
     }
 
-    /// The highest count of each quarter of the bins, what the paper's
-    /// background rule needs.
+    /// The highest count of each quarter of the bins, for the paper's background.
     #[must_use]
     pub fn quadrant_maxima(&self) -> [Count; 4] {
         let [a, b, c, d, e, f, g, h] = self.groups.map(|group| group.count);

@@ -1,11 +1,12 @@
 //! One decision on one histogram: peak, background, threshold, depth.
 //!
-//! A pixel decides so at each look. The same decision serves a histogram that arrives
-//! whole from a sensor.
+//! A pixel decides this way at each look. The same decision works on a whole histogram from
+//! a sensor.
 //!
 //! ```
 //! use dtof_core::fixed::types::U8F8;
-//! use dtof_core::{Count, DepthEstimator, Histogram, PaperRule, RangeGate, detect};
+//! use dtof_core::{Count, DepthEstimator, Histogram, PaperRule, RangeGate};
+//! use dtof_core::rule::detect;
 //!
 //! let rule = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(5));
 //! let mut histogram = Histogram::<128>::new();
@@ -24,12 +25,12 @@
 use fixed::types::U24F8;
 
 use super::rule::DetectionRule;
-use crate::depth::{Depth, DepthEstimator};
+use crate::depth::{DepthEstimate, DepthEstimator};
 use crate::event::DepthEvent;
 use crate::flags::Flags;
 use crate::histogram::counter::CounterWidth;
+use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
-use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak};
 use crate::units::{BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress};
 
@@ -42,7 +43,7 @@ pub struct Detection {
     /// The background a bin, as the rule estimates it, rounded to whole counts.
     pub background: Count,
     /// Where in its bins the pulse lies.
-    pub depth: Depth,
+    pub depth: DepthEstimate,
 }
 
 impl Detection {
@@ -53,8 +54,8 @@ impl Detection {
         BinPosition::of(self.peak.bin, self.depth.offset)
     }
 
-    /// The event that reports it. Laser cycle `cycle` brought the decision, and the
-    /// histogram was counted over `exposure` laser cycles. It is the first echo of one pixel.
+    /// The event that reports it: the first echo of one pixel, decided at the end of laser
+    /// cycle `cycle`, from a histogram of `exposure` laser cycles.
     #[inline(always)]
     #[must_use]
     pub const fn event(&self, pixel: PixelAddress, cycle: LaserCycle, exposure: u16) -> DepthEvent {
@@ -73,11 +74,11 @@ impl Detection {
     }
 }
 
-/// Whether the highest bin of `histogram` stands clear, and how deep its pulse lies.
-/// [`PixelConfig::detect`](crate::PixelConfig::detect) does it by a configuration.
+/// The detection in `histogram`, if its highest bin stands clear of the background.
+/// [`PixelConfig::detect`](crate::PixelConfig::detect) does this for a configuration.
 ///
-/// `histogram` must hold gated bins only: [`Histogram::add_frame`] with the same gate
-/// sees to it. A peak outside the gate is no detection.
+/// `histogram` must hold gated bins only, as [`Histogram::add_frame`] with the same gate
+/// leaves it. A peak outside the gate is not a detection.
 #[inline(always)]
 #[must_use]
 pub fn detect<const BINS: usize, W: CounterWidth, R: DetectionRule>(
@@ -86,7 +87,7 @@ pub fn detect<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     rule: &R,
     estimator: &DepthEstimator,
 ) -> Option<Detection> {
-    // Without a gate, halves and quadrants are known when compiled.
+    // Without a gate, halves and quadrants are known at compile time.
     if gate.is_full() {
         detect_gated(histogram, &RangeGate::full(), rule, estimator)
     } else {
@@ -105,7 +106,7 @@ fn detect_gated<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     if !gate.contains(peak.bin.raw()) {
         return None;
     }
-    let background = rule.detect(histogram, gate, peak)?;
+    let background = rule.detect(histogram, gate, peak, &ExcludedBins::NONE)?;
     let depth = estimator.estimate(histogram, gate, peak, background);
     Some(Detection {
         peak,
@@ -114,9 +115,9 @@ fn detect_gated<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     })
 }
 
-/// Whether `peak` stands clear where some bins are left out. A window that reaches them is
-/// flagged as [`Flags::CLIPPED`], a peak right behind them as [`Flags::TAIL`].
-// Once for each rule: not with the looks of pixels that have reported nothing yet.
+/// The detection of `peak`, with excluded bins. A window that reaches them is flagged as
+/// [`Flags::CLIPPED`], a peak right behind them as [`Flags::TAIL`].
+// Out of line: most looks are of pixels that have not reported yet.
 #[inline(never)]
 pub(crate) fn detect_at<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     histogram: &Histogram<BINS, W>,
@@ -124,31 +125,31 @@ pub(crate) fn detect_at<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     peak: Peak,
     rule: &R,
     estimator: &DepthEstimator,
-    peeled: &PeeledBins,
+    excluded: &ExcludedBins,
 ) -> Option<Detection> {
     if !gate.contains(peak.bin.raw()) {
         return None;
     }
-    let background = rule.detect_without(histogram, gate, peak, peeled)?;
+    let background = rule.detect(histogram, gate, peak, excluded)?;
     Some(detection_at(
-        histogram, gate, peak, background, estimator, peeled,
+        histogram, gate, peak, background, estimator, excluded,
     ))
 }
 
-/// The detection of a peak above such a background, where some bins are left out.
+/// The detection of a peak above `background`, with excluded bins.
 pub(crate) fn detection_at<const BINS: usize, W: CounterWidth>(
     histogram: &Histogram<BINS, W>,
     gate: &RangeGate<BINS>,
     peak: Peak,
     background: U24F8,
     estimator: &DepthEstimator,
-    peeled: &PeeledBins,
+    excluded: &ExcludedBins,
 ) -> Detection {
-    let mut depth = estimator.estimate_without(histogram, gate, peak, background, peeled);
-    if peeled.touches(peak.bin.raw(), estimator.reach()) {
+    let mut depth = estimator.estimate_without(histogram, gate, peak, background, excluded);
+    if excluded.touches(peak.bin.raw(), estimator.reach()) {
         depth.flags |= Flags::CLIPPED;
     }
-    if peeled.is_tail(peak.bin) {
+    if excluded.is_tail(peak.bin) {
         depth.flags |= Flags::TAIL;
     }
     Detection {

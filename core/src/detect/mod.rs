@@ -1,12 +1,13 @@
-//! Does a peak stand clear of the background?
+//! Whether a peak stands clear of the background.
 //!
 //! | module | what it has |
 //! |---|---|
-//! | `rule` | what a detection rule is |
+//! | `rule` | the trait of detection rules |
 //! | `quadrant` | the paper's rule, with its `background`, `threshold` and square `root` |
 //! | `average` | the same threshold over the average of all bins |
 //! | `window`, `window_z` | the window rule, a CFAR test over all photons of the pulse, and its z |
-//! | `any_rule` | a rule that is chosen when the program runs |
+//! | `tracking` | the window rule with a lower threshold where the last event was |
+//! | `any_rule` | a rule that is chosen at run time |
 //! | `decision` | one decision on one histogram |
 //! | `comparator_tree` | the paper's search for the peak, as a model of its hardware |
 
@@ -31,7 +32,7 @@ pub(crate) use decision::detect_at;
 pub use decision::{Detection, detect};
 pub use quadrant::PaperRule;
 pub use root::isqrt;
-pub use rule::{DetectionRule, whole_background};
+pub use rule::{DetectionRule, background_from_count};
 pub use threshold::Threshold;
 pub use tracking::Tracking;
 pub use window::{WindowRule, WindowWidthError};

@@ -2,12 +2,13 @@
 //!
 //! The peak is a detection if it exceeds `background + α·√background`, the
 //! [`Threshold`] of the [`quadrant_background`]. It is a CFAR test whose reference is a
-//! maximum. The false-alarm rate for a given α therefore moves with the background;
-//! [`WindowRule`](crate::WindowRule) is the way out.
+//! maximum. The false-alarm rate for a given α therefore changes with the background; that
+//! of [`WindowRule`](crate::WindowRule) does not.
 //!
 //! ```
 //! use dtof_core::fixed::types::U8F8;
-//! use dtof_core::{Count, DepthEstimator, Histogram, PaperRule, RangeGate, detect};
+//! use dtof_core::{Count, DepthEstimator, Histogram, PaperRule, RangeGate};
+//! use dtof_core::rule::detect;
 //!
 //! let rule = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(5));
 //! let mut histogram = Histogram::<128>::new();
@@ -19,9 +20,9 @@
 //! ```
 //!
 //! Cost on a Cortex-M4, 128 bins: 91 instructions for a usual look without an event, 272
-//! if every bin has to be read. A look that does not fire never learns the background:
-//! [`Threshold::lowest_background`] says which background would hold the peak back, and
-//! the search ends at the first count that reaches it.
+//! if every bin has to be read. A look without an event does not compute the background:
+//! [`Threshold::lowest_background`] is the lowest that the peak does not exceed, and the
+//! search stops at the first count that reaches it.
 //!
 //! Source: the paper's section IV-B and Eq. 5. Its section III, with 8 bins, most likely
 //! took the average of all bins: [`AverageRule`](crate::AverageRule).
@@ -29,11 +30,11 @@
 use fixed::types::{U8F8, U24F8};
 
 use super::background::{background_reaches, background_without, quadrant_background};
-use super::rule::{DetectionRule, whole_background};
+use super::rule::{DetectionRule, background_from_count};
 use super::threshold::Threshold;
 use crate::histogram::counter::CounterWidth;
+use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
-use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak};
 use crate::units::Count;
 
@@ -68,25 +69,15 @@ impl DetectionRule for PaperRule {
         histogram: &Histogram<BINS, W>,
         gate: &RangeGate<BINS>,
         peak: Peak,
-    ) -> Option<U24F8> {
-        self.detect_without(histogram, gate, peak, &PeeledBins::NONE)
-    }
-
-    #[inline(always)]
-    fn detect_without<const BINS: usize, W: CounterWidth>(
-        &self,
-        histogram: &Histogram<BINS, W>,
-        gate: &RangeGate<BINS>,
-        peak: Peak,
-        peeled: &PeeledBins,
+        excluded: &ExcludedBins,
     ) -> Option<U24F8> {
         if peak.count < self.threshold.minimum_count() {
             return None;
         }
-        if peeled.echoes() > 0 {
-            let background = background_without(histogram.counts(), gate, peak.bin, peeled)?;
+        if excluded.echoes() > 0 {
+            let background = background_without(histogram.counts(), gate, peak.bin, excluded)?;
             let exceeded = self.threshold.is_exceeded::<W>(peak.count, background);
-            return exceeded.then_some(whole_background(background));
+            return exceeded.then_some(background_from_count(background));
         }
         // Most looks end here, without the background itself.
         let lowest = self.threshold.lowest_background::<W>(peak.count);
@@ -94,6 +85,6 @@ impl DetectionRule for PaperRule {
             return None;
         }
         let background = quadrant_background(histogram.counts(), gate, peak.bin);
-        Some(whole_background(background))
+        Some(background_from_count(background))
     }
 }

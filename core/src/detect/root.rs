@@ -6,7 +6,7 @@
 //! paper, eight cover 16 bits, twelve cover 24.
 //!
 //! ```
-//! use dtof_core::isqrt;
+//! use dtof_core::paper::isqrt;
 //!
 //! assert_eq!(isqrt::<5>(1023), 31);
 //! assert_eq!(isqrt::<8>(65_535), 255);
@@ -19,8 +19,8 @@
 
 use crate::histogram::counter::CounterWidth;
 
-/// Does `$step` for each shift below `$iterations`, from the highest down. Not a
-/// loop, which takes twice as long where it is not unrolled, at opt-level s.
+/// Does `$step` for each shift below `$iterations`, from the highest down. A loop that is
+/// not unrolled, as at opt-level s, takes twice as long.
 macro_rules! for_each_shift {
     ($iterations:ident, |$shift:ident| $step:block) => {
         for_each_shift!($iterations, |$shift| $step, 15 14 13 12 11 10 9 8 7 6 5 4 3 2 1 0)
@@ -52,7 +52,7 @@ pub const fn isqrt<const ITERATIONS: u32>(value: u32) -> u32 {
             remainder -= trial;
         }
     });
-    let _ = remainder; // the last is not used
+    let _ = remainder; // of the last iteration
     root
 }
 
@@ -91,7 +91,7 @@ pub(super) fn square_root<W: CounterWidth>(count: u32) -> u32 {
 }
 
 /// The largest root of a count of the width `W` for which `r² + alpha·r < level`, or 0,
-/// and what is left of `level`; `alpha` and `level` in 1/256. None overflows.
+/// and the rest of `level`; `alpha` and `level` in 1/256. Nothing overflows.
 #[inline]
 pub(super) fn root_below<W: CounterWidth>(level: u32, alpha: u16) -> (u32, u32) {
     if W::BITS <= 10 {
@@ -111,7 +111,7 @@ mod tests {
     use super::*;
     use crate::histogram::counter::{Count10, Count16, Count24};
 
-    /// Of any level and α, the largest there are among them.
+    /// Random levels and α, and the largest.
     #[test]
     fn no_root_below_a_level_overflows() {
         fn check<W: CounterWidth>(level: u32, alpha: u16) {

@@ -1,21 +1,22 @@
 //! The threshold a peak must exceed: `background + α·√background`.
 //!
 //! α is an unsigned fixed-point number with 8 fractional bits, 0 to 255.996. The root
-//! is the integer one of [`isqrt`](crate::isqrt()). So the threshold lies less than α
+//! is the integer one of [`isqrt`](crate::paper::isqrt()). So the threshold lies less than α
 //! counts below the real-valued one, as in the paper's hardware.
 //!
 //! With a background of 0 the threshold is 0, and one stray photon would exceed it. So
-//! the peak must also hold a minimum count.
+//! the peak must also have a minimum count.
 //!
 //! ```
-//! use dtof_core::{Count, Count10, Threshold, fixed::types::U8F8};
+//! use dtof_core::{Count, Count10, fixed::types::U8F8};
+//! use dtof_core::paper::Threshold;
 //!
 //! let threshold = Threshold::new(const { U8F8::lit("2.5") }, Count::saturating(5));
 //! let background = Count::saturating(20); // root 4
 //! assert_eq!(threshold.level::<Count10>(background), 30u16);
 //! assert!(!threshold.is_exceeded::<Count10>(Count::saturating(30), background));
 //! assert!(threshold.is_exceeded::<Count10>(Count::saturating(31), background));
-//! // Background 0: only the minimum count holds a stray photon back.
+//! // Background 0: only the minimum count rejects a stray photon.
 //! assert!(!threshold.is_exceeded::<Count10>(Count::saturating(4), Count::saturating(0)));
 //! ```
 //!
@@ -62,9 +63,8 @@ impl Threshold {
 
     /// `background + α·⌊√background⌋`, exact in 1/256 counts.
     ///
-    /// `W` is the width of the counters the background comes from. Past the
-    /// largest `U24F8` the level stays
-    /// there, which no [`Count`] exceeds, as none would exceed the true level.
+    /// `W` is the width of the counters the background comes from. The level saturates at
+    /// the largest `U24F8`, which no [`Count`] exceeds.
     #[inline]
     #[must_use]
     pub fn level<W: CounterWidth>(&self, background: Count) -> U24F8 {
@@ -83,8 +83,8 @@ impl Threshold {
     }
 
     /// The lowest background a bin, in counts of the width `W`, whose level a peak
-    /// of `peak` photons does not exceed: one more than the largest count if there
-    /// is none.
+    /// of `peak` photons does not exceed: one more than the largest count if every
+    /// level is exceeded.
     ///
     /// With `r` the root, `peak ≤ background + α·r` is a straight line in the
     /// background from `r²` on, up to the next square. The last `r` whose line

@@ -1,9 +1,9 @@
-//! Tracking: half of the false alarms that are allowed are spent near the last event.
+//! Tracking: half of the allowed false alarms go to the place of the last event.
 //!
 //! A pixel that has reported expects its next event in the same place. A peak within
-//! [`Tracking::reach`] bins of it has to pass a lower threshold, one elsewhere a higher.
-//! The rate of false alarms stays, because both thresholds are shares of it: nothing is
-//! lost where the expectation is wrong. An exposure without an event ends it.
+//! [`Tracking::reach`] bins of it has a lower threshold, one elsewhere a higher one. Each
+//! threshold has half of the false alarms, so that their rate stays the same. An exposure
+//! without an event ends the expectation.
 //!
 //! [`WindowRule::tracking`](crate::WindowRule::tracking) has the two thresholds for a z.
 //!
@@ -20,14 +20,14 @@
 //! ```
 //!
 //! Cost: two bytes a pixel; a look at a pixel that has reported decides twice. On a Cortex-M4
-//! and with a window of 3 bins it takes 405 instructions, without tracking 191.
+//! and with a window of 3 bins it takes 405 instructions, without tracking 195.
 
 use super::decision::{Detection, detect_at, detection_at};
 use super::rule::DetectionRule;
 use crate::depth::DepthEstimator;
 use crate::histogram::counter::CounterWidth;
+use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
-use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak};
 use crate::units::{BinIndex, Count};
 
@@ -41,15 +41,15 @@ pub struct Tracking<R> {
 }
 
 impl<R> Tracking<R> {
-    /// `near` for peaks up to `reach` bins from the last event, `far` for the others. The
-    /// rate of false alarms is what the two have together.
+    /// `near` for peaks up to `reach` bins from the last event, `far` for the others. Their
+    /// rates of false alarms add up.
     #[must_use]
     pub const fn new(near: R, far: R, reach: u16) -> Self {
         Self { near, far, reach }
     }
 
     /// How many bins to either side of the last event count as near: those of all windows
-    /// that hold its bin.
+    /// that contain its bin.
     #[must_use]
     pub const fn reach(&self) -> u16 {
         self.reach
@@ -69,8 +69,9 @@ impl<R> Tracking<R> {
 }
 
 impl<R: DetectionRule> Tracking<R> {
-    /// The windows that hold the bin `expected` by the one rule, or else the highest bin of
-    /// all by the other. The peak of the former is the highest bin near `expected`.
+    /// Decides on the windows that contain the bin `expected` with the near rule, and else on
+    /// the highest bin with the far rule. The peak of the former is the highest bin near
+    /// `expected`.
     #[inline(always)]
     pub(crate) fn detect<const BINS: usize, W: CounterWidth>(
         &self,
@@ -78,7 +79,7 @@ impl<R: DetectionRule> Tracking<R> {
         gate: &RangeGate<BINS>,
         estimator: &DepthEstimator,
         expected: BinIndex,
-        peeled: &PeeledBins,
+        excluded: &ExcludedBins,
     ) -> Option<Detection> {
         let peak_at = |bin: u16| Peak {
             bin: BinIndex::saturating(bin),
@@ -86,22 +87,20 @@ impl<R: DetectionRule> Tracking<R> {
         };
         let at_expected = peak_at(expected.raw());
         if gate.contains(expected.raw())
-            && let Some(background) = self
-                .near
-                .detect_without(histogram, gate, at_expected, peeled)
+            && let Some(background) = self.near.detect(histogram, gate, at_expected, excluded)
         {
             let first = expected.raw().saturating_sub(self.reach);
             let last = expected.raw().saturating_add(self.reach);
             let mut near = at_expected;
             for bin in first.max(gate.first())..=last.min(gate.last()) {
                 let peak = peak_at(bin);
-                // The lowest of the highest, as everywhere.
+                // The lowest index wins a tie, as everywhere.
                 if peak.count > near.count || peak.count == near.count && peak.bin < near.bin {
                     near = peak;
                 }
             }
             return Some(detection_at(
-                histogram, gate, near, background, estimator, peeled,
+                histogram, gate, near, background, estimator, excluded,
             ));
         }
         detect_at(
@@ -110,7 +109,7 @@ impl<R: DetectionRule> Tracking<R> {
             histogram.peak(),
             &self.far,
             estimator,
-            peeled,
+            excluded,
         )
     }
 }

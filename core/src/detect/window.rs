@@ -1,21 +1,20 @@
-//! A calibrated detection rule: all photons of the pulse against all the others.
+//! The window rule, a calibrated test: all photons of the pulse against all the others.
 //!
-//! With `T` photons in `B` gated bins, and `S` of them in a window of `w` bins, of all that
-//! hold the peak bin the one with most, the peak is a detection if
+//! Let `B` gated bins hold `T` photons. Of all windows of `w` bins that contain the peak bin,
+//! take the one with the most photons, `S`. The peak is a detection if
 //!
 //! ```text
 //! S > Tp + z·V/√(V + z²/36) + z²/6·(1 - 2p)     p = w/B     V = Tp·(1 - p)
 //! ```
 //!
-//! the last term at least 0. That is the binomial distribution of `T` photons that fall
-//! into every bin alike: its mean, `z` standard deviations `√V`, and two corrections for
-//! small counts, whose distribution is skew. They are those of Cornish and Fisher, `z²/6` and
-//! `-z³/(72·√V)`; the second stands in the form that fits below one photon as well, where the
-//! series does not. What the
-//! background is need not be known, so that one `z` gives the same rate of false alarms
-//! from fractions of a count a bin to hundreds, for every width and from 8 bins on, where
-//! the α of the paper's rule has to follow the background. The total of the histogram is
-//! known, so that this takes no pass over the bins.
+//! with the last term at least 0. This is a quantile of the binomial distribution of `T`
+//! photons that fall into all bins with equal probability: its mean, `z` standard deviations
+//! `√V`, and two corrections for the skew of small counts. They are those of Cornish and
+//! Fisher, `z²/6` and `-z³/(72·√V)`; the second has a form that also fits below one photon,
+//! where the series does not. The background need not be known. One `z` gives the same rate
+//! of false alarms from fractions of a count a bin to hundreds, for every width and from 8
+//! bins on. The α of the paper's rule has to follow the background. The histogram keeps its
+//! total, so this takes no pass over the bins.
 //!
 //! With `n = B - w` bins outside, multiplied by `B` and squared, this is
 //!
@@ -23,12 +22,13 @@
 //! (B·S - w·T - z²/6·(n - w))² > z²·N²/(N + c)     N = n·w·T     c = z²/36·B²
 //! ```
 //!
-//! if what is squared is positive, without a root. As the right side is at least `z²·(N - c)`, its
-//! division is only done where that is exceeded.
+//! if the term to be squared is positive. There is no root. The right side is at least
+//! `z²·(N - c)`, so it is divided only if the left side exceeds that.
 //!
 //! ```
 //! use dtof_core::fixed::types::U4F12;
-//! use dtof_core::{Count, DepthEstimator, Histogram, RangeGate, WindowRule, detect};
+//! use dtof_core::{Count, DepthEstimator, Histogram, RangeGate, WindowRule};
+//! use dtof_core::rule::detect;
 //!
 //! let rule = WindowRule::new(2, const { U4F12::lit("4.3") }, Count::saturating(4))?;
 //! let mut histogram = Histogram::<128>::new();
@@ -45,10 +45,10 @@ use fixed::types::{U4F12, U8F8, U24F8};
 use super::rule::DetectionRule;
 use super::tracking::Tracking;
 use super::window_z::{block_z, tracking_z};
-use crate::check::written_as_its_text;
+use crate::check::impl_error;
 use crate::histogram::counter::CounterWidth;
+use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
-use crate::histogram::peeled::PeeledBins;
 use crate::histogram::{Histogram, Peak, mean};
 use crate::units::{BlockLevel, Count};
 
@@ -67,14 +67,14 @@ pub struct WindowRule {
 pub struct WindowWidthError;
 
 impl WindowWidthError {
-    /// What is wrong, in one line.
+    /// The error in one line.
     #[must_use]
     pub const fn text(self) -> &'static str {
         "the window must be 1 to 7 bins wide"
     }
 }
 
-written_as_its_text!(WindowWidthError);
+impl_error!(WindowWidthError);
 
 impl WindowRule {
     /// The widest window: a gate always leaves a bin outside it.
@@ -83,14 +83,14 @@ impl WindowRule {
     /// A window of `width` bins, `z` standard deviations above the background and
     /// at least `minimum_count` photons in the window.
     ///
-    /// [`Self::width_for_pulse`] says which width suits the pulse.
+    /// [`Self::width_for_pulse`] gives a width for a pulse.
     ///
-    /// Where the window takes half of the `B` gated bins or more, it needs more than
-    /// `z²·(width/(B - width) - B²/(36·width·(B - width)))` photons even without any
-    /// background, which is many where it leaves few bins: with 7 of 8 and z 4 more than 107.
+    /// If the window takes half of the `B` gated bins or more, a detection needs more than
+    /// `z²·(width/(B - width) - B²/(36·width·(B - width)))` photons even without background.
+    /// That is many if few bins are left: with 7 of 8 and z 4 more than 107.
     ///
     /// # Errors
-    /// [`WindowWidthError`] unless `width` is 1 to [`Self::MAX_WIDTH`].
+    /// Fails unless `width` is 1 to [`Self::MAX_WIDTH`].
     pub const fn new(width: u8, z: U4F12, minimum_count: Count) -> Result<Self, WindowWidthError> {
         if width == 0 || width > Self::MAX_WIDTH {
             return Err(WindowWidthError);
@@ -102,7 +102,7 @@ impl WindowRule {
         })
     }
 
-    /// The width that suits a pulse of the standard deviation `sigma` in bins: 2 bins up
+    /// The width for a pulse of the standard deviation `sigma` in bins: 2 bins up
     /// to 0.6, 3 up to 1.25, 5 above.
     #[must_use]
     pub const fn width_for_pulse(sigma: U8F8) -> u8 {
@@ -134,9 +134,9 @@ impl WindowRule {
         self.minimum_count
     }
 
-    /// The rules of a pixel that tracks, with together the false alarms of this rule. What
-    /// is outside of the range of [`z_for`](crate::z_for) is limited to it; near the last
-    /// event z never gets higher, and elsewhere never lower.
+    /// The rules of a pixel that tracks. Together they have the false alarms of this rule. z
+    /// is limited to the range of [`z_for`](crate::z_for). It is never higher than this
+    /// rule's near the last event, and never lower elsewhere.
     #[must_use]
     pub fn tracking<const BINS: usize>(&self, gate: &RangeGate<BINS>) -> Tracking<Self> {
         let [near, far] = tracking_z(self.z, gate);
@@ -144,9 +144,9 @@ impl WindowRule {
         Tracking::new(near, Self { z: far, ..*self }, u16::from(self.width) - 1)
     }
 
-    /// The rule of blocks of pixels with this rule, of which z never gets lower. Blocks of all
-    /// `levels` have together a third as many false alarms as pixels: see
-    /// [`z_for_levels`](crate::z_for_levels).
+    /// The rule for blocks of pixels with this rule; its z is not lower. The blocks of all
+    /// `levels` together have a third as many false alarms as pixels: see
+    /// [`z_for_levels`](crate::rule::z_for_levels).
     #[must_use]
     pub fn of_blocks(&self, levels: BlockLevel) -> Self {
         Self {
@@ -155,7 +155,7 @@ impl WindowRule {
         }
     }
 
-    /// The most photons in a gated window that holds the peak bin: at most 7 · 2²⁴.
+    /// The most photons in a gated window that contains the peak bin: at most 7 · 2²⁴.
     #[inline(always)]
     fn window_sum<const BINS: usize, W: CounterWidth>(
         &self,
@@ -193,24 +193,14 @@ impl DetectionRule for WindowRule {
         histogram: &Histogram<BINS, W>,
         gate: &RangeGate<BINS>,
         peak: Peak,
-    ) -> Option<U24F8> {
-        self.detect_without(histogram, gate, peak, &PeeledBins::NONE)
-    }
-
-    #[inline(always)]
-    fn detect_without<const BINS: usize, W: CounterWidth>(
-        &self,
-        histogram: &Histogram<BINS, W>,
-        gate: &RangeGate<BINS>,
-        peak: Peak,
-        peeled: &PeeledBins,
+        excluded: &ExcludedBins,
     ) -> Option<U24F8> {
         let inside = self.window_sum(histogram, gate, peak);
         if inside < self.minimum_count.raw() {
             return None;
         }
         let width = u32::from(self.width);
-        let bins = peeled.bins_left(gate)?;
+        let bins = excluded.bins_left(gate)?;
         let bins_outside = bins - width;
 
         // In 1/16 counts.

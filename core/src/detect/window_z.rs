@@ -1,25 +1,25 @@
-//! The z that gives a wanted rate of false alarms.
+//! The z for a given rate of false alarms.
 //!
-//! Without a target the window rule tries its luck once a bin and look. Neighbouring
-//! windows and successive looks share photons: the looks of an exposure are worth fewer
-//! independent ones, the more alike they are. The first table says how many the first
-//! `k` looks are worth when there is one every X laser cycles; of looks from
-//! `N = X·k` on, those before are taken off. The second is the normal distribution's:
-//! the z that one in so many trials exceeds.
+//! Without a target each bin of each look is a trial of the window rule. Neighbouring
+//! windows and successive looks share photons, so the looks of an exposure count as fewer
+//! independent ones. The first table has the number of independent looks that the first `k`
+//! looks count as, with one look every X laser cycles. For looks from `N = X·k` on, those
+//! before are subtracted. The second table is the normal distribution's: the z that one in
+//! so many trials exceeds.
 //!
-//! `core/tests/detect/window_z_tables.rs` works both out again, the first from
-//! simulation. `core/tests/detect/window_z.rs` holds them against another simulation.
+//! `core/tests/detect/window_z_tables.rs` computes both again, the first by simulation.
+//! `core/tests/detect/window_z.rs` checks them with another simulation.
 
 use fixed::types::U4F12;
 
 use crate::histogram::gate::RangeGate;
 use crate::units::BlockLevel;
 
-/// What the first 1, 2, 4, … looks are worth, in 1/16.
+/// Independent looks that the first 1, 2, 4, … looks count as, in 1/16.
 const LOOKS: [u16; 11] = [12, 23, 45, 73, 112, 164, 222, 300, 388, 469, 573];
 
-/// The highest z that [`z_for`] gives, 6.44: for 2³⁴ trials or more, so that more false
-/// alarms may come than wanted.
+/// The highest z that [`z_for`] gives, 6.44, for 2³⁴ trials or more. There the rate of false
+/// alarms may exceed the given one.
 pub const HIGHEST_Z: U4F12 = U4F12::from_bits(26394);
 
 /// z in 1/4096 for 2⁶, 2⁸, … trials.
@@ -28,16 +28,16 @@ const Z: [u16; 15] = [
     25519, 26394,
 ];
 
-/// The z of a [`WindowRule`](crate::WindowRule) with which one in `one_in` exposures
-/// without a target brings a false alarm: 100 for 1 %, 1000 for 0.1 %.
+/// The z of a [`WindowRule`](crate::WindowRule) for one false alarm in `one_in` exposures
+/// without a target: 100 for 1 %, 1000 for 0.1 %.
 ///
 /// `gate`, `x`, `l1` and `l2` are those of the [`PixelConfig`](crate::PixelConfig). With 8 to
-/// 128 bins, 1 in 100 or 1000 and many looks an exposure, at most 1.5 times as many come as
-/// wanted, whatever the width of the window and the background; with a single look, 512
-/// bins or more, or 1 in a million, up to 2.5 times. With 128 bins and 0.4 photons a bin at
-/// the first look or more it is at least 0.5 times as many; with fewer bins or photons,
-/// or a window of most of the bins, fewer still. From 64 to 2³⁴ trials, z 2.15 to
-/// [`HIGHEST_Z`], to which it is limited.
+/// 128 bins, 1 in 100 or 1000 and many looks an exposure, the rate is at most 1.5 times the
+/// given one, whatever the width of the window and the background. With a single look, 512
+/// bins or more, or 1 in a million, it is up to 2.5 times. With 128 bins and at least 0.4
+/// photons a bin at the first look, it is at least 0.5 times the given one; with fewer bins
+/// or photons, or a window of most of the bins, less. z is limited to 2.15, for 64 trials, to
+/// [`HIGHEST_Z`](crate::rule::HIGHEST_Z).
 ///
 /// ```
 /// use dtof_core::{RangeGate, z_for};
@@ -64,11 +64,11 @@ pub fn z_for<const BINS: usize>(
     z_of(log2(trials))
 }
 
-/// [`z_for`] for pixels and blocks of so many levels: one in `one_in` is the share of pixels
-/// that are covered by a false report in L2 laser cycles, their own or that of a block. Pixels
-/// have three quarters of it, and blocks, with the z of
-/// [`WindowRule::of_blocks`](crate::WindowRule::of_blocks), the rest. How patient pixels are
-/// does not matter: without a target nearly all feed their blocks.
+/// [`z_for`] for pixels with blocks of so many levels. One in `one_in` pixels has a false
+/// report in L2 laser cycles, its own or that of a block. Three quarters of these are reports
+/// of pixels, the rest those of blocks with the z of
+/// [`WindowRule::of_blocks`](crate::WindowRule::of_blocks). The patience does not matter:
+/// without a target nearly all pixels feed their blocks.
 #[must_use]
 pub fn z_for_levels<const BINS: usize>(
     one_in: u32,
@@ -86,7 +86,7 @@ pub fn z_for_levels<const BINS: usize>(
     z_of(trials_of(z) + 106)
 }
 
-/// 1 as [`log2`] has it.
+/// 1 in the unit of [`log2`].
 const ONE: u32 = 256;
 
 /// The z for so many trials, as a binary logarithm in 1/256.
@@ -101,8 +101,8 @@ fn z_of(trials: u32) -> U4F12 {
     U4F12::from_bits(z as u16)
 }
 
-/// How many trials a z is for, as a binary logarithm in 1/256: the inverse of [`z_of`],
-/// limited to what it covers.
+/// The trials for a z, as a binary logarithm in 1/256: the inverse of [`z_of`], limited to
+/// its range.
 fn trials_of(z: U4F12) -> u32 {
     let z = z.to_bits();
     let mut trials = 6 * ONE;
@@ -114,8 +114,8 @@ fn trials_of(z: U4F12) -> u32 {
     trials
 }
 
-/// The z near the last event, and elsewhere, that have each half of the false alarms of `z`.
-/// The windows that hold one bin are worth [`NEAR`] bins.
+/// The z near the last event, and elsewhere, each with half of the false alarms of `z`. The
+/// windows that contain one bin count as [`NEAR`] bins.
 pub(super) fn tracking_z<const BINS: usize>(z: U4F12, gate: &RangeGate<BINS>) -> [U4F12; 2] {
     let bins = gate.last() - gate.first() + 1;
     let half = trials_of(z) + ONE;
@@ -123,19 +123,19 @@ pub(super) fn tracking_z<const BINS: usize>(z: U4F12, gate: &RangeGate<BINS>) ->
     [z_of(near).min(z), z_of(half).max(z)]
 }
 
-/// Bins that the windows around an expected one are worth.
+/// Bins that the windows around an expected one count as.
 const NEAR: u16 = 2;
 
-/// The z of blocks of so many levels that have together a third of the false alarms of pixels
-/// with `z`. A block has a quarter more than a pixel with the same z.
+/// The z with which the blocks of all `levels` together have a third of the false alarms of
+/// pixels with `z`. A block has a quarter more than a pixel with the same z.
 pub(super) fn block_z(z: U4F12, levels: BlockLevel) -> U4F12 {
     // 3 · 5/4 · levels.
     let share = log2(15 * u64::from(levels.raw())).saturating_sub(2 * ONE);
     z_of(trials_of(z) + share).max(z)
 }
 
-/// What the first `looks` are worth, in 1/16: between powers of two a straight line in
-/// the number of looks; past the last each power as much more as it.
+/// Independent looks that the first `looks` count as, in 1/16: interpolated between powers
+/// of two, and extrapolated by the last step.
 fn worth(looks: u16) -> u32 {
     let power = looks.checked_ilog2().unwrap_or(0);
     let part = u32::from(looks).saturating_sub(1 << power);
@@ -147,8 +147,8 @@ fn worth(looks: u16) -> u32 {
     low + rise * (power - index) + ((rise * part) >> power)
 }
 
-/// In 1/256, with a straight line between powers of two; 0 of 0. `value` is less than
-/// 2⁵⁶.
+/// The binary logarithm in 1/256, interpolated between powers of two; 0 for 0. `value` is
+/// less than 2⁵⁶.
 #[allow(
     clippy::cast_possible_truncation,
     reason = "only the last 8 bits are kept"

@@ -1,33 +1,33 @@
-//! Dynamic depth: only changes of depth are reported.
+//! Dynamic depth: events of changes of depth only.
 //!
 //! A pixel that looks at a wall reports the wall again and again. Dynamic depth
-//! (section III-E of the paper) keeps quiet until the mean depth of the last events has
-//! moved by more than a threshold, and then reports by how much and to which side, as
-//! an event camera does with brightness. The paper compares the three-event means of
-//! two adjacent events and takes 0.1 m: see [`Reference::Previous`]. A jump moves the
-//! mean of `N` events by an `N`th of it at each of `N` events, so that one of up to `N`
-//! times the threshold is not seen so, nor is slow motion; [`Reference::Reported`] sees
-//! what is more than the threshold. What is reported on the way of the mean are places
-//! where nothing need stand. A false alarm moves the mean twice, when it comes and when it
-//! leaves. Means know no time: an event after a long pause is averaged with those before it.
+//! (section III-E of the paper) reports only when the mean depth of the last events has
+//! moved by more than a threshold: by how much and in which direction, as an event camera
+//! does with brightness. The paper compares the three-event means of two adjacent events
+//! and takes 0.1 m: see [`Reference::Previous`].
+//!
+//! - A jump moves the mean of `N` events in `N` steps. [`Reference::Previous`] therefore
+//!   misses jumps of up to `N` times the threshold, and slow motion.
+//!   [`Reference::Reported`] sees both.
+//! - While the mean moves, positions are reported where no surface needs to be.
+//! - A false alarm moves the mean twice: when it enters it and when it leaves.
+//! - The mean ignores time: an event after a long pause is averaged with those before it.
 //!
 //! ```
 //! use dtof_core::fixed::types::{I24F8, U16F16, U24F8};
-//! use dtof_core::{
-//!     BinIndex, BlockLevel, Count, DepthEvent, DynamicDepthConfig, DynamicDepthPixel, EchoNumber,
-//!     Flags, LaserCycle, PixelAddress, Polarity, RangeScale, Reference, SubBinOffset,
-//! };
+//! use dtof_core::{BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress, RangeScale, SubBinOffset};
+//! use dtof_core::events::{DynamicDepthConfig, DynamicDepthPixel, Polarity, Reference};
 //!
 //! let scale = RangeScale::new(const { U16F16::lit("250") }, I24F8::ZERO)?; // 37.5 mm a bin
 //! let config = DynamicDepthConfig::new(U24F8::from_num(100), &scale, Reference::Previous)?;
 //! let mut pixel = DynamicDepthPixel::<3>::new();
 //! let mut event = |cycle, bin| DepthEvent {
-//!     pixel: PixelAddress(0), level: BlockLevel::PIXEL, echo: EchoNumber::FIRST,
-//!     cycle: LaserCycle(cycle), exposure: 44,
+//!     pixel: PixelAddress::new(0), level: BlockLevel::PIXEL, echo: EchoNumber::FIRST,
+//!     cycle: LaserCycle::new(cycle), exposure: 44,
 //!     peak_bin: BinIndex::saturating(bin), offset: SubBinOffset::CENTRE,
 //!     peak_count: Count::saturating(20), background: Count::saturating(2), flags: Flags::NONE,
 //! };
-//! // Three for the first mean, two more that say the same.
+//! // Three for the first mean, and two more in the same place.
 //! for cycle in 0..5 {
 //!     assert_eq!(pixel.observe(&config, &event(cycle, 40)), None);
 //! }
@@ -40,26 +40,26 @@
 use fixed::types::U24F8;
 
 use super::running_mean::RunningMean;
-use crate::check::written_as_its_text;
+use crate::check::impl_error;
 use crate::depth::RangeScale;
 use crate::event::DepthEvent;
 use crate::flags::Flags;
 use crate::units::{BinPosition, BlockLevel, LaserCycle, PixelAddress};
 
-/// What a mean depth is compared with.
+/// The mean that a mean depth is compared with.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Reference {
-    /// The mean at the event before: the paper's. Sees jumps of more than `N` times the
+    /// The mean at the event before, as in the paper. Sees jumps of more than `N` times the
     /// threshold.
     #[default]
     Previous,
-    /// The mean that was reported last, at first the first mean. Sees slow motion, too,
-    /// a threshold at a time.
+    /// The mean that was reported last; before the first report, the first mean. Sees slow
+    /// motion, too, in steps of the threshold.
     Reported,
 }
 
-/// How dynamic depth is found.
+/// The settings of dynamic depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DynamicDepthConfig {
@@ -74,21 +74,21 @@ pub struct DynamicDepthConfig {
 pub struct ZeroThresholdError;
 
 impl ZeroThresholdError {
-    /// What is wrong, in one line.
+    /// The error in one line.
     #[must_use]
     pub const fn text(self) -> &'static str {
         "the threshold of dynamic depth is less than 1/512 bin"
     }
 }
 
-written_as_its_text!(ZeroThresholdError);
+impl_error!(ZeroThresholdError);
 
 impl DynamicDepthConfig {
-    /// A mean depth more than `threshold` millimetres from `reference` is reported.
-    /// Rounded to the nearest 1/256 bin of `scale`.
+    /// Reports a mean depth more than `threshold` millimetres from `reference`. The threshold
+    /// is rounded to the nearest 1/256 bin of `scale`.
     ///
     /// # Errors
-    /// [`ZeroThresholdError`] if that is 0.
+    /// Fails if the rounded threshold is 0.
     #[allow(clippy::cast_possible_truncation, reason = "limited to 20 bits")]
     pub const fn new(
         threshold: U24F8,
@@ -114,20 +114,20 @@ impl DynamicDepthConfig {
         self.threshold
     }
 
-    /// What a mean is compared with.
+    /// The mean to compare with.
     #[must_use]
     pub const fn reference(&self) -> Reference {
         self.reference
     }
 }
 
-/// To which side a depth has changed.
+/// The direction of a change of depth.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Polarity {
-    /// The depth has become less: the paper's negative event.
+    /// The depth has decreased: the paper's negative event.
     Nearer,
-    /// The depth has become more: the paper's positive event.
+    /// The depth has increased: the paper's positive event.
     Farther,
 }
 
@@ -135,15 +135,15 @@ pub enum Polarity {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct DynamicDepthEvent {
-    /// Which macropixel; of a block its first.
+    /// The macropixel; for a block its first.
     pub pixel: PixelAddress,
-    /// Whether it is one pixel, or a block.
+    /// Whether this is one pixel, or a block.
     pub level: BlockLevel,
     /// The laser cycle of the depth event that moved the mean.
     pub cycle: LaserCycle,
     /// The mean of the last events, to the nearest 1/256 bin.
     pub position: BinPosition,
-    /// What is to be said against any of these events, or the one that has left the mean.
+    /// The flags of these events, and of the one that has left the mean.
     pub flags: Flags,
     change: i32,
 }
@@ -152,8 +152,8 @@ impl DynamicDepthEvent {
     /// The farthest two positions can be from each other, in 1/256 bins.
     const MOST: i32 = BinPosition::MAX.raw() - BinPosition::MIN.raw();
 
-    /// `change` is that of the mean, in 1/256 bins; `None` if it is 0 or more than two
-    /// positions can be apart.
+    /// `change` is the change of the mean, in 1/256 bins. `None` if it is 0 or more than the
+    /// largest distance of two positions.
     #[inline]
     #[must_use]
     pub const fn new(
@@ -184,7 +184,7 @@ impl DynamicDepthEvent {
         self.change
     }
 
-    /// To which side.
+    /// The direction of the change.
     #[inline]
     #[must_use]
     pub const fn polarity(&self) -> Polarity {
@@ -202,9 +202,9 @@ impl DynamicDepthEvent {
 #[derive(Clone, Debug)]
 pub struct DynamicDepthPixel<const N: usize> {
     recent: RunningMean<N>,
-    /// `N` times a mean, in 1/256 bins; of nothing until `recent` is full.
+    /// `N` times a mean, in 1/256 bins; 0 until `recent` is full.
     reference: i32,
-    /// Of the same events, the newest first.
+    /// The flags of the same events, the newest first.
     flags: [Flags; N],
 }
 
@@ -225,8 +225,8 @@ impl<const N: usize> DynamicDepthPixel<N> {
         }
     }
 
-    /// Takes a depth event of this pixel in, and says whether the mean depth has
-    /// changed. The first `N` events only make the first mean.
+    /// Adds a depth event of this pixel. Returns an event if the mean depth has changed. The
+    /// first `N` events only make the first mean.
     #[inline]
     #[allow(
         clippy::cast_possible_truncation,
@@ -238,7 +238,7 @@ impl<const N: usize> DynamicDepthPixel<N> {
         config: &DynamicDepthConfig,
         event: &DepthEvent,
     ) -> Option<DynamicDepthEvent> {
-        // Each moves on by one; the last, which leaves, counts once more.
+        // Each moves on by one; the last one, which leaves, is included once more.
         let mut flags = event.flags;
         let mut moving = event.flags;
         for place in &mut self.flags {

@@ -1,4 +1,4 @@
-//! What comes of the events of a pixel: means, changes of depth, reflectivity.
+//! Results from the events of a pixel: running mean, dynamic depth, reflectivity.
 
 mod dynamic_depth;
 mod reflectivity;

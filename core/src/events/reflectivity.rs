@@ -1,23 +1,25 @@
 //! Reflectivity: how bright a surface is, whatever its distance.
 //!
-//! What comes back from a surface falls with the square of its distance, so that a
-//! count of what came times the square of the distance is its reflectivity, up to a
-//! factor that is the same for all pixels (section III-B of the paper).
+//! The light that returns from a surface falls with the square of its distance. So a count
+//! times the square of the distance is the reflectivity, up to a factor that is the same for
+//! all pixels (section III-B of the paper).
 //!
-//! - The paper counts events: [`Reflectivity::of_events`]. An event takes L1 laser
-//!   cycles at least, so that bright surfaces all count alike, and its number grows
-//!   with the square of the brightness of dark ones.
-//! - What the events say is more: the photons of the peak above the background, and the
-//!   laser cycles they came in. Their ratio, over all events, is the signal a laser
-//!   cycle: [`Reflectivity::of_signal`].
+//! - The paper counts events: [`Reflectivity::of_events`]. An event takes at least L1 laser
+//!   cycles, so all bright surfaces look alike. For dark ones the number of events grows
+//!   with the square of the brightness.
+//! - Events also have the photons of the peak above the background, and the laser cycles of
+//!   the exposure. Their ratio, over all events, is the signal a laser cycle:
+//!   [`Reflectivity::of_signal`].
 //!
-//! Both are relative. A part of the pulse lies outside the peak bin, more so where the
-//! pulse lies on an edge, and a saturated peak counts too little. The paper's background is
-//! a maximum, so that what is above it reads low, the more so the dimmer the pixel: at a
-//! background of 0.05 photons a bin and laser cycle and α = 4 by a quarter to a third for 0.05
-//! signal photons, an eighth for 0.5 and almost nothing for 2; with a window rule it does not
-//! (`core/tests/events/reflectivity.rs`). Exposures that end without an event do not count, so that
-//! pixels which often have none read high.
+//! Both are relative, and have these errors:
+//!
+//! - A part of the pulse lies outside the peak bin, more so if the pulse lies on an edge. A
+//!   saturated peak counts too little.
+//! - The paper's background is a maximum, so the signal above it reads low: at a background
+//!   of 0.05 photons a bin and laser cycle and α = 4 by a quarter to a third for 0.05 signal
+//!   photons, an eighth for 0.5 and almost nothing for 2. With a window rule it does not
+//!   (`core/tests/events/reflectivity.rs`).
+//! - Exposures without an event do not count, so pixels with many of them read high.
 //!
 //! ```
 //! use dtof_core::fixed::types::{I24F8, U48F16};
@@ -25,10 +27,10 @@
 //! #     BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
 //! #     SubBinOffset,
 //! # };
-//! use dtof_core::Reflectivity;
+//! use dtof_core::events::Reflectivity;
 //! # let event = |cycle, exposure, peak| DepthEvent {
-//! #     pixel: PixelAddress(0), level: BlockLevel::PIXEL, echo: EchoNumber::FIRST,
-//! #     cycle: LaserCycle(cycle), exposure,
+//! #     pixel: PixelAddress::new(0), level: BlockLevel::PIXEL, echo: EchoNumber::FIRST,
+//! #     cycle: LaserCycle::new(cycle), exposure,
 //! #     peak_bin: BinIndex::saturating(40), offset: SubBinOffset::CENTRE,
 //! #     peak_count: Count::saturating(peak), background: Count::saturating(4),
 //! #     flags: Flags::NONE,
@@ -45,7 +47,7 @@ use fixed::types::{I24F8, U48F16};
 
 use crate::event::DepthEvent;
 
-/// What is counted of the events of one pixel: 24 bytes.
+/// The counts of the events of one pixel: 24 bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Reflectivity {
@@ -55,7 +57,7 @@ pub struct Reflectivity {
 }
 
 impl Reflectivity {
-    /// Of no events.
+    /// Without events.
     #[must_use]
     pub const fn new() -> Self {
         Self {
@@ -65,8 +67,8 @@ impl Reflectivity {
         }
     }
 
-    /// Takes an event in. Their number stays at 2³² − 1. Once the photons would exceed
-    /// 2⁴⁸ − 1, neither they nor the laser cycles grow any more.
+    /// Adds an event. The number of events saturates at 2³² − 1. Once the photons would exceed
+    /// 2⁴⁸ − 1, neither they nor the laser cycles grow.
     #[inline]
     pub const fn add(&mut self, event: &DepthEvent) {
         self.events = self.events.saturating_add(1);
@@ -82,14 +84,14 @@ impl Reflectivity {
         }
     }
 
-    /// How many events.
+    /// The number of events.
     #[must_use]
     pub const fn events(&self) -> u32 {
         self.events
     }
 
     /// Signal photons in the peak bin a laser cycle of the events' exposures, rounded
-    /// down to 1/65536; 0 of no events.
+    /// down to 1/65536; 0 without events.
     #[inline]
     #[must_use]
     pub const fn signal(&self) -> U48F16 {
@@ -99,16 +101,16 @@ impl Reflectivity {
         }
     }
 
-    /// The paper's: the number of events times the square of the range in mm. Compare
-    /// pixels that have looked equally long. Limited to 64 bits, which 2³² events reach
-    /// beyond 65 m.
+    /// The paper's reflectivity: the number of events times the square of the range in mm.
+    /// Comparable between pixels that have counted equally long. Saturates at 64 bits, which
+    /// 2³² events reach beyond 65 m.
     #[inline]
     #[must_use]
     pub const fn of_events(&self, range: I24F8) -> u64 {
         times_square(self.events as u64, range)
     }
 
-    /// The signal a laser cycle times the square of the range in mm. Limited to 2⁴⁸,
+    /// The signal a laser cycle times the square of the range in mm. Saturates at 2⁴⁸,
     /// which 1023 photons a laser cycle reach beyond 500 m.
     #[inline]
     #[must_use]

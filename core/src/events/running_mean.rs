@@ -4,7 +4,8 @@
 //! for depth maps (section III-B) and three for dynamic depth (section III-E).
 //!
 //! ```
-//! use dtof_core::{BinIndex, BinPosition, RunningMean, SubBinOffset};
+//! use dtof_core::{BinIndex, BinPosition, SubBinOffset};
+//! use dtof_core::events::RunningMean;
 //!
 //! let at = |bin| BinPosition::of(BinIndex::saturating(bin), SubBinOffset::CENTRE);
 //! let mut mean = RunningMean::<3>::new();
@@ -17,7 +18,7 @@
 
 use crate::units::BinPosition;
 
-/// The positions of the last `N` events, or of as many as there were. `N` is 1 to 255.
+/// The positions of the last `N` events, or of all if there were fewer. `N` is 1 to 255.
 ///
 /// Takes `4·N + 4` bytes (asserted in `core/tests/events/running_mean.rs`).
 #[derive(Clone, Debug)]
@@ -29,7 +30,7 @@ pub struct RunningMean<const N: usize> {
 }
 
 impl<const N: usize> RunningMean<N> {
-    /// Of no events yet.
+    /// Without events.
     #[must_use]
     pub const fn new() -> Self {
         const { assert!(0 < N && N < 256, "the mean is of 1 to 255 events") };
@@ -40,7 +41,7 @@ impl<const N: usize> RunningMean<N> {
         }
     }
 
-    /// Takes one event in, and the oldest out once there are `N`.
+    /// Adds an event; once there are `N`, the oldest leaves.
     #[inline]
     #[allow(clippy::cast_possible_truncation, reason = "N is less than 256")]
     pub fn push(&mut self, position: BinPosition) {
@@ -58,7 +59,7 @@ impl<const N: usize> RunningMean<N> {
         }
     }
 
-    /// How many events it is the mean of.
+    /// The number of events in the mean.
     #[inline]
     #[must_use]
     pub const fn len(&self) -> usize {
@@ -87,7 +88,7 @@ impl<const N: usize> RunningMean<N> {
         self.recent.iter().sum()
     }
 
-    /// Their mean to the nearest 1/256 bin, halves up; `None` of no events.
+    /// The mean to the nearest 1/256 bin, halves up; `None` without events.
     #[inline]
     #[must_use]
     pub fn mean(&self) -> Option<BinPosition> {

@@ -1,10 +1,11 @@
-//! The counters of a histogram: how wide they are, and what is asked of many of them.
+//! The counters of a histogram: their widths, and searches through many of them.
 //!
-//! A counter saturates at `2^BITS - 1`. Nothing is shifted or scaled to fit, because
-//! Poisson statistics need real counts.
+//! A counter saturates at `2^BITS - 1`. Nothing is scaled to fit, because Poisson
+//! statistics need real counts.
 //!
 //! ```
-//! use dtof_core::{Count10, CounterWidth, PhotonCount};
+//! use dtof_core::{Count10, CounterWidth};
+//! use dtof_core::rule::PhotonCount;
 //!
 //! assert_eq!(Count10::MAX, 1023);
 //! let counts = [3u16, 9, 1, 0];
@@ -13,7 +14,7 @@
 //! ```
 //!
 //! Cost on a Cortex-M4: [`PhotonCount::highest`] takes three instructions a 16-bit
-//! count. [`PhotonCount::any_reaches`] ends at the first count that is high enough.
+//! count. [`PhotonCount::any_reaches`] stops at the first count that is high enough.
 //!
 //! Source: 10 bits are those of the paper's FPGA (section IV-B).
 
@@ -70,14 +71,14 @@ counter_width!(Count24, u32, 24);
 
 /// An integer that counts the photons of one bin.
 pub trait PhotonCount: Copy + Into<u32> {
-    /// The highest of some counts, 0 of none.
+    /// The highest of some counts, 0 without any.
     #[inline(always)]
     fn highest(counts: &[Self]) -> u32 {
         // Not `max()`, which carries a reference along with each count.
         fold(counts, 0, |highest: u32, count| highest.max(count.into()))
     }
 
-    /// The highest of some counts, 0 of none, and their sum, wrapping.
+    /// The highest of some counts, 0 without any, and their sum, wrapping.
     #[inline(always)]
     fn highest_and_sum(counts: &[Self]) -> (u32, u32) {
         fold(counts, (0, 0), |(highest, sum): (u32, u32), count| {
@@ -88,7 +89,7 @@ pub trait PhotonCount: Copy + Into<u32> {
     /// Whether one of some counts is `level` or more.
     #[inline(always)]
     fn any_reaches(counts: &[Self], level: u32) -> bool {
-        // Four a turn, so that the loop itself costs little.
+        // Four an iteration, for little loop overhead.
         let reaches = |&count: &Self| count.into() >= level;
         let (fours, rest) = counts.as_chunks::<4>();
         let one_of =
@@ -96,7 +97,7 @@ pub trait PhotonCount: Copy + Into<u32> {
         fours.iter().any(one_of) || rest.iter().any(reaches)
     }
 
-    /// Which is the first of some counts that is `level` or more.
+    /// The index of the first of some counts that is `level` or more.
     #[inline(always)]
     fn first_reaching(counts: &[Self], level: u32) -> Option<usize> {
         let reaches = |&count: &Self| count.into() >= level;
@@ -113,8 +114,8 @@ impl PhotonCount for u32 {}
 impl PhotonCount for u16 {
     #[inline(always)]
     fn highest(counts: &[Self]) -> u32 {
-        // How much room is left above the highest: two instructions a count with
-        // Arm's DSP extension, one less than a comparison.
+        // Tracks the room above the highest: two instructions a count with Arm's DSP
+        // extension, one less than a comparison.
         let room = fold(counts, Self::MAX, |room: Self, count| {
             room.saturating_add(count) - count
         });
@@ -132,7 +133,7 @@ impl PhotonCount for u16 {
     }
 }
 
-/// Sixteen a turn, so that the loop itself costs little.
+/// Sixteen an iteration, for little loop overhead.
 #[inline(always)]
 fn fold<C: Copy, A>(counts: &[C], start: A, next: impl Fn(A, C) -> A) -> A {
     let eight = |so_far, &[a, b, c, d, e, f, g, h]: &[C; 8]| {

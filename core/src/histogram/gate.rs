@@ -1,11 +1,11 @@
 //! The range gate: the bins that may hold the peak.
 //!
-//! Real sensors see their own cover glass, in recorded histograms as a peak up
-//! to a hundred times the target's. A gate leaves it out: photons in gated-out
-//! bins never enter a pixel's histogram, and the gated bins play the part the
-//! whole histogram plays in the paper, for the peak, the background and the
-//! depth alike. The halves and quadrants of the background rule are those of
-//! the gate; without a gate they are exactly the paper's.
+//! Real sensors see the crosstalk of their cover glass, in recorded histograms as
+//! a peak up to a hundred times the target's. A gate excludes it: photons outside
+//! the gate never enter a pixel's histogram. The gated bins take the place of the
+//! paper's whole histogram, for the peak, the background and the depth. The halves
+//! and quadrants of the background rule are those of the gate; without a gate they
+//! are exactly the paper's.
 //!
 //! ```
 //! use dtof_core::{BinIndex, RangeGate};
@@ -19,7 +19,7 @@
 
 use core::ops::Range;
 
-use crate::check::written_as_its_text;
+use crate::check::impl_error;
 
 /// First and last bin that may hold the peak, both inclusive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -30,9 +30,10 @@ pub struct RangeGate<const BINS: usize> {
     end: u16,
 }
 
-/// A gate that cannot be used.
+/// Why a gate cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum GateError {
     /// The last bin lies past the histogram's last.
     PastLastBin,
@@ -41,7 +42,7 @@ pub enum GateError {
 }
 
 impl GateError {
-    /// What is wrong, in one line.
+    /// The error in one line.
     #[must_use]
     pub const fn text(self) -> &'static str {
         match self {
@@ -51,7 +52,7 @@ impl GateError {
     }
 }
 
-written_as_its_text!(GateError);
+impl_error!(GateError);
 
 impl<const BINS: usize> RangeGate<BINS> {
     /// The fewest bins a gate may leave, as many as the smallest histogram has.
@@ -71,7 +72,7 @@ impl<const BINS: usize> RangeGate<BINS> {
     /// From bin `first` to bin `last`, both inclusive.
     ///
     /// # Errors
-    /// [`GateError`] if `last` is not a bin, or fewer than
+    /// Fails if `last` is not a bin, or fewer than
     /// [`Self::MIN_BINS`] bins are left.
     pub const fn new(first: u16, last: u16) -> Result<Self, GateError> {
         if last >= Self::full().end {
@@ -106,7 +107,7 @@ impl<const BINS: usize> RangeGate<BINS> {
         (bin as u32).wrapping_sub(first) < self.end as u32 - first
     }
 
-    /// Whether it leaves out nothing.
+    /// Whether it contains all bins.
     #[inline]
     pub(crate) const fn is_full(&self) -> bool {
         self.first == 0 && self.end as usize == BINS

@@ -1,18 +1,17 @@
 //! The histogram of one macropixel.
 //!
 //! Counters saturate and never wrap. What a full counter cannot take is counted as
-//! *saturated*, a TDC code beyond the last bin as *rejected*. No photon is lost without a
-//! trace:
+//! *saturated*, a TDC code beyond the last bin as *rejected*. Every photon is accounted for:
 //!
 //! ```text
 //! photons offered = total + saturated + rejected
 //! ```
 //!
-//! Photons that the range gate leaves out never enter the histogram.
+//! Photons outside the range gate never enter the histogram.
 //!
-//! The highest bin is kept while counting. Counts only grow, so the key
+//! The highest bin is tracked while counting. Counts only grow, so the key
 //! `(count << log2(BINS)) - bin` of the highest bin is the maximum of the keys of all
-//! photons. The lowest index wins a tie. No search has to run when the peak is asked for.
+//! photons. The lowest index wins a tie. Reading the peak needs no search.
 //!
 //! ```
 //! use dtof_core::Histogram;
@@ -28,11 +27,11 @@
 //! to take 128 bins that were counted elsewhere.
 //!
 //! Source: the saturating 10-bit counters of the paper's FPGA (section IV-B). Its
-//! search for the highest bin is [`ComparatorTree`](crate::ComparatorTree).
+//! search for the highest bin is [`ComparatorTree`](crate::paper::ComparatorTree).
 
 pub mod counter;
+pub mod excluded;
 pub mod gate;
-pub mod peeled;
 
 use core::ops::RangeInclusive;
 use core::sync::atomic::{Ordering, compiler_fence};
@@ -47,9 +46,9 @@ use crate::units::{BinIndex, Count};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Peak {
-    /// Which bin.
+    /// The bin.
     pub bin: BinIndex,
-    /// How many photons it holds.
+    /// Its photons.
     pub count: Count,
 }
 
@@ -78,7 +77,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         BINS.ilog2()
     };
 
-    /// Whether the key of a count too high may not fit 32 bits.
+    /// Whether the key of a count that is too high may exceed 32 bits.
     const KEY_MAY_OVERFLOW: bool = Self::LOG2_BINS + W::BITS == 32;
 
     /// An empty histogram.
@@ -110,7 +109,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     }
 
     /// Counts one photon, as [`Self::add`] does, if its bin is gated. Returns the
-    /// photons left out by the gate, 0 or 1.
+    /// photons outside the gate, 0 or 1.
     #[inline]
     pub(crate) fn add_gated(&mut self, code: u16, gate: &RangeGate<BINS>) -> u32 {
         let Some(counter) = self.counts.get_mut(usize::from(code)) else {
@@ -131,7 +130,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     }
 
     /// Counts one photon for each TDC code whose bin is gated. Returns the photons
-    /// left out by the gate.
+    /// outside the gate.
     #[inline]
     pub(crate) fn add_gated_batch(&mut self, codes: &[u16], gate: &RangeGate<BINS>) -> u32 {
         // Bins from 0 on save an instruction a photon.
@@ -144,7 +143,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
 
     #[inline(always)]
     fn add_gated_inlined(&mut self, codes: &[u16], gate: &RangeGate<BINS>) -> u32 {
-        // Here and not in `self`, so that they stay in registers.
+        // Local, so that they stay in registers.
         let (mut peak_key, mut saturated, mut rejected, mut gated_out) = (self.peak_key, 0, 0, 0);
         let counters = self.counts.get_mut(gate.bins()).unwrap_or_default();
         let first = usize::from(gate.first());
@@ -158,7 +157,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
                 None => rejected += 1,
             }
         };
-        // Eight a turn, so that the loop itself costs little.
+        // Eight an iteration, for little loop overhead.
         let (eights, rest) = codes.as_chunks::<8>();
         for [a, b, c, d, e, f, g, h] in eights {
             count(a);
@@ -189,8 +188,8 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     fn count_photon(counter: &mut W::Counter, code: u16, peak_key: &mut u32, saturated: &mut u32) {
         let mut count = (*counter).into() + 1;
         let key = Self::key(count, code.into());
-        // No bin is higher than the peak, so that only what would be a new peak
-        // can be too high for its counter.
+        // No bin is higher than the peak, so only a new peak can be too high for its
+        // counter.
         if key > *peak_key || Self::KEY_MAY_OVERFLOW {
             if count > W::MAX {
                 count = W::MAX;
@@ -205,7 +204,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     /// Adds the gated bins of a histogram that was counted elsewhere, such as the
     /// 5-laser-cycle mini-frames of the paper's sensor (section III-A).
     ///
-    /// Counters saturate bin by bin. Returns the photons left out by the gate; sticks at
+    /// Counters saturate bin by bin. Returns the photons outside the gate; saturates at
     /// `u32::MAX`.
     pub fn add_frame<C: PhotonCount>(&mut self, frame: &[C; BINS], gate: &RangeGate<BINS>) -> u32 {
         if gate.is_full() && self.peak_key == 0 {
@@ -224,7 +223,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         outside(frame.get(..gated.start)).saturating_add(outside(frame.get(gated.end..)))
     }
 
-    /// What [`Self::add_to_each`] makes of an empty histogram, in half the time.
+    /// Does what [`Self::add_to_each`] does to an empty histogram, in half the time.
     /// `highest` is the highest count, which fits the counters, and `total` their sum.
     #[inline(always)]
     fn copy<C: PhotonCount>(&mut self, frame: &[C; BINS], highest: u32, total: u32) {
@@ -242,7 +241,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
                 one(g),
                 one(h),
             ];
-            // Else this is a call of `memcpy`, which takes twice as long.
+            // Otherwise this is a call of `memcpy`, which takes twice as long.
             compiler_fence(Ordering::Release);
         }
         self.total = total;
@@ -289,8 +288,8 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     #[inline]
     #[must_use]
     pub fn peak(&self) -> Peak {
-        // The inverse of `key`: the count rounds up, the bin is what is missing.
-        // Nothing is limited; to say how wide they are saves the test for it.
+        // The inverse of `key`: the count rounds up, the bin is the difference. The masks
+        // change nothing, but save a comparison.
         let last_bin = (1 << Self::LOG2_BINS) - 1;
         let count = (self.peak_key.wrapping_add(last_bin) >> Self::LOG2_BINS) & W::MAX;
         let bin = self.peak_key.wrapping_neg() & last_bin;
@@ -322,14 +321,14 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     }
 
     /// Photons with a TDC code past the last bin, since the last
-    /// [`Self::clear`]. Sticks at `u32::MAX`.
+    /// [`Self::clear`]. Saturates at `u32::MAX`.
     #[inline]
     #[must_use]
     pub const fn rejected(&self) -> u32 {
         self.rejected
     }
 
-    /// Photons that met a full counter, since the last [`Self::clear`]. Sticks
+    /// Photons that met a full counter, since the last [`Self::clear`]. Saturates
     /// at `u32::MAX`.
     #[inline]
     #[must_use]
@@ -337,8 +336,8 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         self.saturated
     }
 
-    /// Empties the bins of some ranges: how many photons they held. The photons are no
-    /// longer in [`Self::total`], and the peak is the highest of the other bins.
+    /// Empties the bins of some ranges. Returns the photons they held, which are no longer in
+    /// [`Self::total`]. The peak is the highest of the other bins.
     pub(crate) fn empty(&mut self, ranges: impl Iterator<Item = RangeInclusive<u16>>) -> u32 {
         let mut emptied = 0u32;
         for range in ranges {
@@ -360,8 +359,8 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     /// Empties the histogram for the next exposure.
     #[inline]
     pub fn clear(&mut self) {
-        // Not `fill`, which calls `memset`: that takes twice as long. The fence, which
-        // is no instruction, keeps the compiler from making it one all the same.
+        // Not `fill`: it calls `memset`, which takes twice as long. The fence, which is not
+        // an instruction, keeps the compiler from calling it, too.
         let (blocks, rest) = self.counts.as_chunks_mut::<8>();
         for block in blocks {
             *block = [W::ZERO; 8];
@@ -388,8 +387,8 @@ impl<const BINS: usize, W: CounterWidth> Default for Histogram<BINS, W> {
     }
 }
 
-/// The mean of `photons` in so many `bins`, in 1/256 rounded down; `None` of no bins.
-// Once in a program: only detections ask for it.
+/// The mean of `photons` in so many `bins`, in 1/256 rounded down; `None` if there are no bins.
+// Out of line: only detections need it.
 #[inline(never)]
 pub(crate) fn mean(photons: u32, bins: u32) -> Option<U24F8> {
     let whole = photons.checked_div(bins)?;

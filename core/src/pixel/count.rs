@@ -6,7 +6,7 @@ use crate::detect::DetectionRule;
 use crate::histogram::counter::{CounterWidth, PhotonCount};
 
 impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
-    /// Counts one photon with the TDC code `code` in the present laser cycle.
+    /// Counts one photon with the TDC code `code` in the current laser cycle.
     #[inline]
     pub fn count<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, code: u16) {
         let gated_out = self.histogram.add_gated(code, config.gate());
@@ -32,7 +32,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         self.leave_out(gated_out);
     }
 
-    /// Counts photons that the gate left out.
+    /// Counts photons outside the gate.
     #[inline(always)]
     fn leave_out(&mut self, photons: u32) {
         // Most often none.

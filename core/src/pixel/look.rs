@@ -1,6 +1,8 @@
-//! What a look brings, and what it has to mind.
+//! The result of a look, and the state of a pixel that looks depend on.
 
-/// What the end of a laser cycle brought.
+/// The result of ending a laser cycle.
+///
+/// Exhaustive, because the C header numbers each outcome.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Look {
@@ -10,18 +12,18 @@ pub enum Look {
     TooEarly,
     /// The peak does not stand clear of the background; the exposure goes on.
     NoPeak,
-    /// The slot still holds an event, so the decision is put off by X laser
+    /// The slot still has an event, so the decision is deferred by X laser
     /// cycles.
     Deferred,
     /// The peak stands clear: the event is in the slot, a new exposure begins.
     Event,
     /// N reached L2 without an event: a new exposure begins.
     Expired,
-    /// The pixel has waited for another echo long enough: a new exposure begins.
+    /// The wait for another echo is over: a new exposure begins.
     Ended,
 }
 
-/// What a look has to mind. Most often nothing, which is one comparison.
+/// The state that looks depend on. Most often it is empty, which takes one comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct State(u8);
 
@@ -29,10 +31,10 @@ impl State {
     pub(super) const NONE: Self = Self(0);
     /// `event` waits for the link.
     pub(super) const REQUESTING: Self = Self(1);
-    /// A decision was put off, since the exposure began or its last echo was reported.
+    /// A decision was deferred, since the exposure began or its last echo was reported.
     pub(super) const DEFERRED: Self = Self(1 << 1);
     /// An echo of this exposure was reported.
-    pub(super) const PEELED: Self = Self(1 << 2);
+    pub(super) const HAS_ECHO: Self = Self(1 << 2);
     /// The exposure before this one had an event, and the pixel tracks.
     pub(super) const EXPECTING: Self = Self(1 << 3);
 
@@ -48,7 +50,7 @@ impl State {
         self.0 &= !other.0;
     }
 
-    /// Forgets what was of the exposure. An event that waits still does.
+    /// Clears the state of the exposure. An event that waits remains.
     pub(super) const fn end_exposure(&mut self) {
         self.0 &= Self::REQUESTING.0;
     }

@@ -5,43 +5,43 @@
 //! (strict, as printed) the detection rule decides. After an event, or once N
 //! has reached L2, the histogram is cleared and N starts from 0.
 //!
-//! An event goes into the pixel's slot; the pixel clears and counts on at once. While the
-//! link has not taken it the pixel does not fire again. It keeps counting and looks again X
-//! laser cycles later. Each look put off is counted as deferred. No event that was made is
-//! lost. An exposure that reaches L2 meanwhile ends without one, and is counted apart.
+//! An event goes into the pixel's slot; the pixel clears its histogram and counts on at once.
+//! Until the link takes the event, the pixel does not report again. It keeps counting and
+//! looks again X laser cycles later. Each such look is counted as deferred. No event is lost.
+//! An exposure that reaches L2 meanwhile ends without an event, and is counted separately.
 //!
 //! ```
-//! use dtof_core::*;
+//! use dtof_core::{AsyncPixel, LaserCycle, Look, PixelAddress, PixelConfig, Statistics, checked};
 //!
 //! const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().build());
-//! let mut pixel = AsyncPixel::<128>::new(PixelAddress(7));
+//! let mut pixel = AsyncPixel::<128>::new(PixelAddress::new(7));
 //! let mut statistics = Statistics::default();
 //!
 //! for cycle in 0..44 {
 //!     pixel.count(&CONFIG, 60); // one photon a laser cycle, always bin 60
-//!     let look = pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle(cycle));
+//!     let look = pixel.end_laser_cycle(&CONFIG, &mut statistics, LaserCycle::new(cycle));
 //!     assert_eq!(look == Look::Event, cycle == 43); // the first N above L1
 //! }
-//! let event = pixel.acknowledge().unwrap();
+//! let event = pixel.take_event().unwrap();
 //! assert_eq!((event.exposure, event.peak_bin.raw(), event.peak_count.raw()), (44, 60, 44));
 //! ```
 //!
 //! With several [echoes](crate::PixelConfigBuilder::echoes) an event does not end the
-//! exposure: the pixel leaves out the bins around its peak, and [waits](
+//! exposure: the pixel excludes the bins around its peak, and [waits](
 //! crate::PixelConfigBuilder::echo_wait) for the next. With
 //! [tracking](crate::PixelConfigBuilder::tracking) it expects an event where the last was.
 //!
 //! Cost: 72 bytes beside the counters (a compile-time check). On a Cortex-M4 and 128
-//! bins 10 instructions a photon in a batch, 130 a look, 110 to clear and re-arm.
+//! bins 10 instructions a photon in a batch, 130 a look, 110 to clear.
 //!
-//! Source: the flow chart of the paper's section II-B. The slot is its REQ (section IV-A);
-//! ACK is ours, as is what happens while the link is busy.
+//! Source: the flow chart of the paper's section II-B. The slot is its REQ (section IV-A).
+//! ACK and the behaviour while the link is busy are ours.
 
 mod count;
-mod decided;
+mod input;
 mod look;
 
-pub use self::decided::Decided;
+pub use self::input::DecisionInput;
 pub use self::look::Look;
 use self::look::State;
 use crate::config::PixelConfig;
@@ -50,7 +50,7 @@ use crate::event::DepthEvent;
 use crate::flags::Flags;
 use crate::histogram::Histogram;
 use crate::histogram::counter::{Count10, CounterWidth};
-use crate::histogram::peeled::PeeledBins;
+use crate::histogram::excluded::ExcludedBins;
 use crate::statistics::Statistics;
 use crate::units::{
     BinIndex, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,
@@ -64,14 +64,14 @@ pub struct AsyncPixel<const BINS: usize, W: CounterWidth = Count10> {
     state: State,
     /// The bin of the last event, of exposures before this one.
     expected: BinIndex,
-    /// The echoes of this exposure, but for its last.
-    peeled: PeeledBins,
-    /// The slot. Its pixel and level are there before the first event.
+    /// The bins around the echoes of this exposure, except its last.
+    excluded: ExcludedBins,
+    /// The slot. Its pixel and level are set from the start.
     event: DepthEvent,
-    /// Photons of this exposure that the gate left out, fewer than 2³².
+    /// Photons of this exposure outside the gate, fewer than 2³².
     gated_out: u32,
     /// Photons of this exposure that were in the bins around its echoes, fewer than 2³².
-    held: u32,
+    excluded_photons: u32,
     histogram: Histogram<BINS, W>,
 }
 
@@ -88,12 +88,12 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             since_look: 0,
             state: State::NONE,
             expected: BinIndex::saturating(0),
-            peeled: PeeledBins::NONE,
+            excluded: ExcludedBins::NONE,
             event: DepthEvent {
                 pixel: address,
                 level: BlockLevel::PIXEL,
                 echo: EchoNumber::FIRST,
-                cycle: LaserCycle(0),
+                cycle: LaserCycle::new(0),
                 exposure: 0,
                 peak_bin: BinIndex::saturating(0),
                 offset: SubBinOffset::CENTRE,
@@ -102,12 +102,12 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
                 flags: Flags::NONE,
             },
             gated_out: 0,
-            held: 0,
+            excluded_photons: 0,
             histogram: Histogram::new(),
         }
     }
 
-    /// One that counts for a block of `level` and the first pixel `first`.
+    /// A pixel that counts for the block of `level` that begins at `first`.
     pub(crate) const fn of_block(first: PixelAddress, level: BlockLevel) -> Self {
         let mut pixel = Self::new(first);
         pixel.event.level = level;
@@ -139,27 +139,27 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         last: LaserCycle,
         cycles: u16,
     ) -> Look {
-        self.end_laser_cycles_seen(config, statistics, last, cycles, |_| ())
+        self.end_laser_cycles_with(config, statistics, last, cycles, |_| ())
     }
 
-    /// The same, and shows what an event is decided from, if there is one: right after it the
-    /// pixel starts over.
+    /// The same with an observer. It is called right before an event is reported, with what the
+    /// decision was made from; the pixel then clears its histogram.
     #[inline]
-    pub fn end_laser_cycles_seen<R: DetectionRule>(
+    pub fn end_laser_cycles_with<R: DetectionRule>(
         &mut self,
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
         last: LaserCycle,
         cycles: u16,
-        see: impl FnOnce(Decided<'_, BINS, W>),
+        observe: impl FnOnce(&DecisionInput<'_, BINS, W>),
     ) -> Look {
-        // An exposure stuck at the top is at least L2, and so expires.
+        // A saturated exposure is at least L2, and so expires.
         self.exposure = self.exposure.saturating_add(cycles);
         self.since_look = self.since_look.saturating_add(cycles);
         if self.since_look < config.x() {
             return Look::NotDue;
         }
-        self.look(config, statistics, last, see)
+        self.look(config, statistics, last, observe)
     }
 
     /// Checks N and decides.
@@ -169,14 +169,14 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
         cycle: LaserCycle,
-        see: impl FnOnce(Decided<'_, BINS, W>),
+        observe: impl FnOnce(&DecisionInput<'_, BINS, W>),
     ) -> Look {
         self.since_look = 0;
         if self.exposure <= config.l1() {
             return Look::TooEarly;
         }
         if self.state != State::NONE {
-            return self.look_further(config, statistics, cycle, see);
+            return self.look_further(config, statistics, cycle, observe);
         }
         if self.exposure >= config.l2() {
             statistics.expired += 1;
@@ -186,25 +186,25 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         let Some(detection) = config.detect(&self.histogram) else {
             return Look::NoPeak;
         };
-        see(Decided::plainly(&self.histogram));
+        observe(&DecisionInput::plain(&self.histogram));
         self.report(config, statistics, cycle, &detection)
     }
 
-    /// A look at a pixel whose event waits, that has reported an echo or expects one, or
-    /// whose decision was put off.
+    /// A look with state: an event waits, an echo was reported, an event is expected, or a
+    /// decision was deferred.
     #[inline(never)]
     fn look_further<R: DetectionRule>(
         &mut self,
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
         cycle: LaserCycle,
-        see: impl FnOnce(Decided<'_, BINS, W>),
+        observe: impl FnOnce(&DecisionInput<'_, BINS, W>),
     ) -> Look {
         let mut longest = config.l2();
-        if self.state.contains(State::PEELED) {
+        if self.state.contains(State::HAS_ECHO) {
             // Photons that have come since the last look.
-            self.peel(statistics);
-            // The slot has the last echo, whether or not that was taken.
+            self.empty_excluded(statistics);
+            // The slot has the last echo, even if that was taken.
             longest = config.end_after_echo(self.event.exposure);
         }
         if self.exposure >= longest {
@@ -217,20 +217,21 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         }
         let expected = self.state.contains(State::EXPECTING);
         let expected = expected.then_some(self.expected);
-        let Some(detection) = config.detect_further(&self.histogram, expected, &self.peeled) else {
+        let Some(detection) = config.detect_further(&self.histogram, expected, &self.excluded)
+        else {
             return Look::NoPeak;
         };
-        see(Decided {
+        observe(&DecisionInput {
             histogram: &self.histogram,
             expected,
-            peeled: self.peeled,
+            excluded: self.excluded,
         });
         self.report(config, statistics, cycle, &detection)
     }
 
     /// Puts the event of `detection` into the slot. The exposure ends, or goes on for the
     /// next echo.
-    // Not behind a call, which would cost each look an instruction.
+    // Inlined: a call would cost each look an instruction.
     #[inline(always)]
     fn report<R: DetectionRule>(
         &mut self,
@@ -252,7 +253,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         self.state.set(State::REQUESTING);
         if config.echoes() > EchoNumber::FIRST {
             if self.goes_on(config) {
-                self.peel(statistics);
+                self.empty_excluded(statistics);
             } else {
                 self.end(config, statistics);
             }
@@ -263,25 +264,25 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         Look::Event
     }
 
-    /// Numbers the echo in the slot, and says whether the exposure goes on after it.
+    /// Numbers the echo in the slot. Returns whether the exposure goes on after it.
     #[inline(never)]
     fn goes_on<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>) -> bool {
-        if !self.state.contains(State::PEELED) {
-            self.peeled = PeeledBins::new(config.peel_reach());
-            self.state.set(State::PEELED);
+        if !self.state.contains(State::HAS_ECHO) {
+            self.excluded = ExcludedBins::new(config.echo_guard_bins());
+            self.state.set(State::HAS_ECHO);
         }
-        let echo = EchoNumber::new(self.peeled.echoes() + 1).unwrap_or(EchoNumber::LAST);
+        let echo = EchoNumber::new(self.excluded.echoes() + 1).unwrap_or(EchoNumber::LAST);
         self.event.echo = echo;
         self.state.clear(State::DEFERRED);
-        let next = config.echo_after(echo, &mut self.peeled, self.event.peak_bin);
+        let next = config.echo_after(echo, &mut self.excluded, self.event.peak_bin);
         next.is_some()
     }
 
     /// Empties the bins around the echoes of this exposure.
-    fn peel(&mut self, statistics: &mut Statistics) {
-        let held = self.peeled.empty(&mut self.histogram);
-        self.held = self.held.wrapping_add(held);
-        statistics.held += u64::from(held);
+    fn empty_excluded(&mut self, statistics: &mut Statistics) {
+        let photons = self.excluded.empty(&mut self.histogram);
+        self.excluded_photons = self.excluded_photons.wrapping_add(photons);
+        statistics.excluded += u64::from(photons);
     }
 
     /// Ends an exposure that may have had an event.
@@ -290,13 +291,13 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
     ) -> Look {
-        let has_reported = self.state.contains(State::PEELED);
+        let has_reported = self.state.contains(State::HAS_ECHO);
         if !has_reported {
             statistics.expired += 1;
             statistics.expired_deferred += u64::from(self.state.contains(State::DEFERRED));
         }
-        self.peeled = PeeledBins::NONE;
-        self.held = 0;
+        self.excluded = ExcludedBins::NONE;
+        self.excluded_photons = 0;
         self.restart(statistics);
         if !has_reported {
             return Look::Expired;
@@ -317,14 +318,14 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// REQ: whether an event waits for the link.
     #[inline]
     #[must_use]
-    pub const fn request(&self) -> bool {
+    pub const fn has_event(&self) -> bool {
         self.state.contains(State::REQUESTING)
     }
 
-    /// ACK: takes the event that waits, so that the pixel may fire again.
+    /// ACK: takes the event that waits, so that the pixel can report again.
     #[inline]
     #[must_use = "the event is taken from the slot"]
-    pub const fn acknowledge(&mut self) -> Option<DepthEvent> {
+    pub const fn take_event(&mut self) -> Option<DepthEvent> {
         if !self.state.contains(State::REQUESTING) {
             return None;
         }
@@ -332,21 +333,21 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         Some(self.event)
     }
 
-    /// Whether an event waits for the link, or one of this exposure was followed by no other
-    /// exposure yet: not a pixel that sees nothing.
+    /// Whether an event waits for the link, or this exposure has had an event. Adaptive
+    /// binning treats such a pixel as not silent.
     #[inline]
     #[must_use]
     pub const fn has_reported(&self) -> bool {
-        self.state.contains(State::REQUESTING) || self.state.contains(State::PEELED)
+        self.state.contains(State::REQUESTING) || self.state.contains(State::HAS_ECHO)
     }
 
-    /// Which macropixel this is.
+    /// The address of the macropixel.
     #[must_use]
     pub const fn address(&self) -> PixelAddress {
         self.event.pixel
     }
 
-    /// Whether it counts for one pixel, or for a block.
+    /// Level 0, or that of the block it counts for.
     #[must_use]
     pub const fn level(&self) -> BlockLevel {
         self.event.level
@@ -358,31 +359,31 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         self.exposure
     }
 
-    /// The histogram of the present exposure.
+    /// The histogram of the current exposure.
     #[must_use]
     pub const fn histogram(&self) -> &Histogram<BINS, W> {
         &self.histogram
     }
 
-    /// Adds the photons of the present exposure to `statistics`. Those of exposures that
-    /// have ended are there already, and those that are held.
+    /// Adds the photons of the current exposure to `statistics`. Those of exposures that have
+    /// ended, and those in excluded bins, are there already.
     #[inline(always)]
     pub fn add_photons_to(&self, statistics: &mut Statistics) {
         statistics.add_photons_of(&self.histogram, self.gated_out);
     }
 
-    /// Photons of the present exposure with a TDC code of a bin.
+    /// Photons of the current exposure with a TDC code of a bin.
     fn photons(&self) -> u64 {
         let histogram = &self.histogram;
         let counted = u64::from(histogram.total()) + u64::from(histogram.saturated());
-        counted + u64::from(self.gated_out) + u64::from(self.held)
+        counted + u64::from(self.gated_out) + u64::from(self.excluded_photons)
     }
 
     /// Begins a new exposure.
     fn restart(&mut self, statistics: &mut Statistics) {
         self.add_photons_to(statistics);
         self.state.end_exposure();
-        // Not behind what `clear` ends with: together they would be a call of `memset`.
+        // Not after `clear`: the compiler would join them in a call of `memset`.
         self.gated_out = 0;
         self.histogram.clear();
         self.exposure = 0;

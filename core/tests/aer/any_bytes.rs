@@ -2,9 +2,10 @@
 
 use std::collections::BTreeMap;
 
+use dtof_core::events::DynamicDepthEvent;
 use dtof_core::{
-    AerDecoder, AerEncoder, AerError, AerRecord, AerWord, BinPosition, BlockLevel,
-    DynamicDepthEvent, Flags, LaserCycle, PixelAddress,
+    AerDecoder, AerEncoder, AerError, AerRecord, AerWord, BinPosition, BlockLevel, Flags,
+    LaserCycle, PixelAddress,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -16,7 +17,9 @@ use crate::parallel;
 fn check_any_bytes(bytes: [u8; 16]) {
     let number = u128::from_le_bytes(bytes);
     let mut decoder = AerDecoder::new();
-    decoder.decode(AerWord::time(LaserCycle(3 << 16))).unwrap();
+    decoder
+        .decode(AerWord::time(LaserCycle::new(3 << 16)))
+        .unwrap();
     let word = AerWord::from_le_bytes(bytes);
     assert_eq!(word.to_le_bytes(), bytes);
     let decoded = decoder.decode(word);
@@ -27,13 +30,13 @@ fn check_any_bytes(bytes: [u8; 16]) {
             let Ok(AerRecord::Event(event)) = decoded else {
                 panic!("{decoded:?}");
             };
-            assert_eq!(event.cycle.0 >> 16, 3);
+            assert_eq!(event.cycle.raw() >> 16, 3);
             // Sent on, it is the same.
             assert_eq!(AerWord::depth_event(&event).to_le_bytes(), bytes);
         }
         (0, 1) => {
             let valid = number << 76 == 0 && number >> 112 == 0;
-            let time = AerRecord::Time(LaserCycle(((number >> 64) << 16) as u64));
+            let time = AerRecord::Time(LaserCycle::new(((number >> 64) << 16) as u64));
             assert_eq!(decoded, valid.then_some(time).ok_or(AerError::ReservedBits));
         }
         (0, 2) => {
@@ -53,7 +56,7 @@ fn check_any_bytes(bytes: [u8; 16]) {
             match decoded {
                 Ok(AerRecord::DynamicDepth(event)) => {
                     assert!(in_range && reserved == 0);
-                    assert_eq!(event.cycle.0 >> 16, 3);
+                    assert_eq!(event.cycle.raw() >> 16, 3);
                     // Sent on, it is the same.
                     assert_eq!(AerWord::dynamic_depth(&event).to_le_bytes(), bytes);
                 }
@@ -114,9 +117,9 @@ fn all_combinations_of_the_boundaries_of_a_dynamic_depth_event() {
                 for change in [-262_911, -1, 1, 262_911] {
                     for flags in 0..32 {
                         let event = DynamicDepthEvent::new(
-                            PixelAddress(pixel),
+                            PixelAddress::new(pixel),
                             BlockLevel::new(level).unwrap(),
-                            LaserCycle(cycle),
+                            LaserCycle::new(cycle),
                             BinPosition::new(position).unwrap(),
                             change,
                             Flags::from_bits(flags).unwrap(),
@@ -145,9 +148,15 @@ fn all_combinations_of_the_boundaries_of_a_dynamic_depth_event() {
     }
     for (position, change) in [(0, 0), (0, 262_912), (0, -262_912)] {
         let position = BinPosition::new(position).unwrap();
-        let (pixel, level) = (PixelAddress(0), BlockLevel::PIXEL);
-        let event =
-            DynamicDepthEvent::new(pixel, level, LaserCycle(0), position, change, Flags::NONE);
+        let (pixel, level) = (PixelAddress::new(0), BlockLevel::PIXEL);
+        let event = DynamicDepthEvent::new(
+            pixel,
+            level,
+            LaserCycle::new(0),
+            position,
+            change,
+            Flags::NONE,
+        );
         assert_eq!(event, None);
     }
 }

@@ -3,9 +3,8 @@
 
 use std::collections::BTreeMap;
 
-use dtof_core::{
-    AerDecoder, AerEncoder, AerError, AerRecord, AerWord, DepthEvent, DynamicDepthEvent, LaserCycle,
-};
+use dtof_core::events::DynamicDepthEvent;
+use dtof_core::{AerDecoder, AerEncoder, AerError, AerRecord, AerWord, DepthEvent, LaserCycle};
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -22,7 +21,7 @@ fn check_event(tables: &[Vec<Field>; 2], event: &DepthEvent) {
     assert_eq!(bytes, pack_event(&tables[0], event), "{event:?}");
 
     let mut decoder = AerDecoder::new();
-    let start = LaserCycle(event.cycle.0 / (1 << 16) * (1 << 16));
+    let start = LaserCycle::new(event.cycle.raw() / (1 << 16) * (1 << 16));
     let decoded = decoder.decode(AerWord::from_le_bytes(time));
     assert_eq!(decoded, Ok(AerRecord::Time(start)));
     let decoded = decoder.decode(AerWord::from_le_bytes(bytes));
@@ -140,7 +139,7 @@ fn a_million_random_events_round_trip() {
     for number in 0..1_000_000 {
         let mut event = random_event(&mut rng);
         if number % 2 == 0 {
-            event.cycle.0 %= 1 << 18; // few time words
+            event.cycle = LaserCycle::new(event.cycle.raw() % (1 << 18)); // few time words
         }
         let (time, word) = encoder.encode(&event);
         if let Some(time) = time {
@@ -195,7 +194,7 @@ fn time_words_come_before_the_first_event_and_at_every_change_of_the_upper_bits(
         let (time, word) = encoder.encode(&event);
         assert_eq!(time.is_some(), due, "{cycle}");
         if let Some(time) = time {
-            let start = LaserCycle(cycle - cycle % TURN);
+            let start = LaserCycle::new(cycle - cycle % TURN);
             assert_eq!(decoder.decode(time), Ok(AerRecord::Time(start)));
         }
         assert_eq!(decoder.decode(word), Ok(AerRecord::Event(event)));
@@ -230,7 +229,7 @@ fn an_error_leaves_the_decoder_as_it_was() {
         (7, 0xc0, AerError::UnknownKind),    // 0 becomes 3
         (15, 0x80, AerError::ReservedBits),
     ] {
-        let mut bytes = AerWord::time(LaserCycle(0)).to_le_bytes();
+        let mut bytes = AerWord::time(LaserCycle::new(0)).to_le_bytes();
         bytes[byte] |= bit;
         assert_eq!(decoder.decode(AerWord::from_le_bytes(bytes)), Err(error));
         assert_eq!(decoder.decode(word), Ok(AerRecord::Event(event)));
@@ -263,8 +262,8 @@ proptest! {
                 None => AerRecord::Event(event),
                 Some(change) => AerRecord::DynamicDepth(change),
             };
-            prop_assert_eq!(time.is_some(), high != Some(event.cycle.0 >> 16));
-            high = Some(event.cycle.0 >> 16);
+            prop_assert_eq!(time.is_some(), high != Some(event.cycle.raw() >> 16));
+            high = Some(event.cycle.raw() >> 16);
             if let Some(time) = time {
                 decoder.decode(time).unwrap();
             }

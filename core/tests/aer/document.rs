@@ -3,9 +3,10 @@
 
 use std::collections::BTreeMap;
 
+use dtof_core::events::DynamicDepthEvent;
 use dtof_core::{
-    BinIndex, BinPosition, BlockLevel, Count, DepthEvent, DynamicDepthEvent, EchoNumber, Flags,
-    LaserCycle, PixelAddress, SubBinOffset,
+    BinIndex, BinPosition, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle,
+    PixelAddress, SubBinOffset,
 };
 
 pub const DOCUMENT: &str = include_str!("../../../docs/aer-format.md");
@@ -80,9 +81,9 @@ pub fn pack(table: &[Field], values: &BTreeMap<&str, u128>) -> [u8; 16] {
 pub fn pack_event(table: &[Field], event: &DepthEvent) -> [u8; 16] {
     let offset = i128::from(event.offset.raw());
     let values = BTreeMap::from([
-        ("pixel", event.pixel.0.into()),
+        ("pixel", event.pixel.raw().into()),
         ("exposure", event.exposure.into()),
-        ("cycle_low", u128::from(event.cycle.0 % (1 << 16))),
+        ("cycle_low", u128::from(event.cycle.raw() % (1 << 16))),
         ("level", event.level.raw().into()),
         ("echo", u128::from(event.echo.raw()) - 1),
         ("peak_bin", event.peak_bin.raw().into()),
@@ -98,7 +99,7 @@ pub fn pack_event(table: &[Field], event: &DepthEvent) -> [u8; 16] {
 pub fn pack_time(table: &[Field], cycle: LaserCycle) -> [u8; 16] {
     pack(
         table,
-        &BTreeMap::from([("cycle_high", u128::from(cycle.0 / (1 << 16)))]),
+        &BTreeMap::from([("cycle_high", u128::from(cycle.raw() / (1 << 16)))]),
     )
 }
 
@@ -115,10 +116,10 @@ pub fn event_of(values: &BTreeMap<&str, i128>) -> DepthEvent {
     assert_eq!(values.len(), 10);
     let count = |name| Count::new(values[name].try_into().unwrap()).unwrap();
     DepthEvent {
-        pixel: PixelAddress(values["pixel"].try_into().unwrap()),
+        pixel: PixelAddress::new(values["pixel"].try_into().unwrap()),
         level: level_of(values),
         echo: EchoNumber::new(values["echo"].try_into().unwrap()).unwrap(),
-        cycle: LaserCycle(values["cycle"].try_into().unwrap()),
+        cycle: LaserCycle::new(values["cycle"].try_into().unwrap()),
         exposure: values["exposure"].try_into().unwrap(),
         peak_bin: BinIndex::new(values["peak_bin"].try_into().unwrap()).unwrap(),
         offset: SubBinOffset::new(values["offset"].try_into().unwrap()).unwrap(),
@@ -135,9 +136,9 @@ fn level_of(values: &BTreeMap<&str, i128>) -> BlockLevel {
 pub fn change_of(values: &BTreeMap<&str, i128>) -> DynamicDepthEvent {
     assert_eq!(values.len(), 6);
     DynamicDepthEvent::new(
-        PixelAddress(values["pixel"].try_into().unwrap()),
+        PixelAddress::new(values["pixel"].try_into().unwrap()),
         level_of(values),
-        LaserCycle(values["cycle"].try_into().unwrap()),
+        LaserCycle::new(values["cycle"].try_into().unwrap()),
         BinPosition::new(values["position"].try_into().unwrap()).unwrap(),
         values["change"].try_into().unwrap(),
         Flags::from_bits(values["flags"].try_into().unwrap()).unwrap(),
@@ -177,10 +178,10 @@ pub fn event(numbers: [u64; 10]) -> DepthEvent {
     let mut numbers = numbers.into_iter();
     let mut next = || numbers.next().unwrap();
     DepthEvent {
-        pixel: PixelAddress(next() as u16),
+        pixel: PixelAddress::new(next() as u16),
         level: BlockLevel::new(next() as u8 % 4).unwrap(),
         echo: EchoNumber::new(next() as u8 % 4 + 1).unwrap(),
-        cycle: LaserCycle(next()),
+        cycle: LaserCycle::new(next()),
         exposure: next() as u16,
         peak_bin: BinIndex::new(next() as u16 % 1024).unwrap(),
         offset: SubBinOffset::new((next() % 1024) as i16 - 512).unwrap(),

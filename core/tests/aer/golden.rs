@@ -40,7 +40,7 @@ fn the_golden_file_is_what_encoder_and_decoder_make_of_it() {
         match kind {
             "time" => {
                 assert_eq!(time_due, None);
-                let cycle = LaserCycle(values["cycle"].try_into().unwrap());
+                let cycle = LaserCycle::new(values["cycle"].try_into().unwrap());
                 assert_eq!(decoded, AerRecord::Time(cycle));
                 time_due = Some(sent);
             }
@@ -93,7 +93,7 @@ fn the_words_to_refuse_are_refused_for_the_reason_given() {
         let word = AerWord::from_le_bytes(word_of(row[0]));
         let mut decoder = AerDecoder::new();
         if row[1] != AerError::MissingTime.to_string() {
-            decoder.decode(AerWord::time(LaserCycle(0))).unwrap();
+            decoder.decode(AerWord::time(LaserCycle::new(0))).unwrap();
         }
         let error = decoder.decode(word).unwrap_err();
         assert_eq!(error.to_string(), row[1], "{}", row[0]);

@@ -1,23 +1,26 @@
 //! Where blocks lie, and who feeds them.
 
-use dtof_core::{
-    Array, Binning, Block, BlockLevel, Feed, Flags, LaserCycle, PixelAddress, PixelConfig,
-    Statistics, count_in_blocks, end_laser_cycles_of_blocks,
-};
+use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
+use dtof_core::{Array, BlockLevel, Flags, LaserCycle, PixelAddress, PixelConfig, Statistics};
 
 use crate::level;
 
 /// The number of the block that a feed is into. It is on from the first tick.
-fn into(mut feed: Feed) -> Option<usize> {
-    assert_eq!(feed.block(), None);
-    feed.tick(false);
-    feed.block()
+fn into(mut link: BlockLink) -> Option<usize> {
+    assert_eq!(link.block(), None);
+    link.tick(false);
+    link.block()
 }
 
 /// Every pixel feeds the block of level 1 that it lies in, and every block that of the next.
 fn check(columns: u32, rows: u32) {
     let array = Array::new(columns, rows).unwrap();
-    let place = |pixel: PixelAddress| (u32::from(pixel.0) % columns, u32::from(pixel.0) / columns);
+    let place = |pixel: PixelAddress| {
+        (
+            u32::from(pixel.raw()) % columns,
+            u32::from(pixel.raw()) / columns,
+        )
+    };
     for top in 1..=3 {
         let binning = Binning::new(array, level(top)).unwrap();
         let blocks: Vec<_> = binning.blocks().collect();
@@ -31,24 +34,27 @@ fn check(columns: u32, rows: u32) {
         let parent = |pixel: PixelAddress, of: u8| {
             let (column, row) = place(pixel);
             let (left, top) = (column >> of << of, row >> of << of);
-            let first = PixelAddress((top * columns + left) as u16);
+            let first = PixelAddress::new((top * columns + left) as u16);
             let found = blocks
                 .iter()
                 .position(|block| (block.first, block.level.raw()) == (first, of));
             found.unwrap()
         };
-        for pixel in (0..array.pixels()).map(|pixel| PixelAddress(pixel as u16)) {
-            assert_eq!(into(binning.feed_of(pixel)), Some(parent(pixel, 1)));
+        for pixel in (0..array.pixels()).map(|pixel| PixelAddress::new(pixel as u16)) {
+            assert_eq!(into(binning.link_of(pixel)), Some(parent(pixel, 1)));
         }
         for block in &blocks {
             let next = block.level.raw() + 1;
             let expected = (next <= top).then(|| parent(block.first, next));
-            assert_eq!(into(block.feed), expected);
+            assert_eq!(into(block.link), expected);
         }
         // No other pixel feeds a block.
         for beyond in [array.pixels(), array.pixels() + 1, 65_535] {
             if (array.pixels()..1 << 16).contains(&beyond) {
-                assert_eq!(into(binning.feed_of(PixelAddress(beyond as u16))), None);
+                assert_eq!(
+                    into(binning.link_of(PixelAddress::new(beyond as u16))),
+                    None
+                );
             }
         }
     }
@@ -77,14 +83,20 @@ fn the_most_blocks_are_those_of_one_row() {
     assert_eq!((most, blocks(1 << 16, 1)), (Some(57_344), 57_344));
     let binning = Binning::new(Array::new(1, 1 << 16).unwrap(), level(3)).unwrap();
     let last = binning.blocks().last().unwrap();
-    assert_eq!((last.first, into(last.feed)), (PixelAddress(65_528), None));
-    assert_eq!(into(binning.feed_of(PixelAddress(65_535))), Some(32_767));
+    assert_eq!(
+        (last.first, into(last.link)),
+        (PixelAddress::new(65_528), None)
+    );
+    assert_eq!(
+        into(binning.link_of(PixelAddress::new(65_535))),
+        Some(32_767)
+    );
 }
 
 #[test]
 fn a_feed_is_on_from_a_tick_to_an_event_and_past_the_tick_after_it() {
     let binning = Binning::new(Array::new(4, 1).unwrap(), level(1)).unwrap();
-    let mut feed = binning.feed_of(PixelAddress(2));
+    let mut link = binning.link_of(PixelAddress::new(2));
     // An event, a tick, or neither; what the feed is into then.
     for (step, expected) in [
         (' ', None),
@@ -104,14 +116,14 @@ fn a_feed_is_on_from_a_tick_to_an_event_and_past_the_tick_after_it() {
         ('t', Some(1)),
     ] {
         match step {
-            'e' => feed.reported(),
-            't' => feed.tick(false),
-            'w' => feed.tick(true),
+            'e' => link.reported(),
+            't' => link.tick(false),
+            'w' => link.tick(true),
             _ => {}
         }
-        assert_eq!(feed.block(), expected);
+        assert_eq!(link.block(), expected);
     }
-    let mut none = Feed::NONE;
+    let mut none = BlockLink::NONE;
     none.tick(false);
     assert_eq!(none.block(), None);
 }
@@ -125,24 +137,24 @@ fn a_block_piles_up_when_its_pixels_do() {
         let mut config = PixelConfig::<32>::paper().l2(4000).build().unwrap();
         config = config.with_one_hit_tdc();
         for (more, piles_up) in [(0, false), (1, true)] {
-            let mut feeds: Vec<Feed> = (0..pixels)
-                .map(|pixel| binning.feed_of(PixelAddress(pixel)))
+            let mut links: Vec<BlockLink> = (0..pixels)
+                .map(|pixel| binning.link_of(PixelAddress::new(pixel)))
                 .collect();
             let mut blocks: Vec<Block<32>> = binning.blocks().map(Block::new).collect();
             // Twice as often as there are levels: all the way up.
             for _ in 0..2 * number {
-                feeds.iter_mut().for_each(|feed| feed.tick(false));
+                links.iter_mut().for_each(|link| link.tick(false));
                 blocks.iter_mut().for_each(Block::tick);
             }
             for photon in 0..22 * pixels + more {
-                let feed = &feeds[usize::from(photon % pixels)];
-                count_in_blocks(&mut blocks, feed, &config, 9);
+                let link = &links[usize::from(photon % pixels)];
+                count_in_blocks(&mut blocks, link, &config, 9);
             }
             let mut statistics = Statistics::default();
-            let last = LaserCycle(43);
+            let last = LaserCycle::new(43);
             end_laser_cycles_of_blocks(&mut blocks, &config, &mut statistics, last, 44);
             let block = blocks.last_mut().unwrap();
-            let event = block.acknowledge().unwrap();
+            let event = block.take_event().unwrap();
             assert_eq!(event.level, level(number));
             assert_eq!(
                 event.flags.contains(Flags::PILE_UP),

@@ -1,9 +1,10 @@
 //! A whole array against a model written from the description of pixels, ticks and feeding.
 
+use dtof_core::binning::{Binning, Block, count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
-    Array, AsyncPixel, Binning, Block, Count, Count16, DepthEvent, EchoNumber, LaserCycle,
-    PaperRule, PixelAddress, PixelConfig, Statistics, count_in_blocks, end_laser_cycles_of_blocks,
+    Array, AsyncPixel, Count, Count16, DepthEvent, EchoNumber, LaserCycle, PaperRule, PixelAddress,
+    PixelConfig, Statistics,
 };
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -22,7 +23,7 @@ struct Node {
     /// The laser cycle of its last event.
     reported: Option<u64>,
     /// From the last tick on, until an event.
-    feeds: bool,
+    links: bool,
     counts: [u32; BINS],
     full: u32,
     exposure: u32,
@@ -58,7 +59,7 @@ impl Model {
                         rows: row..rows.min(row + side),
                         level,
                         reported: None,
-                        feeds: false,
+                        links: false,
                         counts: [0; BINS],
                         full: if level == 0 { 1023 } else { 65_535 },
                         exposure: 0,
@@ -81,7 +82,7 @@ impl Model {
             if let Some(count) = node.counts.get_mut(code) {
                 *count = (*count + 1).min(node.full);
             }
-            if !node.feeds {
+            if !node.links {
                 return;
             }
         }
@@ -119,7 +120,7 @@ impl Model {
                 let first = node.rows.start * self.columns + node.columns.start;
                 events.push((first, node.level, node.exposure, bin, peak, background));
                 node.reported = Some(cycle);
-                node.feeds = false;
+                node.links = false;
             }
             node.counts = [0; BINS];
             node.exposure = 0;
@@ -127,7 +128,7 @@ impl Model {
         // Ticks come every `patience`, for all at once.
         if (cycle + 1).is_multiple_of(self.config.patience) {
             for node in &mut self.nodes {
-                node.feeds = node.reported <= self.last_tick;
+                node.links = node.reported <= self.last_tick;
             }
             self.last_tick = Some(cycle);
         }
@@ -148,8 +149,8 @@ fn compare(columns: u32, rows: u32, settings: Settings, cycles: u64, rng: &mut P
         .l1(settings.l1);
     let config = config.l2(settings.l2).build().unwrap();
     let mut pixels: Vec<_> = (0..array.pixels())
-        .map(|pixel| PixelAddress(pixel as u16))
-        .map(|pixel| (AsyncPixel::<BINS>::new(pixel), binning.feed_of(pixel)))
+        .map(|pixel| PixelAddress::new(pixel as u16))
+        .map(|pixel| (AsyncPixel::<BINS>::new(pixel), binning.link_of(pixel)))
         .collect();
     let mut blocks: Vec<Block<BINS>> = binning.blocks().map(Block::new).collect();
     let [mut of_pixels, mut of_blocks] = [Statistics::new(), Statistics::new()];
@@ -168,7 +169,7 @@ fn compare(columns: u32, rows: u32, settings: Settings, cycles: u64, rng: &mut P
     let background = rng.next_u32() % 100;
     let (mut photons, mut events) = (0, Events::default());
     for cycle in 0..cycles {
-        for (number, (pixel, feed)) in (0..).zip(&mut pixels) {
+        for (number, (pixel, link)) in (0..).zip(&mut pixels) {
             let (bin, rate) = signals[number as usize];
             let mut codes = Vec::new();
             if rng.next_u32() % 256 < rate {
@@ -179,28 +180,28 @@ fn compare(columns: u32, rows: u32, settings: Settings, cycles: u64, rng: &mut P
             }
             for code in codes {
                 pixel.count(&config, code);
-                count_in_blocks(&mut blocks, feed, &config, code);
+                count_in_blocks(&mut blocks, link, &config, code);
                 model.photon(number % columns, number / columns, code.into());
                 photons += 1;
             }
         }
-        let now = LaserCycle(cycle);
+        let now = LaserCycle::new(cycle);
         let mut found: Vec<DepthEvent> = Vec::new();
-        for (pixel, feed) in &mut pixels {
+        for (pixel, link) in &mut pixels {
             pixel.end_laser_cycle(&config, &mut of_pixels, now);
-            if let Some(event) = pixel.acknowledge() {
-                feed.reported();
+            if let Some(event) = pixel.take_event() {
+                link.reported();
                 found.push(event);
             }
         }
         let fired = end_laser_cycles_of_blocks(&mut blocks, &config, &mut of_blocks, now, 1);
-        let waiting = blocks.iter().filter(|block| block.request()).count();
+        let waiting = blocks.iter().filter(|block| block.has_event()).count();
         assert_eq!(fired, waiting > 0);
-        found.extend(blocks.iter_mut().filter_map(Block::acknowledge));
+        found.extend(blocks.iter_mut().filter_map(Block::take_event));
         if (cycle + 1).is_multiple_of(settings.patience) {
             pixels
                 .iter_mut()
-                .for_each(|(pixel, feed)| feed.tick(pixel.has_reported()));
+                .for_each(|(pixel, link)| link.tick(pixel.has_reported()));
             blocks.iter_mut().for_each(Block::tick);
         }
         let expected = model.end_laser_cycle(cycle);
@@ -210,7 +211,7 @@ fn compare(columns: u32, rows: u32, settings: Settings, cycles: u64, rng: &mut P
         }
         let plain = found.iter().map(|event| {
             let counts = (event.peak_count.raw(), event.background.raw());
-            let (first, bin) = (event.pixel.0.into(), event.peak_bin.raw().into());
+            let (first, bin) = (event.pixel.raw().into(), event.peak_bin.raw().into());
             (
                 first,
                 event.level.raw(),

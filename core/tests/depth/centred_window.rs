@@ -9,8 +9,8 @@
 
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{
-    CentredWindow, Count10, Count16, Count24, CounterWidth, Depth, Flags, Histogram, RangeGate,
-    SubBinOffset,
+    CentredWindow, Count10, Count16, Count24, CounterWidth, DepthEstimate, DepthEstimator, Flags,
+    Histogram, RangeGate, SubBinOffset,
 };
 use proptest::prelude::*;
 
@@ -25,7 +25,7 @@ fn depth<W: CounterWidth>(
     bin: usize,
     half_width: u16,
     background: U24F8,
-) -> Depth {
+) -> DepthEstimate {
     formula::depth::<W>(counts, bin, (half_width, half_width), background)
 }
 
@@ -90,17 +90,22 @@ fn all_small_pulses_are_as_written() {
     assert!(compared > number_of * 9 / 10, "{compared} of {number_of}");
 }
 
+/// So many photons of the Gaussian pulse that a window suits, at `place` in bins.
+fn suiting_pulse(half_width: u16, place: f64, photons: f64) -> [u32; BINS] {
+    let sigma = (f64::from(half_width) / 256.0 - 0.5) / 2.0;
+    let below = |x: f64| libm::erfc((place - x) / sigma / 2f64.sqrt()) / 2.0;
+    core::array::from_fn(|bin| {
+        let share = below(bin as f64 + 1.0) - below(bin as f64);
+        (photons * share).round() as u32
+    })
+}
+
 /// A Gaussian pulse that suits the window, a quarter of a bin to either side.
 #[test]
 fn a_pulse_that_suits_the_window_is_found() {
     for half_width in 288..=1024u16 {
-        let sigma = (f64::from(half_width) / 256.0 - 0.5) / 2.0;
         for (quarter, offset) in [(0.25, 64), (0.5, 128), (0.75, 192)] {
-            let below = |x: f64| libm::erfc((16.0 + quarter - x) / sigma / 2f64.sqrt()) / 2.0;
-            let counts: [u32; BINS] = core::array::from_fn(|bin| {
-                let share = below(bin as f64 + 1.0) - below(bin as f64);
-                (1000.0 * share).round() as u32
-            });
+            let counts = suiting_pulse(half_width, 16.0 + quarter, 1000.0);
             let found = depth::<Count10>(&counts, 16, half_width, U24F8::ZERO);
             let off = (found.offset.raw() - offset).abs();
             assert!(off <= 2, "{half_width} {quarter}: off by {off}/256");
@@ -124,7 +129,7 @@ fn an_even_pulse_stays_where_it_is() {
 fn nothing_at_all_lies_in_the_middle() {
     for background in [U24F8::ZERO, U24F8::ONE, U24F8::MAX] {
         let depth = depth::<Count10>(&[0; BINS], 16, 640, background);
-        let Depth { offset, flags } = depth;
+        let DepthEstimate { offset, flags } = depth;
         assert_eq!((offset, flags), (SubBinOffset::CENTRE, Flags::NONE));
     }
 }
@@ -186,7 +191,7 @@ fn an_offset_at_its_limit_is_clipped() {
     for bin in 12..=20 {
         let mut counts = [0; BINS];
         counts[bin] = 900;
-        let Depth { offset, flags } = depth::<Count10>(&counts, 16, 1024, U24F8::ZERO);
+        let DepthEstimate { offset, flags } = depth::<Count10>(&counts, 16, 1024, U24F8::ZERO);
         let limits = [SubBinOffset::MIN, SubBinOffset::MAX].map(|limit| offset == limit);
         assert_eq!(
             flags.contains(Flags::CLIPPED),
@@ -294,9 +299,9 @@ proptest! {
     }
 }
 
-/// Of every peak and gate, and widths from the least to the largest.
+/// For every peak and gate, and widths from the least to the largest.
 #[test]
-fn the_background_outside_is_the_mean_of_the_bins_not_reached() {
+fn the_background_is_the_mean_of_the_bins_not_reached() {
     let counts: [u32; BINS] = std::array::from_fn(|bin| (bin as u32 * 7919) % 101);
     for (first, last) in [(0, 31), (0, 7), (5, 13), (24, 31), (3, 30)] {
         let gate = RangeGate::<BINS>::new(first, last).unwrap();
@@ -311,7 +316,7 @@ fn the_background_outside_is_the_mean_of_the_bins_not_reached() {
         ] {
             for bin in 0..BINS {
                 let window = formula::window((before, after));
-                let found = window.background_outside(&histogram, &gate, peak(&counts, bin), 0);
+                let peak = peak(&counts, bin);
                 let [below, above] = [before, after].map(|half| usize::from(half.div_ceil(256)));
                 let gated = usize::from(first)..=usize::from(last);
                 let inside = bin.saturating_sub(below)..=bin + above;
@@ -322,12 +327,36 @@ fn the_background_outside_is_the_mean_of_the_bins_not_reached() {
                     bins += 1;
                 }
                 let mean = (sum << 8).checked_div(bins).map(U24F8::from_bits);
-                let expected = mean.filter(|_| gated.contains(&bin));
-                assert_eq!(
-                    found, expected,
-                    "{first} to {last}, {before} {after}, {bin}"
-                );
+                let mean = mean.filter(|_| gated.contains(&bin));
+                for given in [U24F8::ZERO, U24F8::lit("200")] {
+                    let found = DepthEstimator::CentredWindow(window)
+                        .estimate(&histogram, &gate, peak, given);
+                    let expected = window.estimate(&histogram, &gate, peak, mean.unwrap_or(given));
+                    assert_eq!(
+                        found, expected,
+                        "{first} to {last}, {before} {after}, {bin}"
+                    );
+                }
             }
         }
+    }
+}
+
+/// The table of gains has one for every sixteenth of a bin. A wrong one shows on average: that of
+/// the widest window changes the place by up to 0.9 of 1/256 bin.
+#[test]
+fn no_width_is_off_on_average() {
+    for half in (256..=1024).step_by(16) {
+        let (mut sum, mut number) = (0.0, 0.0);
+        // All over the second half of a bin.
+        for place in 0..400 {
+            let counts = suiting_pulse(half, 16.5 + f64::from(place) / 800.0, 4e6);
+            let found = depth::<Count24>(&counts, 16, half, U24F8::ZERO);
+            if let Some((expected, _)) = rest(&counts, 16, (half, half)) {
+                sum += f64::from(found.offset.raw()) - expected;
+                number += 1.0;
+            }
+        }
+        assert!(number > 300.0 && (sum / number).abs() < 0.05, "{half}");
     }
 }

@@ -1,9 +1,10 @@
 //! The centroid against the real-valued formula.
 
 use dtof_core::fixed::types::U24F8;
+use dtof_core::paper::centroid;
 use dtof_core::{
-    BinIndex, Count, Count10, Count16, Count24, CounterWidth, Depth, Flags, Histogram, Peak,
-    RangeGate, SubBinOffset, centroid,
+    BinIndex, Count, Count10, Count16, Count24, CounterWidth, DepthEstimate, Flags, Histogram,
+    Peak, RangeGate, SubBinOffset,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -16,7 +17,7 @@ fn peak_at(bin: u16, count: u32) -> Peak {
 }
 
 /// The depth of a pulse of three bins in the middle of a histogram.
-fn depth<W: CounterWidth>([left, centre, right]: [u32; 3], background: u32) -> Depth {
+fn depth<W: CounterWidth>([left, centre, right]: [u32; 3], background: u32) -> DepthEstimate {
     let gate = RangeGate::full();
     let mut histogram = Histogram::<8, W>::new();
     histogram.add_frame(&[0, 0, 0, left, centre, right, 0, 0], &gate);

@@ -7,7 +7,9 @@
 )]
 
 use dtof_core::fixed::types::{U8F8, U24F8};
-use dtof_core::{BinIndex, CentredWindow, Count, CounterWidth, Depth, Histogram, Peak, RangeGate};
+use dtof_core::{
+    BinIndex, CentredWindow, Count, CounterWidth, DepthEstimate, Histogram, Peak, RangeGate,
+};
 use proptest::prelude::*;
 
 pub const BINS: usize = 32;
@@ -37,7 +39,7 @@ pub fn depth<W: CounterWidth>(
     bin: usize,
     sides: (u16, u16),
     background: U24F8,
-) -> Depth {
+) -> DepthEstimate {
     let gate = RangeGate::full();
     let histogram = histogram::<W>(counts);
     window(sides).estimate(&histogram, &gate, peak(counts, bin), background)

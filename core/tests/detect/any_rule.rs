@@ -1,9 +1,10 @@
 //! A rule chosen when the program runs decides as the one it holds.
 
 use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::rule::{ExcludedBins, detect};
 use dtof_core::{
     AnyRule, AverageRule, BlockLevel, CentredWindow, Count, Count10, Count24, CounterWidth,
-    DepthEstimator, Detection, DetectionRule, Histogram, PaperRule, RangeGate, WindowRule, detect,
+    DepthEstimator, Detection, DetectionRule, Histogram, PaperRule, RangeGate, WindowRule,
 };
 use proptest::prelude::*;
 use rand_core::SeedableRng;
@@ -20,8 +21,11 @@ fn decides<const BINS: usize, W: CounterWidth>(
     let alone = detect(histogram, gate, &rule, estimator);
     prop_assert_eq!(detect(histogram, gate, &any, estimator), alone);
     let peak = histogram.peak();
-    let expected = rule.detect(histogram, gate, peak);
-    prop_assert_eq!(any.detect(histogram, gate, peak), expected);
+    let expected = rule.detect(histogram, gate, peak, &ExcludedBins::NONE);
+    prop_assert_eq!(
+        any.detect(histogram, gate, peak, &ExcludedBins::NONE),
+        expected
+    );
     Ok(alone)
 }
 

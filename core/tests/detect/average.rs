@@ -1,9 +1,11 @@
 //! The average rule decides as Eq. 5 has it, in exact numbers.
 
 use dtof_core::fixed::types::{U8F8, U24F8};
+use dtof_core::paper::centroid;
+use dtof_core::rule::{ExcludedBins, detect};
 use dtof_core::{
     AverageRule, BinPosition, Count, Count10, Count16, Count24, CounterWidth, DepthEstimator,
-    DetectionRule, Histogram, RangeGate, centroid, detect,
+    DetectionRule, Histogram, RangeGate,
 };
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -80,7 +82,10 @@ fn every_threshold_of_eight_bins_is_exact() {
                 let mut histogram = Histogram::<8>::new();
                 histogram.add_frame(&frame, &gate);
                 let expected = as_written(&rule, &histogram, &gate, 0);
-                assert_eq!(rule.detect(&histogram, &gate, histogram.peak()), expected);
+                assert_eq!(
+                    rule.detect(&histogram, &gate, histogram.peak(), &ExcludedBins::NONE),
+                    expected
+                );
             }
         }
     }
@@ -98,7 +103,10 @@ fn the_widest_counters_do_not_overflow() {
         for alpha in [0, 1, 256, u16::MAX] {
             let rule = AverageRule::new(U8F8::from_bits(alpha), Count::saturating(1));
             let expected = as_written(&rule, &histogram, &gate, 0);
-            assert_eq!(rule.detect(&histogram, &gate, histogram.peak()), expected);
+            assert_eq!(
+                rule.detect(&histogram, &gate, histogram.peak(), &ExcludedBins::NONE),
+                expected
+            );
         }
     }
 }
@@ -162,7 +170,7 @@ proptest! {
         let fires = |frame: &[u32; 8]| {
             let mut histogram = Histogram::<8>::new();
             histogram.add_frame(frame, &gate);
-            rule.detect(&histogram, &gate, histogram.peak()).is_some()
+            rule.detect(&histogram, &gate, histogram.peak(), &ExcludedBins::NONE).is_some()
         };
         let highest = *frame.iter().max().unwrap();
         let peak = frame.iter().position(|&count| count == highest).unwrap();

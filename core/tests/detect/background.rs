@@ -1,7 +1,9 @@
 //! The background is the smaller of the two quadrant maxima of the half
 //! without the peak, and sees nothing outside the gate.
 
-use dtof_core::{BinIndex, ComparatorTree, Count, PhotonCount, RangeGate, quadrant_background};
+use dtof_core::paper::{ComparatorTree, quadrant_background};
+use dtof_core::rule::PhotonCount;
+use dtof_core::{BinIndex, Count, RangeGate};
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;

@@ -1,7 +1,8 @@
 //! What the tests of more than one rule need.
 
 use dtof_core::fixed::types::U24F8;
-use dtof_core::{CounterWidth, DepthEstimator, DetectionRule, Histogram, RangeGate, detect};
+use dtof_core::rule::{ExcludedBins, detect};
+use dtof_core::{CounterWidth, DepthEstimator, DetectionRule, Histogram, RangeGate};
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
@@ -38,7 +39,10 @@ pub fn gives<const BINS: usize, W: CounterWidth>(
     gate: &RangeGate<BINS>,
     expected: Option<U24F8>,
 ) -> bool {
-    assert_eq!(rule.detect(histogram, gate, histogram.peak()), expected);
+    assert_eq!(
+        rule.detect(histogram, gate, histogram.peak(), &ExcludedBins::NONE),
+        expected
+    );
     let detection = detect(histogram, gate, rule, &DepthEstimator::default());
     let rounded = detection.map(|detection| detection.background.raw());
     assert_eq!(rounded, expected.map(|level| (level.to_bits() + 128) >> 8));

@@ -1,8 +1,7 @@
 //! Comparator tree, running peak and a plain search find the same peak.
 
-use dtof_core::{
-    ComparatorTree, Count10, Count16, Count24, CounterWidth, Histogram, Peak, RangeGate,
-};
+use dtof_core::paper::ComparatorTree;
+use dtof_core::{Count10, Count16, Count24, CounterWidth, Histogram, Peak, RangeGate};
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;

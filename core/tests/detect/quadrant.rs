@@ -1,9 +1,11 @@
 //! The paper's rule decides as it is written.
 
 use dtof_core::fixed::types::U8F8;
+use dtof_core::paper::quadrant_background;
+use dtof_core::rule::{ExcludedBins, background_from_count, detect};
 use dtof_core::{
     Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule, Histogram,
-    PaperRule, Peak, RangeGate, detect, quadrant_background, whole_background,
+    PaperRule, Peak, RangeGate,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -31,8 +33,8 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) {
         let rule = PaperRule::new(U8F8::from_bits(alpha), Count::saturating(minimum));
 
         let expected = as_written(&rule, &histogram, &gate);
-        let background = rule.detect(&histogram, &gate, histogram.peak());
-        let whole = expected.map(|(_, background)| whole_background(background));
+        let background = rule.detect(&histogram, &gate, histogram.peak(), &ExcludedBins::NONE);
+        let whole = expected.map(|(_, background)| background_from_count(background));
         assert_eq!(background, whole);
         let detection = detect(&histogram, &gate, &rule, &DepthEstimator::default());
         let detected = detection.map(|detection| (detection.peak, detection.background));

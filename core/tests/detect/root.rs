@@ -1,6 +1,6 @@
 //! The square root is the exact floor, and the paper's Alg. 1.
 
-use dtof_core::isqrt;
+use dtof_core::paper::isqrt;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 

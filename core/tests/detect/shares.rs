@@ -2,9 +2,9 @@
 //! and blocks. Held against the normal distribution, and tracking against a simulation.
 
 use dtof_core::fixed::types::U4F12;
+use dtof_core::rule::{ExcludedBins, HIGHEST_Z, z_for_levels};
 use dtof_core::{
-    BinIndex, BlockLevel, Count, DetectionRule, HIGHEST_Z, Histogram, Peak, RangeGate, WindowRule,
-    z_for, z_for_levels,
+    BinIndex, BlockLevel, Count, DetectionRule, Histogram, Peak, RangeGate, WindowRule, z_for,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -114,8 +114,8 @@ fn blocks_have_a_third_of_the_false_alarms_of_pixels() {
             let is_covered = (LOWEST..HIGHEST_Z.to_bits() - 2500).contains(&z);
             if is_covered && level > BlockLevel::PIXEL {
                 // One level has them all; a block of each has a quarter more than a pixel.
-                let wanted = 1.0 / 3.0 / 1.25 / f64::from(level.raw());
-                let share = rate(&blocks) / rate(&rule(z)) / wanted;
+                let expected = 1.0 / 3.0 / 1.25 / f64::from(level.raw());
+                let share = rate(&blocks) / rate(&rule(z)) / expected;
                 assert!((0.9..1.1).contains(&share), "{z} {level}: {share}");
             }
         }
@@ -177,10 +177,14 @@ fn false_alarms(width: u8, expected: u16, background: f64, exposures: u32) -> f6
             }
             let count = Count::saturating(histogram.count(expected.into()).unwrap());
             let bin = BinIndex::saturating(expected);
-            let near = tracking
-                .near()
-                .detect(&histogram, &gate, Peak { bin, count });
-            let far = tracking.far().detect(&histogram, &gate, histogram.peak());
+            let near =
+                tracking
+                    .near()
+                    .detect(&histogram, &gate, Peak { bin, count }, &ExcludedBins::NONE);
+            let far =
+                tracking
+                    .far()
+                    .detect(&histogram, &gate, histogram.peak(), &ExcludedBins::NONE);
             if near.is_some() || far.is_some() {
                 events += 1.0;
                 break;

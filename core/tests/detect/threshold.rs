@@ -1,7 +1,8 @@
 //! The threshold is exact, and strict.
 
 use dtof_core::fixed::types::{U8F8, U24F8};
-use dtof_core::{Count, Count10, Count16, Count24, CounterWidth, Threshold};
+use dtof_core::paper::Threshold;
+use dtof_core::{Count, Count10, Count16, Count24, CounterWidth};
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;

@@ -2,9 +2,10 @@
 //! a target as it says.
 
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
+use dtof_core::rule::{ExcludedBins, detect};
 use dtof_core::{
     BinIndex, Count, Count10, Count16, Count24, CounterWidth, DepthEstimator, DetectionRule,
-    Histogram, RangeGate, WindowRule, WindowWidthError, detect,
+    Histogram, RangeGate, WindowRule, WindowWidthError,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -165,7 +166,12 @@ fn it_decides_as_it_is_written_at_the_extremes() {
                             for z in [0, 1, 17_613, u16::MAX] {
                                 let z = U4F12::from_bits(z);
                                 let rule = WindowRule::new(width, z, Count::default()).unwrap();
-                                let found = rule.detect(&histogram, &gate, histogram.peak());
+                                let found = rule.detect(
+                                    &histogram,
+                                    &gate,
+                                    histogram.peak(),
+                                    &ExcludedBins::NONE,
+                                );
                                 let bin = histogram.peak().bin;
                                 let expected = (histogram.total() > 0)
                                     .then(|| as_written(&rule, &histogram, &gate, bin, 0));
@@ -220,7 +226,7 @@ fn it_decides_as_it_is_written_where_the_answer_turns() {
             }
             for count in high.saturating_sub(3).max(background + 1)..=(high + 3).min(W::MAX) {
                 let histogram = of(count);
-                let found = rule.detect(&histogram, &gate, histogram.peak());
+                let found = rule.detect(&histogram, &gate, histogram.peak(), &ExcludedBins::NONE);
                 assert_eq!(
                     found,
                     expected(count),
@@ -311,7 +317,8 @@ fn more_photons_and_a_lower_z_never_undo_a_detection() {
                 let fires: [bool; 256] = std::array::from_fn(|z| {
                     let z = U4F12::from_bits((z as u16) << 8);
                     let rule = WindowRule::new(width, z, Count::default()).unwrap();
-                    rule.detect(&histogram, &gate, histogram.peak()).is_some()
+                    rule.detect(&histogram, &gate, histogram.peak(), &ExcludedBins::NONE)
+                        .is_some()
                 });
                 assert!(fires.is_sorted_by(|lower, higher| lower >= higher));
                 assert!(before.iter().zip(&fires).all(|(before, now)| before <= now));

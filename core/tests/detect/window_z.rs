@@ -40,7 +40,7 @@ fn false_events<const BINS: usize>(
     let photons_a_cycle = background * BINS as f64;
     let (mut events, mut statistics) = (0.0, Statistics::default());
     for _ in 0..exposures {
-        let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
+        let mut pixel = AsyncPixel::<BINS>::new(PixelAddress::new(0));
         let mut next = gap(&mut rng, photons_a_cycle);
         for cycle in 0..l2 {
             while next < f64::from(cycle) + 1.0 {
@@ -49,7 +49,7 @@ fn false_events<const BINS: usize>(
                 pixel.count(&config, code);
                 next += gap(&mut rng, photons_a_cycle);
             }
-            let last = LaserCycle(cycle.into());
+            let last = LaserCycle::new(cycle.into());
             if pixel.end_laser_cycle(&config, &mut statistics, last) == Look::Event {
                 events += 1.0;
                 break;

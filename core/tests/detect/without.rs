@@ -1,9 +1,10 @@
 //! The rules where some bins are left out: as if the histogram had never had them.
 
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
+use dtof_core::rule::ExcludedBins;
 use dtof_core::{
     AnyRule, AverageRule, BinIndex, Count, Count10, Count16, Count24, CounterWidth, DetectionRule,
-    Histogram, PaperRule, Peak, PeeledBins, RangeGate, WindowRule,
+    Histogram, PaperRule, Peak, RangeGate, WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -15,7 +16,7 @@ struct Case<const BINS: usize, W: CounterWidth> {
     gate: RangeGate<BINS>,
     /// Empty where bins are left out.
     histogram: Histogram<BINS, W>,
-    peeled: PeeledBins,
+    excluded: ExcludedBins,
     /// Which of the bins are left out.
     is_out: Vec<bool>,
     /// About the highest count.
@@ -29,17 +30,17 @@ impl<const BINS: usize, W: CounterWidth> Case<BINS, W> {
         let peaks: Vec<u32> = (0..rng.next_u32() % 4)
             .map(|_| rng.next_u32() % BINS as u32)
             .collect();
-        let mut peeled = PeeledBins::new(reach as u8);
+        let mut excluded = ExcludedBins::new(reach as u8);
         for &peak in &peaks {
-            peeled.push(BinIndex::saturating(peak as u16));
+            excluded.push(BinIndex::saturating(peak as u16));
         }
-        peeled.empty(&mut histogram);
+        excluded.empty(&mut histogram);
         let is_out =
             (0..BINS as u32).map(|bin| peaks.iter().any(|peak| peak.abs_diff(bin) <= reach));
         Self {
             gate,
             histogram,
-            peeled,
+            excluded,
             is_out: is_out.collect(),
             most,
         }
@@ -61,11 +62,11 @@ impl<const BINS: usize, W: CounterWidth> Case<BINS, W> {
         let left_out = self.left_out(first..end);
         let is_enough = usize::from(end - first) - left_out >= 8;
         let expected = if is_enough { expected(left_out) } else { None };
-        let found = rule.detect_without(&self.histogram, &self.gate, peak, &self.peeled);
+        let found = rule.detect(&self.histogram, &self.gate, peak, &self.excluded);
         assert_eq!(found, expected);
         let any: AnyRule = (*rule).into();
         assert_eq!(
-            any.detect_without(&self.histogram, &self.gate, peak, &self.peeled),
+            any.detect(&self.histogram, &self.gate, peak, &self.excluded),
             expected
         );
         expected.is_some()
@@ -166,8 +167,8 @@ fn quadrants<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) {
             f64::from(peak.count.raw()) > level && peak.count >= rule.threshold().minimum_count()
         });
         let expected = expected.map(|&background| U24F8::from_num(background));
-        let found = rule.detect_without(&case.histogram, &case.gate, peak, &case.peeled);
-        assert_eq!(found, expected, "{:?} {:?}", case.peeled, case.gate);
+        let found = rule.detect(&case.histogram, &case.gate, peak, &case.excluded);
+        assert_eq!(found, expected, "{:?} {:?}", case.excluded, case.gate);
         fired += u32::from(found.is_some());
     }
     crate::common::both_often(fired, rounds);
@@ -196,45 +197,17 @@ fn no_bins_at_all() {
     for reach in 0..20 {
         let mut histogram = Histogram::<16>::new();
         histogram.add_frame(&[9u8; 16], &gate);
-        let mut peeled = PeeledBins::new(reach);
-        peeled.push(BinIndex::saturating(7));
-        peeled.empty(&mut histogram);
+        let mut excluded = ExcludedBins::new(reach);
+        excluded.push(BinIndex::saturating(7));
+        excluded.empty(&mut histogram);
         let bins = (3..=12u8).filter(|bin| bin.abs_diff(7) > reach).count();
-        assert_eq!(peeled.bins_left(&gate), (bins >= 8).then_some(bins as u32));
+        assert_eq!(
+            excluded.bins_left(&gate),
+            (bins >= 8).then_some(bins as u32)
+        );
         for rule in rules {
-            let found = rule.detect_without(&histogram, &gate, histogram.peak(), &peeled);
+            let found = rule.detect(&histogram, &gate, histogram.peak(), &excluded);
             assert!(found.is_none(), "{rule:?}");
         }
     }
-}
-
-/// A rule of somebody else, which compares no parts of the histogram.
-#[derive(Clone, Copy)]
-struct Above(Count);
-
-impl DetectionRule for Above {
-    fn detect<const BINS: usize, W: CounterWidth>(
-        &self,
-        _histogram: &Histogram<BINS, W>,
-        _gate: &RangeGate<BINS>,
-        peak: Peak,
-    ) -> Option<U24F8> {
-        (peak.count > self.0).then_some(U24F8::lit("0.5"))
-    }
-}
-
-/// It decides alike with bins left out.
-#[test]
-fn a_rule_without_a_way_of_its_own_takes_no_account() {
-    let mut rng = Pcg32::seed_from_u64(5);
-    let mut decided = [0; 2];
-    for round in 0..100 {
-        let case = Case::<64, Count10>::random(&mut rng, round);
-        let rule = Above(Count::saturating(case.most / 2));
-        let peak = case.histogram.peak();
-        let found = rule.detect_without(&case.histogram, &case.gate, peak, &case.peeled);
-        assert_eq!(found, rule.detect(&case.histogram, &case.gate, peak));
-        decided[usize::from(found.is_some())] += 1;
-    }
-    assert!(decided.iter().all(|&times| times > 0), "{decided:?}");
 }

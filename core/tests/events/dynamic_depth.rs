@@ -2,11 +2,14 @@
 
 #![allow(clippy::cast_possible_wrap, reason = "means of a few events")]
 
+use dtof_core::events::{
+    DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Polarity, Reference,
+    ZeroThresholdError,
+};
 use dtof_core::fixed::types::{I24F8, U16F16, U24F8};
 use dtof_core::{
-    BinIndex, BinPosition, BlockLevel, Count, DepthEvent, DynamicDepthConfig, DynamicDepthEvent,
-    DynamicDepthPixel, EchoNumber, Flags, LaserCycle, PixelAddress, Polarity, RangeScale,
-    Reference, SubBinOffset, ZeroThresholdError,
+    BinIndex, BinPosition, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle,
+    PixelAddress, RangeScale, SubBinOffset,
 };
 use proptest::prelude::*;
 
@@ -23,10 +26,10 @@ fn config(threshold_mm: f64, reference: Reference) -> DynamicDepthConfig {
 fn event(cycle: u64, position: i32) -> DepthEvent {
     let bin = (position.max(0) >> 8).min(1023);
     DepthEvent {
-        pixel: PixelAddress(7),
+        pixel: PixelAddress::new(7),
         level: BlockLevel::PIXEL,
         echo: EchoNumber::FIRST,
-        cycle: LaserCycle(cycle),
+        cycle: LaserCycle::new(cycle),
         exposure: 44,
         peak_bin: BinIndex::new(bin.try_into().unwrap()).unwrap(),
         offset: SubBinOffset::new((position - (bin << 8)).try_into().unwrap()).unwrap(),
@@ -88,7 +91,7 @@ fn check<const N: usize>(threshold_mm: f64, reference: Reference, positions: &[i
         assert_eq!(i64::from(found.change()), change / N as i64);
         let polarity = [Polarity::Farther, Polarity::Nearer][usize::from(change < 0)];
         assert_eq!(found.polarity(), polarity);
-        assert_eq!((found.pixel.0, found.cycle.0), (7, at as u64));
+        assert_eq!((found.pixel.raw(), found.cycle.raw()), (7, at as u64));
         let of_mean = positions[at.saturating_sub(N)..=at].iter();
         let flags = of_mean.fold(Flags::NONE, |flags, &position| flags | flags_of(position));
         assert_eq!(found.flags, flags);
@@ -148,8 +151,15 @@ fn the_threshold_is_strict_and_rounded_to_the_nearest_step() {
 fn a_change_is_not_zero_and_no_more_than_two_positions_can_be_apart() {
     let position = BinPosition::MIN;
     let new = |change| {
-        let (pixel, level) = (PixelAddress(1), BlockLevel::PIXEL);
-        DynamicDepthEvent::new(pixel, level, LaserCycle(2), position, change, Flags::NONE)
+        let (pixel, level) = (PixelAddress::new(1), BlockLevel::PIXEL);
+        DynamicDepthEvent::new(
+            pixel,
+            level,
+            LaserCycle::new(2),
+            position,
+            change,
+            Flags::NONE,
+        )
     };
     let most = 1023 * 256 + 511 + 512;
     for change in [1, 2, most - 1, most] {

@@ -2,7 +2,8 @@
 
 #![allow(clippy::cast_possible_wrap, reason = "means of a few events")]
 
-use dtof_core::{BinPosition, RunningMean};
+use dtof_core::BinPosition;
+use dtof_core::events::RunningMean;
 use proptest::prelude::*;
 
 fn check<const N: usize>(positions: &[i32]) {

@@ -1,9 +1,10 @@
 //! Configurations that are valid, and those that are not.
 
 use dtof_core::fixed::types::{U8F8, U24F8};
+use dtof_core::rule::ExcludedBins;
 use dtof_core::{
-    ConfigError, Count, CounterWidth, DepthEstimator, DetectionRule, EchoNumber, Histogram, Look,
-    PaperRule, Peak, PixelConfig, RangeGate, checked,
+    Count, CounterWidth, DepthEstimator, DetectionRule, EchoNumber, Histogram, Look, PaperRule,
+    Peak, PixelConfig, PixelConfigError, RangeGate, checked,
 };
 
 use crate::model::Lone;
@@ -19,13 +20,13 @@ fn small_configurations_are_valid_if_and_only_if_there_is_a_look() {
                     0 < x && x <= l1 && l1 < l2 && (0..20).any(|k| l1 < k * x && k * x < l2);
                 assert_eq!(config.is_ok(), valid, "{x} {l1} {l2}");
                 let reason = if x == 0 {
-                    ConfigError::ZeroX
+                    PixelConfigError::ZeroX
                 } else if x > l1 {
-                    ConfigError::XAboveL1
+                    PixelConfigError::XAboveL1
                 } else if l1 >= l2 {
-                    ConfigError::L2NotAboveL1
+                    PixelConfigError::L2NotAboveL1
                 } else {
-                    ConfigError::NoLook
+                    PixelConfigError::NoLook
                 };
                 match config {
                     Ok(config) => {
@@ -58,7 +59,7 @@ fn every_setting_arrives() {
     let last = EchoNumber::new(3).unwrap();
     let config = config.estimator(estimator).one_hit_tdc(true);
     let config = config.echoes(last, 5).echo_wait(6).build().unwrap();
-    assert_eq!((config.echoes(), config.peel_reach()), (last, 5));
+    assert_eq!((config.echoes(), config.echo_guard_bins()), (last, 5));
     assert_eq!(config.echo_wait(), 6);
     assert_eq!((config.x(), config.l1(), config.l2()), (7, 9, 99));
     assert_eq!((config.gate(), config.estimator()), (&gate, &estimator));
@@ -70,12 +71,12 @@ fn large_configurations_are_checked_without_overflow() {
     let rule = PaperRule::new(U8F8::lit("8"), Count::saturating(5));
     for (x, l1, l2, expected) in [
         (1, 65_533, 65_535, None),
-        (1, 65_534, 65_535, Some(ConfigError::NoLook)),
+        (1, 65_534, 65_535, Some(PixelConfigError::NoLook)),
         (32_767, 32_767, 65_535, None), // looks at 65,534
-        (32_767, 32_767, 65_534, Some(ConfigError::NoLook)),
-        (65_535, 65_535, 65_535, Some(ConfigError::L2NotAboveL1)),
-        (65_535, 65_534, 65_535, Some(ConfigError::XAboveL1)),
-        (65_534, 65_534, 65_535, Some(ConfigError::NoLook)),
+        (32_767, 32_767, 65_534, Some(PixelConfigError::NoLook)),
+        (65_535, 65_535, 65_535, Some(PixelConfigError::L2NotAboveL1)),
+        (65_535, 65_534, 65_535, Some(PixelConfigError::XAboveL1)),
+        (65_534, 65_534, 65_535, Some(PixelConfigError::NoLook)),
     ] {
         let config = PixelConfig::<8>::with_rule(rule).x(x).l1(l1).l2(l2).build();
         assert_eq!(config.err(), expected, "{x} {l1} {l2}");
@@ -92,6 +93,7 @@ impl DetectionRule for EverySecond {
         histogram: &Histogram<BINS, W>,
         _: &RangeGate<BINS>,
         _: Peak,
+        _: &ExcludedBins,
     ) -> Option<U24F8> {
         (histogram.total() == 2).then_some(U24F8::lit("1.25"))
     }
@@ -106,7 +108,7 @@ fn another_rule_takes_the_place_of_the_paper_s() {
         pixel.pixel.count(&config, 5);
         let expected = [Look::TooEarly, Look::Event][cycle as usize % 2];
         assert_eq!(pixel.end(&config, cycle, 1), expected);
-        if let Some(event) = pixel.pixel.acknowledge() {
+        if let Some(event) = pixel.pixel.take_event() {
             assert_eq!((event.peak_count.raw(), event.background.raw()), (2, 1));
         }
     }

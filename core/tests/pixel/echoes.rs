@@ -40,7 +40,7 @@ fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle], seen: &mut S
             }
         }
         lone.pixel.count_frame(&config, &frame);
-        let was_waiting = lone.pixel.request();
+        let was_waiting = lone.pixel.has_event();
         let look = lone.end(&config, number, 1);
         assert_eq!(look, model.end(number, 1), "laser cycle {number}");
         assert!(!(was_waiting && look == Look::Event));
@@ -51,11 +51,11 @@ fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle], seen: &mut S
             lone.pixel.histogram().counts().map(u32::from),
             *model.now.counts
         );
-        assert_eq!(lone.pixel.request(), model.waiting.is_some());
+        assert_eq!(lone.pixel.has_event(), model.waiting.is_some());
         assert_eq!(lone.statistics(), model.now.statistics);
         assert_eq!(lone.statistics().photons(), offered);
         if cycle.acknowledge {
-            let event = lone.pixel.acknowledge();
+            let event = lone.pixel.take_event();
             assert_eq!(event, model.waiting.take(), "laser cycle {number}");
             if let Some(event) = event {
                 seen.echoes[usize::from(event.echo.raw()) - 1] += 1;
@@ -65,10 +65,10 @@ fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle], seen: &mut S
             }
         }
     }
-    assert_eq!(lone.pixel.acknowledge(), model.waiting);
+    assert_eq!(lone.pixel.take_event(), model.waiting);
     seen.near += model.near;
     seen.cramped += model.cramped;
-    seen.held += model.now.statistics.held;
+    seen.held += model.now.statistics.excluded;
 }
 
 fn random_settings(rng: &mut Pcg32, bins: usize) -> Settings {
@@ -276,7 +276,7 @@ fn three_echoes_by_hand() {
         }
         let look = lone.end(&config, cycle, 1);
         assert_eq!(look == Look::Ended, cycle == 31);
-        if let Some(event) = lone.pixel.acknowledge() {
+        if let Some(event) = lone.pixel.take_event() {
             let (bin, count) = (event.peak_bin.raw(), event.peak_count.raw());
             events.push((cycle, event.echo.raw(), bin, count, event.flags));
         }
@@ -289,6 +289,6 @@ fn three_echoes_by_hand() {
     assert_eq!(events, expected);
     // The third took 16 laser cycles, and the exposure ended after 32. All but its photons are around the others. Bin 26 is 6 bins from either.
     let statistics = lone.statistics();
-    assert_eq!((statistics.held, statistics.counted), (9 * 32, 0));
+    assert_eq!((statistics.excluded, statistics.counted), (9 * 32, 0));
     assert_eq!((statistics.events, statistics.expired), (3, 0));
 }

@@ -123,7 +123,7 @@ proptest! {
             let look = pixel.end(&config, cycles, length);
             prop_assert_eq!(look, model.end(cycles, length.into()));
             if acknowledge {
-                prop_assert_eq!(pixel.pixel.acknowledge(), model.waiting.take());
+                prop_assert_eq!(pixel.pixel.take_event(), model.waiting.take());
             }
             prop_assert_eq!(pixel.statistics(), model.now.statistics);
         }
@@ -161,8 +161,8 @@ fn frames_of_five_laser_cycles_are_their_photons_one_cycle_at_a_time() {
                 assert_eq!(framed_look, look);
                 assert_eq!(framed.statistics(), single.statistics());
                 if cycle.acknowledge {
-                    let event = single.pixel.acknowledge();
-                    assert_eq!(framed.pixel.acknowledge(), event);
+                    let event = single.pixel.take_event();
+                    assert_eq!(framed.pixel.take_event(), event);
                     events += u32::from(event.is_some());
                 }
             } else {

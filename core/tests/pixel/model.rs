@@ -45,7 +45,7 @@ pub struct Lone<const BINS: usize> {
 impl<const BINS: usize> Lone<BINS> {
     pub fn new(address: u16) -> Self {
         Self {
-            pixel: AsyncPixel::new(PixelAddress(address)),
+            pixel: AsyncPixel::new(PixelAddress::new(address)),
             statistics: Statistics::default(),
         }
     }
@@ -57,7 +57,7 @@ impl<const BINS: usize> Lone<BINS> {
         last: u64,
         cycles: u16,
     ) -> Look {
-        let (last, statistics) = (LaserCycle(last), &mut self.statistics);
+        let (last, statistics) = (LaserCycle::new(last), &mut self.statistics);
         self.pixel
             .end_laser_cycles(config, statistics, last, cycles)
     }
@@ -145,10 +145,10 @@ impl Model {
         let right = above(gated.get(at + 1));
         let shift = 256.0 * (right - left) / (left + above(Some(&peak)) + right);
         Some(DepthEvent {
-            pixel: PixelAddress(77),
+            pixel: PixelAddress::new(77),
             level: BlockLevel::PIXEL,
             echo: EchoNumber::FIRST,
-            cycle: LaserCycle(cycle),
+            cycle: LaserCycle::new(cycle),
             exposure: self.now.exposure as u16,
             peak_bin: BinIndex::new((first + at) as u16).unwrap(),
             offset: SubBinOffset::new(128 + shift.round() as i16).unwrap(),
@@ -183,7 +183,7 @@ pub fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle]) -> Stati
                 offered += 1;
             }
         }
-        let waiting_before = lone.pixel.request();
+        let waiting_before = lone.pixel.has_event();
         let look = lone.end(&config, number, 1);
         assert_eq!(look, model.end(number, 1), "laser cycle {number}");
         // An event that waits is never replaced.
@@ -191,20 +191,20 @@ pub fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle]) -> Stati
         assert_eq!(u32::from(lone.pixel.exposure()), model.now.exposure);
         let counts = lone.pixel.histogram().counts().map(u32::from);
         assert_eq!(counts, *model.now.counts);
-        assert_eq!(lone.pixel.request(), model.waiting.is_some());
+        assert_eq!(lone.pixel.has_event(), model.waiting.is_some());
         if cycle.acknowledge {
-            let event = lone.pixel.acknowledge();
+            let event = lone.pixel.take_event();
             assert_eq!(event, model.waiting.take());
             acknowledged += u64::from(event.is_some());
         }
         let statistics = lone.statistics();
         assert_eq!(statistics, model.now.statistics);
         assert_eq!(offered, statistics.photons());
-        let waiting = u64::from(lone.pixel.request());
+        let waiting = u64::from(lone.pixel.has_event());
         assert_eq!(statistics.events, acknowledged + waiting);
     }
-    assert_eq!(lone.pixel.address(), PixelAddress(77));
-    assert_eq!(lone.pixel.acknowledge(), model.waiting);
+    assert_eq!(lone.pixel.address(), PixelAddress::new(77));
+    assert_eq!(lone.pixel.take_event(), model.waiting);
     lone.statistics()
 }
 

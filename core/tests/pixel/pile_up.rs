@@ -27,7 +27,7 @@ fn pile_up_is_more_than_a_photon_in_every_other_laser_cycle() {
                 }
                 let last = exposure * 44 + 43;
                 assert_eq!(pixel.end(config, last, 44), Look::Event);
-                let flags = pixel.pixel.acknowledge().unwrap().flags;
+                let flags = pixel.pixel.take_event().unwrap().flags;
                 let expected = is_flagged && may_be_flagged;
                 assert_eq!(flags.contains(Flags::PILE_UP), expected, "{photons:?}");
             }
@@ -44,7 +44,7 @@ fn photons_that_met_a_full_counter_pile_up_too() {
         let mut pixel = Lone::<8>::new(0);
         (0..photons).for_each(|_| pixel.pixel.count(&config, 5));
         assert_eq!(pixel.end(&config, 2999, 3000), Look::Event);
-        let flags = pixel.pixel.acknowledge().unwrap().flags;
+        let flags = pixel.pixel.take_event().unwrap().flags;
         assert_eq!(flags.contains(Flags::PILE_UP), is_flagged);
         assert!(flags.contains(Flags::SATURATED));
     }

@@ -169,7 +169,7 @@ impl Pixel {
         for (bin, count) in self.now.counts.iter_mut().enumerate() {
             if self.held.contains(&bin) {
                 self.now.statistics.counted -= u64::from(*count);
-                self.now.statistics.held += u64::from(*count);
+                self.now.statistics.excluded += u64::from(*count);
                 *count = 0;
             }
         }
@@ -311,10 +311,10 @@ impl Pixel {
         // 0 of 0 is none.
         let shift = 256.0 * (right - left) / (left + above(bin) + right);
         DepthEvent {
-            pixel: PixelAddress(77),
+            pixel: PixelAddress::new(77),
             level: BlockLevel::PIXEL,
             echo: EchoNumber::new(self.peaks.len() as u8 + 1).unwrap(),
-            cycle: LaserCycle(cycle),
+            cycle: LaserCycle::new(cycle),
             exposure: self.now.exposure as u16,
             peak_bin: BinIndex::new(bin as u16).unwrap(),
             offset: SubBinOffset::new(128 + shift.round() as i16).unwrap(),

@@ -1,4 +1,4 @@
-//! A chart as a document: where its parts are, and the frame around the panels.
+//! A chart as a document: the layout, and everything around the panels.
 
 use anyhow::{Result, ensure};
 
@@ -8,20 +8,19 @@ use super::parts::{Chart, Panel};
 use super::scale::{GAP, Scale, Tick};
 use crate::svg::{Anchor, EDGE, Svg, TEXT, TITLE, text_width, wrapped};
 
-/// Width of every chart. At 400 pixels its smallest letters are 10 high.
+/// Width of every chart. At 400 pixels the smallest letters are 10 pixels high.
 const WIDTH: f64 = 560.0;
 const INNER: f64 = WIDTH - 2.0 * EDGE;
-/// Of a plot: the only one, those of one row, those of several.
+/// Height of a plot: the only one, in a single row, in several rows.
 const HEIGHTS: [f64; 3] = [300.0, 210.0, 165.0];
-/// Between two rows of panels, beside titles and labels.
-const BETWEEN: f64 = 14.0;
+/// Gap between two rows of panels, besides titles and labels.
+const ROW_GAP: f64 = 14.0;
 
 /// Draws `chart` as a complete SVG document. The same chart always gives the same
-/// bytes. What lies outside a given range is not drawn, nor is what a logarithmic
-/// axis has no place for.
+/// bytes. Points outside the range of an axis are not drawn.
 ///
 /// # Errors
-/// If there is no point to draw.
+/// Fails if there is no point to draw.
 pub fn chart(chart: &Chart) -> Result<String> {
     let layout = Layout::new(chart)?;
     let mut svg = Svg::default();
@@ -39,17 +38,17 @@ pub fn chart(chart: &Chart) -> Result<String> {
         let title_lines = panels.iter().map(|panel| layout.title(panel).len());
         let top = y + LINE * title_lines.max().unwrap_or(0) as f64;
         let below = rows.get(row + 1).map_or(0, |below| below.len());
-        for (column, of) in panels.iter().enumerate() {
+        for (column, panel) in panels.iter().enumerate() {
             let area = layout.area(column, top);
-            let (at, lines) = ((area.left, y - LINE / 10.0), layout.title(of));
+            let (at, lines) = ((area.left, y - LINE / 10.0), layout.title(panel));
             svg.lines("ink panel", at, (TEXT, LINE), Anchor::Start, &lines);
             layout.frame(&mut svg, &area, column, column >= below);
             let scales = (&layout.x, &layout.y);
-            panel::draw(&mut svg, of, scales, &area, &layout.names[column]);
+            panel::draw(&mut svg, panel, scales, &area, &layout.names[column]);
         }
-        y = top + layout.height + BETWEEN;
+        y = top + layout.height + ROW_GAP;
     }
-    y += LINE - BETWEEN + 6.0;
+    y += LINE - ROW_GAP + 6.0;
     let right = layout.area(layout.columns - 1, 0.0).right;
     let middle = (f64::midpoint(layout.left, right), y + LINE / 2.0);
     svg.text("soft", middle, TEXT, Anchor::Middle, &chart.x.label);
@@ -57,7 +56,7 @@ pub fn chart(chart: &Chart) -> Result<String> {
     Ok(svg.document((WIDTH, y + EDGE - 4.0), &title))
 }
 
-/// What kinds of dots and lines mean. Gives where it ends.
+/// Draws the legend. Returns its bottom.
 fn key(svg: &mut Svg, chart: &Chart, mut y: f64) -> f64 {
     let mut x = EDGE;
     for key in &chart.key {
@@ -84,20 +83,21 @@ fn key(svg: &mut Svg, chart: &Chart, mut y: f64) -> f64 {
     }
 }
 
-/// Where the panels are, and what is common to them.
+/// The positions of the panels, and their common axes.
 struct Layout {
     columns: usize,
     x: Scale,
     y: Scale,
     x_ticks: Vec<Tick>,
     y_ticks: Vec<Tick>,
-    /// Where the first plot begins, and between two plots of a row beside names.
+    /// Left edge of the first plot.
     left: f64,
+    /// Gap between two plots of a row, besides names.
     gap: f64,
-    /// Of a plot.
+    /// Size of a plot.
     width: f64,
     height: f64,
-    /// Beside the plots of each column.
+    /// The names beside the plots of each column.
     names: Vec<Names>,
 }
 
@@ -113,7 +113,7 @@ impl Layout {
             series.points.iter().flat_map(move |point| {
                 let interval = point.interval.filter(|_| has_interval);
                 let (low, high) = interval.unwrap_or((point.y, point.y));
-                // A lower end near 0 would stretch a logarithmic axis without end.
+                // A lower end near 0 would stretch a logarithmic axis without bound.
                 let low = if chart.y.logarithmic {
                     low.max(point.y / 3.0)
                 } else {
@@ -134,18 +134,18 @@ impl Layout {
             widths.fold(0.0, f64::max)
         };
         let left = EDGE + widest(&y_ticks) + 8.0;
-        let most = if columns == 1 { 165.0 } else { 105.0 };
+        let max_width = if columns == 1 { 165.0 } else { 105.0 };
         let names: Vec<Names> = (0..columns)
             .map(|column| {
                 let panels = chart.panels.iter().skip(column).step_by(columns);
-                Names::new(panels.flat_map(|panel| &panel.series), &x, most)
+                Names::new(panels.flat_map(|panel| &panel.series), &x, max_width)
             })
             .collect();
         let beside: f64 = names.iter().map(|names| names.width).sum();
         let whole = WIDTH - left - EDGE - beside;
         let plot = |gap: f64| (whole - gap * (columns as f64 - 1.0)) / columns as f64;
         let ticks = |gap| x.ticks(plot(gap), |label| text_width(label, TEXT));
-        // The last label of a plot and the first of the next stand half beyond their ends.
+        // The outermost labels extend beyond the plots by half of their widths.
         let gap = widest(&ticks(20.0)) + GAP;
         Ok(Self {
             columns,
@@ -172,19 +172,20 @@ impl Layout {
         wrapped(&panel.title, TEXT, self.width + self.gap / 2.0)
     }
 
-    /// The lines of a plot, with labels on the left of the first and `below` the last.
-    fn frame(&self, svg: &mut Svg, area: &Area, column: usize, below: bool) {
+    /// Draws grid and axes of a plot. The first column has the labels of y; `has_x_labels` asks
+    /// for the labels of x.
+    fn frame(&self, svg: &mut Svg, area: &Area, column: usize, has_x_labels: bool) {
         for tick in &self.y_ticks {
-            let y = area.bottom - self.height * self.y.place(tick.value);
+            let y = area.bottom - self.height * self.y.position(tick.value);
             svg.line("grid", (area.left, y), (area.right, y));
             if column == 0 {
                 svg.text("soft", (area.left - 7.0, y), TEXT, Anchor::End, &tick.label);
             }
         }
         for tick in &self.x_ticks {
-            let x = area.left + self.width * self.x.place(tick.value);
+            let x = area.left + self.width * self.x.position(tick.value);
             svg.line("edge", (x, area.bottom), (x, area.bottom + 5.0));
-            if below {
+            if has_x_labels {
                 let at = (x, area.bottom + 6.0 + LINE / 2.0);
                 svg.text("soft", at, TEXT, Anchor::Middle, &tick.label);
             }

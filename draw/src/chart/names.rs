@@ -1,33 +1,33 @@
-//! Where names go, so that none hides another.
+//! Places names so that they do not overlap.
 
 /// A name beside the plot.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Wanted {
-    /// The height at which its curve ends.
+pub(super) struct Label {
+    /// The y at which its curve ends.
     pub y: f64,
-    /// How high its text is.
+    /// The height of its text.
     pub height: f64,
 }
 
-/// The middles of names in a column from `top` to `bottom`, as near as may be to where
-/// they are wanted, in the same order. Where the column is too short they overlap evenly.
-pub(super) fn apart(wanted: &[Wanted], top: f64, bottom: f64) -> Vec<f64> {
-    let mut order: Vec<usize> = (0..wanted.len()).collect();
-    order.sort_by(|&a, &b| wanted[a].y.total_cmp(&wanted[b].y));
-    let all: f64 = wanted.iter().map(|name| name.height).sum();
+/// The middles of `labels` in a column from `top` to `bottom`, as close as possible to the ends
+/// of their curves, in the same order. If the column is too short they overlap evenly.
+pub(super) fn spread(labels: &[Label], top: f64, bottom: f64) -> Vec<f64> {
+    let mut order: Vec<usize> = (0..labels.len()).collect();
+    order.sort_by(|&a, &b| labels[a].y.total_cmp(&labels[b].y));
+    let all: f64 = labels.iter().map(|name| name.height).sum();
     let squeeze = ((bottom - top) / all.max(1.0)).min(1.0);
-    // Names that touch are a block around the mean of what its names want.
+    // Names that touch form a block around the mean of their curve ends.
     let mut blocks: Vec<Vec<usize>> = Vec::new();
     let height = |block: &[usize]| {
-        let heights = block.iter().map(|&index| wanted[index].height * squeeze);
+        let heights = block.iter().map(|&index| labels[index].height * squeeze);
         heights.sum::<f64>()
     };
     let start = |block: &[usize]| {
         let mut above = 0.0;
         let mut sum = 0.0;
         for &index in block {
-            let height = wanted[index].height * squeeze;
-            sum += wanted[index].y - above - height / 2.0;
+            let height = labels[index].height * squeeze;
+            sum += labels[index].y - above - height / 2.0;
             above += height;
         }
         let mean = sum / block.len() as f64;
@@ -45,11 +45,11 @@ pub(super) fn apart(wanted: &[Wanted], top: f64, bottom: f64) -> Vec<f64> {
             }
         }
     }
-    let mut places = vec![0.0; wanted.len()];
+    let mut places = vec![0.0; labels.len()];
     for block in blocks {
         let mut y = start(&block);
         for index in block {
-            let height = wanted[index].height * squeeze;
+            let height = labels[index].height * squeeze;
             places[index] = y + height / 2.0;
             y += height;
         }
@@ -67,7 +67,7 @@ pub(super) struct Area {
 }
 
 impl Area {
-    /// That with these two corners, and `margin` more on every side.
+    /// The area between two corners, enlarged by `margin` on every side.
     pub fn around(from: (f64, f64), to: (f64, f64), margin: f64) -> Self {
         Self {
             left: from.0.min(to.0) - margin,
@@ -77,15 +77,15 @@ impl Area {
         }
     }
 
-    fn common(&self, other: &Self) -> f64 {
+    fn overlap(&self, other: &Self) -> f64 {
         let width = self.right.min(other.right) - self.left.max(other.left);
         let height = self.bottom.min(other.bottom) - self.top.max(other.top);
         width.max(0.0) * height.max(0.0)
     }
 }
 
-/// The left upper corner of a name of this `size` beside a dot, within `bounds`: that
-/// place around the dot which hides least of what is `taken`.
+/// The top left corner of a name of this `size` beside a dot: the position within `bounds` that
+/// overlaps least with the `taken` areas.
 pub(super) fn beside(
     dot: (f64, f64),
     size: (f64, f64),
@@ -107,8 +107,8 @@ pub(super) fn beside(
         ];
         for (left, top) in corners {
             let area = Area::around((left, top), (left + width, top + height), 0.0);
-            let inside = area.common(bounds) / (width * height);
-            let hidden: f64 = taken.iter().map(|other| area.common(other)).sum();
+            let inside = area.overlap(bounds) / (width * height);
+            let hidden: f64 = taken.iter().map(|other| area.overlap(other)).sum();
             let cost = hidden + 1e4 * (1.0 - inside) + away;
             if cost < best.1 - 1e-6 {
                 best = ((left, top), cost);

@@ -1,6 +1,6 @@
-//! What is drawn in a plot: lines, intervals, dots and names.
+//! The contents of a plot: lines, intervals, dots and names.
 
-use super::names::{Area, Wanted, apart, beside};
+use super::names::{Area, Label, beside, spread};
 use super::parts::{Panel, Point, Series, Style};
 use super::scale::Scale;
 use crate::palette::Mark;
@@ -8,47 +8,48 @@ use crate::svg::{Anchor, At, Svg, TEXT, text_width, wrapped};
 
 /// The height of a line.
 pub(super) const LINE: f64 = 18.0;
-/// Between a plot and its names, and between two names.
+/// Gap between a plot and its names.
 const TO_NAME: f64 = 16.0;
+/// Gap between two names.
 const NAME_GAP: f64 = 3.0;
-/// A curve that ends beyond this part of the axis has its name beside the plot.
+/// A curve that ends beyond this share of the axis has its name beside the plot.
 const RIGHT: f64 = 0.9;
-/// A name within the plot is broken at this width.
-const BESIDE: f64 = 150.0;
-/// Boxes of this size keep names off a line.
+/// A name within the plot is wrapped at this width.
+const INNER_NAME_WIDTH: f64 = 150.0;
+/// Names avoid a line by boxes of this size along it.
 const GRAIN: f64 = 6.0;
 
-/// The room for the names beside a column of plots.
+/// The space for the names beside a column of plots.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Names {
-    /// What they take of the picture.
+    /// Their width in the picture.
     pub width: f64,
-    /// Where a name is broken.
-    most: f64,
+    /// Names are wrapped at this width.
+    max_width: f64,
 }
 
 impl Names {
-    /// For the names at the right end of `x`, of at most `most`.
-    pub fn new<'a>(series: impl Iterator<Item = &'a Series>, x: &Scale, most: f64) -> Self {
+    /// For the names of curves that end at the right end of `x`.
+    pub fn new<'a>(series: impl Iterator<Item = &'a Series>, x: &Scale, max_width: f64) -> Self {
         let is_right = |series: &&Series| {
             let mut ends = series.points.iter().rev();
-            let end = ends.find(|point| x.holds(point.x));
-            end.is_some_and(|end| x.place(end.x) > RIGHT)
+            let end = ends.find(|point| x.contains(point.x));
+            end.is_some_and(|end| x.position(end.x) > RIGHT)
         };
         let names = series.filter(is_right);
         let names = names.filter_map(|series| series.name.as_deref());
-        let lines = names.flat_map(|name| wrapped(name, TEXT, most));
+        let lines = names.flat_map(|name| wrapped(name, TEXT, max_width));
         let widest = lines
             .map(|line| text_width(&line, TEXT))
             .fold(0.0, f64::max);
         Self {
             width: if widest > 0.0 { widest + TO_NAME } else { 0.0 },
-            most,
+            max_width,
         }
     }
 }
 
-/// A line as its style has it, through `points`.
+/// Draws a line through `points`.
 pub(super) fn line(svg: &mut Svg, style: Style, points: &[(f64, f64)]) {
     let pen = match style {
         Style::Line => "stroke-width=\"2.4\"",
@@ -63,7 +64,7 @@ pub(super) fn line(svg: &mut Svg, style: Style, points: &[(f64, f64)]) {
     ));
 }
 
-/// An interval from `low` to `high`.
+/// Draws an interval from `low` to `high`.
 pub(super) fn interval(svg: &mut Svg, low: (f64, f64), high: (f64, f64)) {
     let [x, left, right] = [low.0, low.0 - 3.0, low.0 + 3.0].map(At);
     let (low, high) = (At(low.1), At(high.1));
@@ -72,7 +73,7 @@ pub(super) fn interval(svg: &mut Svg, low: (f64, f64), high: (f64, f64)) {
     ));
 }
 
-/// A dot, filled or open.
+/// Draws a dot, filled or open.
 pub(super) fn dot(svg: &mut Svg, mark: Mark, (x, y): (f64, f64), radius: f64, is_filled: bool) {
     let class = if is_filled { "fill" } else { "open" };
     let path = |places: &[(f64, f64)]| {
@@ -112,11 +113,11 @@ pub(super) fn draw(
 ) {
     let place = |at: f64, height: f64| {
         (
-            area.left + (area.right - area.left) * x.place(at),
-            area.bottom - (area.bottom - area.top) * y.place(height),
+            area.left + (area.right - area.left) * x.position(at),
+            area.bottom - (area.bottom - area.top) * y.position(height),
         )
     };
-    let shown = |point: &Point| x.holds(point.x) && y.holds(point.y);
+    let shown = |point: &Point| x.contains(point.x) && y.contains(point.y);
     let most = panel.series.iter().map(|series| series.points.len()).max();
     let radius = if most.unwrap_or(0) > 12 { 2.8 } else { 4.2 };
     let mut taken = Vec::new();
@@ -128,13 +129,17 @@ pub(super) fn draw(
                 let places: Vec<_> = places.map(|point| place(point.x, point.y)).collect();
                 if places.len() > 1 {
                     line(svg, series.style, &places);
-                    taken.extend(places.windows(2).flat_map(|ends| along(ends[0], ends[1])));
+                    taken.extend(
+                        places
+                            .windows(2)
+                            .flat_map(|ends| boxes_along(ends[0], ends[1])),
+                    );
                 }
             }
         }
         let dots = series.points.iter().filter(|_| series.style.has_dots());
         for point in dots {
-            let ends = point.interval.filter(|_| x.holds(point.x));
+            let ends = point.interval.filter(|_| x.contains(point.x));
             let ends = ends.map(|(low, high)| (y.clamp(low), y.clamp(high)));
             if shown(point) {
                 if let Some((low, high)) = ends {
@@ -160,7 +165,7 @@ pub(super) fn draw(
             limit.or(Some(*point)).filter(|end| shown(end))
         });
         let end = ends.next()?;
-        let is_right = x.place(end.x) > RIGHT;
+        let is_right = x.position(end.x) > RIGHT;
         let name = Name {
             class: format!("{} halo", series.pen.colour.class()),
             text: series.name.as_deref()?,
@@ -177,7 +182,7 @@ pub(super) fn draw(
         ..*area
     };
     for (name, _) in within {
-        let lines = wrapped(name.text, TEXT, BESIDE);
+        let lines = wrapped(name.text, TEXT, INNER_NAME_WIDTH);
         let widths = lines.iter().map(|line| text_width(line, TEXT));
         let size = (widths.fold(0.0, f64::max), LINE * lines.len() as f64);
         let (left, top) = beside(name.end, size, &bounds, &taken);
@@ -202,8 +207,8 @@ struct Name<'a> {
     end: (f64, f64),
 }
 
-/// Boxes all along a line.
-fn along(from: (f64, f64), to: (f64, f64)) -> impl Iterator<Item = Area> {
+/// Boxes along a line.
+fn boxes_along(from: (f64, f64), to: (f64, f64)) -> impl Iterator<Item = Area> {
     let steps = ((to.0 - from.0).hypot(to.1 - from.1) / GRAIN)
         .ceil()
         .max(1.0);
@@ -220,16 +225,18 @@ fn along(from: (f64, f64), to: (f64, f64)) -> impl Iterator<Item = Area> {
     })
 }
 
-/// Each with a line to the end of its curve unless that is near.
+/// Draws each name, with a line to the end of its curve if that is not close.
 fn names_beside_the_plot(svg: &mut Svg, ends: &[Name], area: &Area, names: &Names) {
-    let texts = ends.iter().map(|name| wrapped(name.text, TEXT, names.most));
+    let texts = ends
+        .iter()
+        .map(|name| wrapped(name.text, TEXT, names.max_width));
     let texts: Vec<Vec<String>> = texts.collect();
-    let wanted = ends.iter().zip(&texts).map(|(name, lines)| Wanted {
+    let labels = ends.iter().zip(&texts).map(|(name, lines)| Label {
         y: name.end.1,
         height: LINE * lines.len() as f64 - 2.0 + NAME_GAP,
     });
-    let wanted: Vec<Wanted> = wanted.collect();
-    let places = apart(&wanted, area.top - LINE / 2.0, area.bottom + LINE / 2.0);
+    let labels: Vec<Label> = labels.collect();
+    let places = spread(&labels, area.top - LINE / 2.0, area.bottom + LINE / 2.0);
     for ((name, lines), middle) in ends.iter().zip(&texts).zip(places) {
         let (x, class) = (area.right + TO_NAME, &name.class);
         if (middle - name.end.1).abs() > 3.0 {

@@ -1,30 +1,30 @@
-//! What a chart is made of.
+//! The parts of a chart.
 
 use crate::palette::{NEUTRAL, Pen};
 
 /// A chart.
 #[derive(Clone, Debug)]
 pub struct Chart {
-    /// What it shows: a sentence without its full stop.
+    /// The finding: a sentence without a full stop.
     pub finding: String,
-    /// Whether the data show it.
+    /// Whether the data support the finding.
     pub holds: bool,
-    /// What dots, lines and intervals are; drawn below it.
+    /// What dots, lines and intervals mean; drawn below the chart.
     pub note: String,
-    /// What runs to the right.
+    /// The horizontal axis.
     pub x: Axis,
-    /// What runs upwards.
+    /// The vertical axis.
     pub y: Axis,
-    /// What kinds of dots and lines mean, the same for every curve; drawn above it.
+    /// The legend for kinds of dots and lines, the same for every curve; drawn above the panels.
     pub key: Vec<Key>,
-    /// Panels beside each other.
+    /// Panels in a row.
     pub columns: usize,
-    /// At least one, row by row.
+    /// The panels, at least one, row by row.
     pub panels: Vec<Panel>,
 }
 
 impl Chart {
-    /// What stands above it: never what its points do not show.
+    /// The title: the finding, or that the data do not show it.
     #[must_use]
     pub fn title(&self) -> String {
         if self.holds {
@@ -35,19 +35,19 @@ impl Chart {
     }
 }
 
-/// A kind of dots or lines.
+/// An entry of the legend: a kind of dots or lines.
 #[derive(Clone, Debug)]
 pub struct Key {
-    /// Its colour and mark.
+    /// Colour and mark.
     pub pen: Pen,
     /// How it is drawn.
     pub style: Style,
-    /// What it is.
+    /// Its meaning.
     pub text: String,
 }
 
 impl Key {
-    /// What dots or lines of this look are.
+    /// An entry for dots or lines of this look.
     #[must_use]
     pub fn new(pen: Pen, style: Style, text: impl Into<String>) -> Self {
         Self {
@@ -57,7 +57,7 @@ impl Key {
         }
     }
 
-    /// Simulated, exact and as printed.
+    /// Entries for simulated, exact and printed values.
     #[must_use]
     pub fn simulated(printed: &str) -> Vec<Self> {
         vec![
@@ -68,17 +68,17 @@ impl Key {
     }
 }
 
-/// A part of a chart with axes of its own, the same as those of the others.
+/// A part of a chart. All panels of a chart have the same axes.
 #[derive(Clone, Debug)]
 pub struct Panel {
-    /// Drawn above it; empty for the only one.
+    /// Drawn above the panel; empty if there is only one.
     pub title: String,
-    /// What is drawn, in this order.
+    /// The series, in drawing order.
     pub series: Vec<Series>,
 }
 
 impl Panel {
-    /// The only one.
+    /// The only panel of a chart.
     #[must_use]
     pub const fn only(series: Vec<Series>) -> Self {
         Self {
@@ -91,18 +91,18 @@ impl Panel {
 /// An axis.
 #[derive(Clone, Debug)]
 pub struct Axis {
-    /// What it is, with its unit.
+    /// Quantity and unit.
     pub label: String,
-    /// Whether its numbers are shares, written as hundredths.
+    /// Whether values are shares that are labelled in percent.
     pub is_percent: bool,
-    /// Whether equal steps are equal factors.
+    /// Whether the axis is logarithmic.
     pub logarithmic: bool,
-    /// From where to where; by the points where not given. A linear one has 0 then.
+    /// Its range. `None` fits all points; a linear axis then includes 0.
     pub range: Option<(f64, f64)>,
 }
 
 impl Axis {
-    /// Equal steps are equal distances, from 0 to the last point.
+    /// A linear axis that includes 0 and fits all points.
     #[must_use]
     pub fn linear(label: impl Into<String>) -> Self {
         Self {
@@ -113,7 +113,7 @@ impl Axis {
         }
     }
 
-    /// Equal factors are equal distances, all points fit.
+    /// A logarithmic axis that fits all points.
     #[must_use]
     pub fn logarithmic(label: impl Into<String>) -> Self {
         Self {
@@ -122,14 +122,14 @@ impl Axis {
         }
     }
 
-    /// Its numbers are shares.
+    /// Labels shares in percent.
     #[must_use]
     pub const fn percent(mut self) -> Self {
         self.is_percent = true;
         self
     }
 
-    /// From `low` to `high`.
+    /// Limits the range to `low` to `high`.
     #[must_use]
     pub const fn within(mut self, low: f64, high: f64) -> Self {
         self.range = Some((low, high));
@@ -137,21 +137,21 @@ impl Axis {
     }
 }
 
-/// Points that belong together.
+/// A series of points.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// Its name, at the end of its curve or beside its only dot.
+    /// The name, drawn at the end of the curve or beside its only dot.
     pub name: Option<String>,
-    /// Its colour and mark.
+    /// Colour and mark.
     pub pen: Pen,
     /// How it is drawn.
     pub style: Style,
-    /// In order of x.
+    /// The points in order of x.
     pub points: Vec<Point>,
 }
 
 impl Series {
-    /// One with a name.
+    /// A series with a name.
     #[must_use]
     pub fn named(name: impl Into<String>, pen: Pen, style: Style, points: Vec<Point>) -> Self {
         Self {
@@ -162,7 +162,7 @@ impl Series {
         }
     }
 
-    /// One that goes with another, which has the name.
+    /// A series without a name, which goes with another one.
     #[must_use]
     pub const fn unnamed(pen: Pen, style: Style, points: Vec<Point>) -> Self {
         Self {
@@ -177,9 +177,9 @@ impl Series {
 /// How a series is drawn.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Style {
-    /// Worked out: a line.
+    /// Calculated: a line.
     Line,
-    /// Worked out, of less weight: a dashed line.
+    /// Calculated, less important: a dashed line.
     Dashed,
     /// Measured: dots with their intervals.
     Dots,
@@ -197,20 +197,20 @@ impl Style {
     }
 }
 
-/// A point, with an interval if it was measured. One of 0 on a logarithmic axis is drawn
-/// as an upper limit: an open dot at the end of its interval, with a line down.
+/// A point, with an interval if it was measured. A value of 0 on a logarithmic axis is drawn as
+/// an upper limit: an open dot at the upper end of the interval, with a line down.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
-    /// To the right.
+    /// The horizontal value.
     pub x: f64,
-    /// Upwards.
+    /// The vertical value.
     pub y: f64,
-    /// The interval it lies in.
+    /// The confidence interval of `y`.
     pub interval: Option<(f64, f64)>,
 }
 
 impl Point {
-    /// Worked out.
+    /// A calculated point.
     #[must_use]
     pub const fn exact(x: f64, y: f64) -> Self {
         Self {
@@ -220,14 +220,14 @@ impl Point {
         }
     }
 
-    /// A curve, worked out at each of `xs`.
+    /// A curve: `of` at each of `xs`.
     pub fn curve(xs: impl IntoIterator<Item = f64>, of: impl Fn(f64) -> f64) -> Vec<Self> {
         let points = xs.into_iter().map(|x| Self::exact(x, of(x)));
         points.collect()
     }
 
-    /// So many steps of a tenth to the right on a logarithmic axis, beside others that
-    /// would hide it.
+    /// Moves the point to the right by `steps` tenths on a logarithmic axis, so that points with
+    /// the same x do not hide each other.
     #[must_use]
     pub fn aside(mut self, steps: f64) -> Self {
         self.x *= 1.1f64.powf(steps);

@@ -1,22 +1,22 @@
-//! From the values of an axis to places in the picture, and the labels that fit there.
+//! Maps the values of an axis to positions, and chooses labels that fit.
 
 use anyhow::{Result, ensure};
 
 use super::parts::Axis;
 
-/// Least distance of two labels, in the unit of the picture.
+/// The smallest gap between two labels, in units of the picture.
 pub(super) const GAP: f64 = 10.0;
-/// Most labels of a linear axis.
-const MOST: usize = 8;
+/// The most labels of a linear axis.
+const MAX_LABELS: usize = 8;
 
-/// A label of an axis, and the value it stands at.
+/// A label of an axis and its value.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Tick {
     pub value: f64,
     pub label: String,
 }
 
-/// The values of an axis.
+/// The range of an axis.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Scale {
     pub low: f64,
@@ -26,7 +26,7 @@ pub(super) struct Scale {
 }
 
 impl Scale {
-    /// That of `axis`, whose points lie at `values`.
+    /// The scale of `axis` for points at `values`.
     pub fn new(axis: &Axis, values: impl Iterator<Item = f64>) -> Result<Self> {
         let logarithmic = axis.logarithmic;
         let of = |(low, high)| Self {
@@ -53,18 +53,18 @@ impl Scale {
         }))
     }
 
-    /// Whether it has a place for `value`.
-    pub fn holds(&self, value: f64) -> bool {
+    /// Whether `value` lies on the axis.
+    pub fn contains(&self, value: f64) -> bool {
         (self.low..=self.high).contains(&value) && (value > 0.0 || !self.logarithmic)
     }
 
-    /// The nearest value it has a place for.
+    /// The nearest value on the axis.
     pub fn clamp(&self, value: f64) -> f64 {
         value.clamp(self.low, self.high)
     }
 
-    /// Where `value` lies: 0 at the low end, 1 at the high end.
-    pub fn place(&self, value: f64) -> f64 {
+    /// The position of `value`: 0 at the low end, 1 at the high end.
+    pub fn position(&self, value: f64) -> f64 {
         let of = |value: f64| {
             if self.logarithmic {
                 value.log10()
@@ -75,8 +75,8 @@ impl Scale {
         (of(value) - of(self.low)) / (of(self.high) - of(self.low))
     }
 
-    /// As many labels as fit on an axis of `length`, where one takes `room` along it.
-    pub fn ticks(&self, length: f64, room: impl Fn(&str) -> f64) -> Vec<Tick> {
+    /// As many labels as fit on an axis of `length`. `size` is the size of a label along the axis.
+    pub fn ticks(&self, length: f64, size: impl Fn(&str) -> f64) -> Vec<Tick> {
         let mut candidates = if self.logarithmic {
             self.factors()
         } else {
@@ -85,19 +85,19 @@ impl Scale {
         candidates.retain(|ticks| !ticks.is_empty());
         let fits = |ticks: &Vec<Tick>| {
             let spans = ticks.iter().map(|tick| {
-                let (middle, half) = (length * self.place(tick.value), room(&tick.label) / 2.0);
+                let (middle, half) = (length * self.position(tick.value), size(&tick.label) / 2.0);
                 (middle - half, middle + half)
             });
             let spans: Vec<(f64, f64)> = spans.collect();
             spans.windows(2).all(|pair| pair[0].1 + GAP <= pair[1].0)
         };
         let found = candidates.iter().find(|ticks| fits(ticks));
-        // One alone always fits.
-        let alone = || candidates.last().map(|ticks| ticks[..1].to_vec());
-        found.cloned().or_else(alone).unwrap_or_default()
+        // A single label always fits.
+        let single = || candidates.last().map(|ticks| ticks[..1].to_vec());
+        found.cloned().or_else(single).unwrap_or_default()
     }
 
-    /// Labels of a linear axis, ever fewer.
+    /// Candidate labels of a linear axis, the densest first.
     fn steps(&self) -> Vec<Vec<Tick>> {
         let span = self.high - self.low;
         let least = decade(span) - 1;
@@ -105,7 +105,7 @@ impl Scale {
         for power in least..=least + 2 {
             for factor in [1.0, 2.0, 5.0] {
                 let ticks = self.multiples(factor * 10f64.powi(power));
-                if ticks.len() <= MOST {
+                if ticks.len() <= MAX_LABELS {
                     candidates.push(ticks);
                 }
             }
@@ -113,7 +113,7 @@ impl Scale {
         candidates
     }
 
-    /// The multiples of `step` on the axis, if they are not very many.
+    /// The multiples of `step` on the axis, at most 200.
     fn multiples(&self, step: f64) -> Vec<Tick> {
         let first = (self.low / step - 1e-9).ceil();
         let numbers = (0..200).map(|index| first + f64::from(index));
@@ -122,8 +122,8 @@ impl Scale {
         values.map(|value| self.tick(value)).collect()
     }
 
-    /// Labels of a logarithmic axis, ever fewer: 1, 2 and 5 of each decade, decades, every
-    /// second one, and so on. Less than two decades have finer ones first.
+    /// Candidate labels of a logarithmic axis, the densest first: 1, 2 and 5 of each decade, each
+    /// decade, every second decade, and so on. Less than a decade has finer labels first.
     fn factors(&self) -> Vec<Vec<Tick>> {
         let (first, last) = (decade(self.low), decade(self.high));
         let of = |factors: &[f64], every: i32| {
@@ -132,7 +132,7 @@ impl Scale {
                 let factors = factors.iter();
                 factors.map(move |factor| factor * 10f64.powi(power))
             });
-            let values = values.filter(|&value| self.holds(value));
+            let values = values.filter(|&value| self.contains(value));
             values.map(|value| self.tick(value)).collect::<Vec<_>>()
         };
         let mut candidates = Vec::new();
@@ -140,7 +140,7 @@ impl Scale {
             candidates.push(of(&[1.0, 1.2, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0], 1));
             candidates.push(of(&[1.0, 1.5, 2.0, 3.0, 5.0, 7.0], 1));
             candidates.push(of(&[1.0, 2.0, 3.0, 5.0], 1));
-            // A range so small that none of these may lie in it.
+            // A very small range may contain none of these.
             candidates.retain(|ticks| ticks.len() > 1);
             candidates.extend(self.steps());
         }
@@ -165,19 +165,19 @@ fn decade(value: f64) -> i32 {
     (value.log10() + 1e-9).floor() as i32
 }
 
-/// A number at an axis: no more digits than it takes, thousands apart.
+/// The label of a number: the fewest digits, with a comma before thousands.
 pub(super) fn number(value: f64) -> String {
     if value != 0.0 && !(1e-3..1e6).contains(&value.abs()) {
         let power = decade(value.abs());
         let factor = value / 10f64.powi(power);
-        let raised: String = power.to_string().chars().map(raised).collect();
+        let exponent: String = power.to_string().chars().map(superscript).collect();
         let factor = (factor * 1e6).round() / 1e6;
         return match factor {
-            1.0 => format!("10{raised}"),
-            _ => format!("{factor}·10{raised}"),
+            1.0 => format!("10{exponent}"),
+            _ => format!("{factor}·10{exponent}"),
         };
     }
-    // A grid of tenths is not exact.
+    // Multiples of a tenth are not exact.
     let rounded = (value * 1e9).round() / 1e9 + 0.0;
     let text = rounded.to_string();
     let (whole, rest) = text.split_at(text.find('.').unwrap_or(text.len()));
@@ -189,9 +189,9 @@ pub(super) fn number(value: f64) -> String {
     format!("{head},{tail}{rest}").replace('-', "−")
 }
 
-/// A digit, or the sign, of an exponent.
-fn raised(c: char) -> char {
+/// A digit, or the minus sign, of an exponent in superscript.
+fn superscript(c: char) -> char {
     let digit = c.to_digit(10).map(|digit| digit as usize);
-    let raised = digit.and_then(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit));
-    raised.unwrap_or('⁻')
+    let superscript = digit.and_then(|digit| "⁰¹²³⁴⁵⁶⁷⁸⁹".chars().nth(digit));
+    superscript.unwrap_or('⁻')
 }

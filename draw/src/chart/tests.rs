@@ -1,6 +1,6 @@
 use proptest::prelude::*;
 
-use super::names::{Area, Wanted, apart, beside};
+use super::names::{Area, Label, beside, spread};
 use super::scale::{GAP, Scale, number};
 use super::*;
 use crate::palette::{self, EVENTS};
@@ -62,7 +62,7 @@ fn nothing_to_draw_is_an_error() {
 }
 
 #[test]
-fn a_title_says_nothing_that_the_data_do_not_show() {
+fn a_title_says_if_the_data_do_not_show_the_finding() {
     let mut chart_of = of(false, vec![Point::exact(0.0, 1.0)]);
     chart_of.holds = false;
     let svg = chart(&chart_of).unwrap();
@@ -72,8 +72,8 @@ fn a_title_says_nothing_that_the_data_do_not_show() {
 #[test]
 fn a_counting_axis_begins_at_zero() {
     let scale = Scale::new(&Axis::linear("n"), [7.0, 9.0].into_iter()).unwrap();
-    assert_eq!(scale.place(0.0), 0.0);
-    assert!(scale.place(9.0) < 1.0);
+    assert_eq!(scale.position(0.0), 0.0);
+    assert!(scale.position(9.0) < 1.0);
 }
 
 #[test]
@@ -114,8 +114,7 @@ fn a_logarithmic_axis_labels_decades_and_2_and_5_where_there_is_room() {
 }
 
 proptest! {
-    /// Whatever the range and however short the axis: labels do not touch, and there is
-    /// one at least.
+    /// Labels do not touch, for any range and length, and there is at least one.
     #[test]
     fn ticks_never_touch(
         logarithmic: bool,
@@ -135,27 +134,27 @@ proptest! {
         let axis = Axis { logarithmic, ..Axis::linear("x") }.within(from, to);
         let axis = if percent { axis.percent() } else { axis };
         let scale = Scale::new(&axis, [from, to].into_iter()).unwrap();
-        let room = |label: &str| text_width(label, size);
-        let ticks = scale.ticks(length, room);
+        let size_of = |label: &str| text_width(label, size);
+        let ticks = scale.ticks(length, size_of);
         for pair in ticks.windows(2) {
             let [first, second] = [&pair[0], &pair[1]].map(|tick| {
-                (length * scale.place(tick.value), room(&tick.label) / 2.0)
+                (length * scale.position(tick.value), size_of(&tick.label) / 2.0)
             });
             prop_assert!(first.0 + first.1 + GAP <= second.0 - second.1, "{pair:?}");
             prop_assert!(pair[0].label != pair[1].label, "{pair:?}");
         }
         for tick in &ticks {
-            prop_assert!((-1e-6..=1.0 + 1e-6).contains(&scale.place(tick.value)), "{tick:?}");
+            prop_assert!((-1e-6..=1.0 + 1e-6).contains(&scale.position(tick.value)), "{tick:?}");
         }
         // Less than a third of a decade may lie between two round numbers.
         prop_assert!(!ticks.is_empty() || (logarithmic && span < 0.5));
     }
 
-    /// Names keep their order and do not overlap, as long as there is room for all.
+    /// Names keep their order and do not overlap if there is space for all.
     #[test]
     fn names_never_overlap(ends in prop::collection::vec(0.0..300.0_f64, 1..12)) {
-        let wanted: Vec<Wanted> = ends.iter().map(|&y| Wanted { y, height: 20.0 }).collect();
-        let mut places = apart(&wanted, 0.0, 300.0);
+        let labels: Vec<Label> = ends.iter().map(|&y| Label { y, height: 20.0 }).collect();
+        let mut places = spread(&labels, 0.0, 300.0);
         for (end, place) in ends.iter().zip(&places) {
             prop_assert!((9.9..=290.1).contains(place), "{end} {place}");
         }
@@ -166,8 +165,8 @@ proptest! {
 
 #[test]
 fn a_name_alone_stands_where_its_curve_ends() {
-    let wanted = [50.0, 200.0].map(|y| Wanted { y, height: 20.0 });
-    assert_eq!(apart(&wanted, 0.0, 300.0), [50.0, 200.0]);
+    let labels = [50.0, 200.0].map(|y| Label { y, height: 20.0 });
+    assert_eq!(spread(&labels, 0.0, 300.0), [50.0, 200.0]);
 }
 
 #[test]

@@ -1,17 +1,17 @@
-//! What the sides of a map count.
+//! The axes of a map.
 
 use crate::svg::{TEXT, text_width};
 
 /// A single line of more pixels is wrapped.
-const MOST_IN_LINE: usize = 256;
-/// Least distance of the numbers along an axis.
+const MAX_IN_LINE: usize = 256;
+/// The smallest gap between two numbers along an axis.
 const GAP: f64 = 14.0;
 
 /// The name and the numbers along one side of a map.
 #[derive(Debug)]
 pub(super) struct Axis {
     pub name: String,
-    /// Distances from the start of the axis, and what they are called.
+    /// Distances from the start of the axis, and their labels.
     pub numbers: Vec<(f64, String)>,
 }
 
@@ -24,15 +24,15 @@ pub(super) struct Lines {
     pub rows: usize,
     across: String,
     down: String,
-    /// By how much the numbers grow from line to line.
+    /// The difference of the numbers of two lines.
     row_unit: usize,
 }
 
 impl Lines {
-    /// The lines of a map of `columns` and `rows`, each called so.
+    /// The lines of a map of `columns` and `rows`, with the names of its axes.
     pub fn new(columns: usize, rows: usize, [column, row]: [&str; 2]) -> Self {
         let long = columns.max(rows);
-        if columns.min(rows) > 1 || long <= MOST_IN_LINE {
+        if columns.min(rows) > 1 || long <= MAX_IN_LINE {
             return Self {
                 columns,
                 rows,
@@ -42,7 +42,7 @@ impl Lines {
             };
         }
 
-        // The least power of two that does not give more lines than columns.
+        // The smallest power of two that does not give more lines than columns.
         let mut in_line = 1;
         while in_line * in_line < long {
             in_line *= 2;

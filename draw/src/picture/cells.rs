@@ -3,8 +3,8 @@
 use crate::palette::{NO_EVENT, hex, level};
 use crate::svg::{At, Svg};
 
-/// Draws `levels`, `columns` in a line, from `corner` on as rectangles of the size
-/// `cell`: one path a colour. Neighbours in a line that look the same share a rectangle.
+/// Draws `levels`, `columns` in a line, from `corner` on as rectangles of the size `cell`. Each
+/// colour has one path; neighbours of one colour in a line share a rectangle.
 pub(super) fn draw(
     svg: &mut Svg,
     levels: &[Option<u8>],

@@ -1,4 +1,4 @@
-//! The picture as a document.
+//! A map as a document.
 
 use anyhow::{Result, ensure};
 
@@ -12,12 +12,12 @@ use crate::svg::{Anchor, At, EDGE, Svg, TEXT, TITLE};
 /// Draws `map` as a complete SVG document.
 ///
 /// Row 0 is at the top. Pixels are square, unless the map is so long and thin
-/// that it has to be stretched to be seen. A single row or column too long to
-/// be drawn in one piece is wrapped into lines, as text is.
+/// that it has to be stretched. A single row or column of more than 256 pixels is wrapped
+/// into lines.
 ///
-/// The colours span the 2nd to the 98th percentile of the values. Where values
-/// lie beyond, the end of the colour bar is marked `≤` or `≥`. Should the two
-/// percentiles coincide although the values differ, the colours span all values.
+/// The colours span the 2nd to the 98th percentile of the values. If values lie beyond, the end
+/// of the colour bar is marked `≤` or `≥`. If the two percentiles coincide although the values
+/// differ, the colours span all values.
 ///
 /// The same map always gives the same bytes.
 ///
@@ -43,13 +43,13 @@ pub fn heat_map(map: &Map) -> Result<String> {
     axes(&mut svg, &layout);
     let corner = layout.plot.corner;
     cells::draw(&mut svg, &levels, layout.columns, corner, layout.cell);
-    if let Some(of) = &layout.bar {
-        bar(&mut svg, of);
+    if let Some(layout) = &layout.bar {
+        bar(&mut svg, layout);
     }
     Ok(svg.document(layout.size, map.title))
 }
 
-/// Title and notes.
+/// Draws title and notes.
 fn texts(svg: &mut Svg, layout: &Layout) {
     let start = (EDGE, EDGE);
     svg.lines("ink title", start, TITLE, Anchor::Start, &layout.title);
@@ -68,7 +68,7 @@ fn texts(svg: &mut Svg, layout: &Layout) {
     }
 }
 
-/// Numbers and names of the axes: that of the rows stands above them.
+/// Draws numbers and names of the axes. The name of the rows stands above the map.
 fn axes(svg: &mut Svg, layout: &Layout) {
     let ((x, y), (width, height)) = (layout.plot.corner, layout.plot.size);
     let [below, beside] = &layout.axes;
@@ -88,7 +88,7 @@ fn axes(svg: &mut Svg, layout: &Layout) {
     svg.text("soft", above, TEXT, Anchor::Start, &beside.name);
 }
 
-/// Steps, marks and unit of the colour bar.
+/// Draws the colour bar with its marks and unit.
 fn bar(svg: &mut Svg, bar: &Bar) {
     let Frame {
         corner: (x, y),

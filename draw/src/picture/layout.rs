@@ -1,20 +1,20 @@
-//! Where everything in a picture is.
+//! The layout of a map.
 
 use super::axis::{Axis, Lines};
 use super::map::Map;
 use super::scale::{Mark, Scale};
 use crate::svg::{EDGE, TEXT, TITLE, one_line, text_width, wrapped};
 
-/// The room for the pixels of a map.
-const MOST_WIDTH: f64 = 400.0;
-const MOST_HEIGHT: f64 = 640.0;
-/// Side of the only pixel of a map.
-const MOST_CELL: f64 = 64.0;
+/// The largest size of a map.
+const MAX_WIDTH: f64 = 400.0;
+const MAX_HEIGHT: f64 = 640.0;
+/// The largest side of a pixel.
+const MAX_CELL: f64 = 64.0;
 /// Thinner maps are stretched.
-const LEAST_SIDE: f64 = 40.0;
+const MIN_SIDE: f64 = 40.0;
 
-const LEAST_CANVAS: f64 = 400.0;
-/// Between the map and the colour bar.
+const MIN_CANVAS: f64 = 400.0;
+/// Gap between the map and the colour bar.
 const BAR_DISTANCE: f64 = 22.0;
 const BAR_WIDTH: f64 = 16.0;
 pub(super) const LINE: f64 = 22.0;
@@ -36,7 +36,7 @@ pub(super) struct Bar {
     pub levels: Vec<Option<u8>>,
 }
 
-/// A picture but for the values of its pixels.
+/// The layout of a map, without the values of its pixels.
 #[derive(Debug)]
 pub(super) struct Layout {
     pub size: (f64, f64),
@@ -51,24 +51,24 @@ pub(super) struct Layout {
     pub bar: Option<Bar>,
     /// Lines of text below the map.
     pub notes: Vec<String>,
-    /// Whether the first explains the colour of the pixels without a value.
+    /// Whether the first note explains the colour of pixels without a value.
     pub has_silent: bool,
     /// Top of the first note.
     pub notes_y: f64,
 }
 
 impl Layout {
-    /// The picture of `map`, of which `silent` pixels have no value.
+    /// The layout of `map`, in which `silent` pixels have no value.
     pub fn new(map: &Map, scale: Option<&Scale>, silent: usize) -> Self {
-        let lines = Lines::new(map.columns, map.rows, map.sides);
+        let lines = Lines::new(map.columns, map.rows, map.axis_names);
         let (columns, rows) = (lines.columns, lines.rows);
-        let side = (MOST_WIDTH / columns as f64).min(MOST_HEIGHT / rows as f64);
+        let side = (MAX_WIDTH / columns as f64).min(MAX_HEIGHT / rows as f64);
         let side = if side < 1.0 {
             side
         } else {
-            side.floor().min(MOST_CELL)
+            side.floor().min(MAX_CELL)
         };
-        let length = |count: usize| (side * count as f64).round().max(LEAST_SIDE);
+        let length = |count: usize| (side * count as f64).round().max(MIN_SIDE);
         let (width, height) = (length(columns), length(rows));
         let cell = (width / columns as f64, height / rows as f64);
 
@@ -87,10 +87,10 @@ impl Layout {
         } else {
             0.0
         };
-        let canvas = (left + width + right + EDGE).ceil().max(LEAST_CANVAS);
+        let canvas = (left + width + right + EDGE).ceil().max(MIN_CANVAS);
 
         let title = wrapped(&one_line(map.title), TITLE.0, canvas - 2.0 * EDGE);
-        // The line above the map is for the name of its rows and for the bar's unit.
+        // The line above the map has the name of the rows and the unit of the bar.
         let top = EDGE + TITLE.1 * title.len() as f64 + LINE + 10.0;
         let plot = Frame {
             corner: (left, top),

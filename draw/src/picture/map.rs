@@ -1,18 +1,16 @@
-//! What a picture shows.
+//! The values of a map.
 
-/// One value a pixel, row by row from the top.
-///
-/// `None` stands for a pixel that never reported; a value that is not finite is
-/// treated the same.
+/// One value per pixel, row by row from the top. `None` and values that are not finite are pixels
+/// without a value.
 #[derive(Clone, Copy, Debug)]
 pub struct Map<'a> {
-    /// What the values are; drawn above the map.
+    /// The name of the values; drawn above the map.
     pub title: &'a str,
     /// Unit of the values; drawn above the colour bar.
     pub unit: &'a str,
-    /// What columns and rows are; written along the sides.
-    pub sides: [&'a str; 2],
-    /// What a pixel without a value lacks.
+    /// The names of columns and rows; drawn along the axes.
+    pub axis_names: [&'a str; 2],
+    /// The thing that a pixel without a value lacks, such as `event`.
     pub missing: &'a str,
     /// Number of pixels in a row.
     pub columns: usize,

@@ -1,4 +1,4 @@
-//! From values to colours and the marks of the colour bar.
+//! Maps values to colours, and chooses the marks of the colour bar.
 
 #[cfg(test)]
 mod tests;
@@ -7,7 +7,7 @@ mod tests;
 const TOP_LEVEL: u8 = u8::MAX;
 /// The level of values that are all equal.
 const MIDDLE_LEVEL: u8 = TOP_LEVEL / 2;
-/// Least distance of two marks of the bar, in pixels.
+/// The smallest distance between two marks of the bar, in pixels.
 const SPACING: f64 = 36.0;
 
 /// The range of values that the colours span.
@@ -15,11 +15,11 @@ const SPACING: f64 = 36.0;
 pub(super) struct Scale {
     low: f64,
     high: f64,
-    /// Values lie below `low`.
+    /// Whether values lie below `low`.
     below: bool,
-    /// Values lie above `high`.
+    /// Whether values lie above `high`.
     above: bool,
-    /// All values are whole numbers.
+    /// Whether all values are whole numbers.
     whole: bool,
 }
 
@@ -31,13 +31,13 @@ pub(super) struct Mark {
     pub label: String,
 }
 
-/// What the colours of a map span, lowest and highest; `None` without values.
+/// The lowest and the highest value of the colour range of a map; `None` without values.
 #[must_use]
 pub fn span(values: &[Option<f64>]) -> Option<(f64, f64)> {
     Scale::new(values).map(|scale| (scale.low, scale.high))
 }
 
-/// The places of `values` in the colours, as a map shows them.
+/// The colour level of each value, as a map shows it.
 #[must_use]
 pub fn levels(values: &[Option<f64>]) -> Vec<Option<u8>> {
     let scale = Scale::new(values);
@@ -57,7 +57,7 @@ impl Scale {
         sorted.sort_by(f64::total_cmp);
         let (least, most) = (*sorted.first()?, *sorted.last()?);
 
-        // The outer neighbours of the percentiles: few values lose none.
+        // Indices rounded outwards: a small set loses no value.
         let last = sorted.len() - 1;
         let skip = last * 2 / 100;
         let (mut low, mut high) = (sorted[skip], sorted[last - skip]);
@@ -73,7 +73,7 @@ impl Scale {
         })
     }
 
-    /// What the colours span, in words.
+    /// The range of the colours, as text.
     pub fn note(&self) -> &'static str {
         if self.low == self.high {
             "all values are equal"
@@ -84,7 +84,7 @@ impl Scale {
         }
     }
 
-    /// The level of `value`, values beyond the ends at the ends.
+    /// The level of `value`, clamped to the ends.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -120,7 +120,7 @@ impl Scale {
         }
 
         let step = self.step(length);
-        // One digit finer than the step, for the ends.
+        // The ends have one digit more than the step.
         let digits = (1.0 - step.log10().floor()).clamp(0.0, 12.0);
         let decimals = if self.whole { 0 } else { digits as usize };
 
@@ -144,13 +144,13 @@ impl Scale {
         marks
     }
 
-    /// Where `value` lies between the ends: 0 at the low one, 1 at the high one.
+    /// The position of `value`: 0 at the low end, 1 at the high end.
     fn position(&self, value: f64) -> f64 {
-        // Halves, because a difference of wholes may overflow.
+        // Halved, because the difference may overflow.
         (value / 2.0 - self.low / 2.0) / (self.high / 2.0 - self.low / 2.0)
     }
 
-    /// The least round number that keeps marks `SPACING` apart on `length`.
+    /// The smallest round step that keeps marks `SPACING` apart on `length`.
     fn step(&self, length: f64) -> f64 {
         let least = (self.high / length - self.low / length) * SPACING;
         let power = 10.0_f64.powf(least.log10().floor());

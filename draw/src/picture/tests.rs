@@ -5,7 +5,7 @@ use crate::palette;
 const ONE_PIXEL: Map = Map {
     title: "Range",
     unit: "mm",
-    sides: ["column", "row"],
+    axis_names: ["column", "row"],
     missing: "event",
     columns: 1,
     rows: 1,
@@ -32,7 +32,7 @@ fn busy(pixels: u32) -> Vec<Option<f64>> {
         .collect()
 }
 
-/// Tags are balanced, values quoted, and no other `<` or `&` is left.
+/// Checks that tags are balanced, values quoted, and no other `<` or `&` remains.
 fn assert_well_formed(svg: &str) {
     let mut open = Vec::new();
     for part in svg.trim_end().split('<').skip(1) {
@@ -55,7 +55,7 @@ fn assert_well_formed(svg: &str) {
     assert!(open.is_empty());
 }
 
-/// How many pixels are drawn in `color`.
+/// The number of pixels drawn in `color`.
 fn drawn(svg: &str, color: &str) -> usize {
     let path = format!("<path fill=\"{color}\" d=\"");
     let Some((_, path)) = svg.split_once(&path) else {
@@ -68,7 +68,7 @@ fn drawn(svg: &str, color: &str) -> usize {
         .sum()
 }
 
-/// How many pixels are drawn as without an event.
+/// The number of pixels drawn as without an event.
 fn silent(svg: &str) -> usize {
     drawn(svg, &palette::hex(palette::NO_EVENT))
 }
@@ -199,7 +199,7 @@ fn a_long_line_is_wrapped() {
     assert!(picture(1, 4096, &busy(4096)).contains("row − line start"));
     assert!(!picture(256, 1, &busy(256)).contains("line start"));
 
-    // What is left of the last line stays empty.
+    // The rest of the last line stays empty.
     let svg = picture(257, 1, &[None; 257]);
     assert_eq!(silent(&svg), 257);
 }

@@ -9,7 +9,7 @@ compile_error!("an image for a board: cargo xtask image mps2-an386");
 use core::panic::PanicInfo;
 
 use cortex_m_rt::entry;
-use dtof_firmware::board::{mps2_an386::Mps2An386, on_panic, turn};
+use dtof_firmware::board::{mps2_an386::Mps2An386, on_panic, serve, turn};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_sensors::Sensor;
 use dtof_sensors::simulated;
@@ -32,14 +32,12 @@ fn main() -> ! {
         sensor = sensor.without_clock();
     }
     let mut left = unpaced.unwrap_or_default();
-    let mut sidecar = Sidecar::new(PIXELS.take(), BLOCKS.take(), Some(sensor.about()));
+    let mut sidecar = Sidecar::new(PIXELS.take(), BLOCKS.take(), Some(sensor.info()));
     sidecar.set_stop_reason(reason.into());
     let mut is_lit = false;
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
-            let lost = serial.lost();
-            sidecar.set_listening(serial.listens());
-            let Ok(()) = sidecar.poll_with(&mut sensor, serial, lost, now_ms);
+            serve(&mut sidecar, &mut sensor, serial, now_ms);
             if is_lit != sidecar.sensor_is_running() {
                 is_lit = !is_lit;
                 Mps2An386::set_laser(is_lit);

@@ -11,11 +11,10 @@ use core::panic::PanicInfo;
 use cortex_m_rt::entry;
 #[cfg(feature = "sensor-photon-timer")]
 use dtof_core::checked;
-use dtof_firmware::board::{on_panic, pico::Pico, turn};
+use dtof_firmware::board::{on_panic, pico::Pico, run};
 #[cfg(feature = "sensor-photon-timer")]
 use dtof_firmware::photon_timer::{Config, Settings};
-use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
-use dtof_sensors::Sensor;
+use dtof_firmware::sidecar::{Block, Pixel};
 #[cfg(not(feature = "sensor-photon-timer"))]
 use dtof_sensors::simulated;
 use heapless::Vec;
@@ -60,21 +59,14 @@ const fn number(text: Option<&str>, default: u32) -> u32 {
 #[entry]
 fn main() -> ! {
     #[allow(unused_variables, reason = "the simulated sensor is not connected")]
-    let (mut board, mut serial, port) = Pico::start();
+    let (board, serial, port) = Pico::start();
     defmt::info!("pico started: {}", board.reset_reason());
     #[cfg(feature = "sensor-photon-timer")]
-    let mut sensor = port.photon_timer(LASER);
+    let sensor = port.photon_timer(LASER);
     #[cfg(not(feature = "sensor-photon-timer"))]
-    let mut sensor = simulated::scene();
-    let mut sidecar = Sidecar::new(PIXELS.take(), BLOCKS.take(), Some(sensor.about()));
-    sidecar.set_stop_reason(board.reset_reason().into());
-    loop {
-        turn(&mut board, &mut serial, |serial, now_ms| {
-            let lost = serial.lost();
-            sidecar.set_listening(serial.listens());
-            let Ok(()) = sidecar.poll_with(&mut sensor, serial, lost, now_ms);
-        });
-    }
+    let sensor = simulated::scene();
+    let reason = board.reset_reason();
+    run(board, serial, reason, sensor, PIXELS.take(), BLOCKS.take())
 }
 
 #[panic_handler]

@@ -9,9 +9,8 @@ compile_error!("an image for a board: cargo xtask image stm32f405");
 use core::panic::PanicInfo;
 
 use cortex_m_rt::entry;
-use dtof_firmware::board::{on_panic, stm32f405::Stm32F405, turn};
-use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
-use dtof_sensors::Sensor;
+use dtof_firmware::board::{on_panic, run, stm32f405::Stm32F405};
+use dtof_firmware::sidecar::{Block, Pixel};
 #[cfg(not(any(
     feature = "sensor-tdc7200",
     feature = "sensor-tmf8829",
@@ -29,29 +28,22 @@ static BLOCKS: ConstStaticCell<Vec<Block, 42>> = ConstStaticCell::new(Vec::new()
 #[entry]
 fn main() -> ! {
     #[allow(unused_variables, reason = "the simulated sensor is not connected")]
-    let (mut board, mut serial, port) = Stm32F405::start();
+    let (board, serial, port) = Stm32F405::start();
     defmt::info!("stm32f405 started: {}", board.reset_reason());
     #[cfg(feature = "sensor-tdc7200")]
-    let mut sensor = port.tdc7200();
+    let sensor = port.tdc7200();
     #[cfg(feature = "sensor-tmf8829")]
-    let mut sensor = port.tmf8829(include_bytes!(concat!(env!("OUT_DIR"), "/tmf8829.bin")));
+    let sensor = port.tmf8829(include_bytes!(concat!(env!("OUT_DIR"), "/tmf8829.bin")));
     #[cfg(feature = "sensor-tmf882x")]
-    let mut sensor = port.tmf882x(include_bytes!(concat!(env!("OUT_DIR"), "/tmf882x.bin")));
+    let sensor = port.tmf882x(include_bytes!(concat!(env!("OUT_DIR"), "/tmf882x.bin")));
     #[cfg(not(any(
         feature = "sensor-tdc7200",
         feature = "sensor-tmf8829",
         feature = "sensor-tmf882x"
     )))]
-    let mut sensor = simulated::scene();
-    let mut sidecar = Sidecar::new(PIXELS.take(), BLOCKS.take(), Some(sensor.about()));
-    sidecar.set_stop_reason(board.reset_reason().into());
-    loop {
-        turn(&mut board, &mut serial, |serial, now_ms| {
-            let lost = serial.lost();
-            sidecar.set_listening(serial.listens());
-            let Ok(()) = sidecar.poll_with(&mut sensor, serial, lost, now_ms);
-        });
-    }
+    let sensor = simulated::scene();
+    let reason = board.reset_reason();
+    run(board, serial, reason, sensor, PIXELS.take(), BLOCKS.take())
 }
 
 #[panic_handler]

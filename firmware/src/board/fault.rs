@@ -1,7 +1,7 @@
 //! The end of an image by a panic or a hard fault: first the laser goes off.
 //!
 //! The stack is lowest in RAM (see the linker scripts), so that its overflow is a fault and
-//! reaches no static. The handler cannot use a stack that is full: it starts it anew.
+//! reaches no static. The handler cannot use a full stack: it resets the stack pointer first.
 
 use core::ops::Range;
 
@@ -15,7 +15,7 @@ const FRAME: usize = 32;
 /// Bytes that one instruction pushes at most: `vpush` of sixteen double words.
 const LARGEST_PUSH: usize = 128;
 
-/// What a hard fault was, and what is left of it.
+/// A hard fault, and the registers that survived it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
     /// The stack has overflowed.
@@ -27,10 +27,10 @@ pub struct Fault {
 impl Fault {
     /// `pointer` is the stack pointer when the handler begins. `stack` is from the end of the
     /// stack, its lowest address, to its start. `address` is the one whose access failed, if the
-    /// processor knows.
+    /// processor reports it.
     #[must_use]
     pub fn new(pointer: usize, stack: &Range<usize>, address: Option<usize>) -> Self {
-        // A push that fails leaves the stack pointer where it was; a buffered one tells no address.
+        // A push that fails leaves the stack pointer where it was; a buffered one has no address.
         let pushed = stack.start - LARGEST_PUSH..stack.start;
         Self {
             is_overflow: pointer < stack.start + FRAME + LARGEST_PUSH
@@ -56,8 +56,8 @@ mod handlers {
     use crate::board::reset_reason::{self, ResetReason};
     use crate::board::{chip, report};
 
-    /// Registers of the floating-point unit that are yet to be saved, on a stack that may be full,
-    /// are given up: LSPACT of FPCCR (DDI 0403, B3.2.21).
+    /// Drops registers of the floating-point unit that the processor has not saved yet, as the stack
+    /// may be full: LSPACT of FPCCR (DDI 0403, B3.2.21).
     #[cfg(not(feature = "pico"))]
     macro_rules! give_up_float_registers {
         () => {
@@ -77,7 +77,7 @@ mod handlers {
         };
     }
 
-    /// The handler in the vector table. Nothing is pushed before the stack starts anew.
+    /// The handler in the vector table. It pushes nothing before the stack pointer is reset.
     #[unsafe(naked)]
     #[unsafe(no_mangle)]
     #[unsafe(link_section = ".HardFault.board")]
@@ -119,7 +119,7 @@ mod handlers {
         chip::end()
     }
 
-    /// A Cortex-M0+ does not say.
+    /// A Cortex-M0+ does not report it.
     #[cfg(feature = "pico")]
     const fn failed_address() -> Option<usize> {
         None

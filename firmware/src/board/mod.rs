@@ -1,8 +1,8 @@
-//! Boards: what the main loop needs of one, and those there are.
+//! Boards, and the trait that the main loop needs.
 //!
-//! A board is one file beside this one. It starts the clock, a timer of one
-//! millisecond and a serial port, hands the received bytes to
-//! [`SerialInterrupt`](crate::serial::SerialInterrupt) and fetches those to send
+//! Each board has a file in this folder. It starts the clock, a timer of one
+//! millisecond and a serial port, passes received bytes to
+//! [`SerialInterrupt`](crate::serial::SerialInterrupt), fetches the bytes to send
 //! from there, and implements [`Board`]. An image is one build with the feature
 //! of its board and one file in `src/bin`; its memory is in the linker script
 //! `build.rs` chooses.
@@ -48,10 +48,15 @@ use self::pico as chip;
 use self::stm32f405 as chip;
 pub use self::transmit::{Transmitter, transmit};
 
-use crate::serial::Serial;
+use dtof_sensors::Sensor;
+use heapless::VecView;
 
-/// Whether the image drives a real sensor, and with it a laser. A debugger that halts the
-/// processor then does not halt the watchdog: the laser would go on without end.
+use self::reset_reason::ResetReason;
+use crate::serial::Serial;
+use crate::sidecar::{Block, Pixel, Sidecar};
+
+/// Whether the image drives a real sensor, and with it a laser. The watchdog then runs on while a
+/// debugger halts the processor: otherwise the laser would stay on.
 #[cfg(all(target_os = "none", any(feature = "pico", feature = "stm32f405")))]
 const DRIVES_SENSOR: bool = cfg!(any(
     feature = "sensor-photon-timer",
@@ -72,17 +77,17 @@ pub trait Board {
     /// fetches what there is to send. Never waits; harmless if there is nothing.
     fn start_sending();
 
-    /// Does `work`, and lets no interrupt handler run meanwhile.
+    /// Does `work` with interrupts masked.
     fn hold_interrupts(&mut self, work: impl FnOnce(&mut Self));
 
-    /// Sleeps until an interrupt comes, also one that is held back; at least the
-    /// timer's comes within a millisecond. It may return sooner.
+    /// Sleeps until an interrupt is pending, even a masked one; the timer's comes within a
+    /// millisecond. It may return sooner.
     fn sleep(&mut self);
 }
 
-/// The main loop, once round: `work` is given the port and the time, does what
-/// can be done without waiting, and is called again at the latest when more has
-/// been received or a millisecond has passed.
+/// One turn of the main loop: `work` gets the port and the time and does what
+/// can be done without waiting. The next turn comes when more has been received, after a
+/// millisecond at the latest.
 pub fn turn<B: Board>(
     board: &mut B,
     serial: &mut Serial<'_>,
@@ -90,12 +95,46 @@ pub fn turn<B: Board>(
 ) {
     work(serial, board.now_ms());
     board.feed_watchdog();
-    // No byte can come between the question and the sleep.
+    // No byte can come between the check and the sleep.
     board.hold_interrupts(|board| {
         if !serial.has_received() {
             board.sleep();
         }
     });
+}
+
+/// The work of a turn: the sidecar serves the host and polls the sensor.
+pub fn serve(
+    sidecar: &mut Sidecar<'_>,
+    sensor: &mut impl Sensor,
+    serial: &mut Serial<'_>,
+    now_ms: u32,
+) {
+    let lost = serial.lost();
+    sidecar.set_listening(serial.listens());
+    let Ok(()) = sidecar.poll_with(sensor, serial, lost, now_ms);
+}
+
+/// Runs a sidecar with room for these pixels and blocks without end. Its report tells the host why
+/// the board has started.
+// Once in an image. Out of line LLVM calls a function through a register, which `stack-bound` cannot
+// follow.
+#[inline(always)]
+pub fn run<B: Board>(
+    mut board: B,
+    mut serial: Serial<'_>,
+    reason: ResetReason,
+    mut sensor: impl Sensor,
+    pixels: &mut VecView<Pixel>,
+    blocks: &mut VecView<Block>,
+) -> ! {
+    let mut sidecar = Sidecar::new(pixels, blocks, Some(sensor.info()));
+    sidecar.set_stop_reason(reason.into());
+    loop {
+        turn(&mut board, &mut serial, |serial, now_ms| {
+            serve(&mut sidecar, &mut sensor, serial, now_ms);
+        });
+    }
 }
 
 #[cfg(test)]
@@ -107,7 +146,7 @@ mod tests {
     use super::*;
     use crate::serial::Buffers;
 
-    /// Writes down what it is asked for.
+    /// Records its calls.
     #[derive(Default)]
     struct Mock {
         now_ms: u32,

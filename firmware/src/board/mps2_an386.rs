@@ -68,11 +68,10 @@ impl Mps2An386 {
         (Self(()), serial)
     }
 
-    /// Does what the words behind the image's name on the emulator's command line
-    /// (`-semihosting-config arg=…`) ask for. `exit`, `panic`, `fault` and `overflow` show that
-    /// each end is seen; all but the first begin with a laser that is on. Gives N of
-    /// `unpaced=N`: laser cycles that the simulated sensor makes as fast as they are worked on,
-    /// and none after them.
+    /// Executes the words after the image's name on the emulator's command line
+    /// (`-semihosting-config arg=…`). `exit`, `panic`, `fault` and `overflow` test each way to
+    /// end; all but the first switch the laser on first. Returns the N of `unpaced=N`: the
+    /// simulated sensor makes this many laser cycles as fast as they are processed, and then stops.
     ///
     /// # Panics
     /// On request.
@@ -90,11 +89,11 @@ impl Mps2An386 {
             }
             match (word, cycles.and_then(|cycles| cycles.parse().ok())) {
                 ("exit", _) => Self::exit(ExitCode::SUCCESS),
-                ("panic", _) => panic!("as asked for on the command line"),
+                ("panic", _) => panic!("requested on the command line"),
                 ("fault", _) => cortex_m::asm::udf(),
                 ("overflow", _) => overflow(),
                 (_, cycles @ Some(_)) => unpaced = cycles,
-                _ => defmt::warn!("what is `{=str}`?", word),
+                _ => defmt::warn!("unknown word `{=str}`", word),
             }
         }
         unpaced
@@ -156,7 +155,7 @@ impl Board for Mps2An386 {
     }
 
     fn sleep(&mut self) {
-        // An interrupt that is held back ends it all the same.
+        // A pending interrupt ends it even while interrupts are masked.
         cortex_m::asm::wfi();
     }
 }

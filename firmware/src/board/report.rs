@@ -53,7 +53,7 @@ const fn registers() {}
 #[cfg(not(any(feature = "pico", feature = "bench", feature = "self-test")))]
 fn registers() {
     // SAFETY: the registers are only read, and reading them changes nothing.
-    #[allow(unsafe_code, reason = "nobody can hand over the peripherals here")]
+    #[allow(unsafe_code, reason = "there is no handle of the peripheral here")]
     let scb = unsafe { &*SCB::PTR };
     defmt::error!(
         "CFSR {=u32:#010x}, HFSR {=u32:#010x}, MMFAR {=u32:#010x}, BFAR {=u32:#010x}",
@@ -67,7 +67,7 @@ fn registers() {
 /// Does not report what goes wrong while reporting, or without end.
 fn once(report: impl FnOnce()) {
     static REPORTED: AtomicBool = AtomicBool::new(false);
-    // Nobody comes between: not every processor can do both in one step.
+    // No interrupt handler runs in between: not every processor has an atomic swap.
     if !REPORTED.load(Ordering::Relaxed) {
         REPORTED.store(true, Ordering::Relaxed);
         report();

@@ -1,4 +1,4 @@
-//! Why a board has started: what the image before it left in RAM, or else what the chip says.
+//! Why a board has started: from a note of the previous image in RAM, or else from the chip.
 
 #[cfg(all(target_os = "none", feature = "board"))]
 pub use self::word::{remember, take};
@@ -9,7 +9,7 @@ use dtof_link::StopReason;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ResetReason {
-    /// It was switched on. RP2040 says the same of a brown-out, and so does STM32F405 unless its
+    /// It was switched on. RP2040 reports a brown-out the same way, and so does STM32F405 unless its
     /// option bytes (`BOR_LEV`) switch the brown-out reset on.
     PowerOn,
     /// The image panicked.
@@ -25,7 +25,7 @@ pub enum ResetReason {
 }
 
 impl From<ResetReason> for Option<StopReason> {
-    /// What a host is told of it: nothing stopped when the board was switched on.
+    /// The reason for the host: nothing stopped if the board was switched on.
     // Part of a large function it would become a jump that hides where it goes.
     #[inline(never)]
     fn from(reason: ResetReason) -> Self {
@@ -41,7 +41,7 @@ impl From<ResetReason> for Option<StopReason> {
 }
 
 impl ResetReason {
-    /// What an RP2040 says: `REASON` of its watchdog and `CHIP_RESET` of `VREG_AND_CHIP_RESET`
+    /// From the registers of an RP2040: `REASON` of its watchdog and `CHIP_RESET` of `VREG_AND_CHIP_RESET`
     /// (RP2040 datasheet, 4.7.6 and 2.12.8). `watched` is whether the image had started the
     /// watchdog: the boot ROM ends the copying of an image by the same watchdog.
     #[must_use]
@@ -61,7 +61,7 @@ impl ResetReason {
         }
     }
 
-    /// What `RCC_CSR` of an STM32F405 says (RM0090, 7.3.21). More than one flag is set: a
+    /// From `RCC_CSR` of an STM32F405 (RM0090, 7.3.21). More than one flag is set: a
     /// power-on is a brown-out as well, and every reset shows at the reset pin.
     #[must_use]
     pub const fn of_stm32f4(csr: u32) -> Self {
@@ -88,7 +88,7 @@ mod word {
 
     use super::ResetReason;
 
-    /// Words that random RAM does not hold.
+    /// Words that are unlikely in uninitialised RAM.
     const WORDS: [(ResetReason, u32); 2] = [
         (ResetReason::Panic, 0xd70f_9a21),
         (ResetReason::Fault, 0xd70f_fa17),

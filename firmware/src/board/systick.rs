@@ -15,7 +15,7 @@ pub const fn reload(hclk_hz: u32) -> u32 {
 }
 
 /// Waits by the processor's timer, which counts its cycles down from [`reload`] to
-/// 0 again and again and is running. Never shorter than asked for; longer by a
+/// 0 again and again and is running. Never shorter than requested; longer by a
 /// look at the timer, and by the interrupts that come.
 #[derive(Debug)]
 pub struct SystickDelay<F> {
@@ -35,7 +35,7 @@ impl<F: FnMut() -> u32> SystickDelay<F> {
         }
     }
 
-    // Once in an image: whoever waits has the time for a call.
+    // Not inlined to save flash: a call while waiting costs nothing.
     #[inline(never)]
     fn wait(&mut self, ns: u32) {
         let start = (self.now)();
@@ -89,7 +89,7 @@ mod tests {
         assert_eq!(elapsed(0, 1, 0xff_ffff), 0xff_ffff);
     }
 
-    /// From any value of the timer, with interrupts or without: what is asked for,
+    /// From any value of the timer, with interrupts or without: what is requested,
     /// and no more than the looks and pieces cost.
     #[test]
     fn waits_as_long_as_asked() {
@@ -106,10 +106,10 @@ mod tests {
                         };
                         SystickDelay::new(now, hclk_hz).delay_ns(ns);
                         let took = cycle.get() - first;
-                        let asked = (u64::from(ns) * per_us).div_ceil(1000);
+                        let requested = (u64::from(ns) * per_us).div_ceil(1000);
                         let pieces = u64::from(ns.div_ceil(PIECE_NS).max(1));
-                        assert!(took >= asked, "{took} of {asked} cycles");
-                        assert!(took <= asked + pieces * (2 * look + 1));
+                        assert!(took >= requested, "{took} of {requested} cycles");
+                        assert!(took <= requested + pieces * (2 * look + 1));
                     }
                 }
             }

@@ -1,7 +1,7 @@
 //! Sending, as the interrupt handlers of all boards do it.
 //!
 //! No byte is left in the queue without an interrupt to come: either the transmitter interrupts
-//! once it has room, or the queue was empty, and whoever fills it calls
+//! once it has room, or the queue was empty, and the code that fills it calls
 //! [`Board::start_sending`](super::Board::start_sending) afterwards. `tests/wake_ups.rs` tries
 //! every order of events.
 

@@ -9,8 +9,8 @@ pub const BINS: u32 = 128;
 /// The clock of the hardware: a sample, and so a bin, is one of 8 ns.
 pub const CLOCK_HZ: u32 = 125_000_000;
 
-/// Clocks of a laser cycle beside those of its bins: each shift register takes the level
-/// before, hands it over, and begins anew.
+/// Clocks of a laser cycle in addition to those of its bins: each shift register samples the
+/// level before, passes it on, and starts again.
 const BESIDE: u32 = 5;
 
 /// The shortest pulse and the shortest pause of the laser: an instruction each to load a
@@ -20,10 +20,10 @@ const SHORTEST: u32 = 2;
 /// Clocks of the longest pulse within limits: 1 µs.
 const MOST_PULSE: u32 = 125;
 
-/// A pulse within limits takes one clock of so many: 2 % of the time.
+/// A pulse within limits takes at most one clock in this many: 2 % of the time.
 const LEAST_CLOCKS_A_CLOCK: u32 = 50;
 
-/// Of the laser.
+/// Settings of the laser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Settings {
     /// Laser cycles a second.
@@ -39,7 +39,7 @@ pub struct Config {
     pulse: u32,
 }
 
-/// Why settings cannot be.
+/// Settings that cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConfigError {
     /// A laser cycle would be shorter than the bins, and 5 clocks: above 943,396 a second.
@@ -57,7 +57,7 @@ pub enum ConfigError {
 }
 
 impl ConfigError {
-    /// What is wrong, in words.
+    /// The reason, in one line.
     #[must_use]
     pub const fn text(self) -> &'static str {
         match self {
@@ -84,13 +84,13 @@ impl fmt::Display for ConfigError {
 impl Error for ConfigError {}
 
 impl Config {
-    /// The laser cycle is rounded to the nearest clock, its pulse up, to 2 clocks at least. What
-    /// is rounded has to keep to the limits: a pulse of at most 1 µs, at most 2 % of the time.
-    /// They bound what a laser that is wired wrongly or built too strong does to an eye. The
+    /// Rounds the laser cycle to the nearest clock and its pulse up, to at least 2 clocks. The
+    /// rounded values must be within limits: a pulse of at most 1 µs, and at most 2 % of the time.
+    /// The limits bound the harm to an eye from a laser that is wired wrongly or too strong. The
     /// feature `laser-beyond-limits` lifts them.
     ///
     /// # Errors
-    /// [`ConfigError`] says what cannot be.
+    /// Returns a [`ConfigError`] if the settings cannot be used.
     pub const fn new(settings: Settings) -> Result<Self, ConfigError> {
         let config = match Self::of_hardware(settings) {
             Ok(config) => config,
@@ -151,8 +151,8 @@ impl Config {
         self.period - BINS
     }
 
-    /// The clock in Hz, and of its clocks those of a laser cycle and of the laser's pulse: what
-    /// `cargo xtask image` reads from the image and prints.
+    /// The clock in Hz, and the clocks of a laser cycle and of the laser's pulse.
+    /// `cargo xtask image` reads them from the image and prints them.
     #[must_use]
     pub const fn laser_clocks(&self) -> [u32; 3] {
         [CLOCK_HZ, self.period, self.pulse]
@@ -164,13 +164,13 @@ impl Config {
         CLOCK_HZ as u64 * 1000 / self.period as u64
     }
 
-    /// What the two counters of the laser's pulse begin with: of the pulse, of the pause.
+    /// The start values of the two counters of the laser's pulse: pulse and pause.
     #[must_use]
     pub const fn laser_counters(&self) -> [u32; 2] {
         [self.pulse - SHORTEST, self.period - self.pulse - SHORTEST]
     }
 
-    /// What the two counters of a shift register begin with: of its bins, of the rest.
+    /// The start values of the two counters of a shift register: bins and pause.
     #[must_use]
     pub const fn sampler_counters(&self) -> [u32; 2] {
         [BINS / 2 - 1, self.period - BINS - BESIDE]

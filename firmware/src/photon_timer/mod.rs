@@ -1,25 +1,24 @@
 //! A photon timer of shift registers: hardware fires the laser and samples a SPAD's pin at
-//! every clock into memory, and this finds the rising edges.
+//! every clock into memory, and this module finds the rising edges.
 //!
-//! All photons of a laser cycle are found whose pulses are apart: a pulse has to be seen, so
-//! that it lasts a clock or more, and so has the pause before the next. The processor works
-//! a laser cycle, not a sample.
+//! It finds all photons of a laser cycle whose pulses, and the pauses between them, last a clock or
+//! more. The processor's work is per laser cycle, not per sample.
 //!
 //! | clocks of a laser cycle | |
 //! |---|---|
 //! | 0 | the laser's pulse begins at its pin |
 //! | 0 to 127 | bins 0 to 127 of [`BIN_PS`] |
-//! | 128 to the next | nobody looks: 5 at least, see [`Config::unsampled_clocks`] |
+//! | 128 to the next | not sampled: at least 5 clocks, see [`Config::unsampled_clocks`] |
 //!
-//! Samples that are overwritten before they are read make lost laser cycles, which are
-//! counted ([`PhotonTimer::lost`]) and an error. None is read half old and half new.
+//! Laser cycles whose samples are overwritten before they are read are lost. They are counted
+//! ([`PhotonTimer::lost`]) and reported as an error. No laser cycle is read half old and half new.
 
 mod config;
 mod samples;
 
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
+use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 use heapless::Vec;
 
 pub use self::config::{BINS, CLOCK_HZ, Config, ConfigError, Settings};
@@ -28,7 +27,7 @@ pub use self::samples::Samples;
 /// The width of a bin, in picoseconds: a clock.
 pub const BIN_PS: u16 = 8_000;
 
-/// Laser cycles that are copied before it is seen whether they were still there.
+/// Laser cycles that are copied before a check for overwritten ones.
 const BATCH: u32 = 16;
 /// Batches of a poll.
 const BATCHES: u32 = 8;
@@ -36,12 +35,12 @@ const BATCHES: u32 = 8;
 /// Hardware that fires a laser and fills a ring of memory with samples. Laser cycles are
 /// numbered from 0 at the start on; after 2³² from 0 again.
 pub trait Sampler {
-    /// Laser cycles whose samples are certainly in memory, of those that are complete.
+    /// The number of last complete laser cycles whose samples are certainly in memory.
     const KEPT: u32;
 
     /// Begins with laser cycle 0.
     fn start(&mut self, config: &Config);
-    /// The laser rests.
+    /// Switches the laser off.
     fn stop(&mut self);
     /// How many laser cycles are complete.
     fn completed(&mut self) -> u32;
@@ -56,24 +55,24 @@ pub trait Sampler {
 pub struct PhotonTimer<S> {
     sampler: S,
     config: Config,
-    /// The laser fires. Before it starts it rests for a whole laser cycle, so that no start makes
-    /// one shorter than was checked.
+    /// The laser fires. It starts after a pause of a whole laser cycle, so that no laser cycle is
+    /// shorter than configured.
     fires: bool,
-    /// The millisecond in which it has begun to rest, once that is known.
-    rests_since: Option<u32>,
+    /// The millisecond in which the laser went off, once known.
+    off_since: Option<u32>,
     /// The laser cycle that is read next.
     next: u32,
     lost: u32,
-    /// What has been copied out of the ring.
+    /// Samples copied from the ring.
     batch: Vec<Samples, { BATCH as usize }>,
 }
 
-/// A poll that went wrong. The next goes on.
+/// An error of a poll. The next poll goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error {
-    /// So many laser cycles were overwritten before they were read.
+    /// This many laser cycles were overwritten before they were read.
     Lost(u32),
-    /// Samples came late; all that are in memory are given up.
+    /// Samples came late; those in memory are dropped.
     Stalled,
 }
 
@@ -86,42 +85,41 @@ impl From<Error> for SensorFault {
 }
 
 impl<S: Sampler> PhotonTimer<S> {
-    /// A timer that rests.
+    /// A stopped timer.
     pub const fn new(sampler: S, config: Config) -> Self {
         Self {
             sampler,
             config,
             fires: false,
-            rests_since: None,
+            off_since: None,
             next: 0,
             lost: 0,
             batch: Vec::new(),
         }
     }
 
-    /// Laser cycles that were overwritten before they were read, since it was made. Their
-    /// photons count nowhere; the laser cycles do not count either.
+    /// Laser cycles that were overwritten before they were read, since the start. Neither they nor
+    /// their photons count anywhere else.
     pub const fn lost(&self) -> u32 {
         self.lost
     }
 
-    /// Lets the laser rest. The next poll that comes late enough starts it.
+    /// Switches the laser off. The next poll after the pause starts it.
     fn rest(&mut self) {
         self.sampler.stop();
-        (self.fires, self.rests_since) = (false, None);
+        (self.fires, self.off_since) = (false, None);
     }
 
-    /// Copies the next laser cycles that are complete. Says how many have been lost before
-    /// them, if some have.
+    /// Copies the next complete laser cycles. Returns how many were lost before them, if any.
     fn copy(&mut self) -> Result<(), u32> {
         let waiting = self.sampler.completed().wrapping_sub(self.next).min(BATCH);
         self.batch.clear();
         for count in 0..waiting {
             let cycle = self.next.wrapping_add(count);
-            // There is room: asked for above.
+            // There is room: checked above.
             let _ = self.batch.push(self.sampler.samples(cycle));
         }
-        // After they were read: what was overwritten meanwhile is not to be looked at.
+        // After reading: drop what was overwritten meanwhile.
         let age = self.sampler.completed().wrapping_sub(self.next);
         if age > S::KEPT {
             // With room for what comes until the next look.
@@ -144,7 +142,7 @@ fn give(batch: &[Samples], sink: &mut impl PhotonSink) {
                 sink.end_laser_cycles(ended);
                 ended = 0;
             }
-            samples.photons(|bin| sink.photon(PixelAddress(0), bin));
+            samples.photons(|bin| sink.photon(PixelAddress::new(0), bin));
         }
         ended += 1;
     }
@@ -156,12 +154,12 @@ fn give(batch: &[Samples], sink: &mut impl PhotonSink) {
 impl<S: Sampler> Sensor for PhotonTimer<S> {
     type Error = Error;
 
-    fn about(&self) -> About {
-        About {
+    fn info(&self) -> SensorInfo {
+        SensorInfo {
             bin_width: Some(U16F16::from_num(BIN_PS)),
             offset: I24F8::ZERO,
             laser_millihertz: self.config.laser_millihertz(),
-            ..About::new(1)
+            ..SensorInfo::new(1)
         }
     }
 
@@ -175,7 +173,7 @@ impl<S: Sampler> Sensor for PhotonTimer<S> {
 
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Error> {
         if !self.fires {
-            let since = *self.rests_since.get_or_insert(now_ms);
+            let since = *self.off_since.get_or_insert(now_ms);
             // The first of these milliseconds may be nearly over.
             if now_ms.wrapping_sub(since) <= self.config.period().div_ceil(CLOCK_HZ / 1000) {
                 return Ok(Polled::Idle);

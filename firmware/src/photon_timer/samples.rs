@@ -1,10 +1,10 @@
 //! The samples of one laser cycle, and the photons in them.
 
-/// What a pin was at 128 clocks one after the other, and at the clock before. Two shift
-/// registers take turns.
+/// The levels of a pin at 128 successive clocks and at the clock before. Two shift registers
+/// alternate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Samples {
-    /// The top bit is the pin right before bin 0; nobody reads the others.
+    /// The top bit is the pin right before bin 0; the others are not used.
     pub before: u32,
     /// Bit `n` of word `w` is the pin at bin `64 w + 2 n`.
     pub even: [u32; 2],
@@ -21,12 +21,11 @@ impl Samples {
         even | next_even | odd | next_odd == 0
     }
 
-    /// The bins at which the pin was high and right before was not. A pulse that has begun
-    /// before bin 0 is none of them.
+    /// Calls `photon` with each bin of a rising edge. A pulse that began before bin 0 has none.
     #[inline]
     pub fn photons(&self, mut photon: impl FnMut(u16)) {
         let ([even, next_even], [odd, next_odd]) = (self.even, self.odd);
-        // A bit is an edge, of the bin that the second number and the bit's place say.
+        // A set bit is an edge. Its bin is the second number plus twice its position.
         let edges = [
             (even & !(odd << 1 | self.before >> 31), 0),
             (odd & !even, 1),

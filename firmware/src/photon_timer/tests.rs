@@ -76,7 +76,7 @@ struct Ring {
     completed: u32,
     /// How many more at each call; over and over.
     steps: Vec<u32>,
-    asked: usize,
+    polls: usize,
     stalls_at: Option<u32>,
     starts: u32,
 }
@@ -93,8 +93,8 @@ impl Sampler for Ring {
     fn stop(&mut self) {}
 
     fn completed(&mut self) -> u32 {
-        let more = self.steps[self.asked % self.steps.len()];
-        self.asked += 1;
+        let more = self.steps[self.polls % self.steps.len()];
+        self.polls += 1;
         self.completed = (self.completed + more).min(u32::try_from(self.cycles.len()).unwrap());
         self.completed
     }
@@ -126,7 +126,7 @@ struct Seen {
 
 impl PhotonSink for Seen {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
-        assert_eq!(pixel, PixelAddress(0));
+        assert_eq!(pixel, PixelAddress::new(0));
         self.open.push(code);
     }
 
@@ -157,7 +157,7 @@ fn timer(cycles: Vec<Levels>, steps: Vec<u32>) -> PhotonTimer<Ring> {
         cycles,
         completed: 0,
         steps,
-        asked: 0,
+        polls: 0,
         stalls_at: None,
         starts: 0,
     };
@@ -322,8 +322,8 @@ fn between_two_starts_the_laser_rests_for_a_laser_cycle() {
 
 #[test]
 fn says_what_it_is() {
-    let about = timer(Vec::new(), vec![0]).about();
-    assert_eq!((about.pixels, about.is_whole), (1, false));
-    assert_eq!(about.bin_width, Some(U16F16::from_num(8000)));
-    assert_eq!(about.laser_millihertz, 100_000_000);
+    let info = timer(Vec::new(), vec![0]).info();
+    assert_eq!((info.pixels, info.gives_histograms), (1, false));
+    assert_eq!(info.bin_width, Some(U16F16::from_num(8000)));
+    assert_eq!(info.laser_millihertz, 100_000_000);
 }

@@ -13,16 +13,15 @@ use super::{QUEUE, Sidecar};
 const WORDS: usize = BODY_BYTES / AerWord::BYTES;
 
 impl Sidecar<'_> {
-    /// What the host asks, if that is what it has sent next. Histograms come after all events,
-    /// and no event comes sooner or later for them.
+    /// The next message if it is a request. Histograms come after all events and do not change the
+    /// order or time of events.
     pub(super) fn question(&self) -> Option<u8> {
         let next = self.endpoint.peek()?.kind;
         (!matches!(next, message::PHOTONS | message::HISTOGRAM_REQUEST)).then_some(next)
     }
 
-    /// Whether events stay in their slots for now: photons of a sensor do not
-    /// wait, so that a question would never be answered if all events that come
-    /// meanwhile went before the answer.
+    /// Whether events stay in their slots for now. A sensor cannot wait: a request would never be
+    /// answered if all later events went before the answer.
     fn holds_slots(&self) -> bool {
         self.source == Source::Sensor
             && self
@@ -54,20 +53,20 @@ impl Sidecar<'_> {
         self.send_words();
     }
 
-    /// Takes an event for which there is room. Of dynamic depth only a change goes on.
+    /// Takes an event for which there is room. With dynamic depth only a change is sent.
     pub(super) fn enqueue(&mut self, event: &DepthEvent) {
         let (time, word) = match &self.dynamic_depth {
             None => self.encoder.encode(event),
             Some(config) => {
                 let followed = if event.level == BlockLevel::PIXEL {
-                    let pixel = self.pixels.get_mut(usize::from(event.pixel.0));
+                    let pixel = self.pixels.get_mut(usize::from(event.pixel.raw()));
                     pixel.map(|pixel| &mut pixel.dynamic_depth)
                 } else {
                     let mut blocks = self.blocks.iter_mut();
                     let block = blocks.find(|block| block.is_of(event));
                     block.map(|block| &mut block.dynamic_depth)
                 };
-                // Of several echoes the first is followed.
+                // Dynamic depth follows the first of several echoes.
                 let followed = followed.filter(|_| event.echo == EchoNumber::FIRST);
                 let change = followed.and_then(|followed| followed.observe(config, event));
                 let Some(change) = change else {
@@ -86,35 +85,35 @@ impl Sidecar<'_> {
     fn send_words(&mut self) {
         let all = self.endpoint.is_settled() || self.question().is_some();
         while self.words.len() >= WORDS || (!self.words.is_empty() && all) {
-            // An answer stands before the events that came after the question.
+            // An answer goes before the events that came after the request.
             if self.answer.is_some() || !self.endpoint.has_room() {
                 return;
             }
             let words = core::iter::from_fn(|| self.words.dequeue()).take(WORDS);
             let body: Vec<u8, BODY_BYTES> = words.flat_map(AerWord::to_le_bytes).collect();
-            // There is room: asked above.
+            // There is room: checked above.
             let _ = self.endpoint.offer(message::EVENTS, &body);
         }
     }
 
-    /// Whether every event before a question has become a message.
+    /// Whether every event before a request has become a message.
     pub(super) fn is_drained(&self) -> bool {
-        self.words.is_empty() && (self.holds_slots() || !self.waiting())
+        self.words.is_empty() && (self.holds_slots() || !self.has_waiting_events())
     }
 
     /// Whether an event has not left its slot.
-    pub(super) fn waiting(&self) -> bool {
-        self.pixels.iter().any(|pixel| pixel.detector.request())
-            || self.blocks.iter().any(|block| block.detector.request())
+    pub(super) fn has_waiting_events(&self) -> bool {
+        self.pixels.iter().any(|pixel| pixel.detector.has_event())
+            || self.blocks.iter().any(|block| block.detector.has_event())
     }
 
-    /// Whether the slot of a pixel, or behind them of a block, is full.
+    /// Whether the slot of a pixel, or after the pixels of a block, is full.
     fn is_waiting(&self, index: usize) -> bool {
         match self.pixels.get(index) {
-            Some(pixel) => pixel.detector.request(),
+            Some(pixel) => pixel.detector.has_event(),
             None => {
                 let block = self.blocks.get(index - self.pixels.len());
-                block.is_some_and(|block| block.detector.request())
+                block.is_some_and(|block| block.detector.has_event())
             }
         }
     }
@@ -123,10 +122,10 @@ impl Sidecar<'_> {
     fn acknowledge(&mut self, index: usize) -> Option<DepthEvent> {
         let pixels = self.pixels.len();
         match self.pixels.get_mut(index) {
-            Some(pixel) => pixel.detector.acknowledge(),
+            Some(pixel) => pixel.detector.take_event(),
             None => {
                 let block = self.blocks.get_mut(index - pixels)?;
-                block.detector.acknowledge()
+                block.detector.take_event()
             }
         }
     }

@@ -1,5 +1,5 @@
-//! Histograms that the host asks for. They yield to events: one leaves when no event waits, and
-//! leaves room for the next events. One request waits at a time, so that nothing waits behind it.
+//! Histograms on request of the host. Events have priority: a histogram is sent only while no event
+//! waits, and if there is room left for the next events. Only one request waits at a time.
 
 use dtof_core::{LaserCycle, PixelAddress};
 use dtof_link::{HistogramHead, NoHistogram, Source, message};
@@ -7,67 +7,67 @@ use dtof_link::{HistogramHead, NoHistogram, Source, message};
 use super::{BINS, Sidecar};
 
 impl Sidecar<'_> {
-    /// Takes a request on, or says at once why there is no histogram.
+    /// Accepts a request, or answers at once why there is no histogram.
     #[inline(never)]
-    pub(super) fn histogram_of(&mut self, body: &[u8]) {
+    pub(super) fn accept_request(&mut self, body: &[u8]) {
         let Ok(pixel) = body.try_into().map(u16::from_le_bytes) else {
             self.unknown = self.unknown.saturating_add(1);
             return;
         };
-        let of_sensor = self.sensor.filter(|_| self.waits_for_sensor());
+        let of_sensor = self.sensor.filter(|_| self.uses_sensor_histograms());
         let pixels = of_sensor.map_or(u16::MAX, |sensor| sensor.pixels);
-        let pixel = PixelAddress(pixel);
+        let pixel = PixelAddress::new(pixel);
         let reason = if self.config.is_none() {
             NoHistogram::NoConfiguration
-        } else if usize::from(pixel.0) >= self.pixels.len() || pixel.0 >= pixels {
+        } else if usize::from(pixel.raw()) >= self.pixels.len() || pixel.raw() >= pixels {
             NoHistogram::NoPixel
         } else {
-            self.wanted = Some(pixel);
+            self.requested_histogram = Some(pixel);
             return;
         };
         self.answer_none(pixel, reason);
     }
 
-    /// Says that there is no histogram.
+    /// Answers that there is no histogram.
     #[inline(never)]
     fn answer_none(&mut self, pixel: PixelAddress, reason: NoHistogram) {
         self.answer = Some((message::HISTOGRAM, reason.message(pixel)));
     }
 
-    /// Whether pixels count nothing: the sensor gives whole histograms.
-    fn waits_for_sensor(&self) -> bool {
-        self.source == Source::Sensor && self.sensor.is_some_and(|sensor| sensor.is_whole)
+    /// Whether histograms come from the sensor, complete. Then pixels count no photons.
+    fn uses_sensor_histograms(&self) -> bool {
+        self.source == Source::Sensor && self.sensor.is_some_and(|sensor| sensor.gives_histograms)
     }
 
-    /// Another message takes the place of a request that waits. Says whether there was one.
+    /// Another message replaces a waiting request. Returns whether there was one.
     pub(super) fn give_up(&mut self) -> bool {
-        let Some(pixel) = self.wanted.take() else {
+        let Some(pixel) = self.requested_histogram.take() else {
             return false;
         };
         self.answer_none(pixel, NoHistogram::GivenUp);
         true
     }
 
-    /// Answers a request with the exposure that its pixel is in, if events leave room.
-    pub(super) fn send_exposure(&mut self) {
-        if let Some(pixel) = self.wanted
-            && !self.waits_for_sensor()
+    /// Answers a request with the counts of the pixel's present exposure, if events leave room.
+    pub(super) fn send_current_histogram(&mut self) {
+        if let Some(pixel) = self.requested_histogram
+            && !self.uses_sensor_histograms()
             && !self.events_wait()
         {
-            self.send_exposure_of(pixel);
+            self.send_current_histogram_of(pixel);
         }
     }
 
-    // Not with its counts on the stack of others.
+    // Not inlined, to keep its counts off the stack of callers.
     #[inline(never)]
-    fn send_exposure_of(&mut self, pixel: PixelAddress) {
-        let Some(detector) = self.pixels.get(usize::from(pixel.0)) else {
+    fn send_current_histogram_of(&mut self, pixel: PixelAddress) {
+        let Some(detector) = self.pixels.get(usize::from(pixel.raw())) else {
             return;
         };
         let head = HistogramHead {
             pixel,
             is_whole: false,
-            cycle: LaserCycle(self.cycle),
+            cycle: LaserCycle::new(self.cycle),
             exposure: detector.detector.exposure().into(),
         };
         let counts = detector.detector.histogram().counts().map(u32::from);
@@ -76,13 +76,16 @@ impl Sidecar<'_> {
 
     /// Answers a request with the histogram that the sensor gives, if events leave room. If
     /// not, the next one will do.
-    pub(super) fn send_whole(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
-        if self.wanted == Some(pixel) && self.waits_for_sensor() && !self.events_wait() {
+    pub(super) fn send_sensor_histogram(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
+        if self.requested_histogram == Some(pixel)
+            && self.uses_sensor_histograms()
+            && !self.events_wait()
+        {
             let head = HistogramHead {
                 pixel,
                 is_whole: true,
-                cycle: LaserCycle(self.cycle),
-                exposure: self.frame,
+                cycle: LaserCycle::new(self.cycle),
+                exposure: self.frame_cycles,
             };
             self.send_histogram(head, counts);
         }
@@ -90,7 +93,7 @@ impl Sidecar<'_> {
 
     /// Whether something goes before a histogram.
     fn events_wait(&self) -> bool {
-        self.answer.is_some() || !self.words.is_empty() || self.waiting()
+        self.answer.is_some() || !self.words.is_empty() || self.has_waiting_events()
     }
 
     /// Room for one message is left to events.
@@ -101,19 +104,19 @@ impl Sidecar<'_> {
             return;
         }
         for message in messages {
-            // There is room: asked above.
+            // There is room: checked above.
             if let Ok(body) = self.endpoint.offer_empty(message::HISTOGRAM) {
                 message.write(body);
             }
         }
-        self.wanted = None;
+        self.requested_histogram = None;
     }
 
-    /// The sensor has failed: whoever waits for a histogram of it hears that.
-    pub(super) fn no_whole_histogram(&mut self) {
-        if self.waits_for_sensor()
+    /// Answers a waiting request with the failure of the sensor.
+    pub(super) fn answer_sensor_failure(&mut self) {
+        if self.uses_sensor_histograms()
             && self.answer.is_none()
-            && let Some(pixel) = self.wanted.take()
+            && let Some(pixel) = self.requested_histogram.take()
         {
             self.answer_none(pixel, NoHistogram::Sensor);
         }

@@ -6,16 +6,15 @@
 //! takes them.
 //!
 //! Photons come from the link or from a sensor. From the link they wait while
-//! an event cannot leave its slot: the host stops being acknowledged, stops
-//! sending, and the events are those of an engine with all the room in the
-//! world. A sensor does not wait; there the slot stays full and the pixel puts
-//! its decisions off, as the paper has it. [`Sidecar::poll_with`] asks the sensor
+//! an event cannot leave its slot: the host gets no acknowledgement and stops
+//! sending, so that no event is lost. A sensor cannot wait. While the slot is full, the pixel
+//! defers its decisions, as in the paper. [`Sidecar::poll_with`] polls the sensor
 //! as well.
 //!
-//! The sensor, and with it a laser, runs only while a host wants it: from a configuration
-//! that takes its photons on, until another configuration or session, the end of the session,
+//! The sensor, and with it a laser, runs only on request of a host: from a configuration
+//! that uses its photons until another configuration or session, the end of the session,
 //! [`Sidecar::set_listening`], or a host that is silent for as long as it has configured.
-//! Only a further configuration starts it again.
+//! Only another configuration starts it again.
 
 mod configuration;
 mod events;
@@ -24,16 +23,17 @@ mod photons;
 mod records;
 mod sensor;
 
+use dtof_core::binning::{BlockLink, BlockPlace};
+use dtof_core::events::{DynamicDepthConfig, DynamicDepthPixel};
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{
-    AerEncoder, AerWord, AnyRule, AsyncPixel, BlockPlace, DepthEvent, DynamicDepthConfig,
-    DynamicDepthPixel, Feed, PixelAddress, PixelConfig, Statistics,
+    AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, PixelAddress, PixelConfig, Statistics,
 };
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
 use dtof_link::{Configuration, DynamicDepth, Report, SensorRecord, Source, StopReason};
-use dtof_sensors::{About, SensorFault};
+use dtof_sensors::{SensorFault, SensorInfo};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
 use heapless::vec::{Vec, VecView};
@@ -45,7 +45,7 @@ pub const BINS: usize = 128;
 
 /// Words that wait for the link: of an event one, and now and then a time word.
 const QUEUE: usize = 64;
-/// Times that all pixels look at most before the main loop goes round.
+/// The most looks of all pixels in one turn of the main loop.
 const LOOKS: u16 = 64;
 
 /// The kind and the body of a message.
@@ -56,12 +56,12 @@ type Answer = (u8, Vec<u8, BODY_BYTES>);
 #[derive(Debug)]
 pub struct Pixel {
     detector: AsyncPixel<BINS>,
-    feed: Feed,
+    feed: BlockLink,
     dynamic_depth: DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>,
 }
 
 impl Pixel {
-    const fn new(address: PixelAddress, feed: Feed) -> Self {
+    const fn new(address: PixelAddress, feed: BlockLink) -> Self {
         Self {
             detector: AsyncPixel::new(address),
             feed,
@@ -73,14 +73,14 @@ impl Pixel {
 /// The same for a block of pixels.
 #[derive(Debug)]
 pub struct Block {
-    detector: dtof_core::Block<BINS>,
+    detector: dtof_core::binning::Block<BINS>,
     dynamic_depth: DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>,
 }
 
 impl Block {
     const fn new(place: BlockPlace) -> Self {
         Self {
-            detector: dtof_core::Block::new(place),
+            detector: dtof_core::binning::Block::new(place),
             dynamic_depth: DynamicDepthPixel::new(),
         }
     }
@@ -95,13 +95,13 @@ impl Block {
     }
 }
 
-impl AsMut<dtof_core::Block<BINS>> for Block {
-    fn as_mut(&mut self) -> &mut dtof_core::Block<BINS> {
+impl AsMut<dtof_core::binning::Block<BINS>> for Block {
+    fn as_mut(&mut self) -> &mut dtof_core::binning::Block<BINS> {
         &mut self.detector
     }
 }
 
-/// Macropixels of 128 bins behind a link.
+/// Macropixels of 128 bins that are served over a link.
 pub struct Sidecar<'a> {
     endpoint: Endpoint,
     deframer: Deframer,
@@ -120,7 +120,7 @@ pub struct Sidecar<'a> {
     /// Of the configuration in force, for sensors that measure times.
     bin_width: U16F16,
     source: Source,
-    sensor: Option<About>,
+    sensor: Option<SensorInfo>,
     /// The sensor has been started and not been stopped.
     running: bool,
     /// It was started for the configuration in force.
@@ -129,7 +129,7 @@ pub struct Sidecar<'a> {
     off: bool,
     /// A program has the host's port open, as far as the port can tell.
     listens: bool,
-    /// Of the configuration in force: how long the host may be silent, 0 for ever.
+    /// Of the configuration in force: how long the host may be silent, 0 without a limit.
     host_timeout_ms: u16,
     /// Messages that arrived before it went off: no configuration among them starts it.
     stale: usize,
@@ -146,7 +146,7 @@ pub struct Sidecar<'a> {
     words: Queue<AerWord, QUEUE>,
     cycle: u64,
     /// Laser cycles of the histograms that come whole.
-    frame: u32,
+    frame_cycles: u32,
     /// Laser cycles since the pixels looked last: all look at once.
     since_look: u16,
     /// Laser cycles from the last tick of the blocks to the last look.
@@ -156,10 +156,10 @@ pub struct Sidecar<'a> {
     statistics: Statistics,
     /// The same of all blocks.
     block_statistics: Statistics,
-    /// The pixel, or behind them the block, whose slot is emptied next.
+    /// The pixel, or after the pixels the block, whose slot is emptied next.
     turn: usize,
     /// The host waits for the histogram of this pixel.
-    wanted: Option<PixelAddress>,
+    requested_histogram: Option<PixelAddress>,
     unaddressed: u64,
     unknown: u32,
     sensor_errors: u32,
@@ -167,13 +167,13 @@ pub struct Sidecar<'a> {
 }
 
 impl<'a> Sidecar<'a> {
-    /// Waits for a host. `pixels` and `blocks` are the room for them, `sensor` what is to be
-    /// known of the sensor if photons may come from anywhere but the link.
+    /// Waits for a host. `pixels` and `blocks` provide the room for them; `sensor` describes the
+    /// sensor if photons may come from one.
     #[must_use]
     pub fn new(
         pixels: &'a mut VecView<Pixel>,
         blocks: &'a mut VecView<Block>,
-        sensor: Option<About>,
+        sensor: Option<SensorInfo>,
     ) -> Self {
         pixels.clear();
         blocks.clear();
@@ -209,13 +209,13 @@ impl<'a> Sidecar<'a> {
             encoder: AerEncoder::new(),
             words: Queue::new(),
             cycle: 0,
-            frame: 0,
+            frame_cycles: 0,
             since_look: 0,
             since_tick: 0,
             statistics: Statistics::default(),
             block_statistics: Statistics::default(),
             turn: 0,
-            wanted: None,
+            requested_histogram: None,
             unaddressed: 0,
             unknown: 0,
             sensor_errors: 0,
@@ -223,12 +223,12 @@ impl<'a> Sidecar<'a> {
         }
     }
 
-    /// Does all that can be done without waiting: takes what `serial` has
-    /// received, works on it, and gives it what there is to send and it takes.
-    /// `lost` is what the port has lost so far.
+    /// Does all that can be done without waiting: processes the bytes that `serial` has
+    /// received, and sends as much as it takes. `lost` is the number of bytes the port has lost so
+    /// far.
     ///
     /// # Errors
-    /// Those of `serial`.
+    /// Fails if `serial` fails.
     pub fn poll<S: Read + ReadReady + Write + WriteReady>(
         &mut self,
         serial: &mut S,
@@ -236,8 +236,7 @@ impl<'a> Sidecar<'a> {
         now_ms: u32,
     ) -> Result<(), S::Error> {
         let mut bytes = [0; 64];
-        // A piece at a time, so that the main loop goes round whatever the host
-        // sends.
+        // A piece at a time, so that the main loop turns whatever the host sends.
         if serial.read_ready()? {
             let length = serial.read(&mut bytes)?;
             let mut deframer = core::mem::take(&mut self.deframer);
@@ -304,7 +303,7 @@ impl<'a> Sidecar<'a> {
                 self.answer = None;
             }
             self.drain();
-            self.send_exposure();
+            self.send_current_histogram();
             if self.photons.is_some() {
                 self.work_through(&mut looks);
                 if self.photons.is_some() {
@@ -312,7 +311,7 @@ impl<'a> Sidecar<'a> {
                 }
                 continue;
             }
-            // What the host asks next is answered after all events before it.
+            // A request is answered after all events before it.
             let drained = self.is_drained();
             let Some(next) = self.endpoint.peek().map(|next| next.kind) else {
                 return;
@@ -329,7 +328,7 @@ impl<'a> Sidecar<'a> {
             let is_stale = self.stale > 0;
             self.stale = self.stale.saturating_sub(1);
             if next == message::HISTOGRAM_REQUEST {
-                self.histogram_of(&message.body);
+                self.accept_request(&message.body);
             } else {
                 let was_off = self.off;
                 self.answer = self.act(message, overrun);
@@ -365,11 +364,11 @@ impl<'a> Sidecar<'a> {
         }
     }
 
-    /// A session has ended or begun: nothing of it, or of the one before, remains.
+    /// A session has ended or begun: drops everything of the last one.
     #[inline(never)]
     fn start_over(&mut self, reason: StopReason) {
         self.stopping.get_or_insert(reason);
-        // Also if no sensor runs: a host of before is told that its session is over.
+        // Even if no sensor runs: the last host learns that its session is over.
         self.endpoint.set_stop_reason(reason);
         self.pixels.clear();
         self.blocks.clear();
@@ -379,7 +378,7 @@ impl<'a> Sidecar<'a> {
         self.source = Source::Link;
         self.photons = None;
         self.answer = None;
-        self.wanted = None;
+        self.requested_histogram = None;
         self.encoder = AerEncoder::new();
         self.restart_counts();
         while self.words.dequeue().is_some() {}
@@ -387,7 +386,7 @@ impl<'a> Sidecar<'a> {
 
     fn restart_counts(&mut self) {
         self.cycle = 0;
-        self.frame = 0;
+        self.frame_cycles = 0;
         self.since_look = 0;
         self.since_tick = 0;
         self.statistics = Statistics::default();
@@ -401,11 +400,11 @@ impl<'a> Sidecar<'a> {
         for pixel in self.pixels.iter() {
             pixel.detector.add_photons_to(&mut statistics);
             // Those that were sent before the report.
-            statistics.events -= u64::from(pixel.detector.request());
+            statistics.events -= u64::from(pixel.detector.has_event());
         }
         for block in self.blocks.iter() {
             block.detector.pixel().add_photons_to(&mut blocks);
-            blocks.events -= u64::from(block.detector.request());
+            blocks.events -= u64::from(block.detector.has_event());
         }
         Report {
             cycles: self.cycle,

@@ -1,6 +1,7 @@
-//! Photons into pixels, and those that come over the link.
+//! Photons into pixels, and photons messages of the link.
 
-use dtof_core::{LaserCycle, Look, count_in_blocks, end_laser_cycles_of_blocks};
+use dtof_core::binning::{count_in_blocks, end_laser_cycles_of_blocks};
+use dtof_core::{LaserCycle, Look};
 use heapless::vec::Vec;
 
 use super::Sidecar;
@@ -37,7 +38,7 @@ impl Sidecar<'_> {
         };
         loop {
             while photons.cycles > 0 {
-                if *looks == 0 || self.waiting() {
+                if *looks == 0 || self.has_waiting_events() {
                     self.photons = Some(photons);
                     return;
                 }
@@ -46,7 +47,7 @@ impl Sidecar<'_> {
             }
             let left = photons.body.get(photons.next..).unwrap_or_default();
             let Some((token, rest)) = Token::split_first(left) else {
-                // Nothing left, or nothing that means anything.
+                // The end, or an invalid token.
                 self.unknown = self.unknown.saturating_add(u32::from(!left.is_empty()));
                 return;
             };
@@ -74,7 +75,7 @@ impl Sidecar<'_> {
     }
 
     /// Ends up to `cycles` laser cycles, but none after the one at whose end the
-    /// pixels look, and says how many. The events go as far as there is room.
+    /// pixels look, and returns how many. Events move on as far as there is room.
     pub(super) fn end_laser_cycles_to_look(&mut self, cycles: u16) -> u16 {
         let Some(config) = &self.config else {
             return cycles;
@@ -88,7 +89,7 @@ impl Sidecar<'_> {
             0
         };
         self.cycle += u64::from(ended);
-        let last = LaserCycle(self.cycle.saturating_sub(1));
+        let last = LaserCycle::new(self.cycle.saturating_sub(1));
         let mut fired = false;
         for pixel in self.pixels.iter_mut() {
             let (detector, statistics) = (&mut pixel.detector, &mut self.statistics);

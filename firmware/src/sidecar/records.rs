@@ -1,15 +1,15 @@
-//! What the drivers say of a sensor, as the link carries it.
+//! A sensor's description and faults as the link carries them.
 
 use dtof_link::{FaultRecord, SensorRecord};
-use dtof_sensors::{About, SensorFault};
+use dtof_sensors::{SensorFault, SensorInfo};
 
-pub(super) const fn sensor(about: &About) -> SensorRecord {
+pub(super) const fn sensor(info: &SensorInfo) -> SensorRecord {
     SensorRecord {
-        pixels: about.pixels,
-        bin_width: about.bin_width,
-        offset: about.offset,
-        laser_millihertz: about.laser_millihertz,
-        bins: about.bins,
+        pixels: info.pixels,
+        bin_width: info.bin_width,
+        offset: info.offset,
+        laser_millihertz: info.laser_millihertz,
+        bins: info.bins,
     }
 }
 
@@ -19,7 +19,7 @@ pub(super) const fn fault(fault: SensorFault) -> FaultRecord {
         SensorFault::Bus => FaultRecord::Bus,
         SensorFault::Pin => FaultRecord::Pin,
         SensorFault::WrongChip => FaultRecord::WrongChip,
-        SensorFault::NotTaken => FaultRecord::NotTaken,
+        SensorFault::Rejected => FaultRecord::Rejected,
         SensorFault::Timeout => FaultRecord::Timeout,
         SensorFault::StuckInterrupt => FaultRecord::StuckInterrupt,
         SensorFault::NoImage => FaultRecord::NoImage,

@@ -1,4 +1,4 @@
-//! Photons and histograms of a sensor, which does not wait.
+//! Photons and histograms of a sensor, which cannot wait.
 
 use dtof_core::{AnyRule, Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig};
 use dtof_link::frame::Deframer;
@@ -11,20 +11,19 @@ use dtof_link::{Source, StopReason};
 use dtof_sensors::simulated::Simulated;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault};
 
-/// Polls of the sensor one after the other. A sensor that always has more must
-/// not keep the link waiting.
+/// The most polls of the sensor in a row. A sensor that always has more must not block the link.
 const POLLS: usize = 4;
 
 /// Laser cycles between two polls of the link, which come a millisecond apart at the latest, of a
-/// simulated sensor that goes by no clock.
+/// simulated sensor without a clock.
 const UNPACED: u16 = 4096;
 
 impl Sidecar<'_> {
-    /// [`Self::poll`], and `sensor` while a configuration takes photons from it.
-    /// Its errors are counted in the report, which names the last.
+    /// [`Self::poll`], and polls `sensor` while a configuration takes photons from it.
+    /// The report counts its errors and names the last.
     ///
     /// # Errors
-    /// Those of `serial`.
+    /// Fails if `serial` fails.
     pub fn poll_with<S: Read + ReadReady + Write + WriteReady>(
         &mut self,
         sensor: &mut impl Sensor,
@@ -32,8 +31,8 @@ impl Sidecar<'_> {
         lost: u32,
         now_ms: u32,
     ) -> Result<(), S::Error> {
-        // What was configured last takes effect before the next message is answered, and a port
-        // that fails keeps no sensor running.
+        // The last configuration takes effect before the next message is answered, and no sensor
+        // runs on when the port fails.
         self.steer(sensor, now_ms);
         let polled = self.poll(serial, lost, now_ms);
         self.poll_sensor(sensor, now_ms);
@@ -41,9 +40,8 @@ impl Sidecar<'_> {
         self.poll(serial, lost, now_ms)
     }
 
-    /// Asks `sensor` while a configuration takes photons from it, and again while
-    /// it has more, up to a bound. Its errors are counted in the report, which names
-    /// the last.
+    /// Polls `sensor` while a configuration takes photons from it, and again while
+    /// it has more, up to a limit. The report counts its errors and names the last.
     ///
     /// It starts or stops the sensor first: see the module.
     pub fn poll_sensor(&mut self, sensor: &mut impl Sensor, now_ms: u32) {
@@ -72,15 +70,15 @@ impl Sidecar<'_> {
             self.stop_sensor(StopReason::Silence);
         }
         let is_configured = self.config.is_some() && self.source == Source::Sensor;
-        let wanted = is_configured && !self.off;
-        if self.running && !(wanted && self.started) {
+        let should_run = is_configured && !self.off;
+        if self.running && !(should_run && self.started) {
             self.sensor_stops = self.sensor_stops.saturating_add(1);
             self.set_stop_reason(self.stopping);
         } else if is_configured && self.off && self.stopping.is_some() {
             // Before it has started.
             self.set_stop_reason(self.stopping);
         }
-        if wanted && !self.started {
+        if should_run && !self.started {
             sensor.start(self.bin_width);
             self.sensor_starts = self.sensor_starts.saturating_add(1);
             if sensor.is_one_hit() {
@@ -91,21 +89,20 @@ impl Sidecar<'_> {
                 self.binning = self.binning.map(one_hit);
             }
             (self.started, self.running) = (true, true);
-        } else if !wanted && self.running {
+        } else if !should_run && self.running {
             sensor.stop();
             self.running = false;
-            self.no_whole_histogram();
+            self.answer_sensor_failure();
         }
         self.stopping = None;
     }
 
-    /// Asks a simulated sensor for laser cycles, not by the clock but as fast as they are
-    /// worked on. It is asked while its photons count, every event has left its slot, and
-    /// `left` laser cycles are left, which it counts down. So no decision is put off.
-    /// [`Self::poll`] goes between the calls.
+    /// Takes laser cycles from a simulated sensor as fast as they are processed, without a clock.
+    /// It does so while its photons count, every event has left its slot, and `left`, which it
+    /// counts down, is not 0. So no decision is deferred. Call [`Self::poll`] between the calls.
     pub fn simulate(&mut self, sensor: &mut Simulated<'_>, left: &mut u64) {
         for _ in 0..UNPACED {
-            if *left == 0 || !self.takes_sensor() || self.waiting() {
+            if *left == 0 || !self.takes_sensor() || self.has_waiting_events() {
                 return;
             }
             *left -= 1;
@@ -114,7 +111,7 @@ impl Sidecar<'_> {
     }
 
     /// Decides on a whole histogram.
-    // The host may be sent the histogram then: not with this on the stack.
+    // Not inlined, to keep this off the stack while the histogram is sent.
     #[inline(never)]
     fn decide_whole(
         &mut self,
@@ -122,8 +119,8 @@ impl Sidecar<'_> {
         counts: &[u32; BINS],
         config: &PixelConfig<BINS, AnyRule>,
     ) {
-        let cycle = LaserCycle(self.cycle.saturating_sub(1));
-        let exposure = u16::try_from(self.frame).unwrap_or(u16::MAX);
+        let cycle = LaserCycle::new(self.cycle.saturating_sub(1));
+        let exposure = u16::try_from(self.frame_cycles).unwrap_or(u16::MAX);
         let mut histogram = Histogram::<BINS, Count24>::new();
         let gated_out = histogram.add_frame(counts, config.gate());
         self.statistics.add_photons_of(&histogram, gated_out);
@@ -144,7 +141,7 @@ impl Sidecar<'_> {
     /// Counts an error, and logs one of another kind than the last.
     fn sensor_failed(&mut self, fault: SensorFault) {
         self.sensor_errors = self.sensor_errors.saturating_add(1);
-        self.no_whole_histogram();
+        self.answer_sensor_failure();
         if self.sensor_fault.replace(fault) != Some(fault) {
             #[cfg(all(target_os = "none", feature = "defmt"))]
             defmt::warn!("sensor: {}", fault);
@@ -157,8 +154,8 @@ impl Sidecar<'_> {
         self.running
     }
 
-    /// Whether a program has the host's port open, as far as the port can tell. While it has
-    /// not, the sensor is off.
+    /// Whether a program has the host's port open, as far as the port can tell. Otherwise the
+    /// sensor is off.
     pub fn set_listening(&mut self, listens: bool) {
         if self.listens && !listens {
             self.close();
@@ -166,7 +163,7 @@ impl Sidecar<'_> {
         self.listens = listens;
     }
 
-    /// Nothing remains of a frame that was cut off, nor of the session of a program that is gone.
+    /// Drops a frame that was cut off and the session of a program that is gone.
     #[cold]
     #[inline(never)]
     fn close(&mut self) {
@@ -175,7 +172,7 @@ impl Sidecar<'_> {
         self.start_over(StopReason::NotListening);
     }
 
-    /// Why the sensor stopped last, which hosts are told: after a reset, its reason.
+    /// Why the sensor stopped last, for the host: after a reset, its reason.
     pub const fn set_stop_reason(&mut self, reason: Option<StopReason>) {
         self.stop_reason = reason;
         if let Some(reason) = reason {
@@ -211,7 +208,7 @@ impl Sidecar<'_> {
 impl PhotonSink for Sidecar<'_> {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
         if self.takes_sensor() {
-            self.count(pixel.0.into(), code);
+            self.count(pixel.raw().into(), code);
         }
     }
 
@@ -228,25 +225,25 @@ impl PhotonSink for Sidecar<'_> {
     fn begin_frame(&mut self, cycles: u32) {
         if self.takes_sensor() {
             self.cycle += u64::from(cycles);
-            self.frame = cycles;
+            self.frame_cycles = cycles;
         }
     }
 
     /// Decides once, whatever L1, L2 and X are. The event's exposure is the laser cycles of
-    /// the frame, as far as it holds them. Without room for an event
-    /// it is counted as deferred and not looked at: the next one is as good. Blocks have
-    /// no part in it, and nothing is tracked.
+    /// the frame, as far as its field holds them. Without room for an event
+    /// the histogram counts as deferred and is dropped: the next one is as good. Blocks
+    /// and tracking do not apply.
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
         let (true, Some(config)) = (self.takes_sensor(), self.config) else {
             return;
         };
-        if usize::from(pixel.0) >= self.pixels.len() {
+        if usize::from(pixel.raw()) >= self.pixels.len() {
             let photons = counts.iter().map(|&count| u64::from(count));
             self.unaddressed += photons.sum::<u64>();
             return;
         }
         self.decide_whole(pixel, counts, &config);
         self.drain();
-        self.send_whole(pixel, counts);
+        self.send_sensor_histogram(pixel, counts);
     }
 }

@@ -44,6 +44,6 @@ pub fn refused(device: &mut Sidecar, host: &mut Host, pixel: u16) -> NoHistogram
     let (kind, body) = (message::HISTOGRAM_REQUEST, pixel.to_le_bytes());
     let body = host.answer(device, 0, kind, &body);
     let (of, reason) = HistogramPart::from_le_bytes(&body).unwrap().unwrap_err();
-    assert_eq!(of.0, pixel);
+    assert_eq!(of.raw(), pixel);
     reason
 }

@@ -2,17 +2,18 @@
 
 use std::ops::Range;
 
+use dtof_core::events::DynamicDepthEvent;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
-    AerDecoder, AerRecord, AerWord, AnyRule, Count, DepthEstimator, DepthEvent, DynamicDepthEvent,
-    EchoNumber, PaperRule, PixelAddress,
+    AerDecoder, AerRecord, AerWord, AnyRule, Count, DepthEstimator, DepthEvent, EchoNumber,
+    PaperRule, PixelAddress,
 };
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
 use dtof_link::{Configuration, Report, Source};
-use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
+use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 /// A configuration that takes photons from the sensor.
 pub const CONFIGURATION: Configuration = Configuration {
@@ -28,7 +29,7 @@ pub const CONFIGURATION: Configuration = Configuration {
     binning: None,
     tracking: false,
     echoes: EchoNumber::FIRST,
-    peel_reach: 0,
+    echo_guard_bins: 0,
     echo_wait: 4,
     bin_width_ps: U16F16::lit("250"),
     offset_mm: I24F8::ZERO,
@@ -38,13 +39,13 @@ pub const CONFIGURATION: Configuration = Configuration {
 };
 
 /// A device with room for so many pixels and no block.
-pub fn device<const PIXELS: usize>(sensor: Option<About>) -> Sidecar<'static> {
+pub fn device<const PIXELS: usize>(sensor: Option<SensorInfo>) -> Sidecar<'static> {
     device_with_blocks::<PIXELS, 0>(sensor)
 }
 
 /// A device with room for so many pixels and blocks, which stays until the tests have ended.
 pub fn device_with_blocks<const PIXELS: usize, const BLOCKS: usize>(
-    sensor: Option<About>,
+    sensor: Option<SensorInfo>,
 ) -> Sidecar<'static> {
     Sidecar::new(
         Box::leak(Box::new(heapless::Vec::<Pixel, PIXELS>::new())),
@@ -54,10 +55,10 @@ pub fn device_with_blocks<const PIXELS: usize, const BLOCKS: usize>(
 }
 
 /// A device with a sensor, and a host that has configured it.
-pub fn configured<const PIXELS: usize>(wanted: &Configuration) -> (Sidecar<'static>, Host) {
-    let mut device = device::<PIXELS>(Some(About::new(256)));
+pub fn configured<const PIXELS: usize>(requested: &Configuration) -> (Sidecar<'static>, Host) {
+    let mut device = device::<PIXELS>(Some(SensorInfo::new(256)));
     let mut host = Host::new(1, 0);
-    host.configure(&mut device, 0, wanted);
+    host.configure(&mut device, 0, requested);
     (device, host)
 }
 
@@ -157,7 +158,7 @@ impl Host {
                     AerRecord::Event(event) => self.events.push(event),
                     AerRecord::Time(_) => {}
                     AerRecord::DynamicDepth(change) => self.changes.push(change),
-                    AerRecord::End { .. } => panic!("an end"),
+                    other => panic!("{other:?}"),
                 }
             }
         }
@@ -184,8 +185,8 @@ impl Host {
         panic!("no answer to {kind:#04x}");
     }
 
-    pub fn configure(&mut self, device: &mut Sidecar, now_ms: u32, wanted: &Configuration) {
-        self.answer(device, now_ms, message::CONFIGURE, &wanted.to_le_bytes());
+    pub fn configure(&mut self, device: &mut Sidecar, now_ms: u32, requested: &Configuration) {
+        self.answer(device, now_ms, message::CONFIGURE, &requested.to_le_bytes());
         assert_eq!(self.answers.last().unwrap().0, message::CONFIGURED);
     }
 
@@ -221,8 +222,8 @@ pub fn scripted<I>(calls: I) -> Scripted<I> {
 impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
     type Error = SensorFault;
 
-    fn about(&self) -> About {
-        About::new(256)
+    fn info(&self) -> SensorInfo {
+        SensorInfo::new(256)
     }
 
     fn is_one_hit(&self) -> bool {
@@ -237,10 +238,10 @@ impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
         let calls = self.calls.next().unwrap_or(Some(Vec::new()));
         for call in calls.ok_or(SensorFault::Data)? {
             match call {
-                Call::Photon(pixel, code) => sink.photon(PixelAddress(pixel), code),
+                Call::Photon(pixel, code) => sink.photon(PixelAddress::new(pixel), code),
                 Call::End(cycles) => sink.end_laser_cycles(cycles),
                 Call::Frame(cycles) => sink.begin_frame(cycles),
-                Call::Histogram(pixel, counts) => sink.histogram(PixelAddress(pixel), &counts),
+                Call::Histogram(pixel, counts) => sink.histogram(PixelAddress::new(pixel), &counts),
             }
         }
         // One item a poll.

@@ -4,7 +4,7 @@ use dtof_firmware::serial::Buffers;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::frame::WIRE_BYTES;
 use dtof_link::{Configuration, message};
-use dtof_sensors::{About, simulated};
+use dtof_sensors::{SensorInfo, simulated};
 
 use super::host::{CONFIGURATION, Host, device};
 
@@ -14,7 +14,7 @@ use super::host::{CONFIGURATION, Host, device};
 pub fn over_serial(start_ms: u32, milliseconds: u32, bytes: usize) -> (Host, LinkCounters) {
     let mut buffers = Buffers::<512, 1024>::new();
     let (mut interrupt, mut serial) = buffers.split(|| {});
-    let mut device = device::<16>(Some(About::new(256)));
+    let mut device = device::<16>(Some(SensorInfo::new(256)));
     let mut sensor = simulated::scene();
     for now_ms in 0..start_ms {
         let lost = serial.lost();
@@ -23,7 +23,7 @@ pub fn over_serial(start_ms: u32, milliseconds: u32, bytes: usize) -> (Host, Lin
     }
     let mut host = Host::new(1, start_ms);
     let mut wire = [0; WIRE_BYTES];
-    let wanted = Configuration {
+    let requested = Configuration {
         pixels: 16,
         l1: 40,
         l2: 2_000,
@@ -31,7 +31,7 @@ pub fn over_serial(start_ms: u32, milliseconds: u32, bytes: usize) -> (Host, Lin
     };
     for now_ms in start_ms..start_ms + milliseconds {
         if now_ms == start_ms + 10 {
-            host.ask(message::CONFIGURE, &wanted.to_le_bytes());
+            host.ask(message::CONFIGURE, &requested.to_le_bytes());
         }
         let length = host.endpoint.transmit(now_ms, &mut wire);
         let sent = wire[..length].iter();

@@ -60,16 +60,16 @@ pub fn messages(script: &[Vec<Call>]) -> Vec<Vec<u8>> {
 }
 
 /// The configuration for a pixel.
-pub fn config(wanted: &Configuration) -> PixelConfig<128, AnyRule> {
-    let Configuration { x, l1, l2, .. } = *wanted;
-    let config = PixelConfig::with_rule(wanted.rule).x(x).l1(l1).l2(l2);
-    config.estimator(wanted.estimator).build().unwrap()
+pub fn config(requested: &Configuration) -> PixelConfig<128, AnyRule> {
+    let Configuration { x, l1, l2, .. } = *requested;
+    let config = PixelConfig::with_rule(requested.rule).x(x).l1(l1).l2(l2);
+    config.estimator(requested.estimator).build().unwrap()
 }
 
 /// What pixels, 16 at most, with a link that takes every event at once report.
 pub fn reference(script: &[Vec<Call>], config: &PixelConfig<128, AnyRule>) -> Vec<DepthEvent> {
     let mut pixels: Vec<_> = (0..16)
-        .map(|address| AsyncPixel::<128>::new(PixelAddress(address)))
+        .map(|address| AsyncPixel::<128>::new(PixelAddress::new(address)))
         .collect();
     let mut events = Vec::new();
     let mut statistics = Statistics::default();
@@ -80,8 +80,8 @@ pub fn reference(script: &[Vec<Call>], config: &PixelConfig<128, AnyRule>) -> Ve
             Call::End(cycles) => {
                 for _ in 0..cycles {
                     for pixel in &mut pixels {
-                        pixel.end_laser_cycle(config, &mut statistics, LaserCycle(cycle));
-                        events.extend(pixel.acknowledge());
+                        pixel.end_laser_cycle(config, &mut statistics, LaserCycle::new(cycle));
+                        events.extend(pixel.take_event());
                     }
                     cycle += 1;
                 }

@@ -125,11 +125,11 @@ pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> Out
     let began = line.now;
     let mut host = Host::new(number, began);
     let mut wire = [0; WIRE_BYTES];
-    let wanted = Configuration {
+    let requested = Configuration {
         source: Source::Link,
         ..CONFIGURATION
     };
-    let configuration = wanted.to_le_bytes();
+    let configuration = requested.to_le_bytes();
     let photons = script.messages.iter();
     let photons = photons.map(|body| (message::PHOTONS, &body[..]));
     let mut to_send: VecDeque<(u8, &[u8])> = [(message::CONFIGURE, &configuration[..])]
@@ -214,8 +214,11 @@ pub fn check(script: &Script, outcome: &Outcome) {
     let Some(report) = outcome.report else {
         panic!("{:?}: {:?}", outcome.end, outcome.host.counters());
     };
-    let (got, wanted) = (outcome.events.len(), script.events.len());
-    assert!(outcome.events == script.events, "{got} of {wanted} events");
+    let (got, expected) = (outcome.events.len(), script.events.len());
+    assert!(
+        outcome.events == script.events,
+        "{got} of {expected} events"
+    );
     let statistics = report.statistics;
     assert_eq!(statistics.photons(), script.photons);
     assert!(statistics.rejected > 0 && outcome.end == End::Done);

@@ -50,7 +50,7 @@ struct Cell<W: dtof_core::CounterWidth> {
 impl<W: dtof_core::CounterWidth> Cell<W> {
     fn new(first: usize) -> Self {
         Self {
-            pixel: AsyncPixel::new(PixelAddress(first.try_into().unwrap())),
+            pixel: AsyncPixel::new(PixelAddress::new(first.try_into().unwrap())),
             has_reported: false,
             feeds: false,
         }
@@ -62,9 +62,9 @@ impl<W: dtof_core::CounterWidth> Cell<W> {
         statistics: &mut Statistics,
         cycle: u64,
     ) -> Option<DepthEvent> {
-        let cycle = LaserCycle(cycle);
+        let cycle = LaserCycle::new(cycle);
         let look = self.pixel.end_laser_cycle(config, statistics, cycle);
-        let event = self.pixel.acknowledge();
+        let event = self.pixel.take_event();
         assert_eq!(look == Look::Event, event.is_some());
         self.has_reported |= event.is_some();
         self.feeds &= event.is_none();
@@ -87,25 +87,28 @@ pub struct Expected {
 }
 
 /// The same for pixels and for blocks, whose rule may be another.
-pub fn configs(wanted: &Configuration) -> [PixelConfig<128, AnyRule>; 2] {
-    let gate = RangeGate::new(wanted.gate.0, wanted.gate.1).unwrap();
-    let levels = wanted.binning.map_or(BlockLevel::PIXEL, |of| of.levels);
-    [wanted.rule, wanted.rule.of_blocks(levels)].map(|rule| {
-        let config = PixelConfig::with_rule(rule).x(wanted.x).l1(wanted.l1);
-        let config = config.l2(wanted.l2).gate(gate).estimator(wanted.estimator);
+pub fn configs(requested: &Configuration) -> [PixelConfig<128, AnyRule>; 2] {
+    let gate = RangeGate::new(requested.gate.0, requested.gate.1).unwrap();
+    let levels = requested.binning.map_or(BlockLevel::PIXEL, |of| of.levels);
+    [requested.rule, requested.rule.of_blocks(levels)].map(|rule| {
+        let config = PixelConfig::with_rule(rule).x(requested.x).l1(requested.l1);
         let config = config
-            .echoes(wanted.echoes, wanted.peel_reach)
-            .echo_wait(wanted.echo_wait);
-        let tracking = rule.tracking(&gate).filter(|_| wanted.tracking);
+            .l2(requested.l2)
+            .gate(gate)
+            .estimator(requested.estimator);
+        let config = config
+            .echoes(requested.echoes, requested.echo_guard_bins)
+            .echo_wait(requested.echo_wait);
+        let tracking = rule.tracking(&gate).filter(|_| requested.tracking);
         config.tracking(tracking).build().unwrap()
     })
 }
 
 /// The events of all, in order.
-pub fn expected(script: &[Vec<Call>], wanted: &Configuration) -> Expected {
-    let [of_pixels, of_blocks] = configs(wanted);
-    let columns = usize::from(wanted.columns);
-    let binning = wanted.binning.unwrap();
+pub fn expected(script: &[Vec<Call>], requested: &Configuration) -> Expected {
+    let [of_pixels, of_blocks] = configs(requested);
+    let columns = usize::from(requested.columns);
+    let binning = requested.binning.unwrap();
     let levels = usize::from(binning.levels.raw());
     // Level, row and column of a block; ticks when all look.
     let block_of = |pixel: usize, level: usize| {
@@ -115,11 +118,11 @@ pub fn expected(script: &[Vec<Call>], wanted: &Configuration) -> Expected {
             (pixel % columns) >> level,
         )
     };
-    let tick = u64::from(binning.patience.next_multiple_of(wanted.x));
+    let tick = u64::from(binning.patience.next_multiple_of(requested.x));
 
     let mut pixels: Vec<Cell<_>> = Vec::new();
     let mut blocks: BTreeMap<_, Cell<Count16>> = BTreeMap::new();
-    for pixel in 0..usize::from(wanted.pixels) {
+    for pixel in 0..usize::from(requested.pixels) {
         pixels.push(Cell::<dtof_core::Count10>::new(pixel));
         for level in 1..=levels {
             // The first pixel of a block is the first to come.

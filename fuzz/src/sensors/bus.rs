@@ -3,25 +3,12 @@
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
+use dtof_chips::Chip;
 use embedded_hal::digital::{self, ErrorKind, InputPin, OutputPin};
 use embedded_hal::i2c::{self, I2c, NoAcknowledgeSource};
 use embedded_hal::spi::{self, SpiDevice};
 
 use crate::Input;
-
-/// What a sensor's registers do.
-pub trait Chip: Default {
-    /// Bytes were written, the register or the command first.
-    fn write(&mut self, bytes: &[u8]);
-    /// Bytes are read from a register or after a command.
-    fn read(&mut self, register: u8, bytes: &mut [u8]);
-    /// Whether the interrupt line is low.
-    fn interrupts(&self) -> bool;
-    /// ENABLE is low: it loses all.
-    fn reset(&mut self) {
-        *self = Self::default();
-    }
-}
 
 /// A read, as the driver saw it.
 #[derive(Clone, Debug)]
@@ -59,9 +46,9 @@ impl<C> Clone for Bus<'_, C> {
 }
 
 impl<'a, C: Chip> Bus<'a, C> {
-    pub fn new(input: Input<'a>) -> Self {
+    pub fn new(chip: C, input: Input<'a>) -> Self {
         Self(Rc::new(Wires {
-            chip: RefCell::default(),
+            chip: RefCell::new(chip),
             input: RefCell::new(input),
             line: Cell::new(Line::Chip),
             answers: RefCell::default(),

@@ -1,46 +1,48 @@
 //! Drivers of sensors, and a bus that answers anything. Each has a model written from the data sheet
-//! that sees the same answers, and says what the sink must be given.
+//! that sees the same answers and tells the expected calls of the sink.
 
 mod bus;
 mod tdc7200;
 mod tmf8829;
 mod tmf882x;
 
+use dtof_chips::Chip;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault};
 
-use self::bus::{Bus, Chip};
+use self::bus::Bus;
 use crate::Input;
 
 /// One call of the sink.
 #[derive(Clone, Debug, PartialEq, Eq)]
-enum Given {
+enum SinkCall {
     Photon(u16, u16),
     End(u16),
     Frame(u32),
     Histogram(u16, Vec<u32>),
 }
 
-/// What a poll has given.
+/// Records the calls of a poll.
 #[derive(Default)]
-struct Notes(Vec<Given>);
+struct RecordingSink(Vec<SinkCall>);
 
-impl PhotonSink for Notes {
+impl PhotonSink for RecordingSink {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
-        self.0.push(Given::Photon(pixel.0, code));
+        self.0.push(SinkCall::Photon(pixel.raw(), code));
     }
 
     fn end_laser_cycles(&mut self, cycles: u16) {
-        self.0.push(Given::End(cycles));
+        self.0.push(SinkCall::End(cycles));
     }
 
     fn begin_frame(&mut self, cycles: u32) {
-        self.0.push(Given::Frame(cycles));
+        self.0.push(SinkCall::Frame(cycles));
     }
 
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
-        self.0.push(Given::Histogram(pixel.0, counts.to_vec()));
+        self.0
+            .push(SinkCall::Histogram(pixel.raw(), counts.to_vec()));
     }
 }
 
@@ -56,7 +58,7 @@ trait Model<C> {
     fn restart(&mut self);
 
     /// Sees the answers of a poll, and what came of them.
-    fn check(&mut self, answers: &[bus::Answer], failed: bool, given: &[Given]);
+    fn check(&mut self, answers: &[bus::Answer], failed: bool, calls: &[SinkCall]);
 }
 
 /// The input says which sensor, how it is set, and what the bus and the pins do. Calls of a poll are
@@ -121,14 +123,17 @@ fn poll<C: Chip, S: Sensor>(
 where
     S::Error: std::error::Error,
 {
-    let mut notes = Notes::default();
-    let polled = sensor.poll(now_ms, &mut notes);
+    let mut sink = RecordingSink::default();
+    let polled = sensor.poll(now_ms, &mut sink);
     let answers = bus.take_answers();
     assert!(answers.len() <= TRANSFERS, "{} transfers", answers.len());
-    model.check(&answers, polled.is_err(), &notes.0);
+    model.check(&answers, polled.is_err(), &sink.0);
     if let Ok(polled) = &polled {
         // A frame may begin before any of its histograms is whole.
-        let has_data = notes.0.iter().any(|given| !matches!(given, Given::Frame(_)));
+        let has_data = sink
+            .0
+            .iter()
+            .any(|call| !matches!(call, SinkCall::Frame(_)));
         assert_eq!(*polled == Polled::Data, has_data);
     }
     polled.map_err(|error| {

@@ -1,11 +1,12 @@
 //! The TDC7200, as section 8 of its data sheet (SNAS647D) has it.
 
+use dtof_chips::Tdc7200 as Tdc;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::tdc7200::{Config, Mode, Settings, Stops, Tdc7200};
 
-use super::bus::{Answer, Bus, Chip, Pin};
-use super::{Given, Model, drive};
+use super::bus::{Answer, Bus, Pin};
+use super::{Model, SinkCall, drive};
 use crate::Input;
 
 const PIXEL: u16 = 7;
@@ -19,66 +20,6 @@ const STOPS: [Stops; 5] = [
     Stops::Four,
     Stops::Five,
 ];
-
-/// Each measurement is over at once, with all of its stops.
-#[derive(Default)]
-struct Tdc {
-    written: [u8; 10],
-    is_awake: bool,
-}
-
-impl Tdc {
-    /// Of its result registers, with an even parity bit.
-    fn result(&self, register: u8) -> u32 {
-        let value = match register {
-            0x1b => 2110,
-            0x1c => 21121,
-            // Clock counts stand between the times.
-            odd if odd % 2 == 1 => 2,
-            _ => 4175u32,
-        };
-        let has_parity = self.written[0] >> 6 & 1 == 1;
-        value
-            | if has_parity {
-                (value.count_ones() & 1) << 23
-            } else {
-                0
-            }
-    }
-}
-
-impl Chip for Tdc {
-    fn write(&mut self, bytes: &[u8]) {
-        let &[command, value] = bytes else {
-            panic!("{bytes:02x?} is no write");
-        };
-        assert_eq!(command & 0xc0, 0x40, "one register a write");
-        self.is_awake = true;
-        self.written[usize::from(command & 0x3f)] = value;
-    }
-
-    fn read(&mut self, command: u8, bytes: &mut [u8]) {
-        match (command & 0x3f, bytes) {
-            (0x02, [status]) => *status = 0x19,
-            // As after a reset.
-            (0x01, [config2]) if !self.is_awake => *config2 = 0x40,
-            (0x03, [mask]) if !self.is_awake => *mask = 0x07,
-            (register @ 0..10, [value]) => *value = self.written[usize::from(register)],
-            (first @ 0x10..=0x1c, bytes) => {
-                assert_eq!(bytes.len() % 3, 0);
-                for (register, bytes) in (first..=0x1c).zip(bytes.chunks_mut(3)) {
-                    bytes.copy_from_slice(&self.result(register).to_be_bytes()[1..]);
-                }
-            }
-            (register, bytes) => panic!("{} bytes of {register:#04x}", bytes.len()),
-        }
-    }
-
-    fn interrupts(&self) -> bool {
-        // START_MEAS
-        self.written[0] & 1 == 1
-    }
-}
 
 /// What was read last: the results from TIME1 on.
 struct Results {
@@ -110,8 +51,8 @@ impl Results {
     fn is_whole(&self) -> bool {
         let two = usize::from(self.settings.mode == Mode::Two);
         let last = 2 * (self.settings.stops as usize - 1 + two);
-        let mut wanted = self.registers[..=last].iter().chain(&self.registers[11..]);
-        wanted.all(Option::is_some)
+        let mut needed = self.registers[..=last].iter().chain(&self.registers[11..]);
+        needed.all(Option::is_some)
     }
 
     /// Picoseconds of each stop that came: the formulas of section 8.4.2.
@@ -158,19 +99,19 @@ struct Measurements(Settings);
 impl Model<Tdc> for Measurements {
     fn restart(&mut self) {}
 
-    fn check(&mut self, answers: &[Answer], failed: bool, given: &[Given]) {
+    fn check(&mut self, answers: &[Answer], failed: bool, calls: &[SinkCall]) {
         let results = Results::of(self.0, answers);
-        let [photons @ .., last] = given else {
+        let [photons @ .., last] = calls else {
             // What was measured whole is not lost.
-            assert!(failed || !results.is_whole(), "nothing was given");
+            assert!(failed || !results.is_whole(), "no call of the sink");
             return;
         };
-        assert_eq!(*last, Given::End(1));
+        assert_eq!(*last, SinkCall::End(1));
         assert!(results.is_whole(), "of no measurement");
         let times = results.times();
         assert_eq!(photons.len(), times.len());
         for (photon, time) in photons.iter().zip(times) {
-            let Given::Photon(PIXEL, code) = *photon else {
+            let SinkCall::Photon(PIXEL, code) = *photon else {
                 panic!("{photon:?}");
             };
             assert!(results.is_code(code, time), "{code} of {time} ps");
@@ -183,12 +124,12 @@ pub fn run<const CHUNK: usize>(choice: u8, input: Input<'_>) {
         first_bin_ps: FIRST_BIN_PS,
         stops: STOPS[usize::from(choice) % 5],
         parity: choice & 0x80 != 0,
-        ..Settings::new(PixelAddress(PIXEL), CLOCK_KHZ, U16F16::lit("250"))
+        ..Settings::new(PixelAddress::new(PIXEL), CLOCK_KHZ, U16F16::lit("250"))
     };
     if choice & 0x40 != 0 {
         settings.mode = Mode::Two;
     }
-    let bus = Bus::<Tdc>::new(input);
+    let bus = Bus::new(Tdc::default(), input);
     let config = Config::new(settings).expect("good settings");
     let pins = [Pin(bus.clone()), Pin(bus.clone())];
     let [interrupt, enable] = pins;

@@ -1,10 +1,11 @@
 //! The TMF8820, as its published headers and drivers have it.
 
+use dtof_chips::Tmf882x as Tmf;
 use dtof_core::PixelAddress;
 use dtof_sensors::tmf882x::{Config, Settings, Tmf882x};
 
-use super::bus::{Answer, Bus, Chip, Pin};
-use super::{Given, Model, drive};
+use super::bus::{Answer, Bus, Pin};
+use super::{Model, SinkCall, drive};
 use crate::Input;
 
 const FIRST: u16 = 10;
@@ -13,78 +14,16 @@ const REFERENCE: u16 = 99;
 const PACKET: usize = 135;
 const HEADER: usize = 7;
 
-/// After a reset its bootloader runs. While it measures it always has the next packet.
-#[derive(Default)]
-struct Tmf {
-    is_loaded: bool,
-    status: u8,
-    packet: u8,
-}
-
-impl Chip for Tmf {
-    fn write(&mut self, bytes: &[u8]) {
-        let &[0x08, command, ..] = bytes else {
-            return;
-        };
-        if !self.is_loaded {
-            // RAM_REMAP_RESET starts the application.
-            self.is_loaded = command == 0x11;
-            return;
-        }
-        // STAT_OK, or STAT_ACCEPTED while it measures.
-        self.status = u8::from(command == 0x10);
-        self.packet = 0;
-    }
-
-    fn read(&mut self, register: u8, bytes: &mut [u8]) {
-        match (register, bytes) {
-            (0x00, [application]) => *application = if self.is_loaded { 0x03 } else { 0x80 },
-            (0x08, [status]) => *status = self.status,
-            (0x08, [status, length, checksum]) => {
-                [*status, *length, *checksum] = [0x00, 0x00, 0xff];
-            }
-            (0x10, [mode]) => *mode = 0x00,
-            (0x20, [page]) => *page = 0x16,
-            (0xe0, [enable]) => *enable = 0x41,
-            (0xe1, [interrupt]) => *interrupt = if self.interrupts() { 0x08 } else { 0x00 },
-            (0xe3, [id]) => *id = 0x08,
-            (0x20..0xa7, bytes) => {
-                let from = usize::from(register - 0x20);
-                bytes.copy_from_slice(&self.packet()[from..from + bytes.len()]);
-                if from + bytes.len() == PACKET {
-                    self.packet = (self.packet + 1) % 30;
-                }
-            }
-            (register, bytes) => panic!("{} bytes of {register:#04x}", bytes.len()),
-        }
-    }
-
-    fn interrupts(&self) -> bool {
-        self.status == 1
-    }
-}
-
-impl Tmf {
-    fn packet(&self) -> [u8; PACKET] {
-        let mut bytes = [0; PACKET];
-        bytes[..HEADER].copy_from_slice(&[0x81, self.packet, 0, 0, self.packet, 128, 0]);
-        for (bin, byte) in bytes[HEADER..].iter_mut().enumerate() {
-            *byte = (bin as u8).wrapping_mul(31).wrapping_add(self.packet);
-        }
-        bytes
-    }
-}
-
-/// The packets of a set so far, from number 0 on without a gap.
-struct Sets {
+/// The packets of one set so far, from number 0 on without a gap.
+struct PacketSet {
     has_reference: bool,
     packets: Vec<Vec<u8>>,
 }
 
-impl Sets {
-    /// What a packet begins or completes: packet 0 a set, three of them have the bytes of all
-    /// counts of a channel.
-    fn take(&mut self, packet: &[u8]) -> Option<Given> {
+impl PacketSet {
+    /// Adds a packet. Returns the call of the sink that it causes: packet 0 begins a frame. The
+    /// last of the three packets with the bytes of a channel's counts completes a histogram.
+    fn take(&mut self, packet: &[u8]) -> Option<SinkCall> {
         let number = usize::from(packet[4]);
         if packet[0] != 0x81 || packet[5] != 128 || (number != 0 && number != self.packets.len()) {
             self.packets.clear();
@@ -95,7 +34,7 @@ impl Sets {
         }
         self.packets.push(packet[HEADER..].to_vec());
         if number == 0 {
-            return Some(Given::Frame(537 * 1024));
+            return Some(SinkCall::Frame(537 * 1024));
         }
         let channel = number.checked_sub(20)?;
         let counts = (0..128).map(|bin| {
@@ -107,19 +46,19 @@ impl Sets {
             self.packets.clear();
         }
         match channel {
-            0 if self.has_reference => Some(Given::Histogram(REFERENCE, counts)),
+            0 if self.has_reference => Some(SinkCall::Histogram(REFERENCE, counts)),
             0 => None,
-            zone => Some(Given::Histogram(FIRST - 1 + zone as u16, counts)),
+            zone => Some(SinkCall::Histogram(FIRST - 1 + zone as u16, counts)),
         }
     }
 }
 
-impl Model<Tmf> for Sets {
+impl Model<Tmf> for PacketSet {
     fn restart(&mut self) {
         self.packets.clear();
     }
 
-    fn check(&mut self, answers: &[Answer], failed: bool, given: &[Given]) {
+    fn check(&mut self, answers: &[Answer], failed: bool, calls: &[SinkCall]) {
         let mut packet = Vec::new();
         let mut expected = None;
         for answer in answers {
@@ -134,20 +73,25 @@ impl Model<Tmf> for Sets {
         if whole {
             expected = self.take(&packet);
         }
-        // What fails otherwise ends the measurement.
+        // An error that is not about the packet ends the measurement.
         if failed && !whole {
             self.packets.clear();
         }
-        assert_eq!(given, expected.as_slice());
+        assert_eq!(calls, expected.as_slice());
     }
+}
+
+/// Counts that differ in every channel and bin and use all three bytes.
+fn count(channel: u8, bin: u32) -> u32 {
+    (128 * u32::from(channel) + bin).wrapping_mul(2_654_435_761) & 0xff_ffff
 }
 
 pub fn run<const CHUNK: usize>(choice: u8, input: Input<'_>) {
     let has_reference = choice & 1 != 0;
     let settings = Settings {
-        reference: has_reference.then_some(PixelAddress(REFERENCE)),
+        reference: has_reference.then_some(PixelAddress::new(REFERENCE)),
         address: if choice & 2 == 0 { 0x41 } else { 0x30 },
-        ..Settings::new(PixelAddress(FIRST))
+        ..Settings::new(PixelAddress::new(FIRST))
     };
     // Of one message, and of more.
     let image: &[u8] = if choice & 4 == 0 {
@@ -155,15 +99,15 @@ pub fn run<const CHUNK: usize>(choice: u8, input: Input<'_>) {
     } else {
         &[7; 300]
     };
-    let bus = Bus::<Tmf>::new(input);
+    let bus = Bus::new(Tmf::new(count), input);
     let config = Config::new(settings).expect("good settings");
     let (interrupt, enable) = (Pin(bus.clone()), Pin(bus.clone()));
     let mut sensor = Tmf882x::<_, _, _, CHUNK>::new(bus.clone(), interrupt, enable, image, config);
-    let mut sets = Sets {
+    let mut set = PacketSet {
         has_reference,
         packets: Vec::new(),
     };
-    drive(&mut sensor, &bus, &mut sets);
+    drive(&mut sensor, &bus, &mut set);
     let counts = sensor.counts();
     assert!(counts.histograms > 0 && counts.packets >= counts.histograms);
 }

@@ -5,7 +5,7 @@
 ///
 /// # Panics
 ///
-/// If `first..=last` is empty or reaches beyond the histogram.
+/// Panics if `first..=last` is empty or reaches beyond the histogram.
 #[must_use]
 pub fn average_background(counts: &[f64], first: usize, last: usize) -> f64 {
     let window = &counts[first..=last];
@@ -14,10 +14,10 @@ pub fn average_background(counts: &[f64], first: usize, last: usize) -> f64 {
 
 /// The background level `λ_b` by the rule of the FPGA prototype (sec. IV-B).
 ///
-/// The half of the histogram that does not hold the peak consists of two
+/// The half of the histogram without the peak consists of two
 /// quadrants. The smaller of the maxima of these two is the background.
 ///
-/// Under a range gate the window `first..=last` plays the part of the
+/// Under a range gate the window `first..=last` replaces the
 /// histogram: with `n` bins in it, quadrant `k` runs from bin
 /// `first + floor(k n / 4)` up to, not including, bin
 /// `first + floor((k + 1) n / 4)`. In the paper, `n` is 128 and each quadrant
@@ -28,7 +28,7 @@ pub fn average_background(counts: &[f64], first: usize, last: usize) -> f64 {
 ///
 /// # Panics
 ///
-/// If `first..=last` does not hold the peak or reaches beyond the histogram.
+/// Panics if `first..=last` does not contain the peak or reaches beyond the histogram.
 #[must_use]
 pub fn quadrant_background(counts: &[f64], first: usize, last: usize, peak: usize) -> f64 {
     assert!(
@@ -65,8 +65,8 @@ mod tests {
         counts[64] = 90.0;
         assert_eq!(quadrant_background(&counts, 0, 127, 64), 5.0);
         assert_eq!(quadrant_background(&counts, 0, 127, 127), 5.0);
-        // Were bin 63 the peak, it would be bins 64 to 95 (maximum 90) against
-        // bins 96 to 127 (maximum 1).
+        // With the peak in bin 63: bins 64 to 95 (maximum 90) against bins 96 to 127
+        // (maximum 1).
         assert_eq!(quadrant_background(&counts, 0, 127, 63), 1.0);
     }
 

@@ -1,5 +1,5 @@
-//! Adaptive binning: pixels that have been silent for a while are counted in blocks as well.
-//! Not in the paper; from its description in `docs/design.md`.
+//! Adaptive binning: photons of pixels that have been silent for a while also count in blocks.
+//! Not in the paper; written from the description in `docs/design.md`.
 
 use super::{Echo, EchoConfig, EchoPixel, Window};
 
@@ -15,12 +15,12 @@ struct Member {
     has_reported: bool,
 }
 
-/// Who reports: its level and the address of its first pixel.
+/// The origin of an event: its level and the address of its first pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Reporter {
-    /// 0 a pixel, `k` a block of 2ᵏ x 2ᵏ.
+    /// 0: a pixel; `k`: a block of 2ᵏ x 2ᵏ.
     pub level: u32,
-    /// Of its first pixel, row by row.
+    /// The address of its first pixel, row by row.
     pub first: u32,
 }
 
@@ -36,8 +36,8 @@ pub struct BinnedArray {
 
 impl BinnedArray {
     /// An array of `columns` x `rows` pixels and their blocks up to `levels`. Ticks come
-    /// every `patience` laser cycles. Pixels and blocks operate as
-    /// the two configurations say.
+    /// every `patience` laser cycles. Pixels and blocks have a
+    /// configuration each.
     #[must_use]
     pub fn new(
         (columns, rows): (u32, u32),
@@ -74,8 +74,8 @@ impl BinnedArray {
         }
     }
 
-    /// A photon of the pixel `address`: it counts there, in the block of the pixel if that
-    /// feeds it, in the next block if that block feeds it, and so on.
+    /// Counts a photon of the pixel `address`: there, in the block of the pixel if the pixel feeds it,
+    /// in the next block if that block feeds it, and so on.
     pub fn photon(&mut self, address: u32, bin: usize) {
         let (column, row) = (address % self.columns, address / self.columns);
         for level in 0.. {
@@ -93,7 +93,7 @@ impl BinnedArray {
         }
     }
 
-    /// Ends a laser cycle for all. `stands_clear` decides about a window of a reporter.
+    /// Ends a laser cycle for all. `stands_clear` decides about a window.
     pub fn end_laser_cycle(
         &mut self,
         mut stands_clear: impl FnMut(Reporter, &Window) -> bool,

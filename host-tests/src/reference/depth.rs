@@ -6,10 +6,9 @@ const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 /// The sub-bin position of a peak, by the centroid of the peak bin and
 /// its two neighbours (the CMM of sec. III-A).
 ///
-/// The background is taken off each of the three counts and what would be
-/// negative is zero; a neighbour outside `first..=last` counts as zero. The
-/// paper names the method without its window or its background correction;
-/// these are the choices made here.
+/// The background is subtracted from each of the three counts, and negative values become zero;
+/// a neighbour outside `first..=last` counts as zero. The paper names the method without its
+/// window or background correction, which were chosen here.
 ///
 /// The position is in bins from the start of bin 0. Photons spread evenly over
 /// bin `i` have their centre at `i + 0.5`, which is also the result if no count
@@ -17,7 +16,7 @@ const SPEED_OF_LIGHT: f64 = 299_792_458.0;
 ///
 /// # Panics
 ///
-/// If `first..=last` does not hold the peak or reaches beyond the histogram.
+/// Panics if `first..=last` does not contain the peak or reaches beyond the histogram.
 #[must_use]
 pub fn centroid(counts: &[f64], first: usize, last: usize, peak: usize, background: f64) -> f64 {
     assert!(
@@ -38,7 +37,7 @@ pub fn centroid(counts: &[f64], first: usize, last: usize, peak: usize, backgrou
     peak as f64 + 0.5 + offset
 }
 
-/// The range in millimetres of a `position` in bins: the light covers the
+/// The range in millimetres of a `position` in bins: the light travels the
 /// distance twice (direct time of flight, sec. II-A), and `offset_mm` is added
 /// for the delays of the system.
 #[must_use]

@@ -1,11 +1,11 @@
-//! A pixel with the window rule that reports several echoes and expects the next event where
-//! the last was. Not in the paper; its flow chart (sec. II-B) is kept in all else.
+//! A pixel with the window rule that reports several echoes and expects the next event at the bin of
+//! the last. Not in the paper; otherwise it follows its flow chart (sec. II-B).
 
 use std::collections::BTreeSet;
 
 use super::{Histogram, Window, centroid, peak};
 
-/// How such a pixel operates.
+/// The settings of the pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct EchoConfig {
     /// `X`, `L_1` and `L_2` of the flow chart.
@@ -14,49 +14,48 @@ pub struct EchoConfig {
     pub l1: u32,
     /// See [`x`](Self::x).
     pub l2: u32,
-    /// Bins of a window.
+    /// Bins of the window.
     pub width: usize,
     /// Standard deviations above the mean.
     pub z: f64,
-    /// Those near the last event, and elsewhere, of a pixel that tracks.
+    /// With tracking: the standard deviations near the last event, and elsewhere.
     pub tracking: Option<(f64, f64)>,
     /// The fewest photons in the window of an event.
     pub minimum_count: f64,
     /// The first bin inside the range gate.
     pub first: usize,
-    /// The last.
+    /// The last bin inside the range gate.
     pub last: usize,
-    /// Echoes that an exposure may have.
+    /// The most echoes of an exposure.
     pub echoes: usize,
-    /// Bins to either side of an echo that are left out after it.
+    /// Bins to either side of an echo that are excluded after it.
     pub reach: usize,
-    /// An exposure ends when it is so many times as long as it was at its last echo, without
-    /// it at `L_2`.
+    /// An exposure ends when it is this many times as long as at its last echo; `None`: at `L_2`.
     pub wait: Option<u32>,
 }
 
 /// An event.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Echo {
-    /// From 1 on in each exposure.
+    /// Number of the echo, from 1 in each exposure.
     pub number: usize,
     /// Laser cycles of the exposure so far.
     pub exposure: u32,
-    /// What stood clear.
+    /// The window of the peak.
     pub window: Window,
     /// Photons in the bin.
     pub count: f64,
-    /// In bins from the start of bin 0.
+    /// Position in bins from the start of bin 0.
     pub position: f64,
-    /// Whether it is right behind bins left out.
+    /// Whether it follows directly on excluded bins.
     pub is_tail: bool,
-    /// Whether the centroid reaches bins left out, or past the gate.
+    /// Whether the centroid reaches excluded bins, or past the gate.
     pub is_clipped: bool,
-    /// Whether it was expected where it is.
+    /// Whether it was expected in its bin.
     pub is_expected: bool,
 }
 
-/// Such a pixel.
+/// The pixel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EchoPixel {
     config: EchoConfig,
@@ -70,7 +69,7 @@ pub struct EchoPixel {
 }
 
 impl EchoPixel {
-    /// One at the start of its first exposure, with `bins` bins that count up to `limit`.
+    /// A pixel at the start of its first exposure, with `bins` bins that count up to `limit`.
     #[must_use]
     pub fn new(bins: usize, limit: f64, config: EchoConfig) -> Self {
         Self {
@@ -90,8 +89,7 @@ impl EchoPixel {
         !self.peaks.is_empty()
     }
 
-    /// A photon is detected in `bin`. Outside the gate, and where an echo of this exposure
-    /// was, it leaves no trace.
+    /// Counts a photon in `bin`. Photons outside the gate and in excluded bins have no effect.
     pub fn photon(&mut self, bin: usize) {
         let is_gated = (self.config.first..=self.config.last).contains(&bin);
         if is_gated && !self.left_out.contains(&bin) {
@@ -125,7 +123,7 @@ impl EchoPixel {
             self.left_out.insert(bin);
             self.histogram.clear_bin(bin);
         }
-        // Eight bins are the fewest that are decided upon.
+        // A decision needs at least eight bins.
         let left = last + 1 - first - self.left_out.len();
         if self.peaks.len() == self.config.echoes || left < 8 {
             self.start_over();
@@ -133,7 +131,7 @@ impl EchoPixel {
         Some(echo)
     }
 
-    /// The window that stands clear, and whether around the bin where it was expected.
+    /// The window above its threshold, and whether it is around the expected bin.
     fn look(&self, stands_clear: &mut impl FnMut(&Window) -> bool) -> Option<(Window, bool)> {
         let EchoConfig {
             width,
@@ -152,7 +150,7 @@ impl EchoPixel {
         let mut z_far = z;
         if let (Some(expected), Some((near, far))) = (self.expected, self.config.tracking) {
             z_far = far;
-            // The bins of all windows that hold it.
+            // The bins of all windows that contain it.
             let lowest = first.max((expected + 1).saturating_sub(width));
             let (bin, _) = peak(counts, lowest, last.min(expected + width - 1));
             let window = window(near, expected, bin);
@@ -183,7 +181,7 @@ impl EchoPixel {
         }
     }
 
-    /// A new exposure, which expects its event where the last of this one was.
+    /// Starts a new exposure, which expects its event at the bin of the last one.
     fn start_over(&mut self) {
         self.expected = self.peaks.last().copied();
         self.peaks.clear();
@@ -226,7 +224,7 @@ mod tests {
 
     #[test]
     fn echoes_come_one_a_look_and_then_the_exposure_ends() {
-        // Bins 10 to 14 are left out, then bins 18 to 22; bin 16 is two behind the former.
+        // Bins 10 to 14 are excluded, then bins 18 to 22; bin 16 is two after the former.
         let photons = [12, 12, 12, 12, 12, 12, 12, 12, 20, 20, 20, 20, 16, 16];
         let exposure = [(7, 1, 12, false), (11, 2, 20, false), (15, 3, 16, true)];
         assert_eq!(run(CONFIG, 16, &photons), exposure);

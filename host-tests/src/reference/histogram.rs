@@ -48,7 +48,7 @@ impl Histogram {
     ///
     /// # Panics
     ///
-    /// If the histogram has no such bin.
+    /// Panics if the histogram has no such bin.
     pub fn clear_bin(&mut self, bin: usize) {
         self.counts[bin] = 0.0;
     }
@@ -90,7 +90,7 @@ mod tests {
             histogram.add(1);
         }
         assert_eq!(histogram.counts(), [0.0, 1023.0]);
-        // Photon 1024 finds the counter full; its bin exists all the same.
+        // The counter is full at photon 1024; the bin exists nevertheless.
         assert!(histogram.add(1));
         assert_eq!(histogram.counts(), [0.0, 1023.0]);
     }

@@ -3,9 +3,9 @@
 //! Y. Liu et al., "An on-chip Pixel Processing Approach with 2.4 µs latency for
 //! Asynchronous Read-out of SPAD-based dToF Flash `LiDARs`". Every module is
 //! written from the text of the paper and shares nothing with the integer
-//! implementation, so that the two can be held against each other.
+//! implementation, so that tests can compare the two.
 //!
-//! | Module         | What it holds                                  | Paper                |
+//! | Module         | Contents                                       | Paper                |
 //! |----------------|------------------------------------------------|----------------------|
 //! | `histogram`    | photon counts per bin, saturating counters     | sec. II-A, sec. IV-B |
 //! | `peak`         | the bin with the largest count                 | sec. II-A            |
@@ -15,9 +15,9 @@
 //! | `pixel`        | the asynchronous operation of a pixel          | sec. II-B            |
 //! | `square_root`  | the integer square root of the background      | sec. IV-B, Alg. 1    |
 //!
-//! Beyond the paper, from the description of what was added to it:
+//! Beyond the paper, written from the descriptions in `docs/design.md`:
 //!
-//! | Module         | What it holds                                  |
+//! | Module         | Contents                                       |
 //! |----------------|------------------------------------------------|
 //! | `window`       | the window rule                                |
 //! | `echoes`       | a pixel with echoes and tracking               |

@@ -1,14 +1,14 @@
 //! Peak finding (sec. II-A).
 
 /// The peak bin `i_max` and its count: "the bin with the largest photon count
-/// in the histogram" (sec. II-A), looked for in `first..=last`.
+/// in the histogram" (sec. II-A), searched in `first..=last`.
 ///
-/// Of several bins with the same largest count the one with the lowest index
-/// is the peak; the paper leaves this open.
+/// Among bins with the same largest count, the one with the lowest index is the peak; the paper
+/// leaves this open.
 ///
 /// # Panics
 ///
-/// If `first..=last` is empty or reaches beyond the histogram.
+/// Panics if `first..=last` is empty or reaches beyond the histogram.
 #[must_use]
 pub fn peak(counts: &[f64], first: usize, last: usize) -> (usize, f64) {
     assert!(
@@ -36,7 +36,7 @@ mod tests {
 
     #[test]
     fn the_lowest_index_wins_a_tie() {
-        // 7 stands in bins 1 and 3.
+        // Bins 1 and 3 have 7.
         assert_eq!(peak(&[2.0, 7.0, 0.0, 7.0], 0, 3), (1, 7.0));
         // An empty histogram is a tie of all bins.
         assert_eq!(peak(&[0.0; 8], 2, 5), (2, 0.0));

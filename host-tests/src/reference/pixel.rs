@@ -3,7 +3,7 @@
 
 use super::{Histogram, average_background, centroid, peak, quadrant_background, stands_clear};
 
-/// What the background `λ_b` is estimated from.
+/// The estimator of the background `λ_b`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Background {
     /// Two quadrants (sec. IV-B).
@@ -15,20 +15,17 @@ pub enum Background {
 /// The hyperparameters of a pixel (sec. II-B) and its range gate.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Config {
-    /// `X`: the laser cycles from one check to the next, at least one
-    /// (sec. II-B).
+    /// `X`: the laser cycles between checks, at least one (sec. II-B).
     pub x: u32,
-    /// `L_1`: a decision takes an exposure of more laser cycles than this
-    /// (sec. II-B).
+    /// `L_1`: a decision needs an exposure of more laser cycles than this (sec. II-B).
     pub l1: u32,
     /// `L_2`: the exposure ends when it has this many laser cycles (sec. II-B).
     pub l2: u32,
-    /// Where `λ_b` comes from.
+    /// The estimator of `λ_b`.
     pub background: Background,
-    /// `α`: how many standard deviations above the background a peak has to
-    /// stand (Eq. 5).
+    /// `α`: standard deviations of the threshold above the background (Eq. 5).
     pub alpha: f64,
-    /// The smallest count of a peak that makes an event. Not in the paper; zero
+    /// The smallest count of a peak with an event. Not in the paper; zero
     /// turns it off, see [`stands_clear`].
     pub minimum_count: f64,
     /// The first bin inside the range gate. The paper's full histogram
@@ -38,8 +35,7 @@ pub struct Config {
     pub last: usize,
 }
 
-/// One decision, whether or not it made an event: what the pixel saw at a check
-/// with `L_1 < N < L_2` (sec. II-B).
+/// A decision, with or without an event: the values at a check with `L_1 < N < L_2` (sec. II-B).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
     /// Index, from zero, of the laser cycle at whose end the decision was taken
@@ -53,14 +49,14 @@ pub struct Look {
     pub peak_count: f64,
     /// `λ_b`: the background the peak was compared with (Eq. 5, sec. IV-B).
     pub background: f64,
-    /// Whether the peak was significant and made an [`Event`] (Eq. 5).
+    /// Whether the peak was significant and caused an [`Event`] (Eq. 5).
     pub fired: bool,
 }
 
 /// A peak event: a significant peak, reported by the pixel (sec. II-B).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Event {
-    /// The decision that made it.
+    /// The decision that caused it.
     pub look: Look,
     /// The sub-bin position of the peak, in bins from the start of bin 0
     /// (sec. III-A); see [`centroid`].
@@ -69,13 +65,13 @@ pub struct Event {
 
 /// An asynchronous pixel (sec. II-B).
 ///
-/// Every laser cycle is any number of calls of [`photon`](Self::photon), then
-/// one of [`end_laser_cycle`](Self::end_laser_cycle).
+/// For every laser cycle, call [`photon`](Self::photon) any number of times, then
+/// [`end_laser_cycle`](Self::end_laser_cycle) once.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Pixel {
     config: Config,
     histogram: Histogram,
-    /// Laser cycles that have ended since the pixel was made.
+    /// Laser cycles that have ended in all.
     cycles: u64,
     /// `N`
     exposure: u32,
@@ -88,7 +84,7 @@ impl Pixel {
     ///
     /// # Panics
     ///
-    /// If `config.x` is zero, or the gate is empty or reaches beyond the
+    /// Panics if `config.x` is zero, or the gate is empty or reaches beyond the
     /// histogram.
     #[must_use]
     pub fn new(bins: usize, limit: f64, config: Config) -> Self {
@@ -106,15 +102,14 @@ impl Pixel {
         }
     }
 
-    /// A photon is detected in `bin` (sec. II-A). Outside the range gate it
-    /// leaves no trace.
+    /// Counts a photon in `bin` (sec. II-A). Photons outside the range gate have no effect.
     pub fn photon(&mut self, bin: usize) {
         if (self.config.first..=self.config.last).contains(&bin) {
             self.histogram.add(bin);
         }
     }
 
-    /// Ends a laser cycle and does what the flow chart of sec. II-B has next.
+    /// Ends a laser cycle and follows the flow chart of sec. II-B.
     ///
     /// After every `X` cycles `N` is checked. If `L_1 < N < L_2` the decision
     /// is taken, and returned. After an event, or once `N` has reached `L_2`,
@@ -142,8 +137,8 @@ impl Pixel {
         look
     }
 
-    /// The peak event made by the last
-    /// [`end_laser_cycle`](Self::end_laser_cycle), if it made one (sec. II-B).
+    /// The peak event of the last [`end_laser_cycle`](Self::end_laser_cycle), if there was one
+    /// (sec. II-B).
     #[must_use]
     pub fn event(&self) -> Option<&Event> {
         self.event.as_ref()
@@ -207,8 +202,7 @@ mod tests {
         last: 7,
     };
 
-    /// Runs `cycles` laser cycles with the same photons in each, and gathers
-    /// what they bring.
+    /// Runs `cycles` laser cycles with the same photons in each. Returns their decisions and events.
     fn run(pixel: &mut Pixel, cycles: u32, photons: &[usize]) -> (Vec<Look>, Vec<Event>) {
         let mut looks = Vec::new();
         let mut events = Vec::new();
@@ -280,8 +274,7 @@ mod tests {
         assert_eq!(events, [Event { look, position }]);
         assert_eq!(pixel.histogram().total(), 0.0);
 
-        // The next 12 cycles bring the same, and the event is forgotten on the
-        // way.
+        // The next 12 cycles give the same, and clear the event before.
         let (looks, events) = run(&mut pixel, 12, &[0, 2, 5, 5, 6]);
         let look = Look { cycle: 23, ..look };
         assert_eq!(looks, [look]);

@@ -13,7 +13,7 @@
 )]
 pub fn floor_square_root(x: u32) -> u32 {
     let mut root = f64::from(x).sqrt().floor() as u32;
-    // Rounding in the floating-point root must not show.
+    // Corrects the rounding of the floating-point root.
     while square(root) > u64::from(x) {
         root -= 1;
     }

@@ -13,7 +13,7 @@ pub fn threshold(background: f64, alpha: f64) -> f64 {
 /// The minimum count is not in the paper; zero turns it off. Eq. 5 rests on
 /// the background being large enough for the normal approximation
 /// (sec. II-C: `λ_b ≥ 30`); with no background at all the threshold is zero
-/// and a single photon would stand clear of it.
+/// and a single photon would exceed it.
 #[must_use]
 pub fn stands_clear(peak_count: f64, background: f64, alpha: f64, minimum_count: f64) -> bool {
     peak_count > threshold(background, alpha) && peak_count >= minimum_count

@@ -1,11 +1,11 @@
-//! The window rule. Not in the paper: from its formula in `docs/design.md` and the
-//! binomial distribution.
+//! The window rule. Not in the paper: written from its formula in `docs/design.md` and the binomial
+//! distribution.
 
-/// What a decision of the window rule is about: `inside` photons in a window of `width` of
-/// `bins` bins, which hold `total` photons together.
+/// The input of a decision of the window rule: `inside` photons in a window of `width` bins, and `total`
+/// photons in all `bins` bins.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Window {
-    /// The bin that is reported if this stands clear.
+    /// The bin that is reported if the window exceeds the threshold.
     pub bin: usize,
     /// `S`: photons in the window.
     pub inside: f64,
@@ -13,15 +13,15 @@ pub struct Window {
     pub total: f64,
     /// `w`: bins of the window.
     pub width: f64,
-    /// `B`: bins that are not left out.
+    /// `B`: bins that are not excluded.
     pub bins: f64,
     /// `z`: standard deviations above the mean.
     pub z: f64,
 }
 
 impl Window {
-    /// The one with most photons of all windows of `width` bins in `first..=last` that hold
-    /// the bin `around`; it reports `bin`. `left_out` of the bins are empty and do not count.
+    /// The window with the most photons among all of `width` bins in `first..=last` that contain the bin
+    /// `around`; it reports `bin`. `left_out` of the bins are excluded: empty and not counted.
     #[must_use]
     pub fn around(
         counts: &[f64],
@@ -43,7 +43,7 @@ impl Window {
         }
     }
 
-    /// `p = w/B`: the share of a photon that falls into every bin alike.
+    /// `p = w/B`: the probability that a photon of the background is in the window.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.width / self.bins
@@ -55,13 +55,13 @@ impl Window {
         self.total * self.share() * (1.0 - self.share())
     }
 
-    /// `z²/6·(1 - 2p)`, at least 0: photons are not distributed evenly about their mean.
+    /// `z²/6·(1 - 2p)`, at least 0: the correction for the skewness of the distribution.
     #[must_use]
     pub fn skew(&self) -> f64 {
         self.z * self.z / 6.0 * (1.0 - 2.0 * self.share()).max(0.0)
     }
 
-    /// `T·p + z·V/√(V + z²/36) + z²/6·(1 - 2p)`: what the window has to exceed.
+    /// `T·p + z·V/√(V + z²/36) + z²/6·(1 - 2p)`: the threshold of the window.
     #[must_use]
     pub fn level(&self) -> f64 {
         let variance = self.variance();
@@ -73,13 +73,13 @@ impl Window {
         self.total * self.share() + self.z * spread + self.skew()
     }
 
-    /// Whether it holds more.
+    /// Whether the window has more photons than the threshold.
     #[must_use]
     pub fn stands_clear(&self) -> bool {
         self.inside > self.level()
     }
 
-    /// The mean of the bins outside.
+    /// The mean of the bins outside the window.
     #[must_use]
     pub fn background(&self) -> f64 {
         (self.total - self.inside) / (self.bins - self.width)
@@ -110,7 +110,7 @@ mod tests {
             }
             .stands_clear()
         );
-        // Without photons the skewness alone is left; a window of half of the bins has none.
+        // Without photons only the skewness remains, which is 0 for a window of half of the bins.
         let empty = Window {
             inside: 0.0,
             total: 0.0,

@@ -1,5 +1,5 @@
-//! The arrows between packages are those of `ARCHITECTURE.md`, each points to a row
-//! above its own, and no modules of a package import each other in a circle.
+//! The dependencies between packages match the table in `ARCHITECTURE.md`, each on a row above its
+//! own, and the modules of a package have no import cycles.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -14,7 +14,7 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// The packages of the workspace as `cargo metadata` gives them.
+/// The packages of the workspace from `cargo metadata`.
 fn metadata() -> Value {
     let output = Command::new(env!("CARGO"))
         .current_dir(root())
@@ -25,7 +25,7 @@ fn metadata() -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// What each package uses of the workspace: built with it, and with its tests.
+/// The packages of the workspace that each package uses, and that its tests use.
 fn arrows(metadata: &Value) -> (Arrows, Arrows) {
     let packages = metadata["packages"].as_array().unwrap();
     let name = |value: &Value| value["name"].as_str().unwrap().to_owned();
@@ -44,7 +44,7 @@ fn arrows(metadata: &Value) -> (Arrows, Arrows) {
     (built, tested)
 }
 
-/// The rows of the table of packages: package, what it uses, what its tests use.
+/// The rows of the table of packages: package, its dependencies, those of its tests.
 fn documented() -> Vec<[String; 3]> {
     let page = fs::read_to_string(root().join("ARCHITECTURE.md")).unwrap();
     let (_, table) = page.split_once("| package |").expect("a table of packages");
@@ -68,7 +68,7 @@ fn names(cell: &str) -> BTreeSet<String> {
     names.map(str::to_owned).collect()
 }
 
-/// What is wrong with arrows: not as documented, or not to a row above.
+/// Dependencies that differ from the table, or are not on a row above.
 fn wrong(documented: &[[String; 3]], built: &Arrows, tested: &Arrows) -> Vec<String> {
     let mut wrong = Vec::new();
     let mut above = BTreeSet::new();
@@ -80,7 +80,7 @@ fn wrong(documented: &[[String; 3]], built: &Arrows, tested: &Arrows) -> Vec<Str
         if *built != names(uses) {
             wrong.push(format!("{package} uses {built:?}, the table says {uses}"));
         }
-        // What the code uses its tests may use.
+        // Tests may use the dependencies of the code.
         let more: BTreeSet<String> = tested.difference(built).cloned().collect();
         if more != names(tests) {
             wrong.push(format!(
@@ -123,7 +123,7 @@ fn an_arrow_that_is_turned_round_is_found() {
     assert!(turned >= 15, "{turned} arrows");
 }
 
-/// Each package, and what its files import.
+/// Each package with the imports of its files.
 fn graphs() -> Vec<(String, crate::modules::Imports)> {
     let metadata = metadata();
     let of = |package: &Value| {
@@ -145,8 +145,8 @@ fn no_files_or_folders_of_a_package_import_each_other_in_a_circle() {
     }
 }
 
-/// To each import of a file, the other way round another is added: between the same two files, and
-/// between two others of the same folders.
+/// Adds the reverse of each import: between the same two files, and between two others of the same
+/// folders. Each must be found as a cycle.
 #[test]
 fn a_planted_circle_of_files_or_of_folders_is_found() {
     let (mut of_files, mut of_folders) = (0, 0);
@@ -160,7 +160,7 @@ fn a_planted_circle_of_files_or_of_folders_is_found() {
                 .zip(to)
                 .take_while(|(one, other)| one == other)
                 .count();
-            // A folder uses what is in it.
+            // A folder may use its own files.
             let (Some(one), Some(other)) = (from.get(..=depth), to.get(..=depth)) else {
                 continue;
             };
@@ -195,7 +195,7 @@ fn a_planted_circle_of_files_or_of_folders_is_found() {
     );
 }
 
-/// All packages that `package` is built with on this computer, and itself.
+/// `package` and all packages that it is built with on this computer.
 fn built_with(package: &str) -> BTreeSet<String> {
     let output = Command::new(env!("CARGO"))
         .current_dir(root())
@@ -209,8 +209,8 @@ fn built_with(package: &str) -> BTreeSet<String> {
     names.map(str::to_owned).collect()
 }
 
-/// What belongs to the program or to the live page. Libraries and Python read options by key and
-/// text, and are installed without them.
+/// Dependencies of the program or the live page. Libraries and Python must not have them: they read
+/// options by key and text.
 const OF_THE_PROGRAM: [&str; 5] = ["clap", "hyper", "indicatif", "serialport", "tungstenite"];
 
 #[test]

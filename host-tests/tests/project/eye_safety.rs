@@ -1,5 +1,5 @@
-//! The figures of "Eye safety first" in `docs/boards.md`, computed from the limits that the
-//! page states and from the laser of the Pico's image as it comes.
+//! The figures of "Eye safety first" in `docs/boards.md`, computed from the limits on the page and the
+//! default laser of the Pico's image.
 
 use dtof_firmware::photon_timer::{BINS, CLOCK_HZ, Config, Settings};
 
@@ -8,10 +8,10 @@ use dtof_firmware::photon_timer::{BINS, CLOCK_HZ, Config, Settings};
 const PULSE_J: f64 = 7.7e-8;
 const AVERAGE_W: f64 = 3.9e-4;
 
-/// The lowest C5 of pulses that are shorter than 5 µs.
+/// The lowest C5 of pulses shorter than 5 µs.
 const C5: f64 = 0.4;
 
-/// The longest pulse in clocks, and the clocks of a laser cycle for each clock of its pulse.
+/// The longest pulse in clocks, and the fewest clocks of a laser cycle per clock of its pulse.
 const LONGEST: f64 = 125.0;
 const CLOCKS_A_CLOCK: f64 = 50.0;
 
@@ -31,7 +31,7 @@ fn row(label: &str) -> Vec<f64> {
     cells.map(|cell| number(cell).unwrap()).collect()
 }
 
-/// `value`, to so many digits after the point; limits are rounded down.
+/// `value` rounded to `digits` decimals; limits are rounded down.
 fn down(value: f64, digits: i32) -> f64 {
     let unit = 10f64.powi(digits);
     (value * unit).floor() / unit

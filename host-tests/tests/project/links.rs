@@ -1,4 +1,4 @@
-//! Every link of a page leads to a file, and to a heading where it names one.
+//! Every link on a page leads to an existing file and heading.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ fn pages(folder: &Path, pages: &mut Vec<PathBuf>) {
     }
 }
 
-/// A heading as a link names it.
+/// The anchor of a heading.
 fn anchor(heading: &str) -> String {
     let heading = heading.trim_start_matches('#').trim().to_lowercase();
     let kept = heading
@@ -26,7 +26,7 @@ fn anchor(heading: &str) -> String {
     kept.map(|c| if c == ' ' { '-' } else { c }).collect()
 }
 
-/// Whether `target`, as seen from `page`, is there.
+/// Whether the `target` of a link on `page` exists.
 fn leads_somewhere(page: &Path, target: &str) -> bool {
     let (file, heading) = target.split_once('#').unwrap_or((target, ""));
     let path = if file.is_empty() {

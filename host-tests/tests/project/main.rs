@@ -1,4 +1,4 @@
-//! The project about itself: its packages, pages, sizes and rules.
+//! Tests of the project: its packages, pages, sizes and rules.
 
 mod architecture;
 mod doors;

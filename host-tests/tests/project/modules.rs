@@ -1,9 +1,8 @@
-//! Which files of a package import which, read from their syntax.
+//! The imports between the files of a package, read from their syntax.
 //!
-//! Only a path that begins with `crate`, `self` or `super` is an import, and it leads
-//! to the deepest module on it, or to where that has what it hands on with `pub use`. A module and
-//! what lies in its own folder are one room: what a child takes from its parent is no import. Tests
-//! are left out.
+//! An import is a path that begins with `crate`, `self` or `super`. It leads to the deepest module on
+//! it, or to the origin of a `pub use` there. A module and its folder count as one: items that a child
+//! takes from its parent are no import. Tests are left out.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
@@ -13,7 +12,7 @@ use syn::visit::Visit;
 
 /// A module by its path from the package, `["detect", "window"]`.
 type Module = Vec<String>;
-/// What each module imports.
+/// The imports of each module.
 pub type Imports = BTreeMap<Module, BTreeSet<Module>>;
 
 /// The imports of all modules below `source`.
@@ -44,7 +43,7 @@ pub fn imports(source: &Path) -> Imports {
     };
     let leads = |path: &Module| {
         let mut path = path.clone();
-        // What is handed on may be handed on again.
+        // A reexport may be reexported.
         for _ in 0..4 {
             let module = deepest(&path)?;
             let next = path
@@ -84,22 +83,22 @@ fn read(folder: &Path, module: &mut Module, files: &mut BTreeMap<Module, Vec<syn
                 _ => module.push(name),
             }
             let file = syn::parse_file(&fs::read_to_string(&path).unwrap()).unwrap();
-            // A program and the library beside it begin at the same place.
+            // A program and its library have the same root.
             files.entry(module).or_default().extend(file.items);
         }
     }
 }
 
-/// Collects paths, as seen from the package.
+/// Collects paths, relative to the package.
 struct Paths {
     module: Module,
     found: Vec<Module>,
-    /// Names of `pub use`, and what they lead to.
+    /// Names of `pub use`, and their targets.
     handed_on: Vec<(String, Module)>,
 }
 
 impl Paths {
-    /// Notes a path, if it begins within the package.
+    /// Adds a path if it begins in the package.
     fn note(&mut self, path: &[String]) {
         self.found.extend(self.absolute(path));
     }
@@ -123,7 +122,7 @@ impl Paths {
         Some([&from, rest].concat())
     }
 
-    /// Notes a name that is handed on. Its path may begin with a module of this one.
+    /// Adds a reexport. Its path may begin with a module of this one.
     fn hand_on(&mut self, name: &syn::Ident, path: &[String]) {
         let of_child = || [&self.module[..], path].concat();
         let path = self.absolute(path).unwrap_or_else(of_child);
@@ -160,7 +159,7 @@ impl Paths {
     }
 }
 
-/// Whether an item is there in tests only.
+/// Whether an item exists in tests only.
 fn is_test(attributes: &[syn::Attribute]) -> bool {
     attributes.iter().any(|attribute| {
         attribute.path().is_ident("cfg")
@@ -195,9 +194,8 @@ impl<'file> Visit<'file> for Paths {
     }
 }
 
-/// Files and folders that import each other in a circle, circle by circle. What lies side by side
-/// in a folder is compared: a folder imports what any of its files imports, so a circle of files
-/// shows where their ways part.
+/// Import cycles of files and folders. Entries of the same folder are compared: a folder imports
+/// everything that one of its files imports, so a cycle of files appears where their paths part.
 pub fn circles(imports: &Imports) -> Vec<Vec<String>> {
     let folders: BTreeSet<&[String]> = imports
         .keys()
@@ -207,7 +205,7 @@ pub fn circles(imports: &Imports) -> Vec<Vec<String>> {
     folders.into_iter().flat_map(within).collect()
 }
 
-/// What each file and folder in `folder` imports of the others there.
+/// The imports between the files and folders in `folder`.
 fn side_by_side<'a>(
     imports: &'a Imports,
     folder: &[String],

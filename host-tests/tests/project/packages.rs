@@ -1,5 +1,5 @@
-//! What is published is what a user can want, and complete without the workspace: README,
-//! licences, an example, and every file that is compiled in.
+//! The published packages are complete without the workspace: README, licences, an example, and every
+//! file that is compiled in.
 
 use std::collections::BTreeSet;
 use std::fs;
@@ -8,7 +8,7 @@ use std::process::Command;
 
 use serde_json::Value;
 
-/// In the order in which they are published.
+/// In the order of publishing.
 const PUBLISHED: [&str; 18] = [
     "dtof-core",
     "dtof-draw",
@@ -30,12 +30,12 @@ const PUBLISHED: [&str; 18] = [
     "dtof",
 ];
 
-/// The libraries of the host are short pages, with an example in their README alone.
+/// The libraries of the host have an example in their README only.
 fn is_of_host(package: &Value) -> bool {
     folder(package).parent().unwrap().ends_with("host") && package["name"] != "dtof"
 }
 
-/// The most that a package may hold, in bytes before it is compressed.
+/// The most bytes of a package before compression.
 const MOST_BYTES: u64 = 500_000;
 
 fn root() -> PathBuf {
@@ -74,7 +74,7 @@ fn is_published(package: &Value) -> bool {
     package["publish"].is_null()
 }
 
-/// What a package lacks that its page and its users need.
+/// The parts that a package lacks.
 fn lacking(package: &Value) -> Vec<&'static str> {
     let count = |key: &str| package[key].as_array().map_or(0, Vec::len);
     let builds = |kind: &str| {
@@ -87,7 +87,7 @@ fn lacking(package: &Value) -> Vec<&'static str> {
     let library = folder(package).join("src/lib.rs");
     let library = fs::read_to_string(library).unwrap_or_default();
     let least = if is_of_host(package) { 100 } else { 150 };
-    let wanted = [
+    let required = [
         ("description", !text(package, "description").is_empty()),
         ("licence", text(package, "license") == "MIT OR Apache-2.0"),
         ("oldest Rust", !text(package, "rust_version").is_empty()),
@@ -108,11 +108,11 @@ fn lacking(package: &Value) -> Vec<&'static str> {
         ("all features on docs.rs", docs["all-features"] == true),
         ("targets on docs.rs", docs["targets"].is_array()),
     ];
-    let lacking = wanted.iter().filter(|(_, is_there)| !is_there);
+    let lacking = required.iter().filter(|(_, is_there)| !is_there);
     lacking.map(|(what, _)| *what).collect()
 }
 
-/// The files of a package as it is packed.
+/// The files of a packed package.
 fn packed(package: &Value) -> BTreeSet<PathBuf> {
     let list = [
         "package",
@@ -126,7 +126,7 @@ fn packed(package: &Value) -> BTreeSet<PathBuf> {
     list.lines().map(PathBuf::from).collect()
 }
 
-/// What sources among `files` compile in, less what is among them, too.
+/// Files that the sources among `files` compile in, without those that are among `files`.
 fn compiled_from_elsewhere(folder: &Path, files: &BTreeSet<PathBuf>) -> Vec<String> {
     let is_source = |file: &&PathBuf| file.extension() == Some("rs".as_ref());
     let mut elsewhere = Vec::new();
@@ -168,7 +168,7 @@ fn published_is_what_a_user_can_want_and_nothing_that_others_use_comes_later() {
         let place = |name: &str| PUBLISHED.iter().position(|other| *other == name);
         let own = place(text(package, "name"));
         for used in package["dependencies"].as_array().unwrap() {
-            // Without a version, which only dependencies of tests may lack, it is not packed.
+            // Cargo does not pack a dependency without a version, which only tests may have.
             if !used["path"].is_null() && used["req"] != "*" {
                 let place = place(text(used, "name"));
                 assert!(place.is_some() && place < own, "{used}");
@@ -208,7 +208,7 @@ fn a_published_package_has_all_that_its_page_and_its_users_need() {
     for package in packages.iter().filter(|package| is_published(package)) {
         assert_eq!(lacking(package), [""; 0], "{}", package["name"]);
     }
-    // What is not published lacks most of it, and that is found.
+    // An unpublished package lacks most parts, which proves that they are checked.
     let other = packages
         .iter()
         .find(|package| package["name"] == "dtof-lab");
@@ -228,7 +228,7 @@ fn a_package_is_small_and_compiles_in_what_is_packed_only() {
         }
         let has_example = files.iter().any(|file| file.starts_with("examples"));
         assert!(has_example || is_of_host(package), "{}", package["name"]);
-        // Cargo makes some files itself.
+        // Cargo generates some files.
         let there = files
             .iter()
             .filter_map(|file| fs::metadata(folder.join(file)).ok());
@@ -241,7 +241,7 @@ fn a_package_is_small_and_compiles_in_what_is_packed_only() {
             .filter(|file| folder.join(file).exists())
             .collect();
         assert_eq!(compiled_from_elsewhere(&folder, &sources), [""; 0]);
-        // It would be found.
+        // The check finds a missing file.
         let without: BTreeSet<PathBuf> = sources
             .into_iter()
             .filter(|file| file != Path::new("README.md"))

@@ -1,4 +1,4 @@
-//! What `docs/paper.md` names is there, and its verdicts are those of the studies.
+//! The files and names in `docs/paper.md` exist, and its verdicts match the studies.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ fn rows(page: &str) -> Vec<[&str; 6]> {
     let rows = page.lines().filter(|line| line.starts_with('|'));
     let rows = rows.map(|line| line.trim_matches('|').split('|').map(str::trim).collect());
     let rows: Vec<Vec<&str>> = rows.collect();
-    // Those of the verdicts, backgrounds and choices have two or three.
+    // Rows of the other tables have two or three cells.
     assert!(
         rows.iter().all(|row| matches!(row.len(), 2 | 3 | 6)),
         "a | in a cell"
@@ -60,8 +60,8 @@ fn names_of_the_page_are_there() {
     assert!(!is_there("`core/src/pixel/mod.rs: Pixel`") && !is_there("`core/src/nothing.rs`"));
 }
 
-/// The verdict of a claim, by its name in the template of the claims: the row in the results
-/// begins with the same words.
+/// The verdict of a claim, by its name in the template: the row in the results begins with the same
+/// words.
 fn verdict_of(claim: &str, template: &str, results: &str) -> Option<String> {
     let place = format!("**{{{claim}}}**");
     let row = template.lines().find(|line| line.contains(&place))?;

@@ -1,8 +1,9 @@
-//! Memory figures that the documentation states.
+//! Memory figures in the documentation.
 
 use std::mem::size_of;
 
-use dtof_core::{AsyncPixel, Block, Count16, Count24, DepthEvent, Histogram};
+use dtof_core::binning::Block;
+use dtof_core::{AsyncPixel, Count16, Count24, DepthEvent, Histogram};
 
 #[test]
 fn a_macropixel_takes_what_the_documentation_says() {
@@ -14,9 +15,9 @@ fn a_macropixel_takes_what_the_documentation_says() {
     );
     // The pixel: 72 bytes beside its counters.
     assert_eq!(size_of::<AsyncPixel<128>>(), 128 * 2 + 72);
-    let said = "macropixel of 128 bins takes 328 bytes";
-    assert!(include_str!("../../../README.md").contains(said));
-    assert!(include_str!("../../../core/README.md").contains(said));
+    let statement = "macropixel of 128 bins takes 328 bytes";
+    assert!(include_str!("../../../README.md").contains(statement));
+    assert!(include_str!("../../../core/README.md").contains(statement));
     assert_eq!(size_of::<AsyncPixel<128>>(), 328);
     // A block: 8 bytes more.
     assert_eq!(size_of::<Block<128>>(), 128 * 2 + 72 + 8);

@@ -1,9 +1,10 @@
-//! The cover glass: gates that leave it out, glasses with a tail, and glasses that get brighter.
+//! Crosstalk of the cover glass: gates that exclude it, crosstalk with a tail, and crosstalk that grows.
 
 use crate::calibration::{recorded, slices};
-use crate::long_or;
+use crate::slow_or_quick;
 use dtof_calibrate::{
-    Asked, Calibration, Change, Length, Nearest, Observed, RunPhotons, calibrate, glass_change,
+    Calibration, CalibrationOptions, Change, Length, Nearest, Observed, RunPhotons, calibrate,
+    glass_change,
 };
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::SettingsFile;
@@ -11,7 +12,7 @@ use dtof_photons::recorded::Capture;
 use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 
-/// A wall 37.5 mm a bin away, two nearer surfaces, and the glass.
+/// A wall, two nearer surfaces and the cover glass. A bin is 37.5 mm.
 fn scene(background: f64, glass: f64, more: &str) -> Scene {
     let text = format!(
         "columns = 16\nrows = 8\nbackground = {background:?}\npulse_sigma_bins = 0.8\n\
@@ -33,11 +34,11 @@ fn found(scene: &Scene, cycles: u64, seed: u64) -> Calibration {
         bin_width_ps: 250.0,
         truth_mm: None,
     };
-    calibrate(&observed, &Asked::default()).unwrap()
+    calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }
 
-/// Events of the scene with these settings, and how many are farther than three bins from what
-/// their pixel sees.
+/// Events of the scene with these settings, and how many are more than three bins away from the
+/// surface that their pixel sees.
 fn events(scene: &Scene, settings: &SettingsFile, cycles: u64) -> (usize, usize) {
     let settings = settings.settings(128).unwrap();
     let photons = scene.photons(99, cycles).unwrap();
@@ -56,7 +57,7 @@ fn events(scene: &Scene, settings: &SettingsFile, cycles: u64) -> (usize, usize)
 
 #[test]
 fn a_glass_ten_times_the_signal_leaves_no_false_events() {
-    for &background in long_or(&[0.005, 0.05][..], &[0.05]) {
+    for &background in slow_or_quick(&[0.005, 0.05][..], &[0.05]) {
         let scene = scene(background, 2.5, "");
         let found = found(&scene, 20_000, 1);
         let settings = found.settings(SettingsFile::default()).unwrap();
@@ -64,7 +65,7 @@ fn a_glass_ten_times_the_signal_leaves_no_false_events() {
         println!("background {background}: {wrong} of {all} events are false");
         assert!(all > 2000, "{all}");
         assert!(100 * wrong <= all, "{wrong} of {all}");
-        // Without the gate nothing but the glass is reported.
+        // Without the gate only the glass is reported.
         let mut open = settings;
         open.sensor.gate = None;
         let (all, wrong) = events(&scene, &open, 2000);
@@ -72,8 +73,8 @@ fn a_glass_ten_times_the_signal_leaves_no_false_events() {
     }
 }
 
-/// The rate of a glass with a tail in a bin, by its formula: a Gaussian convolved with an
-/// exponential, integrated over the bin in steps.
+/// The rate of crosstalk with a tail in a bin, by its formula: a Gaussian convolved with an
+/// exponential, integrated numerically over the bin.
 fn with_tail(bin: u16, position: f64, sigma: f64, share: f64, decay: f64) -> f64 {
     let gaussian = |x: f64| (-x * x / 2.0).exp() / (2.0 * std::f64::consts::PI).sqrt();
     let below = |x: f64| libm::erfc(-x / std::f64::consts::SQRT_2) / 2.0;
@@ -97,7 +98,7 @@ fn a_glass_with_a_long_tail_ends_where_its_photons_do() {
         2.0 * 2000.0 * with_tail(*bin, 5.3, 0.8, share, decay) >= 0.5 * (0.02f64 * 2000.0).sqrt()
     };
     let end = (0..128).rev().find(matters).unwrap() + 1;
-    for seed in 3..long_or(6, 4) {
+    for seed in 3..slow_or_quick(6, 4) {
         let found = found(&scene, 40_000, seed);
         let Nearest::Glass(glass) = &found.nearest else {
             panic!("{:?}", found.nearest);
@@ -137,7 +138,7 @@ fn summed(capture: &Capture) -> Vec<u64> {
     sums
 }
 
-/// What a run of `scene` says about the glass of `settings`.
+/// How the crosstalk in a run of `scene` differs from that in `settings`.
 fn change(scene: &Scene, settings: &SettingsFile, cycles: u64, seed: u64) -> Change {
     let bins = summed(&recorded(scene, cycles, seed));
     let run = RunPhotons {
@@ -157,7 +158,7 @@ fn a_glass_that_got_brighter_is_flagged_and_nothing_else_is() {
     let settings = found(&calibrated, 20_000, 5)
         .settings(SettingsFile::default())
         .unwrap();
-    for seed in 0..long_or(10, 1) {
+    for seed in 0..slow_or_quick(10, 1) {
         let now = |scene: &Scene| change(scene, &settings, 4000, 100 + seed);
         match now(&scene(0.02, 1.3 * glass, "")) {
             Change::Brighter(factor, least) => {
@@ -177,7 +178,7 @@ fn a_glass_that_got_brighter_is_flagged_and_nothing_else_is() {
             let found = now(&scene(background, glass, ""));
             assert!(matches!(found, Change::Same(_)), "{background}: {found:?}");
         }
-        // A bright target before the gate in eight of 128 pixels.
+        // A bright target in front of the gate in eight of 128 pixels.
         for position in [3.2, 5.3, 6.9] {
             let near = format!(
                 "[[surface]]\nposition_bins = {position:?}\nsignal = 3\n\
@@ -190,13 +191,13 @@ fn a_glass_that_got_brighter_is_flagged_and_nothing_else_is() {
             );
         }
     }
-    // A hundred laser cycles of one pixel's share say nothing.
+    // Twenty laser cycles are too few.
     let dim = scene(0.2, 0.05, "");
     let settings = SettingsFile {
-        sensor: dtof_engine::settings::Sensor {
+        sensor: dtof_engine::settings::SensorSettings {
             glass_bins: Some(vec![0.0, 0.0, 0.001, 0.01, 0.02, 0.015, 0.004]),
             gate: Some((8, 127)),
-            ..dtof_engine::settings::Sensor::default()
+            ..dtof_engine::settings::SensorSettings::default()
         },
         ..SettingsFile::default()
     };

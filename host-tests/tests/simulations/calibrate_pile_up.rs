@@ -1,8 +1,8 @@
-//! Pile-up: which TDC made a recording, and rates that are right in spite of it.
+//! Pile-up: which TDC a recording comes from, and rates that are corrected for it.
 
 use crate::calibration::recorded;
-use crate::long_or;
-use dtof_calibrate::{Asked, Calibration, Length, Observed, Tdc, calibrate};
+use crate::slow_or_quick;
+use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, Tdc, calibrate};
 use dtof_simulate::scene::Scene;
 
 fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibration {
@@ -22,17 +22,17 @@ fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibra
         bin_width_ps: 250.0,
         truth_mm: None,
     };
-    calibrate(&observed, &Asked::default()).unwrap()
+    calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }
 
 #[test]
 fn a_tdc_of_one_hit_is_recognised_and_its_rates_are_corrected() {
-    for &background in long_or(&[0.003, 0.01, 0.02][..], &[0.02]) {
+    for &background in slow_or_quick(&[0.003, 0.01, 0.02][..], &[0.02]) {
         let found = found(background, "[tdc]\nhits_per_cycle = 1", Length::Cycles);
         let Some(Tdc::OneHit(lost)) = found.tdc else {
             panic!("{background}: {:?}", found.tdc);
         };
-        // Of all photons those of laser cycles with one at least are counted, one each.
+        // Each laser cycle with photons counts one of them.
         let all = 128.0 * background + 0.3;
         let truth = 1.0 - -(-all).exp_m1() / all;
         assert!((lost - truth).abs() < 0.01, "{lost} for {truth}");
@@ -50,14 +50,14 @@ fn a_tdc_of_one_hit_is_recognised_and_its_rates_are_corrected() {
 
 #[test]
 fn a_tdc_of_many_hits_is_not_taken_for_one() {
-    for &background in long_or(&[0.003, 0.02, 0.1][..], &[0.02]) {
+    for &background in slow_or_quick(&[0.003, 0.02, 0.1][..], &[0.02]) {
         let found = found(background, "", Length::Cycles);
         assert_eq!(found.tdc, Some(Tdc::SeveralHits), "{background}");
     }
 }
 
 #[test]
-fn without_laser_cycles_nothing_is_said_of_the_tdc() {
+fn without_laser_cycles_the_tdc_is_unknown() {
     let found = found(0.02, "[tdc]\nhits_per_cycle = 1", |_| Length::Unknown);
     assert_eq!(found.tdc, None);
 }

@@ -1,13 +1,13 @@
-//! Calibration by recorded photons: the public TMF8820 capture log. With the settings found, and
-//! nothing fitted by hand, the centre zone reports every distance from 30 mm on.
+//! Calibration by recorded photons, the public TMF8820 capture log. With the settings from the
+//! calibration, and nothing fitted by hand, the centre zone reports every distance from 30 mm.
 
 use crate::capture_log::{ground_truth, log, tell};
-use dtof_calibrate::{Asked, Calibration, Length, Nearest, Observed, calibrate};
+use dtof_calibrate::{Calibration, CalibrationOptions, Length, Nearest, Observed, calibrate};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Array, PixelAddress};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::SettingsFile;
-use dtof_photons::open::{Opening, counts};
+use dtof_photons::open::{ReadOptions, counts};
 use dtof_photons::recorded::{Capture, RecordedHistograms, RecordingLength};
 use dtof_photons::source::{PhotonSource, Slice};
 
@@ -16,8 +16,8 @@ const CENTRE: usize = 4;
 const CYCLES: u16 = 10_000;
 const PHOTONS_PER_CYCLE: f64 = 0.5;
 
-/// Events of the centre zone in captures from 30 mm on: how many captures have one whose
-/// median is within 50 mm, photons an event, and the median error of single events.
+/// Events of the centre zone in captures from 30 mm: the number of captures whose median is within
+/// 50 mm, photons per event, and the median error of single events.
 fn judged(
     found: &Calibration,
     captures: &[Capture],
@@ -36,7 +36,7 @@ fn judged(
     let (pixels, truth): (Vec<_>, Vec<f64>) = centre
         .map(|(zones, &truth)| (zones[CENTRE].clone(), truth))
         .unzip();
-    let addresses: Vec<PixelAddress> = (0..).take(pixels.len()).map(PixelAddress).collect();
+    let addresses: Vec<PixelAddress> = (0..).take(pixels.len()).map(PixelAddress::new).collect();
     let array = Array::new(u32::try_from(pixels.len()).unwrap(), 1).unwrap();
     let mut engine = host_engine(&settings, array, &addresses).unwrap();
     let slice = Slice {
@@ -47,7 +47,7 @@ fn judged(
     let scale = settings.range_scale().unwrap();
     let mut errors = vec![Vec::new(); truth.len()];
     for event in &events {
-        let pixel = usize::from(event.pixel.0);
+        let pixel = usize::from(event.pixel.raw());
         let range: f64 = scale.range(event.position()).to_num();
         errors[pixel].push(range - truth[pixel]);
     }
@@ -62,9 +62,9 @@ fn judged(
     (near, each, median(&mut absolute).unwrap())
 }
 
-/// The median error of an ideal estimate of a pulse from 13 photons: the Cramér-Rao bound for the
-/// pulse that the centre zone shows, whose slope is the difference of the captures before and
-/// after. Of all captures the median, in millimetres.
+/// The median error of an ideal estimate of the pulse from 13 photons, in millimetres: the Cramér-Rao
+/// bound for the pulse of the centre zone, with the slope from the captures before and after. The
+/// median over all captures.
 fn ideal_error(captures: &[Capture], truth: &[f64], mm_per_bin: f64) -> f64 {
     let pulses: Vec<Vec<f64>> = captures
         .iter()
@@ -100,40 +100,42 @@ fn ideal_error(captures: &[Capture], truth: &[f64], mm_per_bin: f64) -> f64 {
 #[test]
 fn a_recording_with_distances_calibrates_itself() {
     let Some(log) = log() else { return };
-    let counts = counts(&log, &Opening::default()).unwrap();
+    let counts = counts(&log, &ReadOptions::default()).unwrap();
     let observed = Observed {
         array: Array::new(9, 1).unwrap(),
         captures: &counts.captures,
         length: Length::PhotonsPerCycle(PHOTONS_PER_CYCLE),
         cycles: None,
-        bin_width_ps: counts.known.bin_width_ps.to_num(),
+        bin_width_ps: counts.metadata.bin_width_ps.to_num(),
         truth_mm: counts.truth_mm.as_deref(),
     };
-    let found = calibrate(&observed, &Asked::default()).unwrap();
+    let found = calibrate(&observed, &CalibrationOptions::default()).unwrap();
     let pulse = found.pulse.as_ref().unwrap();
     tell(&format!(
         "{pulse:?}\n{:?}\n{:?}\n{:?}",
-        found.offset, found.detection, found.spent
+        found.offset, found.detection, found.photon_budget
     ));
-    // The pulse has a tail, and that is said instead of a width that is none.
+    // The pulse has a tail, which is reported instead of a width.
     assert!(pulse.is_core && pulse.tail > 0.05, "{pulse:?}");
     // It falls more slowly than it rises.
-    let suited = pulse.suited.unwrap();
-    let (before, after) = (suited.window.before(), suited.window.after());
+    let asymmetric = pulse.asymmetric.unwrap();
+    let (before, after) = (asymmetric.window.before(), asymmetric.window.after());
     assert_eq!((before, after), (U8F8::lit("1.75"), U8F8::lit("4")));
-    assert!(suited.error < 0.95 * suited.equal, "{suited:?}");
+    assert!(
+        asymmetric.error < 0.95 * asymmetric.symmetric,
+        "{asymmetric:?}"
+    );
     assert_eq!(found.nearest, Nearest::NotCommon);
     // The authors state 91 ps, and a centroid 92.1.
     assert!((91.0..=92.5).contains(&found.bin_width_ps));
 
-    // Whatever settings were before, those that are written hold, with the window that the offset
-    // was found with.
+    // The written settings replace earlier ones, with the window that the offset belongs to.
     let older = "[sensor]\nsigma_bins = 0.5\n[detection]\nestimator = 'centroid'\n";
     for older in [older, "[detection]\nhalf_widths = [1, 3]\n"] {
         let before = || SettingsFile::parse(older).unwrap();
         let settings = found.settings(before()).unwrap();
         let settings = settings.settings(found.bins).unwrap();
-        assert_eq!(settings.half_widths, Some(suited.window));
+        assert_eq!(settings.half_widths, Some(asymmetric.window));
         let mut even = found.clone();
         even.detection.as_mut().unwrap().half_widths = None;
         let settings = even.settings(before()).unwrap();
@@ -142,7 +144,7 @@ fn a_recording_with_distances_calibrates_itself() {
     }
 
     let truth = ground_truth(&log);
-    // In other laser cycles than those that the minimum was chosen by.
+    // In other laser cycles than those that determined the minimum count.
     for seed in 2..12 {
         let (distances, photons, error) = judged(&found, &counts.captures, &truth, seed);
         tell(&format!(

@@ -1,12 +1,12 @@
-//! Calibration against simulated scenes whose truth is known: twenty drawn at random, of which
-//! it is told nothing but the histograms and their laser cycles.
+//! Compares the calibration with the truth of twenty random simulated scenes. It gets only their
+//! histograms and laser cycles.
 
 use crate::calibration::{Drawn, false_alarms};
-use crate::long_or;
-use dtof_calibrate::{Asked, Length, Nearest, Observed, calibrate};
+use crate::slow_or_quick;
+use dtof_calibrate::{CalibrationOptions, Length, Nearest, Observed, calibrate};
 use rayon::prelude::*;
 
-/// What is wrong with the calibration by scene `number`, and a line on it.
+/// The errors of the calibration by scene `number`, and a line about it.
 fn judge(number: u64) -> (Vec<String>, String) {
     let drawn = Drawn::new(number);
     let captures = [drawn.capture(number)];
@@ -18,13 +18,13 @@ fn judge(number: u64) -> (Vec<String>, String) {
         bin_width_ps: drawn.scene.bin_width_ps,
         truth_mm: None,
     };
-    let told = Asked {
-        // A wall alone may be a glass: the user has to say.
+    let options = CalibrationOptions {
+        // A wall alone may be a cover glass: the user decides.
         glass: drawn.is_wall_alone().then_some(false),
         target_mm: Some(drawn.wall_mm + drawn.offset_mm),
-        ..Asked::default()
+        ..CalibrationOptions::default()
     };
-    let found = calibrate(&observed, &told).unwrap();
+    let found = calibrate(&observed, &options).unwrap();
     let mut wrong = Vec::new();
     let mut check = |what: &str, is_right: bool, found: String, truth: String| {
         if !is_right {
@@ -121,8 +121,8 @@ fn truth_of(drawn: &Drawn) -> f64 {
 
 #[test]
 fn random_scenes_are_calibrated_within_the_stated_limits() {
-    // Four that take little time: with and without a glass, hot pixels and nearer surfaces.
-    let scenes = long_or((0..20).collect(), vec![2, 6, 12, 14]);
+    // Four fast ones: with and without a cover glass, hot pixels and nearer surfaces.
+    let scenes = slow_or_quick((0..20).collect(), vec![2, 6, 12, 14]);
     let all: Vec<(Vec<String>, String)> = scenes.into_par_iter().map(judge).collect();
     for (_, line) in &all {
         println!("{line}");
@@ -132,7 +132,7 @@ fn random_scenes_are_calibrated_within_the_stated_limits() {
 }
 
 #[test]
-fn a_wall_alone_may_be_a_glass_and_is_asked_for() {
+fn a_wall_alone_may_be_a_cover_glass() {
     let number = (0..100).find(|&number| Drawn::new(number).is_wall_alone());
     let drawn = Drawn::new(number.unwrap());
     let captures = [drawn.capture(1)];
@@ -145,23 +145,23 @@ fn a_wall_alone_may_be_a_glass_and_is_asked_for() {
         truth_mm: None,
     };
     let with = |glass| {
-        let asked = Asked {
+        let options = CalibrationOptions {
             glass,
-            ..Asked::default()
+            ..CalibrationOptions::default()
         };
-        calibrate(&observed, &asked).unwrap()
+        calibrate(&observed, &options).unwrap()
     };
     let wall = (drawn.wall_mm / drawn.scene.mm_per_bin()).floor();
     let is_wall = |bin: usize| (bin as f64 - wall).abs() <= 1.0;
     let Nearest::WallOrGlass(bin) = with(None).nearest else {
-        panic!("not asked for");
+        panic!("without the option");
     };
     assert!(is_wall(bin));
-    let told = with(Some(false));
-    assert_eq!(told.nearest, Nearest::Wall(bin));
-    assert_eq!(told.gate.0, 0);
+    let wall = with(Some(false));
+    assert_eq!(wall.nearest, Nearest::Wall(bin));
+    assert_eq!(wall.gate.0, 0);
     let Nearest::Glass(glass) = with(Some(true)).nearest else {
-        panic!("told");
+        panic!("with the option");
     };
     assert!(is_wall(glass.top));
 }

@@ -1,4 +1,4 @@
-//! Scenes drawn at random for calibration, and the false alarms of what comes out.
+//! Random scenes for calibration, and the false alarms with the resulting settings.
 
 #![allow(
     dead_code,
@@ -11,7 +11,8 @@ use std::fmt::Write as _;
 
 use dtof_calibrate::Calibration;
 use dtof_core::fixed::types::U4F12;
-use dtof_core::{Count, DepthEstimator, Histogram, RangeGate, WindowRule, detect};
+use dtof_core::rule::detect;
+use dtof_core::{Count, DepthEstimator, Histogram, RangeGate, WindowRule};
 use dtof_photons::recorded::Capture;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_simulate::scene::Scene;
@@ -22,10 +23,10 @@ use rand_core::SeedableRng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 
-/// Photons of a whole recording, about, at most.
+/// About the most photons of a recording.
 const PHOTONS: f64 = 1.2e7;
 
-/// A scene and what is not told of it.
+/// A scene and its truth.
 pub struct Drawn {
     pub scene: Scene,
     pub cycles: u64,
@@ -51,7 +52,7 @@ impl Drawn {
         let mm_per_bin = bin_width_ps * dtof_photons::MM_PER_PS;
         let background = log(&mut between, 0.002, 0.3);
         let sigma = between(0.5, 1.6);
-        // Some with hot pixels, which take most of the photons there are.
+        // Some have hot pixels, which produce most of the photons.
         let hot_count = (between(-3.0, 6.0).max(0.0) as usize).min(pixels / 4);
         let mut hot = Vec::new();
         while hot.len() < hot_count {
@@ -71,7 +72,7 @@ impl Drawn {
         let each_cycle = background * bins as f64 * (pixels + 99 * hot.len()) as f64;
         let cycles = log(&mut between, 4000.0, 100_000.0).min((PHOTONS / each_cycle).max(4000.0));
         let cycles = cycles.round();
-        // So many times its noise in each pixel.
+        // A multiple of its noise in each pixel.
         let noise = (background * (4.0 * sigma + 1.0) / cycles).sqrt();
         let signal = (between(15.0, 60.0) * noise).max(0.03);
         let glass = (between(0.0, 1.0) < 0.6).then(|| {
@@ -86,7 +87,7 @@ impl Drawn {
              laser_rate_mhz = 0.5\nbackground = {background:?}\npulse_sigma_bins = {sigma:?}\n\
              [[surface]]\nposition_bins = {wall:?}\nsignal = {signal:?}\n"
         );
-        // The wall stays what most of the pixels see.
+        // Most pixels still see the wall.
         let several = if pixels == 16 { 1 } else { 3 };
         let surfaces = if between(0.0, 1.0) < 0.3 { 0 } else { several };
         for surface in 0..surfaces {
@@ -97,7 +98,7 @@ impl Drawn {
             let side = ["columns", "rows"][surface % 2];
             let other = ["rows", "columns"][surface % 2];
             let at = between(nearest, wall - 8.0);
-            // A scene is checked a column behind its last one, too.
+            // A scene is also checked one column after its last.
             let right = between(nearest, wall - 8.0).max(0.5 * at);
             let slant = if surface == 2 { right } else { at } * mm_per_bin;
             writeln!(
@@ -130,7 +131,7 @@ impl Drawn {
         }
     }
 
-    /// One flat wall, and no glass before it.
+    /// One flat wall without a cover glass.
     pub fn is_wall_alone(&self) -> bool {
         self.surfaces == 0 && self.scene.effects.cover_glass.is_none()
     }
@@ -144,8 +145,8 @@ impl Drawn {
         capture
     }
 
-    /// The first bin from which on the glass has less than half a standard deviation of the
-    /// background in 2000 laser cycles, or as many as fit the counters.
+    /// The first bin after which the crosstalk of the cover glass is below half a standard deviation of
+    /// the background, in 2000 laser cycles or as many as fit the counters.
     pub fn glass_end(&self) -> u16 {
         let Some(glass) = &self.scene.effects.cover_glass else {
             return 0;
@@ -163,7 +164,7 @@ impl Drawn {
     }
 }
 
-/// Calls `each` with all photons of a source, part by part.
+/// Calls `each` with all photons of a source, in parts.
 pub fn slices(mut photons: impl PhotonSource, cycles: u64, mut each: impl FnMut(&Slice)) {
     let mut left = cycles;
     while left > 0 {
@@ -188,7 +189,8 @@ pub fn recorded(scene: &Scene, cycles: u64, seed: u64) -> Capture {
     capture
 }
 
-/// The share of exposures to `background` alone that end with an event with the settings found.
+/// The share of exposures to `background` alone that have an event, with the settings of the
+/// calibration.
 pub fn false_alarms(found: &Calibration, background: f64) -> f64 {
     match found.bins {
         64 => of::<64>(found, background),
@@ -199,7 +201,7 @@ pub fn false_alarms(found: &Calibration, background: f64) -> f64 {
 }
 
 fn of<const BINS: usize>(found: &Calibration, background: f64) -> f64 {
-    // Some 200 events, or as many as do not take long.
+    // About 200 events, or as many as do not take long.
     let exposure = background * BINS as f64 * 2000.0;
     let exposures_drawn = (6e8 / exposure).clamp(10_000.0, 20_000.0) as u32;
     let detection = found.detection.unwrap();

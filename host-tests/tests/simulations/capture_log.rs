@@ -1,19 +1,18 @@
-//! The public TMF8820 capture log, when it lies at
-//! `../shared/data/tmf8820_plane_gt/distance_data.json` beside the workspace or where
-//! `TMF8820_LOG` says.
+//! The public TMF8820 capture log, if it is at `../shared/data/tmf8820_plane_gt/distance_data.json`
+//! beside the workspace, or at the path in `TMF8820_LOG`.
 
 #![allow(dead_code, reason = "not every test needs all of it")]
 
 use std::io::Write;
 use std::path::PathBuf;
 
-/// Writes past the test harness, which hides what passing tests print.
+/// Writes past the test harness, which hides the output of passing tests.
 pub fn tell(line: &str) {
     let mut out = std::io::stderr().lock();
     writeln!(out, "{line}").unwrap();
 }
 
-/// Where it is; says so if it is nowhere.
+/// Its path. Prints a line if it is missing.
 pub fn log() -> Option<PathBuf> {
     let beside = concat!(
         env!("CARGO_MANIFEST_DIR"),

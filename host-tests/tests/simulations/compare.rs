@@ -1,9 +1,9 @@
-//! What `dtof compare` rests on: costs, thresholds of equal false alarms, harder conditions, the
-//! bound, and the choice.
+//! The parts of `dtof compare`: costs, thresholds of equal false alarms, harder conditions, the bound,
+//! and the choice.
 
 use std::path::Path;
 
-use crate::long_or;
+use crate::slow_or_quick;
 
 use dtof_compare::Figures;
 use dtof_compare::answer::answer;
@@ -21,7 +21,7 @@ use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 use dtof_theory::bounds::likelihood_ratio::information;
 
-/// The count of an operation of a table of instructions at opt-level 3.
+/// The instructions of an operation in a table, at opt-level 3.
 fn counted(variant: &str) -> f64 {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/results/bench/instructions.csv");
     let text = std::fs::read_to_string(path).unwrap();
@@ -72,12 +72,12 @@ fn settings(l1: u16) -> Settings {
     SettingsFile::parse(&toml).unwrap().settings(128).unwrap()
 }
 
-/// Exposures of a background alone, decided by the engine: as many events as were asked for.
+/// In exposures to a background alone, the engine finds the requested number of events.
 #[test]
-fn rules_have_the_false_alarms_that_are_asked_for() {
+fn rules_have_the_requested_false_alarms() {
     const ALL: [Rule; 4] = [Rule::Paper, Rule::Window(3), Rule::Average, Rule::Window(5)];
-    let rules = long_or(&ALL[..], &ALL[..2]);
-    for &(background, l1) in long_or(&[(0.02, 40), (0.1, 4)][..], &[(0.02, 40)]) {
+    let rules = slow_or_quick(&ALL[..], &ALL[..2]);
+    for &(background, l1) in slow_or_quick(&[(0.02, 40), (0.1, 4)][..], &[(0.02, 40)]) {
         let settings = settings(l1);
         let found = Thresholds::simulate(rules, &settings, background, 1).unwrap();
         let scene = format!("columns = 64\nrows = 32\ncycles = 8000\nbackground = {background}\n");
@@ -129,7 +129,7 @@ fn harder_conditions_have_the_photons_they_say() {
         let photons = Box::new(scene.photons(3, scene.cycles).unwrap());
         let mut photons = Stressed::new(photons, stress, 128, 1.0, 3);
         let mut counts = vec![vec![0.0; 128]; 81];
-        // Slices of other lengths are the same photons.
+        // Slices of other lengths have the same photons.
         for _ in 0..8 {
             let slice = photons.next_slice(500).unwrap();
             for (pixel, counts) in slice.pixels.iter().zip(&mut counts) {
@@ -169,12 +169,12 @@ fn harder_conditions_have_the_photons_they_say() {
         let glass: f64 = counts[40][8..20].iter().sum();
         assert_eq!(glass > 9.0, name.starts_with("a glass"), "{name} {glass}");
     }
-    // The second laser is everywhere in turn: its signal in 8 times as many bins.
+    // The second laser is in all places in turn: its signal is in 8 times as many bins.
     let (far, _) = of(&counted(&all[8]));
     assert!((far - 0.02 - 1.0 / (8.0 * 128.0)).abs() < 0.001, "{far}");
 }
 
-/// A likelihood ratio gathers its information at a known rate, and needs that of its threshold.
+/// A likelihood ratio gains information at a known rate, and needs that of its threshold.
 #[test]
 fn the_bound_is_that_of_the_information() {
     for (background, signal, sigma) in [(0.05, 0.145, 1.0), (0.01, 0.3, 0.6), (0.2, 0.5, 1.5)] {
@@ -194,7 +194,7 @@ fn the_bound_is_that_of_the_information() {
     }
 }
 
-/// The answer lies between two trials, of which the slowest pixels may report in one only.
+/// The answer lies between two trials. The slowest pixels may report in only one of them.
 #[test]
 fn the_slowest_pixels_of_the_answer_lie_between_those_of_its_trials() {
     let slowest = |slow: [f64; 2]| {
@@ -204,7 +204,7 @@ fn the_slowest_pixels_of_the_answer_lie_between_those_of_its_trials() {
             outcome.figures.slow_cycles = slow;
         }
         let methods = Method::all(U8F8::ONE, 2);
-        answer(&methods, &outcomes, 10.0).able[0].slow_cycles
+        answer(&methods, &outcomes, 10.0).candidates[0].slow_cycles
     };
     assert!((slowest([200.0, 800.0]) - 400.0).abs() < 1e-3);
     assert_eq!(slowest([200.0, f64::INFINITY]), 200.0);
@@ -246,21 +246,25 @@ fn the_cheapest_of_the_nearly_fastest_is_taken() {
         outcome(frames, 1000, 1000.0, 9.9, 1.0),
     ];
     let found = answer(&methods, &all, 10.0);
-    let able: Vec<usize> = found.able.iter().map(|choice| choice.method).collect();
+    let able: Vec<usize> = found
+        .candidates
+        .iter()
+        .map(|choice| choice.method)
+        .collect();
     assert_eq!(able, [1, 0, 3]);
-    let taken = found.taken.unwrap();
+    let taken = found.best.unwrap();
     assert_eq!((taken.method, taken.effort), (0, 10));
     assert!((taken.cycles - 200.0).abs() < 0.1 && (taken.error_mm - 10.0).abs() < 0.01);
     // A tenth slower is too slow.
     let found = answer(&methods, &all, 9.95);
-    assert_eq!(found.taken.unwrap().method, 0);
+    assert_eq!(found.best.unwrap().method, 0);
     // One that is often wrong is not exact.
     let mut wrong = all.clone();
     wrong[1].figures.wrong = 0.03;
     let found = answer(&methods, &wrong, 10.0);
-    assert_eq!(found.taken.unwrap().method, 1);
+    assert_eq!(found.best.unwrap().method, 1);
     // Unless frames are wrong as often.
     wrong[5].figures.wrong = 0.03;
-    assert_eq!(answer(&methods, &wrong, 10.0).taken.unwrap().method, 0);
-    assert_eq!(answer(&methods, &all, 1.0).taken, None);
+    assert_eq!(answer(&methods, &wrong, 10.0).best.unwrap().method, 0);
+    assert_eq!(answer(&methods, &all, 1.0).best, None);
 }

@@ -1,5 +1,5 @@
-//! Twenty scenes drawn at random: the method that a comparison names is within a tenth of the
-//! fastest on other photons of the same scene, too.
+//! Twenty random scenes: the method that a comparison recommends is within a tenth of the fastest, also
+//! on other photons of the same scene.
 
 use dtof_compare::truth::Truth;
 use dtof_compare::{Comparison, Task, compare};
@@ -10,7 +10,7 @@ use rand_core::SeedableRng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 
-/// A wall, a slanted wall or a ball before one, of random brightness.
+/// A wall, a slanted wall, or a ball in front of a wall, with random brightness.
 fn scene(number: u64) -> String {
     let mut rng = Pcg64::seed_from_u64(1000 + number);
     let mut between = |low: f64, high: f64| Uniform::new(low, high).unwrap().sample(&mut rng);
@@ -66,13 +66,13 @@ fn the_method_named_is_nearly_the_best_on_other_photons() {
         let scene = Scene::parse(&scene(number)).unwrap();
         let one = compared(&scene, 1, None);
         let within = one.answer.within_mm;
-        let taken = one.answer.taken;
+        let taken = one.answer.best;
         let other = compared(&scene, 100, Some(within));
-        let best = other.answer.able.first();
+        let best = other.answer.candidates.first();
         let ratio = match (taken, best) {
             (None, None) => Some(1.0),
             (Some(taken), Some(best)) => {
-                let mut able = other.answer.able.iter();
+                let mut able = other.answer.candidates.iter();
                 let again = able.find(|choice| choice.method == taken.method);
                 again.map(|again| again.cycles / best.cycles)
             }

@@ -1,32 +1,33 @@
-//! A rendered depth map with a picture, `../shared/data/vgroove` beside the workspace: two
-//! walls that meet in a valley. Alone pixels see them, and in blocks.
+//! A rendered depth map with a picture, `../shared/data/vgroove` beside the workspace: two walls that
+//! meet in a valley, seen by single pixels and by blocks.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{BlockLevel, Count, DepthEvent, PixelAddress, RangeGate, WindowRule, z_for_levels};
+use dtof_core::rule::z_for_levels;
+use dtof_core::{BlockLevel, Count, DepthEvent, PixelAddress, RangeGate, WindowRule};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{AdaptiveBinning, Settings};
-use dtof_events::reports::LastReports;
+use dtof_events::last_events::LastEvents;
 use dtof_photons::source::PhotonSource;
-use dtof_run::truth::Comparison;
-use dtof_simulate::scene::{self, Along, DepthMap, Scene};
+use dtof_run::truth::SceneComparison;
+use dtof_simulate::scene::{DepthAlong, DepthMap, Scene};
 
-/// Where it is; says so if it is nowhere.
+/// Its path. Prints a line if it is missing.
 fn vgroove() -> Option<PathBuf> {
     let beside = concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data/vgroove");
     let found = Some(PathBuf::from(beside)).filter(|path| path.exists());
     if found.is_none() {
-        // Past the test harness, which hides what passing tests print.
+        // Past the test harness, which hides the output of passing tests.
         let mut out = std::io::stderr().lock();
         writeln!(out, "SKIPPED: depth map: no vgroove beside the workspace").unwrap();
     }
     found
 }
 
-/// The scene, seen by an array as large as the map unless `size` says otherwise.
-fn scene_of(folder: &Path, along: Along, size: Option<[u32; 2]>) -> Scene {
+/// The scene, seen by an array of `size`, by default as large as the map.
+fn scene_of(folder: &Path, along: DepthAlong, size: Option<[u32; 2]>) -> Scene {
     let map = DepthMap::read(&folder.join("depth.npy"), along).unwrap();
     let map = map.with_picture(&folder.join("rgb.npy")).unwrap();
     let mut scene = Scene::parse("background = 0.02").unwrap();
@@ -36,13 +37,15 @@ fn scene_of(folder: &Path, along: Along, size: Option<[u32; 2]>) -> Scene {
     scene
 }
 
-/// How much z of the points differs along a column, at most, in millimetres.
+/// The largest difference of z along a column, in millimetres.
 fn spread_mm(scene: &Scene) -> f64 {
     let [columns, rows] = scene.size;
     let z = |column: u32, row: u32| {
-        let pixel = PixelAddress(u16::try_from(row * columns + column).unwrap());
+        let pixel = PixelAddress::new(u16::try_from(row * columns + column).unwrap());
         let place = |index: u32, of: u32| (f64::from(index) + 0.5) / f64::from(of);
-        let ray = scene.view().ray(place(column, columns), place(row, rows));
+        let ray = scene
+            .effective_field_of_view()
+            .ray(place(column, columns), place(row, rows));
         scene.truth(pixel, 0).unwrap().range_mm * ray[2]
     };
     let spread = (0..columns).map(|column| {
@@ -53,13 +56,13 @@ fn spread_mm(scene: &Scene) -> f64 {
     spread.fold(0.0, f64::max)
 }
 
-/// Both walls stand upright: taken as range along the ray, z is the same along a column. The
+/// Both walls are upright: if the depths are ranges along the ray, z is the same along a column. The
 /// file has steps of half a millimetre.
 #[test]
 fn its_values_are_ranges_along_the_ray() {
     let Some(folder) = vgroove() else { return };
-    let ray = spread_mm(&scene_of(&folder, Along::Ray, None));
-    let axis = spread_mm(&scene_of(&folder, Along::Axis, None));
+    let ray = spread_mm(&scene_of(&folder, DepthAlong::Ray, None));
+    let axis = spread_mm(&scene_of(&folder, DepthAlong::Axis, None));
     assert!(ray < 1.0, "{ray} mm");
     assert!(axis > 50.0, "{axis} mm");
 }
@@ -68,11 +71,11 @@ fn its_values_are_ranges_along_the_ray() {
 #[test]
 fn events_lie_on_its_walls() {
     let Some(folder) = vgroove() else { return };
-    let scene = scene_of(&folder, Along::Ray, Some([40, 30]));
-    let settings = scene::settings(1);
+    let scene = scene_of(&folder, DepthAlong::Ray, Some([40, 30]));
+    let settings = Settings::static_scene(1);
     let mut photons = scene.photons(settings.seed, 500).unwrap();
     let mut engine = host_engine(&settings, photons.array(), &photons.addresses()).unwrap();
-    let mut comparison = Comparison::new(&scene, &settings, 500).unwrap();
+    let mut comparison = SceneComparison::new(&scene, &settings, 500).unwrap();
     comparison.add(&engine.run(&photons.next_slice(500).unwrap()).unwrap());
     let truth = comparison.finish();
     let all = truth.all;
@@ -99,14 +102,14 @@ fn events(scene: &Scene, settings: &Settings) -> Vec<DepthEvent> {
     slices.collect::<Vec<_>>().concat()
 }
 
-/// A block may cover pixels of both walls, or of different depth. Wrong is more than three bins.
+/// A block may cover pixels of both walls, or of different depth. An error is more than three bins.
 #[test]
 fn blocks_report_its_walls_and_leave_pixels_their_events() {
     let Some(folder) = vgroove() else { return };
-    let mut scene = scene_of(&folder, Along::Ray, Some([80, 60]));
+    let mut scene = scene_of(&folder, DepthAlong::Ray, Some([80, 60]));
     let array = scene.array().unwrap();
     scene.background = 0.05;
-    // Around 0.08 signal photons a laser cycle.
+    // About 0.08 signal photons per laser cycle.
     scene.signal_at_one_metre *= 0.005;
     // One false alarm in a hundred exposures, with the blocks and without.
     let settings = |levels| {
@@ -120,7 +123,7 @@ fn blocks_report_its_walls_and_leave_pixels_their_events() {
             x: 4,
             l1: 40,
             binning: (!is_alone).then_some(AdaptiveBinning { levels, patience }),
-            ..scene::settings(1)
+            ..Settings::static_scene(1)
         }
     };
     let (alone, with_blocks) = (BlockLevel::PIXEL, BlockLevel::saturating(2));
@@ -133,12 +136,12 @@ fn blocks_report_its_walls_and_leave_pixels_their_events() {
     };
     let own = of_pixels(&events(&scene, &alone));
     let events = events(&scene, &with_blocks);
-    let mut reports = vec![LastReports::default(); array.pixels() as usize];
+    let mut last_events = vec![LastEvents::default(); array.pixels() as usize];
     let (mut right, mut wrong) = (0, 0);
     for event in &events {
         for pixel in array.pixels_of(event.pixel, event.level) {
-            let report = &mut reports[usize::from(pixel.0)];
-            let stands = report.take(event.level, event.cycle, event.exposure.into());
+            let report = &mut last_events[usize::from(pixel.raw())];
+            let stands = report.record(event.level, event.cycle, event.exposure.into());
             if !stands || event.level == BlockLevel::PIXEL {
                 continue;
             }

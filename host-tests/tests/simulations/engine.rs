@@ -1,27 +1,27 @@
-//! The engine of this computer against the float reference, event by event, on simulated
+//! Compares the engine of this computer with the float reference, event by event, on simulated
 //! scenes: window rule, tracking, echoes and blocks.
 //!
 //! One difference is allowed: the window rule in integers rounds down z² to 1/256, its sixth to
-//! 1/16, its 36th to 1/576 and a quotient to 16 bits. Where a window lies within what that can
-//! do, the reference takes the engine's answer. Such windows are counted.
+//! 1/16, its 36th to 1/576 and a quotient to 16 bits. If a window lies within that rounding, the
+//! reference takes the engine's answer. Such windows are counted.
 
 use std::collections::BTreeMap;
 
 use dtof_core::fixed::types::U4F12;
+use dtof_core::rule::z_for_levels;
 use dtof_core::{
     AnyRule, BlockLevel, Count, DepthEvent, EchoNumber, Flags, PixelConfig, RangeGate, WindowRule,
-    z_for_levels,
 };
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_host_tests::reference::{BinnedArray, EchoConfig, Reporter, Window};
 use dtof_link::AdaptiveBinning;
 use dtof_photons::source::PhotonSource as _;
-use dtof_simulate::scene::{self, Scene};
+use dtof_simulate::scene::Scene;
 
 const BINS: usize = 128;
 
-/// A dim wall, a matt box and a bright one before it, with a second echo of each.
+/// A dim wall with a matt and a bright box in front of it, and a second echo of each.
 const SCENE: &str = r#"
 columns = 11
 rows = 9
@@ -50,12 +50,12 @@ share = 0.3
 behind_mm = 400
 "#;
 
-/// What came of a run.
+/// The counts of a run.
 #[derive(Debug, Default)]
 struct Tally {
     decisions: u32,
-    /// Windows within the rounding, and of these where the engine was not of one mind with
-    /// the formula.
+    /// Windows within the rounding, and how many of them the engine and the formula decided
+    /// differently.
     close: u32,
     explained: u32,
     levels: [u32; 4],
@@ -64,7 +64,7 @@ struct Tally {
     tails: u32,
 }
 
-/// The least and the most photons between which integers may decide either way.
+/// The range of photons in which integers may decide either way.
 fn rounding(window: &Window) -> (f64, f64) {
     let (z, variance) = (window.z, window.variance());
     let (c, unit) = (z * z / 36.0, 1.0 / (window.bins * window.bins));
@@ -105,12 +105,12 @@ fn reference_config(config: &PixelConfig<BINS, AnyRule>) -> EchoConfig {
         first: config.gate().first().into(),
         last: config.gate().last().into(),
         echoes: config.echoes().raw().into(),
-        reach: config.peel_reach().into(),
+        reach: config.echo_guard_bins().into(),
         wait: Some(config.echo_wait().into()).filter(|&times| times < 255),
     }
 }
 
-/// Both on the same photons.
+/// Runs both on the same photons.
 fn compare(settings: &Settings, cycles: u64, tally: &mut Tally) {
     let scene = Scene::parse(SCENE).unwrap();
     let mut photons = scene.photons(settings.seed, cycles).unwrap();
@@ -133,8 +133,8 @@ fn compare(settings: &Settings, cycles: u64, tally: &mut Tally) {
         let of_engine: BTreeMap<(u64, Reporter), DepthEvent> = events
             .iter()
             .map(|event| {
-                let (level, first) = (event.level.raw().into(), event.pixel.0.into());
-                ((event.cycle.0, Reporter { level, first }), *event)
+                let (level, first) = (event.level.raw().into(), event.pixel.raw().into());
+                ((event.cycle.raw(), Reporter { level, first }), *event)
             })
             .collect();
         assert_eq!(
@@ -222,7 +222,7 @@ fn settings(levels: u8, tracking: bool, echoes: u8, seed: u64) -> Settings {
         echoes: EchoNumber::new(echoes).unwrap(),
         // Of every other run.
         echo_wait: seed.is_multiple_of(2).then_some(5),
-        ..scene::settings(seed)
+        ..Settings::static_scene(seed)
     }
 }
 
@@ -253,7 +253,7 @@ fn the_engine_and_the_float_reference_agree() {
                 .all(|&events| events > 100)
         );
         assert_eq!(tally.expected > 100, tracking);
-        // The rounding decides about few windows.
+        // The rounding affects few windows.
         assert!(tally.close * 50 < tally.decisions, "{tally:?}");
         all.decisions += tally.decisions;
         all.explained += tally.explained;

@@ -1,6 +1,6 @@
 //! Simulations and recordings from end to end, against the float reference, theory and truth.
 //!
-//! Some draw more scenes, exposures or seeds if `DTOF_SLOW` is set, which takes minutes:
+//! With `DTOF_SLOW` some draw more scenes, exposures or seeds, which takes minutes:
 //!
 //! ```sh
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test simulations
@@ -22,10 +22,10 @@ mod recorded_echoes;
 mod recorded_warnings;
 mod theory_exposures;
 
-/// `all` of what a test simulates if `DTOF_SLOW` is set, `few` in a plain `cargo test`.
-fn long_or<T>(all: T, few: T) -> T {
+/// Returns `slow` if `DTOF_SLOW` is set, and `quick` in a plain `cargo test`.
+fn slow_or_quick<T>(slow: T, quick: T) -> T {
     match std::env::var_os("DTOF_SLOW") {
-        Some(_) => all,
-        None => few,
+        Some(_) => slow,
+        None => quick,
     }
 }

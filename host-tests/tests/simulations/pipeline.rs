@@ -1,11 +1,10 @@
-//! The integer pipeline against the float reference, laser cycle by laser
-//! cycle on the same photons.
+//! Compares the integer pipeline with the float reference, laser cycle by laser cycle, on the same
+//! photons.
 //!
-//! Both must agree on every decision: taken when, on which peak, with which
-//! background, fired or not. With the quadrants one difference is allowed, the integer
-//! square root's: its floor lowers the threshold by less than α, so that a peak between
-//! the two thresholds fires in integers alone. Wherever that is claimed the test
-//! proves it from the counts. With the average there is no root, and no difference.
+//! Both must agree on every decision: its time, peak, background and result. With the quadrants one
+//! difference is allowed: the integer square root is rounded down, which lowers the threshold by less
+//! than α, so a peak between the two thresholds causes an event in integers only. The test verifies
+//! each such case from the counts. With the average there is no root and no difference.
 
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
@@ -18,7 +17,7 @@ use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
 
-/// What the exposures of one run came to.
+/// The counts of one run.
 #[derive(Debug, Default)]
 struct Tally {
     exposures: u32,
@@ -29,7 +28,7 @@ struct Tally {
     explained_by_floor: u32,
 }
 
-/// Settings drawn for one simulated pixel.
+/// Random settings for one simulated pixel.
 struct Draw {
     x: u16,
     l1: u16,
@@ -52,7 +51,7 @@ fn one_of<T: Copy>(rng: &mut impl Rng, values: &[T]) -> T {
 
 fn draw<const BINS: usize>(rng: &mut impl Rng) -> Draw {
     let bins = u16::try_from(BINS).unwrap();
-    // One in four is gated where there is room for a gate.
+    // One in four has a gate, if there is room for one.
     let (first, last) = if BINS > 8 && rng.next_u32().is_multiple_of(4) {
         let first = one_of(rng, &[1, 17, 20, 63]);
         (first, one_of(rng, &[first + 7, first + 30, 100, bins - 1]))
@@ -60,8 +59,8 @@ fn draw<const BINS: usize>(rng: &mut impl Rng) -> Draw {
         (0, bins - 1)
     };
     let background = 10f64.powf(-2.0 + 2.0 * unit(rng)); // 0.01 to 1
-    // None, or from a hundredth of the background of all bins to what fills a
-    // counter within some ten laser cycles.
+    // Zero, or from a hundredth of the background of all bins to a rate that fills a counter in about
+    // ten laser cycles.
     let signal = one_of(rng, &[0.0, 0.02, 0.1, 0.3, 1.0, 3.0, 30.0]);
     Draw {
         x: one_of(rng, &[1, 4, 10]),
@@ -80,9 +79,9 @@ fn draw<const BINS: usize>(rng: &mut impl Rng) -> Draw {
     }
 }
 
-/// Runs one pixel until `exposures` of its exposures have ended.
+/// Runs one pixel for `exposures` exposures.
 fn run<const BINS: usize>(seed: u64, background: Background, exposures: u32, tally: &mut Tally) {
-    let mut rng = pixel_rng(seed, PixelAddress(0));
+    let mut rng = pixel_rng(seed, PixelAddress::new(0));
     let draw = draw::<BINS>(&mut rng);
     let gate = RangeGate::new(draw.first, draw.last).unwrap();
     let minimum_count = Count::saturating(draw.minimum_count.into());
@@ -110,10 +109,10 @@ fn run<const BINS: usize>(seed: u64, background: Background, exposures: u32, tal
     };
     let bins = u16::try_from(BINS).unwrap();
     let mut photons = SimulatedPixel::new(&draw.rates, bins, rng).unwrap();
-    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(3));
+    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress::new(3));
     let mut statistics = Statistics::new();
     let mut twin = reference::Pixel::new(BINS, 1023.0, reference_config);
-    // The laser cycle in which the twin was made.
+    // The laser cycle in which the reference pixel started.
     let mut twin_start = 0;
     let end = tally.exposures + exposures;
 
@@ -126,11 +125,11 @@ fn run<const BINS: usize>(seed: u64, background: Background, exposures: u32, tal
             twin.photon(code.into());
         });
         let exposure = pixel.exposure() + 1;
-        // Cleared by an event, so kept for the proof.
+        // An event clears the counts, so they are saved for the check.
         let histogram = pixel.histogram().clone();
-        let look = pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
+        let look = pixel.end_laser_cycle(&config, &mut statistics, LaserCycle::new(cycle));
         let float = twin.end_laser_cycle();
-        let event = pixel.acknowledge();
+        let event = pixel.take_event();
 
         match look {
             Look::NotDue | Look::TooEarly | Look::Expired => {
@@ -162,14 +161,17 @@ fn run<const BINS: usize>(seed: u64, background: Background, exposures: u32, tal
             assert_eq!(look, Look::NoPeak);
             assert!(
                 !float.fired,
-                "the float reference fires alone: the floor cannot explain that"
+                "only the float reference has an event, which rounding down cannot explain"
             );
             continue;
         };
         tally.events += 1;
         tally.exposures += 1;
         tally.saturated += u32::from(peak.count.raw() == 1023);
-        assert_eq!((event.cycle, event.exposure), (LaserCycle(cycle), exposure));
+        assert_eq!(
+            (event.cycle, event.exposure),
+            (LaserCycle::new(cycle), exposure)
+        );
         assert_eq!((event.peak_bin, event.peak_count), (peak.bin, peak.count));
         // The average is rounded, to 1/256 for the depth and to whole counts in the event.
         let (rounding, shift) = match background {
@@ -200,10 +202,10 @@ fn run<const BINS: usize>(seed: u64, background: Background, exposures: u32, tal
             );
             assert!(
                 float.peak_count <= reference::threshold(background, alpha),
-                "and not above the upper one, which differs by the root's floor alone"
+                "and not above the upper one, which differs only by rounding the root down"
             );
             tally.explained_by_floor += 1;
-            // The integer pixel starts over; so must its twin.
+            // The integer pixel starts over, and so must the reference.
             twin = reference::Pixel::new(BINS, 1023.0, reference_config);
             twin_start = cycle + 1;
         }

@@ -1,5 +1,4 @@
-//! Recorded photons with ground truth: the public TMF8820 capture log. Prints what
-//! comes out for each zone.
+//! Recorded photons with ground truth: the public TMF8820 capture log. Prints the results of each zone.
 
 use std::path::PathBuf;
 
@@ -8,16 +7,15 @@ use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, PaperRule};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_photons::open::{Opening, counts};
+use dtof_photons::open::{ReadOptions, counts};
 use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
 use dtof_photons::source::PhotonSource;
 use dtof_photons::tmf8820;
-use dtof_simulate::scene;
 
 const ZONES: usize = 9;
 const CENTRE: usize = 4;
 
-/// What one zone reports over all captures from 30 to 400 mm.
+/// The reports of one zone over all captures from 30 to 400 mm.
 struct Zone {
     events: usize,
     distances: usize,
@@ -35,10 +33,10 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
         rule: PaperRule::new(U8F8::lit("4"), Count::saturating(min_count.into())).into(),
         l1: 40,
         x: 4,
-        ..scene::settings(1)
+        ..Settings::static_scene(1)
     };
     let truth = ground_truth(log);
-    let recorded = counts(log, &Opening::default()).unwrap();
+    let recorded = counts(log, &ReadOptions::default()).unwrap();
     let length = RecordingLength::PhotonsPerCycle(photons_per_cycle);
     let mut photons =
         RecordedHistograms::new(recorded.array, &recorded.captures, length, 10_000, 1).unwrap();
@@ -47,10 +45,15 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
     let scale = settings.range_scale().unwrap();
 
     std::array::from_fn(|zone| {
-        // Capture and range less truth of every event of this zone.
+        // The capture and the error of the range, for every event of this zone.
         let errors: Vec<(usize, f64)> = events
             .iter()
-            .map(|event| (usize::from(event.pixel.0), scale.range(event.position())))
+            .map(|event| {
+                (
+                    usize::from(event.pixel.raw()),
+                    scale.range(event.position()),
+                )
+            })
             .map(|(pixel, range)| (pixel % ZONES, pixel / ZONES, range.to_num::<f64>()))
             .filter(|&(of, capture, _)| of == zone && truth[capture] > 29.9)
             .map(|(_, capture, range)| (capture, range - truth[capture]))
@@ -58,7 +61,7 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
         let mut captures: Vec<usize> = errors.iter().map(|error| error.0).collect();
         captures.sort_unstable();
         captures.dedup();
-        // One constant offset a zone is allowed for.
+        // One constant offset per zone is subtracted.
         let mut signed: Vec<f64> = errors.iter().map(|error| error.1).collect();
         signed.sort_by(f64::total_cmp);
         let offset = signed[signed.len() / 2];
@@ -107,8 +110,7 @@ fn recorded_photons_give_every_distance_within_bounds() {
                 "{zone:>4} {events:>7} {distances:>10} {offset:>10.2} {median:>10.2} {within_95:>8.2} \
                  {beyond_50:>13}"
             ));
-            // The other zones have no ground truth of their own, but see the
-            // same plane.
+            // The other zones see the same plane, but have no ground truth of their own.
             assert_eq!(*distances, all, "zone {zone}: a distance without an event");
             if zone == CENTRE && min_count == 5 {
                 assert!(

@@ -1,5 +1,4 @@
-//! Several echoes of recorded photons: what they find beyond the highest peak, and what they
-//! do not.
+//! Several echoes of recorded photons: which targets they find beyond the highest peak.
 
 use std::fs::File;
 use std::path::{Path, PathBuf};
@@ -12,11 +11,10 @@ use dtof_core::{
 };
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_photons::open::{Known, Opening, counts};
+use dtof_photons::open::{Metadata, ReadOptions, counts};
 use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
 use dtof_photons::source::PhotonSource;
 use dtof_photons::tmf8820;
-use dtof_simulate::scene;
 use flate2::read::GzDecoder;
 
 const CYCLES: u16 = 20_000;
@@ -28,7 +26,7 @@ fn two() -> EchoNumber {
     EchoNumber::new(2).unwrap()
 }
 
-/// What the centre zone of a capture reports, in millimetres.
+/// The reports of the centre zone of a capture, in millimetres.
 #[derive(Default)]
 struct Found {
     firsts: Vec<f64>,
@@ -36,14 +34,14 @@ struct Found {
     tails: usize,
 }
 
-/// Not a number if there are none.
+/// NaN without values.
 fn median(ranges: &mut [f64]) -> f64 {
     ranges.sort_by(f64::total_cmp);
     ranges.get(ranges.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
-/// The captures nearer than [`NEAR_MM`], at four photons a laser cycle: truth, and what was found.
-/// `sigma` bins of the pulse say how many bins around an echo are left out.
+/// The captures nearer than [`NEAR_MM`], at four photons per laser cycle: the truth and the echoes. The
+/// bins that are excluded around an echo depend on `sigma`, the width of the pulse in bins.
 fn near_captures(log: &PathBuf, sigma: &str) -> Vec<(f64, Found)> {
     let settings = Settings {
         bins: tmf8820::BINS,
@@ -57,10 +55,10 @@ fn near_captures(log: &PathBuf, sigma: &str) -> Vec<(f64, Found)> {
         l2: 2000,
         x: 4,
         echoes: two(),
-        ..scene::settings(1)
+        ..Settings::static_scene(1)
     };
     let truth = ground_truth(log);
-    let recorded = counts(log, &Opening::default()).unwrap();
+    let recorded = counts(log, &ReadOptions::default()).unwrap();
     let length = RecordingLength::PhotonsPerCycle(4.0);
     let scale = settings.range_scale().unwrap();
     let captures = truth.into_iter().zip(&recorded.captures);
@@ -85,8 +83,8 @@ fn near_captures(log: &PathBuf, sigma: &str) -> Vec<(f64, Found)> {
     .collect()
 }
 
-/// A second echo that were a target would stay where it is. These move away with the bins that
-/// are left out, and nearly all are flagged: they are the tail of the first.
+/// The second echo of a target would keep its distance. These move with the excluded bins, and nearly
+/// all have the flag of a tail: they are the tail of the first.
 #[test]
 fn behind_the_first_echo_of_near_captures_there_is_its_tail_and_no_target() {
     let Some(log) = log() else { return };
@@ -107,7 +105,7 @@ fn behind_the_first_echo_of_near_captures_there_is_its_tail_and_no_target() {
                 "{truth:8.1} {first:9.1} {firsts:7} {second:10.1} {further:7} {:6}",
                 found.tails
             ));
-            // The others have fewer photons than an event takes.
+            // The others have fewer photons than an event needs.
             if firsts > 1 {
                 lit += 1;
                 let near = if truth < 19.9 { 11.0 } else { 3.0 };
@@ -131,12 +129,12 @@ fn behind_the_first_echo_of_near_captures_there_is_its_tail_and_no_target() {
     );
 }
 
-/// A histogram, and the distance that the sensor made of it.
+/// A histogram, and the distance that the sensor reported for it.
 type Measured = ([u16; 64], f64);
 
 /// The log of a TMF8829, `../shared/data/tmf8829_log` beside the workspace: histograms of one
-/// column of 16 pixels in 26 frames, and the distances the sensor made of them.
-fn tmf8829() -> Option<(Known, Vec<Measured>)> {
+/// column of 16 pixels in 26 frames, with the distances that the sensor reported.
+fn tmf8829() -> Option<(Metadata, Vec<Measured>)> {
     let path = concat!(
         env!("CARGO_MANIFEST_DIR"),
         "/../../shared/data/tmf8829_log/tmf8829_log.json.gz"
@@ -145,12 +143,11 @@ fn tmf8829() -> Option<(Known, Vec<Measured>)> {
         tell("SKIPPED: recorded echoes: no TMF8829 log beside the workspace");
         return None;
     }
-    let recorded = counts(Path::new(path), &Opening::default()).unwrap();
-    // All columns of a row of histograms are the same. They are those of the first row of
-    // results.
+    let recorded = counts(Path::new(path), &ReadOptions::default()).unwrap();
+    // All columns of a row of histograms are the same: they belong to the first row of results.
     assert_eq!(recorded.array, Array::new(1, 16).unwrap());
     assert_eq!(recorded.captures.len(), 26);
-    assert_eq!(recorded.known.gate, Some((0, 53)));
+    assert_eq!(recorded.metadata.gate, Some((0, 53)));
     let log: serde_json::Value =
         serde_json::from_reader(GzDecoder::new(File::open(path).unwrap())).unwrap();
     let frames = log["Result_Set"].as_array().unwrap();
@@ -162,17 +159,17 @@ fn tmf8829() -> Option<(Known, Vec<Measured>)> {
             all.push((bins, peaks[0]["distance"].as_f64().unwrap()));
         }
     }
-    Some((recorded.known, all))
+    Some((recorded.metadata, all))
 }
 
-/// Without a gate. In two histograms something before the target is brighter: with one echo
-/// these have no event at the sensor's distance.
+/// Without a gate. In two histograms something in front of the target is brighter: with one echo they
+/// have no event at the sensor's distance.
 #[test]
 fn the_distances_of_a_newer_sensor_are_among_the_echoes() {
-    let Some((known, log)) = tmf8829() else {
+    let Some((metadata, log)) = tmf8829() else {
         return;
     };
-    let scale = RangeScale::new(known.bin_width_ps, known.offset_mm.unwrap()).unwrap();
+    let scale = RangeScale::new(metadata.bin_width_ps, metadata.offset_mm.unwrap()).unwrap();
     let mut errors = Vec::new();
     let mut found = [[0; 3]; 2];
     for (bins, distance) in &log {
@@ -187,7 +184,7 @@ fn the_distances_of_a_newer_sensor_are_among_the_echoes() {
             histogram.add_frame(bins, &gate);
             let mut right = 0;
             config.detect_echoes(&mut histogram, |echo, detection| {
-                let event = detection.event(PixelAddress(0), LaserCycle(0), 1);
+                let event = detection.event(PixelAddress::new(0), LaserCycle::new(0), 1);
                 let range = scale.range(event.position()).to_num::<f64>();
                 let error = (range - distance).abs();
                 if right == 0 && error < 150.0 {
@@ -204,7 +201,7 @@ fn the_distances_of_a_newer_sensor_are_among_the_echoes() {
         found[0], found[1]
     ));
     assert_eq!(found, [[2, 414, 0], [0, 414, 2]]);
-    // The bin width and the offset of such logs are a fit to these distances.
+    // The bin width and the offset for such logs were fitted to these distances.
     let (all, median) = (errors.len(), median(&mut errors));
     tell(&format!(
         "recorded echoes, TMF8829: {all} ranges, median error {median:.1} mm"

@@ -1,13 +1,13 @@
-//! What recordings are warned of: nothing, unless something is wrong.
+//! Warnings about recordings: none for a good recording.
 
 use crate::capture_log::{log, tell};
-use dtof_photons::open::{Opening, counts};
+use dtof_photons::open::{ReadOptions, counts};
 use dtof_photons::source::PhotonSource;
-use dtof_photons::warnings::of_axes;
+use dtof_photons::warnings::swapped_axes;
 use dtof_simulate::scene::Scene;
 use std::path::Path;
 
-/// The same numbers as if the bins were the first axis: a line a bin and row, of `columns`.
+/// The same numbers with the bins as the first axis: a line for each bin and row, of `columns`.
 fn bins_first(pixels: &[Vec<u64>], columns: usize) -> (usize, Vec<Vec<u64>>) {
     let bins = pixels[0].len();
     let flat: Vec<u64> = (0..bins)
@@ -19,28 +19,28 @@ fn bins_first(pixels: &[Vec<u64>], columns: usize) -> (usize, Vec<Vec<u64>>) {
 #[test]
 fn recorded_photons_of_a_log_are_warned_of_when_turned_and_only_then() {
     let Some(log) = log() else { return };
-    let recorded = counts(&log, &Opening::default()).unwrap();
-    assert_eq!(recorded.known.warnings, [""; 0]);
+    let recorded = counts(&log, &ReadOptions::default()).unwrap();
+    assert_eq!(recorded.metadata.warnings, [""; 0]);
     let pixels = recorded.captures.concat();
-    assert_eq!(of_axes(recorded.captures.len(), &pixels), None);
+    assert_eq!(swapped_axes(recorded.captures.len(), &pixels), None);
     for capture in &recorded.captures {
-        assert_eq!(of_axes(9, capture), None);
+        assert_eq!(swapped_axes(9, capture), None);
     }
     let (bins, turned) = bins_first(&pixels, 9);
-    assert!(of_axes(bins, &turned).is_some());
+    assert!(swapped_axes(bins, &turned).is_some());
     let beside = "../../shared/data/tmf8829_log/tmf8829_log.json.gz";
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join(beside);
     if !beside.exists() {
         tell("SKIPPED: recorded warnings: no TMF8829 log beside the workspace");
         return;
     }
-    let recorded = counts(&beside, &Opening::default()).unwrap();
-    assert_eq!(recorded.known.warnings, [""; 0]);
+    let recorded = counts(&beside, &ReadOptions::default()).unwrap();
+    assert_eq!(recorded.metadata.warnings, [""; 0]);
     let pixels = recorded.captures.concat();
-    assert_eq!(of_axes(26, &pixels), None);
+    assert_eq!(swapped_axes(26, &pixels), None);
 }
 
-/// The histograms of a scene of this repository, over so many laser cycles.
+/// The histograms of a scene of this repository over a number of laser cycles.
 fn histograms(name: &str, laser_off: bool) -> (usize, usize, Vec<Vec<u64>>) {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../scenes");
     let mut scene = Scene::read(&folder.join(name)).unwrap();
@@ -75,12 +75,12 @@ fn simulated_scenes_are_not_warned_of() {
         for laser_off in [false, true] {
             let (rows, columns, pixels) = histograms(&name, laser_off);
             assert_eq!(
-                of_axes(rows, &pixels),
+                swapped_axes(rows, &pixels),
                 None,
                 "{name}, laser off: {laser_off}"
             );
             let (bins, turned) = bins_first(&pixels, columns);
-            let is_warned = of_axes(bins, &turned).is_some();
+            let is_warned = swapped_axes(bins, &turned).is_some();
             assert!(!(laser_off && is_warned), "{name}: a passive image");
             println!("{name}: {rows} rows, {columns} columns, turned: warned {is_warned}");
         }

@@ -1,39 +1,40 @@
-//! False alarms of whole exposures: the table against new simulations and
-//! against what lies between its points, and `tune` against the engine.
+//! False alarms of whole exposures: compares the table with new simulations, at and between its points,
+//! and `tune` with the engine.
 
-use crate::long_or;
+use crate::slow_or_quick;
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{Array, BlockLevel, Count, DepthEvent, PaperRule, PixelAddress, Threshold};
+use dtof_core::paper::Threshold;
+use dtof_core::{Array, BlockLevel, Count, DepthEvent, PaperRule, PixelAddress};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_photons::source::PhotonSource;
-use dtof_simulate::{SimulatedArray, SimulatedPixel, scene};
+use dtof_simulate::{SimulatedArray, SimulatedPixel};
 use dtof_theory::counts::binomial::{alike, plausible};
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::looks::repeated_looks::{
     ALPHA_STEPS, FalseAlarms, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
 };
 use dtof_theory::looks::single_look::SingleLook;
-use dtof_theory::looks::table::{self, Found, MARGIN, Row, Table};
+use dtof_theory::looks::table::{self, Estimate, MARGIN, Row, Table};
 use dtof_theory::random::{pixel_rng, trial_rng};
 use dtof_theory::rates::Rates;
-use dtof_theory::tune::{Request, Tuned, Wanted, tune};
+use dtof_theory::tune::{FalseAlarmLimit, Request, Tuned, tune};
 
-/// The chance that a test fails for nothing.
+/// The probability that a test fails by chance.
 const LEVEL: f64 = 1e-3;
 
-/// By what factor a probability between the table's points may be too high.
+/// The most by which a probability between the table's points may be too high, as a factor.
 const OFF_ABOVE: f64 = 1.75;
 
-/// Seeds of the simulations here. The table's trials are seeded by bits mixed from the
-/// study's name, the point and the seed: none of 36,000 is likely to be one of these.
+/// Seeds of the simulations here. The table's trials have seeds mixed from the study's name, the point
+/// and the seed: a collision with one of the 36,000 is unlikely.
 const SEEDS: [u64; 2] = [0xa076_1d64_78bd_642f, 0xe703_7ed1_a0b4_28db];
 
 fn count(count: u64) -> u32 {
     u32::try_from(count).unwrap()
 }
 
-/// The table's row of a point at α, if it kept one.
+/// The table's row for a point at α, if there is one.
 fn row<'a>(table: &'a Table, point: &Point, last: u32, alpha: u16) -> Option<&'a Row> {
     table.rows.iter().find(|row| {
         let place = (row.first_mean, row.first, row.last, row.alpha);
@@ -41,7 +42,7 @@ fn row<'a>(table: &'a Table, point: &Point, last: u32, alpha: u16) -> Option<&'a
     })
 }
 
-/// Whether the share of events may lie between two probabilities.
+/// Whether the share of events is consistent with a probability between two bounds.
 fn lies_between(events: u32, exposures: u32, [low, high]: [f64; 2], level: f64) -> bool {
     let share = f64::from(events) / f64::from(exposures);
     (share >= low || plausible(events, exposures, low, level))
@@ -50,12 +51,12 @@ fn lies_between(events: u32, exposures: u32, [low, high]: [f64; 2], level: f64) 
 
 #[test]
 fn another_seed_gives_the_same_table() {
-    let table = Table::kept().unwrap();
+    let table = Table::load().unwrap();
     let all = table::points();
-    // One in six or in 24, with fewer photons than would take long.
+    // One in six or in 24, without those with many photons, which would take long.
     let points: Vec<Point> = all
         .into_iter()
-        .step_by(long_or(6, 24))
+        .step_by(slow_or_quick(6, 24))
         .map(|mut point| {
             let first_mean = point.first_mean;
             let first = point.first;
@@ -76,7 +77,11 @@ fn another_seed_gives_the_same_table() {
             }
         }
     }
-    assert!(compared.len() > long_or(100, 25), "{}", compared.len());
+    assert!(
+        compared.len() > slow_or_quick(100, 25),
+        "{}",
+        compared.len()
+    );
     let level = LEVEL / f64::from(u32::try_from(compared.len()).unwrap());
     for (row, events, exposures) in compared {
         let kept = [row.events, table.exposures, events, exposures].map(count);
@@ -89,7 +94,7 @@ fn another_seed_gives_the_same_table() {
 
 #[test]
 fn the_table_lies_between_the_exact_bounds() {
-    let table = Table::kept().unwrap();
+    let table = Table::load().unwrap();
     let level = LEVEL / f64::from(u32::try_from(table.rows.len()).unwrap());
     let exposures = count(table.exposures);
     // Rows of one point share their looks.
@@ -122,8 +127,7 @@ fn the_table_lies_between_the_exact_bounds() {
     }
 }
 
-/// Where nothing was simulated for the table: mean at the first look, first and
-/// last look, drawn at random.
+/// Random points between those of the table: mean at the first look, first and last look.
 const BETWEEN: [(f64, u32, u32); 21] = [
     (0.21, 6, 275),
     (0.364, 8, 28),
@@ -148,7 +152,7 @@ const BETWEEN: [(f64, u32, u32); 21] = [
     (209.0, 14, 20),
 ];
 
-/// The highest α of each exposure at one place, and what the table says at an α.
+/// The highest α of each exposure at one point, and the probability in the table at an α.
 struct Place {
     highest: Vec<u16>,
     steps: Vec<SingleLook>,
@@ -181,9 +185,9 @@ impl Place {
         u32::try_from(events.count()).unwrap()
     }
 
-    /// What the table says at α. `None` where it saw nothing nearby: there `tune` takes
-    /// the sum over looks.
-    fn look_up(&self, table: &Table, alpha: u16) -> Option<Found> {
+    /// The probability in the table at α. `None` without a nearby point: there `tune` takes the sum over
+    /// looks.
+    fn look_up(&self, table: &Table, alpha: u16) -> Option<Estimate> {
         let minimum_count = Count::saturating(MINIMUM_COUNT.into());
         let threshold = Threshold::new(U8F8::from_bits(alpha), minimum_count);
         let looks = RepeatedLooks::new(&self.steps, self.first, self.last);
@@ -191,17 +195,17 @@ impl Place {
         table.look_up(self.first_mean, self.first, self.last, independent)
     }
 
-    fn found(&self, table: &Table, alpha: u16) -> Found {
+    fn found(&self, table: &Table, alpha: u16) -> Estimate {
         self.look_up(table, alpha).unwrap_or_else(|| {
             panic!(
-                "the table has no place for a mean of {} and looks {} to {} at α = {alpha}/256",
+                "the table has no value for a mean of {} and looks {} to {} at α = {alpha}/256",
                 self.first_mean, self.first, self.last
             )
         })
     }
 }
 
-/// Eighths, which the table does not have.
+/// Eighths, which are not in the table.
 fn eighths() -> impl Iterator<Item = u16> {
     (256..2560).step_by(32)
 }
@@ -209,13 +213,13 @@ fn eighths() -> impl Iterator<Item = u16> {
 #[test]
 fn how_far_the_table_is_off_between_its_points() {
     const EXPOSURES: u32 = 5000;
-    let table = Table::kept().unwrap();
+    let table = Table::load().unwrap();
     let mut ratios = Vec::new();
     for (trial, place) in (0..).zip(BETWEEN) {
         let place = Place::new(trial, place, EXPOSURES);
         for alpha in eighths() {
             let seen = f64::from(place.events(alpha)) / f64::from(EXPOSURES);
-            // Enough events to tell a tenth.
+            // Enough events to resolve a tenth.
             if (0.02..0.5).contains(&seen) {
                 ratios.push(place.found(&table, alpha).probability / seen);
             }
@@ -225,21 +229,21 @@ fn how_far_the_table_is_off_between_its_points() {
     ratios.sort_by(f64::total_cmp);
     let [lowest, highest] = [ratios[0], ratios[ratios.len() - 1]];
     println!("{lowest:.2} to {highest:.2} at {} α", ratios.len());
-    // Never far too low, which would let false alarms through.
+    // Never far too low, which would allow false alarms.
     assert!(
         1.0 / MARGIN < lowest && highest < OFF_ABOVE,
         "{lowest} {highest}"
     );
 }
 
-/// Of those places by number, the ones with fewest photons, where many exposures take little time.
+/// The points with the fewest photons, where many exposures take little time.
 const RARE: [usize; 10] = [1, 4, 5, 6, 9, 10, 11, 13, 14, 15];
 
 #[test]
 fn rare_false_alarms_are_not_more_than_the_upper_limit_and_its_margin() {
     const EXPOSURES: u32 = 50_000;
-    let places = long_or(&RARE[..], &RARE[..4]);
-    let table = Table::kept().unwrap();
+    let places = slow_or_quick(&RARE[..], &RARE[..4]);
+    let table = Table::load().unwrap();
     let mut compared = Vec::new();
     for (trial, place) in (100..).zip(places) {
         let place = Place::new(trial, BETWEEN[*place], EXPOSURES);
@@ -251,10 +255,10 @@ fn rare_false_alarms_are_not_more_than_the_upper_limit_and_its_margin() {
         }
     }
     println!("{} α", compared.len());
-    assert!(compared.len() > long_or(20, 8), "{}", compared.len());
+    assert!(compared.len() > slow_or_quick(20, 8), "{}", compared.len());
     let level = LEVEL / f64::from(u32::try_from(compared.len()).unwrap());
     for (events, found) in compared {
-        let most = found.at_most * MARGIN;
+        let most = found.upper_limit * MARGIN;
         assert!(
             lies_between(events, EXPOSURES, [0.0, most], level),
             "{events} {found:?}"
@@ -262,7 +266,7 @@ fn rare_false_alarms_are_not_more_than_the_upper_limit_and_its_margin() {
     }
 }
 
-fn request(background: f64, signal: f64, l2: u16, wanted: f64) -> Request {
+fn request(background: f64, signal: f64, l2: u16, allowed: f64) -> Request {
     Request {
         background,
         signal,
@@ -273,20 +277,19 @@ fn request(background: f64, signal: f64, l2: u16, wanted: f64) -> Request {
         l1: None,
         l2,
         levels: BlockLevel::PIXEL,
-        wanted: Wanted::PerExposure(wanted),
+        limit: FalseAlarmLimit::PerExposure(allowed),
         seed: 1,
     }
 }
 
-/// The first event of each pixel that has one within its first exposure, from
-/// the engine, photon by photon.
+/// The first event of each pixel that has one in its first exposure, from the engine.
 fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec<DepthEvent> {
     let settings = Settings {
         rule: PaperRule::new(tuned.alpha, Count::saturating(request.minimum_count.into())).into(),
         l1: tuned.l1,
         l2: request.l2,
         x: request.x,
-        ..scene::settings(11)
+        ..Settings::static_scene(11)
     };
     let array = Array::new(side, side).unwrap();
     let pixels = (0..side * side).map(|pixel| {
@@ -296,11 +299,11 @@ fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec
             position: position(pixel),
             sigma: request.sigma,
         };
-        let address = PixelAddress(u16::try_from(pixel).unwrap());
+        let address = PixelAddress::new(u16::try_from(pixel).unwrap());
         SimulatedPixel::new(&rates, 128, pixel_rng(settings.seed, address)).unwrap()
     });
     let cycles = tuned.looks.expiry();
-    let mut photons = SimulatedArray::new(array, pixels.collect(), cycles.into(), None);
+    let mut photons = SimulatedArray::new(array, pixels.collect(), cycles.into(), None).unwrap();
     let mut engine = host_engine(&settings, photons.array(), &photons.addresses()).unwrap();
     let slice = photons.next_slice(u16::try_from(cycles).unwrap()).unwrap();
     let mut events = engine.run(&slice).unwrap();
@@ -309,19 +312,19 @@ fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec
     events
 }
 
-/// Where a pixel's pulse lies: at one of the eight places `tune` simulates.
+/// The position of a pixel's pulse: one of the eight that `tune` simulates.
 fn position(pixel: u32) -> f64 {
     48.0 + (f64::from(pixel % 8) + 0.5) / 8.0
 }
 
 #[test]
 fn tuned_settings_keep_their_word_in_the_engine() {
-    let table = Table::kept().unwrap();
-    let wanted = 0.02;
+    let table = Table::load().unwrap();
+    let allowed = 0.02;
     for (background, l2, side) in [(0.02, 800, 40), (0.2, 400, 60), (1.0, 300, 24)] {
-        let request = request(background, 1.0, l2, wanted);
+        let request = request(background, 1.0, l2, allowed);
         let tuned = tune(&request, &table).unwrap();
-        assert!(tuned.false_alarms <= wanted);
+        assert!(tuned.false_alarms <= allowed);
         let events = first_events(&request, &tuned, 0.0, side);
         let events = u32::try_from(events.len()).unwrap();
         let exposures = side * side;
@@ -329,8 +332,8 @@ fn tuned_settings_keep_their_word_in_the_engine() {
             "B {background}: α {}, L1 {}: {events} of {exposures}, expected {:.4} ({:?})",
             tuned.alpha, tuned.l1, tuned.false_alarms, tuned.source
         );
-        assert!(lies_between(events, exposures, [0.0, wanted], LEVEL / 3.0));
-        // And what it says is what happens, but for what the table is off.
+        assert!(lies_between(events, exposures, [0.0, allowed], LEVEL / 3.0));
+        // The prediction agrees with the engine, within the error of the table.
         let bounds = [1.0 / OFF_ABOVE, MARGIN].map(|off| off * tuned.false_alarms);
         assert!(
             lies_between(events, exposures, bounds, LEVEL / 6.0),
@@ -341,13 +344,13 @@ fn tuned_settings_keep_their_word_in_the_engine() {
 
 #[test]
 fn time_and_depth_error_are_those_of_the_engine() {
-    let table = Table::kept().unwrap();
+    let table = Table::load().unwrap();
     let request = request(0.05, 0.4, 800, 0.01);
     let tuned = tune(&request, &table).unwrap();
     let events = first_events(&request, &tuned, request.signal, 40);
     let (mut cycles, mut squares) = (Vec::new(), Vec::new());
     for event in &events {
-        let truth = position(event.pixel.0.into());
+        let truth = position(event.pixel.raw().into());
         let error = f64::from(event.position().raw()) / 256.0 - truth;
         if error.abs() < 3.0 {
             cycles.push(f64::from(event.exposure));

@@ -1,4 +1,4 @@
-//! The images do in QEMU what they should, and keep to their stack. Needs
+//! Runs the images in QEMU and measures their stack. Needs
 //! `qemu-system-arm`, of version 7.2 for `stm32f405`, and `defmt-print`.
 //!
 //! ```sh
@@ -14,34 +14,33 @@ use std::{fs, thread};
 use anyhow::{Context, Result, ensure};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{Array, BlockLevel, Count, EchoNumber, PaperRule, WindowRule};
-use dtof_device::{Client, DeviceEngine, HostTimeout, configuration, monitor};
+use dtof_device::{Client, DeviceEngine, HostTimeout, Task, monitor};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_link::{AdaptiveBinning, FaultRecord, Source};
 use dtof_photons::source::PhotonSource;
-use dtof_simulate::{demo, scene};
+use dtof_simulate::demo;
 
 use crate::emulator::{Board, Emulator, End, Laser, Overflow, QEMU};
-use crate::{dtof, histograms, root, skipped, stack, succeed, target_folder, version, wanted};
+use crate::{dtof, enabled, histograms, root, skipped, stack, succeed, target_folder, version};
 
-/// Decodes what an image logs.
+/// Decodes the log of an image.
 const DEFMT_PRINT: &str = "defmt-print";
 
-/// The QEMU that is known to run `stm32f405`: QEMU 10, for one, ends at a reset of
-/// the clocks.
+/// The QEMU that runs `stm32f405`. QEMU 10, for instance, ends at a reset of the clocks.
 const KNOWN: &str = "version 7.2.";
 
 /// Bytes of the stack of each board.
 const SIZE: u64 = 19 * 1024;
 
-/// Words of statics that a report may change: the log, and what counts time. A stack that runs
-/// into them changes thousands.
+/// The most words of statics that a report may change: the log and the clock. A stack overflow into
+/// the statics changes thousands.
 const CHANGED: usize = 100;
 
 #[test]
 fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
-    let Some(_alone) = wanted("mps2-an386 in QEMU", &[QEMU, DEFMT_PRINT]) else {
+    let Some(_alone) = enabled("mps2-an386 in QEMU", &[QEMU, DEFMT_PRINT]) else {
         return Ok(());
     };
     let board = Board::Mps2An386;
@@ -65,7 +64,7 @@ fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
             reads_every,
         )?);
     }
-    // No side is a multiple of a block's.
+    // No side of the array is a multiple of a block's side.
     let array = Array::new(5, 3).unwrap();
     used.push(agrees(
         board,
@@ -83,7 +82,7 @@ fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
 #[test]
 fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     let test = "stm32f405 in QEMU";
-    let Some(_alone) = wanted(test, &[QEMU, DEFMT_PRINT]) else {
+    let Some(_alone) = enabled(test, &[QEMU, DEFMT_PRINT]) else {
         return Ok(());
     };
     let version = version(QEMU).unwrap_or_default();
@@ -106,16 +105,15 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     ];
     stack::check(&image, &used)?;
     overflows(board, &image)?;
-    // The emulator has no pins, so that all of them read as zeros: a TDC7200 that does
-    // not answer, and an I²C bus that nothing pulls up. On a real board its resistors
-    // pull it up, and both are "no answer".
+    // The emulated pins all read as zero: a TDC7200 that does not answer, and an I²C bus without
+    // pull-up resistors. On a real board both give "no answer".
     for (sensor, fault) in [
         ("tdc7200", FaultRecord::NoAnswer),
         ("tmf8829", FaultRecord::Bus),
         ("tmf882x", FaultRecord::Bus),
     ] {
         let image = board.image(&[sensor])?;
-        let used = says_unplugged(board, &image, fault, array).context(sensor)?;
+        let used = reports_unplugged(board, &image, fault, array).context(sensor)?;
         stack::check(&image, &[used])?;
     }
     tests_itself(board)
@@ -123,7 +121,7 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
 
 #[test]
 fn the_demo_on_an_emulated_device_gives_the_same_files() -> Result<()> {
-    let Some(_alone) = wanted("the demo on mps2-an386", &[QEMU]) else {
+    let Some(_alone) = enabled("the demo on mps2-an386", &[QEMU]) else {
         return Ok(());
     };
     let image = Board::Mps2An386.image(&[])?;
@@ -153,8 +151,7 @@ fn the_demo_on_an_emulated_device_gives_the_same_files() -> Result<()> {
     Ok(())
 }
 
-/// The self-test writes through tables of functions, so that its stack has no bound; it
-/// is measured only.
+/// The self-test calls through function pointers, so its stack has no bound and is only measured.
 fn tests_itself(board: Board) -> Result<()> {
     let image = board.image(&["self-test"])?;
     let End {
@@ -165,22 +162,19 @@ fn tests_itself(board: Board) -> Result<()> {
     } = Emulator::start(board, &image, &[])?.wait()?;
     ensure!(status.success(), "the self-test ends QEMU with {status}");
     let expected = fs::read(root().join("firmware/self-test.out"))?;
-    ensure!(
-        output == expected,
-        "not the lines of firmware/self-test.out"
-    );
+    ensure!(output == expected, "differs from firmware/self-test.out");
     ensure!(stack <= stack::MOST, "{stack} bytes of stack");
     println!("{board:?}: the self-test uses {stack} bytes of stack");
     Ok(())
 }
 
-/// However the image ends, QEMU ends with it, the reason is to be seen, and the laser is off. Gives
-/// the bytes of stack each time used, but for the overflow.
+/// For each way that the image ends: QEMU ends, the log has the reason, and the laser is off. Returns
+/// the bytes of stack used, except for the overflow.
 fn ends(board: Board, image: &Path) -> Result<Vec<u64>> {
     let mut used = Vec::new();
     for (word, success, message) in [
         ("exit", true, "mps2-an386 started"),
-        ("panic", false, "as asked for on the command line"),
+        ("panic", false, "requested on the command line"),
         ("fault", false, "hard fault at 0x"),
         ("overflow", false, "stack overflow"),
     ] {
@@ -220,8 +214,8 @@ fn ends(board: Board, image: &Path) -> Result<Vec<u64>> {
     Ok(used)
 }
 
-/// An image whose stack overflows says so, leaves its statics alone, resets the board, and knows
-/// why it starts again. QEMU has no pins: that of the sensor is not seen.
+/// An image whose stack overflows logs it, does not damage its statics, resets the board, and logs
+/// the reason of the restart. QEMU has no pins, so the sensor's is not checked.
 fn overflows(board: Board, image: &Path) -> Result<()> {
     let Overflow { logs, changed } = Emulator::start(board, image, &[])?.overflow()?;
     let [before, after] = logs.map(|bytes| log(image, bytes));
@@ -238,14 +232,14 @@ fn overflows(board: Board, image: &Path) -> Result<()> {
     Ok(())
 }
 
-/// What an image has logged.
+/// Decodes the log of an image.
 fn log(image: &Path, bytes: Vec<u8>) -> Result<String> {
     let mut decoder = Command::new(DEFMT_PRINT);
     let decoder = decoder.arg("-e").arg(image);
     let decoder = decoder.stdin(Stdio::piped()).stdout(Stdio::piped());
     let mut decoder = decoder.spawn().context("defmt-print does not start")?;
     let mut stdin = decoder.stdin.take().context("no input of defmt-print")?;
-    // Should it end early, its status says so.
+    // Its exit status shows if it ended early.
     let writer = thread::spawn(move || stdin.write_all(&bytes));
     let output = decoder.wait_with_output()?;
     let _ = writer.join();
@@ -253,13 +247,13 @@ fn log(image: &Path, bytes: Vec<u8>) -> Result<String> {
     Ok(String::from_utf8_lossy(&output.stdout).into_owned())
 }
 
-/// What decides the events: a setting at which there are many.
+/// Settings with many events.
 pub fn settings() -> Settings {
     Settings {
         rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
         l1: 20,
         x: 4,
-        ..scene::settings(1)
+        ..Settings::static_scene(1)
     }
 }
 
@@ -290,8 +284,8 @@ pub fn with_all() -> Settings {
     }
 }
 
-/// The demo's scene on a board and on this computer gives the same events and
-/// the same counts, whatever the rule and however seldom the host reads. Gives the bytes of
+/// A board and this computer find the same events and counts in the demo's scene, for every rule and
+/// for slow hosts. Returns the bytes of
 /// stack used.
 fn agrees(
     board: Board,
@@ -313,8 +307,7 @@ fn agrees(
     Ok(stack)
 }
 
-/// What the device makes of the demo's photons is what this computer does. Says
-/// how much that was.
+/// The device and this computer find the same events in the demo's photons. Returns a summary.
 pub fn decides_alike(
     client: Client,
     settings: &Settings,
@@ -329,11 +322,11 @@ pub fn decides_alike(
     let expected = on_host.run(&slice)?;
     let mut on_board = DeviceEngine::new(client, settings, array, &addresses)?;
     let events = on_board.run(&slice)?;
-    ensure!(events == expected, "not the events of this computer");
+    ensure!(events == expected, "the events differ from this computer's");
     let statistics = on_board.statistics();
     ensure!(
         statistics == on_host.statistics(),
-        "not the counts of this computer"
+        "the counts differ from this computer's"
     );
     let [pixels, blocks] = statistics;
     ensure!(
@@ -353,14 +346,14 @@ pub fn decides_alike(
     ))
 }
 
-/// The device decides on photons of its own. Gives the bytes of stack used.
+/// The device finds events in simulated photons of its own. Returns the bytes of stack used.
 fn senses(board: Board, image: &Path) -> Result<u64> {
     let mut emulator = Emulator::start(board, image, &[])?;
     let mut client = Client::new(emulator.connect()?)?;
     let (mut events, mut statistics) = (Vec::new(), Vec::new());
     monitor::monitor(
         &mut client,
-        &monitor::Task {
+        &Task {
             settings: &settings(),
             pixels: 16,
             columns: 4,
@@ -376,7 +369,7 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
             masked: 0,
         },
     )?;
-    // Less their header.
+    // Without the header.
     let events = events.split(|&byte| byte == b'\n').count() - 2;
     ensure!(events > 0, "no event of the simulated sensor");
     histograms::are_those_of_the_scene(&mut client, &settings())?;
@@ -385,25 +378,30 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
     Ok(stack)
 }
 
-/// The image of a sensor with nothing connected says so, and decides on photons of
-/// the link afterwards. Gives the bytes of stack used.
-fn says_unplugged(board: Board, image: &Path, expected: FaultRecord, array: Array) -> Result<u64> {
+/// Without a connected sensor, the image reports the fault, and afterwards processes photons from the
+/// link. Returns the bytes of stack used.
+fn reports_unplugged(
+    board: Board,
+    image: &Path,
+    expected: FaultRecord,
+    array: Array,
+) -> Result<u64> {
     let mut emulator = Emulator::start(board, image, &[])?;
     let mut client = Client::new(emulator.connect()?)?;
     let pixels = u16::try_from(array.pixels())?;
-    let about = client.sensor()?.context("no sensor")?;
-    let mut wanted = settings();
-    if let Some(bin_width) = about.bin_width {
-        wanted.bin_width_ps = bin_width;
+    let sensor = client.sensor()?.context("no sensor")?;
+    let mut settings_of_sensor = settings();
+    if let Some(bin_width) = sensor.bin_width {
+        settings_of_sensor.bin_width_ps = bin_width;
     }
-    client.configure(&configuration(
-        &wanted,
+    let task = Task {
+        settings: &settings_of_sensor,
         pixels,
-        pixels.into(),
-        Source::Sensor,
-        None,
-        HostTimeout::default(),
-    )?)?;
+        columns: pixels.into(),
+        dynamic_depth: None,
+        host_timeout: HostTimeout::default(),
+    };
+    client.configure(&task.configuration(Source::Sensor)?)?;
     let since = Instant::now();
     let report = loop {
         let report = client.report()?;
@@ -412,7 +410,7 @@ fn says_unplugged(board: Board, image: &Path, expected: FaultRecord, array: Arra
         }
         ensure!(
             since.elapsed() < Duration::from_secs(10),
-            "a missing sensor is not noticed"
+            "the missing sensor was not reported"
         );
     };
     let fault = FaultRecord::from_number(report.last_sensor_error);

@@ -1,4 +1,4 @@
-//! The charts of the documentation are those that `dtof compare` draws.
+//! The charts in the documentation are the output of `dtof compare`.
 //!
 //! ```sh
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow compare
@@ -11,7 +11,7 @@ use std::process::Command;
 
 use anyhow::{Result, ensure};
 
-use crate::{dtof, root, skipped, succeed, wanted};
+use crate::{dtof, enabled, root, skipped, succeed};
 
 fn drawn(name: &str, arguments: &[&str]) -> Result<()> {
     let folder = tempfile::tempdir()?;
@@ -29,7 +29,7 @@ fn drawn(name: &str, arguments: &[&str]) -> Result<()> {
 
 #[test]
 fn the_chart_of_the_demo() -> Result<()> {
-    match wanted("compare: the demo", &[]) {
+    match enabled("compare: the demo", &[]) {
         Some(_alone) => drawn("demo", &["--scene", "host/simulate/src/demo.toml"]),
         None => Ok(()),
     }
@@ -38,7 +38,7 @@ fn the_chart_of_the_demo() -> Result<()> {
 #[test]
 fn the_chart_of_the_recorded_log() -> Result<()> {
     let test = "compare: the recorded log";
-    let Some(_alone) = wanted(test, &[]) else {
+    let Some(_alone) = enabled(test, &[]) else {
         return Ok(());
     };
     let beside = PathBuf::from("../shared/data/tmf8820_plane_gt/distance_data.json");

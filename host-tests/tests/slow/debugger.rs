@@ -1,5 +1,5 @@
-//! What a debugger does, by GDB's remote protocol, which QEMU speaks: read
-//! memory and registers, run, stop. It needs no code in the image.
+//! A debugger client for QEMU, by GDB's remote protocol: reads memory and registers, runs and stops.
+//! It needs no code in the image.
 
 use std::io::{BufReader, Read, Write};
 use std::net::{Ipv4Addr, TcpStream};
@@ -8,15 +8,14 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 
-/// Bytes in one answer; QEMU allows 2048.
+/// Bytes per answer; QEMU allows 2048.
 const PIECE: u64 = 1024;
 
 /// A processor under control.
 pub struct Debugger(BufReader<TcpStream>);
 
 impl Debugger {
-    /// Connects. QEMU stops the processor then, if it runs. `patience` is how long
-    /// an answer may take.
+    /// Connects, which stops a running processor. `patience` is the longest wait for an answer.
     pub fn connect(port: u16, patience: Duration) -> std::io::Result<Self> {
         let stream = TcpStream::connect((Ipv4Addr::LOCALHOST, port))?;
         stream.set_nodelay(true)?;
@@ -35,25 +34,25 @@ impl Debugger {
         self.wait_for_stop()
     }
 
-    /// Stops before the instruction at `address` from now on, or no longer.
+    /// Sets or removes a breakpoint at `address`.
     pub fn set_breakpoint(&mut self, address: u64, on: bool) -> Result<()> {
         let letter = if on { 'Z' } else { 'z' };
         self.send(&format!("{letter}0,{address:x},2"))?;
         let reply = self.reply()?;
-        ensure!(reply == "OK", "the debugger says `{reply}`");
+        ensure!(reply == "OK", "the debugger answers `{reply}`");
         Ok(())
     }
 
-    /// One instruction.
+    /// Runs one instruction.
     pub fn step(&mut self) -> Result<()> {
         self.send("s")?;
         self.wait_for_stop()
     }
 
-    /// Until the processor stops.
+    /// Waits until the processor stops.
     pub fn wait_for_stop(&mut self) -> Result<()> {
         let packet = self.receive()?;
-        ensure!(is_stop(&packet), "the debugger says `{packet}`");
+        ensure!(is_stop(&packet), "the debugger answers `{packet}`");
         Ok(())
     }
 
@@ -77,11 +76,11 @@ impl Debugger {
         }
         self.send(&format!("G{digits}"))?;
         let reply = self.reply()?;
-        ensure!(reply == "OK", "the debugger says `{reply}`");
+        ensure!(reply == "OK", "the debugger answers `{reply}`");
         Ok(())
     }
 
-    /// What lies at these addresses.
+    /// Reads memory.
     pub fn memory(&mut self, addresses: Range<u64>) -> Result<Vec<u8>> {
         let mut memory = Vec::new();
         let mut address = addresses.start;
@@ -91,7 +90,7 @@ impl Debugger {
             let piece = bytes(&self.reply()?)?;
             ensure!(
                 piece.len() as u64 == length,
-                "not all memory at {address:#x}"
+                "could not read all memory at {address:#x}"
             );
             memory.extend(piece);
             address += length;
@@ -99,8 +98,8 @@ impl Debugger {
         Ok(memory)
     }
 
-    /// The answer to what was sent. Some versions of QEMU say before it that the
-    /// processor has stopped when the debugger came.
+    /// The answer to the last command. Some versions of QEMU first report that the processor stopped
+    /// when the debugger connected.
     fn reply(&mut self) -> Result<String> {
         loop {
             let packet = self.receive()?;
@@ -116,15 +115,14 @@ impl Debugger {
         Ok(())
     }
 
-    /// The next packet; TCP damages none.
+    /// The next packet. Checksums are ignored, as TCP damages none.
     fn receive(&mut self) -> Result<String> {
         while self.byte()? != b'$' {}
         let mut content = Vec::new();
         loop {
             match self.byte()? {
                 b'#' => break,
-                // QEMU repeats nothing by count, and what it sends here needs no
-                // escape.
+                // QEMU uses no run lengths, and these answers need no escapes.
                 byte @ (b'*' | b'}') => bail!("the debugger sends {byte:#04x}"),
                 byte => content.push(byte),
             }
@@ -138,12 +136,12 @@ impl Debugger {
         let mut byte = [0];
         self.0
             .read_exact(&mut byte)
-            .context("no answer of QEMU's debugger")?;
+            .context("no answer from QEMU's debugger")?;
         Ok(byte[0])
     }
 }
 
-/// Whether a packet says that the processor has stopped.
+/// Whether a packet reports that the processor has stopped.
 fn is_stop(packet: &str) -> bool {
     packet.starts_with(['T', 'S'])
 }
@@ -152,13 +150,13 @@ fn checksum(content: &[u8]) -> u8 {
     content.iter().fold(0, |sum, byte| sum.wrapping_add(*byte))
 }
 
-/// Bytes written as hexadecimal digits.
+/// Parses hexadecimal digits.
 fn bytes(digits: &str) -> Result<Vec<u8>> {
     let (pairs, rest) = digits.as_bytes().as_chunks::<2>();
     let byte = |pair: &[u8; 2]| u8::from_str_radix(std::str::from_utf8(pair).ok()?, 16).ok();
     let bytes: Option<Vec<u8>> = pairs.iter().map(byte).collect();
     let bytes = bytes.filter(|_| rest.is_empty());
-    bytes.with_context(|| format!("the debugger says `{digits}`"))
+    bytes.with_context(|| format!("the debugger answers `{digits}`"))
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! QEMU with an image, its serial port on a TCP port, and under a debugger's control.
+//! Runs an image in QEMU, with its serial port on a TCP port and a debugger attached.
 
 use std::io::Read;
 use std::net::{Ipv4Addr, TcpListener};
@@ -14,11 +14,10 @@ use crate::cargo;
 use crate::debugger::Debugger;
 use crate::stack::{self, Image};
 
-/// How long anything may take that takes no time.
+/// The longest wait for something that should take no time.
 pub const PATIENCE: Duration = Duration::from_secs(20);
 
-/// What an image asks for that ends: `SYS_EXIT` and `SYS_EXIT_EXTENDED` of
-/// Arm's semihosting.
+/// The semihosting operations that end an image: `SYS_EXIT` and `SYS_EXIT_EXTENDED`.
 const SYS_EXIT: [u32; 2] = [0x18, 0x20];
 
 /// The emulator.
@@ -40,15 +39,14 @@ impl Board {
         }
     }
 
-    /// The path of its image, of the sidecar unless something else is named.
+    /// The path of its image, by default the sidecar.
     pub fn image(self, what: &[&str]) -> Result<PathBuf> {
         let image = [&["xtask", "image", "--emulator", self.name()], what].concat();
         Ok(cargo(&image)?.into())
     }
 }
 
-/// How to start an image. `words` are what the image finds on its command line
-/// behind its name.
+/// The command that starts an image. `words` follow its name on its command line.
 fn command(board: Board, image: &Path, port: u16, words: &[&str]) -> Command {
     let mut semihosting = "enable=on,target=native,arg=image".to_owned();
     for word in words {
@@ -59,7 +57,7 @@ fn command(board: Board, image: &Path, port: u16, words: &[&str]) -> Command {
     command.args(["-display", "none", "-monitor", "none"]);
     match board {
         Board::Mps2An386 => command.args(["-machine", "mps2-an386"]),
-        // The first is USART1, ours USART2.
+        // The first serial port is USART1, ours is USART2.
         Board::Stm32F405 => command.args(["-machine", "netduinoplus2", "-serial", "null"]),
     };
     let uart = format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on");
@@ -69,8 +67,7 @@ fn command(board: Board, image: &Path, port: u16, words: &[&str]) -> Command {
     command
 }
 
-/// An emulator, ended when dropped. It is under a debugger's control, so that
-/// the stack can be read before it ends.
+/// An emulator, ended when dropped. A debugger reads its stack before it ends.
 pub struct Emulator {
     board: Board,
     child: Child,
@@ -80,36 +77,36 @@ pub struct Emulator {
     output: Option<JoinHandle<Vec<u8>>>,
 }
 
-/// How an image has ended its emulator.
+/// The result of a run that ended.
 pub struct End {
     pub status: ExitStatus,
-    /// What was printed.
+    /// The output.
     pub output: Vec<u8>,
-    /// Bytes of the stack that were used.
+    /// The bytes of stack used.
     pub stack: u64,
-    /// What the laser of mps2-an386 was while it ran and is at the end; LED0 stands for it.
+    /// The laser of mps2-an386 during the run and at the end; LED0 stands for it.
     pub laser: Option<Laser>,
 }
 
-/// A laser that was on.
+/// A laser that was on during the run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Laser {
     pub is_on: bool,
-    /// Words of the statics that have changed since it was on.
+    /// Words of the statics that have changed since.
     pub changed: usize,
 }
 
-/// What a stack that overflowed has left.
+/// The result of a stack overflow.
 pub struct Overflow {
-    /// What was logged before the reset, and after it.
+    /// The logs before and after the reset.
     pub logs: [Vec<u8>; 2],
     /// Words of the statics that changed before the reset.
     pub changed: usize,
 }
 
 impl Emulator {
-    /// Starts an image with its serial port on a free TCP port; before its first
-    /// instruction it waits.
+    /// Starts an image with its serial port on a free TCP port. It waits before its first
+    /// instruction.
     pub fn start(board: Board, path: &Path, words: &[&str]) -> Result<Self> {
         let image = Image::read(path)?;
         let [port, debugger_port] = free_ports()?;
@@ -121,14 +118,14 @@ impl Emulator {
         let mut stdout = child.stdout.take().context("no output of QEMU")?;
         let output = thread::spawn(move || {
             let mut bytes = Vec::new();
-            // What came before an error is all there is.
+            // Keeps the output before an error.
             let _ = stdout.read_to_end(&mut bytes);
             bytes
         });
         let debugger = match open(&mut child, || Debugger::connect(debugger_port, PATIENCE)) {
             Ok(debugger) => debugger,
             Err(error) => {
-                // It may have ended by itself.
+                // It may already have ended.
                 let _ = child.kill();
                 let _ = child.wait();
                 return Err(error);
@@ -151,8 +148,8 @@ impl Emulator {
         open(&mut self.child, || dtof_device::open(&port, None))
     }
 
-    /// Lets the image run until it ends QEMU. With QEMU ends its memory, so the
-    /// image is stopped before whatever it asks of the emulator.
+    /// Lets the image run until it ends QEMU. Its memory is gone then, so the debugger stops it before
+    /// each semihosting call.
     pub fn wait(mut self) -> Result<End> {
         let start = Instant::now();
         for &address in &self.image.semihosting {
@@ -170,7 +167,7 @@ impl Emulator {
                 break;
             }
             if start.elapsed() > PATIENCE {
-                bail!("the image does not end after {PATIENCE:?}");
+                bail!("the image did not end within {PATIENCE:?}");
             }
             let address = registers[15].into();
             self.debugger.set_breakpoint(address, false)?;
@@ -194,7 +191,7 @@ impl Emulator {
                 break status;
             }
             if start.elapsed() > PATIENCE {
-                bail!("the image does not end after {PATIENCE:?}");
+                bail!("the image did not end within {PATIENCE:?}");
             }
             thread::sleep(Duration::from_millis(20));
         };
@@ -210,8 +207,8 @@ impl Emulator {
         })
     }
 
-    /// Lets the image run for a while and then call a function on a stack that is full, so that it
-    /// resets its board; and run again.
+    /// Lets the image run for a while, then call a function on a full stack, which resets its board,
+    /// and run again.
     pub fn overflow(mut self) -> Result<Overflow> {
         let while_it_runs = Duration::from_millis(300);
         self.debugger.resume()?;
@@ -229,7 +226,7 @@ impl Emulator {
         let next = self.debugger.registers()?[15];
         ensure!(
             u64::from(next) == reset,
-            "it stops at {next:#x}, not at its reset"
+            "it stopped at {next:#x} instead of its reset"
         );
         let changed = changed(&before, &self.statics()?);
         let first = self.log()?;
@@ -244,11 +241,10 @@ impl Emulator {
         })
     }
 
-    /// What the image has logged since its start, as long as it fits: the first channel of RTT to
-    /// the debugger, which nothing has read.
+    /// The log since the start of the image: the first up channel of RTT, which nothing else reads.
     fn log(&mut self) -> Result<Vec<u8>> {
         let block = self.image.address("_SEGGER_RTT")?;
-        // An ID of 16 bytes, two numbers of channels, a name; the buffer, its size, where it is full.
+        // A 16-byte ID, two numbers of channels, a name; then the buffer, its size and write position.
         let words = self.debugger.memory(block + 28..block + 40)?;
         let (words, _) = words.as_chunks();
         let words: Vec<u64> = words
@@ -275,34 +271,33 @@ impl Emulator {
         self.debugger.memory(self.image.statics.clone())
     }
 
-    /// Ends QEMU; bytes of the stack that were used.
+    /// Ends QEMU. Returns the bytes of stack used.
     pub fn stop(mut self) -> Result<u64> {
         self.debugger.interrupt()?;
         self.stack()
     }
 
-    /// Bytes of the stack that were used.
+    /// The bytes of stack used.
     fn stack(&mut self) -> Result<u64> {
         let memory = self.debugger.memory(self.image.stack.clone())?;
         Ok(stack::high_water(&memory))
     }
 }
 
-/// How many words differ.
+/// The number of words that differ.
 fn changed(before: &[u8], after: &[u8]) -> usize {
     let words = before.chunks(4).zip(after.chunks(4));
     words.filter(|(before, after)| before != after).count()
 }
 
-/// Two TCP ports that are free now; should another take one meanwhile, the emulator ends
-/// at once.
+/// Two free TCP ports. If another program takes one meanwhile, the emulator ends at once.
 pub fn free_ports() -> Result<[u16; 2]> {
     let bind = || TcpListener::bind((Ipv4Addr::LOCALHOST, 0));
     let (first, second) = (bind()?, bind()?);
     Ok([first.local_addr()?.port(), second.local_addr()?.port()])
 }
 
-/// Opens what an emulator is about to open.
+/// Connects to a port that the emulator is about to open.
 pub fn open<T, E: Into<anyhow::Error>>(
     child: &mut Child,
     open: impl Fn() -> Result<T, E>,
@@ -317,7 +312,7 @@ pub fn open<T, E: Into<anyhow::Error>>(
             bail!("the emulator ended at once: {status}");
         }
         if start.elapsed() > PATIENCE {
-            return Err(error.into()).context("the emulator does not open its ports");
+            return Err(error.into()).context("the emulator did not open its ports");
         }
         thread::sleep(Duration::from_millis(20));
     }
@@ -325,7 +320,7 @@ pub fn open<T, E: Into<anyhow::Error>>(
 
 impl Drop for Emulator {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // It may already have ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }

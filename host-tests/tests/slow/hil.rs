@@ -1,4 +1,4 @@
-//! `cargo xtask hil` with the emulated Pico as its board, and a stand-in for probe-rs.
+//! `cargo xtask hil` with the emulated Pico as the board and a script in place of probe-rs.
 //!
 //! ```sh
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow hil -- --nocapture
@@ -13,10 +13,9 @@ use anyhow::{Result, ensure};
 
 use crate::emulator::free_ports;
 use crate::rp2040::{NODE, NPM, install};
-use crate::{root, wanted};
+use crate::{enabled, root};
 
-/// Runs the last argument in the emulator. What ends prints; a sidecar has its serial port at
-/// `$PORT` until it is replaced.
+/// Runs the image in the last argument in the emulator. A sidecar has its serial port at `$PORT`.
 const STAND_IN: &str = r#"#!/bin/sh
 for image; do :; done
 emulator="node $RUNNER $image"
@@ -30,8 +29,8 @@ esac
 "#;
 
 #[test]
-fn a_board_is_tried_and_its_results_are_one_file() -> Result<()> {
-    let Some(_alone) = wanted("cargo xtask hil", &[NODE, NPM]) else {
+fn a_board_is_tested_and_its_results_are_one_file() -> Result<()> {
+    let Some(_alone) = enabled("cargo xtask hil", &[NODE, NPM]) else {
         return Ok(());
     };
     install()?;

@@ -7,8 +7,8 @@ use dtof_device::histograms::{SoFar, collect};
 use dtof_device::{Client, HostTimeout};
 use dtof_engine::settings::Settings;
 
-/// Collects them for some seconds. The scene has half a background photon a laser cycle in 128 bins,
-/// and from 0.5 to 0.1 photons of signal in three bins from `20 + 6 * pixel` on.
+/// Collects histograms for some seconds. Per laser cycle the scene has half a background photon in 128
+/// bins, and 0.5 to 0.1 signal photons in three bins from `20 + 6 * pixel`.
 pub fn are_those_of_the_scene(client: &mut Client, settings: &Settings) -> Result<()> {
     const PIXELS: u16 = 16;
     let length = Duration::from_secs(4);

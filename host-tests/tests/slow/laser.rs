@@ -1,11 +1,11 @@
-//! The laser of the Pico's photon timer goes dark and stays dark, whatever happens to the image.
+//! The laser of the Pico's photon timer goes off and stays off after every fault.
 //! Needs Node.js and npm, which installs rp2040js.
 //!
 //! The runner records the laser's pin as it leaves the chip, over all resets.
 //!
 //! ```sh
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow laser:: -- --nocapture
-//! DTOF_SLOW=1 DTOF_LONG=1 cargo test … # a minute of darkness each instead of a second
+//! DTOF_SLOW=1 DTOF_LONG=1 cargo test … # off for a minute each instead of a second
 //! ```
 
 use std::env;
@@ -19,52 +19,57 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use dtof_device::{Client, HostTimeout, Port, Stopped, configuration};
+use dtof_device::{Client, HostTimeout, Port, Stopped, Task};
 use dtof_link::{Report, Source, StopReason};
 
 use crate::pico::senses;
 use crate::rp2040::{Done, NODE, NPM, Rp2040, image, install};
-use crate::{dtof, root, stack, succeed, wanted};
+use crate::{dtof, enabled, root, stack, succeed};
 
-/// How long a pulse is set to be: 100 ns in whole clocks.
+/// The pulse length: 100 ns in whole clocks.
 const PULSE_NS: u64 = 104;
 /// The laser's period.
 const PERIOD_MS: f64 = 0.01;
-/// How long the laser fires before the fault is planted. The faults that end the light at once
-/// are planted as a pulse begins, and at other times of the period, the last just before a pulse.
+/// How long the laser fires before the fault. Faults that switch the laser off at once are planted
+/// at the start of a pulse and at other times of the period, the last just before a pulse.
 const LIT_MS: f64 = 20.0;
 const PHASES_MS: [f64; 4] = [0.0, 0.0025, 0.005, 0.0097];
-/// Where the memory begins.
+/// The start of the RAM.
 const RAM: u64 = 0x2000_0000;
 
-/// How long the host may be silent here; the default takes a minute of emulation.
+/// The host timeout here; the default would take a minute of emulation.
 const HOST_TIMEOUT_MS: u16 = 300;
-/// A round of the main loop in which the sensor is stopped, and that of the keep-alive before it.
+/// The round of the main loop that stops the sensor, and the round of the keep-alive before it.
 const ROUND_MS: f64 = 2.0;
 
-/// A fault, and what follows from it.
+/// A fault and its consequences.
 struct Fault {
     kind: &'static str,
-    /// Milliseconds from the fault to the end of the last pulse, at most.
+    /// The most milliseconds from the fault to the end of the last pulse.
     lit_ms: f64,
-    /// The reason of the boot that follows.
+    /// The reason of the next boot.
     reset: &'static str,
-    /// What the device then tells its host.
-    told: StopReason,
+    /// The reason that the device then reports to its host.
+    reported: StopReason,
 }
 
 /// The watchdog's second, and a period of the laser.
 const WATCHDOG_MS: f64 = 1000.0 + PERIOD_MS;
-/// The handler is entered and turns the laser off: much less than what the report and the reset
-/// take, in which there would be a pulse. The image's start resets the PIO as soon.
+/// The handler turns the laser off at once. The report and the reset take much longer and would
+/// contain a pulse. The start of the image resets the PIO just as fast.
 const HANDLER_MS: f64 = 0.002;
 
-const fn fault(kind: &'static str, lit_ms: f64, reset: &'static str, told: StopReason) -> Fault {
+const fn fault(
+    kind: &'static str,
+    lit_ms: f64,
+    reset: &'static str,
+    reported: StopReason,
+) -> Fault {
     Fault {
         kind,
         lit_ms,
         reset,
-        told,
+        reported,
     }
 }
 
@@ -73,22 +78,22 @@ const FAULTS: [Fault; 8] = [
     fault("fault", HANDLER_MS, "forced", StopReason::Fault),
     fault("hang", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
     fault("lockup", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
-    // The millisecond that has just ended still feeds the watchdog in the next round.
+    // The current millisecond still feeds the watchdog in the next round.
     fault(
         "clock",
         WATCHDOG_MS + ROUND_MS,
         "watchdog",
         StopReason::Watchdog,
     ),
-    // On the chip the boot ROM comes before the image's start.
+    // On the chip, the boot ROM runs before the image.
     fault("core-reset", HANDLER_MS, "core", StopReason::Reset),
-    // The registers of the hard fault find no room: the core locks up, or the handler is entered
-    // without them.
+    // The stack has no room for the registers of the hard fault: the core locks up, or enters the
+    // handler without them.
     fault("overflow", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
     fault("overflow-entered", HANDLER_MS, "forced", StopReason::Fault),
 ];
 
-/// How long it has to stay dark.
+/// How long the laser must stay off, in milliseconds.
 fn dark_ms() -> f64 {
     if env::var_os("DTOF_LONG").is_some() {
         60_000.0
@@ -97,7 +102,7 @@ fn dark_ms() -> f64 {
     }
 }
 
-/// A line that is cut, as when the program at its end is killed: nothing more goes over it.
+/// A line that can be cut, as if the program at its end were killed.
 struct Cut {
     port: Box<dyn Port>,
     is_cut: Arc<AtomicBool>,
@@ -122,7 +127,7 @@ impl Port for Cut {
     }
 }
 
-/// A host that has let the laser fire, and what cuts its line.
+/// A host that has started the laser, and the switch that cuts its line.
 fn light(board: &mut Rp2040) -> Result<(Client, Arc<AtomicBool>)> {
     let is_cut = Arc::new(AtomicBool::new(false));
     let port = board.connect()?;
@@ -131,22 +136,22 @@ fn light(board: &mut Rp2040) -> Result<(Client, Arc<AtomicBool>)> {
         is_cut: is_cut.clone(),
     }))?;
     let timeout = HostTimeout::from_milliseconds(HOST_TIMEOUT_MS).context("no timeout")?;
-    client.configure(&configuration(
-        &senses(),
-        1,
-        1,
-        Source::Sensor,
-        None,
-        timeout,
-    )?)?;
+    let task = Task {
+        settings: &senses(),
+        pixels: 1,
+        columns: 1,
+        dynamic_depth: None,
+        host_timeout: timeout,
+    };
+    client.configure(&task.configuration(Source::Sensor)?)?;
     Ok((client, is_cut))
 }
 
-/// The milliseconds for which the laser has fired after `from`, and for which it has been dark
-/// since. Its pulses were as long as they should be.
+/// The milliseconds for which the laser has fired after `from`, and for which it has been off since.
+/// Fails if a pulse had the wrong length.
 fn dark_since(from: f64, done: &Done) -> Result<(f64, f64)> {
     let laser = &done.laser;
-    let last = laser.last_high_ms.context("the laser has never fired")?;
+    let last = laser.last_high_ms.context("the laser never fired")?;
     let (lit, dark) = (last - from, done.end_ms - last);
     ensure!(done.success, "{done:?}");
     ensure!(laser.pulses >= 1000, "{done:?}");
@@ -157,7 +162,7 @@ fn dark_since(from: f64, done: &Done) -> Result<(f64, f64)> {
 
 #[test]
 fn laser_record_and_resets_of_the_runner_are_right() -> Result<()> {
-    let Some(_alone) = wanted("the runner of the Pico's images", &[NODE, NPM]) else {
+    let Some(_alone) = enabled("the runner of the Pico's images", &[NODE, NPM]) else {
         return Ok(());
     };
     install()?;
@@ -170,13 +175,13 @@ fn laser_record_and_resets_of_the_runner_are_right() -> Result<()> {
 
 #[test]
 fn laser_goes_dark_and_stays_dark_after_every_fault() -> Result<()> {
-    let Some(_alone) = wanted("the laser of the Pico in rp2040js", &[NODE, NPM]) else {
+    let Some(_alone) = enabled("the laser of the Pico in rp2040js", &[NODE, NPM]) else {
         return Ok(());
     };
     install()?;
     let image = image(&["photon-timer"], None)?;
     ensure!(stack::Image::read(&image)?.stack.start == RAM);
-    println!("fault at ms: ms until the last pulse, at most; dark for ms; longest pulse; boots");
+    println!("fault at ms: ms until the last pulse, at most; off for ms; longest pulse; boots");
     for fault in &FAULTS {
         let phases = if fault.lit_ms < PERIOD_MS {
             &PHASES_MS[..]
@@ -195,14 +200,14 @@ fn goes_dark(image: &Path, fault: &Fault, fault_ms: f64) -> Result<()> {
         kind,
         lit_ms,
         reset,
-        told,
+        reported,
     } = fault;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let for_ms = (lit_ms + dark_ms()).ceil() as u32;
     let mut board = Rp2040::start_with_fault(image, kind, fault_ms, for_ms)?;
     let (mut client, is_cut) = light(&mut board)?;
-    // Until the device, which has been reset, knows nothing of the session. A second of the watchdog
-    // may take the emulator longer than a client waits for a sign of life.
+    // Waits until the device has restarted. A second of the watchdog may take the emulator longer than
+    // a client waits for an answer.
     let start = Instant::now();
     let lost = loop {
         match client.exchange() {
@@ -210,7 +215,8 @@ fn goes_dark(image: &Path, fault: &Fault, fault_ms: f64) -> Result<()> {
             _ => ensure!(start.elapsed() < Duration::from_secs(120), "no reset"),
         }
     };
-    let expected = format!("the device has been restarted ({told}) and has forgotten this session");
+    let expected =
+        format!("the device has been restarted ({reported}) and has forgotten this session");
     ensure!(lost == expected, "{lost}");
     is_cut.store(true, Ordering::Relaxed);
     drop(client);
@@ -222,7 +228,7 @@ fn goes_dark(image: &Path, fault: &Fault, fault_ms: f64) -> Result<()> {
         "{kind} at {fault_ms}: {lit:.4}, {lit_ms}; {dark:.0}; {} ns; {boots:?}",
         done.laser.longest_ns
     );
-    ensure!(lit > -2.0 * PERIOD_MS, "it was dark before: {done:?}");
+    ensure!(lit > -2.0 * PERIOD_MS, "the laser was off before: {done:?}");
     ensure!(lit <= lit_ms, "{lit} ms of light: {done:?}");
     ensure!(boots == ["power", reset], "{done:?}");
     ensure!(done.panicked == (kind == "panic"), "{done:?}");
@@ -231,8 +237,8 @@ fn goes_dark(image: &Path, fault: &Fault, fault_ms: f64) -> Result<()> {
     Ok(())
 }
 
-/// Waits until an image has ended, which was not reset. Its laser has to have fired for so many
-/// milliseconds after `from`, or after the host's last byte, and no longer.
+/// Waits until an image has ended, without a reset. Its laser must have fired for the `expected`
+/// milliseconds after `from`, or after the host's last byte.
 fn fired_for(
     what: &str,
     expected: RangeInclusive<f64>,
@@ -242,7 +248,7 @@ fn fired_for(
     let done = board.wait()?;
     let from = from(&done).with_context(|| format!("{what}: {done:?}"))?;
     let (lit, dark) = dark_since(from, &done)?;
-    println!("{what}: {lit:.3} ms of {expected:?}; dark for {dark:.0} ms");
+    println!("{what}: {lit:.3} ms of {expected:?}; off for {dark:.0} ms");
     ensure!(
         expected.contains(&lit),
         "{what}: {lit} ms of light: {done:?}"
@@ -257,14 +263,14 @@ fn start(image: &Path, over_usb: bool) -> Result<Rp2040> {
     Rp2040::start_for(image, over_usb, for_ms.ceil() as u32)
 }
 
-/// From the last byte of the host on, which ends a frame.
+/// From the last byte of the host, which ends a frame.
 const SILENCE_MS: RangeInclusive<f64> =
     HOST_TIMEOUT_MS as f64 - ROUND_MS..=HOST_TIMEOUT_MS as f64 + ROUND_MS;
 const AT_ONCE_MS: RangeInclusive<f64> = -ROUND_MS..=ROUND_MS;
 
 #[test]
 fn laser_goes_dark_when_its_host_ends_its_session_or_is_cut_off() -> Result<()> {
-    let Some(_alone) = wanted("the laser without a host", &[NODE, NPM]) else {
+    let Some(_alone) = enabled("the laser without a host", &[NODE, NPM]) else {
         return Ok(());
     };
     install()?;
@@ -306,15 +312,15 @@ fn fires(client: &mut Client) -> Result<()> {
 }
 
 #[test]
-fn laser_stops_once_for_a_silent_host_which_is_told_why() -> Result<()> {
-    let Some(_alone) = wanted("the laser with a silent host", &[NODE, NPM]) else {
+fn laser_stops_once_for_a_silent_host_which_gets_the_reason() -> Result<()> {
+    let Some(_alone) = enabled("the laser with a silent host", &[NODE, NPM]) else {
         return Ok(());
     };
     install()?;
     let mut board = start(&image(&["photon-timer"], None)?, false)?;
     let (mut client, is_cut) = light(&mut board)?;
     fires(&mut client)?;
-    // This computer's time is not that of the emulator.
+    // The emulator has its own time.
     let mut silence = Duration::from_secs(4);
     let report: Report = loop {
         thread::sleep(silence);
@@ -337,14 +343,14 @@ fn laser_stops_once_for_a_silent_host_which_is_told_why() -> Result<()> {
     drop(client);
     let done = board.wait()?;
     let (_, dark) = dark_since(0.0, &done)?;
-    println!("silent host: dark for {dark:.0} ms; {report:?}");
+    println!("silent host: off for {dark:.0} ms; {report:?}");
     ensure!(done.boots.len() == 1, "{done:?}");
     Ok(())
 }
 
 #[test]
 fn laser_goes_dark_when_the_monitor_is_interrupted_or_killed() -> Result<()> {
-    let Some(_alone) = wanted("the laser of a killed monitor", &[NODE, NPM]) else {
+    let Some(_alone) = enabled("the laser of a killed monitor", &[NODE, NPM]) else {
         return Ok(());
     };
     install()?;
@@ -363,7 +369,7 @@ fn laser_goes_dark_when_the_monitor_is_interrupted_or_killed() -> Result<()> {
         let mut header = String::new();
         let stdout = monitor.stdout.take().context("no output")?;
         let mut stdout = BufReader::new(stdout);
-        // It comes once the device is configured.
+        // Printed once the device is configured.
         stdout.read_line(&mut header)?;
         ensure!(header.starts_with("cycle,"), "{header}");
         thread::sleep(Duration::from_secs(3));
@@ -376,7 +382,7 @@ fn laser_goes_dark_when_the_monitor_is_interrupted_or_killed() -> Result<()> {
             if over_usb { "USB" } else { "UART" }
         );
         match (signal, over_usb) {
-            // It rests before the session ends.
+            // It pauses before the session ends.
             ("INT", _) => {
                 let until = -f64::from(HOST_TIMEOUT_MS) / 2.0..=ROUND_MS;
                 fired_for(&what, until, |done| done.last_input_ms, board)?;

@@ -1,8 +1,8 @@
-//! Checks that take minutes and need what not every computer has: the images in QEMU,
-//! exported files in other projects' readers, the report in a browser.
+//! Checks that take minutes and need additional tools: images in QEMU, exported files in other
+//! projects' readers, reports in a browser.
 //!
-//! Each runs if `DTOF_SLOW` is set and prints a line that begins with `SKIPPED:` if
-//! not, or if something is missing. `cargo xtask setup` installs most of it.
+//! A check runs if `DTOF_SLOW` is set. Otherwise, or if a tool is missing, it prints a line that
+//! begins with `SKIPPED:`. `cargo xtask setup` installs most of the tools.
 //!
 //! ```sh
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow
@@ -33,8 +33,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use anyhow::{Context, Result, ensure};
 
-/// Whether `test` is to run, with what it needs: then alone, as some measure time.
-fn wanted(test: &str, programs: &[&str]) -> Option<MutexGuard<'static, ()>> {
+/// A lock if `test` is enabled and its programs are installed. Tests run one at a time, as some
+/// measure time.
+fn enabled(test: &str, programs: &[&str]) -> Option<MutexGuard<'static, ()>> {
     static ALONE: Mutex<()> = Mutex::new(());
     if env::var_os("DTOF_SLOW").is_none() {
         skipped(test, "it takes minutes; DTOF_SLOW=1 runs it");
@@ -50,13 +51,13 @@ fn wanted(test: &str, programs: &[&str]) -> Option<MutexGuard<'static, ()>> {
     Some(ALONE.lock().unwrap_or_else(PoisonError::into_inner))
 }
 
-/// Says so past the test harness, which hides what passing tests print.
+/// Prints the reason past the test harness, which hides the output of passing tests.
 fn skipped(test: &str, why: &str) {
-    // In one piece: other tests write at the same time.
+    // One write: other tests write at the same time.
     let _ = io::stderr().write_all(format!("SKIPPED: {test}: {why}\n").as_bytes());
 }
 
-/// What a program says of its version, if it is there.
+/// The version that a program prints, if it is installed.
 fn version(program: &str) -> Option<String> {
     let mut command = Command::new(program);
     let command = command.arg("--version").stdin(Stdio::null());
@@ -70,13 +71,13 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
 }
 
-/// Where cargo builds.
+/// The build folder of cargo.
 fn target_folder() -> PathBuf {
     let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
     root().join(folder)
 }
 
-/// Runs cargo in the workspace; the line that it prints.
+/// Runs cargo in the workspace. Returns its output.
 fn cargo(arguments: &[&str]) -> Result<String> {
     let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     let cargo = cargo.current_dir(root()).arg("--locked").args(arguments);
@@ -91,14 +92,14 @@ fn cargo(arguments: &[&str]) -> Result<String> {
     Ok(text)
 }
 
-/// The program as `cargo run --release` builds it.
+/// Builds the program as `cargo run --release` does.
 fn dtof() -> Result<PathBuf> {
     cargo(&["build", "--quiet", "--release", "--package", "dtof"])?;
     Ok(target_folder().join("release/dtof").canonicalize()?)
 }
 
-/// The program with the server for Foxglove, as tests have built it. It lies elsewhere, so that neither
-/// takes the place of the other.
+/// Builds the program with the server for Foxglove, in the profile of the tests. Its path differs from
+/// [`dtof`]'s.
 fn dtof_with_foxglove() -> Result<PathBuf> {
     cargo(&[
         "build",
@@ -112,8 +113,8 @@ fn dtof_with_foxglove() -> Result<PathBuf> {
     Ok(target_folder().join("debug/dtof").canonicalize()?)
 }
 
-/// A Python with the packages of a requirements file of the workspace; says why if
-/// there is none.
+/// A Python with the packages of a requirements file of the workspace. Prints the reason if it
+/// cannot be installed.
 fn python(test: &str, requirements: &str) -> Option<PathBuf> {
     match cargo(&["xtask", "python", requirements]) {
         Ok(path) => Some(path.into()),
@@ -124,7 +125,7 @@ fn python(test: &str, requirements: &str) -> Option<PathBuf> {
     }
 }
 
-/// Runs a command that may not ask.
+/// Runs a command that must succeed, without input.
 fn succeed(command: &mut Command) -> Result<()> {
     let name = command.get_program().display().to_string();
     let status = command.stdin(Stdio::null()).status();

@@ -1,5 +1,4 @@
-//! The images of the Pico in rp2040js do what they should. Needs Node.js and npm, which installs
-//! rp2040js.
+//! Runs the images of the Pico in rp2040js. Needs Node.js and npm, which installs rp2040js.
 //!
 //! ```sh
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow pico -- --nocapture
@@ -13,7 +12,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use dtof_core::fixed::types::{U8F8, U16F16};
 use dtof_core::{Array, Count, PaperRule, PixelAddress};
-use dtof_device::{Client, HostTimeout, configuration};
+use dtof_device::{Client, HostTimeout, Task};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_link::{FaultRecord, Report, Source};
@@ -23,19 +22,19 @@ use rand_pcg::Pcg32;
 
 use crate::boards::{decides_alike, settings, with_all};
 use crate::rp2040::{NODE, NPM, Rp2040, image, install, run, write_edges};
-use crate::{root, stack, target_folder, wanted};
+use crate::{enabled, root, stack, target_folder};
 
 /// The SPAD's pin.
 const SPAD: u8 = 3;
 const BINS: u32 = 128;
 /// Nanoseconds of a bin.
 const BIN_NS: u64 = 8;
-/// How long the SPAD's pulse is: two samples, whenever it begins.
+/// The length of the SPAD's pulse: two samples, whenever it begins.
 const PULSE_NS: u64 = 16;
 
 #[test]
 fn pico_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
-    let Some(_alone) = wanted("the Pico in rp2040js", &[NODE, NPM]) else {
+    let Some(_alone) = enabled("the Pico in rp2040js", &[NODE, NPM]) else {
         return Ok(());
     };
     install()?;
@@ -43,7 +42,7 @@ fn pico_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     let expected = std::fs::read(root().join("firmware/self-test.out"))?;
     ensure!(
         of_core.success && of_core.output == expected,
-        "not the lines of firmware/self-test.out"
+        "differs from firmware/self-test.out"
     );
     ensure!(of_core.stack <= stack::MOST, "{of_core:?}");
 
@@ -68,10 +67,10 @@ fn pico_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     stack::check(&sidecar, &used)
 }
 
-/// Photons of laser cycles, by their bins: in order, and so far apart that each is seen.
+/// The bins of the photons of laser cycles, in order, and far enough apart for the timer.
 type Cycles = Vec<Vec<u16>>;
 
-/// `hits` photons a laser cycle over all bins, of which one in two laser cycles comes from a
+/// `hits` photons per laser cycle over all bins. In every second laser cycle one of them comes from a
 /// target at `target`.
 fn photons(hits: usize, target: u16, cycles: usize, random: &mut Pcg32) -> Cycles {
     let mut below = |limit: u32| {
@@ -95,9 +94,9 @@ fn photons(hits: usize, target: u16, cycles: usize, random: &mut Pcg32) -> Cycle
     (0..cycles).map(|_| cycle()).collect()
 }
 
-/// The edges of the SPAD's pulses in laser cycles of `period_ns`, each somewhere in its bin. In every
-/// 16th laser cycle is a pulse between the bins of two laser cycles as well, which is none, and
-/// one that has begun before bin 0 where the first bins are free.
+/// The edges of the SPAD's pulses in laser cycles of `period_ns`, each somewhere in its bin. Every 16th
+/// laser cycle also has pulses that do not count: one after the last bin, and one that begins before
+/// bin 0 if the first bins are free.
 fn edges(cycles: &Cycles, period_ns: u64, random: &mut Pcg32) -> Vec<(u64, u8, bool)> {
     let mut edges = Vec::new();
     let mut pulse = |from: u64| edges.extend([(from, SPAD, true), (from + PULSE_NS, SPAD, false)]);
@@ -138,13 +137,18 @@ impl Timer {
         let mut client = Client::new(board.connect()?)?;
         let about = client.sensor()?.context("no sensor")?;
         ensure!(about.bin_width == Some(U16F16::from_num(BIN_NS * 1000)));
-        let timeout = HostTimeout::default();
-        let wanted = configuration(settings, 1, 1, Source::Sensor, None, timeout)?;
-        client.configure(&wanted)?;
+        let task = Task {
+            settings,
+            pixels: 1,
+            columns: 1,
+            dynamic_depth: None,
+            host_timeout: HostTimeout::default(),
+        };
+        client.configure(&task.configuration(Source::Sensor)?)?;
         Ok(Self { board, client })
     }
 
-    /// Waits until so many laser cycles have ended.
+    /// Waits until the given number of laser cycles have ended.
     fn wait(&mut self, cycles: u64) -> Result<Report> {
         let start = Instant::now();
         loop {
@@ -156,14 +160,14 @@ impl Timer {
                 start.elapsed() < Duration::from_secs(60),
                 "{cycles} laser cycles take too long: {report:?}"
             );
-            // Each question takes time that laser cycles need.
+            // Each request takes time from the laser cycles.
             thread::sleep(Duration::from_millis(50));
         }
     }
 
     /// The histogram of the exposure so far.
     fn histogram(&mut self) -> Result<Vec<u32>> {
-        self.client.request_histogram(PixelAddress(0))?;
+        self.client.request_histogram(PixelAddress::new(0))?;
         loop {
             if let Some(answer) = self.client.poll_histogram()? {
                 let histogram = answer.ok().context("no histogram")?;
@@ -173,7 +177,7 @@ impl Timer {
     }
 }
 
-/// Decides nothing within the laser cycles of a test.
+/// Settings without a decision within the laser cycles of a test.
 fn gathers() -> Settings {
     Settings {
         l1: 60_000,
@@ -192,7 +196,7 @@ pub fn senses() -> Settings {
 
 #[test]
 fn pico_times_all_photons_of_a_laser_cycle() -> Result<()> {
-    let Some(_alone) = wanted("the Pico's photon timer in rp2040js", &[NODE, NPM]) else {
+    let Some(_alone) = enabled("the Pico's photon timer in rp2040js", &[NODE, NPM]) else {
         return Ok(());
     };
     install()?;
@@ -216,7 +220,7 @@ fn pico_times_all_photons_of_a_laser_cycle() -> Result<()> {
         let done = timer.board.stop()?;
         ensure!(done.laser.pulses >= report.cycles, "{done:?}");
 
-        // All hits show the target. Of a TDC of one hit, six a laser cycle hide it behind early ones.
+        // All hits show the target. In a TDC with one hit, six photons per laser cycle hide it behind early ones.
         let highest = |counts: &[u32]| (0..128).max_by_key(|&bin| counts[bin]).unwrap_or_default();
         ensure!(highest(&found) == usize::from(TARGET));
         let first: Cycles = cycles.iter().map(|cycle| cycle[..1].to_vec()).collect();
@@ -233,7 +237,7 @@ fn pico_times_all_photons_of_a_laser_cycle() -> Result<()> {
     Ok(())
 }
 
-/// The events of the board and of this computer from the same photons.
+/// The events of the board and of this computer for the same photons.
 fn events(
     image: &Path,
     cycles: &Cycles,
@@ -249,7 +253,7 @@ fn events(
     timer.board.stop()?;
 
     let array = Array::new(1, 1).unwrap();
-    let mut engine = host_engine(&settings, array, &[PixelAddress(0)])?;
+    let mut engine = host_engine(&settings, array, &[PixelAddress::new(0)])?;
     let photons = (0..)
         .zip(cycles)
         .flat_map(|(cycle, bins)| bins.iter().map(move |&code| Photon { cycle, code }));
@@ -269,12 +273,12 @@ fn events(
 
 #[test]
 fn pico_keeps_up_with_a_laser_and_counts_what_it_loses() -> Result<()> {
-    let Some(_alone) = wanted("the Pico's highest rates in rp2040js", &[NODE, NPM]) else {
+    let Some(_alone) = enabled("the Pico's highest rates in rp2040js", &[NODE, NPM]) else {
         return Ok(());
     };
     install()?;
-    // Those of docs/boards.md, and one that is too much. Its pulse is the shortest, as the limits of
-    // the laser ask for.
+    // The rates of docs/boards.md, and one that is too high. Its pulse is the shortest, for the limits
+    // of the laser.
     for (hits, laser_hz, pulse_ns, keeps_up) in [
         (1, 138_889, 100, true),
         (3, 100_000, 100, true),

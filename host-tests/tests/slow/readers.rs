@@ -1,6 +1,6 @@
-//! What `dtof export` writes and `dtof view --foxglove` serves, read by other projects' programs and
-//! compared by `host-tests/readers/check.py` and `live.py`. Needs Python; the readers are installed below the
-//! build folder, from the package index unless they are there.
+//! Output of `dtof export` and `dtof view --foxglove`, read by other projects' programs and checked by
+//! `host-tests/readers/check.py` and `live.py`. Needs Python. The readers are installed in the build
+//! folder, from the package index if they are missing.
 //!
 //! ```sh
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow readers
@@ -12,16 +12,16 @@ use std::process::Command;
 
 use anyhow::Result;
 
-use crate::{dtof, dtof_with_foxglove, python, root, succeed, target_folder, wanted};
+use crate::{dtof, dtof_with_foxglove, enabled, python, root, succeed, target_folder};
 
-/// A scene in which something moves, so that there are changes of depth.
+/// A scene with a moving target, for changes of depth.
 const SCENE: &str = "scenes/radial.toml";
 const CYCLES: &str = "40000";
 
 #[test]
 fn other_readers_find_in_exported_files_what_is_in_them() -> Result<()> {
     let test = "exported files in other readers";
-    let Some(_alone) = wanted(test, &["python3"]) else {
+    let Some(_alone) = enabled(test, &["python3"]) else {
         return Ok(());
     };
     let Some(python) = python(test, "host-tests/readers/requirements.txt") else {
@@ -46,7 +46,7 @@ fn other_readers_find_in_exported_files_what_is_in_them() -> Result<()> {
 #[test]
 fn another_client_finds_in_live_data_what_is_in_the_recording() -> Result<()> {
     let test = "live data in other readers";
-    let Some(_alone) = wanted(test, &["python3"]) else {
+    let Some(_alone) = enabled(test, &["python3"]) else {
         return Ok(());
     };
     let Some(python) = python(test, "host-tests/readers/requirements.txt") else {

@@ -1,9 +1,9 @@
-//! The reports of `dtof` in a real browser, used as a reader does by
-//! `host-tests/report/check.py`. Needs Chromium and Python.
+//! The reports of `dtof` in a real browser, which `host-tests/report/check.py` operates like a reader.
+//! Needs Chromium and Python.
 //!
 //! ```sh
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow report
-//! cp out/check-report/report.png docs/figures/     # the README's picture anew
+//! cp out/check-report/report.png docs/figures/     # updates the README's picture
 //! ```
 
 use std::fs;
@@ -11,14 +11,13 @@ use std::process::Command;
 
 use anyhow::{Result, ensure};
 
-use crate::{dtof, python, root, succeed, wanted};
+use crate::{dtof, enabled, python, root, succeed};
 
-/// The most that the picture of the README may take.
+/// The most bytes of the README's picture.
 const MOST_BYTES: u64 = 300_000;
 
-/// The reports of a static scene, of a moving one with more events than a report shows,
-/// of an array whose maps leave room for fewer, and of few pixels and one before a target that
-/// moves.
+/// The reports: a static scene, a moving one with more events than a report shows, an array whose maps
+/// leave room for fewer, and a few pixels and a single one in front of a moving target.
 const REPORTS: [(&str, &str); 5] = [
     ("static", "demo --quiet --out"),
     (
@@ -39,7 +38,7 @@ const REPORTS: [(&str, &str); 5] = [
 #[test]
 fn reports_in_a_browser_are_drawn_turned_and_closed() -> Result<()> {
     let test = "reports in a browser";
-    let Some(_alone) = wanted(test, &["chromium", "python3"]) else {
+    let Some(_alone) = enabled(test, &["chromium", "python3"]) else {
         return Ok(());
     };
     let Some(python) = python(test, "host-tests/report/requirements.txt") else {

@@ -1,4 +1,4 @@
-//! The runner of the Pico's images, `tools/rp2040`, with an image.
+//! Runs images of the Pico with `tools/rp2040`.
 
 use std::fs;
 use std::io::Read;
@@ -13,12 +13,12 @@ use serde_json::Value;
 use crate::emulator::{PATIENCE, free_ports, open};
 use crate::{root, succeed};
 
-/// What runs it. `cargo xtask setup` installs both.
+/// The programs it needs. `cargo xtask setup` installs both.
 pub const NODE: &str = "node";
 pub const NPM: &str = "npm";
 
-/// The path of the image, of the sidecar unless something else is named. `laser` is the rate of the
-/// photon timer in Hz, and its pulse in nanoseconds.
+/// The path of the image, by default the sidecar. `laser` is the rate of the photon timer in Hz and its
+/// pulse in nanoseconds.
 pub fn image(what: &[&str], laser: Option<(u32, u32)>) -> Result<PathBuf> {
     let mut cargo = Command::new(env!("CARGO"));
     cargo
@@ -36,7 +36,7 @@ pub fn image(what: &[&str], laser: Option<(u32, u32)>) -> Result<PathBuf> {
     Ok(String::from_utf8(output.stdout)?.trim().into())
 }
 
-/// Installs rp2040js, if it is not there.
+/// Installs rp2040js unless it is installed.
 pub fn install() -> Result<()> {
     let folder = folder();
     if folder.join("node_modules/.package-lock.json").exists() {
@@ -59,35 +59,35 @@ pub struct Rp2040 {
     port: u16,
 }
 
-/// What a run has done. Times are those of the image, in milliseconds since power-on.
+/// The report of a run. Times are those of the image, in milliseconds since power-on.
 #[derive(Debug)]
 pub struct Done {
-    /// What was printed.
+    /// The output.
     pub output: Vec<u8>,
     pub success: bool,
-    /// Bytes of the stack that were used.
+    /// The bytes of stack used.
     pub stack: u64,
     pub end_ms: f64,
     pub laser: Laser,
-    /// When the last byte came that the host sent.
+    /// The time of the last byte from the host.
     pub last_input_ms: Option<f64>,
-    /// When the USB's host has closed the port.
+    /// The time when the USB host closed the port.
     pub dtr_low_ms: Option<f64>,
     pub planted_ms: Option<f64>,
-    /// The first is at power-on.
+    /// Boots; the first is at power-on.
     pub boots: Vec<Boot>,
-    /// The panic handler has run.
+    /// Whether the panic handler has run.
     pub panicked: bool,
     pub hard_faults: u64,
 }
 
-/// What the laser's pin has done, as it left the chip.
+/// The signal at the laser's pin of the chip.
 #[derive(Clone, Debug)]
 pub struct Laser {
     pub pulses: u64,
     pub longest_ns: u64,
     pub last_high_ms: Option<f64>,
-    /// It is high at the end.
+    /// Whether it is high at the end.
     pub is_high: bool,
 }
 
@@ -100,8 +100,8 @@ pub struct Boot {
 }
 
 impl Rp2040 {
-    /// Starts an image with its serial port on a free TCP port. Pins change as the file `edges`
-    /// says, from the laser's first pulse at GP2 on.
+    /// Starts an image with its serial port on a free TCP port. The file `edges` has the levels of pins,
+    /// from the laser's first pulse at GP2.
     pub fn start(image: &Path, edges: Option<&Path>) -> Result<Self> {
         let mut node = command(image);
         if let Some(edges) = edges {
@@ -110,22 +110,22 @@ impl Rp2040 {
         Self::spawn(node)
     }
 
-    /// The same with the serial port of the USB, and no edges.
+    /// Starts an image with the serial port of the USB, without edges.
     pub fn start_with_usb(image: &Path) -> Result<Self> {
         let mut node = command(image);
         node.arg("--usb");
         Self::spawn(node)
     }
 
-    /// Starts an image in which a fault is planted, `fault_ms` after the laser's first pulse.
-    /// `for_ms` after it, and after the client has gone, the emulator ends.
+    /// Starts an image with a planted fault, `fault_ms` after the laser's first pulse. The emulator ends
+    /// `for_ms` after the fault, once the client has disconnected.
     pub fn start_with_fault(image: &Path, kind: &str, fault_ms: f64, for_ms: u32) -> Result<Self> {
         let mut node = command(image);
         node.args(["--plant", &format!("{kind}@{fault_ms}")]);
         Self::spawn(ending_after(node, for_ms))
     }
 
-    /// The same without a fault. The serial port is that of the USB, or the UART.
+    /// Starts an image without a fault. Its serial port is the USB or the UART.
     pub fn start_for(image: &Path, over_usb: bool, for_ms: u32) -> Result<Self> {
         let mut node = command(image);
         node.args(over_usb.then_some("--usb"));
@@ -140,7 +140,7 @@ impl Rp2040 {
         Ok(Self { child, port })
     }
 
-    /// Its serial port, as `dtof` takes it.
+    /// Its serial port, as an argument for `dtof --device`.
     pub fn device(&self) -> String {
         format!("tcp:127.0.0.1:{}", self.port)
     }
@@ -168,7 +168,7 @@ impl Rp2040 {
 
 impl Drop for Rp2040 {
     fn drop(&mut self) {
-        // It may have ended by itself.
+        // It may already have ended.
         let _ = self.child.kill();
         let _ = self.child.wait();
     }
@@ -231,7 +231,7 @@ fn done(report: &str, output: Vec<u8>, success: bool) -> Result<Done> {
     })
 }
 
-/// Writes edges, each `(nanoseconds, pin, level)`.
+/// Writes edges as `(nanoseconds, pin, level)`.
 pub fn write_edges(path: &Path, edges: &[(u64, u8, bool)]) -> Result<()> {
     let lines = edges.iter();
     let lines = lines.map(|(ns, pin, level)| format!("{ns} {pin} {}\n", u8::from(*level)));

@@ -1,5 +1,5 @@
-//! Photons that an emulated device makes as fast as it goes, and decides on: the events and
-//! counts are those of this computer, which makes the same photons.
+//! An emulated device generates photons as fast as it can and finds events in them. This computer
+//! generates the same photons and must find the same events and counts.
 //!
 //! ```sh
 //! DTOF_SLOW=1 cargo test --release --package dtof-host-tests --test slow soak -- --ignored --nocapture
@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{Array, PixelAddress};
-use dtof_device::{Client, HostTimeout, configuration};
+use dtof_device::{Client, HostTimeout, Task};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_events::aer_file::Event;
@@ -21,23 +21,23 @@ use dtof_sensors::{PhotonSink, Polled, simulated};
 use crate::boards::{settings, with_all};
 use crate::emulator::{Board, Emulator, QEMU};
 use crate::sensed::Photons;
-use crate::{stack, wanted};
+use crate::{enabled, stack};
 
 const BOARD: Board = Board::Mps2An386;
 /// The pixels of the simulated scene.
 const ARRAY: Array = Array::new(4, 4).unwrap();
 const PIXELS: u16 = 16;
-/// Laser cycles that this computer works on at a time.
+/// Laser cycles per slice on this computer.
 const SLICE: u16 = 10_000;
-/// How often the device is asked how far it is.
+/// How often the device is asked for its progress.
 const EVERY: Duration = Duration::from_millis(200);
-/// A device that makes no photon for so long has stopped.
+/// A device without a photon for this time has stopped.
 const PATIENCE: Duration = Duration::from_secs(60);
 
 /// The name of `with_all`.
 const ALL: &str = "windows, blocks, tracking, two echoes";
 
-/// What came of a device.
+/// The results of a device.
 struct Sensed {
     events: Vec<Event>,
     report: Report,
@@ -46,15 +46,20 @@ struct Sensed {
     stack: u64,
 }
 
-/// The device makes the photons of so many laser cycles and decides on them.
+/// The device generates and processes the photons of the given number of laser cycles.
 fn on_device(image: &Path, settings: &Settings, cycles: u64) -> Result<Sensed> {
     let mut emulator = Emulator::start(BOARD, image, &[&format!("unpaced={cycles}")])?;
     let mut client = Client::new(emulator.connect()?)?;
     let start = Instant::now();
     let configure = |client: &mut Client, source| {
-        let (columns, timeout) = (ARRAY.columns(), HostTimeout::default());
-        let wanted = configuration(settings, PIXELS, columns, source, None, timeout)?;
-        client.configure(&wanted)
+        let task = Task {
+            settings,
+            pixels: PIXELS,
+            columns: ARRAY.columns(),
+            dynamic_depth: None,
+            host_timeout: HostTimeout::default(),
+        };
+        client.configure(&task.configuration(source)?)
     };
     configure(&mut client, Source::Sensor)?;
     let (mut events, mut last) = (Vec::new(), client.report()?);
@@ -62,14 +67,17 @@ fn on_device(image: &Path, settings: &Settings, cycles: u64) -> Result<Sensed> {
     loop {
         let since = Instant::now();
         while since.elapsed() < EVERY {
-            ensure!(client.poll_report()?.is_none(), "a report nobody asked for");
+            ensure!(
+                client.poll_report()?.is_none(),
+                "a report without a request"
+            );
             events.append(&mut client.take_events());
         }
         let report = client.report()?;
         events.append(&mut client.take_events());
         if report.cycles == cycles {
             length.get_or_insert_with(|| start.elapsed());
-            // Events may have waited in their slots for the report before.
+            // Events may have waited in their slots since the report before.
             if (report.statistics, report.blocks) == (last.statistics, last.blocks) {
                 break;
             }
@@ -96,13 +104,13 @@ fn on_device(image: &Path, settings: &Settings, cycles: u64) -> Result<Sensed> {
     })
 }
 
-/// Whether what came of the device is what this computer makes of the photons of `sensor`.
+/// Fails unless this computer gets the same results from the photons of `sensor`.
 fn compare(
     sensed: &Sensed,
     settings: &Settings,
     mut sensor: impl FnMut(u16, &mut Photons) -> Polled,
 ) -> Result<()> {
-    let addresses: Vec<_> = (0..PIXELS).map(PixelAddress).collect();
+    let addresses: Vec<_> = (0..PIXELS).map(PixelAddress::new).collect();
     let mut engine = host_engine(settings, ARRAY, &addresses)?;
     let mut sent = sensed.events.iter();
     let (mut cycle, cycles) = (0, sensed.report.cycles);
@@ -144,7 +152,7 @@ fn scene() -> impl FnMut(u16, &mut Photons) -> Polled {
     move |cycles, photons| scene.laser_cycles(cycles, photons)
 }
 
-/// Whether nothing was lost on the way. A pause of this computer may repeat a message.
+/// Fails if bytes were lost. A pause of this computer may repeat a message.
 fn loses_nothing(sensed: &Sensed) -> Result<()> {
     let report = &sensed.report;
     for link in [&report.link, &sensed.here] {
@@ -159,7 +167,7 @@ fn loses_nothing(sensed: &Sensed) -> Result<()> {
     Ok(())
 }
 
-/// Runs so many laser cycles, and holds them against this computer's.
+/// Runs the laser cycles and compares the results with this computer's.
 fn runs_alike(name: &str, image: &Path, settings: &Settings, cycles: u64) -> Result<Sensed> {
     let sensed = on_device(image, settings, cycles)?;
     compare(&sensed, settings, scene())?;
@@ -179,7 +187,7 @@ fn runs_alike(name: &str, image: &Path, settings: &Settings, cycles: u64) -> Res
     Ok(sensed)
 }
 
-/// Gives photons on, one of them in another bin.
+/// Passes photons on, with one of them in another bin.
 struct Altered<'a> {
     photons: &'a mut Photons,
     until: &'a mut u32,
@@ -188,7 +196,7 @@ struct Altered<'a> {
 impl PhotonSink for Altered<'_> {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
         // In the middle of the pulse of pixel 0.
-        let is_signal = pixel.0 == 0 && code == 21;
+        let is_signal = pixel.raw() == 0 && code == 21;
         *self.until = self.until.wrapping_sub(u32::from(is_signal));
         let is_altered = is_signal && *self.until == 0;
         let code = if is_altered { code + 1 } else { code };
@@ -203,7 +211,7 @@ impl PhotonSink for Altered<'_> {
 
 #[test]
 fn a_device_as_fast_as_it_goes_decides_alike_and_one_other_photon_would_show() -> Result<()> {
-    let Some(_alone) = wanted("photons made on mps2-an386", &[QEMU]) else {
+    let Some(_alone) = enabled("photons made on mps2-an386", &[QEMU]) else {
         return Ok(());
     };
     let image = BOARD.image(&[])?;
@@ -213,7 +221,7 @@ fn a_device_as_fast_as_it_goes_decides_alike_and_one_other_photon_would_show() -
     any_difference_shows(sensed, &settings)
 }
 
-/// Photons, events and counts that are not those of this computer.
+/// Wrong photons, events and counts are found.
 fn any_difference_shows(mut sensed: Sensed, settings: &Settings) -> Result<()> {
     let differs = |sensed: &Sensed| compare(sensed, settings, scene()).is_err();
     // One photon, in the next bin.
@@ -222,30 +230,30 @@ fn any_difference_shows(mut sensed: Sensed, settings: &Settings) -> Result<()> {
         let until = &mut until;
         all.laser_cycles(cycles, &mut Altered { photons, until })
     });
-    let said = altered.unwrap_err().to_string();
-    ensure!(said.starts_with("the device sends Depth("), "{said}");
+    let error = altered.unwrap_err().to_string();
+    ensure!(error.starts_with("the device sends Depth("), "{error}");
     // Other random numbers.
     let mut late = scene();
     late(1, &mut Photons::new(PIXELS));
     ensure!(compare(&sensed, settings, late).is_err());
-    // An event that is lost, one that comes twice, two in the wrong order.
-    let whole = sensed.events.clone();
-    let middle = whole.len() / 2;
+    // A lost event, a repeated one, two in the wrong order.
+    let sent = sensed.events.clone();
+    let middle = sent.len() / 2;
     sensed.events.remove(middle);
     ensure!(differs(&sensed));
-    sensed.events.clone_from(&whole);
-    sensed.events.insert(middle, whole[middle]);
+    sensed.events.clone_from(&sent);
+    sensed.events.insert(middle, sent[middle]);
     ensure!(differs(&sensed));
-    sensed.events.clone_from(&whole);
+    sensed.events.clone_from(&sent);
     sensed.events.swap(middle, middle + 1);
     ensure!(differs(&sensed));
     // The first and the last one.
-    for (first, length) in [(1, whole.len()), (0, whole.len() - 1)] {
-        sensed.events = whole[first..length].to_vec();
+    for (first, length) in [(1, sent.len()), (0, sent.len() - 1)] {
+        sensed.events = sent[first..length].to_vec();
         ensure!(differs(&sensed));
     }
     // A wrong count.
-    sensed.events = whole;
+    sensed.events = sent;
     ensure!(!differs(&sensed));
     sensed.report.statistics.expired += 1;
     ensure!(differs(&sensed));
@@ -255,7 +263,7 @@ fn any_difference_shows(mut sensed: Sensed, settings: &Settings) -> Result<()> {
 #[test]
 #[ignore = "takes minutes: `.ci/long soak` runs it"]
 fn a_hundred_million_photons_of_a_device_are_decided_on_alike() -> Result<()> {
-    let Some(_alone) = wanted("10^8 photons on mps2-an386", &[QEMU]) else {
+    let Some(_alone) = enabled("10^8 photons on mps2-an386", &[QEMU]) else {
         return Ok(());
     };
     let image = BOARD.image(&[])?;

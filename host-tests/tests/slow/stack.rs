@@ -1,10 +1,9 @@
-//! What an image has used of its stack.
+//! Measures how much of its stack an image has used.
 //!
-//! Before `main`, cortex-m-rt paints the stack. The stack is lowest in RAM and grows downwards, so
-//! that all above the lowest word that has lost its paint has been used. What a
-//! function reserves and never writes to keeps its paint; it does not count
-//! unless something below it was written to. So what a run has used is held
-//! against what the machine code can need (`stack_bound`).
+//! Before `main`, cortex-m-rt paints the stack. The stack is lowest in RAM and grows downwards:
+//! everything above the lowest word that has lost its paint counts as used. Words that a function
+//! reserves but never writes keep their paint. So the tests compare the used bytes with the bound
+//! from the machine code (`stack_bound`).
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -16,22 +15,21 @@ use object::{Object, ObjectSection, ObjectSymbol, SectionKind};
 
 /// cortex-m-rt's `STACK_PAINT_VALUE`.
 const PAINT: [u8; 4] = 0xcccc_cccc_u32.to_le_bytes();
-/// `bkpt #0xab`: the image asks the debugger or emulator for something.
+/// `bkpt #0xab`: a semihosting call.
 const SEMIHOSTING: [u8; 2] = 0xbeab_u16.to_le_bytes();
 
-/// Bytes of stack that a run may use which ends with a report of a panic, or of what
-/// `cargo xtask sizes` knows no bound of: of the 19 KiB that it leaves to the stack an
-/// image may need 12.
+/// The most bytes of stack for a run that ends with the report of a panic, or for an image without a
+/// bound in `cargo xtask sizes`. An image has 19 KiB of stack and may need 12.
 pub const MOST: u64 = 7 * 1024;
 
-/// What an image says of its stack.
+/// The stack of an image, from its symbols.
 pub struct Image {
-    /// From where it ends to where it begins, which is above.
+    /// From its lowest address to its start.
     pub stack: Range<u64>,
-    /// What lies above: all statics.
+    /// The statics, which lie above.
     pub statics: Range<u64>,
     symbols: BTreeMap<String, u64>,
-    /// Where it may ask the emulator for something.
+    /// The addresses of semihosting calls.
     pub semihosting: Vec<u64>,
 }
 
@@ -64,7 +62,7 @@ impl Image {
         Ok(image)
     }
 
-    /// Where a symbol is.
+    /// The address of a symbol.
     pub fn address(&self, name: &str) -> Result<u64> {
         let address = self.symbols.get(name);
         let address = address.with_context(|| format!("no symbol {name} in the image"))?;
@@ -72,20 +70,20 @@ impl Image {
     }
 }
 
-/// Holds what runs of an image have used against what its machine code can need.
+/// Compares the stack that runs of an image have used with the bound from its machine code.
 pub fn check(path: &Path, used: &[u64]) -> Result<()> {
     let used = used.iter().max().copied().unwrap_or_default();
     let needed = stack_bound::of_image(path)?;
     println!("{used} bytes of stack used at most, {needed} needed at most");
     ensure!(
         used <= needed,
-        "{used} bytes of stack are used, and the machine code should need {needed} at most"
+        "{used} bytes of stack are used, more than the bound of {needed}"
     );
     Ok(())
 }
 
-/// Bytes of the stack that have been used: those from the lowest word that has
-/// lost its paint. `memory` is all of it, lowest address first.
+/// The used bytes of the stack: all from the lowest word that has lost its paint. `memory` is the
+/// whole stack, lowest address first.
 pub fn high_water(memory: &[u8]) -> u64 {
     let painted = memory.chunks(4).take_while(|word| *word == PAINT);
     (memory.len() - 4 * painted.count()) as u64

@@ -1,10 +1,9 @@
-//! What histograms say: one file for each thing that is found.
+//! Findings from histograms, each in a file of its own.
 
 pub mod background;
-pub mod common;
 pub mod glass;
+pub mod good_histograms;
 pub mod half_widths;
-pub mod limits;
 pub mod observed;
 pub mod offset;
 pub mod peaks;
@@ -12,3 +11,4 @@ pub mod pile_up;
 pub mod pixels;
 pub mod pulse;
 pub mod shape;
+pub mod significance;

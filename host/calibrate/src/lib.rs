@@ -12,10 +12,10 @@
 
 mod false_alarms;
 mod find;
+mod photon_budget;
 mod remarks;
 pub mod report;
 mod settle;
-mod spend;
 mod watch;
 mod written;
 
@@ -29,60 +29,59 @@ pub use find::offset::Offset;
 pub use find::pile_up::Tdc;
 pub use find::pixels::Pixels;
 pub use find::pulse::Pulse;
+pub use photon_budget::PhotonBudget;
 pub use remarks::remarks;
-pub use spend::Spent;
 pub use watch::{Change, RunPhotons, glass_change};
 
 use find::background::Level;
-use find::common::Scene;
-use find::limits::{is_less, median};
+use find::good_histograms::GoodHistograms;
 use find::observed::Trace;
 use find::shape::Window;
+use find::significance::{is_surely_less, median};
 use find::{glass, offset, peaks, pile_up, pulse};
-use spend::Replay;
+use photon_budget::Replay;
 
-/// How pixels are to decide.
+/// Settings of the window rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Detection {
+pub struct WindowDetection {
     /// Bins in the window.
     pub window: u8,
-    /// Standard deviations of the background, for so many false alarms; `None` where rates are
-    /// not known.
+    /// Standard deviations of the background; `None` where rates are not known.
     pub z: Option<f64>,
-    /// Whether a lower one would do: the fewest photons alone keep false alarms down.
+    /// Whether the minimum count alone keeps false alarms down, so that a lower z would do.
     pub is_by_count: bool,
-    /// Exposures that were simulated for it.
+    /// Exposures that were simulated to find z.
     pub exposures: u64,
     /// The share of exposures without a target that may end with an event.
     pub false_alarm: f64,
-    /// Photons in the window, at least.
+    /// The fewest photons in the window.
     pub min_count: u16,
-    /// L1.
+    /// L1 in laser cycles.
     pub l1: u16,
-    /// L2.
+    /// L2 in laser cycles.
     pub l2: u16,
-    /// X.
+    /// X in laser cycles.
     pub x: u16,
-    /// Standard deviation of the pulse that the depth is found with.
+    /// Standard deviation of the pulse in bins, for the depth estimator.
     pub sigma_bins: U8F8,
-    /// How far the window that finds it reaches to either side, where that differs.
+    /// Half widths of the depth estimator, where its window is asymmetric.
     pub half_widths: Option<CentredWindow>,
 }
 
-/// What the user says beside the recording.
+/// What the user knows beside the recording, and asks for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Asked {
-    /// Whether the nearest peak that all pixels have is a cover glass.
+pub struct CalibrationOptions {
+    /// Whether the nearest peak that all pixels share is crosstalk of a cover glass.
     pub glass: Option<bool>,
-    /// How far away the target is that most of the pixels see.
+    /// Distance in millimetres of a flat target that most of the pixels see.
     pub target_mm: Option<f64>,
     /// The share of exposures without a target that may end with an event.
     pub false_alarm: f64,
-    /// Seed of what is simulated.
+    /// Seed of the simulations.
     pub seed: u64,
 }
 
-impl Default for Asked {
+impl Default for CalibrationOptions {
     fn default() -> Self {
         Self {
             glass: None,
@@ -106,122 +105,119 @@ pub struct Calibration {
     pub pixels: Pixels,
     /// The TDC, where laser cycles are known.
     pub tdc: Option<Tdc>,
-    /// The nearest peak that all pixels have.
+    /// The nearest peak that all pixels share.
     pub nearest: Nearest,
     /// The pulse, if a peak is bright enough.
     pub pulse: Option<Pulse>,
-    /// How far away the target is, as the user says.
+    /// Distance of the target in millimetres, as the user gives it.
     pub target_mm: Option<f64>,
     /// The range offset, if a distance is known.
     pub offset: Option<Offset>,
-    /// First and last bin that may hold a peak.
+    /// First and last bin of the range gate.
     pub gate: (u16, u16),
-    /// How pixels are to decide, if the pulse is known.
-    pub detection: Option<Detection>,
-    /// What events of the recording come to, where true distances are known.
-    pub spent: Option<Spent>,
+    /// Settings of the window rule, if the pulse is known.
+    pub detection: Option<WindowDetection>,
+    /// The best use of photons, where true distances are known.
+    pub photon_budget: Option<PhotonBudget>,
     /// Photons a laser cycle of each bin, the mean over all good pixels and captures.
     pub mean: Vec<f64>,
-    /// Captures and pixels.
-    pub looked_at: (usize, usize),
+    /// Number of captures.
+    pub captures: usize,
+    /// Pixels of a capture.
+    pub array_pixels: usize,
 }
 
-/// The histograms of a recording, and what their pixels are like.
-struct Seen {
+/// All histograms of a recording, corrected for pile-up, and the properties of their pixels.
+struct AllHistograms {
     traces: Vec<Trace>,
     levels: Vec<Level>,
     pixels: Pixels,
     /// The last bin that was measured.
-    last: usize,
+    last_bin: usize,
     tdc: Option<Tdc>,
 }
 
-impl Seen {
+impl AllHistograms {
     fn new(observed: &Observed, hot: &[usize]) -> Result<Self> {
         let mut traces = observed.traces(hot)?;
-        let last = leave_out_unmeasured(&mut traces);
+        let last_bin = cut_unmeasured(&mut traces);
         let tdc = observed.length.is_known().then(|| pile_up::tdc(&traces));
         if let Some(Tdc::OneHit(_)) = tdc {
             for trace in &mut traces {
                 trace.counts = pile_up::coates(&trace.counts, trace.cycles).0;
             }
         }
-        let levels: Vec<Level> = traces
-            .iter()
-            .map(|trace| Level::of(&trace.counts))
-            .collect();
+        let levels = traces.iter().map(|trace| Level::of(&trace.counts));
+        let levels: Vec<Level> = levels.collect();
         Ok(Self {
             pixels: Pixels::new(observed.array.pixels() as usize, &traces, &levels),
             traces,
             levels,
-            last,
+            last_bin,
             tdc,
         })
     }
 }
 
-/// Calibrates by a recording.
+/// Calibrates a sensor from a recording.
 ///
 /// # Errors
-/// What is wrong with the recording, or with what was asked.
-pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
-    let mut seen = Seen::new(observed, &[])?;
-    if !seen.pixels.hot.is_empty() && !observed.length.is_known() {
-        // A hot pixel is the brightest, and no measure of how long the recording lasted.
-        seen = Seen::new(observed, &seen.pixels.hot)?;
+/// Fails if the recording is empty or its histograms differ in size, if every pixel is hot or dead,
+/// if the crosstalk of the cover glass leaves no gate, or if so few false alarms cannot be
+/// simulated.
+pub fn calibrate(observed: &Observed, options: &CalibrationOptions) -> Result<Calibration> {
+    let mut all = AllHistograms::new(observed, &[])?;
+    if !all.pixels.hot.is_empty() && !observed.length.is_known() {
+        // A hot pixel is the brightest, but does not show how long the recording lasted.
+        all = AllHistograms::new(observed, &all.pixels.hot)?;
     }
-    let Seen {
+    let AllHistograms {
         traces,
         levels,
         pixels,
-        last,
+        last_bin,
         tdc,
-    } = seen;
-    let truth = observed.truth_mm.unwrap_or_default();
-    let good = traces.into_iter().zip(levels).enumerate();
-    let good = good.filter(|(_, (trace, _))| pixels.is_good(trace.pixel));
-    let (numbers, (traces, levels)): (Vec<usize>, (Vec<_>, Vec<_>)) = good.unzip();
+    } = all;
+    let good = traces.into_iter().zip(levels);
+    let good = good.filter(|(trace, _)| pixels.is_good(trace.pixel));
+    let (traces, levels): (Vec<_>, Vec<_>) = good.unzip();
     anyhow::ensure!(!traces.is_empty(), "every pixel is dead or hot");
-    let scene = Scene::new(observed.array, pixels.background, traces, levels);
+    let good = GoodHistograms::new(observed.array, pixels.background, traces, levels);
 
     let l2 = settle::l2(pixels.background);
-    let nearest = glass::nearest(&scene, asked.glass, l2.into());
-    let found = match &nearest {
-        Nearest::Glass(glass) => Some(glass),
-        _ => None,
-    };
+    let nearest = glass::nearest(&good, options.glass, l2.into());
+    let glass = nearest.glass();
     let bins = observed.bins();
-    let gate = settle::gate(last, found.map_or(0, |glass| glass.end))?;
-    let pulse = pulse::pulse(&windows(&scene, gate.0, found), asked.seed);
-    let window = window_of(pulse.as_ref());
-    let mut offset = offset_of(&scene, &numbers, truth, gate, window, observed, asked);
-    let cycles = scene.cycles();
-    let (counts, _) = scene.pooled();
-    let known = |spent| {
-        pulse.as_ref().map(|pulse| settle::Findings {
-            bins,
-            gate,
-            pulse,
-            pixels: &pixels,
-            is_absolute: observed.length != Length::Unknown,
-            spent,
-            asked,
-        })
+    let gate = settle::gate(last_bin, glass.map_or(0, |glass| glass.end))?;
+    let pulse = pulse::pulse(&windows(&good, gate.0, glass), options.seed);
+    let mut offset = offset_of(&good, gate, depth_window(pulse.as_ref()), observed, options);
+    let (counts, _) = good.pooled();
+    let cycles = good.cycles();
+    let findings = pulse.as_ref().map(|pulse| settle::Findings {
+        bins,
+        gate,
+        pulse,
+        background: pixels.background,
+        is_absolute: observed.length != Length::Unknown,
+        options,
+    });
+    let detection = |budget| {
+        let detection = findings.as_ref().map(|of| settle::detection(of, budget));
+        detection.transpose()
     };
-    let decide = |spent| known(spent).map(|known| settle::detection(&known));
-    let mut detection = decide(None).transpose()?;
-    let mut spent = None;
+    let mut found = detection(None)?;
+    let mut photon_budget = None;
     let bin_width_ps = offset
         .and_then(|offset| offset.bin_width_ps)
         .unwrap_or(observed.bin_width_ps);
-    if let (Some(of), Some(offset)) = (&detection, &mut offset) {
+    if let (Some(before), Some(offset)) = (&found, &mut offset) {
         let scale = (gate, bin_width_ps, offset.mm);
-        if let Some(replay) = Replay::new(observed, of, &pixels.hot, scale, asked.seed)? {
-            spent = replay.best()?;
+        if let Some(replay) = Replay::new(observed, before, &pixels.hot, scale, options.seed)? {
+            photon_budget = replay.best()?;
         }
-        if let Some(spent) = spent {
-            offset.mm += spent.offset_mm;
-            detection = decide(Some(spent)).transpose()?;
+        if let Some(budget) = photon_budget {
+            offset.mm += budget.offset_mm;
+            found = detection(Some(budget))?;
         }
     }
     Ok(Calibration {
@@ -231,34 +227,34 @@ pub fn calibrate(observed: &Observed, asked: &Asked) -> Result<Calibration> {
         tdc,
         nearest,
         pulse,
-        target_mm: asked.target_mm,
+        target_mm: options.target_mm,
         offset,
         gate,
-        detection,
-        spent,
+        detection: found,
+        photon_budget,
         mean: counts.iter().map(|count| count / cycles).collect(),
-        looked_at: (observed.captures.len(), observed.array.pixels() as usize),
+        captures: observed.captures.len(),
+        array_pixels: observed.array.pixels() as usize,
         pixels,
     })
 }
 
-/// The last bin before those that were not measured is left out if it has less than this share of
-/// the photons of the others.
-const PARTLY: f64 = 0.8;
+/// The last measured bin is cut too if it has less than this share of the photons of the others.
+const PARTLY_MEASURED: f64 = 0.8;
 
-/// Bins at the end that hold no photon where others surely have some were not measured: they are
-/// cut off. Gives the last one that is left.
-fn leave_out_unmeasured(traces: &mut [Trace]) -> usize {
+/// Cuts off the bins at the end that hold no photon where others surely hold some: they were not
+/// measured. Gives the last bin that is left.
+fn cut_unmeasured(traces: &mut [Trace]) -> usize {
     let bins = traces.first().map_or(0, |trace| trace.counts.len());
     let sum = |bin: usize| traces.iter().map(|trace| trace.counts[bin]).sum::<f64>();
     let sums: Vec<f64> = (0..bins).map(sum).collect();
     let end = sums.iter().rposition(|&sum| sum > 0.0);
     let end = end.map_or(bins, |last| last + 1);
     let usual = median(sums[..end].iter().copied());
-    if !is_less(0.0, usual, 1e6) {
+    if !is_surely_less(0.0, usual, 1e6) {
         return bins.saturating_sub(1);
     }
-    let is_cut = end < bins && is_less(sums[end - 1], PARTLY * usual, 1e6);
+    let is_cut = end < bins && is_surely_less(sums[end - 1], PARTLY_MEASURED * usual, 1e6);
     let end = end - usize::from(is_cut);
     for trace in traces {
         trace.counts.truncate(end);
@@ -266,73 +262,66 @@ fn leave_out_unmeasured(traces: &mut [Trace]) -> usize {
     end - 1
 }
 
-/// One window for each histogram: its strongest peak behind the gate's first bin. Without any the
-/// glass has to do, which is a pulse of the same laser.
-fn windows(scene: &Scene, first: u16, glass: Option<&Glass>) -> Vec<Window> {
+/// One window for each histogram: its strongest peak behind the first bin of the gate. If there is
+/// none, the strongest peak of all, which may be crosstalk: it has the pulse of the same laser.
+fn windows(good: &GoodHistograms, first: u16, glass: Option<&Glass>) -> Vec<Window> {
     let first = usize::from(first);
-    let of = |wanted: &dyn Fn(&peaks::Peak) -> bool| -> Vec<Window> {
-        let all = scene.traces.iter().zip(&scene.peaks).enumerate();
+    let strongest = |is_used: &dyn Fn(&peaks::Peak) -> bool| -> Vec<Window> {
+        let all = good.traces.iter().zip(&good.peaks).enumerate();
         all.filter_map(|(index, (trace, peaks))| {
             let strongest = (0..peaks.len())
-                .filter(|&at| wanted(&peaks[at]))
+                .filter(|&at| is_used(&peaks[at]))
                 .max_by(|&one, &other| peaks[one].photons.total_cmp(&peaks[other].photons))?;
             let before = strongest.checked_sub(1).map_or(0, |at| peaks[at].last + 1);
-            let behind = peaks.get(strongest + 1);
-            let behind = behind.map_or(scene.bins() - 1, |peak| peak.first - 1);
+            let after = peaks.get(strongest + 1);
+            let after = after.map_or(good.bins() - 1, |peak| peak.first - 1);
             let peak = peaks[strongest];
-            let background = scene.background(index, peak.top);
-            let bins = (before.min(peak.first), peak.top, behind.max(peak.last));
+            let background = good.background(index, peak.top);
+            let bins = (before.min(peak.first), peak.top, after.max(peak.last));
             Some(Window::new(&trace.counts, background, trace.cycles, bins))
         })
         .collect()
     };
-    let behind =
-        of(&|peak| peak.top >= first && glass.is_none_or(|glass| peak.top > glass.top + 1));
-    if behind.is_empty() {
-        of(&|_| true)
+    let targets =
+        strongest(&|peak| peak.top >= first && glass.is_none_or(|glass| peak.top > glass.top + 1));
+    if targets.is_empty() {
+        strongest(&|_| true)
     } else {
-        behind
+        targets
     }
 }
 
-/// The window of the depth that events will have; without a pulse one for a bin of deviation.
-fn window_of(pulse: Option<&Pulse>) -> CentredWindow {
-    let suited = pulse.and_then(|pulse| pulse.suited);
+/// The window that events will find their depth with. If the pulse is not known, that for a standard
+/// deviation of one bin.
+fn depth_window(pulse: Option<&Pulse>) -> CentredWindow {
+    let asymmetric = pulse.and_then(|pulse| pulse.asymmetric);
     let sigma = pulse.map_or(1.0, |pulse| pulse.sigma);
-    suited.map_or_else(
+    asymmetric.map_or_else(
         || CentredWindow::for_pulse(settle::sigma(sigma)),
-        |suited| suited.window,
+        |asymmetric| asymmetric.window,
     )
 }
 
+/// The range offset from the distance of the target, else from true distances.
 fn offset_of(
-    scene: &Scene,
-    numbers: &[usize],
-    truth: &[Option<f64>],
+    good: &GoodHistograms,
     gate: (u16, u16),
     window: CentredWindow,
     observed: &Observed,
-    asked: &Asked,
+    options: &CalibrationOptions,
 ) -> Option<Offset> {
-    let stands = |index: usize| {
-        let peaks = scene.peaks[index].iter();
-        peaks
-            .into_iter()
-            .any(|peak| peak.top >= usize::from(gate.0))
-    };
-    let placed = (0..numbers.len()).filter(|&index| stands(index));
-    let placed = placed.filter_map(|index| {
-        let position = offset::position(&scene.traces[index], observed.bins(), gate, window)?;
-        Some((numbers[index], position))
+    let first = usize::from(gate.0);
+    let has_peak = |peaks: &[peaks::Peak]| peaks.iter().any(|peak| peak.top >= first);
+    let all = good.traces.iter().zip(&good.peaks);
+    let with_peak = all.filter(|(_, peaks)| has_peak(peaks));
+    let placed = with_peak.filter_map(|(trace, _)| {
+        let position = offset::position(trace, observed.bins(), gate, window)?;
+        Some((position, trace.truth_mm))
     });
-    let placed: Vec<(usize, f64)> = placed.collect();
-    if let Some(distance) = asked.target_mm {
-        let positions: Vec<f64> = placed.iter().map(|placed| placed.1).collect();
+    if let Some(distance) = options.target_mm {
+        let positions: Vec<f64> = placed.map(|(position, _)| position).collect();
         return offset::from_target(&positions, distance, observed.bin_width_ps);
     }
-    let pairs: Vec<(f64, f64)> = placed
-        .iter()
-        .filter_map(|&(number, position)| Some((position, (*truth.get(number)?)?)))
-        .collect();
-    offset::from_distances(&pairs, observed.bin_width_ps)
+    let pairs = placed.filter_map(|(position, truth)| Some((position, truth?)));
+    offset::from_distances(&pairs.collect::<Vec<_>>(), observed.bin_width_ps)
 }

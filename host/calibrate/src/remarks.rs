@@ -1,52 +1,52 @@
-//! What a recording leaves open, and which option answers it.
+//! Remarks: what a recording does not show, and the option that would help.
 
 use super::{Calibration, Length, Nearest, Tdc};
 use dtof_options::rows::Row;
 
-/// What a reader of the settings has to know: a topic, and a sentence or two on it.
+/// Remarks on the settings, each a topic and a sentence or two.
 #[must_use]
 pub fn remarks(found: &Calibration) -> Vec<Row> {
     let mut remarks = Vec::new();
-    let mut say = |topic: &str, text: String| remarks.push((topic.to_owned(), text));
+    let mut remark = |topic: &str, text: String| remarks.push((topic.to_owned(), text));
     match found.length {
         Length::Cycles(_) => {}
-        Length::PhotonsPerCycle(rate) => say(
+        Length::PhotonsPerCycle(rate) => remark(
             "rates",
             format!(
-                "Rates rest on --photons-per-cycle {rate}: an assumption. --recorded-cycles N makes them \
-             absolute and tells whether there is pile-up."
+                "Rates rest on --photons-per-cycle {rate}, an assumption. --recorded-cycles N makes them \
+             absolute and shows whether there is pile-up."
             ),
         ),
-        Length::Unknown => say(
+        Length::Unknown => remark(
             "rates",
-            "How long the recording lasted is not known, so background, glass and z are not \
-             written: say --recorded-cycles N. The gate is that for one photon a laser cycle in \
-             the brightest pixel, as replay takes it."
+            "The number of laser cycles is not known, so background, crosstalk and z are not \
+             written: pass --recorded-cycles N. The gate is that for one photon a laser cycle in \
+             the brightest pixel, as in replay."
                 .to_owned(),
         ),
     }
     match &found.nearest {
-        Nearest::WallOrGlass(bin) => say(
+        Nearest::WallOrGlass(bin) => remark(
             "cover glass",
             format!(
-                "All pixels see a surface at bin {bin}. Whether it is a wall or a cover glass the recording does \
-             not tell: nothing lies behind it, or there are too few pixels. It is taken as a wall. \
-             --glass yes takes it as a glass, --glass no confirms the wall."
+                "All pixels see a surface at bin {bin}. The recording does not show whether it is a wall or a \
+             cover glass: nothing lies behind it, or there are too few pixels. It is taken as a wall. \
+             --glass yes takes it as a cover glass, --glass no confirms the wall."
             ),
         ),
-        Nearest::Glass(glass) if glass.end == 0 => say(
+        Nearest::Glass(glass) if glass.end == 0 => remark(
             "cover glass",
             format!(
-                "There is a cover glass at bin {}, so dim that it needs no gate.",
+                "The crosstalk of the cover glass, at bin {}, is so dim that it needs no gate.",
                 glass.top
             ),
         ),
         Nearest::Glass(glass) if glass.has_tail => {
             let (low, high) = glass.end_between;
-            say(
+            remark(
                 "cover glass",
                 format!(
-                    "The cover glass has a tail: where it ends, bin {low} to {high}, comes from the \
+                    "The crosstalk of the cover glass has a tail. Its end, bin {low} to {high}, comes from the \
                  photons, not from the shape of the pulse."
                 ),
             );
@@ -54,27 +54,27 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
         _ => {}
     }
     match &found.pulse {
-        None => say(
+        None => remark(
             "pulse",
-            "No peak is bright enough to measure the pulse: record a target, or say --sigma-bins \
-             when you replay."
+            "No peak is bright enough to measure the pulse: record a target, or pass --sigma-bins \
+             to replay."
                 .to_owned(),
         ),
-        Some(pulse) if pulse.sigma > 1.75 => say(
+        Some(pulse) if pulse.sigma > 1.75 => remark(
             "pulse",
-            "The pulse is wider than the widest window, which suits 1.75 bins: that is written. \
-             Wider bins suit it better."
+            "The pulse is too wide for the widest window, which is for 1.75 bins: 1.75 is written. \
+             Wider bins would help."
                 .to_owned(),
         ),
-        Some(pulse) if pulse.is_core => say(
+        Some(pulse) if pulse.is_core => remark(
             "pulse",
             if pulse.tail < 0.005 {
-                "The pulse is no Gaussian: its sides fall faster or more slowly. The standard deviation \
+                "The pulse is not Gaussian: its sides fall faster or more slowly. The standard deviation \
                  is that of its core."
                     .to_owned()
             } else {
                 format!(
-                    "The pulse is no Gaussian: {:.1} % of its photons come more than three standard \
+                    "The pulse is not Gaussian: {:.1} % of its photons come more than three standard \
                      deviations late. The standard deviation is that of its core.",
                     pulse.tail * 100.0
                 )
@@ -82,56 +82,54 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
         ),
         Some(_) => {}
     }
-    if let Some(suited) = found.pulse.as_ref().and_then(|pulse| pulse.suited) {
-        say(
+    let asymmetric = found.pulse.as_ref().and_then(|pulse| pulse.asymmetric);
+    if let Some(asymmetric) = asymmetric {
+        remark(
             "depth",
             format!(
-                "The depth comes from a window that reaches {} bins before its place and {} after it: 16 \
-                 photons of the pulse are off by {:.2} bins in the mean, with equal half widths by {:.2}.",
-                suited.window.before(),
-                suited.window.after(),
-                suited.error,
-                suited.equal
+                "The window of the depth reaches {} bins before its centre and {} after it. The mean error of \
+                 16 photons of the pulse is {:.2} bins, with equal half widths {:.2}.",
+                asymmetric.window.before(),
+                asymmetric.window.after(),
+                asymmetric.error,
+                asymmetric.symmetric
             ),
         );
     }
     match found.tdc {
         Some(Tdc::OneHit(lost)) => {
             let even = if lost > 0.1 {
-                " Rules take the background as even: near bins, which have more of it, bring false \
-                 alarms. Less light helps, or a gate."
+                " Rules expect a constant background: near bins have more of it and give false alarms. Less \
+                 light helps, or a gate."
             } else {
                 ""
             };
-            say(
+            remark(
                 "pile-up",
                 format!(
-                    "The background falls as it does with a TDC that takes one photon a laser \
+                    "The background falls as with a TDC that records one photon a laser \
                      cycle: {:.1} % of the photons are lost. Rates are corrected for that.{even}",
                     lost * 100.0
                 ),
             );
         }
-        Some(Tdc::Unclear(lost)) if lost > 0.01 => say(
+        Some(Tdc::Unclear(lost)) if lost > 0.01 => remark(
             "pile-up",
             format!(
-                "If the TDC takes one photon a laser cycle, {:.1} % of the photons are lost. The \
-             background does not tell.",
+                "If the TDC records one photon a laser cycle, {:.1} % of the photons are lost. The \
+             background does not show it.",
                 lost * 100.0
             ),
         ),
         _ => {}
     }
-    if found
-        .detection
-        .is_some_and(|detection| detection.is_by_count)
-    {
-        say(
+    if let Some(detection) = found.detection.filter(|detection| detection.is_by_count) {
+        remark(
             "z",
             format!(
-                "There is so little background that the fewest photons of an event keep false alarms \
-             below {} %: z is the least that is written.",
-                found.detection.map_or(0.0, |of| of.false_alarm) * 100.0
+                "There is so little background that the minimum count alone keeps false alarms \
+             below {} %: z is the lowest that is written.",
+                detection.false_alarm * 100.0
             ),
         );
     }
@@ -139,15 +137,15 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
         let what = match found.target_mm {
             Some(distance) => format!(
                 "--target-mm {distance} was not used: no more than half of the pixels see a surface at \
-                 one range. Put a flat target before more of them."
+                 one range. Put a flat target in front of more of them."
             ),
             None => {
-                "The range offset is not known: put a flat target at a known distance before more \
-                     than half of the pixels, and say --target-mm D."
+                "The range offset is not known: put a flat target at a known distance in front of more \
+                     than half of the pixels, and pass --target-mm D."
                     .to_owned()
             }
         };
-        say("offset", what);
+        remark("offset", what);
     }
     remarks
 }

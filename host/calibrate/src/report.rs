@@ -1,4 +1,4 @@
-//! The report of a calibration: a page with what was recognised where, and how sure it is.
+//! The report of a calibration: a page with the findings and their 95 % intervals.
 
 use anyhow::Result;
 use dtof_draw::chart::{Axis, Chart, Panel, Point, Series, Style, chart};
@@ -9,22 +9,21 @@ use dtof_engine::settings::SettingsFile;
 use dtof_options::rows::{Row, grouped, significant};
 use dtof_report::{Figure, Section, still};
 
-/// Every settings file and every report has it near its start: files that may be replaced.
+/// Marks near the start of every settings file and of every report: such files may be replaced.
 pub const MARKS: [&str; 2] = [dtof_engine::settings::MARK, dtof_report::MARK];
 
-/// What was found, a row each, with its 95 % interval.
+/// The findings, one a row, with 95 % intervals.
 #[must_use]
 pub fn rows(found: &Calibration) -> Vec<Row> {
     let mut rows: Vec<Row> = Vec::new();
     let mut row = |name: &str, value: String| rows.push((name.to_owned(), value));
-    let (captures, pixels) = found.looked_at;
-    let several = if captures == 1 { "" } else { "s" };
+    let several = if found.captures == 1 { "" } else { "s" };
     row(
         "looked at",
         format!(
             "{} pixels, {} capture{several}, {} bins",
-            grouped(pixels as u64),
-            grouped(captures as u64),
+            grouped(found.array_pixels as u64),
+            grouped(found.captures as u64),
             found.bins
         ),
     );
@@ -66,8 +65,8 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
         "cover glass",
         match &found.nearest {
             Nearest::NotCommon => "none: no peak is the same in all pixels".to_owned(),
-            Nearest::Wall(bin) => format!("none: bin {bin} is a wall, as told"),
-            Nearest::WallOrGlass(bin) => format!("bin {bin} is a wall or a glass"),
+            Nearest::Wall(bin) => format!("none: bin {bin} is a wall, as given"),
+            Nearest::WallOrGlass(bin) => format!("bin {bin} is a wall or a cover glass"),
             Nearest::Glass(glass) => format!(
                 "{} {} photons a laser cycle and pixel at bin {}",
                 short(glass.photons),
@@ -116,19 +115,19 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
             ),
         );
     }
-    if let Some(spent) = &found.spent {
+    if let Some(photon_budget) = &found.photon_budget {
         row(
             "events here",
             format!(
                 "{:.1} photons each, half of them within {:.2} mm",
-                spent.photons, spent.error_mm
+                photon_budget.photons, photon_budget.error_mm
             ),
         );
     }
     rows
 }
 
-/// What changed since an older calibration, a row each.
+/// Changes since an older calibration, one a row.
 #[must_use]
 pub fn changes(now: &SettingsFile, before: &SettingsFile) -> Vec<Row> {
     let (now, before) = (&now.sensor, &before.sensor);
@@ -142,8 +141,9 @@ pub fn changes(now: &SettingsFile, before: &SettingsFile) -> Vec<Row> {
     };
     row("background", before.background, now.background);
     row("cover glass", before.glass, now.glass);
-    let sigma =
-        |sensor: &dtof_engine::settings::Sensor| sensor.sigma_bins.map(|sigma| sigma.to_num());
+    let sigma = |sensor: &dtof_engine::settings::SensorSettings| {
+        sensor.sigma_bins.map(|sigma| sigma.to_num())
+    };
     row("pulse", sigma(before), sigma(now));
     let mut named = |name: &str, before: String, now: String| {
         if before != now {
@@ -168,10 +168,10 @@ pub fn changes(now: &SettingsFile, before: &SettingsFile) -> Vec<Row> {
     rows
 }
 
-/// The page: `name` is that of the recording.
+/// The page; `name` is that of the recording.
 ///
 /// # Errors
-/// If there is nothing to draw.
+/// Fails if the histogram cannot be drawn.
 pub fn page(
     found: &Calibration,
     settings: &SettingsFile,
@@ -213,13 +213,13 @@ pub fn page(
     });
     let figure = Figure {
         svg: &svg,
-        caption: "The mean histogram of all good pixels and captures, and what was recognised in it.",
+        caption: "The mean histogram of all good pixels and captures, with the findings.",
     };
-    let lead = format!("From the histograms of {name}. Intervals hold 95 %.");
+    let lead = format!("From the histograms of {name}. Intervals are 95 % intervals.");
     Ok(still("Calibration", &lead, &sections, &[figure]))
 }
 
-/// The mean histogram, with what was recognised.
+/// The chart of the mean histogram, with the findings.
 fn histogram(found: &Calibration) -> Result<String> {
     let level = found.pixels.background;
     let positive = found.mean.iter().copied().filter(|&rate| rate > 0.0);
@@ -245,7 +245,12 @@ fn histogram(found: &Calibration) -> Result<String> {
     let mut series = Vec::new();
     let gate = usize::from(found.gate.0);
     if gate > 0 {
-        series.push(Series::named("glass", PAPER, Style::Line, curve(0..gate)));
+        series.push(Series::named(
+            "crosstalk",
+            PAPER,
+            Style::Line,
+            curve(0..gate),
+        ));
         let line = vec![
             Point::exact(gate as f64, floor),
             Point::exact(gate as f64, top / 1.3),
@@ -268,9 +273,10 @@ fn histogram(found: &Calibration) -> Result<String> {
     chart(&Chart {
         finding: finding(found),
         holds: true,
-        note: "Background is that of the median pixel; peaks of pixels that see other distances \
-               blur in the mean."
-            .to_owned(),
+        note:
+            "The background is that of the median pixel. Peaks blur in the mean where pixels see \
+               different distances."
+                .to_owned(),
         x: Axis::linear("bin").within(0.0, bins.end as f64),
         y: Axis::logarithmic(if found.length == Length::Unknown {
             "photons a bin, relative"
@@ -284,16 +290,18 @@ fn histogram(found: &Calibration) -> Result<String> {
     })
 }
 
-/// One sentence.
+/// The title of the chart.
 fn finding(found: &Calibration) -> String {
     let signal = found.pulse.as_ref().map(|pulse| pulse.signal);
     match (&found.nearest, signal) {
         (Nearest::Glass(glass), Some(signal)) if glass.end > 0 => format!(
-            "The cover glass ends at bin {}, {} times as bright as targets",
+            "Crosstalk of the cover glass ends at bin {}, {} times as bright as targets",
             glass.end,
             short(glass.photons / signal.max(1e-12))
         ),
-        (Nearest::Glass(_), _) => "The cover glass is so dim that no gate is needed".to_owned(),
+        (Nearest::Glass(_), _) => {
+            "Crosstalk of the cover glass is so dim that no gate is needed".to_owned()
+        }
         (Nearest::WallOrGlass(bin), _) => {
             format!("All pixels see one surface at bin {bin}: a wall or a cover glass")
         }

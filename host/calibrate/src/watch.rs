@@ -1,21 +1,21 @@
-//! Whether the cover glass has become brighter than it was when it was calibrated.
+//! Whether crosstalk of the cover glass has become stronger since it was calibrated.
 //!
-//! The photons of a run before the gate are fitted with a level and so many times the glass. The
-//! level is that of the run behind the gate, so that other ambient light changes nothing. A near
-//! target in a few pixels has another shape: it lifts some of the bins. So the factor is the
-//! weighted median of those of the bins, and what they differ by is part of the interval.
+//! The photons of a run before the gate are a background and a multiple of the calibrated crosstalk. The
+//! background is measured behind the gate, so ambient light may have changed. A near target in a few
+//! pixels has another shape and lifts some of the bins. So the factor is the weighted median over the
+//! bins, and their spread is part of the interval.
 
 use super::find::background::Level;
 
-/// Bins that hold at least this share of the highest one's glass count.
-const SHARE: f64 = 0.02;
-/// A factor within this much of 1 is no change.
+/// Bins with less than this share of the highest crosstalk are not used.
+const MIN_SHARE: f64 = 0.02;
+/// A factor within this distance of 1 is no change.
 const TOLERANCE: f64 = 0.1;
 
 /// All photons of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct RunPhotons<'a> {
-    /// Of all pixels, bin by bin.
+    /// Photons of all pixels in each bin.
     pub bins: &'a [u64],
     /// Laser cycles it lasted.
     pub cycles: u64,
@@ -23,21 +23,21 @@ pub struct RunPhotons<'a> {
     pub pixels: u64,
 }
 
-/// What became of the glass.
+/// How crosstalk has changed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Change {
-    /// It is brighter by about this factor, and at least by the second.
+    /// It is about `.0` times as bright, and at least `.1` times.
     Brighter(f64, f64),
-    /// It is dimmer by about this factor, and at most by the second.
+    /// It is about `.0` times as bright, and at most `.1` times.
     Dimmer(f64, f64),
-    /// It is about this factor as bright as it was: no change that is sure.
+    /// It is about this many times as bright: no significant change.
     Same(f64),
-    /// There is too little light to say, or something else lies before the gate.
+    /// There is too little light, or something else lies before the gate.
     NotSure,
 }
 
-/// Compares a run with the glass of the settings: its photons a laser cycle and pixel for each
-/// bin from 0 on, and the first bin of the gate.
+/// Compares a run with the crosstalk of the settings. `shape` has its photons a laser cycle and pixel for
+/// each bin from 0 on, `gate_first` is the first bin of the gate.
 #[must_use]
 pub fn glass_change(run: &RunPhotons, shape: &[f64], gate_first: u16) -> Change {
     let gate = usize::from(gate_first).min(run.bins.len());
@@ -48,7 +48,7 @@ pub fn glass_change(run: &RunPhotons, shape: &[f64], gate_first: u16) -> Change 
     }
     let level = Level::of(&behind);
     let clear = level.clear_bins() as f64;
-    // Where surfaces lie everywhere the level may be any of these.
+    // If surfaces lie everywhere, the background may be as low as the lowest bins.
     let lowest = behind
         .chunks(4)
         .filter(|chunk| chunk.len() == 4)
@@ -59,7 +59,7 @@ pub fn glass_change(run: &RunPhotons, shape: &[f64], gate_first: u16) -> Change 
     // Factor, weight and error of each bin.
     let mut factors: Vec<(f64, f64, f64)> = Vec::new();
     for (&count, &share) in run.bins.iter().zip(shape).take(gate) {
-        if share > SHARE * highest {
+        if share > MIN_SHARE * highest {
             let glass = share * exposures;
             let error = (count as f64).max(1.0).sqrt().hypot(level_error) / glass;
             factors.push(((count as f64 - level.mean) / glass, share, error));
@@ -88,7 +88,7 @@ pub fn glass_change(run: &RunPhotons, shape: &[f64], gate_first: u16) -> Change 
     }
 }
 
-/// Of values with weights.
+/// The median of values (`.0`) with weights (`.1`).
 fn weighted_median(values: &mut [(f64, f64, f64)]) -> Option<f64> {
     values.sort_by(|one, other| one.0.total_cmp(&other.0));
     let half = values.iter().map(|value| value.1).sum::<f64>() / 2.0;

@@ -1,17 +1,17 @@
-//! What was found, as a settings file.
+//! A calibration as a settings file.
 
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{I24F8, U4F12, U16F16};
 
-use super::{Calibration, Glass, Length, Nearest, Tdc};
-use dtof_engine::settings::{Detection, RuleName, Sensor, SettingsFile};
+use super::{Calibration, Glass, Length, Tdc};
+use dtof_engine::settings::{DetectionSettings, RuleName, SensorSettings, SettingsFile};
 
 impl Calibration {
-    /// The settings of the sensor. What was not found is that of `before`: an older calibration, or
-    /// what the user says.
+    /// The settings of the sensor. Keys that were not found are taken from `before`: an older calibration
+    /// or the options of the user.
     ///
     /// # Errors
-    /// If a number does not fit its format.
+    /// Fails if a number does not fit its format.
     pub fn settings(&self, before: SettingsFile) -> Result<SettingsFile> {
         let is_absolute = self.length != Length::Unknown;
         let whole = |value: f64| is_absolute.then(|| four_digits(value));
@@ -21,7 +21,7 @@ impl Calibration {
         });
         let width = U16F16::checked_from_num(self.bin_width_ps);
         let glass = self.glass().filter(|_| self.gate.0 > 0);
-        let sensor = Sensor {
+        let sensor = SensorSettings {
             laser_hz: before.sensor.laser_hz,
             columns: before.sensor.columns,
             bins: u16::try_from(self.bins).ok(),
@@ -41,7 +41,7 @@ impl Calibration {
                 before_gate.map(|&rate| four_digits(rate)).collect()
             }),
         };
-        let detection = self.detection.map(|detection| Detection {
+        let detection = self.detection.map(|detection| DetectionSettings {
             rule: Some(RuleName::Window),
             window: Some(detection.window),
             z: detection.z.map(U4F12::saturating_from_num),
@@ -51,7 +51,7 @@ impl Calibration {
             l1: Some(detection.l1),
             l2: Some(detection.l2),
             x: Some(detection.x),
-            ..Detection::default()
+            ..DetectionSettings::default()
         });
         // The offset was found with the window of this pulse.
         let mut older = before.detection;
@@ -65,37 +65,32 @@ impl Calibration {
             run: before.run,
             file: before.file,
         };
-        Ok(found.of_any_file())
+        Ok(found.without_recording())
     }
 
-    /// The gate, if it leaves out a bin.
+    /// The gate, if it excludes a bin.
     #[must_use]
     pub fn written_gate(&self) -> Option<(u16, u16)> {
         let (first, last) = self.gate;
         (first > 0 || usize::from(last) + 1 < self.bins).then_some(self.gate)
     }
 
-    /// The cover glass, if there is one.
+    /// The crosstalk of the cover glass, if there is any.
     #[must_use]
     pub const fn glass(&self) -> Option<&Glass> {
-        match &self.nearest {
-            Nearest::Glass(glass) => Some(glass),
-            _ => None,
-        }
+        self.nearest.glass()
     }
 
-    /// Addresses of hot and dead pixels, in every capture.
+    /// Addresses of the hot and dead pixels of all captures.
     ///
     /// # Errors
-    /// If there are more addresses than there can be.
+    /// Fails if there are more than 65,536 pixels.
     pub fn masked(&self) -> Result<Vec<u16>> {
-        let (captures, pixels) = self.looked_at;
         let mut masked = Vec::new();
-        for capture in 0..captures {
+        for capture in 0..self.captures {
             for pixel in self.pixels.hot.iter().chain(&self.pixels.dead) {
-                masked.push(
-                    u16::try_from(capture * pixels + pixel).context("more than 65,536 pixels")?,
-                );
+                let address = u16::try_from(capture * self.array_pixels + pixel);
+                masked.push(address.context("more than 65,536 pixels")?);
             }
         }
         masked.sort_unstable();

@@ -8,18 +8,17 @@ use anyhow::Result;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_engine::slices::each_slice;
-use dtof_photons::open::{Opening, open};
-use dtof_simulate::scene;
+use dtof_photons::open::{ReadOptions, open};
 
 /// Prints each event of the recording `file` and gives their number.
 fn replay(file: &Path) -> Result<usize> {
-    let mut recording = open(file, &Opening::default())?;
+    let mut recording = open(file, &ReadOptions::default())?;
     let settings = Settings {
-        bins: recording.known.bins,
-        bin_width_ps: recording.known.bin_width_ps,
+        bins: recording.metadata.bins,
+        bin_width_ps: recording.metadata.bin_width_ps,
         x: 4,
         l1: 40,
-        ..scene::settings(1)
+        ..Settings::static_scene(1)
     };
     let scale = settings.range_scale()?;
     let photons = recording.photons.as_mut();
@@ -33,7 +32,8 @@ fn replay(file: &Path) -> Result<usize> {
                 let range = scale.range(event.position());
                 println!(
                     "cycle {} pixel {}: {range} mm",
-                    event.cycle.0, event.pixel.0
+                    event.cycle.raw(),
+                    event.pixel.raw()
                 );
             }
             events += found.len();

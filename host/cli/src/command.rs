@@ -1,4 +1,4 @@
-//! One file a command.
+//! The commands, a file each.
 
 pub mod calibrate;
 pub mod compare;
@@ -8,9 +8,10 @@ mod device_options;
 mod dynamic_depth;
 pub mod export;
 pub mod flags;
+mod job;
 pub mod monitor;
 pub mod replay;
-mod seen;
+mod scene_options;
 pub mod simulate;
 pub mod tune;
 pub mod view;
@@ -22,7 +23,7 @@ use dtof::complain;
 use dtof_options::rows::{Row, aligned, printable};
 use dtof_run::summary::Summary;
 
-/// Says on standard error what to know of `file`, a line each, unless `quiet`.
+/// Prints warnings about `file` on standard error, a line each, unless `quiet`.
 fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {
     for warning in warnings.into_iter().filter(|_| !quiet) {
         let warning = format!("warning: {}: {warning}", file.display());
@@ -30,7 +31,7 @@ fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {
     }
 }
 
-/// Prints the summary of a run.
+/// Prints the summary of a run, with `more` rows.
 fn print_summary(summary: &Summary, more: &[Row], folder: &Path) -> io::Result<()> {
     let detection = summary.settings.detection_rows();
     let rows = [&summary.rows()[..], more, &detection].concat();

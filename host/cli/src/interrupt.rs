@@ -1,4 +1,4 @@
-//! Ctrl-C, or a request to end in another way: a command ends when it next looks.
+//! Ctrl-C and other requests to end. A command checks for them now and then.
 
 use std::process;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -7,22 +7,22 @@ use anyhow::Result;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// From now on [`is_interrupted`] says so. Who asks a second time does not wait: `at_once` is
-/// called, and the program ends.
+/// Handles Ctrl-C, which [`is_interrupted`] then reports. A second Ctrl-C calls `before_exit` and
+/// ends the program at once.
 ///
 /// # Errors
-/// If the operating system has no such thing, or this was called before.
-pub fn listen(at_once: fn()) -> Result<()> {
+/// Fails if the operating system does not support it, or if this was called before.
+pub fn handle_ctrl_c(before_exit: fn()) -> Result<()> {
     ctrlc::set_handler(move || {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
-            at_once();
+            before_exit();
             process::exit(130);
         }
     })?;
     Ok(())
 }
 
-/// Whether Ctrl-C was pressed.
+/// Returns whether Ctrl-C was pressed.
 pub fn is_interrupted() -> bool {
     INTERRUPTED.load(Ordering::Relaxed)
 }

@@ -1,8 +1,7 @@
 #![doc = include_str!("../README.md")]
 //! ## Command lines
 //!
-//! Command lines, alike in every program of this project: help is printed whole, an
-//! error is one line and a failure.
+//! Command lines behave alike in all programs of this project: an error is one line and a failure.
 
 pub mod interrupt;
 pub mod progress;
@@ -13,7 +12,7 @@ use std::process::ExitCode;
 
 use anyhow::Result;
 use clap::Parser;
-use clap::builder::{PathBufValueParser, TypedValueParser};
+use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use dtof_options::rows::printable;
@@ -28,7 +27,7 @@ pub fn run<C: Parser>(run: impl FnOnce(C) -> Result<()>) -> ExitCode {
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
-        // The reader of the output has seen enough.
+        // The reader has closed the output.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             complain(&format!("error: {}", dtof_options::line(&error, &flag)));
@@ -37,7 +36,7 @@ pub fn run<C: Parser>(run: impl FnOnce(C) -> Result<()>) -> ExitCode {
     }
 }
 
-/// Help is printed whole; an error with its hints as one line.
+/// Prints help, or an error with its hints in one line.
 fn refuse(error: &clap::Error) -> ExitCode {
     if !error.use_stderr() {
         return error
@@ -48,7 +47,7 @@ fn refuse(error: &clap::Error) -> ExitCode {
     ExitCode::from(2)
 }
 
-/// The flag that sets a key. What is no key, as `<FILE>`, stays as it is.
+/// The flag of a key. Other names, such as `<FILE>`, stay as they are.
 #[must_use]
 pub fn flag(key: &str) -> String {
     if !key.starts_with(char::is_alphabetic) {
@@ -57,7 +56,7 @@ pub fn flag(key: &str) -> String {
     format!("--{}", option_name(key).replace('_', "-"))
 }
 
-/// Why options are refused, as one line.
+/// The reason of an error in one line.
 fn reason(error: &clap::Error) -> String {
     if let Some(refused) = refused(error) {
         return refused.line(&flag);
@@ -73,7 +72,7 @@ fn reason(error: &clap::Error) -> String {
     reason.strip_prefix("error: ").unwrap_or(&reason).to_owned()
 }
 
-/// The same error as of an option that is read from a settings file, or a keyword.
+/// The error in the form that settings files and Python keywords use.
 fn refused(error: &clap::Error) -> Option<Refused> {
     let all = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => vec![key(text)],
@@ -106,8 +105,8 @@ fn refused(error: &clap::Error) -> Option<Refused> {
             let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidArg) else {
                 return None;
             };
-            let alike = all(ContextKind::SuggestedArg);
-            Refused::unknown(name, alike.iter().map(String::as_str))
+            let similar = all(ContextKind::SuggestedArg);
+            Refused::unknown(name, similar.iter().map(String::as_str))
         }
         ErrorKind::ArgumentConflict => {
             let others = all(ContextKind::PriorArg);
@@ -135,15 +134,10 @@ fn key(arg: &str) -> String {
     }
 }
 
-/// Reads the name of a file or a folder. `-`, elsewhere standard input or output, is none.
+/// Reads the name of a file or a folder. Refuses `-`, which often means standard input or output.
 #[must_use]
 pub fn path() -> impl TypedValueParser<Value = PathBuf> {
-    PathBufValueParser::new().try_map(|path| {
-        if path.as_os_str() == "-" {
-            return Err("standard input and output are not supported here; give a name");
-        }
-        Ok(path)
-    })
+    OsStringValueParser::new().try_map(|name| dtof_options::path(&name))
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {
@@ -151,7 +145,7 @@ fn is_broken_pipe(error: &anyhow::Error) -> bool {
     io.is_some_and(|error| error.kind() == io::ErrorKind::BrokenPipe)
 }
 
-/// One line on standard error; if that cannot be written, nobody reads it.
+/// Prints one line on standard error. Errors of that are ignored.
 pub fn complain(message: &str) {
     let line: Vec<&str> = message.lines().collect();
     let _ = writeln!(io::stderr(), "{}", printable(&line.join(" ")));

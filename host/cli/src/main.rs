@@ -23,23 +23,23 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
-    /// Simulate the scene of the demo and show its events.
+    /// Simulate the demo scene and report its events.
     Demo(command::demo::Demo),
-    /// Simulate a scene that a file describes.
+    /// Simulate a scene from a file.
     Simulate(Box<command::simulate::Simulate>),
     /// Turn recorded photons into events.
     Replay(Box<command::replay::Replay>),
-    /// Find the settings of a sensor from a recording, or from a device with the sensor.
+    /// Find the settings of a sensor from a recording or a device.
     Calibrate(Box<command::calibrate::Calibrate>),
-    /// Try all methods on a recording or a scene, and say which one to take.
+    /// Run all methods on a recording or a scene, and recommend one.
     Compare(Box<command::compare::Compare>),
     /// Print the events of an AER file as CSV.
     Decode(command::decode::Decode),
-    /// Write the events of an AER file as points, or as an event camera's.
+    /// Write the events of an AER file as points or as event-camera data.
     Export(Box<command::export::Export>),
     /// Print the events of a device with a sensor as CSV, as they come.
     Monitor(Box<command::monitor::Monitor>),
-    /// Find α and L1 for a wanted rate of false alarms, and say what to expect.
+    /// Find the threshold and L1 for a given rate of false alarms.
     Tune(Box<command::tune::Tune>),
     /// Show a device or a recording live in a browser on this computer.
     View(Box<command::view::View>),

@@ -1,4 +1,4 @@
-//! How far a long job is, on the terminal.
+//! Progress of long jobs on the terminal.
 
 use std::time::{Duration, Instant};
 
@@ -7,8 +7,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use dtof_options::progress::Progress;
 
-/// A progress bar that is not worth showing for short work: it shows after a second, and only on a
-/// terminal.
+/// A progress bar. It appears after a second, and only on a terminal.
 pub struct Bar {
     bar: ProgressBar,
     since: Instant,
@@ -16,7 +15,7 @@ pub struct Bar {
 }
 
 impl Bar {
-    /// Never shows if it is to be `quiet`.
+    /// A progress bar that never appears if `quiet`.
     #[must_use]
     pub fn new(quiet: bool) -> Self {
         Self {
@@ -51,13 +50,13 @@ impl Progress for Bar {
     }
 }
 
-/// What a long job does, step by step.
+/// A line with the current step of a long job.
 pub struct Steps {
     bar: ProgressBar,
 }
 
 impl Steps {
-    /// Shows on a terminal, unless `quiet`.
+    /// A line on a terminal, unless `quiet`.
     #[must_use]
     pub fn new(quiet: bool) -> Self {
         let bar = ProgressBar::new_spinner();
@@ -67,13 +66,13 @@ impl Steps {
         Self { bar }
     }
 
-    /// The next step.
+    /// Shows the next step.
     pub fn at(&self, step: &str) {
         self.bar.set_message(step.to_owned());
         self.bar.tick();
     }
 
-    /// Takes the line away.
+    /// Removes the line.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
     }

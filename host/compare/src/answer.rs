@@ -1,100 +1,99 @@
-//! The method to take: the cheapest of those that are nearly as fast as the fastest, and exact
-//! enough.
+//! The method to take: the cheapest of those that are exact enough and nearly as fast as the fastest.
 
 use super::measure::Outcome;
-use super::method::{Kind, Method};
+use super::method::Method;
 
-/// A method may take so many times the least time.
+/// A method may take this many times the shortest time.
 const NEARLY: f64 = 1.1;
 
 /// The share of wrong reports that is always allowed.
 const WRONG_ALLOWED: f64 = 0.02;
 
-/// And that which is allowed where frames are wrong as often.
+/// The share of wrong reports that is allowed if frames have as many.
 const WRONG_AT_MOST: f64 = 0.05;
 
-/// A method where it is as exact as wanted, between two trials.
+/// A method at the point where it becomes exact enough, interpolated between two trials.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Choice {
-    /// Its number among the methods.
+    /// Index of the method.
     pub method: usize,
-    /// Photons of a peak, at least.
+    /// The fewest photons of a peak.
     pub effort: u16,
     /// Laser cycles from one right report to the next.
     pub cycles: f64,
-    /// The same of the pixel that nine of ten are faster than, or more; infinite if it never reports.
+    /// The same for the pixel at the 90th percentile, or less; infinite if it never reports.
     pub slow_cycles: f64,
-    /// Millimetres that 68 % of the reports are off, at most.
+    /// The 68th percentile of the error, in millimetres.
     pub error_mm: f64,
     /// Instructions a laser cycle and pixel.
     pub instructions: f64,
-    /// The standard deviation of the time, as a share of it.
-    uncertain: f64,
+    /// Relative standard deviation of the time.
+    uncertainty: f64,
 }
 
-/// The answer, and how it came about.
+/// The answer, and the methods it was chosen from.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answer {
-    /// How exact it had to be.
+    /// The error that is allowed, in millimetres.
     pub within_mm: f64,
-    /// Every method that can be, where it is; the fastest first.
-    pub able: Vec<Choice>,
-    /// The method to take: one of `able`. None if there is none.
-    pub taken: Option<Choice>,
+    /// All methods that become exact enough, the fastest first.
+    pub candidates: Vec<Choice>,
+    /// The method to take: one of the candidates, if there are any.
+    pub best: Option<Choice>,
 }
 
-/// The error and the share of wrong reports of the frame of L2, the last trial of frames.
-#[must_use]
-pub fn of_longest_frame(methods: &[Method], outcomes: &[Outcome]) -> Option<(f64, f64)> {
-    let frames = outcomes
-        .iter()
-        .filter(|outcome| methods[outcome.trial.method].kind == Kind::Frames);
+/// The error in millimetres and the share of wrong reports of the longest frame, that of L2.
+pub(super) fn longest_frame(methods: &[Method], outcomes: &[Outcome]) -> Option<(f64, f64)> {
+    let frames = outcomes.iter().filter(|outcome| {
+        methods
+            .get(outcome.trial.method)
+            .is_some_and(Method::is_frames)
+    });
     let longest = frames.max_by_key(|outcome| outcome.trial.effort)?;
     Some((longest.figures.error_mm, longest.figures.wrong))
 }
 
-/// Chooses among `outcomes`, those of a method in order of effort.
+/// Chooses among `outcomes`, in which those of each method are in order of effort.
 #[must_use]
 pub fn answer(methods: &[Method], outcomes: &[Outcome], within_mm: f64) -> Answer {
-    let frame_wrong = of_longest_frame(methods, outcomes).map_or(0.0, |frame| frame.1);
+    let frame_wrong = longest_frame(methods, outcomes).map_or(0.0, |frame| frame.1);
     let allowed = frame_wrong.clamp(WRONG_ALLOWED, WRONG_AT_MOST);
-    let numbers = (0..methods.len()).filter(|&number| methods[number].kind != Kind::Frames);
-    let able = numbers.filter_map(|number| {
+    let numbers = (0..methods.len()).filter(|&number| !methods[number].is_frames());
+    let candidates = numbers.filter_map(|number| {
         let of_method = outcomes
             .iter()
             .filter(|outcome| outcome.trial.method == number);
         where_exact(&of_method.collect::<Vec<_>>(), within_mm, allowed)
     });
-    let mut able: Vec<Choice> = able.collect();
-    able.sort_unstable_by(|one, other| one.cycles.total_cmp(&other.cycles));
-    let least = able.first().map_or(0.0, |choice| choice.cycles);
-    // What may be slower by chance of these photons is not taken.
-    let near = able.iter().enumerate().filter(|(place, choice)| {
-        *place == 0 || choice.cycles * (1.0 + choice.uncertain) <= NEARLY * least
+    let mut candidates: Vec<Choice> = candidates.collect();
+    candidates.sort_unstable_by(|one, other| one.cycles.total_cmp(&other.cycles));
+    let least = candidates.first().map_or(0.0, |choice| choice.cycles);
+    // The uncertainty counts against a method, unless it is the fastest.
+    let near = candidates.iter().enumerate().filter(|(place, choice)| {
+        *place == 0 || choice.cycles * (1.0 + choice.uncertainty) <= NEARLY * least
     });
-    let taken = near
+    let best = near
         .map(|(_, choice)| choice)
         .min_by(|one, other| one.instructions.total_cmp(&other.instructions))
         .copied();
     Answer {
         within_mm,
-        able,
-        taken,
+        candidates,
+        best,
     }
 }
 
-/// Between the last trial that is not exact enough and the first that is, values change by
-/// equal factors.
+/// Interpolates geometrically between the last trial that is not exact enough and the first that is.
 fn where_exact(trials: &[&Outcome], within_mm: f64, wrong_allowed: f64) -> Option<Choice> {
-    // The error of few reports may be smaller by chance.
-    let error = |outcome: &Outcome| outcome.figures.error_mm * (1.0 + uncertain(outcome));
+    // The error of few reports may be small by chance.
+    let error = |outcome: &Outcome| outcome.figures.error_mm * (1.0 + uncertainty(outcome));
     let is_exact =
         |outcome: &&Outcome| error(outcome) <= within_mm && outcome.figures.wrong <= wrong_allowed;
     let first = trials.iter().position(is_exact)?;
     let exact = trials[first];
     let before = first.checked_sub(1).map(|index| trials[index]);
     let part = match before {
-        // Only its error was too large, so that it is known how far to go.
+        // Only its error was too large: the errors show how far to go.
         Some(before) if before.figures.wrong <= wrong_allowed => {
             let [from, to] = [before, exact].map(error);
             ((from / within_mm).ln() / (from / to).ln()).clamp(0.0, 1.0)
@@ -109,7 +108,7 @@ fn where_exact(trials: &[&Outcome], within_mm: f64, wrong_allowed: f64) -> Optio
     let slow: fn(&Outcome) -> f64 = |outcome| outcome.figures.slow_cycles;
     let slow_cycles = match between(slow) {
         cycles if cycles.is_finite() => cycles,
-        // It reports in one of the trials at most.
+        // It reports in at most one of the trials.
         _ => before.map_or(f64::INFINITY, slow).min(slow(exact)),
     };
     #[allow(
@@ -125,11 +124,11 @@ fn where_exact(trials: &[&Outcome], within_mm: f64, wrong_allowed: f64) -> Optio
         slow_cycles,
         error_mm: between(|outcome| outcome.figures.error_mm),
         instructions: between(|outcome| outcome.instructions),
-        uncertain: uncertain(exact),
+        uncertainty: uncertainty(exact),
     })
 }
 
-/// The standard deviation of a mean over all reports, as a share of that of one.
-fn uncertain(outcome: &Outcome) -> f64 {
+/// The standard deviation of a mean over all reports, relative to that of one report.
+fn uncertainty(outcome: &Outcome) -> f64 {
     1.0 / (outcome.figures.reports.max(1) as f64).sqrt()
 }

@@ -1,5 +1,5 @@
-//! What no single pixel can do better: the likelihood ratio of someone who knows background,
-//! signal and pulse, and from then on the Cramér-Rao bound.
+//! A bound for single pixels: the time to an event of the likelihood-ratio test, which knows background,
+//! signal and pulse, and after that the Cramér-Rao bound of the error.
 
 use anyhow::Result;
 use dtof_core::PixelAddress;
@@ -8,16 +8,17 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use super::stress::{Light, count};
-use super::tally::mm_per_bin;
+use super::tally::{first_and_last, mm_per_bin};
 use dtof_engine::settings::Settings;
 use dtof_theory::bounds::cramer_rao::Pulse;
 use dtof_theory::bounds::likelihood_ratio::{Evidence, LikelihoodRatio};
 use dtof_theory::random::pixel_rng;
 
-/// Exposures without a target, unless they have more looks than [`MOST_LOOKS`], and with one.
+/// Exposures without a target, at most; fewer if they have more looks than [`MAX_LOOKS`].
 const WITHOUT: u16 = 10_000;
+/// Exposures with a target.
 const WITH: u16 = 1_000;
-const MOST_LOOKS: u32 = 5_000_000;
+const MAX_LOOKS: u32 = 5_000_000;
 
 /// The bound of one pixel.
 #[derive(Clone, Copy, Debug)]
@@ -29,28 +30,27 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// Of a pixel with this light that looks as `settings` say and has `share` false alarms in
-    /// an exposure. None without background or signal.
+    /// The bound of a pixel with this light, and with gate, L1, L2 and X of `settings`, that has `share`
+    /// false alarms in an exposure. `None` without background or signal, or if there are no events.
     ///
     /// # Errors
-    /// If the light is none.
+    /// Fails if the gate or the light is invalid.
     pub fn new(light: &Light, settings: &Settings, share: f64, seed: u64) -> Result<Option<Self>> {
         if light.background <= 0.0 || light.signal <= 0.0 {
             return Ok(None);
         }
-        let (first, last) = settings
-            .gate
-            .map_or((0, settings.bins - 1), |(first, last)| {
-                (first.into(), last.into())
-            });
+        let (first, last) = first_and_last(settings)?;
         let bins = u32::try_from(last - first + 1)?;
         let ratio = LikelihoodRatio::new(bins, light.background, light.signal, light.sigma);
         let exposure = |number: u16, signal: f64, threshold: f64| {
-            let rng = pixel_rng(seed.wrapping_add(signal.to_bits()), PixelAddress(number));
+            let rng = pixel_rng(
+                seed.wrapping_add(signal.to_bits()),
+                PixelAddress::new(number),
+            );
             Exposure::new(light, bins, signal, settings)?.run(ratio.evidence(), threshold, rng)
         };
         let looks = u32::from(settings.l2) / u32::from(settings.x.max(1));
-        let most = u16::try_from(MOST_LOOKS / looks.max(1)).unwrap_or(WITHOUT);
+        let most = u16::try_from(MAX_LOOKS / looks.max(1)).unwrap_or(WITHOUT);
         let exposures = most.clamp(WITH, WITHOUT);
         let without = (0..exposures).into_par_iter();
         let without = without.map(|number| Ok(exposure(number, 0.0, f64::INFINITY)?.1));
@@ -75,8 +75,7 @@ impl Bound {
         }))
     }
 
-    /// Millimetres that the best estimate from so many laser cycles is off: one standard
-    /// deviation.
+    /// The lowest standard deviation of a range from so many laser cycles, in millimetres.
     #[must_use]
     pub fn error_mm(&self, cycles: f64) -> f64 {
         let pulse = Pulse {
@@ -88,7 +87,7 @@ impl Bound {
     }
 }
 
-/// One exposure.
+/// Exposures of a pixel.
 struct Exposure {
     even: Poisson<f64>,
     bin: Uniform<u16>,
@@ -102,7 +101,7 @@ struct Exposure {
 impl Exposure {
     fn new(light: &Light, bins: u32, signal: f64, settings: &Settings) -> Result<Self> {
         let x = f64::from(settings.x.max(1));
-        // Anywhere in its bin would not change the mean by a hundredth.
+        // Other positions in the bin change the mean by less than 1 %.
         let place = f64::from(bins / 2) + 0.25;
         let pulse = if signal > 0.0 {
             Some((Poisson::new(signal * x)?, Normal::new(place, light.sigma)?))
@@ -120,7 +119,8 @@ impl Exposure {
         })
     }
 
-    /// How long it lasted and whether it ended with an event, and the highest ratio.
+    /// Simulates one: the laser cycles it lasted, whether it ended with an event, and the highest
+    /// likelihood ratio.
     fn run(
         &self,
         mut evidence: Evidence,

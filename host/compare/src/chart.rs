@@ -8,12 +8,12 @@ use super::Comparison;
 use super::method::Kind;
 
 impl Comparison {
-    /// Laser cycles in the unit of the chart.
+    /// A number of laser cycles in the unit of the chart.
     pub(super) fn time(&self, cycles: f64) -> f64 {
         self.laser_hz.map_or(cycles, |hz| cycles * 1e6 / hz as f64)
     }
 
-    /// That unit.
+    /// The unit of time of the chart.
     const fn unit(&self) -> &'static str {
         match self.laser_hz {
             Some(_) => "µs",
@@ -24,7 +24,7 @@ impl Comparison {
     /// The chart: time to a report against its error, a curve a method.
     ///
     /// # Errors
-    /// If there is nothing to draw.
+    /// Fails if there is nothing to draw.
     pub fn chart(&self) -> Result<String> {
         let panel = |title: &str, single: bool| {
             let numbers = 0..self.methods.len();
@@ -59,13 +59,13 @@ impl Comparison {
         })
     }
 
-    /// What dots and names of the chart are.
+    /// Explains dots and names of the chart.
     fn note(&self) -> String {
         format!(
-            "A dot is a least count of photons, or a length of frames; all rules have at most \
-             the same false alarms. Beside a name: instructions a laser cycle and pixel on a Cortex-M4F. \
-             Times are of the middle half of the pixels; {}, 68 % of which are smaller.",
-            self.truth.told()
+            "A dot is a minimum count of photons, or a length of frames. All rules have at most \
+             the same rate of false alarms. Beside a name: instructions a laser cycle and pixel on a Cortex-M4F. \
+             Times are those of the middle half of the pixels; {}, 68 % of which are smaller.",
+            self.truth.description()
         )
     }
 

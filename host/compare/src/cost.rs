@@ -1,36 +1,36 @@
-//! What a method costs on a Cortex-M4F: counted instructions, at opt-level 3.
+//! The cost of a method on a Cortex-M4F: counted instructions, at opt-level 3.
 //!
-//! Source: `docs/results/bench/instructions.csv`. A test holds these numbers against it.
+//! Source: `docs/results/bench/instructions.csv`. A test compares these numbers with it.
 
 use dtof_core::{DepthEstimator, Statistics};
 
 use super::method::{Kind, Method, Rule};
 use dtof_engine::settings::Settings;
 
-/// A photon in a histogram (`AsyncPixel::count_batch`).
+/// Counting a photon (`AsyncPixel::count_batch`).
 pub const PHOTON: f64 = 10.22;
-/// More of one that may count in blocks (`count and count_in_blocks; feeds none`, less
+/// Asking whether it also counts in blocks (`count and count_in_blocks; feeds none`, less
 /// `AsyncPixel::count`).
 pub const FEED: f64 = 31.56 - 28.56;
-/// One in a block (`count and count_in_blocks; 1 level`, less `feeds none`).
+/// Counting it in a block (`count and count_in_blocks; 1 level`, less `feeds none`).
 pub const BLOCK_PHOTON: f64 = 58.99 - 31.56;
 /// A look without an event with the paper's rule (`kept peak; no event`).
 pub const PAPER: f64 = 90.68;
-/// With the average of all bins (`average; no event`).
+/// The same with the average of all bins (`average; no event`).
 pub const AVERAGE: f64 = 32.0;
-/// With tracking (`look; tracking; no event`).
+/// The same with tracking (`look; tracking; no event`).
 pub const TRACKING: f64 = 405.45;
-/// Of a block (`look; block; no event`).
+/// The same for a block (`look; block; no event`).
 pub const BLOCK_LOOK: f64 = 247.28;
 /// An exposure that L2 ends (`look at L2`).
 pub const EXPIRY: f64 = 108.0;
-/// Peak and depth of three bins of an event (`kept peak; event and depth`), and its word (`encode
-/// and to_le_bytes`).
+/// An event with its peak and the depth from three bins (`kept peak; event and depth`), and its word
+/// (`encode and to_le_bytes`).
 pub const EVENT: f64 = 517.0 + 46.0;
-/// More of the depth from a centred window (`centred window, σ 1`, less `centroid`).
+/// The depth from a centred window instead (`centred window, σ 1`, less `centroid`).
 pub const CENTRED: f64 = 135.84 - 68.0;
 
-/// With a window of so many bins (`window of N; no event`).
+/// A look without an event with a window of so many bins (`window of N; no event`).
 #[must_use]
 pub const fn window(bins: u8) -> f64 {
     match bins {
@@ -55,9 +55,9 @@ fn look(method: &Method) -> f64 {
     }
 }
 
-/// Instructions a laser cycle and pixel of a run of `pixel_cycles` laser cycles of all pixels
-/// together, from what pixels and blocks have counted. Blocks have at most a third of the looks
-/// of the pixels.
+/// Instructions a laser cycle and pixel of a run, from the statistics of pixels and blocks.
+/// `pixel_cycles` are the laser cycles of all pixels together. Blocks have at most a third of the looks of
+/// the pixels.
 #[must_use]
 pub fn instructions(
     method: &Method,

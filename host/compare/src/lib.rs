@@ -1,10 +1,10 @@
 #![doc = include_str!("../README.md")]
 //! ## Time against error
 //!
-//! Every rule has the threshold at which it has the false alarms that are asked for, in
-//! simulated exposures without a target at the background that there is. What is left to choose
-//! is how many photons a peak must hold: more make a report later and more exact. So each
-//! method is a curve of time against error, and frames of all lengths are another.
+//! Every rule gets the threshold that gives the requested rate of false alarms in simulated exposures
+//! without a target, with the background of the recording. One parameter is left: the minimum count of a
+//! peak. A higher one makes reports later and more exact. So each method is a curve of time against
+//! error, and so are frames of all lengths.
 
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
@@ -17,7 +17,7 @@ pub mod method;
 pub mod page;
 mod selected;
 pub mod stress;
-pub mod survey;
+mod survey;
 mod tally;
 mod text;
 pub mod thresholds;
@@ -26,7 +26,7 @@ pub mod truth;
 use anyhow::{Result, ensure};
 use dtof_core::{Array, BlockLevel, PixelAddress};
 
-use answer::{Answer, answer, of_longest_frame};
+use answer::{Answer, answer, longest_frame};
 use bound::Bound;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
@@ -39,48 +39,33 @@ use stress::{Light, Stress, Stressed};
 use survey::{PixelLight, light, median, survey};
 pub use tally::Figures;
 use tally::{WRONG_BEYOND_BINS, mm_per_bin};
-use thresholds::{LEAST_COUNT, Thresholds};
+use thresholds::{MIN_COUNT, Thresholds};
 use truth::Truth;
 
-/// Photons that methods are compared on, about, and those under stress.
+/// About so many photons methods are compared on, and so many under stress.
 const PHOTONS: f64 = 1.5e7;
 const STRESS_PHOTONS: f64 = 3e6;
 
-/// Photons of a peak, at least: each about 1.4 times the one before.
-const LEAST_COUNTS: [u16; 16] = [
-    LEAST_COUNT,
-    7,
-    10,
-    14,
-    20,
-    28,
-    40,
-    57,
-    80,
-    113,
-    160,
-    226,
-    320,
-    453,
-    640,
-    905,
+/// Minimum counts of a peak: each about 1.4 times the one before.
+const MIN_COUNTS: [u16; 16] = [
+    MIN_COUNT, 7, 10, 14, 20, 28, 40, 57, 80, 113, 160, 226, 320, 453, 640, 905,
 ];
 
-/// Reports that a trial has at least; one with fewer is not told.
-const LEAST_REPORTS: u64 = 100;
+/// The fewest reports of a trial; a trial with fewer is left out.
+const MIN_REPORTS: u64 = 100;
 
-/// Where no method is as exact as frames of L2, the answer may be off by so many times more,
-/// again and again, but by no more than a report that is wrong.
-const WIDER: f64 = std::f64::consts::SQRT_2;
+/// If no method is as exact as frames of L2, the allowed error grows by this factor until one is, but not
+/// beyond that of a wrong report.
+const RELAXATION: f64 = std::f64::consts::SQRT_2;
 
 /// Laser cycles of frames, up to L2.
 const FRAMES: [u16; 6] = [100, 200, 500, 1000, 2000, 5000];
 
-/// What is compared.
+/// The input of a comparison.
 pub struct Task<'a> {
-    /// The photons of a seed.
+    /// Opens the photons of a seed.
     pub photons: &'a dyn Fn(u64) -> Result<Box<dyn PhotonSource>>,
-    /// What reports are compared with; without, the range of all photons of the pixel.
+    /// The true ranges; without them, the range of all photons of the pixel.
     pub truth: Option<Truth>,
     /// Bins, gate, masked pixels, L1, L2, X and seed.
     pub settings: &'a Settings,
@@ -88,36 +73,37 @@ pub struct Task<'a> {
     pub sigma: f64,
     /// The share of exposures without a target that may end with an event.
     pub false_alarm: f64,
-    /// How exact the answer has to be, in millimetres; as frames of L2 unless given, or as near to
-    /// that as any method comes.
+    /// The error that is allowed, in millimetres; by default that of frames of L2, or the lowest that
+    /// any method reaches.
     pub within_mm: Option<f64>,
-    /// Told what comes next. An error from it ends the comparison.
+    /// Takes the name of the next step. An error from it ends the comparison.
     pub progress: &'a dyn Fn(&str) -> Result<()>,
 }
 
-/// What came out.
+/// The result of a comparison.
 pub struct Comparison {
-    /// The methods. Frames are the last.
+    /// The methods; frames are the last.
     pub methods: Vec<Method>,
-    /// The threshold of each that reports events.
+    /// The threshold of each method that reports events.
     pub thresholds: Vec<Option<f64>>,
     /// All trials, by method and effort.
     pub outcomes: Vec<Outcome>,
-    /// What a single pixel cannot do better than.
+    /// The bound for a single pixel.
     pub bound: Option<Bound>,
-    /// The methods at their fastest, and the longest frame, under each stress; the first is none.
+    /// The methods with the lowest minimum count, and the longest frame, under each stress. The first is
+    /// without stress.
     pub stressed: Vec<(Stress, Vec<Outcome>)>,
     /// The error of frames of L2, in millimetres.
     pub frame_mm: Option<f64>,
     /// The method to take.
     pub answer: Answer,
-    /// The settings that have it.
-    pub taken: Option<Settings>,
-    /// Photons of the median pixel.
+    /// The settings of the method to take.
+    pub settings: Option<Settings>,
+    /// The light of the median pixel.
     pub light: Light,
-    /// How errors came about.
+    /// The true ranges.
     pub truth: Truth,
-    /// Pixels and laser cycles that were compared.
+    /// Pixels.
     pub pixels: usize,
     /// Laser cycles.
     pub cycles: u64,
@@ -125,32 +111,35 @@ pub struct Comparison {
     pub laser_hz: Option<u64>,
 }
 
-/// The methods, and where their trials come from.
-struct Field<'a> {
+/// The methods with their thresholds.
+struct Methods<'a> {
     settings: &'a Settings,
-    methods: Vec<Method>,
+    all: Vec<Method>,
     thresholds: Vec<Option<f64>>,
 }
 
-impl<'a> Field<'a> {
-    /// All methods that suit `light`, each with the threshold of equal false alarms.
+impl<'a> Methods<'a> {
+    /// All methods for the pulse of `light`, each with the threshold for the same rate of false alarms.
     fn new(task: &Task<'a>, light: &Light, most_levels: u8) -> Result<Self> {
         let settings = task.settings;
         let pulse = dtof_core::fixed::types::U8F8::saturating_from_num(light.sigma);
         let methods = Method::all(pulse, most_levels);
         let mut rules: Vec<Rule> = methods.iter().filter_map(Method::rule).collect();
         rules.dedup();
-        let known = Thresholds::simulate(&rules, settings, light.background, settings.seed)?;
+        let simulated = Thresholds::simulate(&rules, settings, light.background, settings.seed)?;
         let thresholds = methods.iter().map(|method| {
             // Blocks have a quarter of the false alarms.
             let alone = method.levels() == BlockLevel::PIXEL;
             let share = task.false_alarm * if alone { 1.0 } else { 0.75 };
-            method.rule().map(|rule| known.of(rule, share)).transpose()
+            method
+                .rule()
+                .map(|rule| simulated.of(rule, share))
+                .transpose()
         });
         Ok(Self {
             settings,
             thresholds: thresholds.collect::<Result<_>>()?,
-            methods,
+            all: methods,
         })
     }
 
@@ -160,13 +149,13 @@ impl<'a> Field<'a> {
         Ok(Trial {
             method: number,
             effort,
-            settings: self.methods[number].settings(self.settings, threshold, effort)?,
+            settings: self.all[number].settings(self.settings, threshold, effort)?,
         })
     }
 
-    /// Every method with every effort.
+    /// All methods with all efforts.
     fn trials(&self, light: &Light) -> Result<Vec<Trial>> {
-        let methods = self.methods.iter().enumerate();
+        let methods = self.all.iter().enumerate();
         let trials = methods.flat_map(|(number, method)| {
             let efforts = efforts(method, self.settings.l2, light).into_iter();
             efforts.map(move |effort| self.trial(number, effort))
@@ -174,26 +163,27 @@ impl<'a> Field<'a> {
         trials.collect()
     }
 
-    /// Every method at its fastest, and the longest frame.
+    /// All methods with the lowest minimum count, and the longest frame.
     fn fastest(&self) -> Result<Vec<Trial>> {
-        let methods = self.methods.iter().enumerate();
+        let methods = self.all.iter().enumerate();
         let trials = methods.map(|(number, method)| match method.kind {
             Kind::Frames => self.trial(number, self.settings.l2),
-            Kind::Events { .. } => self.trial(number, LEAST_COUNT),
+            Kind::Events { .. } => self.trial(number, MIN_COUNT),
         });
         trials.collect()
     }
 }
 
-/// Compares all methods that suit the pulse.
+/// Compares all methods for the pulse.
 ///
 /// # Errors
-/// If the photons cannot be had, or the settings are none.
+/// Fails if the photons cannot be read, if settings are invalid, if no pixel has a target, or if frames
+/// of L2 give too few reports and no error is given.
 pub fn compare(task: &Task) -> Result<Comparison> {
     let Task {
         settings, sigma, ..
     } = *task;
-    // What no pixel could run with is refused before anything is drawn.
+    // Invalid settings are refused before any photons are drawn.
     host_engine(settings, const { Array::new(1, 1).unwrap() }, &[])?;
     (task.progress)("surveys the photons")?;
     let mut source = photons(task, 0, PHOTONS)?;
@@ -209,44 +199,44 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     let light = light(&surveyed, sigma, has_target);
 
     (task.progress)("finds thresholds of equal false alarms")?;
-    let field = Field::new(task, &light, most_levels)?;
+    let methods = Methods::new(task, &light, most_levels)?;
     let bound = Bound::new(&light, settings, task.false_alarm, settings.seed)?;
 
     (task.progress)("tries all methods")?;
     let mut source = photons(task, 0, PHOTONS)?;
     let (pixels, cycles) = (source.addresses().len(), source.cycles());
-    let trials = field.trials(&light)?;
+    let trials = methods.trials(&light)?;
     let mut outcomes = measure(
         source.as_mut(),
-        &field.methods,
+        &methods.all,
         &trials,
         &truth,
         &Stress::NONE,
     )?;
     outcomes.retain(|outcome| is_measured(outcome, cycles));
 
-    let frame_mm = of_longest_frame(&field.methods, &outcomes).map(|frame| frame.0);
-    let answer = choose(task, &field.methods, &outcomes, frame_mm)?;
-    let taken = answer.taken.as_ref();
-    let taken = taken.map(|taken| field.trial(taken.method, taken.effort));
-    let taken = taken.transpose()?;
-    // The one to take stands under stress as it is taken.
-    let mut trials = field.fastest()?;
-    trials.extend(taken.clone());
+    let frame_mm = longest_frame(&methods.all, &outcomes).map(|frame| frame.0);
+    let answer = choose(task, &methods.all, &outcomes, frame_mm)?;
+    let best = answer.best.as_ref();
+    let best = best.map(|best| methods.trial(best.method, best.effort));
+    let best = best.transpose()?;
+    // The method to take is tried under stress with the minimum count that it is taken with.
+    let mut trials = methods.fastest()?;
+    trials.extend(best.clone());
     let mut stresses = Stress::all(&light, settings.gate.map_or(0, |gate| gate.0));
-    // Where every pixel is hot there is no other to look at.
+    // A stress that makes every pixel hot leaves none to compare.
     let is_hot = |stress: &Stress, pixel| stress.is_hot(pixel, array.columns());
     stresses.retain(|stress| surveyed.iter().any(|(pixel, _)| !is_hot(stress, *pixel)));
     let stressed = stresses
         .into_iter()
-        .map(|stress| under_stress(task, &field, &trials, &truth, stress))
+        .map(|stress| under_stress(task, &methods.all, &trials, &truth, stress))
         .collect::<Result<_>>()?;
     Ok(Comparison {
         frame_mm,
         answer,
-        taken: taken.map(|taken| taken.settings),
-        methods: field.methods,
-        thresholds: field.thresholds,
+        settings: best.map(|best| best.settings),
+        methods: methods.all,
+        thresholds: methods.thresholds,
         outcomes,
         bound,
         stressed,
@@ -258,13 +248,13 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     })
 }
 
-/// About `most` photons of the seed after so many others.
+/// About `most` photons of the seed that is `nth_seed` after the first.
 fn photons(task: &Task, nth_seed: u64, most: f64) -> Result<Box<dyn PhotonSource>> {
     let Settings { seed, l2, .. } = *task.settings;
     limited((task.photons)(seed + nth_seed)?, most, l2)
 }
 
-/// The method to take, as exact as was asked for, or as frames of L2 are with `frame_mm`.
+/// The method to take. Its error is at most the one given, or else that of frames of L2, `frame_mm`.
 fn choose(
     task: &Task,
     methods: &[Method],
@@ -276,22 +266,22 @@ fn choose(
     }
     let frame_mm = frame_mm.ok_or_else(|| {
         Refused::input(format!(
-            "frames of L2 give fewer than {LEAST_REPORTS} reports here; say `within`, or take more \
+            "frames of L2 give fewer than {MIN_REPORTS} reports here; set `within`, or take more \
              laser cycles"
         ))
     })?;
     let mut found = answer(methods, outcomes, frame_mm);
     let widest = WRONG_BEYOND_BINS * mm_per_bin(task.settings);
-    while found.taken.is_none() && found.within_mm < widest {
-        found = answer(methods, outcomes, WIDER * found.within_mm);
+    while found.best.is_none() && found.within_mm < widest {
+        found = answer(methods, outcomes, RELAXATION * found.within_mm);
     }
     Ok(found)
 }
 
-/// What `trials` come to under `stress`, on photons of another seed.
+/// The outcomes of `trials` under `stress`, on photons of another seed.
 fn under_stress(
     task: &Task,
-    field: &Field,
+    methods: &[Method],
     trials: &[Trial],
     truth: &Truth,
     stress: Stress,
@@ -300,18 +290,18 @@ fn under_stress(
     let source = photons(task, 1, STRESS_PHOTONS)?;
     let bins = u16::try_from(task.settings.bins)?;
     let mut source = Stressed::new(source, &stress, bins, task.sigma, task.settings.seed);
-    let outcomes = measure(&mut source, &field.methods, trials, truth, &stress)?;
+    let outcomes = measure(&mut source, methods, trials, truth, &stress)?;
     Ok((stress, outcomes))
 }
 
-/// Whether a trial has enough reports to tell its time and its error.
+/// Whether a trial has enough reports for its time and its error.
 fn is_measured(outcome: &Outcome, cycles: u64) -> bool {
     let figures = &outcome.figures;
-    figures.reports >= LEAST_REPORTS && figures.cycles <= cycles as f64
+    figures.reports >= MIN_REPORTS && figures.cycles <= cycles as f64
 }
 
-/// The truth. Without, it is where all photons of a pixel lie. That of a recording may have
-/// another offset: the median pixel tells.
+/// The true ranges, or those of all photons of each pixel. Ranges of a recording may have another offset:
+/// the median over the pixels removes it.
 fn known_ranges(
     truth: Option<Truth>,
     surveyed: &[(PixelAddress, PixelLight)],
@@ -323,24 +313,24 @@ fn known_ranges(
     let range = |pixel: &PixelLight| Some(pixel.position? * mm_per_bin + offset);
     Ok(match truth {
         Some(Truth::Scene(scene)) => Truth::Scene(scene),
-        Some(known) => {
+        Some(given) => {
             let errors = surveyed
                 .iter()
-                .filter_map(|(address, pixel)| Some(range(pixel)? - known.ranges(*address, 0)[0]?));
+                .filter_map(|(address, pixel)| Some(range(pixel)? - given.ranges(*address, 0)[0]?));
             let offset = median(errors.collect());
-            known.moved(offset)
+            given.moved(offset)
         }
         None => {
             let mut ranges = vec![None; array.pixels() as usize];
             for (address, pixel) in surveyed {
-                ranges[usize::from(address.0)] = range(pixel);
+                ranges[usize::from(address.raw())] = range(pixel);
             }
             Truth::OfAllPhotons(ranges)
         }
     })
 }
 
-/// The highest level whose blocks have more than a pixel, and none of another capture.
+/// The highest level whose blocks fit the array and do not reach across captures.
 fn most_levels(source: &dyn PhotonSource) -> u8 {
     let array = source.array();
     let fits = |level: &u8| {
@@ -350,8 +340,8 @@ fn most_levels(source: &dyn PhotonSource) -> u8 {
     [2, 1].into_iter().find(fits).unwrap_or(0)
 }
 
-/// So much of `source` that it has about `most` photons: fewer laser cycles, but enough for three
-/// exposures, and then fewer pixels.
+/// Limits `source` to about `most` photons: first to fewer laser cycles, at least three exposures, then to
+/// fewer pixels.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -368,7 +358,7 @@ fn limited(source: Box<dyn PhotonSource>, most: f64, l2: u16) -> Result<Box<dyn 
     Ok(Box::new(Selected::new(source, nth, cycles)))
 }
 
-/// The least counts that a method can reach within L2, or lengths of frames.
+/// The minimum counts that a method can reach within L2, or the lengths of frames.
 fn efforts(method: &Method, l2: u16, light: &Light) -> Vec<u16> {
     match method.kind {
         Kind::Frames => {
@@ -378,9 +368,9 @@ fn efforts(method: &Method, l2: u16, light: &Light) -> Vec<u16> {
         }
         Kind::Events { .. } => {
             let all = (light.signal + light.background) * f64::from(l2);
-            let reachable = LEAST_COUNTS.into_iter();
+            let reachable = MIN_COUNTS.into_iter();
             reachable
-                .filter(|&count| count == LEAST_COUNT || f64::from(count) <= 2.0 * all)
+                .filter(|&count| count == MIN_COUNT || f64::from(count) <= 2.0 * all)
                 .collect()
         }
     }

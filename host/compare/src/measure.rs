@@ -1,6 +1,6 @@
-//! One pass over photons: every method decides on the same ones.
+//! One pass over photons: all methods decide on the same ones.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use rayon::prelude::*;
 
 use super::cost::instructions;
@@ -17,20 +17,20 @@ use dtof_photons::source::PhotonSource;
 /// A method with its settings.
 #[derive(Clone, Debug)]
 pub struct Trial {
-    /// Its number among the methods.
+    /// Index of the method.
     pub method: usize,
-    /// Photons of a peak, at least, or laser cycles of a frame.
+    /// The fewest photons of a peak, or the laser cycles of a frame.
     pub effort: u16,
-    /// The settings that it runs with.
+    /// The settings for both.
     pub settings: Settings,
 }
 
-/// What a trial came to.
+/// The outcome of a trial.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     /// The trial.
     pub trial: Trial,
-    /// How it did.
+    /// Times and errors.
     pub figures: Figures,
     /// Instructions a laser cycle and pixel.
     pub instructions: f64,
@@ -43,10 +43,10 @@ struct Running<'a> {
     tally: Tally<'a>,
 }
 
-/// Runs all `trials` on the photons of `source`.
+/// Runs all `trials` of `methods` on the photons of `source`, which are under `stress`.
 ///
 /// # Errors
-/// What is wrong with the settings or the recording.
+/// Fails if a trial is of no method, if settings are invalid, or if the photons cannot be read.
 pub fn measure(
     source: &mut dyn PhotonSource,
     methods: &[Method],
@@ -54,6 +54,10 @@ pub fn measure(
     truth: &Truth,
     stress: &Stress,
 ) -> Result<Vec<Outcome>> {
+    ensure!(
+        trials.iter().all(|trial| trial.method < methods.len()),
+        "a trial of a method that does not exist"
+    );
     let array = source.array();
     let masked = trials
         .first()
@@ -84,8 +88,9 @@ pub fn measure(
             for (address, pixel) in addresses.iter().zip(&slice.pixels) {
                 let here = u64::from(pixel.cycles);
                 pixel_cycles += here;
-                if !masked.contains(&address.0) && truth.has_target(*address, slice.first_cycle) {
-                    watched[usize::from(address.0)] += here;
+                if !masked.contains(&address.raw()) && truth.has_target(*address, slice.first_cycle)
+                {
+                    watched[usize::from(address.raw())] += here;
                 }
             }
             Ok(())
@@ -111,4 +116,26 @@ pub fn measure(
         }
     });
     Ok(outcomes.collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_core::Array;
+    use dtof_engine::settings::Settings;
+    use dtof_simulate::demo;
+
+    #[test]
+    fn a_trial_of_a_method_that_does_not_exist_is_refused() {
+        let mut source = demo::photons(Array::new(2, 2).unwrap(), 1, 10).unwrap();
+        let trial = Trial {
+            method: 0,
+            effort: 5,
+            settings: Settings::static_scene(1),
+        };
+        let truth = Truth::Ranges(Vec::new());
+        let refused = measure(&mut source, &[], &[trial], &truth, &Stress::NONE);
+        let error = refused.unwrap_err().to_string();
+        assert_eq!(error, "a trial of a method that does not exist");
+    }
 }

@@ -1,4 +1,4 @@
-//! The methods that are compared: what decides, what finds the depth, and what it is called.
+//! The methods that are compared: rule, depth estimator and name.
 
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{AnyRule, AverageRule, BlockLevel, Count, PaperRule, WindowRule};
@@ -7,10 +7,10 @@ use dtof_link::AdaptiveBinning;
 
 use dtof_engine::settings::Settings;
 
-/// What decides in one pixel, without its threshold.
+/// The rule that decides in one pixel, without its threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Rule {
-    /// The paper's; its threshold is α.
+    /// The paper's rule; its threshold is α.
     Paper,
     /// The same over the average of all bins.
     Average,
@@ -19,19 +19,19 @@ pub enum Rule {
 }
 
 impl Rule {
-    /// Thresholds run from 0 in steps of a 32nd; any rule can have so many.
+    /// The number of thresholds that are tried, from 0 in steps of 1/32.
     pub const THRESHOLDS: usize = 480;
 
-    /// The threshold with a number.
+    /// The threshold with this number.
     #[must_use]
     pub fn threshold(number: usize) -> f64 {
         number as f64 / 32.0
     }
 
-    /// The core's rule.
+    /// The rule in the types of the core.
     ///
     /// # Errors
-    /// If a window is too wide.
+    /// Fails if a window is too wide.
     pub fn with(self, threshold: f64, min_count: u16) -> anyhow::Result<AnyRule> {
         let minimum = Count::saturating(min_count.into());
         let alpha = || U8F8::saturating_from_num(threshold);
@@ -51,11 +51,11 @@ impl Rule {
 pub enum Kind {
     /// Events, as soon as a peak stands clear.
     Events {
-        /// What decides.
+        /// The rule.
         rule: Rule,
-        /// Levels of blocks.
+        /// The number of levels of blocks.
         levels: u8,
-        /// Half of the false alarms near the last event.
+        /// Whether half of the false alarms are spent near the last event.
         tracking: bool,
     },
     /// Readings of frames.
@@ -65,13 +65,13 @@ pub enum Kind {
 /// A method.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Method {
-    /// What charts and tables call it.
+    /// Its name in charts and tables.
     pub name: String,
     /// How pixels report.
     pub kind: Kind,
-    /// The depth comes from three bins.
+    /// Whether the depth is the centroid of three bins.
     pub centroid: bool,
-    /// What it looks like in charts.
+    /// Its colour and mark in charts.
     pub pen: Pen,
 }
 
@@ -89,13 +89,13 @@ impl Method {
         }
     }
 
-    /// All that suit a pulse of standard deviation `sigma` bins in an array that has blocks of
-    /// so many levels. Frames are the last.
+    /// All methods for a pulse of standard deviation `sigma` bins, in an array that has blocks of up to
+    /// `most_levels` levels. Frames are the last.
     #[must_use]
     pub fn all(sigma: U8F8, most_levels: u8) -> Vec<Self> {
-        let suits = WindowRule::width_for_pulse(sigma);
-        let window = Rule::Window(suits);
-        let named = format!("window of {suits}");
+        let width = WindowRule::width_for_pulse(sigma);
+        let window = Rule::Window(width);
+        let name = format!("window of {width}");
         let mut methods = vec![
             Self {
                 centroid: true,
@@ -105,9 +105,9 @@ impl Method {
             Self::events("average of all bins", Rule::Average, palette::AVERAGE),
             Self {
                 centroid: true,
-                ..Self::events(format!("{named}, centroid"), window, palette::window(2))
+                ..Self::events(format!("{name}, centroid"), window, palette::window(2))
             },
-            Self::events(named, window, palette::window(3)),
+            Self::events(name, window, palette::window(3)),
         ];
         let more = |name: &str, levels, tracking, pen| Self {
             kind: Kind::Events {
@@ -134,7 +134,13 @@ impl Method {
         methods
     }
 
-    /// What decides, if it reports events.
+    /// Whether it reads frames.
+    #[must_use]
+    pub fn is_frames(&self) -> bool {
+        self.kind == Kind::Frames
+    }
+
+    /// The rule, if it reports events.
     #[must_use]
     pub const fn rule(&self) -> Option<Rule> {
         match self.kind {
@@ -143,7 +149,7 @@ impl Method {
         }
     }
 
-    /// Levels of its blocks.
+    /// The highest level of its blocks.
     #[must_use]
     pub fn levels(&self) -> BlockLevel {
         match self.kind {
@@ -152,7 +158,7 @@ impl Method {
         }
     }
 
-    /// Whether it is one pixel by itself with every exposure for itself, which a bound binds.
+    /// Whether each pixel and each exposure decides alone, so that the bound applies.
     #[must_use]
     pub const fn is_single(&self) -> bool {
         !matches!(
@@ -161,11 +167,11 @@ impl Method {
         )
     }
 
-    /// `like` with this method. `effort` is the least photons of a peak, or the laser cycles of
-    /// a frame.
+    /// The settings `like`, with this method. `effort` is the minimum count of a peak, or the laser cycles
+    /// of a frame.
     ///
     /// # Errors
-    /// If a window is too wide.
+    /// Fails if a window is too wide.
     pub fn settings(
         &self,
         like: &Settings,

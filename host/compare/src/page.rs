@@ -10,11 +10,10 @@ use dtof_draw::svg;
 use super::Comparison;
 use super::measure::Outcome;
 use dtof_engine::settings::{self, SettingsFile};
-use dtof_options::files::{Marked, may_replace, write_marked};
+use dtof_options::files::{MarkedFile, may_replace, write_marked};
 use dtof_report::{Figure, Section, still};
 
-/// The files of a comparison, and what stands near the start of each. The last makes a folder
-/// complete.
+/// The files of a comparison, and the mark near the start of each. The last one makes a folder complete.
 pub const FILES: [(&str, &str); 5] = [
     ("dtof.toml", settings::MARK),
     ("compare.svg", svg::MARK),
@@ -34,7 +33,7 @@ impl Comparison {
         text
     }
 
-    /// The same under stress, `stress.csv`.
+    /// All trials under stress as a table, `stress.csv`.
     #[must_use]
     pub fn stress_table(&self) -> String {
         let mut text = format!("{STRESS_HEAD},{TABLE_HEAD}\n");
@@ -79,13 +78,13 @@ impl Comparison {
 pub const TABLE_HEAD: &str = "method,threshold,least_photons_or_frame,cycles,cycles_slow_pixel,error_mm,\
      wrong_share,reports,reports_without_target,instructions";
 
-/// The columns before these under stress.
+/// The columns that come first in the table under stress.
 const STRESS_HEAD: &str = "condition,holds";
 
 /// Checks that the results may be written into `folder`.
 ///
 /// # Errors
-/// If a file is there that no comparison has written, or one of `inputs`.
+/// Fails if it holds a run, one of `inputs`, or a file of these names that no comparison has written.
 pub fn may_write(folder: &Path, inputs: &[&Path]) -> Result<()> {
     ensure!(
         !folder.join("summary.json").exists(),
@@ -97,59 +96,59 @@ pub fn may_write(folder: &Path, inputs: &[&Path]) -> Result<()> {
         .try_for_each(|(name, mark)| may_replace(&folder.join(name), mark, inputs))
 }
 
-/// Writes the results of photons called `name` into `folder`: charts, tables, the page, and the
-/// settings that were `taken`, if there are any.
+/// Writes the results for the input `name` into `folder`: chart, tables, page, and the settings of the
+/// method to take, if there is one.
 ///
 /// # Errors
-/// If the folder cannot be written.
+/// Fails if the folder cannot be written.
 pub fn write(
-    compared: &Comparison,
+    comparison: &Comparison,
     folder: &Path,
     name: &Path,
-    taken: Option<&SettingsFile>,
+    settings: Option<&SettingsFile>,
     inputs: &[&Path],
 ) -> Result<()> {
     fs::create_dir_all(folder)
         .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
     may_write(folder, inputs)?;
-    let svg = compared.chart()?;
+    let svg = comparison.chart()?;
     let section = |heading, rows| Section { heading, rows };
-    let (answer, able, stress) = (
-        compared.rows(),
-        compared.able_rows(),
-        compared.stress_rows(),
+    let (answer, candidates, stress) = (
+        comparison.rows(),
+        comparison.candidate_rows(),
+        comparison.stress_rows(),
     );
     let sections = [
         section("Answer", &answer[..]),
-        section("Methods as exact as wanted", &able),
-        section("Harder conditions: times as long to a report", &stress),
+        section("Methods that are exact enough", &candidates),
+        section("Harder conditions: time to a report, relative", &stress),
     ];
     let lead = format!("All methods on the same photons of {}.", name.display());
-    let (title, _) = compared.finding();
+    let (title, _) = comparison.finding();
     let caption = "methods.csv has every dot, stress.csv the harder conditions.";
     let figure = Figure { svg: &svg, caption };
     let page = still(&title, &lead, &sections, &[figure]);
-    let toml = taken.map(SettingsFile::to_toml).transpose()?;
+    let toml = settings.map(SettingsFile::to_toml).transpose()?;
     let texts = [
         toml,
         Some(svg.clone()),
-        Some(compared.table()),
-        Some(compared.stress_table()),
+        Some(comparison.table()),
+        Some(comparison.stress_table()),
         Some(page),
     ];
     let places = FILES.map(|(name, _)| folder.join(name));
     let all = places.iter().zip(FILES).zip(&texts);
-    let files: Vec<Marked> = all
+    let files: Vec<MarkedFile> = all
         .filter_map(|((place, (_, mark)), text)| {
             let text = text.as_deref()?;
-            Some(Marked { place, text, mark })
+            Some(MarkedFile { place, text, mark })
         })
         .collect();
     write_marked(&files, inputs)?;
-    let [settings, ..] = &places;
-    if taken.is_none() && settings.exists() {
-        // Settings of an earlier comparison are not the answer of this one.
-        fs::remove_file(settings).with_context(|| settings.display().to_string())?;
+    let [old, ..] = &places;
+    if settings.is_none() && old.exists() {
+        // Settings of an earlier comparison would look like the answer of this one.
+        fs::remove_file(old).with_context(|| old.display().to_string())?;
     }
     Ok(())
 }

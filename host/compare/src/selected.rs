@@ -1,4 +1,4 @@
-//! A part of a large array: whole blocks of 8×8 pixels, evenly spread.
+//! A part of a large array: blocks of 8×8 pixels, evenly spread.
 
 use std::collections::BTreeSet;
 
@@ -7,12 +7,12 @@ use dtof_core::{Array, PixelAddress};
 
 use dtof_photons::source::{PhotonSource, Slice};
 
-/// A source with some of its pixels, and with fewer laser cycles.
+/// A source with fewer pixels and fewer laser cycles.
 pub struct Selected {
     source: Box<dyn PhotonSource>,
     addresses: Vec<PixelAddress>,
-    /// Where they are in a slice.
-    places: Vec<usize>,
+    /// Their indices in a slice of the source.
+    indices: Vec<usize>,
     cycles: u64,
     photons_per_cycle: f64,
 }
@@ -25,26 +25,26 @@ impl Selected {
         let blocks_across = columns.div_ceil(8);
         let block = |address: PixelAddress| {
             let (row, column) = (
-                u32::from(address.0) / columns,
-                u32::from(address.0) % columns,
+                u32::from(address.raw()) / columns,
+                u32::from(address.raw()) % columns,
             );
-            // Not one below the other.
+            // The row shifts the choice, so that chosen blocks are not all in the same columns.
             (row / 8 * blocks_across + column / 8, row / 8)
         };
         let mut blocks: Vec<_> = source.addresses().into_iter().map(block).collect();
         blocks.sort_unstable();
         blocks.dedup();
         let numbered = blocks.into_iter().zip(0u32..);
-        let wanted: BTreeSet<_> = numbered
+        let chosen: BTreeSet<_> = numbered
             .filter(|((_, row), number)| *number == 0 || (number + row).is_multiple_of(nth))
             .map(|(block, _)| block)
             .collect();
-        let is_in = |address| wanted.contains(&block(address));
-        source.spare(&is_in);
+        let is_in = |address| chosen.contains(&block(address));
+        source.limit_to(&is_in);
         let all = source.addresses();
         let all_pixels = all.len();
         let all = all.into_iter().enumerate();
-        let (places, addresses) = all.filter(|(_, address)| is_in(*address)).unzip();
+        let (indices, addresses) = all.filter(|(_, address)| is_in(*address)).unzip();
         let addresses: Vec<PixelAddress> = addresses;
         let share = addresses.len() as f64 / all_pixels.max(1) as f64;
         Self {
@@ -52,7 +52,7 @@ impl Selected {
             photons_per_cycle: source.photons_per_cycle() * share,
             source,
             addresses,
-            places,
+            indices,
         }
     }
 }
@@ -81,9 +81,9 @@ impl PhotonSource for Selected {
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
         let mut slice = self.source.next_slice(cycles)?;
         let pixels = self
-            .places
+            .indices
             .iter()
-            .map(|&place| std::mem::take(&mut slice.pixels[place]));
+            .map(|&index| std::mem::take(&mut slice.pixels[index]));
         Ok(Slice {
             first_cycle: slice.first_cycle,
             pixels: pixels.collect(),
@@ -98,7 +98,7 @@ mod tests {
     use dtof_simulate::demo;
 
     #[test]
-    fn what_it_does_not_change_is_what_its_source_says() {
+    fn laser_rate_and_masked_photons_are_those_of_the_source() {
         let source = demo::photons(Array::new(32, 16).unwrap(), 1, 100).unwrap();
         let masked = Masked::new(Box::new(source), &[3]).unwrap();
         let mut part = Selected::new(Box::new(masked.with_laser_hz(Some(20_000))), 2, 50);

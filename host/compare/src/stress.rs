@@ -1,7 +1,7 @@
-//! Harder conditions, made of the photons there are: any source can be tried in them.
+//! Harder conditions, made from the photons of any source.
 //!
-//! Poisson counts stay Poisson counts when photons are left out at random or others are added.
-//! So half of the signal is half of all photons and the missing half of the background anew.
+//! Poisson counts stay Poisson counts if photons are dropped at random or others are added. So half of the
+//! signal is half of all photons, plus new photons for the missing half of the background.
 
 use anyhow::{Context, Result};
 use dtof_core::{Array, PixelAddress};
@@ -11,25 +11,25 @@ use rand_pcg::Pcg64;
 use dtof_photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_theory::random::pixel_rng;
 
-/// What is done to the photons.
+/// A change of the photons.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stress {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
     /// The share of the photons that stays.
     pub keep: f64,
     /// Background photons a bin and laser cycle that are added.
     pub background: f64,
-    /// The same in one pixel of each block of 8×8, which is hot.
+    /// Background photons that are added in one hot pixel of each block of 8×8.
     pub hot: f64,
-    /// How many bins all photons have moved by the last laser cycle, and the truth with them.
+    /// Bins that all photons move until the last laser cycle, and the true ranges with them.
     pub drift_bins: f64,
-    /// A second pulse in each laser cycle: photons, where it lies in the first one, and how many
-    /// bins later it comes each laser cycle.
+    /// A second pulse in each laser cycle: its photons, its bin in the first laser cycle, and the bins
+    /// that it moves each laser cycle.
     pub pulse: Option<(f64, f64, f64)>,
 }
 
-/// What is known of the photons.
+/// Background, signal and pulse.
 #[derive(Clone, Copy, Debug)]
 pub struct Light {
     /// Background photons a bin and laser cycle of the median pixel.
@@ -40,11 +40,11 @@ pub struct Light {
     pub sigma: f64,
 }
 
-/// From one pulse of the second laser to the next, in lengths of the histogram.
+/// The period of the second laser, in lengths of the histogram.
 const PERIODS: f64 = 8.0;
 
 impl Stress {
-    /// Nothing is done to them.
+    /// No change.
     pub const NONE: Self = Self {
         name: "as it is",
         keep: 1.0,
@@ -54,7 +54,7 @@ impl Stress {
         pulse: None,
     };
 
-    /// All of them, the first of which changes nothing. Bins from `first_bin` on may hold a peak.
+    /// All stresses; the first is [`Self::NONE`]. The gate begins at `first_bin`.
     #[must_use]
     pub fn all(light: &Light, first_bin: u16) -> Vec<Self> {
         let Light {
@@ -108,16 +108,19 @@ impl Stress {
         ]
     }
 
-    /// How many bins photons have moved in a laser cycle.
+    /// Bins that photons have moved in laser cycle `cycle` of `cycles`.
     #[must_use]
     pub fn moved(&self, cycle: u64, cycles: u64) -> f64 {
         self.drift_bins * cycle as f64 / cycles.max(1) as f64
     }
 
-    /// Whether `pixel` of an array of `columns` is hot: one of each 8×8.
+    /// Whether `pixel` of an array of `columns` columns is hot: one of each 8×8.
     #[must_use]
     pub fn is_hot(&self, pixel: PixelAddress, columns: u32) -> bool {
-        let place = [u32::from(pixel.0) / columns, u32::from(pixel.0) % columns];
+        let place = [
+            u32::from(pixel.raw()) / columns.max(1),
+            u32::from(pixel.raw()) % columns.max(1),
+        ];
         self.hot > 0.0 && place.map(|side| side % 8) == [0, 0]
     }
 }
@@ -144,7 +147,7 @@ impl Stressed {
         seed: u64,
     ) -> Self {
         let pixels = source.addresses().into_iter();
-        // Other numbers than those of the photons there are.
+        // Random numbers other than those of the source.
         let seed = seed.wrapping_add(0x5eed_0f57_2e55_0000);
         Self {
             cycles: source.cycles(),
@@ -214,7 +217,7 @@ impl PhotonSource for Stressed {
     }
 }
 
-/// One pixel and slice.
+/// One pixel in one slice.
 struct StressedSlice<'a> {
     stress: &'a Stress,
     background: f64,
@@ -249,16 +252,16 @@ impl StressedSlice<'_> {
                     continue;
                 }
                 let code = f64::from(photon.code);
-                // Anywhere in its bin.
+                // A moved photon lies anywhere in its bin.
                 put(if moved == 0.0 {
                     code
                 } else {
-                    code + moved + within(rng)
+                    code + moved + uniform(rng)
                 });
             }
             if let Some(even) = &even {
                 for _ in 0..count(even, rng) {
-                    put(within(rng) * bins);
+                    put(uniform(rng) * bins);
                 }
             }
             if let (Some(of_pulse), Some((_, at, step))) = (&of_pulse, pulse) {
@@ -276,7 +279,7 @@ impl StressedSlice<'_> {
     }
 }
 
-/// A Poisson number, which is whole.
+/// A Poisson number.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -286,7 +289,7 @@ pub(super) fn count(poisson: &Poisson<f64>, rng: &mut Pcg64) -> u64 {
     poisson.sample(rng) as u64
 }
 
-/// From 0 up to 1.
-fn within(rng: &mut Pcg64) -> f64 {
+/// A number from 0 to 1, without 1.
+fn uniform(rng: &mut Pcg64) -> f64 {
     StandardUniform.sample(rng)
 }

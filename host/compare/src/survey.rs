@@ -1,38 +1,38 @@
-//! What the photons of each pixel are like: background, signal, whether there is a target.
+//! Background and signal of each pixel, and the position of its target if there is one.
 
 use anyhow::Result;
 use dtof_core::PixelAddress;
 
 use super::stress::Light;
+use super::tally::first_and_last;
 use dtof_engine::settings::Settings;
 use dtof_engine::slices::next_cycles;
 use dtof_photons::source::PhotonSource;
 
-/// A window stands clear of the background by so many of its standard deviations, if there is
-/// a target for sure.
+/// There is a target if a window exceeds the background by so many standard deviations.
 const CLEAR: f64 = 6.0;
 
-/// The whole histogram of a pixel, and what it comes to.
+/// The light of a pixel, from its whole histogram.
 #[derive(Clone, Debug, Default)]
 pub struct PixelLight {
-    /// Background photons a bin and laser cycle, of bins away from the highest window.
+    /// Background photons a bin and laser cycle, from the bins outside the highest window.
     pub background: f64,
-    /// Photons a laser cycle in the highest window above the background.
+    /// Photons a laser cycle above the background in the highest window.
     pub signal: f64,
-    /// Where the photons above the background lie in that window on average, in bins, if it stands
-    /// clear of the background.
+    /// Mean position of these photons in bins, if there is a target.
     pub position: Option<f64>,
 }
 
-/// Counts all photons of `source`, and gives each pixel's.
+/// Counts all photons of `source`: the light of each pixel.
 ///
 /// # Errors
-/// What is wrong with the recording.
+/// Fails if the gate is invalid or the photons cannot be read.
 pub fn survey(
     source: &mut dyn PhotonSource,
     settings: &Settings,
     sigma: f64,
 ) -> Result<Vec<(PixelAddress, PixelLight)>> {
+    let (first, last) = first_and_last(settings)?;
     let addresses = source.addresses();
     let mut histograms = vec![vec![0u64; settings.bins]; addresses.len()];
     let mut cycles = vec![0; addresses.len()];
@@ -54,10 +54,6 @@ pub fn survey(
             break;
         }
     }
-    let last = settings.bins - 1;
-    let (first, last) = settings
-        .gate
-        .map_or((0, last), |(first, last)| (first.into(), usize::from(last)));
     let all = addresses.into_iter().zip(histograms).zip(cycles);
     let all = all.map(|((address, histogram), cycles)| {
         let mut pixel = of_pixel(&histogram[first..=last], cycles, sigma);
@@ -67,7 +63,8 @@ pub fn survey(
     Ok(all.collect())
 }
 
-/// The window is as wide as six standard deviations, which hold nearly all of a pulse.
+/// The light of a pixel with these counts. The window is six standard deviations wide, which holds nearly
+/// all of a pulse.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -114,7 +111,7 @@ pub fn light(
     }
 }
 
-/// The middle one; 0 of none.
+/// The median; 0 if there are no values.
 pub(super) fn median(mut values: Vec<f64>) -> f64 {
     values.sort_unstable_by(f64::total_cmp);
     values.get(values.len() / 2).copied().unwrap_or(0.0)

@@ -1,6 +1,6 @@
-//! What the reports of one method come to: how often they come, and how far off they are.
+//! The reports of one method: how often they come, and their errors.
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use dtof_core::{Array, DepthEvent, PixelAddress, RangeScale};
 
 use super::stress::Stress;
@@ -9,16 +9,33 @@ use dtof_engine::settings::Settings;
 use dtof_events::events_csv::range_mm;
 use dtof_photons::MM_PER_PS;
 
-/// A report farther off than so many bins is wrong.
+/// A report with an error of more than so many bins is wrong.
 pub const WRONG_BEYOND_BINS: f64 = 3.0;
 
-/// How long a bin is.
+/// The length of a bin in millimetres.
 pub fn mm_per_bin(settings: &Settings) -> f64 {
     settings.bin_width_ps.to_num::<f64>() * MM_PER_PS
 }
 
-/// Reports that are kept for their errors, of all pixels together.
-const MOST_KEPT: usize = 400_000;
+/// The first and the last bin of the gate, or of the histogram.
+///
+/// # Errors
+/// Fails if the gate does not lie in the histogram.
+pub fn first_and_last(settings: &Settings) -> Result<(usize, usize)> {
+    let (first, last) = match settings.gate {
+        Some((first, last)) => (first.into(), last.into()),
+        None => (0, settings.bins.saturating_sub(1)),
+    };
+    ensure!(
+        first <= last && last < settings.bins,
+        "a gate from bin {first} to {last} of {} bins",
+        settings.bins
+    );
+    Ok((first, last))
+}
+
+/// The most errors that are kept, of all pixels together.
+const MAX_KEPT: usize = 400_000;
 
 /// The reports of a method.
 pub struct Tally<'a> {
@@ -28,7 +45,7 @@ pub struct Tally<'a> {
     scale: RangeScale,
     mm_per_bin: f64,
     cycles: u64,
-    /// Reports kept of a pixel, at most.
+    /// The most errors that are kept of a pixel.
     most: usize,
     pixels: Vec<Reports>,
     /// Reports of pixels without a target.
@@ -52,7 +69,7 @@ impl Reports {
             return;
         }
         if self.kept.len() == most {
-            // Every other one goes.
+            // Drop every other one.
             let mut odd = false;
             self.kept.retain(|_| {
                 odd = !odd;
@@ -68,30 +85,30 @@ impl Reports {
     }
 }
 
-/// How a method did.
+/// Times and errors of a method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
-    /// Laser cycles of a pixel from one right report to the next, of the middle half of the pixels
-    /// with a target together. Infinite if these have none.
+    /// Laser cycles of a pixel from one right report to the next: the mean of the middle half of the pixels
+    /// with a target. Infinite if they have no right report.
     pub cycles: f64,
-    /// The same in the pixel that nine of ten are faster than.
+    /// The same for the pixel at the 90th percentile.
     pub slow_cycles: f64,
-    /// 68 % of the reports of pixels with a target are at most so many millimetres off. Each
-    /// pixel counts the same.
+    /// The 68th percentile of the absolute error in millimetres, of pixels with a target. Each pixel has
+    /// the same weight.
     pub error_mm: f64,
     /// Reports of pixels with a target.
     pub reports: u64,
-    /// The share of these that is more than three bins off.
+    /// The share of these with an error of more than three bins.
     pub wrong: f64,
     /// Reports of pixels without a target.
     pub stray: u64,
 }
 
 impl<'a> Tally<'a> {
-    /// Of an array, for a run of `cycles` laser cycles.
+    /// A tally of an array, for a run of `cycles` laser cycles.
     ///
     /// # Errors
-    /// If bins have no range.
+    /// Fails if the range scale is invalid.
     pub fn new(
         truth: &'a Truth,
         stress: &'a Stress,
@@ -107,13 +124,13 @@ impl<'a> Tally<'a> {
             scale: settings.range_scale()?,
             mm_per_bin: mm_per_bin(settings),
             cycles,
-            most: (MOST_KEPT / pixels.max(1)).clamp(8, 1024),
+            most: (MAX_KEPT / pixels.max(1)).clamp(8, 1024),
             pixels: vec![Reports::default(); pixels],
             stray: 0,
         })
     }
 
-    /// Takes events into account: one of a block for each of its pixels.
+    /// Adds events. An event of a block counts for each of its pixels.
     pub fn add(&mut self, events: &[DepthEvent]) {
         for event in events {
             for pixel in self.array.pixels_of(event.pixel, event.level) {
@@ -123,7 +140,7 @@ impl<'a> Tally<'a> {
     }
 
     fn report(&mut self, event: &DepthEvent, pixel: PixelAddress) {
-        let cycle = event.cycle.0;
+        let cycle = event.cycle.raw();
         if self.stress.is_hot(pixel, self.array.columns()) {
             return;
         }
@@ -132,14 +149,14 @@ impl<'a> Tally<'a> {
             self.stray += 1;
             return;
         }
-        // Where it would be if nothing had moved, half an exposure ago.
+        // Without the drift, at the middle of the exposure.
         let middle = cycle.saturating_sub(u64::from(event.exposure) / 2);
         let moved = self.stress.moved(middle, self.cycles) * self.mm_per_bin;
         let range = range_mm(event, &self.scale) - moved;
         let errors = ranges.into_iter().flatten().map(|truth| range - truth);
         let error = errors.min_by(|one, other| one.abs().total_cmp(&other.abs()));
         let limit = WRONG_BEYOND_BINS * self.mm_per_bin;
-        let reports = &mut self.pixels[usize::from(pixel.0)];
+        let reports = &mut self.pixels[usize::from(pixel.raw())];
         let Some(error) = error else { return };
         if error.abs() > limit {
             reports.wrong += 1;
@@ -149,11 +166,11 @@ impl<'a> Tally<'a> {
         reports.keep(error, self.most);
     }
 
-    /// What it came to. `watched` are the laser cycles in which each pixel had a target.
+    /// The figures. `watched` are the laser cycles in which each pixel had a target.
     #[must_use]
     pub fn finish(mut self, watched: &[u64]) -> Figures {
         if !matches!(self.truth, Truth::Scene(_)) {
-            self.without_offset(watched);
+            self.subtract_offset(watched);
         }
         let mut figures = Figures {
             stray: self.stray,
@@ -166,7 +183,7 @@ impl<'a> Tally<'a> {
             #[allow(clippy::cast_possible_truncation, reason = "an address")]
             let is_hot = self
                 .stress
-                .is_hot(PixelAddress(pixel as u16), self.array.columns());
+                .is_hot(PixelAddress::new(pixel as u16), self.array.columns());
             if cycles == 0 || is_hot {
                 continue;
             }
@@ -176,7 +193,7 @@ impl<'a> Tally<'a> {
             let weight = 1.0 / reports.kept.len().max(1) as f64;
             errors.extend(reports.kept.iter().map(|error| (error.abs(), weight)));
         }
-        // No right report is an infinite time.
+        // Infinite without a right report.
         let time = |(cycles, right): &(f64, f64)| cycles / right;
         times.sort_unstable_by(|one, other| time(one).total_cmp(&time(other)));
         let quarter = times.len() / 4;
@@ -198,8 +215,8 @@ impl<'a> Tally<'a> {
         figures
     }
 
-    /// Leaves out the median error: a sensor's offset is calibrated with the estimator it has.
-    fn without_offset(&mut self, watched: &[u64]) {
+    /// Subtracts the median error: the offset of a sensor is calibrated for its estimator.
+    fn subtract_offset(&mut self, watched: &[u64]) {
         let mut errors = Vec::new();
         for (reports, _) in self
             .pixels
@@ -219,7 +236,7 @@ impl<'a> Tally<'a> {
     }
 }
 
-/// The value that so much of the weight lies at or below; infinite without any.
+/// The weighted quantile of values (`.0`) with weights (`.1`); infinite without values.
 fn weighted_quantile(values: &mut [(f32, f64)], share: f64) -> f64 {
     values.sort_unstable_by(|one, other| one.0.total_cmp(&other.0));
     let all: f64 = values.iter().map(|value| value.1).sum();

@@ -1,54 +1,54 @@
-//! The answer of a comparison, in words.
+//! The answer of a comparison as text.
 
 use super::Comparison;
 use super::answer::Choice;
 use super::measure::Outcome;
-use super::method::Kind;
 use dtof_options::rows::{Row, grouped, significant};
+use dtof_report::capitalised;
 
-/// A method holds in harder conditions if its error is at most so many times what it was, and
-/// the share of wrong reports at most this.
+/// A method holds in harder conditions if its error grows at most by this factor, and the share of wrong
+/// reports is at most `HOLDS_WRONG`.
 const HOLDS_ERROR: f64 = 1.5;
 const HOLDS_WRONG: f64 = 0.05;
 
-/// A time that differs by less than this share is not told.
-const AS_BEFORE: f64 = 0.2;
+/// A time that differs by less than this share counts as equal.
+const SAME_TIME: f64 = 0.2;
 
 impl Comparison {
-    /// What the chart shows, and whether there is a method to take.
+    /// The finding of the chart, and whether there is a method to take.
     pub(super) fn finding(&self) -> (String, bool) {
-        match &self.answer.taken {
-            None => ("A method is as exact as wanted".to_owned(), false),
-            Some(taken) => {
-                let name = capital(&self.methods[taken.method].name);
-                let time = self.told(taken.cycles);
-                let times = self.as_a_frame(taken).map_or(String::new(), |times| {
+        match &self.answer.best {
+            None => ("A method is exact enough".to_owned(), false),
+            Some(best) => {
+                let name = capitalised(&self.methods[best.method].name);
+                let time = self.time_text(best.cycles);
+                let times = self.speed_up(best).map_or(String::new(), |times| {
                     format!(", {times:.1} times as fast as frames")
                 });
-                let error = short(taken.error_mm);
+                let error = short(best.error_mm);
                 (format!("{name}: {error} mm after {time}{times}"), true)
             }
         }
     }
 
-    /// How many times the time of `taken` the shortest frame takes that is as exact.
-    fn as_a_frame(&self, taken: &Choice) -> Option<f64> {
+    /// The time of the shortest frame that is exact enough, relative to that of `best`.
+    fn speed_up(&self, best: &Choice) -> Option<f64> {
         let frames = self.of(self.methods.len() - 1);
         let exact = frames.filter(|outcome| outcome.figures.error_mm <= self.answer.within_mm);
-        let times = exact.map(|outcome| outcome.figures.cycles / taken.cycles);
+        let times = exact.map(|outcome| outcome.figures.cycles / best.cycles);
         times
             .min_by(f64::total_cmp)
             .filter(|times| times.is_finite())
     }
 
-    /// The trials of a method.
+    /// The trials of the method with this index.
     pub(super) fn of(&self, number: usize) -> impl Iterator<Item = &Outcome> {
         let outcomes = self.outcomes.iter();
         outcomes.filter(move |outcome| outcome.trial.method == number)
     }
 
     /// A time with its unit.
-    fn told(&self, cycles: f64) -> String {
+    fn time_text(&self, cycles: f64) -> String {
         let time = self.time(cycles);
         match self.laser_hz {
             _ if !cycles.is_finite() => "never".to_owned(),
@@ -58,7 +58,7 @@ impl Comparison {
         }
     }
 
-    /// The answer, in rows.
+    /// The answer in rows.
     #[must_use]
     pub fn rows(&self) -> Vec<Row> {
         let row = |name: &str, value: String| (name.to_owned(), value);
@@ -79,27 +79,27 @@ impl Comparison {
                     short(self.light.signal)
                 ),
             ),
-            row("truth", self.truth.told().to_owned()),
-            row("wanted", self.wanted()),
+            row("truth", self.truth.description().to_owned()),
+            row("wanted", self.allowed_error()),
         ];
-        let Some(taken) = &self.answer.taken else {
+        let Some(best) = &self.answer.best else {
             let all = self.outcomes.iter().filter(|outcome| {
-                self.methods[outcome.trial.method].kind != Kind::Frames
+                !self.methods[outcome.trial.method].is_frames()
                     && outcome.figures.cycles.is_finite()
             });
-            let best =
+            let closest =
                 all.min_by(|one, other| one.figures.error_mm.total_cmp(&other.figures.error_mm));
-            rows.push(row("take", "no method is so exact here".to_owned()));
-            if let Some(best) = best {
+            rows.push(row("take", "no method is exact enough here".to_owned()));
+            if let Some(closest) = closest {
                 rows.push(row(
                     "most exact",
                     format!(
-                        "{}: {} mm; --within takes another",
-                        self.methods[best.trial.method].name,
-                        short(best.figures.error_mm)
+                        "{}: {} mm; a larger --within allows it",
+                        self.methods[closest.trial.method].name,
+                        short(closest.figures.error_mm)
                     ),
                 ));
-                if best.figures.wrong > 0.5 {
+                if closest.figures.wrong > 0.5 {
                     let text = "most reports are wrong: a cover glass? `calibrate` finds the gate";
                     rows.push(row("hint", text.to_owned()));
                 }
@@ -107,47 +107,56 @@ impl Comparison {
             return rows;
         };
         rows.extend([
-            row("take", self.methods[taken.method].name.clone()),
-            row("photons of a peak", format!("at least {}", taken.effort)),
-            row("time to a report", self.told(taken.cycles)),
-            row("slowest tenth", self.slowest(taken)),
-            row("error", format!("{} mm", short(taken.error_mm))),
+            row("take", self.methods[best.method].name.clone()),
+            row("photons of a peak", format!("at least {}", best.effort)),
+            row("time to a report", self.time_text(best.cycles)),
+            row("slowest tenth", self.slowest_tenth(best)),
+            row("error", format!("{} mm", short(best.error_mm))),
             row(
                 "cost",
                 format!(
                     "{:.0} instructions a laser cycle and pixel",
-                    taken.instructions
+                    best.instructions
                 ),
             ),
         ]);
-        if let Some(fastest) = self.answer.able.first().filter(|first| *first != taken) {
+        if let Some(fastest) = self
+            .answer
+            .candidates
+            .first()
+            .filter(|first| *first != best)
+        {
             rows.push(row(
                 "fastest",
                 format!(
                     "{}: {}, {:.0} instructions",
                     self.methods[fastest.method].name,
-                    self.told(fastest.cycles),
+                    self.time_text(fastest.cycles),
                     fastest.instructions
                 ),
             ));
         }
-        let broken: Vec<&str> = self.broken(taken).collect();
+        let broken: Vec<&str> = self.failing(best).collect();
         if !broken.is_empty() {
             rows.push(row("does not hold with", broken.join("; ")));
         }
         rows
     }
 
-    /// How long the pixels take that nine of ten are faster than.
-    fn slowest(&self, taken: &Choice) -> String {
-        if taken.slow_cycles.is_finite() {
-            return format!("of the pixels: {} or more", self.told(taken.slow_cycles));
+    /// The time of the slowest tenth of the pixels.
+    fn slowest_tenth(&self, best: &Choice) -> String {
+        if best.slow_cycles.is_finite() {
+            return format!(
+                "of the pixels: {} or more",
+                self.time_text(best.slow_cycles)
+            );
         }
-        "of the pixels: never report; a larger --within takes what reports sooner".to_owned()
+        "of the pixels: never report; a larger --within allows methods that report sooner"
+            .to_owned()
     }
 
-    /// How exact the answer has to be.
-    fn wanted(&self) -> String {
+    /// The error that is allowed.
+    fn allowed_error(&self) -> String {
         let within = self.answer.within_mm;
         let frame = self.frame_mm.filter(|frame| *frame < within);
         let frame = frame.map_or(String::new(), |frame| {
@@ -156,22 +165,22 @@ impl Comparison {
         format!("errors of at most {} mm{frame}", short(within))
     }
 
-    /// Where each method that is exact enough gets there.
+    /// Time and cost of each method that is exact enough.
     #[must_use]
-    pub fn able_rows(&self) -> Vec<Row> {
-        let able = self.answer.able.iter().map(|choice| {
+    pub fn candidate_rows(&self) -> Vec<Row> {
+        let rows = self.answer.candidates.iter().map(|choice| {
             let text = format!(
                 "{}, at least {} photons, {:.0} instructions",
-                self.told(choice.cycles),
+                self.time_text(choice.cycles),
                 choice.effort,
                 choice.instructions
             );
             (self.methods[choice.method].name.clone(), text)
         });
-        able.collect()
+        rows.collect()
     }
 
-    /// How each method does in harder conditions: its time over that without, and where it fails.
+    /// The time of each method in harder conditions relative to that without, and where it fails.
     #[must_use]
     pub fn stress_rows(&self) -> Vec<Row> {
         let rows = self.methods.iter().enumerate().map(|(number, method)| {
@@ -188,7 +197,7 @@ impl Comparison {
                     let times = outcome.figures.cycles / before;
                     if !self.holds(outcome) {
                         Some(format!("{name}: fails"))
-                    } else if (times - 1.0).abs() < AS_BEFORE {
+                    } else if (times - 1.0).abs() < SAME_TIME {
                         None
                     } else {
                         Some(format!("{name}: ×{times:.1}"))
@@ -201,19 +210,19 @@ impl Comparison {
         rows.collect()
     }
 
-    /// The conditions in which the method to take fails, as it is taken.
-    fn broken(&self, taken: &Choice) -> impl Iterator<Item = &'static str> {
-        let (method, effort) = (taken.method, taken.effort);
+    /// The conditions in which the method to take fails, with its minimum count.
+    fn failing(&self, best: &Choice) -> impl Iterator<Item = &'static str> {
+        let (method, effort) = (best.method, best.effort);
         let stressed = self.stressed.iter().skip(1).filter(move |(_, outcomes)| {
-            let mut as_taken = outcomes
+            let mut same = outcomes
                 .iter()
                 .filter(|outcome| outcome.trial.method == method && outcome.trial.effort == effort);
-            as_taken.any(|outcome| !self.holds(outcome))
+            same.any(|outcome| !self.holds(outcome))
         });
         stressed.map(|(stress, _)| stress.name)
     }
 
-    /// Whether a method still works: it reports, as exact as without stress and seldom wrong.
+    /// Whether a method holds under stress: it reports, about as exact as without, and is rarely wrong.
     pub(super) fn holds(&self, stressed: &Outcome) -> bool {
         let without = self.stressed.first().and_then(|(_, outcomes)| {
             let mut all = outcomes.iter();
@@ -230,18 +239,10 @@ impl Comparison {
     }
 }
 
-/// Three digits that count.
+/// To three significant digits.
 fn short(value: f64) -> String {
     if !value.is_finite() || value == 0.0 {
         return value.to_string();
     }
     significant(value, 3)
-}
-
-fn capital(name: &str) -> String {
-    let mut letters = name.chars();
-    let first = letters
-        .next()
-        .map(|letter| letter.to_uppercase().to_string());
-    first.unwrap_or_default() + letters.as_str()
 }

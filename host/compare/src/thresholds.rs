@@ -1,8 +1,9 @@
-//! The thresholds at which rules have equal false alarms: exposures without a target are
-//! simulated, and all rules decide on the same ones.
+//! Thresholds that give all rules the same rate of false alarms: exposures without a target are simulated,
+//! and all rules decide on the same ones.
 
 use anyhow::{Result, ensure};
-use dtof_core::{AnyRule, Count10, DepthEstimator, Histogram, RangeGate, detect};
+use dtof_core::rule::detect;
+use dtof_core::{AnyRule, Count10, DepthEstimator, Histogram, RangeGate};
 use rand_distr::{Distribution, Poisson, Uniform};
 use rayon::prelude::*;
 
@@ -12,69 +13,70 @@ use dtof_engine::with_bins;
 use dtof_options::Refused;
 use dtof_theory::random::pixel_rng;
 
-/// Exposures, unless their photons would be more than [`MOST_PHOTONS`].
-const EXPOSURES: u32 = 20_000;
-/// At least so many, whatever they cost.
-const LEAST_EXPOSURES: u32 = 1_000;
-const MOST_PHOTONS: f64 = 4e8;
-/// Exposures with a false alarm at a threshold, at least.
-const LEAST_EVENTS: f64 = 5.0;
+/// The most exposures; fewer if they have more than [`MAX_PHOTONS`] photons.
+const MAX_EXPOSURES: u32 = 20_000;
+/// The fewest exposures.
+const MIN_EXPOSURES: u32 = 1_000;
+const MAX_PHOTONS: f64 = 4e8;
+/// The fewest exposures with a false alarm at a threshold.
+const MIN_EVENTS: f64 = 5.0;
 
-/// How many exposures end with an event at each threshold.
+/// The number of exposures that end with an event at each threshold.
 pub struct Thresholds {
     rules: Vec<Rule>,
-    /// Of each rule: how many exposures fire at so many of the lowest thresholds.
-    highest: Vec<Vec<u32>>,
+    /// For each rule a histogram of exposures by the number of thresholds that they exceed.
+    exceeded: Vec<Vec<u32>>,
     exposures: u32,
 }
 
 impl Thresholds {
-    /// Of `rules`, for `background` photons a bin and laser cycle, with gate, L1, L2 and X of
+    /// Simulates `rules` with `background` photons a bin and laser cycle, and gate, L1, L2 and X of
     /// `settings`.
     ///
     /// # Errors
-    /// If the number of bins is none.
+    /// Fails if number of bins, gate, background or a window is invalid.
     pub fn simulate(
         rules: &[Rule],
         settings: &Settings,
         background: f64,
         seed: u64,
     ) -> Result<Self> {
-        let highest = with_bins!(settings.bins, BINS => {
-            highest::<BINS>(rules, settings, background, seed)
+        let exceeded = with_bins!(settings.bins, BINS => {
+            exceeded::<BINS>(rules, settings, background, seed)
         })??;
         Ok(Self {
             rules: rules.to_vec(),
-            exposures: highest.first().map_or(0, |counts| counts.iter().sum()),
-            highest,
+            exposures: exceeded.first().map_or(0, |counts| counts.iter().sum()),
+            exceeded,
         })
     }
 
-    /// The least threshold at which at most `share` of the exposures end with an event.
+    /// The lowest threshold at which at most `share` of the exposures end with an event.
     ///
     /// # Errors
-    /// If even the highest has more.
+    /// Fails if `share` is too small for the number of exposures, or if even the highest threshold has
+    /// more events.
     pub fn of(&self, rule: Rule, share: f64) -> Result<f64> {
-        let known = self.rules.iter().zip(&self.highest);
-        let counts = known.into_iter().find(|(known, _)| **known == rule);
+        let mut rules = self.rules.iter().zip(&self.exceeded);
+        let counts = rules.find(|(simulated, _)| **simulated == rule);
         let counts = counts.map_or(&[][..], |(_, counts)| counts);
-        let wanted = share * f64::from(self.exposures);
+        let allowed = share * f64::from(self.exposures);
         ensure!(
-            wanted >= LEAST_EVENTS,
+            allowed >= MIN_EVENTS,
             Refused::value(
                 "false_alarm",
                 share,
                 format!(
-                    "{} exposures show shares from {} on",
+                    "{} exposures can only show shares of {} or more",
                     self.exposures,
-                    LEAST_EVENTS / f64::from(self.exposures)
+                    MIN_EVENTS / f64::from(self.exposures)
                 )
             )
         );
         let mut firing = self.exposures;
         for (number, &here) in counts.iter().enumerate() {
             firing -= here;
-            if f64::from(firing) <= wanted {
+            if f64::from(firing) <= allowed {
                 return Ok(Rule::threshold(number));
             }
         }
@@ -82,8 +84,8 @@ impl Thresholds {
     }
 }
 
-/// Of each rule: how many exposures fire at so many of the lowest thresholds.
-fn highest<const BINS: usize>(
+/// For each rule a histogram of exposures by the number of thresholds that they exceed.
+fn exceeded<const BINS: usize>(
     rules: &[Rule],
     settings: &Settings,
     background: f64,
@@ -99,7 +101,7 @@ fn highest<const BINS: usize>(
         .map(|rule| {
             let numbers = 0..Rule::THRESHOLDS;
             numbers
-                .map(|number| rule.with(Rule::threshold(number), LEAST_COUNT))
+                .map(|number| rule.with(Rule::threshold(number), MIN_COUNT))
                 .collect()
         })
         .collect::<Result<_>>()?;
@@ -110,17 +112,17 @@ fn highest<const BINS: usize>(
         clippy::cast_sign_loss,
         reason = "within u32"
     )]
-    let exposures = (MOST_PHOTONS / photons.max(1.0)).min(EXPOSURES.into()) as u32;
-    let exposures = exposures.max(LEAST_EXPOSURES);
+    let exposures = (MAX_PHOTONS / photons.max(1.0)).min(MAX_EXPOSURES.into()) as u32;
+    let exposures = exposures.max(MIN_EXPOSURES);
     let each_look = background * bins * f64::from(settings.x);
     let each_look = (each_look > 0.0)
         .then(|| Poisson::new(each_look))
         .transpose()?;
     #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
     let bin = Uniform::new(0, BINS as u16)?;
-    // One type for all rules and numbers of bins: what runs it on threads is compiled once.
+    // One type for all rules and numbers of bins: the parallel code is compiled once.
     let one: &(dyn Fn(u32) -> Vec<usize> + Sync) = &|exposure| {
-        let place = dtof_core::PixelAddress((exposure & 0xffff) as u16);
+        let place = dtof_core::PixelAddress::new((exposure & 0xffff) as u16);
         let mut rng = pixel_rng(seed.wrapping_add(u64::from(exposure >> 16) << 32), place);
         let mut histogram = Histogram::<BINS, Count10>::new();
         let mut fired = vec![0usize; ladders.len()];
@@ -161,5 +163,5 @@ fn highest<const BINS: usize>(
     Ok(counts)
 }
 
-/// Photons of a peak, at least.
-pub const LEAST_COUNT: u16 = 5;
+/// The lowest minimum count of a peak.
+pub const MIN_COUNT: u16 = 5;

@@ -1,59 +1,60 @@
-//! What is true of the pixels of a recording or a scene.
+//! The true ranges of the pixels of a recording or a scene.
 
 use anyhow::{Result, ensure};
 use dtof_core::PixelAddress;
 
-use dtof_photons::medium::Medium;
+use dtof_photons::input::Input;
 use dtof_photons::npy::numbers;
 use dtof_simulate::scene::Scene;
 
-/// What reports are compared with.
+/// The true ranges that reports are compared with.
 #[derive(Clone, Debug)]
 pub enum Truth {
     /// A simulated scene.
     Scene(Box<Scene>),
     /// A range in millimetres for each pixel that has one.
     Ranges(Vec<Option<f64>>),
-    /// The same, where nothing better is known: that of all photons of the pixel.
+    /// The range of all photons of each pixel, where nothing better is known.
     OfAllPhotons(Vec<Option<f64>>),
 }
 
 impl Truth {
-    /// Reads ranges in millimetres, an `.npy` array with as many numbers as pixels, a file or in
-    /// memory. A pixel
-    /// without a target is 0, negative or not a number.
+    /// Reads ranges in millimetres: an `.npy` array, as a file or in memory, with one number for each
+    /// pixel. The number of a pixel without a target is 0, negative or not a number.
     ///
     /// # Errors
-    /// What is wrong with it, its name first.
-    pub fn read(medium: &Medium, pixels: usize) -> Result<Self> {
-        let numbers = numbers::read(medium)?;
+    /// Fails if the array cannot be read, has another number of ranges, or none that is positive; the
+    /// error begins with its name.
+    pub fn read(input: &Input, pixels: usize) -> Result<Self> {
+        let numbers = numbers::read(input)?;
         let there = numbers.values.len();
         ensure!(
             there == pixels,
-            "{medium}: {there} ranges, but there are {pixels} pixels"
+            "{input}: {there} ranges, but there are {pixels} pixels"
         );
         let ranges = numbers.values.into_iter();
         let ranges: Vec<_> = ranges
             .map(|range| Some(range).filter(|range| range.is_finite() && *range > 0.0))
             .collect();
         let any = ranges.iter().any(Option::is_some);
-        ensure!(any, "{medium}: no pixel has a range");
+        ensure!(any, "{input}: no pixel has a range");
         Ok(Self::Ranges(ranges))
     }
 
-    /// The ranges that a report of `pixel` may have in a laser cycle: of the nearest surface,
-    /// and of the one behind it. None without a target, or where nothing is known.
+    /// The true ranges of `pixel` in a laser cycle: that of the nearest surface, and that of the one
+    /// behind it.
     #[must_use]
     pub fn ranges(&self, pixel: PixelAddress, cycle: u64) -> [Option<f64>; 2] {
         match self {
             Self::Scene(scene) => {
                 let end = f64::from(scene.bins) * scene.mm_per_bin();
-                let views = scene.views(pixel, cycle);
+                let views = scene.hits(pixel, cycle);
                 views.map(|view| view.map(|view| view.range_mm).filter(|range| *range < end))
             }
-            Self::Ranges(ranges) | Self::OfAllPhotons(ranges) => {
-                [ranges.get(usize::from(pixel.0)).copied().flatten(), None]
-            }
+            Self::Ranges(ranges) | Self::OfAllPhotons(ranges) => [
+                ranges.get(usize::from(pixel.raw())).copied().flatten(),
+                None,
+            ],
         }
     }
 
@@ -63,7 +64,7 @@ impl Truth {
         self.ranges(pixel, cycle)[0].is_some()
     }
 
-    /// With so many millimetres more, if it is a list of ranges.
+    /// The same with `mm` added, if it is a list of ranges.
     #[must_use]
     pub fn moved(self, mm: f64) -> Self {
         match self {
@@ -75,9 +76,9 @@ impl Truth {
         }
     }
 
-    /// How errors come about, in a sentence.
+    /// What errors are relative to, as a sentence.
     #[must_use]
-    pub const fn told(&self) -> &'static str {
+    pub const fn description(&self) -> &'static str {
         match self {
             Self::Scene(_) | Self::Ranges(_) => "errors are against the true range",
             Self::OfAllPhotons(_) => "errors are against the range of all photons of the pixel",

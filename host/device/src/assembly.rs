@@ -1,4 +1,4 @@
-//! Histograms out of the messages that carry them.
+//! Assembles histograms from link messages.
 
 use std::collections::VecDeque;
 
@@ -9,28 +9,28 @@ use dtof_link::{HistogramHead, HistogramPart, NoHistogram};
 /// The histogram of a pixel as a device has sent it.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PixelHistogram {
-    /// What it is of.
+    /// Pixel, laser cycle and exposure.
     pub head: HistogramHead,
     /// Photons of each bin.
     pub counts: Vec<u32>,
 }
 
-/// What a device answers: the histogram, or of which pixel there is none and why.
+/// The answer to a request: the histogram, or the pixel and the reason why it has none.
 pub type HistogramAnswer = Result<PixelHistogram, (PixelAddress, NoHistogram)>;
 
-/// Requests that are not answered yet, and answers.
+/// Open requests, and answers that have arrived.
 #[derive(Debug, Default)]
 pub(super) struct Assembly {
-    asked: VecDeque<PixelAddress>,
-    /// The first bins of one that takes two messages.
+    requested: VecDeque<PixelAddress>,
+    /// A histogram whose last bins are still missing.
     begun: Option<PixelHistogram>,
     answers: VecDeque<HistogramAnswer>,
 }
 
 impl Assembly {
-    /// A request is on its way.
-    pub fn asked(&mut self, pixel: PixelAddress) {
-        self.asked.push_back(pixel);
+    /// Notes that a histogram was requested.
+    pub fn request(&mut self, pixel: PixelAddress) {
+        self.requested.push_back(pixel);
     }
 
     /// The next answer.
@@ -38,23 +38,23 @@ impl Assembly {
         self.answers.pop_front()
     }
 
-    /// Takes a message; the device has so many bins.
+    /// Takes a message from a device with `bins` bins.
     ///
     /// # Errors
-    /// If it makes no sense.
+    /// Fails if the message is invalid or was not requested.
     pub fn take(&mut self, body: &[u8], bins: u16) -> Result<()> {
         let part = HistogramPart::from_le_bytes(body);
-        let part = part.context("the device sends a histogram that is none")?;
+        let part = part.context("the device sends an invalid histogram")?;
         let pixel = match &part {
             Ok(part) => part.head().pixel,
             Err((pixel, _)) => *pixel,
         };
         ensure!(
-            self.asked.front() == Some(&pixel),
-            "the device sends a histogram of pixel {} that nobody asked for",
-            pixel.0
+            self.requested.front() == Some(&pixel),
+            "the device sends a histogram of pixel {}, which was not requested",
+            pixel.raw()
         );
-        let number = pixel.0;
+        let number = pixel.raw();
         let part = match part {
             Ok(part) => part,
             Err(none) => {
@@ -62,7 +62,7 @@ impl Assembly {
                     self.begun.is_none(),
                     "the device sends half a histogram of pixel {number}"
                 );
-                self.asked.pop_front();
+                self.requested.pop_front();
                 self.answers.push_back(Err(none));
                 return Ok(());
             }
@@ -78,7 +78,7 @@ impl Assembly {
             "the device sends bin {first} of pixel {number} where bin {have} comes next"
         );
         ensure!(
-            u64::from(head.exposure) <= head.cycle.0,
+            u64::from(head.exposure) <= head.cycle.raw(),
             "the device sends an exposure of pixel {number} that began before the first laser cycle"
         );
         histogram.counts.extend(part.counts());
@@ -90,7 +90,7 @@ impl Assembly {
         if have < usize::from(bins) {
             self.begun = Some(histogram);
         } else {
-            self.asked.pop_front();
+            self.requested.pop_front();
             self.answers.push_back(Ok(histogram));
         }
         Ok(())
@@ -104,9 +104,9 @@ mod tests {
     use proptest::prelude::*;
 
     const HEAD: HistogramHead = HistogramHead {
-        pixel: PixelAddress(3),
+        pixel: PixelAddress::new(3),
         is_whole: false,
-        cycle: LaserCycle(1000),
+        cycle: LaserCycle::new(1000),
         exposure: 40,
     };
 
@@ -120,13 +120,13 @@ mod tests {
     }
 
     #[test]
-    fn pieces_become_histograms_in_the_order_they_were_asked_for() {
+    fn pieces_become_histograms_in_the_order_of_requests() {
         let mut counts = vec![7; 128];
         counts[99] = 1 << 20;
         let mut assembly = Assembly::default();
-        let other = PixelAddress(4);
+        let other = PixelAddress::new(4);
         for pixel in [HEAD.pixel, other, HEAD.pixel] {
-            assembly.asked(pixel);
+            assembly.request(pixel);
         }
         let bodies = bodies(HEAD, &counts);
         assert_eq!(bodies.len(), 2);
@@ -142,7 +142,7 @@ mod tests {
     }
 
     #[test]
-    fn nonsense_is_named() {
+    fn invalid_messages_are_refused() {
         let whole = bodies(HEAD, &[1; 128]).remove(0);
         let halves = bodies(HEAD, &[1 << 20; 128]);
         let late = HistogramHead {
@@ -150,13 +150,13 @@ mod tests {
             ..HEAD
         };
         let none = NoHistogram::NoPixel.message(HEAD.pixel).to_vec();
-        let other = NoHistogram::NoPixel.message(PixelAddress(9)).to_vec();
+        let other = NoHistogram::NoPixel.message(PixelAddress::new(9)).to_vec();
         let too_many = bodies(HEAD, &[1; 136]).remove(0);
         let cases: [(&[&[u8]], &str); 8] = [
-            (&[&[]], "a histogram that is none"),
-            (&[&whole[..16]], "a histogram that is none"),
-            (&[&other], "of pixel 9 that nobody asked for"),
-            (&[&none, &none], "of pixel 3 that nobody asked for"),
+            (&[&[]], "an invalid histogram"),
+            (&[&whole[..16]], "an invalid histogram"),
+            (&[&other], "of pixel 9, which was not requested"),
+            (&[&none, &none], "of pixel 3, which was not requested"),
             (&[&halves[1]], "bin 80 of pixel 3 where bin 0 comes next"),
             (
                 &[&halves[0], &halves[0]],
@@ -165,28 +165,28 @@ mod tests {
             (&[&halves[0], &none], "half a histogram of pixel 3"),
             (&[&too_many], "136 bins of pixel 3, and has 128 bins"),
         ];
-        for (messages, says) in cases {
+        for (messages, reason) in cases {
             let mut assembly = Assembly::default();
-            assembly.asked(HEAD.pixel);
+            assembly.request(HEAD.pixel);
             let mut taken = messages.iter().map(|body| assembly.take(body, 128));
             let error = taken.find_map(Result::err).unwrap().to_string();
-            assert!(error.contains(says), "{error}");
+            assert!(error.contains(reason), "{error}");
         }
         let mut assembly = Assembly::default();
-        assembly.asked(HEAD.pixel);
+        assembly.request(HEAD.pixel);
         let error = assembly.take(&bodies(late, &[1; 128])[0], 128);
         assert!(error.unwrap_err().to_string().contains("began before"));
     }
 
     proptest! {
         #[test]
-        fn any_messages_are_taken_or_named(
+        fn any_messages_are_taken_or_refused(
             bodies in prop::collection::vec(prop::collection::vec(any::<u8>(), 0..244), 0..4),
             reason in 0u8..5,
         ) {
             let mut assembly = Assembly::default();
             for mut body in bodies {
-                assembly.asked(PixelAddress(0));
+                assembly.request(PixelAddress::new(0));
                 for (place, byte) in body.iter_mut().zip([0, 0, reason, 0]) {
                     *place = byte;
                 }

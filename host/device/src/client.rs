@@ -1,4 +1,4 @@
-//! The host's end of the link over a real port.
+//! The host's end of the link over a port.
 
 mod wait;
 
@@ -20,16 +20,16 @@ use dtof_events::aer_file::Event;
 use dtof_options::Refused;
 use wait::Wait;
 
-/// A device that says nothing for so long is gone.
+/// A device that is silent for so long is gone.
 const SILENCE: Duration = Duration::from_secs(5);
-/// A device that has not heard of the end of its session by then is left to its host timeout.
+/// Longest wait for the device to confirm the end of a session. After that its host timeout applies.
 const END: Duration = Duration::from_millis(300);
 
-/// A session with a device. It ends when this is dropped: the device stops its sensor then, and
-/// with it the laser.
+/// A session with a device. When this is dropped, the session ends and the device stops its sensor,
+/// and with it the laser.
 pub struct Client {
     port: Box<dyn Port>,
-    /// The port has failed, and is not used again.
+    /// The port has failed and is not used any more.
     is_gone: bool,
     endpoint: Endpoint,
     deframer: Deframer,
@@ -39,24 +39,24 @@ pub struct Client {
     /// Events so far.
     arrived: u64,
     histograms: Assembly,
-    /// Messages are taken no more often than this: a slow reader, for tests.
+    /// Shortest interval between two reads of messages. Makes a slow reader, for tests.
     pub reads_every: Duration,
     read: Instant,
     bins: u16,
     pixels: u16,
-    /// Pixels of the configuration in force.
+    /// Number of pixels of the current configuration.
     configured: u16,
-    /// What [`Self::poll_report`] waits for.
-    asked: Option<Wait>,
+    /// The wait of [`Self::poll_report`] for a requested report.
+    report_wait: Option<Wait>,
 }
 
 impl Client {
     /// Begins a session.
     ///
     /// # Errors
-    /// If nobody answers, or one of another version.
+    /// Fails if no device answers, or if it has other versions of link or AER.
     pub fn new(port: Box<dyn Port>) -> Result<Self> {
-        // Any number but that of the session before will do.
+        // Any number other than the last session's will do.
         let time = SystemTime::now()
             .duration_since(UNIX_EPOCH)
             .unwrap_or_default();
@@ -77,13 +77,13 @@ impl Client {
             bins: 0,
             pixels: 0,
             configured: 0,
-            asked: None,
+            report_wait: None,
         };
         let mut wait = Wait::new(0);
         while !client.endpoint.is_open() {
             let answered = client.exchange();
             answered
-                .and_then(|()| wait.goes_on(0))
+                .and_then(|()| wait.check(0))
                 .context("no device answered")?;
         }
         let [a, b, c, d, e, f, g, h] = *client.endpoint.peer_greeting();
@@ -99,28 +99,28 @@ impl Client {
         Ok(client)
     }
 
-    /// Bins of the device's histograms.
+    /// Number of bins of a histogram.
     #[must_use]
     pub fn bins(&self) -> u16 {
         self.bins
     }
 
-    /// Pixels the device has at most.
+    /// Largest number of pixels.
     #[must_use]
     pub fn pixels(&self) -> u16 {
         self.pixels
     }
 
-    /// The host's end of the link.
+    /// The host's counts of the link.
     #[must_use]
     pub fn counters(&self) -> &LinkCounters {
         self.endpoint.counters()
     }
 
-    /// Puts a configuration in force.
+    /// Configures the device.
     ///
     /// # Errors
-    /// If the device refuses it, with its reason.
+    /// Fails with the device's reason if it refuses the configuration, or if it is gone.
     pub fn configure(&mut self, configuration: &Configuration) -> Result<()> {
         self.send(message::CONFIGURE, &configuration.to_le_bytes())?;
         let answer = self.answer()?;
@@ -137,7 +137,7 @@ impl Client {
                 let refusal = refusal.context("for a reason this program does not know")?;
                 if configuration.host_timeout_ms == 0 && refusal == Refusal::HostTimeout {
                     let reason = format!(
-                        "0 is for firmware that was built with laser-on-without-host: {refusal}"
+                        "0 needs firmware that was built with laser-on-without-host: {refusal}"
                     );
                     return Err(Refused::new("host_timeout", reason).into());
                 }
@@ -150,82 +150,85 @@ impl Client {
     /// The device's sensor, if it has one.
     ///
     /// # Errors
-    /// If the device is gone.
+    /// Fails if the device is gone.
     pub fn sensor(&mut self) -> Result<Option<SensorRecord>> {
-        let answer = self.ask(message::SENSOR_REQUEST, message::SENSOR)?;
-        SensorRecord::from_le_bytes(&answer.body).context("the device says nothing of its sensor")
+        let answer = self.request(message::SENSOR_REQUEST, message::SENSOR)?;
+        SensorRecord::from_le_bytes(&answer.body)
+            .context("the device sends an invalid description of its sensor")
     }
 
-    /// Waits until the device has done all it was sent, and gives its events.
+    /// Waits until the device has processed all messages, and returns its events.
     ///
     /// # Errors
-    /// If the device is gone.
+    /// Fails if the device is gone.
     pub fn synchronise(&mut self) -> Result<Vec<Event>> {
-        self.ask(message::SYNCHRONISE, message::SYNCHRONISED)?;
+        self.request(message::SYNCHRONISE, message::SYNCHRONISED)?;
         Ok(self.take_events())
     }
 
-    /// The report of the device so far.
+    /// Requests the device's report and waits for it.
     ///
     /// # Errors
-    /// If the device is gone.
+    /// Fails if the device is gone.
     pub fn report(&mut self) -> Result<Report> {
         self.request_report()?;
         let answer = self.answer()?;
-        self.asked = None;
+        self.report_wait = None;
         report(&answer)
     }
 
-    /// Asks what the device has done so far; [`Self::poll_report`] gives the
-    /// answer.
+    /// Requests the device's report, which [`Self::poll_report`] returns.
     ///
     /// # Errors
-    /// If the device is gone.
+    /// Fails if the device is gone.
     pub fn request_report(&mut self) -> Result<()> {
-        self.asked = Some(Wait::new(self.arrived));
+        self.report_wait = Some(Wait::new(self.arrived));
         self.send(message::STATISTICS_REQUEST, &[])
     }
 
-    /// [`Self::exchange`], and takes what has arrived: events, which
-    /// [`Self::take_events`] gives, and the report if it was asked for.
+    /// Calls [`Self::exchange`], then reads the messages that have arrived: events, which
+    /// [`Self::take_events`] returns, and a requested report.
     ///
     /// # Errors
-    /// If the device is gone, or neither answers nor sends an event for long.
+    /// Fails if the device is gone, or neither answers nor sends an event for 30 seconds.
     pub fn poll_report(&mut self) -> Result<Option<Report>> {
         if let Err(gone) = self.exchange() {
-            // Events that have arrived before are taken all the same.
+            // Events that have arrived before are kept.
             while let Ok(Some(_)) = self.next() {}
             return Err(gone);
         }
         if let Some(answer) = self.next()? {
-            self.asked = None;
+            self.report_wait = None;
             return report(&answer).map(Some);
         }
-        if let Some(mut wait) = self.asked {
-            wait.goes_on(self.arrived)?;
-            self.asked = Some(wait);
+        if let Some(mut wait) = self.report_wait {
+            wait.check(self.arrived)?;
+            self.report_wait = Some(wait);
         }
         Ok(None)
     }
 
-    /// Asks for the histogram of a pixel. [`Self::poll_histogram`] gives the answer, also when
-    /// other questions are asked meanwhile.
+    /// Requests the histogram of a pixel. [`Self::poll_histogram`] returns the answer. Other requests
+    /// may be sent meanwhile.
     ///
     /// # Errors
-    /// If the device is gone.
+    /// Fails if the device is gone.
     pub fn request_histogram(&mut self, pixel: PixelAddress) -> Result<()> {
-        self.histograms.asked(pixel);
-        self.send(message::HISTOGRAM_REQUEST, &pixel.0.to_le_bytes())
+        self.histograms.request(pixel);
+        self.send(message::HISTOGRAM_REQUEST, &pixel.raw().to_le_bytes())
     }
 
-    /// The next answer to [`Self::request_histogram`], in their order. Without one
-    /// [`Self::exchange`], and `None`.
+    /// The next answer to [`Self::request_histogram`], in the order of the requests. If there is none
+    /// yet, calls [`Self::exchange`] and returns `None`.
     ///
     /// # Errors
-    /// If the device is gone, or sends what nobody asked for.
+    /// Fails if the device is gone, or sends a message that was not requested.
     pub fn poll_histogram(&mut self) -> Result<Option<HistogramAnswer>> {
         if let Some(message) = self.next()? {
-            bail!("the device sends message {:#04x} unasked", message.kind);
+            bail!(
+                "the device sends message {:#04x}, which was not requested",
+                message.kind
+            );
         }
         let answer = self.take_histogram();
         if answer.is_none() {
@@ -239,29 +242,32 @@ impl Client {
         self.histograms.next()
     }
 
-    /// The events that have arrived.
+    /// Returns the events that have arrived.
     pub fn take_events(&mut self) -> Vec<Event> {
         std::mem::take(&mut self.events)
     }
 
-    /// Sends a message, waiting while the window is full.
+    /// Sends a message, after waiting for room in the link's window.
     ///
     /// # Errors
-    /// If the device is gone.
+    /// Fails if the device is gone.
     pub fn send(&mut self, kind: u8, body: &[u8]) -> Result<()> {
         let mut wait = Wait::new(self.arrived);
         while self.endpoint.offer(kind, body).is_err() {
             self.exchange()?;
             if let Some(message) = self.next()? {
-                bail!("the device sends message {:#04x} unasked", message.kind);
+                bail!(
+                    "the device sends message {:#04x}, which was not requested",
+                    message.kind
+                );
             }
-            wait.goes_on(self.arrived)?;
+            wait.check(self.arrived)?;
         }
         Ok(())
     }
 
-    /// Sends a message without a body, and waits for its answer, which is `kind`.
-    fn ask(&mut self, request: u8, kind: u8) -> Result<Message> {
+    /// Sends a message without a body, and waits for its answer of this `kind`.
+    fn request(&mut self, request: u8, kind: u8) -> Result<Message> {
         self.send(request, &[])?;
         let answer = self.answer()?;
         ensure!(
@@ -279,12 +285,12 @@ impl Client {
             if let Some(message) = self.next()? {
                 return Ok(message);
             }
-            wait.goes_on(self.arrived)?;
+            wait.check(self.arrived)?;
             self.exchange()?;
         }
     }
 
-    /// Takes messages until one is not events and no histogram.
+    /// Takes events and histograms until another message comes, and returns that one.
     fn next(&mut self) -> Result<Option<Message>> {
         if self.read.elapsed() < self.reads_every {
             return Ok(None);
@@ -304,9 +310,12 @@ impl Client {
                     AerRecord::Event(event) => Event::Depth(event),
                     AerRecord::DynamicDepth(event) => Event::DynamicDepth(event),
                     AerRecord::Time(_) => continue,
-                    AerRecord::End { .. } => bail!("the device ends a stream it never ends"),
+                    AerRecord::End { .. } => {
+                        bail!("the device sends the end of a file in its stream of events")
+                    }
+                    other => bail!("this program cannot read {other:?}"),
                 };
-                let (pixel, pixels) = (event.pixel().0, self.configured);
+                let (pixel, pixels) = (event.pixel().raw(), self.configured);
                 ensure!(
                     pixel < pixels,
                     "the device sends an event of pixel {pixel}, and has {pixels} pixels"
@@ -325,13 +334,13 @@ impl Client {
         Ok(None)
     }
 
-    /// Sends what is due and takes what has come. Waits a moment if nothing has.
+    /// Sends frames that are due and receives bytes, after a short wait if there are none.
     ///
-    /// A device whose sensor runs stops it unless this is called again and again: see
+    /// The device stops its sensor unless this is called again and again: see
     /// [`HostTimeout`](super::HostTimeout).
     ///
     /// # Errors
-    /// If the device is gone or has been restarted.
+    /// Fails if the device is gone or has been restarted.
     pub fn exchange(&mut self) -> Result<()> {
         let exchanged = self.transfer();
         self.is_gone |= exchanged.is_err();
@@ -349,18 +358,18 @@ impl Client {
         Ok(())
     }
 
-    /// Does `work`, which may take long, while the device goes on hearing this program. What the
-    /// device sends waits.
+    /// Runs `work`, which may take long, while the link to the device stays alive. The device's
+    /// messages wait.
     pub fn exchange_during<T: Send>(&mut self, work: impl FnOnce() -> T + Send) -> T {
         thread::scope(|scope| {
             let working = scope.spawn(work);
-            // A device that is gone is so at the next exchange, too.
+            // If the device is gone, the next exchange fails as well.
             while !working.is_finished() && self.exchange().is_ok() {}
             working.join().unwrap_or_else(|panic| resume_unwind(panic))
         })
     }
 
-    /// Frames to the port and from it.
+    /// Moves frames to the port and bytes from it.
     fn transfer(&mut self) -> Result<()> {
         let mut wire = [0; WIRE_BYTES];
         loop {
@@ -406,9 +415,9 @@ impl Drop for Client {
     }
 }
 
-/// A message that must be a report.
+/// Decodes a report.
 fn report(answer: &Message) -> Result<Report> {
     Report::from_le_bytes(&answer.body)
         .filter(|_| answer.kind == message::STATISTICS)
-        .context("the device answers with no statistics")
+        .context("the device answers with something other than a report")
 }

@@ -1,19 +1,19 @@
-//! Histograms of exposures, added up so that no photon counts twice.
+//! Adds up histograms of exposures so that no photon counts twice.
 //!
-//! A device is asked again and again. Of two histograms of one exposure the later holds the photons
-//! of the earlier and takes its place. An exposure with a full counter is left out: its other
-//! photons would say that there is less light than there is.
+//! The same exposure may be read several times. A later histogram of an exposure contains the photons
+//! of an earlier one and replaces it. Exposures with a full counter are left out, as they would show
+//! too little light.
 
 use dtof_link::HistogramHead;
 
 use super::assembly::PixelHistogram;
 
-/// A counter of a pixel is full at it.
+/// A full counter of a pixel.
 const FULL: u32 = 1023;
-/// A sensor's.
+/// A full counter of a sensor that counts histograms itself.
 const FULL_WHOLE: u32 = (1 << 24) - 1;
 
-/// What was counted in some exposures of each pixel.
+/// Summed histograms of each pixel.
 #[derive(Clone, Debug)]
 pub struct Exposures {
     pixels: Vec<Pixel>,
@@ -24,12 +24,12 @@ pub struct Exposures {
 struct Pixel {
     sums: Vec<u64>,
     cycles: u64,
-    /// The last histogram, whose exposure may go on.
+    /// The last histogram. Its exposure may not have ended.
     latest: Option<PixelHistogram>,
 }
 
 impl Exposures {
-    /// Nothing yet, of so many pixels and bins.
+    /// Empty histograms.
     #[must_use]
     pub fn new(pixels: u16, bins: u16) -> Self {
         let empty = Pixel {
@@ -43,11 +43,10 @@ impl Exposures {
         }
     }
 
-    /// Takes a histogram of a pixel that there is, and says whether it has laser cycles that none
-    /// before it had.
+    /// Adds a histogram, unless its pixel does not exist. Returns whether it has new laser cycles.
     pub fn add(&mut self, histogram: PixelHistogram) -> bool {
         let head = histogram.head;
-        let Some(pixel) = self.pixels.get_mut(usize::from(head.pixel.0)) else {
+        let Some(pixel) = self.pixels.get_mut(usize::from(head.pixel.raw())) else {
             return false;
         };
         let before = pixel.latest.as_ref().map(|latest| latest.head);
@@ -62,24 +61,24 @@ impl Exposures {
         is_news
     }
 
-    /// No exposure goes on: the device is configured anew, or no longer asked.
+    /// Ends all exposures: the device is about to be configured or left alone.
     pub fn close(&mut self) {
         self.full += self.pixels.iter_mut().map(Pixel::close).sum::<u64>();
     }
 
-    /// Exposures with a full counter. They are left out.
+    /// Number of exposures that were left out for a full counter.
     #[must_use]
     pub fn full(&self) -> u64 {
         let latest = self.pixels.iter().filter_map(|pixel| pixel.latest.as_ref());
         self.full + latest.filter(|latest| latest.is_full()).count() as u64
     }
 
-    /// Photons of each bin of each pixel, of exposures that are closed.
+    /// Photons of each bin of each pixel, from closed exposures.
     pub fn sums(&self) -> impl Iterator<Item = &[u64]> {
         self.pixels.iter().map(|pixel| pixel.sums.as_slice())
     }
 
-    /// Their laser cycles.
+    /// Laser cycles of each pixel, from closed exposures.
     pub fn cycles(&self) -> impl Iterator<Item = u64> {
         self.pixels.iter().map(|pixel| pixel.cycles)
     }
@@ -94,9 +93,8 @@ impl Exposures {
         photons.get(photons.len() / 2).copied().unwrap_or(0)
     }
 
-    /// Photons a laser cycle that the brightest bin has, at most: by three standard deviations,
-    /// and five photons more where there are few. `None` as long as a pixel has fewer than `least`
-    /// laser cycles.
+    /// Upper bound of the photons a laser cycle in the brightest bin: its count, three standard
+    /// deviations and five photons. `None` while a pixel has fewer than `least` laser cycles.
     #[must_use]
     pub fn brightest(&self, least: u16) -> Option<f64> {
         let mut brightest = 0.0;
@@ -117,7 +115,7 @@ impl Exposures {
 }
 
 impl PixelHistogram {
-    /// Whether a counter is full.
+    /// Returns whether a counter is full.
     #[must_use]
     pub fn is_full(&self) -> bool {
         let full = if self.head.is_whole { FULL_WHOLE } else { FULL };
@@ -130,7 +128,7 @@ impl PixelHistogram {
 }
 
 impl Pixel {
-    /// Counts the last histogram; 1 if it is left out.
+    /// Adds the last histogram to the sums. Returns 1 if it is left out, else 0.
     fn close(&mut self) -> u64 {
         let Some(latest) = self.latest.take() else {
             return 0;
@@ -148,7 +146,7 @@ impl Pixel {
 
 /// The laser cycle at which an exposure began.
 fn began(head: &HistogramHead) -> u64 {
-    head.cycle.0.saturating_sub(head.exposure.into())
+    head.cycle.raw().saturating_sub(head.exposure.into())
 }
 
 #[cfg(test)]
@@ -160,9 +158,9 @@ mod tests {
     fn histogram(pixel: u16, cycle: u64, exposure: u32, counts: &[u32]) -> PixelHistogram {
         PixelHistogram {
             head: HistogramHead {
-                pixel: PixelAddress(pixel),
+                pixel: PixelAddress::new(pixel),
                 is_whole: false,
-                cycle: LaserCycle(cycle),
+                cycle: LaserCycle::new(cycle),
                 exposure,
             },
             counts: counts.to_vec(),
@@ -170,11 +168,11 @@ mod tests {
     }
 
     #[test]
-    fn a_later_look_at_an_exposure_replaces_an_earlier_one() {
+    fn a_later_histogram_of_an_exposure_replaces_an_earlier_one() {
         let mut exposures = Exposures::new(2, 2);
         assert!(exposures.add(histogram(0, 10, 10, &[1, 0])));
         assert!(exposures.add(histogram(0, 20, 20, &[1, 2])));
-        // The same once more, and one that has no laser cycle yet.
+        // The same again, and one without a laser cycle.
         assert!(!exposures.add(histogram(0, 20, 20, &[1, 2])));
         assert!(!exposures.add(histogram(0, 24, 0, &[0, 0])));
         assert!(exposures.add(histogram(0, 30, 6, &[0, 5])));
@@ -211,15 +209,15 @@ mod tests {
     }
 
     proptest! {
-        /// A photon a laser cycle, looked at whenever: as many photons as laser cycles, and none
-        /// twice.
+        /// With one photon a laser cycle there are as many photons as laser cycles, whenever the
+        /// histograms are read.
         #[test]
         fn photons_and_laser_cycles_belong_together(
-            looks in prop::collection::vec((1u64..400, 0u16..2), 1..60), length in 8u64..200,
+            reads in prop::collection::vec((1u64..400, 0u16..2), 1..60), length in 8u64..200,
         ) {
             let mut exposures = Exposures::new(2, 1);
             let (mut cycle, mut seen) = (0, std::collections::BTreeMap::new());
-            for (wait, pixel) in looks {
+            for (wait, pixel) in reads {
                 cycle += wait;
                 let exposure = u32::try_from(cycle % length).unwrap();
                 if exposure < FULL {

@@ -1,8 +1,7 @@
 //! The histograms of all pixels of a device with a sensor, over many exposures.
 //!
-//! Pixels are configured so that no event clears a histogram: the threshold is the highest there
-//! is. The first exposures are short. They tell how bright the brightest bin is, and later ones are
-//! as long as the counters allow.
+//! The pixels get the highest threshold, so that no event clears a histogram. The first exposures
+//! are short and show how bright the brightest bin is. Later ones are as long as the counters allow.
 
 use std::time::{Duration, Instant};
 
@@ -13,51 +12,51 @@ use dtof_link::{FaultRecord, NoHistogram, Report, Source};
 
 use super::assembly::HistogramAnswer;
 use super::exposures::Exposures;
-use super::{Client, HostTimeout, Stopped, configuration};
+use super::{Client, HostTimeout, Stopped, Task};
 use dtof_engine::settings::Settings;
 
 /// Laser cycles between looks.
 const X: u16 = 4;
-/// Laser cycles of the first exposures, of the shortest there may be, and of the longest.
+/// Laser cycles of the first, the shortest and the longest exposures.
 const FIRST: u16 = 64;
 const SHORTEST: u16 = 16;
 const LONGEST: u16 = 65_532;
-/// Photons that the brightest bin is to have, at most: a counter is full at 1023, twelve standard
-/// deviations above it.
+/// Most photons that the brightest bin is expected to collect. A counter is full at 1023, twelve
+/// standard deviations above.
 const BRIGHTEST: f64 = 700.0;
-/// Exposures become longer only if by this factor.
+/// Exposures are lengthened only by this factor or more.
 const WORTH_IT: f64 = 1.5;
-/// A device that gives nothing new for so long gives nothing.
+/// Longest time without new laser cycles.
 const STALLED: Duration = Duration::from_secs(5);
 
-/// How far it is.
+/// Progress of a collection.
 #[derive(Clone, Copy, Debug)]
 pub struct SoFar {
-    /// Since it began.
+    /// Time since the start.
     pub elapsed: Duration,
     /// Photons of the median pixel.
     pub photons: u64,
 }
 
-/// What was counted.
+/// Collected histograms.
 #[derive(Clone, Debug)]
 pub struct Collected {
     /// Photons of each bin of each pixel.
     pub histograms: Vec<Vec<u64>>,
     /// Laser cycles of each pixel.
     pub cycles: Vec<u64>,
-    /// Exposures with a full counter, which were left out: as they were seen, or as many as there
-    /// were events, which only a full counter brings.
+    /// Exposures that were left out for a full counter. Counted directly or by events, which only a
+    /// full counter causes; the larger number.
     pub full: u64,
 }
 
-/// Collects histograms of `pixels` pixels, addresses 0 up, until `done`, asked again and again,
-/// says so. Bins are as wide as `settings` say. The sensor rests then. It stops sooner if this program
-/// is silent for `host_timeout`.
+/// Collects histograms of `pixels` pixels, addresses 0 up, until `done` returns true; it is called
+/// again and again. The bin width is that of `settings`. The sensor is off afterwards. It stops
+/// sooner if this program is silent for `host_timeout`.
 ///
 /// # Errors
-/// If the device refuses, is gone, stops its sensor or gives nothing, or a pixel has no histogram
-/// when it is done.
+/// Fails if the device refuses the configuration, disconnects, stops its sensor or measures nothing,
+/// or if a pixel has no histogram at the end.
 pub fn collect(
     client: &mut Client,
     settings: &Settings,
@@ -109,15 +108,16 @@ struct Collecting<'a> {
     pixels: u16,
     host_timeout: HostTimeout,
     l2: u16,
+    /// The sensor itself counts histograms.
     is_whole: bool,
-    /// Of a sensor that gives whole histograms they mean nothing.
+    /// Events so far. They mean nothing if the sensor counts histograms.
     events: u64,
-    /// Exposures with a full counter that are known.
+    /// Exposures with a full counter so far.
     full: u64,
-    /// At the beginning.
+    /// The report at the start.
     first: Report,
     started: Instant,
-    /// When the last laser cycles came that are new.
+    /// When the last new laser cycles arrived.
     news: Instant,
 }
 
@@ -132,34 +132,32 @@ impl Collecting<'_> {
             l2: self.l2,
             ..self.settings.clone()
         };
-        let columns = self.pixels.into();
-        let wanted = configuration(
-            &settings,
-            self.pixels,
-            columns,
-            source,
-            None,
-            self.host_timeout,
-        )?;
-        self.client.configure(&wanted)?;
+        let task = Task {
+            settings: &settings,
+            pixels: self.pixels,
+            columns: self.pixels.into(),
+            dynamic_depth: None,
+            host_timeout: self.host_timeout,
+        };
+        self.client.configure(&task.configuration(source)?)?;
         self.news = Instant::now();
         Ok(())
     }
 
-    /// A report of a sensor that runs.
+    /// The device's report. Fails if the sensor has stopped.
     fn check_running(&mut self) -> Result<Report> {
         let report = self.client.report()?;
         Stopped::check(&report, self.host_timeout)?;
         Ok(report)
     }
 
-    /// Asks every pixel once. Says whether that is all.
+    /// Requests the histogram of every pixel once. Returns whether the collection is done.
     fn round(
         &mut self,
         exposures: &mut Exposures,
         done: &mut impl FnMut(&SoFar) -> bool,
     ) -> Result<bool> {
-        let mut pixels = (0..self.pixels).map(PixelAddress);
+        let mut pixels = (0..self.pixels).map(PixelAddress::new);
         let mut next = pixels.next();
         while let Some(pixel) = next {
             let photons = exposures.median_photons();
@@ -175,31 +173,31 @@ impl Collecting<'_> {
                     }
                     next = pixels.next();
                 }
-                // It is asked again.
+                // It is requested again.
                 Err((_, NoHistogram::GivenUp | NoHistogram::Sensor)) => {}
-                Err((pixel, none)) => bail!("no histogram of pixel {}: {none}", pixel.0),
+                Err((pixel, none)) => bail!("no histogram of pixel {}: {none}", pixel.raw()),
             }
             self.check_news(true)?;
         }
         Ok(false)
     }
 
-    /// The answer of a pixel; `None` if it is done before that comes.
+    /// The answer of a pixel; `None` if the collection is done before it comes.
     fn ask(
         &mut self,
         pixel: PixelAddress,
         photons: u64,
         done: &mut impl FnMut(&SoFar) -> bool,
     ) -> Result<Option<HistogramAnswer>> {
-        let mut is_asked = false;
+        let mut is_requested = false;
         loop {
             let elapsed = self.started.elapsed();
             if done(&SoFar { elapsed, photons }) {
                 return Ok(None);
             }
-            if !is_asked {
+            if !is_requested {
                 self.client.request_histogram(pixel)?;
-                is_asked = true;
+                is_requested = true;
             }
             if let Some(answer) = self.client.poll_histogram()? {
                 return Ok(Some(answer));
@@ -208,7 +206,7 @@ impl Collecting<'_> {
         }
     }
 
-    /// Ends with what is wrong if nothing new has come for long.
+    /// Fails with the cause if nothing new has come for [`STALLED`].
     fn check_news(&mut self, answers: bool) -> Result<()> {
         if self.news.elapsed() < STALLED {
             return Ok(());
@@ -231,13 +229,13 @@ impl Collecting<'_> {
         bail!("no laser cycle for {seconds} seconds: is the laser on?");
     }
 
-    /// Makes exposures as long as the counters allow, once there are laser cycles enough to tell;
-    /// or shorter if a counter was full.
+    /// Shortens exposures if a counter was full. Otherwise lengthens them as far as the counters
+    /// allow, once there are enough laser cycles.
     fn adapt(&mut self, exposures: &mut Exposures) -> Result<()> {
         if self.is_whole {
             return Ok(());
         }
-        // An event leaves if a counter was full between two looks.
+        // An event is sent if a counter was full between two looks.
         let full = exposures.full() + self.events;
         let l2 = if full > self.full {
             (self.l2 / 4).max(SHORTEST)
@@ -251,7 +249,7 @@ impl Collecting<'_> {
         if l2 < self.l2 || f64::from(l2) >= WORTH_IT * f64::from(self.l2) {
             self.l2 = l2;
             exposures.close();
-            // A sensor that has stopped is not started again.
+            // A sensor that has stopped is not restarted.
             self.check_running()?;
             self.configure(Source::Sensor)?;
         }

@@ -1,4 +1,4 @@
-//! How long a device goes on without its host.
+//! Longest silence of the host.
 
 use std::fmt;
 
@@ -6,28 +6,28 @@ use dtof_link::Configuration;
 
 use dtof_options::numbers::real;
 
-/// A device stops its sensor, and with it the laser, once its host has been silent for so long.
+/// A device stops its sensor, and with it the laser, after the host has been silent for so long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HostTimeout {
     milliseconds: u16,
 }
 
 impl HostTimeout {
-    /// So many milliseconds, if a device takes them; with 0 the sensor never stops for that.
+    /// A timeout in milliseconds: 200 to 60,000, or 0 for never. `None` for other numbers.
     #[must_use]
     pub fn from_milliseconds(milliseconds: u16) -> Option<Self> {
-        let is_known = milliseconds == 0 || Configuration::HOST_TIMEOUTS_MS.contains(&milliseconds);
-        is_known.then_some(Self { milliseconds })
+        let is_valid = milliseconds == 0 || Configuration::HOST_TIMEOUTS_MS.contains(&milliseconds);
+        is_valid.then_some(Self { milliseconds })
     }
 
-    /// Reads seconds.
+    /// Reads seconds: 0.2 to 60 with at most three decimals, or 0.
     ///
     /// # Errors
-    /// If no device takes them.
+    /// Fails for other numbers and texts.
     pub fn from_seconds(text: &str) -> Result<Self, String> {
         let exact = real(text).map(|seconds| seconds * 1000.0);
         let milliseconds = exact.filter(|exact| (exact - exact.round()).abs() < 1e-6);
-        // What does not fit is refused as -1 is.
+        // -1 stands for every text that is not a number of milliseconds.
         #[allow(clippy::cast_possible_truncation, reason = "saturates")]
         let milliseconds = milliseconds.map_or(-1, |exact| exact.round() as i64);
         let milliseconds = u16::try_from(milliseconds).ok();
@@ -40,7 +40,7 @@ impl HostTimeout {
             })
     }
 
-    /// As a configuration has it.
+    /// The timeout in milliseconds.
     #[must_use]
     pub const fn milliseconds(self) -> u16 {
         self.milliseconds
@@ -84,7 +84,7 @@ mod tests {
     }
 
     #[test]
-    fn what_no_device_takes_is_refused() {
+    fn other_texts_are_refused() {
         for text in [
             "", "x", "-3", "0.199", "0.1999", "0.0001", "2.0005", "60.001", "61", "65536", "1e300",
             "3 s", "inf", "NaN",

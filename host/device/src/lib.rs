@@ -32,7 +32,59 @@ use dtof_events::aer_file::Event;
 use dtof_options::Refused;
 use dtof_photons::source::Slice;
 
-/// Photons into a device, events out.
+/// How the pixels of a device operate.
+#[derive(Clone, Copy, Debug)]
+pub struct Task<'a> {
+    /// The settings of each pixel.
+    pub settings: &'a Settings,
+    /// Number of pixels, with addresses from 0.
+    pub pixels: u16,
+    /// Pixels in a row of the array.
+    pub columns: u32,
+    /// The device sends changes of depth in place of depth events.
+    pub dynamic_depth: Option<DynamicDepth>,
+    /// The device stops its sensor once the host has been silent for so long.
+    pub host_timeout: HostTimeout,
+}
+
+impl Task<'_> {
+    /// The configuration of a device that takes photons from `source`.
+    ///
+    /// # Errors
+    /// Fails if the settings have no bins or ask for frames, or if a number does not fit.
+    pub fn configuration(&self, source: Source) -> Result<Configuration> {
+        let settings = self.settings;
+        ensure!(
+            settings.frame.is_none(),
+            Refused::new("frame", "is not for a device, which reports events")
+        );
+        let last_bin = u16::try_from(settings.bins)?.checked_sub(1);
+        let last_bin = last_bin.context("the settings have no bins")?;
+        Ok(Configuration {
+            rule: settings.rule,
+            estimator: settings.estimator(),
+            x: settings.x,
+            l1: settings.l1,
+            l2: settings.l2,
+            gate: settings.gate.unwrap_or((0, last_bin)),
+            one_hit_tdc: settings.one_hit_tdc,
+            pixels: self.pixels,
+            columns: u16::try_from(self.columns)?,
+            binning: settings.binning,
+            tracking: settings.tracking,
+            echoes: settings.echoes,
+            echo_guard_bins: settings.echo_guard_bins(),
+            echo_wait: settings.echo_wait_times(),
+            bin_width_ps: settings.bin_width_ps,
+            offset_mm: settings.offset_mm,
+            source,
+            dynamic_depth: self.dynamic_depth,
+            host_timeout_ms: self.host_timeout.milliseconds(),
+        })
+    }
+}
+
+/// An engine that runs on a device: photons go out over the link, events come back.
 pub struct DeviceEngine {
     client: Client,
     report: Report,
@@ -42,11 +94,11 @@ pub struct DeviceEngine {
 }
 
 impl DeviceEngine {
-    /// Configures the device for the pixels `addresses`, which must be the first
-    /// of its own, and for photons from the link.
+    /// Configures the device for the pixels `addresses`, which must be 0 up, and for photons from
+    /// the link.
     ///
     /// # Errors
-    /// If the device refuses, with its reason.
+    /// Fails if the pixels or bins do not suit the device, or if it refuses the configuration.
     pub fn new(
         mut client: Client,
         settings: &Settings,
@@ -55,7 +107,7 @@ impl DeviceEngine {
     ) -> Result<Self> {
         let consecutive = addresses
             .iter()
-            .map(|address| address.0)
+            .map(|address| address.raw())
             .eq((0..).take(addresses.len()));
         ensure!(consecutive, "a device has pixels 0 up, without gaps");
         ensure!(
@@ -65,16 +117,14 @@ impl DeviceEngine {
             settings.bins
         );
         let pixels = u16::try_from(addresses.len()).ok();
-        let pixels = pixels.context("a device has at most 65,535 pixels")?;
-        let wanted = configuration(
+        let task = Task {
             settings,
-            pixels,
-            array.columns(),
-            Source::Link,
-            None,
-            HostTimeout::default(),
-        )?;
-        client.configure(&wanted)?;
+            pixels: pixels.context("a device has at most 65,535 pixels")?,
+            columns: array.columns(),
+            dynamic_depth: None,
+            host_timeout: HostTimeout::default(),
+        };
+        client.configure(&task.configuration(Source::Link)?)?;
         Ok(Self {
             client,
             report: Report::default(),
@@ -83,53 +133,11 @@ impl DeviceEngine {
         })
     }
 
-    /// The report of the device after the last slice.
+    /// The device's report after the last slice.
     #[must_use]
     pub fn report(&self) -> &Report {
         &self.report
     }
-}
-
-/// The settings as the device takes them. With `dynamic_depth` it sends changes of depth
-/// in place of depth events. A sensor that it takes photons from stops after `host_timeout`.
-///
-/// # Errors
-/// If there are no bins, or it is to read frames.
-pub fn configuration(
-    settings: &Settings,
-    pixels: u16,
-    columns: u32,
-    source: Source,
-    dynamic_depth: Option<DynamicDepth>,
-    host_timeout: HostTimeout,
-) -> Result<Configuration> {
-    ensure!(
-        settings.frame.is_none(),
-        Refused::new("frame", "is not for a device, which reports events")
-    );
-    let last_bin = u16::try_from(settings.bins)?.checked_sub(1);
-    let last_bin = last_bin.context("a device without bins")?;
-    Ok(Configuration {
-        rule: settings.rule,
-        estimator: settings.estimator(),
-        x: settings.x,
-        l1: settings.l1,
-        l2: settings.l2,
-        gate: settings.gate.unwrap_or((0, last_bin)),
-        one_hit_tdc: settings.one_hit_tdc,
-        pixels,
-        columns: u16::try_from(columns)?,
-        binning: settings.binning,
-        tracking: settings.tracking,
-        echoes: settings.echoes,
-        peel_reach: settings.peel_reach(),
-        echo_wait: settings.echo_wait_times(),
-        bin_width_ps: settings.bin_width_ps,
-        offset_mm: settings.offset_mm,
-        source,
-        dynamic_depth,
-        host_timeout_ms: host_timeout.milliseconds(),
-    })
 }
 
 impl Engine for DeviceEngine {
@@ -143,7 +151,7 @@ impl Engine for DeviceEngine {
             body: Vec::new(),
         };
         let photons = slice.pixels.iter().map(|pixel| &pixel.photons);
-        let mut photons: Vec<_> = photons.map(|of| of.iter().peekable()).collect();
+        let mut photons: Vec<_> = photons.map(|photons| photons.iter().peekable()).collect();
         for cycle in 0..cycles {
             let mut at = 0;
             for (pixel, photons) in photons.iter_mut().enumerate() {
@@ -157,7 +165,9 @@ impl Engine for DeviceEngine {
         let events = self.client.synchronise()?.into_iter();
         let events = events.map(|event| match event {
             Event::Depth(event) => Ok(event),
-            Event::DynamicDepth(_) => bail!("the device sends changes of depth nobody asked for"),
+            Event::DynamicDepth(_) => {
+                bail!("the device sends changes of depth, which were not requested")
+            }
         });
         let events = events.collect::<Result<_>>()?;
         self.report = self.client.report()?;
@@ -167,8 +177,8 @@ impl Engine for DeviceEngine {
         let accounted = self.report.statistics.photons();
         ensure!(
             accounted == self.sent && self.report.cycles == self.cycles,
-            "the device accounts for {accounted} of {} photons and {} of {} laser cycles; {} messages \
-             made no sense to it",
+            "the device accounts for {accounted} of {} photons and {} of {} laser cycles; it did not \
+             understand {} messages",
             self.sent,
             self.report.cycles,
             self.cycles,
@@ -182,18 +192,18 @@ impl Engine for DeviceEngine {
     }
 }
 
-/// Tokens on their way into photons messages.
+/// Packs tokens into photon messages.
 struct Tokens<'a> {
     client: &'a mut Client,
     body: Vec<u8>,
 }
 
 impl Tokens<'_> {
-    /// A photon of `pixel` where the present pixel is `at`; gives the present
-    /// pixel then.
+    /// Adds a photon of `pixel`, where the current pixel is `at`. Returns the current pixel
+    /// afterwards.
     fn photon(&mut self, mut at: usize, pixel: usize, code: u16) -> Result<usize> {
-        // The most that a photon takes: three bytes and the way from pixel 0,
-        // where a new message begins.
+        // A photon takes at most three bytes and the advances from pixel 0, where a new message
+        // begins.
         if self.body.len() + Token::MAX_BYTES + pixel.div_ceil(64) > BODY_BYTES {
             self.flush()?;
             at = 0;

@@ -1,5 +1,4 @@
-//! A device with a sensor: its events as they come, and once a second what it
-//! does.
+//! A device with a sensor: its events as they come, and a line of statistics a second.
 
 mod event_file;
 pub mod losses;
@@ -11,9 +10,9 @@ use std::time::{Duration, Instant};
 use anyhow::{Result, ensure};
 use dtof_core::{Array, RangeScale};
 use dtof_link::endpoint::LinkCounters;
-use dtof_link::{DynamicDepth, Report, Source};
+use dtof_link::{Report, Source};
 
-use crate::{Client, HostTimeout, Stopped, configuration};
+use crate::{Client, Stopped, Task};
 use dtof_engine::settings::Settings;
 use dtof_events::aer_file::Event;
 use dtof_events::events_csv;
@@ -22,27 +21,11 @@ pub use event_file::EventFile;
 use losses::{Losses, since};
 use map::LiveMap;
 
-/// How often there are statistics.
+/// Interval of the statistics.
 const EVERY: Duration = Duration::from_secs(1);
 
-/// The task of the device.
-#[derive(Clone, Copy, Debug)]
-pub struct Task<'a> {
-    /// How its pixels operate.
-    pub settings: &'a Settings,
-    /// How many, addresses 0 up.
-    pub pixels: u16,
-    /// How many of them are a row.
-    pub columns: u32,
-    /// It is to send changes of depth in place of depth events.
-    pub dynamic_depth: Option<DynamicDepth>,
-    /// It stops its sensor once this program has been silent for so long.
-    pub host_timeout: HostTimeout,
-}
-
-/// The array of so many `pixels`, to draw and to record: in so many `columns`, or else as
-/// high as wide, or the least bit wider. None without pixels, or with rows of more than there are
-/// addresses.
+/// The array of `pixels`, for pictures and files: with `columns`, or else square or as little wider
+/// than high as possible. `None` if there are no pixels, or if the array has more than 65,536.
 #[must_use]
 pub fn array(pixels: u16, columns: Option<u32>) -> Option<Array> {
     let pixels = u32::from(pixels);
@@ -55,10 +38,10 @@ pub fn array(pixels: u16, columns: Option<u32>) -> Option<Array> {
     Array::new(columns, pixels.div_ceil(columns))
 }
 
-/// Checks that no pixel is left out whose photons count all the same.
+/// Checks that no masked pixel counts in a block.
 ///
 /// # Errors
-/// If there are blocks of pixels.
+/// Fails if there are both masked pixels and blocks.
 pub fn check_masked(settings: &Settings) -> Result<()> {
     ensure!(
         settings.masked.is_empty() || settings.binning.is_none(),
@@ -69,46 +52,45 @@ pub fn check_masked(settings: &Settings) -> Result<()> {
     Ok(())
 }
 
-/// Takes the events of masked pixels out, and says how many there were.
+/// Removes the events of masked pixels and returns their number.
 pub fn leave_out_masked(events: &mut Vec<Event>, settings: &Settings) -> u64 {
     let all = events.len();
-    events.retain(|event| !settings.masked.contains(&event.pixel().0));
+    events.retain(|event| !settings.masked.contains(&event.pixel().raw()));
     (all - events.len()) as u64
 }
 
-/// Where what it does is written.
+/// Where events and statistics are written.
 pub struct Outputs<'a> {
-    /// Its events as CSV, as they come.
+    /// Events as CSV, as they come.
     pub events: &'a mut dyn Write,
-    /// A line a second: rates, and of what was lost or went wrong all that did, counted
-    /// from the beginning.
+    /// A line a second: rates, and each loss and error counted since the start.
     pub statistics: &'a mut dyn Write,
-    /// The ranges as a picture, and then the lines of statistics below it.
+    /// The ranges as a picture, with the line of statistics below.
     pub map: Option<&'a mut LiveMap>,
-    /// All events once more.
+    /// All events as an AER file.
     pub recording: Option<&'a mut EventFile>,
-    /// Events of pixels that are left out, which are written nowhere.
+    /// Events of masked pixels so far, which are not written.
     pub masked: u64,
 }
 
 impl Outputs<'_> {
-    /// A line of statistics.
-    fn tell(&mut self, line: String, readers: &mut Readers) -> Result<()> {
+    /// Writes a line of statistics.
+    fn show(&mut self, line: String, readers: &mut Readers) -> Result<()> {
         if !readers.statistics {
             return Ok(());
         }
         readers.statistics = still_open(match &mut self.map {
             None => writeln!(self.statistics, "{line}"),
             Some(map) => {
-                map.tell(line);
+                map.set_line(line);
                 map.draw()
             }
         })?;
         Ok(())
     }
 
-    /// Events, but for those of pixels left out. They are recorded whether or not somebody reads
-    /// them.
+    /// Writes events, except those of masked pixels. They are recorded even if the other outputs
+    /// are closed.
     fn write(
         &mut self,
         mut events: Vec<Event>,
@@ -133,7 +115,7 @@ impl Outputs<'_> {
         Ok(())
     }
 
-    /// The picture as it is at the end.
+    /// Draws the final picture.
     fn finish(&mut self, readers: &Readers) -> Result<()> {
         if let Some(map) = &mut self.map
             && readers.statistics
@@ -144,26 +126,26 @@ impl Outputs<'_> {
     }
 }
 
-/// Which outputs somebody still reads.
+/// Which outputs still have a reader.
 struct Readers {
     events: bool,
-    /// Or the map in their place.
+    /// Of the statistics or the map.
     statistics: bool,
 }
 
-/// Has the device take photons from its sensor, and writes what it does to `outputs`.
+/// Has the device take photons from its sensor, and writes its events and statistics to `outputs`.
 ///
-/// Ends when `done`, asked again and again, says so of the time it has taken, or
-/// when the reader of an output is gone, unless there is a recording: it goes on, and
-/// what is read by nobody ends alone. The device takes no photons from its sensor then.
-/// Every event that has arrived is written, also if the device is gone.
+/// Ends when `done`, called again and again with the time since the start, returns true. Also ends
+/// when the reader of an output has closed it, unless there is a recording: then only that output
+/// ends. At the end the sensor is stopped. Every event that has arrived is written, also if the
+/// device is gone.
 ///
-/// An output that blocks keeps this from being heard: the device stops its sensor after the host
-/// timeout, and this ends with the reason once the output goes on.
+/// While an output blocks, the device hears nothing from this program. It stops its sensor after the
+/// host timeout, and this function then fails once the output goes on.
 ///
 /// # Errors
-/// If the device refuses the settings, is gone or has stopped its sensor, or what is written
-/// cannot be.
+/// Fails if the device refuses the settings, disconnects or stops its sensor, or if an output cannot
+/// be written.
 pub fn monitor(
     client: &mut Client,
     task: &Task,
@@ -179,7 +161,7 @@ pub fn monitor(
     watched.and(written).and(outputs.finish(&readers))
 }
 
-/// [`monitor`] but for the events that have arrived and are not yet written.
+/// [`monitor`] except for the events that have arrived and are not written yet.
 fn watch(
     client: &mut Client,
     task: &Task,
@@ -187,68 +169,49 @@ fn watch(
     outputs: &mut Outputs,
     readers: &mut Readers,
 ) -> Result<()> {
-    let configuration = |source| {
-        configuration(
-            task.settings,
-            task.pixels,
-            task.columns,
-            source,
-            task.dynamic_depth,
-            task.host_timeout,
-        )
-    };
     check_masked(task.settings)?;
-    client.configure(&configuration(Source::Sensor)?)?;
-    // From now on there may be events, which are written also if nothing else comes.
+    client.configure(&task.configuration(Source::Sensor)?)?;
+    // Events may arrive from now on. They are written even if the device fails at once.
     let columns = match task.dynamic_depth {
         None => events_csv::HEADER,
         Some(_) => events_csv::DYNAMIC_DEPTH_HEADER,
     };
     readers.events = still_open(write_header(outputs.events, columns))?;
     let started = Instant::now();
-    let mut figures = Figures {
+    let mut rates = Rates {
         since: started,
         here: *client.counters(),
         first: client.report()?,
         last: [0; 2],
     };
-    let is_running = |report: &Report| Stopped::check(report, task.host_timeout);
-    is_running(&figures.first)?;
-    let recorded = outputs.recording.is_some();
-    let goes_on = |readers: &Readers| recorded || (readers.events && readers.statistics);
-    let mut asked = false;
-    while goes_on(readers) && !done(started.elapsed()) {
-        if !asked && figures.since.elapsed() >= EVERY {
+    Stopped::check(&rates.first, task.host_timeout)?;
+    let mut requested = false;
+    loop {
+        let is_read = outputs.recording.is_some() || (readers.events && readers.statistics);
+        let ends = !is_read || done(started.elapsed());
+        // The last line may cover less than a second, but at least half of one.
+        let interval = if ends { EVERY / 2 } else { EVERY };
+        if !requested && is_read && rates.since.elapsed() >= interval {
             client.request_report()?;
-            asked = true;
+            requested = true;
+        }
+        if ends && !requested {
+            break;
         }
         let report = client.poll_report()?;
         outputs.write(client.take_events(), task.settings, readers)?;
         if let Some(report) = report {
-            let line = figures.line(client, &report, outputs.masked);
-            outputs.tell(line, readers)?;
-            is_running(&report)?;
-            asked = false;
-        }
-    }
-    // The last second, unless it has only just begun.
-    if asked || (goes_on(readers) && figures.since.elapsed() >= EVERY / 2) {
-        if !asked {
-            client.request_report()?;
-        }
-        let report = loop {
-            let report = client.poll_report()?;
-            outputs.write(client.take_events(), task.settings, readers)?;
-            if let Some(report) = report {
-                break report;
+            let line = rates.line(client, &report, outputs.masked);
+            outputs.show(line, readers)?;
+            Stopped::check(&report, task.host_timeout)?;
+            requested = false;
+            if ends {
+                break;
             }
-        };
-        let line = figures.line(client, &report, outputs.masked);
-        outputs.tell(line, readers)?;
-        is_running(&report)?;
+        }
     }
-    // After the answer there are no more events.
-    client.configure(&configuration(Source::Link)?)
+    // The device sends no events after its answer.
+    client.configure(&task.configuration(Source::Link)?)
 }
 
 fn write_header(out: &mut dyn Write, columns: &str) -> io::Result<()> {
@@ -260,13 +223,10 @@ fn write(out: &mut dyn Write, events: &[Event], scale: &RangeScale) -> io::Resul
     for event in events {
         events_csv::write_event(&mut *out, event, scale)?;
     }
-    if events.is_empty() {
-        return Ok(());
-    }
     out.flush()
 }
 
-/// Whether somebody still reads what was written.
+/// Whether the output still has a reader.
 fn still_open(written: io::Result<()>) -> io::Result<bool> {
     match written {
         Ok(()) => Ok(true),
@@ -275,24 +235,24 @@ fn still_open(written: io::Result<()>) -> io::Result<bool> {
     }
 }
 
-/// The basis of the lines of statistics.
-struct Figures {
-    /// When the last line was.
+/// Makes the lines of statistics.
+struct Rates {
+    /// The time of the last line.
     since: Instant,
-    /// The counts of this end at the beginning.
+    /// The host's counts at the start.
     here: LinkCounters,
-    /// The counts of the device at the beginning.
+    /// The device's counts at the start.
     first: Report,
     /// Events and photons at the last line.
     last: [u64; 2],
 }
 
-impl Figures {
-    /// Rates since the last line; so many events were left out.
+impl Rates {
+    /// Rates since the last line, losses since the start, and `masked` events.
     fn line(&mut self, client: &Client, report: &Report, masked: u64) -> String {
         let seconds = self.since.elapsed().as_secs_f64();
         let rate = |now: u64, before: u64| now.saturating_sub(before) as f64 / seconds;
-        // Photons of blocks are those of pixels.
+        // Blocks count the photons of pixels again.
         let (pixels, blocks) = (&report.statistics, &report.blocks);
         let now = [pixels.events + blocks.events, pixels.photons()];
         let mut line = format!(
@@ -319,7 +279,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn arrays_are_as_high_as_wide_if_they_can_be() {
+    fn arrays_are_as_square_as_possible() {
         let array = |pixels, columns| {
             let array = array(pixels, columns)?;
             Some((array.columns(), array.rows()))

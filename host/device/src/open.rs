@@ -14,11 +14,11 @@ use dtof_options::Refused;
 /// The speed of the boards' serial ports.
 const BAUD: u32 = 1_000_000;
 
-/// Opens `tcp:HOST:PORT` or the serial port of that name. `qemu` starts an emulated
-/// device, with `image` or the one that xtask has built, and opens its port.
+/// Opens `tcp:HOST:PORT` or a serial port. `qemu` starts an emulated device with `image`, or with the
+/// image that xtask has built, and opens its port.
 ///
 /// # Errors
-/// If there is none.
+/// Fails if the port cannot be opened or the emulator does not start.
 pub fn open(name: &str, image: Option<&Path>) -> Result<Box<dyn Port>> {
     if name == "qemu" {
         return Ok(Box::new(Emulator::start(image)?));
@@ -30,7 +30,7 @@ pub fn open(name: &str, image: Option<&Path>) -> Result<Box<dyn Port>> {
     if let Some(address) = name.strip_prefix("tcp:") {
         return Ok(Box::new(tcp(address).with_context(|| name.to_owned())?));
     }
-    // A device on USB stops its sensor while DTR is low.
+    // A device on USB keeps its sensor off while DTR is low.
     let port = serialport::new(name, BAUD).timeout(PATIENCE);
     let port = port.dtr_on_open(true).open();
     match port {
@@ -42,24 +42,24 @@ pub fn open(name: &str, image: Option<&Path>) -> Result<Box<dyn Port>> {
     }
 }
 
-/// The serial ports there are, for people.
+/// Lists the serial ports of this computer, for an error message.
 fn serial_ports() -> String {
     let ports = serialport::available_ports().unwrap_or_default();
     let mut names: Vec<String> = ports.into_iter().map(|port| port.port_name).collect();
     names.sort();
     if names.is_empty() {
-        return "no serial port is here; or say tcp:HOST:PORT, or qemu".to_owned();
+        return "no serial port found; use tcp:HOST:PORT or qemu".to_owned();
     }
     format!(
-        "serial ports here: {}; or say tcp:HOST:PORT, or qemu",
+        "serial ports found: {}; or use tcp:HOST:PORT or qemu",
         names.join(", ")
     )
 }
 
-/// A connection that waits no longer than a port should.
+/// A connection to the first address that accepts it.
 ///
 /// # Errors
-/// If nobody listens.
+/// Fails if none does.
 fn tcp(address: &str) -> io::Result<TcpStream> {
     let mut connected = Err(ErrorKind::AddrNotAvailable.into());
     for address in address.to_socket_addrs()? {

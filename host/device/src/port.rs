@@ -1,12 +1,12 @@
-//! Ports a device can be behind.
+//! Ports that connect a device.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::time::{Duration, Instant};
 
-/// How long a port waits for a byte.
+/// Longest wait for a byte, or for room in the output buffer.
 pub(super) const PATIENCE: Duration = Duration::from_millis(2);
-/// A port that takes nothing for so long is gone.
+/// A port that accepts no byte for so long is gone.
 pub(super) const STUCK: Duration = Duration::from_secs(5);
 
 /// Bytes to a device and from it.
@@ -14,13 +14,13 @@ pub trait Port: Send {
     /// Sends all of `bytes`.
     ///
     /// # Errors
-    /// If the port is gone.
+    /// Fails if the port is gone.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Gives what has come, waiting a moment for it; 0 bytes if nothing has.
+    /// Receives into `bytes` and returns the number of bytes, 0 if none has come after a short wait.
     ///
     /// # Errors
-    /// If the port is gone.
+    /// Fails if the port is gone.
     fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize>;
 }
 
@@ -47,7 +47,7 @@ impl Port for Box<dyn serialport::SerialPort> {
     }
 }
 
-/// A full buffer is no error until it stays full.
+/// Sends all bytes. A full buffer is an error only if it stays full for [`STUCK`].
 fn send(port: &mut impl Write, mut bytes: &[u8]) -> io::Result<()> {
     let since = Instant::now();
     while !bytes.is_empty() {
@@ -60,7 +60,7 @@ fn send(port: &mut impl Write, mut bytes: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
-/// Nothing yet is no error.
+/// A timeout counts as 0 bytes, not as an error.
 fn patient(result: io::Result<usize>) -> io::Result<usize> {
     match result {
         Err(error)
@@ -75,7 +75,7 @@ fn patient(result: io::Result<usize>) -> io::Result<usize> {
     }
 }
 
-/// A port that closes is not a reader of the output that has seen enough.
+/// Turns a broken pipe into another error: the program takes a broken pipe for a closed output.
 fn gone(error: io::Error) -> io::Error {
     match error.kind() {
         ErrorKind::BrokenPipe => io::Error::new(ErrorKind::NotConnected, "the port is gone"),
@@ -83,10 +83,10 @@ fn gone(error: io::Error) -> io::Error {
     }
 }
 
-/// The same connection, which sends at once, and does not wait long for a byte or for room.
+/// The same connection, which sends at once and waits at most [`PATIENCE`].
 ///
 /// # Errors
-/// If it is gone.
+/// Fails if it is gone.
 pub fn prompt(stream: TcpStream) -> io::Result<TcpStream> {
     stream.set_nodelay(true)?;
     stream.set_read_timeout(Some(PATIENCE))?;
@@ -98,7 +98,7 @@ pub fn prompt(stream: TcpStream) -> io::Result<TcpStream> {
 mod tests {
     use super::*;
 
-    /// Whatever it takes at first.
+    /// The buffers take some bytes first.
     #[test]
     fn a_tcp_port_that_takes_nothing_is_gone() {
         let listener = std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap();
@@ -116,7 +116,7 @@ mod tests {
         assert!(began.elapsed() >= STUCK);
     }
 
-    /// Else the program would end as if all were well.
+    /// Otherwise the program would end with success.
     #[test]
     fn a_port_that_closes_is_not_a_closed_output() {
         let closed = |kind| patient(Err(io::Error::from(kind))).unwrap_err().kind();

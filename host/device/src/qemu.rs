@@ -1,4 +1,4 @@
-//! An emulated device of one's own: QEMU with an image of the board `mps2-an386`.
+//! An emulated device: QEMU with an image of the board `mps2-an386`.
 
 use std::fs::File;
 use std::io::{self, ErrorKind, Read};
@@ -16,14 +16,14 @@ use dtof_options::{Refused, plain};
 
 const QEMU: &str = "qemu-system-arm";
 
-/// What `cargo xtask image mps2-an386` builds, in the folder that cargo builds in.
+/// The image of `cargo xtask image mps2-an386`, in cargo's target folder.
 const IMAGE: &str = "images/sidecar-mps2-an386";
 
-/// How long QEMU may take to start.
+/// Longest start of QEMU.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Runs its arguments until they end or its standard input does: however this program
-/// ends, the other end of the pipe then does.
+/// Runs its arguments and kills them when its standard input closes. That happens whichever way
+/// this program ends.
 #[cfg(unix)]
 const UNTIL_END_OF_INPUT: &str = "exec 3<&0
 \"$@\" </dev/null 3<&- &
@@ -35,7 +35,7 @@ status=$?
 kill $watch 2>/dev/null
 exit $status";
 
-/// An emulator and its serial port; it ends with this.
+/// An emulator and its serial port. The emulator ends when this is dropped.
 pub struct Emulator {
     _process: Process,
     port: TcpStream,
@@ -45,7 +45,7 @@ impl Emulator {
     /// Starts QEMU with `image`, or with the one that xtask has built.
     ///
     /// # Errors
-    /// If there is no image or no QEMU, or QEMU does not start.
+    /// Fails if there is no image or no QEMU, or if QEMU does not start.
     pub fn start(image: Option<&Path>) -> Result<Self> {
         let image = image.map_or_else(built, |image| Ok(image.to_owned()))?;
         ensure!(
@@ -60,14 +60,14 @@ impl Emulator {
         let read = File::open(&image).and_then(|mut file| file.read_exact(&mut start));
         ensure!(
             read.is_ok() && start == *b"\x7fELF",
-            "{}: no ELF file, as an image is",
+            "{}: is not an ELF file, as an image must be",
             image.display()
         );
-        let mut ask = Command::new(QEMU);
-        let ask = ask.arg("--version").stdin(Stdio::null());
-        let asked = ask.stdout(Stdio::null()).stderr(Stdio::null()).status();
+        let mut version = Command::new(QEMU);
+        let version = version.arg("--version").stdin(Stdio::null());
+        let version = version.stdout(Stdio::null()).stderr(Stdio::null());
         ensure!(
-            asked.is_ok_and(|status| status.success()),
+            version.status().is_ok_and(|status| status.success()),
             "{QEMU} is missing: install QEMU for Arm; in a clone of dtof `cargo xtask setup` does"
         );
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, 0))?;
@@ -101,7 +101,7 @@ impl Emulator {
     }
 }
 
-/// Where the image is that xtask builds: this program lies in a folder beside it.
+/// Path of the image that xtask builds, found from the path of this program.
 fn built() -> Result<PathBuf> {
     let program = env::current_exe()?;
     let folder = program.ancestors().nth(2);
@@ -115,7 +115,7 @@ fn qemu(image: &Path, port: u16) -> Command {
         use std::os::unix::process::CommandExt;
         let mut shell = Command::new("sh");
         shell.args(["-c", UNTIL_END_OF_INPUT, "sh", QEMU]);
-        // Of its own, so that Ctrl-C is for this program alone.
+        // A process group of its own, so that Ctrl-C reaches this program alone.
         shell.process_group(0);
         shell
     };
@@ -139,13 +139,13 @@ impl Port for Emulator {
     }
 }
 
-/// QEMU or what runs it; it ends with this.
+/// QEMU, or the shell that runs it. It ends when this is dropped.
 struct Process(Child);
 
 impl Drop for Process {
     fn drop(&mut self) {
         if cfg!(unix) {
-            // QEMU ends then, and the shell with it.
+            // The shell then kills QEMU and ends.
             drop(self.0.stdin.take());
         } else {
             // It may have ended by itself.

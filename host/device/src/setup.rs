@@ -1,17 +1,17 @@
-//! A device with a sensor, and how it is to operate: what was said, what the device says, and
-//! what follows.
+//! A device with a sensor, and how it operates: the options, the device's own values and the
+//! resulting settings.
 
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use anyhow::{Result, bail, ensure};
+use anyhow::{Result, ensure};
 use dtof_core::Array;
 use dtof_core::fixed::types::I24F8;
-use dtof_link::SensorRecord;
+use dtof_link::{DynamicDepth, SensorRecord};
 
 use super::monitor::array;
-use super::{Client, Stopped};
+use super::{Client, HostTimeout, Stopped, Task};
 use dtof_engine::settings::Settings;
-use dtof_engine::settings::{Sensor, SettingsFile};
+use dtof_engine::settings::{SensorSettings, SettingsFile};
 use dtof_events::aer_file::Header;
 use dtof_events::clock::LaserClock;
 use dtof_options::Refused;
@@ -20,33 +20,33 @@ use dtof_photons::masked;
 /// How a device operates.
 #[derive(Clone, Debug)]
 pub struct Setup {
-    /// What was said.
-    pub asked: SettingsFile,
-    /// The same, and of the rest what the device says.
-    pub said: SettingsFile,
-    /// What follows from it.
+    /// The options.
+    pub requested: SettingsFile,
+    /// The options, completed by the device's own values.
+    pub effective: SettingsFile,
+    /// The resulting settings.
     pub settings: Settings,
-    /// Pixels, addresses 0 up.
+    /// Number of pixels, with addresses from 0.
     pub pixels: u16,
-    /// Their array.
+    /// Array of these pixels.
     pub array: Array,
-    /// Laser cycles in a thousand seconds; 0 if that is not known.
+    /// Laser cycles in a thousand seconds; 0 if unknown.
     pub laser_millihertz: u64,
-    /// What was said is not what the device says, or the device has failed before.
+    /// Warnings: the options contradict the device, or it has failed before.
     pub warnings: Vec<String>,
-    /// Bins that the sensor measures.
-    pub measured_bins: u16,
     /// When its laser cycles began.
     pub began: SystemTime,
+    sensor: SensorRecord,
+    bins: u16,
 }
 
 impl Setup {
-    /// That of a device with its first `pixels`, or as many as its sensor has.
+    /// The setup of a device with its first `pixels`, or with as many as its sensor has.
     ///
     /// # Errors
-    /// If the device is gone, or what was `said` does not suit it.
-    pub fn of(client: &mut Client, said: SettingsFile, pixels: Option<u16>) -> Result<Self> {
-        // A device without a sensor says so when it is configured.
+    /// Fails if the device is gone or `requested` does not suit it.
+    pub fn of(client: &mut Client, requested: SettingsFile, pixels: Option<u16>) -> Result<Self> {
+        // A device without a sensor refuses its configuration later.
         let sensor = client.sensor()?.unwrap_or(SensorRecord {
             pixels: client.pixels(),
             bin_width: None,
@@ -56,58 +56,76 @@ impl Setup {
         });
         let report = client.report()?;
         let pixels = pixels.unwrap_or(sensor.pixels.min(client.pixels()));
+        let mut setup = Self::new(sensor, client.bins(), requested, pixels)?;
+        setup.warnings.extend(Stopped::warning(&report));
+        Ok(setup)
+    }
+
+    /// The same device with other options.
+    ///
+    /// # Errors
+    /// Fails if `requested` does not suit the device.
+    pub fn with_requested(&self, requested: SettingsFile) -> Result<Self> {
+        Self::new(self.sensor, self.bins, requested, self.pixels)
+    }
+
+    fn new(sensor: SensorRecord, bins: u16, requested: SettingsFile, pixels: u16) -> Result<Self> {
         ensure!(pixels > 0, "the device has no pixels");
-        let asked = said.clone();
-        let said = said.or(SettingsFile {
-            sensor: Sensor {
+        let mut effective = requested.clone().or(SettingsFile {
+            sensor: SensorSettings {
                 bin_width_ps: sensor.bin_width,
                 offset_mm: Some(sensor.offset),
-                ..Sensor::default()
+                ..SensorSettings::default()
             },
             ..SettingsFile::default()
         });
-        ensure!(
-            said.sensor.bins.is_none_or(|bins| bins == client.bins()),
-            "the settings are for {} bins, the device has {}",
-            said.sensor.bins.unwrap_or_default(),
-            client.bins()
-        );
-        let columns = said.sensor.columns;
+        effective.check_bins(bins)?;
         // A sensor may be slower than its settings promise.
         let own = LaserClock::from_millihertz(sensor.laser_millihertz);
-        let told = said.sensor.laser_hz.map(LaserClock::new).transpose()?;
-        let (clock, warning) = LaserClock::known(told, own, "the device");
-        let said = with_gate(said, sensor.bins, client.bins());
-        let settings = said.settings(client.bins().into())?;
-        masked::check(&settings.masked, pixels.into())?;
-        if let Some(columns) = columns.filter(|&columns| columns > u32::from(pixels)) {
-            bail!(Refused::value(
-                "columns",
-                columns,
-                format!("there are {pixels} pixels")
-            ));
+        let requested_clock = effective.sensor.laser_hz.map(LaserClock::new).transpose()?;
+        let (clock, warning) = LaserClock::prefer(requested_clock, own, "the device");
+        // Without a gate, bins that the sensor does not measure are left out.
+        if (1..bins).contains(&sensor.bins) {
+            let measured = (0, sensor.bins - 1);
+            effective.sensor.gate = effective.sensor.gate.or(Some(measured));
         }
-        let array = array(pixels, columns);
+        let settings = effective.settings(bins.into())?;
+        masked::check(&settings.masked, pixels.into())?;
+        let columns = effective.sensor.columns;
+        let refused = |reason| Refused::value("columns", columns.unwrap_or_default(), reason);
+        ensure!(
+            columns.is_none_or(|columns| columns <= u32::from(pixels)),
+            refused(format!("there are {pixels} pixels"))
+        );
+        let array = array(pixels, columns)
+            .ok_or_else(|| refused(format!("with {pixels} pixels it makes more than 65,536")))?;
         Ok(Self {
             settings,
-            asked,
-            said,
+            requested,
+            effective,
             pixels,
-            array: array.ok_or_else(|| {
-                let reason = format!("with {pixels} pixels it makes more than 65,536");
-                Refused::value("columns", columns.unwrap_or_default(), reason)
-            })?,
+            array,
             laser_millihertz: clock.map_or(0, |clock| clock.millihertz()),
-            warnings: warning
-                .into_iter()
-                .chain(Stopped::warning(&report))
-                .collect(),
-            measured_bins: sensor.bins,
+            warnings: warning.into_iter().collect(),
             began: SystemTime::now(),
+            sensor,
+            bins,
         })
     }
 
-    /// The header of its events.
+    /// The task of the device.
+    #[must_use]
+    pub fn task(&self, dynamic_depth: Option<DynamicDepth>, host_timeout: HostTimeout) -> Task<'_> {
+        Task {
+            settings: &self.settings,
+            pixels: self.pixels,
+            columns: self.array.columns(),
+            dynamic_depth,
+            host_timeout,
+        }
+    }
+
+    /// Header of a file of its events.
     #[must_use]
     pub fn header(&self) -> Header {
         let start = self.began.duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -123,36 +141,29 @@ impl Setup {
     }
 }
 
-/// Without a gate, that of the bins the sensor measures, if it does not measure all.
-#[must_use]
-pub fn with_gate(settings: SettingsFile, measured_bins: u16, bins: u16) -> SettingsFile {
-    let last = measured_bins
-        .checked_sub(1)
-        .filter(|_| measured_bins < bins);
-    let gate = settings.sensor.gate.or(last.map(|last| (0, last)));
-    SettingsFile {
-        sensor: Sensor {
-            gate,
-            ..settings.sensor
-        },
-        ..settings
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn the_gate_ends_with_the_sensor_unless_it_is_given() {
-        let gate = |given, measured| {
+        let gate = |requested, measured| {
+            let sensor = SensorRecord {
+                pixels: 4,
+                bin_width: None,
+                offset: I24F8::ZERO,
+                laser_millihertz: 0,
+                bins: measured,
+            };
             let mut settings = SettingsFile::default();
-            settings.sensor.gate = given;
-            with_gate(settings, measured, 128).sensor.gate
+            settings.sensor.gate = requested;
+            let setup = Setup::new(sensor, 128, settings, 4).unwrap();
+            (setup.requested.sensor.gate, setup.settings.gate)
         };
-        assert_eq!(gate(None, 128), None);
-        assert_eq!(gate(None, 117), Some((0, 116)));
-        assert_eq!(gate(Some((8, 127)), 117), Some((8, 127)));
-        assert_eq!(gate(None, 0), None);
+        assert_eq!(gate(None, 128), (None, None));
+        assert_eq!(gate(None, 117), (None, Some((0, 116))));
+        let requested = Some((8, 127));
+        assert_eq!(gate(requested, 117), (requested, requested));
+        assert_eq!(gate(None, 0), (None, None));
     }
 }

@@ -7,17 +7,17 @@ use dtof_link::{Report, StopReason};
 
 use super::HostTimeout;
 
-/// The sensor that this program has configured does not run any more.
+/// The sensor that this program has started does not run any more.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stopped {
-    /// The session goes on. The device tells the reason.
+    /// The session goes on, and the device reports the reason.
     InSession {
-        /// Why, if it is known.
+        /// The reason, if this program knows it.
         reason: Option<StopReason>,
-        /// That of the configuration.
+        /// The host timeout of the configuration.
         host_timeout: HostTimeout,
     },
-    /// The device has been restarted, and may tell the reason.
+    /// The device has been restarted, with the reason if known.
     Restarted(Option<StopReason>),
     /// Another program has begun a session.
     AnotherSession,
@@ -29,13 +29,13 @@ impl Stopped {
     /// Checks a report of the device after it was configured to take photons from its sensor.
     ///
     /// # Errors
-    /// If the sensor has been started and does not run.
+    /// Fails if the sensor has been started and does not run.
     pub fn check(report: &Report, host_timeout: HostTimeout) -> Result<(), Self> {
         let reason = StopReason::from_number(report.stop_reason);
-        // Before its first start a sensor is off for these.
-        let is_held = matches!(reason, Some(StopReason::Silence | StopReason::NotListening));
+        // These also keep a sensor from its first start.
+        let is_prevented = matches!(reason, Some(StopReason::Silence | StopReason::NotListening));
         let runs = report.sensor_starts != report.sensor_stops;
-        if runs || (report.sensor_starts == 0 && !is_held) {
+        if runs || (report.sensor_starts == 0 && !is_prevented) {
             return Ok(());
         }
         Err(Self::InSession {
@@ -44,7 +44,7 @@ impl Stopped {
         })
     }
 
-    /// Why a device has forgotten a session, by what it says of its last stop.
+    /// Why a device has forgotten a session, from the reason of its last stop.
     pub(super) const fn forgotten(reason: Option<StopReason>) -> Self {
         match reason {
             Some(StopReason::NewSession) => Self::AnotherSession,
@@ -53,19 +53,12 @@ impl Stopped {
         }
     }
 
-    /// Why the device was reset, if its sensor has not stopped for another reason since.
-    #[must_use]
-    fn reset_before(report: &Report) -> Option<StopReason> {
-        StopReason::from_number(report.stop_reason).filter(|&reason| is_of_reset(reason))
-    }
-
-    /// The warning about a device that has failed before this session.
+    /// A warning if the device has failed before this session.
     #[must_use]
     pub fn warning(report: &Report) -> Option<String> {
-        let reason = Self::reset_before(report).filter(|&reason| reason != StopReason::Reset)?;
-        Some(format!(
-            "the device has been restarted ({reason}) before this session"
-        ))
+        let reason = StopReason::from_number(report.stop_reason)?;
+        let has_failed = is_of_reset(reason) && reason != StopReason::Reset;
+        has_failed.then(|| format!("the device has been restarted ({reason}) before this session"))
     }
 }
 
@@ -128,7 +121,7 @@ mod tests {
             };
             Stopped::check(&report, host_timeout).map_err(|stopped| stopped.to_string())
         };
-        // It runs, or says nothing of itself.
+        // It runs, or has not been started.
         for (starts, stops, reason) in [(1, 0, 4), (7, 6, 4), (0, 0, 0), (0, 0, 8)] {
             assert_eq!(checked(starts, stops, reason), Ok(()));
         }
@@ -171,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn a_failure_of_the_device_is_worth_a_warning() {
+    fn a_failure_of_the_device_gives_a_warning() {
         let warned = (0..=u8::MAX).filter(|&stop_reason| {
             let report = Report {
                 stop_reason,

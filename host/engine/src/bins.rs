@@ -1,9 +1,9 @@
-//! A number of bins as a type. All other code asks here.
+//! From a number of bins to a type with so many.
 
 use std::error::Error;
 use std::fmt::{self, Display, Formatter};
 
-/// No histogram has so many bins.
+/// A number of bins that histograms cannot have.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct UnsupportedBins(pub usize);
 
@@ -16,7 +16,7 @@ impl Display for UnsupportedBins {
 
 impl Error for UnsupportedBins {}
 
-/// Evaluates an expression for a number of bins that is known only when the program runs:
+/// Evaluates an expression for a number of bins that is known only at run time. Returns
 /// [`UnsupportedBins`] unless it is a power of two from 8 to 1024.
 ///
 /// ```

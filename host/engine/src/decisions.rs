@@ -1,116 +1,116 @@
-//! What the last event of each pixel was decided from.
+//! The histogram from which the last event of each pixel was decided.
 //!
-//! A pixel starts over the moment it reports, so that its histogram is copied right before. That
-//! takes as much memory as the pixels themselves.
+//! A pixel starts over the moment it reports, so its histogram is copied just before. The copies
+//! take as much memory as the pixels.
 
-use dtof_core::{Array, BinIndex, CounterWidth, Decided, DepthEvent, PeeledBins, PixelAddress};
+use dtof_core::rule::{DecisionInput, ExcludedBins};
+use dtof_core::{Array, BinIndex, CounterWidth, DepthEvent, PixelAddress};
 
-/// An event, and what it was decided from.
+/// An event and its histogram.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Decision {
     /// The event.
     pub event: DepthEvent,
     /// The histogram of its exposure. The bins around earlier echoes are empty.
     pub counts: Vec<u16>,
-    /// Where a pixel that tracks expected it.
+    /// The bin where a pixel that tracks expected its event.
     pub expected: Option<BinIndex>,
     /// The bins around earlier echoes of the exposure.
-    pub peeled: PeeledBins,
+    pub excluded: ExcludedBins,
 }
 
-/// By level and pixel.
-pub(super) fn sort(decisions: &mut [Decision]) {
-    decisions.sort_unstable_by_key(|decision| (decision.event.level, decision.event.pixel));
-}
-
-/// Room for the last decision of a pixel or a block.
+/// The last decision of a pixel or a block.
 #[derive(Clone, Debug)]
 pub struct LastDecision<const BINS: usize> {
     event: Option<DepthEvent>,
     counts: [u16; BINS],
     expected: Option<BinIndex>,
-    peeled: PeeledBins,
+    excluded: ExcludedBins,
 }
 
 impl<const BINS: usize> LastDecision<BINS> {
-    /// None yet, if it `is_wanted`.
+    /// Allocates an empty decision, if it `is_kept`.
     #[must_use]
-    pub fn room(is_wanted: bool) -> Option<Box<Self>> {
-        is_wanted.then(|| {
+    pub fn allocate(is_kept: bool) -> Option<Box<Self>> {
+        is_kept.then(|| {
             Box::new(Self {
                 event: None,
                 counts: [0; BINS],
                 expected: None,
-                peeled: PeeledBins::NONE,
+                excluded: ExcludedBins::NONE,
             })
         })
     }
 
-    /// Takes what an event is decided from.
+    /// Records the input of a decision.
     #[inline]
-    pub fn see<W: CounterWidth<Counter = u16>>(&mut self, decided: &Decided<'_, BINS, W>) {
-        self.counts = *decided.histogram.counts();
-        self.expected = decided.expected;
-        self.peeled = decided.peeled;
+    pub fn record_input<W: CounterWidth<Counter = u16>>(
+        &mut self,
+        input: &DecisionInput<'_, BINS, W>,
+    ) {
+        self.counts = *input.histogram.counts();
+        self.expected = input.expected;
+        self.excluded = input.excluded;
     }
 
-    /// Takes the event itself.
+    /// Records the event.
     #[inline]
-    pub const fn report(&mut self, event: DepthEvent) {
+    pub const fn record_event(&mut self, event: DepthEvent) {
         self.event = Some(event);
     }
 
-    /// The decision, if there was one.
+    /// The decision, if there was an event.
     #[must_use]
     pub fn decision(&self) -> Option<Decision> {
         Some(Decision {
             event: self.event?,
             counts: self.counts.to_vec(),
             expected: self.expected,
-            peeled: self.peeled,
+            excluded: self.excluded,
         })
     }
 }
 
-/// The pixels whose decisions are kept: all of a small array, those of every second column and
-/// row of a larger one, of every fourth, and so on.
+/// The pixels whose decisions are kept: all of a small array, step second column and row of a
+/// larger one, step fourth, and so on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Kept {
+pub struct KeptPixels {
     columns: u32,
-    /// Each so many columns and rows, from the first.
-    pub every: u32,
+    /// The step between columns and rows, from the first.
+    pub step: u32,
 }
 
-impl Kept {
-    /// Bins that are kept of pixels, at most: 64 × 64 histograms of 128 bins. Those of blocks
-    /// come to it, a third at most.
+impl KeptPixels {
+    /// The most bins kept of pixels: 64 × 64 histograms of 128 bins. Blocks add at most a third.
     pub const MOST_BINS: usize = 1 << 19;
 
-    /// Those of an array with so many bins a pixel.
+    /// The pixels of an array with `bins` bins a pixel.
     #[must_use]
-    pub fn of(array: Array, bins: usize) -> Self {
-        let taken = |every: u32| {
+    pub fn new(array: Array, bins: usize) -> Self {
+        let pixels_kept = |step: u32| {
             let pixels =
-                array.columns().div_ceil(every) as usize * array.rows().div_ceil(every) as usize;
+                array.columns().div_ceil(step) as usize * array.rows().div_ceil(step) as usize;
             pixels * bins
         };
-        // Blocks begin at these, too.
-        let mut powers = (0..32).map(|power| 1 << power);
-        let every = powers.find(|&every| taken(every) <= Self::MOST_BINS);
+        // A power of two, as blocks begin at multiples of these.
+        let mut step = 1;
+        while step < Array::MOST_PIXELS && pixels_kept(step) > Self::MOST_BINS {
+            step *= 2;
+        }
         Self {
             columns: array.columns(),
-            every: every.unwrap_or(1 << 31),
+            step,
         }
     }
 
-    /// Whether the decisions of `pixel` are kept, and of blocks that begin with it.
+    /// Whether the decisions of `pixel` are kept, and those of blocks that begin with it.
     #[must_use]
-    pub fn holds(&self, pixel: PixelAddress) -> bool {
+    pub fn contains(&self, pixel: PixelAddress) -> bool {
         let [column, row] = [
-            u32::from(pixel.0) % self.columns,
-            u32::from(pixel.0) / self.columns,
+            u32::from(pixel.raw()) % self.columns,
+            u32::from(pixel.raw()) / self.columns,
         ];
-        column.is_multiple_of(self.every) && row.is_multiple_of(self.every)
+        column.is_multiple_of(self.step) && row.is_multiple_of(self.step)
     }
 }
 

@@ -1,12 +1,12 @@
-//! The frame-based sensor events are held against: the same photons and histograms, but
-//! every pixel reads its highest bin at the same time, if it stands above the background
-//! at all. Pile-up is not flagged.
+//! A frame-based sensor to compare with: the same photons and histograms, but every pixel reads its
+//! highest bin at the same time, if it is above the background. Pile-up is not flagged.
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::U8F8;
+use dtof_core::rule::{DecisionInput, ExcludedBins, detect};
 use dtof_core::{
-    Count, Count16, Decided, DepthEstimator, DepthEvent, Histogram, LaserCycle, PaperRule,
-    PeeledBins, PixelAddress, RangeGate, Statistics, detect,
+    Count, Count16, DepthEstimator, DepthEvent, Histogram, LaserCycle, PaperRule, PixelAddress,
+    RangeGate, Statistics,
 };
 
 use super::decisions::{Decision, LastDecision};
@@ -15,10 +15,10 @@ use crate::settings::Settings;
 use dtof_options::Refused;
 use dtof_photons::source::Slice;
 
-/// Whatever stands above the background.
+/// Accepts any peak above the background.
 pub const ANY: PaperRule = PaperRule::new(U8F8::ZERO, Count::saturating(1));
 
-/// One pixel, with 16-bit counters, as frames may be long.
+/// A pixel. Its counters have 16 bits, as frames may be long.
 #[derive(Clone, Debug)]
 pub struct FramePixel<const BINS: usize> {
     address: PixelAddress,
@@ -27,10 +27,10 @@ pub struct FramePixel<const BINS: usize> {
     /// Laser cycles of a frame.
     length: u16,
     histogram: Histogram<BINS, Count16>,
-    /// Photons of the frame that the gate left out.
+    /// Photons of the frame outside the gate.
     gated_out: u32,
     statistics: Statistics,
-    /// If it is to be kept.
+    /// The last decision, if it is kept.
     last: Option<Box<LastDecision<BINS>>>,
 }
 
@@ -61,8 +61,8 @@ impl<const BINS: usize> FramePixel<BINS> {
         }
     }
 
-    /// Ends laser cycle `cycle`. None until the frame ends, or if no bin stands above the
-    /// background, the paper's.
+    /// Ends laser cycle `cycle`. Returns an event when the frame ends, if a bin is above the
+    /// paper's background.
     pub fn end_laser_cycle(
         &mut self,
         gate: &RangeGate<BINS>,
@@ -74,14 +74,15 @@ impl<const BINS: usize> FramePixel<BINS> {
         }
         self.first = cycle + 1;
         let found = detect(&self.histogram, gate, &ANY, estimator);
-        let event = found.map(|found| found.event(self.address, LaserCycle(cycle), self.length));
+        let event =
+            found.map(|found| found.event(self.address, LaserCycle::new(cycle), self.length));
         if let (Some(last), Some(event)) = (&mut self.last, event) {
-            last.see(&Decided {
+            last.record_input(&DecisionInput {
                 histogram: &self.histogram,
                 expected: None,
-                peeled: PeeledBins::NONE,
+                excluded: ExcludedBins::NONE,
             });
-            last.report(event);
+            last.record_event(event);
         }
         self.statistics = self.statistics();
         self.histogram.clear();
@@ -93,7 +94,7 @@ impl<const BINS: usize> FramePixel<BINS> {
         event
     }
 
-    /// Its counts so far, the frame that has not ended included.
+    /// The counts so far, including the current frame.
     fn statistics(&self) -> Statistics {
         let mut statistics = self.statistics;
         statistics.add_photons_of(&self.histogram, self.gated_out);
@@ -101,7 +102,7 @@ impl<const BINS: usize> FramePixel<BINS> {
     }
 }
 
-/// Pixels that all read at the same laser cycles.
+/// Pixels that all read out at the same time.
 pub struct FrameEngine<const BINS: usize> {
     gate: RangeGate<BINS>,
     estimator: DepthEstimator,
@@ -112,7 +113,7 @@ impl<const BINS: usize> FrameEngine<BINS> {
     /// Frames of `length` laser cycles, from laser cycle 0 on.
     ///
     /// # Errors
-    /// The constraint the settings break.
+    /// Fails if the settings break a constraint.
     pub fn new(settings: &Settings, length: u16, addresses: &[PixelAddress]) -> Result<Self> {
         ensure!(
             length > 0,
@@ -142,7 +143,7 @@ impl<const BINS: usize> Engine for FrameEngine<BINS> {
                 events.extend(pixel.end_laser_cycle(&self.gate, &self.estimator, now));
             }
         }
-        sort(&mut events);
+        events.sort_unstable_by_key(|event| (event.cycle, event.pixel));
         Ok(events)
     }
 
@@ -154,9 +155,9 @@ impl<const BINS: usize> Engine for FrameEngine<BINS> {
         [sum, Statistics::default()]
     }
 
-    fn keep_decisions(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+    fn keep_decisions(&mut self, is_kept: &dyn Fn(PixelAddress) -> bool) {
         for pixel in &mut self.pixels {
-            pixel.last = LastDecision::room(is_wanted(pixel.address));
+            pixel.last = LastDecision::allocate(is_kept(pixel.address));
         }
     }
 
@@ -164,9 +165,4 @@ impl<const BINS: usize> Engine for FrameEngine<BINS> {
         let all = self.pixels.iter().filter_map(|pixel| pixel.last.as_ref());
         all.filter_map(|last| last.decision()).collect()
     }
-}
-
-/// By laser cycle and pixel.
-fn sort(events: &mut [DepthEvent]) {
-    events.sort_unstable_by_key(|event| (event.cycle, event.pixel));
 }

@@ -1,12 +1,14 @@
-//! Pixels that decide together: one by itself, or those of one block of the highest level
-//! with all the blocks in it. Groups know nothing of each other, so that each runs on a thread
-//! of its own.
+//! Pixels that decide together: a single one, or those of a block of the highest level with all its
+//! blocks. Groups are independent, so each may run on its own thread.
 
 use anyhow::{Context, Result};
+use dtof_core::binning::{
+    Binning, Block, BlockLink, BlockPlace, count_in_blocks, end_laser_cycles_of_blocks_with,
+};
+use dtof_core::rule::DecisionInput;
 use dtof_core::{
-    AnyRule, Array, AsyncPixel, Binning, Block, BlockLevel, BlockPlace, Count16, Decided,
-    DepthEvent, Feed, LaserCycle, PixelAddress, PixelConfig, Statistics, count_in_blocks,
-    end_laser_cycles_of_blocks_seen,
+    AnyRule, Array, AsyncPixel, BlockLevel, Count16, DepthEvent, LaserCycle, PixelAddress,
+    PixelConfig, Statistics,
 };
 use dtof_link::AdaptiveBinning;
 
@@ -27,17 +29,17 @@ pub struct Configs<const BINS: usize> {
 /// A pixel of a group.
 #[derive(Clone, Debug)]
 struct Member<const BINS: usize> {
-    /// Its number among the pixels of the source.
+    /// Its index among the pixels of the source.
     number: usize,
     pixel: AsyncPixel<BINS>,
-    feed: Option<Feed>,
-    /// If it is to be kept.
+    link: Option<BlockLink>,
+    /// The last decision, if it is kept.
     last: Option<Box<LastDecision<BINS>>>,
 }
 
 impl<const BINS: usize> Member<BINS> {
-    /// Runs a pixel by itself, `since_look` laser cycles after its last look. Looks before L1
-    /// decide nothing: the photons until the first one after it are counted at once.
+    /// Runs a single pixel, `since_look` laser cycles after its last look. Looks before L1 decide
+    /// nothing, so the photons up to the first look after it are counted at once.
     fn run(
         &mut self,
         configs: &Configs<BINS>,
@@ -59,7 +61,7 @@ impl<const BINS: usize> Member<BINS> {
                     .saturating_add(x);
             }
             if cycles > left {
-                // Up to the last look there is, if there is one, and then to the end.
+                // Up to the last look in the slice, if there is one, and then to its end.
                 let after_look = after(*since_look, left, x);
                 cycles = if left > after_look {
                     left - after_look
@@ -74,14 +76,14 @@ impl<const BINS: usize> Member<BINS> {
                 self.pixel.count(config, photon.code);
                 photons = later;
             }
-            let last = LaserCycle(first + u64::from(cycle) - 1);
+            let last = LaserCycle::new(first + u64::from(cycle) - 1);
             self.end_laser_cycles(config, done, last, cycles);
             *since_look = after(*since_look, cycles, x);
         }
     }
 
-    /// Ends laser cycles, the last of which is `last`. The link takes an event at once; whether
-    /// there was one.
+    /// Ends `cycles` laser cycles, up to `last`. Takes the event at once, and returns whether there
+    /// was one.
     fn end_laser_cycles(
         &mut self,
         config: &PixelConfig<BINS, AnyRule>,
@@ -90,25 +92,25 @@ impl<const BINS: usize> Member<BINS> {
         cycles: u16,
     ) -> bool {
         let kept = &mut self.last;
-        let see = |decided: Decided<'_, BINS, _>| {
+        let observe = |input: &DecisionInput<'_, BINS, _>| {
             if let Some(kept) = kept {
-                kept.see(&decided);
+                kept.record_input(input);
             }
         };
         self.pixel
-            .end_laser_cycles_seen(config, &mut done.pixels, last, cycles, see);
-        let Some(event) = self.pixel.acknowledge() else {
+            .end_laser_cycles_with(config, &mut done.pixels, last, cycles, observe);
+        let Some(event) = self.pixel.take_event() else {
             return false;
         };
         if let Some(kept) = &mut self.last {
-            kept.report(event);
+            kept.record_event(event);
         }
         done.events.push(event);
         true
     }
 }
 
-/// Laser cycles since the last look, `cycles` later, where each `x` there is one.
+/// Laser cycles since the last look, `cycles` later, with a look every `x`.
 fn after(since_look: u16, cycles: u16, x: u16) -> u16 {
     let rest = (u32::from(since_look) + u32::from(cycles)) % u32::from(x);
     u16::try_from(rest).unwrap_or(0)
@@ -119,48 +121,48 @@ fn after(since_look: u16, cycles: u16, x: u16) -> u16 {
 pub struct Group<const BINS: usize> {
     members: Vec<Member<BINS>>,
     blocks: Vec<Block<BINS>>,
-    /// One for each block.
-    of_blocks: Vec<Option<Box<LastDecision<BINS>>>>,
+    /// The last decision of each block, if it is kept.
+    block_decisions: Vec<Option<Box<LastDecision<BINS>>>>,
     /// Laser cycles since the last look, and of blocks since the last tick.
     since_look: u16,
     since_tick: u16,
 }
 
-/// What a group has done: its pixels, and its blocks.
+/// The events and counts of a group in a slice.
 #[derive(Clone, Debug, Default)]
 pub struct Done {
     /// In no particular order.
     pub events: Vec<DepthEvent>,
-    /// What its pixels have done.
+    /// Counts of its pixels.
     pub pixels: Statistics,
-    /// What its blocks have done.
+    /// Counts of its blocks.
     pub blocks: Statistics,
 }
 
 impl<const BINS: usize> Group<BINS> {
-    /// One pixel by itself, which has a number among the pixels of the source.
+    /// A single pixel with its index among the pixels of the source.
     #[must_use]
-    pub fn of_pixel(number: usize, address: PixelAddress) -> Self {
+    pub fn single(number: usize, address: PixelAddress) -> Self {
         let member = Member {
             number,
             pixel: AsyncPixel::new(address),
-            feed: None,
+            link: None,
             last: None,
         };
         Self {
             members: vec![member],
             blocks: Vec::new(),
-            of_blocks: Vec::new(),
+            block_decisions: Vec::new(),
             since_look: 0,
             since_tick: 0,
         }
     }
 
-    /// The groups of an array, of which the pixels `addresses` are there, ascending.
+    /// The groups of an array whose pixels `addresses` exist, ascending.
     ///
     /// # Errors
-    /// If there are no levels of blocks.
-    pub fn of_array(
+    /// Fails if there are no levels of blocks.
+    pub fn for_array(
         array: Array,
         binning: AdaptiveBinning,
         addresses: &[PixelAddress],
@@ -169,20 +171,20 @@ impl<const BINS: usize> Group<BINS> {
         let groups = (0..array.blocks(top)).map(|block| {
             let pixels: Vec<PixelAddress> =
                 array.pixels_of(array.first_of(block, top), top).collect();
-            Self::of_block(array, top, &pixels, addresses)
+            Self::for_block(array, top, &pixels, addresses)
         });
         groups.collect()
     }
 
     /// The pixels of one block of the highest level, row by row.
-    fn of_block(
-        whole: Array,
+    fn for_block(
+        array: Array,
         top: BlockLevel,
         pixels: &[PixelAddress],
         addresses: &[PixelAddress],
     ) -> Result<Self> {
-        // As if it were an array by itself.
-        let row = |pixel: &PixelAddress| u32::from(pixel.0) / whole.columns();
+        // Addresses as if the block were an array.
+        let row = |pixel: &PixelAddress| u32::from(pixel.raw()) / array.columns();
         let rows = match pixels {
             [first, .., last] => row(last) - row(first) + 1,
             _ => 1,
@@ -190,33 +192,33 @@ impl<const BINS: usize> Group<BINS> {
         let columns = u32::try_from(pixels.len())? / rows;
         let part = Array::new(columns, rows).context("a block without pixels")?;
         let binning = Binning::new(part, top).context("an array without blocks")?;
-        let local = (0..=u16::MAX).map(PixelAddress);
+        let local = (0..=u16::MAX).map(PixelAddress::new);
         let members = local.zip(pixels).filter_map(|(local, &address)| {
             let number = addresses.binary_search(&address).ok()?;
             Some(Member {
                 number,
                 pixel: AsyncPixel::new(address),
-                feed: Some(binning.feed_of(local)),
+                link: Some(binning.link_of(local)),
                 last: None,
             })
         });
         let blocks = binning.blocks().map(|place| {
             Block::new(BlockPlace {
-                first: pixels[usize::from(place.first.0)],
+                first: pixels[usize::from(place.first.raw())],
                 ..place
             })
         });
         let blocks: Vec<_> = blocks.collect();
         Ok(Self {
             members: members.collect(),
-            of_blocks: vec![None; blocks.len()],
+            block_decisions: vec![None; blocks.len()],
             blocks,
             since_look: 0,
             since_tick: 0,
         })
     }
 
-    /// Runs one slice that begins with laser cycle `first`. The link takes each event at once.
+    /// Runs a slice that begins with laser cycle `first`. Events are taken at once.
     pub fn run(&mut self, configs: &Configs<BINS>, first: u64, photons: &[PixelPhotons]) -> Done {
         let mut done = Done::default();
         if let ([member], []) = (&mut self.members[..], &self.blocks[..]) {
@@ -224,12 +226,12 @@ impl<const BINS: usize> Group<BINS> {
             member.run(configs, first, photons, &mut self.since_look, &mut done);
             return done;
         }
-        let of_member = |member: &Member<BINS>| &photons[member.number];
-        let cycles = self.members.iter().map(|member| of_member(member).cycles);
+        let photons_of = |member: &Member<BINS>| &photons[member.number];
+        let cycles = self.members.iter().map(|member| photons_of(member).cycles);
         let cycles = cycles.max().unwrap_or(0);
         let mut next = vec![0; self.members.len()];
         for cycle in 0..cycles {
-            let now = LaserCycle(first + u64::from(cycle));
+            let now = LaserCycle::new(first + u64::from(cycle));
             for (member, next) in self.members.iter_mut().zip(&mut next) {
                 let received = &photons[member.number];
                 while let Some(photon) = received.photons.get(*next)
@@ -237,14 +239,14 @@ impl<const BINS: usize> Group<BINS> {
                 {
                     *next += 1;
                     member.pixel.count(&configs.pixels, photon.code);
-                    if let Some(feed) = &member.feed {
-                        count_in_blocks(&mut self.blocks, feed, &configs.blocks, photon.code);
+                    if let Some(link) = &member.link {
+                        count_in_blocks(&mut self.blocks, link, &configs.blocks, photon.code);
                     }
                 }
                 if cycle < received.cycles {
                     let has_reported = member.end_laser_cycles(&configs.pixels, &mut done, now, 1);
-                    if let Some(feed) = member.feed.as_mut().filter(|_| has_reported) {
-                        feed.reported();
+                    if let Some(link) = member.link.as_mut().filter(|_| has_reported) {
+                        link.reported();
                     }
                 }
             }
@@ -262,19 +264,19 @@ impl<const BINS: usize> Group<BINS> {
         done: &mut Done,
     ) {
         let (blocks, statistics) = (&mut self.blocks, &mut done.blocks);
-        let of_blocks = &mut self.of_blocks;
-        let see = |number: usize, decided: Decided<'_, BINS, Count16>| {
-            if let Some(Some(last)) = of_blocks.get_mut(number) {
-                last.see(&decided);
+        let block_decisions = &mut self.block_decisions;
+        let observe = |number: usize, input: &DecisionInput<'_, BINS, Count16>| {
+            if let Some(Some(last)) = block_decisions.get_mut(number) {
+                last.record_input(input);
             }
         };
-        if end_laser_cycles_of_blocks_seen(blocks, &configs.blocks, statistics, now, 1, see) {
-            for (block, last) in blocks.iter_mut().zip(of_blocks) {
-                let Some(event) = block.acknowledge() else {
+        if end_laser_cycles_of_blocks_with(blocks, &configs.blocks, statistics, now, 1, observe) {
+            for (block, last) in blocks.iter_mut().zip(block_decisions) {
+                let Some(event) = block.take_event() else {
                     continue;
                 };
                 if let Some(last) = last {
-                    last.report(event);
+                    last.record_event(event);
                 }
                 done.events.push(event);
             }
@@ -288,29 +290,29 @@ impl<const BINS: usize> Group<BINS> {
         if self.since_tick >= configs.patience {
             self.since_tick = 0;
             for member in &mut self.members {
-                if let Some(feed) = &mut member.feed {
-                    feed.tick(member.pixel.has_reported());
+                if let Some(link) = &mut member.link {
+                    link.tick(member.pixel.has_reported());
                 }
             }
             self.blocks.iter_mut().for_each(Block::tick);
         }
     }
 
-    /// Keeps what the last event was decided from, of pixels that `is_wanted` names and of
-    /// blocks that begin with one.
-    pub fn keep_decisions(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+    /// Keeps the last decision of pixels for which `is_kept` is true, and of blocks that begin with
+    /// one.
+    pub fn keep_decisions(&mut self, is_kept: &dyn Fn(PixelAddress) -> bool) {
         for member in &mut self.members {
-            member.last = LastDecision::room(is_wanted(member.pixel.address()));
+            member.last = LastDecision::allocate(is_kept(member.pixel.address()));
         }
-        for (block, last) in self.blocks.iter().zip(&mut self.of_blocks) {
-            *last = LastDecision::room(is_wanted(block.pixel().address()));
+        for (block, last) in self.blocks.iter().zip(&mut self.block_decisions) {
+            *last = LastDecision::allocate(is_kept(block.pixel().address()));
         }
     }
 
-    /// What was kept.
+    /// The decisions that were kept.
     pub fn decisions(&self) -> impl Iterator<Item = Decision> {
         let of_members = self.members.iter().map(|member| &member.last);
-        let all = of_members.chain(&self.of_blocks).flatten();
+        let all = of_members.chain(&self.block_decisions).flatten();
         all.filter_map(|last| last.decision())
     }
 

@@ -1,32 +1,32 @@
-//! The core on this computer.
+//! `dtof-core` on this computer.
 
 use anyhow::Result;
 use dtof_core::{Array, DepthEvent, PixelAddress, Statistics};
 use rayon::prelude::*;
 
 use super::Engine;
-use super::decisions::{self, Decision};
+use super::decisions::Decision;
 use super::frame::FrameEngine;
 use super::group::{Configs, Done, Group};
 use crate::settings::Settings;
 use crate::with_bins;
 use dtof_photons::source::Slice;
 
-/// `dtof-core` on this computer, groups of pixels spread over its threads.
+/// Runs groups of pixels on all threads.
 #[derive(Debug)]
 struct HostEngine<const BINS: usize> {
     configs: Configs<BINS>,
     groups: Vec<Group<BINS>>,
-    /// Of all pixels, without the exposures that have not ended.
+    /// The counts of all pixels, without the current exposures.
     pixels: Statistics,
-    /// The same of all blocks.
+    /// The counts of all blocks.
     blocks: Statistics,
 }
 
 /// An engine on this computer for the pixels `addresses` of an array.
 ///
 /// # Errors
-/// The constraint the settings break.
+/// Fails if the settings break a constraint.
 pub fn host_engine(
     settings: &Settings,
     array: Array,
@@ -47,11 +47,11 @@ impl<const BINS: usize> HostEngine<BINS> {
             )?));
         }
         let groups = match settings.binning {
-            Some(binning) => Group::of_array(array, binning, addresses)?,
+            Some(binning) => Group::for_array(array, binning, addresses)?,
             None => {
                 let numbered = addresses.iter().enumerate();
                 numbered
-                    .map(|(number, &address)| Group::of_pixel(number, address))
+                    .map(|(number, &address)| Group::single(number, address))
                     .collect()
             }
         };
@@ -94,24 +94,24 @@ impl<const BINS: usize> Engine for HostEngine<BINS> {
         [pixels, blocks]
     }
 
-    fn keep_decisions(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+    fn keep_decisions(&mut self, is_kept: &dyn Fn(PixelAddress) -> bool) {
         for group in &mut self.groups {
-            group.keep_decisions(is_wanted);
+            group.keep_decisions(is_kept);
         }
     }
 
     fn decisions(&self) -> Vec<Decision> {
         let mut all: Vec<Decision> = self.groups.iter().flat_map(Group::decisions).collect();
-        decisions::sort(&mut all);
+        all.sort_unstable_by_key(|decision| (decision.event.level, decision.event.pixel));
         all
     }
 }
 
-/// By laser cycle, level and pixel. The same for every number of bins, so it is compiled once.
+/// Sorts by laser cycle, level and pixel. Not generic, so that it is compiled once.
 fn sort(events: &mut [DepthEvent], first_cycle: u64) {
-    // As one number: three compare more slowly.
+    // One number compares faster than three.
     events.sort_unstable_by_key(|event| {
-        let cycle = event.cycle.0 - first_cycle;
-        cycle << 24 | u64::from(event.level.raw()) << 16 | u64::from(event.pixel.0)
+        let cycle = event.cycle.raw() - first_cycle;
+        cycle << 24 | u64::from(event.level.raw()) << 16 | u64::from(event.pixel.raw())
     });
 }

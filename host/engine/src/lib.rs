@@ -3,10 +3,10 @@
 
 pub mod bins;
 pub mod decisions;
+pub mod explain;
 pub mod frame;
 pub mod group;
 pub mod host;
-pub mod look;
 pub mod settings;
 pub mod slices;
 
@@ -16,24 +16,22 @@ use dtof_core::{DepthEvent, PixelAddress, Statistics};
 use self::decisions::Decision;
 use dtof_photons::source::Slice;
 
-/// Turns photons into events. Whatever runs behind it, the same photons give
-/// the same events.
+/// Turns photons into events. The same photons give the same events with any engine.
 pub trait Engine: Send {
-    /// Runs one slice and gives the events of its laser cycles, in order of
-    /// laser cycle, of level and of pixel address.
+    /// Runs a slice. Returns its events by laser cycle, level and pixel address.
     ///
     /// # Errors
-    /// If the engine could not be reached.
+    /// Fails if the engine cannot be reached.
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>>;
 
     /// The counts of all pixels so far, and of all blocks.
     fn statistics(&self) -> [Statistics; 2];
 
-    /// From now on keeps what the last event was decided from, of pixels that `is_wanted` names
-    /// and of blocks that begin with one. An engine that does not see it keeps nothing.
-    fn keep_decisions(&mut self, _is_wanted: &dyn Fn(PixelAddress) -> bool) {}
+    /// From now on keeps the last decision of pixels for which `is_kept` is true, and of blocks
+    /// that begin with one. Engines that do not see histograms keep nothing.
+    fn keep_decisions(&mut self, _is_kept: &dyn Fn(PixelAddress) -> bool) {}
 
-    /// What was kept, in order of level and pixel.
+    /// The decisions that were kept, by level and pixel.
     fn decisions(&self) -> Vec<Decision> {
         Vec::new()
     }

@@ -1,26 +1,26 @@
-//! Photons in slices: those of the next are made while an engine decides on one.
+//! Feeds an engine slice by slice, and makes the photons of the next slice meanwhile.
 
 use anyhow::{Context, Result};
 
 use dtof_photons::source::{PhotonSource, Slice};
 
-/// Laser cycles produced and decided at a time, at most. Changes nothing in the events.
+/// The most laser cycles of a slice. It does not change events.
 const SLICE: u16 = 256;
-/// About how many photons these are: so many a pixel, that they stay near the processor, but
-/// not so few in all that a slice takes longer than they do, nor more than fit into memory.
+/// About the photons of a slice: so few a pixel that they stay in the cache, but enough in all to
+/// be worth a slice, and no more than fit into memory.
 const PHOTONS_A_PIXEL: f64 = 128.0;
 const FEWEST_PHOTONS: f64 = 5e5;
 const MOST_PHOTONS: f64 = 1e7;
 
 /// Gives all of `source` to `decide`, slice by slice, and makes the photons of the next slice
-/// meanwhile. `see` is given each slice, what was decided, and how many laser cycles are done.
+/// meanwhile. `observe` gets each slice, its result, and how many laser cycles are done.
 ///
 /// # Errors
-/// Those of the recording, of `decide` and of `see`. The first of them ends it.
+/// Returns the first error of the recording, of `decide` or of `observe`.
 pub fn each_slice<T: Send>(
     source: &mut dyn PhotonSource,
     mut decide: impl FnMut(&Slice) -> Result<T> + Send,
-    mut see: impl FnMut(&Slice, T, u64) -> Result<()>,
+    mut observe: impl FnMut(&Slice, T, u64) -> Result<()>,
 ) -> Result<()> {
     let mut done = 0;
     let mut next = next_slice(source, done)?;
@@ -31,13 +31,13 @@ pub fn each_slice<T: Send>(
             scope.spawn(|_| decided = Some(decide(&slice)));
             after = next_slice(source, done);
         });
-        see(&slice, decided.context("no slice was decided on")??, done)?;
+        observe(&slice, decided.context("no slice was decided on")??, done)?;
         next = after?;
     }
     Ok(())
 }
 
-/// The photons after `done` laser cycles, if there are any, and of how many laser cycles.
+/// The next slice after `done` laser cycles and its length, unless the source has ended.
 fn next_slice(source: &mut dyn PhotonSource, done: u64) -> Result<Option<(Slice, u16)>> {
     if done >= source.cycles() {
         return Ok(None);
@@ -46,7 +46,7 @@ fn next_slice(source: &mut dyn PhotonSource, done: u64) -> Result<Option<(Slice,
     Ok(Some((source.next_slice(length)?, length)))
 }
 
-/// Laser cycles of the next slice, `done` of all being done.
+/// Laser cycles of the next slice after `done`.
 #[must_use]
 pub fn next_cycles(source: &dyn PhotonSource, done: u64) -> u16 {
     let photons = source.addresses().len() as f64 * PHOTONS_A_PIXEL;

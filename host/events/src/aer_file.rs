@@ -7,18 +7,19 @@ use std::io::{self, Read, Write};
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
+use dtof_core::events::DynamicDepthEvent;
 use dtof_core::{
-    AerDecoder, AerEncoder, AerRecord, AerWord, BinPosition, BlockLevel, DepthEvent,
-    DynamicDepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
+    AerDecoder, AerEncoder, AerRecord, AerWord, BinPosition, BlockLevel, DepthEvent, EchoNumber,
+    Flags, LaserCycle, PixelAddress,
 };
 
 pub use header::Header;
 pub use header::MAGIC;
 use header::{HEADER_BYTES, header_length};
 
-use dtof_options::Named;
+use dtof_options::named_values;
 
-/// Of 16 bytes at a time, as long as a word.
+/// Processes 16 bytes at a time, the size of a word.
 type Checksum = Table<16>;
 static CRC_32: Crc<u32, Checksum> = Crc::<u32, Checksum>::new(&CRC_32_ISO_HDLC);
 
@@ -31,24 +32,19 @@ pub enum Event {
     DynamicDepth(DynamicDepthEvent),
 }
 
-/// Which kind of event.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum EventKind {
-    /// Depth events.
-    Depth,
-    /// Dynamic depth events.
-    DynamicDepth,
-}
-
-impl Named for EventKind {
-    const NAMES: &'static [(&'static str, Self, &'static str)] = &[
-        ("depth", Self::Depth, "Depth events"),
-        ("dynamic-depth", Self::DynamicDepth, "Dynamic depth events"),
-    ];
+named_values! {
+    /// The kind of an event.
+    #[derive(Debug, PartialEq, Eq)]
+    pub enum EventKind {
+        /// Depth events
+        Depth = "depth",
+        /// Dynamic depth events
+        DynamicDepth = "dynamic-depth",
+    }
 }
 
 impl Event {
-    /// Which kind it is.
+    /// The kind.
     #[must_use]
     pub fn kind(&self) -> EventKind {
         match self {
@@ -57,7 +53,7 @@ impl Event {
         }
     }
 
-    /// Which macropixel.
+    /// The macropixel, or the first of the block.
     #[must_use]
     pub fn pixel(&self) -> PixelAddress {
         match self {
@@ -66,7 +62,7 @@ impl Event {
         }
     }
 
-    /// Whether it is one macropixel, or a block.
+    /// [`BlockLevel::PIXEL`], or the level of the block.
     #[must_use]
     pub fn level(&self) -> BlockLevel {
         match self {
@@ -75,7 +71,7 @@ impl Event {
         }
     }
 
-    /// Which echo of its exposure; the first of a change of depth.
+    /// The number of the echo in its exposure; the first for a dynamic depth event.
     #[must_use]
     pub fn echo(&self) -> EchoNumber {
         match self {
@@ -84,7 +80,7 @@ impl Event {
         }
     }
 
-    /// When.
+    /// The laser cycle.
     #[must_use]
     pub fn cycle(&self) -> LaserCycle {
         match self {
@@ -93,7 +89,7 @@ impl Event {
         }
     }
 
-    /// Where: the pulse, or the mean after the change.
+    /// The position of the pulse, or the mean after the change.
     #[must_use]
     pub fn position(&self) -> BinPosition {
         match self {
@@ -112,7 +108,7 @@ impl Event {
     }
 }
 
-/// Writes a file; it is complete once [`Writer::finish`] has returned.
+/// Writes a file, which is complete once [`Writer::finish`] has returned.
 pub struct Writer<W: Write> {
     out: W,
     digest: Digest<'static, u32, Checksum>,
@@ -124,7 +120,7 @@ impl<W: Write> Writer<W> {
     /// Begins a file.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// Fails if the writer fails.
     pub fn new(out: W, header: &Header) -> io::Result<Self> {
         let mut writer = Self {
             out,
@@ -139,7 +135,7 @@ impl<W: Write> Writer<W> {
     /// Writes one event, and the time word before it if one is due.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// Fails if the writer fails.
     pub fn write(&mut self, event: &Event) -> io::Result<()> {
         let (time, word) = match event {
             Event::Depth(event) => self.encoder.encode(event),
@@ -152,18 +148,18 @@ impl<W: Write> Writer<W> {
         self.put(&word.to_le_bytes())
     }
 
-    /// What was written goes as far as it can.
+    /// Flushes the writer.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// Fails if the writer fails.
     pub fn flush(&mut self) -> io::Result<()> {
         self.out.flush()
     }
 
-    /// Ends the file and gives the writer back.
+    /// Ends the file and returns the writer.
     ///
     /// # Errors
-    /// Those of the writer.
+    /// Fails if the writer fails.
     pub fn finish(mut self) -> io::Result<W> {
         let end = AerWord::end(self.events, self.digest.finalize());
         self.out.write_all(&end.to_le_bytes())?;
@@ -191,7 +187,7 @@ impl<R: Read> Reader<R> {
     /// Reads the header.
     ///
     /// # Errors
-    /// If there is none, or one of another format.
+    /// Fails if there is no header, or one of another format.
     pub fn new(mut input: R) -> Result<Self> {
         let mut bytes = [0; HEADER_BYTES as usize];
         input
@@ -203,7 +199,7 @@ impl<R: Read> Reader<R> {
         let mut digest = CRC_32.digest();
         digest.update(&bytes);
         let header = Header::from_bytes(&bytes)?;
-        // The settings of the run, which no event needs.
+        // The settings of the run are skipped.
         let length = header_length(&bytes).unwrap_or(HEADER_BYTES);
         let mut settings = vec![0; usize::from(length - HEADER_BYTES)];
         input
@@ -226,7 +222,7 @@ impl<R: Read> Reader<R> {
         &self.header
     }
 
-    /// The byte of the file at which the next word begins.
+    /// The offset in the file of the next word.
     pub fn offset(&self) -> u64 {
         self.offset
     }
@@ -234,11 +230,11 @@ impl<R: Read> Reader<R> {
     /// The next event, or `None` after the end word.
     ///
     /// # Errors
-    /// What is wrong and at which byte of the file.
+    /// Returns what is wrong and at which byte of the file.
     pub fn next_event(&mut self) -> Result<Option<Event>> {
         while !self.ended {
             let word = self.next_word();
-            // Nothing that is wrong has been passed.
+            // The offset still points at the wrong word.
             if let Some(event) = word.with_context(|| format!("byte {}", self.offset))? {
                 return Ok(Some(event));
             }
@@ -246,7 +242,7 @@ impl<R: Read> Reader<R> {
         Ok(None)
     }
 
-    /// Reads one word; gives the event if it is one.
+    /// Reads one word. Returns its event, if it has one.
     fn next_word(&mut self) -> Result<Option<Event>> {
         let Some(bytes) = self.read_word()? else {
             bail!("the file ends without an end word");
@@ -275,6 +271,7 @@ impl<R: Read> Reader<R> {
                 ensure!(self.input.read(&mut [0])? == 0, "bytes follow the end word");
                 Ok(None)
             }
+            other => bail!("this program cannot read {other:?}"),
         }
     }
 

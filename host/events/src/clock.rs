@@ -6,7 +6,7 @@ use anyhow::{Result, ensure};
 
 use crate::aer_file::Header;
 
-/// How many laser cycles a second has.
+/// The rate of the laser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct LaserClock {
     /// Laser cycles in a thousand seconds, not 0.
@@ -28,7 +28,7 @@ impl LaserClock {
     /// `hz` laser cycles a second.
     ///
     /// # Errors
-    /// If `hz` is 0.
+    /// Fails if `hz` is 0.
     pub fn new(hz: u64) -> Result<Self> {
         ensure!(hz > 0, "the laser has 0 cycles a second");
         Ok(Self {
@@ -36,24 +36,24 @@ impl LaserClock {
         })
     }
 
-    /// That of a file which says so.
+    /// The clock of a file; `None` if its rate is unknown.
     #[must_use]
-    pub fn of(header: &Header) -> Option<Self> {
+    pub fn from_header(header: &Header) -> Option<Self> {
         Self::from_millihertz(header.laser_millihertz)
     }
 
-    /// So many laser cycles in a thousand seconds; none if that is 0, which stands for unknown.
+    /// The clock for so many laser cycles in a thousand seconds; `None` for 0, which means unknown.
     #[must_use]
     pub fn from_millihertz(millihertz: u64) -> Option<Self> {
         let millihertz = u128::from(millihertz);
         (millihertz > 0).then_some(Self { millihertz })
     }
 
-    /// The one that holds for a file, and a warning if that is not the file's: `wanted` comes
-    /// before the file, and the paper's is for want of any. To the whole hertz they are the same.
+    /// The clock to use for a file: `requested`, else the file's, else the paper's. Warns if it is
+    /// not the file's. Rates that agree to the whole hertz are equal, and the file's is more exact.
     #[must_use]
-    pub fn choose(wanted: Option<Self>, header: &Header) -> (Self, Option<String>) {
-        match Self::known(wanted, Self::of(header), "the file") {
+    pub fn for_file(requested: Option<Self>, header: &Header) -> (Self, Option<String>) {
+        match Self::prefer(requested, Self::from_header(header), "the file") {
             (Some(clock), warning) => (clock, warning),
             (None, _) => {
                 let assumed = Self::default();
@@ -66,19 +66,22 @@ impl LaserClock {
         }
     }
 
-    /// The same if there is one; `own` is what `whose`, a file or a device, says.
+    /// The requested clock, or `own`, that of a file or a device called `whose`. Warns if they
+    /// differ.
     #[must_use]
-    pub fn known(
-        wanted: Option<Self>,
+    pub fn prefer(
+        requested: Option<Self>,
         own: Option<Self>,
         whose: &str,
     ) -> (Option<Self>, Option<String>) {
-        match (wanted, own) {
-            (Some(wanted), Some(own)) if own.millihertz / 1000 * 1000 != wanted.millihertz => {
-                let differ = format!("{whose} has a laser of {own}; times are for {wanted}");
-                (Some(wanted), Some(differ))
+        match (requested, own) {
+            (Some(requested), Some(own))
+                if own.millihertz / 1000 * 1000 != requested.millihertz =>
+            {
+                let differ = format!("{whose} has a laser of {own}; times are for {requested}");
+                (Some(requested), Some(differ))
             }
-            _ => (own.or(wanted), None),
+            _ => (own.or(requested), None),
         }
     }
 
@@ -100,7 +103,8 @@ impl LaserClock {
         u128::from(cycle) * 1_000_000_000 / self.millihertz
     }
 
-    /// The nanosecond in which laser cycle `cycle` ends, as far as 64 bits go; not 0.
+    /// The nanosecond in which laser cycle `cycle` ends; at least 1, at most the largest 64-bit
+    /// number.
     #[must_use]
     pub fn end_ns(&self, cycle: u64) -> u64 {
         let end = self.nanoseconds(cycle.saturating_add(1)).max(1);
@@ -143,20 +147,20 @@ mod tests {
 
     #[test]
     fn what_was_said_of_the_laser_holds_and_a_difference_is_told() {
-        let known = |said: Option<u64>, own| {
-            let said = said.map(|hz| LaserClock::new(hz).unwrap());
+        let preferred = |requested: Option<u64>, own| {
+            let requested = requested.map(|hz| LaserClock::new(hz).unwrap());
             let (clock, warning) =
-                LaserClock::known(said, LaserClock::from_millihertz(own), "the device");
+                LaserClock::prefer(requested, LaserClock::from_millihertz(own), "the device");
             (clock.map(|clock| clock.millihertz()), warning)
         };
-        assert_eq!(known(None, 0), (None, None));
-        assert_eq!(known(None, 4_165_818), (Some(4_165_818), None));
-        assert_eq!(known(Some(10_000), 0), (Some(10_000_000), None));
-        // A setting has whole hertz: to these, what the device says is exact.
-        assert_eq!(known(Some(4165), 4_165_818), (Some(4_165_818), None));
-        let (rate, warning) = known(Some(3000), 4_165_818);
+        assert_eq!(preferred(None, 0), (None, None));
+        assert_eq!(preferred(None, 4_165_818), (Some(4_165_818), None));
+        assert_eq!(preferred(Some(10_000), 0), (Some(10_000_000), None));
+        // Options have whole hertz, so the device's own rate is more exact.
+        assert_eq!(preferred(Some(4165), 4_165_818), (Some(4_165_818), None));
+        let (rate, warning) = preferred(Some(3000), 4_165_818);
         assert_eq!(rate, Some(3_000_000));
-        let told = "the device has a laser of 4.165818 kHz; times are for 3 kHz";
-        assert_eq!(warning.as_deref(), Some(told));
+        let expected = "the device has a laser of 4.165818 kHz; times are for 3 kHz";
+        assert_eq!(warning.as_deref(), Some(expected));
     }
 }

@@ -1,26 +1,24 @@
-//! What pixels and blocks send in place of depth events: changes of their depth.
+//! Dynamic depth: changes of the mean depth of pixels and blocks.
 
 use std::collections::HashMap;
 
-use dtof_core::{
-    BlockLevel, DepthEvent, DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, EchoNumber,
-    PixelAddress,
-};
+use dtof_core::events::{DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel};
+use dtof_core::{BlockLevel, DepthEvent, EchoNumber, PixelAddress};
 use dtof_link::DynamicDepth;
 
 use super::echoes::Echo;
 
-/// The last depths of each pixel and block, three as in the paper.
+/// The state of each pixel and block: the mean of its last depths, three as in the paper.
 #[derive(Clone, Debug)]
 pub struct DepthChanges {
     config: DynamicDepthConfig,
-    /// The one echo of each exposure that comes, if not all.
+    /// The echo of each exposure that is observed, if not all.
     echo: Echo,
     pixels: HashMap<(PixelAddress, BlockLevel), DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>>,
 }
 
 impl DepthChanges {
-    /// No depth yet. Of the echoes of an exposure only `echo` will come.
+    /// Starts without depths. Only `echo` of each exposure will be observed.
     #[must_use]
     pub fn new(config: DynamicDepthConfig, echo: Echo) -> Self {
         Self {
@@ -30,8 +28,8 @@ impl DepthChanges {
         }
     }
 
-    /// The change that a depth event is, if it is one. Each pixel and block sends its events in
-    /// order, so that they are looked at as they come. Of all echoes the first is followed.
+    /// Observes an event and returns the change of depth it brings, if any. Each pixel and block
+    /// must report in order. If all echoes are observed, only the first counts.
     pub fn observe(&mut self, event: &DepthEvent) -> Option<DynamicDepthEvent> {
         if self.echo == Echo::All && event.echo > EchoNumber::FIRST {
             return None;

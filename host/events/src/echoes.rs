@@ -1,48 +1,37 @@
-//! Which echo of each exposure is shown: the first, the last, the strongest or all.
+//! Selects one echo of each exposure: the first, the last, the strongest, or all.
 //!
-//! Which it is cannot be known before the exposure ends, and events stay in their order. So
-//! they wait until those before them are decided, no longer than an exposure may last.
+//! The selected echo is known only when the exposure ends, and events stay in order. So they wait
+//! until earlier ones are decided, at most as long as an exposure.
 
 use std::collections::{HashMap, VecDeque};
 
 use dtof_core::{BlockLevel, DepthEvent, EchoNumber, LaserCycle, PixelAddress};
 
-use dtof_options::Named;
+use dtof_options::named_values;
 
-/// Which echo of an exposure of a pixel or a block.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Echo {
-    /// The nearest
-    First,
-    /// The farthest
-    Last,
-    /// The one with the most photons a laser cycle in its peak, less the background
-    Strongest,
-    /// Every one
-    All,
-}
-
-impl Named for Echo {
-    const NAMES: &'static [(&'static str, Self, &'static str)] = &[
-        ("first", Self::First, "The nearest"),
-        ("last", Self::Last, "The farthest"),
-        (
-            "strongest",
-            Self::Strongest,
-            "The one with the most photons a laser cycle in its peak, less the background",
-        ),
-        ("all", Self::All, "Every one"),
-    ];
+named_values! {
+    /// Which echo of an exposure of a pixel or a block.
+    #[derive(Debug, PartialEq, Eq)]
+    pub enum Echo {
+        /// The nearest
+        First = "first",
+        /// The farthest
+        Last = "last",
+        /// The one with the most photons a laser cycle in its peak, less the background
+        Strongest = "strongest",
+        /// Every one
+        All = "all",
+    }
 }
 
 impl Echo {
-    /// Is `event` to be shown rather than `other`, which came before it?
+    /// Whether `event` is shown rather than `other`, which came before it.
     fn prefers(self, event: &DepthEvent, other: &DepthEvent) -> bool {
         match self {
             Self::First => event.position() < other.position(),
             Self::Last => event.position() > other.position(),
             Self::Strongest => {
-                // Signals a laser cycle, both times both exposures.
+                // Compares signals a laser cycle, both multiplied by both exposures.
                 let above = |event: &DepthEvent| {
                     let signal = event
                         .peak_count
@@ -58,29 +47,29 @@ impl Echo {
     }
 }
 
-/// Events that wait for a choice.
+/// Selects echoes from a stream of events.
 #[derive(Clone, Debug)]
-pub struct Selection {
+pub struct EchoSelection {
     echo: Echo,
-    /// An exposure has no more echoes.
+    /// The last echo of an exposure.
     most: EchoNumber,
-    /// An exposure lasts no longer.
+    /// The most laser cycles of an exposure.
     longest: u16,
-    /// The exposures that may have more echoes, one a pixel or block at most.
-    open: HashMap<(PixelAddress, BlockLevel), Open>,
-    /// In the order they came.
+    /// Exposures that may have more echoes, at most one a pixel or block.
+    open: HashMap<(PixelAddress, BlockLevel), OpenExposure>,
+    /// Events in the order they came.
     waiting: VecDeque<(DepthEvent, Fate)>,
-    /// How many have left the queue.
-    left: u64,
+    /// How many events have left the queue.
+    taken: u64,
     now: LaserCycle,
 }
 
 /// An exposure.
 #[derive(Clone, Copy, Debug)]
-struct Open {
+struct OpenExposure {
     /// Its latest echo.
     last: EchoNumber,
-    /// The number of the event that is to be shown so far.
+    /// The number of the event to be shown so far.
     chosen: u64,
     /// The last laser cycle that may belong to it.
     end: LaserCycle,
@@ -89,15 +78,15 @@ struct Open {
 /// What becomes of an event.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fate {
-    /// To be shown, unless its exposure has another that is preferred.
-    Open,
+    /// Shown, unless its exposure has a better one.
+    Pending,
     Shown,
     Dropped,
 }
 
-impl Selection {
-    /// Of each exposure, `echo`. It has `most` echoes at most and lasts `longest` laser cycles
-    /// at most.
+impl EchoSelection {
+    /// Selects `echo` of each exposure. An exposure has at most `most` echoes and lasts at most
+    /// `longest` laser cycles.
     #[must_use]
     pub fn new(echo: Echo, most: EchoNumber, longest: u16) -> Self {
         Self {
@@ -106,26 +95,26 @@ impl Selection {
             longest,
             open: HashMap::new(),
             waiting: VecDeque::new(),
-            left: 0,
-            now: LaserCycle(0),
+            taken: 0,
+            now: LaserCycle::new(0),
         }
     }
 
-    /// Takes the next event. [`Self::next`] gives those that are decided then.
+    /// Takes the next event. [`Self::next`] then returns those that are decided.
     pub fn push(&mut self, event: DepthEvent) {
         self.now = self.now.max(event.cycle);
         if self.echo == Echo::All {
             self.waiting.push_back((event, Fate::Shown));
             return;
         }
-        let number = self.left + self.waiting.len() as u64;
+        let number = self.taken + self.waiting.len() as u64;
         let key = (event.pixel, event.level);
         let open = self.open.get(&key).copied();
         let same = open.filter(|open| event.echo > open.last && event.cycle <= open.end);
         let other = same.and_then(|open| self.waiting.get(self.place(open.chosen)?));
         let is_chosen = other.is_none_or(|(other, _)| self.echo.prefers(&event, other));
         let fate = match is_chosen {
-            true => Fate::Open,
+            true => Fate::Pending,
             false => Fate::Dropped,
         };
         self.waiting.push_back((event, fate));
@@ -147,9 +136,9 @@ impl Selection {
             self.open.remove(&key);
             return;
         }
-        let begun = (event.cycle.0 + 1).saturating_sub(event.exposure.into());
-        let end = LaserCycle(begun.saturating_add(self.longest.into()));
-        let open = Open {
+        let begun = (event.cycle.raw() + 1).saturating_sub(event.exposure.into());
+        let end = LaserCycle::new(begun.saturating_add(self.longest.into()));
+        let open = OpenExposure {
             last: event.echo,
             chosen,
             end: same.map_or(end, |open| open.end),
@@ -157,16 +146,16 @@ impl Selection {
         self.open.insert(key, open);
     }
 
-    /// No exposure has more echoes.
+    /// Ends all exposures.
     pub fn finish(&mut self) {
         for (_, open) in std::mem::take(&mut self.open) {
             self.decide(open.chosen, Fate::Shown);
         }
     }
 
-    /// The place of an event in the queue.
+    /// The index of an event in the queue.
     fn place(&self, number: u64) -> Option<usize> {
-        usize::try_from(number.checked_sub(self.left)?).ok()
+        usize::try_from(number.checked_sub(self.taken)?).ok()
     }
 
     fn decide(&mut self, number: u64, fate: Fate) {
@@ -177,14 +166,14 @@ impl Selection {
     }
 }
 
-/// Those to be shown, in the order they came, as far as that is decided.
-impl Iterator for Selection {
+/// The selected events that are decided, in the order they came.
+impl Iterator for EchoSelection {
     type Item = DepthEvent;
 
     fn next(&mut self) -> Option<DepthEvent> {
         loop {
             let &(event, fate) = self.waiting.front()?;
-            if fate == Fate::Open {
+            if fate == Fate::Pending {
                 let key = (event.pixel, event.level);
                 let open = self.open.get(&key)?;
                 if self.now <= open.end {
@@ -193,7 +182,7 @@ impl Iterator for Selection {
                 self.open.remove(&key);
             }
             self.waiting.pop_front();
-            self.left += 1;
+            self.taken += 1;
             if fate != Fate::Dropped {
                 return Some(event);
             }

@@ -2,25 +2,26 @@
 
 use std::io::{self, Write};
 
-use dtof_core::{DepthEvent, DynamicDepthEvent, Polarity, RangeScale};
+use dtof_core::events::{DynamicDepthEvent, Polarity};
+use dtof_core::{DepthEvent, RangeScale};
 
 use crate::aer_file::{Event, EventKind};
 
 /// The columns of depth events.
 ///
-/// `depth_bins` is measured from the start of bin 0, `flags` is the sum of the
-/// flag bits of `docs/aer-format.md`. A `level` above 0 is a block of pixels, the first of
-/// which is `pixel`; `echo` counts from 1.
+/// `depth_bins` is measured from the start of bin 0. `flags` is the sum of the flag bits of
+/// `docs/aer-format.md`. A `level` above 0 is a block of pixels, the first of which is `pixel`.
+/// `echo` counts from 1.
 pub const HEADER: &str =
     "cycle,pixel,exposure,peak_bin,depth_bins,range_mm,peak_count,background,flags,level,echo";
 
 /// The columns of dynamic depth events.
 ///
-/// `polarity` is 1 if the depth has become more and -1 if less, `range_mm` the mean after
-/// the change, `change_mm` by how much it has changed.
+/// `polarity` is 1 if the depth has grown and -1 if it has shrunk. `range_mm` is the mean after the
+/// change, `change_mm` the change.
 pub const DYNAMIC_DEPTH_HEADER: &str = "cycle,pixel,polarity,range_mm,change_mm,flags,level";
 
-/// The columns of events of this kind.
+/// The columns for events of `kind`.
 #[must_use]
 pub fn header(kind: EventKind) -> &'static str {
     match kind {
@@ -32,7 +33,7 @@ pub fn header(kind: EventKind) -> &'static str {
 /// Writes one event of either kind.
 ///
 /// # Errors
-/// Those of the writer.
+/// Fails if the writer fails.
 pub fn write_event(
     out: &mut (impl Write + ?Sized),
     event: &Event,
@@ -53,7 +54,7 @@ pub fn range_mm(event: &DepthEvent, scale: &RangeScale) -> f64 {
 /// Writes one event.
 ///
 /// # Errors
-/// Those of the writer.
+/// Fails if the writer fails.
 pub fn write(
     out: &mut (impl Write + ?Sized),
     event: &DepthEvent,
@@ -63,8 +64,8 @@ pub fn write(
     writeln!(
         out,
         "{},{},{},{},{depth_bins:.4},{:.3},{},{},{},{},{}",
-        event.cycle.0,
-        event.pixel.0,
+        event.cycle.raw(),
+        event.pixel.raw(),
         event.exposure,
         event.peak_bin,
         range_mm(event, scale),
@@ -79,7 +80,7 @@ pub fn write(
 /// Writes one dynamic depth event.
 ///
 /// # Errors
-/// Those of the writer.
+/// Fails if the writer fails.
 pub fn write_dynamic_depth(
     out: &mut (impl Write + ?Sized),
     event: &DynamicDepthEvent,
@@ -92,8 +93,8 @@ pub fn write_dynamic_depth(
     writeln!(
         out,
         "{},{},{polarity},{:.3},{:.3},{},{}",
-        event.cycle.0,
-        event.pixel.0,
+        event.cycle.raw(),
+        event.pixel.raw(),
         scale.range(event.position).to_num::<f64>(),
         scale.distance(event.change()).to_num::<f64>(),
         event.flags,

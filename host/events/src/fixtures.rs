@@ -1,4 +1,4 @@
-//! An event and a scale for the tests of several modules.
+//! An event and a scale for tests of several modules.
 
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
@@ -10,10 +10,10 @@ use dtof_core::{
 #[must_use]
 pub fn event(pixel: u16, cycle: u64, bin: u16) -> DepthEvent {
     DepthEvent {
-        pixel: PixelAddress(pixel),
+        pixel: PixelAddress::new(pixel),
         level: BlockLevel::PIXEL,
         echo: EchoNumber::FIRST,
-        cycle: LaserCycle(cycle),
+        cycle: LaserCycle::new(cycle),
         exposure: 40,
         peak_bin: BinIndex::saturating(bin),
         offset: SubBinOffset::CENTRE,
@@ -26,7 +26,7 @@ pub fn event(pixel: u16, cycle: u64, bin: u16) -> DepthEvent {
 /// Bins of 250 ps.
 ///
 /// # Panics
-/// Never: the numbers are those of a scale.
+/// Never panics: the numbers are valid.
 #[must_use]
 pub fn scale() -> RangeScale {
     RangeScale::new(U16F16::lit("250"), I24F8::ZERO).unwrap()

@@ -7,6 +7,6 @@ pub mod dynamic;
 pub mod echoes;
 pub mod events_csv;
 pub mod fixtures;
-pub mod maps;
-pub mod reports;
+pub mod histories;
+pub mod last_events;
 pub mod sample;

@@ -1,48 +1,47 @@
-//! A sample of a run's events that is small however many there are.
+//! A sample of a run's events that has a bounded size.
 //!
-//! All events as long as there are few. At the limit every other one is dropped, and
-//! from then on one of two is kept, then one of four, and so on: which ones depends on
-//! their number in the run alone, so that the same run gives the same sample.
+//! It keeps all events as long as there are few. At the limit, every other one is dropped, and from
+//! then on one of two is kept, then one of four, and so on. The choice depends only on the number
+//! of an event, so the same run gives the same sample.
 //!
-//! Which number is kept follows multiples of the golden ratio. They spread evenly (of k
-//! in a row one is kept, or two, or none), but not in step with the columns of an array,
-//! which a plain k-th would show as stripes.
+//! The choice follows multiples of the golden ratio. They spread evenly: of k in a row, none, one
+//! or two are kept. Keeping every k-th would show as stripes in step with the columns of an array.
 
 use dtof_core::{BlockLevel, DepthEvent, EchoNumber, Flags, PixelAddress};
 
-/// The part of an event that is kept.
+/// The sampled fields of an event.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledEvent {
-    /// The laser cycle whose end brought it.
+    /// The laser cycle.
     pub cycle: u64,
-    /// Its pixel, the first of its block.
+    /// The pixel, or the first of the block.
     pub pixel: PixelAddress,
-    /// Whether it is one pixel that reports, or a block.
+    /// [`BlockLevel::PIXEL`], or the level of the block.
     pub level: BlockLevel,
-    /// Which echo of its exposure.
+    /// The number of the echo in its exposure.
     pub echo: EchoNumber,
-    /// Its range in millimetres.
+    /// The range in millimetres.
     pub range_mm: f64,
-    /// Laser cycles that it was decided from.
+    /// The exposure in laser cycles.
     pub exposure: u16,
-    /// Photons of its peak.
+    /// The photons of its peak.
     pub peak_count: u32,
-    /// What is to be said against it.
+    /// The flags.
     pub flags: Flags,
 }
 
-/// Evenly one of 1, 2, 4 … events.
+/// An even sample: one of 1, 2, 4 … events.
 #[derive(Clone, Debug)]
 pub struct Sample {
     limit: usize,
     halvings: u32,
     seen: u64,
-    /// Each with its place in 0..2⁶⁴.
+    /// Each event with its place in 0..2⁶⁴.
     kept: Vec<(u64, SampledEvent)>,
 }
 
 impl Sample {
-    /// Most events of a report, and 13 MB of memory.
+    /// The most events of a report; they take 13 MB of memory.
     pub const LIMIT: usize = 1 << 18;
 
     /// Keeps at most `limit` events.
@@ -56,7 +55,7 @@ impl Sample {
         }
     }
 
-    /// Takes the next event in, or leaves it out.
+    /// Samples the next event.
     pub fn add(&mut self, event: &DepthEvent, range_mm: f64) {
         // 2⁶⁴ divided by the golden ratio, made odd.
         let place = self.seen.wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -71,7 +70,7 @@ impl Sample {
             }
         }
         let event = SampledEvent {
-            cycle: event.cycle.0,
+            cycle: event.cycle.raw(),
             pixel: event.pixel,
             level: event.level,
             echo: event.echo,
@@ -90,7 +89,7 @@ impl Sample {
             .retain(|(place, _)| place.leading_zeros() >= halvings);
     }
 
-    /// Keeps at most `limit` events from now on.
+    /// Lowers the limit.
     pub fn limit(&mut self, limit: usize) {
         self.limit = self.limit.min(limit);
         while self.kept.len() > self.limit {
@@ -104,7 +103,7 @@ impl Sample {
         1 << self.halvings
     }
 
-    /// How many events there were.
+    /// The number of events seen.
     #[must_use]
     pub fn seen(&self) -> u64 {
         self.seen
@@ -177,7 +176,7 @@ mod tests {
         let sample = sampled(1000, 64_000);
         assert!(sample.one_of() >= 64);
         for column in 0..64 {
-            let kept = sample.events().filter(|event| event.pixel.0 == column);
+            let kept = sample.events().filter(|event| event.pixel.raw() == column);
             assert!((4..32).contains(&kept.count()), "column {column}");
         }
     }

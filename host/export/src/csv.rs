@@ -22,7 +22,7 @@ pub fn begin(out: Out, projection: Projection, kind: EventKind) -> Result<Points
 fn write(out: &mut Out, event: &Event, projection: &Projection) -> Result<()> {
     let time = projection.nanoseconds(event);
     let (us, ns) = (time / 1000, time % 1000);
-    // The fewest digits that give the same f32 back.
+    // Writes the fewest digits that give the same f32.
     let [x, y, z] = projection.point(event)?;
     write!(out, "{us}.{ns:03},{x},{y},{z},")?;
     Ok(events_csv::write_event(out, event, &projection.scale)?)

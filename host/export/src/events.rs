@@ -10,45 +10,45 @@ use dtof_core::EchoNumber;
 use super::Format;
 use dtof_events::aer_file::{Event, EventKind, Header, Reader};
 use dtof_events::clock::LaserClock;
-use dtof_events::echoes::{Echo, Selection};
+use dtof_events::echoes::{Echo, EchoSelection};
 use dtof_options::Refused;
 use dtof_options::progress::Progress;
 
-/// The events of a file.
+/// Opens a file.
 pub fn open(path: &Path) -> Result<Reader<BufReader<File>>> {
     Reader::new(BufReader::new(File::open(path)?))
 }
 
-/// What chooses the echo of each exposure: a file does not say how long one may last, or how
-/// many echoes it may have.
-pub fn chosen(echo: Echo) -> Selection {
-    Selection::new(echo, EchoNumber::LAST, u16::MAX)
+/// Selects `echo` of each exposure. A file does not give the length of exposures or the number of
+/// echoes, so the limits are the largest.
+pub fn selection(echo: Echo) -> EchoSelection {
+    EchoSelection::new(echo, EchoNumber::LAST, u16::MAX)
 }
 
-/// The contents of a file.
+/// The result of a first pass over a file.
 pub struct Survey {
     pub header: Header,
-    /// Depth events and dynamic depth events.
+    /// Numbers of depth events and of dynamic depth events.
     counts: [u64; 2],
-    /// Depth events of the echo that is wanted.
+    /// Depth events that are selected.
     chosen: u64,
-    /// How long a laser cycle is.
+    /// The rate of the laser.
     pub clock: LaserClock,
-    /// What is to be said of it.
+    /// A warning about the laser rate.
     pub warning: Option<String>,
     /// The laser cycle of the latest event.
     pub latest: u64,
-    /// Damage that ends the file too early: the byte, and what is wrong there.
+    /// Where the file is damaged, if it is: the byte and what is wrong there.
     pub damage: Option<String>,
 }
 
 impl Survey {
-    /// Reads all of a file. In a damaged file, an event at a time that `format` cannot hold
-    /// is where the damage begins.
+    /// Reads all of a file. In a damaged file, the damage begins at the first event with a time
+    /// that `format` cannot hold.
     ///
     /// # Errors
-    /// Of a file that is not damaged, such an event is an error.
-    pub fn of(
+    /// Fails if an intact file has such an event.
+    pub fn read(
         path: &Path,
         format: Format,
         clock: Option<LaserClock>,
@@ -59,7 +59,7 @@ impl Survey {
         ensure!(file.is_file(), "not a file that can be read twice");
         let mut reader = open(path)?;
         let header = *reader.header();
-        let (clock, warning) = LaserClock::choose(clock, &header);
+        let (clock, warning) = LaserClock::for_file(clock, &header);
         let mut survey = Self {
             header,
             clock,
@@ -70,7 +70,7 @@ impl Survey {
             damage: None,
         };
         progress.begin(file.len(), "bytes counted");
-        let mut selection = chosen(echo);
+        let mut selection = selection(echo);
         let mut beyond = None;
         loop {
             let begin = reader.offset();
@@ -91,8 +91,8 @@ impl Survey {
             if beyond.is_some() {
                 continue;
             }
-            if let Err(time) = format.check(&clock, event.cycle().0) {
-                // The byte of the time word, if there is one before the event.
+            if let Err(time) = format.check(&clock, event.cycle().raw()) {
+                // The offset of the time word, if there is one before the event.
                 beyond = Some((begin, time));
                 continue;
             }
@@ -101,7 +101,7 @@ impl Survey {
                 selection.push(event);
                 survey.chosen += selection.by_ref().count() as u64;
             }
-            survey.latest = survey.latest.max(event.cycle().0);
+            survey.latest = survey.latest.max(event.cycle().raw());
             if survey.all().is_multiple_of(4096) {
                 progress.at(reader.offset())?;
             }
@@ -121,7 +121,7 @@ impl Survey {
         self.counts[kind as usize]
     }
 
-    /// How many events of a kind are written, if depth events are of one echo.
+    /// How many events of a kind will be written.
     pub fn chosen(&self, kind: EventKind) -> u64 {
         match kind {
             EventKind::Depth => self.chosen,
@@ -129,19 +129,19 @@ impl Survey {
         }
     }
 
-    /// The one kind there is, unless one is wanted.
-    pub fn kind(&self, wanted: Option<EventKind>) -> Result<EventKind> {
-        if let Some(wanted) = wanted {
-            let name = match wanted {
+    /// The kind to write: `requested`, or the only one in the file.
+    pub fn kind(&self, requested: Option<EventKind>) -> Result<EventKind> {
+        if let Some(requested) = requested {
+            let name = match requested {
                 EventKind::Depth => "depth",
                 EventKind::DynamicDepth => "dynamic depth",
             };
             ensure!(
-                self.events(wanted) > 0 || self.all() == 0 || self.damage.is_some(),
+                self.events(requested) > 0 || self.all() == 0 || self.damage.is_some(),
                 "{} events, none of them a {name} event",
                 self.all()
             );
-            return Ok(wanted);
+            return Ok(requested);
         }
         match self.counts {
             [_, 0] => Ok(EventKind::Depth),

@@ -1,8 +1,8 @@
 //! EVT2, the RAW format of Prophesee: changes of depth as an event camera's changes of
 //! brightness. ON is farther, OFF nearer.
 //!
-//! Below a header in ASCII there are words of 32 bits, least significant byte first;
-//! bits 28-31 say what a word is:
+//! Words of 32 bits, least significant byte first, follow a header in ASCII. Bits 28-31 are the
+//! type of a word:
 //!
 //! | word | bits 28-31 | bits 22-27 | bits 11-21 | bits 0-10 |
 //! |---|---|---|---|---|
@@ -10,13 +10,14 @@
 //! | ON | 1 | time, bits 0-5 | column | row |
 //! | time | 8 | bits 0-27: time, bits 6-33 | | |
 //!
-//! Time is in microseconds. A time word comes before the first event and before each
-//! whose upper bits differ from those of the event before it.
+//! Time is in microseconds. A time word precedes the first event, and each event whose upper bits
+//! of time have changed.
 
 use std::io::{self, Write};
 
 use anyhow::{Result, ensure};
-use dtof_core::{Array, DynamicDepthConfig, DynamicDepthEvent, Polarity};
+use dtof_core::Array;
+use dtof_core::events::{DynamicDepthConfig, DynamicDepthEvent, Polarity};
 
 use super::reorder::{Reorder, WAITING};
 use super::{Finished, Out, Sink};
@@ -63,7 +64,7 @@ impl<W: Write> Encoder<W> {
         })
     }
 
-    /// Times have 34 bits (`span::EVT2_BITS`), and do not go back.
+    /// Times have 34 bits (`span::EVT2_BITS`) and do not decrease.
     #[allow(clippy::cast_possible_truncation, reason = "28 and 6 bits")]
     fn write(&mut self, change: &Change) -> io::Result<()> {
         let high = (change.time >> 6) as u32 & ((1 << 28) - 1);
@@ -84,7 +85,8 @@ impl<W: Write> Encoder<W> {
     }
 }
 
-/// Changes of depth, found or taken, put in order and written.
+/// Writes changes of depth in order of time. Computes them from depth events, or takes dynamic
+/// depth events.
 pub struct Evt2 {
     encoder: Encoder<Out>,
     order: Reorder<Change>,
@@ -138,10 +140,10 @@ impl Sink for Evt2 {
         let Some(change) = self.change(event) else {
             return Ok(());
         };
-        let time = u64::try_from(self.clock.microseconds(change.cycle.0))?;
-        // The change of a block is one of each of its pixels.
+        let time = u64::try_from(self.clock.microseconds(change.cycle.raw()))?;
+        // The change of a block is written for each of its pixels.
         for pixel in self.array.pixels_of(change.pixel, change.level) {
-            let pixel = u32::from(pixel.0);
+            let pixel = u32::from(pixel.raw());
             let change = Change {
                 time,
                 column: pixel % self.array.columns(),

@@ -1,5 +1,5 @@
-//! Messages for Foxglove: the points of a slice of time and its statistics, the same in an MCAP file
-//! and live.
+//! Messages for Foxglove: the points of a slice of time and its statistics, in an MCAP file and
+//! live.
 
 use anyhow::{Context, Result};
 use dtof_core::{BlockLevel, Flags};
@@ -11,19 +11,19 @@ use serde_json::{Value, json};
 use super::points::fields;
 use dtof_events::aer_file::{Event, EventKind};
 
-/// Points of a message, at most.
+/// The most points of a message.
 pub const MOST_POINTS: usize = 1 << 16;
 
-/// The frame that points are in.
+/// The coordinate frame of the points.
 pub const FRAME: &str = "dtof_optical";
 
-/// A topic, and what its messages are.
+/// A topic and the type of its messages.
 pub struct Channel {
     /// Its name.
     pub topic: &'static str,
-    /// Of its messages.
+    /// The encoding of its messages.
     pub encoding: &'static str,
-    /// Of its messages.
+    /// The encoding of its messages.
     pub schema: Schema,
 }
 
@@ -31,24 +31,24 @@ impl Channel {
     /// Points of a slice of time.
     ///
     /// # Errors
-    /// Never: the messages have a schema.
+    /// Never fails: the messages have a schema.
     pub fn events() -> Result<Self> {
-        Self::of::<PointCloud>("/events")
+        Self::protobuf::<PointCloud>("/events")
     }
 
     /// Statistics of the same slice.
     ///
     /// # Errors
-    /// Never: the messages are objects.
+    /// Never fails: the messages are objects.
     pub fn statistics() -> Result<Self> {
         Self::json("/statistics", "Statistics", &Statistics::default())
     }
 
-    /// Messages that Foxglove knows.
+    /// Messages of Foxglove's own types.
     ///
     /// # Errors
-    /// If they have no schema.
-    pub fn of<T: Encode>(topic: &'static str) -> Result<Self> {
+    /// Fails if they have no schema.
+    pub fn protobuf<T: Encode>(topic: &'static str) -> Result<Self> {
         let schema = T::get_schema();
         Ok(Self {
             topic,
@@ -57,17 +57,17 @@ impl Channel {
         })
     }
 
-    /// Messages of this project, all with the fields of `sample`.
+    /// JSON messages of this project, all with the fields of `sample`.
     ///
     /// # Errors
-    /// If `sample` is no object.
+    /// Fails if `sample` is not an object.
     pub fn json(topic: &'static str, name: &str, sample: &impl Serialize) -> Result<Self> {
         let fields = serde_json::to_value(sample)?;
         let fields = fields.as_object().context("a message has fields")?;
         let kind = |of: &str| json!({ "type": of });
         let properties = fields.iter().map(|(name, value)| {
             let schema = match value {
-                // The only one of them.
+                // The only object is a time.
                 Value::Object(_) => json!({
                     "type": "object",
                     "title": "time",
@@ -98,11 +98,11 @@ impl Channel {
 pub struct Statistics {
     /// When the slice begins.
     timestamp: Time,
-    /// How long it is, in seconds. In a file the last one ends with the last event.
+    /// The length in seconds. In a file, the last slice ends with the last event.
     duration_s: f64,
     /// Events.
     events: u64,
-    /// The same a second; null of a slice of no length, whose events are no later than the slice
+    /// Events a second; null for a slice of length 0, whose events are late ones of the slice
     /// before.
     events_per_s: f64,
     /// Pixels with an event.
@@ -111,7 +111,7 @@ pub struct Statistics {
     flagged: u64,
     /// Events whose peak counter was full.
     saturated: u64,
-    /// Events whose depth window was cut by the range gate, or whose position was held two
+    /// Events whose depth window was cut by the range gate, or whose position was limited to two
     /// bins from the peak.
     clipped: u64,
     /// Events that had to wait for the link.
@@ -127,14 +127,14 @@ pub struct Statistics {
 }
 
 impl Statistics {
-    /// Of a slice that began at `time` and lasted so many nanoseconds, after which there were so
-    /// many events.
+    /// Fills in the time: the slice began at `time` and lasted `duration_ns`, and `events_so_far`
+    /// events came up to its end.
     #[must_use]
     pub fn over(self, time: u64, duration_ns: u64, events_so_far: u64) -> Self {
         let duration_s = duration_ns as f64 / 1e9;
         let rate = self.events as f64 / duration_s;
         Self {
-            timestamp: Time::of(time),
+            timestamp: Time::from_nanoseconds(time),
             duration_s,
             events_per_s: if duration_ns > 0 { rate } else { f64::NAN },
             events_so_far,
@@ -143,7 +143,7 @@ impl Statistics {
     }
 }
 
-/// As Foxglove has it in JSON.
+/// A time in Foxglove's JSON format.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Time {
     sec: u32,
@@ -151,34 +151,34 @@ pub struct Time {
 }
 
 impl Time {
-    /// A time of less than 2^32 s.
+    /// `nanoseconds` must be less than 2^32 s.
     #[allow(clippy::cast_possible_truncation, reason = "checked by the clock")]
     #[must_use]
-    pub fn of(nanoseconds: u64) -> Self {
+    pub fn from_nanoseconds(nanoseconds: u64) -> Self {
         Self {
             sec: (nanoseconds / 1_000_000_000) as u32,
             nsec: (nanoseconds % 1_000_000_000) as u32,
         }
     }
 
-    /// The same in a message.
+    /// The same as a timestamp of a message.
     #[must_use]
     pub fn stamp(self) -> Option<Timestamp> {
         Timestamp::new_checked(self.sec, self.nsec)
     }
 }
 
-/// Counts the events of slices.
+/// Counts the events of each slice.
 #[derive(Debug)]
 pub struct Tally {
     now: Statistics,
-    /// The slice in which each pixel had its last event, counted from 1.
+    /// The slice of each pixel's last event, counted from 1.
     last_slice: Vec<u64>,
     so_far: u64,
 }
 
 impl Tally {
-    /// No event of so many pixels yet.
+    /// Starts without events, for so many pixels.
     #[must_use]
     pub fn new(pixels: usize) -> Self {
         Self {
@@ -188,13 +188,13 @@ impl Tally {
         }
     }
 
-    /// Counts an event of the slice with this number. Numbers rise.
+    /// Counts an event of slice number `slice`. Numbers must not decrease.
     ///
     /// # Errors
-    /// If the array has no such pixel. Nothing is counted then.
+    /// Fails if the array has no such pixel. Nothing is counted then.
     pub fn add(&mut self, event: &Event, slice: u64) -> Result<()> {
-        let last = self.last_slice.get_mut(usize::from(event.pixel().0));
-        let last = last.context("an event of no pixel")?;
+        let last = self.last_slice.get_mut(usize::from(event.pixel().raw()));
+        let last = last.context("the array has no such pixel")?;
         let now = &mut self.now;
         now.events += 1;
         now.pixels += u64::from(*last != slice + 1);
@@ -215,7 +215,7 @@ impl Tally {
         Ok(())
     }
 
-    /// The counts of a slice, which ends.
+    /// Ends a slice and returns its counts.
     pub fn take(&mut self) -> Statistics {
         std::mem::take(&mut self.now)
     }
@@ -230,7 +230,7 @@ impl Tally {
 /// Packed points as a message.
 ///
 /// # Errors
-/// If it cannot be encoded.
+/// Fails if it cannot be encoded.
 pub fn cloud(kind: EventKind, time: u64, data: Vec<u8>) -> Result<Vec<u8>> {
     let mut offset = 0;
     let mut fields_of_points = Vec::new();
@@ -243,7 +243,7 @@ pub fn cloud(kind: EventKind, time: u64, data: Vec<u8>) -> Result<Vec<u8>> {
         offset += field.number.bytes;
     }
     encoded(&PointCloud {
-        timestamp: Time::of(time).stamp(),
+        timestamp: Time::from_nanoseconds(time).stamp(),
         frame_id: FRAME.to_owned(),
         pose: Some(Pose {
             position: Some(Vector3::default()),
@@ -261,7 +261,7 @@ pub fn cloud(kind: EventKind, time: u64, data: Vec<u8>) -> Result<Vec<u8>> {
 /// A message as bytes.
 ///
 /// # Errors
-/// If it cannot be encoded.
+/// Fails if it cannot be encoded.
 pub fn encoded<T: Encode>(message: &T) -> Result<Vec<u8>>
 where
     T::Error: Send + Sync + 'static,

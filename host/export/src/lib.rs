@@ -1,8 +1,8 @@
 #![doc = include_str!("../README.md")]
 //! ## From events to a file
 //!
-//! The AER file is read once to count the events up to its end, or to where it is damaged, and once
-//! to write them. `docs/export.md` says what is in each format.
+//! The AER file is read twice: to count the events up to its end or to where it is damaged, and to
+//! write them. `docs/export.md` describes each format.
 
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
@@ -24,19 +24,17 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use dtof_core::{Array, RangeScale};
+use dtof_core::RangeScale;
 use dtof_link::DynamicDepth;
 use tempfile::NamedTempFile;
 
-use dtof_engine::settings::{Rays as SaidRays, SettingsFile};
+use dtof_engine::settings::{RaySettings, SettingsFile};
 use dtof_events::aer_file::{Event, EventKind, Header};
 use dtof_events::clock::LaserClock;
 use dtof_events::echoes::Echo;
-use dtof_options::files::{aside, flushed, place_of};
-use dtof_options::numbers::{MOST_WHOLE, whole};
+use dtof_options::files::{destination, flush_to_disk, temporary_file};
 use dtof_options::progress::Progress;
-use dtof_options::{NO_OPTION, Named, Refused, named};
-use dtof_photons::geometry::{FieldOfView, FieldOfViewError, Rays};
+use dtof_options::{Refused, named, named_values};
 
 use events::Survey;
 use mcap::Slices;
@@ -44,98 +42,40 @@ use points::Points;
 use projection::Projection;
 use span::Span;
 
-/// The format of an exported file.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Comma-separated values
-    Csv,
-    /// Points, in the format of PCL
-    Pcd,
-    /// Points, as vertices of a mesh
-    Ply,
-    /// Points slice by slice and statistics, for Foxglove
-    Mcap,
-    /// Points slice by slice as a bag of ROS 2 (MCAP)
-    Ros2,
-    /// Changes of depth as an event camera's RAW file (EVT2)
-    Evt2,
-}
-
-impl Named for Format {
-    const NAMES: &'static [(&'static str, Self, &'static str)] = &[
-        ("csv", Self::Csv, "Comma-separated values"),
-        ("pcd", Self::Pcd, "Points, in the format of PCL"),
-        ("ply", Self::Ply, "Points, as vertices of a mesh"),
-        (
-            "mcap",
-            Self::Mcap,
-            "Points slice by slice and statistics, for Foxglove",
-        ),
-        (
-            "ros2",
-            Self::Ros2,
-            "Points slice by slice as a bag of ROS 2 (MCAP)",
-        ),
-        (
-            "evt2",
-            Self::Evt2,
-            "Changes of depth as an event camera's RAW file (EVT2)",
-        ),
-    ];
-}
-
-/// Where the rays of the pixels come from.
-#[derive(Clone, Debug)]
-pub enum Optics {
-    /// A pinhole camera; [`FieldOfView::of`] the array unless given.
-    Pinhole(Option<FieldOfView>),
-    /// A calibration file.
-    Calibration(PathBuf),
-}
-
-impl Optics {
-    /// As a settings file says.
-    ///
-    /// # Errors
-    /// If its field of view is none.
-    pub fn of(said: &SaidRays) -> Result<Self> {
-        Ok(match (&said.calibration, said.field_of_view_degrees) {
-            (Some(file), _) => Self::Calibration(file.into()),
-            (None, Some(degrees)) => Self::Pinhole(Some(FieldOfView::new(degrees)?)),
-            (None, None) => Self::Pinhole(None),
-        })
-    }
-
-    /// The rays, and what they are for people.
-    ///
-    /// # Errors
-    /// If a calibration cannot be read, or is of another array.
-    pub fn rays(&self, array: Array) -> Result<(Rays, String)> {
-        Ok(match self {
-            Self::Pinhole(view) => {
-                let view = view.unwrap_or_else(|| FieldOfView::of([array.columns(), array.rows()]));
-                (Rays::pinhole(array, view), format!("{view} degrees, "))
-            }
-            Self::Calibration(path) => (Rays::read(path, array)?, format!("{}, ", path.display())),
-        })
+named_values! {
+    /// The format of an exported file.
+    #[derive(Debug, PartialEq, Eq)]
+    pub enum Format {
+        /// Comma-separated values
+        Csv = "csv",
+        /// Points, in the format of PCL
+        Pcd = "pcd",
+        /// Points, as vertices of a mesh
+        Ply = "ply",
+        /// Points slice by slice and statistics, for Foxglove
+        Mcap = "mcap",
+        /// Points slice by slice as a bag of ROS 2 (MCAP)
+        Ros2 = "ros2",
+        /// Changes of depth as an event camera's RAW file (EVT2)
+        Evt2 = "evt2",
     }
 }
 
 /// How events become points in space and time, or changes of depth.
 #[derive(Clone, Debug)]
 pub struct Options {
-    /// Where pixels look.
-    pub optics: Optics,
-    /// How long a laser cycle is; what the file says unless given, and if it does not the
-    /// paper's 10 MHz.
+    /// The rays of the pixels.
+    pub rays: RaySettings,
+    /// The rate of the laser, by default that of the file, else the paper's 10 MHz.
     pub clock: Option<LaserClock>,
-    /// Which events of a file that holds both kinds.
+    /// The kind of events to export, if the file has depth events and changes of depth.
     pub kind: Option<EventKind>,
     /// Which echo of each exposure, of depth events.
     pub echo: Echo,
-    /// MCAP and ROS 2: nanoseconds of a slice, not 0; 1/100 of the run unless given, see docs/export.md.
+    /// MCAP and ROS 2: nanoseconds of a slice, not 0; by default 1/100 of the run, see
+    /// docs/export.md.
     pub slice_ns: Option<u64>,
-    /// EVT2: what is made of depth events.
+    /// EVT2: how changes are found in depth events.
     pub dynamic_depth: DynamicDepth,
 }
 
@@ -144,7 +84,7 @@ impl Default for Options {
     /// between the means of adjacent events (section III-E).
     fn default() -> Self {
         Self {
-            optics: Optics::Pinhole(None),
+            rays: RaySettings::default(),
             clock: None,
             kind: None,
             echo: Echo::All,
@@ -154,65 +94,46 @@ impl Default for Options {
     }
 }
 
-/// How events become points, as options give it. What is not given is as in the settings file.
+/// How events become points, as given by options.
 #[derive(Clone, Debug, Default)]
-pub struct Projected {
+pub struct ProjectionOptions {
     /// Which echo of each exposure.
     pub echo: Option<Echo>,
-    /// The field of view of a pinhole camera.
-    pub fov: Option<FieldOfView>,
-    /// A calibration file.
-    pub calibration: Option<PathBuf>,
-    /// Laser cycles a second.
-    pub laser_hz: Option<u64>,
+    /// The rays and the laser rate, which override those of a settings file.
+    pub given: SettingsFile,
 }
 
-impl dtof_options::Options for Projected {
+impl dtof_options::Options for ProjectionOptions {
     const KEYS: &'static [&'static [&'static str]] =
         &[&["field_of_view_degrees", "calibration", "laser_hz", "echo"]];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
-            "field_of_view_degrees" => {
-                let view = text
-                    .parse()
-                    .map_err(|error: FieldOfViewError| error.to_string());
-                self.fov = Some(view?);
-            }
-            "laser_hz" => self.laser_hz = Some(whole(1..=MOST_WHOLE)(text)?),
             "echo" => self.echo = Some(named(text)?),
-            _ => return Err(NO_OPTION.to_owned()),
+            _ => self.given.set(key, text)?,
         }
         Ok(())
     }
 
     fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
-        (key == "calibration").then_some(&mut self.calibration)
+        (key == "calibration").then_some(&mut self.given.rays.calibration)
     }
 
     fn check(&self) -> Result<(), Refused> {
-        if self.fov.is_some() && self.calibration.is_some() {
-            let reason = "cannot be used with `calibration`";
-            return Err(Refused::new("field_of_view_degrees", reason));
-        }
-        Ok(())
+        self.given.check()
     }
 }
 
-impl Projected {
-    /// These, and of `file` what these do not say.
+impl ProjectionOptions {
+    /// These options, and the settings of `file` that they do not override.
     ///
     /// # Errors
-    /// If the file has no field of view or laser rate that can be.
-    pub fn options(self, file: &SettingsFile) -> Result<Options> {
-        let laser_hz = self.laser_hz.or(file.sensor.laser_hz);
+    /// Fails if the laser rate is 0.
+    pub fn options(self, file: SettingsFile) -> Result<Options> {
+        let SettingsFile { sensor, rays, .. } = self.given.or(file);
         Ok(Options {
-            optics: match (self.calibration, self.fov) {
-                (Some(file), _) => Optics::Calibration(file),
-                (None, Some(view)) => Optics::Pinhole(Some(view)),
-                (None, None) => Optics::of(&file.rays)?,
-            },
-            clock: laser_hz.map(LaserClock::new).transpose()?,
+            rays,
+            clock: sensor.laser_hz.map(LaserClock::new).transpose()?,
             echo: self.echo.unwrap_or(Echo::All),
             ..Options::default()
         })
@@ -221,30 +142,30 @@ impl Projected {
 
 /// The result of an export.
 #[derive(Debug)]
-pub struct Exported {
+pub struct ExportSummary {
     /// Events or points in the file.
     pub written: u64,
-    /// Events that came too late to be put in order, and are left out.
+    /// Events that came too late to be put in order; they are left out.
     pub late: u64,
-    /// Where the AER file is damaged and how, if it is. What came before is written.
+    /// Where and how the AER file is damaged, if it is. Everything before is written.
     pub damage: Option<String>,
     /// The assumptions behind points and times: "60x32.2 degrees, 10 MHz".
-    pub assumed: String,
-    /// What is to be said of the laser rate, if it is not the file's.
+    pub assumptions: String,
+    /// A warning about the laser rate, if it is not the file's.
     pub warning: Option<String>,
 }
 
-/// A file on its way.
+/// A temporary file.
 type Out = BufWriter<NamedTempFile>;
 
-/// A file that is whole.
+/// A complete file.
 struct Finished {
     out: Out,
     written: u64,
     late: u64,
 }
 
-/// Takes events, writes a file.
+/// Writes events to a file.
 trait Sink {
     fn write(&mut self, event: &Event) -> Result<()>;
     fn finish(self: Box<Self>) -> Result<Finished>;
@@ -253,24 +174,21 @@ trait Sink {
 /// Writes the events of the AER file `input` to `out`.
 ///
 /// # Errors
-/// If `input` is not an AER file, holds what the format cannot, or `out` cannot be
-/// written; `out` is what it was then. Damage of `input` is no error: see
-/// [`Exported::damage`].
+/// Fails if `input` is not an AER file, holds what the format cannot, or `out` cannot be written;
+/// `out` stays as it was. Damage of `input` is not an error: see [`ExportSummary::damage`].
 pub fn export(
     input: &Path,
     out: &Path,
     format: Format,
     options: &Options,
     progress: &mut dyn Progress,
-) -> Result<Exported> {
+) -> Result<ExportSummary> {
     let name = || input.display().to_string();
-    let inputs = match &options.optics {
-        Optics::Pinhole(_) => vec![input],
-        Optics::Calibration(calibration) => vec![input, calibration],
-    };
-    let place = place_of(out, &inputs)?;
+    let calibration = options.rays.calibration.as_deref();
+    let inputs: Vec<&Path> = [input].into_iter().chain(calibration).collect();
+    let place = destination(out, &inputs)?;
     let survey =
-        Survey::of(input, format, options.clock, options.echo, progress).with_context(name)?;
+        Survey::read(input, format, options.clock, options.echo, progress).with_context(name)?;
     let kind = survey.kind(options.kind).with_context(name)?;
     ensure!(
         kind == EventKind::Depth || options.echo == Echo::All,
@@ -278,21 +196,21 @@ pub fn export(
     );
     let (header, clock) = (survey.header, survey.clock);
     let array = header.array;
-    let (rays, mut assumed) = options.optics.rays(array)?;
+    let (rays, assumed_rays) = options.rays.rays(array)?;
     let projection = Projection {
         rays,
         scale: RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?,
         clock,
     };
-    if format == Format::Evt2 {
-        assumed.clear();
-    }
-    assumed += &clock.to_string();
-    let span = Span::of(format, &clock, &header, survey.latest).with_context(name)?;
+    let mut assumptions = match format {
+        Format::Evt2 => clock.to_string(),
+        _ => format!("{assumed_rays}, {clock}"),
+    };
+    let span = Span::new(format, &clock, &header, survey.latest).with_context(name)?;
     let slice_ns = options
         .slice_ns
         .unwrap_or_else(|| mcap::slice_of(span.end_ns));
-    let file = BufWriter::new(aside(&place.folder, ".dtof-export-")?);
+    let file = BufWriter::new(temporary_file(&place.folder, ".dtof-export-")?);
     let points = survey.chosen(kind);
     let to = || out.display().to_string();
     let sink: Result<Box<dyn Sink>> = match format {
@@ -300,7 +218,11 @@ pub fn export(
         Format::Pcd => Points::packed(file, projection, &pcd::header(kind, points)).map(boxed),
         Format::Ply => Points::packed(file, projection, &ply::header(kind, points)).map(boxed),
         Format::Mcap | Format::Ros2 => {
-            let _ = write!(assumed, ", clouds every {} µs", slice_ns as f64 / 1000.0);
+            let _ = write!(
+                assumptions,
+                ", clouds every {} µs",
+                slice_ns as f64 / 1000.0
+            );
             let for_ros2 = format == Format::Ros2;
             let slices = Slices { span, slice_ns };
             mcap::Mcap::new(file, projection, array, kind, slices, for_ros2).map(boxed)
@@ -317,7 +239,7 @@ pub fn export(
 
     progress.begin(survey.all(), "events");
     let mut events = events::open(input).with_context(name)?;
-    let mut selection = events::chosen(options.echo);
+    let mut selection = events::selection(options.echo);
     for done in 1..=survey.all() {
         let event = events.next_event().with_context(name)?;
         let event = event.with_context(|| format!("{} changed while it was read", name()))?;
@@ -339,13 +261,15 @@ pub fn export(
     }
     progress.end();
     let finished = sink.finish().with_context(to)?;
-    let moved = flushed(finished.out).with_context(to)?.persist(&place.file);
+    let moved = flush_to_disk(finished.out)
+        .with_context(to)?
+        .persist(&place.file);
     moved.map_err(|error| error.error).with_context(to)?;
-    Ok(Exported {
+    Ok(ExportSummary {
         written: finished.written,
         late: finished.late,
         damage: survey.damage,
-        assumed,
+        assumptions,
         warning: survey.warning,
     })
 }
@@ -354,15 +278,15 @@ pub fn export(
 /// header.
 ///
 /// # Errors
-/// If there are no such rays, or the header gives no range.
+/// Fails if the rays cannot be read, or the header has no valid scale.
 pub fn points<'a>(
     events: impl IntoIterator<Item = &'a Event>,
     header: &Header,
     options: &Options,
 ) -> Result<Vec<u8>> {
-    let (clock, _) = LaserClock::choose(options.clock, header);
+    let (clock, _) = LaserClock::for_file(options.clock, header);
     let projection = Projection {
-        rays: options.optics.rays(header.array)?.0,
+        rays: options.rays.rays(header.array)?.0,
         scale: RangeScale::new(header.bin_width_ps, header.offset_mm)?,
         clock,
     };

@@ -1,5 +1,4 @@
-//! MCAP: point clouds, one for each slice of time, as Foxglove knows them, with statistics of
-//! the slice; or as ROS 2 does.
+//! MCAP: one point cloud for each slice of time, for Foxglove with statistics, or for ROS 2.
 
 use std::collections::BTreeMap;
 use std::io::Write;
@@ -17,36 +16,36 @@ use super::span::Span;
 use super::{Finished, Out, Sink, ros2};
 use dtof_events::aer_file::{Event, EventKind};
 
-/// When slices are, and how long.
+/// The length and the extent of slices.
 #[derive(Clone, Copy, Debug)]
 pub struct Slices {
-    /// Of all events: the last slice ends with it, at the latest.
+    /// The time of all events, at whose end the last slice ends.
     pub span: Span,
-    /// Not 0.
+    /// Nanoseconds of a slice, not 0.
     pub slice_ns: u64,
 }
 
-/// Events put in order, gathered slice by slice.
+/// Puts events in order and collects them slice by slice.
 pub struct Mcap {
     writer: ::mcap::Writer<Out>,
     points_channel: u16,
-    /// None in a bag of ROS 2, which has no message for them.
+    /// `None` for ROS 2, which has no such message.
     statistics_channel: Option<u16>,
     sequence: u32,
     kind: EventKind,
     projection: Projection,
     order: Reorder<Event>,
     slices: Slices,
-    /// The slice that is being gathered: its number, its points that are not written and
-    /// their time, what happened.
+    /// The current slice: its number, its points that are not written yet, their time, and its
+    /// counts.
     slice: Option<u64>,
     points: Vec<u8>,
     points_ns: u64,
     tally: Tally,
 }
 
-/// Slices of a run that ends at `end_ns`: 1/100 of it in whole microseconds, rounded up,
-/// from 10 µs to 10 ms.
+/// The length of slices of a run that ends at `end_ns`: 1/100 of it in whole microseconds, rounded
+/// up, from 10 µs to 10 ms.
 pub fn slice_of(end_ns: u64) -> u64 {
     (end_ns.div_ceil(100_000) * 1000).clamp(10_000, 10_000_000)
 }
@@ -91,7 +90,7 @@ impl Mcap {
         })
     }
 
-    /// Takes the next event in time.
+    /// Adds the next event in order of time.
     fn gather(&mut self, event: &Event) -> Result<()> {
         let time = u64::try_from(self.projection.nanoseconds(event))?;
         let slice = time / self.slices.slice_ns;
@@ -100,7 +99,7 @@ impl Mcap {
             self.slice = Some(slice);
             self.points_ns = slice * self.slices.slice_ns;
         } else if self.points.is_empty() {
-            // The slice has a message already. Of two of one time viewers show the last.
+            // The slice has a message already. Viewers show only the last message of a time.
             self.points_ns = time;
         }
         self.points.write_all(&record(event, &self.projection)?)?;
@@ -111,7 +110,7 @@ impl Mcap {
         Ok(())
     }
 
-    /// Writes what was gathered.
+    /// Writes the current slice.
     fn end_slice(&mut self) -> Result<()> {
         let Some(slice) = self.slice else {
             return Ok(());
@@ -180,7 +179,7 @@ fn channels_for_foxglove(writer: &mut ::mcap::Writer<Out>) -> Result<[u16; 2]> {
 
 impl Sink for Mcap {
     fn write(&mut self, event: &Event) -> Result<()> {
-        match self.order.push(event.cycle().0, *event) {
+        match self.order.push(event.cycle().raw(), *event) {
             Some(next) => self.gather(&next),
             None => Ok(()),
         }

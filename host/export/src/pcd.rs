@@ -3,7 +3,7 @@
 use super::points::fields;
 use dtof_events::aer_file::EventKind;
 
-/// The header of a file of so many points.
+/// The header of a file of `points` points.
 pub fn header(kind: EventKind, points: u64) -> String {
     let fields = fields(kind);
     let names = fields.map(|field| field.name).join(" ");

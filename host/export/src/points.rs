@@ -9,10 +9,10 @@ use super::projection::Projection;
 use super::{Finished, Out, Sink};
 use dtof_events::aer_file::{Event, EventKind};
 
-/// The type of a field, little-endian, and its names in the formats.
+/// The type of a field, little-endian, and its name in each format.
 #[derive(Clone, Copy, Debug)]
 pub struct Number {
-    /// How many bytes it has.
+    /// Its size in bytes.
     pub bytes: u32,
     /// In PCD.
     pub pcd: &'static str,
@@ -62,7 +62,7 @@ const fn field(name: &'static str, number: Number) -> Field {
 #[must_use]
 pub fn fields(kind: EventKind) -> [Field; 9] {
     let value = match kind {
-        // What viewers look for to give points their brightness: the peak count.
+        // Viewers use this name for the brightness of points: the peak count.
         EventKind::Depth => "intensity",
         EventKind::DynamicDepth => "change",
     };
@@ -71,7 +71,7 @@ pub fn fields(kind: EventKind) -> [Field; 9] {
         field("y", F32),
         field("z", F32),
         field(value, F32),
-        // More than an address needs: Open3D leaves out 16 bits of a PLY file.
+        // Wider than an address, as Open3D skips 16-bit fields of PLY files.
         field("pixel", U32),
         field("flags", U8),
         // The point stands for 2^level pixels a side.
@@ -87,7 +87,7 @@ pub const BYTES: usize = 5 * 4 + 3 + 8;
 /// The record of an event.
 ///
 /// # Errors
-/// If the pixel of the event has no ray.
+/// Fails if the pixel of the event has no ray.
 #[allow(
     clippy::cast_possible_truncation,
     reason = "a peak count has 24 bits, a time is less than 2^53 ns; a change is rounded"
@@ -105,7 +105,7 @@ pub fn record(event: &Event, projection: &Projection) -> Result<[u8; BYTES]> {
     for (place, number) in record.chunks_exact_mut(4).zip([x, y, z, value]) {
         place.copy_from_slice(&number.to_le_bytes());
     }
-    record[16..20].copy_from_slice(&u32::from(event.pixel().0).to_le_bytes());
+    record[16..20].copy_from_slice(&u32::from(event.pixel().raw()).to_le_bytes());
     record[20] = event.flags().bits();
     record[21] = event.level().raw();
     record[22] = event.echo().raw();
@@ -114,7 +114,7 @@ pub fn record(event: &Event, projection: &Projection) -> Result<[u8; BYTES]> {
     Ok(record)
 }
 
-/// Records below a header, all written alike.
+/// Writes records after a header.
 pub struct Points {
     out: Out,
     projection: Projection,
@@ -126,7 +126,7 @@ impl Points {
     /// Writes `header`, and then each event with `write`.
     ///
     /// # Errors
-    /// If the header cannot be written.
+    /// Fails if the header cannot be written.
     pub fn new(
         mut out: Out,
         projection: Projection,
@@ -145,7 +145,7 @@ impl Points {
     /// Packed records below `header`.
     ///
     /// # Errors
-    /// If the header cannot be written.
+    /// Fails if the header cannot be written.
     pub fn packed(out: Out, projection: Projection, header: &str) -> Result<Self> {
         Self::new(out, projection, header, |out, event, projection| {
             Ok(out.write_all(&record(event, projection)?)?)

@@ -9,7 +9,7 @@ use dtof_photons::geometry::Rays;
 
 /// Turns an event into a point in space and time.
 pub struct Projection {
-    /// Where pixels look.
+    /// The rays of the pixels.
     pub rays: Rays,
     /// Bins to millimetres.
     pub scale: RangeScale,
@@ -18,10 +18,10 @@ pub struct Projection {
 }
 
 impl Projection {
-    /// x, y and z in metres, rounded to what files hold.
+    /// x, y and z in metres, rounded to f32.
     ///
     /// # Errors
-    /// If the pixel of the event has no ray.
+    /// Fails if the pixel of the event has no ray.
     #[allow(
         clippy::cast_possible_truncation,
         reason = "rounded to the nearest f32"
@@ -29,14 +29,14 @@ impl Projection {
     pub fn point(&self, event: &Event) -> Result<[f32; 3]> {
         let range_mm = self.scale.range(event.position()).to_num();
         let point = self.rays.point(event.pixel(), event.level(), range_mm);
-        let point = point.with_context(|| format!("pixel {} has no ray", event.pixel().0))?;
+        let point = point.with_context(|| format!("pixel {} has no ray", event.pixel().raw()))?;
         // No negative zeros.
         Ok(point.map(|side| side as f32 + 0.0))
     }
 
-    /// When it was, in nanoseconds.
+    /// The time in nanoseconds.
     #[must_use]
     pub fn nanoseconds(&self, event: &Event) -> u128 {
-        self.clock.nanoseconds(event.cycle().0)
+        self.clock.nanoseconds(event.cycle().raw())
     }
 }

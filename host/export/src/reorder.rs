@@ -1,27 +1,27 @@
-//! Puts events in order of time that are a little out of order.
+//! Sorts events that are slightly out of order by time.
 //!
-//! A device sends events in the order in which the link takes them, and each pixel has
-//! one event that may wait. So no event can be overtaken by more events than there are
-//! pixels, as long as the link takes all of them.
+//! A device sends events in the order in which the link takes them, and each pixel holds at most
+//! one event. So at most as many events as there are pixels can overtake an event, as long as the
+//! link takes all of them.
 
 use std::collections::BTreeMap;
 
-/// How many events wait for those that are older: one for each pixel address.
+/// How many events are held back to be sorted: one for each pixel address.
 pub const WAITING: usize = 1 << 16;
 
-/// Events on their way, the oldest first.
+/// Events that are held back.
 pub struct Reorder<T> {
-    /// By time; events of one time by their number, so that they stay in the order they came in.
+    /// Keyed by time and then by number, so that events of the same time stay in order.
     waiting: BTreeMap<(u64, u64), T>,
     most: usize,
     number: u64,
-    /// The time of the event that was given out last.
+    /// The time of the last event returned.
     last: u64,
     late: u64,
 }
 
 impl<T> Reorder<T> {
-    /// With room for `most` events.
+    /// Holds up to `most` events back.
     pub fn new(most: usize) -> Self {
         Self {
             waiting: BTreeMap::new(),
@@ -32,8 +32,8 @@ impl<T> Reorder<T> {
         }
     }
 
-    /// Takes one in, and gives the oldest out when there is no more room. One that is
-    /// older than what was given out is left out and counted.
+    /// Adds an event, and returns the oldest if more than `most` are held. An event older than the
+    /// last one returned is counted and dropped.
     pub fn push(&mut self, time: u64, item: T) -> Option<T> {
         if time < self.last {
             self.late += 1;
@@ -48,14 +48,14 @@ impl<T> Reorder<T> {
         }
     }
 
-    /// The oldest.
+    /// Returns the oldest event.
     pub fn pop(&mut self) -> Option<T> {
         let ((time, _), oldest) = self.waiting.pop_first()?;
         self.last = time;
         Some(oldest)
     }
 
-    /// How many were left out.
+    /// How many events were dropped.
     pub fn late(&self) -> u64 {
         self.late
     }
@@ -67,7 +67,7 @@ mod tests {
 
     use super::*;
 
-    /// What comes out, and how many do not.
+    /// The events that come out, and how many are dropped.
     fn ordered(most: usize, times: &[u64]) -> (Vec<(u64, usize)>, u64) {
         let mut reorder = Reorder::new(most);
         let mut out = Vec::new();
@@ -80,7 +80,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn comes_out_sorted_and_nothing_is_lost_unsaid(
+        fn comes_out_sorted_and_every_loss_is_counted(
             times in prop::collection::vec(0u64..50, 0..100), most in 0usize..20,
         ) {
             let (out, late) = ordered(most, &times);
@@ -89,7 +89,7 @@ mod tests {
         }
 
         #[test]
-        fn nothing_is_late_that_fewer_than_there_is_room_for_have_overtaken(
+        fn no_event_is_late_if_there_is_room_for_those_that_overtake_it(
             shifts in prop::collection::vec(0u64..8, 0..200),
         ) {
             // Each is at most 7 out of its place.

@@ -1,4 +1,4 @@
-//! Point clouds as messages of ROS 2: `sensor_msgs/msg/PointCloud2` in CDR, as a bag has them.
+//! Point clouds as messages of ROS 2: `sensor_msgs/msg/PointCloud2` in CDR, as in bags.
 //!
 //! Sources: the MCAP profile `ros2`; the definitions of the package `sensor_msgs`; CDR of the
 //! Object Management Group (DDSI-RTPS 2.3, section 10), which the first four bytes announce.
@@ -15,7 +15,7 @@ pub const PROFILE: &str = "ros2";
 pub const MESSAGES: &str = "cdr";
 /// The topic.
 pub const TOPIC: &str = "/dtof/points";
-/// The type of the messages, the encoding of its definition, and the definition with those that it
+/// The type of the messages, the encoding of its definition, and the definition with those it
 /// needs.
 pub const SCHEMA: [&str; 3] = [
     "sensor_msgs/msg/PointCloud2",
@@ -57,7 +57,7 @@ int32 sec
 uint32 nanosec
 ",
 ];
-/// What a channel says besides. Bags need the key; players take their defaults if it says nothing.
+/// Metadata of a channel. Bags need this key; with an empty value, players use their defaults.
 pub const METADATA: (&str, &str) = ("offered_qos_profiles", "");
 
 /// Little-endian CDR.
@@ -96,10 +96,10 @@ struct PointCloud2<'a> {
     is_dense: bool,
 }
 
-/// The message of packed points with these fields, at a time since 1970 of less than 2^31 s.
+/// The message of packed points with these fields. `time_ns` since 1970 must be less than 2^31 s.
 ///
 /// # Errors
-/// If there are more bytes than a message can have.
+/// Fails if there are more bytes than a message can have.
 pub fn cloud(fields: &[Field], frame_id: &str, time_ns: u64, data: &[u8]) -> Result<Vec<u8>> {
     let mut point_step = 0;
     let fields = fields.iter().map(|field| {
@@ -150,7 +150,7 @@ mod tests {
         let cloud = cloud(&fields(EventKind::Depth), "ab", 7_000_000_009, &point).unwrap();
         let mut expected = vec![0, 1, 0, 0];
         expected.extend([7, 0, 0, 0, 9, 0, 0, 0]);
-        // The frame, and a byte before the next number.
+        // The frame, and padding before the next number.
         expected.extend([3, 0, 0, 0, b'a', b'b', 0, 0]);
         // Height, width, how many fields.
         expected.extend([1, 0, 0, 0, 1, 0, 0, 0, 9, 0, 0, 0]);
@@ -171,7 +171,7 @@ mod tests {
             expected.resize(expected.len().next_multiple_of(4), 0);
             expected.extend([offset, 0, 0, 0, datatype, 0, 0, 0, 1, 0, 0, 0]);
         }
-        // Little-endian; the steps; the points; no point is missing.
+        // Byte order; the steps; the points; none is missing.
         expected.extend([0, 0, 0, 0, 31, 0, 0, 0, 31, 0, 0, 0, 31, 0, 0, 0]);
         expected.extend(point);
         expected.push(1);

@@ -1,4 +1,4 @@
-//! Which times a format can hold.
+//! The times that each format can hold.
 
 use anyhow::{Result, ensure};
 
@@ -7,24 +7,24 @@ use dtof_events::aer_file::Header;
 use dtof_events::clock::LaserClock;
 use dtof_options::Refused;
 
-/// Bits of a time of EVT2, in microseconds.
+/// Bits of an EVT2 time in microseconds.
 pub(super) const EVT2_BITS: u32 = 34;
 
-/// When the events of a file were.
+/// The time span of the events of a file.
 #[derive(Clone, Copy, Debug)]
 pub struct Span {
-    /// The nanosecond of 1970-01-01 UTC at which laser cycle 0 was; 0 if that is not known.
+    /// Nanoseconds from 1970-01-01 UTC to laser cycle 0; 0 if unknown.
     pub start_ns: u64,
-    /// The nanosecond after laser cycle 0 at which the last event's laser cycle ended, not 0.
+    /// Nanoseconds from laser cycle 0 to the end of the last event's laser cycle, not 0.
     pub end_ns: u64,
 }
 
 impl Span {
-    /// That of a file whose latest event is in laser cycle `latest`.
+    /// The span of a file whose last event is in laser cycle `latest`.
     ///
     /// # Errors
-    /// If `format` cannot hold the time of its events.
-    pub fn of(format: Format, clock: &LaserClock, header: &Header, latest: u64) -> Result<Self> {
+    /// Fails if `format` cannot hold the time of its events.
+    pub fn new(format: Format, clock: &LaserClock, header: &Header, latest: u64) -> Result<Self> {
         let start_ns = i128::from(header.start_us) * 1000;
         let end_ns = clock.end_ns(latest);
         if let Some(seconds) = format.end_seconds() {
@@ -37,14 +37,14 @@ impl Span {
                 format.name()
             );
         }
-        // Others have no such time.
+        // The other formats have no absolute time.
         let start_ns = u64::try_from(start_ns).unwrap_or(0);
         Ok(Self { start_ns, end_ns })
     }
 }
 
 impl Format {
-    /// Whether it can hold the time of an event in laser cycle `cycle`.
+    /// Checks that the format can hold the time of an event in laser cycle `cycle`.
     pub(super) fn check(self, clock: &LaserClock, cycle: u64) -> Result<()> {
         let Some(end_ns) = self.end_ns() else {
             return Ok(());
@@ -64,12 +64,12 @@ impl Format {
         Ok(())
     }
 
-    /// As people write it.
+    /// Its name in messages.
     fn name(self) -> String {
         format!("{self:?}").to_uppercase()
     }
 
-    /// The second since 1970 from which on it does not hold the time, if it has that time.
+    /// Absolute times must be less than so many seconds since 1970, if the format has them.
     fn end_seconds(self) -> Option<u64> {
         match self {
             Self::Csv | Self::Pcd | Self::Ply | Self::Evt2 => None,
@@ -78,13 +78,13 @@ impl Format {
         }
     }
 
-    /// The nanosecond from which on it does not hold the time of an event.
+    /// Times of events must be less than so many nanoseconds.
     fn end_ns(self) -> Option<u128> {
         match self {
             Self::Csv => None,
             // Whole numbers in a double.
             Self::Pcd | Self::Ply | Self::Mcap | Self::Ros2 => Some(1 << 53),
-            // Readers differ in what they take time for that has wrapped.
+            // Readers differ in how they treat times that wrap around.
             Self::Evt2 => Some(1000 << EVT2_BITS),
         }
     }

@@ -1,4 +1,4 @@
-//! Where events come from: a thread that takes them, and commands.
+//! The source of events: a thread that takes events and executes commands.
 
 mod device;
 mod playback;
@@ -8,38 +8,56 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::Receiver;
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
+use dtof_link::DynamicDepth;
 use tokio::sync::oneshot;
 
-pub use device::Device;
 pub use playback::Playback;
 
 use super::hub::{Hub, Kind};
-use super::outputs::{Folder, Recorded, Recorder};
+use super::outputs::{Folder, Recorder};
 use super::terminal::Terminal;
+use dtof_device::{HostTimeout, Port};
+use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::Header;
-use dtof_options::rows::{grouped, printable};
+use dtof_options::rows::printable;
 
-/// Where an answer goes: what was done, or why not, in a line.
+/// Takes the answer: what was done, or why not, in a line.
 pub type Answer = oneshot::Sender<Result<String, String>>;
 
-/// A wish of a page.
-pub struct Command {
-    pub wish: Wish,
+/// A command of a page, and the channel of its answer.
+pub struct PageRequest {
+    pub command: Command,
     pub answer: Answer,
 }
 
-/// What pages can wish for.
+/// A command.
 #[derive(Debug)]
-pub enum Wish {
-    /// Settings, in the form of a settings file.
+pub enum Command {
+    /// Apply settings, the text of a settings file.
     Settings(String),
-    /// The settings in force into a file.
+    /// Write the current settings into a file.
     Save,
-    /// Record, or stop it.
+    /// Switch recording on or off.
     Record(bool),
     /// Play a recording, or pause it.
     Play(bool),
+}
+
+/// A device and its options.
+pub struct Device {
+    /// Its name, for display.
+    pub name: String,
+    /// Opens its port; called for each session.
+    pub open: Box<dyn Fn() -> Result<Box<dyn Port>> + Send>,
+    /// The options of the command line.
+    pub requested: SettingsFile,
+    /// Number of pixels; by default the device's own.
+    pub pixels: Option<u16>,
+    /// The device sends changes of depth in place of depth events.
+    pub dynamic_depth: Option<DynamicDepth>,
+    /// The device stops its sensor once this program has been silent for so long.
+    pub host_timeout: HostTimeout,
 }
 
 /// A source of events.
@@ -51,7 +69,7 @@ pub enum Feed {
 }
 
 impl Feed {
-    /// For people.
+    /// Its name, for display.
     #[must_use]
     pub fn name(&self) -> String {
         match self {
@@ -60,7 +78,7 @@ impl Feed {
         }
     }
 
-    /// Which kind it is.
+    /// Its kind.
     #[must_use]
     pub fn kind(&self) -> Kind {
         match self {
@@ -69,63 +87,60 @@ impl Feed {
         }
     }
 
-    /// Runs until it is to `stop`.
+    /// Runs until `stop` is set.
     pub(super) fn run(
         self,
         hub: &Arc<Hub>,
-        commands: &Receiver<Command>,
+        requests: &Receiver<PageRequest>,
         folder: Folder,
         stop: &AtomicBool,
         terminal: Terminal,
     ) -> Result<()> {
-        let mut work = Work {
+        let mut context = FeedContext {
             name: self.name(),
             warned: Vec::new(),
             hub,
-            commands,
+            requests,
             stop,
             terminal,
             recorder: Recorder::new(folder),
-            recorded: Recorded::default(),
         };
-        let rests = match self {
-            Self::Device(device) => device.run(&mut work),
+        let ended = match self {
+            Self::Device(device) => device.run(&mut context),
             Self::Playback(playback) => {
-                playback.run(&mut work);
+                playback.run(&mut context);
                 Ok(())
             }
         };
-        // What was recorded is whole, also at the end.
-        let kept = work.recorder.stop(&mut work.recorded);
-        rests.and(kept)
+        let recorded = context.recorder.stop();
+        ended.and(recorded)
     }
 }
 
-/// What a feed works with.
-struct Work<'a> {
-    /// Of the source, for people.
+/// What a feed works with: the hub, requests of pages, the terminal and the recorder.
+struct FeedContext<'a> {
+    /// Name of the source, for display.
     name: String,
-    /// Warnings that were told.
+    /// Warnings that were printed.
     warned: Vec<String>,
     hub: &'a Hub,
-    commands: &'a Receiver<Command>,
+    requests: &'a Receiver<PageRequest>,
     stop: &'a AtomicBool,
     terminal: Terminal,
     recorder: Recorder,
-    recorded: Recorded,
 }
 
-impl Work<'_> {
+impl FeedContext<'_> {
     fn is_stopped(&self) -> bool {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// A line on standard error.
+    /// Prints a line on standard error.
     fn complain(&self, text: &str) {
         (self.terminal.complain)(&printable(&format!("{}: {text}", self.name)));
     }
 
-    /// Warnings on standard error, each once.
+    /// Prints warnings on standard error, each once.
     fn warn(&mut self, warnings: &[String]) {
         for warning in warnings {
             if !self.warned.contains(warning) {
@@ -136,44 +151,26 @@ impl Work<'_> {
         }
     }
 
-    /// Records events of a `header`, or stops it.
-    fn wish_to_record(&mut self, on: bool, header: Option<&Header>) -> Result<String> {
-        let done = record(&mut self.recorder, &mut self.recorded, on, header);
-        self.tell_recorded();
+    /// Switches recording on or off, and tells pages.
+    fn record(&mut self, on: bool, header: Option<&Header>) -> Result<String> {
+        let done = self.recorder.switch(on, header);
+        self.show_recording();
         done
     }
 
-    /// Tells pages how far the recording is.
-    fn tell_recorded(&self) {
-        self.hub.recorded(&self.recorded);
+    /// Tells pages the status of the recorder.
+    fn show_recording(&self) {
+        self.hub.set_recording(self.recorder.status());
+    }
+
+    /// Answers a command, with every option as its flag.
+    fn reply(&self, answer: Answer, result: Result<String>) {
+        let flags = |error| anyhow!(dtof_options::line(&error, &self.terminal.name));
+        reply(answer, result.map_err(flags));
     }
 }
 
-/// Records events of a `header`, or stops it. The disk may take long.
-fn record(
-    recorder: &mut Recorder,
-    recorded: &mut Recorded,
-    on: bool,
-    header: Option<&Header>,
-) -> Result<String> {
-    if on {
-        recorder.start(header, recorded)?;
-    } else {
-        recorder.stop(recorded)?;
-    }
-    Ok(match (on, header) {
-        (true, Some(_)) => format!("Recording into {}.", recorded.file),
-        (true, None) => "Recording begins with the device.".to_owned(),
-        (false, _) if recorded.file.is_empty() => "Nothing was recorded.".to_owned(),
-        (false, _) => format!(
-            "Saved {} events as {}.",
-            grouped(recorded.events),
-            recorded.file
-        ),
-    })
-}
-
-/// Answers a wish. A page that has gone does not read it.
+/// Answers a command, with every option as its key. A page that has gone does not read it.
 fn reply(answer: Answer, result: Result<String>) {
     let _ = answer.send(result.map_err(|error| format!("{error:#}")));
 }

@@ -1,11 +1,11 @@
-//! The live data for Foxglove: a websocket on this computer alone, beside the page.
+//! A server for Foxglove: a WebSocket on this computer alone, beside the page.
 //!
 //! ```text
-//! Hub → frames, ten a second, made once → a ring of the newest → each client what it wants of them
+//! Hub → ten frames a second, the same for all → ring of the newest → each client its topics
 //! ```
 //!
-//! The feed never waits for a client. A client that reads slowly misses frames, which are counted
-//! and told to it; one that takes nothing is given up.
+//! The feed never waits for a client. A slow client misses frames and is told how many. A client that
+//! reads nothing is disconnected.
 
 mod client;
 mod frames;
@@ -33,11 +33,11 @@ use topics::Topic;
 
 use dtof_options::Refused;
 
-/// Between two frames.
+/// Interval of frames.
 const EVERY: Duration = Duration::from_millis(100);
-/// Frames that wait for clients, at most: the newest.
+/// Most frames that wait for clients: the newest.
 const RING: usize = 4;
-/// Clients at a time, at most. Others wait to be taken.
+/// Most clients at a time. Others wait to be accepted.
 pub const MOST_CLIENTS: usize = 16;
 
 /// A port for Foxglove that is ready to be served.
@@ -48,11 +48,11 @@ pub struct Foxglove {
 }
 
 impl Foxglove {
-    /// At `port` of this computer, 0 for any that is free. Pages of `origins` may read, beside
-    /// Foxglove's own.
+    /// Listens at `port` of this computer, or at any free port if it is 0. Pages of `origins` may
+    /// connect, and Foxglove's own.
     ///
     /// # Errors
-    /// If the port is taken.
+    /// Fails if the port is taken.
     pub fn bind(port: u16, origins: Vec<Origin>) -> Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
             .map_err(|error| Refused::value("foxglove", port, error.to_string()))?;
@@ -70,18 +70,18 @@ impl Foxglove {
     }
 }
 
-/// What all clients share.
+/// State that all clients share.
 pub(super) struct App {
     hub: Arc<Hub>,
     origins: Origins,
     frames: broadcast::Sender<Arc<Frame>>,
-    /// Clients that want each topic.
-    wanted: [AtomicUsize; Topic::ALL.len()],
-    /// Somebody wants what may have been said before.
-    is_new: AtomicBool,
-    /// Of this program, among others that a client may have known.
+    /// Number of subscribers of each topic.
+    subscribers: [AtomicUsize; Topic::ALL.len()],
+    /// A client has subscribed. It needs values that have not changed, too.
+    has_new_subscriber: AtomicBool,
+    /// Start of this program, which tells it from other programs a client may have seen.
     began_ms: u128,
-    /// What was refused, as far as it was said: each once.
+    /// Refusals that were printed.
     refused: Mutex<Vec<String>>,
     terminal: Terminal,
 }
@@ -93,25 +93,26 @@ impl App {
             hub,
             origins: Origins::new(&foxglove.origins),
             frames: broadcast::Sender::new(RING),
-            wanted: <_>::default(),
-            is_new: AtomicBool::new(false),
+            subscribers: <_>::default(),
+            has_new_subscriber: AtomicBool::new(false),
             began_ms: now.unwrap_or_default().as_millis(),
             refused: Mutex::default(),
             terminal,
         }
     }
 
-    /// Makes frames of what is wanted, as long as something is.
+    /// Makes frames of the topics that have subscribers.
     pub async fn make_frames(self: Arc<Self>) {
         let mut ticks = interval(EVERY);
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-        let mut frames = Frames::new();
+        let mut frames = Frames::default();
         loop {
             ticks.tick().await;
-            let is_new = self.is_new.swap(false, Ordering::Relaxed);
-            let wanted = |topic: Topic| self.wanted[topic.index()].load(Ordering::Relaxed) > 0;
-            let frame = frames.next(&self.hub, &wanted, is_new);
-            // Nobody reads it if nobody is there.
+            let resend = self.has_new_subscriber.swap(false, Ordering::Relaxed);
+            let is_subscribed =
+                |topic: Topic| self.subscribers[topic.index()].load(Ordering::Relaxed) > 0;
+            let frame = frames.next(&self.hub, &is_subscribed, resend);
+            // Sending fails without clients.
             let _ = self.frames.send(Arc::new(frame));
         }
     }
@@ -123,21 +124,21 @@ impl App {
         }
     }
 
-    fn wants(&self, topic: Topic) {
-        self.wanted[topic.index()].fetch_add(1, Ordering::Relaxed);
-        self.is_new.store(true, Ordering::Relaxed);
+    fn subscribe(&self, topic: Topic) {
+        self.subscribers[topic.index()].fetch_add(1, Ordering::Relaxed);
+        self.has_new_subscriber.store(true, Ordering::Relaxed);
     }
 
-    fn wants_no_more(&self, topic: Topic) {
-        self.wanted[topic.index()].fetch_sub(1, Ordering::Relaxed);
+    fn unsubscribe(&self, topic: Topic) {
+        self.subscribers[topic.index()].fetch_sub(1, Ordering::Relaxed);
     }
 
-    /// Says once, to who started the program, that somebody was refused.
+    /// Prints a refusal on the terminal, each once.
     fn complain(&self, why: &str) {
-        /// Lines, at most.
+        /// Most lines.
         const MOST: usize = 8;
         let mut refused = self.refused.lock().unwrap_or_else(PoisonError::into_inner);
-        if refused.len() < MOST && !refused.iter().any(|said| said == why) {
+        if refused.len() < MOST && !refused.iter().any(|printed| printed == why) {
             (self.terminal.complain)(&format!("{}: {why}", (self.terminal.name)("foxglove")));
             refused.push(why.to_owned());
         }

@@ -1,8 +1,7 @@
-//! Who may ask: a page of this server, and nobody else.
+//! Admits requests from pages of this server only.
 //!
-//! The server listens on this computer alone. Pages of other sites, which a browser here shows,
-//! can reach it all the same. So a request names this server as its host, which one that was
-//! led here by a name of another site does not, and comes from a page of this server.
+//! The server listens on this computer alone, but pages of other sites in a browser here can reach it.
+//! So a request must name this server as its host and come from a page of this server.
 
 use hyper::header::{CONTENT_TYPE, HOST, HeaderMap, HeaderName, HeaderValue, ORIGIN};
 use hyper::{Method, Request, StatusCode};
@@ -11,16 +10,16 @@ const SEC_FETCH_SITE: HeaderName = HeaderName::from_static("sec-fetch-site");
 
 /// Names of this computer.
 pub const HERE: [&str; 2] = ["127.0.0.1", "localhost"];
-/// Why another name is refused.
+/// The refusal of other names.
 pub const NOT_HERE: &str = "this server is 127.0.0.1 and localhost only";
 
-/// Why not, in a line.
+/// Status and reason of a refusal.
 pub type Refused = (StatusCode, &'static str);
 
 /// Checks a request to the server at `port`.
 ///
 /// # Errors
-/// Why it is not answered.
+/// Fails with the reason if the request may not be answered.
 pub fn check<B>(request: &Request<B>, port: u16) -> Result<(), Refused> {
     let headers = request.headers();
     let forbidden = |why| Err((StatusCode::FORBIDDEN, why));
@@ -46,38 +45,38 @@ pub fn check<B>(request: &Request<B>, port: u16) -> Result<(), Refused> {
     Ok(())
 }
 
-/// Whether a host is the server at `port`.
+/// Returns whether a host is the server at `port`.
 fn is_here(host: &str, port: u16) -> bool {
-    // A browser leaves out the port that http has by itself.
-    let said = match port {
+    // A browser leaves out the default port of http.
+    let suffix = match port {
         80 => String::new(),
         port => format!(":{port}"),
     };
-    let name = host.strip_suffix(&said);
+    let name = host.strip_suffix(&suffix);
     name.is_some_and(|name| HERE.contains(&name))
 }
 
-/// Checks that a body is of a kind that forms of other sites cannot send.
+/// Checks that a body has the content type `kind`, which forms of other sites cannot send.
 ///
 /// # Errors
-/// If it is not.
+/// Fails if it has another.
 pub fn check_kind(headers: &HeaderMap<HeaderValue>, kind: &str) -> Result<(), Refused> {
-    let is_kind = one(headers, &CONTENT_TYPE)?.is_some_and(|said| said == kind);
+    let is_kind = one(headers, &CONTENT_TYPE)?.is_some_and(|value| value == kind);
     is_kind.then_some(()).ok_or((
         StatusCode::UNSUPPORTED_MEDIA_TYPE,
-        "the content type must be application/toml of settings, and application/json of all else",
+        "the content type must be application/toml for settings, and application/json otherwise",
     ))
 }
 
 /// The only value of a header.
 ///
 /// # Errors
-/// If there are several, or it is no text.
+/// Fails if there are several, or if the value is not text.
 pub fn one<'a>(
     headers: &'a HeaderMap<HeaderValue>,
     name: &HeaderName,
 ) -> Result<Option<&'a str>, Refused> {
-    let bad = || (StatusCode::BAD_REQUEST, "a header makes no sense");
+    let bad = || (StatusCode::BAD_REQUEST, "a header is invalid");
     let mut values = headers.get_all(name).iter();
     let Some(value) = values.next() else {
         return Ok(None);
@@ -143,14 +142,14 @@ mod tests {
     }
 
     #[test]
-    fn a_browser_does_not_say_the_port_that_http_has_by_itself() {
-        let ask = |host: &str, origin| {
+    fn a_browser_leaves_out_the_default_port() {
+        let is_admitted = |host: &str, origin| {
             let request = Request::builder().uri("/").header("host", host);
             let request = request.header("origin", origin).body(()).unwrap();
             check(&request, 80).is_ok()
         };
-        assert!(ask("localhost", "http://localhost"));
-        assert!(!ask("localhost", "http://localhost:8000"));
-        assert!(!ask("example.com", "http://localhost"));
+        assert!(is_admitted("localhost", "http://localhost"));
+        assert!(!is_admitted("localhost", "http://localhost:8000"));
+        assert!(!is_admitted("example.com", "http://localhost"));
     }
 }

@@ -1,11 +1,11 @@
-//! What is known now, for all pages: bounded, however many events come.
+//! The current state, shared by all pages. Its memory is bounded.
 
 mod frame;
 mod pages;
 mod pixels;
-#[cfg(feature = "foxglove")]
-mod seen;
 mod slice;
+#[cfg(feature = "foxglove")]
+mod snapshot;
 #[cfg(test)]
 mod tests;
 
@@ -16,92 +16,92 @@ use serde::Serialize;
 
 use dtof_core::RangeScale;
 use dtof_device::{HistogramAnswer, Setup};
-use dtof_engine::look::look;
+use dtof_engine::explain::explain;
 use dtof_engine::settings::Settings;
 use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::{Event, Header};
 
-use super::outputs::Recorded;
+use super::outputs::RecordingStatus;
 pub use frame::MOST_PIXELS;
 use pages::Pages;
 pub use pages::{MOST_EVENTS, MOST_PAGES, Page};
 #[cfg(feature = "foxglove")]
 pub use pixels::Pixel;
 use pixels::Pixels;
-#[cfg(feature = "foxglove")]
-pub use seen::{Seen, Wanted};
 use slice::Slice;
+#[cfg(feature = "foxglove")]
+pub use snapshot::Snapshot;
 
 /// Where events come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Kind {
-    /// A device, which takes commands and gives histograms.
+    /// A device, which takes commands and sends histograms.
     Device,
-    /// A recording, which can be stopped and played again.
+    /// A recording, which can be paused and played again.
     Recording,
 }
 
-/// How the source is.
+/// The state of the source.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Connection {
-    /// In a word: `opening`, `live`, `stopped`, `gone`, `playing`, `paused`, `ended`, `failed`.
+    /// One of `opening`, `live`, `stopped`, `gone`, `playing`, `paused`, `ended`, `failed`.
     pub state: &'static str,
-    /// Why.
+    /// The reason, if any.
     pub reason: String,
-    /// How often it has come back.
+    /// How often the device has come back.
     pub returned: u64,
 }
 
-/// What was lost, and rates, as the device says.
+/// Losses and rates, from the device's reports.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Losses {
-    /// Laser cycles since the settings are in force.
+    /// Laser cycles since the settings were applied.
     pub cycles: u64,
     /// Photons since then.
     pub photons: u64,
     /// Photons a second.
     pub photon_rate: f64,
-    /// Each loss by its name, also those that are 0.
+    /// Each loss with its name, also those of 0.
     pub counts: Vec<(&'static str, u64)>,
     /// The last error of the sensor.
     pub last_fault: Option<String>,
 }
 
-/// A histogram for pages that look at its pixel.
+/// The last histogram of a pixel that a page shows.
 #[derive(Debug)]
-struct Shot {
-    /// As JSON.
-    text: String,
+struct LastHistogram {
+    pixel: u16,
+    json: String,
     number: u64,
 }
 
 struct State {
     name: String,
     kind: Kind,
-    /// Changes with what [`frame`] tells once: array and settings.
+    /// Changes with array and settings, which a page is sent once.
     version: u64,
-    /// None before laser cycles begin.
+    /// `None` before laser cycles begin.
     header: Option<Header>,
     settings: Option<(SettingsFile, Settings)>,
-    /// What was said of settings before any were in force.
-    said: SettingsFile,
+    /// The options, shown until settings are applied.
+    requested: SettingsFile,
     scale: Option<RangeScale>,
     connection: Connection,
     pixels: Pixels,
     pages: Pages,
-    /// For those who are sent points, if there are any.
+    /// Events for point clouds, if a client subscribes to them.
     slice: Option<Slice>,
-    /// Events since the beginning, and of these those of masked pixels.
+    /// Events since the start, and events of masked pixels.
     events: u64,
     masked: u64,
     rate: Rate,
     losses: Losses,
-    recorded: Recorded,
-    /// The last histogram of each pixel that a page looks at.
-    shots: Vec<(u16, Shot)>,
-    shot: u64,
-    /// Laser cycle and second of a recording.
+    recording: RecordingStatus,
+    histograms: Vec<LastHistogram>,
+    /// Histograms so far.
+    histogram_number: u64,
+    /// Playback time of a recording.
     seconds: f64,
 }
 
@@ -112,11 +112,11 @@ struct Rate {
     per_second: f64,
 }
 
-/// What is known now. A lock is held for a batch of events, or for a frame of a page.
+/// The current state. It is locked for a batch of events, or for a frame of a page.
 pub struct Hub(Mutex<State>);
 
 impl Hub {
-    /// Nothing yet, of a source of this name.
+    /// The state of a source without events.
     #[must_use]
     pub fn new(name: String, kind: Kind) -> Self {
         Self(Mutex::new(State {
@@ -125,7 +125,7 @@ impl Hub {
             version: 1,
             header: None,
             settings: None,
-            said: SettingsFile::default(),
+            requested: SettingsFile::default(),
             scale: None,
             connection: Connection {
                 state: "opening",
@@ -143,39 +143,39 @@ impl Hub {
                 per_second: 0.0,
             },
             losses: Losses::default(),
-            recorded: Recorded::default(),
-            shots: Vec::new(),
-            shot: 0,
+            recording: RecordingStatus::default(),
+            histograms: Vec::new(),
+            histogram_number: 0,
             seconds: 0.0,
         }))
     }
 
     fn state(&self) -> MutexGuard<'_, State> {
-        // Each change is whole before anything can fail.
+        // A panic leaves the state valid.
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Settings that are to be put in force.
-    pub(super) fn said(&self, said: &SettingsFile) {
+    /// Sets the options, before settings are applied.
+    pub(super) fn set_requested(&self, requested: &SettingsFile) {
         let mut state = self.state();
         state.version += 1;
-        state.said = said.clone();
+        state.requested = requested.clone();
     }
 
-    /// Settings are in force: laser cycles begin at 0.
+    /// Begins with a new setup, at laser cycle 0.
     pub(super) fn begin(&self, setup: &Setup) {
         let mut state = self.state();
         state.begin(setup.header());
-        state.settings = Some((setup.said.clone(), setup.settings.clone()));
+        state.settings = Some((setup.effective.clone(), setup.settings.clone()));
     }
 
-    /// A recording begins.
+    /// Begins to play a recording, at laser cycle 0.
     pub(super) fn begin_recording(&self, header: Header) {
         self.state().begin(header);
     }
 
-    /// How the source is now.
-    pub(super) fn connection(&self, state: &'static str, reason: &str) {
+    /// Sets the state of the source.
+    pub(super) fn set_connection(&self, state: &'static str, reason: &str) {
         let mut all = self.state();
         let connection = &mut all.connection;
         connection.returned += u64::from(connection.state == "gone" && state == "live");
@@ -183,15 +183,16 @@ impl Hub {
         connection.reason = reason.to_owned();
     }
 
-    /// Takes all events in, of which so many more were of masked pixels.
-    pub(super) fn events(&self, events: &[Event], masked: u64) {
-        if events.is_empty() && masked == 0 {
-            return;
-        }
+    /// Counts events of masked pixels.
+    pub(super) fn add_masked(&self, events: u64) {
+        self.state().masked += events;
+    }
+
+    /// Adds events.
+    pub(super) fn add_events(&self, events: &[Event]) {
         let mut state = self.state();
         let state = &mut *state;
         state.events += events.len() as u64;
-        state.masked += masked;
         let (Some(header), Some(scale)) = (&state.header, &state.scale) else {
             return;
         };
@@ -207,102 +208,107 @@ impl Hub {
         }
     }
 
-    /// Where a recording is.
-    pub(super) fn at(&self, seconds: f64) {
+    /// Sets the playback time of a recording.
+    pub(super) fn set_seconds(&self, seconds: f64) {
         self.state().seconds = seconds;
     }
 
-    pub(super) fn losses(&self, losses: Losses) {
+    /// Sets losses and rates.
+    pub(super) fn set_losses(&self, losses: Losses) {
         self.state().losses = losses;
     }
 
-    pub(super) fn recorded(&self, recorded: &Recorded) {
-        let mut state = self.state();
-        if state.recorded != *recorded {
-            state.recorded = recorded.clone();
-        }
+    /// Sets the status of the recorder.
+    pub(super) fn set_recording(&self, recording: &RecordingStatus) {
+        self.state().recording.clone_from(recording);
     }
 
-    /// The pixels whose histograms somebody looks at, each once.
+    /// The pixels that pages show, each once.
     pub(super) fn watched(&self) -> Vec<u16> {
         self.state().pages.watched()
     }
 
-    /// The answer to a request for a histogram.
-    pub(super) fn histogram(&self, answer: &HistogramAnswer) {
+    /// Adds the answer to a request for a histogram.
+    pub(super) fn add_histogram(&self, answer: &HistogramAnswer) {
         let mut state = self.state();
         let state = &mut *state;
         let watched = state.pages.watched();
-        state.shots.retain(|(pixel, _)| watched.contains(pixel));
-        let (pixel, text) = match answer {
+        let (pixel, json) = match answer {
             Ok(histogram) => {
                 let settings = state.settings.as_ref();
-                let seen = settings.and_then(|(_, settings)| {
-                    look(settings, &histogram.counts, histogram.head.is_whole)
+                let look = settings.and_then(|(_, settings)| {
+                    explain(settings, &histogram.counts, histogram.head.is_whole)
                 });
-                let text = frame::histogram(histogram, seen.as_ref());
-                (histogram.head.pixel.0, text)
+                let json = frame::histogram(histogram, look.as_ref());
+                (histogram.head.pixel.raw(), json)
             }
-            Err((pixel, none)) => (pixel.0, frame::no_histogram(pixel.0, &none.to_string())),
+            Err((pixel, none)) => (
+                pixel.raw(),
+                frame::no_histogram(pixel.raw(), &none.to_string()),
+            ),
         };
-        if !watched.contains(&pixel) {
-            return;
+        let histograms = &mut state.histograms;
+        histograms.retain(|other| other.pixel != pixel && watched.contains(&other.pixel));
+        if watched.contains(&pixel) {
+            state.histogram_number += 1;
+            let number = state.histogram_number;
+            histograms.push(LastHistogram {
+                pixel,
+                json,
+                number,
+            });
         }
-        state.shot += 1;
-        let number = state.shot;
-        state.shots.retain(|(other, _)| *other != pixel);
-        state.shots.push((pixel, Shot { text, number }));
     }
 
-    /// A page opens, looking at a pixel; `None` if [`MOST_PAGES`] are open.
+    /// Opens a page that shows a pixel; `None` if [`MOST_PAGES`] are open.
     #[must_use]
     pub fn join(&self, pixel: u16) -> Option<Page> {
         self.state().pages.join(pixel)
     }
 
-    /// A page looks at another pixel. Says whether there is such a page.
+    /// Makes a page show another pixel. Returns whether the page exists.
     pub fn watch(&self, page: u64, pixel: u16) -> bool {
         self.state().pages.watch(page, pixel)
     }
 
-    /// A page has closed.
+    /// Closes a page.
     pub fn leave(&self, page: &Page) {
         self.state().pages.leave(page);
     }
 
-    /// What has changed for a page since its last frame, as JSON.
+    /// The changes since a page's last frame, as JSON.
     #[must_use]
     pub fn frame(&self, page: &mut Page) -> String {
         self.state().frame(page)
     }
 
-    /// Pages that are open.
+    /// Number of open pages.
     #[must_use]
     pub fn pages(&self) -> usize {
         self.state().pages.len()
     }
 
-    /// Events since the beginning.
+    /// Events since the start.
     #[must_use]
     pub fn arrived(&self) -> u64 {
         self.state().events
     }
 
-    /// Things that are kept for pages: pixels, then events and histograms that wait. All are
+    /// Numbers of pixels, of events that wait for pages, and of histograms in memory. All are
     /// bounded.
     #[must_use]
-    pub fn kept(&self) -> [usize; 3] {
+    pub fn memory(&self) -> [usize; 3] {
         let state = self.state();
-        let [pixels, shots] = [state.pixels.len(), state.shots.len()];
-        let events = state.pages.kept() + state.slice.as_ref().map_or(0, Slice::len);
-        [pixels, events, shots]
+        let [pixels, histograms] = [state.pixels.len(), state.histograms.len()];
+        let events = state.pages.waiting() + state.slice.as_ref().map_or(0, Slice::len);
+        [pixels, events, histograms]
     }
 }
 
 impl State {
     fn begin(&mut self, header: Header) {
         self.version += 1;
-        // Of other settings or another device: nothing of before holds.
+        // Another device or other settings: earlier values do not hold.
         self.pixels = Pixels::new(header.array);
         self.pages.restart();
         if let Some(slice) = &mut self.slice {
@@ -312,7 +318,7 @@ impl State {
         self.scale = RangeScale::new(header.bin_width_ps, header.offset_mm).ok();
         self.losses = Losses::default();
         self.seconds = 0.0;
-        self.shots.clear();
+        self.histograms.clear();
     }
 
     /// Events a second.

@@ -39,10 +39,10 @@ pub use origin::Origin;
 pub use outputs::Folder;
 pub use terminal::Terminal;
 
-/// Commands that wait for the feed, at most.
-const COMMANDS: usize = 16;
+/// Most commands that wait for the feed.
+const REQUESTS: usize = 16;
 
-/// A page that is ready to be served.
+/// A page that is ready to be served. Nothing runs yet.
 pub struct Served {
     /// Its address.
     pub address: String,
@@ -55,11 +55,11 @@ pub struct Served {
 }
 
 impl Served {
-    /// A page of `feed` on `port` of this computer, 0 for any that is free. Files are written into
-    /// `folder` only, what went wrong is told on `terminal`, too. Nothing runs yet.
+    /// Prepares a page of `feed` on `port` of this computer, or on any free port if it is 0. Files are
+    /// written into `folder` only. Errors are printed on `terminal` as well.
     ///
     /// # Errors
-    /// If the port is taken.
+    /// Fails if the port is taken.
     pub fn begin(feed: Feed, port: u16, folder: Folder, terminal: Terminal) -> Result<Self> {
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
             .map_err(|error| Refused::value("port", port, error.to_string()))?;
@@ -76,24 +76,24 @@ impl Served {
         })
     }
 
-    /// Foxglove is served, too.
+    /// Serves Foxglove as well, if it is given.
     #[must_use]
     pub fn with(mut self, foxglove: Option<Foxglove>) -> Self {
         self.foxglove = foxglove;
         self
     }
 
-    /// What is known now.
+    /// The state that pages show.
     #[must_use]
     pub fn hub(&self) -> &Arc<Hub> {
         &self.hub
     }
 
-    /// Runs the feed on a thread of its own, and serves the page until `done`, asked some times a
-    /// second, says so. Then the device rests, and a recording is ended.
+    /// Runs the feed on a thread, and serves the page until `done`, called 20 times a second, returns
+    /// true. Then the device stops its sensor, and a recording is completed.
     ///
     /// # Errors
-    /// If there is no more serving, the device does not rest, or the recording cannot be written.
+    /// Fails if the page cannot be served, the sensor may still run, or the recording cannot be written.
     pub fn until(self, done: impl Fn() -> bool) -> Result<()> {
         let Self {
             listener,
@@ -104,12 +104,12 @@ impl Served {
             terminal,
             ..
         } = self;
-        let (commands, receiver) = mpsc::sync_channel(COMMANDS);
+        let (requests, receiver) = mpsc::sync_channel(REQUESTS);
         let stop = AtomicBool::new(false);
         let (served, ended) = thread::scope(|scope| {
             let (hub, stop) = (&hub, &stop);
             let thread = scope.spawn(move || feed.run(hub, &receiver, folder, stop, terminal));
-            let served = server::serve(listener, foxglove, hub, commands, terminal, done);
+            let served = server::serve(listener, foxglove, hub, requests, terminal, done);
             stop.store(true, Ordering::Relaxed);
             (served, thread.join())
         });

@@ -1,21 +1,21 @@
-//! In place of the server for Foxglove, where the feature `foxglove` is off.
+//! Replaces the server for Foxglove if the feature `foxglove` is off.
 
 use anyhow::Result;
 
 use super::origin::Origin;
 use dtof_options::Refused;
 
-/// Clients at a time.
+/// Most clients at a time.
 pub const MOST_CLIENTS: usize = 0;
 
-/// There is none.
+/// A server that cannot exist.
 pub enum Foxglove {}
 
 impl Foxglove {
-    /// Refuses.
+    /// Refuses to listen.
     ///
     /// # Errors
-    /// Always: it names the feature.
+    /// Always fails, and names the feature.
     pub fn bind(_port: u16, _origins: Vec<Origin>) -> Result<Self> {
         Err(Refused::new(
             "foxglove",
@@ -24,7 +24,7 @@ impl Foxglove {
         .into())
     }
 
-    /// There is none.
+    /// Cannot be called.
     #[must_use]
     pub fn address(&self) -> &str {
         match *self {}

@@ -4,12 +4,12 @@ use std::str::FromStr;
 
 use hyper::Uri;
 
-/// Where pages come from, as browsers say: `https://example.com`, `http://localhost:8080`.
+/// The origin of pages as browsers send it: `https://example.com`, `http://localhost:8080`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Origin(String);
 
 impl Origin {
-    /// Its text, in small letters.
+    /// Its text in lower case.
     #[must_use]
     pub fn as_str(&self) -> &str {
         &self.0
@@ -22,14 +22,14 @@ impl FromStr for Origin {
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         let wrong = "must be http://HOST, https://HOST, or the same with :PORT";
         let uri: Uri = text.parse().map_err(|_| wrong)?;
-        let usual = match uri.scheme_str() {
+        let default = match uri.scheme_str() {
             Some("http") => 80,
             Some("https") => 443,
             _ => return Err(wrong),
         };
         let host = uri.host().filter(|host| !host.is_empty()).ok_or(wrong)?;
-        // As browsers say it: without the port that its kind has by itself.
-        let port = uri.port_u16().filter(|&port| port != usual);
+        // Browsers leave out the default port.
+        let port = uri.port_u16().filter(|&port| port != default);
         let port = port.map_or(String::new(), |port| format!(":{port}"));
         let origin = format!("{}://{host}{port}", uri.scheme_str().unwrap_or_default());
         let is_origin = text.len() >= origin.len() && uri.path() == "/" && !text.ends_with('/');

@@ -1,5 +1,4 @@
-//! The files of the live page: recordings and settings, in one folder, under names of their own.
-//! None replaces another.
+//! The files of the live page: recordings and settings, in one folder, under new names.
 
 use std::fs;
 use std::io::Write;
@@ -10,20 +9,22 @@ use anyhow::{Context, Result, bail};
 use dtof_device::monitor::EventFile;
 use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::{Event, Header};
-use dtof_options::files::aside;
+use dtof_options::Refused;
+use dtof_options::files::temporary_file;
+use dtof_options::rows::grouped;
 
-/// Files of a kind in a folder, at most.
+/// Most files of a kind in a folder.
 const MOST: u32 = 9999;
 
-/// Where files are written, if anywhere.
+/// The folder for files, or none.
 #[derive(Debug, Default)]
 pub struct Folder(Option<PathBuf>);
 
 impl Folder {
-    /// The folder, which is made if it is not there.
+    /// The folder at `path`, which is created if it does not exist.
     ///
     /// # Errors
-    /// If it cannot be made.
+    /// Fails if it cannot be created.
     pub fn new(path: Option<&Path>) -> Result<Self> {
         if let Some(path) = path {
             fs::create_dir_all(path).with_context(|| path.display().to_string())?;
@@ -31,10 +32,10 @@ impl Folder {
         Ok(Self(path.map(Path::to_owned)))
     }
 
-    /// A name that is free: `NAME.END`, `NAME-2.END` and so on.
+    /// A free name: `NAME.END`, `NAME-2.END` and so on.
     fn free(&self, name: &str, end: &str) -> Result<PathBuf> {
         let Some(folder) = &self.0 else {
-            bail!("nothing is written: start with --out DIR");
+            bail!(Refused::input("nothing is written: start with `out` DIR"));
         };
         for number in 1..=MOST {
             let number = if number == 1 {
@@ -50,15 +51,15 @@ impl Folder {
         bail!("{}: is full: {MOST} files of a kind", folder.display());
     }
 
-    /// Writes settings, and gives the name of the file.
+    /// Writes settings and returns the path of the file.
     ///
     /// # Errors
-    /// If there is no folder, or it cannot be written.
+    /// Fails if there is no folder, or it cannot be written.
     pub fn save(&self, settings: &SettingsFile) -> Result<PathBuf> {
         let path = self.free("dtof", "toml")?;
         let name = || path.display().to_string();
         let folder = path.parent().unwrap_or(Path::new("."));
-        let mut file = aside(folder, ".dtof-")?;
+        let mut file = temporary_file(folder, ".dtof-")?;
         file.write_all(settings.to_toml()?.as_bytes())
             .and_then(|()| file.as_file().sync_all())
             .with_context(name)?;
@@ -66,138 +67,147 @@ impl Folder {
         Ok(path)
     }
 
-    /// Begins a recording, and gives the name that its file gets.
+    /// Begins a recording and returns the path that its file will have.
     ///
     /// # Errors
-    /// If there is no folder, or it cannot be written.
+    /// Fails if there is no folder, or it cannot be written.
     pub fn record(&self, header: &Header) -> Result<(PathBuf, EventFile)> {
         let path = self.free("events", "aer")?;
-        let recording = EventFile::new(&path, &[], header)?.that_replaces_nothing();
-        Ok((path, recording))
+        let file = EventFile::new(&path, &[], header)?.that_replaces_nothing();
+        Ok((path, file))
     }
 }
 
-/// A recording that goes on, file after file, as long as it is wanted.
+/// Records events into one file after another.
 pub struct Recorder {
     folder: Folder,
-    /// Whether events are to be recorded.
-    is_wanted: bool,
-    now: Option<(PathBuf, EventFile, u64)>,
+    file: Option<EventFile>,
+    status: RecordingStatus,
 }
 
-/// What a recorder does, for pages.
+/// Status of a recorder, for pages.
 #[derive(Clone, Debug, Default, PartialEq, Eq, serde::Serialize)]
-pub struct Recorded {
-    /// Whether events are recorded.
+pub struct RecordingStatus {
+    /// Whether recording is on. A session without a file begins one then.
     pub on: bool,
-    /// The file that is written, or was last.
+    /// The current file, or the last one.
     pub file: String,
     /// Events in it.
     pub events: u64,
-    /// Files that are whole.
+    /// Number of complete files.
     pub files: u64,
-    /// Why it ended by itself.
+    /// Why recording has ended by itself.
     pub error: String,
 }
 
 impl Recorder {
-    /// One that records nothing yet.
+    /// A recorder that is off.
     #[must_use]
     pub fn new(folder: Folder) -> Self {
         Self {
             folder,
-            is_wanted: false,
-            now: None,
+            file: None,
+            status: RecordingStatus::default(),
         }
     }
 
-    /// The folder.
+    /// The folder of its files.
     #[must_use]
     pub fn folder(&self) -> &Folder {
         &self.folder
     }
 
-    /// Begins with events of a `header`, now, or with the next session if there is none.
+    /// Its status.
+    #[must_use]
+    pub fn status(&self) -> &RecordingStatus {
+        &self.status
+    }
+
+    /// Switches recording on or off. Without a `header`, the next session begins the file. Returns a
+    /// line that says what was done.
     ///
     /// # Errors
-    /// If no file can be begun.
-    pub fn start(&mut self, header: Option<&Header>, told: &mut Recorded) -> Result<()> {
-        if self.now.is_none()
-            && let Some(header) = header
-        {
-            let (path, recording) = self.folder.record(header)?;
-            *told = Recorded {
-                on: true,
-                file: path.display().to_string(),
-                files: told.files,
-                ..Recorded::default()
-            };
-            self.now = Some((path, recording, 0));
+    /// Fails if no file can be begun, or the disk does not take the last one.
+    pub fn switch(&mut self, on: bool, header: Option<&Header>) -> Result<String> {
+        if !on {
+            self.stop()?;
+        } else if let Some(header) = header {
+            self.begin_file(header)?;
         }
-        self.is_wanted = true;
-        told.on = true;
+        self.status.on = on;
+        let RecordingStatus { file, events, .. } = &self.status;
+        Ok(match (on, header) {
+            (true, Some(_)) => format!("Recording into {file}."),
+            (true, None) => "Recording begins with the device.".to_owned(),
+            (false, _) if file.is_empty() => "Nothing was recorded.".to_owned(),
+            (false, _) => format!("Saved {} events as {file}.", grouped(*events)),
+        })
+    }
+
+    /// Switches recording off and ends the file.
+    ///
+    /// # Errors
+    /// Fails if the disk does not take it.
+    pub fn stop(&mut self) -> Result<()> {
+        self.status.on = false;
+        self.end_file()
+    }
+
+    /// Ends the file. Recording stays on, and the next session begins another file.
+    ///
+    /// # Errors
+    /// Fails if the disk does not take it.
+    pub fn end_file(&mut self) -> Result<()> {
+        let ended = self.file.take().map(EventFile::finish);
+        match &ended {
+            None => {}
+            Some(Ok(())) => self.status.files += 1,
+            Some(Err(error)) => self.fail(error),
+        }
+        ended.unwrap_or(Ok(()))
+    }
+
+    /// Begins the file of a session, if recording is on.
+    pub fn resume(&mut self, header: &Header) {
+        if self.status.on
+            && let Err(error) = self.begin_file(header)
+        {
+            self.fail(&error);
+        }
+    }
+
+    /// Records events. If the disk does not take them, recording is switched off.
+    pub fn write(&mut self, events: &[Event]) {
+        let Some(file) = &mut self.file else {
+            return;
+        };
+        match file.write(events) {
+            Ok(()) => self.status.events += events.len() as u64,
+            Err(error) => {
+                // The error of the end says where the events are.
+                let ended = self.end_file();
+                self.fail(&ended.err().unwrap_or(error));
+            }
+        }
+    }
+
+    fn begin_file(&mut self, header: &Header) -> Result<()> {
+        if self.file.is_some() {
+            return Ok(());
+        }
+        let (path, file) = self.folder.record(header)?;
+        self.file = Some(file);
+        self.status = RecordingStatus {
+            on: true,
+            file: path.display().to_string(),
+            files: self.status.files,
+            ..RecordingStatus::default()
+        };
         Ok(())
     }
 
-    /// Ends the file; the next session begins another if that is still wanted.
-    ///
-    /// # Errors
-    /// If the disk does not take it.
-    pub fn end_file(&mut self, told: &mut Recorded) -> Result<()> {
-        let Some((_, recording, events)) = self.now.take() else {
-            return Ok(());
-        };
-        told.events = events;
-        let ended = recording.finish();
-        match &ended {
-            Ok(()) => told.files += 1,
-            Err(error) => self.failed(error, told),
-        }
-        ended
-    }
-
-    /// Ends it altogether.
-    ///
-    /// # Errors
-    /// If the disk does not take it.
-    pub fn stop(&mut self, told: &mut Recorded) -> Result<()> {
-        self.is_wanted = false;
-        told.on = false;
-        self.end_file(told)
-    }
-
-    /// Begins the file of a session, if one is wanted.
-    pub fn resume(&mut self, header: &Header, told: &mut Recorded) {
-        if self.is_wanted
-            && let Err(error) = self.start(Some(header), told)
-        {
-            self.failed(&error, told);
-        }
-    }
-
-    /// Takes all events in. A disk that does not take them ends the recording.
-    pub fn write(&mut self, events: &[Event], told: &mut Recorded) {
-        let Some((_, recording, count)) = &mut self.now else {
-            return;
-        };
-        let written = recording.write(events);
-        match written {
-            Ok(()) => {
-                *count += events.len() as u64;
-                told.events = *count;
-            }
-            Err(error) => {
-                // Says where they are.
-                let kept = self.end_file(told);
-                self.failed(&kept.err().unwrap_or(error), told);
-            }
-        }
-    }
-
-    fn failed(&mut self, error: &anyhow::Error, told: &mut Recorded) {
-        self.is_wanted = false;
-        self.now = None;
-        told.on = false;
-        told.error = format!("{error:#}");
+    fn fail(&mut self, error: &anyhow::Error) {
+        self.status.on = false;
+        self.status.error = format!("{error:#}");
     }
 }

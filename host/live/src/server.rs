@@ -1,7 +1,7 @@
-//! Serving the page: this computer alone, and nobody for ever.
+//! Serves the page to this computer alone.
 //!
-//! A connection that does not send its request, or does not take what it asked for, is closed; so
-//! many are open at a time, and a page is sent only what it takes.
+//! A connection is closed if its request does not arrive or its answer is not read in time. The
+//! number of connections is bounded, and a page is sent only as much as it reads.
 
 mod answer;
 mod assets;
@@ -21,7 +21,7 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 use tokio_io_timeout::TimeoutStream;
 
-use super::feed::Command;
+use super::feed::PageRequest;
 use super::foxglove::Foxglove;
 #[cfg(feature = "foxglove")]
 use super::foxglove::{App as Clients, MOST_CLIENTS};
@@ -29,23 +29,23 @@ use super::hub::Hub;
 use super::terminal::Terminal;
 use routes::App;
 
-/// Connections at a time, at most. Others wait to be taken.
+/// Most connections at a time. Others wait to be accepted.
 const CONNECTIONS: usize = 64;
-/// Bytes of a request's head, at most.
+/// Most bytes of a request's head.
 const HEAD: usize = 16 * 1024;
-/// A request's head takes no longer to come.
+/// Longest wait for a request's head.
 const HEAD_TIME: Duration = Duration::from_secs(5);
-/// A reader that takes nothing for so long is gone.
+/// A reader that reads nothing for so long is disconnected.
 const STUCK: Duration = Duration::from_secs(10);
-/// How often it is asked whether it is done.
-const ASK: Duration = Duration::from_millis(50);
+/// Interval of calls of `done`, and of retries.
+const POLL: Duration = Duration::from_millis(50);
 
-/// Serves pages and Foxglove until `done` says so.
+/// Serves pages and Foxglove until `done` returns true.
 pub fn serve(
     listener: Listener,
     foxglove: Option<Foxglove>,
     hub: &Arc<Hub>,
-    commands: SyncSender<Command>,
+    requests: SyncSender<PageRequest>,
     terminal: Terminal,
     done: impl Fn() -> bool,
 ) -> Result<()> {
@@ -57,7 +57,7 @@ pub fn serve(
         .build()?;
     let app = Arc::new(App {
         hub: Arc::clone(hub),
-        commands,
+        requests,
         port,
     });
     runtime.block_on(async {
@@ -78,16 +78,16 @@ pub fn serve(
             }));
         }
         while !done() {
-            tokio::time::sleep(ASK).await;
+            tokio::time::sleep(POLL).await;
         }
         anyhow::Ok(())
     })
 }
 
-/// A connection whose reader is given up if it takes nothing.
+/// A connection that fails if its reader reads nothing.
 type Stream = Pin<Box<TimeoutStream<TcpStream>>>;
 
-/// Takes at most so many connections at a time, and has each served.
+/// Accepts connections, at most `most` at a time, and serves each.
 async fn accept<F: Future<Output = ()> + Send + 'static>(
     listener: TcpListener,
     most: usize,
@@ -99,8 +99,8 @@ async fn accept<F: Future<Output = ()> + Send + 'static>(
             return;
         };
         let Ok((stream, _)) = listener.accept().await else {
-            // No more files can be opened, or it was gone at once.
-            tokio::time::sleep(ASK).await;
+            // Too many open files, or the connection was closed at once.
+            tokio::time::sleep(POLL).await;
             continue;
         };
         let mut stream = TimeoutStream::new(stream);
@@ -124,6 +124,6 @@ async fn answer_all(stream: Stream, app: Arc<App>) {
         .header_read_timeout(HEAD_TIME)
         .max_buf_size(HEAD)
         .serve_connection(TokioIo::new(stream), service);
-    // One that was broken off concerns nobody else.
+    // An error ends this connection only.
     let _ = connection.await;
 }

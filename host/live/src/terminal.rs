@@ -1,10 +1,10 @@
-//! What is told to who started the program.
+//! The terminal of the program that serves the page.
 
-/// The terminal of the program that serves the page.
+/// Prints lines, and names options, on the terminal.
 #[derive(Clone, Copy)]
 pub struct Terminal {
     /// Writes a line on standard error.
     pub complain: fn(&str),
-    /// What an option is called there, by its key.
+    /// Gives the name of an option from its key, such as its flag.
     pub name: fn(&str) -> String,
 }

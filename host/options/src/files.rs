@@ -1,4 +1,5 @@
-//! Files that are written: each beside its place, and moved there when it is whole.
+//! Output files. Each is written to a temporary file in the same folder and renamed when it is
+//! complete.
 //!
 //! A file that a command reads is never replaced.
 
@@ -9,26 +10,27 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use tempfile::NamedTempFile;
 
-/// Names of files that are not complete end so.
-pub const ASIDE: &str = ".partial";
+/// The suffix of incomplete files.
+pub const PARTIAL: &str = ".partial";
 
-/// Bytes at the start of a file that say what wrote it.
+/// The mark of a file is searched in so many bytes at its start.
 const HEAD: u64 = 1024;
 
-/// Where a file is to be.
-pub struct Place {
-    /// The folder it is written in.
+/// The path of an output file.
+pub struct Destination {
+    /// Its folder, where the temporary file is written.
     pub folder: PathBuf,
-    /// The file.
+    /// The path itself, with links resolved.
     pub file: PathBuf,
 }
 
-/// Where `out` is: what it leads to, if it is a link. Only a file is ever replaced, and
+/// Resolves the output path `out` and checks that it may be written. It must be new or a file, and
 /// none of `inputs`.
 ///
 /// # Errors
-/// If something else is there, or there is no folder for it.
-pub fn place_of(out: &Path, inputs: &[&Path]) -> Result<Place> {
+/// Fails if something other than a file is at `out`, if `out` is one of `inputs`, or if its folder
+/// does not exist.
+pub fn destination(out: &Path, inputs: &[&Path]) -> Result<Destination> {
     let name = || out.display().to_string();
     let is_there = is_no_input(out, inputs)?;
     let file = if is_there {
@@ -48,14 +50,14 @@ pub fn place_of(out: &Path, inputs: &[&Path]) -> Result<Place> {
         folder.display()
     );
     let folder = folder.to_owned();
-    Ok(Place { folder, file })
+    Ok(Destination { folder, file })
 }
 
-/// Checks that a result may take the place `file`: nothing is there, or a file with `mark`
-/// near its start, which an earlier run has written.
+/// Checks that a result may be written to `file`: nothing is there yet, or a file of an earlier
+/// run, which has `mark` near its start.
 ///
 /// # Errors
-/// If something else is there, or one of `inputs`.
+/// Fails if `file` was not written by this program, or is one of `inputs`.
 pub fn may_replace(file: &Path, mark: &str, inputs: &[&Path]) -> Result<()> {
     if !is_no_input(file, inputs)? {
         return Ok(());
@@ -75,50 +77,50 @@ pub fn may_replace(file: &Path, mark: &str, inputs: &[&Path]) -> Result<()> {
     Ok(())
 }
 
-/// Whether something is at `file`, which must then be a file and none of `inputs`.
+/// Returns whether `file` exists. If it does, it must be a file and none of `inputs`.
 fn is_no_input(file: &Path, inputs: &[&Path]) -> Result<bool> {
     let name = file.display();
     match fs::metadata(file) {
         Err(error) if matches!(error.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {
-            ensure!(!file.is_symlink(), "{name}: is a link to what is not there");
+            ensure!(!file.is_symlink(), "{name}: is a broken link");
             return Ok(false);
         }
         Err(error) => return Err(error).with_context(|| name.to_string()),
-        Ok(there) => ensure!(there.is_file(), "{name}: is there, and is no file"),
+        Ok(there) => ensure!(there.is_file(), "{name}: exists and is not a file"),
     }
-    let is_read = inputs.iter().any(|input| are_same(input, file));
-    ensure!(!is_read, "{name}: is the file that is read");
+    let is_read = inputs.iter().any(|input| is_same_file(input, file));
+    ensure!(!is_read, "{name}: is an input file");
     Ok(true)
 }
 
-/// Whether two names lead to one file, also through links of either kind.
+/// Returns whether two paths lead to the same file, through links of either kind.
 #[cfg(unix)]
 #[must_use]
-pub fn are_same(one: &Path, other: &Path) -> bool {
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
     let identity = |path| fs::metadata(path).map(|file| (file.dev(), file.ino()));
     matches!((identity(one), identity(other)), (Ok(one), Ok(other)) if one == other)
 }
 
-/// Whether two names lead to one file.
+/// Returns whether two paths lead to the same file.
 #[cfg(not(unix))]
 #[must_use]
-pub fn are_same(one: &Path, other: &Path) -> bool {
+pub fn is_same_file(one: &Path, other: &Path) -> bool {
     matches!((fs::canonicalize(one), fs::canonicalize(other)), (Ok(one), Ok(other)) if one == other)
 }
 
-/// A file in `folder` that vanishes unless it is moved to its place. Its name begins
-/// with `prefix`, which says whose it is.
+/// Creates a file in `folder` that is deleted unless it is persisted. Its name begins with
+/// `prefix`.
 ///
 /// # Errors
-/// If the folder cannot be written.
-pub fn aside(folder: &Path, prefix: &str) -> Result<NamedTempFile> {
+/// Fails if the folder cannot be written.
+pub fn temporary_file(folder: &Path, prefix: &str) -> Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();
-    builder.prefix(prefix).suffix(ASIDE);
+    builder.prefix(prefix).suffix(PARTIAL);
     #[cfg(unix)]
     {
         use std::os::unix::fs::PermissionsExt;
-        // As any other new file: the umask takes away what it should.
+        // The same permissions as any other new file, less the umask.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
     builder
@@ -129,8 +131,8 @@ pub fn aside(folder: &Path, prefix: &str) -> Result<NamedTempFile> {
 /// Writes the buffer to disk.
 ///
 /// # Errors
-/// If it cannot be written.
-pub fn flushed(file: BufWriter<NamedTempFile>) -> Result<NamedTempFile> {
+/// Fails if it cannot be written.
+pub fn flush_to_disk(file: BufWriter<NamedTempFile>) -> Result<NamedTempFile> {
     let file = file
         .into_inner()
         .map_err(std::io::IntoInnerError::into_error)?;
@@ -138,30 +140,30 @@ pub fn flushed(file: BufWriter<NamedTempFile>) -> Result<NamedTempFile> {
     Ok(file)
 }
 
-/// A text that is to be the file `place`. One of an earlier run, with `mark` near its start, is
+/// A text to be written to `place`. A file of an earlier run, with `mark` near its start, is
 /// replaced.
-pub struct Marked<'a> {
-    /// Where.
+pub struct MarkedFile<'a> {
+    /// The path.
     pub place: &'a Path,
-    /// What.
+    /// The content.
     pub text: &'a str,
-    /// By what files of this kind are known.
+    /// Marks files of this kind.
     pub mark: &'a str,
 }
 
-/// Writes `files`, all or none, in this order. None of `inputs` is replaced.
+/// Writes all `files` in this order, or none. None of `inputs` is replaced.
 ///
 /// # Errors
-/// If something else is in one of the places, or cannot be written.
-pub fn write_marked(files: &[Marked], inputs: &[&Path]) -> Result<()> {
+/// Fails if one of the files cannot be written or replaced.
+pub fn write_marked(files: &[MarkedFile], inputs: &[&Path]) -> Result<()> {
     let mut written = Vec::new();
-    for Marked { place, text, mark } in files {
+    for MarkedFile { place, text, mark } in files {
         may_replace(place, mark, inputs)?;
         let name = || place.display().to_string();
-        let to = place_of(place, inputs)?;
-        let mut file = BufWriter::new(aside(&to.folder, ".dtof-")?);
+        let to = destination(place, inputs)?;
+        let mut file = BufWriter::new(temporary_file(&to.folder, ".dtof-")?);
         file.write_all(text.as_bytes()).with_context(name)?;
-        written.push((flushed(file).with_context(name)?, to.file));
+        written.push((flush_to_disk(file).with_context(name)?, to.file));
     }
     for (file, place) in written {
         let name = || place.display().to_string();

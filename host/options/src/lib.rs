@@ -1,8 +1,8 @@
 #![doc = include_str!("../README.md")]
 //! ## An error that names another option
 //!
-//! Where a reason names another option it stands in backticks, with its key in a settings file: `false_alarm`.
-//! Whoever prints the error puts the name in its place that its user knows, `--false-alarm`.
+//! A reason names other options in backticks, by their keys in a settings file: `false_alarm`.
+//! Whoever prints the error replaces a key with the name its user knows, such as `--false-alarm`.
 //!
 //! ```
 //! use dtof_options::{Refused, line};
@@ -28,32 +28,33 @@ use std::ffi::OsStr;
 use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
 
-/// Why an option is refused.
+/// An error about an option or an input: a key, a value and a reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Refused {
-    /// The key of the option; none where an input is refused.
+    /// The key of the option; `None` if an input is refused.
     pub key: Option<String>,
-    /// Its value, if that is what is wrong.
+    /// The value, if the value is wrong.
     pub value: Option<String>,
     /// The reason. Other options stand in backticks.
     pub reason: String,
-    /// The key is a name as its user wrote it.
+    /// No option has this key; the user wrote it.
     is_unknown: bool,
-    /// The settings file that gave some of the options.
-    file: Option<Box<GivenByFile>>,
+    /// The settings file that set some of the options.
+    file: Option<Box<KeysOfFile>>,
 }
 
-/// The keys that a settings file gave.
+/// The keys that a settings file sets.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct GivenByFile {
-    /// The file.
+pub struct KeysOfFile {
+    /// The path itself, with links resolved.
     pub path: PathBuf,
-    /// Its keys, less those that an option has overridden.
+    /// Its keys, except those that an option has overridden.
     pub keys: BTreeSet<String>,
 }
 
 impl Refused {
-    /// The option `key` cannot stand here: the reason follows its name, as in "is for `rule` window".
+    /// The option `key` cannot be used here. The reason follows its name, as in "is for `rule`
+    /// window".
     pub fn new(key: impl Into<String>, reason: impl Into<String>) -> Self {
         Self {
             key: Some(key.into()),
@@ -74,26 +75,36 @@ impl Refused {
 
     /// The option `key` cannot have `value`.
     pub fn value(key: impl Into<String>, value: impl Display, reason: impl Into<String>) -> Self {
+        let (value, mut reason) = (value.to_string(), reason.into());
+        let number = value.trim_end_matches(char::is_alphabetic).trim_end();
+        let has_unit = number.len() < value.len() && numbers::real(number).is_some();
+        if has_unit
+            && ["must be a number", "must be a whole"]
+                .iter()
+                .any(|text| reason.starts_with(text))
+        {
+            reason += "; write it without a unit";
+        }
         Self {
-            value: Some(value.to_string()),
+            value: Some(value),
             ..Self::new(key, reason)
         }
     }
 
-    /// There is no option of this `name`, which is as its user wrote it; there are `keys`.
+    /// No option is called `name`, as the user wrote it. Suggests the most similar of `keys`.
     #[must_use]
     pub fn unknown<'a>(name: &str, keys: impl IntoIterator<Item = &'a str>) -> Self {
-        let likeness = |known: &&str| strsim::jaro(known, name.trim_start_matches('-'));
-        let alike = keys.into_iter().filter(|known| likeness(known) > 0.75);
-        let nearest = alike.max_by(|one, other| likeness(one).total_cmp(&likeness(other)));
-        let hint = nearest.map_or(String::new(), |known| format!("; is it `{known}`?"));
+        let likeness = |key: &&str| strsim::jaro(key, name.trim_start_matches('-'));
+        let similar = keys.into_iter().filter(|key| likeness(key) > 0.75);
+        let nearest = similar.max_by(|one, other| likeness(one).total_cmp(&likeness(other)));
+        let hint = nearest.map_or(String::new(), |key| format!("; is it `{key}`?"));
         Self {
             is_unknown: true,
             ..Self::new(name, format!("is unknown{hint}"))
         }
     }
 
-    /// In one line, with every option as `name` has it, or as the settings file that gave it.
+    /// The error in one line. `name` gives the name of each key, unless a settings file set it.
     #[must_use]
     pub fn line(&self, name: &dyn Fn(&str) -> String) -> String {
         let mut from_file = None;
@@ -126,7 +137,7 @@ impl Refused {
 }
 
 impl Display for Refused {
-    /// With keys as settings files have them.
+    /// Names keys as settings files do.
     fn fmt(&self, formatter: &mut Formatter) -> fmt::Result {
         formatter.write_str(&self.line(&|key| key.to_owned()))
     }
@@ -134,7 +145,7 @@ impl Display for Refused {
 
 impl Error for Refused {}
 
-/// A list of many values is not printed whole.
+/// Long lists are cut off.
 fn shortened(value: &str) -> String {
     const MOST: usize = 60;
     match value.char_indices().nth(MOST) {
@@ -143,19 +154,19 @@ fn shortened(value: &str) -> String {
     }
 }
 
-/// A name from outside for a reason: its backticks are none of a key.
+/// Replaces the backticks of a name from outside, which would mark a key.
 #[must_use]
 pub fn plain(name: impl Display) -> String {
     name.to_string().replace('`', "'")
 }
 
 fn is_key(text: &str) -> bool {
-    let of_keys =
+    let is_key_letter =
         |letter: char| letter.is_ascii_lowercase() || letter.is_ascii_digit() || letter == '_';
-    text.chars().all(of_keys)
+    text.chars().all(is_key_letter)
 }
 
-/// An error and what led to it in one line, with every option as `name` has it.
+/// An error and its causes in one line, with the name that `name` gives to each key.
 #[must_use]
 pub fn line(error: &anyhow::Error, name: &dyn Fn(&str) -> String) -> String {
     let texts = error.chain().map(|cause| match cause.downcast_ref() {
@@ -165,10 +176,9 @@ pub fn line(error: &anyhow::Error, name: &dyn Fn(&str) -> String) -> String {
     texts.collect::<Vec<_>>().join(": ")
 }
 
-/// `error`, which names `file` where it is about a key that the file gave, unless it names one
-/// already.
+/// Adds to `error` that `file` set the option it is about. Keeps a file that is already named.
 #[must_use]
-pub fn blamed(mut error: anyhow::Error, file: Option<&GivenByFile>) -> anyhow::Error {
+pub fn add_file_name(mut error: anyhow::Error, file: Option<&KeysOfFile>) -> anyhow::Error {
     if let Some(refused) = error.downcast_mut::<Refused>() {
         let file = file.cloned().map(Box::new);
         refused.file = refused.file.take().or(file);
@@ -176,45 +186,45 @@ pub fn blamed(mut error: anyhow::Error, file: Option<&GivenByFile>) -> anyhow::E
     error
 }
 
-/// The name of a key where options are given one by one: of a flag, less its dashes, and of a keyword.
+/// The name of a key as a flag, without its dashes, and as a keyword of Python.
 #[must_use]
 pub fn option_name(key: &str) -> &str {
-    let other = OTHER_NAMES.iter().find(|(known, _)| *known == key);
-    other.map_or(key, |(_, name)| name)
+    let found = OTHER_NAMES.iter().find(|(other, _)| *other == key);
+    found.map_or(key, |(_, name)| name)
 }
 
-/// The options whose keys in a settings file are longer.
+/// Options whose keys in a settings file are longer than their names.
 const OTHER_NAMES: [(&str, &str); 2] = [("masked", "mask"), ("field_of_view_degrees", "fov")];
 
-/// What a job takes.
+/// The options of a job.
 pub trait Options: Default {
-    /// The keys of all of its options, in groups.
+    /// The keys of all options, in groups.
     const KEYS: &'static [&'static [&'static str]];
 
     /// Sets one of [`Self::KEYS`].
     ///
     /// # Errors
-    /// Why it cannot be so.
+    /// Says what the value must be, or returns [`NO_OPTION`] for another key.
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String>;
 
-    /// The place of a key that names a file, whose name need not be text.
+    /// Where to put the path, if `key` names a file. Its name need not be UTF-8.
     fn file(&mut self, _key: &str) -> Option<&mut Option<PathBuf>> {
         None
     }
 
-    /// Is called once all are set.
+    /// Checks the options together, once all are set.
     ///
     /// # Errors
-    /// An option that is missing, or that excludes another.
+    /// Fails if an option is missing or excludes another.
     fn check(&self) -> Result<(), Refused> {
         Ok(())
     }
 }
 
-/// The options that are given as [`option_name`]s and texts.
+/// Reads options given by [`option_name`] and text.
 ///
 /// # Errors
-/// The first that is wrong.
+/// Returns the first error.
 pub fn read<O: Options>(
     given: impl IntoIterator<Item = (impl AsRef<str>, impl AsRef<OsStr>)>,
 ) -> Result<O, Refused> {
@@ -245,16 +255,55 @@ pub fn read<O: Options>(
     Ok(options)
 }
 
-/// Values that are chosen by a name.
+/// Values that have names.
 pub trait Named: Copy + 'static {
-    /// Each with its name, and what it is.
+    /// Each name with its value and its help.
     const NAMES: &'static [(&'static str, Self, &'static str)];
+}
+
+/// Defines an enum whose values have names. The doc comment of a value is its help.
+///
+/// ```
+/// use dtof_options::{named, named_values};
+///
+/// named_values! {
+///     /// An end of a list.
+///     #[derive(Debug, PartialEq)]
+///     pub enum End {
+///         /// The lowest bin
+///         First = "first",
+///         /// The highest bin
+///         Last = "last",
+///     }
+/// }
+/// assert_eq!(named("last"), Ok(End::Last));
+/// assert_eq!(named::<End>("best").unwrap_err(), "must be first or last");
+/// ```
+#[macro_export]
+macro_rules! named_values {
+    (
+        $(#[$of_enum:meta])*
+        $visibility:vis enum $type:ident {
+            $(#[doc = $help:literal] $(#[$of_value:meta])* $value:ident = $name:literal,)+
+        }
+    ) => {
+        $(#[$of_enum])*
+        #[derive(Clone, Copy)]
+        $visibility enum $type {
+            $(#[doc = $help] $(#[$of_value])* $value,)+
+        }
+
+        impl $crate::Named for $type {
+            const NAMES: &'static [(&'static str, Self, &'static str)] =
+                &[$(($name, Self::$value, $help.trim_ascii())),+];
+        }
+    };
 }
 
 /// Reads a name.
 ///
 /// # Errors
-/// All names.
+/// Lists all names if `text` is none of them.
 pub fn named<T: Named>(text: &str) -> Result<T, String> {
     let found = T::NAMES.iter().find(|(name, ..)| *name == text);
     found.map(|(_, value, _)| *value).ok_or_else(|| {
@@ -266,10 +315,11 @@ pub fn named<T: Named>(text: &str) -> Result<T, String> {
     })
 }
 
-/// Reads the name of a file or a folder. `-`, elsewhere standard input or output, is none.
+/// Reads the name of a file or a folder. `-`, which elsewhere means standard input or output, is
+/// refused.
 ///
 /// # Errors
-/// If it is `-`.
+/// Fails if it is `-`.
 pub fn path(name: &OsStr) -> Result<PathBuf, String> {
     if name == "-" {
         return Err("standard input and output are not supported here; give a name".to_owned());
@@ -277,24 +327,40 @@ pub fn path(name: &OsStr) -> Result<PathBuf, String> {
     Ok(name.into())
 }
 
-/// Why [`Options::set`] refuses what is none of its keys.
-pub const NO_OPTION: &str = "is no option here";
+/// The reason why [`Options::set`] refuses a key that it does not have.
+pub const NO_OPTION: &str = "is not an option here";
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use std::io;
 
-    /// A closed output ends the program well: it is found below whatever a file is blamed for.
+    #[test]
+    fn a_number_with_a_unit_is_refused_with_a_hint() {
+        let reason = "must be a number above 0";
+        for (value, hint) in [
+            ("0.25ns", "; write it without a unit"),
+            ("3 m", "; write it without a unit"),
+            ("-3", ""),
+            ("ns", ""),
+            ("", ""),
+        ] {
+            let refused = Refused::value("bin_width_ps", value, reason);
+            assert_eq!(refused.reason, format!("{reason}{hint}"), "{value}");
+        }
+    }
+
+    /// The program ends without an error if its output is closed, so this error must be found below
+    /// any context.
     #[test]
     fn an_error_of_another_kind_stays_what_it_is() {
-        let file = GivenByFile {
+        let file = KeysOfFile {
             path: "my.toml".into(),
             keys: BTreeSet::from(["l2".to_owned()]),
         };
         let error = io::Error::from(io::ErrorKind::BrokenPipe);
-        assert!(blamed(error.into(), Some(&file)).is::<io::Error>());
-        let refused = blamed(Refused::new("l2", "is wrong").into(), Some(&file));
+        assert!(add_file_name(error.into(), Some(&file)).is::<io::Error>());
+        let refused = add_file_name(Refused::new("l2", "is wrong").into(), Some(&file));
         assert_eq!(refused.to_string(), "my.toml: l2 is wrong");
     }
 }

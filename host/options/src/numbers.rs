@@ -1,4 +1,4 @@
-//! How numbers are read from texts, the same for every option.
+//! Numbers as text, read the same way for every option.
 //!
 //! A number is decimal, with or without an exponent: `0.5`, `10e6`. A whole number may have an
 //! exponent, too: `1e5`.
@@ -9,14 +9,14 @@ use std::str::FromStr;
 
 use dtof_core::fixed::traits::Fixed;
 
-/// Exponents go so far either way, somewhat farther than those of any `f64`.
+/// Larger exponents are refused. Those of any `f64` are smaller.
 const MOST_EXPONENT: u32 = 400;
 
-/// The highest seed or number of laser cycles: that of a settings file.
-pub const MOST_WHOLE: u64 = i64::MAX as u64;
+/// The highest seed or number of laser cycles, as TOML has no larger integers.
+pub const MAX_INTEGER: u64 = i64::MAX as u64;
 
 /// Reads a whole number in `range`.
-pub fn whole<T>(
+pub fn integer<T>(
     range: RangeInclusive<T>,
 ) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static
 where
@@ -33,22 +33,30 @@ where
     }
 }
 
-/// Reads how many bins a histogram has.
+/// Reads laser cycles a second: up to 1 THz, so that 64 bits hold the rate in millihertz.
 ///
 /// # Errors
-/// If there is no such histogram.
-pub fn bins(text: &str) -> Result<u16, String> {
-    // What is no number is refused as 0 is.
-    bins_of(whole(0..=u16::MAX)(text).unwrap_or(0))
+/// Fails if it is not a whole number in that range.
+pub fn laser_hz(text: &str) -> Result<u64, String> {
+    integer(1..=1_000_000_000_000)(text)
 }
 
-/// `bins`, if a histogram can have so many.
+/// Reads a number of bins.
 ///
 /// # Errors
-/// If there is no such histogram.
+/// Fails if a histogram cannot have so many bins.
+pub fn bins(text: &str) -> Result<u16, String> {
+    // Text that is not a number is refused like 0.
+    bins_of(integer(0..=u16::MAX)(text).unwrap_or(0))
+}
+
+/// Checks a number of bins.
+///
+/// # Errors
+/// Fails if a histogram cannot have so many bins.
 pub fn bins_of(bins: u16) -> Result<u16, String> {
-    let is_known = (8..=1024).contains(&bins) && bins.is_power_of_two();
-    is_known
+    let is_valid = (8..=1024).contains(&bins) && bins.is_power_of_two();
+    is_valid
         .then_some(bins)
         .ok_or("must be a power of two from 8 to 1024".to_owned())
 }
@@ -56,7 +64,7 @@ pub fn bins_of(bins: u16) -> Result<u16, String> {
 /// Reads a fixed-point number, rounded to the nearest.
 ///
 /// # Errors
-/// If it is none, does not fit, or becomes 0 and was not written so.
+/// Fails if it is not a number, is out of range, or is not 0 but rounds to 0.
 pub fn fixed<T: Fixed + FromStr>(text: &str) -> Result<T, String> {
     let range = || format!("must be a number from {} to {}", T::MIN, T::MAX);
     let plain = plain(text).ok_or_else(range)?;
@@ -70,10 +78,11 @@ pub fn fixed<T: Fixed + FromStr>(text: &str) -> Result<T, String> {
     Ok(number)
 }
 
-/// A fixed-point number, of up to 53 bits, with as few decimals as [`fixed`] reads it from.
+/// Writes a fixed-point number of up to 53 bits with the fewest decimals from which [`fixed`] reads
+/// it back.
 #[must_use]
 pub fn shortest<T: Fixed + FromStr>(number: T) -> String {
-    // The decimals of a fixed-point number's own format may be those of its neighbour.
+    // The number's own format may write decimals that read as its neighbour.
     let exact: f64 = number.to_num();
     let all = T::FRAC_NBITS as usize;
     let texts = (0..all).map(|decimals| format!("{exact:.decimals$}"));
@@ -84,7 +93,7 @@ pub fn shortest<T: Fixed + FromStr>(number: T) -> String {
 /// Reads a number above 0.
 ///
 /// # Errors
-/// If it is none, or not a finite one.
+/// Fails if it is not finite and above 0.
 pub fn positive(text: &str) -> Result<f64, String> {
     real(text)
         .filter(|number| *number > 0.0)
@@ -104,23 +113,23 @@ pub fn within(
 ) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
     move |text| {
         let number = real(text).filter(|number| range.contains(number));
-        let (least, most) = (range.start(), range.end());
-        number.ok_or_else(|| format!("must be a number from {least} to {most}"))
+        let (min, max) = (range.start(), range.end());
+        number.ok_or_else(|| format!("must be a number from {min} to {max}"))
     }
 }
 
 /// Reads `true` or `false`.
 ///
 /// # Errors
-/// If it is neither.
-pub fn truth(text: &str) -> Result<bool, String> {
+/// Fails if it is neither.
+pub fn boolean(text: &str) -> Result<bool, String> {
     text.parse().map_err(|_| "must be true or false".to_owned())
 }
 
-/// Reads numbers that stand one after the other, separated by `separators`.
+/// Reads numbers separated by `separators`.
 ///
 /// # Errors
-/// That of the first that is none, which it names.
+/// Returns the first error and names the number.
 pub fn list<T>(
     text: &str,
     separators: &[char],
@@ -136,7 +145,7 @@ pub fn list<T>(
     text.split(separators).map(read).collect()
 }
 
-/// A number without an exponent, and without zeros that say nothing: `2.50e3` as `2500`.
+/// A number without exponent and without superfluous zeros: `2.50e3` becomes `2500`.
 fn plain(text: &str) -> Option<String> {
     let (number, exponent) = match text.split_once(['e', 'E']) {
         Some((number, exponent)) => (number, exponent.parse::<i32>().ok()?),
@@ -153,7 +162,7 @@ fn plain(text: &str) -> Option<String> {
     if !is_number || zeros > MOST_EXPONENT {
         return None;
     }
-    // Room for the point wherever it goes.
+    // Enough zeros for any place of the point.
     let zeros = "0".repeat(zeros as usize);
     let mut point = before.len();
     if exponent < 0 {
@@ -162,12 +171,12 @@ fn plain(text: &str) -> Option<String> {
         digits.push_str(&zeros);
         point += zeros.len();
     }
-    let (whole, fraction) = digits.split_at(point);
-    let whole = whole.trim_start_matches('0');
-    let whole = if whole.is_empty() { "0" } else { whole };
+    let (integer, fraction) = digits.split_at(point);
+    let integer = integer.trim_start_matches('0');
+    let integer = if integer.is_empty() { "0" } else { integer };
     let fraction = fraction.trim_end_matches('0');
     let point = if fraction.is_empty() { "" } else { "." };
-    Some(format!("{sign}{whole}{point}{fraction}"))
+    Some(format!("{sign}{integer}{point}{fraction}"))
 }
 
 #[cfg(test)]
@@ -201,7 +210,7 @@ mod tests {
 
     #[test]
     fn a_whole_number_is_exact_and_in_its_range() {
-        let cycles = whole(1..=u64::MAX);
+        let cycles = integer(1..=u64::MAX);
         assert_eq!(cycles("1e5"), Ok(100_000));
         assert_eq!(cycles("18446744073709551615"), Ok(u64::MAX));
         let refused = format!("must be a whole number from 1 to {}", u64::MAX);

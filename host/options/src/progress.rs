@@ -1,23 +1,23 @@
-//! How far a long job is: the job tells it, whoever runs the job shows it.
+//! Progress of a long job: the job reports it, and its caller shows it.
 
 use anyhow::Result;
 
-/// Is told how far a long job is.
+/// Receives the progress of a long job.
 pub trait Progress {
-    /// A part of the job begins: `total` things called `unit`.
+    /// A part of the job begins: `total` items called `unit`.
     fn begin(&mut self, total: u64, unit: &str);
 
-    /// So many of them are done.
+    /// `done` items are done.
     ///
     /// # Errors
-    /// If nobody wants the rest.
+    /// Fails if the job was cancelled.
     fn at(&mut self, done: u64) -> Result<()>;
 
     /// The part has ended.
     fn end(&mut self);
 }
 
-/// Nobody watches.
+/// Shows nothing.
 impl Progress for () {
     fn begin(&mut self, _total: u64, _unit: &str) {}
 

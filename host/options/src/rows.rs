@@ -1,9 +1,9 @@
-//! Rows of text: a name and a value, for people.
+//! Tables of names and values for people.
 
 /// A name and a value.
 pub type Row = (String, String);
 
-/// A number with its thousands apart: 12,345.
+/// A number with a comma between thousands: 12,345.
 #[must_use]
 pub fn grouped(value: u64) -> String {
     let digits = value.to_string();
@@ -17,7 +17,7 @@ pub fn grouped(value: u64) -> String {
     text
 }
 
-/// A number other than 0 with at least so many digits from its first, and at most 12 decimals.
+/// A number other than 0 with at least `digits` significant digits and at most 12 decimals.
 #[must_use]
 #[allow(
     clippy::cast_possible_truncation,
@@ -30,10 +30,11 @@ pub fn significant(value: f64, digits: u8) -> String {
     format!("{value:.decimals$}")
 }
 
-/// The text without what a terminal obeys: a name in a file does not move the cursor.
+/// Replaces control characters, so that a name in a file cannot move the terminal's cursor.
 #[must_use]
 pub fn printable(text: &str) -> String {
-    // Unicode's marks of direction, after which text is read the other way, are not among its controls.
+    // Unicode does not count its direction marks, which reverse the text that follows, as control
+    // characters.
     let turns = |character: char| {
         let marks = [
             '\u{200e}'..='\u{200f}',
@@ -48,7 +49,7 @@ pub fn printable(text: &str) -> String {
     )
 }
 
-/// Rows as lines of text, names to the left, values aligned, all [`printable`].
+/// Rows as lines of text: names to the left, values aligned, all [`printable`].
 #[must_use]
 pub fn aligned(rows: &[Row]) -> String {
     let width = rows

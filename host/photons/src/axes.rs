@@ -1,31 +1,29 @@
-//! Which axis of an array of histograms is what.
+//! The meaning of each axis of an array of histograms.
 
 use std::fmt;
 use std::str::FromStr;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 use dtof_core::Array;
 
-use dtof_options::Refused;
+use dtof_options::{Named, Refused, named, named_values};
 
-/// What an axis counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Axis {
-    Captures,
-    Rows,
-    Columns,
-    Bins,
+named_values! {
+    /// The meaning of an axis, in the order of the address space.
+    #[derive(Debug, PartialEq, Eq, PartialOrd, Ord)]
+    enum Axis {
+        /// Captures
+        Captures = "captures",
+        /// Rows
+        Rows = "rows",
+        /// Columns
+        Columns = "columns",
+        /// Bins
+        Bins = "bins",
+    }
 }
 
-/// The names of the axes, in the order of the address space.
-const NAMES: [(Axis, &str); 4] = [
-    (Axis::Captures, "captures"),
-    (Axis::Rows, "rows"),
-    (Axis::Columns, "columns"),
-    (Axis::Bins, "bins"),
-];
-
-/// The axes of an array by name, in the order of its shape.
+/// The names of the axes of an array, in the order of its shape.
 ///
 /// ```
 /// use dtof_photons::axes::Axes;
@@ -43,12 +41,10 @@ impl FromStr for Axes {
     fn from_str(text: &str) -> Result<Self, String> {
         let mut axes = Vec::new();
         for word in text.split(',') {
-            let found = NAMES.iter().find(|(_, name)| *name == word.trim());
-            let Some(&(axis, name)) = found else {
-                return Err("must be some of captures, rows, columns, bins".to_owned());
-            };
+            let axis: Axis = named(word.trim())
+                .map_err(|_| "must be some of captures, rows, columns, bins".to_owned())?;
             if axes.contains(&axis) {
-                return Err(format!("{name} is there twice"));
+                return Err(format!("{} is given twice", word.trim()));
             }
             axes.push(axis);
         }
@@ -61,31 +57,30 @@ impl FromStr for Axes {
 
 impl fmt::Display for Axes {
     fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
-        let name = |axis: &Axis| NAMES.iter().find(|(named, _)| named == axis);
-        let names: Vec<&str> = self.0.iter().filter_map(name).map(|name| name.1).collect();
+        let name = |axis: &Axis| Axis::NAMES[*axis as usize].0;
+        let names: Vec<&str> = self.0.iter().map(name).collect();
         formatter.write_str(&names.join(","))
     }
 }
 
-/// Where the elements of an array lie: of each axis its length, and how far apart in the file
-/// its neighbours are.
+/// The elements of an array in its file: the length and the stride of each axis.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Layout {
-    /// The axes of pixels, the one that changes fastest last.
+pub struct AxisLayout {
+    /// The axes of pixels. The last changes fastest.
     pixels: Vec<(usize, usize)>,
     bins: (usize, usize),
     /// The array of one capture.
     pub array: Array,
     /// The names of columns and rows.
-    pub sides: [&'static str; 2],
+    pub axis_names: [&'static str; 2],
 }
 
-impl Layout {
-    /// Of an array of `shape`. Without `axes` the last axis is the bins, the one before it the
-    /// columns, and all before it are rows of one capture.
+impl AxisLayout {
+    /// The layout of an array of `shape`. Without `axes` the last axis is the bins, the one before
+    /// it the columns, and all others are rows of one capture.
     ///
     /// # Errors
-    /// If there are more pixels than addresses, or not as many axes as names.
+    /// Fails if there are more pixels than addresses, or if the numbers of axes and names differ.
     pub fn new(shape: &[u64], fortran: bool, axes: Option<&Axes>) -> Result<Self> {
         ensure!(
             !shape.is_empty(),
@@ -94,45 +89,37 @@ impl Layout {
         ensure!(!shape.contains(&0), "the array {shape:?} is empty");
         let lengths = shape.iter().map(|&length| usize::try_from(length));
         let lengths = lengths.collect::<Result<Vec<_>, _>>()?;
-        let placed = placed(&lengths, fortran);
-        let Some(axes) = axes else {
-            let Some((&bins, pixels)) = placed.split_last() else {
-                bail!("the array has no axis");
-            };
-            let columns = pixels.last().map_or(1, |axis| axis.0);
-            return Ok(Self {
-                pixels: pixels.to_vec(),
-                bins,
-                array: array(columns, pixels_of(pixels)?)?,
-                sides: ["column", "row"],
-            });
-        };
+        let strides = strides(&lengths, fortran);
+        let mut default = Axes(vec![Axis::Rows; shape.len()]);
+        let last = default.0.iter_mut().rev();
+        last.zip([Axis::Bins, Axis::Columns])
+            .for_each(|(axis, meaning)| *axis = meaning);
+        let axes = axes.unwrap_or(&default);
         ensure!(
-            axes.0.len() == placed.len(),
+            axes.0.len() == strides.len(),
             Refused::value(
                 "axes",
                 axes,
                 format!(
                     "has {} names, but the array {shape:?} has {} axes",
                     axes.0.len(),
-                    placed.len()
+                    strides.len()
                 )
             )
         );
-        let place = |wanted: Axis| {
-            let place = axes.0.iter().position(|&axis| axis == wanted);
-            place.map(|place| placed[place])
-        };
-        let [captures, rows, columns] = [Axis::Captures, Axis::Rows, Axis::Columns].map(place);
-        let pixels: Vec<_> = [captures, rows, columns].into_iter().flatten().collect();
+        let mut named: Vec<_> = axes.0.iter().copied().zip(strides).collect();
+        named.sort_by_key(|(axis, _)| *axis);
+        let (_, bins) = named.pop().context("no axis of bins")?;
+        let of = |axis| named.iter().filter(move |(other, _)| *other == axis);
+        let length = |axis| of(axis).map(|(_, (length, _))| length).product::<usize>();
+        let by_capture = of(Axis::Captures).count() > of(Axis::Rows).count();
+        let pixels: Vec<_> = named.iter().map(|(_, stride)| *stride).collect();
         let all = pixels_of(&pixels)?;
-        let length = |axis: Option<(usize, usize)>| axis.map_or(1, |axis| axis.0);
-        let by_capture = captures.is_some() && rows.is_none();
         Ok(Self {
-            array: array(length(columns), all / length(captures))?,
-            sides: ["column", if by_capture { "capture" } else { "row" }],
+            array: array(length(Axis::Columns), all / length(Axis::Captures))?,
+            axis_names: ["column", if by_capture { "capture" } else { "row" }],
             pixels,
-            bins: place(Axis::Bins).context("no axis of bins")?,
+            bins,
         })
     }
 
@@ -147,22 +134,24 @@ impl Layout {
         let pixels: usize = self.pixels.iter().map(|axis| axis.0).product();
         (0..pixels).map(move |mut address| {
             let mut first = 0;
-            for (length, apart) in self.pixels.iter().rev() {
-                first += address % length * apart;
+            for (length, stride) in self.pixels.iter().rev() {
+                first += address % length * stride;
                 address /= length;
             }
-            let (bins, apart) = self.bins;
-            (0..bins).map(|bin| elements[first + bin * apart]).collect()
+            let (bins, stride) = self.bins;
+            (0..bins)
+                .map(|bin| elements[first + bin * stride])
+                .collect()
         })
     }
 }
 
-/// Each axis with how far apart its neighbours are.
-fn placed(lengths: &[usize], fortran: bool) -> Vec<(usize, usize)> {
-    let mut apart = 1usize;
+/// The length and the stride of each axis.
+fn strides(lengths: &[usize], fortran: bool) -> Vec<(usize, usize)> {
+    let mut stride = 1usize;
     let mut next = |&length: &usize| {
-        let axis = (length, apart);
-        apart = apart.saturating_mul(length);
+        let axis = (length, stride);
+        stride = stride.saturating_mul(length);
         axis
     };
     if fortran {
@@ -173,13 +162,15 @@ fn placed(lengths: &[usize], fortran: bool) -> Vec<(usize, usize)> {
     axes
 }
 
-/// The index, as NumPy writes it, of element `place` of the file.
+/// The index of element `place` of the file, as NumPy writes it.
 #[must_use]
 pub fn index_of(place: usize, shape: &[u64], fortran: bool) -> String {
     let lengths = shape.iter().map(|&length| usize::try_from(length));
     let lengths = lengths.collect::<Result<Vec<_>, _>>().unwrap_or_default();
-    let placed = placed(&lengths, fortran);
-    let index = placed.iter().map(|(length, apart)| place / apart % length);
+    let strides = strides(&lengths, fortran);
+    let index = strides
+        .iter()
+        .map(|(length, stride)| place / stride % length);
     let index: Vec<String> = index.map(|index| index.to_string()).collect();
     format!("[{}]", index.join(", "))
 }
@@ -190,7 +181,7 @@ fn pixels_of(axes: &[(usize, usize)]) -> Result<usize> {
         .try_fold(1usize, |all, axis| all.checked_mul(axis.0));
     let pixels = pixels.context("more pixels than can be counted")?;
     ensure!(
-        pixels <= 65_536,
+        pixels <= Array::MOST_PIXELS as usize,
         Refused::input(format!(
             "{pixels} pixels; there are 65,536 addresses (see `axes` if one axis is the bins)"
         ))
@@ -246,7 +237,7 @@ mod tests {
                         value(index)
                     })
                     .collect();
-                let layout = Layout::new(&shape, fortran, Some(&axes)).unwrap();
+                let layout = AxisLayout::new(&shape, fortran, Some(&axes)).unwrap();
                 let histograms: Vec<_> = layout.histograms(&elements).collect();
                 assert_eq!(histograms, expected, "{names} {fortran}");
                 assert_eq!(layout.array, Array::new(4, 3).unwrap());

@@ -1,7 +1,7 @@
-//! How the bins of a recording become those of a run, a power of two from 8 to 1024.
+//! Turns the bins of a recording into those of a run: a power of two from 8 to 1024.
 //!
-//! First neighbours are added up, then empty bins are added at the end, or bins at the end are
-//! cut off. Nothing is cut off unless fewer bins are asked for.
+//! First, neighbouring bins are summed. Then empty bins are added at the end, or bins at the end
+//! are cut off. Nothing is cut off unless fewer bins are requested.
 
 use std::iter::repeat_n;
 
@@ -10,37 +10,37 @@ use anyhow::{Result, ensure};
 use dtof_options::Refused;
 use dtof_options::rows::{Row, grouped};
 
-/// Most bins of a recording.
+/// The most bins of a recording.
 pub const MOST_BINS: usize = 4096;
-/// Most bins of a run.
+/// The most bins of a run.
 const MOST_OF_A_RUN: usize = 1024;
-/// Fewest bins that may hold a peak.
+/// The fewest bins in which a peak can be found.
 const FEWEST: usize = 8;
 
-/// From the bins of a recording to those of a run.
+/// How the bins of a recording become those of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Fit {
+pub struct BinFit {
     /// Bins of the recording.
     recorded: usize,
-    /// The first of them that were measured in full.
+    /// How many of them were measured in full, from the first on.
     measured: usize,
-    /// Neighbours that are added up.
+    /// How many neighbours are summed.
     rebin: usize,
     /// Bins of the run.
     run: usize,
 }
 
-impl Fit {
-    /// Sums `rebin` neighbours of `recorded` bins each, the first `measured` of which were
-    /// measured in full. The run then has `wanted` bins, or the next power of two.
+impl BinFit {
+    /// Sums `rebin` neighbours of `recorded` bins, the first `measured` of which were measured in
+    /// full. The run has `requested` bins, or the next power of two.
     ///
     /// # Errors
-    /// If no run can have so many bins.
+    /// Fails if no run can have so many bins.
     pub fn new(
         recorded: usize,
         measured: usize,
         rebin: usize,
-        wanted: Option<u16>,
+        requested: Option<u16>,
     ) -> Result<Self> {
         ensure!(
             (FEWEST..=MOST_BINS).contains(&recorded),
@@ -50,7 +50,7 @@ impl Fit {
             ))
         );
         let summed = recorded.div_ceil(rebin.max(1));
-        let run = wanted.map_or(summed.next_power_of_two(), usize::from);
+        let run = requested.map_or(summed.next_power_of_two(), usize::from);
         ensure!(
             run <= MOST_OF_A_RUN,
             Refused::input(format!(
@@ -66,13 +66,13 @@ impl Fit {
             run,
         };
         ensure!(
-            fit.whole() >= FEWEST,
+            fit.complete_sums() >= FEWEST,
             Refused::value(
                 "rebin",
                 rebin,
                 format!(
                     "makes {} whole bins of {measured}: must be at least {FEWEST}",
-                    fit.whole()
+                    fit.complete_sums()
                 )
             )
         );
@@ -85,16 +85,16 @@ impl Fit {
         self.run
     }
 
-    /// Sums that are made of as many bins as the others, of those that the run has.
-    fn whole(&self) -> usize {
+    /// Bins of the run that are sums of `rebin` measured bins.
+    fn complete_sums(&self) -> usize {
         (self.measured / self.rebin).min(self.run)
     }
 
-    /// The bins of the run that were recorded as the others, if not all were: from 0 on.
+    /// The first and the last bin that were measured in full, if not all were.
     #[must_use]
     pub fn gate(&self) -> Option<(u16, u16)> {
-        let last = u16::try_from(self.whole() - 1).unwrap_or(u16::MAX);
-        (self.whole() < self.run).then_some((0, last))
+        let last = u16::try_from(self.complete_sums() - 1).unwrap_or(u16::MAX);
+        (self.complete_sums() < self.run).then_some((0, last))
     }
 
     /// The histogram of a run, and the photons that were cut off.
@@ -109,7 +109,7 @@ impl Fit {
         (kept.to_vec(), sum(cut_off))
     }
 
-    /// What is done, for people; `cut_off` photons were.
+    /// The changes as a table; `cut_off` photons were cut off.
     #[must_use]
     pub fn rows(&self, cut_off: u64) -> Vec<Row> {
         let row = |name: &str, value: String| (name.to_owned(), value);
@@ -143,7 +143,7 @@ impl Fit {
     }
 }
 
-/// Sticks at the most: no pixel may hold so many.
+/// Saturates: no pixel may have so many photons.
 fn sum(counts: &[u64]) -> u64 {
     counts
         .iter()
@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn bins_are_padded_summed_and_cut() {
         let counts: Vec<u64> = (1..=100).collect();
-        let fit = |rebin, wanted| Fit::new(100, 100, rebin, wanted).unwrap();
+        let fit = |rebin, requested| BinFit::new(100, 100, rebin, requested).unwrap();
         let padded = fit(1, None);
         assert_eq!((padded.bins(), padded.gate()), (128, Some((0, 99))));
         let (bins, cut_off) = padded.apply(counts.clone());
@@ -176,7 +176,7 @@ mod tests {
 
     #[test]
     fn what_fits_no_run_is_refused() {
-        for (recorded, rebin, wanted) in [
+        for (recorded, rebin, requested) in [
             (7, 1, None),
             (4097, 1, None),
             (1025, 1, None),
@@ -184,11 +184,13 @@ mod tests {
             (4096, 3, None),
         ] {
             assert!(
-                Fit::new(recorded, recorded, rebin, wanted).is_err(),
+                BinFit::new(recorded, recorded, rebin, requested).is_err(),
                 "{recorded}"
             );
         }
-        assert!(Fit::new(4096, 4096, 4, None).is_ok() && Fit::new(4096, 4096, 1, Some(8)).is_ok());
+        assert!(
+            BinFit::new(4096, 4096, 4, None).is_ok() && BinFit::new(4096, 4096, 1, Some(8)).is_ok()
+        );
     }
 
     proptest! {
@@ -197,12 +199,12 @@ mod tests {
             counts in prop::collection::vec(0u64..1000, 8..300),
             rebin in 1usize..5,
             log2 in 3u32..11,
-            asked in any::<bool>(),
+            is_requested in any::<bool>(),
             unmeasured in 0usize..9,
         ) {
-            let wanted = asked.then_some(1u16 << log2);
+            let requested = is_requested.then_some(1u16 << log2);
             let measured = counts.len() - unmeasured.min(counts.len());
-            let Ok(fit) = Fit::new(counts.len(), measured, rebin, wanted) else { return Ok(()) };
+            let Ok(fit) = BinFit::new(counts.len(), measured, rebin, requested) else { return Ok(()) };
             let (bins, cut_off) = fit.apply(counts.clone());
             prop_assert_eq!(bins.len(), fit.bins());
             prop_assert_eq!(bins.iter().sum::<u64>() + cut_off, counts.iter().sum::<u64>());
@@ -210,10 +212,10 @@ mod tests {
                 let of = counts.iter().skip(bin * rebin).take(rebin);
                 prop_assert_eq!(*count, of.sum::<u64>());
             }
-            // The gate keeps bins that are sums of as many as the others.
+            // All bins within the gate are sums of the same number of measured bins.
             let last = fit.gate().map_or(bins.len() - 1, |gate| gate.1.into());
             prop_assert!((last + 1) * rebin <= measured);
-            prop_assert!(wanted.is_some() || cut_off == 0);
+            prop_assert!(requested.is_some() || cut_off == 0);
         }
     }
 }

@@ -1,5 +1,5 @@
-//! JSON logs of sensors that send whole histograms, told apart by what is in them. A log may
-//! be packed with gzip.
+//! JSON logs of sensors that send histograms. The first character tells the format. A log may be
+//! compressed with gzip.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};
@@ -22,19 +22,19 @@ pub enum CaptureLog {
 /// Reads `path`.
 ///
 /// # Errors
-/// What is wrong with the file; its name, and the line where there is one, first.
+/// Returns what is wrong with the file, after its name and the line if there is one.
 pub fn read(path: &Path) -> Result<CaptureLog> {
     let name = path.display().to_string();
     let mut file = BufReader::new(File::open(path).with_context(|| name.clone())?);
     let start = file.fill_buf().with_context(|| name.clone())?;
     if start.starts_with(&[0x1f, 0x8b]) {
-        of_text(&name, BufReader::new(MultiGzDecoder::new(file)))
+        parse(&name, BufReader::new(MultiGzDecoder::new(file)))
     } else {
-        of_text(&name, file)
+        parse(&name, file)
     }
 }
 
-fn of_text(name: &str, mut text: impl BufRead) -> Result<CaptureLog> {
+fn parse(name: &str, mut text: impl BufRead) -> Result<CaptureLog> {
     let start = text.fill_buf().with_context(|| name.to_owned())?;
     let first = start.iter().find(|byte| !byte.is_ascii_whitespace());
     let is_object = first == Some(&b'{');

@@ -1,13 +1,13 @@
-//! Where pixels look: the unit ray of each, and points in metres along it.
+//! The unit ray of each pixel, and points in metres along it.
 //!
-//! The frame is the camera's (optical frame): x to the right, y down, z forward, the
-//! lens in the origin. Direct time of flight measures along the ray, so that
+//! The frame is the optical frame of a camera: x to the right, y down, z forward, the lens at the
+//! origin. Direct time of flight measures along the ray:
 //!
 //! ```text
 //! point = (range - range bias) × unit ray
 //! ```
 //!
-//! Rays are those of a pinhole camera, through the middle of each pixel, or those of a
+//! The rays are those of a pinhole camera, through the middle of each pixel, or come from a
 //! calibration file.
 
 mod calibration;
@@ -20,16 +20,16 @@ use dtof_core::{Array, BlockLevel, PixelAddress};
 
 use dtof_options::numbers::real;
 
-/// Degrees across the longer side of an array unless said otherwise.
+/// Degrees across the longer side of an array by default.
 const LONGER_SIDE_DEGREES: f64 = 60.0;
 
-/// Half of the height and of the width of what a pinhole camera sees at distance 1.
+/// The field of view of a pinhole camera: half of its width and height at distance 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FieldOfView {
     half: [f64; 2],
 }
 
-/// A field of view that is none.
+/// The field of view is not valid.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FieldOfViewError;
 
@@ -45,7 +45,7 @@ impl FieldOfView {
     /// Horizontal and vertical angle in degrees, from edge to edge of the array.
     ///
     /// # Errors
-    /// If one is not from 0.01 to 179.
+    /// Fails if one is not from 0.01 to 179.
     pub fn new(degrees: [f64; 2]) -> Result<Self, FieldOfViewError> {
         if !degrees.iter().all(|angle| (0.01..=179.0).contains(angle)) {
             return Err(FieldOfViewError);
@@ -57,7 +57,7 @@ impl FieldOfView {
     /// The default field of view of so many columns and rows: 60 degrees across the longer
     /// side, with square pixels. For 64×32 pixels that is 60×32.2 degrees.
     #[must_use]
-    pub fn of(size: [u32; 2]) -> Self {
+    pub fn default_for(size: [u32; 2]) -> Self {
         let [columns, rows] = size.map(f64::from);
         let longer = columns.max(rows);
         let half = (LONGER_SIDE_DEGREES / 2.0).to_radians().tan();
@@ -72,8 +72,8 @@ impl FieldOfView {
         self.half.map(|half| 2.0 * half.atan().to_degrees())
     }
 
-    /// The unit ray through a place of the image: `across` and `down` are 0 at the left
-    /// and upper edge, 1 at the right and lower one.
+    /// The unit ray through a point of the image: `across` and `down` are 0 at the left and upper
+    /// edge and 1 at the right and lower one.
     #[must_use]
     pub fn ray(&self, across: f64, down: f64) -> [f64; 3] {
         let [width, height] = self.half;
@@ -85,7 +85,7 @@ impl FieldOfView {
     }
 }
 
-/// As `--fov` takes it, rounded to two decimals or as many as the format says.
+/// The format of `--fov`, rounded to two decimals or to the given precision.
 impl fmt::Display for FieldOfView {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let decimals = f.precision().unwrap_or(2);
@@ -102,23 +102,31 @@ impl FromStr for FieldOfView {
     type Err = FieldOfViewError;
 
     fn from_str(text: &str) -> Result<Self, FieldOfViewError> {
-        let angles = text
-            .split_once('x')
-            .and_then(|(horizontal, vertical)| Some([real(horizontal)?, real(vertical)?]));
-        Self::new(angles.ok_or(FieldOfViewError)?)
+        Self::new(angles(text)?)
     }
 }
 
-/// Where one pixel looks.
+/// Reads two numbers, as `60x32.2` or `60,32.2`.
+///
+/// # Errors
+/// Fails if there are not two numbers.
+pub fn angles(text: &str) -> Result<[f64; 2], FieldOfViewError> {
+    let sides = text.split_once(['x', ',']);
+    let angles =
+        sides.and_then(|(horizontal, vertical)| Some([real(horizontal)?, real(vertical)?]));
+    angles.ok_or(FieldOfViewError)
+}
+
+/// The ray of one pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
-    /// Of length 1.
+    /// A unit vector.
     pub direction: [f64; 3],
     /// The range bias of the pixel in millimetres, positive if its ranges are too long.
     pub bias_mm: f64,
 }
 
-/// Where each pixel of an array looks.
+/// The rays of all pixels of an array.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rays {
     array: Array,
@@ -127,7 +135,7 @@ pub struct Rays {
 }
 
 impl Rays {
-    /// Those of a pinhole camera, through the middle of each pixel.
+    /// The rays of a pinhole camera, through the middle of each pixel.
     #[must_use]
     pub fn pinhole(array: Array, view: FieldOfView) -> Self {
         let place = |index: u32, of: u32| (f64::from(index) + 0.5) / f64::from(of);
@@ -142,21 +150,21 @@ impl Rays {
         }
     }
 
-    /// Those of a calibration file, as `docs/export.md` describes it.
+    /// The rays of a calibration file; `docs/export.md` describes its format.
     ///
     /// # Errors
-    /// One line with the name of the file and the line that is wrong.
+    /// Returns one line with the name of the file and the wrong line.
     pub fn read(path: &Path, array: Array) -> anyhow::Result<Self> {
         let rays = calibration::read(path, array)?;
         Ok(Self { array, rays })
     }
 
-    /// The point that a pixel sees at a range, in metres; `None` if there is no such
-    /// pixel. That of a block, whose first pixel is `pixel`, lies on the mean of its rays.
+    /// The point that a pixel sees at a range, in metres; `None` if there is no such pixel. The
+    /// point of a block, whose first pixel is `pixel`, is on the mean of its rays.
     #[must_use]
     pub fn point(&self, pixel: PixelAddress, level: BlockLevel, range_mm: f64) -> Option<[f64; 3]> {
         let ray = if level == BlockLevel::PIXEL {
-            *self.rays.get(usize::from(pixel.0))?
+            *self.rays.get(usize::from(pixel.raw()))?
         } else {
             self.mean_ray(pixel, level)?
         };
@@ -164,11 +172,11 @@ impl Rays {
         Some(ray.direction.map(|side| side * metres))
     }
 
-    /// The mean ray of a block; `None` if there is no such block, or its rays cancel.
+    /// The mean ray of a block; `None` if there is no such block or its rays cancel.
     fn mean_ray(&self, pixel: PixelAddress, level: BlockLevel) -> Option<Ray> {
         let (mut direction, mut bias_mm, mut pixels) = ([0.0; 3], 0.0, 0.0);
         for pixel in self.array.pixels_of(pixel, level) {
-            let ray = self.rays.get(usize::from(pixel.0))?;
+            let ray = self.rays.get(usize::from(pixel.raw()))?;
             for (sum, side) in direction.iter_mut().zip(ray.direction) {
                 *sum += side;
             }
@@ -183,7 +191,7 @@ impl Rays {
     }
 }
 
-/// The same direction, of length 1.
+/// Scales a vector to length 1.
 fn unit(direction: [f64; 3]) -> [f64; 3] {
     let [x, y, z] = direction;
     let length = x.hypot(y).hypot(z);

@@ -1,5 +1,4 @@
-//! Pixels that are left out: hot ones, which would report noise and drown their block, and dead
-//! ones.
+//! Masked pixels: hot ones, whose noise would drown the block, and dead ones.
 
 use anyhow::{Result, bail};
 use dtof_core::{Array, PixelAddress};
@@ -8,16 +7,16 @@ use super::source::{PhotonSource, Slice};
 
 use dtof_options::Refused;
 
-/// A source whose masked pixels have no photons. What they had is counted.
+/// A source whose masked pixels have no photons. It counts the photons it removes.
 pub struct Masked {
     source: Box<dyn PhotonSource>,
-    /// Where the masked pixels are in a slice.
+    /// The indices of the masked pixels in a slice.
     places: Vec<usize>,
     photons: u64,
     laser_hz: Option<u64>,
 }
 
-/// Whether each of `masked` is one of so many `pixels`.
+/// Checks that all addresses of `masked` are below `pixels`.
 ///
 /// # Errors
 /// Names the first that is not.
@@ -36,11 +35,11 @@ impl Masked {
     /// `source` without the photons of `pixels`.
     ///
     /// # Errors
-    /// If one of `pixels` is not in the array.
+    /// Fails if one of `pixels` is not in the array.
     pub fn new(source: Box<dyn PhotonSource>, pixels: &[u16]) -> Result<Self> {
         check(pixels, source.array().pixels() as usize)?;
         let addresses = source.addresses();
-        let place = |&pixel| addresses.binary_search(&PixelAddress(pixel)).ok();
+        let place = |&pixel| addresses.binary_search(&PixelAddress::new(pixel)).ok();
         Ok(Self {
             laser_hz: source.laser_hz(),
             places: pixels.iter().filter_map(place).collect(),
@@ -49,7 +48,7 @@ impl Masked {
         })
     }
 
-    /// The same with a laser of `hz` cycles a second, if that is said.
+    /// Sets the laser rate, if one is given.
     #[must_use]
     pub fn with_laser_hz(self, hz: Option<u64>) -> Self {
         Self {
@@ -80,8 +79,8 @@ impl PhotonSource for Masked {
         self.laser_hz
     }
 
-    fn spare(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
-        self.source.spare(is_wanted);
+    fn limit_to(&mut self, is_needed: &dyn Fn(PixelAddress) -> bool) {
+        self.source.limit_to(is_needed);
     }
 
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {

@@ -1,5 +1,5 @@
-//! NumPy arrays: recorded histograms and photon lists, from `.npy` and `.npz` files; and
-//! pictures, also of floats.
+//! NumPy arrays: recorded histograms and photon lists from `.npy` and `.npz` files, and pictures,
+//! also of floats.
 
 pub(crate) mod archive;
 mod header;

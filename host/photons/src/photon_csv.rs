@@ -4,26 +4,26 @@ use std::io::{BufRead, BufReader, Read};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::medium::Medium;
-use crate::photon_list::{Row, Rows};
+use crate::input::Input;
+use crate::photon_list::{PhotonReader, RawPhoton};
 
-/// Longer than any row can be; a longer line is not read to its end.
+/// Rows are shorter. A longer line is not read to its end.
 const LINE_BYTES: u64 = 256;
 
-/// The rows of a file.
-pub struct CsvRows {
-    medium: Medium,
+/// Reads the rows of a file.
+pub struct CsvReader {
+    input: Input,
     file: BufReader<Box<dyn Read>>,
     line: Vec<u8>,
     line_number: u64,
 }
 
-impl Rows for CsvRows {
-    fn open(medium: &Medium) -> Result<Self> {
-        let name = medium;
-        let (file, _) = medium.open().with_context(|| name.to_string())?;
+impl PhotonReader for CsvReader {
+    fn open(input: &Input) -> Result<Self> {
+        let name = input;
+        let (file, _) = input.open().with_context(|| name.to_string())?;
         let mut rows = Self {
-            medium: medium.clone(),
+            input: input.clone(),
             file: BufReader::new(file),
             line: Vec::new(),
             line_number: 0,
@@ -40,12 +40,12 @@ impl Rows for CsvRows {
         Ok(rows)
     }
 
-    fn next(&mut self) -> Result<Option<Row>> {
+    fn next(&mut self) -> Result<Option<RawPhoton>> {
         loop {
             if !self.read_line()? {
                 return Ok(None);
             }
-            // A blank line is no photon and no damage.
+            // Blank lines are skipped.
             if !self.text().is_ok_and(str::is_empty) {
                 return self.parse().map(Some);
             }
@@ -53,12 +53,12 @@ impl Rows for CsvRows {
     }
 
     fn place(&self) -> String {
-        format!("{}:{}", self.medium, self.line_number)
+        format!("{}:{}", self.input, self.line_number)
     }
 }
 
-impl CsvRows {
-    /// Reads the next line; `false` at the end of the file.
+impl CsvReader {
+    /// Reads the next line. Returns `false` at the end of the file.
     fn read_line(&mut self) -> Result<bool> {
         self.line.clear();
         self.line_number += 1;
@@ -66,13 +66,13 @@ impl CsvRows {
         Ok(limited.read_until(b'\n', &mut self.line)? > 0)
     }
 
-    /// The line without its end.
+    /// The line without its line break.
     fn text(&self) -> Result<&str> {
         let ([line @ .., b'\r', b'\n'] | [line @ .., b'\n' | b'\r'] | line) = &*self.line;
         str::from_utf8(line).ok().context("not text")
     }
 
-    fn parse(&self) -> Result<Row> {
+    fn parse(&self) -> Result<RawPhoton> {
         let text = self.text()?;
         let mut fields = text.split(',');
         let (Some(pixel), Some(cycle), Some(bin), None) =

@@ -1,69 +1,69 @@
 //! Recorded photons one by one, in non-decreasing laser cycle.
 //!
-//! A file is read twice: once to check every photon before anything is written, and to learn
-//! which pixels there are and when the recording ends; once to replay it, without ever
-//! holding more than a slice.
+//! A file is read twice. The first pass checks every photon and finds the pixels and the end of the
+//! recording. The second replays it and holds only one slice at a time.
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{Array, PixelAddress};
 
-use crate::medium::Medium;
+use crate::input::Input;
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_options::Refused;
 
-/// A photon as a file has it: the numbers of its pixel, laser cycle and bin.
-pub type Row = [u64; 3];
+/// A photon as written in a file: pixel, laser cycle and bin.
+pub type RawPhoton = [u64; 3];
 
-/// The photons of a file, whatever its format.
-pub trait Rows: Sized {
-    /// Opens `medium` at its first photon.
+/// Reads the photons of a file of any format.
+pub trait PhotonReader: Sized {
+    /// Opens `input` at its first photon.
     ///
     /// # Errors
-    /// What is wrong with the file; its name first.
-    fn open(medium: &Medium) -> Result<Self>;
+    /// Returns what is wrong with the file, after its name.
+    fn open(input: &Input) -> Result<Self>;
 
     /// The next photon.
     ///
     /// # Errors
-    /// What is wrong with it, without the place.
-    fn next(&mut self) -> Result<Option<Row>>;
+    /// Returns what is wrong with the photon, without its place.
+    fn next(&mut self) -> Result<Option<RawPhoton>>;
 
-    /// Where the photon stands that was read last, the file's name first.
+    /// The file and the place of the photon that was read last.
     fn place(&self) -> String;
 }
 
-/// Laser cycles over which the brightest part of a recording is averaged.
+/// The photon rate is the highest mean over so many laser cycles.
 const SPAN: u64 = 256;
 
-/// A source of listed photons.
-pub trait Listed: PhotonSource {
-    /// The photons of all laser cycles to replay: a histogram for each pixel of the array.
+/// A source that can also give histograms.
+pub trait CountedSource: PhotonSource {
+    /// The photons of all laser cycles to replay: one histogram a pixel of the array.
     ///
     /// # Errors
-    /// If the file has changed since it was checked.
+    /// Fails if the file has changed since it was checked.
     fn counts(&mut self) -> Result<Vec<Vec<u64>>>;
 }
 
-/// What a user says of a photon list.
+/// The options of a photon list.
 #[derive(Clone, Copy, Debug)]
-pub struct Shape {
+pub struct ListOptions {
     /// Bins of a run.
     pub bins: u16,
-    /// Neighbouring bins of the file that make one of these.
+    /// How many neighbouring bins of the file are summed.
     pub rebin: u16,
-    /// Columns of the array; without, it is one row.
+    /// Columns of the array; one row if left out.
     pub columns: Option<u32>,
 }
 
-/// A photon that can be.
+/// A photon that has been checked.
 #[derive(Clone, Copy, Debug)]
-struct Checked {
+struct ValidPhoton {
     cycle: u64,
-    /// Two numbers in one: a processor waits where it reads at once what it wrote in parts.
+    /// Two numbers in one. Written separately and read together, they would stall the processor's
+    /// store forwarding.
     pixel_and_bin: u32,
 }
 
-impl Checked {
+impl ValidPhoton {
     fn new(pixel: u16, cycle: u64, bin: u16) -> Self {
         Self {
             cycle,
@@ -81,24 +81,24 @@ impl Checked {
     }
 }
 
-/// The photons of a file, each checked.
-struct Checks<R> {
+/// Checks each photon of a file.
+struct Validator<R> {
     rows: R,
-    shape: Shape,
+    shape: ListOptions,
     last_cycle: u64,
 }
 
-impl<R: Rows> Checks<R> {
-    fn open(medium: &Medium, shape: Shape) -> Result<Self> {
+impl<R: PhotonReader> Validator<R> {
+    fn open(input: &Input, shape: ListOptions) -> Result<Self> {
         Ok(Self {
-            rows: R::open(medium)?,
+            rows: R::open(input)?,
             shape,
             last_cycle: 0,
         })
     }
 
     #[inline(always)]
-    fn next(&mut self) -> Result<Option<Checked>> {
+    fn next(&mut self) -> Result<Option<ValidPhoton>> {
         let row = match self.rows.next() {
             Ok(None) => return Ok(None),
             Ok(Some([pixel, cycle, recorded])) => {
@@ -109,7 +109,7 @@ impl<R: Rows> Checks<R> {
                 match (u16::try_from(pixel), u16::try_from(bin)) {
                     (Ok(pixel), Ok(bin)) if bin < self.shape.bins && cycle >= self.last_cycle => {
                         self.last_cycle = cycle;
-                        return Ok(Some(Checked::new(pixel, cycle, bin)));
+                        return Ok(Some(ValidPhoton::new(pixel, cycle, bin)));
                     }
                     _ => self.wrong([pixel, cycle, recorded]),
                 }
@@ -119,16 +119,16 @@ impl<R: Rows> Checks<R> {
         row.with_context(|| self.rows.place())
     }
 
-    /// Why a photon is refused.
+    /// Says why a photon is refused.
     #[cold]
-    fn wrong(&self, [pixel, cycle, bin]: Row) -> Result<Option<Checked>> {
+    fn wrong(&self, [pixel, cycle, bin]: RawPhoton) -> Result<Option<ValidPhoton>> {
         if u16::try_from(pixel).is_err() {
             bail!("pixel {pixel} is above 65535, the last address");
         }
         if cycle < self.last_cycle {
             bail!("cycle {cycle} comes after cycle {}", self.last_cycle);
         }
-        let Shape { bins, rebin, .. } = self.shape;
+        let ListOptions { bins, rebin, .. } = self.shape;
         let bins = u32::from(bins) * u32::from(rebin);
         bail!(Refused::input(format!(
             "bin {bin} is past the last of {bins} bins (see `bins` and `rebin`)"
@@ -138,36 +138,36 @@ impl<R: Rows> Checks<R> {
 
 /// A checked photon list.
 pub struct PhotonList<R> {
-    medium: Medium,
+    input: Input,
     addresses: Vec<PixelAddress>,
-    /// Of each address up to the last, its place in `addresses`.
+    /// The index in `addresses` of each address, up to the last.
     places: Vec<Option<u16>>,
     array: Array,
     cycles: u64,
     photons_per_cycle: f64,
     not_replayed: u64,
     next_cycle: u64,
-    rows: Checks<R>,
-    /// Read, but of a later slice.
-    ahead: Option<Checked>,
+    rows: Validator<R>,
+    /// A photon of a later slice that has been read already.
+    ahead: Option<ValidPhoton>,
 }
 
-impl<R: Rows> PhotonList<R> {
-    /// Checks all of `medium`, to replay its first `cycles` laser cycles. The recording lasts
-    /// until the laser cycle of its last photon.
+impl<R: PhotonReader> PhotonList<R> {
+    /// Checks all of `input`, to replay its first `cycles` laser cycles. The recording ends with
+    /// the laser cycle of its last photon.
     ///
     /// # Errors
-    /// What is wrong with the file; its name and the place first.
-    pub fn open(medium: &Medium, shape: Shape, cycles: u64) -> Result<Self> {
-        let can_be = medium.can_be_read_twice();
+    /// Returns what is wrong with the file, after its name and the place.
+    pub fn open(input: &Input, shape: ListOptions, cycles: u64) -> Result<Self> {
+        let can_be = input.can_be_read_twice();
         ensure!(
-            can_be.with_context(|| medium.to_string())?,
-            "{medium}: not a file that can be read twice"
+            can_be.with_context(|| input.to_string())?,
+            "{input}: not a file that can be read twice"
         );
-        let mut rows = Checks::<R>::open(medium, shape)?;
-        let mut is_there = vec![false; 1 << 16];
+        let mut rows = Validator::<R>::open(input, shape)?;
+        let mut is_there = vec![false; Array::MOST_PIXELS as usize];
         let (mut photons, mut not_replayed, mut recorded) = (0u64, 0, 0u64);
-        // Of the span in which the last photon was, and the most of one.
+        // The span of the last photon, its photons so far, and the most photons of any span.
         let (mut span, mut of_span, mut most) = (0, 0u64, 0);
         while let Some(row) = rows.next()? {
             is_there[row.pixel()] = true;
@@ -184,21 +184,21 @@ impl<R: Rows> PhotonList<R> {
         }
         ensure!(photons > 0, "{}: no photons", rows.rows.place());
         let all = (0..=u16::MAX).filter(|&pixel| is_there[usize::from(pixel)]);
-        let addresses: Vec<PixelAddress> = all.map(PixelAddress).collect();
-        let mut places = vec![None; 1 << 16];
+        let addresses: Vec<PixelAddress> = all.map(PixelAddress::new).collect();
+        let mut places = vec![None; is_there.len()];
         for (place, address) in (0..=u16::MAX).zip(&addresses) {
-            places[usize::from(address.0)] = Some(place);
+            places[usize::from(address.raw())] = Some(place);
         }
-        let pixels_in_file = addresses.last().map_or(0, |last| u32::from(last.0) + 1);
+        let pixels_in_file = addresses.last().map_or(0, |last| u32::from(last.raw()) + 1);
         let columns = shape.columns.unwrap_or(pixels_in_file);
         ensure!(
             columns > 0,
             Refused::value("columns", columns, "must be 1 or more")
         );
         let array = Array::new(columns, pixels_in_file.div_ceil(columns));
-        let rows = Checks::<R>::open(medium, shape)?;
+        let rows = Validator::<R>::open(input, shape)?;
         Ok(Self {
-            medium: medium.clone(),
+            input: input.clone(),
             array: array.ok_or_else(|| {
                 let reason = "makes more than 65,536 pixels";
                 Refused::value("columns", columns, reason)
@@ -215,7 +215,7 @@ impl<R: Rows> PhotonList<R> {
     }
 }
 
-impl<R: Rows> Listed for PhotonList<R> {
+impl<R: PhotonReader> CountedSource for PhotonList<R> {
     fn counts(&mut self) -> Result<Vec<Vec<u64>>> {
         let bins = self.rows.shape.bins.into();
         let mut counts = vec![vec![0; bins]; self.array.pixels() as usize];
@@ -226,7 +226,7 @@ impl<R: Rows> Listed for PhotonList<R> {
             let histogram = counts.get_mut(row.pixel());
             let Some(count) = histogram.and_then(|bins| bins.get_mut(usize::from(row.bin())))
             else {
-                bail!("{} changed while it was read", self.medium);
+                bail!("{} changed while it was read", self.input);
             };
             *count += 1;
         }
@@ -234,7 +234,7 @@ impl<R: Rows> Listed for PhotonList<R> {
     }
 }
 
-impl<R: Rows> PhotonSource for PhotonList<R> {
+impl<R: PhotonReader> PhotonSource for PhotonList<R> {
     fn array(&self) -> Array {
         self.array
     }
@@ -264,7 +264,7 @@ impl<R: Rows> PhotonSource for PhotonList<R> {
         let first_cycle = self.next_cycle;
         self.next_cycle += u64::from(cycles);
         let all = self.photons_per_cycle * f64::from(cycles);
-        // Somewhat more than there are on average where it is brightest.
+        // A quarter more than the mean in the brightest span.
         let expected = (1.25 * all / self.addresses.len() as f64) as usize + 4;
         let pixels = self.addresses.iter().map(|_| PixelPhotons {
             cycles,
@@ -279,10 +279,10 @@ impl<R: Rows> PhotonSource for PhotonList<R> {
                     None => break,
                 },
             };
-            // Also where the file has changed since it was checked.
+            // Also fails if the file has changed since it was checked.
             let cycle = row.cycle.checked_sub(first_cycle);
             let (Some(cycle), Some(place)) = (cycle, self.places[row.pixel()]) else {
-                bail!("{} changed while it was read", self.medium);
+                bail!("{} changed while it was read", self.input);
             };
             if cycle >= u64::from(cycles) {
                 self.ahead = Some(row);

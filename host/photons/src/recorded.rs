@@ -1,17 +1,15 @@
-//! Recorded histograms as a photon stream.
+//! Recorded histograms as a stream of photons.
 //!
-//! Poisson counts split exactly: every recorded photon is given one uniformly
-//! random laser cycle of the recording, and none is used twice. Some laser cycles
-//! at a time, a chunk, this is: of the photons left, each falls into this chunk of
-//! the laser cycles left with the same probability, so their number is binomial;
-//! which ones they are is a draw without replacement, and each has any laser cycle
-//! of the chunk. The recording alone says how long a chunk is, so that slices of
-//! any length hold the same photons.
+//! Poisson counts split exactly: every recorded photon gets one uniformly random laser cycle of the
+//! recording. Photons are drawn a chunk of laser cycles at a time. Each remaining photon falls into
+//! the chunk with equal probability, so their number is binomial. Which photons they are is a draw
+//! without replacement, and each gets a random laser cycle of the chunk. The chunk length depends
+//! on the recording alone, so slices of any length hold the same photons.
 
+mod layout;
 mod remaining;
 #[cfg(test)]
 mod tests;
-mod whole;
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{Array, PixelAddress};
@@ -20,42 +18,41 @@ use rand_distr::{Binomial, Distribution};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
+pub use self::layout::Layout;
 use self::remaining::Remaining;
-pub use self::whole::Whole;
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_options::Refused;
 use dtof_theory::random::pixel_rng;
 
-/// Photons of a histogram and laser cycles of a recording, at most: within it
-/// the binomial numbers are exact to better than one in ten thousand.
+/// The most photons of a histogram, and the most laser cycles of a recording. Up to here, binomial
+/// numbers are exact to better than one in ten thousand.
 const MOST: u64 = 1 << 40;
-/// Photons of all pixels in one laser cycle, at most, so that they fit into
-/// memory.
+/// The most photons of all pixels in one laser cycle, so that they fit into memory.
 const MOST_A_CYCLE: f64 = 5e7;
-/// Laser cycles of a chunk, at most, and about how many photons of all pixels.
+/// The most laser cycles of a chunk, and about the photons of all pixels in a chunk.
 const CHUNK: u16 = 2048;
 const CHUNK_PHOTONS: f64 = 4e6;
-/// Photons of a laser cycle that are written at once.
+/// How many photons of a laser cycle are written without a check.
 const AT_ONCE: usize = 4;
 
-/// How many laser cycles a recording is taken to have lasted.
+/// The assumed length of a recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum RecordingLength {
-    /// So many that the brightest pixel of each capture, of those that are not masked, averages
-    /// this many photons a laser cycle.
+    /// Photons a laser cycle of the brightest pixel of each capture that is not masked.
     PhotonsPerCycle(f64),
-    /// This many.
+    /// Laser cycles.
     Cycles(u64),
 }
 
 /// The histograms of pixels that were recorded together, one a pixel.
 pub type Capture = Vec<Vec<u64>>;
 
-/// Captures of one file, one after the other in the address space.
+/// The captures of a file, which follow each other in the address space.
 #[derive(Clone, Debug)]
 pub struct RecordedHistograms {
     array: Array,
-    sides: [&'static str; 2],
+    /// What a column and a row of the array are called, for people.
+    axis_names: [&'static str; 2],
     capture_rows: u32,
     cycles: u64,
     photons_per_cycle: f64,
@@ -73,7 +70,7 @@ impl RecordedHistograms {
     /// Replays `captures`, each of `array`, for at most `cycles` laser cycles.
     ///
     /// # Errors
-    /// If there are more pixels than addresses, or more photons than can be
+    /// Fails if there are more pixels than addresses, or more photons than can be
     /// counted.
     pub fn new(
         array: Array,
@@ -82,64 +79,61 @@ impl RecordedHistograms {
         cycles: u64,
         seed: u64,
     ) -> Result<Self> {
-        Self::placed(&Whole::of(array, captures)?, captures, length, cycles, seed)
+        let layout = Layout::from_captures(array, captures)?;
+        Self::with_layout(&layout, captures, length, cycles, seed)
     }
 
-    /// Replays `captures`, which are a part of `whole`, as they are replayed there.
+    /// Replays `captures`, a part of the recording of `layout`. They yield the same photons as in a
+    /// replay of the whole recording.
     ///
     /// # Errors
-    /// If they are no part of it, and those of [`Self::new`].
-    pub fn part(
-        whole: &Whole,
+    /// Fails if they are not a part of it, or as [`Self::new`] does.
+    pub fn with_layout(
+        layout: &Layout,
         captures: &[Capture],
         length: RecordingLength,
         cycles: u64,
         seed: u64,
     ) -> Result<Self> {
-        let mut own = Vec::new();
+        let mut part_totals = Vec::new();
         for capture in captures {
-            own.extend(totals(capture)?);
+            part_totals.extend(totals(capture)?);
         }
-        whole.check(&own)?;
-        Self::placed(whole, captures, length, cycles, seed)
-    }
-
-    fn placed(
-        whole: &Whole,
-        captures: &[Capture],
-        length: RecordingLength,
-        cycles: u64,
-        seed: u64,
-    ) -> Result<Self> {
-        let (mut recorded, mut of_all) = (Vec::new(), 0.0);
+        layout.check(&part_totals)?;
+        let (mut recorded, mut total_per_cycle) = (Vec::new(), 0.0);
         let (mut shortest, mut longest) = (u64::MAX, 0);
-        let mut first = 0;
-        for totals in &whole.captures {
+        let mut pixels_before = 0;
+        for totals in &layout.captures {
             let is_masked = |&(pixel, _): &(usize, &u64)| {
-                u16::try_from(first + pixel).is_ok_and(|pixel| whole.masked.contains(&pixel))
+                u16::try_from(pixels_before + pixel)
+                    .is_ok_and(|pixel| layout.masked.contains(&pixel))
             };
-            let looked_at = totals.iter().enumerate().filter(|pixel| !is_masked(pixel));
-            let brightest = looked_at.map(|(_, &total)| total).max().unwrap_or(0);
-            first += totals.len();
-            let lasted = recorded_cycles(length, brightest, cycles)?;
-            shortest = shortest.min(lasted);
-            longest = longest.max(lasted);
-            of_all += totals.iter().map(|&total| mean(total, lasted)).sum::<f64>();
-            recorded.extend(totals.iter().map(|_| lasted));
+            let unmasked = totals.iter().enumerate().filter(|pixel| !is_masked(pixel));
+            let brightest = unmasked.map(|(_, &total)| total).max().unwrap_or(0);
+            pixels_before += totals.len();
+            let length_cycles = recorded_cycles(length, brightest, cycles)?;
+            shortest = shortest.min(length_cycles);
+            longest = longest.max(length_cycles);
+            total_per_cycle += totals
+                .iter()
+                .map(|&total| mean(total, length_cycles))
+                .sum::<f64>();
+            recorded.extend(totals.iter().map(|_| length_cycles));
         }
         let (mut pixels, mut photons_per_cycle) = (Vec::new(), 0.0);
-        let recorded = recorded.into_iter().enumerate().skip(whole.first);
-        for (counts, (address, recorded)) in captures.iter().flatten().zip(recorded) {
-            let address = u16::try_from(address).context("more than 65,536 pixels")?;
-            let left = Remaining::new(counts);
-            photons_per_cycle += mean(left.photons(), recorded);
+        let first = u16::try_from(layout.first).context("more than 65,536 pixels")?;
+        let recorded = recorded.into_iter().skip(layout.first);
+        let addressed = (first..=u16::MAX).zip(captures.iter().flatten());
+        for ((address, counts), recorded) in addressed.zip(recorded) {
+            let remaining = Remaining::new(counts);
+            photons_per_cycle += mean(remaining.photons(), recorded);
             pixels.push(RecordedPixel {
-                left,
+                remaining,
                 cycles_left: recorded,
-                rng: pixel_rng(seed, PixelAddress(address)),
+                rng: pixel_rng(seed, PixelAddress::new(address)),
                 chunk: PixelPhotons::default(),
-                given: 0,
-                given_photons: 0,
+                replayed_cycles: 0,
+                replayed_photons: 0,
             });
         }
         ensure!(
@@ -147,23 +141,23 @@ impl RecordedHistograms {
             "{photons_per_cycle:.0} photons a laser cycle are more than {MOST_A_CYCLE:.0}"
         );
         Ok(Self {
-            array: whole.array,
-            sides: ["column", "row"],
-            capture_rows: whole.capture_rows()?,
+            array: layout.array,
+            axis_names: ["column", "row"],
+            capture_rows: layout.capture_rows()?,
             photons_per_cycle,
             cycles: cycles.min(longest),
             recorded: (shortest, longest),
             next_cycle: 0,
-            chunk: chunk(of_all),
-            first: u16::try_from(whole.first).context("more than 65,536 pixels")?,
+            chunk: chunk(total_per_cycle),
+            first,
             pixels,
         })
     }
 
-    /// With other names for columns and rows.
+    /// Renames columns and rows.
     #[must_use]
-    pub fn with_sides(self, sides: [&'static str; 2]) -> Self {
-        Self { sides, ..self }
+    pub fn with_axis_names(self, axis_names: [&'static str; 2]) -> Self {
+        Self { axis_names, ..self }
     }
 }
 
@@ -182,7 +176,7 @@ fn mean(photons: u64, cycles: u64) -> f64 {
     photons as f64 / cycles.max(1) as f64
 }
 
-/// Laser cycles of a chunk, if all pixels have so many photons a laser cycle.
+/// Laser cycles of a chunk, for so many photons a laser cycle of all pixels.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -194,7 +188,7 @@ fn chunk(photons_per_cycle: f64) -> u16 {
 
 /// Laser cycles of a capture whose brightest pixel holds `brightest` photons.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-fn recorded_cycles(length: RecordingLength, brightest: u64, wanted: u64) -> Result<u64> {
+fn recorded_cycles(length: RecordingLength, brightest: u64, requested: u64) -> Result<u64> {
     match length {
         RecordingLength::Cycles(cycles) => {
             ensure!(
@@ -203,8 +197,8 @@ fn recorded_cycles(length: RecordingLength, brightest: u64, wanted: u64) -> Resu
             );
             Ok(cycles)
         }
-        // Without a photon every length is the same; last as long as asked for.
-        RecordingLength::PhotonsPerCycle(_) if brightest == 0 => Ok(wanted),
+        // Without a photon the length does not matter.
+        RecordingLength::PhotonsPerCycle(_) if brightest == 0 => Ok(requested),
         RecordingLength::PhotonsPerCycle(rate) => {
             let cycles = (brightest as f64 / rate).round().max(1.0);
             ensure!(
@@ -225,8 +219,8 @@ impl PhotonSource for RecordedHistograms {
         self.array
     }
 
-    fn sides(&self) -> [&'static str; 2] {
-        self.sides
+    fn axis_names(&self) -> [&'static str; 2] {
+        self.axis_names
     }
 
     fn capture_rows(&self) -> u32 {
@@ -234,8 +228,8 @@ impl PhotonSource for RecordedHistograms {
     }
 
     fn addresses(&self) -> Vec<PixelAddress> {
-        let there = (self.first..=u16::MAX).take(self.pixels.len());
-        there.map(PixelAddress).collect()
+        let addresses = (self.first..=u16::MAX).take(self.pixels.len());
+        addresses.map(PixelAddress::new).collect()
     }
 
     fn cycles(&self) -> u64 {
@@ -254,9 +248,9 @@ impl PhotonSource for RecordedHistograms {
         Some(self.recorded)
     }
 
-    fn spare(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
+    fn limit_to(&mut self, is_needed: &dyn Fn(PixelAddress) -> bool) {
         for (address, pixel) in self.addresses().into_iter().zip(&mut self.pixels) {
-            if !is_wanted(address) {
+            if !is_needed(address) {
                 pixel.cycles_left = 0;
             }
         }
@@ -277,85 +271,85 @@ impl PhotonSource for RecordedHistograms {
     }
 }
 
-/// One pixel's photons that have not been used.
+/// The photons of a pixel that have not been replayed.
 #[derive(Clone, Debug)]
 struct RecordedPixel {
-    /// Of the laser cycles after the chunk.
-    left: Remaining,
+    /// Photons of the laser cycles after the chunk.
+    remaining: Remaining,
     cycles_left: u64,
     rng: Pcg64,
-    /// Some laser cycles.
+    /// The chunk: its laser cycles and photons.
     chunk: PixelPhotons,
-    /// Laser cycles and photons of the chunk that slices have had.
-    given: u16,
-    given_photons: usize,
+    /// Laser cycles and photons of the chunk that have been replayed.
+    replayed_cycles: u16,
+    replayed_photons: usize,
 }
 
 impl RecordedPixel {
     fn photons_left(&self) -> u64 {
-        let in_chunk = self.chunk.photons.len() - self.given_photons;
-        self.left.photons() + in_chunk as u64
+        let in_chunk = self.chunk.photons.len() - self.replayed_photons;
+        self.remaining.photons() + in_chunk as u64
     }
 
-    /// The next `cycles` laser cycles, from chunks of `chunk`.
+    /// The next `cycles` laser cycles, from chunks of `chunk` laser cycles.
     fn next_cycles(&mut self, cycles: u16, chunk: u16) -> Result<PixelPhotons> {
         let mut received = PixelPhotons::default();
         while received.cycles < cycles {
-            if self.given == self.chunk.cycles {
+            if self.replayed_cycles == self.chunk.cycles {
                 self.next_chunk(chunk)?;
                 if self.chunk.cycles == 0 {
                     break;
                 }
             }
-            let taken = (self.chunk.cycles - self.given).min(cycles - received.cycles);
-            let end = self.given + taken;
-            let left = &self.chunk.photons[self.given_photons..];
+            let taken = (self.chunk.cycles - self.replayed_cycles).min(cycles - received.cycles);
+            let end = self.replayed_cycles + taken;
+            let left = &self.chunk.photons[self.replayed_photons..];
             let next = left.iter().take_while(|photon| photon.cycle < end).count();
             let next = &left[..next];
-            let (from, to) = (self.given, received.cycles);
+            let (from, to) = (self.replayed_cycles, received.cycles);
             received.photons.extend(next.iter().map(|photon| Photon {
                 cycle: to + (photon.cycle - from),
                 code: photon.code,
             }));
-            self.given_photons += next.len();
-            self.given = end;
+            self.replayed_photons += next.len();
+            self.replayed_cycles = end;
             received.cycles += taken;
         }
         Ok(received)
     }
 
-    /// Draws the photons of the next `cycles` laser cycles, or of all there are.
+    /// Draws the photons of the next `cycles` laser cycles, or of all that are left.
     fn next_chunk(&mut self, cycles: u16) -> Result<()> {
         let cycles = u16::try_from(self.cycles_left).map_or(cycles, |left| left.min(cycles));
-        (self.given, self.given_photons) = (0, 0);
+        (self.replayed_cycles, self.replayed_photons) = (0, 0);
         self.chunk.cycles = cycles;
         self.chunk.photons.clear();
         if cycles == 0 {
             return Ok(());
         }
         let share = f64::from(cycles) / self.cycles_left as f64;
-        let count = Binomial::new(self.left.photons(), share)?.sample(&mut self.rng);
+        let count = Binomial::new(self.remaining.photons(), share)?.sample(&mut self.rng);
         self.cycles_left -= u64::from(cycles);
-        // A laser cycle for each. As any photon may have any of them, how many fall into each
-        // says enough.
-        let mut of_cycle = [0u32; CHUNK as usize];
+        // Draws a laser cycle for each photon. Photons are interchangeable, so only the number in
+        // each laser cycle matters.
+        let mut photons_in_cycle = [0u32; CHUNK as usize];
         for _ in 0..count {
             let cycle = UniformInt::<u16>::sample_single(0, cycles, &mut self.rng)?;
-            of_cycle[usize::from(cycle)] += 1;
+            photons_in_cycle[usize::from(cycle)] += 1;
         }
         let photons = &mut self.chunk.photons;
         for _ in 0..count {
-            let Some(code) = self.left.draw(&mut self.rng) else {
-                bail!("a photon too few");
+            let Some(code) = self.remaining.draw(&mut self.rng) else {
+                bail!("the histogram has too few photons");
             };
             photons.push(Photon { cycle: 0, code });
         }
         let all = photons.len();
-        // Most laser cycles have few photons: to write some too many, which the next laser
-        // cycles have, is faster than to ask each time.
+        // Most laser cycles have few photons. It is faster to write `AT_ONCE` of them without a
+        // check; the next laser cycle overwrites those too many.
         photons.resize(all + AT_ONCE, Photon { cycle: 0, code: 0 });
         let mut next = 0;
-        for (cycle, &count) in (0..cycles).zip(&of_cycle) {
+        for (cycle, &count) in (0..cycles).zip(&photons_in_cycle) {
             for photon in &mut photons[next..next + AT_ONCE] {
                 photon.cycle = cycle;
             }

@@ -8,15 +8,15 @@ use dtof_core::{Array, BlockLevel, PixelAddress};
 pub struct Photon {
     /// Laser cycles after the slice's first.
     pub cycle: u16,
-    /// The bin, as a TDC would give it.
+    /// The bin, as from a TDC.
     pub code: u16,
 }
 
 /// The photons of one pixel in one slice.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct PixelPhotons {
-    /// Laser cycles of the slice that were recorded: all of them, or fewer
-    /// where the pixel's recording ends.
+    /// Laser cycles of the slice that were recorded. Fewer than its length where the pixel's
+    /// recording ends.
     pub cycles: u16,
     /// In non-decreasing laser cycle.
     pub photons: Vec<Photon>,
@@ -31,13 +31,13 @@ pub struct Slice {
     pub pixels: Vec<PixelPhotons>,
 }
 
-/// Produces photons as they are needed, so that memory does not grow with their
+/// A source of photons. It makes them as they are needed, so memory does not grow with their
 /// number.
 ///
-/// A source that changes the photons of another names it as [`inner`](Self::inner). It then
-/// says all that the other says, but for what it changes.
+/// A source that changes the photons of another returns it as [`inner`](Self::inner). By default,
+/// all other methods forward to it.
 pub trait PhotonSource {
-    /// The source whose photons these are, if this one changes those of another.
+    /// The source whose photons this one changes.
     fn inner(&self) -> Option<&dyn PhotonSource> {
         None
     }
@@ -46,12 +46,12 @@ pub trait PhotonSource {
     fn array(&self) -> Array;
 
     /// The names of its columns and rows.
-    fn sides(&self) -> [&'static str; 2] {
+    fn axis_names(&self) -> [&'static str; 2] {
         self.inner()
-            .map_or(["column", "row"], |inner| inner.sides())
+            .map_or(["column", "row"], |inner| inner.axis_names())
     }
 
-    /// Rows that were recorded together: a block of pixels has no others.
+    /// Rows that were recorded together. Blocks do not span captures.
     fn capture_rows(&self) -> u32 {
         match self.inner() {
             Some(inner) => inner.capture_rows(),
@@ -59,61 +59,59 @@ pub trait PhotonSource {
         }
     }
 
-    /// The pixels that are there, ascending: all of the array unless said
-    /// otherwise.
+    /// The addresses of the pixels, ascending: by default all of the array.
     fn addresses(&self) -> Vec<PixelAddress> {
         if let Some(inner) = self.inner() {
             return inner.addresses();
         }
         let all = (0..=u16::MAX).take(self.array().pixels() as usize);
-        all.map(PixelAddress).collect()
+        all.map(PixelAddress::new).collect()
     }
 
-    /// Laser cycles there are, from 0.
+    /// The number of laser cycles.
     fn cycles(&self) -> u64;
 
-    /// Photons of all pixels in the next laser cycle, about; 0 if that is not
-    /// known.
+    /// About the photons of all pixels in the next laser cycle; 0 if unknown.
     fn photons_per_cycle(&self) -> f64 {
         self.inner().map_or(0.0, |inner| inner.photons_per_cycle())
     }
 
-    /// Recorded photons that no slice has held so far.
+    /// Recorded photons that no slice has contained yet.
     fn not_replayed(&self) -> u64 {
         self.inner().map_or(0, |inner| inner.not_replayed())
     }
 
-    /// Photons of pixels that are left out so far.
+    /// Photons of masked pixels so far.
     fn masked(&self) -> u64 {
         self.inner().map_or(0, |inner| inner.masked())
     }
 
-    /// Laser cycles that recorded histograms are taken to have lasted: those of
-    /// the shortest and of the longest capture.
+    /// The assumed laser cycles of the shortest and the longest capture of recorded histograms.
     fn recorded_cycles(&self) -> Option<(u64, u64)> {
         self.inner()?.recorded_cycles()
     }
 
-    /// Laser cycles a second, if that is known.
+    /// Laser cycles a second, if known.
     fn laser_hz(&self) -> Option<u64> {
         self.inner()?.laser_hz()
     }
 
-    /// Of pixels that `is_wanted` does not name no photons need be made from now on, if that
-    /// saves time.
-    fn spare(&mut self, _is_wanted: &dyn Fn(PixelAddress) -> bool) {}
+    /// From now on, photons of pixels for which `is_needed` is false may be left out, if that saves
+    /// time.
+    fn limit_to(&mut self, _is_needed: &dyn Fn(PixelAddress) -> bool) {}
 
     /// The photons of the next `cycles` laser cycles.
     ///
     /// # Errors
-    /// What went wrong with the recording, naming file and place.
+    /// Returns what is wrong with the recording, after the file and the place.
     fn next_slice(&mut self, cycles: u16) -> Result<Slice>;
 }
 
-/// Whether blocks of `level` have only neighbours: columns and rows lie side by side, and no
-/// block reaches into another capture.
+/// Whether the pixels of every block of `level` are neighbours: columns and rows are adjacent, and
+/// no block spans two captures.
 #[must_use]
 pub fn has_only_neighbours(source: &dyn PhotonSource, level: BlockLevel) -> bool {
     let (rows, side) = (source.capture_rows(), 1 << level.raw());
-    source.sides()[0] == "column" && (rows == source.array().rows() || rows.is_multiple_of(side))
+    source.axis_names()[0] == "column"
+        && (rows == source.array().rows() || rows.is_multiple_of(side))
 }

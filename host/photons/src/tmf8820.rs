@@ -1,6 +1,6 @@
-//! Recorded histograms from the public TMF8820 capture log, as it is: a JSON
-//! list of captures of the 3×3-zone sensor, each with nine histograms of 128
-//! bins. Pixel address = capture × 9 + zone; zone 4 is the centre.
+//! Recorded histograms from the public TMF8820 capture log: a JSON list of captures of the 3×3-zone
+//! sensor, each with nine histograms of 128 bins. Pixel address = capture × 9 + zone; zone 4 is the
+//! centre.
 
 use std::io::Read;
 
@@ -15,16 +15,16 @@ use crate::recorded::Capture;
 pub const ZONES: u32 = 9;
 /// The array of a capture.
 pub const ARRAY: Array = Array::new(ZONES, 1).unwrap();
-/// The one that looks straight ahead.
+/// The centre zone.
 pub const CENTRE: u32 = 4;
 /// The names of the columns and rows of a log.
-pub const SIDES: [&str; 2] = ["zone", "capture"];
+pub const AXIS_NAMES: [&str; 2] = ["zone", "capture"];
 /// Bins of its histograms.
 pub const BINS: usize = 128;
-/// Its bin width: a fit of pulse positions to distances from 30 to 400 mm gives
-/// 13.80 mm a bin; the log's authors state 91 ps.
+/// The bin width. A fit of pulse positions to distances from 30 to 400 mm gives 13.80 mm a bin; the
+/// log's authors state 91 ps.
 pub const BIN_WIDTH_PS: U16F16 = U16F16::lit("92.1");
-/// Brings the centre zone of the public log to its ground truth from 30 to 400 mm.
+/// Moves the ranges of the centre zone of the public log to its ground truth from 30 to 400 mm.
 pub const OFFSET_MM: I24F8 = I24F8::lit("-179.5");
 
 /// The captures of a log.
@@ -32,12 +32,11 @@ pub const OFFSET_MM: I24F8 = I24F8::lit("-179.5");
 pub struct Tmf8820Log {
     /// Nine histograms each.
     pub captures: Vec<Capture>,
-    /// The true distance in millimetres of each zone that has one, if the log has it: of the
-    /// centre zones.
+    /// The true distance of each zone in millimetres. The log has it for centre zones, if at all.
     pub truth_mm: Option<Vec<Option<f64>>>,
 }
 
-/// The part of a capture that is read. The sensor's own results stand beside it in the log.
+/// The fields that are read. The log also has the sensor's own results.
 #[derive(Deserialize)]
 struct LogEntry {
     hists: Vec<Vec<u64>>,
@@ -48,8 +47,7 @@ struct LogEntry {
 /// Reads the log from the text of the file `name`.
 ///
 /// # Errors
-/// What is wrong with the file; its name, and the line where there is one,
-/// first.
+/// Returns what is wrong with the file, after its name and the line if there is one.
 pub fn read(name: &str, text: impl Read) -> Result<Tmf8820Log> {
     let entries: Vec<LogEntry> = serde_json::from_reader(text).map_err(|error| {
         let line = error.line();

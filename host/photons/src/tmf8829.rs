@@ -2,7 +2,7 @@
 //! object with a frame in each `Result_Set`, and in each frame a histogram a pixel,
 //! `mp_histo[row][column].bin`. Pixel address = (frame × rows + row) × columns + column.
 //!
-//! The sensor's own results stand beside the histograms, and are not read.
+//! The sensor's own results are not read.
 
 use std::io::Read;
 
@@ -16,12 +16,12 @@ use dtof_options::rows::Row;
 
 /// Bins of its histograms.
 pub const BINS: usize = 64;
-/// The width of the sensor's own bins: a fit of the pulses to its distances from 0.26 to
-/// 2.85 m, in a log with four of them a bin, gives 122.2 mm a bin of the log.
+/// The width of the sensor's own bins. A fit of the pulses to its distances from 0.26 to 2.85 m, in
+/// a log with four of them a bin, gives 122.2 mm a bin of the log.
 const OWN_BIN_WIDTH_PS: U16F16 = U16F16::lit("203.8");
-/// Brings pulses to the sensor's distances: from the same fit.
+/// Moves pulses to the sensor's distances, from the same fit.
 pub const OFFSET_MM: I24F8 = I24F8::lit("-441.1");
-/// What a sensor does unless the log says otherwise: four of its bins make one.
+/// The sensor's default: four of its bins make one.
 const BIN_SHIFT: u32 = 2;
 
 /// The frames of a log.
@@ -33,13 +33,13 @@ pub struct Tmf8829Log {
     pub captures: Vec<Capture>,
     /// Picoseconds a bin.
     pub bin_width_ps: U16F16,
-    /// The first bins that were measured in full: all, if the log does not say.
+    /// The bins that were measured in full, from the first on: all, if the log does not say.
     pub measured_bins: usize,
     /// What was left out.
     pub rows: Vec<Row>,
 }
 
-/// The part of a log that is read.
+/// The fields that are read.
 #[derive(Deserialize)]
 struct Log {
     #[serde(rename = "Result_Set")]
@@ -59,7 +59,7 @@ struct Pixel {
 
 #[derive(Deserialize)]
 struct Configuration {
-    /// Of the sensor's own bins, two to this power make one of the log.
+    /// 2 to this power of the sensor's own bins make one of the log.
     bin_shift: Option<u32>,
     /// How many of its own bins the sensor measured.
     histogram_bins: Option<u32>,
@@ -68,16 +68,16 @@ struct Configuration {
 /// Reads the log from the text of the file `name`.
 ///
 /// # Errors
-/// What is wrong with the file; its name, and the line where there is one, first.
+/// Returns what is wrong with the file, after its name and the line if there is one.
 pub fn read(name: &str, text: impl Read) -> Result<Tmf8829Log> {
     let log: Log = serde_json::from_reader(text).map_err(|error| {
         let line = error.line();
         anyhow!("{name}:{line}: not a TMF8829 log: {error}")
     })?;
-    of_log(log).with_context(|| name.to_owned())
+    parse_log(log).with_context(|| name.to_owned())
 }
 
-fn of_log(log: Log) -> Result<Tmf8829Log> {
+fn parse_log(log: Log) -> Result<Tmf8829Log> {
     ensure!(!log.frames.is_empty(), "no frames");
     let mut frames = Vec::new();
     for (number, frame) in log.frames.into_iter().enumerate() {
@@ -104,14 +104,16 @@ fn of_log(log: Log) -> Result<Tmf8829Log> {
             }
         }
     }
-    // Some viewers write one column as many times as the sensor has columns.
+    // Some viewers write the same column once for each column of the sensor.
     let mut all = frames.iter().flatten();
     let is_copied = columns > 1 && all.all(|row| row.iter().all(|pixel| *pixel == row[0]));
-    let kept = if is_copied { 1 } else { columns };
+    let columns_kept = if is_copied { 1 } else { columns };
     let captures: Vec<Capture> = frames
         .into_iter()
         .map(|frame| {
-            let pixels = frame.into_iter().flat_map(|row| row.into_iter().take(kept));
+            let pixels = frame
+                .into_iter()
+                .flat_map(|row| row.into_iter().take(columns_kept));
             pixels.map(|pixel| pixel.bin).collect()
         })
         .collect();
@@ -127,9 +129,9 @@ fn of_log(log: Log) -> Result<Tmf8829Log> {
     let measured = measured.filter(|bins| (1..BINS).contains(bins));
     let copies = format!(
         "{} of {columns}, each the same as the first",
-        columns - kept
+        columns - columns_kept
     );
-    let array = Array::new(u32::try_from(kept)?, u32::try_from(rows)?);
+    let array = Array::new(u32::try_from(columns_kept)?, u32::try_from(rows)?);
     Ok(Tmf8829Log {
         array: array.context("more than 65,536 pixels")?,
         captures,

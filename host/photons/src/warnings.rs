@@ -1,10 +1,10 @@
-//! What is surely wrong with a recording that can be read all the same.
+//! Warnings about recordings that can be read but look wrong.
 
 use dtof_core::fixed::types::U16F16;
 
-/// No SPAD resolves a picosecond: a narrower bin was said in another unit.
+/// No SPAD resolves a picosecond, so a narrower bin was probably given in nanoseconds.
 #[must_use]
-pub fn of_bin_width(width_ps: U16F16) -> Option<String> {
+pub fn narrow_bins(width_ps: U16F16) -> Option<String> {
     (width_ps < U16F16::ONE && width_ps > U16F16::ZERO).then(|| {
         let (given, ns) = (width_ps.to_num::<f64>(), width_ps.to_num::<f64>() * 1000.0);
         format!(
@@ -13,9 +13,9 @@ pub fn of_bin_width(width_ps: U16F16) -> Option<String> {
     })
 }
 
-/// Histograms without a photon, if each `is_empty`.
+/// Warns if all histograms are empty.
 #[must_use]
-pub fn of_photons(is_empty: impl Iterator<Item = bool>) -> Option<String> {
+pub fn empty_histograms(is_empty: impl Iterator<Item = bool>) -> Option<String> {
     let (mut all, mut empty) = (0u32, 0);
     for is_empty in is_empty {
         all += 1;
@@ -24,8 +24,8 @@ pub fn of_photons(is_empty: impl Iterator<Item = bool>) -> Option<String> {
     (empty == all).then(|| format!("no photons: all {all} histograms are empty"))
 }
 
-/// How much more often two photons of a line meet in one place than if they were spread
-/// evenly: 1 for an even line whatever its noise, its length if all are in one place.
+/// How much more often two photons of a line fall into one place than if they were spread evenly. 1
+/// for an even line whatever its noise, and its length if all are in one place.
 #[derive(Clone, Copy, Default)]
 struct Concentration {
     meet: f64,
@@ -54,12 +54,11 @@ impl Concentration {
     }
 }
 
-/// An array whose first axis, of `first`, is the bins, and that was read as if its last were.
-/// Along the bins there is a pulse, along pixels there is none: photons gather along the first
-/// axis, and hardly along the last.
+/// Warns if the first axis, of length `first`, looks like the bins although the last was read as
+/// such. Photons concentrate in a pulse along the bins, and hardly along pixels.
 #[must_use]
-pub fn of_axes(first: usize, pixels: &[Vec<u64>]) -> Option<String> {
-    // Fewer are no histogram.
+pub fn swapped_axes(first: usize, pixels: &[Vec<u64>]) -> Option<String> {
+    // A histogram has at least 8 bins.
     if first < 8 || !pixels.len().is_multiple_of(first) {
         return None;
     }

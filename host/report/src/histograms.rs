@@ -1,4 +1,4 @@
-//! The histograms of the report: of each pixel the one that its last event was decided from.
+//! The histograms of the report: that of the last event of each pixel.
 
 use std::collections::BTreeSet;
 
@@ -6,18 +6,18 @@ use dtof_core::Array;
 use serde_json::json;
 
 use super::packed::Packed;
-use dtof_engine::decisions::{Decision, Kept};
-use dtof_engine::look::{Look, look_back};
+use dtof_engine::decisions::{Decision, KeptPixels};
+use dtof_engine::explain::{Explanation, explain_decisions};
 use dtof_engine::settings::Settings;
 use dtof_events::events_csv::range_mm;
 
 /// The last decisions of a run.
 #[derive(Clone, Copy, Debug)]
 pub struct Decisions<'a> {
-    /// How they were made.
+    /// The settings of the pixels.
     pub settings: &'a Settings,
-    /// Which of them are there.
-    pub kept: Kept,
+    /// The pixels whose decisions were kept.
+    pub kept: KeptPixels,
     /// In order of level and pixel.
     pub all: &'a [Decision],
     /// The array.
@@ -25,15 +25,15 @@ pub struct Decisions<'a> {
 }
 
 impl Decisions<'_> {
-    /// What the script is given, in at most so many bytes of base64: if there is no room for all,
-    /// the pixels of every second column and row, and so on.
+    /// The data for the script and its size, at most `room` bytes of base64. If there is no room for all
+    /// pixels, those of every second column and row, then of every fourth, and so on.
     pub(super) fn data(&self, room: usize) -> (serde_json::Value, usize) {
         let all = self.last();
-        let looks = look_back(self.settings, &all);
+        let looks = explain_decisions(self.settings, &all);
         let mut kept = self.kept;
         let (packed, count) = loop {
             let pairs = all.iter().zip(&looks);
-            let pairs = pairs.filter(|(decision, _)| kept.holds(decision.event.pixel));
+            let pairs = pairs.filter(|(decision, _)| kept.contains(decision.event.pixel));
             let (mut packed, mut count) = (Packed::default(), 0);
             for (decision, look) in pairs {
                 self.push(&mut packed, decision, look);
@@ -42,8 +42,8 @@ impl Decisions<'_> {
             if packed.len() <= room || count == 0 {
                 break (packed, count);
             }
-            kept.every = kept.every.saturating_mul(2);
-            if kept.every > u32::from(u16::MAX) {
+            kept.step = kept.step.saturating_mul(2);
+            if kept.step > u32::from(u16::MAX) {
                 break (Packed::default(), 0);
             }
         };
@@ -54,15 +54,15 @@ impl Decisions<'_> {
             "bins": bins,
             "gate": gate.map_or([0, last], |(first, last)| [first.into(), last.into()]),
             "quadrants": looks.first().map(|look| look.quadrants),
-            "every": kept.every,
+            "every": kept.step,
             "count": count,
             "packed": packed.base64(),
         });
         (data, packed.len())
     }
 
-    /// Those that are the last of some pixel: of the decisions of a pixel and of its blocks the
-    /// latest, of several the smallest block's.
+    /// The last decision of each pixel: the latest of the pixel and of its blocks, and of several at the
+    /// same time that of the smallest block.
     fn last(&self) -> Vec<Decision> {
         let mut last: Vec<Option<usize>> = vec![None; self.array.pixels() as usize];
         for (number, decision) in self.all.iter().enumerate() {
@@ -70,7 +70,7 @@ impl Decisions<'_> {
                 .array
                 .pixels_of(decision.event.pixel, decision.event.level)
             {
-                if let Some(last) = last.get_mut(usize::from(pixel.0)) {
+                if let Some(last) = last.get_mut(usize::from(pixel.raw())) {
                     let before = last.map(|before| self.all[before].event.cycle);
                     if before.is_none_or(|before| before < decision.event.cycle) {
                         *last = Some(number);
@@ -85,17 +85,17 @@ impl Decisions<'_> {
             .collect()
     }
 
-    /// Event, look, bins that are left out, and counts.
-    fn push(&self, packed: &mut Packed, decision: &Decision, look: &Look) {
+    /// Packs event, look, excluded bins and counts.
+    fn push(&self, packed: &mut Packed, decision: &Decision, look: &Explanation) {
         let Decision { event, counts, .. } = decision;
-        packed.push(event.pixel.0);
+        packed.push(event.pixel.raw());
         packed.push(super::events::kind(event.level, event.echo, event.flags));
-        packed.push(event.cycle.0);
+        packed.push(event.cycle.raw());
         packed.push(event.exposure);
         let scale = self.settings.range_scale().ok();
         packed.push_range(scale.map_or(0.0, |scale| range_mm(event, &scale)));
         packed.push(event.peak_bin.raw());
-        // One more than the number, or 0 for none.
+        // The number plus 1, or 0 for none.
         packed.push(look.needed.map_or(0, |needed| u64::from(needed) + 1));
         let background = look.background.unwrap_or_default();
         packed.push_range(background);
@@ -106,9 +106,9 @@ impl Decisions<'_> {
         if width > 0 {
             packed.push(first);
         }
-        let left_out = self.left_out(decision);
-        packed.push(left_out.len() as u64);
-        for [first, last] in left_out {
+        let excluded = self.excluded_ranges(decision);
+        packed.push(excluded.len() as u64);
+        for [first, last] in excluded {
             packed.push(first);
             packed.push(last);
         }
@@ -117,11 +117,11 @@ impl Decisions<'_> {
         }
     }
 
-    /// First and last bin of each range around earlier echoes.
-    fn left_out(&self, decision: &Decision) -> Vec<[u16; 2]> {
+    /// First and last bin of each excluded range around earlier echoes.
+    fn excluded_ranges(&self, decision: &Decision) -> Vec<[u16; 2]> {
         let mut ranges: Vec<[u16; 2]> = Vec::new();
         let bins = u16::try_from(self.settings.bins).unwrap_or(0);
-        for bin in (0..bins).filter(|&bin| decision.peeled.contains(bin)) {
+        for bin in (0..bins).filter(|&bin| decision.excluded.contains(bin)) {
             match ranges.last_mut() {
                 Some([_, last]) if *last + 1 == bin => *last = bin,
                 _ => ranges.push([bin, bin]),

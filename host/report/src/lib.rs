@@ -23,8 +23,7 @@ use self::shared::STYLE;
 /// A picture of the report.
 #[derive(Clone, Copy, Debug)]
 pub struct Figure<'a> {
-    /// An SVG document. It is placed in the page as it is, so it has to come
-    /// from a trusted source.
+    /// An SVG document from a trusted source: it is placed in the page as it is.
     pub svg: &'a str,
     /// The text below it.
     pub caption: &'a str,
@@ -39,25 +38,23 @@ pub struct Section<'a> {
     pub rows: &'a [(String, String)],
 }
 
-/// Every page has it near its start.
+/// The mark near the start of every page.
 pub const MARK: &str = "<meta name=\"generator\" content=\"dtof\">";
 
 const OWN_STYLE: &str = include_str!("report.css");
 
-/// Bytes of a page. Larger ones are slow to open, and to send.
-const PAGE: usize = 5_000_000;
-/// Bytes of a page for all but events and figures, at most.
-const ALL_ELSE: usize = 200_000;
-/// So many pixels, at most, are shown as plots, not as maps.
+/// The size limit of a page in bytes. Larger ones are slow to open and to send.
+const MAX_PAGE: usize = 5_000_000;
+/// The most bytes of a page for all but events and figures.
+const MAX_OTHER: usize = 200_000;
+/// Up to so many pixels are shown as plots, not as maps.
 pub const FEW: usize = 16;
 
-/// A page with `title` and the paragraph `lead`, the events to turn and look at, then
-/// all `figures`, then all `sections`. Events and histograms are thinned until the page has
-/// less than 5 MB.
+/// A page with `title`, the paragraph `lead`, an interactive cloud of events, `figures` and `sections`.
+/// Events and histograms are thinned until the page has less than 5 MB.
 ///
-/// The page is whole: it loads nothing, and runs no script but its own, which the
-/// policy at its head names by its hash. All texts are escaped. Figures are taken as
-/// they are, and define no identifiers.
+/// The page loads nothing. Its content security policy names its only script by hash. All texts are
+/// escaped. Figures are placed as they are, and must not define identifiers.
 #[must_use]
 pub fn html(
     title: &str,
@@ -69,7 +66,7 @@ pub fn html(
     let hash = BASE64.encode(Sha256::digest(&*cloud::SCRIPT));
     let script = format!("script-src 'sha256-{hash}'; ");
     let taken: usize = figures.iter().map(|figure| figure.svg.len()).sum();
-    let interactive = events.html(PAGE.saturating_sub(ALL_ELSE + taken));
+    let interactive = events.html(MAX_PAGE.saturating_sub(MAX_OTHER + taken));
     page(title, lead, (&script, &interactive), sections, figures)
 }
 
@@ -79,7 +76,7 @@ pub fn still(title: &str, lead: &str, sections: &[Section], figures: &[Figure]) 
     page(title, lead, ("", ""), sections, figures)
 }
 
-/// `interactive` is the policy of its script, and what the script fills.
+/// `script` is the policy of the script, `interactive` the elements that it fills.
 fn page(
     title: &str,
     lead: &str,
@@ -126,7 +123,15 @@ fn text(text: &str) -> String {
     escape(&one_line(text))
 }
 
-/// The `<svg>` element of a document: a page has no room for its declaration.
+/// The `<svg>` element of a document, without the XML declaration.
 fn element(svg: &str) -> &str {
     svg.find("<svg").map_or("", |start| svg[start..].trim_end())
+}
+
+/// `word` with a capital letter, for the start of a sentence.
+#[must_use]
+pub fn capitalised(word: &str) -> String {
+    let mut letters = word.chars();
+    let first = letters.next().map(|first| first.to_ascii_uppercase());
+    first.into_iter().chain(letters).collect()
 }

@@ -1,12 +1,12 @@
-//! Small numbers in little room.
+//! A compact format for small numbers.
 //!
-//! A number is written in digits of three bits, the lowest first, two digits a byte. A fourth
-//! bit says that another digit follows. Photons of a bin most often take one digit.
+//! A number is written in digits of three bits, the lowest first, two digits in a byte. The fourth bit of a
+//! digit is set if another digit follows. The count of a bin usually takes one digit.
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 
-/// Numbers, one after the other.
+/// Packed numbers.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Packed {
     bytes: Vec<u8>,
@@ -35,7 +35,7 @@ impl Packed {
         }
     }
 
-    /// Adds a range, exact below 2⁴⁵ mm: twice its 1/256 mm, and one more below 0.
+    /// Adds a range in steps of 1/256 mm, zigzag coded; exact below 2⁴⁵ mm.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -46,7 +46,7 @@ impl Packed {
         self.push((parts << 1 ^ parts >> 63) as u64);
     }
 
-    /// How many characters [`Self::base64`] has.
+    /// The length of [`Self::base64`] in characters.
     pub fn len(&self) -> usize {
         self.bytes.len().div_ceil(3) * 4
     }

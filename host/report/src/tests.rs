@@ -21,27 +21,27 @@ fn sample(limit: usize, count: u32) -> Sample {
 }
 
 /// The events of `sample`, on an array of four pixels.
-fn cloud<'a>(sample: &'a mut Sample, cycles: u64, called: [&'static str; 2]) -> Cloud<'a> {
+fn cloud<'a>(sample: &'a mut Sample, cycles: u64, nouns: [&'static str; 2]) -> Cloud<'a> {
     Cloud {
-        sides: ["zone", "capture"],
+        axis_names: ["zone", "capture"],
         array: Array::new(2, 2).unwrap(),
         cycles,
         laser_hz: Some(20_000),
         sample,
         is_chosen: false,
-        pixels: &[PixelAddress(2), PixelAddress(0)],
-        called,
+        pixels: const { &[PixelAddress::new(2), PixelAddress::new(0)] },
+        nouns,
         decisions: None,
     }
 }
 
-/// A page with the events of `sample`, nothing else that varies.
+/// A page with the events of `sample`.
 fn page(mut sample: Sample, cycles: u64, sections: &[Section], figures: &[Figure]) -> String {
     let events = cloud(&mut sample, cycles, ["event", "events"]);
     html("t", "l", sections, figures, events)
 }
 
-/// What the script is given.
+/// The data of the script.
 fn data(page: &str) -> serde_json::Value {
     let (_, data) = page.split_once("id=\"data\">").unwrap();
     let (data, _) = data.split_once("</script>").unwrap();
@@ -78,7 +78,7 @@ fn page_loads_nothing() {
     let map = dtof_draw::picture::Map {
         title: "t",
         unit: "m",
-        sides: ["column", "row"],
+        axis_names: ["column", "row"],
         missing: "event",
         columns: 2,
         rows: 1,
@@ -153,7 +153,7 @@ fn events_of(data: &serde_json::Value) -> Vec<Read> {
 }
 
 #[test]
-fn the_script_is_given_every_event() {
+fn every_event_is_in_the_data() {
     let data = data(&page(sample(10, 10), 12, &[], &[]));
     assert_eq!((&data["columns"], &data["rows"]), (&2.into(), &2.into()));
     assert_eq!(data["cycles"], 12);
@@ -178,7 +178,7 @@ fn the_script_is_given_every_event() {
 }
 
 #[test]
-fn the_script_is_given_level_echo_and_flags_of_each_event() {
+fn level_echo_and_flags_of_each_event_are_in_the_data() {
     let mut sample = Sample::new(100);
     let mut expected = Vec::new();
     for level in 0..4u8 {
@@ -204,7 +204,7 @@ fn the_script_is_given_level_echo_and_flags_of_each_event() {
 }
 
 #[test]
-fn times_of_a_laser_that_nobody_knows_are_said_to_be_assumed() {
+fn an_unknown_laser_rate_is_marked_as_assumed() {
     let known = page(sample(10, 10), 10, &[], &[]);
     assert_eq!(data(&known)["laserHz"], 20_000);
     assert!(known.contains("Times are those of a laser of 20 kHz."));
@@ -252,13 +252,13 @@ fn events_and_figures_stay_below_the_documented_size() {
             caption: "c",
         }];
         let page = page(sample, 1 << 20, &[], &figures);
-        assert!(page.len() < PAGE, "{}", page.len());
-        // Beside maps that leave little there are some.
+        assert!(page.len() < MAX_PAGE, "{}", page.len());
+        // Large figures leave room for some events.
         let count = data(&page)["count"].as_u64().unwrap();
         assert!(count > 2048, "{count}");
     }
     let empty = page(sample(1, 1), 1, &[], &[]).len();
-    assert!(empty < ALL_ELSE / 2, "{empty}");
+    assert!(empty < MAX_OTHER / 2, "{empty}");
 }
 
 #[test]

@@ -1,45 +1,27 @@
-//! The settings of a sensor from a recording.
+//! `calibrate`: the settings of a sensor from a recording.
 
 use anyhow::{Context, Result};
 
 use super::given::Given;
-use super::recording::{RECORDING, of_file, opening, warning_of_width, warnings};
-use dtof_calibrate::{Asked, Calibration, Length, Observed, calibrate};
+use super::recording::{RECORDING, bin_width_warning, read_options, settings_of_file, warnings};
+use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate};
 use dtof_engine::settings::{SettingsFile, share};
 use dtof_options::Refused;
-use dtof_options::numbers::{MOST_WHOLE, whole, within};
-use dtof_photons::medium::Medium;
+use dtof_options::numbers::{MAX_INTEGER, integer, within};
+use dtof_photons::input::Input;
 use dtof_photons::open::{Counts, counts};
 use dtof_photons::recorded::RecordingLength;
 
-/// The options that are not of settings files, whose keys of these names are others.
+/// Options of this job; keys of settings files with these names mean something else.
 const OWN: &[&str] = &["target_mm", "glass", "false_alarm", "seed"];
 
-/// What is calibrated by.
-#[derive(Clone, Debug)]
+/// The options of a calibration.
+#[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// What the recording is.
+    /// How to read the recording.
     pub given: Given,
-    /// The distance of a flat target that most of the pixels see, in millimetres.
-    pub target_mm: Option<f64>,
-    /// Whether the nearest surface, where all pixels have it at the same bin, is a cover glass.
-    pub glass: Option<bool>,
-    /// The share of exposures without a target that may end with an event.
-    pub false_alarm: f64,
-    /// Of what is simulated.
-    pub seed: u64,
-}
-
-impl Default for Options {
-    fn default() -> Self {
-        Self {
-            given: Given::default(),
-            target_mm: None,
-            glass: None,
-            false_alarm: 0.01,
-            seed: 1,
-        }
-    }
+    /// The options of the calibration itself.
+    pub calibration: CalibrationOptions,
 }
 
 impl dtof_options::Options for Options {
@@ -47,10 +29,10 @@ impl dtof_options::Options for Options {
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
-            "target_mm" => self.target_mm = Some(within(0.0..=1e6)(text)?),
-            "glass" => self.glass = Some(yes_or_no(text)?),
-            "false_alarm" => self.false_alarm = share(text)?,
-            "seed" => self.seed = whole(0..=MOST_WHOLE)(text)?,
+            "target_mm" => self.calibration.target_mm = Some(within(0.0..=1e6)(text)?),
+            "glass" => self.calibration.glass = Some(yes_or_no(text)?),
+            "false_alarm" => self.calibration.false_alarm = share(text)?,
+            "seed" => self.calibration.seed = integer(0..=MAX_INTEGER)(text)?,
             key => self.given.set(key, text)?,
         }
         Ok(())
@@ -69,56 +51,45 @@ fn yes_or_no(text: &str) -> Result<bool, String> {
     }
 }
 
-/// A calibrated sensor.
-pub struct Calibrated {
-    /// What was found.
+/// The result of a calibration.
+pub struct CalibrateResult {
+    /// The findings.
     pub found: Calibration,
-    /// The settings that say so.
+    /// The settings of the sensor.
     pub settings: SettingsFile,
-    /// What to know of the recording, a line each.
+    /// Warnings about the recording, a line each.
     pub warnings: Vec<String>,
 }
 
 impl Options {
-    /// What these options say, then the `older` settings of the sensor.
+    /// These options over the `older` settings of the sensor.
     ///
     /// # Errors
-    /// What is wrong with them.
-    pub fn said(&self, older: Option<&SettingsFile>) -> Result<SettingsFile> {
+    /// Fails if `rebin` is given without the bin width of the recording, or the bin width overflows.
+    pub fn requested(&self, older: Option<&SettingsFile>) -> Result<SettingsFile> {
         let older = older.cloned().unwrap_or_default();
-        let mut said = self.given.for_recording_over(older)?;
+        let mut requested = self.given.for_recording_over(older)?;
         for key in OWN {
-            said.override_key(key);
+            requested.override_key(key);
         }
-        Ok(said)
+        Ok(requested)
     }
 
-    /// What is asked for.
-    #[must_use]
-    pub fn asked(&self) -> Asked {
-        Asked {
-            glass: self.glass,
-            target_mm: self.target_mm,
-            false_alarm: self.false_alarm,
-            seed: self.seed,
-        }
-    }
-
-    /// Calibrates by `input`, of which so much is `said`.
+    /// Calibrates the sensor that recorded `input`, with the settings from [`Self::requested`].
     ///
     /// # Errors
-    /// What is wrong with the recording, its name first.
-    pub fn calibrate(&self, input: &Medium, said: SettingsFile) -> Result<Calibrated> {
-        let mut opening = opening(&said);
-        opening.cycles = u64::MAX;
-        let counts = counts(input, &opening)?;
-        self.given.suits(input, &counts.known)?;
-        let found = look(&said, &counts, &self.asked());
+    /// Fails if the recording cannot be read or calibrated; the error begins with its name.
+    pub fn calibrate(&self, input: &Input, requested: SettingsFile) -> Result<CalibrateResult> {
+        let mut options = read_options(&requested);
+        options.cycles = u64::MAX;
+        let counts = counts(input, &options)?;
+        self.given.suits(input, &counts.metadata)?;
+        let found = calibrate_counts(&requested, &counts, &self.calibration);
         let found = found.with_context(|| input.to_string())?;
-        let of_width = warning_of_width(&counts.known, &said);
-        let warnings = warnings(&counts.known).chain(of_width).collect();
-        let before = said.or(of_file(&counts.known, counts.array));
-        Ok(Calibrated {
+        let width = bin_width_warning(&counts.metadata, &requested);
+        let warnings = warnings(&counts.metadata).chain(width).collect();
+        let before = requested.or(settings_of_file(&counts.metadata, counts.array));
+        Ok(CalibrateResult {
             settings: found.settings(before)?,
             found,
             warnings,
@@ -126,12 +97,16 @@ impl Options {
     }
 }
 
-/// Calibrates by what a recording holds.
+/// Calibrates the sensor of a recording that has been read.
 ///
 /// # Errors
-/// If it holds nothing to calibrate by.
-pub(super) fn look(said: &SettingsFile, counts: &Counts, asked: &Asked) -> Result<Calibration> {
-    let length = match (counts.cycles, opening(said).length) {
+/// Those of [`calibrate`].
+pub(super) fn calibrate_counts(
+    requested: &SettingsFile,
+    counts: &Counts,
+    options: &CalibrationOptions,
+) -> Result<Calibration> {
+    let length = match (counts.cycles, read_options(requested).length) {
         (Some(cycles), _) | (None, Some(RecordingLength::Cycles(cycles))) => Length::Cycles(cycles),
         (None, Some(RecordingLength::PhotonsPerCycle(rate))) => Length::PhotonsPerCycle(rate),
         (None, None) => Length::Unknown,
@@ -141,8 +116,8 @@ pub(super) fn look(said: &SettingsFile, counts: &Counts, asked: &Asked) -> Resul
         captures: &counts.captures,
         length,
         cycles: None,
-        bin_width_ps: counts.known.bin_width_ps.to_num(),
+        bin_width_ps: counts.metadata.bin_width_ps.to_num(),
         truth_mm: counts.truth_mm.as_deref(),
     };
-    calibrate(&observed, asked)
+    calibrate(&observed, options)
 }

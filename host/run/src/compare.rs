@@ -1,33 +1,33 @@
-//! All methods on the photons of a recording or a scene.
+//! `compare`: all methods on the photons of a recording or a scene.
 
 use anyhow::{Context, Result};
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 
-use super::calibrate::look;
+use super::calibrate::calibrate_counts;
 use super::given::{Given, SENSOR, of_given};
-use super::recording::{RECORDING, of_file, opening, warning_of_width, warnings};
-use super::simulate::of_scene;
-use dtof_calibrate::Asked;
+use super::recording::{RECORDING, bin_width_warning, read_options, settings_of_file, warnings};
+use super::simulate::settings_of_scene;
+use dtof_calibrate::CalibrationOptions;
 use dtof_compare::truth::Truth;
 use dtof_compare::{Comparison, Task, compare};
-use dtof_engine::settings::{Run, Sensor, SettingsFile, share};
-use dtof_options::numbers::{MOST_WHOLE, positive, whole};
+use dtof_engine::settings::{SettingsFile, share};
+use dtof_options::numbers::{MAX_INTEGER, integer, positive};
 use dtof_options::{Refused, plain};
+use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
-use dtof_photons::medium::Medium;
-use dtof_photons::open::{Counts, Opening, counts, open};
+use dtof_photons::open::{Counts, ReadOptions, counts, open};
 use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 
-/// What is compared, and how exact it has to be.
+/// The options of a comparison.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Millimetres that 68 % of the reports may be off at most; as frames of L2 unless given.
+    /// The highest error of 68 % of the reports, in millimetres; by default that of frames of L2.
     pub within: Option<f64>,
-    /// The share of exposures without a target that may end with an event; 0.01 unless given.
+    /// The share of exposures without a target that may end with an event; by default 0.01.
     pub false_alarm: Option<f64>,
-    /// What the recording is, and what is known of the sensor.
+    /// Settings of recording and sensor.
     pub given: Given,
 }
 
@@ -44,7 +44,7 @@ impl dtof_options::Options for Options {
             "within" => self.within = Some(positive(text)?),
             "false_alarm" => self.false_alarm = Some(share(text)?),
             // One more is the seed of a second run.
-            "seed" => self.given.options.run.seed = Some(whole(0..=MOST_WHOLE - 1)(text)?),
+            "seed" => self.given.options.run.seed = Some(integer(0..=MAX_INTEGER - 1)(text)?),
             key => self.given.set(key, text)?,
         }
         Ok(())
@@ -54,138 +54,132 @@ impl dtof_options::Options for Options {
 }
 
 /// Where photons come from.
-pub enum Input {
-    /// A recording, and the true range of each pixel if it is known.
-    Recording(Medium, Option<Medium>),
-    /// A scene, and what errors call it.
+pub enum CompareInput {
+    /// A recording, and an array with the true range of each pixel if there is one.
+    Recording(Input, Option<Input>),
+    /// A scene, and its name for errors.
     Scene(Box<Scene>, String),
 }
 
-/// Told while methods are compared.
-pub struct Told<'a> {
-    /// What is wrong with the recording.
+/// Callbacks of a comparison.
+pub struct Callbacks<'a> {
+    /// Takes a warning about the recording.
     pub warning: &'a dyn Fn(String),
-    /// What comes next. An error from it ends the comparison.
+    /// Takes the name of the next step. An error from it ends the comparison.
     pub step: &'a dyn Fn(&str) -> Result<()>,
 }
 
-/// What came of it.
-pub struct Compared {
+/// The result of a comparison.
+pub struct CompareResult {
     /// All methods.
     pub comparison: Comparison,
-    /// The settings of the one to take, if there is one.
+    /// The settings of the method to take, if there is one.
     pub settings: Option<SettingsFile>,
 }
 
-/// What is compared, once it is known.
+/// A recording or a scene that can be compared.
 struct Subject {
-    said: SettingsFile,
+    requested: SettingsFile,
     truth: Option<Truth>,
     photons: Photons,
 }
 
-/// Where its photons come from, again and again.
+/// Where photons come from, for each seed.
 enum Photons {
     Scene(Box<Scene>),
-    /// A file is read once.
+    /// Histograms, in memory.
     Histograms(Counts),
-    /// A list is never held in memory.
-    List(Medium),
+    /// A photon list, which is read each time.
+    List(Input),
 }
 
-impl Input {
-    /// As errors call it.
+impl CompareInput {
+    /// Its name for errors.
     #[must_use]
     pub fn name(&self) -> String {
         match self {
-            Self::Recording(medium, _) => medium.to_string(),
+            Self::Recording(input, _) => input.to_string(),
             Self::Scene(_, name) => name.clone(),
         }
     }
 }
 
 impl Options {
-    /// What these options say of a recording or of a scene, and the settings file.
+    /// These options over the settings file, for a recording or a scene.
     ///
     /// # Errors
-    /// What is wrong with them.
-    pub fn said(&self, is_scene: bool) -> Result<SettingsFile> {
-        let mut said = match is_scene {
-            true => self.of_scene().merged(),
-            false => self.given.merged_for_recording(),
-        }?;
-        if self.false_alarm.is_some() {
-            said.override_key("false_alarm");
-        }
-        Ok(said)
-    }
-
-    /// Without what says what a recording is: a scene knows.
-    fn of_scene(&self) -> Given {
-        let Given { file, options } = self.given.clone();
-        let SettingsFile { sensor, run, .. } = options;
-        let options = SettingsFile {
-            sensor: Sensor {
-                gate: sensor.gate,
-                masked: sensor.masked,
-                sigma_bins: sensor.sigma_bins,
-                ..Sensor::default()
-            },
-            run: Run {
-                cycles: run.cycles,
-                seed: run.seed,
-                ..Run::default()
-            },
-            ..SettingsFile::default()
+    /// Fails if the file cannot be read, if an option that describes a recording is given for a scene,
+    /// or if `rebin` and `bin_width_ps` do not fit.
+    pub fn requested(&self, is_scene: bool) -> Result<SettingsFile> {
+        let mut requested = if is_scene {
+            let reason = "is for recordings, not for a scene";
+            self.given.refuse(RECORDING, reason)?;
+            self.given.merged()?
+        } else {
+            self.given.merged_for_recording()?
         };
-        Given { file, options }
+        if self.false_alarm.is_some() {
+            requested.override_key("false_alarm");
+        }
+        Ok(requested)
     }
 
-    /// Compares all methods on `input`, of which so much is `said`.
+    /// Compares all methods on `input`, with the settings from [`Self::requested`].
     ///
     /// # Errors
-    /// What is wrong with it, its name first, or with what is said.
-    pub fn compare(&self, input: Input, said: &SettingsFile, told: &Told) -> Result<Compared> {
-        let compared = self.compare_as_said(input, said.clone(), told);
-        compared.map_err(|error| said.blame(error))
+    /// Fails if the input cannot be read or has no targets, if a setting is invalid, or if the width of
+    /// the pulse is neither given nor found.
+    pub fn compare(
+        &self,
+        input: CompareInput,
+        requested: &SettingsFile,
+        callbacks: &Callbacks,
+    ) -> Result<CompareResult> {
+        let result = self.compare_requested(input, requested.clone(), callbacks);
+        result.map_err(|error| requested.add_file_name(error))
     }
 
-    fn compare_as_said(&self, input: Input, said: SettingsFile, told: &Told) -> Result<Compared> {
+    fn compare_requested(
+        &self,
+        input: CompareInput,
+        requested: SettingsFile,
+        callbacks: &Callbacks,
+    ) -> Result<CompareResult> {
         let name = input.name();
         let subject = match input {
-            Input::Scene(scene, name) => of_known_scene(*scene, &name, said)?,
-            Input::Recording(medium, truth) => {
-                self.of_recording(medium, truth.as_ref(), said, told)?
+            CompareInput::Scene(scene, name) => subject_of_scene(*scene, &name, requested)?,
+            CompareInput::Recording(input, truth) => {
+                self.subject_of_recording(input, truth.as_ref(), requested, callbacks)?
             }
         };
         let Subject {
-            said,
+            requested,
             truth,
             photons,
         } = subject;
-        let false_alarm = self.share(&said);
-        let sigma = said.sensor.sigma_bins.ok_or_else(|| {
+        let false_alarm = self.false_alarm_share(&requested);
+        let sigma = requested.sensor.sigma_bins.ok_or_else(|| {
             let reason = format!(
-                "is needed: no peak of {} tells how wide the pulse is",
+                "is needed: no peak of {} is bright enough to measure the pulse",
                 plain(&name)
             );
             Refused::new("sigma_bins", reason)
         })?;
-        let settings = said.settings(said.sensor.bins.unwrap_or(128).into())?;
+        let settings = requested.settings(requested.sensor.bins.unwrap_or(128).into())?;
         let photons = |seed: u64| -> Result<Box<dyn PhotonSource>> {
-            let opening = Opening {
+            let options = ReadOptions {
                 seed,
-                ..opening(&said)
+                ..read_options(&requested)
             };
             let photons: Box<dyn PhotonSource> = match &photons {
                 Photons::Scene(scene) => {
-                    Box::new(scene.photons(seed, said.run.cycles.unwrap_or(scene.cycles))?)
+                    Box::new(scene.photons(seed, requested.run.cycles.unwrap_or(scene.cycles))?)
                 }
-                Photons::Histograms(counts) => Box::new(counts.photons(&opening)?),
-                Photons::List(medium) => open(medium, &opening)?.photons,
+                Photons::Histograms(counts) => Box::new(counts.photons(&options)?),
+                Photons::List(input) => open(input, &options)?.photons,
             };
             let photons = Masked::new(photons, &settings.masked)?;
-            Ok(Box::new(photons.with_laser_hz(said.sensor.laser_hz)))
+            Ok(Box::new(photons.with_laser_hz(requested.sensor.laser_hz)))
         };
         let comparison = compare(&Task {
             photons: &photons,
@@ -194,58 +188,60 @@ impl Options {
             sigma: sigma.to_num(),
             false_alarm,
             within_mm: self.within,
-            progress: told.step,
+            progress: callbacks.step,
         });
         let comparison = comparison.context(name)?;
-        let taken = comparison.taken.as_ref();
-        Ok(Compared {
-            settings: taken.map(|taken| said.with(taken).of_any_file()),
+        let settings = comparison.settings.as_ref();
+        Ok(CompareResult {
+            settings: settings
+                .map(|settings| requested.with_settings(settings).without_recording()),
             comparison,
         })
     }
 
-    /// The share of false alarms.
-    fn share(&self, said: &SettingsFile) -> f64 {
-        let share = self.false_alarm.or(said.detection.false_alarm);
+    fn false_alarm_share(&self, requested: &SettingsFile) -> f64 {
+        let share = self.false_alarm.or(requested.detection.false_alarm);
         share.unwrap_or(0.01)
     }
 
-    /// What is not said of a recording is found in it.
-    fn of_recording(
+    /// A recording; settings that are not given are found by calibration.
+    fn subject_of_recording(
         &self,
-        medium: Medium,
-        truth: Option<&Medium>,
-        said: SettingsFile,
-        told: &Told,
+        input: Input,
+        truth: Option<&Input>,
+        requested: SettingsFile,
+        callbacks: &Callbacks,
     ) -> Result<Subject> {
-        let counts = counts(&medium, &opening(&said))?;
-        self.given.suits(&medium, &counts.known)?;
-        let of_width = warning_of_width(&counts.known, &said);
-        warnings(&counts.known)
-            .chain(of_width)
-            .for_each(told.warning);
+        let counts = counts(&input, &read_options(&requested))?;
+        self.given.suits(&input, &counts.metadata)?;
+        let width = bin_width_warning(&counts.metadata, &requested);
+        warnings(&counts.metadata)
+            .chain(width)
+            .for_each(callbacks.warning);
         let pixels = counts.array.pixels() as usize * counts.captures.len();
         let truth = match (truth, &counts.truth_mm) {
             (Some(truth), _) => Some(Truth::read(truth, pixels)?),
             (None, ranges) => ranges.clone().map(Truth::Ranges),
         };
-        let said = if said.sensor.sigma_bins.is_some() {
-            said.or(of_file(&counts.known, counts.array))
+        let merged = requested
+            .clone()
+            .or(settings_of_file(&counts.metadata, counts.array));
+        let requested = if requested.sensor.sigma_bins.is_some() {
+            merged
         } else {
-            let asked = Asked {
-                false_alarm: self.share(&said),
-                ..Asked::default()
+            let options = CalibrationOptions {
+                false_alarm: self.false_alarm_share(&requested),
+                ..CalibrationOptions::default()
             };
-            let found = look(&said, &counts, &asked);
-            let found = found.with_context(|| medium.to_string())?;
-            said.clone()
-                .or(found.settings(said.or(of_file(&counts.known, counts.array)))?)
+            let found = calibrate_counts(&requested, &counts, &options);
+            let found = found.with_context(|| input.to_string())?;
+            requested.or(found.settings(merged)?)
         };
         Ok(Subject {
-            said: with_short_exposures(said),
+            requested: with_short_exposures(requested),
             truth,
-            photons: if counts.known.is_list {
-                Photons::List(medium)
+            photons: if counts.metadata.is_list {
+                Photons::List(input)
             } else {
                 Photons::Histograms(counts)
             },
@@ -253,23 +249,22 @@ impl Options {
     }
 }
 
-/// A scene knows everything of itself.
-fn of_known_scene(scene: Scene, name: &str, said: SettingsFile) -> Result<Subject> {
-    let mut said = of_scene(said, &scene).with_context(|| name.to_owned())?;
+/// A scene; the width of the pulse is that of the scene unless it is given.
+fn subject_of_scene(scene: Scene, name: &str, requested: SettingsFile) -> Result<Subject> {
+    let mut requested = settings_of_scene(requested, &scene).with_context(|| name.to_owned())?;
     let sigma = U8F8::checked_from_num(scene.pulse_sigma_bins);
-    let known = sigma.filter(|sigma| *sigma <= CentredWindow::WIDEST_PULSE);
-    said.sensor.sigma_bins = said.sensor.sigma_bins.or(known);
+    let sigma = sigma.filter(|sigma| *sigma <= CentredWindow::WIDEST_PULSE);
+    requested.sensor.sigma_bins = requested.sensor.sigma_bins.or(sigma);
     Ok(Subject {
-        said: with_short_exposures(said),
+        requested: with_short_exposures(requested),
         truth: Some(Truth::Scene(Box::new(scene.clone()))),
         photons: Photons::Scene(Box::new(scene)),
     })
 }
 
-/// A decision may come at the second look, unless something else is said: rules have the
-/// thresholds for it.
-fn with_short_exposures(mut said: SettingsFile) -> SettingsFile {
-    let x = said.detection.x.unwrap_or(4);
-    said.detection.l1.get_or_insert(x);
-    said
+/// By default a pixel may decide at its second look: the thresholds of the rules allow for that.
+fn with_short_exposures(mut requested: SettingsFile) -> SettingsFile {
+    let x = requested.detection.x.unwrap_or(4);
+    requested.detection.l1.get_or_insert(x);
+    requested
 }

@@ -4,15 +4,15 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 
-use dtof_engine::settings::{Detection, SettingsFile};
+use dtof_engine::settings::{DetectionSettings, SettingsFile};
 use dtof_options::{Options, Refused};
 
-/// The settings file, and what options say of the sensor beside a recording.
+/// The settings file, and options of the sensor that hold for any input.
 pub const SENSOR: &[&str] = &["settings", "gate", "masked", "sigma_bins"];
-/// A frame-based sensor in place of asynchronous pixels.
+/// The option for a frame-based sensor instead of asynchronous pixels.
 pub const FRAME: &[&str] = &["frame"];
 
-/// Settings that are given.
+/// A settings file, and the options that override it.
 #[derive(Clone, Debug, Default)]
 pub struct Given {
     /// The settings file.
@@ -22,64 +22,71 @@ pub struct Given {
 }
 
 impl Given {
-    /// Sets a key of a settings file.
+    /// Sets the option `key`.
     ///
     /// # Errors
-    /// Why it cannot be so.
+    /// Returns the reason if `text` is not a value for it.
     pub fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
         self.options.set(key, text)
     }
 
-    /// The place of the settings file's name.
+    /// Where to put the name of the settings file, if `key` is the option for it.
     pub fn file(&mut self, key: &str) -> Option<&mut Option<PathBuf>> {
         (key == "settings").then_some(&mut self.file)
     }
 
-    /// Are there two options of which only one can be given?
+    /// Checks that options do not exclude each other.
     ///
     /// # Errors
-    /// Which.
+    /// Returns the option that cannot be used with another.
     pub fn check(&self) -> Result<(), Refused> {
         self.options.check()?;
-        if let (Some(_), Some(key)) = (self.options.run.frame, self.decides()) {
-            return Err(Refused::new(
-                "frame",
-                format!("cannot be used with `{key}`"),
-            ));
+        match self.given_event_option() {
+            Some(key) => self.refuse(FRAME, &format!("cannot be used with `{key}`")),
+            None => Ok(()),
         }
-        Ok(())
     }
 
-    /// An option of detection that frames do not have, if one is given.
-    fn decides(&self) -> Option<&'static str> {
-        let keys = self.options.keys().unwrap_or_default();
+    /// An option that only pixels with events have, if one is given.
+    fn given_event_option(&self) -> Option<&'static str> {
         let of_frames = ["estimator", "half_widths"];
-        let mut of_pixels = Detection::KEYS
-            .iter()
-            .filter(|key| !of_frames.contains(key));
-        of_pixels.find(|key| keys.contains(**key)).copied()
+        let keys = DetectionSettings::KEYS.iter().copied();
+        self.first_given(keys.filter(|key| !of_frames.contains(key)))
     }
 
-    /// The options, then the file.
+    fn first_given(&self, keys: impl IntoIterator<Item = &'static str>) -> Option<&'static str> {
+        let given = self.options.keys().unwrap_or_default();
+        keys.into_iter().find(|key| given.contains(*key))
+    }
+
+    /// Refuses the options `keys`, for the `reason`.
+    pub(super) fn refuse(&self, keys: &[&'static str], reason: &str) -> Result<(), Refused> {
+        match self.first_given(keys.iter().copied()) {
+            Some(key) => Err(Refused::new(key, reason)),
+            None => Ok(()),
+        }
+    }
+
+    /// The options over the file.
     ///
     /// # Errors
-    /// What is wrong with the file.
+    /// Fails if the file cannot be read.
     pub fn merged(&self) -> Result<SettingsFile> {
         Ok(self.options.clone().or(self.read()?))
     }
 
-    /// The file, less what the options leave no room for.
+    /// The file, without `frame` if options are for pixels with events.
     pub(super) fn read(&self) -> Result<SettingsFile> {
         let file = self.file.as_deref().map(SettingsFile::read);
         let mut file = file.transpose()?.unwrap_or_default();
-        if self.decides().is_some() {
+        if self.given_event_option().is_some() {
             file.run.frame = None;
         }
         Ok(file)
     }
 }
 
-/// What [`Options`] of a job that has them leaves to [`Given`].
+/// The methods of [`Options`] that a job leaves to its [`Given`].
 macro_rules! of_given {
     () => {
         fn file(&mut self, key: &str) -> Option<&mut Option<std::path::PathBuf>> {
@@ -93,7 +100,7 @@ macro_rules! of_given {
 }
 pub(crate) use of_given;
 
-/// How pixels operate: those of a device, or one alone.
+/// Options of the pixels of a device, or of a single pixel.
 #[derive(Clone, Debug, Default)]
 pub struct Operation {
     /// The settings.
@@ -101,8 +108,11 @@ pub struct Operation {
 }
 
 impl Options for Operation {
-    const KEYS: &'static [&'static [&'static str]] =
-        &[&["bin_width_ps", "offset_mm"], SENSOR, Detection::KEYS];
+    const KEYS: &'static [&'static [&'static str]] = &[
+        &["bin_width_ps", "offset_mm"],
+        SENSOR,
+        DetectionSettings::KEYS,
+    ];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         self.given.set(key, text)

@@ -14,4 +14,4 @@ pub mod summary;
 pub mod truth;
 pub mod tune;
 
-pub use run::{Ran, Sink, run};
+pub use run::{RunResult, Sink, run};

@@ -20,16 +20,15 @@ use crate::summary::{self, Summary};
 use changes::Changes;
 use dtof_draw::svg;
 use dtof_engine::Engine;
-use dtof_engine::decisions::{Decision, Kept};
-use dtof_engine::settings::Settings;
-use dtof_engine::settings::{self, SettingsFile};
+use dtof_engine::decisions::{Decision, KeptPixels};
+use dtof_engine::settings::{self, Settings, SettingsFile};
 use dtof_events::aer_file;
-use dtof_events::echoes::{Echo, Selection};
+use dtof_events::echoes::{Echo, EchoSelection};
 use dtof_events::events_csv::{self, range_mm};
-use dtof_events::maps::Maps;
+use dtof_events::histories::PixelHistories;
 use dtof_events::sample::Sample;
 use dtof_link::DynamicDepth;
-use dtof_options::files::{ASIDE, are_same, aside, flushed, may_replace};
+use dtof_options::files::{PARTIAL, flush_to_disk, is_same_file, may_replace, temporary_file};
 use dtof_options::rows::Row;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_report::{Cloud, Decisions, Figure, Section};
@@ -39,45 +38,44 @@ const CSV: &str = "events.csv";
 const AER: &str = "events.aer";
 const REPORT: &str = "report.html";
 const SETTINGS: &str = "dtof.toml";
-/// Makes a folder complete: moved to its place last.
+/// Moved to its place last: it makes the folder complete.
 const SUMMARY: &str = "summary.json";
-/// Names of files of a run that are not complete begin so.
-const OF_A_RUN: &str = ".dtof-run-";
+/// The prefix of unfinished files of a run.
+const UNFINISHED: &str = ".dtof-run-";
 
-/// Files on their way into the output folder.
+/// The files of a run, until they are in the output folder.
 pub struct Output {
     folder: PathBuf,
-    /// What is read, and so stays.
+    /// Files that the run reads: they must not be replaced.
     inputs: Vec<PathBuf>,
     /// The settings of the run.
     settings: SettingsFile,
     bins: usize,
-    /// Unless it is not wanted.
+    /// None with [`Self::without_csv`].
     csv: Option<BufWriter<NamedTempFile>>,
     aer: aer_file::Writer<BufWriter<NamedTempFile>>,
     scale: RangeScale,
-    maps: Maps,
-    sides: [&'static str; 2],
+    maps: PixelHistories,
+    axis_names: [&'static str; 2],
     sample: Sample,
-    /// What the last events of pixels were decided from.
-    decisions: Option<(Kept, Vec<Decision>)>,
-    /// The echo asked for, and the choice of it where pixels report several: for the maps, and
-    /// for the events of the report unless it shows all.
+    /// The pixels whose last decisions are kept, and these decisions.
+    decisions: Option<(KeptPixels, Vec<Decision>)>,
+    /// The requested echo, and its selection if pixels report several: for the maps, and for the events
+    /// of the report unless it shows all.
     echo: Option<Echo>,
-    selection: Option<Selection>,
-    /// If they are asked for.
+    selection: Option<EchoSelection>,
+    /// If they are requested.
     changes: Option<Changes>,
     /// The pixels of the photons.
     pixels: Vec<PixelAddress>,
 }
 
 impl Output {
-    /// Makes the folder if it is not there and begins the event files for the array of
-    /// `source`.
+    /// Creates the folder if it does not exist, and begins the event files for the array of `source`.
     ///
     /// # Errors
-    /// If nothing can be written there, or the settings do not give a range. Or if a result
-    /// would replace `input`, or a file that no run of this program has written.
+    /// Fails if nothing can be written there, if the range scale is invalid, or if a result would replace
+    /// `input` or a file that no run has written.
     pub fn create(
         folder: &Path,
         settings: &Settings,
@@ -97,21 +95,21 @@ impl Output {
         remove_leftovers(folder, &inputs);
         let array = source.array();
         let name = || folder.display().to_string();
-        let mut csv = BufWriter::new(aside(folder, OF_A_RUN)?);
+        let mut csv = BufWriter::new(temporary_file(folder, UNFINISHED)?);
         writeln!(csv, "{}", events_csv::HEADER).with_context(name)?;
         let header = header(settings, source)?;
-        let aer = BufWriter::new(aside(folder, OF_A_RUN)?);
+        let aer = BufWriter::new(temporary_file(folder, UNFINISHED)?);
         let aer = aer_file::Writer::new(aer, &header).with_context(name)?;
         Ok(Self {
             folder: folder.to_owned(),
             inputs,
-            settings: SettingsFile::default().with(settings),
+            settings: SettingsFile::default().with_settings(settings),
             bins: settings.bins,
             csv: Some(csv),
             aer,
             scale,
-            maps: Maps::new(array),
-            sides: source.sides(),
+            maps: PixelHistories::new(array),
+            axis_names: source.axis_names(),
             sample: Sample::new(Sample::LIMIT),
             decisions: None,
             echo: None,
@@ -121,29 +119,29 @@ impl Output {
         })
     }
 
-    /// The settings file of the folder is `said`, which was read from `file`, if from one.
+    /// Writes `requested` as the settings file; it was read from `file`, if there is one.
     ///
     /// # Errors
-    /// If a result would replace it.
-    pub fn with_settings(mut self, said: SettingsFile, file: Option<&Path>) -> Result<Self> {
-        self.settings = said;
+    /// Fails if a result would replace `file`.
+    pub fn with_settings(mut self, requested: SettingsFile, file: Option<&Path>) -> Result<Self> {
+        self.settings = requested;
         self.inputs.extend(file.map(Path::to_owned));
         may_hold_results(&self.folder, &self.inputs)?;
         Ok(self)
     }
 
-    /// The report shows dynamic depth as well, if there are `options` for it.
+    /// Shows dynamic depth in the report, if there are `options` for it.
     ///
     /// # Errors
-    /// If the threshold is too low.
+    /// Fails if the threshold is too low.
     pub fn with_changes(mut self, options: Option<&DynamicDepth>) -> Result<Self> {
         let changes = options.map(|options| Changes::new(options, self.scale));
         self.changes = changes.transpose()?;
         Ok(self)
     }
 
-    /// Maps and report show this echo of each exposure. Without, maps show the strongest and
-    /// the events of the report are all.
+    /// Shows this echo of each exposure in maps and report. By default maps show the strongest, and the
+    /// report all events.
     #[must_use]
     pub fn with_echo(mut self, echo: Option<Echo>, settings: &Settings) -> Self {
         self.echo = echo;
@@ -151,20 +149,20 @@ impl Output {
         self
     }
 
-    /// Without `events.csv`; one of an earlier run is removed.
+    /// Writes no `events.csv` if `without`; one of an earlier run is removed.
     #[must_use]
     pub fn without_csv(self, without: bool) -> Self {
         let csv = self.csv.filter(|_| !without);
         Self { csv, ..self }
     }
 
-    fn show_decided(&mut self) {
-        while let Some(event) = self.selection.as_mut().and_then(Selection::next) {
+    fn show_selected(&mut self) {
+        while let Some(event) = self.selection.as_mut().and_then(EchoSelection::next) {
             self.show(&event);
         }
     }
 
-    /// An event that has been chosen.
+    /// Adds a selected event to maps and report.
     fn show(&mut self, event: &DepthEvent) {
         self.maps.add(event, &self.scale);
         if self.echo.is_some() {
@@ -185,11 +183,10 @@ impl Output {
         several.then(|| ("echoes shown".to_owned(), text.to_owned()))
     }
 
-    /// Draws the maps and puts every file in its place. `sections` stand in the
-    /// report beside the totals.
+    /// Draws the maps and moves every file to its place. The report has `sections` beside the totals.
     ///
     /// # Errors
-    /// If the folder cannot be written.
+    /// Fails if the folder cannot be written.
     pub fn finish(
         mut self,
         summary: &Summary,
@@ -197,17 +194,17 @@ impl Output {
         lead: &str,
         sections: &[Section],
     ) -> Result<()> {
-        let called = summary.settings.reports();
-        let pictures = pictures(&self.maps, self.sides, called)?;
+        let nouns = summary.settings.reports();
+        let pictures = pictures(&self.maps, self.axis_names, nouns)?;
         let changes = self.changes.as_ref();
-        let changes = changes.map(|changes| changes.picture(summary.cycles, called[1]));
+        let changes = changes.map(|changes| changes.picture(summary.cycles, nouns[1]));
         let changes = changes.transpose()?.flatten();
         let of_maps = pictures.iter().filter_map(|picture| {
             let Picture { svg, caption, .. } = picture;
             Some((svg, caption.as_ref()?))
         });
         let of_changes = changes.iter().map(|(svg, caption)| (svg, caption));
-        // Few pixels are no picture: a table says the same.
+        // Few pixels are shown in a table, not in a map.
         let few = self.maps.array.pixels() as usize <= dtof_report::FEW;
         let figures = of_maps.filter(|_| !few).chain(of_changes);
         let figures: Vec<Figure> = figures
@@ -219,7 +216,7 @@ impl Output {
         let section = |heading, rows| Section { heading, rows };
         let mut all = vec![section("Totals", &totals[..])];
         all.extend(sections);
-        let pixels = few.then(|| self.maps.rows(self.sides, called));
+        let pixels = few.then(|| self.maps.rows(self.axis_names, nouns));
         if let Some(pixels) = &pixels {
             all.insert(0, section("Pixels", pixels));
         }
@@ -228,13 +225,13 @@ impl Output {
         let decisions = decisions.filter(|(_, all)| !all.is_empty());
         let cloud = Cloud {
             array: self.maps.array,
-            sides: self.sides,
+            axis_names: self.axis_names,
             cycles: summary.cycles,
             laser_hz: summary.laser_hz,
             sample: &mut self.sample,
             is_chosen: self.echo.is_some_and(|echo| echo != Echo::All),
             pixels: &self.maps.spread(),
-            called,
+            nouns,
             decisions: decisions.map(|(kept, all)| Decisions {
                 settings: &summary.settings,
                 kept: *kept,
@@ -246,20 +243,24 @@ impl Output {
 
         let name = |file: &str| self.folder.join(file).display().to_string();
         let written = |text: &str, file: &'static str| -> Result<_> {
-            let mut aside = BufWriter::new(aside(&self.folder, OF_A_RUN)?);
+            let mut aside = BufWriter::new(temporary_file(&self.folder, UNFINISHED)?);
             let text = aside.write_all(text.as_bytes()).map_err(Error::from);
-            let whole = text.and_then(|()| flushed(aside));
+            let whole = text.and_then(|()| flush_to_disk(aside));
             Ok((whole.with_context(|| name(file))?, file))
         };
-        // Everything is written before anything is moved to its place.
-        let aer = self.aer.finish().map_err(Error::from).and_then(flushed);
+        // All files are written before the first is moved to its place.
+        let aer = self
+            .aer
+            .finish()
+            .map_err(Error::from)
+            .and_then(flush_to_disk);
         let mut files = vec![(aer.with_context(|| name(AER))?, AER)];
-        // Without a summary the folder does not look complete; a table that is not written
-        // is not that of another run.
-        let mut gone = vec![SUMMARY];
+        // Without a summary the folder does not look complete. A table that this run does not write would
+        // be that of another run.
+        let mut removed = vec![SUMMARY];
         match self.csv {
-            Some(csv) => files.push((flushed(csv).with_context(|| name(CSV))?, CSV)),
-            None => gone.push(CSV),
+            Some(csv) => files.push((flush_to_disk(csv).with_context(|| name(CSV))?, CSV)),
+            None => removed.push(CSV),
         }
         for picture in &pictures {
             files.push(written(&picture.svg, picture.name)?);
@@ -269,9 +270,9 @@ impl Output {
         let summary = serde_json::to_string_pretty(summary)? + "\n";
         files.push(written(&summary, SUMMARY)?);
 
-        // Something may have come there since.
+        // Files may have appeared there during the run.
         may_hold_results(&self.folder, &self.inputs)?;
-        for name in gone {
+        for name in removed {
             let old = self.folder.join(name);
             match fs::remove_file(&old) {
                 Err(error) if error.kind() != ErrorKind::NotFound => {
@@ -290,10 +291,10 @@ impl Output {
 }
 
 impl Sink for Output {
-    /// The report shows what the last events of pixels were decided from.
+    /// Asks the engine to keep the last decisions of pixels, for the report.
     fn begin(&mut self, source: &dyn PhotonSource, engine: &mut dyn Engine) {
-        let kept = Kept::of(source.array(), self.bins);
-        engine.keep_decisions(&|pixel| kept.holds(pixel));
+        let kept = KeptPixels::new(source.array(), self.bins);
+        engine.keep_decisions(&|pixel| kept.contains(pixel));
         self.decisions = Some((kept, Vec::new()));
     }
 
@@ -314,17 +315,17 @@ impl Sink for Output {
                 Some(selection) => selection.push(*event),
                 None => self.show(event),
             }
-            self.show_decided();
+            self.show_selected();
         }
         Ok(())
     }
 
-    /// No event waits for another echo of its exposure.
+    /// Shows the events that still waited for another echo of their exposure.
     fn end(&mut self, engine: &dyn Engine) {
         if let Some(selection) = &mut self.selection {
             selection.finish();
         }
-        self.show_decided();
+        self.show_selected();
         if let Some((_, decisions)) = &mut self.decisions {
             *decisions = engine.decisions();
         }
@@ -334,7 +335,7 @@ impl Sink for Output {
 /// The header of an AER file with the events of `source`.
 ///
 /// # Errors
-/// Never: a run has at most 1024 bins.
+/// Fails if the number of bins does not fit 32 bits.
 pub fn header(settings: &Settings, source: &dyn PhotonSource) -> Result<aer_file::Header> {
     Ok(aer_file::Header {
         bins: u32::try_from(settings.bins)?,
@@ -346,14 +347,14 @@ pub fn header(settings: &Settings, source: &dyn PhotonSource) -> Result<aer_file
     })
 }
 
-/// What chooses the echo of each exposure, if a pixel reports several and not all are shown.
-fn selection(echo: Option<Echo>, settings: &Settings) -> Option<Selection> {
+/// The selection of one echo of each exposure, if a pixel reports several and not all are shown.
+fn selection(echo: Option<Echo>, settings: &Settings) -> Option<EchoSelection> {
     let echo = echo.unwrap_or(Echo::Strongest);
     let several = settings.echoes > EchoNumber::FIRST && echo != Echo::All;
-    several.then(|| Selection::new(echo, settings.echoes, settings.l2))
+    several.then(|| EchoSelection::new(echo, settings.echoes, settings.l2))
 }
 
-/// Names of results, and what stands near the start of each.
+/// Names of results, and the mark near the start of each.
 fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
     let pictures = pictures::NAMES.map(|name| (name, svg::MARK));
     pictures.into_iter().chain([
@@ -371,14 +372,16 @@ fn may_hold_results(folder: &Path, inputs: &[PathBuf]) -> Result<()> {
     results().try_for_each(|(name, mark)| may_replace(&folder.join(name), mark, &inputs))
 }
 
-/// Removes what a killed run has left, and nothing of an export or a recording, which
-/// may be under way. None of it is worth an error.
+/// Removes files that a killed run has left. Those of an export or a recording stay: it may still run.
+/// Failures are ignored.
 fn remove_leftovers(folder: &Path, inputs: &[PathBuf]) {
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         let name = entry.file_name();
         let name = name.to_string_lossy();
-        let is_read = inputs.iter().any(|input| are_same(input, &entry.path()));
-        if name.starts_with(OF_A_RUN) && name.ends_with(ASIDE) && !is_read {
+        let is_read = inputs
+            .iter()
+            .any(|input| is_same_file(input, &entry.path()));
+        if name.starts_with(UNFINISHED) && name.ends_with(PARTIAL) && !is_read {
             let _ = fs::remove_file(entry.path());
         }
     }

@@ -1,18 +1,18 @@
-//! The options that say what a recording is, the same for every job.
+//! Options that describe a recording, the same for every job.
 
 use anyhow::{Result, ensure};
 use dtof_core::Array;
 use dtof_core::fixed::types::U16F16;
 
 use super::given::Given;
-use dtof_engine::settings::{Run, Sensor, SettingsFile};
+use dtof_engine::settings::{RunSettings, SensorSettings, SettingsFile};
 use dtof_options::rows::grouped;
 use dtof_options::{Refused, plain};
-use dtof_photons::medium::Medium;
-use dtof_photons::open::{BIN_WIDTH_PS, Known, Opening};
+use dtof_photons::input::Input;
+use dtof_photons::open::{BIN_WIDTH_PS, Metadata, ReadOptions};
 use dtof_photons::recorded::RecordingLength;
 
-/// What a recording is.
+/// The options that describe a recording.
 pub const RECORDING: &[&str] = &[
     "axes",
     "array",
@@ -25,18 +25,20 @@ pub const RECORDING: &[&str] = &[
     "recorded_cycles",
     "laser_hz",
 ];
+/// The options for the laser cycles of recorded histograms.
+const LENGTH: &[&str] = &["photons_per_cycle", "recorded_cycles"];
 
 impl Given {
-    /// What holds for a recording: the options, then the file.
+    /// The options over the file, for a recording.
     ///
     /// # Errors
-    /// What is wrong with these.
+    /// Fails if the file cannot be read, or if `rebin` and `bin_width_ps` do not fit.
     pub fn merged_for_recording(&self) -> Result<SettingsFile> {
         self.for_recording_over(self.read()?)
     }
 
-    /// The options, of which the width is that of a bin of the recording, then `file`, of which it
-    /// is that of a bin that is used.
+    /// The options over `file`. A bin width among the options is that of the recorded bins, one in the
+    /// file that of bins after `rebin`.
     pub(super) fn for_recording_over(&self, file: SettingsFile) -> Result<SettingsFile> {
         let mut options = self.options.clone();
         let width = options.sensor.bin_width_ps.take();
@@ -47,7 +49,7 @@ impl Given {
                 || merged.sensor.bin_width_ps.is_none(),
             Refused::new(
                 "rebin",
-                "is for other bins than those of the settings file; leave one of them out"
+                "changes the bins that the settings file is for; leave one of them out"
             )
         );
         if let Some(width) = width {
@@ -59,61 +61,38 @@ impl Given {
         Ok(merged)
     }
 
-    /// Options that say nothing about a device are refused.
+    /// Checks that options suit a device.
     ///
     /// # Errors
-    /// If there are any.
+    /// Returns an option that is only for recordings.
     pub fn suits_device(&self) -> Result<(), Refused> {
-        let Run {
-            axes, array, rebin, ..
-        } = &self.options.run;
-        let of_files = [
-            ("axes", axes.is_some()),
-            ("array", array.is_some()),
-            ("rebin", rebin.is_some()),
-            ("bins", self.options.sensor.bins.is_some()),
-        ];
-        if let Some((key, _)) = of_files.iter().find(|(_, is_there)| *is_there) {
-            return Err(Refused::new(*key, "is of recordings, not of a device"));
-        }
-        match self.length() {
-            Some(key) => Err(Refused::new(
-                key,
-                "is of recordings: this device counts its laser cycles",
-            )),
-            None => Ok(()),
-        }
+        let keys = &["axes", "array", "rebin", "bins"];
+        self.refuse(keys, "is for recordings, not for a device")?;
+        self.refuse(
+            LENGTH,
+            "is for recordings: this device counts its laser cycles",
+        )
     }
 
-    /// The option that says how long a recording is.
-    fn length(&self) -> Option<&'static str> {
-        let run = &self.options.run;
-        match (run.photons_per_cycle, run.recorded_cycles) {
-            (Some(_), _) => Some("photons_per_cycle"),
-            (None, Some(_)) => Some("recorded_cycles"),
-            (None, None) => None,
-        }
-    }
-
-    /// Options that say nothing about a list of photons are refused.
+    /// Checks that options suit a recording.
     ///
     /// # Errors
-    /// If there are any, and it is one.
-    pub fn suits(&self, input: &Medium, known: &Known) -> Result<(), Refused> {
-        match self.length().filter(|_| known.is_list) {
-            Some(key) => Err(Refused::new(
-                key,
-                format!("is for histograms; {} holds photons", plain(input)),
-            )),
-            None => Ok(()),
+    /// Returns an option that is only for histograms, if it is a photon list.
+    pub fn suits(&self, input: &Input, metadata: &Metadata) -> Result<(), Refused> {
+        if !metadata.is_list {
+            return Ok(());
         }
+        self.refuse(
+            LENGTH,
+            &format!("is for histograms; {} holds photons", plain(input)),
+        )
     }
 }
 
-/// How a recording is opened, as is said.
+/// How to open a recording with these settings.
 #[must_use]
-pub fn opening(said: &SettingsFile) -> Opening {
-    let Run {
+pub fn read_options(requested: &SettingsFile) -> ReadOptions {
+    let RunSettings {
         cycles,
         seed,
         photons_per_cycle,
@@ -122,14 +101,14 @@ pub fn opening(said: &SettingsFile) -> Opening {
         array,
         rebin,
         ..
-    } = said.run.clone();
+    } = requested.run.clone();
     let recorded = recorded_cycles.map(RecordingLength::Cycles);
     let rate = photons_per_cycle.map(RecordingLength::PhotonsPerCycle);
     let rebin = rebin.unwrap_or(1);
-    let width = said.sensor.bin_width_ps;
-    Opening {
-        columns: said.sensor.columns,
-        bins: said.sensor.bins,
+    let width = requested.sensor.bin_width_ps;
+    ReadOptions {
+        columns: requested.sensor.columns,
+        bins: requested.sensor.bins,
         rebin,
         axes,
         array,
@@ -137,40 +116,40 @@ pub fn opening(said: &SettingsFile) -> Opening {
         length: recorded.or(rate),
         cycles: cycles.unwrap_or(10_000),
         seed: seed.unwrap_or(1),
-        whole: None,
-        masked: said.sensor.masked.clone().unwrap_or_default(),
+        layout: None,
+        masked: requested.sensor.masked.clone().unwrap_or_default(),
     }
 }
 
-/// What the file says.
+/// The settings that a recording contains.
 #[must_use]
-pub fn of_file(known: &Known, array: Array) -> SettingsFile {
+pub fn settings_of_file(metadata: &Metadata, array: Array) -> SettingsFile {
     SettingsFile {
-        sensor: Sensor {
+        sensor: SensorSettings {
             columns: Some(array.columns()),
-            bins: u16::try_from(known.bins).ok(),
-            bin_width_ps: Some(known.bin_width_ps),
-            offset_mm: known.offset_mm,
-            gate: known.gate,
-            ..Sensor::default()
+            bins: u16::try_from(metadata.bins).ok(),
+            bin_width_ps: Some(metadata.bin_width_ps),
+            offset_mm: metadata.offset_mm,
+            gate: metadata.gate,
+            ..SensorSettings::default()
         },
         ..SettingsFile::default()
     }
 }
 
-/// What is surely wrong with the recording, and what of it is left out: a line each.
-pub fn warnings(known: &Known) -> impl Iterator<Item = String> + '_ {
-    let cut_off = Some(known.cut_off).filter(|&photons| photons > 0);
+/// Warnings about a recording, and about photons that are left out: a line each.
+pub fn warnings(metadata: &Metadata) -> impl Iterator<Item = String> + '_ {
+    let cut_off = Some(metadata.cut_off).filter(|&photons| photons > 0);
     let cut_off =
         cut_off.map(|photons| format!("{} photons in bins that were cut off", grouped(photons)));
-    known.warnings.iter().cloned().chain(cut_off)
+    metadata.warnings.iter().cloned().chain(cut_off)
 }
 
-/// That nobody has told how wide a bin is, if nobody has.
+/// Warns that the bin width was assumed, if it was.
 #[must_use]
-pub fn warning_of_width(known: &Known, said: &SettingsFile) -> Option<String> {
-    let is_known = said.sensor.bin_width_ps.is_some() || known.bin_width_ps != BIN_WIDTH_PS;
+pub fn bin_width_warning(metadata: &Metadata, requested: &SettingsFile) -> Option<String> {
+    let is_known = requested.sensor.bin_width_ps.is_some() || metadata.bin_width_ps != BIN_WIDTH_PS;
     (!is_known).then(|| {
-        format!("bins are taken to be {BIN_WIDTH_PS} ps wide; --bin-width-ps says otherwise")
+        format!("bins are taken to be {BIN_WIDTH_PS} ps wide; --bin-width-ps changes that")
     })
 }

@@ -1,23 +1,22 @@
-//! Recorded photons or histograms, ready for the engine.
+//! `replay`: recorded photons or histograms through the engine.
 
 use anyhow::{Context, Result, ensure};
 
 use super::given::{FRAME, Given, SENSOR, of_given};
-use super::recording::{RECORDING, of_file, opening};
-use super::run::{Ran, Sink, run};
+use super::recording::{RECORDING, read_options, settings_of_file};
+use super::run::{RunResult, Sink, run};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
-use dtof_engine::settings::Settings;
-use dtof_engine::settings::{Detection, SettingsFile};
+use dtof_engine::settings::{DetectionSettings, Settings, SettingsFile};
 use dtof_options::Refused;
 use dtof_options::progress::Progress;
+use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
-use dtof_photons::medium::Medium;
-use dtof_photons::open::{Known, Opening, open};
-use dtof_photons::recorded::Whole;
+use dtof_photons::open::{Metadata, ReadOptions, open};
+use dtof_photons::recorded::Layout;
 use dtof_photons::source::{PhotonSource, has_only_neighbours};
 
-/// What is replayed, and how.
+/// The options of a replay.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// The settings.
@@ -28,7 +27,7 @@ impl dtof_options::Options for Options {
     const KEYS: &'static [&'static [&'static str]] = &[
         RECORDING,
         SENSOR,
-        Detection::KEYS,
+        DetectionSettings::KEYS,
         FRAME,
         &["cycles", "seed"],
     ];
@@ -46,86 +45,87 @@ pub struct Replay {
     pub photons: Masked,
     /// The pixels.
     pub engine: Box<dyn Engine>,
-    /// How they operate.
+    /// The settings of the pixels.
     pub settings: Settings,
-    /// What was said, and what the recording says besides.
-    pub said: SettingsFile,
-    /// What is known of the recording.
-    pub known: Known,
+    /// The requested settings, over those of the recording.
+    pub requested: SettingsFile,
+    /// Metadata of the recording.
+    pub metadata: Metadata,
 }
 
 impl Replay {
-    /// Replays all of `input`, which it was opened from, into `sink`.
+    /// Replays all of `input`, from which it was opened, into `sink`.
     ///
     /// # Errors
     /// Those of [`run`].
     pub fn run(
         &mut self,
-        input: &Medium,
+        input: &Input,
         sink: &mut dyn Sink,
         progress: &mut dyn Progress,
-    ) -> Result<Ran> {
-        let how = (&self.settings, &self.said);
+    ) -> Result<RunResult> {
+        let settings = (&self.settings, &self.requested);
         let engine = self.engine.as_mut();
-        let mut ran = run(&mut self.photons, engine, how, &mut [sink], progress)?;
-        ran.summary.input = Some(input.to_string());
-        ran.summary.cut_off = self.known.cut_off;
-        ran.summary.recording.clone_from(&self.known.rows);
-        ran.summary.warnings.clone_from(&self.known.warnings);
-        Ok(ran)
+        let mut result = run(&mut self.photons, engine, settings, &mut [sink], progress)?;
+        result.summary.input = Some(input.to_string());
+        result.summary.cut_off = self.metadata.cut_off;
+        result.summary.recording.clone_from(&self.metadata.rows);
+        result.summary.warnings.clone_from(&self.metadata.warnings);
+        Ok(result)
     }
 }
 
 impl Options {
-    /// What these options say, and the settings file.
+    /// These options over the settings file.
     ///
     /// # Errors
-    /// What is wrong with them.
-    pub fn said(&self) -> Result<SettingsFile> {
+    /// Fails if the file cannot be read, or if `rebin` and `bin_width_ps` do not fit.
+    pub fn requested(&self) -> Result<SettingsFile> {
         self.given.merged_for_recording()
     }
 
-    /// Opens `input` as is `said`.
+    /// Opens `input`, with the settings from [`Self::requested`].
     ///
     /// # Errors
-    /// What is wrong with it, its name first, or with what is said.
-    pub fn open(&self, input: &Medium, said: &SettingsFile) -> Result<Replay> {
-        self.open_part(input, said, None)
+    /// Fails if the recording cannot be read or a setting does not suit it; the error begins with the name
+    /// of the recording.
+    pub fn open(&self, input: &Input, requested: &SettingsFile) -> Result<Replay> {
+        self.open_part(input, requested, None)
     }
 
-    /// The same of an array that is a part of `whole`, if that is given.
+    /// The same for a part of a recording with this `layout`, if there is one.
     ///
     /// # Errors
-    /// The same, and if it is no part of it or cuts blocks of pixels.
+    /// As [`Self::open`]. Also fails if `input` does not fit the layout, cuts blocks of pixels, or holds
+    /// photons.
     pub fn open_part(
         &self,
-        input: &Medium,
-        said: &SettingsFile,
-        whole: Option<Whole>,
+        input: &Input,
+        requested: &SettingsFile,
+        layout: Option<Layout>,
     ) -> Result<Replay> {
-        let opening = Opening {
-            whole,
-            ..opening(said)
+        let options = ReadOptions {
+            layout,
+            ..read_options(requested)
         };
-        let recording = open(input, &opening)?;
-        let (photons, known) = (recording.photons, recording.known);
-        self.given.suits(input, &known)?;
+        let recording = open(input, &options)?;
+        let (photons, metadata) = (recording.photons, recording.metadata);
+        self.given.suits(input, &metadata)?;
         ensure!(
-            opening.whole.is_none() || !known.is_list,
+            options.layout.is_none() || !metadata.is_list,
             "{input} holds photons: only histograms are replayed in parts"
         );
-        let said = said.clone().or(of_file(&known, photons.array()));
-        let settings = said.settings(known.bins)?;
+        let requested = requested
+            .clone()
+            .or(settings_of_file(&metadata, photons.array()));
+        let settings = requested.settings(metadata.bins)?;
         let refused = |refused: Refused| anyhow::Error::from(refused).context(input.to_string());
         ensure!(
-            known.has_shape || settings.binning.is_none(),
-            refused(Refused::new(
-                "binning",
-                "needs to know the array: say `columns`"
-            ))
+            metadata.has_shape || settings.binning.is_none(),
+            refused(Refused::new("binning", "needs the array: give `columns`"))
         );
         if let Some(binning) = settings.binning {
-            let ([column, row], side) = (photons.sides(), 1 << binning.levels.raw());
+            let ([column, row], side) = (photons.axis_names(), 1 << binning.levels.raw());
             ensure!(
                 has_only_neighbours(photons.as_ref(), binning.levels),
                 refused(Refused::value(
@@ -133,25 +133,25 @@ impl Options {
                     binning.levels.raw(),
                     format!(
                         "blocks of {side}x{side} pixels would reach across captures; a {column} and \
-                         a {row} are no neighbours there"
+                         a {row} are not neighbours there"
                     )
                 ))
             );
-            if let Some(whole) = &opening.whole {
+            if let Some(layout) = &options.layout {
                 let pixels = photons.addresses().len();
-                let is_whole = whole.has_whole_blocks(pixels, side);
+                let is_whole = layout.has_whole_blocks(pixels, side);
                 is_whole.with_context(|| input.to_string())?;
             }
         }
         let photons = Masked::new(photons, &settings.masked)?;
-        let photons = photons.with_laser_hz(said.sensor.laser_hz);
+        let photons = photons.with_laser_hz(requested.sensor.laser_hz);
         let engine = host_engine(&settings, photons.array(), &photons.addresses())?;
         Ok(Replay {
             photons,
             engine,
             settings,
-            said,
-            known,
+            requested,
+            metadata,
         })
     }
 }

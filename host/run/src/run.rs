@@ -19,36 +19,36 @@ pub trait Sink {
     /// Takes a slice of photons, and the events of its laser cycles.
     ///
     /// # Errors
-    /// If they cannot be written.
+    /// Fails if they cannot be written.
     fn take(&mut self, slice: &Slice, events: &[DepthEvent]) -> Result<()>;
 
     /// The run has ended.
     fn end(&mut self, _engine: &dyn Engine) {}
 }
 
-/// A run that has ended.
+/// The result of a run.
 #[derive(Clone, Debug)]
-pub struct Ran {
+pub struct RunResult {
     /// Its totals.
     pub summary: Summary,
-    /// Its photons bin by bin, if the settings know what the cover glass sends back.
+    /// Its photons bin by bin, if the settings have the crosstalk of the cover glass.
     pub bins: Option<Vec<u64>>,
 }
 
-/// Runs all of `source` with `settings`, which come of `said`, into `sinks`.
+/// Runs all of `source` with `settings`, which resolve `requested`, into `sinks`.
 ///
 /// # Errors
-/// What is wrong with the recording, the engine or a sink, or that `progress` wants no more.
+/// Fails if the recording, the engine or a sink fails, or if `progress` ends the run.
 pub fn run(
     source: &mut dyn PhotonSource,
     engine: &mut dyn Engine,
-    (settings, said): (&Settings, &SettingsFile),
+    (settings, requested): (&Settings, &SettingsFile),
     sinks: &mut [&mut dyn Sink],
     progress: &mut dyn Progress,
-) -> Result<Ran> {
+) -> Result<RunResult> {
     let array = source.array();
     let mut has_reported = vec![false; array.pixels() as usize];
-    let has_glass = said.sensor.glass_bins.is_some();
+    let has_glass = requested.sensor.glass_bins.is_some();
     let mut bins = has_glass.then(|| vec![0; settings.bins]);
     for sink in &mut *sinks {
         sink.begin(source, engine);
@@ -61,7 +61,7 @@ pub fn run(
         |slice, events, done| {
             for event in &events {
                 for pixel in array.pixels_of(event.pixel, event.level) {
-                    has_reported[usize::from(pixel.0)] = true;
+                    has_reported[usize::from(pixel.raw())] = true;
                 }
             }
             if let Some(bins) = &mut bins {
@@ -79,11 +79,11 @@ pub fn run(
     }
     let reporting = has_reported.into_iter().filter(|&has| has).count();
     let mut summary = Summary::new(engine.statistics(), source, reporting, settings);
-    watch_glass(said, bins.as_deref(), &mut summary);
-    Ok(Ran { summary, bins })
+    watch_glass(requested, bins.as_deref(), &mut summary);
+    Ok(RunResult { summary, bins })
 }
 
-/// Photons past the last bin are counted elsewhere.
+/// Photons past the last bin are left out; statistics count them.
 fn add_photons(slice: &Slice, bins: &mut [u64]) {
     for photon in slice.pixels.iter().flat_map(|pixel| &pixel.photons) {
         if let Some(count) = bins.get_mut(usize::from(photon.code)) {

@@ -1,26 +1,28 @@
-//! A scene on an array, ready to be simulated.
+//! `simulate`: a scene through the engine.
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::DepthEvent;
 use dtof_core::fixed::types::U16F16;
 
 use super::given::{FRAME, Given, SENSOR, of_given};
-use super::run::{Ran, Sink, run};
-use super::truth::Comparison;
+use super::run::{RunResult, Sink, run};
+use super::truth::SceneComparison;
 use dtof_engine::Engine;
-use dtof_engine::settings::{Detection, Rays, Run, Sensor, Settings, SettingsFile};
-use dtof_options::numbers::{truth, whole};
+use dtof_engine::settings::{
+    DetectionSettings, RaySettings, RunSettings, SensorSettings, Settings, SettingsFile,
+};
+use dtof_options::numbers::{boolean, integer};
 use dtof_options::progress::Progress;
 use dtof_photons::masked::Masked;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_simulate::scene::Scene;
 
-/// What is simulated beside the scene, and how.
+/// The options of a simulation.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// Columns and rows of the array that looks at the scene.
+    /// Columns and rows of the array, in place of those of the scene.
     pub array: Option<[u32; 2]>,
-    /// Without signal: the picture of photon counts is then a passive image.
+    /// Whether there is no signal: the picture of photon counts is then a passive image.
     pub laser_off: bool,
     /// The settings.
     pub given: Given,
@@ -30,7 +32,7 @@ impl dtof_options::Options for Options {
     const KEYS: &'static [&'static [&'static str]] = &[
         &["array", "laser_off"],
         SENSOR,
-        Detection::KEYS,
+        DetectionSettings::KEYS,
         FRAME,
         &["cycles", "seed"],
     ];
@@ -38,7 +40,7 @@ impl dtof_options::Options for Options {
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
             "array" => self.array = Some(array(text)?),
-            "laser_off" => self.laser_off = truth(text)?,
+            "laser_off" => self.laser_off = boolean(text)?,
             key => self.given.set(key, text)?,
         }
         Ok(())
@@ -48,29 +50,36 @@ impl dtof_options::Options for Options {
 }
 
 impl Options {
-    /// What these options say, and the settings file.
+    /// These options over the settings file.
     ///
     /// # Errors
-    /// What is wrong with it.
-    pub fn said(&self) -> Result<SettingsFile> {
+    /// Fails if the file cannot be read.
+    pub fn requested(&self) -> Result<SettingsFile> {
         self.given.merged()
     }
 
-    /// `scene` as the array sees it, and as is `said`. Errors call it `name`.
+    /// Prepares the simulation of `scene`, with the settings from [`Self::requested`]. Errors call the
+    /// scene `name`.
     ///
     /// # Errors
-    /// If what is said is for other histograms, or there are more pixels than addresses.
-    pub fn open(&self, mut scene: Scene, name: &str, said: SettingsFile) -> Result<Simulation> {
+    /// Fails if the settings are for other histograms, or if there are more pixels than addresses.
+    pub fn open(
+        &self,
+        mut scene: Scene,
+        name: &str,
+        requested: SettingsFile,
+    ) -> Result<Simulation> {
         scene.size = self.array.unwrap_or(scene.size);
         if self.laser_off {
             scene = scene.with_laser_off();
         }
-        let said = of_scene(said, &scene).with_context(|| match &self.given.file {
-            Some(file) => file.display().to_string(),
-            None => "the scene".to_owned(),
-        })?;
-        let settings = said.settings(scene.bins.into())?;
-        Simulation::new(scene, settings, said, Some(name.to_owned()))
+        let requested =
+            settings_of_scene(requested, &scene).with_context(|| match &self.given.file {
+                Some(file) => file.display().to_string(),
+                None => "the scene".to_owned(),
+            })?;
+        let settings = requested.settings(scene.bins.into())?;
+        Simulation::new(scene, settings, requested, Some(name.to_owned()))
     }
 }
 
@@ -80,26 +89,27 @@ pub struct Simulation {
     pub scene: Scene,
     /// Its photons.
     pub photons: Masked,
-    /// How the pixels operate.
+    /// The settings of the pixels.
     pub settings: Settings,
-    /// What was said of them, and what the scene says besides.
-    pub said: SettingsFile,
-    /// What summary and errors call the scene; none where it is a part of the program.
+    /// The requested settings, over those of the scene.
+    pub requested: SettingsFile,
+    /// The name of the scene for summary and errors; none if it is built in.
     pub input: Option<String>,
 }
 
 impl Simulation {
-    /// Of `scene`, with `settings`, which come of `said`. Summary and errors call it `input`.
+    /// A simulation of `scene` with `settings`, which resolve `requested`. Summary and errors call the
+    /// scene `input`.
     ///
     /// # Errors
-    /// If there are more pixels than addresses, or one that is left out is not there.
+    /// Fails if there are more pixels than addresses, or if a masked pixel does not exist.
     pub fn new(
         scene: Scene,
         settings: Settings,
-        said: SettingsFile,
+        requested: SettingsFile,
         input: Option<String>,
     ) -> Result<Self> {
-        let cycles = said.run.cycles.unwrap_or(scene.cycles);
+        let cycles = requested.run.cycles.unwrap_or(scene.cycles);
         let photons = scene.photons(settings.seed, cycles);
         let photons = match &input {
             Some(name) => photons.with_context(|| name.clone())?,
@@ -109,7 +119,7 @@ impl Simulation {
             photons: Masked::new(Box::new(photons), &settings.masked)?,
             scene,
             settings,
-            said,
+            requested,
             input,
         })
     }
@@ -124,81 +134,75 @@ impl Simulation {
         engine: &mut dyn Engine,
         sink: &mut dyn Sink,
         progress: &mut dyn Progress,
-    ) -> Result<Ran> {
-        let mut comparison = Comparison::new(&self.scene, &self.settings, self.photons.cycles())?;
-        let how = (&self.settings, &self.said);
+    ) -> Result<RunResult> {
+        let mut comparison =
+            SceneComparison::new(&self.scene, &self.settings, self.photons.cycles())?;
+        let settings = (&self.settings, &self.requested);
         let sinks: &mut [&mut dyn Sink] = &mut [sink, &mut comparison];
-        let mut ran = run(&mut self.photons, engine, how, sinks, progress)?;
-        ran.summary.input.clone_from(&self.input);
-        ran.summary.field_of_view_degrees = Some(self.scene.view().degrees());
-        ran.summary.against_truth = Some(comparison.finish());
-        Ok(ran)
+        let mut result = run(&mut self.photons, engine, settings, sinks, progress)?;
+        result.summary.input.clone_from(&self.input);
+        result.summary.field_of_view_degrees = Some(self.scene.effective_field_of_view().degrees());
+        result.summary.against_truth = Some(comparison.finish());
+        Ok(result)
     }
 }
 
-impl Sink for Comparison<'_> {
+impl Sink for SceneComparison<'_> {
     fn take(&mut self, _slice: &Slice, events: &[DepthEvent]) -> Result<()> {
         self.add(events);
         Ok(())
     }
 }
 
-/// What is said, on a scene: it has histograms, a TDC and rays of its own.
+/// The requested settings, with histograms, TDC, rays and laser rate of the scene.
 ///
 /// # Errors
-/// If what is said is for other histograms.
-pub fn of_scene(said: SettingsFile, scene: &Scene) -> Result<SettingsFile> {
+/// Fails if the settings are for another number of bins or another bin width.
+pub fn settings_of_scene(requested: SettingsFile, scene: &Scene) -> Result<SettingsFile> {
     let bin_width_ps = U16F16::from_num(scene.bin_width_ps);
-    let Sensor {
-        bins: said_bins,
-        bin_width_ps: said_width,
-        ..
-    } = said.sensor;
-    let (bins, width) = (
-        said_bins.unwrap_or(scene.bins),
-        said_width.unwrap_or(bin_width_ps),
-    );
+    let bins = requested.sensor.bins.unwrap_or(scene.bins);
+    let width = requested.sensor.bin_width_ps.unwrap_or(bin_width_ps);
     ensure!(
         (bins, width) == (scene.bins, bin_width_ps),
         "{bins} bins of {width} ps, but the scene has {} of {bin_width_ps} ps",
         scene.bins
     );
     Ok(SettingsFile {
-        sensor: Sensor {
+        sensor: SensorSettings {
             laser_hz: Some(scene.laser_hz()),
             columns: Some(scene.size[0]),
             bins: Some(bins),
             bin_width_ps: Some(width),
-            // Simulated photons come at their distance.
+            // The ranges of simulated photons need no offset.
             offset_mm: None,
             one_hit_tdc: scene.effects.one_hit_tdc().then_some(true),
-            ..said.sensor
+            ..requested.sensor
         },
-        rays: Rays {
-            // As written: 60 is not 59.99999999999999.
+        rays: RaySettings {
+            // Rounded, so that 60 is not 59.99999999999999.
             field_of_view_degrees: Some(
                 scene
-                    .view()
+                    .effective_field_of_view()
                     .degrees()
                     .map(|angle| (angle * 1e9).round() / 1e9),
             ),
             calibration: None,
         },
-        run: Run {
-            cycles: said.run.cycles.or(Some(scene.cycles)),
-            ..said.run
+        run: RunSettings {
+            cycles: requested.run.cycles.or(Some(scene.cycles)),
+            ..requested.run
         },
-        ..said
+        ..requested
     })
 }
 
-/// As `64x32`.
+/// Columns and rows from a text such as `64x32`.
 ///
 /// # Errors
-/// If it is no array.
+/// Fails unless the text is two numbers from 1 to 65,535 with an `x` between them.
 pub fn array(text: &str) -> Result<[u32; 2], String> {
     let sides = text.split_once('x').and_then(|(columns, rows)| {
-        let side = whole(1..=u16::MAX);
+        let side = integer(1..=u16::MAX);
         Some([side(columns).ok()?, side(rows).ok()?])
     });
     let sides = sides.ok_or("must be COLUMNSxROWS, as 64x32")?;

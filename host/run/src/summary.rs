@@ -1,7 +1,10 @@
 //! The summary of a run: `summary.json`, and the same on the terminal and in
 //! the report.
 
-use dtof_core::{DepthEstimator, Statistics};
+use dtof_core::fixed::types::U8F8;
+use dtof_core::paper::Threshold;
+use dtof_core::{AnyRule, DepthEstimator, Statistics};
+use serde::ser::SerializeMap;
 use serde::{Serialize, Serializer};
 
 use crate::truth::AgainstTruth;
@@ -12,7 +15,7 @@ use dtof_photons::source::PhotonSource;
 /// Every `summary.json` begins with it, less the version.
 pub(crate) const MARK: &str = "\"program\": \"dtof ";
 
-/// The summary, as in `summary.json`.
+/// The content of `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// This program and its version.
@@ -36,11 +39,11 @@ pub struct Summary {
     pub events: u64,
     /// Of these, those of blocks of pixels.
     pub events_of_blocks: u64,
-    /// Pixels that were there.
+    /// Pixels of the recording or scene.
     pub pixels: usize,
     /// Pixels with at least one event.
     pub pixels_reporting: usize,
-    /// Photons in the bins around an echo that was reported.
+    /// Photons in the excluded bins around an echo that was reported.
     pub held: u64,
     /// Photons with a TDC code past the last bin.
     pub rejected: u64,
@@ -61,49 +64,86 @@ pub struct Summary {
     /// Recorded photons that were not replayed, as they lie after the last
     /// laser cycle.
     pub not_replayed: u64,
-    /// How many times as bright the cover glass is as when it was calibrated, and how many times
-    /// at least, if that is surely more.
+    /// How many times as bright crosstalk of the cover glass is as when it was calibrated, and how many
+    /// times at least, if it is significantly brighter.
     pub cover_glass: Option<[f64; 2]>,
     /// Recorded photons in bins that were cut off.
     pub cut_off: u64,
-    /// What was done to the recording before.
+    /// How the recording was preprocessed.
     #[serde(serialize_with = "named")]
     pub recording: Vec<Row>,
-    /// What is surely wrong with the recording.
+    /// Warnings about the recording.
     pub warnings: Vec<String>,
     /// How the events of a simulated scene compare with it.
     pub against_truth: Option<AgainstTruth>,
-    /// How the pixels operated.
-    #[serde(serialize_with = "with_estimator")]
+    /// The settings of the pixels.
+    #[serde(serialize_with = "settings")]
     pub settings: Settings,
 }
 
-/// Settings, and the name of the estimator that they choose.
-fn with_estimator<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, S::Error> {
-    #[derive(Serialize)]
-    struct Chosen<'a> {
-        #[serde(flatten)]
-        settings: &'a Settings,
-        estimator: &'static str,
+/// Writes settings by their keys in a settings file, and the estimator that follows from them.
+fn settings<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut map = serializer.serialize_map(None)?;
+    map.serialize_entry("bins", &settings.bins)?;
+    map.serialize_entry("bin_width_ps", &settings.bin_width_ps.to_num::<f64>())?;
+    map.serialize_entry("offset_mm", &settings.offset_mm.to_num::<f64>())?;
+    map.serialize_entry("gate", &settings.gate)?;
+    if !settings.masked.is_empty() {
+        map.serialize_entry("masked", &settings.masked)?;
     }
+    let mut with_alpha = |name: &str, threshold: &Threshold| {
+        map.serialize_entry("rule", name)?;
+        map.serialize_entry("alpha", &threshold.alpha().to_num::<f64>())?;
+        map.serialize_entry("min_count", &threshold.minimum_count().raw())
+    };
+    match &settings.rule {
+        AnyRule::Paper(rule) => with_alpha("paper", rule.threshold())?,
+        AnyRule::Average(rule) => with_alpha("average", rule.threshold())?,
+        AnyRule::Window(rule) => {
+            map.serialize_entry("rule", "window")?;
+            map.serialize_entry("window", &rule.width())?;
+            map.serialize_entry("z", &rule.z().to_num::<f64>())?;
+            map.serialize_entry("min_count", &rule.minimum_count().raw())?;
+        }
+    }
+    if let Some(sigma) = settings.sigma_bins {
+        map.serialize_entry("sigma_bins", &sigma.to_num::<f64>())?;
+    }
+    if let Some(window) = settings.half_widths {
+        let sides = [window.before(), window.after()].map(U8F8::to_num::<f64>);
+        map.serialize_entry("half_widths", &sides)?;
+    }
+    map.serialize_entry("l1", &settings.l1)?;
+    map.serialize_entry("l2", &settings.l2)?;
+    map.serialize_entry("x", &settings.x)?;
+    let levels = settings.binning.map_or(0, |binning| binning.levels.raw());
+    map.serialize_entry("binning", &levels)?;
+    if let Some(binning) = settings.binning {
+        map.serialize_entry("patience", &binning.patience)?;
+    }
+    map.serialize_entry("tracking", &settings.tracking)?;
+    map.serialize_entry("echoes", &settings.echoes.raw())?;
+    map.serialize_entry("echo_wait", &settings.echo_wait)?;
+    map.serialize_entry("one_hit_tdc", &settings.one_hit_tdc)?;
+    if let Some(frame) = settings.frame {
+        map.serialize_entry("frame", &frame)?;
+    }
+    map.serialize_entry("seed", &settings.seed)?;
     let estimator = match settings.estimator() {
         DepthEstimator::Centroid3 => "centroid",
         DepthEstimator::CentredWindow(_) => "centred-window",
     };
-    Chosen {
-        settings,
-        estimator,
-    }
-    .serialize(serializer)
+    map.serialize_entry("estimator", estimator)?;
+    map.end()
 }
 
-/// Rows as an object.
+/// Writes rows as an object.
 fn named<S: Serializer>(rows: &[Row], serializer: S) -> Result<S::Ok, S::Error> {
     serializer.collect_map(rows.iter().map(|(name, value)| (name, value)))
 }
 
 impl Summary {
-    /// Puts together what the pixels counted and where it came from.
+    /// The summary of a run from the statistics of pixels and blocks.
     #[must_use]
     pub fn new(
         [statistics, blocks]: [Statistics; 2],
@@ -124,7 +164,7 @@ impl Summary {
             events_of_blocks: blocks.events,
             pixels: source.addresses().len(),
             pixels_reporting,
-            held: statistics.held,
+            held: statistics.excluded,
             rejected: statistics.rejected,
             saturated: statistics.saturated,
             saturated_in_blocks: blocks.saturated,
@@ -188,7 +228,7 @@ impl Summary {
                 format!("the first decision comes after {first_decision} laser cycles"),
             ));
         }
-        // Losses are named where there are any.
+        // Only losses that have occurred.
         let losses = [
             ("photons outside the range gate", self.gated_out),
             ("photons of pixels left out", self.masked),

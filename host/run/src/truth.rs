@@ -1,5 +1,5 @@
-//! How the events of a simulated scene, or the readings of frames, compare with it: each with what
-//! its pixel saw in its laser cycle. Memory does not grow with their number.
+//! Compares the events of a simulated scene, or the readings of frames, with the scene: each with the
+//! surfaces that its pixel saw in that laser cycle. Memory does not grow with their number.
 
 use std::ops::AddAssign;
 
@@ -10,7 +10,7 @@ use serde::Serialize;
 use dtof_engine::settings::Settings;
 use dtof_events::events_csv::range_mm;
 use dtof_options::rows::{Row, grouped};
-use dtof_simulate::scene::{Scene, View};
+use dtof_simulate::scene::{Hit, Scene};
 
 /// An event is a false alarm if its range lies farther from the truth than this many bins.
 pub const FALSE_BEYOND_BINS: f64 = 3.0;
@@ -18,90 +18,89 @@ pub const FALSE_BEYOND_BINS: f64 = 3.0;
 /// Errors are counted in so many steps from 0 to [`FALSE_BEYOND_BINS`]: 1024 a bin.
 const STEPS: usize = 3 * 1024;
 
-/// False alarms look like a cover glass if there are at least so many in one place.
-const GLASS_AT_LEAST: u64 = 10;
-/// At least one of so many events must be one of these false alarms.
+/// False alarms look like crosstalk of a cover glass if there are at least so many in one place.
+const GLASS_MIN_EVENTS: u64 = 10;
+/// At least one in so many events must be such a false alarm.
 const GLASS_ONE_IN: u64 = 100;
-/// They must be more than so many times what these bins would hold if all lay evenly.
-const GLASS_TIMES_EVEN: u64 = 4;
-/// The pulse of the glass ends after so many standard deviations.
+/// There must be this many times more of them than if all false alarms were evenly spread.
+const GLASS_CONCENTRATION: u64 = 4;
+/// The crosstalk ends after so many standard deviations of the pulse.
 const GLASS_ENDS_SIGMA: f64 = 6.0;
-/// A range gate has so many bins at least.
-const LEAST_GATE: usize = 8;
+/// The fewest bins of a range gate.
+const MIN_GATE: usize = 8;
 
 /// All events of a run against the truth.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AgainstTruth {
     /// Pixels of the array.
     pub pixels: usize,
-    /// Where the last bin ends.
+    /// The range at the end of the last bin.
     pub histogram_ends_mm: f64,
     /// [`FALSE_BEYOND_BINS`].
     pub false_beyond_bins: f64,
-    /// Of all events.
+    /// Errors of all events.
     #[serde(flatten)]
     pub all: Errors,
-    /// Surface by surface, and events of pixels that see none.
-    pub surfaces: Vec<OfSurface>,
-    /// False alarms that look like the cover glass, if there are any.
+    /// Errors surface by surface, and of pixels that see none.
+    pub surfaces: Vec<SurfaceStats>,
+    /// False alarms that look like crosstalk of a cover glass, if there are any.
     pub cover_glass: Option<CoverGlass>,
 }
 
 /// Events of pixels that saw one surface.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OfSurface {
-    /// Its name.
+pub struct SurfaceStats {
+    /// Name of the surface.
     pub name: String,
-    /// Pixels with such an event.
+    /// Pixels with an event.
     pub pixels: usize,
-    /// The laser cycle of the first.
+    /// Laser cycle of the first event.
     pub first_cycle: Option<u64>,
-    /// How they compare.
+    /// Errors of the events.
     #[serde(flatten)]
     pub errors: Errors,
-    /// Pixels that see it beyond the last bin, at the start or the end of the run.
+    /// Pixels that see the surface beyond the last bin, at the start or the end of the run.
     pub pixels_beyond: usize,
 }
 
-/// How some events compare with the truth.
+/// False alarms and errors of events.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Errors {
-    /// How many there are.
+    /// Number of events.
     pub events: u64,
-    /// Of these, false alarms. They are left out of the errors.
+    /// Number of false alarms among them, which do not count in the errors.
     pub false_alarms: u64,
-    /// The same as a share.
+    /// The share of false alarms.
     pub false_alarm_share: Option<f64>,
     /// Mean error: positive if events are too far away.
     pub bias_mm: Option<f64>,
     /// Root mean square of the error.
     pub rms_mm: Option<f64>,
-    /// 95 % of the errors are at most so large, rounded up to 1/1024 bin: that is how fine they
-    /// are counted.
+    /// The 95th percentile of the absolute error, rounded up to 1/1024 bin.
     pub within_95_mm: Option<f64>,
 }
 
-/// False alarms in one place, nearer than every surface.
+/// False alarms in one place, nearer than every surface: probably crosstalk of a cover glass.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct CoverGlass {
-    /// First and last bin of their peaks.
+    /// First and last bin of these peaks.
     pub bins: (u16, u16),
-    /// How many there are.
+    /// Number of these false alarms.
     pub false_alarms: u64,
-    /// First and last bin of a range gate without them.
+    /// First and last bin of a range gate that excludes them.
     pub gate: (u16, u16),
 }
 
 impl AgainstTruth {
-    /// For people. The pixels' reports are `called` so: one of them, and several.
+    /// Rows for people. `nouns` name one report of a pixel, and several.
     #[must_use]
-    pub fn rows(&self, called: [&str; 2]) -> Vec<Row> {
+    pub fn rows(&self, nouns: [&str; 2]) -> Vec<Row> {
         let mut rows = Vec::new();
         if self.surfaces.len() > 1 {
-            rows.extend(self.all.rows("", called));
+            rows.extend(self.all.rows("", nouns));
         }
         for surface in &self.surfaces {
-            rows.extend(surface.rows(self, called));
+            rows.extend(surface.rows(self, nouns));
         }
         if let Some(glass) = &self.cover_glass {
             let (first, last) = glass.bins;
@@ -119,8 +118,8 @@ impl AgainstTruth {
     }
 }
 
-impl OfSurface {
-    fn rows(&self, of: &AgainstTruth, called: [&str; 2]) -> Vec<Row> {
+impl SurfaceStats {
+    fn rows(&self, all: &AgainstTruth, nouns: [&str; 2]) -> Vec<Row> {
         let name = &self.name;
         let first = self.first_cycle.map_or("-".to_owned(), grouped);
         let mut rows = vec![(
@@ -128,7 +127,7 @@ impl OfSurface {
             format!(
                 "{} {} of {} pixels, the first in laser cycle {first}",
                 grouped(self.errors.events),
-                called[1],
+                nouns[1],
                 self.pixels,
             ),
         )];
@@ -137,23 +136,23 @@ impl OfSurface {
                 format!("{name}, beyond the last bin"),
                 format!(
                     "{} of {} pixels at the start or the end: no photons from {:.0} mm on",
-                    self.pixels_beyond, of.pixels, of.histogram_ends_mm
+                    self.pixels_beyond, all.pixels, all.histogram_ends_mm
                 ),
             ));
         }
-        rows.extend(self.errors.rows(&format!("{name}, "), called));
+        rows.extend(self.errors.rows(&format!("{name}, "), nouns));
         rows
     }
 }
 
 impl Errors {
-    /// Nothing if there are no events.
-    fn rows(&self, of: &str, [_, several]: [&str; 2]) -> Vec<Row> {
+    /// Rows whose names begin with `prefix`; none without events.
+    fn rows(&self, prefix: &str, [_, several]: [&str; 2]) -> Vec<Row> {
         let Some(share) = self.false_alarm_share else {
             return Vec::new();
         };
         let mut rows = vec![(
-            format!("{of}false alarms"),
+            format!("{prefix}false alarms"),
             format!(
                 "{} of {} {several} ({}), more than {FALSE_BEYOND_BINS} bins from the truth",
                 grouped(self.false_alarms),
@@ -165,7 +164,7 @@ impl Errors {
             (self.bias_mm, self.rms_mm, self.within_95_mm)
         {
             rows.push((
-                format!("{of}errors of the others"),
+                format!("{prefix}errors of the others"),
                 format!("bias {bias:+.1} mm, rms {rms:.1} mm, 95 % within {within:.1} mm"),
             ));
         }
@@ -173,7 +172,7 @@ impl Errors {
     }
 }
 
-/// A share with two digits that count.
+/// A share in percent with two significant digits.
 fn percent(share: f64) -> String {
     let percent = 100.0 * share;
     match percent {
@@ -185,43 +184,43 @@ fn percent(share: f64) -> String {
     }
 }
 
-/// Counts and sums over the events so far.
-pub struct Comparison<'a> {
+/// Compares events with a scene: counts and sums over the events so far.
+pub struct SceneComparison<'a> {
     scene: &'a Scene,
     array: Array,
     scale: RangeScale,
     /// Laser cycles of the run.
     cycles: u64,
-    /// How far behind the first surface there is a second, where pixels report several echoes.
+    /// Distance from the first echo to the second, if pixels report several.
     behind_mm: Option<f64>,
-    /// The first bin that may hold the peak, and the last.
+    /// The first and the last bin that may hold the peak.
     first_bin: usize,
     last_bin: usize,
-    /// One a surface, and one for pixels that see none.
+    /// One for each surface, and one for pixels that see none.
     tallies: Vec<Tally>,
-    /// False alarms by the bin of their peak.
+    /// Number of false alarms with their peak in each bin.
     false_peaks: Vec<u64>,
 }
 
-/// Events of pixels that saw the same surface.
+/// Counts and sums over the events of one surface.
 #[derive(Clone)]
 struct Tally {
-    /// For each address whether it has sent one.
+    /// For each pixel whether it has sent an event.
     has_sent: Vec<bool>,
     first_cycle: Option<u64>,
     events: u64,
-    /// Sums over those that are no false alarms: errors in millimetres, their squares, and how
-    /// many there are by size.
+    /// Sums of the errors in millimetres and of their squares, and a histogram of their size, all without
+    /// false alarms.
     sum: f64,
     squares: f64,
     sizes: Vec<u64>,
 }
 
-impl<'a> Comparison<'a> {
+impl<'a> SceneComparison<'a> {
     /// Begins to compare the events of `cycles` laser cycles with `scene`.
     ///
     /// # Errors
-    /// If the settings give no range, or the scene has more pixels than addresses.
+    /// Fails if the range scale is invalid, or if the scene has more pixels than addresses.
     pub fn new(scene: &'a Scene, settings: &Settings, cycles: u64) -> Result<Self> {
         let (array, bins) = (scene.array()?, usize::from(scene.bins));
         let second_echo = scene.effects.second_echo.as_ref();
@@ -239,16 +238,16 @@ impl<'a> Comparison<'a> {
         })
     }
 
-    /// Takes events into account.
+    /// Adds events.
     pub fn add(&mut self, events: &[DepthEvent]) {
         for event in events {
             let limit_mm = FALSE_BEYOND_BINS * self.scene.mm_per_bin();
             let (surface, right) = match self.found(event, limit_mm) {
                 Some((surface, error)) => (surface, Some(error)),
                 None => {
-                    let view = self.scene.truth(event.pixel, event.cycle.0);
+                    let view = self.scene.truth(event.pixel, event.cycle.raw());
                     let surface = view.map_or(self.scene.surfaces.len(), |view| view.surface);
-                    self.tallies[surface].has_sent[usize::from(event.pixel.0)] = true;
+                    self.tallies[surface].has_sent[usize::from(event.pixel.raw())] = true;
                     (surface, None)
                 }
             };
@@ -260,14 +259,14 @@ impl<'a> Comparison<'a> {
         }
     }
 
-    /// The surface that an event has found, and its error, at most `limit_mm`. That of a block
-    /// is the mean over those of its pixels that see a surface there.
+    /// The surface of an event and its error, if that is at most `limit_mm`. The error of a block is the
+    /// mean over its pixels that see a surface there.
     fn found(&mut self, event: &DepthEvent, limit_mm: f64) -> Option<(usize, f64)> {
         let range_mm = range_mm(event, &self.scale);
         let (mut surface, mut sum, mut pixels) = (None, 0.0, 0.0);
         for pixel in self.array.pixels_of(event.pixel, event.level) {
-            let [nearest, behind] = self.scene.views(pixel, event.cycle.0);
-            let echo = nearest.zip(self.behind_mm).map(|(view, behind_mm)| View {
+            let [nearest, behind] = self.scene.hits(pixel, event.cycle.raw());
+            let echo = nearest.zip(self.behind_mm).map(|(view, behind_mm)| Hit {
                 range_mm: view.range_mm + behind_mm,
                 ..view
             });
@@ -278,13 +277,13 @@ impl<'a> Comparison<'a> {
                 surface.get_or_insert(of);
                 sum += error;
                 pixels += 1.0;
-                self.tallies[of].has_sent[usize::from(pixel.0)] = true;
+                self.tallies[of].has_sent[usize::from(pixel.raw())] = true;
             }
         }
         Some((surface?, sum / pixels))
     }
 
-    /// How they compare.
+    /// The result.
     #[must_use]
     pub fn finish(&self) -> AgainstTruth {
         let step_mm = FALSE_BEYOND_BINS * self.scene.mm_per_bin() / STEPS as f64;
@@ -294,9 +293,9 @@ impl<'a> Comparison<'a> {
         for (index, name) in names.chain(["no surface"]).enumerate() {
             let tally = &self.tallies[index];
             all += tally;
-            // Events of pixels that see nothing are only worth a word if there are any.
+            // Pixels that see nothing are listed only if they have events.
             if index < self.scene.surfaces.len() || tally.events > 0 {
-                surfaces.push(OfSurface {
+                surfaces.push(SurfaceStats {
                     name: name.to_owned(),
                     pixels: tally.has_sent.iter().filter(|sent| **sent).count(),
                     first_cycle: tally.first_cycle,
@@ -315,8 +314,8 @@ impl<'a> Comparison<'a> {
         }
     }
 
-    /// False alarms that look like the cover glass: more than half of all false alarms, in as many bins
-    /// as an event may lie from the truth, nearer than every surface.
+    /// False alarms that look like crosstalk of a cover glass: more than half of all false alarms, within
+    /// three bins, nearer than every surface.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -333,17 +332,17 @@ impl<'a> Comparison<'a> {
         let bins = self.last_bin + 1 - self.first_bin;
         let even = false_alarms * (last + 1 - first) as u64 / bins as u64;
         let is_glass = 2 * here > false_alarms
-            && here >= GLASS_AT_LEAST
+            && here >= GLASS_MIN_EVENTS
             && here >= events / GLASS_ONE_IN
-            && here > GLASS_TIMES_EVEN * even;
-        // The gate begins where the pulse of the glass has ended, but before that of a surface.
+            && here > GLASS_CONCENTRATION * even;
+        // The gate begins after the crosstalk, but before the nearest surface.
         let sigma = self.scene.pulse_sigma_bins;
         let ends = middle as f64 + (GLASS_ENDS_SIGMA * sigma).ceil().max(FALSE_BEYOND_BINS);
         let surfaces = self.scene.surfaces.iter();
         let ranges = surfaces.map(|surface| self.scene.nearest_mm(surface, self.cycles));
         let nearest = ranges.fold(f64::INFINITY, f64::min) / self.scene.mm_per_bin();
         let gate = (ends + 1.0).min((nearest - FALSE_BEYOND_BINS).floor());
-        let has_room = gate > last as f64 && gate + LEAST_GATE as f64 <= self.last_bin as f64 + 1.0;
+        let has_room = gate > last as f64 && gate + MIN_GATE as f64 <= self.last_bin as f64 + 1.0;
         (is_glass && has_room).then_some(CoverGlass {
             bins: (first as u16, last as u16),
             false_alarms: here,
@@ -364,15 +363,14 @@ impl Tally {
         }
     }
 
-    /// An event; with its error in millimetres and as a share of the largest, unless it is a
-    /// false alarm.
+    /// Adds an event. `error` is in millimetres and as a share of the largest; false alarms have none.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "0 to STEPS"
     )]
     fn add(&mut self, event: &DepthEvent, error: Option<(f64, f64)>) {
-        self.first_cycle.get_or_insert(event.cycle.0);
+        self.first_cycle.get_or_insert(event.cycle.raw());
         self.events += 1;
         if let Some((error, size)) = error {
             self.sum += error;
@@ -402,7 +400,7 @@ impl Tally {
 }
 
 impl AddAssign<&Self> for Tally {
-    /// But for pixels and times, which nobody asks of all.
+    /// Adds all but pixels and times, which the total does not need.
     fn add_assign(&mut self, other: &Self) {
         self.events += other.events;
         self.sum += other.sum;

@@ -1,14 +1,14 @@
-//! The threshold and L1 for a wanted rate of false alarms.
+//! `tune`: threshold and L1 for a rate of false alarms.
 
 mod average;
 mod window;
 
 use std::fmt::Write as _;
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 use dtof_core::BlockLevel;
 use dtof_engine::settings::RuleName;
-use dtof_options::numbers::{MOST_WHOLE, bins, positive, shortest, whole};
+use dtof_options::numbers::{MAX_INTEGER, bins, integer, positive, shortest};
 use dtof_options::rows::significant;
 use dtof_options::{NO_OPTION, Refused, named};
 use dtof_photons::MM_PER_PS;
@@ -16,10 +16,10 @@ use dtof_theory::gaussian;
 use dtof_theory::looks::detections::Detections;
 use dtof_theory::looks::table::Table;
 use dtof_theory::rates::{signal_for_snr, snr};
-use dtof_theory::tune::{Request, Source, Wanted, tune};
+use dtof_theory::tune::{FalseAlarmLimit, Request, Source, tune};
 use serde_json::json;
 
-/// What settings are for.
+/// The options of `tune`.
 #[derive(Clone, Debug)]
 pub struct Options {
     /// The rule to find settings for
@@ -118,84 +118,56 @@ impl dtof_options::Options for Options {
             "false_alarm" => self.false_alarm = Some(positive(text)?),
             "false_alarms_per_second" => self.false_alarms_per_second = Some(positive(text)?),
             "laser_hz" => self.laser_hz = Some(positive(text)?),
-            "l1" => self.l1 = Some(whole(0..=u16::MAX)(text)?),
-            "l2" => self.l2 = whole(1..=u16::MAX)(text)?,
-            "x" => self.x = whole(1..=u16::MAX)(text)?,
-            "min_count" => self.min_count = whole(1..=1023)(text)?,
-            "binning" => self.binning = whole(0..=BlockLevel::MAX.raw())(text)?,
-            "seed" => self.seed = whole(0..=MOST_WHOLE)(text)?,
+            "l1" => self.l1 = Some(integer(0..=u16::MAX)(text)?),
+            "l2" => self.l2 = integer(1..=u16::MAX)(text)?,
+            "x" => self.x = integer(1..=u16::MAX)(text)?,
+            "min_count" => self.min_count = integer(1..=1023)(text)?,
+            "binning" => self.binning = integer(0..=BlockLevel::MAX.raw())(text)?,
+            "seed" => self.seed = integer(0..=MAX_INTEGER)(text)?,
             _ => return Err(NO_OPTION.to_owned()),
         }
         Ok(())
     }
 
     fn check(&self) -> Result<(), Refused> {
-        let (signal, sigma) = (self.signal.is_some(), self.sigma_bins.is_some());
-        let (per_second, is_share) = (
-            self.false_alarms_per_second.is_some(),
-            self.false_alarm.is_some(),
-        );
-        let missing = [
-            (self.background.is_none(), "`background`"),
-            (!signal && self.snr.is_none(), "`signal` or `snr`"),
+        let needed = [
+            ("`background`", self.background),
+            ("`signal` or `snr`", self.signal.or(self.snr)),
             (
-                !sigma && self.sigma_ps.is_none(),
                 "`sigma_bins` or `sigma_ps`",
+                self.sigma_bins.or(self.sigma_ps),
             ),
         ];
-        let missing = missing.iter().filter(|(is_missing, _)| *is_missing);
-        let missing: Vec<&str> = missing.map(|(_, keys)| *keys).collect();
+        let missing = needed.iter().filter(|(_, value)| value.is_none());
+        let missing: Vec<&str> = missing.map(|(keys, _)| *keys).collect();
         if missing.len() > 1 {
             let reason = format!("{} are needed", missing.join(", "));
             return Err(Refused::input(reason));
         }
-        let refused = [
-            (self.background.is_none(), "background", "is needed"),
-            (
-                !signal && self.snr.is_none(),
-                "signal",
-                "is needed, or `snr`",
-            ),
-            (
-                signal && self.snr.is_some(),
-                "snr",
-                "cannot be used with `signal`",
-            ),
-            (
-                !sigma && self.sigma_ps.is_none(),
-                "sigma_bins",
-                "is needed, or `sigma_ps`",
-            ),
-            (
-                sigma && self.sigma_ps.is_some(),
-                "sigma_ps",
-                "cannot be used with `sigma_bins`",
-            ),
-            (
-                is_share && per_second,
-                "false_alarm",
-                "cannot be used with `false_alarms_per_second`",
-            ),
-            (
-                per_second && self.laser_hz.is_none(),
-                "false_alarms_per_second",
-                "needs `laser_hz`",
-            ),
-        ];
-        match refused.into_iter().find(|(is_wrong, ..)| *is_wrong) {
-            Some((_, key, reason)) => Err(Refused::new(key, reason)),
-            None => Ok(()),
-        }
+        self.request().map(drop)
     }
 }
 
-/// One result: its name in JSON, its value and where that comes from.
+/// The value of the one of two options that is given.
+fn one_of<T>(
+    (key, value): (&str, Option<T>),
+    (other_key, other): (&str, Option<T>),
+) -> Result<T, Refused> {
+    if value.is_some() && other.is_some() {
+        let reason = format!("cannot be used with `{key}`");
+        return Err(Refused::new(other_key, reason));
+    }
+    let missing = || Refused::new(key, format!("is needed, or `{other_key}`"));
+    value.or(other).ok_or_else(missing)
+}
+
+/// One result: its name in JSON, its value and the source of the value.
 struct Line(&'static str, f64, String);
 
-/// What was found.
-pub struct Tuned {
+/// The settings that were found, and what to expect of them.
+pub struct TuneResult {
     lines: Vec<Line>,
-    /// The options that other commands take.
+    /// The options for other commands.
     options: String,
 }
 
@@ -220,24 +192,24 @@ const NAMES: [(&str, &str, &str); 14] = [
 impl Line {
     /// Name for people and unit.
     fn names(&self) -> (&'static str, &'static str) {
-        let known = NAMES.iter().find(|names| names.0 == self.0);
-        known.map_or((self.0, ""), |names| (names.1, names.2))
+        let names = NAMES.iter().find(|names| names.0 == self.0);
+        names.map_or((self.0, ""), |names| (names.1, names.2))
     }
 }
 
 impl Options {
-    /// Finds them.
+    /// Finds the settings.
     ///
     /// # Errors
-    /// If nothing suits what is asked for.
-    pub fn tune(&self) -> Result<Tuned> {
+    /// Fails if options are missing or exclude each other, or if no threshold has so few false alarms.
+    pub fn tune(&self) -> Result<TuneResult> {
         let request = self.request()?;
         let (lines, rule) = match self.rule {
             RuleName::Paper => self.paper(&request)?,
             RuleName::Average => self.average(&request)?,
             RuleName::Window => self.window(&request)?,
         };
-        // Without them `replay` takes another histogram than these settings are for.
+        // Without these options, `replay` would use other bins than the settings are for.
         let histogram = if (self.bins, self.bin_width_ps) == (128, 250.0) {
             String::new()
         } else {
@@ -247,35 +219,45 @@ impl Options {
             "{rule} --l2 {} --x {} --min-count {}{histogram}",
             self.l2, self.x, self.min_count
         );
-        Ok(Tuned { lines, options })
+        Ok(TuneResult { lines, options })
     }
 
-    fn request(&self) -> Result<Request> {
-        let needed = |key: &'static str| move || Refused::new(key, "is needed");
-        let background = self.background.ok_or_else(needed("background"))?;
+    /// The same in the units of theory.
+    fn request(&self) -> Result<Request, Refused> {
+        let background = self.background;
+        let background = background.ok_or_else(|| Refused::new("background", "is needed"))?;
         let by_snr = |snr| signal_for_snr(snr, background, self.l2.into());
-        let signal = self.signal.or(self.snr.map(by_snr));
-        let signal = signal.ok_or_else(needed("signal"))?;
+        let signal = one_of(("signal", self.signal), ("snr", self.snr.map(by_snr)))?;
         let by_ps = self.sigma_ps.map(|ps| ps / self.bin_width_ps);
-        let sigma = self.sigma_bins.or(by_ps);
-        let sigma = sigma.ok_or_else(needed("sigma_bins"))?;
-        ensure!(
-            sigma <= f64::from(self.bins) / 4.0,
-            "a pulse of σ = {} bins does not fit {} bins",
-            number(sigma),
-            self.bins
-        );
-        ensure!(
-            self.binning == 0 || self.rule == RuleName::Window,
-            Refused::new(
+        let sigma = one_of(("sigma_bins", self.sigma_bins), ("sigma_ps", by_ps))?;
+        let limit = match (
+            self.false_alarm,
+            self.false_alarms_per_second,
+            self.laser_hz,
+        ) {
+            (Some(_), Some(_), _) => Err(Refused::new(
+                "false_alarm",
+                "cannot be used with `false_alarms_per_second`",
+            )),
+            (None, Some(_), None) => {
+                Err(Refused::new("false_alarms_per_second", "needs `laser_hz`"))
+            }
+            (None, Some(per_second), Some(laser_hz)) => {
+                Ok(FalseAlarmLimit::PerCycle(per_second / laser_hz))
+            }
+            (share, None, _) => Ok(FalseAlarmLimit::PerExposure(share.unwrap_or(0.01))),
+        }?;
+        if sigma > f64::from(self.bins) / 4.0 {
+            let (sigma, bins) = (number(sigma), self.bins);
+            let reason = format!("a pulse of σ = {sigma} bins does not fit {bins} bins");
+            return Err(Refused::input(reason));
+        }
+        if self.binning > 0 && self.rule != RuleName::Window {
+            return Err(Refused::new(
                 "binning",
-                "needs `rule` window here: only its z is shared with blocks"
-            )
-        );
-        let wanted = match (self.false_alarms_per_second, self.laser_hz) {
-            (Some(per_second), Some(laser_hz)) => Wanted::PerCycle(per_second / laser_hz),
-            _ => Wanted::PerExposure(self.false_alarm.unwrap_or(0.01)),
-        };
+                "needs `rule` window here: only its z is shared with blocks",
+            ));
+        }
         Ok(Request {
             background,
             signal,
@@ -285,27 +267,27 @@ impl Options {
             x: self.x,
             l1: self.l1,
             l2: self.l2,
-            wanted,
+            limit,
             levels: BlockLevel::saturating(self.binning),
             seed: self.seed,
         })
     }
 
-    /// α, L1 and what to expect of them; the options for it.
+    /// α and L1, what to expect of them, and the options for them.
     fn paper(&self, request: &Request) -> Result<(Vec<Line>, String)> {
-        let table = Table::kept()?;
+        let table = Table::load()?;
         let tuned = tune(request, &table)?;
         let false_alarms = match tuned.source {
             Source::Table => format!("simulation: table, {} exposures a point", table.exposures),
             Source::TableAtMost => format!(
-                "simulation: at most, the least the table saw, {} exposures a point",
+                "simulation: at most, the lowest value of the table, {} exposures a point",
                 table.exposures
             ),
             Source::Bound => "formula: upper bound, single looks (exact) added up".to_owned(),
         };
         let exact = |what: &str| format!("formula: {what}, single look (exact)");
-        let alpha = format!("smallest for the false alarms wanted; {false_alarms}");
-        let gaussian = gaussian::alpha_min(tuned.wanted, u32::from(request.bins) - 1);
+        let alpha = format!("lowest for these false alarms; {false_alarms}");
+        let gaussian = gaussian::alpha_min(tuned.limit, u32::from(request.bins) - 1);
         let mut lines = vec![
             Line("alpha", tuned.alpha.to_num(), alpha),
             self.l1(tuned.l1, &tuned.detections),
@@ -316,7 +298,6 @@ impl Options {
         lines.extend(self.expected(request, &tuned.detections));
         let source = "formula: Eq. 11, one look, background known; not for use";
         lines.push(Line("gaussian_alpha", gaussian, source.to_owned()));
-        // As few digits as name it.
         let alpha = shortest(tuned.alpha);
         Ok((lines, format!("--alpha {alpha} --l1 {}", tuned.l1)))
     }
@@ -336,7 +317,7 @@ impl Options {
         Line("l1", l1.into(), source)
     }
 
-    /// False alarms counted in so many exposures, of which so many have an event.
+    /// The rate of false alarms, from `events` in `exposures`.
     #[allow(clippy::cast_precision_loss)]
     fn counted(&self, (exposures, events): (u64, u64)) -> Line {
         let blocks = match self.binning {
@@ -373,8 +354,8 @@ impl Options {
     }
 }
 
-impl Tuned {
-    /// For programs: each result with its value, unit and source.
+impl TuneResult {
+    /// Results for programs: each with value, unit and source.
     #[must_use]
     pub fn json(&self) -> serde_json::Value {
         let fields = self.lines.iter().map(|line| {
@@ -385,7 +366,7 @@ impl Tuned {
         fields.collect::<serde_json::Map<_, _>>().into()
     }
 
-    /// For people; the last line is what other commands take.
+    /// Results for people; the last line has the options for other commands.
     #[must_use]
     pub fn text(&self) -> String {
         let mut text = String::new();
@@ -399,14 +380,14 @@ impl Tuned {
         text
     }
 
-    /// The options that other commands take, as `--alpha 4.5 --l1 40`.
+    /// The options for other commands, such as `--alpha 4.5 --l1 40`.
     #[must_use]
     pub fn options(&self) -> &str {
         &self.options
     }
 }
 
-/// Whole numbers as they are, others to four significant digits.
+/// A whole number as it is, another to four significant digits.
 fn number(value: f64) -> String {
     if value == value.round() && value.abs() < 1e6 {
         format!("{value}")

@@ -1,6 +1,6 @@
 //! An array of simulated pixels.
 
-use anyhow::{Context, Result};
+use anyhow::{Result, ensure};
 use dtof_core::{Array, PixelAddress};
 use dtof_theory::rates::Rates;
 use rayon::prelude::*;
@@ -8,9 +8,9 @@ use rayon::prelude::*;
 use super::pixel::SimulatedPixel;
 use dtof_photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
 
-/// The rates of a pixel in a laser cycle, for scenes that change: those of what it sees, and of
-/// what is behind.
-pub type RatesAt = Box<dyn Fn(PixelAddress, u64) -> [Rates; 2] + Send + Sync>;
+/// The rates of a pixel in a laser cycle, for scenes that change: of the surface it sees, and of
+/// the one behind.
+pub type RatesFn = Box<dyn Fn(PixelAddress, u64) -> [Rates; 2] + Send + Sync>;
 
 /// An array of simulated pixels.
 pub struct SimulatedArray {
@@ -18,39 +18,41 @@ pub struct SimulatedArray {
     cycles: u64,
     next_cycle: u64,
     pixels: Vec<SimulatedPixel>,
-    rates_at: Option<RatesAt>,
+    rates_at: Option<RatesFn>,
     laser_hz: Option<u64>,
-    /// Whether photons of a pixel are not wanted.
-    spared: Vec<bool>,
+    /// Whether the photons of each pixel are left out.
+    skipped: Vec<bool>,
 }
 
 impl SimulatedArray {
-    /// `pixels` row by row for `cycles` laser cycles, at the rates they have or
-    /// at those of `rates_at`.
-    #[must_use]
+    /// `pixels` row by row for `cycles` laser cycles, at their own rates or those of `rates_at`.
+    ///
+    /// # Errors
+    /// Fails unless there is one for each address.
     pub fn new(
         array: Array,
         pixels: Vec<SimulatedPixel>,
         cycles: u64,
-        rates_at: Option<RatesAt>,
-    ) -> Self {
-        assert_eq!(
-            pixels.len(),
-            array.pixels() as usize,
-            "one for each address"
+        rates_at: Option<RatesFn>,
+    ) -> Result<Self> {
+        let addresses = array.pixels() as usize;
+        ensure!(
+            pixels.len() == addresses,
+            "{} simulated pixels for {addresses} addresses",
+            pixels.len()
         );
-        Self {
+        Ok(Self {
             array,
             cycles,
             next_cycle: 0,
             pixels,
             rates_at,
             laser_hz: None,
-            spared: vec![false; array.pixels() as usize],
-        }
+            skipped: vec![false; addresses],
+        })
     }
 
-    /// The same with a laser of `hz` cycles a second.
+    /// Sets the laser rate in hertz.
     #[must_use]
     pub fn with_laser_hz(self, hz: u64) -> Self {
         Self {
@@ -80,26 +82,25 @@ impl PhotonSource for SimulatedArray {
         self.laser_hz
     }
 
-    fn spare(&mut self, is_wanted: &dyn Fn(PixelAddress) -> bool) {
-        for (address, spared) in (0..=u16::MAX).map(PixelAddress).zip(&mut self.spared) {
-            *spared = !is_wanted(address);
+    fn limit_to(&mut self, is_needed: &dyn Fn(PixelAddress) -> bool) {
+        for (address, skipped) in (0..=u16::MAX).map(PixelAddress::new).zip(&mut self.skipped) {
+            *skipped = !is_needed(address);
         }
     }
 
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
         let first_cycle = self.next_cycle;
         self.next_cycle += u64::from(cycles);
-        let (rates_at, spared) = (self.rates_at.as_ref(), &self.spared);
-        let received = |(index, pixel): (usize, &mut SimulatedPixel)| {
-            let address = u16::try_from(index).context("more than 65,536 pixels")?;
+        let (rates_at, addresses) = (self.rates_at.as_ref(), self.addresses());
+        let received = |((pixel, &address), &skipped): ((&mut SimulatedPixel, _), _)| {
             let mut photons = Vec::new();
-            if spared[index] {
+            if skipped {
                 return Ok(PixelPhotons { cycles, photons });
             }
             for cycle in 0..cycles {
                 if let Some(rates_at) = rates_at {
                     let at = first_cycle + u64::from(cycle);
-                    let [rates, behind] = rates_at(PixelAddress(address), at);
+                    let [rates, behind] = rates_at(address, at);
                     pixel.set_rates(&rates)?;
                     pixel.set_behind(&behind)?;
                 }
@@ -107,10 +108,14 @@ impl PhotonSource for SimulatedArray {
             }
             Ok(PixelPhotons { cycles, photons })
         };
-        let pixels = self.pixels.par_iter_mut().enumerate().map(received);
+        let pixels = self
+            .pixels
+            .par_iter_mut()
+            .zip(&addresses)
+            .zip(&self.skipped);
         Ok(Slice {
             first_cycle,
-            pixels: pixels.collect::<Result<_>>()?,
+            pixels: pixels.map(received).collect::<Result<_>>()?,
         })
     }
 }

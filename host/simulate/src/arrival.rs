@@ -2,9 +2,9 @@
 
 /// A photon of the plain model.
 pub(super) enum Arrival {
-    /// In a bin, anywhere.
+    /// In this bin, anywhere in it.
     Background(u16),
-    /// So many bins from the start of bin 0.
+    /// At this position in bins, from the start of bin 0.
     Signal(f64),
 }
 

@@ -1,53 +1,43 @@
-//! The demo: what its pixels see, and how they decide.
+//! The scene and the settings of the demo.
 
-use anyhow::{Context, Result};
-use dtof_core::fixed::types::U8F8;
-use dtof_core::{Array, BlockLevel, Count, EchoNumber, RangeGate, WindowRule, z_for_levels};
-use dtof_link::AdaptiveBinning;
+use anyhow::Result;
+use dtof_core::Array;
 
 use super::SimulatedArray;
-use super::scene::{self, Scene};
-use dtof_engine::settings::Settings;
+use super::scene::Scene;
+use dtof_engine::settings::{Settings, SettingsFile};
 
 /// `demo.toml` beside this file.
 ///
 /// # Errors
-/// Never: it is a part of the program.
+/// Never fails: the text is a part of the program.
 pub fn scene() -> Result<Scene> {
     Scene::parse(include_str!("demo.toml"))
 }
 
 /// Blocks of 4×4 pixels and two echoes, with the window rule and one false alarm in a hundred
-/// exposures: `--rule window --sigma-bins 1 --binning 2 --echoes 2 --echo-wait 4`.
+/// exposures.
 ///
 /// # Errors
-/// Never: the numbers are those of a rule.
+/// Never fails: the text is a part of the program.
 pub fn settings(seed: u64) -> Result<Settings> {
-    const SIGMA: U8F8 = U8F8::ONE;
-    let (x, l1, l2) = (4, 40, 2000);
-    let levels = BlockLevel::saturating(2);
-    let z = z_for_levels(100, &RangeGate::<128>::full(), x, l1, l2, levels);
-    let width = WindowRule::width_for_pulse(SIGMA);
-    Ok(Settings {
-        rule: WindowRule::new(width, z, Count::saturating(5))?.into(),
-        sigma_bins: Some(SIGMA),
-        x,
-        l1,
-        l2,
-        binning: Some(AdaptiveBinning {
-            levels,
-            patience: AdaptiveBinning::PATIENCE,
-        }),
-        echoes: EchoNumber::new(2).context("an echo")?,
-        echo_wait: Some(4),
-        ..scene::settings(seed)
-    })
+    let mut file = SettingsFile::parse(
+        "[sensor]
+         sigma_bins = 1
+         [detection]
+         rule = 'window'
+         binning = 2
+         echoes = 2
+         echo_wait = 4",
+    )?;
+    file.run.seed = Some(seed);
+    file.settings(128)
 }
 
-/// Its photons on an array, `cycles` laser cycles of them.
+/// The photons of `cycles` laser cycles on an array.
 ///
 /// # Errors
-/// Never: it is a part of the program.
+/// Fails if the array is so large that there are too many photons a laser cycle.
 pub fn photons(array: Array, seed: u64, cycles: u64) -> Result<SimulatedArray> {
     let scene = Scene {
         size: [array.columns(), array.rows()],

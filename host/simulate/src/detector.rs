@@ -1,4 +1,4 @@
-//! The way of a pixel's photons through all effects that are on.
+//! The path of a pixel's photons through all effects that are on.
 
 use anyhow::Result;
 use dtof_core::PixelAddress;
@@ -12,38 +12,36 @@ use super::effects::cover_glass::Crosstalk;
 use super::effects::dead_time::Recharge;
 use super::effects::jitter::TimingError;
 use super::effects::limits::Timing;
-use super::effects::second_echo::Echo;
-use super::effects::tail::Late;
+use super::effects::second_echo::EchoDelay;
+use super::effects::tail::TailDelay;
 use super::stream::Stream;
 use dtof_theory::rates::Rates;
 
-/// One pixel's light and SPAD and TDC. All times are in bins from the start of
-/// the laser cycle.
+/// The light, SPAD and TDC of one pixel. All times are in bins from the start of the laser cycle.
 ///
-/// The background goes on between the histogram and the next laser pulse, where
-/// it has no TDC code but blinds the SPAD. Signal photons before time 0 or after
-/// the next laser pulse do not arrive.
+/// The background continues between the histogram and the next laser pulse. There it has no TDC
+/// code, but blinds the SPAD. Signal photons before time 0 or after the next laser pulse are lost.
 #[derive(Clone, Debug)]
 pub(super) struct Detector {
     end: f64,
     period: f64,
     within_bin: Pcg64,
-    second_echo: Option<Echo>,
+    second_echo: Option<EchoDelay>,
     cover_glass: Option<Crosstalk>,
-    tail: Option<Late>,
+    tail: Option<TailDelay>,
     /// The additional background of a hot pixel.
     hot: Option<Background>,
-    /// Only if it can change what is in the histogram.
+    /// Background after the histogram, if it can change the histogram.
     gap: Option<Background>,
     recharge: Recharge,
     trap: Option<Trap>,
     jitter: Option<TimingError>,
     hits: usize,
-    /// Photons of the effects in a laser cycle.
+    /// Photons a laser cycle that effects add.
     added: f64,
-    /// Avalanches a photon, at most.
+    /// The most avalanches a photon.
     avalanches_each: f64,
-    /// Of this laser cycle: arrivals, then avalanches, then measured times.
+    /// In this laser cycle: arrivals, and avalanches, which become measured times.
     times: Vec<f64>,
     avalanches: Vec<f64>,
 }
@@ -86,13 +84,13 @@ impl Detector {
             avalanches_each: afterpulsing.map_or(1.0, |after| 1.0 / (1.0 - after.probability)),
             within_bin: rng(Stream::WithinBin),
             second_echo: second_echo
-                .map(|echo| Echo::new(echo, timing, rng(Stream::SecondEcho)))
+                .map(|echo| EchoDelay::new(echo, timing, rng(Stream::SecondEcho)))
                 .transpose()?,
             cover_glass: cover_glass
                 .map(|glass| Crosstalk::new(glass, rates.sigma, rng(Stream::CoverGlass)))
                 .transpose()?,
             tail: tail
-                .map(|tail| Late::new(tail, rng(Stream::Tail)))
+                .map(|tail| TailDelay::new(tail, rng(Stream::Tail)))
                 .transpose()?,
             hot,
             gap,
@@ -109,8 +107,7 @@ impl Detector {
         })
     }
 
-    /// Photons and afterpulses in a laser cycle, at most, if the plain model has
-    /// `plain` photons.
+    /// The most photons and afterpulses in a laser cycle, if the plain model has `plain` photons.
     pub(super) fn photons_per_cycle(&self, plain: f64) -> f64 {
         (plain + self.added) * self.avalanches_each
     }
@@ -120,7 +117,7 @@ impl Detector {
         let Self { times, tail, .. } = self;
         times.clear();
         if let Some(glass) = &mut self.cover_glass {
-            glass.draw(|time| times.push(time + tail.as_mut().map_or(0.0, Late::delay)));
+            glass.draw(|time| times.push(time + tail.as_mut().map_or(0.0, TailDelay::delay)));
         }
         for background in [&mut self.hot, &mut self.gap].into_iter().flatten() {
             background.draw(|time| times.push(time));
@@ -135,14 +132,13 @@ impl Detector {
                 f64::from(*bin) + within
             }
             Arrival::Signal(position) => {
-                let echo = self.second_echo.as_mut().map_or(0.0, Echo::delay);
-                position + echo + self.tail.as_mut().map_or(0.0, Late::delay)
+                let echo = self.second_echo.as_mut().map_or(0.0, EchoDelay::delay);
+                position + echo + self.tail.as_mut().map_or(0.0, TailDelay::delay)
             }
         });
     }
 
-    /// All photons have arrived: gives `photon` the TDC codes of this laser
-    /// cycle, ascending.
+    /// Ends the arrivals. Gives `photon` the TDC codes of this laser cycle, ascending.
     pub(super) fn finish(&mut self, photon: impl FnMut(u16)) {
         self.detect();
         if let Some(jitter) = &mut self.jitter {
@@ -158,7 +154,7 @@ impl Detector {
             .for_each(photon);
     }
 
-    /// Which photons and which trapped charges start an avalanche.
+    /// Finds the photons and trapped charges that start an avalanche.
     fn detect(&mut self) {
         let period = self.period;
         self.times.retain(|time| (0.0..period).contains(time));
@@ -184,8 +180,7 @@ impl Detector {
         self.trap.as_mut()?.release_before(time)
     }
 
-    /// A photon or a trapped charge at `time`: an avalanche, unless the SPAD is
-    /// blind.
+    /// Starts an avalanche at `time`, unless the SPAD is blind.
     fn avalanche(&mut self, time: f64) {
         if let Some(recharged) = self.recharge.avalanche(time) {
             self.avalanches.push(time);
@@ -208,7 +203,7 @@ struct Background {
 }
 
 impl Background {
-    /// `rate` photons a bin; none at all if there is nothing to draw.
+    /// `rate` photons a bin; `None` without photons.
     fn new(rate: f64, from: f64, to: f64, rng: Pcg64) -> Result<Option<Self>> {
         let length = to - from;
         if rate * length <= 0.0 {

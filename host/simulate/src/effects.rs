@@ -21,14 +21,14 @@ use self::second_echo::SecondEcho;
 use self::tail::Tail;
 use self::tdc::Tdc;
 
-/// Every effect is off unless it is here. `docs/scenes.md` lists them.
+/// All effects are off by default. `docs/scenes.md` lists them.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Effects {
     /// The pulse decays slowly.
     pub tail: Option<Tail>,
     /// Some of the signal comes from farther away.
     pub second_echo: Option<SecondEcho>,
-    /// Light that never left the sensor.
+    /// Laser light that never leaves the sensor.
     pub cover_glass: Option<CoverGlass>,
     /// Pixels with more background.
     pub hot_pixels: Option<HotPixels>,
@@ -43,38 +43,31 @@ pub struct Effects {
 }
 
 impl Effects {
-    /// Is there one?
+    /// Whether an effect is on.
     #[must_use]
     pub fn any(&self) -> bool {
         *self != Self::default()
     }
 
-    /// Does the TDC take one photon a laser cycle?
+    /// Whether the TDC takes one photon a laser cycle.
     #[must_use]
     pub fn one_hit_tdc(&self) -> bool {
         self.tdc.as_ref().is_some_and(|tdc| tdc.hits_per_cycle == 1)
     }
 
-    /// Are all numbers in their ranges?
+    /// Checks that all numbers are in their ranges.
     ///
     /// # Errors
-    /// The first that is not, named `[section] key`.
+    /// Names the first that is not as `[section] key`.
     pub fn check(&self) -> Result<()> {
-        fn section<T>(name: &str, on: Option<&T>, check: fn(&T) -> Result<()>) -> Result<()> {
-            on.map_or(Ok(()), check)
-                .with_context(|| format!("[{name}]"))
+        macro_rules! check {
+            ($($effect:ident)+) => {
+                $(if let Some(effect) = &self.$effect {
+                    effect.check().context(concat!("[", stringify!($effect), "]"))?;
+                })+
+            };
         }
-        section("tail", self.tail.as_ref(), Tail::check)?;
-        section("second_echo", self.second_echo.as_ref(), SecondEcho::check)?;
-        section("cover_glass", self.cover_glass.as_ref(), CoverGlass::check)?;
-        section("hot_pixels", self.hot_pixels.as_ref(), HotPixels::check)?;
-        section("dead_time", self.dead_time.as_ref(), DeadTime::check)?;
-        section(
-            "afterpulsing",
-            self.afterpulsing.as_ref(),
-            Afterpulsing::check,
-        )?;
-        section("jitter", self.jitter.as_ref(), Jitter::check)?;
-        section("tdc", self.tdc.as_ref(), Tdc::check)
+        check!(tail second_echo cover_glass hot_pixels dead_time afterpulsing jitter tdc);
+        Ok(())
     }
 }

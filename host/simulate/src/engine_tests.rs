@@ -1,17 +1,17 @@
-//! Tests of the engine, and of sources of photons, with simulated photons.
+//! Tests of the engine and of sources of photons, with simulated photons.
 
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AnyRule, Array, AverageRule, BlockLevel, Count, DepthEvent, EchoNumber, PaperRule, WindowRule,
 };
 use dtof_engine::decisions::Decision;
+use dtof_engine::explain::explain_decisions;
 use dtof_engine::host::host_engine;
-use dtof_engine::look::look_back;
 use dtof_engine::settings::Settings;
 use dtof_photons::masked::Masked;
 use dtof_photons::source::{PhotonSource, Slice};
 
-use crate::{demo, scene};
+use crate::demo;
 
 const ARRAY: Array = Array::new(8, 4).unwrap();
 
@@ -43,11 +43,11 @@ fn rules() -> [AnyRule; 3] {
     ]
 }
 
-/// Settings with everything a decision can depend on, one after the other.
+/// Settings that cover everything a decision depends on.
 fn all_settings() -> Vec<Settings> {
     let plain = rules().map(|rule| Settings {
         rule,
-        ..scene::settings(0)
+        ..Settings::static_scene(0)
     });
     let window = plain[2].clone();
     let gated = plain.clone().map(|settings| Settings {
@@ -102,14 +102,14 @@ fn counts_are_the_photons_of_the_exposure() {
             if event.level != BlockLevel::PIXEL {
                 continue;
             }
-            let first = event.cycle.0 + 1 - u64::from(event.exposure);
+            let first = event.cycle.raw() + 1 - u64::from(event.exposure);
             let mut counts = vec![0u16; 128];
             for slice in &slices {
-                for photon in &slice.pixels[usize::from(event.pixel.0)].photons {
+                for photon in &slice.pixels[usize::from(event.pixel.raw())].photons {
                     let cycle = slice.first_cycle + u64::from(photon.cycle);
-                    let is_counted = (first..=event.cycle.0).contains(&cycle)
+                    let is_counted = (first..=event.cycle.raw()).contains(&cycle)
                         && (gate.0..=gate.1).contains(&photon.code)
-                        && !decision.peeled.contains(photon.code);
+                        && !decision.excluded.contains(photon.code);
                     counts[usize::from(photon.code)] += u16::from(is_counted);
                 }
             }
@@ -120,7 +120,7 @@ fn counts_are_the_photons_of_the_exposure() {
     }
 }
 
-/// A block counts photons of pixels that are silent only: not more than all, and enough.
+/// A block counts photons of silent pixels only.
 #[test]
 fn counts_of_a_block_are_those_its_event_tells() {
     let settings = demo::settings(3).unwrap();
@@ -137,78 +137,82 @@ fn counts_of_a_block_are_those_its_event_tells() {
 
 #[test]
 fn decisions_do_not_depend_on_slices_or_threads() {
-    for settings in [demo::settings(3).unwrap(), scene::settings(0)] {
-        let (_, whole, _) = run(&settings, 256);
+    for settings in [demo::settings(3).unwrap(), Settings::static_scene(0)] {
+        let (_, all, _) = run(&settings, 256);
         let one = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .build()
             .unwrap();
         for length in [1, 37, 255] {
-            assert_eq!(one.install(|| run(&settings, length)).1, whole);
+            assert_eq!(one.install(|| run(&settings, length)).1, all);
         }
     }
 }
 
-/// Whatever the rule, the number it needs is at most that of the peak, and the background is the
+/// With every rule, the photons needed are at most those of the peak, and the background is the
 /// event's.
 #[test]
-fn looking_back_finds_what_the_pixel_found() {
+fn an_explanation_agrees_with_the_event() {
     for settings in all_settings() {
         let (_, decisions, _) = run(&settings, 256);
-        let looks = look_back(&settings, &decisions);
-        assert_eq!(looks.len(), decisions.len());
+        let explanations = explain_decisions(&settings, &decisions);
+        assert_eq!(explanations.len(), decisions.len());
         let mut exactly = 0;
-        for (look, Decision { event, counts, .. }) in looks.iter().zip(&decisions) {
+        for (explained, Decision { event, counts, .. }) in explanations.iter().zip(&decisions) {
             let bin = event.peak_bin.raw();
-            assert_eq!(look.peak, (bin, event.peak_count.raw()));
-            assert!(!look.depends);
-            let needed = look.needed.unwrap();
-            assert!(needed <= look.peak.1, "{event:?} {settings:?}");
-            exactly += usize::from(needed == look.peak.1);
-            let background = look.background.unwrap();
-            let told = f64::from(event.background.raw());
+            assert_eq!(explained.peak, (bin, event.peak_count.raw()));
+            assert!(!explained.depends);
+            let needed = explained.needed.unwrap();
+            assert!(needed <= explained.peak.1, "{event:?} {settings:?}");
+            exactly += usize::from(needed == explained.peak.1);
+            let background = explained.background.unwrap();
+            let reported = f64::from(event.background.raw());
             assert!(
-                (background - told).abs() <= 0.5,
+                (background - reported).abs() <= 0.5,
                 "{background} {event:?} {settings:?}"
             );
             let is_window = matches!(settings.rule, AnyRule::Window(_)) && settings.frame.is_none();
-            assert_eq!(look.window.is_some(), is_window);
-            if let (Some((first, last)), false) = (look.window, settings.tracking) {
+            assert_eq!(explained.window.is_some(), is_window);
+            if let (Some((first, last)), false) = (explained.window, settings.tracking) {
                 assert!((first..=last).contains(&bin));
             }
             assert_eq!(counts.len(), 128);
         }
-        // Most report the moment that they may, unless it was a frame.
+        // Most events come as soon as possible, except in frames.
         assert!(exactly > 0 || settings.frame.is_some(), "{settings:?}");
     }
 }
 
 #[test]
-fn no_room_is_taken_unless_asked_for() {
+fn decisions_are_kept_only_on_request() {
     let mut photons = demo::photons(ARRAY, 3, 2000).unwrap();
-    let mut engine = host_engine(&scene::settings(0), ARRAY, &photons.addresses()).unwrap();
+    let mut engine = host_engine(&Settings::static_scene(0), ARRAY, &photons.addresses()).unwrap();
     engine.run(&photons.next_slice(256).unwrap()).unwrap();
     assert!(engine.decisions().is_empty());
-    engine.keep_decisions(&|pixel| pixel.0 == 5);
+    engine.keep_decisions(&|pixel| pixel.raw() == 5);
     engine.run(&photons.next_slice(1744).unwrap()).unwrap();
     let kept = engine.decisions();
-    assert!(kept.iter().map(|decision| decision.event.pixel.0).eq([5]));
+    assert!(
+        kept.iter()
+            .map(|decision| decision.event.pixel.raw())
+            .eq([5])
+    );
 }
 
 #[test]
 fn only_masked_pixels_lose_their_photons_and_they_are_counted() {
     let array = Array::new(4, 2).unwrap();
     let photons = || Box::new(demo::photons(array, 1, 100).unwrap());
-    let whole = photons().next_slice(100).unwrap();
+    let all = photons().next_slice(100).unwrap();
     let mut masked = Masked::new(photons(), &[1, 6, 6]).unwrap();
     let part = masked.next_slice(100).unwrap();
     let mut lost = 0;
-    for (pixel, (whole, part)) in whole.pixels.iter().zip(&part.pixels).enumerate() {
+    for (pixel, (all, part)) in all.pixels.iter().zip(&part.pixels).enumerate() {
         if [1, 6].contains(&pixel) {
-            assert!(part.photons.is_empty() && !whole.photons.is_empty());
-            lost += whole.photons.len() as u64;
+            assert!(part.photons.is_empty() && !all.photons.is_empty());
+            lost += all.photons.len() as u64;
         } else {
-            assert_eq!(whole, part);
+            assert_eq!(all, part);
         }
     }
     assert_eq!(masked.masked(), lost);

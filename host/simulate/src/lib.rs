@@ -6,9 +6,8 @@
 //! pulse position (Eq. 1 to 3, one object). A signal photon outside the
 //! histogram is not detected.
 //!
-//! That is the plain model, and all there is unless [`Effects`](effects::Effects) say otherwise.
-//! With effects the same photons, drawn from the same random numbers, take a
-//! longer way:
+//! This is the plain model, used unless there are [`Effects`](effects::Effects). With effects, the
+//! same photons from the same random numbers take a longer path:
 //!
 //! ```text
 //! arrivals (f64, bins after the laser fires)
@@ -18,8 +17,7 @@
 //!   → TDC codes
 //! ```
 //!
-//! Each effect has random numbers of its own: switching one on leaves those of
-//! all others as they were.
+//! Each effect has its own random numbers: switching one on does not change the others.
 
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
@@ -34,5 +32,5 @@ mod pixel;
 pub mod scene;
 mod stream;
 
-pub use self::array::{RatesAt, SimulatedArray};
+pub use self::array::{RatesFn, SimulatedArray};
 pub use self::pixel::SimulatedPixel;

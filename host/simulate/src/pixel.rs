@@ -30,7 +30,7 @@ impl Model {
         } else {
             0.0
         };
-        // No photons at all is a rate the distribution does not take.
+        // The distribution does not accept a rate of 0.
         let photons = (total != 0.0).then(|| Poisson::new(total));
         Ok(Self {
             photons: photons.transpose()?,
@@ -44,7 +44,7 @@ impl Model {
     /// The photons of one laser cycle, in no order.
     fn draw(&self, rng: &mut Pcg64, mut arrival: impl FnMut(Arrival)) {
         let Some(photons) = self.photons else { return };
-        // A Poisson sample is a whole number; counting up to it is exact.
+        // A Poisson sample is a whole number, so counting up to it is exact.
         let count = photons.sample(rng);
         let mut made = 0.0;
         while made < count {
@@ -58,15 +58,15 @@ impl Model {
     }
 }
 
-/// Rates and their photons.
+/// The photons at certain rates.
 #[derive(Clone, Debug)]
-struct Light {
+struct PhotonStream {
     rates: Rates,
     model: Model,
     rng: Pcg64,
 }
 
-impl Light {
+impl PhotonStream {
     fn new(rates: &Rates, bins: u16, rng: Pcg64) -> Result<Self> {
         Ok(Self {
             rates: *rates,
@@ -95,11 +95,11 @@ impl Light {
 /// One pixel.
 #[derive(Clone, Debug)]
 pub struct SimulatedPixel {
-    light: Light,
-    /// From behind a surface that lets light through; without background.
-    behind: Option<Light>,
+    light: PhotonStream,
+    /// Photons from behind a surface that lets light through, without background.
+    behind: Option<PhotonStream>,
     bins: u16,
-    /// If there is an effect.
+    /// The detector, if an effect is on.
     detector: Option<Box<Detector>>,
 }
 
@@ -108,32 +108,35 @@ impl SimulatedPixel {
     /// `rng`.
     ///
     /// # Errors
-    /// If a rate is negative or not a number, or `bins` is 0.
+    /// Fails if a rate is negative or not a number, or `bins` is 0.
     pub fn new(rates: &Rates, bins: u16, rng: Pcg64) -> Result<Self> {
         Ok(Self {
-            light: Light::new(rates, bins, rng)?,
+            light: PhotonStream::new(rates, bins, rng)?,
             behind: None,
             bins,
             detector: None,
         })
     }
 
-    /// The same pixel with light from behind the surface it sees: the signal of `rates`, without
-    /// their background. Its random numbers are by `seed` and `address`.
+    /// Adds light from behind the surface that the pixel sees: the signal of `rates`, without their
+    /// background. `seed` and `address` give its random numbers.
     ///
     /// # Errors
-    /// If a rate is negative or not a number.
+    /// Fails if a rate is negative or not a number.
     pub fn with_behind(mut self, rates: &Rates, seed: u64, address: PixelAddress) -> Result<Self> {
         let rng = Stream::Behind.rng(seed, address);
-        self.behind = Some(Light::new(&without_background(rates), self.bins, rng)?);
+        self.behind = Some(PhotonStream::new(
+            &without_background(rates),
+            self.bins,
+            rng,
+        )?);
         Ok(self)
     }
 
-    /// The same pixel with `effects`, which have random numbers by `seed` and
-    /// `address`.
+    /// Adds `effects`. `seed` and `address` give their random numbers.
     ///
     /// # Errors
-    /// If a parameter is out of its range.
+    /// Fails if a parameter is out of its range.
     pub fn with_effects(
         mut self,
         effects: &Effects,
@@ -148,20 +151,20 @@ impl SimulatedPixel {
         Ok(self)
     }
 
-    /// From the next laser cycle on the signal and its place are these. The
-    /// background and the pulse of the effects stay what they were.
+    /// Changes the signal and its position from the next laser cycle on. The background and the
+    /// pulse of the effects stay as they were.
     ///
     /// # Errors
-    /// If a rate is negative or not a number.
+    /// Fails if a rate is negative or not a number.
     pub fn set_rates(&mut self, rates: &Rates) -> Result<()> {
         self.light.set(rates, self.bins)
     }
 
-    /// From the next laser cycle on the signal from behind the surface is that of these rates.
-    /// Nothing changes for a pixel without such light.
+    /// Changes the signal from behind the surface from the next laser cycle on. Does nothing if the
+    /// pixel has no such light.
     ///
     /// # Errors
-    /// If a rate is negative or not a number.
+    /// Fails if a rate is negative or not a number.
     pub fn set_behind(&mut self, rates: &Rates) -> Result<()> {
         match &mut self.behind {
             Some(behind) => behind.set(&without_background(rates), self.bins),
@@ -169,7 +172,7 @@ impl SimulatedPixel {
         }
     }
 
-    /// Photons that have to be drawn in a laser cycle.
+    /// Photons to be drawn in a laser cycle.
     pub(super) fn photons_per_cycle(&self) -> f64 {
         let lights = [Some(&self.light), self.behind.as_ref()];
         let lights = lights.into_iter().flatten();

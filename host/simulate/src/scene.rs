@@ -1,14 +1,13 @@
-//! Scenes: what an array of simulated pixels looks at, read from a TOML file.
+//! Scenes: what an array of simulated pixels sees, read from a TOML file.
 //!
-//! Each pixel sees one surface, the nearest at its place, and the next one behind if that lets
-//! light through. Signal photons follow
-//! the reflectivity and the inverse square of the range; the background is the
-//! same everywhere. `docs/scenes.md` lists all keys.
+//! Each pixel sees the nearest surface, and the next one behind if the nearest lets light through.
+//! Signal photons follow the reflectivity and the inverse square of the range. The background is
+//! the same everywhere. `docs/scenes.md` lists all keys.
 
 mod depth_map;
 mod file;
+mod line_of_sight;
 mod of_depth_map;
-mod sight;
 mod surface;
 
 use anyhow::{Context, Result, ensure};
@@ -16,36 +15,35 @@ use dtof_core::{Array, PixelAddress};
 
 use crate::effects::Effects;
 use crate::effects::limits::Timing;
-use crate::{RatesAt, SimulatedArray, SimulatedPixel};
-use dtof_engine::settings::Settings;
+use crate::{RatesFn, SimulatedArray, SimulatedPixel};
 use dtof_photons::MM_PER_PS;
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::source::PhotonSource;
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 
-pub use depth_map::{Along, DepthMap};
-use sight::Sight;
-pub use surface::{Ball, Fan, Light, Plane, Rectangle, Shape, Surface};
+pub use depth_map::{DepthAlong, DepthMap};
+use line_of_sight::LineOfSight;
+pub use surface::{Ball, Brightness, Fan, Plane, Rectangle, Shape, Surface};
 
-/// Signal photons a laser cycle that a pixel may have.
+/// The most signal photons a laser cycle of a pixel.
 const MOST_SIGNAL: f64 = 10_000.0;
 
-/// Photons a laser cycle that all pixels together may have.
+/// The most photons a laser cycle of all pixels.
 const MOST_PHOTONS: f64 = 1e7;
 
-/// Surfaces are this far away, at least, at all times.
+/// Surfaces must always be at least this far away.
 const NEAREST_MM: f64 = 1.0;
 
 /// A scene on an array.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Scene {
-    /// Columns and rows of the array that looks at it, those of the file unless changed. A
-    /// pixel's place in the scene is its upper left corner.
+    /// Columns and rows of the array, by default those of the file. The place of a pixel in the
+    /// scene is its upper left corner.
     pub size: [u32; 2],
-    /// Columns and rows that the places in `surfaces` are given in.
+    /// Columns and rows in which the places of `surfaces` are given.
     pub layout: [u32; 2],
-    /// The field of view; [`FieldOfView::of`] the layout unless given. Planes need it.
+    /// The field of view, by default [`FieldOfView::default_for`] the layout. Planes need it.
     pub field_of_view: Option<FieldOfView>,
     /// Laser cycles.
     pub cycles: u64,
@@ -63,19 +61,19 @@ pub struct Scene {
     pub signal_at_one_metre: f64,
     /// In the order of the file.
     pub surfaces: Vec<Surface>,
-    /// Everything beyond the plain model.
+    /// Effects beyond the plain model.
     pub effects: Effects,
 }
 
-/// The surface that a pixel sees.
+/// Where the ray of a pixel hits a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct View {
-    /// Which of [`Scene::surfaces`].
+pub struct Hit {
+    /// The index in [`Scene::surfaces`].
     pub surface: usize,
     /// How far away it is.
     pub range_mm: f64,
-    /// How many photons come back from there.
-    pub light: Light,
+    /// How much light comes back.
+    pub light: Brightness,
 }
 
 impl Scene {
@@ -83,50 +81,50 @@ impl Scene {
     #[must_use]
     pub fn with_laser_off(mut self) -> Self {
         for surface in &mut self.surfaces {
-            surface.light = Light::Signal(0.0);
+            surface.light = Brightness::Signal(0.0);
         }
         self.effects.cover_glass = None;
         self
     }
 
-    /// The view of `pixel` in laser cycle `cycle`: the truth its events are
-    /// compared with. None if there is nothing at its place.
+    /// What `pixel` sees in laser cycle `cycle`: the truth for its events. `None` if its ray hits
+    /// nothing.
     #[must_use]
-    pub fn truth(&self, pixel: PixelAddress, cycle: u64) -> Option<View> {
-        self.views(pixel, cycle)[0]
+    pub fn truth(&self, pixel: PixelAddress, cycle: u64) -> Option<Hit> {
+        self.hits(pixel, cycle)[0]
     }
 
-    /// What `pixel` sees in laser cycle `cycle`: the nearest surface, and if that lets light
-    /// through the nearest of those behind it.
+    /// The surfaces that `pixel` sees in laser cycle `cycle`: the nearest, and the next behind it
+    /// if the nearest lets light through.
     #[must_use]
-    pub fn views(&self, pixel: PixelAddress, cycle: u64) -> [Option<View>; 2] {
-        self.views_along(&self.sight(pixel), cycle)
+    pub fn hits(&self, pixel: PixelAddress, cycle: u64) -> [Option<Hit>; 2] {
+        self.hits_along(&self.sight(pixel), cycle)
     }
 
-    /// The same for a pixel whose sight is at hand.
-    fn views_along(&self, sight: &Sight, cycle: u64) -> [Option<View>; 2] {
+    /// The same along a line of sight.
+    fn hits_along(&self, sight: &LineOfSight, cycle: u64) -> [Option<Hit>; 2] {
         let seconds = self.seconds(cycle);
-        let [mut nearest, mut second]: [Option<View>; 2] = [None; 2];
+        let [mut nearest, mut second]: [Option<Hit>; 2] = [None; 2];
         for (index, surface) in self.surfaces.iter().enumerate() {
             let Some(range_mm) = surface.range_mm(sight, seconds, self.layout) else {
                 continue;
             };
-            let view = Some(View {
+            let hit = Some(Hit {
                 surface: index,
                 range_mm,
                 light: surface.light(sight),
             });
             if nearest.is_none_or(|other| range_mm < other.range_mm) {
-                (nearest, second) = (view, nearest);
+                (nearest, second) = (hit, nearest);
             } else if second.is_none_or(|other| range_mm < other.range_mm) {
-                second = view;
+                second = hit;
             }
         }
-        let transmittance = nearest.map_or(0.0, |view| self.surfaces[view.surface].transmittance);
-        // The light passes on its way there and back.
-        let behind = second.filter(|_| transmittance > 0.0).map(|view| View {
-            light: view.light.times(transmittance.powi(2)),
-            ..view
+        let transmittance = nearest.map_or(0.0, |hit| self.surfaces[hit.surface].transmittance);
+        // The light passes the surface twice.
+        let behind = second.filter(|_| transmittance > 0.0).map(|hit| Hit {
+            light: hit.light.times(transmittance.powi(2)),
+            ..hit
         });
         [nearest, behind]
     }
@@ -137,12 +135,12 @@ impl Scene {
         self.rates_of(self.truth(pixel, cycle))
     }
 
-    /// The rates of what a pixel sees.
-    fn rates_of(&self, view: Option<View>) -> Rates {
+    /// The rates for what a pixel sees.
+    fn rates_of(&self, hit: Option<Hit>) -> Rates {
         Rates {
             background: self.background,
-            signal: view.map_or(0.0, |view| self.signal(view.light, view.range_mm)),
-            position: view.map_or(0.0, |view| view.range_mm / self.mm_per_bin()),
+            signal: hit.map_or(0.0, |hit| self.signal(hit.light, hit.range_mm)),
+            position: hit.map_or(0.0, |hit| hit.range_mm / self.mm_per_bin()),
             sigma: self.pulse_sigma_bins,
         }
     }
@@ -150,8 +148,7 @@ impl Scene {
     /// The photons of `cycles` laser cycles.
     ///
     /// # Errors
-    /// If a surface comes too near in that time, or there are too many photons
-    /// or pixels.
+    /// Fails if a surface comes too near in that time, or if there are too many photons or pixels.
     pub fn photons(&self, seed: u64, cycles: u64) -> Result<SimulatedArray> {
         self.check_motion(cycles)?;
         let array = self.array()?;
@@ -161,9 +158,9 @@ impl Scene {
             .surfaces
             .iter()
             .any(|surface| surface.transmittance > 0.0);
-        let sights: Vec<Sight> = self.addresses().map(|pixel| self.sight(pixel)).collect();
-        let pixels = self.addresses().zip(&sights).map(|(address, sight)| {
-            let [rates, behind] = self.views_along(sight, 0).map(|view| self.rates_of(view));
+        let lines: Vec<LineOfSight> = self.addresses().map(|pixel| self.sight(pixel)).collect();
+        let pixels = self.addresses().zip(&lines).map(|(address, sight)| {
+            let [rates, behind] = self.hits_along(sight, 0).map(|hit| self.rates_of(hit));
             let pixel = SimulatedPixel::new(&rates, self.bins, pixel_rng(seed, address))?;
             let pixel = match has_behind {
                 true => pixel.with_behind(&behind, seed, address)?,
@@ -175,12 +172,12 @@ impl Scene {
         let rates_at = self.surfaces.iter().any(Surface::moves).then(|| {
             let scene = self.clone();
             Box::new(move |pixel: PixelAddress, cycle| {
-                let [seen, behind] = scene.views_along(&sights[usize::from(pixel.0)], cycle);
+                let [seen, behind] = scene.hits_along(&lines[usize::from(pixel.raw())], cycle);
                 [scene.rates_of(seen), scene.rates_of(behind)]
-            }) as RatesAt
+            }) as RatesFn
         });
-        let photons =
-            SimulatedArray::new(array, pixels, cycles, rates_at).with_laser_hz(self.laser_hz());
+        let photons = SimulatedArray::new(array, pixels, cycles, rates_at)?;
+        let photons = photons.with_laser_hz(self.laser_hz());
         let each_cycle = photons.photons_per_cycle();
         ensure!(
             each_cycle <= MOST_PHOTONS,
@@ -195,20 +192,20 @@ impl Scene {
         self.bin_width_ps * MM_PER_PS
     }
 
-    /// Where the last bin ends.
+    /// The range at the end of the last bin.
     #[must_use]
     pub fn end_mm(&self) -> f64 {
         f64::from(self.bins) * self.mm_per_bin()
     }
 
-    /// Pixels that see a surface at the start or the end of `cycles` laser cycles too
-    /// far away for the histogram.
+    /// How many pixels see the surface beyond the end of the histogram, at the start or the end of
+    /// `cycles` laser cycles.
     #[must_use]
     pub fn pixels_beyond(&self, surface: usize, cycles: u64) -> usize {
         let is_beyond = |address, cycle| {
-            let views = self.views(address, cycle).into_iter().flatten();
-            let mut of_surface = views.filter(|view| view.surface == surface);
-            of_surface.any(|view| view.range_mm >= self.end_mm())
+            let hits = self.hits(address, cycle).into_iter().flatten();
+            let mut of_surface = hits.filter(|hit| hit.surface == surface);
+            of_surface.any(|hit| hit.range_mm >= self.end_mm())
         };
         self.addresses()
             .filter(|&address| is_beyond(address, 0) || is_beyond(address, cycles))
@@ -226,7 +223,7 @@ impl Scene {
         (self.laser_rate_mhz * 1e6).round() as u64
     }
 
-    /// Picoseconds as bins.
+    /// The time base of the effects.
     fn timing(&self) -> Timing {
         Timing {
             bins: self.bins,
@@ -235,10 +232,10 @@ impl Scene {
         }
     }
 
-    /// The array that looks at it.
+    /// The array.
     ///
     /// # Errors
-    /// If it has more pixels than addresses, or none.
+    /// Fails if it has no pixels, or more than there are addresses.
     pub fn array(&self) -> Result<Array> {
         let [columns, rows] = self.size;
         let pixels = u64::from(columns) * u64::from(rows);
@@ -249,28 +246,28 @@ impl Scene {
         })
     }
 
-    /// Every pixel of the array.
+    /// The addresses of all pixels.
     fn addresses(&self) -> impl Iterator<Item = PixelAddress> + use<> {
         let [columns, rows] = self.size.map(|side| side as usize);
-        let pixels = (0..=u16::MAX).map(PixelAddress);
+        let pixels = (0..=u16::MAX).map(PixelAddress::new);
         pixels.take(columns.saturating_mul(rows))
     }
 
-    /// The field of view: the one given, or the default.
+    /// The field of view of the scene, or the default.
     #[must_use]
-    pub fn view(&self) -> FieldOfView {
+    pub fn effective_field_of_view(&self) -> FieldOfView {
         let view = self.field_of_view;
-        view.unwrap_or_else(|| FieldOfView::of(self.layout))
+        view.unwrap_or_else(|| FieldOfView::default_for(self.layout))
     }
 
-    /// Where a pixel looks, along the ray that `dtof export` has.
-    fn sight(&self, pixel: PixelAddress) -> Sight {
-        let pixel = u32::from(pixel.0);
+    /// The line of sight of a pixel, along the ray that `dtof export` uses.
+    fn sight(&self, pixel: PixelAddress) -> LineOfSight {
+        let pixel = u32::from(pixel.raw());
         let pixel = [pixel % self.size[0], pixel / self.size[0]];
         let [column, row] = pixel.map(f64::from);
         let [columns, rows] = self.size.map(f64::from);
-        let view = self.view();
-        Sight {
+        let view = self.effective_field_of_view();
+        LineOfSight {
             pixel,
             size: self.size,
             place: [
@@ -286,16 +283,16 @@ impl Scene {
     }
 
     /// Signal photons a laser cycle from a range.
-    fn signal(&self, light: Light, range_mm: f64) -> f64 {
+    fn signal(&self, light: Brightness, range_mm: f64) -> f64 {
         match light {
-            Light::Signal(signal) => signal,
-            Light::Reflectivity(reflectivity) => {
+            Brightness::Signal(signal) => signal,
+            Brightness::Reflectivity(reflectivity) => {
                 self.signal_at_one_metre * reflectivity / (range_mm / 1000.0).powi(2)
             }
         }
     }
 
-    /// Are the listed hot pixels there?
+    /// Checks that the listed hot pixels are in the array.
     fn check_hot_pixels(&self, pixels: u32) -> Result<()> {
         let listed = self.effects.hot_pixels.iter().flat_map(|hot| &hot.pixels);
         for pixel in listed {
@@ -307,14 +304,14 @@ impl Scene {
         Ok(())
     }
 
-    /// As near as a surface comes in `cycles` laser cycles.
+    /// The nearest distance of a surface in `cycles` laser cycles.
     #[must_use]
     pub fn nearest_mm(&self, surface: &Surface, cycles: u64) -> f64 {
         let at = |seconds| surface.nearest_mm(seconds, self.layout);
         at(0.0).min(at(self.seconds(cycles)))
     }
 
-    /// Does every surface stay where a target can be, and is none too bright?
+    /// Checks that no surface comes too near or is too bright.
     fn check_motion(&self, cycles: u64) -> Result<()> {
         for surface in &self.surfaces {
             let nearest = self.nearest_mm(surface, cycles);
@@ -334,11 +331,4 @@ impl Scene {
         }
         Ok(())
     }
-}
-
-/// The paper's settings for its static scene (section III-B), on 128 bins of
-/// 250 ps.
-#[must_use]
-pub fn settings(seed: u64) -> Settings {
-    Settings::static_scene(seed)
 }

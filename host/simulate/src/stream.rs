@@ -5,10 +5,10 @@ use rand_pcg::Pcg64;
 
 use dtof_theory::random::pixel_rng;
 
-/// The effect that draws.
+/// The effect that draws the numbers.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Stream {
-    /// Where in its bin a background photon lies.
+    /// The place of a background photon within its bin.
     WithinBin = 1,
     /// Background between the histogram and the next laser pulse.
     Gap,
@@ -23,10 +23,10 @@ pub(super) enum Stream {
 }
 
 impl Stream {
-    /// Its numbers in one pixel: neither those of the plain model nor those of
-    /// another effect.
+    /// The random numbers of an effect in one pixel, independent of the plain model and the other
+    /// effects.
     pub(super) fn rng(self, seed: u64, pixel: PixelAddress) -> Pcg64 {
-        // Seeds are expanded by a hash, so that far apart is good enough.
+        // Seeds are hashed, so any difference will do.
         let offset = (self as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         pixel_rng(seed.wrapping_add(offset), pixel)
     }

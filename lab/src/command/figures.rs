@@ -3,7 +3,7 @@
 use anyhow::{Result, bail};
 use clap::Args;
 use dtof::path;
-use dtof_lab::pages::{self, Anew};
+use dtof_lab::pages::{self, Rerun};
 use std::io::{self, Write};
 use std::path::PathBuf;
 
@@ -12,30 +12,30 @@ pub struct Figures {
     /// The folder of the documentation
     #[arg(long, value_name = "DIR", default_value = "docs", value_parser = path())]
     docs: PathBuf,
-    /// Work out all seeds, not only those of a quick look
+    /// Run all seeds, not only those of a quick look
     #[arg(long)]
     all: bool,
-    /// Draw again from what is kept; work out no seed
+    /// Draw again from the stored data, without new trials
     #[arg(long, conflicts_with = "all")]
     kept: bool,
-    /// Change nothing; fail if something would change
+    /// Change nothing; fail if a document would change
     #[arg(long)]
     check: bool,
 }
 
 impl Figures {
     pub fn run(&self) -> Result<()> {
-        let anew = match (self.all, self.kept) {
-            (true, _) => Anew::All,
-            (_, true) => Anew::None,
-            _ => Anew::Few,
+        let rerun = match (self.all, self.kept) {
+            (true, _) => Rerun::All,
+            (_, true) => Rerun::None,
+            _ => Rerun::Quick,
         };
-        let documents = pages::documents(&self.docs, anew, |study| {
-            // Nobody may be reading it.
+        let documents = pages::documents(&self.docs, rerun, |study| {
+            // Progress is optional: standard error may be closed.
             let _ = writeln!(io::stderr(), "{}", study.name);
         })?;
         let changed = if self.check {
-            pages::different(&self.docs, &documents)
+            pages::outdated(&self.docs, &documents)
         } else {
             pages::write(&self.docs, &documents)?
         };

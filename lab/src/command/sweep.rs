@@ -10,22 +10,22 @@ use clap::Args;
 use dtof::path;
 use dtof_lab::studies;
 use dtof_lab::sweep::{self, Part};
-use dtof_options::numbers::whole;
+use dtof_options::numbers::integer;
 use dtof_options::rows::grouped;
 use indicatif::{ProgressBar, ProgressStyle};
 
 #[derive(Args)]
 pub struct Sweep {
-    /// What is swept; without it, a list
+    /// The study to run; lists all studies if omitted
     study: Option<String>,
-    /// First seed, and one past the last
+    /// First seed, and the last plus one
     #[arg(long, value_name = "A..B", value_parser = seeds, requires = "out")]
     seeds: Option<Range<u64>>,
-    /// The part: a new file, or one that an earlier run with the same seeds left
+    /// The part: a new file, or one from an earlier run with these seeds
     #[arg(long, value_name = "FILE", requires = "seeds", value_parser = path())]
     out: Option<PathBuf>,
-    /// Save the part after so many seconds, for a run that is ended early
-    #[arg(long, value_name = "S", default_value_t = 10, value_parser = whole(0..=u64::MAX))]
+    /// Seconds between saves, for runs that may be interrupted
+    #[arg(long, value_name = "S", default_value_t = 10, value_parser = integer(0..=u64::MAX))]
     save_every: u64,
     /// Show no progress
     #[arg(long)]
@@ -33,11 +33,11 @@ pub struct Sweep {
 }
 
 fn seeds(text: &str) -> Result<Range<u64>> {
-    let (first, end) = text.split_once("..").context("not A..B")?;
-    let seed = |text: &str| whole(0..=u64::MAX)(text).ok();
-    let first = seed(first).context("the first is no seed")?;
-    let end = seed(end).context("the last is no seed")?;
-    ensure!(first < end, "no seed lies between them");
+    let (first, end) = text.split_once("..").context("must be A..B")?;
+    let seed = |text: &str| integer(0..=u64::MAX)(text).ok();
+    let first = seed(first).context("the first seed is invalid")?;
+    let end = seed(end).context("the last seed is invalid")?;
+    ensure!(first < end, "the range is empty");
     Ok(first..end)
 }
 
@@ -48,7 +48,7 @@ impl Sweep {
         };
         let study = studies::named(name)?;
         let (Some(seeds), Some(out)) = (self.seeds.clone(), &self.out) else {
-            bail!("{name}: --seeds A..B and --out FILE say what to do");
+            bail!("{name}: --seeds A..B and --out FILE are required");
         };
         let bar = if self.quiet {
             ProgressBar::hidden()
@@ -100,10 +100,10 @@ fn show(part: &Part) -> Result<()> {
 
 #[derive(Args)]
 pub struct Merge {
-    /// Parts of one study without a seed in common
+    /// Parts of one study with disjoint seeds
     #[arg(required = true, value_name = "PART", value_parser = path())]
     parts: Vec<PathBuf>,
-    /// The part that holds all of them, a new file
+    /// The merged part, a new file
     #[arg(long, value_name = "FILE", value_parser = path())]
     out: PathBuf,
 }
@@ -112,7 +112,7 @@ impl Merge {
     pub fn run(&self) -> Result<()> {
         ensure!(
             !self.out.exists(),
-            "{}: is there already; --out is a new file",
+            "{}: already exists; --out must be a new file",
             self.out.display()
         );
         let part = sweep::merge(&self.parts, studies::named)?;

@@ -1,40 +1,39 @@
-//! What the link carries, and what it costs that all pixels share one bus (the REQ and ACK
-//! of section IV-A).
+//! The load of the link, and the waits on a bus that all pixels share (REQ and ACK of section
+//! IV-A).
 //!
-//! A bus takes one event a slot. Events of random pixels arrive with a Poisson law, `load`
-//! of them a slot on average, and one of those that are there is taken at its end.
+//! A bus transfers one event per slot. Events of random pixels arrive as a Poisson process, `load`
+//! per slot on average. At the end of a slot, one of the pending events is transferred.
 
 use dtof_core::AerWord;
 use dtof_options::rows::grouped;
 
 /// Macropixels of the paper's array.
 const PIXELS: u16 = 64 * 32;
-/// A place in the paper, laser cycles from an event of a pixel to its next, and laser cycles
-/// a second.
+/// Section of the paper, laser cycles between two events of a pixel, and laser cycles a second.
 const RATES: [(&str, u16, f64); 3] = [
     ("III-B, no pixel more often", 110, 1.2e6),
     ("IV, no pixel more often", 44, 10e6),
     ("III-B, once in L2", 2000, 1.2e6),
 ];
-/// Events offered, of those that a bus can take.
+/// Offered events per slot.
 const LOADS: [f64; 6] = [0.1, 0.2, 0.5, 0.8, 0.9, 0.99];
 
-/// The share of events that are not taken in the slot they arrive in, below a load of 1.
+/// The share of events that are not transferred in the slot of their arrival, for a load below 1.
 ///
-/// A slot is idle with probability 1 - load: nothing was left over and nothing came, so
-/// that nothing is left over with probability (1 - load)·exp(load). Then the first of
-/// those that come is taken.
+/// A slot is idle with probability 1 - load: the queue is empty and no event arrives. So the queue
+/// is empty with probability (1 - load)·exp(load), and then the first event to arrive does not
+/// wait.
 fn waiting_share(load: f64) -> f64 {
     1.0 - (1.0 - load) * load.exp_m1() / load
 }
 
-/// How many slots an event waits on average, those that do not wait included.
+/// The mean wait of all events, in slots.
 fn mean_wait(load: f64) -> f64 {
     load / (2.0 * (1.0 - load))
 }
 
-/// A row for each of [`RATES`]: events and bytes a second, events a laser cycle, and how long
-/// a bus has for one.
+/// A row for each of [`RATES`]: events and bytes a second, events a laser cycle, and the bus time
+/// of an event.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -81,8 +80,8 @@ mod tests {
     use rand_pcg::Pcg64;
     use std::collections::VecDeque;
 
-    /// 2,048 pixels that fire at random, each with a small probability, and a bus that takes
-    /// the oldest of those that are there.
+    /// 2,048 pixels that fire at random, each with a small probability, and a bus that transfers
+    /// the oldest event.
     #[test]
     fn random_pixels_wait_as_worked_out() {
         let mut rng = Pcg64::seed_from_u64(1);
@@ -117,7 +116,7 @@ mod tests {
     fn a_full_bus_sets_the_rate_and_no_event_is_lost() {
         let config = prototype(40).unwrap();
         let mut pixels: Vec<_> = (0..PIXELS)
-            .map(|address| AsyncPixel::<BINS>::new(PixelAddress(address)))
+            .map(|address| AsyncPixel::<BINS>::new(PixelAddress::new(address)))
             .collect();
         let mut statistics = Statistics::new();
         let mut waiting = VecDeque::new();
@@ -125,19 +124,19 @@ mod tests {
         let cycles = 3 * u64::from(PIXELS) + 43;
         for cycle in 0..cycles {
             for (address, pixel) in (0..PIXELS).zip(&mut pixels) {
-                let was_waiting = pixel.request();
+                let was_waiting = pixel.has_event();
                 pixel.count(&config, 60);
-                pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
-                if pixel.request() && !was_waiting {
+                pixel.end_laser_cycle(&config, &mut statistics, LaserCycle::new(cycle));
+                if pixel.has_event() && !was_waiting {
                     waiting.push_back(address);
                 }
             }
             if let Some(address) = waiting.pop_front() {
                 let address = usize::from(address);
-                taken[address] += u32::from(pixels[address].acknowledge().is_some());
+                taken[address] += u32::from(pixels[address].take_event().is_some());
             }
         }
-        // One a laser cycle from the first look on; each pixel in turn.
+        // One event per laser cycle from the first look on, from each pixel in turn.
         assert!(
             taken.iter().all(|&events| events == 3),
             "{:?}",

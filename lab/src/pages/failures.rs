@@ -1,4 +1,4 @@
-//! Where methods fail: the tables of what the study of failures found.
+//! Where methods fail: the tables of the study of failures.
 
 use std::fmt::Write as _;
 
@@ -12,7 +12,7 @@ use dtof_options::rows::grouped;
 /// The tables of the page.
 ///
 /// # Errors
-/// If `part` is not of the study.
+/// Fails if `part` is of another study.
 pub fn tables(part: &Part) -> Result<Values> {
     let outcomes = outcomes(part)?;
     let methods: Vec<String> = Method::all().map(|method| method.name()).collect();
@@ -40,7 +40,7 @@ pub fn tables(part: &Part) -> Result<Values> {
             writeln!(advice, "| {} | {text} |", case.name)?;
         }
     }
-    // The kept data call the centroid so.
+    // The stored data call the centroid centre of mass.
     let named = |text: String| text.replace("centre of mass", "centroid");
     Ok([
         ("table", named(table)),
@@ -55,7 +55,7 @@ fn percent(share: f64) -> String {
     format!("{:.1} %", share * 100.0)
 }
 
-/// A word, what is worst, and whether flags tell.
+/// The verdict, the worst number, and whether events are flagged.
 fn cell(outcome: &Outcome) -> String {
     let word = match outcome.verdict {
         Verdict::Survives => "ok".to_owned(),
@@ -85,7 +85,7 @@ fn worst(outcome: &Outcome) -> String {
     }
 }
 
-/// The methods that survive; a rule alone where it does with both estimators.
+/// The methods that survive; only the rule if it survives with both estimators.
 fn survivors(outcomes: &[Outcome]) -> String {
     let survives = |outcome: &&Outcome| outcome.verdict == Verdict::Survives;
     let all: Vec<&Outcome> = outcomes.iter().filter(survives).collect();
@@ -112,7 +112,7 @@ fn survivors(outcomes: &[Outcome]) -> String {
     }
 }
 
-/// Everything about the methods that do not survive.
+/// All numbers of the methods that do not survive.
 fn reports(outcomes: &[(Case, Vec<Outcome>)]) -> Result<String> {
     let mut text = String::new();
     for (case, outcomes) in outcomes {

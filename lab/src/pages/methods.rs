@@ -1,13 +1,12 @@
-//! Which method for which scene: what the studies of time and error found, against
-//! the instructions it takes.
+//! Which method for which scene: time and error from the studies, against the cost in instructions.
 
 mod events;
 mod recorded;
 mod tables;
 
 use self::recorded::recorded;
-use crate::studies::methods::depth_error::Method as Estimator;
-use crate::studies::methods::passage::Method as Rule;
+use crate::studies::methods::depth_error::Estimator;
+use crate::studies::methods::passage::Rule;
 use crate::studies::methods::time_to_detect::Outcome;
 use crate::studies::methods::{depth_error, time_to_detect};
 use crate::sweep::mean::Measured;
@@ -21,9 +20,9 @@ use std::path::PathBuf;
 
 pub use self::recorded::RECORDED;
 
-/// The instruction counts, below the documentation.
+/// The instruction counts, relative to the documentation.
 pub const INSTRUCTIONS: &str = "results/bench/instructions.csv";
-/// The cheapest method that may be no more than this share above the best is chosen.
+/// The cheapest method within this share of the best is chosen.
 const MARGIN: f64 = 0.1;
 
 /// Instructions of the operations of the core on a Cortex-M4F, optimised for speed.
@@ -39,7 +38,7 @@ impl Instructions<'_> {
             .with_context(|| format!("{INSTRUCTIONS}: {line}{found}"))
     }
 
-    /// A decision without an event.
+    /// The cost of a decision without an event.
     fn rule(&self, rule: Rule) -> Result<f64> {
         match rule {
             Rule::Window(width) => self.of("decision", &format!("window of {width}; no event")),
@@ -48,10 +47,10 @@ impl Instructions<'_> {
         }
     }
 
-    /// A depth, for a pulse of `sigma` bins.
+    /// The cost of a depth, for a pulse of `sigma` bins.
     fn estimator(&self, estimator: Estimator, sigma: f64) -> Result<f64> {
         let centred = |sigma: f64| {
-            // The next wider pulse that was counted.
+            // The next wider pulse with a count.
             let counted = [0.4, 0.5, 1.0].into_iter().find(|&of| sigma <= of);
             let variant = format!("centred window, σ {}", counted.unwrap_or(1.5));
             self.of("depth", &variant)
@@ -65,13 +64,13 @@ impl Instructions<'_> {
     }
 }
 
-/// A method: what it costs, and how it does over several scenes.
+/// A method: its cost, and its results over several scenes.
 struct Entry {
     label: String,
     pen: Pen,
     cost: f64,
-    /// Mean over the scenes of the time or error over the reference's. The interval is
-    /// the mean of theirs, which may have their errors in common.
+    /// The mean ratio of time or error to the reference over the scenes. The interval is the mean
+    /// of the intervals, because their errors may be correlated.
     mean: Measured,
     /// From the best scene to the worst.
     range: (f64, f64),
@@ -98,14 +97,13 @@ impl Entry {
     }
 }
 
-/// That of the smallest mean.
+/// The entry with the smallest mean.
 fn best(entries: &[Entry]) -> Result<&Entry> {
     let by_mean = |a: &&Entry, b: &&Entry| a.mean.value.total_cmp(&b.mean.value);
     entries.iter().min_by(by_mean).context("no methods")
 }
 
-/// The chosen: the cheapest whose interval ends within [`MARGIN`] of the best's mean, or
-/// the best.
+/// The cheapest entry whose interval ends within [`MARGIN`] of the best mean; otherwise the best.
 fn chosen(entries: &[Entry]) -> Result<&Entry> {
     let best = best(entries)?;
     let limit = best.mean.value * (1.0 + MARGIN);
@@ -116,7 +114,7 @@ fn chosen(entries: &[Entry]) -> Result<&Entry> {
     Ok(cheapest.unwrap_or(best))
 }
 
-/// Those that no other is both cheaper and better than, by cost.
+/// The Pareto frontier, by cost: entries without another that is both cheaper and better.
 fn frontier(entries: &[Entry]) -> Vec<Dot> {
     let mut by_cost: Vec<&Entry> = entries.iter().collect();
     by_cost.sort_by(|a, b| {
@@ -128,7 +126,7 @@ fn frontier(entries: &[Entry]) -> Vec<Dot> {
     for entry in by_cost {
         let before = dots.last().map_or(f64::INFINITY, |dot| dot.y);
         if entry.mean.value < before {
-            // A step: what costs less than this does no better than the one before.
+            // A step: between two costs, the previous entry is the best.
             if let Some(last) = dots.last().copied() {
                 dots.push(Dot::exact(entry.cost, last.y));
             }
@@ -138,7 +136,7 @@ fn frontier(entries: &[Entry]) -> Vec<Dot> {
     dots
 }
 
-/// The cost of entries against how they do.
+/// The chart of results against cost.
 fn against_cost(
     finding: String,
     holds: bool,
@@ -155,7 +153,7 @@ fn against_cost(
             y: entry.mean.value,
             interval: Some(entry.range),
         };
-        // The note says what is left out.
+        // The note of the chart names the parts left out here.
         let mut name = entry.label.clone();
         for (long, short) in [
             ("centred window for ", ""),
@@ -180,14 +178,14 @@ fn against_cost(
     })
 }
 
-/// How `label` does.
+/// The mean of the entry `label`.
 fn value(entries: &[Entry], label: &str) -> Result<f64> {
     let found = entries.iter().find(|entry| entry.label == label);
     let found = found.with_context(|| format!("no method {label}"))?;
     Ok(found.mean.value)
 }
 
-/// Every rule over the outcomes that `of` takes.
+/// Every rule over the outcomes that `of` selects.
 fn rules(
     counts: &Instructions,
     outcomes: &[Outcome],
@@ -196,8 +194,8 @@ fn rules(
     let entry = |rule: Rule| {
         let those = outcomes
             .iter()
-            .filter(|outcome| outcome.method == rule && of(outcome));
-        // Without how sure the likelihood ratio's time is, the same for all rules.
+            .filter(|outcome| outcome.rule == rule && of(outcome));
+        // The uncertainty of the likelihood ratio is left out: it is the same for all rules.
         let ratios = those.map(|outcome| {
             let one = outcome.ratio.value / outcome.cycles.value;
             outcome.cycles.times(one)
@@ -212,7 +210,7 @@ fn rules(
 /// The best rule for each pulse.
 const SUITED: &str = "best for the pulse";
 
-/// For each pulse the rule that is fastest over its scenes.
+/// The fastest rule for each pulse, over its scenes.
 fn suited(counts: &Instructions, outcomes: &[Outcome]) -> Result<Entry> {
     let (mut ratios, mut cost) = (Vec::new(), 0.0f64);
     for sigma in time_to_detect::SIGMAS {
@@ -221,14 +219,14 @@ fn suited(counts: &Instructions, outcomes: &[Outcome]) -> Result<Entry> {
         cost = cost.max(fastest.cost);
         let those = outcomes
             .iter()
-            .filter(|outcome| outcome.sigma == sigma && outcome.method.label() == fastest.label);
+            .filter(|outcome| outcome.sigma == sigma && outcome.rule.label() == fastest.label);
         ratios.extend(those.map(|outcome| outcome.ratio));
     }
     let (label, pen) = (SUITED.to_owned(), palette::NEUTRAL);
     Ok(Entry::new(label, pen, cost, &ratios))
 }
 
-/// Every estimator over the points that `of` takes.
+/// Every estimator over the points that `of` selects.
 fn estimators(
     counts: &Instructions,
     part: &Part,
@@ -246,11 +244,11 @@ fn estimators(
     Estimator::ALL.into_iter().map(entry).collect()
 }
 
-/// The documents, below `docs`: the table and its figures.
+/// The documents below `docs`: the table and its figures.
 ///
 /// # Errors
-/// If an operation was not counted, a part is not the study's, or the file of recorded
-/// photons has another form.
+/// Fails if an instruction count is missing, a part is of another study, or the file of recorded
+/// photons has another format.
 pub fn documents(
     instructions: &str,
     recorded_rules: &str,
@@ -329,7 +327,7 @@ pub fn documents(
 mod tests {
     use super::*;
 
-    /// As sure as 0.02 either way.
+    /// With an interval of 0.02 to either side.
     fn entry(cost: f64, value: f64) -> Entry {
         let interval = (value - 0.02, value + 0.02);
         let scene = Measured { value, interval };
@@ -357,7 +355,7 @@ mod tests {
         assert!(found.eq(expected));
     }
 
-    /// Intervals end at 1.02 times the mean: a tenth above the best is where one of 1.078 ends.
+    /// Intervals end at 1.02 times the mean: the interval of 1.078 ends a tenth above the best.
     #[test]
     fn the_cheapest_that_is_surely_within_the_margin_is_chosen() {
         let chosen = |second: f64| {

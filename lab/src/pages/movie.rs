@@ -1,9 +1,9 @@
-//! Events as a moving picture: each flash is an event.
+//! Events as an animation: each flash is an event.
 //!
-//! A pixel appears with its first event, in the colour of its range, and lights up with
-//! each event. That of a block lights up all of the block. A second echo is a smaller square
-//! within the pixel. The picture is an SVG document with animations of its own style sheet: a
-//! viewer that knows none, or a reader who wants no motion, sees the last moment.
+//! A pixel appears with its first event, in the colour of its range, and lights up with each event.
+//! An event of a block lights up the whole block. A second echo is a smaller square within the
+//! pixel. The picture is an SVG document with CSS animations. Viewers without animations, and
+//! readers who prefer reduced motion, see the last frame.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -15,27 +15,27 @@ use dtof_draw::picture::{levels, span};
 use dtof_draw::svg::{Anchor, At, EDGE, Svg, TEXT, TITLE, wrapped};
 use dtof_engine::host::host_engine;
 use dtof_events::events_csv::range_mm;
-use dtof_events::reports::LastReports;
+use dtof_events::last_events::LastEvents;
 use dtof_options::rows::grouped;
 use dtof_photons::source::PhotonSource;
 use dtof_simulate::demo;
 
-/// Laser cycles that are shown, and moments into which they are cut.
+/// Laser cycles shown, and the number of animation frames.
 const CYCLES: u16 = 2000;
 const MOMENTS: u16 = 100;
-/// Seconds until the last laser cycle, and until the picture starts over.
-const RUN: f64 = 10.0;
-const WHOLE: f64 = 12.0;
-/// Colours a range is shown in: every so many levels.
+/// Seconds until the last laser cycle, and until the animation repeats.
+const PLAY_SECONDS: f64 = 10.0;
+const LOOP_SECONDS: f64 = 12.0;
+/// Ranges are drawn in every 15th colour level.
 const STEP: u8 = 15;
 
 const WIDTH: f64 = 560.0;
 const INNER: f64 = WIDTH - 2.0 * EDGE;
 const LINE: f64 = 19.0;
-/// Seconds that a flash takes to fade, of [`WHOLE`], in percent.
+/// The time a flash takes to fade, in percent of [`LOOP_SECONDS`].
 const FADE: f64 = 6.0;
 
-/// An event: its moment, its place in the array, and its range in millimetres.
+/// An event: its frame, its square in the array, and its range in millimetres.
 #[derive(Clone, Copy, Debug)]
 struct Flash {
     moment: u16,
@@ -49,14 +49,14 @@ struct Square {
     column: u32,
     row: u32,
     side: u32,
-    /// Drawn smaller: a second echo.
+    /// Whether it is a second echo, which is drawn smaller.
     is_behind: bool,
 }
 
 /// The first laser cycles of `dtof demo`.
 ///
 /// # Errors
-/// If the scene of the demo cannot be simulated.
+/// Fails if the scene of the demo cannot be simulated.
 pub fn demo() -> Result<String> {
     let (scene, settings) = (demo::scene()?, demo::settings(1)?);
     let mut photons = scene.photons(settings.seed, CYCLES.into())?;
@@ -66,21 +66,21 @@ pub fn demo() -> Result<String> {
     let scale: RangeScale = settings.range_scale()?;
     let array = photons.array();
     let mut firsts = vec![u64::MAX; array.pixels() as usize];
-    let mut reports = vec![LastReports::default(); array.pixels() as usize];
+    let mut last_events = vec![LastEvents::default(); array.pixels() as usize];
     let mut flashes = Vec::new();
     let mut marks = Vec::new();
     for event in &events {
         let flash = |pixel, side| Flash {
-            moment: moment(event.cycle.0),
+            moment: moment(event.cycle.raw()),
             square: square(pixel, side, event.echo, array),
             range_mm: range_mm(event, &scale),
         };
         flashes.push(flash(event.pixel, 1 << event.level.raw()));
         for pixel in array.pixels_of(event.pixel, event.level) {
-            let index = usize::from(pixel.0);
-            if reports[index].take(event.level, event.cycle, event.exposure.into()) {
+            let index = usize::from(pixel.raw());
+            if last_events[index].record(event.level, event.cycle, event.exposure.into()) {
                 marks.push(flash(pixel, 1));
-                firsts[index] = firsts[index].min(event.cycle.0 + 1);
+                firsts[index] = firsts[index].min(event.cycle.raw() + 1);
             }
         }
     }
@@ -92,7 +92,7 @@ pub fn demo() -> Result<String> {
         };
         let seen = photons.addresses().into_iter();
         let seen = seen.filter(|&address| on_surface(address));
-        let mut firsts: Vec<u64> = seen.map(|pixel| firsts[usize::from(pixel.0)]).collect();
+        let mut firsts: Vec<u64> = seen.map(|pixel| firsts[usize::from(pixel.raw())]).collect();
         firsts.sort_unstable();
         let median = firsts.get(firsts.len() / 2).copied().unwrap_or(u64::MAX);
         let more = if median > u64::from(CYCLES) {
@@ -117,9 +117,9 @@ fn moment(cycle: u64) -> u16 {
     u16::try_from(moment).unwrap_or(MOMENTS)
 }
 
-/// That of a pixel, or of a block that starts there.
+/// The square of a pixel, or of a block that starts there.
 fn square(pixel: PixelAddress, side: u32, echo: EchoNumber, array: Array) -> Square {
-    let pixel = u32::from(pixel.0);
+    let pixel = u32::from(pixel.raw());
     Square {
         column: pixel % array.columns(),
         row: pixel / array.columns(),
@@ -128,7 +128,7 @@ fn square(pixel: PixelAddress, side: u32, echo: EchoNumber, array: Array) -> Squ
     }
 }
 
-/// `flashes` light up. `marks` stay until another is in their place.
+/// Draws `flashes`, which light up, and `marks`, which stay until the next mark of their square.
 fn draw(array: Array, flashes: &[Flash], marks: &[Flash], title: &str, note: &str) -> String {
     let mut svg = Svg::default();
     svg.raw(&format!("<style>{}</style>", sheet()));
@@ -159,7 +159,7 @@ fn draw(array: Array, flashes: &[Flash], marks: &[Flash], title: &str, note: &st
     for moment in 0..=MOMENTS {
         let flash = shapes(&flashes, moment);
         if !flash.is_empty() {
-            let delay = At(f64::from(moment) / f64::from(MOMENTS) * RUN);
+            let delay = At(f64::from(moment) / f64::from(MOMENTS) * PLAY_SECONDS);
             svg.raw(&format!(
                 "<g class=\"f\" style=\"animation-delay:{delay}s\">{flash}</g>"
             ));
@@ -178,7 +178,7 @@ fn draw(array: Array, flashes: &[Flash], marks: &[Flash], title: &str, note: &st
     svg.document((WIDTH, y + EDGE - 4.0), title)
 }
 
-/// Those marks that are not what their place shows already.
+/// The marks that change the colour of their square.
 fn changes(marks: &[(Flash, u8)]) -> Vec<(Flash, u8)> {
     let mut shown: HashMap<Square, u8> = HashMap::new();
     let mut changes = Vec::new();
@@ -194,7 +194,7 @@ fn changes(marks: &[(Flash, u8)]) -> Vec<(Flash, u8)> {
     changes
 }
 
-/// The squares of one moment, a path for those of a size and colour; the small ones on top.
+/// The squares of one frame: a path for each size and colour, the small ones on top.
 fn shapes(those: &[(Flash, u8)], moment: u16) -> String {
     let mut paths: BTreeMap<(bool, u32, u8), String> = BTreeMap::new();
     for (flash, step) in those.iter().filter(|(flash, _)| flash.moment == moment) {
@@ -204,7 +204,7 @@ fn shapes(those: &[(Flash, u8)], moment: u16) -> String {
             side,
             is_behind,
         } = flash.square;
-        // A line as long as it is wide is a square, in the fewest letters.
+        // A line as long as wide is the shortest way to write a square.
         let y = At(f64::from(row) + f64::from(side) / 2.0);
         let path = paths.entry((is_behind, side, *step)).or_default();
         *path += &match is_behind {
@@ -227,12 +227,12 @@ fn shapes(those: &[(Flash, u8)], moment: u16) -> String {
     text
 }
 
-/// How the picture moves.
+/// The style sheet of the animation.
 fn sheet() -> String {
-    let end = RUN / WHOLE * 100.0;
+    let end = PLAY_SECONDS / LOOP_SECONDS * 100.0;
     let mut sheet = format!(
-        ".s{{opacity:.45}}.f{{opacity:0;animation:f {WHOLE}s linear infinite}}\
-         .t{{transform-box:fill-box;transform-origin:left;animation:t {WHOLE}s linear infinite}}\
+        ".s{{opacity:.45}}.f{{opacity:0;animation:f {LOOP_SECONDS}s linear infinite}}\
+         .t{{transform-box:fill-box;transform-origin:left;animation:t {LOOP_SECONDS}s linear infinite}}\
          @keyframes f{{0%{{opacity:1}}{FADE}%,to{{opacity:0}}}}\
          @keyframes t{{0%{{transform:scaleX(0)}}{}%,to{{transform:scaleX(1)}}}}",
         At(end)
@@ -241,7 +241,7 @@ fn sheet() -> String {
         let at = f64::from(moment) / f64::from(MOMENTS) * end;
         let (before, at) = (At(at), At(at + 0.1));
         sheet += &format!(
-            "\n.b{moment}{{animation:b{moment} {WHOLE}s linear infinite}}\
+            "\n.b{moment}{{animation:b{moment} {LOOP_SECONDS}s linear infinite}}\
              @keyframes b{moment}{{0%,{before}%{{opacity:0}}{at}%,to{{opacity:1}}}}"
         );
     }
@@ -249,7 +249,7 @@ fn sheet() -> String {
         + "\n@media (prefers-reduced-motion:reduce){.b,.f,.t{animation:none!important}.s{opacity:1}}"
 }
 
-/// The laser cycles as a bar that grows. Gives where it ends.
+/// Draws the laser cycles as a growing bar. Returns its bottom.
 fn time(svg: &mut Svg, y: f64) -> f64 {
     let [left, top, width] = [EDGE, y, INNER].map(At);
     svg.raw(&format!(
@@ -269,7 +269,7 @@ fn time(svg: &mut Svg, y: f64) -> f64 {
     y + 28.0
 }
 
-/// What the colours mean. Gives where it ends.
+/// Draws the legend of the colours. Returns its bottom.
 fn colours(svg: &mut Svg, (low, high): (f64, f64), y: f64) -> f64 {
     let name = "range, mm:";
     svg.text("soft", (EDGE, y + LINE / 2.0), TEXT, Anchor::Start, name);
@@ -317,9 +317,9 @@ mod tests {
         assert!(svg.contains("animation-delay:4s"));
     }
 
-    /// As promised: it is shown at the head of the README.
+    /// The animation is at the top of the README.
     #[test]
-    fn that_of_the_demo_is_small_and_the_same_each_time() {
+    fn the_demo_is_small_and_reproducible() {
         let svg = demo().unwrap();
         assert!(svg.len() < 400_000, "{}", svg.len());
         assert_eq!(svg, demo().unwrap());

@@ -1,47 +1,49 @@
-//! When the histograms of four pixels are in their processing element: the paper's Fig. 22,
-//! for each reading of its words.
+//! When the histograms of four pixels are in their processing element: the paper's Fig. 22, for
+//! each possible interpretation.
 
 use crate::studies::scenes::latency::element::{PIXELS, ProcessingElement, READINGS};
 use dtof_draw::palette::Colour;
 use dtof_draw::svg::{Anchor, At, EDGE, Svg, TEXT, TITLE, wrapped};
 
-/// Laser cycles that are drawn.
+/// Laser cycles drawn.
 const CYCLES: u16 = 24;
 const WIDTH: f64 = 560.0;
 const INNER: f64 = WIDTH - 2.0 * EDGE;
-/// Where laser cycles begin, and how wide one is.
+/// The left edge of the laser cycles, and the width of one.
 const LEFT: f64 = EDGE + 72.0;
 const CYCLE: f64 = (INNER - 72.0) / CYCLES as f64;
 const ROW: f64 = 22.0;
 const LINE: f64 = 19.0;
-/// A colour a pixel.
+/// One colour per pixel.
 const COLOURS: [Colour; PIXELS as usize] =
     [Colour::Blue, Colour::Orange, Colour::Green, Colour::Purple];
 
 /// A histogram in a stage, in laser cycles of the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Stay {
+struct Occupancy {
     pixel: u16,
     from: u16,
     to: u16,
 }
 
-/// What is in stage number `stage`, after any number of laser cycles before.
-fn stays(element: ProcessingElement, stage: u16) -> Vec<Stay> {
+/// The occupancy of stage `stage` in steady state.
+fn occupancies(element: ProcessingElement, stage: u16) -> Vec<Occupancy> {
     let interval = element.interval;
-    // As many turns before as are still in it, and all pixels once more: the same picture.
+    // Starts early enough that the element is full.
     let before = element.x() * 4;
     let enters = (0..before + CYCLES).filter(|end| end % interval == 0);
-    let stays = enters.filter_map(|enter| {
+    let occupancies = enters.filter_map(|enter| {
         let from = enter + stage * interval;
         let to = (from + interval).min(before + CYCLES);
-        (before..before + CYCLES).contains(&from).then(|| Stay {
-            pixel: enter / interval % PIXELS,
-            from: from - before,
-            to: to - before,
-        })
+        (before..before + CYCLES)
+            .contains(&from)
+            .then(|| Occupancy {
+                pixel: enter / interval % PIXELS,
+                from: from - before,
+                to: to - before,
+            })
     });
-    stays.collect()
+    occupancies.collect()
 }
 
 /// The drawing.
@@ -67,7 +69,7 @@ pub fn timing() -> String {
     svg.document((WIDTH, y + EDGE - 4.0), title)
 }
 
-/// A reading: a row a stage. Gives where it ends.
+/// Draws one interpretation with a row per stage. Returns its bottom.
 fn panel(svg: &mut Svg, element: ProcessingElement, top: f64) -> f64 {
     let name = format!(
         "{}: X = {}, an answer after {}",
@@ -87,16 +89,16 @@ fn panel(svg: &mut Svg, element: ProcessingElement, top: f64) -> f64 {
         let place = (EDGE, y + ROW / 2.0);
         let name = format!("stage {}", stage + 1);
         svg.text("soft", place, TEXT, Anchor::Start, &name);
-        for stay in stays(element, stage) {
-            let left = LEFT + f64::from(stay.from) * CYCLE;
-            let width = f64::from(stay.to - stay.from) * CYCLE;
-            let class = COLOURS[usize::from(stay.pixel)].class();
+        for occupancy in occupancies(element, stage) {
+            let left = LEFT + f64::from(occupancy.from) * CYCLE;
+            let width = f64::from(occupancy.to - occupancy.from) * CYCLE;
+            let class = COLOURS[usize::from(occupancy.pixel)].class();
             let [x, y_at, wide, high] = [left + 1.0, y + 1.0, width - 2.0, ROW - 2.0].map(At);
             svg.raw(&format!(
                 "<g class=\"{class}\"><rect class=\"fill\" fill-opacity=\".22\" x=\"{x}\" y=\"{y_at}\" width=\"{wide}\" height=\"{high}\"/></g>"
             ));
             let place = (left + width / 2.0, y + ROW / 2.0);
-            let number = (stay.pixel + 1).to_string();
+            let number = (occupancy.pixel + 1).to_string();
             svg.text("ink", place, TEXT, Anchor::Middle, &number);
         }
         y += ROW;
@@ -112,9 +114,12 @@ mod tests {
     fn a_stage_is_never_empty_and_holds_one_histogram() {
         for element in &READINGS[1..] {
             for stage in 0..element.in_flight() {
-                let stays = stays(*element, stage);
-                assert_eq!((stays[0].from, stays.last().unwrap().to), (0, CYCLES));
-                for pair in stays.windows(2) {
+                let occupancies = occupancies(*element, stage);
+                assert_eq!(
+                    (occupancies[0].from, occupancies.last().unwrap().to),
+                    (0, CYCLES)
+                );
+                for pair in occupancies.windows(2) {
                     assert_eq!(pair[0].to, pair[1].from);
                     assert_eq!((pair[0].pixel + 1) % PIXELS, pair[1].pixel);
                 }
@@ -122,17 +127,17 @@ mod tests {
         }
     }
 
-    /// The second stage has what the first had one interval before; four at once are four
-    /// pixels.
+    /// The second stage holds what the first held one interval earlier; four histograms at once are
+    /// of four pixels.
     #[test]
-    fn the_title_is_so() {
+    fn the_title_holds() {
         let [_, pipeline, ..] = READINGS;
         assert_eq!(
             (pipeline.x(), pipeline.delay, pipeline.in_flight()),
             (4, 4, 4)
         );
         let mut at_once: Vec<u16> = (0..4)
-            .map(|stage| stays(pipeline, stage)[8].pixel)
+            .map(|stage| occupancies(pipeline, stage)[8].pixel)
             .collect();
         at_once.sort_unstable();
         assert_eq!(at_once, [0, 1, 2, 3]);

@@ -6,7 +6,7 @@ pub mod binning_reports;
 pub mod binning_scenes;
 pub mod echo_wait;
 pub mod echoes;
-mod field;
 mod light;
 mod setting;
+mod simulated_array;
 pub mod tracking;

@@ -1,5 +1,5 @@
-//! Where methods fail: scenes that are not the plain model, and whether events say
-//! that something is wrong with them.
+//! Where methods fail: scenes that violate the plain model, and whether the flags of events show
+//! it.
 
 mod case;
 pub mod cases;
@@ -28,7 +28,7 @@ pub use self::outcome::{Outcome, Verdict, Warning, outcomes};
 
 /// Bins of a histogram.
 pub const BINS: usize = 128;
-/// How the pixels operate.
+/// Settings of the pixels.
 const X: u16 = 4;
 const L1: u16 = 40;
 const L2: u16 = 2000;
@@ -41,7 +41,7 @@ const PERIOD: f64 = 400.0;
 /// An event farther from every surface is false: 1 + 2σ bins, at least 2.
 const FALSE: i64 = 3 * PER_BIN;
 
-/// Held against the plain scene.
+/// Compared with the plain scene.
 pub const STUDY: Study = Study {
     name: "failures",
     about: "false alarms, missing and wrong events in scenes that are not plain, and their flags",
@@ -53,15 +53,15 @@ pub const STUDY: Study = Study {
     results,
 };
 
-/// What decides.
+/// A detection rule with its threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Rule {
-    /// The paper's with this α. 4 is the least that gives at most one false alarm in 100
-    /// exposures at the background of the plain scene (a step of its square root lies
-    /// just below), 8 is the paper's own.
+    /// The paper's rule with this α. 4 is the smallest α with at most one false alarm in 100
+    /// exposures at the background of the plain scene (a step of the integer root lies just below);
+    /// the paper uses 8.
     Paper(u8),
-    /// The average of all bins with this α, the least whole one with at most one false alarm
-    /// in 100 exposures at the background of the plain scene.
+    /// The average of all bins with this α, the smallest integer with at most one false alarm in
+    /// 100 exposures at the background of the plain scene.
     Average(u8),
     /// The window of 3 bins, with the z for a false alarm in 100 exposures at any
     /// background.
@@ -88,7 +88,7 @@ impl Rule {
         }
     }
 
-    /// What it looks like in a chart.
+    /// Its pen in a chart.
     const fn pen(self) -> Pen {
         match self {
             Self::Paper(4) => palette::alpha(4),
@@ -99,23 +99,24 @@ impl Rule {
     }
 }
 
-/// A rule and how it finds the depth.
+/// A rule with a depth estimator.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Method {
-    /// What decides.
+    /// The rule.
     pub rule: Rule,
-    /// Whether by a centred window for the pulse; else by the paper's centre of mass.
+    /// Whether the estimator is a centred window for the pulse; otherwise the paper's centre of
+    /// mass.
     pub is_centred: bool,
 }
 
 impl Method {
-    /// All, those of a rule one after the other.
+    /// All methods, grouped by rule.
     pub fn all() -> impl Iterator<Item = Self> {
         let of = |rule| [false, true].map(|is_centred| Self { rule, is_centred });
         Rule::ALL.into_iter().flat_map(of)
     }
 
-    /// That of its depth estimator.
+    /// The name of its depth estimator.
     #[must_use]
     pub const fn estimator(self) -> &'static str {
         if self.is_centred {
@@ -131,7 +132,7 @@ impl Method {
         format!("{}, {}", self.rule.name(), self.estimator())
     }
 
-    /// A pixel of `case` that runs it.
+    /// A pixel that runs this method in `case`.
     fn pixel(self, case: &Case) -> Result<(PixelConfig<BINS, AnyRule>, AsyncPixel<BINS>)> {
         let minimum = Count::saturating(MINIMUM_COUNT);
         let rule: AnyRule = match self.rule {
@@ -155,7 +156,7 @@ impl Method {
             .estimator(estimator)
             .one_hit_tdc(case.is_one_hit())
             .build()?;
-        Ok((config, AsyncPixel::new(PixelAddress(0))))
+        Ok((config, AsyncPixel::new(PixelAddress::new(0))))
     }
 }
 
@@ -175,7 +176,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// One exposure, which each method ends for itself.
+/// One exposure of the same photons for all methods; each ends it on its own.
 fn exposure(case: &Case, rng: &mut Pcg64, tally: &mut Tally) -> Result<()> {
     let mut photons = case.pixel(rng)?;
     let pixel = |method: Method| Ok((method.name(), method.pixel(case)?));
@@ -188,9 +189,9 @@ fn exposure(case: &Case, rng: &mut Pcg64, tally: &mut Tally) -> Result<()> {
         photons.next_cycle(cycle, |code| codes.push(code))?;
         waiting.retain_mut(|(name, (config, pixel))| {
             pixel.count_batch(config, &codes);
-            let now = LaserCycle(cycle.into());
+            let now = LaserCycle::new(cycle.into());
             let look = pixel.end_laser_cycle(config, &mut Statistics::new(), now);
-            if let Some(event) = pixel.acknowledge() {
+            if let Some(event) = pixel.take_event() {
                 add(tally, name, "cycles", cycle.into());
                 add_event(tally, name, &event, case.surfaces(cycle));
             }
@@ -200,7 +201,7 @@ fn exposure(case: &Case, rng: &mut Pcg64, tally: &mut Tally) -> Result<()> {
     Ok(())
 }
 
-/// What an event of the method `name` says, with surfaces at `surfaces`.
+/// Counts an event of the method `name`, with surfaces at `surfaces`.
 fn add_event(
     tally: &mut Tally,
     name: &str,
@@ -209,7 +210,7 @@ fn add_event(
 ) {
     let position = i64::from(event.position().raw());
     let errors = surfaces.map(|surface| position - in_parts(surface));
-    // In the order of the pulses: the first is the nearest unless another is nearer.
+    // On a tie, the first pulse counts.
     let nearest = errors.enumerate().min_by_key(|(_, error)| error.abs());
     let right = nearest.filter(|(_, error)| error.abs() <= FALSE);
     let (is_false, is_flagged) = (right.is_none(), event.flags != Flags::NONE);
@@ -234,7 +235,7 @@ fn add_event(
 
 fn results(part: &Part) -> Result<Results> {
     let outcomes = outcomes(part)?;
-    // Both estimators have the same false alarms but for a few near the limit.
+    // Both estimators have the same false alarms, except a few near the limit.
     let share = |rule: Rule, background: f64, is_weak: bool| {
         let name = background_name(background, is_weak);
         let (_, of_case) = outcomes.iter().find(|(case, _)| case.name == name)?;
@@ -263,7 +264,7 @@ fn results(part: &Part) -> Result<Results> {
             series: series.into(),
         }
     });
-    // The most of a weak signal, in events.
+    // The largest share of false events with a weak signal.
     let most = |rule| {
         let all = BACKGROUNDS.into_iter();
         let all = all.filter_map(|background| share(rule, background, true));
@@ -328,18 +329,18 @@ mod tests {
     use rayon::prelude::*;
 
     use super::*;
-    use crate::studies::methods::passage::{Ladder, Method as Passed, Passage, count_false};
+    use crate::studies::methods::passage::{Ladder, Passage, Rule as PassageRule, count_false};
     use crate::sweep::mean::Measured;
     use dtof_theory::looks::exposure::{Exposures, Looks};
     use dtof_theory::random::trial_rng;
     use dtof_theory::rates::Rates;
 
-    /// The step of the square root lies between 3.98 and 4: no α between gives less.
-    /// Random numbers of its own.
+    /// The step of the integer root lies between 3.98 and 4: no α between them has fewer false
+    /// alarms. Random numbers independent of the study.
     #[test]
     fn four_is_the_least_alpha_with_one_percent_of_false_events_in_the_plain_scene() {
         let rates = Rates::without_target(case::BACKGROUND);
-        let ladders = [Ladder::new(Passed::Paper, 255, 256, 64)];
+        let ladders = [Ladder::new(PassageRule::Paper, 255, 256, 64)];
         let tallies: Vec<Tally> = (0..8)
             .into_par_iter()
             .map(|number| {

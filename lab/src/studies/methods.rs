@@ -1,4 +1,4 @@
-//! What the paper does not have: other methods beside its own.
+//! Beyond the paper: comparison with other methods.
 
 pub mod depth_error;
 pub mod event_depth;

@@ -1,8 +1,7 @@
-//! Means and errors of whole numbers that add up.
+//! Means and errors from integer sums.
 //!
-//! Sums are whole numbers of 64 bits, and what is subtracted from each other is
-//! worked out in 128 bits, so that nothing cancels: a mean and a variance are
-//! rounded once, to a part in 2^52.
+//! Sums are 64-bit integers, differences are calculated in 128 bits, so there is no cancellation:
+//! means and variances are rounded once, to 53 bits.
 
 use super::{PointTally, Tally};
 use dtof_draw::chart;
@@ -17,9 +16,8 @@ pub fn add(tally: &mut Tally, name: &str, what: &str, amount: u64) {
     *sum = sum.saturating_add(amount);
 }
 
-/// Adds one value of `name`: how many there are, their sum and that of their
-/// squares. A sum that does not fit stays at 2^64 - 1, and no other seed adds to
-/// it: [`super::Part::add`] is an error then.
+/// Adds a value of `name`: its count, sum and sum of squares. Sums saturate at 2^64 - 1, and
+/// [`super::Part::add`] then fails.
 pub fn add_value(tally: &mut Tally, name: &str, value: i64) {
     let size = value.unsigned_abs();
     let side = if value < 0 { "below 0" } else { "above 0" };
@@ -28,25 +26,25 @@ pub fn add_value(tally: &mut Tally, name: &str, value: i64) {
     add(tally, name, "squares", size.saturating_pow(2));
 }
 
-/// Adds one error of `name`, whose root mean square is asked for: a value, and
-/// its fourth power. 16 million errors of up to 1,000 fit.
+/// Adds an error of `name`, for its root mean square: a value, and its fourth power. 16 million
+/// errors of up to 1,000 fit.
 pub fn add_error(tally: &mut Tally, name: &str, error: i64) {
     add_value(tally, name, error);
     let fourth = error.unsigned_abs().saturating_pow(4);
     add(tally, name, "fourths", fourth);
 }
 
-/// A number with the 99 % interval it lies in.
+/// A number with its 99 % interval.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Measured {
     /// The best estimate.
     pub value: f64,
-    /// From where to where.
+    /// Its 99 % interval.
     pub interval: (f64, f64),
 }
 
-/// The mean of `values` whole numbers of this `sum` and sum of `squares`, and half
-/// the width of its 99 % interval by the central limit theorem.
+/// The mean of `values` integers from their `sum` and sum of `squares`, and half the width of its
+/// 99 % interval by the central limit theorem.
 fn mean_and_half(values: u128, sum: i128, squares: u128) -> (f64, f64) {
     // values² times the variance; never below 0 (Cauchy and Schwarz).
     let spread = (values * squares).saturating_sub(sum.unsigned_abs().pow(2));
@@ -57,8 +55,8 @@ fn mean_and_half(values: u128, sum: i128, squares: u128) -> (f64, f64) {
 }
 
 impl Measured {
-    /// The share of `successes` in `trials`, with the interval (Clopper and Pearson's, never
-    /// less sure than 99 %) in which the probability lies.
+    /// The share of `successes` in `trials`, with the Clopper-Pearson interval (at least 99 %) of
+    /// the probability.
     #[must_use]
     pub fn share(successes: u64, trials: u64) -> Self {
         Self {
@@ -67,13 +65,13 @@ impl Measured {
         }
     }
 
-    /// Whether the interval holds `value`.
+    /// Whether the interval contains `value`.
     #[must_use]
-    pub fn holds(&self, value: f64) -> bool {
+    pub fn contains(&self, value: f64) -> bool {
         (self.interval.0..=self.interval.1).contains(&value)
     }
 
-    /// A point of a chart, above `x`.
+    /// A point of a chart at `x`.
     #[must_use]
     pub const fn at(&self, x: f64) -> chart::Point {
         chart::Point {
@@ -83,15 +81,14 @@ impl Measured {
         }
     }
 
-    /// With `digits` after the point, and from where to where: three cells of a CSV table.
+    /// Value and interval with `digits` decimals: three cells of a CSV table.
     #[must_use]
     pub fn cells(&self, digits: usize) -> String {
         let (low, high) = self.interval;
         format!("{:.digits$},{low:.digits$},{high:.digits$}", self.value)
     }
 
-    /// The mean of the values of `name`, by the central limit theorem. NaN
-    /// without a value.
+    /// The mean of the values of `name`, by the central limit theorem. NaN without values.
     #[must_use]
     pub fn mean(point: &PointTally, name: &str) -> Self {
         let count = |what: &str| point.count(&format!("{name} {what}"));
@@ -103,16 +100,15 @@ impl Measured {
         }
     }
 
-    /// The root mean square of the errors of `name`. NaN without an error.
+    /// The root mean square of the errors of `name`. NaN without errors.
     #[must_use]
     pub fn root_mean_square(point: &PointTally, name: &str) -> Self {
         let sum = |what: &str| u128::from(point.count(&format!("{name} {what}")));
         Self::root_of_squares(sum("values"), sum("squares"), sum("fourths"))
     }
 
-    /// The root mean square of `values` errors whose `squares` and `fourths` powers
-    /// add up to these, below 2^64 each, by the central limit theorem for the
-    /// squares. NaN without an error.
+    /// The root mean square of `values` errors, from the sums of their `squares` and `fourths`
+    /// powers (each below 2^64), by the central limit theorem for the squares. NaN without errors.
     #[must_use]
     pub fn root_of_squares(values: u128, squares: u128, fourths: u128) -> Self {
         let sum = i128::try_from(squares).unwrap_or(i128::MAX);
@@ -123,7 +119,7 @@ impl Measured {
         }
     }
 
-    /// As many times as much.
+    /// Value and interval multiplied by `factor`.
     #[must_use]
     pub fn times(self, factor: f64) -> Self {
         Self {
@@ -132,8 +128,7 @@ impl Measured {
         }
     }
 
-    /// How many times `other` it is; the two are taken to be independent, and
-    /// their intervals to be small.
+    /// The ratio to `other`, for independent values with small intervals.
     #[must_use]
     pub fn over(self, other: Self) -> Self {
         let share = |part: Self| (part.interval.1 - part.interval.0) / 2.0 / part.value;
@@ -145,7 +140,7 @@ impl Measured {
         }
     }
 
-    /// With `digits` after the point, and its interval.
+    /// Value and interval with `digits` decimals, as text.
     #[must_use]
     pub fn text(&self, digits: usize) -> String {
         let (low, high) = self.interval;

@@ -1,4 +1,4 @@
-//! Parts of a sweep, and adding them up.
+//! Parts of a sweep, and merging them.
 
 use std::fs;
 use std::io::Write;
@@ -8,13 +8,13 @@ use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::{Point, Study, Tally};
-use dtof_options::files::{aside, place_of};
+use dtof_options::files::{destination, temporary_file};
 
-/// One point with the sum of its trials.
+/// A point with the sum of its trials.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointTally {
-    /// Where in the grid.
+    /// The parameters of the point.
     pub parameters: Point,
     /// The sum over the seeds of the part.
     pub tally: Tally,
@@ -38,26 +38,26 @@ impl PointTally {
         self.parameters[name]
     }
 
-    /// A count of the tally; 0 if no trial gave it.
+    /// A count of the tally; 0 if no trial has it.
     #[must_use]
     pub fn count(&self, name: &str) -> u64 {
         self.tally.get(name).copied().unwrap_or_default()
     }
 }
 
-/// Every point of a study over some seeds.
+/// The tallies of all points of a study over a set of seeds.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Part {
     study: String,
     revision: u32,
-    /// From the first to before the last; disjoint, ascending, none next to another.
+    /// Half-open ranges: disjoint, ascending, not adjacent.
     seeds: Vec<(u64, u64)>,
     points: Vec<PointTally>,
 }
 
 impl Part {
-    /// Without a seed.
+    /// A part without seeds.
     #[must_use]
     pub fn empty(study: &Study) -> Self {
         let without_trials = |parameters| PointTally {
@@ -79,13 +79,13 @@ impl Part {
         &self.study
     }
 
-    /// The seeds whose trials are in it: ranges of the first and one past the last.
+    /// The seeds of the part, as half-open ranges.
     #[must_use]
     pub fn seeds(&self) -> &[(u64, u64)] {
         &self.seeds
     }
 
-    /// How many seeds those are.
+    /// The number of seeds.
     #[must_use]
     pub fn seed_count(&self) -> u64 {
         let lengths = self.seeds.iter().map(|(first, end)| end - first);
@@ -98,7 +98,7 @@ impl Part {
         &self.points
     }
 
-    /// Adds the tallies of `seed`, one a point.
+    /// Adds the tallies of `seed`, one per point.
     pub(super) fn add_seed(&mut self, seed: u64, tallies: Vec<Tally>) -> Result<()> {
         let end = seed.checked_add(1).context("the last seed is too large")?;
         self.add_range((seed, end))?;
@@ -111,12 +111,12 @@ impl Part {
     /// Adds another part of the same study.
     ///
     /// # Errors
-    /// If it is of another study, revision or grid, shares a seed, or a count would not
-    /// fit. This part is then as it was.
+    /// Fails if it is of another study, revision or grid, shares a seed, or a count would overflow.
+    /// This part is then unchanged.
     pub fn add(&mut self, other: &Self) -> Result<()> {
         ensure!(
             (&self.study, self.revision) == (&other.study, other.revision),
-            "{} (revision {}) does not add to {} (revision {})",
+            "{} (revision {}) cannot be added to {} (revision {})",
             other.study,
             other.revision,
             self.study,
@@ -126,7 +126,7 @@ impl Part {
         let [own, others] =
             [&self.points, &other.points].map(|points| points.iter().map(parameters));
         ensure!(own.eq(others), "{}: not the same points", self.study);
-        // Aside, so that an error leaves this part as it was.
+        // On a copy, so that an error leaves this part unchanged.
         let mut sum = self.clone();
         for &range in &other.seeds {
             sum.add_range(range)?;
@@ -138,7 +138,7 @@ impl Part {
         Ok(())
     }
 
-    /// Notes seeds, which must be new.
+    /// Adds a range of seeds, which must be new.
     fn add_range(&mut self, (first, end): (u64, u64)) -> Result<()> {
         ensure!(first < end, "no seeds: {first}..{end}");
         let at = self.seeds.partition_point(|seeds| seeds.1 <= first);
@@ -159,12 +159,12 @@ impl Part {
     /// Reads a part.
     ///
     /// # Errors
-    /// If there is none at `path`, or it is none.
+    /// Fails if the file at `path` cannot be read or is not a part.
     pub fn load(path: &Path) -> Result<Self> {
         let name = || path.display().to_string();
         let text = fs::read_to_string(path).with_context(name)?;
         let read: Self = serde_json::from_str(&text).with_context(name)?;
-        // The ranges may be anything; adding them up again checks them.
+        // Adding the ranges one by one validates them.
         let mut part = Self {
             seeds: Vec::new(),
             ..read.clone()
@@ -175,10 +175,10 @@ impl Part {
         Ok(part)
     }
 
-    /// As a file holds it: a line a point.
+    /// The contents of the file: a line for each point.
     ///
     /// # Errors
-    /// If a parameter is not finite.
+    /// Fails if a parameter is not finite.
     pub fn to_json(&self) -> Result<String> {
         let points: Vec<String> = self
             .points
@@ -194,14 +194,14 @@ impl Part {
         ))
     }
 
-    /// Writes it aside and moves it to `path`, so that a part there is whole.
+    /// Writes a temporary file and moves it to `path`, so that a part there is complete.
     ///
     /// # Errors
-    /// If the folder cannot be written.
+    /// Fails if the folder cannot be written.
     pub fn save(&self, path: &Path) -> Result<()> {
         let name = || path.display().to_string();
-        let place = place_of(path, &[])?;
-        let mut file = aside(&place.folder, ".dtof-part-").with_context(name)?;
+        let place = destination(path, &[])?;
+        let mut file = temporary_file(&place.folder, ".dtof-part-").with_context(name)?;
         let text = self.to_json().with_context(name)?;
         file.write_all(text.as_bytes()).with_context(name)?;
         file.persist(&place.file).with_context(name)?;
@@ -220,10 +220,10 @@ fn add(sum: &mut Tally, more: &Tally) -> Result<()> {
     Ok(())
 }
 
-/// The sum of all parts at `paths`, of a study that `named` knows and of its grid.
+/// The sum of all parts at `paths`. `named` finds their study.
 ///
 /// # Errors
-/// The part that does not fit, and why.
+/// Fails if a part cannot be read or does not fit; the message names it.
 pub fn merge<P: AsRef<Path>>(
     paths: &[P],
     named: impl Fn(&str) -> Result<&'static Study>,
@@ -255,10 +255,10 @@ mod tests {
     }
 
     #[test]
-    fn what_does_not_add_leaves_a_part_as_it_was() {
+    fn a_part_that_does_not_fit_changes_nothing() {
         let mut sum = part(3, 1);
         let before = sum.clone();
-        // Its first seed is new, its second is not; the other's counts do not fit.
+        // One shares its second seed, the counts of the other overflow.
         let mut shares = part(1, 1);
         shares.add(&part(3, 1)).unwrap();
         for bad in [shares, part(4, u64::MAX)] {

@@ -1,4 +1,4 @@
-//! What a study comes to: figures, and verdicts on what the paper claims.
+//! The results of a study: figures, and verdicts on the paper's claims.
 
 use super::mean::Measured;
 use super::values::Values;
@@ -8,25 +8,25 @@ use dtof_draw::chart::{self, Chart};
 use dtof_theory::counts::poisson::Poisson;
 use std::fmt;
 
-/// What can be said from all trials of a study.
+/// The results from all trials of a study.
 #[derive(Clone, Debug, Default)]
 pub struct Results {
-    /// In the order they are shown.
+    /// Figures in the order of the page.
     pub figures: Vec<Figure>,
-    /// In the order of the paper.
+    /// Claims in the order of the paper.
     pub claims: Vec<Claim>,
-    /// What the pages say of it beside these.
+    /// Further values for the pages.
     pub values: Values,
-    /// Numbers for programs: files as seen from `docs`, and their content.
+    /// Tables for programs: paths relative to `docs`, and their content.
     pub tables: Vec<(&'static str, String)>,
 }
 
-/// A picture and what it shows.
+/// A picture.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// The file's name, without its extension.
+    /// The file name without its extension.
     pub name: &'static str,
-    /// Whether the data show what its title says.
+    /// Whether the data support the finding in its title.
     pub holds: bool,
     /// An SVG document.
     pub svg: String,
@@ -36,7 +36,7 @@ impl Figure {
     /// Draws `chart`.
     ///
     /// # Errors
-    /// If there is nothing to draw.
+    /// Fails if there is nothing to draw.
     pub fn new(name: &'static str, chart: &Chart) -> Result<Self> {
         Ok(Self {
             name,
@@ -46,14 +46,14 @@ impl Figure {
     }
 }
 
-/// Something the paper says, and whether it is so. The page of claims has the rest.
+/// A claim of the paper with its verdict. The page of claims has its text.
 #[derive(Clone, Debug)]
 pub struct Claim {
     /// Its name in the page.
     pub name: &'static str,
-    /// Our figure or number, with its interval or sample size.
+    /// The result of this study, with its interval or sample size.
     pub here: String,
-    /// Whether it goes together with the paper's.
+    /// Whether the result agrees with the paper's claim.
     pub verdict: Verdict,
 }
 
@@ -69,14 +69,14 @@ impl Claim {
     }
 }
 
-/// How a claim fares.
+/// The verdict on a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// It is so here as well.
+    /// The claim holds here as well.
     Agrees,
-    /// In part, or by another number.
+    /// The claim holds in part, or with another number.
     Differs,
-    /// It is not so.
+    /// The claim does not hold.
     Refuted,
     /// The sample is too small to tell.
     NotDecided,
@@ -89,7 +89,8 @@ impl Verdict {
         Self::graded(holds, false)
     }
 
-    /// [`Self::Agrees`] or else [`Self::Differs`] if what they ask for holds.
+    /// [`Self::Agrees`] or else [`Self::Differs`] if its condition holds, otherwise
+    /// [`Self::Refuted`].
     #[must_use]
     pub const fn graded(agrees: bool, differs: bool) -> Self {
         match (agrees, differs) {
@@ -99,7 +100,7 @@ impl Verdict {
         }
     }
 
-    /// The same as an answer to a question.
+    /// The verdict as an answer to a question.
     #[must_use]
     pub const fn answer(self) -> &'static str {
         match self {
@@ -122,7 +123,7 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// The least and the greatest of values from 0 on.
+/// The smallest and the largest of values that are not negative.
 #[must_use]
 pub fn ends(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let ends = (f64::INFINITY, 0.0f64);
@@ -130,32 +131,32 @@ pub fn ends(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     values.fold(ends, |(low, high), value| (value.min(low), value.max(high)))
 }
 
-/// Shares beside what was predicted for them.
+/// Shares compared with predictions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Comparison {
-    /// How many were compared.
+    /// Number of comparisons.
     pub points: u32,
-    /// How many predictions lie outside the share's 99 % interval.
+    /// Predictions outside the 99 % interval of the share.
     pub outside: u32,
     /// The largest difference.
     pub largest: f64,
 }
 
 impl Comparison {
-    /// Of shares with the probabilities predicted.
+    /// Compares shares with predicted probabilities.
     #[must_use]
     pub fn of(pairs: impl IntoIterator<Item = (Measured, f64)>) -> Self {
         let mut comparison = Self::default();
         for (share, predicted) in pairs {
             comparison.points += 1;
-            comparison.outside += u32::from(!share.holds(predicted));
+            comparison.outside += u32::from(!share.contains(predicted));
             comparison.largest = comparison.largest.max((share.value - predicted).abs());
         }
         comparison
     }
 
-    /// Whether right predictions lie outside as often, or more often, in more than
-    /// one of a thousand studies: one interval in a hundred is wrong.
+    /// Whether chance explains the predictions outside: correct predictions have as many in more
+    /// than one of a thousand studies, because one interval in a hundred misses.
     #[must_use]
     pub fn is_chance(&self) -> bool {
         Poisson::new(f64::from(self.points) / 100.0).at_least(self.outside) > 1e-3
@@ -163,7 +164,7 @@ impl Comparison {
 }
 
 impl PointTally {
-    /// How many of `trials` were `successes`, both names of counts.
+    /// The share of `successes` in `trials`, both names of counts.
     #[must_use]
     pub fn share(&self, successes: &str, trials: &str) -> Measured {
         Measured::share(self.count(successes), self.count(trials))
@@ -190,7 +191,7 @@ impl Part {
     /// The point with these parameters.
     ///
     /// # Errors
-    /// If there is none.
+    /// Fails if there is no such point.
     pub fn one<const N: usize>(&self, parameters: [(&str, f64); N]) -> Result<&PointTally> {
         let found = self.points().iter().find(|point| point.is_at(parameters));
         found.with_context(|| format!("{}: no point {parameters:?}", self.study()))
@@ -201,21 +202,20 @@ impl Part {
 mod tests {
     use super::*;
 
-    /// From the sums of binomial terms, for 10 of 100.
+    /// From sums of binomial terms, for 10 of 100.
     #[test]
     fn the_interval_is_exact() {
         let share = Measured::share(10, 100);
         assert!((share.value - 0.1).abs() < 1e-15);
         assert!((share.interval.0 - 0.03820).abs() < 1e-5);
         assert!((share.interval.1 - 0.20195).abs() < 1e-5);
-        assert!(share.holds(0.1) && !share.holds(0.03) && !share.holds(0.21));
-        // No success is no proof that there is none.
-        assert!(Measured::share(0, 100).holds(0.05) && Measured::share(100, 100).holds(0.95));
-        assert!(!Measured::share(0, 100).holds(0.053));
+        assert!(share.contains(0.1) && !share.contains(0.03) && !share.contains(0.21));
+        // Zero successes do not prove a probability of zero.
+        assert!(Measured::share(0, 100).contains(0.05) && Measured::share(100, 100).contains(0.95));
+        assert!(!Measured::share(0, 100).contains(0.053));
     }
 
-    /// However rare the event, the interval misses the probability in at most 1 % of
-    /// studies.
+    /// The interval misses the probability in at most 1 % of studies, even for rare events.
     #[test]
     fn the_interval_holds_99_percent_of_rare_events() {
         let trials = 2000u32;
@@ -223,7 +223,9 @@ mod tests {
             let probability = mean / f64::from(trials);
             let law = Poisson::new(mean);
             let missed = (0..60)
-                .filter(|&count| !Measured::share(count.into(), trials.into()).holds(probability))
+                .filter(|&count| {
+                    !Measured::share(count.into(), trials.into()).contains(probability)
+                })
                 .map(|count| law.mass(count));
             // Poisson instead of binomial: a thousandth of 1 % off.
             assert!(missed.sum::<f64>() < 0.010_01, "{mean}");

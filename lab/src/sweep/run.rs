@@ -9,22 +9,22 @@ use rayon::prelude::*;
 
 use super::{Part, Study, Tally};
 
-/// The part of these seeds.
+/// Runs `seeds` and returns their part.
 ///
 /// # Errors
-/// If a trial fails, or there is no place for it in the folder of temporary files.
-pub fn work_out(study: &Study, seeds: Range<u64>) -> Result<Part> {
+/// Fails if a trial fails or the temporary file cannot be written.
+pub fn run_seeds(study: &Study, seeds: Range<u64>) -> Result<Part> {
     let folder = tempfile::tempdir()?;
     let path = folder.path().join("part");
     run(study, seeds, &path, Duration::MAX, |_| ())
 }
 
-/// Works out `seeds` into the file at `path`. If there is a part of them already,
-/// as a run that was ended early leaves it, the rest is added. It is saved every
-/// `save_every` and at the end; `progress` is told how many seeds are done.
+/// Runs `seeds` into the file at `path`. If the file has a part of them from an interrupted run,
+/// the rest is added. Saves every `save_every` and at the end; calls `progress` with the number of
+/// finished seeds.
 ///
 /// # Errors
-/// If the file holds something else, or cannot be written, or a trial fails.
+/// Fails if the file is not such a part or cannot be written, or if a trial fails.
 pub fn run(
     study: &Study,
     seeds: Range<u64>,
@@ -38,7 +38,7 @@ pub fn run(
         let inside = |&(first, end): &(u64, u64)| seeds.start <= first && end <= seeds.end;
         ensure!(
             before.seeds().iter().all(inside),
-            "{}: holds seeds that are not asked for",
+            "{}: has seeds outside the requested range",
             path.display()
         );
         part.add(&before)
@@ -47,7 +47,7 @@ pub fn run(
     let done = part.seeds().to_vec();
     let is_left = |seed: &u64| !done.iter().any(|range| (range.0..range.1).contains(seed));
     let points = (study.points)();
-    // As many trials at once as keep every thread busy.
+    // Enough trials at once to keep every thread busy.
     let at_once = (8 * rayon::current_num_threads()).div_ceil(points.len().max(1));
     let mut saved = Instant::now();
     let mut left = seeds.filter(is_left);

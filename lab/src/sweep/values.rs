@@ -1,10 +1,10 @@
-//! What stands in the places of a page.
+//! Values for the placeholders of a page.
 
 use anyhow::{Context, Result};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
-/// Texts by the name of their place.
+/// Texts by the names of their placeholders.
 #[derive(Clone, Debug, Default)]
 pub struct Values(BTreeMap<String, String>);
 
@@ -15,22 +15,22 @@ impl<const N: usize> From<[(&str, String); N]> for Values {
 }
 
 impl Values {
-    /// One more.
+    /// Adds a value.
     pub fn set(&mut self, name: impl Into<String>, value: impl Display) {
         self.0.insert(name.into(), value.to_string());
     }
 
-    /// Those of a study, with its name before theirs.
+    /// Adds the values of a study, prefixed with its name.
     pub fn add(&mut self, study: &str, values: &Self) {
         for (name, value) in &values.0 {
             self.set(format!("{study}.{name}"), value);
         }
     }
 
-    /// The template with a value in place of each `{name}`.
+    /// Replaces each `{name}` in the template by its value.
     ///
     /// # Errors
-    /// If a place has no value.
+    /// Fails if a placeholder has no value.
     pub fn fill(&self, template: &str) -> Result<String> {
         let mut text = String::new();
         let mut rest = template;

@@ -5,7 +5,7 @@ use std::process::{Command, Output};
 
 use tempfile::TempDir;
 
-/// A folder of its own for one test.
+/// A temporary folder for one test.
 pub struct Scratch(TempDir);
 
 impl Scratch {
@@ -34,7 +34,7 @@ impl Scratch {
         command.output().unwrap()
     }
 
-    /// The program must have failed with one line that says all of `parts`.
+    /// Checks that the program failed with one line that contains all of `parts`.
     #[track_caller]
     pub fn refused(output: &Output, parts: &[&str]) {
         let message = String::from_utf8(output.stderr.clone()).unwrap();

@@ -1,15 +1,14 @@
-//! One end of the link: messages arrive whole, once and in order, or not yet.
+//! One end of the link: messages arrive whole, once and in order.
 //!
-//! Every frame carries, beside its message, two numbers: that of the message its
-//! sender expects next, and the first one it has no room for. An end keeps a message
-//! until it is acknowledged, and sends it again when that takes too long. A message
-//! that is not the expected one is dropped and comes again. A receiver that does not
-//! take its messages closes its window, which stops the sender: back-pressure, not
-//! loss.
+//! Besides its message every frame carries two numbers: that of the message its sender
+//! expects next, and the first one it has no room for. An end keeps a message until it is
+//! acknowledged, and sends it again after a timeout. A message out of order is dropped and
+//! comes again. If the messages of a receiver are not taken, it closes its window, which
+//! stops the sender: there is back-pressure, but no loss.
 //!
-//! Sequence numbers have 8 bits and a window holds a few messages, so a number never
-//! stands for two messages at once. The host draws a new session at each start, which
-//! keeps frames of an earlier life apart.
+//! Sequence numbers have 8 bits and a window has a few messages, so a number never means
+//! two messages at once. The host chooses a new session number at each start, so that frames
+//! of an earlier session are recognised.
 
 mod receive;
 mod transmit;
@@ -19,66 +18,66 @@ use heapless::{Deque, Vec};
 use crate::StopReason;
 use crate::frame::PAYLOAD_BYTES;
 
-/// The most bytes a message holds.
+/// The most bytes of a message's body.
 pub const BODY_BYTES: usize = PAYLOAD_BYTES - HEADER_BYTES;
-/// Messages under way, and messages that wait to be taken.
+/// The most messages in flight, and the most that wait to be taken.
 pub const WINDOW: usize = 4;
-/// A message not acknowledged for so long is sent again. Each repetition doubles the
-/// wait, up to [`RETRANSMIT_MOST_MS`]. Every eight messages that arrive at once halve it.
+/// A message that is not acknowledged for this long is sent again. Each repetition doubles
+/// the wait, up to [`RETRANSMIT_MOST_MS`]. Eight acknowledged messages without a repetition halve it.
 pub const RETRANSMIT_MS: u32 = 100;
 /// The longest wait.
 pub const RETRANSMIT_MOST_MS: u32 = 1600;
-/// An end with nothing to say says so this often.
+/// An end with nothing to send sends a keep-alive this often.
 pub const KEEP_ALIVE_MS: u32 = 50;
 
-/// Bytes of a greeting, the description an end gives of itself when a session begins.
+/// Bytes of a greeting, in which an end describes itself when a session begins.
 pub const GREETING_BYTES: usize = 8;
 
 const HEADER_BYTES: usize = 6;
-/// Messages that arrive before the wait is halved.
+/// Messages that are acknowledged before the wait is halved.
 const PATIENCE: u8 = 8;
 const WINDOW_U8: u8 = 4;
 
-/// Kinds below this one are numbered; the others stand outside the sequence.
+/// Kinds below this one are numbered; the others are outside the sequence.
 const FIRST_UNNUMBERED: u8 = 0xf0;
-/// Those of a host lie below this one, those of a device from it on.
+/// A host's kinds are below this one, a device's begin with it.
 const FIRST_OF_DEVICE: u8 = 0x80;
-/// Carries no message. A device's has another kind than a host's: where a line sends a device
-/// its own frames back, they are not taken for a host that is alive.
+/// Carries no message. Devices have a kind of their own: a line that echoes a device's frames
+/// must not look like a host that is alive.
 const KEEP_ALIVE: u8 = 0xf0;
 const KEEP_ALIVE_OF_DEVICE: u8 = 0xf4;
 /// The host begins a session.
 const HELLO: u8 = 0xf1;
 /// The device has begun it.
 const WELCOME: u8 = 0xf2;
-/// The device knows no such session; in its body, why its sensor stopped last.
+/// The device has no such session; the body says why its sensor stopped last.
 const NO_SESSION: u8 = 0xf3;
 /// The host ends its session.
 const END: u8 = 0xf5;
 
-/// A numbered message: what it is and what it says.
+/// A numbered message.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Message {
     /// Its kind, below 0xf0.
     pub kind: u8,
-    /// Its content.
+    /// Its body.
     pub body: Vec<u8, BODY_BYTES>,
 }
 
-/// The window is full: no further message may be under way.
+/// The window is full: no further message can be sent yet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Full;
 
 impl core::fmt::Display for Full {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        f.write_str("as many messages are under way as may be")
+        f.write_str("the window is full")
     }
 }
 
 impl core::error::Error for Full {}
 
-/// Losses and repairs on the way, since the end was made.
+/// Losses and repairs on the wire, since the end was made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct LinkCounters {
@@ -99,49 +98,48 @@ pub struct LinkCounters {
     pub retransmitted: u32,
 }
 
-/// One end. The host draws sessions, the device follows.
+/// One end. The host begins sessions, the device follows.
 #[derive(Debug)]
 pub struct Endpoint {
     host: bool,
     session: u16,
     open: bool,
-    /// A session began and nobody has asked yet.
+    /// A session began since `take_began`.
     began: bool,
-    /// The host has ended the session, and nobody has asked yet.
+    /// The host has ended the session since `take_ended`.
     ended: bool,
-    /// The host ends its session, and waits to hear that the device has forgotten it.
+    /// The host ends its session, until the device has forgotten it.
     ending: bool,
     /// The device has forgotten the session.
     lost: bool,
-    /// Why the device's sensor stopped last, by its number: what a device says, or what a host
-    /// was told.
+    /// The number of the reason why the device's sensor stopped last.
     stop_reason: u8,
     greeting: [u8; GREETING_BYTES],
     peer_greeting: [u8; GREETING_BYTES],
     /// Not acknowledged yet; the front one has the number `first`.
     outbox: Deque<Message, WINDOW>,
     first: u8,
-    /// How many of the outbox have been sent, and how many had been before they
-    /// are sent again.
+    /// How many of the outbox have been sent, and how many had been sent before a
+    /// repetition.
     sent: u8,
     sent_before: u8,
     /// The first number the other end has no room for.
     peer_limit: u8,
-    /// Arrived and not taken yet.
+    /// Messages that have arrived and were not taken yet.
     inbox: Deque<Message, WINDOW>,
     /// The number that comes next.
     expected: u8,
     /// A message of the session has arrived.
     has_received: bool,
-    /// An unnumbered frame that is due, and the session it is about.
+    /// An unnumbered frame that is due, and its session.
     reply: Option<(u8, u16)>,
     acknowledge: bool,
     progress_ms: u32,
-    /// How long until what is under way is sent again.
+    /// How long until unacknowledged messages are sent again.
     wait_ms: u32,
-    /// Messages acknowledged since it was last changed.
-    quiet: u8,
-    /// The first message is being sent again, and goes alone.
+    /// Messages acknowledged since `wait_ms` last changed, or one was sent again.
+    acknowledged_in_a_row: u8,
+    /// The first message is sent again, by itself.
     alone: bool,
     spoke_ms: u32,
     heard_ms: u32,
@@ -149,7 +147,7 @@ pub struct Endpoint {
 }
 
 impl Endpoint {
-    /// The host's end, which opens `session` (a number not used just before).
+    /// The host's end, which opens `session`: a number that was not used recently.
     #[must_use]
     pub const fn host(session: u16, greeting: [u8; GREETING_BYTES], now_ms: u32) -> Self {
         let mut end = Self::closed(greeting);
@@ -191,7 +189,7 @@ impl Endpoint {
             acknowledge: false,
             progress_ms: 0,
             wait_ms: RETRANSMIT_MS,
-            quiet: 0,
+            acknowledged_in_a_row: 0,
             alone: false,
             spoke_ms: 0,
             heard_ms: 0,
@@ -213,52 +211,52 @@ impl Endpoint {
         self.open
     }
 
-    /// Whether a session began since this was last asked. All that belonged to
-    /// the session before is gone.
+    /// Whether a session began since the last call. Messages of the session before are
+    /// gone.
     pub const fn take_began(&mut self) -> bool {
         core::mem::replace(&mut self.began, false)
     }
 
-    /// Whether the device has said that it knows nothing of this session, as
-    /// after a restart. It does not come back.
+    /// Whether the device has no such session, as after a restart. The session does not
+    /// come back.
     #[must_use]
     pub const fn is_lost(&self) -> bool {
         self.lost
     }
 
-    /// Why the device's sensor stopped last, as the device said when it had forgotten the
+    /// Why the device's sensor stopped last, as the device reported with the loss of the
     /// session.
     #[must_use]
     pub const fn stop_reason(&self) -> Option<StopReason> {
         StopReason::from_number(self.stop_reason)
     }
 
-    /// What a device tells a host whose session it has forgotten.
+    /// Sets the reason that a device reports to a host whose session it does not have.
     pub const fn set_stop_reason(&mut self, reason: StopReason) {
         self.stop_reason = reason as u8;
     }
 
-    /// Ends the host's session: the device stops its sensor. [`Self::is_lost`] tells when the
-    /// device has heard it. Nothing else is sent from now on.
+    /// Ends the host's session: the device stops its sensor. [`Self::is_lost`] is true once
+    /// the device has received this. Nothing else is sent from now on.
     pub const fn end(&mut self, now_ms: u32) {
         self.ending = true;
-        // It is due at once.
+        // Due at once.
         self.spoke_ms = now_ms.wrapping_sub(KEEP_ALIVE_MS);
     }
 
-    /// Forgets the session, as if the host had ended it.
+    /// Forgets the session. [`Self::take_ended`] does not report this.
     pub fn close(&mut self) {
         self.forget();
     }
 
-    /// Messages that have arrived and were not taken.
+    /// The number of messages that have arrived and were not taken.
     #[must_use]
     pub fn waiting(&self) -> usize {
         self.inbox.len()
     }
 
-    /// Whether the host has ended its session since this was last asked. All that belonged to
-    /// the session is gone.
+    /// Whether the host has ended its session since the last call. Messages of the session are
+    /// gone.
     pub const fn take_ended(&mut self) -> bool {
         core::mem::replace(&mut self.ended, false)
     }
@@ -269,13 +267,13 @@ impl Endpoint {
         &self.peer_greeting
     }
 
-    /// Milliseconds since the other end was last heard.
+    /// Milliseconds since the last frame of the other end.
     #[must_use]
     pub const fn silent_ms(&self, now_ms: u32) -> u32 {
         now_ms.wrapping_sub(self.heard_ms)
     }
 
-    /// Losses and repairs on the way so far.
+    /// Losses and repairs so far.
     #[must_use]
     pub const fn counters(&self) -> &LinkCounters {
         &self.counters
@@ -287,23 +285,22 @@ impl Endpoint {
         self.room() > 0
     }
 
-    /// Messages that [`Self::offer`] has room for.
+    /// The number of messages that [`Self::offer`] has room for.
     #[must_use]
     pub fn room(&self) -> usize {
         WINDOW - self.outbox.len()
     }
 
-    /// Whether the other end has everything that was offered.
+    /// Whether the other end has acknowledged every message.
     #[must_use]
     pub fn is_settled(&self) -> bool {
         self.outbox.is_empty()
     }
 
-    /// Sends a message, sooner or later. Of `body` only [`BODY_BYTES`] are
-    /// taken.
+    /// Queues a message. Of `body` only the first [`BODY_BYTES`] are taken.
     ///
     /// # Errors
-    /// [`Full`] while the window is; nothing was taken.
+    /// Fails while the window is full; the message is not queued.
     pub fn offer(&mut self, kind: u8, body: &[u8]) -> Result<(), Full> {
         let taken = body.get(..body.len().min(BODY_BYTES)).unwrap_or_default();
         // There is room for them.
@@ -311,10 +308,10 @@ impl Endpoint {
         Ok(())
     }
 
-    /// The same for a body that the caller writes in its place, before anything else is done.
+    /// Queues a message and returns its empty body for the caller to write.
     ///
     /// # Errors
-    /// [`Full`] while the window is.
+    /// Fails while the window is full.
     pub fn offer_empty(&mut self, kind: u8) -> Result<&mut Vec<u8, BODY_BYTES>, Full> {
         let body = Vec::new();
         self.outbox
@@ -324,15 +321,15 @@ impl Endpoint {
         Ok(&mut message.body)
     }
 
-    /// The next message from the other end, left where it is.
+    /// The next message from the other end, without taking it.
     #[must_use]
     pub fn peek(&self) -> Option<&Message> {
         self.inbox.front()
     }
 
-    /// The next message from the other end.
+    /// Takes the next message from the other end.
     pub fn take(&mut self) -> Option<Message> {
-        // A window that was closed is open again, which the other end must hear.
+        // The window was closed and opens again, which the other end must learn.
         self.acknowledge |= self.inbox.is_full();
         self.inbox.pop_front()
     }

@@ -8,13 +8,13 @@ use super::{
 };
 use crate::frame::FrameError;
 
-/// One more; after 2³² of them from 0 again, as differences are what is looked at.
+/// Adds one. Counters wrap, because readers compare differences.
 pub(super) const fn count(counter: &mut u32) {
     *counter = counter.wrapping_add(1);
 }
 
 impl Endpoint {
-    /// Takes what a [`Deframer`](crate::frame::Deframer) found on the wire.
+    /// Takes a frame, or an error, from a [`Deframer`](crate::frame::Deframer).
     pub fn receive(&mut self, frame: Result<&[u8], FrameError>, now_ms: u32) {
         match frame {
             Ok(payload) => self.frame(payload, now_ms),
@@ -43,8 +43,8 @@ impl Endpoint {
                     count(&mut self.counters.corrupt);
                     return;
                 };
-                // After a message of the session, only from another host that has
-                // drawn the same number.
+                // After a message of the session a greeting comes only from another host
+                // with the same session number.
                 if !ours || self.has_received {
                     self.begin(session, *greeting);
                 }
@@ -72,7 +72,7 @@ impl Endpoint {
             }
             _ => {
                 count(&mut self.counters.foreign);
-                // Only what a host is known to have sent is answered: never an answer.
+                // Only frames of a host are answered, never answers.
                 let is_of_host = matches!(kind, 0..FIRST_OF_DEVICE | KEEP_ALIVE | END);
                 if !self.host && is_of_host {
                     self.reply = Some((NO_SESSION, session));
@@ -91,11 +91,11 @@ impl Endpoint {
         self.peer_greeting = peer_greeting;
     }
 
-    /// Back to an end without a session.
+    /// Becomes an end without a session.
     pub(super) fn forget(&mut self) {
         *self = Self {
             host: self.host,
-            // Also if the session begins only now.
+            // Also if the session begins now.
             ending: self.ending,
             counters: self.counters,
             stop_reason: self.stop_reason,
@@ -107,7 +107,7 @@ impl Endpoint {
     fn acknowledged(&mut self, expects: u8, limit: u8, now_ms: u32) {
         let arrived = expects.wrapping_sub(self.first);
         if arrived > self.sent_before {
-            return; // older than what is known
+            return; // older than the last one
         }
         for _ in 0..arrived {
             self.outbox.pop_front();
@@ -115,9 +115,9 @@ impl Endpoint {
         if arrived > 0 {
             self.progress_ms = now_ms;
             self.alone = false;
-            self.quiet = self.quiet.saturating_add(arrived);
-            if self.quiet >= PATIENCE {
-                self.quiet = 0;
+            self.acknowledged_in_a_row = self.acknowledged_in_a_row.saturating_add(arrived);
+            if self.acknowledged_in_a_row >= PATIENCE {
+                self.acknowledged_in_a_row = 0;
                 self.wait_ms = RETRANSMIT_MS.max(self.wait_ms / 2);
             }
         }

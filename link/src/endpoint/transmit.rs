@@ -8,7 +8,7 @@ use super::{
 use crate::frame::{self, WIRE_BYTES};
 
 impl Endpoint {
-    /// The next frame to put on the wire, or 0 bytes if none is due.
+    /// Writes the next frame into `wire`. Returns its bytes, 0 if none is due.
     pub fn transmit(&mut self, now_ms: u32, wire: &mut [u8; WIRE_BYTES]) -> usize {
         if let Some((kind, session)) = self.reply.take() {
             return self.unnumbered(kind, session, now_ms, wire);
@@ -21,9 +21,9 @@ impl Endpoint {
             }
             return 0;
         }
-        let is_quiet = now_ms.wrapping_sub(self.spoke_ms) >= KEEP_ALIVE_MS;
+        let is_due = now_ms.wrapping_sub(self.spoke_ms) >= KEEP_ALIVE_MS;
         if self.ending {
-            if self.lost || !is_quiet {
+            if self.lost || !is_due {
                 return 0;
             }
             return self.unnumbered(END, self.session, now_ms, wire);
@@ -31,16 +31,16 @@ impl Endpoint {
         if self.sent > 0 && waited_ms >= self.wait_ms {
             self.sent = 0;
             self.wait_ms = RETRANSMIT_MOST_MS.min(2 * self.wait_ms);
-            self.quiet = 0;
+            self.acknowledged_in_a_row = 0;
             self.alone = true;
         }
         let number = self.first.wrapping_add(self.sent);
         let room = self.peer_limit.wrapping_sub(number);
         let next = self.outbox.iter().nth(self.sent.into());
-        // A repeated message goes alone until it arrives. So a slow line is not filled
-        // with repetitions.
-        let held = self.alone && self.sent > 0;
-        if let Some(message) = next.filter(|_| (1..128).contains(&room) && !held) {
+        // A repeated message goes by itself until it arrives, so that repetitions do not fill
+        // a slow line.
+        let must_wait = self.alone && self.sent > 0;
+        if let Some(message) = next.filter(|_| (1..128).contains(&room) && !must_wait) {
             let header = self.header(message.kind, self.session, number);
             let length = frame::encode([&header, &message.body], wire);
             if self.sent == 0 {
@@ -56,7 +56,7 @@ impl Endpoint {
             self.spoke_ms = now_ms;
             return length;
         }
-        if self.acknowledge || is_quiet {
+        if self.acknowledge || is_due {
             let kind = if self.host {
                 KEEP_ALIVE
             } else {

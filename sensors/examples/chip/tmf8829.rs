@@ -1,5 +1,5 @@
-//! A TMF8829 that runs its application. While it measures it always has the next frame of 8×8
-//! zones: a peak in bin 10 of each, and its own distance of it.
+//! A simulated TMF8829 that runs its application. While it measures it always has the next frame of
+//! 8×8 zones: a histogram with a peak in bin 10, and a measured distance, of each.
 
 use core::convert::Infallible;
 
@@ -12,13 +12,13 @@ const RESULTS: usize = 21 + 64 * 6 + 12;
 #[derive(Clone, Default)]
 pub struct Chip {
     status: u8,
-    /// Frames that were sent, and bytes of the present one.
+    /// Frames that were sent, and bytes of the present frame that were sent.
     frame: u32,
     at: usize,
 }
 
 impl Chip {
-    /// Answers one transaction. Whether INT is low after it.
+    /// Answers one transaction. Returns whether INT is low afterwards.
     pub fn answer(&mut self, operations: &mut [Operation<'_>]) -> bool {
         match operations {
             [Operation::Write([0x08, command])] => {

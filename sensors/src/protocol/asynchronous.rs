@@ -14,14 +14,14 @@ where
     EN: OutputPin + PinErrorType<Error = INT::Error>,
 {
     /// [`Sensor::poll`](crate::Sensor::poll) that awaits its transfers: the same ones, in the same
-    /// order. It awaits nothing else. Between polls that are [`Polled::Idle`] await an edge of
+    /// order. It awaits nothing else. After a poll that is [`Polled::Idle`] await an edge of
     /// INT or a millisecond, whichever comes first.
     ///
-    /// The future may be dropped. If that is within a transfer, nobody knows how far it came, and
-    /// the next poll begins to bring the sensor up again.
+    /// The future may be dropped. If it is dropped within a transfer, the state of the sensor is
+    /// unknown, and the next poll begins to bring it up again.
     ///
     /// # Errors
-    /// The error of this step. The next polls bring the sensor up again.
+    /// Fails if this step fails. The next polls bring the sensor up again.
     pub async fn poll_async(
         &mut self,
         now_ms: u32,
@@ -35,15 +35,15 @@ where
         polled.inspect_err(|error| self.protocol.failed(error))
     }
 
-    /// A configuration comes into force: whatever is under way is given up.
+    /// Starts with a new configuration: abandons the present measurement.
     pub fn start_async(&mut self) {
         self.protocol.restart();
     }
 
-    /// Takes the sensor's ENABLE down, and tells it to stop: no answer would say that it has, and
-    /// ENABLE may not be wired.
+    /// Drives ENABLE low, and also sends the command to stop, as ENABLE may not be wired. Errors are
+    /// ignored.
     pub async fn stop_async(&mut self) {
-        // Before anything is awaited: a future that is dropped has stopped the sensor all the same.
+        // Before the first await: a dropped future has stopped the sensor all the same.
         let _ = self.enable.set_low();
         if let Request::Write { address, bytes } = self.protocol.stop() {
             let _ = self.i2c.write(address, bytes).await;

@@ -5,7 +5,7 @@ use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
 use embedded_hal::i2c::I2c;
 
 use super::{Done, Driver, Failure, Protocol, Request};
-use crate::{About, PhotonSink, Polled, Sensor, SensorFault};
+use crate::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN>
 where
@@ -14,7 +14,7 @@ where
     INT: InputPin,
     EN: OutputPin + PinErrorType<Error = INT::Error>,
 {
-    /// One request.
+    /// Executes one request.
     fn transfer(&mut self, now_ms: u32) -> Result<Done, Failure<I2C::Error, INT::Error>> {
         match self.protocol.request(now_ms) {
             Request::Nothing(polled) => return Ok(Done::Over(polled)),
@@ -70,16 +70,16 @@ where
 {
     type Error = P::Error<I2C::Error, INT::Error>;
 
-    fn about(&self) -> About {
-        self.protocol.about()
+    fn info(&self) -> SensorInfo {
+        self.protocol.info()
     }
 
     fn start(&mut self, _: U16F16) {
         self.protocol.restart();
     }
 
-    /// Takes the sensor's ENABLE down, and tells it to stop: no answer would say that it has, and
-    /// ENABLE may not be wired.
+    /// Drives ENABLE low, and also sends the command to stop, as ENABLE may not be wired. Errors are
+    /// ignored.
     fn stop(&mut self) {
         let _ = self.enable.set_low();
         if let Request::Write { address, bytes } = self.protocol.stop() {

@@ -1,7 +1,7 @@
 //! Protocols without input and output, and what drives them over embedded-hal.
 //!
-//! A [`Protocol`] knows a sensor and neither a bus nor a pin. It says what it wants next as a
-//! [`Request`], and is told when that is done. [`Driver`] does it over embedded-hal as a
+//! A [`Protocol`] is the state machine of a sensor without a bus or pins. It returns its next
+//! [`Request`] and takes the answer. [`Driver`] executes requests over embedded-hal as a
 //! [`Sensor`](crate::Sensor), which never waits, or over embedded-hal-async
 //! (`Driver::poll_async`, with the feature `async`). Both make the same transfers.
 
@@ -11,19 +11,19 @@ mod blocking;
 
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 
-use crate::{About, PhotonSink, Polled};
+use crate::{PhotonSink, Polled, SensorInfo};
 
-/// What a protocol wants of its bus and its pins.
+/// A request of a protocol to its bus or its pins.
 #[derive(Debug)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Request<'a> {
-    /// Nothing: the poll is over, and this came of it.
+    /// Nothing: the poll is over with this result.
     Nothing(Polled),
     /// Drive ENABLE high, or else low.
     Enable(bool),
-    /// Look at INT.
+    /// Read INT.
     Interrupt,
-    /// Write to the I²C address: the register first, then what goes there.
+    /// Write to the I²C address: the register first, then its values.
     Write {
         /// 7 bits.
         address: u8,
@@ -34,7 +34,7 @@ pub enum Request<'a> {
     Read {
         /// 7 bits.
         address: u8,
-        /// Where to read from.
+        /// The first register.
         register: u8,
         /// At least one.
         bytes: &'a mut [u8],
@@ -44,8 +44,9 @@ pub enum Request<'a> {
 /// A transfer that failed. `B` is the error of the bus, `P` that of a pin.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Failure<B, P> {
-    /// Nobody acknowledged the address, or the bus does not tell what was not acknowledged.
+    /// No device acknowledged the address, or the bus does not tell which byte was not acknowledged.
     Nack(B),
     /// The bus failed otherwise.
     Bus(B),
@@ -66,35 +67,35 @@ impl<B: embedded_hal::i2c::Error, P> Failure<B, P> {
 
 /// A request that was done.
 enum Done {
-    /// There was none, and the poll is over.
+    /// There was nothing to do, and the poll is over.
     Over(Polled),
-    /// There was; the level of INT if that was asked.
+    /// It is done; with the level of INT if that was read.
     Level(bool),
 }
 
-/// A sensor's protocol. Whoever drives it repeats: [`Self::request`], the transfer, and then
+/// A sensor's protocol. Its driver repeats: [`Self::request`], the transfer, and then
 /// [`Self::answered`] or [`Self::failed`].
 pub trait Protocol {
     /// An error of the bus, of a pin or of the device.
     type Error<B, P>: From<Failure<B, P>>;
 
     /// The description for a host.
-    fn about(&self) -> About;
+    fn info(&self) -> SensorInfo;
 
-    /// Gives up what is under way; the next requests begin anew.
+    /// Abandons the present measurement; the next requests begin again.
     fn restart(&mut self);
 
-    /// Tells the sensor to rest, if it can be told; restarts.
+    /// The command that stops the sensor, if it is up. Restarts the protocol.
     fn stop(&mut self) -> Request<'_>;
 
-    /// What is wanted now.
+    /// The next request.
     fn request(&mut self, now_ms: u32) -> Request<'_>;
 
-    /// The request was done; `is_high` is the level of INT, if that was asked. `None` if this
-    /// poll goes on with the next request, else what came of it.
+    /// Takes the answer to the request; `is_high` is the level of INT if that was read. Returns
+    /// `None` if this poll goes on with the next request, else its result.
     ///
     /// # Errors
-    /// What is wrong with the answer. [`Self::failed`] is to be told.
+    /// Fails if the answer is wrong. Pass the error to [`Self::failed`].
     fn answered<B, P>(
         &mut self,
         is_high: bool,
@@ -102,7 +103,7 @@ pub trait Protocol {
         sink: &mut impl PhotonSink,
     ) -> Result<Option<Polled>, Self::Error<B, P>>;
 
-    /// A request failed, or its answer was wrong: counts it, and chooses how to go on.
+    /// A request failed, or its answer was wrong: counts the error and chooses how to go on.
     fn failed<B, P>(&mut self, error: &Self::Error<B, P>);
 }
 
@@ -113,7 +114,7 @@ pub struct Driver<P, I2C, INT, EN> {
     i2c: I2C,
     interrupt: INT,
     enable: EN,
-    /// A transfer was begun and has not ended: who awaited it gave it up.
+    /// A transfer began and did not end: its future was dropped.
     #[cfg(feature = "async")]
     is_under_way: bool,
 }

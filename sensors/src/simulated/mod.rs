@@ -1,15 +1,15 @@
-//! A simulated sensor. The device draws the photons itself, to bring a board up with
-//! nothing attached and to load it with known rates.
+//! A simulated sensor. It draws random photons, to bring up a board with nothing attached and to
+//! load it with known rates.
 //!
 //! In every laser cycle each pixel sees a Poisson count of photons. Each of them
 //! is signal or background by their rates; a signal photon falls into the bins
 //! of the pulse, a background photon into any bin. That is the same as two
-//! independent Poisson counts. Integers throughout; see [`Poisson`] for how
-//! exact.
+//! independent Poisson counts. It computes in integers: every probability of a count is within 2⁻²⁶
+//! of the exact one.
 //!
 //! The photons depend on the seed and the pixels alone: the n-th laser cycle is
-//! the same whenever and however often the driver is asked. The time only says
-//! how many laser cycles are due, or nothing at all: [`Simulated::without_clock`].
+//! the same whenever and however often the driver is polled. The time only decides
+//! how many laser cycles are due; [`Simulated::without_clock`] ignores it.
 //!
 //! The example of the [crate] runs one.
 
@@ -25,10 +25,11 @@ use dtof_core::fixed::types::{U0F32, U8F24, U16F16};
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
-use crate::{About, PhotonSink, Polled, Sensor};
+use crate::{PhotonSink, Polled, Sensor, SensorInfo};
 
-pub use self::poisson::Poisson;
 pub use self::scene::scene;
+
+use self::poisson::Poisson;
 
 /// The stream of random numbers; any will do.
 const STREAM: u64 = 0x6474_6f66;
@@ -38,15 +39,14 @@ const STREAM: u64 = 0x6474_6f66;
 pub struct Pulse<'a>(&'a [U0F32]);
 
 impl<'a> Pulse<'a> {
-    /// The share of the photons in each bin of the pulse but the last, which
-    /// takes what is left. Of shares that add up to more than 1 the last do not
-    /// count.
+    /// The share of the photons in each bin of the pulse except the last, which
+    /// takes the rest. Shares beyond a sum of 1 are ignored.
     #[must_use]
     pub const fn new(shares: &'a [U0F32]) -> Self {
         Self(shares)
     }
 
-    /// How many bins after the first.
+    /// Draws a bin, counted from the first of the pulse.
     fn draw(&self, random: &mut impl Rng) -> u16 {
         let mut rest = random.next_u32();
         let mut bin = 0;
@@ -72,9 +72,10 @@ pub struct SimulatedPixel {
     signal: u64,
 }
 
-/// More photons a laser cycle than [`Poisson::MAX_MEAN`].
+/// A pixel has more than 4 photons a laser cycle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub struct RateError;
 
 impl fmt::Display for RateError {
@@ -91,7 +92,7 @@ impl SimulatedPixel {
     /// photons a laser cycle, the latter over all bins.
     ///
     /// # Errors
-    /// [`RateError`] if they add up to more than [`Poisson::MAX_MEAN`].
+    /// Returns [`RateError`] if they add up to more than 4.
     pub const fn new(
         address: PixelAddress,
         position: u16,
@@ -120,14 +121,14 @@ impl SimulatedPixel {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
-    /// Where the random numbers start.
+    /// The seed of the random numbers.
     pub seed: u64,
     /// Bins the background falls into.
     pub bins: u16,
     /// The rate of the laser.
     pub cycles_per_second: u32,
-    /// The most laser cycles one poll makes up for. Those that are due beyond
-    /// them are skipped: a laser does not wait either.
+    /// The most laser cycles of one poll. If more are due, the rest is skipped: a laser does not
+    /// wait either.
     pub cycles_per_poll: NonZeroU16,
 }
 
@@ -159,8 +160,8 @@ impl<'a> Simulated<'a> {
         }
     }
 
-    /// The same photons, but none by the clock: only [`Self::laser_cycles`] simulates, and the
-    /// laser has no rate.
+    /// The same photons without a clock: only [`Self::laser_cycles`] simulates, and the laser rate
+    /// is unknown.
     #[must_use]
     pub const fn without_clock(mut self) -> Self {
         self.settings.cycles_per_second = 0;
@@ -173,11 +174,11 @@ impl<'a> Simulated<'a> {
         self.skipped
     }
 
-    /// Simulates the next laser cycles now, whatever the time. The answer is [`Polled::Idle`]
-    /// if there are none.
+    /// Simulates the next laser cycles now, whatever the time. Returns [`Polled::Idle`] if `cycles`
+    /// is 0.
     pub fn laser_cycles(&mut self, cycles: u16, sink: &mut impl PhotonSink) -> Polled {
         let pixels = self.pixels;
-        // Laser cycles that are over but not yet said to be.
+        // Laser cycles that have ended and are not reported yet.
         let mut over = 0;
         for _ in 0..cycles {
             for pixel in pixels {
@@ -227,12 +228,12 @@ impl<'a> Simulated<'a> {
 impl Sensor for Simulated<'_> {
     type Error = Infallible;
 
-    fn about(&self) -> About {
-        let addresses = self.pixels.iter().map(|pixel| pixel.address.0);
+    fn info(&self) -> SensorInfo {
+        let addresses = self.pixels.iter().map(|pixel| pixel.address.raw());
         let pixels = addresses.max().map_or(0, |last| last.saturating_add(1));
-        About {
+        SensorInfo {
             laser_millihertz: 1000 * u64::from(self.settings.cycles_per_second),
-            ..About::new(pixels)
+            ..SensorInfo::new(pixels)
         }
     }
 

@@ -28,7 +28,7 @@ static PIXELS: [SimulatedPixel; 16] = {
 const fn pixel(index: u16) -> SimulatedPixel {
     let signal = U8F24::from_bits(U8F24::lit("0.5").to_bits() * 5 / (5 + index as u32 * 4 / 3));
     let background = U8F24::lit("0.5");
-    match SimulatedPixel::new(PixelAddress(index), 20 + 6 * index, signal, background) {
+    match SimulatedPixel::new(PixelAddress::new(index), 20 + 6 * index, signal, background) {
         Ok(pixel) => pixel,
         // Both are far below the most there may be.
         Err(_) => unreachable!(),
@@ -56,7 +56,7 @@ mod tests {
     fn the_surface_recedes_and_fades() {
         assert_eq!(PIXELS[0], pixel(0));
         for (near, far) in PIXELS.iter().zip(&PIXELS[1..]) {
-            assert_eq!(far.address.0, near.address.0 + 1);
+            assert_eq!(far.address.raw(), near.address.raw() + 1);
             assert_eq!(far.position, near.position + 6);
             assert!(far.signal < near.signal);
         }

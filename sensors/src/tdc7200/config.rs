@@ -47,23 +47,22 @@ pub enum Edge {
     Falling,
 }
 
-/// The choices there are. [`Config::new`] checks them.
+/// The settings. [`Config::new`] checks them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
-    /// Whose photons these are.
+    /// The pixel of the photons.
     pub pixel: PixelAddress,
     /// The reference clock at the pin CLOCK in kHz, 1,000 to 16,000. A clock
     /// that is not a whole number of kHz is not supported.
     pub clock_khz: u16,
     /// Picoseconds a bin, until [`Sensor::start`](crate::Sensor::start)
-    /// says otherwise.
+    /// changes it.
     pub bin_width: U16F16,
     /// Where bin 0 starts, in picoseconds after START.
     pub first_bin_ps: u32,
-    /// Measurements in a thousand seconds, for who turns laser cycles into time; 0 if that is not
-    /// known. It is the rate of START if the driver arms in time for each. No register
-    /// depends on it.
+    /// Measurements in a thousand seconds, for converting laser cycles to time; 0 if unknown. This
+    /// is the rate of START if the driver arms in time for each. No register depends on it.
     pub laser_millihertz: u64,
     /// The measurement mode.
     pub mode: Mode,
@@ -78,7 +77,7 @@ pub struct Settings {
     /// Where a measurement without enough stops ends: clock periods
     /// (`CLOCK_CNTR_OVF`) in mode 2, turns of the ring oscillator
     /// (`COARSE_CNTR_OVF`) in mode 1. The data sheet does not say how long a turn
-    /// is; TI's support has given 63 and 126 counts for it, 3.5 and 7 ns.
+    /// takes; TI's support has stated 63 and 126 counts, 3.5 and 7 ns.
     pub overflow: u16,
     /// Clock periods after START in which STOP is ignored
     /// (`CLOCK_CNTR_STOP_MASK`).
@@ -86,8 +85,8 @@ pub struct Settings {
     /// Whether the result registers carry an even parity bit, and it is checked
     /// (CONFIG1 bit `PARITY_EN`).
     pub parity: bool,
-    /// Milliseconds without an interrupt after which the measurement is given
-    /// up: the laser, and START with it, does not come.
+    /// Milliseconds without an interrupt after which the driver abandons the measurement: the
+    /// laser, and START with it, is missing.
     pub timeout_ms: u32,
     /// Polls in a row that may find INTB low and `INT_STATUS` without a reason.
     pub stuck_limit: u8,
@@ -125,6 +124,7 @@ pub struct Config(Settings);
 /// Settings that cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum ConfigError {
     /// The clock is outside 1 to 16 MHz.
     Clock,
@@ -158,7 +158,7 @@ impl Config {
     /// Checks `settings`.
     ///
     /// # Errors
-    /// [`ConfigError`] says what cannot be.
+    /// Returns a [`ConfigError`] if the settings cannot be used.
     pub const fn new(settings: Settings) -> Result<Self, ConfigError> {
         if settings.clock_khz < 1_000 || settings.clock_khz > 16_000 {
             return Err(ConfigError::Clock);

@@ -7,12 +7,13 @@ use crate::SensorFault;
 /// An error of the bus (`B`), of a pin (`P`) or of the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Error<B, P> {
     /// The bus failed.
     Bus(B),
     /// A pin failed.
     Pin(P),
-    /// After its reset the device does not hold what a TDC7200 holds there:
+    /// After its reset the device does not have the register values of a TDC7200:
     /// CONFIG2 = 0x40, `INT_MASK` = 0x07. It has no identification register.
     WrongChip {
         /// The value of CONFIG2.
@@ -21,7 +22,7 @@ pub enum Error<B, P> {
         int_mask: u8,
     },
     /// A register does not hold what was written to it.
-    NotTaken {
+    NotWritten {
         /// Its address.
         register: u8,
         /// The value written.
@@ -29,14 +30,14 @@ pub enum Error<B, P> {
         /// The value read.
         read: u8,
     },
-    /// No interrupt came: START does not come, or the sensor is gone.
+    /// No interrupt came: START is missing, or the sensor is gone.
     Timeout,
     /// INTB stays low while `INT_STATUS` names no reason.
     StuckInterrupt {
         /// `INT_STATUS`.
         status: u8,
     },
-    /// `INT_STATUS` reads as ones, its reserved bits too: nothing drives the bus.
+    /// `INT_STATUS` reads as all ones, reserved bits included: nothing drives the bus.
     NoAnswer,
     /// A result register has an odd number of ones, parity bit included.
     Parity {
@@ -61,7 +62,7 @@ impl<B: fmt::Debug, P: fmt::Debug> fmt::Display for Error<B, P> {
                 f,
                 "not a TDC7200: CONFIG2 {config2:#04x}, INT_MASK {int_mask:#04x} after reset"
             ),
-            Self::NotTaken {
+            Self::NotWritten {
                 register,
                 wrote,
                 read,
@@ -106,7 +107,7 @@ impl<B, P> From<Error<B, P>> for SensorFault {
                 int_mask: 0xff,
             } => Self::NoAnswer,
             Error::WrongChip { .. } => Self::WrongChip,
-            Error::NotTaken { .. } => Self::NotTaken,
+            Error::NotWritten { .. } => Self::Rejected,
             Error::Timeout => Self::Timeout,
             Error::StuckInterrupt { .. } => Self::StuckInterrupt,
             Error::Parity { .. } | Error::Calibration { .. } => Self::Data,

@@ -3,8 +3,8 @@
 //!
 //! One measurement is one laser cycle. The driver arms the device, which raises
 //! TRIGG; the laser fires and gives START; each stop is a photon, whose bin is
-//! `(time - first_bin_ps) / bin_width`, rounded down. A bin past the histogram
-//! is passed on as it is, for the pixel to count as rejected. When a counter
+//! `(time - first_bin_ps) / bin_width`, rounded down. The driver passes on a bin past the histogram
+//! unchanged, and the pixel counts it as rejected. When a counter
 //! overflows before all stops have come the photons are those that came; a
 //! laser cycle without any is counted as empty.
 //!
@@ -18,10 +18,10 @@
 //!
 //! # Its clock
 //!
-//! All times are fractions of the reference clock. Nothing else knows how fast that is: a clock
+//! All times are fractions of the reference clock, and no other clock checks it: a clock
 //! that is 2 % faster than [`Settings::clock_khz`] makes every time, and every range, 2 % too
-//! long, and a slower one too short. The calibration takes out the chip's own oscillator, not the
-//! clock. A crystal oscillator of 50 ppm is 0.05 mm a metre; an RC oscillator is not good enough.
+//! long, and a slower one too short. The calibration corrects the chip's own oscillator, not the
+//! clock. A crystal oscillator of 50 ppm adds 0.05 mm a metre; an RC oscillator is not good enough.
 //!
 //! # Wiring
 //!
@@ -52,7 +52,7 @@ use self::registers::{
 };
 use self::results::Results;
 use crate::timer::Since;
-use crate::{About, PhotonSink, Polled, Sensor};
+use crate::{PhotonSink, Polled, Sensor, SensorInfo};
 
 pub use self::config::{Config, ConfigError, Edge, Mode, Settings, Stops};
 pub use self::error::Error;
@@ -67,8 +67,8 @@ const START_MS: u32 = 2;
 /// A TDC7200 on an SPI device, with INTB and ENABLE.
 ///
 /// `CHUNK` is how many 24-bit registers are read in one SPI transaction, 1 to
-/// 13 (checked when compiled): what another device on the bus may have to wait
-/// for.
+/// 13 (checked when compiled). Another device on the bus may have to wait for that
+/// long.
 #[derive(Debug)]
 pub struct Tdc7200<SPI, INT, EN, const CHUNK: usize = RESULTS> {
     spi: SPI,
@@ -79,7 +79,7 @@ pub struct Tdc7200<SPI, INT, EN, const CHUNK: usize = RESULTS> {
     counts: Counts,
 }
 
-/// Counts of the measurements so far. Each sticks at `u32::MAX`.
+/// Counts of the measurements so far. They stop at their largest value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counts {
@@ -95,10 +95,10 @@ pub struct Counts {
     pub errors: u32,
 }
 
-/// The state of the driver: each waits for something else.
+/// The state of the driver.
 #[derive(Clone, Copy, Debug)]
 enum State {
-    /// Nothing: to be reset.
+    /// Reset the device next.
     Off,
     /// ENABLE is low.
     Resetting { since: Since },
@@ -119,7 +119,7 @@ where
     INT: InputPin,
     EN: OutputPin + PinErrorType<Error = INT::Error>,
 {
-    /// A driver that has not touched its device yet.
+    /// A driver that has not accessed its device yet.
     pub const fn new(spi: SPI, interrupt: INT, enable: EN, config: Config) -> Self {
         const { assert!(CHUNK >= 1 && CHUNK <= RESULTS, "CHUNK must be from 1 to 13") };
         Self {
@@ -195,7 +195,7 @@ where
         Ok(Polled::Working)
     }
 
-    /// Its registers after reset are all there is to know it by.
+    /// The device has no identification: its registers after reset have to do.
     fn check_chip(&mut self) -> Result<(), SPI, INT> {
         let config2 = self.read(CONFIG2)?;
         let int_mask = self.read(INT_MASK)?;
@@ -206,7 +206,7 @@ where
         }
     }
 
-    /// Writes all that is configured and reads it back.
+    /// Writes the configuration and reads it back.
     fn configure(&mut self) -> Result<(), SPI, INT> {
         let [[coarse_h, coarse_l], [clock_h, clock_l]] =
             self.config.overflows().map(u16::to_be_bytes);
@@ -227,7 +227,7 @@ where
         for (register, wrote) in registers {
             let read = self.read(register)?;
             if read != wrote {
-                return Err(Error::NotTaken {
+                return Err(Error::NotWritten {
                     register,
                     wrote,
                     read,
@@ -247,7 +247,7 @@ where
         Ok(())
     }
 
-    /// INTB is low: gives the photons away and arms again.
+    /// INTB is low: passes the photons on and arms again.
     fn serve(
         &mut self,
         now_ms: u32,
@@ -298,8 +298,8 @@ where
     /// Reads the result registers `first..=last`, `CHUNK` at a time.
     fn read_results(&mut self, results: &mut Results, first: u8, last: u8) -> Result<(), SPI, INT> {
         let mut register = first;
-        let wanted = results.range(first, last);
-        for chunk in wanted.chunks_mut(CHUNK) {
+        let values = results.range(first, last);
+        for chunk in values.chunks_mut(CHUNK) {
             let bytes = chunk.as_flattened_mut();
             let command = [AUTO_INCREMENT | register];
             self.spi
@@ -340,14 +340,14 @@ where
 {
     type Error = Error<SPI::Error, INT::Error>;
 
-    fn about(&self) -> About {
+    fn info(&self) -> SensorInfo {
         let settings = self.config.settings();
-        About {
-            pixels: settings.pixel.0.saturating_add(1),
+        SensorInfo {
+            pixels: settings.pixel.raw().saturating_add(1),
             bin_width: None,
             bins: 128,
             offset: self.config.offset(),
-            is_whole: false,
+            gives_histograms: false,
             laser_millihertz: settings.laser_millihertz,
         }
     }
@@ -367,7 +367,7 @@ where
         self.state = State::Off;
     }
 
-    /// After an error the device is reset and configured anew, within some 5 ms.
+    /// After an error the next polls reset and configure the device again, within some 5 ms.
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, SPI, INT> {
         let polled = self.step(now_ms, sink);
         if polled.is_err() {

@@ -31,7 +31,7 @@ pub(super) const CONFIG2_RESET: u8 = 0x40;
 pub(super) const INT_STATUS: u8 = 0x02;
 /// `INT_STATUS` bit 4 `MEAS_COMPLETE_FLAG`, bit 2 `CLOCK_CNTR_OVF_INT`, bit 1
 /// `COARSE_CNTR_OVF_INT` and bit 0 `NEW_MEAS_INT`: with one of them the measurement
-/// is over. Bit 3, `MEAS_STARTED_FLAG`, says nothing of the kind.
+/// is over. Bit 3, `MEAS_STARTED_FLAG`, does not count.
 pub(super) const OVER: u8 = 0b1_0111;
 
 /// `CLOCK_CNTR_OVF_INT` and `COARSE_CNTR_OVF_INT`: a counter ended it.
@@ -42,9 +42,9 @@ pub(super) const INT_MASK: u8 = 0x03;
 /// `INT_MASK` after reset: all three interrupts.
 pub(super) const INT_MASK_RESET: u8 = 0x07;
 
-/// `COARSE_CNTR_OVF_H`, then _L: where measurement mode 1 gives up.
+/// `COARSE_CNTR_OVF_H`, then _L: where measurement mode 1 ends.
 pub(super) const COARSE_CNTR_OVF_H: u8 = 0x04;
-/// `CLOCK_CNTR_OVF_H`, then _L: where measurement mode 2 gives up.
+/// `CLOCK_CNTR_OVF_H`, then _L: where measurement mode 2 ends.
 pub(super) const CLOCK_CNTR_OVF_H: u8 = 0x06;
 /// `CLOCK_CNTR_STOP_MASK_H`, then _L: clock periods in which STOP is ignored.
 pub(super) const CLOCK_CNTR_STOP_MASK_H: u8 = 0x08;

@@ -29,7 +29,7 @@ impl Results {
     }
 
     /// Picoseconds from START to each stop that came. `None` if one came and the
-    /// calibration cannot be.
+    /// calibration is invalid.
     pub(super) fn times(&self, settings: &Settings) -> Option<[Option<i64>; 5]> {
         let stops = 0..settings.stops as u8;
         // The time, and in mode 2 the clock count before it.

@@ -10,8 +10,8 @@
 //! ```
 //!
 //! Here each is one fraction, rounded once: the result is the formula's value
-//! to the nearest picosecond, half a picosecond up. A clock that is off by some percent is not
-//! seen: times are off by as much.
+//! to the nearest picosecond, half a picosecond up. An error of the reference clock is an error of
+//! all times.
 //!
 //! The data sheet's example of mode 1:
 //!
@@ -39,7 +39,7 @@ pub enum CalibrationPeriods {
 }
 
 impl CalibrationPeriods {
-    /// How many.
+    /// Their number.
     #[must_use]
     pub const fn periods(self) -> u8 {
         match self {
@@ -76,8 +76,7 @@ impl Calibration {
     const PS_PER_MS: i64 = 1_000_000_000;
 
     /// From CALIBRATION1 and CALIBRATION2 and the reference clock in kHz, or
-    /// `None` unless CALIBRATION2 is the greater one, both fit 23 bits and the
-    /// clock lies within 1 to 16 MHz.
+    /// `None` unless CALIBRATION2 is greater, both fit 23 bits and the clock is within 1 to 16 MHz.
     #[must_use]
     #[allow(clippy::cast_lossless, reason = "`From` is not const")]
     pub const fn new(

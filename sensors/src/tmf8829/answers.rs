@@ -1,4 +1,4 @@
-//! What comes of an answer in each state.
+//! The next state after each answer.
 
 use super::frame::{Flags, Header, Kind};
 use super::registers::{
@@ -6,8 +6,8 @@ use super::registers::{
     FIRST_COMMAND, FRAME_INT, POFF, PON, STAT_INCOMPLETE, STAT_OK,
 };
 use super::requests::{ADDRESS_BLOCK, LAST_BLOCK};
-use super::{Error, MOST_IMAGE, State, Tmf8829Protocol, Waiting, count};
-use crate::timer::Since;
+use super::{DeviceError, Error, MAX_IMAGE, State, Tmf8829Protocol, Waiting};
+use crate::tmf::count;
 use crate::{PhotonSink, Polled};
 
 type Next<B, P> = Result<Option<Polled>, Error<B, P>>;
@@ -27,7 +27,7 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
             }
             State::Off { reset: false } | State::Resetting => self.wait_in(State::Starting, now_ms),
             State::Starting => {
-                self.since = Since::new(now_ms);
+                self.watch.restart(now_ms);
                 self.state = State::Waking;
                 self.wake(answer, now_ms)
             }
@@ -42,13 +42,13 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
                 // It may be measuring.
                 APPLICATION => self.go_on_in(State::Commanding(Command::Stop)),
                 BOOTLOADER if self.image.is_empty() => Err(Error::NoImage),
-                BOOTLOADER if self.image.len() > MOST_IMAGE => Err(Error::LongImage),
-                BOOTLOADER => self.go_on_in(State::Telling(BootCommand::SpiOff)),
+                BOOTLOADER if self.image.len() > MAX_IMAGE => Err(DeviceError::LongImage.into()),
+                BOOTLOADER => self.go_on_in(State::BootCommanding(BootCommand::SpiOff)),
                 id => Err(Error::WrongApplication { id }),
             },
-            State::Telling(BootCommand::Start) => self.wait_in(State::Booting, now_ms),
-            State::Telling(command) => self.wait_in(State::Told(command), now_ms),
-            State::Told(command) => self.told(command, answer, now_ms),
+            State::BootCommanding(BootCommand::Start) => self.wait_in(State::Booting, now_ms),
+            State::BootCommanding(command) => self.wait_in(State::BootCommanded(command), now_ms),
+            State::BootCommanded(command) => self.boot_commanded(command, answer, now_ms),
             State::Uploading { sent } => {
                 // At most 16 KiB.
                 let sent = sent.saturating_add(u16::try_from(CHUNK).unwrap_or(0));
@@ -61,25 +61,25 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
             State::Uploaded => match answer {
                 STAT_INCOMPLETE => {
                     let command = BootCommand::Upload;
-                    self.patience(Waiting::Bootloader(command), now_ms)
+                    self.wait_on(Waiting::Bootloader(command), now_ms)
                 }
-                status => self.told(BootCommand::Start, status, now_ms),
+                status => self.boot_commanded(BootCommand::Start, status, now_ms),
             },
             State::Booting if answer == APPLICATION => self.go_on_in(State::Keeping),
-            State::Booting => self.patience(Waiting::Application, now_ms),
+            State::Booting => self.wait_on(Waiting::Application, now_ms),
             State::Keeping => self.load_preset(),
             State::Commanding(command) => self.wait_in(State::Commanded(command), now_ms),
             State::Commanded(command) => self.commanded(command, answer, now_ms),
             State::Paging if answer == self.preset() => self.go_on_in(State::Configuring(0)),
             State::Paging => Err(Error::WrongPage { page: answer }),
             State::Configuring(LAST_BLOCK) => {
-                // Its status stands at the new address.
+                // The status is read at the new address.
                 self.address = self.config.settings().address;
                 self.wait_in(State::Commanded(Command::WritePage), now_ms)
             }
             State::Configuring(block) => {
                 let next = block + 1;
-                // The preset has the default one, whatever it answers at now.
+                // The preset has the default address, whatever the present one is.
                 let keeps = self.config.settings().address == DEFAULT_ADDRESS;
                 let skipped = next == ADDRESS_BLOCK && keeps;
                 self.go_on_in(State::Configuring(next + u8::from(skipped)))
@@ -99,16 +99,14 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
 
     fn wait_in<B, P>(&mut self, state: State, now_ms: u32) -> Next<B, P> {
         self.state = state;
-        self.since = Since::new(now_ms);
+        self.watch.restart(now_ms);
         Ok(Some(Polled::Working))
     }
 
-    /// Nothing yet; an error once it takes too long.
-    fn patience<B, P>(&self, waiting: Waiting, now_ms: u32) -> Next<B, P> {
+    /// Stays idle until the time is over.
+    fn wait_on<B, P>(&self, waiting: Waiting, now_ms: u32) -> Next<B, P> {
         let limit = self.config.settings().command_timeout_ms;
-        if self.since.is_over(limit, now_ms) {
-            return Err(Error::Timeout(waiting));
-        }
+        self.watch.check_time(limit, waiting, now_ms)?;
         Ok(Some(Polled::Idle))
     }
 
@@ -116,25 +114,30 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
         if enable & CPU_READY != 0 {
             return self.go_on_in(State::Identifying);
         }
-        let idle = self.patience(Waiting::PowerUp, now_ms)?;
+        let idle = self.wait_on(Waiting::PowerUp, now_ms)?;
         if enable & (PON | POFF) == PON {
             return Ok(idle);
         }
         self.go_on_in(State::SwitchingOn { enable })
     }
 
-    /// The answer to a command of the bootloader; to be started is to have all of the image.
-    fn told<B, P>(&mut self, command: BootCommand, status: u8, now_ms: u32) -> Next<B, P> {
+    /// The answer to a command of the bootloader. `Start` stands for a complete upload.
+    fn boot_commanded<B, P>(
+        &mut self,
+        command: BootCommand,
+        status: u8,
+        now_ms: u32,
+    ) -> Next<B, P> {
         if status >= FIRST_COMMAND {
-            return self.patience(Waiting::Bootloader(command), now_ms);
+            return self.wait_on(Waiting::Bootloader(command), now_ms);
         }
         if status != STAT_OK {
-            return Err(Error::Bootloader { command, status });
+            return Err(DeviceError::Bootloader { command, status }.into());
         }
         self.go_on_in(match command {
-            BootCommand::SpiOff => State::Telling(BootCommand::Upload),
+            BootCommand::SpiOff => State::BootCommanding(BootCommand::Upload),
             BootCommand::Upload => State::Uploading { sent: 0 },
-            BootCommand::Start => State::Telling(BootCommand::Start),
+            BootCommand::Start => State::BootCommanding(BootCommand::Start),
         })
     }
 
@@ -153,32 +156,31 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
             if status < FIRST_COMMAND {
                 return Err(Error::Refused { command, status });
             }
-            return self.patience(Waiting::Command(command), now_ms);
+            return self.wait_on(Waiting::Command(command), now_ms);
         }
         match command {
             Command::Stop => self.load_preset(),
             Command::LoadPreset(_) => self.go_on_in(State::Paging),
             Command::WritePage => self.go_on_in(State::Commanding(Command::Measure)),
             Command::Measure => {
-                (self.stuck, self.next, self.has_given) = (0, None, false);
+                self.watch.clear_stuck();
+                (self.next, self.has_given) = (None, false);
                 self.wait_in(State::Measuring, now_ms)
             }
         }
     }
 
-    fn is_silent(&self, now_ms: u32) -> bool {
+    fn check_silence<B, P>(&self, now_ms: u32) -> Result<(), Error<B, P>> {
         let limit = self.config.settings().data_timeout_ms;
-        self.since.is_over(limit, now_ms)
+        self.watch.check_time(limit, Waiting::Data, now_ms)
     }
 
     fn look<B, P>(&mut self, is_high: bool, now_ms: u32) -> Next<B, P> {
         if !is_high {
             return self.go_on_in(State::Asking);
         }
-        if self.is_silent(now_ms) {
-            return Err(Error::Timeout(Waiting::Frame));
-        }
-        self.stuck = 0;
+        self.check_silence(now_ms)?;
+        self.watch.clear_stuck();
         Ok(Some(Polled::Idle))
     }
 
@@ -187,13 +189,9 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
         if reasons != 0 {
             return self.go_on_in(State::Clearing { reasons });
         }
-        self.stuck = self.stuck.saturating_add(1);
-        if self.stuck >= self.config.settings().stuck_limit {
-            return Err(Error::StuckInterrupt { status });
-        }
-        if self.is_silent(now_ms) {
-            return Err(Error::Timeout(Waiting::Frame));
-        }
+        let limit = self.config.settings().stuck_limit;
+        self.watch.check_stuck(limit, status)?;
+        self.check_silence(now_ms)?;
         self.state = State::Measuring;
         Ok(Some(Polled::Idle))
     }
@@ -205,16 +203,16 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
         if let Kind::Histograms { .. } = header.kind {
             sink.begin_frame(self.config.pulses());
         }
-        self.stuck = 0;
+        self.watch.clear_stuck();
         let working = self.wait_in(State::Reading, now_ms)?;
         let found = header.number;
         match self.next.replace(found.wrapping_add(1)) {
             Some(expected) if expected != found => {
                 let missed = found.wrapping_sub(expected);
-                // A number that goes back says nothing of how many.
+                // A number that goes back does not tell how many are missed.
                 let missed = if missed >> 31 == 0 { missed } else { 0 };
                 self.counts.missed = self.counts.missed.saturating_add(missed);
-                Err(Error::Missed { expected, found })
+                Err(DeviceError::Missed { expected, found }.into())
             }
             _ => Ok(working),
         }
@@ -231,7 +229,7 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
         } else {
             Polled::Data
         };
-        self.since = Since::new(now_ms);
+        self.watch.restart(now_ms);
         if self.stream.left() > 0 {
             return Ok(Some(polled));
         }

@@ -1,19 +1,18 @@
 //! How a TMF8829 measures.
 
-use core::fmt;
-
 use dtof_core::PixelAddress;
 
 use super::registers::DEFAULT_ADDRESS;
 use super::zones::{Preset, REFERENCES, Zones};
+use crate::tmf::{ConfigError, check_address_and_pulses};
 
-/// What the sensor says of each zone beside its histogram.
+/// The results of each zone beside its histogram.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Results {
     /// Targets a zone, 1 to 4, nearest first. A cover glass may be the first.
     pub peaks: u8,
-    /// How strong each target is.
+    /// The strength of each target.
     pub signal: bool,
     /// The mean bin outside the peaks.
     pub noise: bool,
@@ -37,40 +36,40 @@ impl Results {
     }
 }
 
-/// The choices there are. [`Config::new`] checks them.
+/// The settings. [`Config::new`] checks them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
     /// The pixel of the zone in the first row and column; the others follow it row by row.
     pub first_pixel: PixelAddress,
-    /// The pixel of the first of four reference histograms, if they are wanted; the other
-    /// three follow it. They have 64 bins as the sensor sends them, never added. With the preset for
-    /// high accuracy nobody has published how wide these are.
+    /// The pixel of the first of four reference histograms, if they are enabled; the other
+    /// three follow it. They have 64 bins as the sensor sends them, never added. Their width with
+    /// the preset for high accuracy is not published.
     pub reference: Option<PixelAddress>,
     /// How many zones.
     pub zones: Zones,
     /// The vendor's preset.
     pub preset: Preset,
-    /// What else is said of each zone.
+    /// The results of each zone.
     pub results: Results,
     /// The I²C address to change to, 7 bits; 0x41 is the one after power-up.
     pub address: u8,
     /// Milliseconds from one measurement to the next. The pulses take 50.7 ns each, with long range
     /// 91.4 ns, and have to fit.
     pub period_ms: u16,
-    /// Laser pulses a measurement, in 1,024: those of all its time slots.
+    /// Laser pulses of a measurement in units of 1,024, all time slots together.
     pub kilo_iterations: u16,
     /// Milliseconds a command may take.
     pub command_timeout_ms: u32,
-    /// Milliseconds without data after which the measurement is given up.
+    /// Milliseconds without data after which the driver abandons the measurement.
     pub data_timeout_ms: u32,
     /// Polls in a row that may find INT low and `INT_STATUS` without a reason.
     pub stuck_limit: u8,
 }
 
 impl Settings {
-    /// The standard preset with 586 × 1,024 pulses, as the vendor has it. The period is what a bus
-    /// of 400 kHz takes for the histograms, some 600 ms for each time slot: 1.3 s with 8×8 and
+    /// The standard preset with 586 × 1,024 pulses, the vendor's default. The period is the time that a bus
+    /// of 400 kHz needs for the histograms, some 600 ms for each time slot: 1.3 s with 8×8 and
     /// 16×16 zones, 5 s with 32×32, 7.5 s with 48×32.
     #[must_use]
     pub const fn new(first_pixel: PixelAddress, zones: Zones) -> Self {
@@ -105,68 +104,14 @@ impl Settings {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config(Settings);
 
-/// Settings that cannot be used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum ConfigError {
-    /// The I²C address is reserved: below 0x08 or above 0x77.
-    Address,
-    /// A measurement without pulses.
-    ZeroIterations,
-    /// The pulses of a measurement take longer than its period; so they do with a period of 0,
-    /// which the sensor takes for a single measurement.
-    Period,
-    /// The last zone, or the last reference, would have a pixel past the last.
-    Pixels,
-    /// A reference would have the pixel of a zone.
-    Reference,
-    /// The time limit of data is not longer than the period.
-    Timeout,
-    /// The preset is one of 8×8 zones alone.
-    LongRange,
-    /// No target a zone, or more than four.
-    Peaks,
-    /// A frame of results would have more than 8,192 bytes, which the sensor refuses.
-    ResultSize,
-}
-
-impl ConfigError {
-    /// The reason, in one line.
-    #[must_use]
-    pub const fn text(self) -> &'static str {
-        match self {
-            Self::Address => "the I2C address must be within 0x08 and 0x77",
-            Self::ZeroIterations => "a measurement needs at least 1,024 pulses",
-            Self::Period => "the pulses of a measurement take longer than its period",
-            Self::Pixels => "the pixels of all zones do not fit behind the first",
-            Self::Reference => "a reference has the pixel of a zone",
-            Self::Timeout => "data would time out within one period",
-            Self::LongRange => "only 8x8 zones have a preset for long ranges",
-            Self::Peaks => "a zone has 1 to 4 targets",
-            Self::ResultSize => "the results of all zones are more than the sensor's 8,192 bytes",
-        }
-    }
-}
-
-impl fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.text())
-    }
-}
-
-impl core::error::Error for ConfigError {}
-
 impl Config {
     /// Checks `settings`.
     ///
     /// # Errors
-    /// [`ConfigError`] says what cannot be.
+    /// Returns a [`ConfigError`] if the settings cannot be used.
     pub const fn new(settings: Settings) -> Result<Self, ConfigError> {
-        if settings.address < 0x08 || settings.address > 0x77 {
-            return Err(ConfigError::Address);
-        }
-        if settings.kilo_iterations == 0 {
-            return Err(ConfigError::ZeroIterations);
+        if let Err(error) = check_address_and_pulses(settings.address, settings.kilo_iterations) {
+            return Err(error);
         }
         // In hundredths of a picosecond.
         let lasts = settings.kilo_iterations as u64 * 1024 * settings.preset.laser_period();
@@ -174,15 +119,15 @@ impl Config {
             return Err(ConfigError::Period);
         }
         let zones = settings.zones;
-        let PixelAddress(first) = settings.first_pixel;
+        let first = settings.first_pixel.raw();
         let Some(last) = first.checked_add(zones.number() - 1) else {
             return Err(ConfigError::Pixels);
         };
-        if let Some(PixelAddress(reference)) = settings.reference {
-            let Some(last_reference) = reference.checked_add(REFERENCES - 1) else {
+        if let Some(reference) = settings.reference {
+            let Some(last_reference) = reference.raw().checked_add(REFERENCES - 1) else {
                 return Err(ConfigError::Pixels);
             };
-            if reference <= last && first <= last_reference {
+            if reference.raw() <= last && first <= last_reference {
                 return Err(ConfigError::Reference);
             }
         }
@@ -209,9 +154,9 @@ impl Config {
 
     /// One more than the last pixel of a zone or a reference.
     pub(super) fn pixels(&self) -> u16 {
-        let PixelAddress(first) = self.0.first_pixel;
+        let first = self.0.first_pixel.raw();
         let zones = first.saturating_add(self.0.zones.number());
-        let references = self.0.reference.map(|PixelAddress(first)| first);
+        let references = self.0.reference.map(PixelAddress::raw);
         references.map_or(zones, |first| zones.max(first.saturating_add(REFERENCES)))
     }
 

@@ -16,7 +16,7 @@
 //! FIFOSTATUS on, all others from the FIFO.
 
 use super::config::Config;
-use super::error::Error;
+use super::error::DeviceError;
 use super::registers::OVERRUN;
 use super::zones::{FEW_BINS, REFERENCES};
 
@@ -24,12 +24,12 @@ use super::zones::{FEW_BINS, REFERENCES};
 pub(super) const HEADER: usize = 21;
 /// Bytes behind the data.
 pub(super) const END: u16 = 12;
-/// Of the length, these are not in the payload.
+/// Bytes that the length in the header does not count.
 const UNCOUNTED: u16 = 9;
 const MARKER: u16 = 0xE0F7;
 const RESULT: u8 = 0x10;
 const HISTOGRAM: u8 = 0x20;
-/// Of a format: these are the rows of odd numbers.
+/// The bit of a format for the odd rows.
 const SECOND: u8 = 1 << 6;
 
 /// What a frame holds.
@@ -52,15 +52,15 @@ pub(super) struct Header {
 
 impl Header {
     /// # Errors
-    /// If this begins no frame of a measurement that is configured so.
-    pub(super) fn of<B, P>(bytes: &[u8], config: &Config) -> Result<Self, Error<B, P>> {
+    /// Fails if this is not the header of a frame of the configured measurement.
+    pub(super) fn of(bytes: &[u8], config: &Config) -> Result<Self, DeviceError> {
         let Some(&[status, _, _, _, _, id, part, size_l, size_h, a, b, c, d, ..]) =
             bytes.first_chunk::<HEADER>()
         else {
-            return Err(Error::NoEnd { marker: 0 });
+            return Err(DeviceError::NoEnd { marker: 0 });
         };
         if status & OVERRUN != 0 {
-            return Err(Error::Overrun { status });
+            return Err(DeviceError::Overrun { status });
         }
         let settings = config.settings();
         let zones = settings.zones;
@@ -74,13 +74,13 @@ impl Header {
             let bins = REFERENCES * FEW_BINS + zones.frame_zones() * zones.bins();
             (Kind::Histograms { slot: part }, 3 * bins)
         } else {
-            return Err(Error::ForeignFrame { id, part, payload });
+            return Err(DeviceError::ForeignFrame { id, part, payload });
         };
         #[allow(clippy::cast_possible_truncation, reason = "21")]
         let length = HEADER as u16 + data + END;
         let is_halved = zones.is_halved() || kind != Kind::Results { is_second: true };
         if payload != length - UNCOUNTED || !is_halved {
-            return Err(Error::ForeignFrame { id, part, payload });
+            return Err(DeviceError::ForeignFrame { id, part, payload });
         }
         Ok(Self {
             kind,
@@ -90,30 +90,28 @@ impl Header {
     }
 }
 
-/// What the end of a frame says.
+/// The flags at the end of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Flags(u8);
 
 impl Flags {
     /// # Errors
-    /// If this is no end, or the frame is not valid.
-    pub(super) fn of<B, P>(end: &[u8; END as usize]) -> Result<Self, Error<B, P>> {
+    /// Fails if the end marker is missing.
+    pub(super) fn of(end: &[u8; END as usize]) -> Result<Self, DeviceError> {
         let [.., flags, _, low, high] = *end;
         match u16::from_le_bytes([low, high]) {
             MARKER => Ok(Self(flags)),
-            marker => Err(Error::NoEnd { marker }),
+            marker => Err(DeviceError::NoEnd { marker }),
         }
     }
 
-    /// Not aborted, and marked as valid.
-    ///
     /// # Errors
-    /// If it is not.
-    pub(super) const fn check<B, P>(self) -> Result<(), Error<B, P>> {
+    /// Fails if the frame was aborted or is not marked as valid.
+    pub(super) const fn check(self) -> Result<(), DeviceError> {
         if self.0 & 0b1100_0001 == 1 {
             Ok(())
         } else {
-            Err(Error::Aborted { flags: self.0 })
+            Err(DeviceError::Aborted { flags: self.0 })
         }
     }
 

@@ -2,13 +2,13 @@
 //!
 //! The sensor's program is the vendor's and not part of this crate. Pass the bytes of its image to
 //! the driver. It is loaded when the bootloader runs; a sensor that already runs the application
-//! is configured anew and not loaded again.
+//! is configured again and not loaded again.
 //!
 //! # Histograms
 //!
 //! A measurement has 2 to 12 time slots ([`Zones::frames`]). The sensor sends a frame of histograms
-//! for each, and waits until it is read. A histogram is given as soon as its last byte is here, so
-//! the driver has room for one. Bins behind those of the preset are 0: [`About`] says how many
+//! for each, and waits until it is read. The driver passes a histogram on as soon as its last byte
+//! is read, so it needs room for one only. Bins behind those of the preset are 0: [`SensorInfo`] says how many
 //! bins are measured and how wide they are.
 //!
 //! | preset | bins | width |
@@ -18,39 +18,39 @@
 //! | high accuracy | 64 | 203.65 ps |
 //! | high accuracy, 8×8 zones | 109 | 407.3 ps |
 //!
-//! The last one has 218 bins of 203.65 ps, more than a histogram holds: the driver adds two and two.
+//! The last one has 218 bins of 203.65 ps, more than a histogram holds: the driver adds pairs of bins.
 //! A count in a bin that a histogram does not hold is in [`Counts::beyond`].
 //!
 //! Pixels follow the sensor's own zones row by row, the first row on top. Lenses mirror the scene
 //! from left to right, as seen from the sensor; the driver does not turn it.
 //!
-//! After its histograms the sensor says which targets it sees itself
-//! ([`PhotonSink::target`]). [`snr`] says what their confidence stands for. Their distances are not
+//! After its histograms the sensor reports the targets that it has found itself
+//! ([`PhotonSink::target`]). [`snr`] converts their confidence. Their distances are not
 //! corrected for the sensor's clock.
 //!
 //! # Time zero
 //!
-//! The offset in [`About`] was fitted to a public log of one sensor with the standard preset: pulses
+//! The offset in [`SensorInfo`] was fitted to a public log of one sensor with the standard preset: pulses
 //! then lie at the sensor's own distances, 1.0 to 2.85 m, 3.5 mm off in the median and 17 mm at
 //! 95 %. In the same log the detector beside the laser sees its pulse within 12 mm of there.
 //!
-//! No log shows the other presets. They have the same offset, as the best guess; the shorter pulse of
-//! high accuracy may shift it by some centimetres. Find yours with a target at a known distance.
+//! No log covers the other presets. The driver assumes the same offset for them; the shorter pulse
+//! of high accuracy may shift it by some centimetres. Measure yours with a target at a known distance.
 //!
-//! The four reference histograms of each frame, of the detector beside the laser, show time zero as
-//! it is now: [`Settings::reference`] asks for them.
+//! The four reference histograms of each frame come from the detector beside the laser and show the
+//! present time zero. [`Settings::reference`] enables them.
 //!
 //! # Laser cycles
 //!
 //! Every laser pulse is a laser cycle. The pulses of a measurement, `kilo_iterations` × 1,024, are
-//! shared out among its time slots, and a frame of histograms ends those of its slot. No
-//! source says so; stamps of recorded frames agree. The laser rate is the mean over a period, if the
+//! divided among its time slots, and a frame of histograms ends those of its slot. No
+//! source documents this; the time stamps of recorded frames agree. The laser rate is the mean over a period, if the
 //! bus is fast enough for it: a frame of histograms takes 0.6 s at 400 kHz, and the sensor waits.
 //! Periods of 33 ms were 31.5 ms long with two sensors, so the rate may be 5 % low.
 //!
 //! # Where the numbers come from
 //!
-//! The data sheet DS001140, the application note AN001096, and for what they leave out or print
+//! The data sheet DS001140, the application note AN001096, and where these are incomplete or
 //! wrong the vendor's published drivers: the upload (0x45, least significant byte first), the
 //! identifications of frames, and that no command has a checksum.
 //!
@@ -65,10 +65,10 @@
 //!
 //! # After an error
 //!
-//! Frames that were left out and frames that are marked as not valid are errors that cost nothing
-//! else. Any other error while measuring stops and configures the sensor anew. An error before it has
-//! given a whole frame switches it off and on and loads the image again. Of a frame that breaks off
-//! its first histograms have been given.
+//! Missed frames and frames that are marked as not valid are reported as errors, and the measurement
+//! goes on. After any other error while measuring the driver stops the sensor and configures it again.
+//! After an error before the first whole frame it switches the sensor off and on and loads the image
+//! again. The first histograms of a frame that breaks off have been given.
 //!
 //! # Cost
 //!
@@ -90,14 +90,15 @@ use dtof_core::fixed::types::I24F8;
 use self::registers::DEFAULT_ADDRESS;
 use self::stream::Stream;
 use crate::protocol::{Driver, Protocol, Request};
-use crate::timer::Since;
-use crate::{About, PhotonSink, Polled};
+use crate::tmf::{Watch, count};
+use crate::{PhotonSink, Polled, SensorInfo};
 
-pub use self::config::{Config, ConfigError, Results, Settings};
-pub use self::error::{Error, Waiting};
+pub use self::config::{Config, Results, Settings};
+pub use self::error::{DeviceError, Error, Waiting};
 pub use self::registers::{BootCommand, Command};
 pub use self::snr::snr;
 pub use self::zones::{Preset, Zones};
+pub use crate::tmf::ConfigError;
 
 /// ENABLE stays low this long when the sensor is switched off and on.
 const RESET_MS: u32 = 3;
@@ -105,16 +106,16 @@ const RESET_MS: u32 = 3;
 const START_MS: u32 = 3;
 /// From the start of the image to the first access.
 const BOOT_MS: u32 = 10;
-/// The bootloader counts at most so many words of an image.
-const MOST_IMAGE: usize = 4 * 0x1000;
+/// The most bytes of an image: the bootloader counts 0x1000 words.
+const MAX_IMAGE: usize = 4 * 0x1000;
 /// Room for a transfer: the register, and as many bytes as a chunk may have.
 const BUFFER: usize = 256;
 
 /// A TMF8829 on an I²C bus, with INT and ENABLE.
 ///
 /// `CHUNK` is how many bytes of a frame or of the image go over the bus in one transaction, 4 to
-/// 252 in fours (checked when compiled): what another device on the bus may have to wait for. The
-/// header of a frame is always 21.
+/// 252 in steps of 4 (checked when compiled). Another device on the bus may have to wait for that
+/// long. The header of a frame always has 21.
 pub type Tmf8829<'a, I2C, INT, EN, const CHUNK: usize = 128> =
     Driver<Tmf8829Protocol<'a, CHUNK>, I2C, INT, EN>;
 
@@ -126,11 +127,8 @@ pub struct Tmf8829Protocol<'a, const CHUNK: usize = 128> {
     /// The address it answers at now.
     address: u8,
     state: State,
-    /// When the present wait began.
-    since: Since,
-    /// Polls in a row with INT low for no reason.
-    stuck: u8,
-    /// A frame has come whole since it began to measure.
+    watch: Watch,
+    /// A whole frame has come since it began to measure.
     has_given: bool,
     /// The frame that should come next, once one has come.
     next: Option<u32>,
@@ -153,7 +151,7 @@ pub struct Counts {
     pub aborted: u32,
     /// Of these, frames with SPADs overloaded or the laser at its limit.
     pub limited: u32,
-    /// Frames that were left out, by their numbers.
+    /// Missed frames, by their numbers.
     pub missed: u32,
     /// Photons in bins that a histogram does not hold.
     pub beyond: u64,
@@ -161,57 +159,57 @@ pub struct Counts {
     pub errors: u32,
 }
 
-/// What is to be done next. Each is one transfer, or a wait.
+/// The next step: one transfer, or a wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// ENABLE is to be driven high, or before that low.
+    /// Drive ENABLE high, or with `reset` first low.
     Off { reset: bool },
     /// ENABLE is low.
     Resetting,
     /// ENABLE is high.
     Starting,
-    /// Whether the processor is ready.
+    /// Read whether the processor is ready.
     Waking,
-    /// It is not, nor switched on.
+    /// It is not ready, and not switched on: switch it on.
     SwitchingOn { enable: u8 },
-    /// Which chip is it?
+    /// Read which chip it is.
     Identifying,
-    /// Which program runs?
+    /// Read which program runs.
     Looking,
-    /// The bootloader is to be told.
-    Telling(BootCommand),
-    /// Whether it has done so.
-    Told(BootCommand),
-    /// The rest of the image from here on is to be sent.
+    /// Send a command to the bootloader.
+    BootCommanding(BootCommand),
+    /// Read whether it is done.
+    BootCommanded(BootCommand),
+    /// Send the image from this byte on.
     Uploading { sent: u16 },
-    /// Whether all of it is there.
+    /// Read whether the image is complete.
     Uploaded,
-    /// Whether the application runs.
+    /// Read whether the application runs.
     Booting,
-    /// A reset is to start the application again.
+    /// Make resets start the application.
     Keeping,
-    /// The application is to be told.
+    /// Send a command to the application.
     Commanding(Command),
-    /// Whether it has done so.
+    /// Read whether it is done.
     Commanded(Command),
-    /// Whether the preset is there.
+    /// Read whether the preset is loaded.
     Paging,
-    /// This block of the configuration is to be written.
+    /// Write this block of the configuration.
     Configuring(u8),
-    /// Whether INT is low.
+    /// Read INT.
     Measuring,
-    /// Why it is.
+    /// INT is low: read why.
     Asking,
-    /// These reasons are to be cleared.
+    /// Clear these reasons.
     Clearing { reasons: u8 },
-    /// A frame begins.
+    /// Read the header of a frame.
     Beginning,
-    /// The rest of it comes.
+    /// Read the rest of the frame.
     Reading,
 }
 
 impl<'a, I2C, INT, EN, const CHUNK: usize> Tmf8829<'a, I2C, INT, EN, CHUNK> {
-    /// A driver that has not touched its device yet. `image` may be empty for a sensor that
+    /// A driver that has not accessed its device yet. `image` may be empty for a sensor that
     /// already runs the application.
     pub const fn new(
         i2c: I2C,
@@ -233,14 +231,14 @@ impl<'a, I2C, INT, EN, const CHUNK: usize> Tmf8829<'a, I2C, INT, EN, CHUNK> {
         self.protocol().address
     }
 
-    /// Whether the sensor is up.
+    /// Whether the sensor measures.
     pub const fn is_measuring(&self) -> bool {
         self.protocol().is_measuring()
     }
 }
 
 impl<'a, const CHUNK: usize> Tmf8829Protocol<'a, CHUNK> {
-    /// Of a device that was not touched yet.
+    /// The protocol of a device that was not accessed yet.
     #[must_use]
     pub const fn new(image: &'a [u8], config: Config) -> Self {
         const {
@@ -253,13 +251,11 @@ impl<'a, const CHUNK: usize> Tmf8829Protocol<'a, CHUNK> {
             image,
             config,
             address: DEFAULT_ADDRESS,
-            // With an address of its own it may answer at that or at 0x41, so
-            // that only a reset makes sure.
+            // A sensor with its own address may answer there or at 0x41: a reset makes sure.
             state: State::Off {
                 reset: config.settings().address != DEFAULT_ADDRESS,
             },
-            since: Since::new(0),
-            stuck: 0,
+            watch: Watch::new(),
             has_given: false,
             next: None,
             buffer: [0; BUFFER],
@@ -283,7 +279,7 @@ impl<'a, const CHUNK: usize> Tmf8829Protocol<'a, CHUNK> {
         self.counts
     }
 
-    /// Whether the sensor is up.
+    /// Whether the sensor measures.
     #[must_use]
     pub const fn is_measuring(&self) -> bool {
         matches!(
@@ -296,7 +292,7 @@ impl<'a, const CHUNK: usize> Tmf8829Protocol<'a, CHUNK> {
         )
     }
 
-    /// Begins again, with a reset or without.
+    /// Abandons the measurement and begins again, with a reset or without.
     fn give_up(&mut self, reset: bool) {
         if self.state == State::Reading {
             count(&mut self.counts.broken);
@@ -308,16 +304,16 @@ impl<'a, const CHUNK: usize> Tmf8829Protocol<'a, CHUNK> {
 impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
     type Error<B, P> = Error<B, P>;
 
-    fn about(&self) -> About {
+    fn info(&self) -> SensorInfo {
         /// From a fit of the pulses to the sensor's own distances.
         const OFFSET: I24F8 = I24F8::lit("-441.1");
         let settings = self.config.settings();
-        About {
+        SensorInfo {
             pixels: self.config.pixels(),
             bin_width: Some(settings.preset.bin_width(settings.zones)),
             bins: settings.preset.bins(settings.zones),
             offset: OFFSET,
-            is_whole: true,
+            gives_histograms: true,
             laser_millihertz: self.config.laser_millihertz(),
         }
     }
@@ -353,13 +349,12 @@ impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
 
     fn failed<B, P>(&mut self, error: &Error<B, P>) {
         count(&mut self.counts.errors);
-        if !matches!(error, Error::Missed { .. } | Error::Aborted { .. }) {
-            // Only a sensor that has given a frame is known to be well.
+        if !matches!(
+            error,
+            Error::Device(DeviceError::Missed { .. } | DeviceError::Aborted { .. })
+        ) {
+            // Only a sensor that has sent a frame is known to work.
             self.give_up(!self.is_measuring() || !self.has_given);
         }
     }
-}
-
-fn count(counter: &mut u32) {
-    *counter = counter.saturating_add(1);
 }

@@ -1,29 +1,13 @@
 //! Registers, commands and answers of the TMF8829, named as in its data sheet DS001140 and in
-//! the vendor's application note AN001096.
+//! the vendor's application note AN001096. `tmf::registers` has those that all TMF sensors share.
 
-/// The I²C address after power-up.
-pub(super) const DEFAULT_ADDRESS: u8 = 0x41;
+pub(super) use crate::tmf::registers::*;
 
-/// What runs.
-pub(super) const APPID: u8 = 0x00;
-/// APPID of the bootloader.
-pub(super) const BOOTLOADER: u8 = 0x80;
 /// APPID of the measurement application in RAM.
 pub(super) const APPLICATION: u8 = 0x01;
 
-/// A command is written here with its parameters, in one transaction; its state is read back.
-pub(super) const CMD_STAT: u8 = 0x08;
-/// `CMD_STAT`: done.
-pub(super) const STAT_OK: u8 = 0x00;
-/// `CMD_STAT`: accepted and going on, the answer to [`Command::Measure`].
-pub(super) const STAT_ACCEPTED: u8 = 0x01;
 /// `CMD_STAT` of the bootloader: words of the image are missing.
 pub(super) const STAT_INCOMPLETE: u8 = 0x04;
-/// `CMD_STAT` from here on is a command that is not answered yet.
-pub(super) const FIRST_COMMAND: u8 = 0x10;
-
-/// Which page the registers behind it hold.
-pub(super) const PAGE: u8 = 0x20;
 /// Period in ms and iterations in 1,024, 16 bits each.
 pub(super) const PERIOD: u8 = 0x22;
 /// `fp_mode`: the zones.
@@ -35,12 +19,8 @@ pub(super) const HISTOGRAMS_ON: u8 = 1;
 /// The I²C address in bits 7..1.
 pub(super) const I2C_ADDRESS: u8 = 0x90;
 
-/// Why INT is low. Writing a 1 clears a bit. Behind it, which bits pull INT low.
-pub(super) const INT_STATUS: u8 = 0xE1;
 /// `INT_STATUS`: a frame of results, or of histograms, stands ready.
 pub(super) const FRAME_INT: u8 = 1 << 3 | 1;
-/// The chip's identification.
-pub(super) const ID: u8 = 0xE3;
 /// The value of ID.
 pub(super) const CHIP_ID: u8 = 0x9E;
 
@@ -52,7 +32,7 @@ pub(super) const CPU_READY: u8 = 1 << 7;
 pub(super) const POFF: u8 = 1 << 3;
 /// ENABLE bit 2: powered on.
 pub(super) const PON: u8 = 1 << 2;
-/// ENABLE bits 5..4: it wakes up with the program in RAM. PON besides.
+/// ENABLE bits 5..4: it wakes up with the program in RAM; with PON.
 pub(super) const ON_FROM_RAM: u8 = 2 << 4 | PON;
 
 /// FIFOSTATUS; behind it the systick, and the FIFO.
@@ -65,6 +45,7 @@ pub(super) const FIFO: u8 = 0xFF;
 /// A command of the measurement application.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Command {
     /// Measure until told to stop.
     Measure,
@@ -99,6 +80,7 @@ impl Command {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum BootCommand {
     /// Start the program in RAM.
     Start = 0x16,

@@ -1,4 +1,4 @@
-//! What is wanted in each state.
+//! The request of each state.
 
 use super::frame::HEADER;
 use super::registers::{
@@ -10,35 +10,36 @@ use super::{BOOT_MS, BUFFER, RESET_MS, START_MS, State, Tmf8829Protocol};
 use crate::Polled;
 use crate::protocol::Request;
 
-/// Where an image goes.
+/// Where an image is loaded.
 const LOAD_ADDRESS: [u8; 4] = 0x0001_0000u32.to_le_bytes();
 
-/// Of the configuration: the block with the address, which is skipped if that is the preset's.
+/// The block of the configuration with the address. It is skipped if the preset's address is right.
 pub(super) const ADDRESS_BLOCK: u8 = 3;
-/// The command that takes it over.
+/// The command that applies the configuration.
 pub(super) const LAST_BLOCK: u8 = 5;
 
 impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
-    // Not in the middle of a main loop: its table of jumps would go backwards there.
+    // Inlined into a main loop, its jump table would have backward branches, which `stack-bound`
+    // does not follow.
     #[inline(never)]
     pub(super) fn next_request(&mut self, now_ms: u32) -> Request<'_> {
         match self.state {
             State::Off { reset } => Request::Enable(!reset),
-            State::Resetting if !self.since.is_over(RESET_MS, now_ms) => {
+            State::Resetting if !self.watch.is_over(RESET_MS, now_ms) => {
                 Request::Nothing(Polled::Idle)
             }
             State::Resetting => Request::Enable(true),
-            State::Starting if !self.since.is_over(START_MS, now_ms) => {
+            State::Starting if !self.watch.is_over(START_MS, now_ms) => {
                 Request::Nothing(Polled::Idle)
             }
             State::Starting | State::Waking => self.read(ENABLE, 1),
             State::SwitchingOn { enable } => self.write(&[ENABLE, enable & !POFF | PON]),
             State::Identifying => self.read(ID, 1),
-            State::Booting if !self.since.is_over(BOOT_MS, now_ms) => {
+            State::Booting if !self.watch.is_over(BOOT_MS, now_ms) => {
                 Request::Nothing(Polled::Idle)
             }
             State::Looking | State::Booting => self.read(APPID, 1),
-            State::Telling(BootCommand::Upload) => {
+            State::BootCommanding(BootCommand::Upload) => {
                 let words = self.image.len().div_ceil(4);
                 // At most 0x1000.
                 let [low, high] = u16::try_from(words).unwrap_or(u16::MAX).to_le_bytes();
@@ -46,8 +47,10 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
                 let upload = BootCommand::Upload as u8;
                 self.write(&[CMD_STAT, upload, 6, a, b, c, d, low, high])
             }
-            State::Telling(command) => self.write(&[CMD_STAT, command as u8]),
-            State::Told(_) | State::Uploaded | State::Commanded(_) => self.read(CMD_STAT, 1),
+            State::BootCommanding(command) => self.write(&[CMD_STAT, command as u8]),
+            State::BootCommanded(_) | State::Uploaded | State::Commanded(_) => {
+                self.read(CMD_STAT, 1)
+            }
             State::Uploading { sent } => self.upload(usize::from(sent)),
             State::Keeping => self.write(&[ENABLE, ON_FROM_RAM]),
             State::Commanding(command) => self.write(&[CMD_STAT, command.code()]),

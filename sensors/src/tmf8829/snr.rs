@@ -1,6 +1,6 @@
 //! The signal-to-noise ratio of a target.
 
-/// 40, and from there on each the one before × 1.053676, with 64 binary places behind the point.
+/// 40, and each next one is × 1.053676, computed with 64 fractional bits.
 const RATIOS: [u32; 216] = {
     let mut ratios = [0; 216];
     let mut ratio: u128 = 40 << 64;
@@ -14,14 +14,14 @@ const RATIOS: [u32; 216] = {
         {
             ratios[code] = (ratio >> 64) as u32;
         }
-        // What the division leaves is less than 2⁻⁴⁴.
+        // The remainder of the division is less than 2⁻⁴⁴.
         ratio = ratio / 1_000_000 * 1_053_676;
         code += 1;
     }
     ratios
 };
 
-/// The ratio that a target's `confidence` stands for, rounded down: itself up to 40, then
+/// The signal-to-noise ratio of a target's `confidence`, rounded down: up to 40 they are equal, then
 /// 40 × 1.053676^(confidence − 40), at most 3.05 million.
 #[must_use]
 pub fn snr(confidence: u8) -> u32 {

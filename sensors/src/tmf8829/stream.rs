@@ -1,4 +1,4 @@
-//! Histograms and targets out of the bytes of a frame, as they come. It holds one histogram.
+//! Decodes histograms and targets from the bytes of a frame as they come. It holds one histogram.
 
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::I24F8;
@@ -12,13 +12,13 @@ use crate::{PhotonSink, Target};
 /// The most bytes of a zone in a frame of results: four targets.
 const RECORD: usize = 24;
 
-/// A frame behind its header.
+/// A frame after its header.
 #[derive(Debug)]
 pub(super) struct Stream {
     header: Header,
     /// Bytes of it so far.
     at: u16,
-    /// The histogram or the zone that comes, and its bytes so far.
+    /// The present histogram or zone, and its bytes so far.
     index: u16,
     taken: u16,
     /// The present count.
@@ -114,15 +114,15 @@ impl Stream {
         if bin + 1 < bins {
             return;
         }
-        let (PixelAddress(first), zone) = match zone {
+        let (first, zone) = match zone {
             Some(zone) => (settings.first_pixel, zones.of_histogram(slot, zone)),
             None => match settings.reference {
                 Some(first) => (first, self.index),
-                None => (PixelAddress(0), u16::MAX),
+                None => (PixelAddress::new(0), u16::MAX),
             },
         };
-        if let Some(pixel) = first.checked_add(zone).filter(|_| zone < u16::MAX) {
-            sink.histogram(PixelAddress(pixel), &self.counts);
+        if let Some(pixel) = first.raw().checked_add(zone).filter(|_| zone < u16::MAX) {
+            sink.histogram(PixelAddress::new(pixel), &self.counts);
             counts.histograms = counts.histograms.saturating_add(1);
         }
         self.counts = [0; 128];
@@ -149,9 +149,9 @@ impl Stream {
         let noise = results.noise.then(&mut word).map(unpack);
         let crosstalk = results.crosstalk.then(&mut word).map(unpack);
         let zone = settings.zones.of_result(is_second, self.index);
-        let PixelAddress(first) = settings.first_pixel;
+        let first = settings.first_pixel.raw();
         // The last zone fits.
-        let pixel = PixelAddress(first.saturating_add(zone));
+        let pixel = PixelAddress::new(first.saturating_add(zone));
         for number in 0..results.peaks {
             let [low, high, confidence] = [(); 3].map(|()| bytes.next().unwrap_or(0));
             let mut word = || [(); 2].map(|()| bytes.next().unwrap_or(0));
@@ -175,7 +175,7 @@ impl Stream {
     }
 }
 
-/// A strength: with the highest bit, the others are in 256.
+/// A strength: the highest bit multiplies the others by 256.
 fn unpack(packed: u16) -> u32 {
     match packed & 0x7fff {
         value if value < packed => u32::from(value) << 8,

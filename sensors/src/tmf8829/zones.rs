@@ -9,7 +9,7 @@ pub(super) const FEW_BINS: u16 = 64;
 /// The width of a bin before any shift.
 const FINEST: U16F16 = U16F16::lit("203.65");
 
-/// How many zones a measurement has.
+/// The zones of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Zones {
@@ -26,7 +26,7 @@ pub enum Zones {
 }
 
 impl Zones {
-    /// All there are.
+    /// All of them.
     pub const ALL: [Self; 5] = [
         Self::Z8x8,
         Self::Z16x16,
@@ -152,7 +152,7 @@ impl Preset {
         matches!(self, Self::HighAccuracy)
     }
 
-    /// The sensor's bins to this power of two are one of those that are given.
+    /// A bin of the histogram is 2 to this power of the sensor's bins.
     pub(super) const fn merge(self, zones: Zones) -> u8 {
         (self.is_fine() && matches!(zones, Zones::Z8x8)) as u8
     }
@@ -176,7 +176,7 @@ impl Preset {
         steps * 20_365
     }
 
-    /// The width of the bins that are given.
+    /// The width of the histogram's bins.
     pub(super) const fn bin_width(self, zones: Zones) -> U16F16 {
         let shift = if self.is_fine() { self.merge(zones) } else { 2 };
         U16F16::from_bits(FINEST.to_bits() << shift)

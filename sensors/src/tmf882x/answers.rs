@@ -1,4 +1,4 @@
-//! What comes of an answer in each state, on the way up.
+//! The next state after each answer until the sensor measures.
 
 use super::bootloader::{Answer, MAX_DATA};
 use super::config::Zones;
@@ -7,8 +7,7 @@ use super::registers::{
     DEFAULT_ADDRESS, FIRST_COMMAND, MODE_8X8, PON,
 };
 use super::requests::Block;
-use super::{BOOT_MS, Error, State, Tmf882xProtocol, Waiting};
-use crate::timer::Since;
+use super::{BOOT_MS, DeviceError, Error, State, Tmf882xProtocol, Waiting};
 use crate::{PhotonSink, Polled};
 
 pub(super) type Next<B, P> = Result<Option<Polled>, Error<B, P>>;
@@ -27,7 +26,7 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
                 self.wait_in(State::Resetting, now_ms)
             }
             State::Off { reset: false } | State::Resetting => self.wait_in(State::Starting, now_ms),
-            // It is waited for without a request.
+            // It waits without a request.
             State::Starting => Ok(Some(Polled::Idle)),
             State::Waking => self.wake(answer, now_ms),
             State::SwitchingOn { .. } => {
@@ -46,7 +45,7 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
                 }),
                 id => Err(Error::WrongApplication { id }),
             },
-            // It does not answer this one: the application does.
+            // The bootloader does not answer this command; the application does.
             State::Loading {
                 command: BootCommand::RamRemapReset,
                 ..
@@ -60,10 +59,10 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
             }
             State::Loaded { command, sent } => self.load_more(command, sent, now_ms),
             State::Booting if answer == APPLICATION => self.show_page(),
-            State::Booting => self.patience(BOOT_MS, Waiting::Application, now_ms),
+            State::Booting => self.wait_on(BOOT_MS, Waiting::Application, now_ms),
             State::Commanding(command) => {
                 if command == Command::I2cSlaveAddress {
-                    // Its status stands at the new address.
+                    // The status is read at the new address.
                     self.address = self.config.settings().address;
                 }
                 self.wait_in(State::Commanded(command), now_ms)
@@ -72,7 +71,7 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
             State::Switched => {
                 let is_8x8 = self.config.settings().zones == Zones::SixtyFour;
                 if is_8x8 != (answer == MODE_8X8) {
-                    return Err(Error::WrongMode { mode: answer });
+                    return Err(DeviceError::WrongMode { mode: answer }.into());
                 }
                 self.go_on_in(State::Commanding(Command::LoadConfigPageCommon))
             }
@@ -111,38 +110,37 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
 
     fn wait_in<B, P>(&mut self, state: State, now_ms: u32) -> Next<B, P> {
         self.state = state;
-        self.since = Since::new(now_ms);
+        self.watch.restart(now_ms);
         Ok(Some(Polled::Working))
     }
 
-    /// Nothing yet; an error once it takes too long.
-    fn patience<B, P>(&self, more_ms: u32, waiting: Waiting, now_ms: u32) -> Next<B, P> {
+    /// Stays idle until the time is over.
+    fn wait_on<B, P>(&self, more_ms: u32, waiting: Waiting, now_ms: u32) -> Next<B, P> {
         let limit = self.config.settings().command_timeout_ms;
-        if self.since.is_over(limit.saturating_add(more_ms), now_ms) {
-            return Err(Error::Timeout(waiting));
-        }
+        let limit = limit.saturating_add(more_ms);
+        self.watch.check_time(limit, waiting, now_ms)?;
         Ok(Some(Polled::Idle))
     }
 
-    /// Waits for the processor, then sees what runs.
+    /// Waits for the processor.
     fn wake<B, P>(&mut self, enable: u8, now_ms: u32) -> Next<B, P> {
         if enable & CPU_READY != 0 {
             return self.go_on_in(State::Identifying);
         }
-        let idle = self.patience(0, Waiting::PowerUp, now_ms)?;
+        let idle = self.wait_on(0, Waiting::PowerUp, now_ms)?;
         if enable & PON != 0 {
             return Ok(idle);
         }
         self.go_on_in(State::SwitchingOn { enable })
     }
 
-    /// The bootloader answers to `command`, and so many bytes of the image have been sent.
+    /// Takes the answer of the bootloader to `command` after `sent` bytes of the image.
     fn load_more<B, P>(&mut self, command: BootCommand, sent: usize, now_ms: u32) -> Next<B, P> {
         let [a, b, c, ..] = self.buffer;
         let answer = [a, b, c];
         match Answer::of(answer, command) {
-            Answer::Busy => self.patience(0, Waiting::Bootloader(command), now_ms),
-            Answer::Wrong => Err(Error::Bootloader { command, answer }),
+            Answer::Busy => self.wait_on(0, Waiting::Bootloader(command), now_ms),
+            Answer::Wrong => Err(DeviceError::Bootloader { command, answer }.into()),
             Answer::Done => {
                 let command = match command {
                     BootCommand::DownloadInit => BootCommand::SetRamAddress,
@@ -154,7 +152,7 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
         }
     }
 
-    /// The application shows its configuration, of the zones that are wanted.
+    /// Asks the application for its configuration page for the configured zones.
     fn show_page<B, P>(&mut self) -> Next<B, P> {
         self.go_on_in(State::Commanding(match self.config.settings().zones {
             Zones::Nine(_) => Command::LoadConfigPageCommon,
@@ -167,10 +165,10 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
             if status < FIRST_COMMAND {
                 return Err(Error::Refused { command, status });
             }
-            return self.patience(0, Waiting::Command(command), now_ms);
+            return self.wait_on(0, Waiting::Command(command), now_ms);
         }
         match command {
-            // With nine zones: it may still have 8×8, and nothing in their packets tells.
+            // It may still be in the 8×8 mode, which its packets do not show.
             Command::Stop if self.config.settings().zones != Zones::SixtyFour => {
                 self.go_on_in(State::Switched)
             }
@@ -186,7 +184,8 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
             Command::Measure => {
                 self.assembly.restart();
                 self.captures.restart();
-                (self.stuck, self.has_given) = (0, false);
+                self.watch.clear_stuck();
+                self.has_given = false;
                 self.wait_in(State::Measuring, now_ms)
             }
         }

@@ -1,8 +1,8 @@
 //! The 8×8 zones of a TMF8828: four captures of two halves of eight zones.
 //!
-//! A capture is 30 packets of each half, and then a result, which alone says which of the four it
-//! was: its number mod 4. So histograms have zones once a result has come, and the next result
-//! confirms them.
+//! A capture is 30 packets of each half and then a result. Only the result tells which of the four
+//! captures it was: its number mod 4. So the zones of histograms are known once a result has come,
+//! and the next result confirms them.
 //!
 //! A result is 132 bytes from `CONFIG_RESULT` on: 24 of which byte 4 is its number, and 36 targets
 //! (confidence, distance in mm, least significant byte first). Target i is the first or second one,
@@ -11,7 +11,7 @@
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::I24F8;
 
-use super::Error;
+use super::DeviceError;
 use super::frame::PACKET;
 use crate::{PhotonSink, Target};
 
@@ -45,8 +45,8 @@ impl Captures {
         *self = Self::new();
     }
 
-    /// The first packet of a capture. Whether the result of the one before is lost: nobody
-    /// confirms its zones then.
+    /// Takes the first packet of a capture. Returns whether the result of the last capture is lost,
+    /// which leaves its zones unconfirmed.
     pub(super) const fn begin(&mut self) -> bool {
         let is_lost = self.has_begun;
         if is_lost {
@@ -64,13 +64,13 @@ impl Captures {
     /// The result of a capture.
     ///
     /// # Errors
-    /// [`Error::WrongCapture`]: its histograms were given as those of other zones.
-    pub(super) fn end<B, P>(
+    /// Returns [`DeviceError::WrongCapture`] if its histograms were given as those of other zones.
+    pub(super) fn end(
         &mut self,
         result: &[u8; PACKET],
-        PixelAddress(first): PixelAddress,
+        first: PixelAddress,
         sink: &mut impl PhotonSink,
-    ) -> Result<(), Error<B, P>> {
+    ) -> Result<(), DeviceError> {
         let [_, _, _, _, number, ..] = *result;
         let found = number % 4;
         let expected = self.present.replace((found + 1) % 4);
@@ -96,11 +96,16 @@ impl Captures {
                     noise: None,
                     crosstalk: None,
                 };
-                sink.target(PixelAddress(first.saturating_add(zone.into())), &target);
+                sink.target(
+                    PixelAddress::new(first.raw().saturating_add(zone.into())),
+                    &target,
+                );
             }
         }
         match expected {
-            Some(expected) if expected != found => Err(Error::WrongCapture { expected, found }),
+            Some(expected) if expected != found => {
+                Err(DeviceError::WrongCapture { expected, found })
+            }
             _ => Ok(()),
         }
     }

@@ -1,11 +1,10 @@
 //! How a TMF8820/21/28 measures.
 
-use core::fmt;
-
 use dtof_core::PixelAddress;
 
 use super::frame::CHANNELS;
 use super::registers::DEFAULT_ADDRESS;
+use crate::tmf::{ConfigError, check_address_and_pulses};
 
 /// The vendor's maps of nine zones that are measured at once (`SPAD_MAP_ID`).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -31,7 +30,7 @@ pub enum SpadMap {
     Map12 = 12,
 }
 
-/// How many zones a measurement has.
+/// The zones of a measurement.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Zones {
@@ -42,7 +41,7 @@ pub enum Zones {
 }
 
 impl Zones {
-    /// How many they are.
+    /// Their number.
     #[must_use]
     pub const fn number(self) -> u16 {
         match self {
@@ -52,34 +51,34 @@ impl Zones {
     }
 }
 
-/// The choices there are. [`Config::new`] checks them.
+/// The settings. [`Config::new`] checks them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
     /// The pixel of the first zone; the others follow it.
     pub first_pixel: PixelAddress,
-    /// The pixel that the reference histogram goes to, if to any.
+    /// The pixel of the reference histogram, if it is enabled.
     pub reference: Option<PixelAddress>,
     /// The I²C address to change to, 7 bits; 0x41 is the one after power-up.
     pub address: u8,
-    /// `PERIOD_MS`: milliseconds from one measurement to the next. With 8×8 zones that seems to
-    /// be all four captures.
+    /// `PERIOD_MS`: milliseconds from one measurement to the next. With 8×8 zones this
+    /// seems to cover all four captures.
     pub period_ms: u16,
-    /// `KILO_ITERATIONS`: laser pulses a measurement, or half a capture, in 1,024.
+    /// `KILO_ITERATIONS`: laser pulses of a measurement, or of half a capture, in units of 1,024.
     pub kilo_iterations: u16,
     /// How many zones, and which SPADs make them up (`SPAD_MAP_ID`).
     pub zones: Zones,
     /// Milliseconds a command may take.
     pub command_timeout_ms: u32,
-    /// Milliseconds without a packet after which the measurement is given up.
+    /// Milliseconds without a packet after which the driver abandons the measurement.
     pub data_timeout_ms: u32,
     /// Polls in a row that may find INT low and `INT_STATUS` without a reason.
     pub stuck_limit: u8,
 }
 
 impl Settings {
-    /// 537 × 1,024 pulses of map 1 as the vendor's drivers have it, but every
-    /// 132 ms: at 400 kHz the 30 packets alone take 98 ms.
+    /// 537 × 1,024 pulses of map 1, the vendor's default, but every 132 ms: at 400 kHz the 30
+    /// packets alone take 98 ms.
     #[must_use]
     pub const fn new(first_pixel: PixelAddress) -> Self {
         Self {
@@ -113,63 +112,22 @@ impl Settings {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config(Settings);
 
-/// Settings that cannot be used.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum ConfigError {
-    /// The I²C address is reserved: below 0x08 or above 0x77.
-    Address,
-    /// A measurement without pulses.
-    ZeroIterations,
-    /// The last zone would have a pixel past the last.
-    Pixels,
-    /// The reference would have the pixel of a zone.
-    Reference,
-    /// The time limit of data is not longer than the period.
-    Timeout,
-}
-
-impl ConfigError {
-    /// The reason, in one line.
-    #[must_use]
-    pub const fn text(self) -> &'static str {
-        match self {
-            Self::Address => "the I2C address must be within 0x08 and 0x77",
-            Self::ZeroIterations => "a measurement needs at least 1,024 pulses",
-            Self::Pixels => "the pixels of all zones do not fit behind the first",
-            Self::Reference => "the reference has the pixel of a zone",
-            Self::Timeout => "data would time out within one period",
-        }
-    }
-}
-
-impl fmt::Display for ConfigError {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.text())
-    }
-}
-
-impl core::error::Error for ConfigError {}
-
 impl Config {
     /// Checks `settings`.
     ///
     /// # Errors
-    /// [`ConfigError`] says what cannot be.
+    /// Returns a [`ConfigError`] if the settings cannot be used.
     pub const fn new(settings: Settings) -> Result<Self, ConfigError> {
-        if settings.address < 0x08 || settings.address > 0x77 {
-            return Err(ConfigError::Address);
+        if let Err(error) = check_address_and_pulses(settings.address, settings.kilo_iterations) {
+            return Err(error);
         }
-        if settings.kilo_iterations == 0 {
-            return Err(ConfigError::ZeroIterations);
-        }
-        let PixelAddress(first) = settings.first_pixel;
+        let first = settings.first_pixel.raw();
         let Some(last) = first.checked_add(settings.zones.number() - 1) else {
             return Err(ConfigError::Pixels);
         };
-        if let Some(PixelAddress(reference)) = settings.reference
-            && first <= reference
-            && reference <= last
+        if let Some(reference) = settings.reference
+            && first <= reference.raw()
+            && reference.raw() <= last
         {
             return Err(ConfigError::Reference);
         }
@@ -187,9 +145,9 @@ impl Config {
 
     /// One more than the last pixel of a zone or the reference.
     pub(super) fn pixels(&self) -> u16 {
-        let PixelAddress(first) = self.0.first_pixel;
+        let first = self.0.first_pixel.raw();
         let zones = first.saturating_add(self.0.zones.number());
-        let reference = self.0.reference.map(|PixelAddress(pixel)| pixel);
+        let reference = self.0.reference.map(PixelAddress::raw);
         reference.map_or(zones, |pixel| zones.max(pixel.saturating_add(1)))
     }
 
@@ -198,8 +156,8 @@ impl Config {
         self.0.kilo_iterations as u32 * 1024
     }
 
-    /// Laser pulses that are counted in a thousand seconds, on average, rounded down. With 8×8
-    /// zones nobody says.
+    /// Laser pulses that are counted in a thousand seconds, on average, rounded down. 0 with 8×8
+    /// zones, for which it is not documented.
     pub(super) const fn laser_millihertz(&self) -> u64 {
         if matches!(self.0.zones, Zones::SixtyFour) {
             return 0;
@@ -210,10 +168,10 @@ impl Config {
         }
     }
 
-    /// Where the histogram of a zone goes.
+    /// The pixel of a zone.
     pub(super) const fn pixel(&self, zone: u8) -> Option<PixelAddress> {
-        let PixelAddress(first) = self.0.first_pixel;
+        let first = self.0.first_pixel.raw();
         // At most the last zone, which fits.
-        Some(PixelAddress(first.saturating_add(zone as u16)))
+        Some(PixelAddress::new(first.saturating_add(zone as u16)))
     }
 }

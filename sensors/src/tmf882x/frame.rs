@@ -16,7 +16,7 @@
 //! the least significant ones in packets 0 to 9, the most significant ones in
 //! packets 20 to 29. Channel 0 is the reference, 1 to 9 are the zones.
 
-use super::Error;
+use super::DeviceError;
 
 /// Bytes of a packet.
 pub(super) const PACKET: usize = HEADER + BINS;
@@ -40,22 +40,19 @@ pub(super) struct Packet<'a> {
 }
 
 impl<'a> Packet<'a> {
-    /// If it is `captured`, packets of the second half have numbers from 30 on.
+    /// With `is_captured`, packets of the second half have numbers from 30 on.
     ///
     /// # Errors
-    /// If the bytes are not a packet of raw histograms.
-    pub(super) fn of<B, P>(
-        bytes: &'a [u8; PACKET],
-        is_captured: bool,
-    ) -> Result<Self, Error<B, P>> {
+    /// Fails if the bytes are not a packet of raw histograms.
+    pub(super) fn of(bytes: &'a [u8; PACKET], is_captured: bool) -> Result<Self, DeviceError> {
         let (&[result, _, _, _, mut number, size, half], data) = bytes
             .split_first_chunk::<HEADER>()
-            .ok_or(Error::WrongSize { size: 0 })?;
+            .ok_or(DeviceError::WrongSize { size: 0 })?;
         if result != RAW_HISTOGRAM {
-            return Err(Error::ForeignResult { result });
+            return Err(DeviceError::ForeignResult { result });
         }
         if usize::from(size) != BINS {
-            return Err(Error::WrongSize { size });
+            return Err(DeviceError::WrongSize { size });
         }
         if is_captured {
             number = match half {
@@ -77,7 +74,7 @@ pub(super) struct Assembly {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Next {
-    /// Packet 0; all others are left out.
+    /// Packet 0; all others are dropped.
     Set,
     /// This packet, not the first.
     Packet(u8),
@@ -96,18 +93,23 @@ impl Assembly {
         self.next = Next::Set;
     }
 
-    /// Takes a packet, of so many a set. Its histogram, with the number of its channel, once its
-    /// most significant bytes are there.
+    /// Takes a packet of a set of `all`. Writes its histogram to `counts` once the most
+    /// significant bytes are there.
     ///
     /// # Errors
-    /// [`Error::OutOfOrder`]: the set is given up. A packet 0 begins the next one.
-    pub(super) fn take<B, P>(&mut self, packet: Packet, all: u8) -> Result<Taken, Error<B, P>> {
+    /// Returns [`DeviceError::OutOfOrder`] and drops the set. A packet 0 begins the next one.
+    pub(super) fn take(
+        &mut self,
+        packet: Packet,
+        all: u8,
+        counts: &mut [u32; BINS],
+    ) -> Result<Taken, DeviceError> {
         let found = packet.number;
         let result = match self.next {
             Next::Packet(expected) if found != expected => {
-                Err(Error::OutOfOrder { expected, found })
+                Err(DeviceError::OutOfOrder { expected, found })
             }
-            Next::Set if found >= all => Err(Error::OutOfOrder { expected: 0, found }),
+            Next::Set if found >= all => Err(DeviceError::OutOfOrder { expected: 0, found }),
             Next::Set if found != 0 => Ok(Taken::LeftOut),
             Next::Set | Next::Packet(_) => Ok(Taken::Part),
         };
@@ -132,25 +134,20 @@ impl Assembly {
             }
             return result;
         }
-        let mut counts = [0; BINS];
         for ((count, &low), &byte) in counts.iter_mut().zip(&*low).zip(packet.data) {
             *count = u32::from(byte) << 16 | u32::from(low);
         }
-        Ok(Taken::Histogram { channel, counts })
+        Ok(Taken::Histogram { channel })
     }
 }
 
 /// The use of a packet.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[allow(
-    clippy::large_enum_variant,
-    reason = "lives on the stack for a moment, and there is no heap"
-)]
 pub(super) enum Taken {
     /// It is not part of a set that began with packet 0.
     LeftOut,
     /// More of its histogram is yet to come.
     Part,
-    /// It completed this one.
-    Histogram { channel: u8, counts: [u32; BINS] },
+    /// It completed the histogram of this channel.
+    Histogram { channel: u8 },
 }

@@ -4,32 +4,32 @@
 //! The sensor's program is the vendor's and not part of this crate. Pass the bytes of
 //! its RAM image to the driver, from RAM address 0x0000 on.
 //! It is loaded when the bootloader runs; a sensor that already runs the
-//! application is configured anew and not loaded again.
+//! application is configured again and not loaded again.
 //!
 //! # Laser cycles
 //!
-//! Every laser pulse of a measurement is a laser cycle. So a set of histograms ends
-//! `kilo_iterations` × 1,024 of them, 549,888 with [`Settings::new`], all for the same end. They
-//! end at the set's packet 0: a set that is damaged behind it has still lasted.
+//! Every laser pulse of a measurement is a laser cycle. A set of histograms ends
+//! `kilo_iterations` × 1,024 of them, 549,888 with [`Settings::new`]. They end at the set's packet 0
+//! and count even if the set is damaged later.
 //!
-//! The sensor pulses faster while it measures, and rests until the next period. The laser
-//! rate of [`About`] is the mean, pulses of a measurement ÷ `period_ms`: 4.166 MHz with
+//! The sensor pulses faster while it measures and then pauses until the next period. The laser
+//! rate of [`SensorInfo`] is the mean, pulses of a measurement ÷ `period_ms`: 4.166 MHz with
 //! [`Settings::new`]. Laser cycle ÷ rate is then a time, if a measurement is over within its
-//! period, and the sensor's clock is right. A period of 0 ms has no rate that is known.
+//! period, and the sensor's clock is right. With a period of 0 ms the rate is unknown.
 //!
 //! # 8×8 zones
 //!
 //! With [`Zones::SixtyFour`] a TMF8828 measures its zones in four captures of two halves. Only the
-//! result behind a capture says which of the four it was. So the histograms of the first capture are
-//! left out, those of the next ones are given as what is due, and each result confirms them. If it does
-//! not, [`Error::WrongCapture`] or [`Error::OutOfOrder`] says so, and the driver knows again from there.
-//! Zones are numbered row by row as in the vendor's examples; how they lie in space is not published.
-//! Targets of the sensor come with each result ([`PhotonSink::target`]).
+//! result after a capture tells which of the four it was. So the driver drops the histograms of the
+//! first capture and assigns the next ones in turn; each result confirms them. If it does not, the poll
+//! returns [`DeviceError::WrongCapture`] or [`DeviceError::OutOfOrder`], and the driver is in step again.
+//! Zones are numbered row by row as in the vendor's examples; their place in space is not published.
+//! The sensor's own targets come with each result ([`PhotonSink::target`]).
 //!
-//! Each half is one frame of `kilo_iterations` × 1,024 laser cycles. That is assumed, and
-//! the laser rate is not known. The crosstalk calibration is neither made nor restored. A TMF8828
-//! that is in the 8×8 mode when nine zones are wanted is switched off and on, after
-//! [`Error::WrongMode`].
+//! The driver assumes that each half is one frame of `kilo_iterations` × 1,024 laser cycles; the
+//! laser rate is unknown. It neither makes nor restores a crosstalk calibration. If a TMF8828
+//! is in the 8×8 mode while nine zones are configured, the driver switches it off and on, after
+//! [`DeviceError::WrongMode`].
 //!
 //! # Where the numbers come from
 //!
@@ -37,7 +37,7 @@
 //! vendor's published headers (`tmf8x2x_application_registers.h`,
 //! `tmf8x2x_config_page_common.h`), generated from the register description that
 //! the data sheet DS000693 prints. From the vendor's drivers alone (`tmf8828.c`
-//! for Arduino, `tmf8820_21_28_driver_python`), with no table to name:
+//! for Arduino, `tmf8820_21_28_driver_python`), which have no table to cite:
 //!
 //! - the bootloader's messages, and the seed 0x29 of `DOWNLOAD_INIT`, which the
 //!   newer drivers leave out;
@@ -66,9 +66,9 @@
 //!
 //! # After an error
 //!
-//! A packet that is wrong costs its set. Any other error while measuring stops
-//! and configures the sensor anew; an error while that is going on, or no packet
-//! after it, switches it off and on and loads the image again.
+//! A wrong packet costs its set. After any other error while measuring the driver stops the sensor
+//! and configures it again. If that fails too, or no packet comes, it switches the sensor off and on
+//! and loads the image again.
 //!
 //! # Cost
 //!
@@ -93,12 +93,13 @@ use self::frame::{Assembly, PACKET};
 use self::registers::{CMD_STAT, DEFAULT_ADDRESS};
 use self::requests::Block;
 use crate::protocol::{Driver, Protocol, Request};
-use crate::timer::Since;
-use crate::{About, PhotonSink, Polled};
+use crate::tmf::{Watch, count};
+use crate::{PhotonSink, Polled, SensorInfo};
 
-pub use self::config::{Config, ConfigError, Settings, SpadMap, Zones};
-pub use self::error::{Error, Waiting};
+pub use self::config::{Config, Settings, SpadMap, Zones};
+pub use self::error::{DeviceError, Error, Waiting};
 pub use self::registers::{BootCommand, Command};
+pub use crate::tmf::ConfigError;
 
 /// ENABLE stays low this long when the sensor is switched off and on.
 const RESET_MS: u32 = 5;
@@ -111,8 +112,7 @@ const BOOT_MS: u32 = 10;
 ///
 /// `CHUNK` is how many bytes of a packet or of the image go over the bus in one
 /// transaction, 1 to 135 (checked when compiled; the
-/// bootloader takes 128 at most): what another device on the bus
-/// may have to wait for.
+/// bootloader takes 128 at most). Another device on the bus may have to wait for that long.
 pub type Tmf882x<'a, I2C, INT, EN, const CHUNK: usize = PACKET> =
     Driver<Tmf882xProtocol<'a, CHUNK>, I2C, INT, EN>;
 
@@ -124,11 +124,8 @@ pub struct Tmf882xProtocol<'a, const CHUNK: usize = PACKET> {
     /// The address it answers at now.
     address: u8,
     state: State,
-    /// When the present wait began.
-    since: Since,
-    /// Polls in a row with INT low for no reason.
-    stuck: u8,
-    /// A packet was taken since it began to measure.
+    watch: Watch,
+    /// A packet has come since it began to measure.
     has_given: bool,
     buffer: [u8; PACKET],
     assembly: Assembly,
@@ -136,7 +133,7 @@ pub struct Tmf882xProtocol<'a, const CHUNK: usize = PACKET> {
     counts: Counts,
 }
 
-/// Counts of the data so far. Each sticks at `u32::MAX`.
+/// Counts of the data so far. They stop at their largest value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Counts {
@@ -144,60 +141,60 @@ pub struct Counts {
     pub histograms: u32,
     /// Packets of raw histograms.
     pub packets: u32,
-    /// Packets left out while waiting for packet 0 of a set. With 8×8 zones also histograms while it
-    /// is not known of which zones they are.
+    /// Packets dropped while waiting for packet 0 of a set. With 8×8 zones also histograms whose
+    /// zones are unknown.
     pub left_out: u32,
     /// Errors.
     pub errors: u32,
 }
 
-/// What is to be done next. Each is one transfer, or a wait.
+/// The next step: one transfer, or a wait.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum State {
-    /// ENABLE is to be driven high, or before that low.
+    /// Drive ENABLE high, or with `reset` first low.
     Off { reset: bool },
     /// ENABLE is low.
     Resetting,
-    /// ENABLE is high, nothing is asked yet.
+    /// ENABLE is high.
     Starting,
-    /// Whether the processor is ready.
+    /// Read whether the processor is ready.
     Waking,
-    /// It is not, nor switched on.
+    /// It is not ready, and not switched on: switch it on.
     SwitchingOn { enable: u8 },
-    /// Which chip is it?
+    /// Read which chip it is.
     Identifying,
-    /// Which program runs?
+    /// Read which program runs.
     Looking,
-    /// The bootloader is to be told; this much of the image has been sent.
+    /// Send a command to the bootloader; this much of the image has been sent.
     Loading { command: BootCommand, sent: usize },
-    /// Whether it has done so.
+    /// Read whether it is done.
     Loaded { command: BootCommand, sent: usize },
-    /// Whether the application runs.
+    /// Read whether the application runs.
     Booting,
-    /// The application is to be told.
+    /// Send a command to the application.
     Commanding(Command),
-    /// Whether it has done so.
+    /// Read whether it is done.
     Commanded(Command),
-    /// Whether it has 8×8 zones, as it should or should not.
+    /// Read whether it has 8×8 zones.
     Switched,
-    /// Which page is shown?
+    /// Read which page is shown.
     Paging,
-    /// This part of it is to be written.
+    /// Write this part of the page.
     Configuring(Block),
-    /// Interrupts are to be cleared, and then enabled.
+    /// Clear the interrupts, then enable them.
     Unmasking { cleared: bool },
-    /// Whether INT is low.
+    /// Read INT.
     Measuring,
-    /// Why it is.
+    /// INT is low: read why.
     Asking,
-    /// These reasons are to be cleared.
+    /// Clear these reasons.
     Clearing { reasons: u8 },
-    /// A packet comes, from this byte on.
+    /// Read a packet from this byte on.
     Reading { at: u8 },
 }
 
 impl<'a, I2C, INT, EN, const CHUNK: usize> Tmf882x<'a, I2C, INT, EN, CHUNK> {
-    /// A driver that has not touched its device yet. `image` may be empty for a
+    /// A driver that has not accessed its device yet. `image` may be empty for a
     /// sensor that already runs the application.
     pub const fn new(
         i2c: I2C,
@@ -220,14 +217,14 @@ impl<'a, I2C, INT, EN, const CHUNK: usize> Tmf882x<'a, I2C, INT, EN, CHUNK> {
         self.protocol().address
     }
 
-    /// Whether the sensor is up.
+    /// Whether the sensor measures.
     pub const fn is_measuring(&self) -> bool {
         self.protocol().is_measuring()
     }
 }
 
 impl<'a, const CHUNK: usize> Tmf882xProtocol<'a, CHUNK> {
-    /// Of a device that was not touched yet.
+    /// The protocol of a device that was not accessed yet.
     #[must_use]
     pub const fn new(image: &'a [u8], config: Config) -> Self {
         const {
@@ -237,13 +234,11 @@ impl<'a, const CHUNK: usize> Tmf882xProtocol<'a, CHUNK> {
             image,
             config,
             address: DEFAULT_ADDRESS,
-            // With an address of its own it may answer at that or at 0x41, so
-            // that only a reset makes sure.
+            // A sensor with its own address may answer there or at 0x41: a reset makes sure.
             state: State::Off {
                 reset: config.settings().address != DEFAULT_ADDRESS,
             },
-            since: Since::new(0),
-            stuck: 0,
+            watch: Watch::new(),
             has_given: false,
             buffer: [0; PACKET],
             assembly: Assembly::new(),
@@ -263,7 +258,7 @@ impl<'a, const CHUNK: usize> Tmf882xProtocol<'a, CHUNK> {
         self.counts
     }
 
-    /// Whether the sensor is up.
+    /// Whether the sensor measures.
     #[must_use]
     pub const fn is_measuring(&self) -> bool {
         matches!(
@@ -272,7 +267,7 @@ impl<'a, const CHUNK: usize> Tmf882xProtocol<'a, CHUNK> {
         )
     }
 
-    /// Where to begin again: only a sensor that measures is known to be well.
+    /// Abandons the measurement. Only a sensor that measures is known to work; others are reset.
     const fn give_up(&mut self) {
         self.state = State::Off {
             reset: !self.is_measuring(),
@@ -280,17 +275,13 @@ impl<'a, const CHUNK: usize> Tmf882xProtocol<'a, CHUNK> {
     }
 }
 
-fn count(counter: &mut u32) {
-    *counter = counter.saturating_add(1);
-}
-
 impl<const CHUNK: usize> Protocol for Tmf882xProtocol<'_, CHUNK> {
     type Error<B, P> = Error<B, P>;
 
-    /// Bin width and offset are those fitted to the public log of one TMF8820, and with 8×8 zones
-    /// to a short one of a TMF8828, which says nothing of the offset. The laser rate is the mean
+    /// Bin width and offset were fitted to the public log of one TMF8820. For 8×8 zones the width was
+    /// fitted to a short log of a TMF8828, which does not show the offset. The laser rate is the mean
     /// over a period.
-    fn about(&self) -> About {
+    fn info(&self) -> SensorInfo {
         const BIN_WIDTH: U16F16 = U16F16::lit("92.1");
         const BIN_WIDTH_8X8: U16F16 = U16F16::lit("380.3");
         const OFFSET: I24F8 = I24F8::lit("-179.5");
@@ -299,12 +290,12 @@ impl<const CHUNK: usize> Protocol for Tmf882xProtocol<'_, CHUNK> {
             Zones::Nine(_) => (BIN_WIDTH, OFFSET),
             Zones::SixtyFour => (BIN_WIDTH_8X8, I24F8::ZERO),
         };
-        About {
+        SensorInfo {
             pixels: self.config.pixels(),
             bin_width: Some(bin_width),
             bins: 128,
             offset,
-            is_whole: true,
+            gives_histograms: true,
             laser_millihertz: self.config.laser_millihertz(),
         }
     }
@@ -341,12 +332,14 @@ impl<const CHUNK: usize> Protocol for Tmf882xProtocol<'_, CHUNK> {
     fn failed<B, P>(&mut self, error: &Error<B, P>) {
         count(&mut self.counts.errors);
         match error {
-            Error::ForeignResult { .. }
-            | Error::WrongSize { .. }
-            | Error::OutOfOrder { .. }
-            | Error::WrongCapture { .. } => {}
-            // To stop it and to begin again would bring no packet either.
-            Error::Timeout(Waiting::Histogram) if !self.has_given => {
+            Error::Device(
+                DeviceError::ForeignResult { .. }
+                | DeviceError::WrongSize { .. }
+                | DeviceError::OutOfOrder { .. }
+                | DeviceError::WrongCapture { .. },
+            ) => {}
+            // Stopping and configuring it again has not helped before.
+            Error::Timeout(Waiting::Data) if !self.has_given => {
                 self.state = State::Off { reset: true };
             }
             _ => self.give_up(),

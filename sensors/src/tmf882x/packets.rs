@@ -2,14 +2,14 @@
 
 use super::answers::Next;
 use super::config::Zones;
-use super::frame::{PACKET, PACKETS, Packet, RESULT, Taken};
+use super::frame::{BINS, PACKET, PACKETS, Packet, RESULT, Taken};
 use super::registers::{HISTOGRAM_INT, RESULT_INT};
-use super::{Error, State, Tmf882xProtocol, Waiting, count};
-use crate::timer::Since;
+use super::{DeviceError, Error, State, Tmf882xProtocol, Waiting};
+use crate::tmf::count;
 use crate::{PhotonSink, Polled};
 
 impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
-    /// Sees whether a packet came, and takes it.
+    /// Takes a packet if one came.
     pub(super) fn serve<B, P>(
         &mut self,
         is_high: bool,
@@ -17,8 +17,8 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
         sink: &mut impl PhotonSink,
     ) -> Next<B, P> {
         let limit = self.config.settings().data_timeout_ms;
-        let is_silent = self.since.is_over(limit, now_ms);
-        let timeout = Err(Error::Timeout(Waiting::Histogram));
+        let is_silent = self.watch.is_over(limit, now_ms);
+        let timeout = Err(Error::Timeout(Waiting::Data));
         match self.state {
             State::Asking => self.ask(is_silent),
             State::Clearing { reasons } if reasons & self.readable() == 0 => {
@@ -34,9 +34,9 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
                 }
                 self.state = State::Measuring;
                 let taken = self.take(sink)?;
-                self.stuck = 0;
+                self.watch.clear_stuck();
                 if taken != Polled::Idle {
-                    self.since = Since::new(now_ms);
+                    self.watch.restart(now_ms);
                     self.has_given = true;
                 } else if is_silent {
                     return timeout;
@@ -46,13 +46,13 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
             _ if !is_high => self.go_on_in(State::Asking),
             _ if is_silent => timeout,
             _ => {
-                self.stuck = 0;
+                self.watch.clear_stuck();
                 Ok(Some(Polled::Idle))
             }
         }
     }
 
-    /// Which reasons of an interrupt have something that is read.
+    /// The reasons of an interrupt whose data the driver reads.
     const fn readable(&self) -> u8 {
         match self.config.settings().zones {
             Zones::Nine(_) => HISTOGRAM_INT,
@@ -64,13 +64,11 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
         let [status, ..] = self.buffer;
         let reasons = status & (RESULT_INT | HISTOGRAM_INT);
         if reasons & self.readable() == 0 {
-            // A result now and then is no reason to worry; more in a row are.
-            self.stuck = self.stuck.saturating_add(1);
-            if self.stuck >= self.config.settings().stuck_limit {
-                return Err(Error::StuckInterrupt { status });
-            }
+            // A single result is harmless; many in a row are not.
+            let limit = self.config.settings().stuck_limit;
+            self.watch.check_stuck(limit, status)?;
             if is_silent {
-                return Err(Error::Timeout(Waiting::Histogram));
+                return Err(Error::Timeout(Waiting::Data));
             }
             if reasons == 0 {
                 self.state = State::Measuring;
@@ -80,8 +78,8 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
         self.go_on_in(State::Clearing { reasons })
     }
 
-    /// A packet, or with 64 zones a result. [`Polled::Idle`] if it is left out.
-    fn take<B, P>(&mut self, sink: &mut impl PhotonSink) -> Result<Polled, Error<B, P>> {
+    /// Takes a packet, or with 64 zones a result. Returns [`Polled::Idle`] if it is dropped.
+    fn take(&mut self, sink: &mut impl PhotonSink) -> Result<Polled, DeviceError> {
         let is_captured = self.config.settings().zones == Zones::SixtyFour;
         if is_captured && self.buffer.first() == Some(&RESULT) {
             self.assembly.restart();
@@ -92,7 +90,7 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
         let packet = Packet::of(&self.buffer, is_captured);
         let packet = packet.inspect_err(|_| self.assembly.restart())?;
         count(&mut self.counts.packets);
-        let lost = Error::OutOfOrder {
+        let lost = DeviceError::OutOfOrder {
             expected: 2 * PACKETS,
             found: 0,
         };
@@ -102,12 +100,13 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
         }
         let all = if is_captured { 2 * PACKETS } else { PACKETS };
         let half = packet.number / PACKETS;
-        match self.assembly.take(packet, all)? {
-            Taken::Histogram { channel, counts } => {
+        let mut counts = [0; BINS];
+        match self.assembly.take(packet, all, &mut counts)? {
+            Taken::Histogram { channel } => {
                 let pixel = match channel.checked_sub(1) {
                     Some(zone) if is_captured => match self.captures.zone(half, zone) {
                         Some(zone) => self.config.pixel(zone),
-                        // Of which zones is not known yet; or the last one, which is empty.
+                        // The zones are not known yet; or it is the last channel, which is empty.
                         None => {
                             self.counts.left_out =
                                 self.counts.left_out.saturating_add(u32::from(zone < 8));

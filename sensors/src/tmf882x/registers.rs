@@ -1,33 +1,16 @@
 //! Registers, commands and answers of the TMF8820/21/28, named as in the
-//! vendor's published headers and the data sheet DS000693.
+//! vendor's published headers and the data sheet DS000693. `tmf::registers` has those that all
+//! TMF sensors share.
 
-/// The I²C address after power-up.
-pub(super) const DEFAULT_ADDRESS: u8 = 0x41;
+pub(super) use crate::tmf::registers::*;
 
-/// APPID: what runs.
-pub(super) const APPID: u8 = 0x00;
-/// APPID of the bootloader.
-pub(super) const BOOTLOADER: u8 = 0x80;
 /// APPID of the measurement application in RAM.
 pub(super) const APPLICATION: u8 = 0x03;
-
-/// `CMD_STAT`: a command is written here, its state read back.
-pub(super) const CMD_STAT: u8 = 0x08;
-/// `CMD_STAT`: done.
-pub(super) const STAT_OK: u8 = 0x00;
-/// `CMD_STAT`: accepted and going on, the answer to [`Command::Measure`].
-pub(super) const STAT_ACCEPTED: u8 = 0x01;
-/// `CMD_STAT` from here on is a command that is not done yet; all between
-/// [`STAT_ACCEPTED`] and this are errors.
-pub(super) const FIRST_COMMAND: u8 = 0x10;
 
 /// MODE: how many zones a TMF8828 has.
 pub(super) const MODE: u8 = 0x10;
 /// MODE: 8×8 zones.
 pub(super) const MODE_8X8: u8 = 8;
-
-/// `CONFIG_RESULT`: which page or result the registers from here on hold.
-pub(super) const CONFIG_RESULT: u8 = 0x20;
 
 /// `PERIOD_MS`, `KILO_ITERATIONS`, 16 bits each, least significant byte first
 /// (common configuration page).
@@ -51,17 +34,11 @@ pub(super) const CPU_READY: u8 = 1 << 6;
 /// ENABLE bit 0: powered on; 0 is standby.
 pub(super) const PON: u8 = 1;
 
-/// `INT_STATUS`: why the pin INT is low. Writing a 1 clears a bit.
-pub(super) const INT_STATUS: u8 = 0xE1;
-/// `INT_ENAB`: which of these bits pull the pin INT low.
-pub(super) const INT_ENAB: u8 = 0xE2;
 /// `INT_STATUS` bit 1: a measurement result stands ready.
 pub(super) const RESULT_INT: u8 = 1 << 1;
 /// `INT_STATUS` bit 3: a packet of a raw histogram stands ready.
 pub(super) const HISTOGRAM_INT: u8 = 1 << 3;
 
-/// ID: bits 5..0 are [`CHIP_ID`].
-pub(super) const ID: u8 = 0xE3;
 /// The chip's identification.
 pub(super) const CHIP_ID: u8 = 0x08;
 /// Its bits in ID.
@@ -71,6 +48,7 @@ pub(super) const CHIP_ID_BITS: u8 = 0x3f;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum Command {
     /// Measure until told to stop.
     Measure = 0x10,
@@ -100,6 +78,7 @@ impl Command {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[repr(u8)]
+#[non_exhaustive]
 pub enum BootCommand {
     /// Start the program in RAM.
     RamRemapReset = 0x11,

@@ -1,17 +1,16 @@
-//! What is wanted in each state.
+//! The request of each state.
 
 use super::bootloader::{MAX_DATA, Message, SEED};
 use super::config::Zones;
 use super::frame::PACKET;
 use super::registers::{
-    APPID, BootCommand, CMD_STAT, CONFIG_RESULT, ENABLE, HIST_DUMP, HISTOGRAM_INT, I2C_ADDR_CHANGE,
-    I2C_SLAVE_ADDRESS, ID, INT_ENAB, INT_STATUS, MODE, PERIOD_MS, PON, RAW_HISTOGRAMS, RESULT_INT,
-    SPAD_MAP_ID,
+    APPID, BootCommand, CMD_STAT, ENABLE, HIST_DUMP, HISTOGRAM_INT, I2C_ADDR_CHANGE,
+    I2C_SLAVE_ADDRESS, ID, INT_ENAB, INT_STATUS, MODE, PAGE, PERIOD_MS, PON, RAW_HISTOGRAMS,
+    RESULT_INT, SPAD_MAP_ID,
 };
 use super::{BOOT_MS, RESET_MS, START_MS, State, Tmf882xProtocol};
 use crate::Polled;
 use crate::protocol::Request;
-use crate::timer::Since;
 
 /// Blocks of the configuration page that are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,14 +23,15 @@ pub(super) enum Block {
 }
 
 impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
-    // Not in the middle of a main loop: its table of jumps would go backwards there.
+    // Inlined into a main loop, its jump table would have backward branches, which `stack-bound`
+    // does not follow.
     #[inline(never)]
     pub(super) fn next_request(&mut self, now_ms: u32) -> Request<'_> {
         match self.state {
             State::Off { reset } => Request::Enable(!reset),
-            State::Resetting if self.since.is_over(RESET_MS, now_ms) => Request::Enable(true),
-            State::Starting if self.since.is_over(START_MS, now_ms) => {
-                self.since = Since::new(now_ms);
+            State::Resetting if self.watch.is_over(RESET_MS, now_ms) => Request::Enable(true),
+            State::Starting if self.watch.is_over(START_MS, now_ms) => {
+                self.watch.restart(now_ms);
                 self.state = State::Waking;
                 Request::Nothing(Polled::Working)
             }
@@ -42,12 +42,12 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
             State::Looking => self.read(APPID, 1),
             State::Loading { command, sent } => self.load(command, sent),
             State::Loaded { .. } => self.read(CMD_STAT, 3),
-            State::Booting if self.since.is_over(BOOT_MS, now_ms) => self.read(APPID, 1),
+            State::Booting if self.watch.is_over(BOOT_MS, now_ms) => self.read(APPID, 1),
             State::Booting => Request::Nothing(Polled::Idle),
             State::Commanding(command) => self.write(&[CMD_STAT, command as u8]),
             State::Commanded(_) => self.read(CMD_STAT, 1),
             State::Switched => self.read(MODE, 1),
-            State::Paging => self.read(CONFIG_RESULT, 1),
+            State::Paging => self.read(PAGE, 1),
             State::Configuring(block) => self.configure(block),
             State::Unmasking { cleared: false } => self.write(&[INT_STATUS, 0xFF]),
             State::Unmasking { cleared: true } => {
@@ -61,7 +61,7 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
                 Request::Read {
                     address: self.address,
                     // 0x20 + 135 bytes end at 0xA7.
-                    register: CONFIG_RESULT.saturating_add(at),
+                    register: PAGE.saturating_add(at),
                     bytes: self.buffer.get_mut(at.into()..end).unwrap_or_default(),
                 }
             }
@@ -88,7 +88,7 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
             Block::Period => self.write(&[PERIOD_MS, period_l, period_h, pulses_l, pulses_h]),
             Block::Map => match settings.zones {
                 Zones::Nine(map) => self.write(&[SPAD_MAP_ID, map as u8]),
-                // As the vendor has it: distances, and how sure they are.
+                // The vendor's values: distances and their confidence.
                 Zones::SixtyFour => self.write(&[SPAD_MAP_ID, 15, 0x84]),
             },
             Block::Histograms => self.write(&[HIST_DUMP, RAW_HISTOGRAMS]),

@@ -1,14 +1,8 @@
-//! What the tests of the drivers share: a sink that notes what it is given, and
+//! What the tests of the drivers share: a sink that records its calls, and
 //! a pin whose level the test sets.
 
 #![allow(dead_code, reason = "no test uses all of it")]
 
-/// The chips of the examples.
-#[path = "../../examples/chip"]
-pub mod chips {
-    pub mod tdc7200;
-    pub mod tmf882x;
-}
 pub mod plug;
 pub mod tdc7200;
 pub mod tmf8828;
@@ -24,7 +18,7 @@ use embedded_hal::digital::{Error, ErrorKind, ErrorType, InputPin, OutputPin};
 
 /// One call of the sink.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub enum Given {
+pub enum SinkCall {
     Photon(u16, u16),
     End(u16),
     Frame(u32),
@@ -32,32 +26,33 @@ pub enum Given {
     Target(u16, Target),
 }
 
-/// Notes every call.
+/// Records every call.
 #[derive(Debug, Default)]
-pub struct Notes(pub Vec<Given>);
+pub struct RecordingSink(pub Vec<SinkCall>);
 
-impl Notes {
-    /// What was given since the last call.
-    pub fn take(&mut self) -> Vec<Given> {
+impl RecordingSink {
+    /// The calls since this was last used.
+    pub fn take(&mut self) -> Vec<SinkCall> {
         std::mem::take(&mut self.0)
     }
 }
 
-impl PhotonSink for Notes {
+impl PhotonSink for RecordingSink {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
-        self.0.push(Given::Photon(pixel.0, code));
+        self.0.push(SinkCall::Photon(pixel.raw(), code));
     }
     fn end_laser_cycles(&mut self, cycles: u16) {
-        self.0.push(Given::End(cycles));
+        self.0.push(SinkCall::End(cycles));
     }
     fn begin_frame(&mut self, cycles: u32) {
-        self.0.push(Given::Frame(cycles));
+        self.0.push(SinkCall::Frame(cycles));
     }
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
-        self.0.push(Given::Histogram(pixel.0, counts.to_vec()));
+        self.0
+            .push(SinkCall::Histogram(pixel.raw(), counts.to_vec()));
     }
     fn target(&mut self, pixel: PixelAddress, target: &Target) {
-        self.0.push(Given::Target(pixel.0, *target));
+        self.0.push(SinkCall::Target(pixel.raw(), *target));
     }
 }
 

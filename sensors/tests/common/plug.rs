@@ -7,8 +7,8 @@ use embedded_hal::i2c::{self, I2c, NoAcknowledgeSource};
 use embedded_hal::spi::{self, SpiDevice};
 
 use super::Line;
-pub use super::chips::tdc7200::Chip as Tdc;
-pub use super::chips::tmf882x::Chip as Tmf;
+use dtof_chips::Chip;
+pub use dtof_chips::{Tdc7200 as Tdc, Tmf882x as Tmf};
 
 /// How a bus answers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,25 +25,27 @@ pub enum Answers {
 
 /// A bus with one sensor; clones are the same bus.
 #[derive(Clone)]
-pub struct Bus<Chip> {
-    chip: Rc<RefCell<Chip>>,
+pub struct Bus<C> {
+    chip: Rc<RefCell<C>>,
     answers: Rc<Cell<Answers>>,
     transfers: Rc<Cell<u32>>,
     pub interrupt: Line,
+    pub enable: Line,
 }
 
-impl<Chip: Default> Bus<Chip> {
+impl<C: Chip + Default> Bus<C> {
     pub fn new() -> Self {
         Self {
             chip: Rc::default(),
             answers: Rc::new(Cell::new(Answers::Sensor)),
             transfers: Rc::default(),
             interrupt: Line::new(true),
+            enable: Line::new(false),
         }
     }
 
-    /// Plugs a sensor in that has just got power, or takes it out.
-    pub fn plug(&self, answers: Answers) {
+    /// Sets how the bus answers from now on. A sensor that is plugged in has just got power.
+    pub fn set_answers(&self, answers: Answers) {
         self.answers.set(answers);
         self.chip.take();
         self.interrupt.set(true);
@@ -54,10 +56,32 @@ impl<Chip: Default> Bus<Chip> {
         self.transfers.get()
     }
 
-    /// How this transfer goes.
-    fn begin(&self) -> Answers {
+    /// A transfer: bytes are written, and others may be read. `false` if the bus fails.
+    fn exchange(&self, written: &[u8], read: Option<&mut [u8]>, status: u8) -> bool {
         self.transfers.set(self.transfers.get() + 1);
-        self.answers.get()
+        // The chip forgets everything when ENABLE was low since the last transfer.
+        if self.enable.driven.take().contains(&false) {
+            self.chip.borrow_mut().reset();
+        }
+        let answers = self.answers.get();
+        match (answers, read) {
+            (Answers::Error, _) => return false,
+            (Answers::Ones, Some(bytes)) => bytes.fill(0xff),
+            (Answers::Ones, None) => {}
+            (_, None) => self.chip.borrow_mut().write(written),
+            (_, Some(bytes)) => {
+                self.chip.borrow_mut().read(written[0], bytes);
+                if written == [status] && matches!(answers, Answers::Stuck(_)) {
+                    bytes.fill(0);
+                }
+            }
+        }
+        match answers {
+            Answers::Sensor => self.interrupt.set(!self.chip.borrow().interrupts()),
+            Answers::Stuck(level) => self.interrupt.set(level),
+            Answers::Error | Answers::Ones => {}
+        }
+        true
     }
 }
 
@@ -70,24 +94,14 @@ impl SpiDevice for Bus<Tdc> {
         &mut self,
         operations: &mut [spi::Operation<'_, u8>],
     ) -> Result<(), spi::ErrorKind> {
-        match (self.begin(), &mut *operations) {
-            (Answers::Error, _) => return Err(spi::ErrorKind::Other),
-            (Answers::Ones, [_, spi::Operation::Read(bytes)]) => bytes.fill(0xff),
-            (Answers::Ones, _) => {}
-            (answers, _) => {
-                let is_low = self.chip.borrow_mut().answer(operations);
-                self.interrupt.set(!is_low);
-                if let Answers::Stuck(level) = answers {
-                    self.interrupt.set(level);
-                    if let [spi::Operation::Write([0x02]), spi::Operation::Read(status)] =
-                        operations
-                    {
-                        status.fill(0);
-                    }
-                }
+        let is_done = match operations {
+            [spi::Operation::Write(bytes)] => self.exchange(bytes, None, 0x02),
+            [spi::Operation::Write(register), spi::Operation::Read(bytes)] => {
+                self.exchange(register, Some(bytes), 0x02)
             }
-        }
-        Ok(())
+            other => panic!("{other:?}"),
+        };
+        is_done.then_some(()).ok_or(spi::ErrorKind::Other)
     }
 }
 
@@ -101,19 +115,18 @@ impl I2c for Bus<Tmf> {
         _: u8,
         operations: &mut [i2c::Operation<'_>],
     ) -> Result<(), i2c::ErrorKind> {
-        let answers = self.begin();
-        if matches!(answers, Answers::Error | Answers::Ones) {
-            let source = NoAcknowledgeSource::Address;
-            return Err(i2c::ErrorKind::NoAcknowledge(source));
-        }
-        let is_low = self.chip.borrow_mut().answer(operations);
-        self.interrupt.set(!is_low);
-        if let Answers::Stuck(level) = answers {
-            self.interrupt.set(level);
-            if let [i2c::Operation::Write([0xE1]), i2c::Operation::Read(status)] = operations {
-                status.fill(0);
+        let is_done = match operations {
+            // Nobody pulls SDA low to acknowledge.
+            _ if self.answers.get() == Answers::Ones => false,
+            [i2c::Operation::Write(bytes)] => self.exchange(bytes, None, 0xE1),
+            [i2c::Operation::Write(register), i2c::Operation::Read(bytes)] => {
+                self.exchange(register, Some(bytes), 0xE1)
             }
-        }
-        Ok(())
+            other => panic!("{other:?}"),
+        };
+        let source = NoAcknowledgeSource::Address;
+        is_done
+            .then_some(())
+            .ok_or(i2c::ErrorKind::NoAcknowledge(source))
     }
 }

@@ -11,7 +11,7 @@ use dtof_sensors::{Polled, Sensor};
 use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
 use embedded_hal_mock::eh1::spi::{Mock, Transaction};
 
-use super::{Broken, Given, Line, Notes};
+use super::{Broken, Line, RecordingSink, SinkCall};
 
 pub type Access = Transaction<u8>;
 
@@ -19,7 +19,7 @@ pub type Access = Transaction<u8>;
 #[derive(Clone)]
 pub struct Plug {
     pub mock: Mock<u8>,
-    pub out: Rc<Cell<bool>>,
+    pub is_unplugged: Rc<Cell<bool>>,
 }
 
 impl ErrorType for Plug {
@@ -28,7 +28,7 @@ impl ErrorType for Plug {
 
 impl SpiDevice for Plug {
     fn transaction(&mut self, operations: &mut [Operation<'_, u8>]) -> Result<(), ErrorKind> {
-        if self.out.get() {
+        if self.is_unplugged.get() {
             return Err(ErrorKind::Other);
         }
         self.mock.transaction(operations)
@@ -99,7 +99,7 @@ pub const CALIBRATIONS: [u32; 2] = [2110, 21121];
 pub fn mode_1() -> Settings {
     Settings {
         first_bin_ps: 240_000,
-        ..Settings::new(PixelAddress(7), 8_000, U16F16::lit("250"))
+        ..Settings::new(PixelAddress::new(7), 8_000, U16F16::lit("250"))
     }
 }
 
@@ -108,7 +108,7 @@ pub struct Bench<const CHUNK: usize> {
     pub spi: Plug,
     pub interrupt: Line,
     pub enable: Line,
-    pub sink: Notes,
+    pub sink: RecordingSink,
     pub now_ms: u32,
 }
 
@@ -116,7 +116,7 @@ impl<const CHUNK: usize> Bench<CHUNK> {
     pub fn new(settings: Settings) -> Self {
         let spi = Plug {
             mock: Mock::new(&[]),
-            out: Rc::default(),
+            is_unplugged: Rc::default(),
         };
         let interrupt = Line::new(true);
         let enable = Line::new(false);
@@ -126,7 +126,7 @@ impl<const CHUNK: usize> Bench<CHUNK> {
             spi,
             interrupt,
             enable,
-            sink: Notes::default(),
+            sink: RecordingSink::default(),
             // So that the milliseconds wrap in the middle of it.
             now_ms: u32::MAX - 3,
         }
@@ -172,7 +172,10 @@ impl<const CHUNK: usize> Bench<CHUNK> {
     pub fn measure(&mut self) {
         assert_eq!(self.serve(&example()), Ok(Polled::Data));
         // 247.061 ns are 7.061 ns into the histogram: bin 28.
-        assert_eq!(self.sink.take(), [Given::Photon(7, 28), Given::End(1)]);
+        assert_eq!(
+            self.sink.take(),
+            [SinkCall::Photon(7, 28), SinkCall::End(1)]
+        );
         self.interrupt.set(true);
         assert_eq!(self.poll(&[]), Ok(Polled::Idle));
     }

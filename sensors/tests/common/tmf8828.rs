@@ -1,5 +1,5 @@
-//! A TMF8828 with 8×8 zones, written from its vendor's drivers and not from the driver. It runs
-//! its application; whoever tests it can make it lose packets.
+//! A simulated TMF8828 with 8×8 zones, written from the vendor's drivers and not from ours. It runs
+//! its application; a test can make it lose packets.
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -28,9 +28,9 @@ pub struct Chip {
     pub is_fixed: bool,
     status: u8,
     pub page: [u8; 256],
-    /// Of the present capture: packets sent, 60 and a result.
-    pub at: u8,
-    /// Of the present capture.
+    /// Packets of the present capture that were sent: up to 60, and then the result.
+    pub packets_sent: u8,
+    /// The number of the present capture.
     pub number: u8,
     pub is_measuring: bool,
     interrupt: u8,
@@ -47,7 +47,7 @@ impl Chip {
             is_fixed: false,
             status: 0,
             page: [0; 256],
-            at: 0,
+            packets_sent: 0,
             number,
             is_measuring: false,
             interrupt: 0,
@@ -64,7 +64,7 @@ impl Chip {
             0x16 => self.page[0x20] = 0x16,
             0x15 => {}
             0x10 => {
-                (self.is_measuring, self.status, self.at) = (true, 1, 0);
+                (self.is_measuring, self.status, self.packets_sent) = (true, 1, 0);
                 self.interrupt = 0x08;
             }
             0xFF => (self.is_measuring, self.interrupt) = (false, 0),
@@ -72,11 +72,11 @@ impl Chip {
         }
     }
 
-    /// The packet that stands ready, or after 60 the result.
+    /// The next packet, or the result after 60 packets.
     pub fn packet(&self) -> Vec<u8> {
         let capture = self.number % 4;
         let mut bytes = vec![0; 135];
-        if self.at == 60 {
+        if self.packets_sent == 60 {
             bytes[..8].copy_from_slice(&[0x10, 9, 128, 0, self.number, 30, 9, 0]);
             for entry in 0..18 {
                 let (half, channel) = (entry / 9, entry % 9);
@@ -95,8 +95,8 @@ impl Chip {
             }
             return bytes;
         }
-        let (half, n) = (self.at / 30, self.at % 30);
-        bytes[..7].copy_from_slice(&[0x81, self.at, 0, 0, n, 128, half]);
+        let (half, n) = (self.packets_sent / 30, self.packets_sent % 30);
+        bytes[..7].copy_from_slice(&[0x81, self.packets_sent, 0, 0, n, 128, half]);
         let (plane, channel) = (usize::from(n / 10), n % 10);
         let zone = channel.checked_sub(1).and_then(|k| zone(capture, half, k));
         for (bin, byte) in (0..).zip(&mut bytes[7..]) {
@@ -105,14 +105,14 @@ impl Chip {
         bytes
     }
 
-    /// What stands ready was taken, or is lost.
+    /// Goes on to the next packet: the last one was read, or is lost.
     pub fn next(&mut self) {
-        if self.at == 60 {
-            (self.at, self.number) = (0, self.number.wrapping_add(1));
+        if self.packets_sent == 60 {
+            (self.packets_sent, self.number) = (0, self.number.wrapping_add(1));
         } else {
-            self.at += 1;
+            self.packets_sent += 1;
         }
-        self.interrupt = if self.at == 60 { 0x02 } else { 0x08 };
+        self.interrupt = if self.packets_sent == 60 { 0x02 } else { 0x08 };
     }
 
     fn read(&mut self, register: u8, bytes: &mut [u8]) {
@@ -142,7 +142,7 @@ pub fn zone(capture: u8, half: u8, channel: u8) -> Option<u16> {
     u16::try_from(at).ok()
 }
 
-/// The counts of a zone tell which it is, those of no zone that it is none.
+/// Counts that differ between zones, and from those of a channel without a zone.
 pub fn count(zone: Option<u16>, bin: u32) -> u32 {
     let zone = zone.map_or(255, u32::from);
     zone << 16 | (bin * 7 + zone) & 0xFFFF

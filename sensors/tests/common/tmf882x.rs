@@ -9,7 +9,7 @@ use dtof_sensors::{Polled, Sensor};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock, Transaction as Access};
 
-use super::{Broken, Line, Notes};
+use super::{Broken, Line, RecordingSink};
 
 pub type Counts = [[u32; 128]; 10];
 
@@ -67,8 +67,8 @@ pub fn packet(address: u8, bytes: &[u8], chunk: usize) -> Vec<Access> {
 
 pub fn settings() -> Settings {
     Settings {
-        reference: Some(PixelAddress(99)),
-        ..Settings::new(PixelAddress(10))
+        reference: Some(PixelAddress::new(99)),
+        ..Settings::new(PixelAddress::new(10))
     }
 }
 
@@ -97,7 +97,7 @@ pub struct Bench<const CHUNK: usize> {
     pub i2c: Mock,
     pub interrupt: Line,
     pub enable: Line,
-    pub sink: Notes,
+    pub sink: RecordingSink,
     pub now_ms: u32,
 }
 
@@ -120,7 +120,7 @@ impl<const CHUNK: usize> Bench<CHUNK> {
             i2c,
             interrupt,
             enable,
-            sink: Notes::default(),
+            sink: RecordingSink::default(),
             // So that the milliseconds wrap in the middle of it.
             now_ms: u32::MAX - 5,
         }
@@ -234,8 +234,8 @@ impl<const CHUNK: usize> Bench<CHUNK> {
         let pixels = iter::once(99).chain(10..19);
         let histograms = pixels
             .zip(counts)
-            .map(|(pixel, counts)| super::Given::Histogram(pixel, counts.to_vec()));
-        let frame = super::Given::Frame(537 * 1024);
+            .map(|(pixel, counts)| super::SinkCall::Histogram(pixel, counts.to_vec()));
+        let frame = super::SinkCall::Frame(537 * 1024);
         let given: Vec<_> = iter::once(frame).chain(histograms).collect();
         assert_eq!(self.sink.take(), given);
     }

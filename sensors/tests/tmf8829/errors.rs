@@ -2,10 +2,11 @@
 
 use crate::common::tmf8829::bench::{Bench, settings};
 use crate::common::tmf8829::bus::Fault;
-use crate::common::tmf8829::frame;
-use crate::common::{Broken, Given};
+use crate::common::{Broken, SinkCall};
+use dtof_chips::Chip;
+use dtof_chips::tmf8829::frame;
 use dtof_core::fixed::types::U16F16;
-use dtof_sensors::tmf8829::{BootCommand, Command, Error, Settings, Waiting, Zones};
+use dtof_sensors::tmf8829::{BootCommand, Command, DeviceError, Error, Settings, Waiting, Zones};
 use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 
@@ -47,7 +48,7 @@ fn recovers(bench: &mut Bench<128>) {
     let given = bench.frames(3);
     let frames = given
         .iter()
-        .filter(|given| matches!(given, Given::Frame(_)));
+        .filter(|given| matches!(given, SinkCall::Frame(_)));
     assert!(frames.count() >= 1);
     assert_eq!(bench.sensor.counts().errors, errors);
 }
@@ -94,7 +95,7 @@ fn a_bus_or_a_sensor_that_fails_costs_one_error_and_a_new_start() {
     // INT is high: only silence shows it at first.
     for _ in 0..3000 {
         let before = bench.bus.0.borrow().log.len();
-        let unplugged = [Error::Nack(NACK), Error::Timeout(Waiting::Frame)];
+        let unplugged = [Error::Nack(NACK), Error::Timeout(Waiting::Data)];
         if let Err(error) = poll(&mut bench) {
             assert!(unplugged.contains(&error), "{error}");
             errors += 1;
@@ -122,14 +123,20 @@ fn another_chip_another_program_no_image() {
     }
     for (image, expected) in [
         (Vec::new(), Error::NoImage),
-        (vec![1; 16 * 1024 + 1], Error::LongImage),
+        (
+            vec![1; 16 * 1024 + 1],
+            Error::Device(DeviceError::LongImage),
+        ),
     ] {
         let mut bench = bench();
         bench.load_with(settings(Zones::Z8x8), image.leak());
         assert_eq!(error(&mut bench, 20), expected);
     }
     assert_eq!(SensorFault::from(Of::NoImage), SensorFault::NoImage);
-    assert_eq!(SensorFault::from(Of::LongImage), SensorFault::NotTaken);
+    assert_eq!(
+        SensorFault::from(Of::Device(DeviceError::LongImage)),
+        SensorFault::Rejected
+    );
 }
 
 #[test]
@@ -148,7 +155,7 @@ fn a_bootloader_that_refuses_or_never_ends() {
         let mut bench = bench();
         until_written(&mut bench, &[0x08, 0x45]);
         bench.bus.0.borrow_mut().chip.set(0x08, status);
-        let expected = Error::Bootloader { command, status };
+        let expected = Error::Device(DeviceError::Bootloader { command, status });
         assert_eq!(error(&mut bench, 2), expected);
         recovers(&mut bench);
     }
@@ -223,7 +230,7 @@ fn an_interrupt_that_is_stuck() {
     recovers(&mut bench);
 
     bench.bus.0.borrow_mut().stuck = Some(true);
-    let expected = Error::Timeout(Waiting::Frame);
+    let expected = Error::Timeout(Waiting::Data);
     assert_eq!(error(&mut bench, 10_000), expected);
     bench.bus.0.borrow_mut().stuck = None;
     recovers(&mut bench);
@@ -237,7 +244,10 @@ fn what_is_no_frame_ends_the_measurement() {
     let mut overrun = frame(0x20, 0, 9, &histograms, 1);
     overrun[0] = 0x20;
     let cases = [
-        (overrun, Error::Overrun { status: 0x20 }),
+        (
+            overrun,
+            Error::Device(DeviceError::Overrun { status: 0x20 }),
+        ),
         // Of another mode, of another format, of a time slot there is not, a reference frame.
         (frame(0x22, 0, 9, &histograms, 1), foreign(0x22, 0, 25_368)),
         (frame(0x10, 3, 9, &results, 1), foreign(0x10, 3, 408)),
@@ -250,7 +260,10 @@ fn what_is_no_frame_ends_the_measurement() {
             foreign(0x20, 1, 25_365),
         ),
         (vec![0; 21], foreign(0, 0, 0)),
-        (vec![0xFF; 21], Error::Overrun { status: 0xFF }),
+        (
+            vec![0xFF; 21],
+            Error::Device(DeviceError::Overrun { status: 0xFF }),
+        ),
     ];
     for (bytes, expected) in cases {
         let mut bench = measuring();
@@ -266,7 +279,7 @@ fn what_is_no_frame_ends_the_measurement() {
 }
 
 fn foreign(id: u8, part: u8, payload: u16) -> Of {
-    Error::ForeignFrame { id, part, payload }
+    Error::Device(DeviceError::ForeignFrame { id, part, payload })
 }
 
 /// Its FIFO may stay out of step: to stop and to measure again does not help, so it is switched off and
@@ -329,7 +342,10 @@ fn a_frame_without_its_end_is_broken() {
     bench.bus.0.borrow_mut().chip.is_halted = true;
     bench.bus.0.borrow_mut().chip.present(&bytes[..20_000], 8);
     bench.sink.take();
-    assert_eq!(error(&mut bench, 500), Error::NoEnd { marker: 0 });
+    assert_eq!(
+        error(&mut bench, 500),
+        Error::Device(DeviceError::NoEnd { marker: 0 })
+    );
     assert_eq!(bench.sensor.counts().broken, 1);
     bench.bus.0.borrow_mut().chip.is_halted = false;
     recovers(&mut bench);
@@ -343,10 +359,10 @@ fn missed_frames_are_counted_and_the_next_is_good() {
     let missed = error(&mut bench, 500);
     assert_eq!(
         missed,
-        Error::Missed {
+        Error::Device(DeviceError::Missed {
             expected: 103,
             found: 106
-        }
+        })
     );
     assert!(bench.sensor.is_measuring());
     bench.frames(4);
@@ -356,7 +372,7 @@ fn missed_frames_are_counted_and_the_next_is_good() {
     bench.bus.0.borrow_mut().chip.number = 0;
     assert!(matches!(
         error(&mut bench, 500),
-        Error::Missed { found: 0, .. }
+        Error::Device(DeviceError::Missed { found: 0, .. })
     ));
     assert_eq!(bench.sensor.counts().missed, 3);
 }
@@ -370,7 +386,10 @@ fn frames_that_are_not_valid_are_counted() {
         bench.frames(1);
         bench.bus.0.borrow_mut().chip.flags = 1;
         if counted > 0 {
-            assert_eq!(error(&mut bench, 500), Error::Aborted { flags });
+            assert_eq!(
+                error(&mut bench, 500),
+                Error::Device(DeviceError::Aborted { flags })
+            );
         }
         bench.frames(3);
         let counts = bench.sensor.counts();

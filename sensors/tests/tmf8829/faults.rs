@@ -2,13 +2,14 @@
 //! that was not seen on the bus, every frame that is lost is counted, and all is right again
 //! afterwards.
 
-use crate::common::Given;
+use crate::common::SinkCall;
 use crate::common::tmf8829::bench::{Bench, settings};
 use crate::common::tmf8829::bus::Fault;
-use crate::common::tmf8829::{order, shape};
+use dtof_chips::Chip;
+use dtof_chips::tmf8829::{order, shape};
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::Sensor;
-use dtof_sensors::tmf8829::{Error, Zones};
+use dtof_sensors::tmf8829::{DeviceError, Error, Zones};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -62,7 +63,7 @@ impl Oracle {
         fits.then_some((id, part, data, number))
     }
 
-    fn see(&mut self, written: &[u8], read: Option<&[u8]>) -> Vec<Given> {
+    fn see(&mut self, written: &[u8], read: Option<&[u8]>) -> Vec<SinkCall> {
         let mut given = Vec::new();
         match (written, read) {
             ([0xFA], Some(bytes)) => {
@@ -72,7 +73,7 @@ impl Oracle {
                     self.begun += 1;
                     if id & 0xF0 == 0x20 {
                         let slots = u32::from(shape(self.mode).2);
-                        given.push(Given::Frame(586 * 1024 / slots));
+                        given.push(SinkCall::Frame(586 * 1024 / slots));
                     }
                 }
             }
@@ -91,7 +92,7 @@ impl Oracle {
     }
 
     /// Those of which the last byte has come.
-    fn histograms(&mut self, slot: usize, before: usize, data: usize) -> Vec<Given> {
+    fn histograms(&mut self, slot: usize, before: usize, data: usize) -> Vec<SinkCall> {
         let bins = if self.mode == 0 { 256 } else { 64 };
         let columns = shape(self.mode).0;
         let mut given = Vec::new();
@@ -109,7 +110,7 @@ impl Oracle {
                 .collect();
             counts.resize(128, 0);
             let pixel = u16::try_from(10 + y * columns + x).unwrap();
-            given.push(Given::Histogram(pixel, counts));
+            given.push(SinkCall::Histogram(pixel, counts));
             self.histograms += 1;
         }
         given
@@ -201,10 +202,15 @@ fn survive(zones: Zones, seed: u64) -> (u32, u32, u32) {
         let given = bench.sink.take();
         let given: Vec<_> = given
             .into_iter()
-            .filter(|given| !matches!(given, Given::Target(..)))
+            .filter(|given| !matches!(given, SinkCall::Target(..)))
             .collect();
         assert!(given == expected, "{polled:?}");
-        let goes_on = matches!(polled, Err(Error::Missed { .. } | Error::Aborted { .. }));
+        let goes_on = matches!(
+            polled,
+            Err(Error::Device(
+                DeviceError::Missed { .. } | DeviceError::Aborted { .. }
+            ))
+        );
         oracle.end(polled.is_err(), goes_on);
         let errors = bench.sensor.counts().errors;
         if polls == 30_000 {

@@ -2,9 +2,9 @@
 
 use std::rc::Rc;
 
-use crate::common::Given;
-use crate::common::tmf8829::bench::{Bench, PRESETS, settings, some};
-use crate::common::tmf8829::{Scene, frame, order, shape};
+use crate::common::SinkCall;
+use crate::common::tmf8829::bench::{Bench, PRESETS, settings};
+use dtof_chips::tmf8829::{Scene, frame, order, shape, varied_counts};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_sensors::tmf8829::{Preset, Results, Settings, Zones, snr};
@@ -12,20 +12,20 @@ use dtof_sensors::{Sensor, Target};
 use proptest::prelude::*;
 
 /// What a frame of histograms of this time slot brings: zones in the chip's order.
-fn expected(zones: Zones, slot: u8, measurement: u32, merge: usize) -> Vec<Given> {
+fn expected(zones: Zones, slot: u8, measurement: u32, merge: usize) -> Vec<SinkCall> {
     let mode = [0, 2, 3, 4, 5][zones as usize];
     let (columns, _, slots) = shape(mode);
     let bins = if mode == 0 { 256 } else { 64 };
-    let frame = Given::Frame(586 * 1024 / u32::from(slots));
+    let frame = SinkCall::Frame(586 * 1024 / u32::from(slots));
     let histograms = order(mode, slot.into()).into_iter().map(|(x, y)| {
-        let counts = some()(measurement, Some((x, y)), bins);
+        let counts = varied_counts()(measurement, Some((x, y)), bins);
         let mut merged = vec![0; 128];
         for (bin, count) in counts.into_iter().enumerate() {
             if let Some(place) = merged.get_mut(bin >> merge) {
                 *place += count;
             }
         }
-        Given::Histogram(u16::try_from(10 + y * columns + x).unwrap(), merged)
+        SinkCall::Histogram(u16::try_from(10 + y * columns + x).unwrap(), merged)
     });
     [frame].into_iter().chain(histograms).collect()
 }
@@ -50,7 +50,7 @@ fn round<const CHUNK: usize>(zones: Zones, preset: Preset) {
                 let given = bench.frames(1);
                 assert_eq!(given, expected(zones, slot, measurement, merge));
                 pixels.extend(given.iter().filter_map(|given| match given {
-                    Given::Histogram(pixel, _) => Some(*pixel),
+                    SinkCall::Histogram(pixel, _) => Some(*pixel),
                     _ => None,
                 }));
             }
@@ -59,8 +59,8 @@ fn round<const CHUNK: usize>(zones: Zones, preset: Preset) {
         pixels.sort_unstable();
         let all: Vec<u16> = (10..).take(columns * rows).collect();
         assert_eq!(pixels, all);
-        let of = |target: &Given| match target {
-            Given::Target(pixel, target) => {
+        let of = |target: &SinkCall| match target {
+            SinkCall::Target(pixel, target) => {
                 (*pixel, target.number, target.distance, target.confidence)
             }
             other => panic!("{other:?}"),
@@ -68,10 +68,10 @@ fn round<const CHUNK: usize>(zones: Zones, preset: Preset) {
         let mut targets: Vec<_> = targets.iter().map(of).collect();
         targets.sort_unstable();
         let quarters = |zone: u16| I24F8::from_num(zone + 1) / 4;
-        let wanted = (0..)
+        let expected = (0..)
             .zip(&all)
             .map(|(zone, &pixel)| (pixel, 0, quarters(zone), 41));
-        assert_eq!(targets, wanted.collect::<Vec<_>>());
+        assert_eq!(targets, expected.collect::<Vec<_>>());
     }
     let counts = bench.sensor.counts();
     assert_eq!((counts.errors, counts.missed, counts.broken), (0, 0, 0));
@@ -125,7 +125,7 @@ fn zones_are_where_the_tables_have_them() {
         let given = bench.present(&frame(0x20 | mode, slot, 1, &[0; 25_344], 1), 8);
         let second_row = if zones == Zones::Z8x8 { 4 } else { 8 };
         for (index, (x, y)) in [0, 1, 2, second_row].into_iter().zip(places) {
-            let Given::Histogram(pixel, _) = &given[1 + index] else {
+            let SinkCall::Histogram(pixel, _) = &given[1 + index] else {
                 panic!("{given:?}");
             };
             let columns = zones.size().0;
@@ -137,17 +137,17 @@ fn zones_are_where_the_tables_have_them() {
 #[test]
 fn references_are_four_pixels_if_they_are_wanted() {
     let mut bench = Bench::<128>::new(Settings {
-        reference: Some(PixelAddress(1000)),
+        reference: Some(PixelAddress::new(1000)),
         ..settings(Zones::Z16x16)
     });
-    assert_eq!(bench.sensor.about().pixels, 1004);
+    assert_eq!(bench.sensor.info().pixels, 1004);
     bench.bring_up();
     let given = bench.frames(1);
     for reference in 0..4 {
-        let mut counts = some()(0, None, reference);
+        let mut counts = varied_counts()(0, None, reference);
         counts.resize(128, 0);
         let pixel = u16::try_from(1000 + reference).unwrap();
-        assert_eq!(given[1 + reference], Given::Histogram(pixel, counts));
+        assert_eq!(given[1 + reference], SinkCall::Histogram(pixel, counts));
     }
     assert_eq!(given[5..], expected(Zones::Z16x16, 0, 0, 0)[1..]);
 }
@@ -184,7 +184,7 @@ fn constructed_frames_are_read_as_agreed() {
         results,
         ..settings(Zones::Z8x8)
     };
-    let mut results = Settings::new(PixelAddress(0), Zones::Z8x8).results;
+    let mut results = Settings::new(PixelAddress::new(0), Zones::Z8x8).results;
     results.peaks = 1;
 
     let zeros = [0; 192];
@@ -204,10 +204,10 @@ fn constructed_frames_are_read_as_agreed() {
     bench.sensor.start(U16F16::ZERO);
     bench.bring_up();
     let given = bench.present(&a, 1);
-    let wanted = [(0, 4000, 40), (1, 1, 41), (63, 65535, 255)];
-    let wanted =
-        wanted.map(|(zone, quarters, snr)| Given::Target(10 + zone, target(0, quarters, snr)));
-    assert_eq!(given, wanted);
+    let expected = [(0, 4000, 40), (1, 1, 41), (63, 65535, 255)];
+    let expected =
+        expected.map(|(zone, quarters, snr)| SinkCall::Target(10 + zone, target(0, quarters, snr)));
+    assert_eq!(given, expected);
     assert_eq!(bench.sensor.counts().limited, 1);
 
     let all = Results {
@@ -226,13 +226,13 @@ fn constructed_frames_are_read_as_agreed() {
     bench.bring_up();
     bench.sensor.start(U16F16::ZERO);
     bench.bring_up();
-    let wanted = Target {
+    let expected = Target {
         signal: Some(8_388_352),
         noise: Some(32_767),
         crosstalk: Some(32_768),
         ..target(0, 4 * 241, 64)
     };
-    assert_eq!(bench.present(&b, 1), [Given::Target(10, wanted)]);
+    assert_eq!(bench.present(&b, 1), [SinkCall::Target(10, expected)]);
     assert_eq!(snr(64), 140);
 
     let data = [0; 25_344];
@@ -248,7 +248,7 @@ fn constructed_frames_are_read_as_agreed() {
     );
     assert_eq!(c.len(), 25_377);
     let mut bench = Bench::<128>::new(Settings {
-        reference: Some(PixelAddress(100)),
+        reference: Some(PixelAddress::new(100)),
         preset: Preset::HighAccuracy,
         ..settings(Zones::Z8x8)
     });
@@ -257,7 +257,7 @@ fn constructed_frames_are_read_as_agreed() {
     bench.bring_up();
     let given = bench.present(&c, 8);
     let counts = given.iter().filter_map(|given| match given {
-        Given::Histogram(pixel, counts) => Some((*pixel, counts)),
+        SinkCall::Histogram(pixel, counts) => Some((*pixel, counts)),
         _ => None,
     });
     let mut found = Vec::new();
@@ -267,13 +267,13 @@ fn constructed_frames_are_read_as_agreed() {
     }
     // Two bins of the sensor are one.
     let zone = |x: u16, y: u16| 10 + 8 * y + x;
-    let wanted = [
+    let expected = [
         (100, 3, 29_735),
         (zone(4, 0), 0, 1),
         (zone(5, 3), 5, 872),
         (zone(7, 7), 127, 16_777_215),
     ];
-    assert_eq!(found, wanted);
+    assert_eq!(found, expected);
     assert_eq!(given.len(), 1 + 4 + 32);
     assert_eq!(bench.sensor.counts().beyond, 0);
 }
@@ -334,7 +334,7 @@ proptest! {
                 let mut counts = scene(0, Some(zone), 64);
                 counts.resize(128, 0);
                 let pixel = u16::try_from(10 + 16 * zone.1 + zone.0).unwrap();
-                prop_assert_eq!(given, &Given::Histogram(pixel, counts));
+                prop_assert_eq!(given, &SinkCall::Histogram(pixel, counts));
             }
         }
     }

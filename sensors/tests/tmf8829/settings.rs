@@ -1,8 +1,8 @@
 //! Settings of the TMF8829: what reaches the chip, what is described, what is refused.
 
-use crate::common::tmf8829::Chip;
-use crate::common::tmf8829::bench::{Bench, IMAGE, PRESETS, settings, some};
+use crate::common::tmf8829::bench::{Bench, IMAGE, PRESETS, settings};
 use crate::common::tmf8829::bus::Bus;
+use dtof_chips::tmf8829::{Tmf8829 as Chip, varied_counts};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::Sensor;
@@ -82,35 +82,35 @@ fn presets_are_those_of_the_data_sheet() {
 
 #[test]
 fn bins_and_laser_are_described_as_they_are() {
-    let about = |zones, preset| {
+    let info = |zones, preset| {
         let config = Config::new(Settings {
             preset,
             ..settings(zones)
         });
-        let bus = Bus::new(Chip::new(&IMAGE, some()));
-        Tmf8829::<_, _, _>::new(bus.clone(), bus.clone(), bus, &IMAGE, config.unwrap()).about()
+        let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
+        Tmf8829::<_, _, _>::new(bus.clone(), bus.clone(), bus, &IMAGE, config.unwrap()).info()
     };
     let width = |text| Some(U16F16::lit(text));
-    let fine = about(Zones::Z16x16, Preset::HighAccuracy);
+    let fine = info(Zones::Z16x16, Preset::HighAccuracy);
     assert_eq!((fine.bins, fine.bin_width), (64, width("203.65")));
-    let merged = about(Zones::Z8x8, Preset::HighAccuracy);
+    let merged = info(Zones::Z8x8, Preset::HighAccuracy);
     assert_eq!(merged.bins, 109);
     assert_eq!(merged.bin_width, width("203.65").map(|bin| bin * 2));
-    let long = about(Zones::Z8x8, Preset::LongRange);
+    let long = info(Zones::Z8x8, Preset::LongRange);
     assert_eq!(long.bins, 104);
     for zones in Zones::ALL {
-        let about = about(zones, Preset::Standard);
-        assert_eq!(about.bins, 54);
-        assert_eq!(about.bin_width, width("203.65").map(|bin| bin * 4));
-        assert_eq!(about.pixels, 10 + zones.number());
-        assert!(about.is_whole);
+        let info = info(zones, Preset::Standard);
+        assert_eq!(info.bins, 54);
+        assert_eq!(info.bin_width, width("203.65").map(|bin| bin * 4));
+        assert_eq!(info.pixels, 10 + zones.number());
+        assert!(info.gives_histograms);
         // 600,064 pulses, but what twelve slots cannot share, in the period.
         let (period_ms, pulses) = match zones {
             Zones::Z8x8 | Zones::Z16x16 => (1300, 600_064),
             Zones::Z32x32Pairs | Zones::Z32x32 => (5000, 600_064),
             Zones::Z48x32 => (7500, 600_060),
         };
-        assert_eq!(about.laser_millihertz, pulses * 1_000_000 / period_ms);
+        assert_eq!(info.laser_millihertz, pulses * 1_000_000 / period_ms);
     }
 }
 
@@ -126,14 +126,14 @@ fn settings_that_cannot_be_are_refused() {
     assert_eq!(refused(|bad| bad.address = 0x78), ConfigError::Address);
     let zero = refused(|bad| bad.kilo_iterations = 0);
     assert_eq!(zero, ConfigError::ZeroIterations);
-    let pixels = refused(|bad| bad.first_pixel = PixelAddress(u16::MAX - 1534));
+    let pixels = refused(|bad| bad.first_pixel = PixelAddress::new(u16::MAX - 1534));
     assert_eq!(pixels, ConfigError::Pixels);
-    let reference = refused(|bad| bad.reference = Some(PixelAddress(u16::MAX - 2)));
+    let reference = refused(|bad| bad.reference = Some(PixelAddress::new(u16::MAX - 2)));
     assert_eq!(reference, ConfigError::Pixels);
     // Zones are pixels 10 to 1545.
     for (first, is_good) in [(6, true), (7, false), (1545, false), (1546, true)] {
         let with = Config::new(Settings {
-            reference: Some(PixelAddress(first)),
+            reference: Some(PixelAddress::new(first)),
             ..settings(Zones::Z48x32)
         });
         assert_eq!(with.err(), (!is_good).then_some(ConfigError::Reference));

@@ -7,7 +7,7 @@
 //
 // Eight bins make a word. A word is empty until its valid bit is set, and one clock takes
 // all those bits away. A bin has 11 bits and counts to 1536. Its count is 1023 at most; the
-// rest tells apart what came after a look, as long as that was fewer than 512 photons.
+// rest separates the photons after a look, as long as they are fewer than 512.
 //
 // A photon takes four clocks: A reads the words, B takes what is still on its way to them,
 // C counts, D writes.
@@ -83,7 +83,7 @@ module bin_counter #(
         c_hit_d <= c_writes && c_address == b_address;
     end
 
-    // While the words are read, the reader asks for a word as well. Words that photons in B
+    // While the words are read, the reader requests a word as well. Words that photons in B
     // and C are about to write for the first time are still empty; what D writes is passed on.
     reg read_hit;
     always @(posedge clk) read_hit <= d_writes && d_address == read_address;

@@ -35,7 +35,7 @@ module decision (
     reg [18:0] excess;
     reg        is_less;
 
-    // What a step leaves: below 0, which bit 10 says, if the bit is not in the root. The
+    // The remainder of a step: negative (bit 10) if the bit is not in the root. The
     // part is (root + bit)^2 - root^2, at most 320.
     wire [10:0] less [0:STEPS-1];
     genvar number;

@@ -54,7 +54,7 @@ module event_reader #(
         .is_last(is_last)
     );
 
-    // The first clock asks for the left neighbour, the second for the right one.
+    // The first clock requests the left neighbour, the second the right one.
     wire [7:0] neighbour = is_right ? {1'b0, bin} + 8'd1 : {1'b0, bin} - 8'd1;
     wire [PIXELS_LOG2+3:0] address = waiting ? {pixel, neighbour[6:3]} : host_address;
     assign host_taken = host_asks && !waiting;

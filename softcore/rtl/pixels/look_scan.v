@@ -14,7 +14,7 @@ module look_scan #(
 ) (
     input                              clk,
     input                              reset,     // for as many clocks as there are macropixels,
-    input      [PIXELS_LOG2-1:0]       emptied,   // of which this says the macropixel of the clock
+    input      [PIXELS_LOG2-1:0]       emptied,   // which macropixel it is in this clock
     input                              begins,    // laser cycles are counted from 0
     input      [15:0]                  x,
     input      [15:0]                  l1,

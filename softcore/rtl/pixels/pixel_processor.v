@@ -17,7 +17,7 @@ module pixel_processor #(
     input      [15:0] photon_code,
     input             cycle_end,
 
-    // AER words, if the registers say that events leave packed. One stays until it is taken,
+    // AER words, if the registers choose packed events. One stays until it is taken,
     // or `run` falls.
     output            word_valid,
     output     [127:0] word,

@@ -22,7 +22,7 @@
 //                   that there are not; events; decisions put off; exposures without an
 //                   event; of these, those with a decision put off; looks; laser cycles at
 //                   whose end a look was due but one was under way; laser cycles
-// While `run` is 1, settings are not written, nor bit 1 of CONTROL. COUNTS begin anew when it
+// While `run` is 1, settings are not written, nor bit 1 of CONTROL. COUNTS restart when it
 // rises, and have 48 bits, laser cycles 64. Of an exposure 2^24 - 1 photons in full counters
 // count.
 module pixel_registers #(
@@ -65,7 +65,7 @@ module pixel_registers #(
     wire write = access && wb_we;
     wire read = access && !wb_we;
 
-    // A counter each. They start anew when `run` rises.
+    // A counter each. They restart when `run` rises.
     reg was_running;
     assign begins = reset || run && !was_running;
     wire [KINDS*BITS-1:0] counts;
@@ -130,7 +130,7 @@ module pixel_registers #(
             host_address <= wb_dat_i[PIXELS_LOG2+3:0];
             host_asks <= 1;
             host_waits <= 1;
-            // What was asked for before does not come.
+            // Earlier requests are dropped.
             host_on_way <= 0;
             host_comes <= 0;
         end

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::memory::Memory;
 use crate::table::{COLD, Row};
-use crate::trials::sustained::Sustained;
+use crate::trials::sustained::SustainedRate;
 
 /// The page but for its tables, each of which stands where its name is in braces.
 const PAGE: &str = include_str!("../page.md");
@@ -21,7 +21,7 @@ const AGAINST: [&str; 5] = [
 ];
 
 /// The whole file.
-pub fn text(rows: &[Row], photons: &[Sustained], memory: &[Memory]) -> String {
+pub fn text(rows: &[Row], photons: &[SustainedRate], memory: &[Memory]) -> String {
     PAGE.replace("{cycles}\n", &cycles(rows))
         .replace("{against}\n", &against(rows))
         .replace("{rates}\n", &rates(photons))
@@ -113,7 +113,7 @@ fn against(rows: &[Row]) -> String {
 }
 
 /// Some lines a processor: the highest rate, and parts of it.
-fn rates(photons: &[Sustained]) -> String {
+fn rates(photons: &[SustainedRate]) -> String {
     let mut text = String::new();
     for sustained in photons {
         let _ = writeln!(
@@ -147,23 +147,30 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::files::{DOCUMENT, Files};
+    use crate::files::{DOCUMENT, Figures};
     use crate::root;
 
-    fn committed() -> Files {
-        Files::read(&root()).unwrap()
+    fn committed() -> Figures {
+        Figures::read(&root()).unwrap()
     }
 
     #[test]
     fn the_document_says_what_the_files_say() {
-        let files = committed();
+        let figures = committed();
         let written = fs::read_to_string(root().join(DOCUMENT)).unwrap();
-        assert_eq!(text(&files.rows, &files.photons, &files.memory), written);
+        assert_eq!(
+            text(
+                &figures.operations,
+                &figures.sustained_rates,
+                &figures.memory
+            ),
+            written
+        );
     }
 
     #[test]
     fn what_the_page_says_of_240_cycles_holds() {
-        let rows = committed().rows;
+        let rows = committed().operations;
         let is_within = |core: &str, operation| {
             let (warm, cold) = find(&rows, core, operation);
             let warm = warm.unwrap();
@@ -188,7 +195,7 @@ mod tests {
 
     #[test]
     fn the_rates_are_a_highest_one_and_parts_of_it() {
-        let photons = committed().photons;
+        let photons = committed().sustained_rates;
         for of_core in photons.chunks(3) {
             assert!(of_core.iter().all(|one| one.core == of_core[0].core));
             assert_eq!(of_core[1].rate, of_core[0].rate / 2);

@@ -1,4 +1,4 @@
-//! The files with the figures, and how what is measured is compared with them.
+//! The files with the figures, and their comparison with new measurements.
 
 use std::fs;
 use std::iter;
@@ -7,35 +7,35 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 
 use crate::document;
-use crate::line::Column::{self, Percent, Told};
+use crate::line::Column::{self, Percent, Unchecked};
 use crate::line::Line;
 use crate::memory::Memory;
 use crate::table::Row;
-use crate::trials::sustained::Sustained;
+use crate::trials::sustained::SustainedRate;
 
 pub const DOCUMENT: &str = "docs/results/bench/softcore.md";
 
-/// All figures.
+/// The figures of all files.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Files {
-    pub rows: Vec<Row>,
-    pub photons: Vec<Sustained>,
+pub struct Figures {
+    pub operations: Vec<Row>,
+    pub sustained_rates: Vec<SustainedRate>,
     pub memory: Vec<Memory>,
 }
 
-impl Files {
+impl Figures {
     /// The figures in the files.
     pub fn read(root: &Path) -> Result<Self> {
         Ok(Self {
-            rows: lines(root)?,
-            photons: lines(root)?,
+            operations: lines(root)?,
+            sustained_rates: lines(root)?,
             memory: lines(root)?,
         })
     }
 
     /// Writes the files and the document.
     pub fn write(&self, root: &Path) -> Result<()> {
-        let document = document::text(&self.rows, &self.photons, &self.memory);
+        let document = document::text(&self.operations, &self.sustained_rates, &self.memory);
         for (file, text) in self.texts().into_iter().chain([(DOCUMENT, document)]) {
             fs::write(root.join(file), text).context(file)?;
             println!("{file}: written");
@@ -45,13 +45,18 @@ impl Files {
 
     /// The files with their text.
     fn texts(&self) -> [(&'static str, String); 3] {
-        [text(&self.rows), text(&self.photons), text(&self.memory)]
+        [
+            text(&self.operations),
+            text(&self.sustained_rates),
+            text(&self.memory),
+        ]
     }
 
-    /// The figures of the processors that `wants` selects.
-    pub fn only(mut self, wants: impl Fn(&str) -> bool) -> Self {
-        self.rows.retain(|row| wants(&row.core));
-        self.photons.retain(|sustained| wants(&sustained.core));
+    /// The figures of the processors that `selects` accepts.
+    pub fn only(mut self, selects: impl Fn(&str) -> bool) -> Self {
+        self.operations.retain(|row| selects(&row.core));
+        self.sustained_rates
+            .retain(|sustained| selects(&sustained.core));
         self
     }
 
@@ -62,7 +67,7 @@ impl Files {
             expected.stack = expected.stack.filter(|_| measured.stack.is_some());
         }
         let texts = expected.texts().into_iter().zip(measured.texts());
-        let columns = [Row::COLUMNS, Sustained::COLUMNS, Memory::COLUMNS];
+        let columns = [Row::COLUMNS, SustainedRate::COLUMNS, Memory::COLUMNS];
         texts
             .zip(columns)
             .flat_map(|(((_, expected), (_, measured)), columns)| {
@@ -77,14 +82,14 @@ impl Files {
         for difference in &differences {
             println!("{difference}");
         }
-        let [rows, photons, memory] = [Row::FILE, Sustained::FILE, Memory::FILE];
+        let [operations, sustained_rates, memory] = [Row::FILE, SustainedRate::FILE, Memory::FILE];
         ensure!(
             differences.is_empty(),
-            "not what {rows}, {photons} and {memory} say, see above; `cargo softcore` writes them"
+            "not what {operations}, {sustained_rates} and {memory} say, see above; `cargo softcore` writes them"
         );
         println!(
-            "{rows}, {photons}, {memory}: {} lines as measured",
-            measured.rows.len() + measured.photons.len() + measured.memory.len()
+            "{operations}, {sustained_rates}, {memory}: {} lines as measured",
+            measured.operations.len() + measured.sustained_rates.len() + measured.memory.len()
         );
         Ok(())
     }
@@ -131,7 +136,7 @@ fn is_near(a: &str, b: &str, columns: &[Column]) -> bool {
         a.parse::<f64>(),
         b.parse::<f64>(),
     ) {
-        (Told, Ok(_), Ok(_)) => true,
+        (Unchecked, Ok(_), Ok(_)) => true,
         (Percent(percent), Ok(a), Ok(b)) => (a - b).abs() <= a.abs() * percent / 100.0,
         _ => a == b,
     };
@@ -147,7 +152,7 @@ mod tests {
 
     #[test]
     fn figures_may_differ_by_little() {
-        let columns = [Name, Percent(2.0), Told];
+        let columns = [Name, Percent(2.0), Unchecked];
         for (a, b, near) in [
             ("a,100,5", "a,102,5", true),
             ("a,100,5", "a,98,9", true),
@@ -180,22 +185,22 @@ mod tests {
             sizes: Sizes { code: 9, data: 1 },
             stack,
         };
-        let files = Files {
-            rows: vec![row("a,x", 10.0), row("b,x", 20.0)],
-            photons: Vec::new(),
+        let figures = Figures {
+            operations: vec![row("a,x", 10.0), row("b,x", 20.0)],
+            sustained_rates: Vec::new(),
             memory: vec![memory(Some(4))],
         };
-        let of_a = files.clone().only(|core| core == "a,x");
-        let mut measured = Files {
-            rows: vec![row("a,x", 10.1)],
-            photons: Vec::new(),
+        let of_a = figures.clone().only(|core| core == "a,x");
+        let mut measured = Figures {
+            operations: vec![row("a,x", 10.1)],
+            sustained_rates: Vec::new(),
             memory: vec![memory(None)],
         };
         assert!(of_a.check(&measured).is_ok());
-        assert_eq!(files.differences(&measured).len(), 1);
-        measured.rows[0].cycles = 11.01;
+        assert_eq!(figures.differences(&measured).len(), 1);
+        measured.operations[0].cycles = 11.01;
         assert!(of_a.check(&measured).is_err());
-        measured.rows[0].cycles = 10.0;
+        measured.operations[0].cycles = 10.0;
         measured.memory[0].stack = Some(5);
         assert_eq!(of_a.differences(&measured).len(), 1);
         measured.memory.clear();
@@ -205,8 +210,8 @@ mod tests {
     #[test]
     fn the_files_are_read_as_they_are_written() {
         let root = root();
-        let files = Files::read(&root).unwrap();
-        for (file, text) in files.texts() {
+        let figures = Figures::read(&root).unwrap();
+        for (file, text) in figures.texts() {
             assert_eq!(fs::read_to_string(root.join(file)).unwrap(), text, "{file}");
         }
     }

@@ -17,7 +17,7 @@ use anyhow::{Context, Result, bail, ensure};
 use lexopt::prelude::{Long, Short};
 
 use crate::pixels::Mutant;
-use crate::program::{self, Ran};
+use crate::program::{self, ProgramRun};
 use crate::{root, target_folder};
 
 const HELP: &str = "\
@@ -34,9 +34,9 @@ const PATIENCE: Duration = Duration::from_secs(400);
 enum Engine {
     /// In so many clocks from any state, after which no clock matters any more.
     Clocks(u32),
-    /// By induction over so many clocks, and in these from the beginning: for ever.
+    /// By induction over so many clocks, and in these from the beginning: without end.
     Induction(u32),
-    /// With invariants that ABC finds (PDR): for ever.
+    /// With invariants that ABC finds (PDR): without end.
     Reachability,
 }
 
@@ -44,7 +44,7 @@ enum Engine {
 struct Proof {
     name: &'static str,
     sources: &'static [&'static str],
-    says: &'static str,
+    claim: &'static str,
     engine: Engine,
     fault: Mutant,
 }
@@ -57,7 +57,7 @@ const PROOFS: [Proof; 7] = [
             "rtl/pixels/word_bin.v",
             "formal/histogram_ram.sv",
         ],
-        says: "every photon counts in its bin of both histograms, a look empties the spare one, readers see that",
+        claim: "every photon counts in its bin of both histograms, a look empties the spare one, readers see that",
         engine: Engine::Induction(5),
         fault: Mutant {
             file: "bin_counter",
@@ -68,7 +68,7 @@ const PROOFS: [Proof; 7] = [
     Proof {
         name: "decision",
         sources: &["rtl/pixels/decision.v"],
-        says: "background, root and comparison are the paper's formula",
+        claim: "background, root and comparison are the paper's formula",
         engine: Engine::Clocks(11),
         fault: Mutant {
             file: "decision",
@@ -79,7 +79,7 @@ const PROOFS: [Proof; 7] = [
     Proof {
         name: "event_packer",
         sources: &["rtl/pixels/event_packer.v"],
-        says: "the offset is the centroid, rounded; words stay until taken; time words come when due",
+        claim: "the offset is the centroid, rounded; words stay until taken; time words come when due",
         engine: Engine::Induction(3),
         fault: Mutant {
             file: "event_packer",
@@ -90,7 +90,7 @@ const PROOFS: [Proof; 7] = [
     Proof {
         name: "event_queue",
         sources: &["rtl/pixels/event_queue.v"],
-        says: "what is put in leaves once, in order",
+        claim: "what is put in leaves once, in order",
         engine: Engine::Reachability,
         fault: Mutant {
             file: "event_queue",
@@ -105,7 +105,7 @@ const PROOFS: [Proof; 7] = [
             "rtl/pixels/event_queue.v",
             "rtl/pixels/word_bin.v",
         ],
-        says: "the neighbours are the counts at the look, though photons came since",
+        claim: "the neighbours are the counts at the look, though photons came since",
         engine: Engine::Clocks(7),
         fault: Mutant {
             file: "event_reader",
@@ -116,7 +116,7 @@ const PROOFS: [Proof; 7] = [
     Proof {
         name: "look_scan",
         sources: &["rtl/pixels/look_scan.v"],
-        says: "no macropixel has a second event before its first was taken",
+        claim: "no macropixel has a second event before its first was taken",
         engine: Engine::Reachability,
         fault: Mutant {
             file: "look_scan",
@@ -127,7 +127,7 @@ const PROOFS: [Proof; 7] = [
     Proof {
         name: "peak_keeper",
         sources: &["rtl/pixels/peak_keeper.v"],
-        says: "a look shows the peak, the maxima and the numbers of photons as they were when it passed",
+        claim: "a look shows the peak, the maxima and the numbers of photons as they were when it passed",
         engine: Engine::Induction(3),
         fault: Mutant {
             file: "peak_keeper",
@@ -172,9 +172,9 @@ pub fn run(mut parser: lexopt::Parser) -> Result<()> {
 fn prove(root: &Path, proof: &Proof) -> Result<String> {
     let began = Instant::now();
     let depth = |frames: u32| -> Result<()> {
-        let said = solve(root, proof, false, &format!("bmc3 -F {frames}"))?;
-        let wanted = format!("No output asserted in {frames} frames");
-        ensure!(said.contains(&wanted), "an assertion fails: {said}");
+        let output = solve(root, proof, false, &format!("bmc3 -F {frames}"))?;
+        let expected = format!("No output asserted in {frames} frames");
+        ensure!(output.contains(&expected), "an assertion fails: {output}");
         Ok(())
     };
     let how = match proof.engine {
@@ -184,30 +184,30 @@ fn prove(root: &Path, proof: &Proof) -> Result<String> {
         }
         Engine::Induction(clocks) => {
             depth(clocks + 1)?;
-            let said = solve(root, proof, false, &format!("orpos; ind -F {clocks}"))?;
+            let output = solve(root, proof, false, &format!("orpos; ind -F {clocks}"))?;
             ensure!(
-                said.contains("Networks are equivalent"),
-                "not shown: {said}"
+                output.contains("Networks are equivalent"),
+                "not shown: {output}"
             );
             format!("by induction over {clocks} clocks")
         }
         Engine::Reachability => {
-            let said = solve(root, proof, false, "scorr; orpos; pdr")?;
-            ensure!(said.contains("Property proved"), "not shown: {said}");
+            let output = solve(root, proof, false, "scorr; orpos; pdr")?;
+            ensure!(output.contains("Property proved"), "not shown: {output}");
             "for every state that can be".to_owned()
         }
     };
     let seconds = began.elapsed().as_secs_f32();
-    let said = solve(root, proof, true, "orpos; bmc3 -F 60")?;
+    let output = solve(root, proof, true, "orpos; bmc3 -F 60")?;
     ensure!(
-        said.contains("was asserted in frame"),
-        "a fault is not found: {said}"
+        output.contains("was asserted in frame"),
+        "a fault is not found: {output}"
     );
     let Proof {
-        name, says, fault, ..
+        name, claim, fault, ..
     } = proof;
     Ok(format!(
-        "{name}: {says}: proved {how}, {seconds:.1} s; fails with `{}` as `{}`",
+        "{name}: {claim}: proved {how}, {seconds:.1} s; fails with `{}` as `{}`",
         fault.from, fault.to
     ))
 }
@@ -249,7 +249,7 @@ fn solve(root: &Path, proof: &Proof, is_faulty: bool, commands: &str) -> Result<
     // Without it, the wrapper and the module would stand apart.
     ensure!(
         !ran.errors.contains("is used but has no driver"),
-        ran.said()
+        ran.output()
     );
     let mut abc = Command::new("yosys-abc");
     let commands = format!("read_aiger circuit.aig; fold; strash; {commands}");
@@ -275,11 +275,11 @@ fn connections(text: &str) -> String {
     all
 }
 
-fn succeed(command: &mut Command) -> Result<Ran> {
+fn succeed(command: &mut Command) -> Result<ProgramRun> {
     let name = command.get_program().to_string_lossy().into_owned();
     let ran = program::run(command, PATIENCE, None)
         .with_context(|| format!("{name}: sudo apt-get install --yes yosys"))?;
-    ensure!(ran.code == Some(0), "{name}: {}", ran.said());
+    ensure!(ran.code == Some(0), "{name}: {}", ran.output());
     Ok(ran)
 }
 

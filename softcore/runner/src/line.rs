@@ -24,8 +24,8 @@ pub trait Line: Sized {
 #[derive(Clone, Copy)]
 pub enum Column {
     Name,
-    /// It may differ by so many percent, more or less.
+    /// May differ by up to this many percent.
     Percent(f64),
-    /// It is not.
-    Told,
+    /// Not compared.
+    Unchecked,
 }

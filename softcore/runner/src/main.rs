@@ -24,10 +24,10 @@ use anyhow::{Context, Result, ensure};
 use lexopt::ValueExt;
 use lexopt::prelude::{Long, Short};
 
-use files::Files;
+use files::Figures;
 use image::Images;
 use memory::{Memory, Stacks};
-use program::Ran;
+use program::ProgramRun;
 use rtl::{CORES, Core, Simulator};
 use trials::{Cycles, Trials};
 
@@ -155,7 +155,7 @@ impl Options {
         Ok(Some(options))
     }
 
-    fn wants(&self, core: Core) -> bool {
+    fn selects(&self, core: Core) -> bool {
         self.cores.is_empty() || self.cores.iter().any(|name| name == core.name)
     }
 }
@@ -172,24 +172,28 @@ fn run(options: &Options) -> Result<()> {
     }
 
     rtl::check_fifo(root)?;
-    let (mut measured, mut stacks) = (Files::default(), Stacks::new());
-    for core in CORES.into_iter().filter(|&core| options.wants(core)) {
-        let (files, stack) = on_rtl(root, core, &expected).with_context(|| core.name)?;
-        measured.rows.extend(files.rows);
-        measured.photons.extend(files.photons);
+    let (mut measured, mut stacks) = (Figures::default(), Stacks::new());
+    for core in CORES.into_iter().filter(|&core| options.selects(core)) {
+        let (figures, stack) = on_rtl(root, core, &expected).with_context(|| core.name)?;
+        measured.operations.extend(figures.operations);
+        measured.sustained_rates.extend(figures.sustained_rates);
         stacks.extend(stack);
     }
     measured.memory = Memory::of_all(root, &stacks)?;
     println!(
         "\n{}",
-        document::text(&measured.rows, &measured.photons, &measured.memory)
+        document::text(
+            &measured.operations,
+            &measured.sustained_rates,
+            &measured.memory
+        )
     );
     if options.check {
-        let wanted = |of: &str| {
+        let selected = |of: &str| {
             let core = CORES.into_iter().find(|&core| name(core) == of);
-            core.is_none_or(|core| options.wants(core))
+            core.is_none_or(|core| options.selects(core))
         };
-        Files::read(root)?.only(wanted).check(&measured)?;
+        Figures::read(root)?.only(selected).check(&measured)?;
     } else if options.cores.is_empty() {
         measured.write(root)?;
     }
@@ -218,7 +222,7 @@ fn in_qemu(root: &Path, isa: &str, expected: &str) -> Result<()> {
     let run = |program, last_line| virt::run(&images.elf(program), isa, last_line);
     let stack = golden(&run("self-test", None)?, expected)?;
     let bench = run("bench", None)?;
-    ensure!(bench.code == Some(0), "bench: {}", bench.said());
+    ensure!(bench.code == Some(0), "bench: {}", bench.output());
     for (program, message) in MUST_FAIL {
         // QEMU has no limit of its own.
         let is_endless = program == "endless-loop";
@@ -238,7 +242,7 @@ fn in_qemu(root: &Path, isa: &str, expected: &str) -> Result<()> {
 }
 
 /// Everything on one processor.
-fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<(Files, Stacks)> {
+fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<(Figures, Stacks)> {
     let images = Images::build(root, core.isa, false)?;
     let simulator = Simulator::build(root, core)?;
     let run = |program, cycles| simulator.run(&images.flat(program), cycles);
@@ -258,7 +262,7 @@ fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<(Files, Stacks)> {
         println!("{of}: {program} fails: {last} ({end})");
     }
     let bench = run("bench", MOST_CYCLES)?;
-    ensure!(bench.code == Some(0), "bench: {}", bench.said());
+    ensure!(bench.code == Some(0), "bench: {}", bench.output());
     let rows = table::rows(&name(core), core.caches, &bench)?;
     let trials = Trials {
         simulator: &simulator,
@@ -276,20 +280,20 @@ fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<(Files, Stacks)> {
     );
     let stacks = found.stack.into_iter();
     let stacks = stacks.map(|(pixels, stack)| (isa, pixels, stack));
-    let files = Files {
-        rows,
-        photons: found.sustained,
+    let figures = Figures {
+        operations: rows,
+        sustained_rates: found.sustained,
         memory: Vec::new(),
     };
-    Ok((files, stacks.collect()))
+    Ok((figures, stacks.collect()))
 }
 
 /// Whether a run printed the golden vectors; the bytes of stack it used.
-fn golden(ran: &Ran, expected: &str) -> Result<u64> {
+fn golden(ran: &ProgramRun, expected: &str) -> Result<u64> {
     let (lines, stack) = ran
         .output
         .split_once("golden ok\nstack ")
-        .with_context(|| format!("no `golden ok`: {}", ran.said()))?;
+        .with_context(|| format!("no `golden ok`: {}", ran.output()))?;
     for (number, (expected, line)) in (1..).zip(expected.lines().zip(lines.lines())) {
         ensure!(
             line == expected,
@@ -302,13 +306,13 @@ fn golden(ran: &Ran, expected: &str) -> Result<u64> {
 }
 
 /// Whether a run failed as it should, and said so.
-fn must_fail(program: &str, ran: &Ran, failed: bool, messages: [&str; 2]) -> Result<()> {
-    let said = ran.said();
-    ensure!(failed, "{program} does not fail\n{said}");
+fn must_fail(program: &str, ran: &ProgramRun, failed: bool, messages: [&str; 2]) -> Result<()> {
+    let output = ran.output();
+    ensure!(failed, "{program} does not fail\n{output}");
     for message in messages {
         ensure!(
-            said.contains(message),
-            "{program} does not say `{message}`\n{said}"
+            output.contains(message),
+            "{program} does not say `{message}`\n{output}"
         );
     }
     Ok(())
@@ -324,10 +328,10 @@ mod tests {
         let options = parse(&["--core", "serv", "--check", "--core=ibex"]);
         let options = options.unwrap().unwrap();
         assert!(options.check && !options.qemu_only);
-        let wanted = CORES.into_iter().filter(|&core| options.wants(core));
-        let names: Vec<&str> = wanted.map(|core| core.name).collect();
+        let selected = CORES.into_iter().filter(|&core| options.selects(core));
+        let names: Vec<&str> = selected.map(|core| core.name).collect();
         assert_eq!(names, ["ibex", "serv"]);
-        assert!(CORES.iter().all(|&core| Options::default().wants(core)));
+        assert!(CORES.iter().all(|&core| Options::default().selects(core)));
         assert_eq!(parse(&["--help"]).unwrap(), None);
         for wrong in [
             &["--core"][..],

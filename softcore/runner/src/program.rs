@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result};
 
 /// The end of a program and its output.
-pub struct Ran {
+pub struct ProgramRun {
     /// Its exit code; `None` if it was ended.
     pub code: Option<i32>,
     /// Whether it was ended because it took too long.
@@ -18,8 +18,8 @@ pub struct Ran {
     pub errors: String,
 }
 
-impl Ran {
-    /// A success that has said so much.
+impl ProgramRun {
+    /// A success with this output and these errors.
     #[cfg(test)]
     pub fn success(output: &str, errors: &str) -> Self {
         Self {
@@ -35,7 +35,7 @@ impl Ran {
     }
 
     /// All that it said, and how it ended.
-    pub fn said(&self) -> String {
+    pub fn output(&self) -> String {
         let end = match self.code {
             _ if self.timed_out => "took too long".to_owned(),
             Some(code) => format!("ends with {code}"),
@@ -51,7 +51,7 @@ pub fn run(
     command: &mut Command,
     most: Duration,
     mut awaited: Option<(&str, Duration)>,
-) -> Result<Ran> {
+) -> Result<ProgramRun> {
     let name = command.get_program().to_string_lossy().into_owned();
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(command, 0);
@@ -87,7 +87,7 @@ pub fn run(
         }
         thread::sleep(Duration::from_millis(5));
     };
-    Ok(Ran {
+    Ok(ProgramRun {
         code,
         timed_out,
         output: output.all(),
@@ -148,7 +148,7 @@ mod tests {
         for (most, awaited) in [(rest, None), (LONG, Some(("begun", rest)))] {
             let ran = run(&mut endless, most, awaited).unwrap();
             assert!(ran.timed_out && ran.code.is_none());
-            assert!(ran.said().ends_with("(took too long)"));
+            assert!(ran.output().ends_with("(took too long)"));
         }
     }
 

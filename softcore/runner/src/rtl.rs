@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::program::{self, Ran};
+use crate::program::{self, ProgramRun};
 use crate::target_folder;
 
 /// A processor as it is configured in `softcore/rtl`.
@@ -56,12 +56,12 @@ impl Simulator {
     }
 
     /// Runs an image for so many cycles at most.
-    pub fn run(&self, image: &Path, cycles: u64) -> Result<Ran> {
+    pub fn run(&self, image: &Path, cycles: u64) -> Result<ProgramRun> {
         program::run(&mut self.command(image, cycles), PATIENCE, None)
     }
 
     /// The same with photons.
-    pub fn stream(&self, image: &Path, cycles: u64, laser: &Laser) -> Result<Ran> {
+    pub fn stream(&self, image: &Path, cycles: u64, laser: &Laser) -> Result<ProgramRun> {
         let mut command = self.command(image, cycles);
         command.arg("--stream").arg(laser.photons);
         command.args(["--clocks-per-laser-cycle", &laser.clocks.to_string()]);
@@ -90,7 +90,7 @@ pub struct Laser<'a> {
 pub fn check(root: &Path, name: &str) -> Result<()> {
     let test = verilate(root, name, name, Path::new(""), &[])?;
     let ran = program::run(&mut Command::new(test), PATIENCE, None)?;
-    ensure!(ran.code == Some(0), ran.said());
+    ensure!(ran.code == Some(0), ran.output());
     print!("{}", ran.output);
     Ok(())
 }
@@ -111,7 +111,7 @@ pub fn check_fifo(root: &Path) -> Result<()> {
     ensure!(
         ran.code == Some(0),
         "photon FIFO: not four block RAMs of an iCE40\n{}",
-        ran.said()
+        ran.output()
     );
     let cells = |name| {
         let mut lines = ran.output.lines();
@@ -132,7 +132,7 @@ pub fn package_folder(root: &Path, package: &str) -> Result<PathBuf> {
     let ask = format!("import {package}; print({package}.data_location)");
     let mut ask_python = Command::new(python);
     let ran = program::run(ask_python.args(["-c", &ask]), PATIENCE, None)?;
-    ensure!(ran.code == Some(0), "{package}: {}", ran.said());
+    ensure!(ran.code == Some(0), "{package}: {}", ran.output());
     Ok(ran.output.trim().into())
 }
 
@@ -187,7 +187,7 @@ pub fn verilate_in(
     ensure!(
         ran.code == Some(0),
         "{list}: verilator fails\n{}",
-        ran.said()
+        ran.output()
     );
     Ok(folder.join("sim"))
 }

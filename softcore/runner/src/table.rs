@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::line::Column::{self, Name, Percent, Told};
+use crate::line::Column::{self, Name, Percent, Unchecked};
 use crate::line::Line;
-use crate::program::Ran;
+use crate::program::ProgramRun;
 
 /// The first operation of the bench: a call that does nothing, taken off the others.
 const CALL: &str = "call";
@@ -35,9 +35,9 @@ pub struct Row {
 const COUNTS: [&str; 4] = ["cycle", "instructions", "code", "data"];
 type Counts = [u64; COUNTS.len()];
 
-/// The operations of a run of the bench: cold ones of a processor that has `caches`
-/// only; where there is none, both must be the same.
-pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
+/// The rows of a run of the bench, one for each operation, less the cost of an empty call. Cold
+/// operations have rows only with `caches`; without them, cold and warm must cost the same.
+pub fn rows(core: &str, caches: bool, ran: &ProgramRun) -> Result<Vec<Row>> {
     let totals = totals(&ran.errors)?;
     let mut operations = Vec::new();
     for line in ran.output.lines() {
@@ -52,11 +52,13 @@ pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
         }
     }
     let mut pairs = operations.chunks_exact(2);
-    let mut calls = [(Counts::default(), 0); 2];
+    let mut empty_calls = [(Counts::default(), 0); 2];
     let mut rows = Vec::new();
     for (number, pair) in pairs.by_ref().enumerate() {
         let mut both = Vec::new();
-        for ((end, call), &(index, times, name)) in [COLD, WARM].iter().zip(&mut calls).zip(pair) {
+        for ((end, empty_call), &(index, times, name)) in
+            [COLD, WARM].iter().zip(&mut empty_calls).zip(pair)
+        {
             let name = name.strip_suffix(end);
             let name = name.with_context(|| format!("operation {index} is not{end}"))?;
             let marks = totals.get(&index);
@@ -64,25 +66,25 @@ pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
             if number == 0 {
                 ensure!(name == CALL, "the first operation is not `{CALL}`");
                 ensure!(times == measured, "{measured} marks for {times} calls");
-                *call = (total, measured);
+                *empty_call = (total, measured);
                 continue;
             }
-            let less = |of: usize| {
-                // In parts of a call of nothing, of which there may be more or fewer.
-                let parts = call.1.max(1);
-                let rest = (total[of] * parts).checked_sub(call.0[of] * measured);
-                let rest = rest.with_context(|| format!("{name}: less than a call of nothing"))?;
-                let times = times.max(1) * parts;
+            let cost_per_call = |of: usize| {
+                // Multiplied by the number of empty calls, which may differ from that of operations.
+                let scale = empty_call.1.max(1);
+                let rest = (total[of] * scale).checked_sub(empty_call.0[of] * measured);
+                let rest = rest.with_context(|| format!("{name}: less than an empty call"))?;
+                let times = times.max(1) * scale;
                 anyhow::Ok(((rest * 100 + times / 2) / times) as f64 / 100.0)
             };
             both.push(Row {
                 core: core.to_owned(),
                 operation: name.to_owned(),
-                cycles: less(0)?,
-                instructions: less(1)?,
-                // A call of nothing may meet a line that the operation does not.
-                code_lines: less(2).unwrap_or_default(),
-                data_lines: less(3).unwrap_or_default(),
+                cycles: cost_per_call(0)?,
+                instructions: cost_per_call(1)?,
+                // An empty call may fill a line that the operation does not.
+                code_lines: cost_per_call(2).unwrap_or_default(),
+                data_lines: cost_per_call(3).unwrap_or_default(),
             });
         }
         let [cold, warm] = &mut both[..] else {
@@ -98,13 +100,13 @@ pub fn rows(core: &str, caches: bool, ran: &Ran) -> Result<Vec<Row>> {
     }
     ensure!(
         pairs.remainder().is_empty() && !rows.is_empty(),
-        "{} operations, each of which is two",
+        "{} operations, which must be pairs of cold and warm",
         operations.len()
     );
     Ok(rows)
 }
 
-/// Counts between marks 2 k + 1 and 2 k + 2, and how often, by k.
+/// The sum of counts from each mark 2 k + 1 to the next mark 2 k + 2, and their number, by k.
 fn totals(lines: &str) -> Result<BTreeMap<u64, (Counts, u64)>> {
     let mut totals = BTreeMap::<u64, (Counts, u64)>::new();
     let mut begun: Option<(u64, Counts)> = None;
@@ -115,7 +117,10 @@ fn totals(lines: &str) -> Result<BTreeMap<u64, (Counts, u64)>> {
         let (number, counts) = mark(rest).with_context(|| format!("what is `{line}`?"))?;
         match begun.take() {
             None => {
-                ensure!(number % 2 == 1, "`{line}` ends what did not begin");
+                ensure!(
+                    number % 2 == 1,
+                    "`{line}` ends an operation that did not begin"
+                );
                 begun = Some((number, counts));
             }
             Some((before, start)) => {
@@ -147,7 +152,15 @@ fn mark(rest: &str) -> Option<(u64, Counts)> {
 impl Line for Row {
     const FILE: &str = "docs/results/bench/softcore.csv";
     const HEADER: &str = "core,isa,operation,cycles,instructions,code lines,data lines";
-    const COLUMNS: &[Column] = &[Name, Name, Name, Percent(10.0), Percent(2.0), Told, Told];
+    const COLUMNS: &[Column] = &[
+        Name,
+        Name,
+        Name,
+        Percent(10.0),
+        Percent(2.0),
+        Unchecked,
+        Unchecked,
+    ];
 
     fn csv(&self) -> String {
         let counts = [
@@ -204,7 +217,7 @@ exit 0x0 cycle 250 instructions 60
 
     #[test]
     fn takes_a_call_of_the_same_kind_off_and_divides_by_the_times() {
-        let rows = rows("vexriscv,rv32im", true, &Ran::success(OUTPUT, MARKS)).unwrap();
+        let rows = rows("vexriscv,rv32im", true, &ProgramRun::success(OUTPUT, MARKS)).unwrap();
         let lines: Vec<String> = rows.iter().map(Row::csv).collect();
         let cold = "vexriscv,rv32im,a: b; cold,12.50,5.00,0.50,1.00";
         assert_eq!(lines, [cold, "vexriscv,rv32im,a: b,9.00,5.00,0.00,0.00"]);
@@ -218,7 +231,7 @@ exit 0x0 cycle 250 instructions 60
 
     #[test]
     fn a_processor_without_a_cache_has_nothing_cold() {
-        let error = rows("serv,rv32i", false, &Ran::success(OUTPUT, MARKS)).unwrap_err();
+        let error = rows("serv,rv32i", false, &ProgramRun::success(OUTPUT, MARKS)).unwrap_err();
         assert!(error.to_string().starts_with("without a cache"));
         let same = "\
 mark 1 cycle 1 instructions 1 code 0 data 0
@@ -231,14 +244,14 @@ mark 7 cycle 9 instructions 9 code 0 data 0
 mark 8 cycle 12 instructions 12 code 0 data 0
 ";
         let output = OUTPUT.replace("1 2 call", "1 1 call");
-        let rows = rows("serv,rv32i", false, &Ran::success(&output, same)).unwrap();
+        let rows = rows("serv,rv32i", false, &ProgramRun::success(&output, same)).unwrap();
         let lines: Vec<String> = rows.iter().map(Row::csv).collect();
         assert_eq!(lines, ["serv,rv32i,a: b,0.50,0.50,0.00,0.00"]);
     }
 
     #[test]
     fn marks_out_of_order_and_operations_without_marks_fail() {
-        let rows = |output: &str, marks: &str| rows("", true, &Ran::success(output, marks));
+        let rows = |output: &str, marks: &str| rows("", true, &ProgramRun::success(output, marks));
         assert!(rows(OUTPUT, MARKS).is_ok());
         assert!(rows(OUTPUT, &MARKS.replacen("mark 3", "mark 2", 1)).is_err());
         let unended = format!("{MARKS}mark 1 cycle 999 instructions 60 code 6 data 12\n");

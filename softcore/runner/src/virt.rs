@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 
-use crate::program::{self, Ran};
+use crate::program::{self, ProgramRun};
 
 /// Whatever ends, ends in a fraction of this.
 const PATIENCE: Duration = Duration::from_secs(120);
@@ -15,7 +15,7 @@ const A_MOMENT: Duration = Duration::from_secs(1);
 
 /// Runs an image until it ends, or a moment longer than it takes to print a line, after which
 /// no end is expected. What the instruction set has not is an illegal instruction.
-pub fn run(image: &Path, isa: &str, last_line: Option<&str>) -> Result<Ran> {
+pub fn run(image: &Path, isa: &str, last_line: Option<&str>) -> Result<ProgramRun> {
     let letters = isa.trim_start_matches("rv32");
     let mut processor =
         "rv32,a=false,f=false,d=false,zba=false,zbb=false,zbc=false,zbs=false".to_owned();

@@ -17,7 +17,8 @@ mod ways;
 use core::arch::asm;
 use core::hint::black_box;
 
-use dtof_core::{AerEncoder, AsyncPixel, Look, PixelAddress, PixelConfig, isqrt};
+use dtof_core::paper::isqrt;
+use dtof_core::{AerEncoder, AsyncPixel, Look, PixelAddress, PixelConfig};
 use dtof_softcore::{cache, io, println, program};
 
 use scene::{BINS, CYCLES, PHOTONS, State};
@@ -146,7 +147,7 @@ fn measure(number: usize, operation: Operation, state: &mut State, argument: u32
 }
 
 fn empty(state: &mut State) {
-    state.pixel = AsyncPixel::new(PixelAddress(7));
+    state.pixel = AsyncPixel::new(PixelAddress::new(7));
     state.histogram.clear();
     state.encoder = AerEncoder::new();
     state.event = None;
@@ -170,7 +171,7 @@ fn arrived(state: &mut State) {
 fn at_event(state: &mut State) {
     counted(state);
     let _ = state.end_laser_cycle(u32::from(CYCLES) - 1);
-    state.event = state.pixel.acknowledge();
+    state.event = state.pixel.take_event();
 }
 
 #[allow(unsafe_code, reason = "beside what calls it, for the same reason")]
@@ -194,7 +195,7 @@ fn one(pixel: &mut AsyncPixel<BINS>, config: &PixelConfig<BINS>, code: u16) {
 
 extern "C" fn event(state: &mut State, cycle: u32) -> u32 {
     if state.end_laser_cycle(cycle) == Look::Event {
-        state.event = state.pixel.acknowledge();
+        state.event = state.pixel.take_event();
     }
     pack(state, 0)
 }

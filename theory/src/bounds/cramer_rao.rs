@@ -20,12 +20,11 @@ pub struct Pulse {
 }
 
 impl Pulse {
-    /// The smallest variance of its position, in bins², in a histogram of `bins`
-    /// bins, the pulse at `position`.
+    /// The smallest variance of the position, in bins², for a pulse at `position` in a
+    /// histogram of `bins` bins.
     #[must_use]
     pub fn position_variance(&self, bins: u32, position: f64) -> f64 {
-        // Of position with itself, amplitude, background; amplitude with itself
-        // and background; background with itself.
+        // The Fisher information of each pair of position, amplitude and background.
         let [mut pp, mut pa, mut pb, mut aa, mut ab, mut bb] = [0.0; 6];
         for bin in 0..bins {
             let share = bin_share(bin, position, self.sigma);
@@ -39,13 +38,13 @@ impl Pulse {
             ab += share / mean;
             bb += 1.0 / mean;
         }
-        // What amplitude and background take from what is known of position.
-        let taken = (pa * pa * bb - 2.0 * pa * pb * ab + pb * pb * aa) / (aa * bb - ab * ab);
-        1.0 / (pp - taken)
+        // The information that is lost because amplitude and background are unknown.
+        let lost = (pa * pa * bb - 2.0 * pa * pb * ab + pb * pb * aa) / (aa * bb - ab * ab);
+        1.0 / (pp - lost)
     }
 
-    /// The smallest root mean square error, in bins, when the pulse lies anywhere
-    /// in a bin with equal probability, in the middle of 128 bins.
+    /// The smallest root mean square error, in bins, averaged over the position of the
+    /// pulse within a bin, in the middle of 128 bins.
     #[must_use]
     pub fn position_error(&self) -> f64 {
         const POSITIONS: u32 = 64;
@@ -63,8 +62,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn without_background_and_with_fine_bins_it_is_that_of_a_mean() {
-        // Photons whose times are known exactly: σ²/S. A bin spreads them by 1/12.
+    fn without_background_and_with_fine_bins_it_is_the_error_of_a_mean() {
+        // σ²/S for photons with exact times. A bin adds a variance of 1/12.
         let pulse = Pulse {
             signal: 50.0,
             background: 1e-9,
@@ -76,7 +75,7 @@ mod tests {
     }
 
     #[test]
-    fn it_is_what_gauss_jordan_makes_of_numerical_slopes() {
+    fn it_equals_gauss_jordan_on_numerical_derivatives() {
         let pulse = Pulse {
             signal: 60.0,
             background: 2.0,
@@ -104,7 +103,7 @@ mod tests {
                         .sum()
                 };
                 let mut row_of: Vec<f64> = (0..3).map(information).collect();
-                // The right side: where position is.
+                // The right side: the unit vector of position.
                 row_of.push(f64::from(u8::from(row == 0)));
                 row_of
             })
@@ -134,7 +133,7 @@ mod tests {
     }
 
     #[test]
-    fn more_of_everything_is_less_by_the_root() {
+    fn the_error_falls_with_the_root_of_the_counts() {
         let of = |factor: f64| Pulse {
             signal: 40.0 * factor,
             background: 1.5 * factor,

@@ -1,5 +1,5 @@
-//! The generalised likelihood ratio of a pulse against none, for whoever knows
-//! everything but where it lies: what a detection rule can be measured against.
+//! The generalised likelihood ratio test for a pulse of known shape and strength at an unknown
+//! position: the reference for detection rules.
 //!
 //! With background `B` a bin and laser cycle, signal `A` a laser cycle and the
 //! share `h_i(µ)` of the pulse in bin i, counts `n_i` after N laser cycles have the
@@ -9,41 +9,41 @@
 //! L(µ) = Σ n_i·ln(1 + A·h_i(µ)/B) − N·A·Σ h_i(µ)
 //! ```
 //!
-//! of a pulse at µ against background alone. The largest over the positions µ,
-//! every half bin, is what is compared with a threshold. No rule that has to
-//! estimate `A`, `B` or the shape knows more.
+//! of a pulse at µ against background alone. The test compares the largest `L(µ)`, over
+//! positions half a bin apart, with a threshold. A rule that has to estimate `A`, `B` or
+//! the shape has less information.
 
 use crate::counts::bisect;
 use crate::rates::bin_share;
 
-/// Positions a bin: its start and its middle.
+/// Positions per bin: its start and its middle.
 const POSITIONS: usize = 2;
 
-/// The scene, which is known, and what follows from it.
+/// The test for a known scene.
 #[derive(Clone, Debug)]
 pub struct LikelihoodRatio {
     bins: usize,
-    /// Bins beside its own that a pulse reaches.
+    /// Bins that a pulse reaches on either side of its own.
     reach: usize,
-    /// `ln(1 + A·h/B)` of a photon for each position from `reach` bins before its
-    /// own bin to `reach` bins after.
+    /// `ln(1 + A·h/B)` of a photon for each position from `reach` bins before the
+    /// photon's bin to `reach` bins after it.
     gains: Vec<f64>,
-    /// `A·Σ h_i`, of each position.
+    /// `A·Σ h_i` for each position.
     losses: Vec<f64>,
 }
 
-/// The ratio of one exposure so far.
+/// The likelihood ratio of one exposure so far.
 #[derive(Clone, Debug)]
 pub struct Evidence<'a> {
     scene: &'a LikelihoodRatio,
-    /// Of each position, with `reach` bins more at both ends.
+    /// The sum of gains for each position, with `reach` extra bins at both ends.
     gains: Vec<f64>,
 }
 
 impl LikelihoodRatio {
-    /// Histograms of `bins` bins, `background` photons a bin and laser cycle,
-    /// `signal` photons a laser cycle in a pulse of standard deviation `sigma`
-    /// bins, all above 0.
+    /// For histograms of `bins` bins, `background` photons a bin and laser cycle, and
+    /// `signal` photons a laser cycle in a pulse of standard deviation `sigma` bins. All
+    /// must be above 0.
     #[must_use]
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     pub fn new(bins: u32, background: f64, signal: f64, sigma: f64) -> Self {
@@ -67,7 +67,7 @@ impl LikelihoodRatio {
         }
     }
 
-    /// Of an exposure that begins.
+    /// The evidence at the start of an exposure.
     #[must_use]
     pub fn evidence(&self) -> Evidence<'_> {
         Evidence {
@@ -78,7 +78,7 @@ impl LikelihoodRatio {
 }
 
 impl Evidence<'_> {
-    /// Counts `photons` more in `bin`, which is one of the histogram's.
+    /// Adds `photons` in `bin`, which must be a bin of the histogram.
     pub fn add(&mut self, bin: u16, photons: u16) {
         let photons = f64::from(photons);
         let from = usize::from(bin) * POSITIONS;
@@ -98,11 +98,12 @@ impl Evidence<'_> {
     }
 }
 
-/// How fast the ratio grows at the true position: nats a laser cycle, on average,
-/// of a pulse of `signal` photons a laser cycle at `position`.
+/// The mean growth of the log likelihood ratio at the true position (the Kullback-Leibler
+/// divergence), in nats a laser cycle, for a pulse of `signal` photons a laser cycle at
+/// `position`.
 #[must_use]
 pub fn information(background: f64, signal: f64, position: f64, sigma: f64) -> f64 {
-    // Far from both ends, wherever in its bin the pulse lies.
+    // Far from both ends; only the position within a bin matters.
     let far = (8.0 * sigma).ceil() + 1.0;
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let bins = 2 * far as u32 + 1;
@@ -114,10 +115,10 @@ pub fn information(background: f64, signal: f64, position: f64, sigma: f64) -> f
     (0..bins).map(one_bin).sum()
 }
 
-/// The signal photons a laser cycle with which [`information`] is `wanted`.
+/// The signal photons a laser cycle at which [`information`] equals `target`.
 #[must_use]
-pub fn signal_for_information(background: f64, position: f64, sigma: f64, wanted: f64) -> f64 {
-    let is_less = |signal| information(background, signal, position, sigma) < wanted;
+pub fn signal_for_information(background: f64, position: f64, sigma: f64, target: f64) -> f64 {
+    let is_less = |signal| information(background, signal, position, sigma) < target;
     let mut high = 1.0;
     while is_less(high) {
         high *= 2.0;
@@ -168,7 +169,7 @@ mod tests {
     fn information_is_the_mean_growth() {
         let (background, signal, position, sigma) = (0.05, 0.4, 64.5, 1.0);
         let scene = LikelihoodRatio::new(128, background, signal, sigma);
-        // 10,000 laser cycles of exactly the mean counts, but for rounding.
+        // 10,000 laser cycles of the mean counts, rounded.
         let cycles = 10_000;
         let mut evidence = scene.evidence();
         for bin in 0..128 {

@@ -1,11 +1,10 @@
-//! The binomial distribution's exact tails: intervals of a probability, and whether a
-//! count is what a probability gives.
+//! Exact tails of the binomial distribution: confidence intervals, and tests of a count.
 
 use libm::lgamma;
 
 use crate::counts::bisect;
 
-/// The probability of at most `count` of `times`.
+/// The probability of at most `count` successes in `times` trials.
 #[must_use]
 pub fn at_most(count: u64, times: u64, probability: f64) -> f64 {
     if count >= times || probability <= 0.0 {
@@ -19,7 +18,7 @@ pub fn at_most(count: u64, times: u64, probability: f64) -> f64 {
     }
 }
 
-/// The probability of at least `count` of `times`.
+/// The probability of at least `count` successes in `times` trials.
 #[must_use]
 pub fn at_least(count: u64, times: u64, probability: f64) -> f64 {
     times
@@ -27,8 +26,8 @@ pub fn at_least(count: u64, times: u64, probability: f64) -> f64 {
         .map_or(0.0, |misses| at_most(misses, times, 1.0 - probability))
 }
 
-/// The probability of at most `count`, which lies below the mean or hardly above: from
-/// its largest term down, so that a small one keeps its relative precision.
+/// The probability of at most `count` successes, a count below the mean or hardly above.
+/// Summed from the largest term down, so that small probabilities keep their relative precision.
 fn outward(count: u64, times: u64, probability: f64) -> f64 {
     let [n, k] = [times, count].map(real);
     let ways = lgamma(n + 1.0) - lgamma(k + 1.0) - lgamma(n - k + 1.0);
@@ -49,8 +48,8 @@ fn real(count: u64) -> f64 {
     count as f64
 }
 
-/// Clopper and Pearson's interval of a probability with which `seen` of `times` were
-/// seen: below it and above it as many have at most `tail`. All of 0 to 1 without a trial.
+/// The Clopper-Pearson interval of a probability, from `seen` successes in `times` trials, with
+/// a probability of at most `tail` on either side. 0 to 1 without a trial.
 #[must_use]
 pub fn interval(seen: u64, times: u64, tail: f64) -> (f64, f64) {
     if times == 0 {
@@ -63,23 +62,23 @@ pub fn interval(seen: u64, times: u64, tail: f64) -> (f64, f64) {
     )
 }
 
-/// Whether `seen` of `times` is what a probability of `probability` gives, in
-/// the interval that holds all but `level` of the binomial distribution.
+/// Whether `seen` successes in `times` trials agree with `probability` in a two-sided test at
+/// significance `level`.
 #[must_use]
 pub fn plausible(seen: u32, times: u32, probability: f64, level: f64) -> bool {
     tail(seen, times, probability) >= level / 2.0
 }
 
-/// The probability of a count as far out as `seen`, on its side.
+/// The probability of a count at least as far from the mean as `seen`, on the same side.
 fn tail(seen: u32, times: u32, probability: f64) -> f64 {
     let is_high = f64::from(seen) > f64::from(times) * probability;
     let of = if is_high { at_least } else { at_most };
     of(seen.into(), times.into(), probability)
 }
 
-/// Whether `first` of `first_times` and `second` of `second_times` may have the
-/// same probability: given both together, how they are shared out is (at most
-/// as wide as) binomial.
+/// Whether `first` of `first_times` and `second` of `second_times` agree with a common
+/// probability at significance `level`. Given their sum, the second count has a distribution
+/// no wider than a binomial one.
 #[must_use]
 pub fn alike(first: u32, first_times: u32, second: u32, second_times: u32, level: f64) -> bool {
     let share = f64::from(second_times) / f64::from(first_times + second_times);
@@ -101,7 +100,7 @@ mod tests {
         assert!(plausible(10, 10, 1.0, 0.01) && !plausible(9, 10, 1.0, 0.01));
     }
 
-    /// Every count of some numbers of trials, against the sum of all terms.
+    /// Every count, against the sum of all terms.
     #[test]
     fn both_tails_are_all_terms_added_up() {
         for times in [1u64, 2, 7, 40] {

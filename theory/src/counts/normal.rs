@@ -30,16 +30,16 @@ pub fn ln_below(x: f64) -> f64 {
     }
 }
 
-/// The `x` with a probability of `p` above it: Φ⁻¹(1 − p), exact also where
-/// 1 − p rounds to 1. `p` lies between 0 and 1.
+/// The `x` with a probability of `p` above it: Φ⁻¹(1 − p), exact even where
+/// 1 − p rounds to 1. `p` must lie between 0 and 1.
 #[must_use]
 pub fn quantile_above(p: f64) -> f64 {
     if p > 0.5 {
         return -quantile_above(1.0 - p);
     }
-    // Newton's method on the logarithm of the tail, which is concave, from
-    // above: 1 − Φ(x) is at most exp(−x²/2)/2. So it comes down to the root and
-    // never passes it, but for rounding.
+    // Newton's method on the logarithm of the tail, which is concave. The start lies above
+    // the root, because 1 − Φ(x) ≤ exp(−x²/2)/2, so the iteration descends to the root
+    // without passing it (up to rounding).
     let mut x = (-2.0 * (2.0 * p).ln()).sqrt();
     for _ in 0..100 {
         let density = (-x * x / 2.0).exp() / (2.0 * PI).sqrt();

@@ -1,11 +1,11 @@
-//! The Poisson distribution, tabulated, and that of the highest of several bins.
+//! The tabulated Poisson distribution, and the distribution of the highest of several bins.
 
 use libm::lgamma;
 
-/// All counts of one mean that have a probability above 1e-280.
+/// A Poisson distribution: all counts with a probability above 1e-280.
 ///
-/// Probabilities are sums of positive terms from the small end, so that both
-/// tails keep their relative precision (1e-11 at a mean of 1000).
+/// Tails are sums of positive terms from the small end, so both keep their relative
+/// precision (1e-11 at a mean of 1000).
 #[derive(Clone, Debug)]
 pub struct Poisson {
     mass: Vec<f64>,
@@ -14,7 +14,7 @@ pub struct Poisson {
 }
 
 impl Poisson {
-    /// Counts of mean `mean`, not negative.
+    /// The distribution of mean `mean`, which must not be negative.
     #[must_use]
     pub fn new(mean: f64) -> Self {
         // 37 standard deviations of a Gaussian are 1e-300; the Poisson tail is
@@ -25,8 +25,7 @@ impl Poisson {
         Self::from_mass(mass)
     }
 
-    /// Counts of mean `mean` in a counter that is full at `full`: all above are
-    /// taken as `full`.
+    /// The distribution of a counter that saturates at `full`.
     #[must_use]
     pub fn saturating(mean: f64, full: u32) -> Self {
         let Self {
@@ -57,7 +56,7 @@ impl Poisson {
         }
     }
 
-    /// The largest count that is tabulated.
+    /// The largest tabulated count.
     #[must_use]
     pub fn last(&self) -> u32 {
         u32::try_from(self.mass.len() - 1).unwrap_or(u32::MAX)
@@ -75,8 +74,8 @@ impl Poisson {
         self.at_least.get(count as usize).copied().unwrap_or(0.0)
     }
 
-    /// ln of the probability of less than `count`, where that itself would round
-    /// to 1; −∞ for 0.
+    /// ln of the probability of fewer than `count`, precise even where the probability
+    /// rounds to 1; −∞ for 0.
     #[must_use]
     pub fn ln_below(&self, count: u32) -> f64 {
         let more = self.at_least(count);
@@ -93,8 +92,7 @@ impl Poisson {
         -(f64::from(bins) * self.ln_below(count)).exp_m1()
     }
 
-    /// The probability that the highest of `bins` bins, at least one, holds
-    /// exactly `count`.
+    /// The probability that the highest of `bins` bins (at least one) holds exactly `count`.
     #[must_use]
     pub fn highest_mass(&self, count: u32, bins: u32) -> f64 {
         let mass = self.mass(count);
@@ -103,7 +101,7 @@ impl Poisson {
             return 0.0;
         }
         let bins = f64::from(bins);
-        // F(k)ⁿ − F(k−1)ⁿ, where F(k−1)/F(k) is 1 but for what `count` adds.
+        // F(k)ⁿ − F(k−1)ⁿ, with F(k−1)/F(k) = 1 − mass/F(k).
         let ratio = if below == f64::NEG_INFINITY {
             f64::NEG_INFINITY
         } else {
@@ -169,7 +167,7 @@ mod tests {
     #[test]
     fn far_out_the_highest_is_any_of_the_bins() {
         let law = Poisson::new(7.0);
-        // P = 1e-15 and less: as many times one bin's.
+        // At P ≤ 1e-15: the number of bins times the probability of one bin.
         for count in 45..100 {
             let ratio = law.highest_at_least(count, 64) / (64.0 * law.at_least(count));
             assert!((ratio - 1.0).abs() < 1e-9, "{count}");

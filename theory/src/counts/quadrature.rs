@@ -35,7 +35,7 @@ mod tests {
             let found = integral(0.0, 2.0, 1, |x| x.powi(degree));
             assert!((found / exact - 1.0).abs() < 1e-13, "{degree}: {found}");
         }
-        // The next even power is not: the rule has ten points and no more.
+        // The next even power is not exact with ten points.
         let found = integral(-1.0, 1.0, 1, |x| x.powi(20));
         assert!((found * 21.0 / 2.0 - 1.0).abs() > 1e-7);
     }

@@ -1,4 +1,4 @@
-//! What simulated exposures with a target come to.
+//! Detections in simulated exposures with a target.
 
 use anyhow::Result;
 use dtof_core::{AnyRule, BinPosition, DepthEstimator};
@@ -7,29 +7,29 @@ use crate::looks::exposure::{Exposures, Looks};
 use crate::random::trial_rng;
 use crate::rates::Rates;
 
-/// When a pixel looks and what decides then.
+/// When a pixel looks, and how it decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Decisions {
-    /// When.
+pub struct DetectionSettings {
+    /// When the pixel looks.
     pub looks: Looks,
-    /// Whether there is an event.
+    /// The rule that decides about an event.
     pub rule: AnyRule,
-    /// Where.
+    /// The depth estimator.
     pub estimator: DepthEstimator,
 }
 
-/// What some exposures with a target came to; sums of integers, so that they
-/// add up the same in any order.
+/// The outcome of a number of exposures. All fields are integer sums, so the order of
+/// addition does not matter.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Detections {
-    /// Exposures.
+    /// Number of exposures.
     pub exposures: u64,
-    /// Laser cycles of all of them.
+    /// Laser cycles of all exposures.
     pub cycles: u64,
-    /// Those with an event whose depth lies within [`Self::NEAR_BINS`] of the
-    /// target's.
+    /// Exposures with an event whose depth lies within [`Self::NEAR_BINS`] of the
+    /// target.
     pub near: u64,
-    /// Those with an event elsewhere.
+    /// Exposures with an event elsewhere.
     pub far: u64,
     /// Laser cycles of the exposures counted in `near`.
     pub near_cycles: u64,
@@ -38,25 +38,25 @@ pub struct Detections {
 }
 
 impl Detections {
-    /// An event farther from the target is a false one.
+    /// An event farther from the target is a false alarm.
     pub const NEAR_BINS: f64 = 3.0;
 
-    /// As many as `exposures`, of trial number `trial`.
+    /// Simulates `exposures` exposures with the random numbers of trial `trial`.
     ///
     /// # Errors
-    /// If a rate is negative or not a number.
+    /// Fails if a rate is negative or not a number.
     pub fn trial<const BINS: usize>(
         seed: u64,
         trial: u16,
         rates: &Rates,
-        decisions: &Decisions,
+        settings: &DetectionSettings,
         exposures: u32,
     ) -> Result<Self> {
-        let Decisions {
+        let DetectionSettings {
             looks,
             rule,
             estimator,
-        } = decisions;
+        } = settings;
         let bins = u16::try_from(BINS)?;
         let simulated = Exposures::new(rates, bins, *looks)?;
         let mut rng = trial_rng(seed, trial);
@@ -82,8 +82,8 @@ impl Detections {
         Ok(sum)
     }
 
-    /// Mean laser cycles to an event near the target, expired exposures and
-    /// those with a false alarm included.
+    /// Mean laser cycles to an event near the target, including expired exposures and
+    /// those with a false alarm.
     #[must_use]
     pub fn cycles_to_event(&self) -> f64 {
         self.cycles as f64 / self.near as f64
@@ -95,7 +95,7 @@ impl Detections {
         (self.squared_errors as f64 / self.near as f64).sqrt() / 256.0
     }
 
-    /// Exposures with an event near the target, of all.
+    /// The share of exposures with an event near the target.
     #[must_use]
     pub fn detected(&self) -> f64 {
         self.near as f64 / self.exposures as f64
@@ -127,12 +127,12 @@ mod tests {
             position: 40.25,
             sigma: 1.0,
         };
-        let decisions = Decisions {
+        let settings = DetectionSettings {
             looks: Looks::new(4, 40, 1000),
             rule: PaperRule::new(alpha.parse::<U8F8>().unwrap(), Count::saturating(2)).into(),
             estimator: DepthEstimator::Centroid3,
         };
-        Detections::trial::<128>(3, 7, &rates, &decisions, 200).unwrap()
+        Detections::trial::<128>(3, 7, &rates, &settings, 200).unwrap()
     }
 
     #[test]
@@ -148,7 +148,7 @@ mod tests {
         };
         assert_eq!(found, expected);
         assert_eq!((found.detected(), found.cycles_to_event()), (1.0, 44.0));
-        // 132 photons of a pulse of one bin: a tenth, and what the centroid of three bins is off by.
+        // 132 photons, σ of one bin: a tenth, plus the bias of the centroid of three bins.
         let error = found.depth_error_bins();
         assert!((0.05..0.3).contains(&error), "{error}");
         let squares = found.squared_errors as f64 / 200.0;
@@ -158,7 +158,7 @@ mod tests {
     #[test]
     fn false_alarms_are_anywhere_and_parts_add_up() {
         let found = trial(0.0, "1");
-        // Within three bins of 128 lie one in twenty.
+        // One event in twenty lies within three bins by chance.
         assert!(found.far > 120 && found.near < found.far / 4, "{found:?}");
         assert!(found.near_cycles < found.cycles);
 

@@ -1,22 +1,21 @@
-//! Simulated exposures, from look to look.
+//! Simulated exposures, one look after the other.
 //!
-//! Between two looks the counts of a bin grow by a Poisson number. Background
-//! is the same everywhere, so its photons of all bins are drawn at once and
-//! thrown into bins, which is the same law and costs a photon, not a bin. The
-//! histogram and the rule are the core's.
+//! Between two looks the count of each bin grows by a Poisson number. Background is equal
+//! in all bins, so its photons are drawn with one Poisson number and spread evenly over the
+//! bins: the same distribution at a cost per photon, not per bin. Histogram and rule are
+//! those of the core.
 
 use anyhow::{Context, Result};
-use dtof_core::{
-    AnyRule, Count, DepthEstimator, Detection, Histogram, RangeGate, detect, isqrt,
-    quadrant_background,
-};
+use dtof_core::paper::{isqrt, quadrant_background};
+use dtof_core::rule::detect;
+use dtof_core::{AnyRule, Count, DepthEstimator, Detection, Histogram, RangeGate};
 use rand_core::Rng;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 
 use crate::rates::{Rates, bin_share};
 
-/// When a pixel looks, counted in steps of X laser cycles.
+/// When a pixel looks at its histogram, in steps of X laser cycles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Looks {
     /// Laser cycles a step (X).
@@ -28,8 +27,7 @@ pub struct Looks {
 }
 
 impl Looks {
-    /// Those of a [`PixelConfig`](dtof_core::PixelConfig) of these, valid as
-    /// one.
+    /// The looks of a valid [`PixelConfig`](dtof_core::PixelConfig) with these settings.
     #[must_use]
     pub fn new(x: u16, l1: u16, l2: u16) -> Self {
         let [x, l1, l2] = [x, l1, l2].map(u32::from);
@@ -48,7 +46,7 @@ impl Looks {
     }
 }
 
-/// The photons of some laser cycles of one pixel.
+/// The photon distribution of one pixel over a number of laser cycles.
 #[derive(Clone, Debug)]
 struct Photons {
     background: Option<Poisson<f64>>,
@@ -56,12 +54,12 @@ struct Photons {
 }
 
 impl Photons {
-    /// Of `cycles` laser cycles with `bins` bins, a power of two.
+    /// For `cycles` laser cycles. `bins` must be a power of two.
     fn new(rates: &Rates, bins: u16, cycles: f64) -> Result<Self> {
         let background = rates.background * f64::from(bins) * cycles;
         let signal = |bin: u16| {
             let mean = rates.signal * cycles * bin_share(bin.into(), rates.position, rates.sigma);
-            // One photon in 1e12 exposures does not show.
+            // Less than a photon in 1e12 exposures is left out.
             (mean > 1e-12).then(|| Ok((bin, Poisson::new(mean)?)))
         };
         let signal = (0..bins).filter_map(signal).collect::<Result<_>>();
@@ -72,25 +70,25 @@ impl Photons {
         })
     }
 
-    /// Calls `photon` with the bin of each, one of `BINS`.
+    /// Draws photons and calls `photon` with the bin of each.
     fn draw<const BINS: usize>(&self, rng: &mut Pcg64, mut photon: impl FnMut(u16)) {
         // A Poisson sample is a whole number.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let sample = |law: &Poisson<f64>, rng: &mut Pcg64| law.sample(rng) as u64;
         let background = &self.background;
-        let mut left = background.as_ref().map_or(0, |law| sample(law, rng));
+        let mut remaining = background.as_ref().map_or(0, |law| sample(law, rng));
         // Four uniform bins from one random number: BINS is a power of two.
-        while left > 0 {
+        while remaining > 0 {
             let mut random = rng.next_u64();
-            for _ in 0..left.min(4) {
+            for _ in 0..remaining.min(4) {
                 #[allow(clippy::cast_possible_truncation)]
                 photon((random as usize & (BINS - 1)) as u16);
                 random >>= 16;
             }
-            left = left.saturating_sub(4);
+            remaining = remaining.saturating_sub(4);
         }
         for (bin, law) in &self.signal {
-            // A counter is full by then.
+            // More photons than a counter holds change nothing.
             for _ in 0..sample(law, rng).min(1024) {
                 photon(*bin);
             }
@@ -111,10 +109,10 @@ pub struct Exposures {
 }
 
 impl Exposures {
-    /// With `bins` bins, a power of two from 8 to 1024.
+    /// `bins` must be a power of two from 8 to 1024.
     ///
     /// # Errors
-    /// If a rate is negative or not a number.
+    /// Fails if a rate is negative or not a number.
     pub fn new(rates: &Rates, bins: u16, looks: Looks) -> Result<Self> {
         let photons = |steps: u32| Photons::new(rates, bins, f64::from(steps * looks.x));
         Ok(Self {
@@ -125,7 +123,7 @@ impl Exposures {
     }
 
     /// Calls `look` with the histogram at each look until it returns `true` or
-    /// the exposure expires. Gives the laser cycles it lasted.
+    /// the exposure expires. Returns the duration in laser cycles.
     pub(crate) fn run<const BINS: usize>(
         &self,
         rng: &mut Pcg64,
@@ -142,8 +140,8 @@ impl Exposures {
         self.looks.expiry()
     }
 
-    /// One exposure, photons only: calls `look` at each look with the laser cycles so
-    /// far and the photons since the look before, until it returns `true` or the
+    /// Simulates the photons of one exposure. Calls `look` at each look with the laser cycles
+    /// so far and the photons since the previous look, until it returns `true` or the
     /// exposure expires.
     pub fn frames<const BINS: usize>(
         &self,
@@ -164,7 +162,7 @@ impl Exposures {
         }
     }
 
-    /// One exposure: the laser cycles it lasted, and its event if there was one.
+    /// Simulates one exposure: its duration in laser cycles, and its event if there was one.
     pub fn event<const BINS: usize>(
         &self,
         rule: &AnyRule,
@@ -179,9 +177,8 @@ impl Exposures {
         (cycles, event)
     }
 
-    /// One exposure without a rule: for each look of `lasts`, ascending, the
-    /// highest α (in 1/256) that would have given an event by then, if any
-    /// would.
+    /// Simulates one exposure to its end. For each look of `lasts`, ascending: the highest α
+    /// (in 1/256) that would have caused an event up to that look, if any.
     pub fn highest_alphas<const BINS: usize>(
         &self,
         minimum_count: Count,
@@ -242,10 +239,10 @@ mod tests {
             let config = PixelConfig::<8>::paper().x(x).l1(l1).l2(l2);
             let config = config.build().unwrap();
             let looks = Looks::new(x, l1, l2);
-            let mut pixel = AsyncPixel::<8>::new(PixelAddress(0));
+            let mut pixel = AsyncPixel::<8>::new(PixelAddress::new(0));
             let (mut seen, mut statistics) = (Vec::new(), Statistics::new());
             for cycle in 0.. {
-                match pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle)) {
+                match pixel.end_laser_cycle(&config, &mut statistics, LaserCycle::new(cycle)) {
                     Look::NoPeak => seen.push(u32::from(pixel.exposure())),
                     Look::Expired => {
                         assert_eq!(cycle + 1, u64::from(looks.expiry()));

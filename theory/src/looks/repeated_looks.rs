@@ -1,14 +1,14 @@
 //! False alarms of a whole exposure: a pixel that looks every X laser cycles
 //! while L1 < N < L2.
 //!
-//! There is no closed form, as the looks share photons. Whatever they share, an
-//! exposure has a false alarm at least as often as its worst look alone and at
-//! most as often as the looks' probabilities add up to. What lies between comes
-//! from simulation: [`FalseAlarms`] tallies it, [`table`](crate::looks::table) keeps
-//! it.
+//! There is no closed form, because the looks share photons. The probability of a false alarm
+//! in an exposure is at least that of its worst look, and at most the sum over its looks.
+//! Simulation finds the value in between: [`FalseAlarms`] counts,
+//! [`table`](crate::looks::table) interpolates.
 
 use anyhow::Result;
-use dtof_core::{Count, Threshold};
+use dtof_core::Count;
+use dtof_core::paper::Threshold;
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
@@ -22,8 +22,7 @@ pub struct RepeatedLooks<'a> {
     looks: &'a [SingleLook],
 }
 
-/// The single looks up to `last`, the first being step 1: what
-/// [`RepeatedLooks`] takes its looks from.
+/// The single looks at steps 1 to `last`, the input of [`RepeatedLooks`].
 #[must_use]
 pub fn single_looks(bins: u32, mean_a_step: f64, last: u32) -> Vec<SingleLook> {
     let look = |step: u32| SingleLook::new(bins, mean_a_step * f64::from(step));
@@ -39,7 +38,7 @@ impl<'a> RepeatedLooks<'a> {
         }
     }
 
-    /// What the exact laws of the looks say of the exposure.
+    /// The exact bounds for the exposure.
     #[must_use]
     pub fn bounds(&self, threshold: &Threshold) -> Bounds {
         let mut bounds = Bounds::default();
@@ -54,38 +53,38 @@ impl<'a> RepeatedLooks<'a> {
     }
 }
 
-/// Between what the probability of a false alarm in an exposure lies.
+/// Bounds on the probability of a false alarm in an exposure.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Bounds {
-    /// At least: the probability of its worst look.
+    /// Lower bound: the probability at the worst look.
     pub worst_look: f64,
-    /// At most: the probabilities of its looks added up, at most 1.
+    /// Upper bound: the sum of the probabilities of all looks, at most 1.
     pub sum: f64,
-    /// `H`: −ln of the probability of no false alarm, were the looks
-    /// independent. Looks share photons, so the simulated intensity is lower:
-    /// [`table`](crate::looks::table) has its ratio to this.
+    /// `H`: −ln of the probability of no false alarm if the looks were independent.
+    /// Looks share photons, so the simulated intensity is lower;
+    /// [`table`](crate::looks::table) has the ratio.
     pub independent: f64,
 }
 
-/// Where repeated looks are simulated: 128 bins, background only.
+/// A point of the simulated grid: 128 bins, background only.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Point {
     /// Mean background photons a bin at the first look.
     pub first_mean: f64,
     /// The first look, in steps of X laser cycles.
     pub first: u32,
-    /// Last looks to tally, ascending.
+    /// The last looks to count for, ascending.
     pub lasts: Vec<u32>,
 }
 
 /// Bins of the histograms simulated.
 pub const BINS: usize = 128;
-/// Photons a reported peak holds at least, the default of the commands.
+/// The fewest photons of a reported peak, the default of the commands.
 pub const MINIMUM_COUNT: u16 = 5;
 /// α from 1 to 10 in halves.
 pub const ALPHA_STEPS: usize = 19;
 
-/// α number `step`, in 1/256.
+/// α at `step` of [`ALPHA_STEPS`], in 1/256.
 #[must_use]
 pub fn alpha_bits(step: usize) -> u16 {
     u16::try_from(256 + 128 * step).unwrap_or(u16::MAX)
@@ -94,14 +93,14 @@ pub fn alpha_bits(step: usize) -> u16 {
 /// Exposures with a false alarm.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FalseAlarms {
-    /// Exposures simulated.
+    /// Simulated exposures.
     pub exposures: u64,
     /// For each last look and each α, exposures with a false alarm.
     pub events: Vec<[u64; ALPHA_STEPS]>,
 }
 
 impl FalseAlarms {
-    /// None yet, for as many last looks.
+    /// Zero counts for `lasts` last looks.
     #[must_use]
     pub fn new(lasts: usize) -> Self {
         Self {
@@ -110,10 +109,10 @@ impl FalseAlarms {
         }
     }
 
-    /// `exposures` of them at `point`.
+    /// Simulates `exposures` exposures at `point`.
     ///
     /// # Errors
-    /// If the mean is negative or not a number.
+    /// Fails if the mean is negative or not a number.
     pub fn trial(point: &Point, exposures: u32, rng: &mut Pcg64) -> Result<Self> {
         let rates = Rates::without_target(point.first_mean / f64::from(point.first));
         let looks = Looks {

@@ -1,20 +1,21 @@
 //! False alarms of one look, exactly: background only, the quadrant estimate,
 //! the core's tie-break, counters and threshold.
 //!
-//! Halves and quadrants are independent. Let the peak lie in one half, its
-//! count being that half's maximum `h`; the other half has the quadrant maxima
-//! `a` and `b`, of which the smaller is the background `q` and the greater must
-//! not be above `h`. The rule fires from a peak count `f(q)` on, so with F the
-//! distribution of one bin
+//! Halves and quadrants are independent. Let the peak lie in one half, with that half's
+//! maximum `h` as its count. The other half has the quadrant maxima `a` and `b`: the smaller
+//! is the background `q`, the larger must not exceed `h`. The rule fires from a peak count
+//! of `f(q)` on, so
 //!
 //! ```text
 //! P = Σ over q, m ≥ q of P(min(a, b) = q, max(a, b) = m) · P(h ≥ max(m, f(q)))
 //! ```
 //!
-//! for the lower half, which wins ties, and with `m + 1` for `m` for the upper.
-//! `a` and `b` have the distribution F^(n/4), `h` has F^(n/2).
+//! for the lower half, which wins ties, and with `m + 1` instead of `m` for the upper half.
+//! With F the distribution of one bin, `a` and `b` have the distribution F^(n/4), `h` has
+//! F^(n/2).
 
-use dtof_core::{Count, Count10, CounterWidth, Threshold};
+use dtof_core::paper::Threshold;
+use dtof_core::{Count, Count10, CounterWidth};
 
 use crate::counts::poisson::Poisson;
 use crate::gaussian;
@@ -37,7 +38,7 @@ pub struct SingleLook {
 }
 
 impl SingleLook {
-    /// `bins` a power of two from 8, `mean` background photons a bin, 10-bit
+    /// For `bins` bins (a power of two from 8), `mean` background photons a bin and 10-bit
     /// counters.
     #[must_use]
     pub fn new(bins: u32, mean: f64) -> Self {
@@ -70,23 +71,23 @@ impl SingleLook {
         }
     }
 
-    /// The probability of an event, if a background of `q` makes the rule fire
-    /// from a peak count of `fires_from(q)` on, which is above `q`.
+    /// The probability of an event if, at a background of `q`, the rule fires from a peak
+    /// count of `fires_from(q)` on. That count must be above `q`.
     #[must_use]
     pub fn probability(&self, fires_from: impl Fn(u32) -> u32) -> f64 {
         let mut sum = 0.0;
         for (q, &mass) in (0..).zip(&self.quadrant) {
             let lowest = fires_from(q) as usize;
-            // What is not tabulated has no probability.
+            // Counts beyond the table have no probability.
             let Some(&half) = self.half.get(lowest) else {
                 continue;
             };
             if mass == 0.0 {
                 continue;
             }
-            // The other quadrant's maximum is q as well, between q and the
-            // lowest count that fires, or at least that count; either quadrant
-            // may be the smaller one.
+            // Cases for the maximum of the other quadrant: equal to q, between q and the
+            // lowest count that fires, or at least that count. Either quadrant may be the
+            // smaller one.
             let between = self.quadrant_above[q as usize] - self.quadrant_above[lowest - 1];
             sum += mass * (mass * 2.0 * half);
             sum += 2.0 * mass * (between.max(0.0) * 2.0 * half + self.exceeded[lowest]);
@@ -94,7 +95,7 @@ impl SingleLook {
         sum
     }
 
-    /// With the core's own threshold: integer root, α in 1/256, minimum count.
+    /// With the core's threshold: integer root, α in 1/256, minimum count.
     #[must_use]
     pub fn false_alarm_probability(&self, threshold: &Threshold) -> f64 {
         self.probability(|background| fires_from(threshold, background))
@@ -150,7 +151,8 @@ mod tests {
     /// All histograms of 8 bins with up to five photons a bin, one by one.
     #[test]
     fn agrees_with_all_histograms_of_few_photons() {
-        use dtof_core::{DepthEstimator, Histogram, PaperRule, RangeGate, detect};
+        use dtof_core::rule::detect;
+        use dtof_core::{DepthEstimator, Histogram, PaperRule, RangeGate};
         let mean = 0.2;
         let law = Poisson::new(mean);
         let rule = PaperRule::new(U8F8::lit("0.5"), Count::saturating(1));

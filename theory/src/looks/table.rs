@@ -1,22 +1,21 @@
 //! False alarms of repeated looks, simulated once and interpolated.
 //!
-//! Were the looks of an exposure independent, a false alarm would have the
-//! intensity `H = Σ −ln(1 − p_k)` over the exact single-look probabilities, and
-//! the probability `1 − exp(−H)`. As they share photons, the simulated intensity is
-//! lower. Its ratio to `H`, here the share, varies slowly, where the probability itself goes
-//! over orders of magnitude and in steps (α meets an integer root): so the
-//! share is what is interpolated, over the logarithms of the mean background at
-//! the first look, of the first look, and of last over first look. Between two
-//! α the larger share is taken.
+//! If the looks of an exposure were independent, false alarms would have the intensity
+//! `H = Σ −ln(1 − p_k)` over the exact single-look probabilities, and the probability
+//! `1 − exp(−H)`. Because looks share photons, the simulated intensity is lower. The table has
+//! the ratio of the two, called the share. The share varies slowly, while the probability
+//! spans orders of magnitude and has steps (α times an integer root). The share is interpolated
+//! over the logarithms of three numbers: the mean background at the first look, the first
+//! look, and the ratio of last to first look. Between two α the larger share counts.
 //!
-//! `theory/data/repeated_looks.csv` is made by `cargo lab figures`, from the study
-//! `false-events`.
+//! `cargo lab figures` writes `theory/data/repeated_looks.csv` from the study `false-events`.
 
 use std::fmt::Write;
 
 use anyhow::{Context, Result, ensure};
+use dtof_core::Count;
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count, Threshold};
+use dtof_core::paper::Threshold;
 use rayon::prelude::*;
 
 use crate::counts::binomial;
@@ -36,16 +35,16 @@ const FIRSTS: [u32; 5] = [2, 5, 11, 33, 101];
 const SPANS: [u32; 10] = [1, 2, 4, 8, 16, 32, 64, 128, 256, 512];
 /// The highest last look.
 const LAST: u32 = 1700;
-/// The highest mean background at the last look: four times 400, as twice the mean
-/// and twice the span must be in the table to interpolate. Counters fill up there, in the
-/// simulation as in the exact law.
+/// The highest mean background at the last look: four times 400, because interpolation needs
+/// twice the mean and twice the span. Counters saturate there, both in the simulation and in
+/// the exact law.
 const HIGHEST_MEAN: f64 = 1700.0;
-/// Fewer events say too little of their probability.
-const FEWEST_EVENTS: u64 = 20;
-/// Between its points an upper limit of the table may be too low by this factor,
-/// no more (`host-tests/tests/simulations/theory_exposures.rs`).
+/// Fewer events give no usable estimate.
+const MIN_EVENTS: u64 = 20;
+/// Between its points, an upper limit of the table may be too low by up to this factor
+/// (checked in `host-tests/tests/simulations/theory_exposures.rs`).
 pub const MARGIN: f64 = 1.4;
-/// Above the upper limit of a simulated probability lie as many of its samples.
+/// The probability that a simulated probability exceeds its upper limit.
 const UPPER_TAIL: f64 = 0.01;
 /// Exposures of one trial.
 const TRIAL: u32 = 500;
@@ -63,11 +62,11 @@ pub struct Row {
     pub alpha: u16,
     /// Exposures with a false alarm.
     pub events: u64,
-    /// `H`, `independent` of [`Bounds`](crate::looks::repeated_looks::Bounds).
+    /// `H`: `independent` of [`Bounds`](crate::looks::repeated_looks::Bounds).
     pub intensity: f64,
 }
 
-/// All points that are simulated.
+/// All simulated points.
 #[must_use]
 pub fn points() -> Vec<Point> {
     let mut points = Vec::new();
@@ -86,20 +85,21 @@ pub fn points() -> Vec<Point> {
     points
 }
 
-/// The grid in words: what a table says it was made for.
+/// The grid as text: the header of the table.
 fn grid() -> String {
     let alphas: Vec<u16> = (0..ALPHA_STEPS).map(alpha_bits).collect();
     format!(
         "# grid first_mean {FIRST_MEANS:?} first_look {FIRSTS:?} span {SPANS:?} \
          last_look up to {LAST} last_mean up to {HIGHEST_MEAN} alpha_256 {alphas:?} \
-         events from {FEWEST_EVENTS}"
+         events from {MIN_EVENTS}"
     )
 }
 
 /// Simulates one point, in trials numbered from `first_trial`.
 ///
 /// # Errors
-/// If the point is not one, or there are too many trials.
+/// Fails if the mean of the point is negative or not a number, or if the trial numbers exceed
+/// `u16::MAX`.
 pub fn simulate(seed: u64, first_trial: u16, point: &Point, trials: u16) -> Result<FalseAlarms> {
     let numbers = first_trial..first_trial.checked_add(trials).context("too many trials")?;
     let tallies: Vec<FalseAlarms> = numbers
@@ -113,7 +113,7 @@ pub fn simulate(seed: u64, first_trial: u16, point: &Point, trials: u16) -> Resu
     Ok(sum)
 }
 
-/// What is worth keeping of one point.
+/// The rows of one point; probabilities near 0 or 1 are left out.
 #[must_use]
 pub fn rows(point: &Point, tally: &FalseAlarms) -> Vec<Row> {
     let Some(&last) = point.lasts.last() else {
@@ -126,7 +126,7 @@ pub fn rows(point: &Point, tally: &FalseAlarms) -> Vec<Row> {
         let looks = RepeatedLooks::new(&steps, point.first, last);
         for (step, &events) in (0..ALPHA_STEPS).zip(events) {
             let certain = events * 20 > tally.exposures * 19;
-            if events < FEWEST_EVENTS || certain {
+            if events < MIN_EVENTS || certain {
                 continue;
             }
             let alpha = alpha_bits(step);
@@ -145,10 +145,10 @@ pub fn rows(point: &Point, tally: &FalseAlarms) -> Vec<Row> {
     rows
 }
 
-/// The table of points and their tallies, all of as many exposures, as CSV.
+/// Points and their tallies as CSV. All tallies must have the same number of exposures.
 ///
 /// # Errors
-/// If there is no point.
+/// Fails if `tallies` is empty.
 pub fn csv(tallies: &[(Point, FalseAlarms)]) -> Result<String> {
     let (_, first) = tallies.first().context("no points")?;
     let mut text = format!(
@@ -172,48 +172,48 @@ pub fn csv(tallies: &[(Point, FalseAlarms)]) -> Result<String> {
     Ok(text)
 }
 
-/// The table that is kept.
-const KEPT: &str = include_str!("../../data/repeated_looks.csv");
+/// The table of this crate.
+const CSV: &str = include_str!("../../data/repeated_looks.csv");
 
 /// ln H and ln of its share, ascending in H.
 type Shares = Vec<(f64, f64)>;
 
-/// Shares by mean, first look and span; empty where nothing was simulated.
+/// Shares by mean, first look and span; empty where nothing is simulated.
 type Grid = Vec<[[Shares; SPANS.len()]; FIRSTS.len()]>;
 
-/// The table, ready to be asked.
+/// The table, ready for look-ups.
 #[derive(Clone, Debug)]
 pub struct Table {
     /// Exposures simulated at each point.
     pub exposures: u64,
-    /// Its rows.
+    /// The rows of the file.
     pub rows: Vec<Row>,
-    /// The shares that were seen.
+    /// Simulated shares.
     shares: Grid,
-    /// Upper 99 % limits of those.
+    /// Upper 99 % limits of the shares.
     upper: Grid,
 }
 
 impl Table {
-    /// The table in `repeated_looks.csv`.
+    /// The table in `repeated_looks.csv`, which is compiled in.
     ///
     /// # Errors
-    /// If the file is damaged, or was made for another grid.
-    pub fn kept() -> Result<Self> {
-        Self::read(KEPT)
+    /// Fails if the file is damaged or has another grid.
+    pub fn load() -> Result<Self> {
+        Self::read(CSV)
     }
 
     fn read(text: &str) -> Result<Self> {
         ensure!(
             text.lines().any(|line| line == grid()),
-            "repeated_looks.csv is of another grid than this program's: make it anew with \
-             `cargo xtask figures --all`"
+            "repeated_looks.csv has another grid than this program: write it again with \
+             `cargo lab figures --all`"
         );
         let header = |name: &str| {
             let mut lines = text.lines();
             let value = lines.find_map(|line| line.strip_prefix("# ")?.strip_prefix(name));
             value
-                .context("the table says not how it was made")?
+                .with_context(|| format!("the table has no header `{name}`"))?
                 .trim()
                 .parse::<u64>()
                 .context("the table's header")
@@ -248,13 +248,13 @@ impl Table {
             "not a probability"
         );
         let share = row.events as f64 / self.exposures as f64;
-        let (_, most) = binomial::interval(row.events, self.exposures, UPPER_TAIL);
+        let (_, upper_limit) = binomial::interval(row.events, self.exposures, UPPER_TAIL);
         let independent = row.intensity.ln();
-        for (grid, probability) in [(&mut self.shares, share), (&mut self.upper, most)] {
+        for (grid, probability) in [(&mut self.shares, share), (&mut self.upper, upper_limit)] {
             let shares = &mut grid[mean][first][span];
-            // Higher α, lower intensity: from the back. Two α with the same
-            // thresholds have the same.
-            if shares.first().is_none_or(|known| independent < known.0) {
+            // Rows come with ascending α and so descending intensity. Two α with the same
+            // thresholds have equal intensities.
+            if shares.first().is_none_or(|first| independent < first.0) {
                 let found = -(-probability).ln_1p();
                 shares.insert(0, (independent, (found / row.intensity).ln()));
             }
@@ -263,9 +263,9 @@ impl Table {
         Ok(())
     }
 
-    /// What looks `first` to `last` with `first_mean` photons a bin at the
-    /// first come to, if they would have the intensity `independent` were they
-    /// independent. `None` outside the table.
+    /// The probability of a false alarm in the looks `first` to `last`, with `first_mean`
+    /// photons a bin at the first look. `independent` is the intensity of independent looks
+    /// ([`Bounds`](crate::looks::repeated_looks::Bounds)). `None` outside the table.
     #[must_use]
     pub fn look_up(
         &self,
@@ -273,14 +273,14 @@ impl Table {
         first: u32,
         last: u32,
         independent: f64,
-    ) -> Option<Found> {
+    ) -> Option<Estimate> {
         let span = f64::from(last) / f64::from(first);
         let (mean, mean_part) = place(&FIRST_MEANS, first_mean)?;
         let (first, first_part) = place(&FIRSTS.map(f64::from), first.into())?;
         let (span, span_part) = place(&SPANS.map(f64::from), span)?;
         let independent = independent.ln();
         let [mut sum, mut upper] = [0.0; 2];
-        let mut seen = true;
+        let mut is_observed = true;
         for corner in 0..8 {
             let [a, b, c] = [corner & 1, corner >> 1 & 1, corner >> 2];
             let part = |upper: usize, part: f64| if upper == 1 { part } else { 1.0 - part };
@@ -288,31 +288,31 @@ impl Table {
             if weight > 0.0 {
                 let of = |grid: &Grid| at(&grid[mean + a][first + b][span + c], independent);
                 let (found, within) = of(&self.shares)?;
-                let (most, _) = of(&self.upper)?;
+                let (upper_limit, _) = of(&self.upper)?;
                 sum += weight * found;
-                upper += weight * most;
-                seen &= within;
+                upper += weight * upper_limit;
+                is_observed &= within;
             }
         }
         let probability = |intensity: f64| -(-intensity.exp()).exp_m1();
-        Some(Found {
+        Some(Estimate {
             probability: probability(sum),
-            at_most: probability(upper),
-            seen,
+            upper_limit: probability(upper),
+            is_observed,
         })
     }
 }
 
 /// A probability from the table.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Found {
-    /// That of a false alarm in an exposure.
+pub struct Estimate {
+    /// The probability of a false alarm in an exposure.
     pub probability: f64,
-    /// The same from the upper 99 % limits of what was seen at the points around it.
-    pub at_most: f64,
-    /// Whether events of that kind were seen. If not, it is at most
-    /// `probability`, the least the table saw.
-    pub seen: bool,
+    /// The same from the upper 99 % limits of the points around it.
+    pub upper_limit: f64,
+    /// Whether the simulation had such events. If not, the probability is at most
+    /// `probability`, the smallest value in the table.
+    pub is_observed: bool,
 }
 
 fn read_row(line: &str) -> Result<Row> {
@@ -330,10 +330,10 @@ fn read_row(line: &str) -> Result<Row> {
     })
 }
 
-/// Between which two of `values` `value` lies, and how far from the lower one
-/// on a logarithmic scale; `None` outside.
+/// The index of the last of `values` below `value`, and how far `value` lies from there to the
+/// next on a logarithmic scale, 0 to 1; `None` outside.
 fn place(values: &[f64], value: f64) -> Option<(usize, f64)> {
-    let upper = values.iter().position(|&known| value <= known)?;
+    let upper = values.iter().position(|&upper| value <= upper)?;
     if upper == 0 {
         return (value == values[0]).then_some((0, 0.0));
     }
@@ -341,19 +341,19 @@ fn place(values: &[f64], value: f64) -> Option<(usize, f64)> {
     Some((upper - 1, (value / low).ln() / (high / low).ln()))
 }
 
-/// ln of the intensity found at ln H `independent`, and whether it was seen.
+/// ln of the intensity at ln H `independent`, and whether the simulation had such events.
 ///
-/// Between two α of the table the share rises, then falls where an integer
-/// threshold is passed: so the larger of the two shares is taken, and the
-/// intensity is never above that of the lower α, nor below what was seen. Above
-/// all the share is that of the lowest α. `None` where nothing was seen.
+/// Between two α of the table the share rises, then falls at an integer threshold. So the
+/// larger of the two shares counts, and the intensity never exceeds that of the lower α, nor
+/// falls below the smallest in the table. Above the table the share is that of the lowest α.
+/// `None` if there are no shares.
 fn at(shares: &Shares, independent: f64) -> Option<(f64, bool)> {
     let found = |(independent, share): (f64, f64)| independent + share.min(0.0);
-    let upper = shares.iter().position(|known| independent <= known.0);
+    let upper = shares.iter().position(|upper| independent <= upper.0);
     match upper {
         None => shares
             .last()
-            .map(|known| (found((independent, known.1)), true)),
+            .map(|last| (found((independent, last.1)), true)),
         Some(0) => Some((found(shares[0]), false)),
         Some(upper) => {
             let [low, high] = [shares[upper - 1], shares[upper]];

@@ -1,44 +1,45 @@
-//! Settings of the average rule for a wanted rate of false alarms.
+//! Settings of the average rule for a required rate of false alarms.
 //!
-//! There is no table for it: exposures without a target are simulated. Each gives the
-//! highest α with which one of its looks fires. α is the smallest that so few exceed that
-//! the upper 99 % limit of their share is not above the wanted one, for each L1. So a share below
-//! 4.6 over the number of exposures cannot be had. Of all L1 the one with
-//! the shortest mean time to an event is taken. False alarms are counted in other exposures.
+//! There is no table for this rule: exposures without a target are simulated. Each exposure
+//! yields the highest α with which one of its looks fires. For each L1, α is the smallest value
+//! with which the upper 99 % limit of the share of firing exposures is within the limit. A
+//! limit below 4.6 over the number of exposures cannot be met. The L1 with the shortest mean
+//! time to an event wins. False alarms are counted in separate exposures.
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{AverageRule, Count, DepthEstimator, Histogram};
 use rayon::prelude::*;
 
-use super::shortest::{false_alarms, of_bins, shortest};
+use super::shortest::{false_alarms, for_bins, shortest};
 use super::{Request, candidates, check};
 use crate::counts::binomial;
-use crate::looks::detections::{Decisions, Detections};
+use crate::looks::detections::{DetectionSettings, Detections};
 use crate::looks::exposure::{Exposures, Looks};
 use crate::random::trial_rng;
 use crate::rates::Rates;
 
-/// Photons of all simulated exposures, about: some seconds' work.
+/// Approximate photons of all simulated exposures, which take some seconds.
 const PHOTONS: f64 = 5e8;
-/// Exposures are simulated in as many trials, of at most so many exposures.
+/// Trials that share the exposures.
 const TRIALS: u16 = 64;
+/// The most exposures of a trial.
 const LONGEST_TRIAL: f64 = 2000.0;
-/// The first of their trials, which no other simulation here takes.
+/// The number of the first trial; no other simulation of this crate uses these numbers.
 const FIRST_TRIAL: u16 = 1000;
 /// The upper limit of a simulated share is one-sided, for 99 % confidence.
 const UPPER_TAIL: f64 = 0.01;
 
-/// The settings and what to expect of them.
+/// The settings and the performance to expect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tuned {
     /// α.
     pub alpha: U8F8,
     /// L1.
     pub l1: u16,
-    /// Exposures without a target that α was found with.
+    /// Exposures without a target that determined α.
     pub exposures: u64,
-    /// Other exposures without a target, and those of them with an event.
+    /// Further exposures without a target, and how many of them had an event.
     pub false_alarms: (u64, u64),
     /// Exposures simulated with the target.
     pub detections: Detections,
@@ -47,7 +48,7 @@ pub struct Tuned {
 /// Finds α and L1.
 ///
 /// # Errors
-/// What about the request cannot be met, in one line.
+/// Fails if the request is invalid or cannot be met; the message is one line.
 pub fn tune(request: &Request) -> Result<Tuned> {
     check(request)?;
     let l1s = candidates(request);
@@ -61,18 +62,18 @@ pub fn tune(request: &Request) -> Result<Tuned> {
     let mut all = Vec::new();
     let mut rarest = 1.0_f64;
     for (at, (&l1, &looks)) in l1s.iter().zip(&looks).enumerate() {
-        let wanted = request.wanted.in_an_exposure(looks);
-        rarest = rarest.min(wanted);
+        let limit = request.limit.per_exposure(looks);
+        rarest = rarest.min(limit);
         let highest = highest.iter().map(|of| of[at]).collect();
-        let Some(alpha) = smallest_alpha(highest, wanted) else {
+        let Some(alpha) = smallest_alpha(highest, limit) else {
             continue;
         };
-        let decisions = Decisions {
+        let settings = DetectionSettings {
             looks,
             rule: AverageRule::new(alpha, minimum_count).into(),
             estimator: DepthEstimator::Centroid3,
         };
-        all.push((decisions, (decisions, alpha, l1)));
+        all.push((settings, (settings, alpha, l1)));
     }
     ensure!(
         !all.is_empty(),
@@ -80,24 +81,24 @@ pub fn tune(request: &Request) -> Result<Tuned> {
          false alarms, or take --rule window",
         1.0 / rarest
     );
-    let ((decisions, alpha, l1), detections) = shortest(request, &all)?;
+    let ((settings, alpha, l1), detections) = shortest(request, &all)?;
     Ok(Tuned {
         alpha,
         l1,
         exposures,
-        false_alarms: false_alarms(request, &decisions)?,
+        false_alarms: false_alarms(request, &settings)?,
         detections,
     })
 }
 
-/// The smallest α that so few of the `highest` reach that no more than `wanted` do, with
-/// 99 % confidence; `None` if there is none.
-fn smallest_alpha(mut highest: Vec<Option<u16>>, wanted: f64) -> Option<U8F8> {
+/// The smallest α that a share of at most `limit` of the exposures reaches, with 99 %
+/// confidence. `highest` has the highest α of each exposure. `None` if no α does.
+fn smallest_alpha(mut highest: Vec<Option<u16>>, limit: f64) -> Option<U8F8> {
     let times = highest.len();
-    // The upper limit is not above `wanted` if that gives so few with a probability of
-    // the tail at most. It grows with the count.
+    // The upper confidence limit is within `limit` if, at that probability, so few successes
+    // lie in the tail. It grows with the count.
     let holds =
-        |&reached: &usize| binomial::at_most(reached as u64, times as u64, wanted) <= UPPER_TAIL;
+        |&reached: &usize| binomial::at_most(reached as u64, times as u64, limit) <= UPPER_TAIL;
     let reached = (0..times).take_while(holds).last()?;
     highest.sort_unstable();
     let first_above = highest.get(times - 1 - reached)?;
@@ -105,10 +106,10 @@ fn smallest_alpha(mut highest: Vec<Option<u16>>, wanted: f64) -> Option<U8F8> {
     Some(U8F8::from_bits(alpha))
 }
 
-/// Of many exposures without a target the highest α, in 1/256, that fires at any of the
-/// looks of each candidate; `None` where none fires.
+/// Simulates exposures without a target. For each exposure and candidate: the highest α, in
+/// 1/256, that fires at any look; `None` if none fires.
 fn highest_alphas(request: &Request, looks: &[Looks]) -> Result<Vec<Vec<Option<u16>>>> {
-    let trial = of_bins!(request.bins, trial);
+    let trial = for_bins!(request.bins, trial);
     let photons = request.background * f64::from(request.bins) * f64::from(request.l2);
     let most = (PHOTONS / photons / f64::from(TRIALS)).clamp(1.0, LONGEST_TRIAL);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
@@ -128,7 +129,7 @@ fn trial<const BINS: usize>(
 ) -> Result<Vec<Vec<Option<u16>>>> {
     let rates = Rates::without_target(request.background);
     let minimum_count = Count::saturating(request.minimum_count.into());
-    // Of all candidates the first look and the last.
+    // The looks of all candidates.
     let first = looks.iter().map(|looks| looks.first).min().unwrap_or(1);
     let all = Looks { first, ..looks[0] };
     let simulated = Exposures::new(&rates, request.bins, all)?;
@@ -167,7 +168,8 @@ fn highest_alpha<const BINS: usize>(
 
 #[cfg(test)]
 mod tests {
-    use dtof_core::{RangeGate, detect};
+    use dtof_core::RangeGate;
+    use dtof_core::rule::detect;
 
     use super::*;
 
@@ -197,7 +199,7 @@ mod tests {
     }
 
     #[test]
-    fn the_limit_of_the_share_is_below_the_wanted_one() {
+    fn the_upper_limit_of_the_share_is_within_the_limit() {
         let highest = |reached: usize| {
             let reach = (0..1000).map(|at| (at < reached).then_some(700));
             smallest_alpha(reach.collect(), 0.01)

@@ -1,14 +1,14 @@
-//! Of some settings those with the shortest time to an event, by simulated exposures.
+//! The settings with the shortest time to an event, by simulated exposures.
 
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 
 use super::Request;
-use crate::looks::detections::{Decisions, Detections};
+use crate::looks::detections::{DetectionSettings, Detections};
 use crate::rates::Rates;
 
-/// The function for so many bins, which [`check`](super::check) has let through.
-macro_rules! of_bins {
+/// The function for this number of bins, which [`check`](super::check) has validated.
+macro_rules! for_bins {
     ($bins:expr, $($function:ident)::+) => {
         match $bins {
             8 => $($function)::+::<8>,
@@ -22,87 +22,90 @@ macro_rules! of_bins {
         }
     };
 }
-pub(super) use of_bins;
+pub(super) use for_bins;
 
-/// Places of the pulse within a bin that are simulated, evenly spread.
+/// Simulated positions of the pulse within a bin, evenly spread.
 const POSITIONS: u16 = 8;
-/// Exposures at each place to compare settings with, and for those chosen.
+/// Exposures at each position: to compare settings, and for the chosen one.
 const EXPOSURES: (u32, u32) = (50, 500);
-/// An exposure reports the target less often than this: too weak.
-const LEAST_DETECTED: f64 = 0.01;
-/// Photons of all exposures without a target, about, which take a second.
+/// The signal is too weak if a smaller share of exposures reports the target.
+const MIN_DETECTED: f64 = 0.01;
+/// Approximate photons of all exposures without a target, which take a second.
 const PHOTONS: f64 = 1e8;
 
-/// Of `all` what has the shortest mean time to an event, and what to expect of it.
+/// The entry of `all` with the shortest mean time to an event, and its detections.
 ///
 /// # Errors
-/// If the signal is too weak for all of them.
-pub fn shortest<T: Copy>(request: &Request, all: &[(Decisions, T)]) -> Result<(T, Detections)> {
-    let mut best: Option<(&(Decisions, T), f64)> = None;
-    for one in all {
-        let detections = detections(request, &one.0, 0, EXPOSURES.0)?;
+/// Fails if the signal is too weak for all of them.
+pub fn shortest<T: Copy>(
+    request: &Request,
+    all: &[(DetectionSettings, T)],
+) -> Result<(T, Detections)> {
+    let mut best: Option<(&(DetectionSettings, T), f64)> = None;
+    for entry in all {
+        let detections = detections(request, &entry.0, 0, EXPOSURES.0)?;
         let time = detections.cycles_to_event();
         if detections.near > 0 && best.is_none_or(|best| time < best.1) {
-            best = Some((one, time));
+            best = Some((entry, time));
         }
     }
     let mut found = None;
-    if let Some(((decisions, settings), _)) = best {
-        // Other photons than those it was chosen by, which flatter it.
-        let detections = detections(request, decisions, POSITIONS, EXPOSURES.1)?;
-        found = Some((*settings, detections));
+    if let Some(((settings, value), _)) = best {
+        // Fresh photons: those that chose it would flatter it.
+        let detections = detections(request, settings, POSITIONS, EXPOSURES.1)?;
+        found = Some((*value, detections));
     }
     found
-        .filter(|(_, detections)| detections.detected() >= LEAST_DETECTED)
+        .filter(|(_, detections)| detections.detected() >= MIN_DETECTED)
         .with_context(|| {
             format!(
                 "the signal is too weak: fewer than {} % of exposures report the target before L2 = {}",
-                LEAST_DETECTED * 100.0,
+                MIN_DETECTED * 100.0,
                 request.l2
             )
         })
 }
 
-/// Exposures without a target, as many as do not take long, and those of them with an
+/// Simulates exposures without a target for about a second: their number, and how many had an
 /// event.
 ///
 /// # Errors
-/// If the background cannot be simulated.
-pub fn false_alarms(request: &Request, decisions: &Decisions) -> Result<(u64, u64)> {
+/// Fails if the background cannot be simulated.
+pub fn false_alarms(request: &Request, settings: &DetectionSettings) -> Result<(u64, u64)> {
     let without_target = Request {
         signal: 0.0,
         ..*request
     };
-    let last = f64::from(decisions.looks.last * decisions.looks.x);
+    let last = f64::from(settings.looks.last * settings.looks.x);
     let photons = request.background * f64::from(request.bins) * last;
     let most = f64::from(EXPOSURES.1);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let exposures = (PHOTONS / photons / f64::from(POSITIONS)).clamp(50.0, most) as u32;
-    let found = detections(&without_target, decisions, 2 * POSITIONS, exposures)?;
+    let found = detections(&without_target, settings, 2 * POSITIONS, exposures)?;
     Ok((found.exposures, found.near + found.far))
 }
 
-/// Exposures with the target, at all places within a bin: trials `first_trial` on.
+/// Exposures with the target at all positions within a bin, in trials from `first_trial` on.
 fn detections(
     request: &Request,
-    decisions: &Decisions,
+    settings: &DetectionSettings,
     first_trial: u16,
     exposures: u32,
 ) -> Result<Detections> {
-    let trial = of_bins!(request.bins, Detections::trial);
+    let trial = for_bins!(request.bins, Detections::trial);
     let trials: Vec<Detections> = (0..POSITIONS)
         .into_par_iter()
-        .map(|place| {
+        .map(|index| {
             // In the second quadrant, clear of the middle and of both ends.
             let bin = f64::from(request.bins / 8 * 3);
             let rates = Rates {
                 background: request.background,
                 signal: request.signal,
-                position: bin + (f64::from(place) + 0.5) / f64::from(POSITIONS),
+                position: bin + (f64::from(index) + 0.5) / f64::from(POSITIONS),
                 sigma: request.sigma,
             };
-            let number = first_trial + place;
-            trial(request.seed, number, &rates, decisions, exposures)
+            let number = first_trial + index;
+            trial(request.seed, number, &rates, settings, exposures)
         })
         .collect::<Result<_>>()?;
     let mut sum = Detections::default();

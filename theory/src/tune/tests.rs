@@ -1,4 +1,5 @@
-use dtof_core::{BlockLevel, Count, Threshold};
+use dtof_core::paper::Threshold;
+use dtof_core::{BlockLevel, Count};
 
 use super::*;
 
@@ -11,7 +12,7 @@ const REQUEST: Request = Request {
     x: 4,
     l1: Some(40),
     l2: 1000,
-    wanted: Wanted::PerExposure(0.01),
+    limit: FalseAlarmLimit::PerExposure(0.01),
     levels: BlockLevel::PIXEL,
     seed: 1,
 };
@@ -21,11 +22,11 @@ const REQUEST: Request = Request {
 fn a_rate_is_that_of_the_shortest_exposures() {
     for (x, l1, l2, rate) in [(4, 40, 1000, 1e-6), (1, 1, 3, 0.2), (10, 100, 5000, 1e-3)] {
         let looks = Looks::new(x, l1, l2);
-        let probability = Wanted::PerCycle(rate).in_an_exposure(looks);
+        let probability = FalseAlarmLimit::PerCycle(rate).per_exposure(looks);
         let [expiry, first] = [looks.expiry(), looks.first * looks.x].map(f64::from);
         let length = (1.0 - probability) * expiry + probability * first;
         assert!((probability / length / rate - 1.0).abs() < 1e-12);
-        assert_eq!(Wanted::PerExposure(0.1).in_an_exposure(looks), 0.1);
+        assert_eq!(FalseAlarmLimit::PerExposure(0.1).per_exposure(looks), 0.1);
     }
 }
 
@@ -47,7 +48,7 @@ fn candidates_go_from_x_to_half_of_an_exposure() {
 }
 
 #[test]
-fn what_is_refused_says_how_it_would_go() {
+fn a_refusal_suggests_a_fix() {
     let refused = |request: &Request| check(request).unwrap_err().to_string();
     let full = |background, x, l1| Request {
         background,
@@ -96,12 +97,12 @@ fn what_is_refused_says_how_it_would_go() {
     );
 }
 
-/// α in the smallest step that keeps the upper limit of false alarms below what is wanted.
+/// The upper limit of false alarms is within the limit at α, and not one step below.
 #[test]
 fn alpha_is_the_smallest_that_keeps_false_alarms_down() {
-    let table = Table::kept().unwrap();
+    let table = Table::load().unwrap();
     let mut sources = Vec::new();
-    for (bins, background, wanted) in [
+    for (bins, background, limit) in [
         (64, 0.05, 0.01),
         (128, 0.05, 0.01),
         (128, 0.1, 0.03),
@@ -117,30 +118,27 @@ fn alpha_is_the_smallest_that_keeps_false_alarms_down() {
         let looks = Looks::new(4, 40, 1000);
         let steps = single_looks(bins.into(), background * 4.0, looks.last);
         let request = Request {
-            wanted: Wanted::PerExposure(wanted),
+            limit: FalseAlarmLimit::PerExposure(limit),
             ..request
         };
         let found = tune(&request, &table).unwrap();
-        assert_eq!((found.l1, found.looks, found.wanted), (40, looks, wanted));
+        assert_eq!((found.l1, found.looks, found.limit), (40, looks, limit));
 
         let repeated = RepeatedLooks::new(&steps, looks.first, looks.last);
-        // The most there may be, as the table or the sum over looks says.
+        // The upper limit by the table or by the sum over looks.
         let most = |alpha: u16| {
             let minimum = Count::saturating(MINIMUM_COUNT.into());
             let bounds = repeated.bounds(&Threshold::new(U8F8::from_bits(alpha), minimum));
             let first_mean = background * 44.0;
             let found = table.look_up(first_mean, 11, 249, bounds.independent);
             match found.filter(|found| bins == 128 && found.probability < bounds.sum) {
-                Some(found) => (found.at_most.max(bounds.worst_look) * MARGIN).min(bounds.sum),
+                Some(found) => (found.upper_limit.max(bounds.worst_look) * MARGIN).min(bounds.sum),
                 None => bounds.sum,
             }
         };
         let alpha = found.alpha.to_bits();
-        assert!(
-            most(alpha) <= wanted && most(alpha - 1) > wanted,
-            "{found:?}"
-        );
-        assert!(found.false_alarms <= wanted);
+        assert!(most(alpha) <= limit && most(alpha - 1) > limit, "{found:?}");
+        assert!(found.false_alarms <= limit);
         assert!(found.detections.detected() > 0.99);
         sources.push(found.source);
     }
@@ -148,29 +146,29 @@ fn alpha_is_the_smallest_that_keeps_false_alarms_down() {
     assert!(sources.contains(&Source::Table), "{sources:?}");
 }
 
-/// In exposures that α was not found with, too.
+/// In exposures that did not determine α, too.
 #[test]
 fn alpha_of_the_average_keeps_false_alarms_down() {
-    let wanted = 0.02;
+    let limit = 0.02;
     let found = average::tune(&Request {
         background: 0.2,
         bins: 8,
         l2: 200,
         signal: 2.0,
-        wanted: Wanted::PerExposure(wanted),
+        limit: FalseAlarmLimit::PerExposure(limit),
         ..REQUEST
     })
     .unwrap();
     assert_eq!((found.l1, found.exposures), (40, 64 * 2000));
     let (exposures, events) = found.false_alarms;
     assert_eq!(exposures, 8 * 500);
-    let share = events as f64 / exposures as f64 / wanted;
-    // Steps of α are coarse; 80 events are wanted.
+    let share = events as f64 / exposures as f64 / limit;
+    // Steps of α are coarse; 80 events are expected.
     assert!((0.5..1.3).contains(&share), "{share}");
     assert!(found.detections.detected() > 0.9);
 }
 
-/// Near enough: L1 is chosen by fewer exposures.
+/// Within a tenth: fewer exposures choose L1.
 #[test]
 fn no_other_l1_is_much_faster() {
     let time = |l1| {
@@ -206,7 +204,7 @@ fn a_bright_target_waits_until_z_holds() {
     assert_eq!(found.unwrap().l1, 36);
 }
 
-/// So many exposures that their photons take a second.
+/// The number of exposures follows from the photons simulated in a second.
 #[test]
 fn much_background_has_fewer_exposures_without_a_target() {
     let found = window::tune(&Request {
@@ -214,6 +212,6 @@ fn much_background_has_fewer_exposures_without_a_target() {
         signal: 3.0,
         ..REQUEST
     });
-    // Of the 1e8 photons an exposure of 996 laser cycles has 50,995.
+    // An exposure of 996 laser cycles has 50,995 of the 1e8 photons.
     assert_eq!(found.unwrap().false_alarms.0, 8 * 245);
 }

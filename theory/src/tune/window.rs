@@ -1,46 +1,46 @@
-//! Settings of the window rule for a wanted rate of false alarms.
+//! Settings of the window rule for a required rate of false alarms.
 //!
-//! Window and estimator are those that suit the pulse, z is that of [`z_for_levels`]. Of all L1
-//! the one with the shortest mean time to an event is taken, of those whose first look
-//! has a background that it holds for if there are any. False alarms are counted
-//! in simulated exposures without a target.
+//! Window and estimator follow from the pulse, z from [`z_for_levels`]. The L1 with the shortest
+//! mean time to an event wins; values whose background at the first look (the first decision after L1)
+//! is in the range of [`z_for_levels`] take precedence. False alarms are counted in simulated exposures
+//! without a target.
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{Count, DepthEstimator, HIGHEST_Z, RangeGate, WindowRule, z_for_levels};
+use dtof_core::rule::{HIGHEST_Z, z_for_levels};
+use dtof_core::{Count, DepthEstimator, RangeGate, WindowRule};
 
 use super::shortest::{false_alarms, shortest};
 use super::{Request, candidates, check};
-use crate::looks::detections::{Decisions, Detections};
+use crate::looks::detections::{DetectionSettings, Detections};
 use crate::looks::exposure::Looks;
 
-/// Background counts a bin at the first look that [`z_for_levels`] holds for.
+/// Background counts a bin at the first look for which [`z_for_levels`] is valid.
 const BACKGROUND: std::ops::RangeInclusive<f64> = 0.4..=200.0;
 
-/// The settings and what to expect of them.
+/// The settings and the performance to expect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tuned {
-    /// The standard deviation of the pulse in bins, as it can be given.
+    /// The standard deviation of the pulse in bins, rounded to the format of the option.
     pub sigma: U8F8,
     /// Bins in the window.
     pub window: u8,
     /// Standard deviations of the background.
     pub z: U4F12,
-    /// Wanted is a false alarm in so many exposures.
+    /// The limit: one false alarm in this many exposures.
     pub one_in: u32,
-    /// L1.
+    /// L1: the laser cycles that an exposure must exceed before the first look.
     pub l1: u16,
-    /// How the depth is found.
+    /// The depth estimator.
     pub estimator: DepthEstimator,
-    /// Exposures of a pixel without a target that were simulated, and those with an event. Of
-    /// blocks come a third as many.
+    /// Simulated exposures of a pixel without a target, and how many had an event. The blocks
+    /// of adaptive binning add a third as many false alarms.
     pub false_alarms: (u64, u64),
     /// Exposures simulated with the target.
     pub detections: Detections,
 }
 
-/// The exposures of which `share` is one, rounded up: what [`z_for_levels`] takes. Limited to what
-/// a `u32` holds.
+/// `1 / share`, rounded up and saturating: the argument of [`z_for_levels`].
 #[must_use]
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
 pub fn one_in(share: f64) -> u32 {
@@ -50,14 +50,14 @@ pub fn one_in(share: f64) -> u32 {
 /// Finds z and L1.
 ///
 /// # Errors
-/// What about the request cannot be met, in one line.
+/// Fails if the request is invalid or cannot be met; the message is one line.
 pub fn tune(request: &Request) -> Result<Tuned> {
     check(request)?;
     let sigma = U8F8::saturating_from_num(request.sigma).max(U8F8::DELTA);
     let window = WindowRule::width_for_pulse(sigma);
     let estimator = DepthEstimator::for_pulse(sigma);
     let minimum_count = Count::saturating(request.minimum_count.into());
-    // z takes the number of bins from it only.
+    // z uses only its number of bins.
     let gate = RangeGate::<1024>::new(0, request.bins - 1)?;
 
     let mut candidates = candidates(request);
@@ -72,7 +72,7 @@ pub fn tune(request: &Request) -> Result<Tuned> {
     let mut all = Vec::new();
     for l1 in candidates {
         let looks = Looks::new(request.x, l1, request.l2);
-        let one_in = one_in(request.wanted.in_an_exposure(looks));
+        let one_in = one_in(request.limit.per_exposure(looks));
         ensure!(
             one_in >= 10,
             "a false alarm in {one_in} exposures: there is a z for one in 10 or fewer"
@@ -82,14 +82,14 @@ pub fn tune(request: &Request) -> Result<Tuned> {
             z < HIGHEST_Z,
             "a false alarm in {one_in} exposures: there is no z for so few"
         );
-        let decisions = Decisions {
+        let settings = DetectionSettings {
             looks,
             rule: WindowRule::new(window, z, minimum_count)?.into(),
             estimator,
         };
-        all.push((decisions, (decisions, l1, one_in, z)));
+        all.push((settings, (settings, l1, one_in, z)));
     }
-    let ((decisions, l1, one_in, z), detections) = shortest(request, &all)?;
+    let ((settings, l1, one_in, z), detections) = shortest(request, &all)?;
     Ok(Tuned {
         sigma,
         window,
@@ -97,7 +97,7 @@ pub fn tune(request: &Request) -> Result<Tuned> {
         one_in,
         l1,
         estimator,
-        false_alarms: false_alarms(request, &decisions)?,
+        false_alarms: false_alarms(request, &settings)?,
         detections,
     })
 }

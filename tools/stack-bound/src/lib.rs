@@ -31,7 +31,7 @@ const HARD_FAULT: usize = 3;
 
 /// Bytes of stack an image can need: the main loop, a handler of an interrupt on
 /// it (all have the same priority), and on that the hard fault's and the NMI's. The hard
-/// fault's may start the stack anew, as it may come from an overflow: it then needs its
+/// fault's may reset the stack pointer, as it may come from an overflow: it then needs its
 /// own bytes from the start on.
 ///
 /// # Errors
@@ -75,7 +75,26 @@ pub fn of_image(path: &Path) -> Result<u64> {
     Ok(((bound + handlers).max(anew) + nmi).into())
 }
 
-/// The functions defmt asks of a logger, in defmt-rtt, and how often each calls one
+/// The function of an image that takes most stack for itself: its name and its bytes.
+///
+/// # Errors
+/// If the file is no Cortex-M image, or a function sets the stack pointer.
+pub fn largest_frame(path: &Path) -> Result<(String, u32)> {
+    largest_frame_of(&fs::read(path).with_context(|| path.display().to_string())?)
+}
+
+fn largest_frame_of(image: &[u8]) -> Result<(String, u32)> {
+    let functions = functions(&object::File::parse(image)?)?.into_values();
+    let functions: Vec<Function> = functions.collect();
+    if let Some(Function { name, .. }) = functions.iter().find(|one| one.sets_stack_pointer) {
+        bail!("{name} sets the stack pointer");
+    }
+    let largest = functions.into_iter().max_by_key(|function| function.takes);
+    let largest = largest.context("no function in the image")?;
+    Ok((largest.name, largest.takes))
+}
+
+/// The functions of a defmt logger, in defmt-rtt, and how often each calls one
 /// of the two that write. One call more may be of something else.
 const DEFMT_RTT: [(&str, u32); 3] = [
     ("_defmt_acquire", 1),
@@ -94,7 +113,7 @@ struct Function {
     name: String,
     takes: u32,
     goes_to: BTreeSet<u32>,
-    /// How often it goes where nobody knows before it runs.
+    /// The number of calls and jumps whose target is only known when it runs.
     goes_anywhere: u32,
     sets_stack_pointer: bool,
 }
@@ -370,8 +389,58 @@ mod tests {
         assert!(needs.lets_start_anew(0));
         assert_eq!(needs.of(0).unwrap(), 4);
         assert!(needs.of(2).is_err());
-        // Asked again, or of what is not there.
+        // Repeated, or of a function that does not exist.
         assert!(!needs.lets_start_anew(0) && !needs.lets_start_anew(4));
+    }
+
+    /// An ELF file for Arm with these functions, one after the other, each a name and its code.
+    fn image(functions: &[(&str, &[u16])]) -> Vec<u8> {
+        let (mut code, mut symbols, mut names) = (vec![], vec![0; 16], b"\0.text\0".to_vec());
+        let words = |words: &[usize]| -> Vec<u8> {
+            let bytes = words.iter().map(|&word| u32::try_from(word).unwrap());
+            bytes.flat_map(u32::to_le_bytes).collect()
+        };
+        for (name, halfwords) in functions {
+            symbols.extend(words(&[names.len(), code.len(), 2 * halfwords.len()]));
+            symbols.extend([2, 0, 1, 0]); // a function in section 1
+            names.extend([name.as_bytes(), b"\0"].concat());
+            code.extend(halfwords.iter().flat_map(|word| word.to_le_bytes()));
+        }
+        let [code_bytes, symbol_bytes, name_bytes] = [&code, &symbols, &names].map(Vec::len);
+        let symbols_at = 52 + code_bytes;
+        let names_at = symbols_at + symbol_bytes;
+        let headers_at = names_at + name_bytes;
+        let mut file = b"\x7fELF\x01\x01\x01\0\0\0\0\0\0\0\0\0\x02\0\x28\0".to_vec();
+        // Four headers of 40 bytes; section 3 has the names.
+        file.extend(words(&[1, 0, 0, headers_at, 0, 52, 40 << 16, 3 << 16 | 4]));
+        file.extend([code, symbols, names].concat());
+        for header in [
+            [0; 10],
+            [1, 1, 6, 0, 52, code_bytes, 0, 0, 2, 0],
+            [0, 2, 0, 0, symbols_at, symbol_bytes, 3, 1, 4, 16],
+            [0, 3, 0, 0, names_at, name_bytes, 0, 0, 1, 0],
+        ] {
+            file.extend(words(&header));
+        }
+        file
+    }
+
+    #[test]
+    fn the_largest_frame_is_one_function_and_not_a_chain() {
+        // push {r4, r6, r7, lr}; sub sp, #24; bl large; pop {r4, pc}
+        let small: (_, &[u16]) = ("small", &[0xb5d0, 0xb086, 0xf000, 0xf801, 0xbd10]);
+        // push {r4, r6, r7, lr}; sub.w sp, sp, #4800; pop {r4, pc}
+        let large: (_, &[u16]) = ("large", &[0xb5d0, 0xf5ad, 0x5d96, 0xbd10]);
+        for order in [[small, large], [large, small]] {
+            let largest = largest_frame_of(&image(&order)).unwrap();
+            assert_eq!(largest, ("large".to_owned(), 4816));
+        }
+        // mov sp, r4; bx lr
+        let anew: (_, &[u16]) = ("anew", &[0x46a5, 0x4770]);
+        let error = largest_frame_of(&image(&[large, anew])).unwrap_err();
+        assert_eq!(error.to_string(), "anew sets the stack pointer");
+        assert!(largest_frame_of(&image(&[])).is_err());
+        assert!(largest_frame_of(b"text").is_err());
     }
 
     #[test]

@@ -7,11 +7,11 @@
 pub enum Effect {
     /// Nothing of interest; gives back some of the stack; returns.
     None,
-    /// Takes so many bytes of the stack.
+    /// Takes this many bytes of the stack.
     Takes(u32),
     /// Goes to the instruction at this address, for good or to come back.
     GoesTo(u32),
-    /// Goes where a register or the memory says, other than back to the caller.
+    /// Jumps to an address from a register or from memory, other than back to the caller.
     GoesAnywhere,
     /// Sets the stack pointer in another way.
     SetsStackPointer,

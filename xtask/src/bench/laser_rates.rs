@@ -1,5 +1,5 @@
-//! The laser rates that the real board could keep up with: a table for the documentation,
-//! worked out from the counts.
+//! The laser rates that the real board can keep up with: a table for the documentation, computed
+//! from the counts.
 
 use std::fmt::Write as _;
 
@@ -7,16 +7,16 @@ use anyhow::{Context, Result};
 
 use super::Row;
 
-/// Clock cycles a second of the STM32F405, taken for as many instructions.
+/// Clock cycles per second of the STM32F405, taken as instructions per second.
 const INSTRUCTIONS_A_SECOND: f64 = 168e6;
 /// Macropixels.
 const ARRAYS: [f64; 2] = [64.0, 128.0];
 /// Laser cycles between looks.
 const X: [f64; 2] = [4.0, 40.0];
-/// Blocks a macropixel, of 2 × 2 and of 4 × 4.
+/// Blocks per macropixel, of 2 × 2 and of 4 × 4.
 const BLOCKS: f64 = 1.0 / 4.0 + 1.0 / 16.0;
 
-/// What a macropixel is busy with: a photon each laser cycle, and a look.
+/// The work of a macropixel: a photon each laser cycle, and a look.
 struct Load {
     what: &'static str,
     photon: &'static str,

@@ -16,15 +16,15 @@ use crate::cargo;
 /// Pixels of both examples.
 const PIXELS: u32 = 64;
 const CYCLES: u32 = 1000;
-/// What the device prints when its sensor starts, and when it stops for a reason.
+/// The lines of the device when its sensor starts and stops.
 const ON: &str = "sensor on";
 const OFF: &str = "sensor off, reason ";
 /// `DTOF_STOP_SILENCE`.
 const SILENCE: u8 = 4;
-/// For a line of the device: a host may be silent for 3 s.
+/// The longest wait for a line of the device: a host may be silent for 3 s.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Runs both and compares with the program of this workspace, which it builds.
+/// Builds the program of this workspace and compares both examples with it.
 pub fn check(root: &Path, host: &Path, target: &Path) -> Result<()> {
     let mut build = cargo();
     build
@@ -43,7 +43,7 @@ pub fn check(root: &Path, host: &Path, target: &Path) -> Result<()> {
     silence(&dtof, host)
 }
 
-/// The photons of a file become the events that `dtof replay` makes of them.
+/// The example finds the same events in a file of photons as `dtof replay`.
 fn events(dtof: &Path, host: &Path, folder: &Path) -> Result<()> {
     let (photons, c, rust) = (
         folder.join("photons.csv"),
@@ -68,21 +68,21 @@ fn events(dtof: &Path, host: &Path, folder: &Path) -> Result<()> {
     let found = printed(Command::new(dtof).arg("decode").arg(&c))?;
     let expected = fs::read_to_string(rust.join("events.csv"))?;
     let events = expected.lines().count() - 1;
-    ensure!(events > 1000, "only {events} events of the photons");
-    ensure!(found == expected, "events: not those of `dtof replay`");
-    println!("events: {events} as `dtof replay` has them");
+    ensure!(events > 1000, "only {events} events");
+    ensure!(found == expected, "events: differ from `dtof replay`");
+    println!("events: {events}, the same as `dtof replay`");
 
-    // What is there stays, and bad input is one line.
+    // It does not overwrite a file; the error is one line.
     let again = Command::new(host.join("events")).arg(&c).output()?;
     let why = String::from_utf8_lossy(&again.stderr).into_owned();
     ensure!(
         !again.status.success() && why.lines().count() == 1,
-        "events: writes over a file that is there"
+        "events: overwrites a file"
     );
     Ok(())
 }
 
-/// Photons of targets and background, by a generator.
+/// Generated photons of targets and background.
 fn list() -> String {
     let mut text = "pixel,cycle,bin\n".to_owned();
     let mut drawn = 1u32;
@@ -104,7 +104,7 @@ fn list() -> String {
     text
 }
 
-/// A device, its port, and the lines that it prints from then on.
+/// Starts a device. Returns its port, and the lines that it prints afterwards.
 fn device(host: &Path) -> Result<(Child, String, Receiver<String>)> {
     let mut device = Command::new(host.join("device"))
         .stdin(Stdio::null())
@@ -158,7 +158,7 @@ fn monitor(dtof: &Path, host: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A host is stopped, as a computer does that goes to sleep. The device switches its sensor off.
+/// A stopped host, like a computer that goes to sleep: the device switches its sensor off.
 fn silence(dtof: &Path, host: &Path) -> Result<()> {
     let (mut device, port, lines) = device(host)?;
     let mut watch = Command::new(dtof);
@@ -174,9 +174,9 @@ fn silence(dtof: &Path, host: &Path) -> Result<()> {
     let lines = lines_while_stopped();
     watch.kill()?;
     watch.wait()?;
-    // Without a host it ends.
+    // It ends when the host is gone.
     device.wait()?;
-    let lines = lines.context("the sensor of a host that is silent")?;
+    let lines = lines.context("no line about the sensor after the host fell silent")?;
     ensure!(
         lines == [ON.to_owned(), format!("{OFF}{SILENCE}")],
         "device: {lines:?}"
@@ -185,7 +185,7 @@ fn silence(dtof: &Path, host: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The whole numbers at the beginning of a line of events.
+/// The first four numbers of a line of events.
 fn numbers(line: &str) -> Vec<u32> {
     let numbers = line.split(',').take(4);
     numbers.filter_map(|number| number.parse().ok()).collect()

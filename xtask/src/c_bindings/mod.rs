@@ -1,5 +1,5 @@
-//! `cargo xtask c-bindings`: the header, the library and the examples of `bindings/c`, here and
-//! in QEMU, held against what Rust gives.
+//! `cargo xtask c-bindings`: builds the library and the examples of `bindings/c`, runs them here
+//! and in QEMU, and compares the results with Rust.
 
 mod examples;
 mod figures;
@@ -23,17 +23,17 @@ const FOLDER: &str = "bindings/c";
 const HEADER: &str = "bindings/c/include/dtof.h";
 const README: &str = "bindings/c/README.md";
 const TARGET: &str = "thumbv7em-none-eabihf";
-/// An instruction takes 256 ns of the emulator's clock.
+/// With these, an instruction takes 256 ns of the emulator's clock.
 const COUNT_INSTRUCTIONS: [&str; 2] = ["-icount", "shift=8"];
-/// The parts of the self-test that C has, from the first line to the line after the last.
+/// The part of the self-test that exists in C: its first line, and the line after its last.
 const PARTS: [&str; 2] = ["stream of 128 bins\n", "stream of a block\n"];
 
-/// Builds, runs and compares all. With `bless` the header and the figures are written first.
+/// Builds, runs and compares everything. With `bless` it writes the header and the figures.
 pub fn check(root: &Path, bless: bool) -> Result<()> {
     let missing = [CXX, CMAKE, ARM_GCC, QEMU];
     let missing: Vec<String> = missing
         .iter()
-        .filter(|tool| !tool.is_there())
+        .filter(|tool| !tool.is_installed())
         .map(Tool::missing)
         .collect();
     ensure!(missing.is_empty(), "{}", missing.join("\n"));
@@ -66,7 +66,8 @@ pub fn check(root: &Path, bless: bool) -> Result<()> {
     figures::check(root, &c?, &rust?, bless)
 }
 
-/// The header, with what the README makes of it, is C99 and C++17 without a warning.
+/// Fails unless the README's C code, and with it the header, compiles as C99 and C++17 without a
+/// warning.
 fn header(root: &Path) -> Result<()> {
     let page = fs::read_to_string(root.join(README))?;
     let block = page
@@ -82,7 +83,7 @@ fn header(root: &Path) -> Result<()> {
         let mut command = Command::new(compiler);
         command.current_dir(root).args(strict.split(' '));
         command.arg("bindings/c/include").args(language.split(' '));
-        // Not the header itself: of the main file some compilers warn less, some more.
+        // As an include: compilers have other warnings for the main file.
         let mut compiler = command.arg("-").stdin(Stdio::piped()).spawn()?;
         let stdin = compiler.stdin.take().context("no standard input")?;
         std::io::Write::write_all(&mut { stdin }, block.as_bytes())?;
@@ -93,7 +94,7 @@ fn header(root: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Builds with `CMake`; gives the folder of the examples.
+/// Builds with `CMake`. Returns the folder of the examples.
 fn build(root: &Path, target: &Path, name: &str, options: &[String]) -> Result<PathBuf> {
     let folder = target.join("c-bindings").join(name);
     let mut configure = Command::new(CMAKE.program);
@@ -107,7 +108,7 @@ fn build(root: &Path, target: &Path, name: &str, options: &[String]) -> Result<P
     Ok(folder.join("examples"))
 }
 
-/// The same for the Cortex-M4, and the operations in Rust.
+/// Builds for the Cortex-M4, with the operations in Rust.
 fn build_for_board(root: &Path, target: &Path) -> Result<PathBuf> {
     let mut twin = cargo();
     twin.current_dir(root)
@@ -128,13 +129,13 @@ fn build_for_board(root: &Path, target: &Path) -> Result<PathBuf> {
     Ok(build(root, target, "cortex-m4", &options)?.join("cortex-m4"))
 }
 
-/// The lines of the self-test that the example has as well.
+/// The lines of the self-test that the example prints.
 fn expected(root: &Path) -> Result<String> {
     let name = self_test::EXPECTED;
     let text = fs::read_to_string(root.join(name)).context(name)?;
     let [first, after] = PARTS.map(|line| text.find(line));
     let part = first.zip(after).and_then(|(from, to)| text.get(from..to));
-    let part = part.with_context(|| format!("{name}: not the parts that there were"))?;
+    let part = part.with_context(|| format!("{name}: a part is missing"))?;
     Ok(format!("{part}end\n"))
 }
 
@@ -145,13 +146,13 @@ fn same(what: &str, expected: &str, found: &str) -> Result<()> {
     }
     ensure!(
         differences.is_empty(),
-        "{what}: not those of Rust, see above"
+        "{what}: differ from Rust, see above"
     );
     println!("{what}: {} lines as in Rust", expected.lines().count());
     Ok(())
 }
 
-/// Neither panics nor floating point nor a heap is in an image.
+/// Fails if an image has a panic, floating point or a heap.
 fn no_panic(path: &Path) -> Result<()> {
     use object::{Object, ObjectSymbol};
     let bytes = fs::read(path).with_context(|| path.display().to_string())?;
@@ -166,10 +167,7 @@ fn no_panic(path: &Path) -> Result<()> {
         .iter()
         .filter(|name| name.starts_with("dtof_"))
         .count();
-    ensure!(
-        functions > 5,
-        "{name}: only {functions} functions are in it"
-    );
+    ensure!(functions > 5, "{name}: has only {functions} functions");
     println!("{name}: {functions} functions; no panic, no floating point, no heap");
     Ok(())
 }
@@ -180,7 +178,7 @@ fn in_emulator(image: &Path, arguments: &[&str]) -> Result<String> {
     Ok(output)
 }
 
-/// Runs a command that must succeed; what it prints.
+/// Runs a command that must succeed. Returns its output.
 fn printed(command: &mut Command) -> Result<String> {
     let name = command.get_program().display().to_string();
     let command = command.stdin(Stdio::null()).stderr(Stdio::inherit());

@@ -1,13 +1,11 @@
-//! `cargo xtask check-image`: builds `core-image` for every target and looks at
-//! what the linker made of it.
+//! `cargo xtask check-image`: builds `core-image` for every target and checks the linked image.
 //!
-//! The linker itself refuses an image in which a panic is reachable. The rest is
-//! read off the symbols. On the targets without a floating-point unit (all but
-//! thumbv7em) any floating-point operation is a call of a library routine,
-//! which has a name; that the same source makes none there says as much as a
-//! search through the instructions of thumbv7em would, and needs no
-//! disassembler.
+//! The linker itself refuses an image with a reachable panic. The symbols show the rest. On the
+//! targets without a floating-point unit (all but thumbv7em) every floating-point operation calls
+//! a library routine by name. The same source is compiled for thumbv7em, so its instructions need
+//! no disassembler.
 
+mod frames;
 mod panics;
 pub mod symbols;
 
@@ -22,23 +20,21 @@ use crate::{cargo, target_folder};
 
 /// For speed, and for size.
 const PROFILES: [&str; 2] = ["firmware", "firmware-small"];
-/// The target that images are for. It is looked at in both profiles, the others in the small one
-/// unless all are asked for.
+/// The target of the boards. It is checked in both profiles, the others in the small one unless
+/// `all` is set.
 const BOARDS: &str = "thumbv7em-none-eabihf";
 
-/// The function that the panic handler of the image calls and nobody defines.
+/// The undefined function that the panic handler of the image calls.
 const UNDEFINED: &str = "dtof_core_has_a_reachable_panic";
 
-/// The functions of `core_image/main.rs` that between them use all of dtof-core.
-const PARTS: &str =
-    "units roots ranges words products texts gates trees thresholds histograms pixels blocks peels";
+/// The functions of `core_image/main.rs`, which together use all of dtof-core.
+const PARTS: &str = "units roots ranges words products texts gates trees thresholds histograms pixels blocks excluded_bins";
 
-/// Bytes of code below which something has been optimised away: half of the
-/// smallest image there was when this was written.
+/// With fewer bytes of code, something has been optimised away. About half of the smallest image.
 const MIN_TEXT: u64 = 16 * 1024;
 
-/// Builds and looks at images of every target, in `all` profiles or those that matter most, and
-/// fails if anything is wrong with any.
+/// Builds and checks the images of every target, in `all` profiles or the most important ones.
+/// Fails if one has a problem.
 pub fn check(root: &Path, all: bool) -> Result<()> {
     let targets = Toolchain::read(root)?.targets;
     let mut bad = 0;
@@ -52,7 +48,7 @@ pub fn check(root: &Path, all: bool) -> Result<()> {
         for &profile in &PROFILES[usize::from(!both)..] {
             let (image, mut problems) = match build(root, target, profile, &[])? {
                 Build::Done(path) => (Image::read(&path)?, vec![]),
-                // Link it all the same, to say what can panic.
+                // Links it anyway, to find what can panic.
                 Build::CanPanic => {
                     let defined = format!("link-arg=--defsym={UNDEFINED}=0");
                     let Build::Done(path) = build(root, target, profile, &["-C", &defined])? else {
@@ -78,19 +74,19 @@ pub fn check(root: &Path, all: bool) -> Result<()> {
         }
     }
     ensure!(bad == 0, "core-image: {bad} bad images, see above");
-    Ok(())
+    frames::check(root)
 }
 
 enum Build {
-    /// Here.
+    /// The path of the image.
     Done(PathBuf),
-    /// The linker misses what the panic handler calls.
+    /// The linker refused it: a panic is reachable.
     CanPanic,
 }
 
-/// Builds one image, with these arguments more for the compiler.
+/// Builds one image, with additional arguments for the compiler.
 fn build(root: &Path, target: &str, profile: &str, compiler: &[&str]) -> Result<Build> {
-    // Given to cargo as well, so that there is no doubt where the image is.
+    // Also passed to cargo, so that the path of the image is known.
     let folder = target_folder(root);
     let output = cargo()
         .current_dir(root)
@@ -118,7 +114,7 @@ fn build(root: &Path, target: &str, profile: &str, compiler: &[&str]) -> Result<
 /// The parts of an image that are checked.
 #[derive(Clone, Default)]
 struct Image {
-    /// Names as the linker has them.
+    /// Mangled names of symbols.
     symbols: Vec<String>,
     /// Bytes of code.
     text: u64,
@@ -137,7 +133,7 @@ impl Image {
             image.symbols.push(symbol.name()?.into());
         }
         for section in file.sections() {
-            // Tables for unwinding, which the library brings along.
+            // Tables for unwinding, from the standard library.
             if section.name()?.starts_with(".eh_frame") {
                 continue;
             }
@@ -163,7 +159,7 @@ impl Image {
             problems.push("the entry `_start` is missing".into());
         }
         for part in PARTS.split(' ') {
-            // Either mangling writes a name's length before it.
+            // Both manglings write a name's length before it.
             let mangled = format!("10core_image{}{part}", part.len());
             if !self.symbols.iter().any(|name| name.contains(&mangled)) {
                 problems.push(format!("the part `{part}` of core-image is missing"));

@@ -1,17 +1,15 @@
-//! The places where an image can panic. The linker names only the panic handler, so
-//! `check-image` looks for them when it refuses an image.
+//! Finds the places where an image can panic. The linker names only the panic handler, so
+//! `check-image` searches for them in an image with a panic.
 //!
-//! Every call of the panicking machinery hands over the address of a
-//! [`Location`](std::panic::Location) among the constants: the address and
-//! length of the file's name, line and column. Its layout is the compiler's own
-//! business; should it change, nothing is found here, and the image is turned
-//! away all the same.
+//! Every call of the panicking machinery passes the address of a
+//! [`Location`](std::panic::Location) among the constants: address and length of the file's name,
+//! line and column. The compiler may change that layout: then nothing is found here, but the image
+//! is still refused.
 
 use anyhow::Result;
 use object::{Object, ObjectSection, SectionKind};
 
-/// Every place in Rust source that is named among the constants of a 32-bit
-/// little-endian image.
+/// Every source location among the constants of a 32-bit little-endian image.
 pub fn places(image: &[u8]) -> Result<Vec<String>> {
     let file = object::File::parse(image)?;
     let mut constants = Vec::new();
@@ -33,7 +31,7 @@ pub fn places(image: &[u8]) -> Result<Vec<String>> {
     Ok(places)
 }
 
-/// `file:line:column` if that is what these four words are.
+/// `file:line:column` if these four words are a location.
 fn place(words: &[u8], constants: &[(u64, &[u8])]) -> Option<String> {
     let word = |index: usize| {
         let bytes = words.get(4 * index..4 * index + 4)?;

@@ -1,13 +1,12 @@
-//! Which names of symbols give away panics, floating point and allocation.
+//! Finds panics, floating point and allocation by the names of symbols.
 
-/// A line for each of `names` that has no place in an image.
+/// A line for each of `names` that an image must not have.
 pub fn problems<S: AsRef<str>>(names: &[S]) -> impl Iterator<Item = String> {
     let names = names.iter().map(AsRef::as_ref);
     names.filter_map(|name| Some(format!("{}: {name}", forbidden(name)?)))
 }
 
-/// Why a symbol of this name, mangled or not, has no place in the image; `None`
-/// if it may stay.
+/// The reason why an image must not have a symbol of this name, mangled or not; `None` if it may.
 fn forbidden(name: &str) -> Option<&'static str> {
     if is_panic(name) {
         Some("panics")
@@ -20,8 +19,7 @@ fn forbidden(name: &str) -> Option<&'static str> {
     }
 }
 
-/// The panicking machinery, and what the compiler calls to enter it. These
-/// names come through both manglings as they are.
+/// The panicking machinery and its entry points. Both manglings keep these names as they are.
 const PANICS: &[&str] = &[
     // core::panicking::*, panic_fmt, panic_bounds_check, panic_const_*,
     // panic_already_borrowed, rust_panic, begin_panic
@@ -47,8 +45,7 @@ fn is_allocator(name: &str) -> bool {
     has_part(name, PARTS) || is_made_of(name, &[C])
 }
 
-/// A routine that stands in for a floating-point instruction, or a function of
-/// the mathematical library.
+/// A routine that replaces a floating-point instruction, or a function of the mathematical library.
 fn is_soft_float(name: &str) -> bool {
     if has_part(name, "compiler_builtins5float compiler_builtins4math") {
         return true;
@@ -61,9 +58,9 @@ fn is_soft_float(name: &str) -> bool {
     }
 }
 
-/// The names of Arm's run-time ABI, less `__aeabi_`.
+/// The names of Arm's run-time ABI, without `__aeabi_`.
 ///
-/// The names of the integers stay: `uidiv`, `uldivmod`, `lmul`, `llsl`, `memcpy`.
+/// The names for integers are allowed: `uidiv`, `uldivmod`, `lmul`, `llsl`, `memcpy`.
 fn is_aeabi_float(name: &str) -> bool {
     // Operations on one of the types: fadd, dmul, fcmplt, cdcmpeq, cfrcmple, d2iz.
     const TYPES: &str = "f d h cf cd";
@@ -74,7 +71,7 @@ fn is_aeabi_float(name: &str) -> bool {
     is_made_of(name, &[TYPES, OPERATIONS]) || is_made_of(name, &[FROM, TYPES])
 }
 
-/// The names of GCC's and LLVM's run-time libraries, less `__`. A float is
+/// The names of GCC's and LLVM's run-time libraries, without `__`. A float is
 /// named by its machine mode: `sf` single, `df` double and so on.
 fn is_gnu_float(name: &str) -> bool {
     const FLOATS: &str = "hf bf sf df xf tf kf";
@@ -100,7 +97,7 @@ fn is_gnu_float(name: &str) -> bool {
     forms.iter().any(|form| is_made_of(name, form))
 }
 
-/// Whether one of these words stands in `name`.
+/// Whether one of these words is in `name`.
 fn has_part(name: &str, words: &str) -> bool {
     words.split_whitespace().any(|word| name.contains(word))
 }
@@ -118,8 +115,8 @@ fn is_made_of(name: &str, parts: &[&str]) -> bool {
 }
 
 /// Functions of the mathematical library, for `double`, and with `f`, `l`,
-/// `f16` or `f128` at the end for others. The name of an integer square root is
-/// mangled, and so another one.
+/// `f16` or `f128` at the end for others. An integer square root has another name, as it is
+/// mangled.
 fn is_mathematics(name: &str) -> bool {
     const FUNCTIONS: &str = "acos acosh asin asinh atan atan2 atanh cbrt ceil copysign cos cosh \
         erf erfc exp exp10 exp2 expm1 fabs fdim floor fma fmax fmaximum fmaximum_num fmin \

@@ -1,6 +1,5 @@
-/* How many instructions the operations take. QEMU counts, if it runs with `-icount shift=8`: an
- * instruction then takes 256 ns, and the timer advances every 40 ns. It is the way of
- * docs/results/bench/README.md. */
+/* Counts the instructions of the operations. In QEMU with `-icount shift=8` an instruction takes
+ * 256 ns, and the timer advances every 40 ns. See docs/results/bench/README.md. */
 #include <stddef.h>
 
 #include "operations.h"
@@ -45,8 +44,8 @@ static uint16_t below(uint32_t limit)
     return (uint16_t)(((drawn >> 16) * limit) >> 16);
 }
 
-/* The photons of exposure `number`: background, and with a target every sixth photon in its bin
- * or the next. */
+/* Draws the photons of exposure `number`: background, and with a target every sixth photon in its
+ * bin or the next. */
 static void draw(uint32_t number, int target)
 {
     drawn = number * 977 + 1;
@@ -58,7 +57,7 @@ static void draw(uint32_t number, int target)
     begin(number);
 }
 
-/* To the last laser cycle before the look. */
+/* Runs to the last laser cycle before the look. */
 static void count_all(void)
 {
     for (uint32_t pixel = 0; pixel < PIXELS; pixel++) {
@@ -69,7 +68,7 @@ static void count_all(void)
     }
 }
 
-/* Of all events: FNV-1a. */
+/* The checksum of all events: FNV-1a. */
 static uint32_t sum = 0x811c9dc5;
 
 static void add_packed(uint32_t length)
@@ -115,7 +114,7 @@ int run(void)
     systick[1] = 0xffffff;
     systick[2] = 0;
     systick[0] = 5;
-    /* The return belongs to an operation, the call does not. */
+    /* An operation includes its return, but not its call. */
     overhead = measure(only_return, 0, &gave) - 1;
     if (measure(hundred, 0, &gave) != 100 || configure(&paper) != 0) {
         print("the counter does not count instructions\n");

@@ -1,4 +1,4 @@
-/* An image that is looked at, not run. */
+/* An image that is inspected, not run. */
 #include "platform.h"
 
 int run(void)

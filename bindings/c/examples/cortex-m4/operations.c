@@ -14,20 +14,21 @@ uint32_t pixel_bytes(void)
 
 uint32_t configure(const struct settings *settings)
 {
-    dtof_config_t wanted;
-    if (dtof_config_paper(&wanted) != DTOF_OK) {
+    dtof_config_t pixel_settings;
+    if (dtof_statistics_init(&statistics) != DTOF_OK
+        || dtof_config_paper(&pixel_settings) != DTOF_OK) {
         return 1;
     }
-    wanted.rule = (uint8_t)settings->rule;
-    wanted.window = (uint8_t)settings->window;
-    wanted.estimator = (uint8_t)settings->estimator;
-    wanted.alpha_q8 = (uint16_t)settings->alpha_q8;
-    wanted.z_q12 = (uint16_t)settings->z_q12;
-    wanted.minimum_count = settings->minimum_count;
-    wanted.x = (uint16_t)settings->x;
-    wanted.l1 = (uint16_t)settings->l1;
-    wanted.l2 = (uint16_t)settings->l2;
-    return dtof_config_check(&wanted, &config);
+    pixel_settings.rule = (uint8_t)settings->rule;
+    pixel_settings.window = (uint8_t)settings->window;
+    pixel_settings.estimator = (uint8_t)settings->estimator;
+    pixel_settings.alpha_q8 = (uint16_t)settings->alpha_q8;
+    pixel_settings.z_q12 = (uint16_t)settings->z_q12;
+    pixel_settings.minimum_count = settings->minimum_count;
+    pixel_settings.x = (uint16_t)settings->x;
+    pixel_settings.l1 = (uint16_t)settings->l1;
+    pixel_settings.l2 = (uint16_t)settings->l2;
+    return dtof_config_check(&pixel_settings, &config);
 }
 
 uint32_t begin(uint32_t number)

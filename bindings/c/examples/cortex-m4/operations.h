@@ -1,4 +1,4 @@
-/* The operations that are counted: operations.c has them in C, operations.rs in Rust. */
+/* The operations that are measured, in C (operations.c) and in Rust (operations.rs). */
 #ifndef OPERATIONS_H
 #define OPERATIONS_H
 
@@ -7,7 +7,7 @@
 #define PIXELS 16
 #define PHOTONS 256
 
-/* What is chosen when the program runs. */
+/* Settings that are chosen at run time. */
 struct settings {
     uint32_t rule, window, estimator, alpha_q8, z_q12, minimum_count, x, l1, l2;
 };
@@ -19,19 +19,19 @@ extern uint8_t packed[32];
 
 /* Bytes of a pixel. */
 uint32_t pixel_bytes(void);
-/* Makes the configuration; 0 if it can be used. */
+/* Builds the configuration: 0 if it is valid. */
 uint32_t configure(const struct settings *settings);
-/* Makes all pixels anew, and begins a stream. */
+/* Resets all pixels, and begins a stream. */
 uint32_t begin(uint32_t number);
-/* One photon into pixel 0. */
+/* Counts one photon in pixel 0. */
 uint32_t photon(uint32_t code);
-/* All photons of `codes` into pixel `number`, at once. */
+/* Counts all photons of `codes` in pixel `number` with one call. */
 uint32_t photons(uint32_t number);
-/* Ends a laser cycle of pixel 0; what the look brought. */
+/* Ends a laser cycle of pixel 0. Returns the outcome of the look. */
 uint32_t end_one(uint32_t cycle);
-/* Ends a laser cycle of all pixels; how many have an event. */
+/* Ends a laser cycle of all pixels. Returns the number of pixels with an event. */
 uint32_t end_all(uint32_t cycle);
-/* Takes the event of pixel 0 and packs it into `packed`; how many bytes, 0 if there is none. */
+/* Packs the event of pixel 0 into `packed`. Returns the number of bytes, 0 without an event. */
 uint32_t pack(uint32_t number);
 /* From the first photon of all pixels to the packed event of one: 44 laser cycles of 6 photons. */
 uint32_t exposure(uint32_t number);

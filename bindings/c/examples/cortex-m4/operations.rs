@@ -1,8 +1,8 @@
 //! The operations of `operations.h` in Rust, to compare with those in C.
 
 #![cfg_attr(target_os = "none", no_std)]
-#![allow(unsafe_code, reason = "C calls it")]
-#![allow(clippy::cast_possible_truncation, reason = "small numbers of C's")]
+#![allow(unsafe_code, reason = "C calls these functions")]
+#![allow(clippy::cast_possible_truncation, reason = "small numbers from C")]
 
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
@@ -50,7 +50,7 @@ unsafe impl Sync for Shared {}
 static STATE: Shared = Shared(UnsafeCell::new(MaybeUninit::zeroed()));
 
 fn state() -> &'static mut State {
-    // SAFETY: there is one thread; no operation calls another with the state in its hands.
+    // SAFETY: there is one thread, and no operation calls another while it uses the state.
     // `configure` has written it before.
     unsafe { (*STATE.0.get()).assume_init_mut() }
 }
@@ -82,19 +82,15 @@ fn config_of(settings: &Settings) -> Option<PixelConfig<128, AnyRule>> {
     config.x(x).l1(l1).l2(l2).build().ok()
 }
 
-fn empty() -> [AsyncPixel<128>; PIXELS] {
-    core::array::from_fn(|address| AsyncPixel::new(PixelAddress(address as u16)))
-}
-
 #[unsafe(no_mangle)]
 extern "C" fn pixel_bytes() -> u32 {
     size_of::<AsyncPixel<128>>() as u32
 }
 
-/// Comes before all others.
+/// Must be called first.
 ///
 /// # Safety
-/// `settings` leads to settings.
+/// `settings` is null or points to settings.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn configure(settings: *const Settings) -> u32 {
     // SAFETY: the caller's promise.
@@ -103,7 +99,8 @@ pub unsafe extern "C" fn configure(settings: *const Settings) -> u32 {
     // SAFETY: there is one thread.
     let state = unsafe { &mut *STATE.0.get() };
     state.write(State {
-        pixels: empty(),
+        // `begin` gives them their addresses.
+        pixels: [const { AsyncPixel::new(PixelAddress::new(0)) }; PIXELS],
         config,
         statistics: Statistics::new(),
         encoder: AerEncoder::new(),
@@ -115,7 +112,7 @@ pub unsafe extern "C" fn configure(settings: *const Settings) -> u32 {
 extern "C" fn begin(number: u32) -> u32 {
     let state = state();
     for (address, pixel) in (0..).zip(&mut state.pixels) {
-        *pixel = AsyncPixel::new(PixelAddress(address));
+        *pixel = AsyncPixel::new(PixelAddress::new(address));
     }
     state.encoder = AerEncoder::new();
     number
@@ -145,7 +142,7 @@ extern "C" fn end_one(cycle: u32) -> u32 {
     let Some(config) = &state.config else {
         return 0;
     };
-    let cycle = LaserCycle(cycle.into());
+    let cycle = LaserCycle::new(cycle.into());
     state.pixels[0].end_laser_cycle(config, &mut state.statistics, cycle) as u32
 }
 
@@ -157,7 +154,7 @@ extern "C" fn end_all(cycle: u32) -> u32 {
     };
     let mut fired = 0;
     for pixel in &mut state.pixels {
-        let cycle = LaserCycle(cycle.into());
+        let cycle = LaserCycle::new(cycle.into());
         let look = pixel.end_laser_cycle(config, &mut state.statistics, cycle);
         fired += u32::from(look == Look::Event);
     }
@@ -167,7 +164,7 @@ extern "C" fn end_all(cycle: u32) -> u32 {
 #[unsafe(no_mangle)]
 extern "C" fn pack(_: u32) -> u32 {
     let state = state();
-    let Some(event) = state.pixels[0].acknowledge() else {
+    let Some(event) = state.pixels[0].take_event() else {
         return 0;
     };
     let (time, word) = state.encoder.encode(&event);

@@ -5,7 +5,7 @@
 
 extern uint32_t stack_top, data_start, data_end, data_source, bss_start, bss_end;
 
-/* Asks the emulator or debugger for something: Arm's semihosting. */
+/* Calls the emulator or debugger through Arm's semihosting. */
 static uint32_t semihosting(uint32_t operation, const void *argument)
 {
     register uint32_t r0 __asm__("r0") = operation;
@@ -14,7 +14,7 @@ static uint32_t semihosting(uint32_t operation, const void *argument)
     return r0;
 }
 
-/* Onto the emulator's standard output. */
+/* Prints to the emulator's standard output. */
 void print(const char *text)
 {
     static const char console[] = ":tt";
@@ -53,7 +53,7 @@ void reset(void)
     volatile uint32_t *const cpacr = (volatile uint32_t *)0xe000ed88;
     const uint32_t *from = &data_source;
 
-    /* The floating-point registers: compilers move memory with them. */
+    /* Enables the floating-point registers: compilers copy memory with them. */
     *cpacr |= 0xfu << 20;
     __asm__ volatile("dsb\n\tisb");
     for (uint32_t *to = &data_start; to < &data_end; to++) {

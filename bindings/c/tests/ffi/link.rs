@@ -1,4 +1,4 @@
-//! A device in C and a host of `dtof-link`.
+//! A device with the C functions and a host of `dtof-link`.
 
 use dtof_c::dtof_status_t::*;
 use dtof_c::*;
@@ -14,28 +14,24 @@ use dtof_link::{
     Source, StopReason,
 };
 
-use crate::{OK, checked, zeroed};
+use crate::{OK, checked, config, link, pixel, statistics, zeroed};
 
 /// A host, a device, and the wire between them.
 struct Pair {
     host: Endpoint,
     deframer: Deframer,
     device: dtof_link_t,
-    /// Each `DTOF_SESSION_...` that was told.
+    /// Each `DTOF_SESSION_...` that was reported.
     sessions: Vec<u8>,
     now_ms: u32,
 }
 
 impl Pair {
     fn new() -> Self {
-        let mut device = zeroed();
-        // SAFETY: the pointer leads to a link.
-        let status = unsafe { dtof_link_init(&mut device, size_of::<dtof_link_t>(), 64) };
-        assert_eq!(status, OK);
         let mut pair = Self {
             host: Endpoint::host(7, greeting(0, 0), 0),
             deframer: Deframer::new(),
-            device,
+            device: link(),
             sessions: Vec::new(),
             now_ms: 0,
         };
@@ -52,7 +48,7 @@ impl Pair {
             self.now_ms += 10;
             let (mut wire, mut session) = ([0; WIRE_BYTES], 9);
             let length = self.host.transmit(self.now_ms, &mut wire);
-            // SAFETY: each pointer leads to what it should.
+            // SAFETY: each pointer leads to an object of its type.
             unsafe {
                 let (device, bytes) = (&mut self.device, wire.as_ptr());
                 let status = dtof_link_receive(device, bytes, length, self.now_ms, &mut session);
@@ -77,7 +73,7 @@ impl Pair {
     /// The next message of the host.
     fn take(&mut self) -> Option<(u8, Vec<u8>)> {
         let (mut message, mut kind) = (zeroed::<dtof_message_t>(), 0);
-        // SAFETY: each pointer leads to what it should.
+        // SAFETY: each pointer leads to an object of its type.
         unsafe {
             let peeked = dtof_link_peek(&self.device, &mut kind);
             let status = dtof_link_take(&mut self.device, &mut message);
@@ -91,13 +87,13 @@ impl Pair {
     }
 
     fn offer(&mut self, kind: u8, body: &[u8]) -> dtof_status_t {
-        // SAFETY: both pointers lead to what they should.
+        // SAFETY: both pointers lead to objects of their types.
         unsafe { dtof_link_offer(&mut self.device, kind, body.as_ptr(), body.len()) }
     }
 
     fn state(&self) -> dtof_link_state_t {
         let mut state = dtof_link_state_t::default();
-        // SAFETY: both pointers lead to what they should.
+        // SAFETY: both pointers lead to objects of their types.
         assert_eq!(unsafe { dtof_link_state(&self.device, &mut state) }, OK);
         state
     }
@@ -119,7 +115,7 @@ fn configuration() -> Configuration {
         binning: None,
         tracking: true,
         echoes: EchoNumber::LAST,
-        peel_reach: 6,
+        echo_guard_bins: 6,
         echo_wait: 4,
         bin_width_ps: U16F16::lit("97.5"),
         offset_mm: I24F8::lit("-12.5"),
@@ -131,7 +127,7 @@ fn configuration() -> Configuration {
 
 fn read(body: &[u8]) -> Result<dtof_device_config_t, dtof_status_t> {
     let mut config = dtof_device_config_t::default();
-    // SAFETY: both pointers lead to what they should.
+    // SAFETY: both pointers lead to objects of their types.
     match unsafe { dtof_device_config_read(body.as_ptr(), body.len(), &mut config) } {
         OK => Ok(config),
         error => Err(error),
@@ -207,7 +203,7 @@ fn the_hosts_configuration_becomes_settings() {
 }
 
 #[test]
-fn what_this_library_does_not_have_is_refused() {
+fn unsupported_configurations_are_refused() {
     let good = configuration();
     let binning = Some(AdaptiveBinning {
         levels: BlockLevel::MAX,
@@ -254,8 +250,8 @@ fn records_are_those_of_the_link() {
         last_sensor_error: 6,
         stop_reason: DTOF_STOP_WATCHDOG,
     };
-    let done: dtof_statistics_t = zeroed();
-    // SAFETY: each pointer leads to what it should.
+    let done = statistics();
+    // SAFETY: each pointer leads to an object of its type.
     unsafe {
         let room = sensor.as_mut_ptr();
         let written = dtof_sensor_write(9, 100, 250 << 16, 1_000_000, -256, room);
@@ -291,12 +287,12 @@ fn a_device_knows_how_long_its_host_has_been_silent() {
     let mut pair = Pair::new();
     let silent = |pair: &Pair, now_ms| {
         let mut silent_ms = 9;
-        // SAFETY: both pointers lead to what they should.
+        // SAFETY: both pointers lead to objects of their types.
         let status = unsafe { dtof_link_silent_ms(&pair.device, now_ms, &mut silent_ms) };
         assert_eq!(status, OK);
         silent_ms
     };
-    // A host with nothing to say says so every 50 ms.
+    // An idle host sends a frame every 50 ms.
     for _ in 0..10 {
         pair.carry();
         assert!(silent(&pair, pair.now_ms) <= 50);
@@ -304,12 +300,12 @@ fn a_device_knows_how_long_its_host_has_been_silent() {
     let first = silent(&pair, pair.now_ms);
     assert_eq!(silent(&pair, pair.now_ms + 3000), first + 3000);
 
-    // Its own frames, which a line may send back, are not its host.
+    // Its own frames, which a line may echo, do not count as the host's.
     for _ in 0..100 {
         pair.now_ms += 10;
         let (mut wire, mut length, mut session) = ([0; WIRE_BYTES], 0, 9);
         let room = wire.as_mut_ptr();
-        // SAFETY: each pointer leads to what it should.
+        // SAFETY: each pointer leads to an object of its type.
         unsafe {
             let sent = dtof_link_transmit(&mut pair.device, pair.now_ms, room, &mut length);
             assert_eq!(sent, OK);
@@ -327,8 +323,8 @@ fn a_host_that_ends_its_session_hears_why_the_sensor_stopped() {
     let mut pair = Pair::new();
     assert_eq!(pair.host.stop_reason(), None);
     // SAFETY: the pointer leads to a link.
-    let told = unsafe { dtof_link_set_stop_reason(&mut pair.device, DTOF_STOP_END_OF_SESSION) };
-    assert_eq!(told, OK);
+    let status = unsafe { dtof_link_set_stop_reason(&mut pair.device, DTOF_STOP_END_OF_SESSION) };
+    assert_eq!(status, OK);
     pair.host.end(pair.now_ms);
     pair.carry();
     assert_eq!(pair.sessions, [DTOF_SESSION_BEGAN, DTOF_SESSION_ENDED]);
@@ -336,21 +332,21 @@ fn a_host_that_ends_its_session_hears_why_the_sensor_stopped() {
     assert_eq!(pair.host.stop_reason(), Some(StopReason::EndOfSession));
     assert_eq!(pair.state().is_open, 0);
     let mut silent_ms = 0;
-    // SAFETY: both pointers lead to what they should.
-    let told = unsafe { dtof_link_silent_ms(&pair.device, pair.now_ms, &mut silent_ms) };
-    assert_eq!((told, silent_ms), (OK, u32::MAX));
+    // SAFETY: both pointers lead to objects of their types.
+    let status = unsafe { dtof_link_silent_ms(&pair.device, pair.now_ms, &mut silent_ms) };
+    assert_eq!((status, silent_ms), (OK, u32::MAX));
 
     // The next host.
     pair.host = Endpoint::host(8, greeting(0, 0), pair.now_ms);
     pair.carry();
     assert_eq!(pair.sessions[2..], [DTOF_SESSION_BEGAN]);
-    // Another one, without a word of goodbye from the one before.
+    // Another host, while the session of the one before is open.
     pair.host = Endpoint::host(9, greeting(0, 0), pair.now_ms);
     pair.carry();
     assert_eq!(pair.sessions[3..], [DTOF_SESSION_BEGAN]);
 }
 
-/// The counts of all parts, which begin where the one before ended.
+/// The counts of all parts. Each part continues the one before.
 fn counts_of(mut part: impl FnMut(usize, &mut [u8; DTOF_BODY_BYTES]) -> usize) -> Vec<u32> {
     let mut counts = Vec::new();
     for number in 0.. {
@@ -363,7 +359,10 @@ fn counts_of(mut part: impl FnMut(usize, &mut [u8; DTOF_BODY_BYTES]) -> usize) -
             .unwrap()
             .unwrap();
         assert_eq!(usize::from(read.first_bin()), counts.len());
-        assert_eq!((read.head().pixel.0, read.head().cycle.0), (5, 1 << 40));
+        assert_eq!(
+            (read.head().pixel.raw(), read.head().cycle.raw()),
+            (5, 1 << 40)
+        );
         counts.extend(read.counts());
     }
     counts
@@ -371,19 +370,14 @@ fn counts_of(mut part: impl FnMut(usize, &mut [u8; DTOF_BODY_BYTES]) -> usize) -
 
 #[test]
 fn histograms_go_out_as_the_host_reads_them() {
-    let config = checked(&crate::paper()).unwrap();
-    let mut pixel = zeroed();
+    let (config, mut pixel) = (config(), pixel(5));
     let codes = [3, 60, 60, 127];
     let mut expected = [0; 128];
     for code in codes {
         expected[usize::from(code)] += 1;
     }
-    // SAFETY: each pointer leads to what it should.
+    // SAFETY: each pointer leads to an object of its type.
     unsafe {
-        assert_eq!(
-            dtof_pixel_init(&mut pixel, size_of::<dtof_pixel_t>(), 5),
-            OK
-        );
         assert_eq!(
             dtof_pixel_count_batch(&mut pixel, &config, codes.as_ptr(), 4),
             OK
@@ -392,7 +386,7 @@ fn histograms_go_out_as_the_host_reads_them() {
     let of_pixel = counts_of(|part, body| {
         let mut length = 9;
         let room = body.as_mut_ptr();
-        // SAFETY: each pointer leads to what it should.
+        // SAFETY: each pointer leads to an object of its type.
         let status =
             unsafe { dtof_pixel_histogram_write(&pixel, part, 1 << 40, room, &mut length) };
         assert_eq!(status, OK);
@@ -400,11 +394,11 @@ fn histograms_go_out_as_the_host_reads_them() {
     });
     assert_eq!(of_pixel, expected);
 
-    // Of 24 bits: two parts.
+    // With counts of 24 bits there are two parts.
     expected[60] = 16_777_215;
     let whole = counts_of(|part, body| {
         let (counts, room, mut length) = (expected.as_ptr(), body.as_mut_ptr(), 9);
-        // SAFETY: each pointer leads to what it should.
+        // SAFETY: each pointer leads to an object of its type.
         let status =
             unsafe { dtof_counts_write(counts, part, 1 << 40, 549_888, 5, room, &mut length) };
         assert_eq!(status, OK);
@@ -413,11 +407,11 @@ fn histograms_go_out_as_the_host_reads_them() {
     assert_eq!(whole, expected);
 
     let (mut body, mut length) = ([0; DTOF_BODY_BYTES], 0);
-    // SAFETY: each pointer leads to what it should.
+    // SAFETY: each pointer leads to an object of its type.
     let mut none =
         |reason| unsafe { dtof_no_histogram_write(5, reason, body.as_mut_ptr(), &mut length) };
     assert_eq!(none(0), DTOF_ERROR_REASON);
     assert_eq!(none(DTOF_NO_HISTOGRAM_PIXEL), OK);
     let read = HistogramPart::from_le_bytes(&body[..length]).unwrap();
-    assert_eq!(read, Err((PixelAddress(5), NoHistogram::NoPixel)));
+    assert_eq!(read, Err((PixelAddress::new(5), NoHistogram::NoPixel)));
 }

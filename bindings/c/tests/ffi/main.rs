@@ -1,7 +1,6 @@
-//! The functions as C calls them: every refusal, and the same results as `dtof-core` and
-//! `dtof-link`.
+//! Calls the functions as C does: every error, and the same results as `dtof-core` and `dtof-link`.
 
-#![allow(unsafe_code, reason = "they are called as C calls them")]
+#![allow(unsafe_code, reason = "C functions")]
 
 mod link;
 mod memory;
@@ -12,10 +11,11 @@ mod words;
 use core::mem::MaybeUninit;
 
 use dtof_c::*;
+use dtof_link::HistogramPart;
 
-/// Memory as a C program has it: all zero.
+/// A static of a C program before anything has initialised it.
 fn zeroed<T>() -> T {
-    // SAFETY: only for types of the header, which any bytes are a value of.
+    // SAFETY: only for types of the header, for which any bytes are valid.
     unsafe { MaybeUninit::zeroed().assume_init() }
 }
 
@@ -27,12 +27,81 @@ fn paper() -> dtof_config_t {
     config
 }
 
+/// An object that its function has initialised.
+fn initialised<T>(initialise: impl FnOnce(*mut T) -> dtof_status_t) -> T {
+    let mut object = zeroed();
+    assert_eq!(initialise(&mut object), OK);
+    object
+}
+
+fn config() -> dtof_checked_config_t {
+    checked(&paper()).unwrap()
+}
+
+fn pixel(address: u16) -> dtof_pixel_t {
+    // SAFETY: the pointer leads to a pixel.
+    initialised(|pixel| unsafe { dtof_pixel_init(pixel, size_of::<dtof_pixel_t>(), address) })
+}
+
+fn statistics() -> dtof_statistics_t {
+    // SAFETY: the pointer leads to statistics.
+    initialised(|statistics| unsafe { dtof_statistics_init(statistics) })
+}
+
+/// A histogram without photons.
+fn histogram() -> dtof_histogram_t {
+    let (size, counts) = (size_of::<dtof_histogram_t>(), [0; DTOF_BINS]);
+    // SAFETY: each pointer leads to an object of its type.
+    initialised(|histogram| unsafe {
+        dtof_histogram_fill(
+            histogram,
+            size,
+            &config(),
+            &mut statistics(),
+            counts.as_ptr(),
+        )
+    })
+}
+
+/// Bins of 250 ps.
+fn scale() -> dtof_scale_t {
+    // SAFETY: the pointer leads to a scale.
+    initialised(|scale| unsafe { dtof_scale_init(scale, 250 << 16, 0) })
+}
+
+fn encoder() -> dtof_aer_encoder_t {
+    // SAFETY: the pointer leads to an encoder.
+    initialised(|encoder| unsafe { dtof_aer_encoder_init(encoder) })
+}
+
+fn decoder() -> dtof_aer_decoder_t {
+    // SAFETY: the pointer leads to a decoder.
+    initialised(|decoder| unsafe { dtof_aer_decoder_init(decoder) })
+}
+
+/// The link of a device with 64 pixels.
+fn link() -> dtof_link_t {
+    // SAFETY: the pointer leads to a link.
+    initialised(|link| unsafe { dtof_link_init(link, size_of::<dtof_link_t>(), 64) })
+}
+
+/// The laser cycles of a pixel's exposure.
+fn exposure(pixel: *const dtof_pixel_t) -> u32 {
+    let mut body = [0; DTOF_BODY_BYTES];
+    let (room, mut length) = (body.as_mut_ptr(), 0);
+    // SAFETY: the tests pass pixels; the other pointers lead to objects of their types.
+    let status = unsafe { dtof_pixel_histogram_write(pixel, 0, 0, room, &mut length) };
+    assert_eq!(status, OK);
+    let part = HistogramPart::from_le_bytes(&body[..length]);
+    part.unwrap().unwrap().head().exposure
+}
+
 const OK: dtof_status_t = dtof_status_t::DTOF_OK;
 
 /// The configuration of settings.
 fn checked(settings: &dtof_config_t) -> Result<dtof_checked_config_t, dtof_status_t> {
     let mut checked = zeroed();
-    // SAFETY: both pointers lead to what they should.
+    // SAFETY: both pointers lead to objects of their types.
     match unsafe { dtof_config_check(settings, &mut checked) } {
         OK => Ok(checked),
         error => Err(error),

@@ -1,17 +1,21 @@
-//! Memory as C has it: never written to, full of anything, of another kind, or not where it should
-//! be. Miri runs these, and finds what reads or keeps what it must not.
+//! Memory as C passes it: uninitialised, with any contents, of another type, null or misaligned. Under
+//! Miri these tests find invalid reads and references.
 
 use core::mem::MaybeUninit;
 use core::ptr;
+use std::collections::BTreeSet;
 use std::ffi::CStr;
 
 use dtof_c::dtof_status_t::*;
 use dtof_c::*;
 use proptest::prelude::*;
 
-use crate::{OK, checked, paper, zeroed};
+use crate::{
+    OK, config, decoder, encoder, exposure, histogram, link, paper, pixel, scale, statistics,
+    zeroed,
+};
 
-/// Memory that nobody has written to.
+/// Uninitialised memory.
 struct Room<T>(MaybeUninit<T>);
 
 impl<T> Room<T> {
@@ -23,16 +27,16 @@ impl<T> Room<T> {
         self.0.as_mut_ptr()
     }
 
-    /// The value, once there is one.
+    /// The value, after a function has written it.
     const fn read(self) -> T {
-        // SAFETY: the tests ask once a function has written it.
+        // SAFETY: the tests call it after a function has written the value.
         unsafe { self.0.assume_init() }
     }
 }
 
 #[test]
-fn what_a_function_writes_may_be_written_by_nobody_before() {
-    let config = checked(&paper()).unwrap();
+fn functions_write_to_uninitialised_memory() {
+    let config = config();
     let (mut settings, mut pixel, mut histogram) = (Room::new(), Room::new(), Room::new());
     let (mut scale, mut range, mut link) = (Room::new(), Room::new(), Room::new());
     let (mut encoder, mut decoder, mut record) = (Room::new(), Room::new(), Room::new());
@@ -44,7 +48,7 @@ fn what_a_function_writes_may_be_written_by_nobody_before() {
     let (mut look, mut fired, mut session) = (Room::new(), Room::new(), Room::new());
     let mut sensor = Room::<[u8; DTOF_SENSOR_BYTES]>::new();
     let mut report = Room::<[u8; DTOF_REPORT_BYTES]>::new();
-    let mut done = zeroed();
+    let mut done = Room::new();
     let photons = [60u16; 20];
     let wide = [7u32; DTOF_BINS];
     // SAFETY: each pointer leads to room for its type, or to what it should.
@@ -55,6 +59,8 @@ fn what_a_function_writes_may_be_written_by_nobody_before() {
         assert_eq!(dtof_range(scale.at(), 256, range.at()), OK);
         assert_eq!(range.read(), 9593);
 
+        assert_eq!(dtof_statistics_init(done.at()), OK);
+        let done = done.at();
         assert_eq!(dtof_pixel_init(pixel.at(), DTOF_PIXEL_SIZE, 5), OK);
         let (first, number) = (photons.as_ptr(), photons.len());
         assert_eq!(
@@ -62,23 +68,23 @@ fn what_a_function_writes_may_be_written_by_nobody_before() {
             OK
         );
         let (one, last) = (pixel.at(), 44);
-        let ended = dtof_pixel_end_laser_cycles(one, &config, 40, &mut done, 40, look.at());
+        let ended = dtof_pixel_end_laser_cycles(one, &config, 40, done, 40, look.at());
         assert_eq!((ended, look.read()), (OK, dtof_look_t::DTOF_LOOK_TOO_EARLY));
-        let ended = dtof_pixels_end_laser_cycles(one, 1, last, &config, &mut done, 4, fired.at());
+        let ended = dtof_pixels_end_laser_cycles(one, 1, last, &config, done, 4, fired.at());
         assert_eq!((ended, fired.read()), (OK, 1));
         let mut event = Room::new();
         assert_eq!(dtof_pixel_take_event(one, event.at()), OK);
-        assert_eq!(dtof_pixel_add_photons(one, &mut done), OK);
-        assert_eq!(dtof_statistics_read(&done, counts.at()), OK);
+        assert_eq!(dtof_pixel_add_photons(one, done), OK);
+        assert_eq!(dtof_statistics_read(done, counts.at()), OK);
         assert_eq!(counts.read().events, 1);
 
         let size = DTOF_HISTOGRAM_SIZE;
-        let filled = dtof_histogram_fill(histogram.at(), size, &config, &mut done, wide.as_ptr());
+        let filled = dtof_histogram_fill(histogram.at(), size, &config, done, wide.as_ptr());
         assert_eq!(filled, OK);
         let room = events.at().cast::<dtof_event_t>();
         let found = length.at();
         let at = histogram.at();
-        let decided = dtof_histogram_detect(at, &config, 0, &mut done, 0, 1, room, found);
+        let decided = dtof_histogram_detect(at, &config, 0, done, 0, 1, room, found);
         assert_eq!((decided, length.read()), (OK, 0));
 
         let mut length = Room::new();
@@ -117,7 +123,7 @@ fn what_a_function_writes_may_be_written_by_nobody_before() {
         assert_eq!(sensor.read()[..2], [1, 0]);
         let room = report.at();
         let of = dtof_report_t::default();
-        assert_eq!(dtof_report_write(&of, &done, at, room.cast()), OK);
+        assert_eq!(dtof_report_write(&of, done, at, room.cast()), OK);
         assert_eq!(report.read()[..8], [0; 8]);
         let room = body.at().cast::<u8>();
         let mut length = Room::new();
@@ -134,8 +140,8 @@ fn what_a_function_writes_may_be_written_by_nobody_before() {
     }
 }
 
-/// Memory that is long enough for every object, and aligned for each. An object has padding, which
-/// nobody may read.
+/// Memory that is long enough and aligned for every object. Objects may contain padding, which must
+/// not be read.
 #[repr(C, align(16))]
 #[derive(Clone, Copy)]
 struct Memory([MaybeUninit<u8>; DTOF_LINK_SIZE]);
@@ -145,110 +151,174 @@ impl Memory {
         Self([MaybeUninit::new(byte); DTOF_LINK_SIZE])
     }
 
+    /// An object at the beginning, then zeros.
+    const fn with<T>(object: T) -> Self {
+        let mut memory = Self::of(0);
+        // SAFETY: the memory is long enough and aligned.
+        unsafe { memory.at::<T>().write(object) };
+        memory
+    }
+
     const fn at<T>(&mut self) -> *mut T {
         assert!(size_of::<T>() <= DTOF_LINK_SIZE);
         ptr::from_mut(self).cast()
     }
 }
 
-#[test]
-fn no_object_is_taken_for_another() {
-    let mut objects = [Memory::of(0); 6];
-    let [config, link, encoder, decoder, _, erased] = &mut objects;
-    *erased = Memory::of(0xff);
-    // SAFETY: all memory is long enough and aligned for each type.
-    unsafe {
-        assert_eq!(dtof_config_check(&paper(), config.at()), OK);
-        assert_eq!(dtof_link_init(link.at(), DTOF_LINK_SIZE, 1), OK);
-        assert_eq!(dtof_aer_encoder_init(encoder.at()), OK);
-        assert_eq!(dtof_aer_decoder_init(decoder.at()), OK);
-    }
-    let mut accepted = [0; 6];
-    for (object, accepted) in objects.iter_mut().zip(&mut accepted) {
-        let (mut pixel, event, mut done) = (zeroed(), dtof_event_t::default(), zeroed());
-        let (mut wire, mut length) = ([0u8; DTOF_WIRE_BYTES], 0);
-        let (room, mut record, mut message) = (wire.as_mut_ptr(), zeroed(), zeroed());
-        // SAFETY: all memory is long enough and aligned for each type.
-        let statuses = unsafe {
-            let codes = [0u16; DTOF_BINS];
-            let counts = [0u32; DTOF_BINS];
-            let mut histogram = zeroed();
-            let size = DTOF_HISTOGRAM_SIZE;
-            let mut events = [event; DTOF_ECHOES];
-            [
-                dtof_pixel_count(&mut pixel, object.at(), 0),
-                dtof_pixel_count_batch(&mut pixel, object.at(), codes.as_ptr(), 1),
-                dtof_pixel_count_frame(&mut pixel, object.at(), codes.as_ptr()),
-                dtof_pixel_end_laser_cycles(
-                    &mut pixel,
-                    object.at(),
-                    0,
-                    &mut done,
-                    1,
-                    ptr::null_mut(),
-                ),
-                dtof_pixels_end_laser_cycles(
-                    &mut pixel,
-                    1,
-                    0,
-                    object.at(),
-                    &mut done,
-                    1,
-                    ptr::null_mut(),
-                ),
-                dtof_histogram_fill(
-                    &mut histogram,
-                    size,
-                    object.at(),
-                    &mut done,
-                    counts.as_ptr(),
-                ),
-                dtof_histogram_detect(
-                    &mut histogram,
-                    object.at(),
-                    0,
-                    &mut done,
-                    0,
-                    1,
-                    events.as_mut_ptr(),
-                    &mut length,
-                ),
-                dtof_aer_encode(object.at(), &event, room, &mut length),
-                dtof_aer_decode(object.at(), room, &mut record),
-                dtof_link_receive(object.at(), room, 0, 0, &mut 0),
-                dtof_link_transmit(object.at(), 0, room, &mut length),
-                dtof_link_peek(object.at(), &mut 0),
-                dtof_link_take(object.at(), &mut message),
-                dtof_link_offer(object.at(), DTOF_MESSAGE_EVENTS, room, 0),
-                dtof_link_state(object.at(), &mut zeroed()),
-                dtof_link_silent_ms(object.at(), 0, &mut 0),
-                dtof_link_set_stop_reason(object.at(), DTOF_STOP_RESET),
-                dtof_report_write(&zeroed(), &done, object.at(), room),
-            ]
-        };
-        *accepted = statuses
-            .iter()
-            .filter(|&&status| status != DTOF_ERROR_NOT_INITIALISED)
-            .count();
-    }
-    // Those of its own.
-    assert_eq!(accepted, [7, 9, 1, 1, 0, 0]);
-}
-
-/// A link in this memory.
-fn link_at(memory: &mut dtof_link_t) -> *const dtof_link_t {
-    // SAFETY: the pointer leads to a link.
-    assert_eq!(unsafe { dtof_link_init(memory, DTOF_LINK_SIZE, 1) }, OK);
-    memory
-}
-
-/// A function is handed a pointer to what it should have.
+/// A call that is right but for the pointer it gets.
 type Call = fn(*mut u8) -> dtof_status_t;
 
-/// Each pointer of each function, with the alignment of what lies there.
+/// Each function that takes an initialised object: its name, the type, and a call.
 #[rustfmt::skip]
-const POINTERS: [(usize, Call); 31] = {
-    // SAFETY: the tests hand over null, what is misaligned, and nothing else.
+const TAKES: [(&str, &str, Call); 35] = {
+    const CODES: *const u16 = [0u16; DTOF_BINS].as_ptr();
+    const COUNTS: *const u32 = [0u32; DTOF_BINS].as_ptr();
+    const NO_LOOK: *mut dtof_look_t = ptr::null_mut();
+    const NO_COUNT: *mut usize = ptr::null_mut();
+    // SAFETY: all memory is long enough and aligned for each type.
+    unsafe {[
+        ("dtof_statistics_read", "dtof_statistics_t", |p| dtof_statistics_read(p.cast(), &mut zeroed())),
+        ("dtof_range", "dtof_scale_t", |p| dtof_range(p.cast(), 0, &mut 0)),
+        ("dtof_pixel_count", "dtof_pixel_t", |p| dtof_pixel_count(p.cast(), &config(), 0)),
+        ("dtof_pixel_count", "dtof_checked_config_t", |p| dtof_pixel_count(&mut pixel(0), p.cast(), 0)),
+        ("dtof_pixel_count_batch", "dtof_pixel_t", |p| dtof_pixel_count_batch(p.cast(), &config(), CODES, 1)),
+        ("dtof_pixel_count_batch", "dtof_checked_config_t", |p| dtof_pixel_count_batch(&mut pixel(0), p.cast(), CODES, 1)),
+        ("dtof_pixel_count_frame", "dtof_pixel_t", |p| dtof_pixel_count_frame(p.cast(), &config(), CODES)),
+        ("dtof_pixel_count_frame", "dtof_checked_config_t", |p| dtof_pixel_count_frame(&mut pixel(0), p.cast(), CODES)),
+        ("dtof_pixel_end_laser_cycles", "dtof_pixel_t", |p| dtof_pixel_end_laser_cycles(p.cast(), &config(), 0, &mut statistics(), 1, NO_LOOK)),
+        ("dtof_pixel_end_laser_cycles", "dtof_checked_config_t", |p| dtof_pixel_end_laser_cycles(&mut pixel(0), p.cast(), 0, &mut statistics(), 1, NO_LOOK)),
+        ("dtof_pixel_end_laser_cycles", "dtof_statistics_t", |p| dtof_pixel_end_laser_cycles(&mut pixel(0), &config(), 0, p.cast(), 1, NO_LOOK)),
+        ("dtof_pixels_end_laser_cycles", "dtof_pixel_t", |p| dtof_pixels_end_laser_cycles(p.cast(), 1, 0, &config(), &mut statistics(), 1, NO_COUNT)),
+        ("dtof_pixels_end_laser_cycles", "dtof_checked_config_t", |p| dtof_pixels_end_laser_cycles(&mut pixel(0), 1, 0, p.cast(), &mut statistics(), 1, NO_COUNT)),
+        ("dtof_pixels_end_laser_cycles", "dtof_statistics_t", |p| dtof_pixels_end_laser_cycles(&mut pixel(0), 1, 0, &config(), p.cast(), 1, NO_COUNT)),
+        ("dtof_pixel_take_event", "dtof_pixel_t", |p| dtof_pixel_take_event(p.cast(), &mut zeroed())),
+        ("dtof_pixel_add_photons", "dtof_pixel_t", |p| dtof_pixel_add_photons(p.cast(), &mut statistics())),
+        ("dtof_pixel_add_photons", "dtof_statistics_t", |p| dtof_pixel_add_photons(&pixel(0), p.cast())),
+        ("dtof_histogram_fill", "dtof_checked_config_t", |p| dtof_histogram_fill(&mut zeroed(), DTOF_HISTOGRAM_SIZE, p.cast(), &mut statistics(), COUNTS)),
+        ("dtof_histogram_fill", "dtof_statistics_t", |p| dtof_histogram_fill(&mut zeroed(), DTOF_HISTOGRAM_SIZE, &config(), p.cast(), COUNTS)),
+        ("dtof_histogram_detect", "dtof_histogram_t", |p| dtof_histogram_detect(p.cast(), &config(), 0, &mut statistics(), 0, 1, echoes().as_mut_ptr(), &mut 0)),
+        ("dtof_histogram_detect", "dtof_checked_config_t", |p| dtof_histogram_detect(&mut histogram(), p.cast(), 0, &mut statistics(), 0, 1, echoes().as_mut_ptr(), &mut 0)),
+        ("dtof_histogram_detect", "dtof_statistics_t", |p| dtof_histogram_detect(&mut histogram(), &config(), 0, p.cast(), 0, 1, echoes().as_mut_ptr(), &mut 0)),
+        ("dtof_aer_encode", "dtof_aer_encoder_t", |p| dtof_aer_encode(p.cast(), &event(), [0; 32].as_mut_ptr(), &mut 0)),
+        ("dtof_aer_decode", "dtof_aer_decoder_t", |p| dtof_aer_decode(p.cast(), [0; 16].as_ptr(), &mut zeroed())),
+        ("dtof_link_receive", "dtof_link_t", |p| dtof_link_receive(p.cast(), [0].as_ptr(), 1, 0, &mut 0)),
+        ("dtof_link_transmit", "dtof_link_t", |p| dtof_link_transmit(p.cast(), 0, [0; 256].as_mut_ptr(), &mut 0)),
+        ("dtof_link_peek", "dtof_link_t", |p| dtof_link_peek(p.cast(), &mut 0)),
+        ("dtof_link_take", "dtof_link_t", |p| dtof_link_take(p.cast(), &mut zeroed())),
+        ("dtof_link_offer", "dtof_link_t", |p| dtof_link_offer(p.cast(), DTOF_MESSAGE_EVENTS, [0].as_ptr(), 1)),
+        ("dtof_link_state", "dtof_link_t", |p| dtof_link_state(p.cast(), &mut zeroed())),
+        ("dtof_link_silent_ms", "dtof_link_t", |p| dtof_link_silent_ms(p.cast(), 0, &mut 0)),
+        ("dtof_link_set_stop_reason", "dtof_link_t", |p| dtof_link_set_stop_reason(p.cast(), DTOF_STOP_RESET)),
+        ("dtof_report_write", "dtof_statistics_t", |p| dtof_report_write(&zeroed(), p.cast(), &link(), [0; 256].as_mut_ptr())),
+        ("dtof_report_write", "dtof_link_t", |p| dtof_report_write(&zeroed(), &statistics(), p.cast(), [0; 256].as_mut_ptr())),
+        ("dtof_pixel_histogram_write", "dtof_pixel_t", |p| dtof_pixel_histogram_write(p.cast(), 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
+    ]}
+};
+
+/// Parameters that a function initialises, besides the functions named `..._init`.
+const INITIALISES: [(&str, &str); 2] = [
+    ("dtof_config_check", "dtof_checked_config_t"),
+    ("dtof_histogram_fill", "dtof_histogram_t"),
+];
+
+/// An event whose fields are in range.
+const fn event() -> dtof_event_t {
+    dtof_event_t {
+        cycle: 0,
+        peak_count: 0,
+        background: 0,
+        position_q8: 0,
+        pixel: 0,
+        exposure: 0,
+        peak_bin: 0,
+        offset_q8: 0,
+        level: 0,
+        echo: 1,
+        flags: 0,
+    }
+}
+
+const fn echoes() -> [dtof_event_t; DTOF_ECHOES] {
+    [event(); DTOF_ECHOES]
+}
+
+#[test]
+fn an_object_without_the_tag_of_its_type_is_refused() {
+    let mut objects = [
+        ("zeroed", Memory::of(0)),
+        ("0xaa", Memory::of(0xaa)),
+        ("erased", Memory::of(0xff)),
+        ("dtof_statistics_t", Memory::with(statistics())),
+        ("dtof_scale_t", Memory::with(scale())),
+        ("dtof_checked_config_t", Memory::with(config())),
+        ("dtof_pixel_t", Memory::with(pixel(0))),
+        ("dtof_histogram_t", Memory::with(histogram())),
+        ("dtof_aer_encoder_t", Memory::with(encoder())),
+        ("dtof_aer_decoder_t", Memory::with(decoder())),
+        ("dtof_link_t", Memory::with(link())),
+    ];
+    for (function, takes, call) in TAKES {
+        for (object, memory) in &mut objects {
+            let is_refused = call(memory.at()) == DTOF_ERROR_NOT_INITIALISED;
+            assert_eq!(
+                is_refused,
+                *object != takes,
+                "{function}, {takes}: {object}"
+            );
+        }
+    }
+}
+
+#[test]
+fn every_object_of_the_header_is_checked() {
+    let header = include_str!("../../include/dtof.h");
+    let code: String = header
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//"))
+        .flat_map(|line| [line, " "])
+        .collect();
+    let opaque: BTreeSet<&str> = TAKES.iter().map(|(_, of, _)| *of).collect();
+    assert_eq!(opaque.len(), code.matches(" opaque[").count());
+    let mut found = BTreeSet::new();
+    for statement in code.split(';') {
+        let Some((name, parameters)) = statement.split_once('(') else {
+            continue;
+        };
+        let name = name.split_whitespace().last().unwrap_or_default();
+        if !name.starts_with("dtof_") || name.ends_with("_init") {
+            continue;
+        }
+        for parameter in parameters.split(',') {
+            let mut words = parameter.split_whitespace();
+            let of = words.find(|word| opaque.contains(word));
+            found.extend(of.map(|of| (name, of)));
+        }
+    }
+    let checked = TAKES.iter().map(|(name, of, _)| (*name, *of));
+    assert_eq!(found, checked.chain(INITIALISES).collect());
+}
+
+#[test]
+fn one_pixel_without_a_tag_leaves_all_as_they_were() {
+    let (config, mut done, mut fired) = (config(), statistics(), 0);
+    let mut pixels = [pixel(0), zeroed(), pixel(2)];
+    let mut end = |pixels: &mut [dtof_pixel_t; 3]| {
+        let first = pixels.as_mut_ptr();
+        // SAFETY: each pointer leads to objects of its type.
+        unsafe { dtof_pixels_end_laser_cycles(first, 3, 0, &config, &mut done, 40, &mut fired) }
+    };
+    assert_eq!(end(&mut pixels), DTOF_ERROR_NOT_INITIALISED);
+    pixels[1] = pixel(1);
+    assert_eq!(end(&mut pixels), OK);
+    for pixel in &mut pixels {
+        assert_eq!(exposure(pixel), 40);
+    }
+}
+
+/// Pointers of the functions, each with the alignment of its type.
+#[rustfmt::skip]
+const POINTERS: [(usize, Call); 32] = {
+    // SAFETY: the tests pass null and misaligned pointers only.
     unsafe {[
         (4, |p| dtof_config_paper(p.cast())),
         (4, |p| dtof_config_for_pulse(p.cast(), 256)),
@@ -257,14 +327,15 @@ const POINTERS: [(usize, Call); 31] = {
         (4, |p| dtof_config_check(&paper(), p.cast())),
         (4, |p| dtof_scale_init(p.cast(), 250 << 16, 0)),
         (4, |p| dtof_range(p.cast(), 0, &mut 0)),
-        (4, |p| dtof_range(&zeroed(), 0, p.cast())),
+        (4, |p| dtof_range(&scale(), 0, p.cast())),
         (8, |p| dtof_pixel_init(p.cast(), DTOF_PIXEL_SIZE, 0)),
         (8, |p| dtof_pixel_take_event(p.cast(), &mut zeroed())),
-        (8, |p| dtof_pixel_take_event(&mut zeroed(), p.cast())),
+        (8, |p| dtof_pixel_take_event(&mut pixel(0), p.cast())),
         (8, |p| dtof_pixel_add_photons(p.cast(), &mut zeroed())),
-        (8, |p| dtof_pixel_add_photons(&zeroed(), p.cast())),
+        (8, |p| dtof_pixel_add_photons(&pixel(0), p.cast())),
+        (8, |p| dtof_statistics_init(p.cast())),
         (8, |p| dtof_statistics_read(p.cast(), &mut zeroed())),
-        (8, |p| dtof_statistics_read(&zeroed(), p.cast())),
+        (8, |p| dtof_statistics_read(&statistics(), p.cast())),
         (8, |p| dtof_aer_encoder_init(p.cast())),
         (8, |p| dtof_aer_decoder_init(p.cast())),
         (8, |p| dtof_aer_encode(p.cast(), &zeroed(), [0; 32].as_mut_ptr(), &mut 0)),
@@ -276,7 +347,7 @@ const POINTERS: [(usize, Call); 31] = {
         (8, |p| dtof_link_peek(p.cast(), &mut 0)),
         (8, |p| dtof_link_state(p.cast(), &mut zeroed())),
         (8, |p| dtof_link_silent_ms(p.cast(), 0, &mut 0)),
-        (4, |p| dtof_link_silent_ms(link_at(&mut zeroed()), 0, p.cast())),
+        (4, |p| dtof_link_silent_ms(&link(), 0, p.cast())),
         (8, |p| dtof_link_set_stop_reason(p.cast(), DTOF_STOP_RESET)),
         (8, |p| dtof_pixel_histogram_write(p.cast(), 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
         (4, |p| dtof_counts_write(p.cast(), 0, 0, 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
@@ -285,7 +356,7 @@ const POINTERS: [(usize, Call); 31] = {
 };
 
 #[test]
-fn each_pointer_is_refused_where_its_type_cannot_lie() {
+fn null_and_misaligned_pointers_are_refused() {
     let mut memory = Memory::of(0);
     for (number, (alignment, call)) in POINTERS.into_iter().enumerate() {
         assert_eq!(call(ptr::null_mut()), DTOF_ERROR_NULL, "{number}");
@@ -294,27 +365,20 @@ fn each_pointer_is_refused_where_its_type_cannot_lie() {
             assert_eq!(call(pointer), DTOF_ERROR_ALIGNMENT, "{number} at {off}");
         }
     }
-    // SAFETY: they were written when it was made.
+    // SAFETY: `Memory::of` has written them.
     let bytes = memory.0.map(|byte| unsafe { byte.assume_init() });
     assert_eq!(bytes, [0; DTOF_LINK_SIZE]);
 }
 
 #[test]
-fn bytes_that_do_not_lie_anywhere_are_refused() {
+fn null_pointers_to_bytes_are_refused() {
     let mut bytes = [0u8; 256];
     let room = bytes.as_mut_ptr();
     let none = ptr::null_mut();
     let mut length = 0;
-    let (mut encoder, mut decoder, mut link) = (zeroed(), zeroed(), zeroed());
-    // SAFETY: each pointer leads to what it should, or is null.
+    let (mut encoder, mut decoder, mut link, event) = (encoder(), decoder(), link(), event());
+    // SAFETY: each pointer leads to an object of its type, or is null.
     unsafe {
-        assert_eq!(dtof_aer_encoder_init(&mut encoder), OK);
-        assert_eq!(dtof_aer_decoder_init(&mut decoder), OK);
-        assert_eq!(dtof_link_init(&mut link, DTOF_LINK_SIZE, 1), OK);
-        let event = dtof_event_t {
-            echo: 1,
-            ..dtof_event_t::default()
-        };
         let refused = [
             dtof_aer_encode(&mut encoder, &event, none, &mut length),
             dtof_aer_encode(&mut encoder, &event, room, ptr::null_mut()),
@@ -328,14 +392,14 @@ fn bytes_that_do_not_lie_anywhere_are_refused() {
             dtof_link_state(&link, ptr::null_mut()),
             dtof_link_silent_ms(&link, 0, ptr::null_mut()),
             dtof_sensor_write(1, 0, 0, 0, 0, none),
-            dtof_report_write(&zeroed(), &zeroed(), &link, none),
+            dtof_report_write(&zeroed(), &statistics(), &link, none),
             dtof_device_config_read(none, 1, &mut zeroed()),
             dtof_no_histogram_write(0, 1, none, &mut length),
             dtof_no_histogram_write(0, 1, room, ptr::null_mut()),
             dtof_counts_write([0; DTOF_BINS].as_ptr(), 0, 0, 0, 0, room, ptr::null_mut()),
         ];
         assert_eq!(refused, [DTOF_ERROR_NULL; 17]);
-        // The encoder has sent no time.
+        // The encoder has not yet counted a time word as sent.
         assert_eq!(dtof_aer_encode(&mut encoder, &event, room, &mut length), OK);
         assert_eq!(length, 32);
         // Longer than memory.
@@ -352,31 +416,37 @@ fn bytes_that_do_not_lie_anywhere_are_refused() {
 }
 
 #[test]
-fn the_library_says_what_it_is() {
-    // SAFETY: a text of the library.
+fn version_and_bins_are_those_of_the_build() {
+    // SAFETY: the pointer leads to a text of the library.
     let version = unsafe { CStr::from_ptr(dtof_version()) };
     assert_eq!(version.to_str(), Ok(env!("CARGO_PKG_VERSION")));
     assert_eq!(usize::from(dtof_bins()), DTOF_BINS);
 }
 
 proptest! {
-    /// They have no tag: a program may have forgotten to make them, or written over them.
+    /// A program may have overwritten all but the tags.
     #[test]
     fn any_bytes_are_a_pixel_a_histogram_a_scale_and_statistics(
-        bytes in prop::collection::vec(any::<u8>(), DTOF_HISTOGRAM_SIZE),
+        mut bytes in prop::collection::vec(any::<u8>(), DTOF_HISTOGRAM_SIZE - 4),
         ones in any::<bool>(),
         code in any::<u16>(),
         cycles in any::<u16>(),
         last in any::<u64>(),
     ) {
-        let config = checked(&paper()).unwrap();
-        let mut memory = Memory::of(0xff);
-        if !ones {
-            memory.0[..bytes.len()].write_copy_of_slice(&bytes);
+        if ones {
+            bytes.fill(0xff);
         }
-        let [mut pixel, mut histogram, mut scale] = [memory; 3];
-        // Of counts that no program reaches.
-        let mut done = zeroed();
+        let mut memories = [
+            Memory::with(pixel(0)),
+            Memory::with(histogram()),
+            Memory::with(scale()),
+            Memory::with(statistics()),
+        ];
+        for memory in &mut memories {
+            memory.0[4..4 + bytes.len()].write_copy_of_slice(&bytes);
+        }
+        let [mut pixel, mut histogram, mut scale, mut read] = memories;
+        let (config, mut done) = (config(), statistics());
         let mut events = [dtof_event_t::default(); DTOF_ECHOES];
         let mut body = [0; DTOF_BODY_BYTES];
         // SAFETY: all memory is long enough and aligned for each type.
@@ -395,7 +465,7 @@ proptest! {
                 histogram.at(), &config, last, &mut done, 0, cycles, first, &mut 0,
             );
             let _ = dtof_range(scale.at(), 0, &mut 0);
-            let _ = dtof_statistics_read(memory.at(), &mut zeroed());
+            let _ = dtof_statistics_read(read.at(), &mut zeroed());
         }
     }
 }

@@ -1,4 +1,6 @@
-//! Pixels and whole histograms decide as those of `dtof-core`.
+//! Pixels and histograms give the same results as those of `dtof-core`.
+
+use core::ptr;
 
 use dtof_c::*;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
@@ -9,9 +11,9 @@ use dtof_core::{
 };
 use proptest::prelude::*;
 
-use crate::{OK, checked, paper, zeroed};
+use crate::{OK, checked, exposure, paper, pixel, statistics, zeroed};
 
-/// Settings that are mostly right, and what the core makes of them.
+/// Random settings, most of them valid.
 fn settings() -> impl Strategy<Value = dtof_config_t> {
     let rule = (0u8..3, 1u8..8, 256u16..2048, 4096u16..30000, 3u32..12);
     let depth = (0u8..2, 256u16..1025, 256u16..1025);
@@ -72,11 +74,11 @@ fn plain(event: &DepthEvent) -> dtof_event_t {
 
 fn read(statistics: &dtof_statistics_t) -> [u64; 9] {
     let mut counts = dtof_counts_t::default();
-    // SAFETY: both pointers lead to what they should.
+    // SAFETY: both pointers lead to objects of their types.
     assert_eq!(unsafe { dtof_statistics_read(statistics, &mut counts) }, OK);
     [
         counts.counted,
-        counts.held,
+        counts.excluded,
         counts.saturated,
         counts.rejected,
         counts.gated_out,
@@ -88,7 +90,13 @@ fn read(statistics: &dtof_statistics_t) -> [u64; 9] {
 }
 
 fn numbers(of: &Statistics) -> [u64; 9] {
-    let photons = [of.counted, of.held, of.saturated, of.rejected, of.gated_out];
+    let photons = [
+        of.counted,
+        of.excluded,
+        of.saturated,
+        of.rejected,
+        of.gated_out,
+    ];
     let events = [of.events, of.deferred, of.expired, of.expired_deferred];
     [&photons[..], &events].concat().try_into().unwrap()
 }
@@ -115,14 +123,11 @@ proptest! {
             return Ok(());
         };
         let checked = checked(&settings).unwrap();
-        let (mut mine, mut done): ([dtof_pixel_t; 2], dtof_statistics_t) = (zeroed(), zeroed());
-        let mut others = [5, 6].map(|address| AsyncPixel::<128>::new(PixelAddress(address)));
+        let (mut mine, mut done) = ([pixel(5), pixel(6)], statistics());
+        let mut others = [5, 6].map(|address| AsyncPixel::<128>::new(PixelAddress::new(address)));
         let mut statistics = Statistics::new();
-        // SAFETY: each pointer leads to what it should.
+        // SAFETY: each pointer leads to an object of its type.
         unsafe {
-            for (pixel, address) in mine.iter_mut().zip([5, 6]) {
-                prop_assert_eq!(dtof_pixel_init(pixel, size_of_val(pixel), address), OK);
-            }
             for ((cycle, codes), taken) in (0..).zip(&photons).zip(taken) {
                 for (mine, other) in mine.iter_mut().zip(&mut others) {
                     if batches {
@@ -136,17 +141,17 @@ proptest! {
                     }
                     other.count_batch(&config, codes);
                 }
-                let (last, mut fired) = (LaserCycle(cycle), 9);
+                let (last, mut fired) = (LaserCycle::new(cycle), 9);
                 let looks = others
                     .each_mut()
                     .map(|other| other.end_laser_cycle(&config, &mut statistics, last));
                 if cycle % 2 == 0 {
                     for (mine, look) in mine.iter_mut().zip(looks) {
-                        let mut brought = dtof_look_t::DTOF_LOOK_NOT_DUE;
+                        let mut outcome = dtof_look_t::DTOF_LOOK_NOT_DUE;
                         let status = dtof_pixel_end_laser_cycles(
-                            mine, &checked, cycle, &mut done, 1, &mut brought,
+                            mine, &checked, cycle, &mut done, 1, &mut outcome,
                         );
-                        prop_assert_eq!((status, brought), (OK, look.into()));
+                        prop_assert_eq!((status, outcome), (OK, look.into()));
                     }
                 } else {
                     let status = dtof_pixels_end_laser_cycles(
@@ -158,7 +163,7 @@ proptest! {
                 for (mine, other) in mine.iter_mut().zip(&mut others).filter(|_| taken) {
                     let mut event = dtof_event_t::default();
                     let status = dtof_pixel_take_event(mine, &mut event);
-                    let expected = other.acknowledge();
+                    let expected = other.take_event();
                     prop_assert_eq!(status == OK, expected.is_some());
                     prop_assert_eq!(event, expected.as_ref().map(plain).unwrap_or_default());
                 }
@@ -191,16 +196,16 @@ proptest! {
         statistics.add_photons_of(&histogram, gated_out);
         let mut expected = Vec::new();
         config.detect_echoes(&mut histogram, |echo, detection| {
-            let event = detection.event(PixelAddress(9), LaserCycle(1 << 40), 7);
+            let event = detection.event(PixelAddress::new(9), LaserCycle::new(1 << 40), 7);
             expected.push(plain(&DepthEvent { echo, ..event }));
         });
         statistics.events += expected.len() as u64;
         statistics.expired += u64::from(expected.is_empty());
 
-        let (mut room, mut done): (dtof_histogram_t, dtof_statistics_t) = (zeroed(), zeroed());
+        let (mut room, mut done) = (zeroed::<dtof_histogram_t>(), crate::statistics());
         let (mut events, mut found) = ([dtof_event_t::default(); DTOF_ECHOES], 9);
         let (size, first) = (size_of_val(&room), events.as_mut_ptr());
-        // SAFETY: each pointer leads to what it should.
+        // SAFETY: each pointer leads to an object of its type.
         let status = unsafe {
             let counts = counts.as_ptr();
             let status = dtof_histogram_fill(&mut room, size, &checked, &mut done, counts);
@@ -227,11 +232,30 @@ proptest! {
         prop_assert_eq!(status == OK, scale.is_ok());
         if let Ok(scale) = scale {
             let (mut range, place) = (0, BinPosition::new(position).unwrap());
-            // SAFETY: both pointers lead to what they should.
+            // SAFETY: both pointers lead to objects of their types.
             prop_assert_eq!(unsafe { dtof_range(&mine, position, &mut range) }, OK);
             prop_assert_eq!(range, scale.range(place).to_bits());
         }
     }
+}
+
+#[test]
+fn a_misaligned_pointer_to_the_number_of_events_leaves_the_pixels_as_they_were() {
+    let (config, mut done) = (crate::config(), statistics());
+    let (mut pixels, mut fired) = ([pixel(0), pixel(1)], [9usize; 2]);
+    let misaligned = fired.as_mut_ptr().wrapping_byte_add(1);
+    let first = pixels.as_mut_ptr();
+    // SAFETY: each pointer leads to objects of its type, or is null or misaligned.
+    unsafe {
+        let mut end =
+            |fired| dtof_pixels_end_laser_cycles(first, 2, 0, &config, &mut done, 40, fired);
+        assert_eq!(end(misaligned), dtof_status_t::DTOF_ERROR_ALIGNMENT);
+        assert_eq!([0, 1].map(|pixel| exposure(first.add(pixel))), [0; 2]);
+        assert_eq!(end(ptr::null_mut()), OK);
+        assert_eq!([0, 1].map(|pixel| exposure(first.add(pixel))), [40; 2]);
+    }
+    assert_eq!(fired, [9; 2]);
+    assert_eq!(read(&done), [0; 9]);
 }
 
 #[test]

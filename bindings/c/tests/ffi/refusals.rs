@@ -1,4 +1,4 @@
-//! Every refusal has its own status.
+//! Every error has its own status.
 
 use core::ptr::{null, null_mut};
 use std::collections::BTreeSet;
@@ -8,7 +8,7 @@ use dtof_c::dtof_status_t::*;
 use dtof_c::*;
 use dtof_link::Refusal;
 
-use crate::{OK, checked, paper, zeroed};
+use crate::{OK, checked, config, histogram, link, paper, pixel, scale, statistics, zeroed};
 
 #[test]
 fn each_setting_that_cannot_be_has_its_own_error() {
@@ -79,20 +79,18 @@ fn each_setting_that_cannot_be_has_its_own_error() {
 }
 
 #[test]
-fn no_pointer_is_taken_that_is_null_or_misaligned() {
-    let config = checked(&paper()).unwrap();
-    let (mut pixel, mut statistics): (dtof_pixel_t, dtof_statistics_t) = (zeroed(), zeroed());
-    let (mut histogram, mut link): (dtof_histogram_t, dtof_link_t) = (zeroed(), zeroed());
-    let (mut encoder, mut decoder) = (zeroed(), zeroed());
+fn pointers_and_numbers_are_checked() {
+    let (config, mut pixel, mut statistics) = (config(), pixel(0), statistics());
+    let (mut histogram, mut link) = (histogram(), link());
     let mut event = dtof_event_t::default();
     let (counts, wide, bytes) = ([0u16; 128], [0u32; 128], [0u8; 256]);
-    let (mut wire, mut length, mut byte) = ([0u8; 256], 0usize, 0u8);
+    let mut length = 0usize;
     let size = DTOF_PIXEL_SIZE;
-    /// One byte behind.
+    /// One byte further.
     fn off<T>(pointer: *mut T) -> *mut T {
         pointer.wrapping_byte_add(1)
     }
-    // SAFETY: each pointer leads to what it should, is null, or is misaligned.
+    // SAFETY: each pointer leads to an object of its type, is null, or is misaligned.
     unsafe {
         assert_eq!(dtof_pixel_init(null_mut(), size, 0), DTOF_ERROR_NULL);
         assert_eq!(
@@ -108,7 +106,8 @@ fn no_pointer_is_taken_that_is_null_or_misaligned() {
             DTOF_ERROR_ALIGNMENT
         );
         let codes = counts.as_ptr();
-        let batch = |codes, number| dtof_pixel_count_batch(&mut zeroed(), &config, codes, number);
+        let batch =
+            |codes, number| dtof_pixel_count_batch(&mut crate::pixel(0), &config, codes, number);
         assert_eq!(batch(null(), 1), DTOF_ERROR_NULL);
         assert_eq!(batch(null(), 0), OK);
         assert_eq!(batch(codes.wrapping_byte_add(1), 1), DTOF_ERROR_ALIGNMENT);
@@ -118,12 +117,12 @@ fn no_pointer_is_taken_that_is_null_or_misaligned() {
             DTOF_ERROR_NULL
         );
         let end = |statistics, look| {
-            dtof_pixel_end_laser_cycles(&mut zeroed(), &config, 0, statistics, 1, look)
+            dtof_pixel_end_laser_cycles(&mut crate::pixel(0), &config, 0, statistics, 1, look)
         };
         assert_eq!(end(null_mut(), null_mut()), DTOF_ERROR_NULL);
         assert_eq!(end(&mut statistics, null_mut()), OK);
         let pixels = |number| {
-            let (pixel, statistics) = (null_mut(), &mut zeroed());
+            let (pixel, statistics) = (null_mut(), &mut crate::statistics());
             dtof_pixels_end_laser_cycles(pixel, number, 0, &config, statistics, 1, null_mut())
         };
         assert_eq!(pixels(1), DTOF_ERROR_NULL);
@@ -144,7 +143,13 @@ fn no_pointer_is_taken_that_is_null_or_misaligned() {
         );
 
         let mut fill = |size, counts| {
-            dtof_histogram_fill(&mut histogram, size, &config, &mut zeroed(), counts)
+            dtof_histogram_fill(
+                &mut histogram,
+                size,
+                &config,
+                &mut crate::statistics(),
+                counts,
+            )
         };
         assert_eq!(fill(DTOF_HISTOGRAM_SIZE, null()), DTOF_ERROR_NULL);
         assert_eq!(
@@ -163,35 +168,23 @@ fn no_pointer_is_taken_that_is_null_or_misaligned() {
         );
         assert_eq!(found, DTOF_ERROR_NULL);
 
-        let scale = zeroed::<dtof_scale_t>();
+        let scale = scale();
         assert_eq!(dtof_range(&scale, 262_400, &mut 0), DTOF_ERROR_POSITION);
         assert_eq!(dtof_range(&scale, 0, null_mut()), DTOF_ERROR_NULL);
 
-        // Nothing was begun.
         let word = bytes.as_ptr();
-        let mut record = dtof_record_t::default();
-        let encoded = dtof_aer_encode(&mut encoder, &event, wire.as_mut_ptr(), &mut length);
-        assert_eq!(encoded, DTOF_ERROR_NOT_INITIALISED);
-        let decoded = dtof_aer_decode(&mut decoder, word, &mut record);
-        assert_eq!(decoded, DTOF_ERROR_NOT_INITIALISED);
-        assert_eq!(
-            dtof_pixel_count(&mut pixel, &zeroed(), 1),
-            DTOF_ERROR_NOT_INITIALISED
-        );
-        assert_eq!(dtof_link_peek(&link, &mut byte), DTOF_ERROR_NOT_INITIALISED);
-
         assert_eq!(dtof_link_init(&mut link, 8, 1), DTOF_ERROR_SIZE);
         assert_eq!(dtof_link_init(&mut link, DTOF_LINK_SIZE, 1), OK);
         let sent = dtof_link_transmit(&mut link, 0, null_mut(), &mut length);
         assert_eq!(sent, DTOF_ERROR_NULL);
-        // Those of a host, and none.
+        // Kinds from a host, and unused kinds.
         for kind in [0, DTOF_MESSAGE_CONFIGURE, 0x7f, 0xf0, 0xff] {
             let offer = dtof_link_offer(&mut link, kind, null(), 0);
             assert_eq!(offer, DTOF_ERROR_MESSAGE_KIND);
         }
         for reason in [DTOF_STOP_NONE, DTOF_STOP_RESET + 1, u8::MAX] {
-            let told = dtof_link_set_stop_reason(&mut link, reason);
-            assert_eq!(told, DTOF_ERROR_REASON);
+            let status = dtof_link_set_stop_reason(&mut link, reason);
+            assert_eq!(status, DTOF_ERROR_REASON);
         }
         let offer = dtof_link_offer(&mut link, DTOF_MESSAGE_EVENTS, word, 245);
         assert_eq!(offer, DTOF_ERROR_MESSAGE_LENGTH);
@@ -222,7 +215,7 @@ fn every_status_has_a_text_of_its_own() {
     assert_eq!(numbers.len(), 43);
     let mut texts = BTreeSet::new();
     for number in 0..=u8::MAX {
-        // SAFETY: all are texts of the library.
+        // SAFETY: each pointer leads to a text of the library.
         let text = unsafe { CStr::from_ptr(dtof_status_text(number)) };
         assert_eq!(
             text == c"unknown status",

@@ -1,4 +1,4 @@
-//! Words and checksums are those of `docs/aer-format.md`.
+//! Words and checksums match `docs/aer-format.md`.
 
 use dtof_c::dtof_status_t::*;
 use dtof_c::*;
@@ -26,7 +26,7 @@ fn golden_words_are_read_and_events_written_again() {
     assert_eq!(words.len(), 21);
     let (mut encoder, mut decoder) = (zeroed(), zeroed());
     let (mut kinds, mut file) = ([0; 5], Vec::new());
-    // SAFETY: each pointer leads to what it should.
+    // SAFETY: each pointer leads to an object of its type.
     unsafe {
         assert_eq!(dtof_aer_encoder_init(&mut encoder), OK);
         assert_eq!(dtof_aer_decoder_init(&mut decoder), OK);
@@ -75,7 +75,7 @@ fn golden_words_are_read_and_events_written_again() {
 }
 
 #[test]
-fn words_that_mean_nothing_have_errors_of_their_own() {
+fn invalid_words_have_their_own_errors() {
     let words = rows(PAGE, "| bytes as sent | why |");
     assert_eq!(words.len(), 10);
     let expected = [
@@ -86,7 +86,7 @@ fn words_that_mean_nothing_have_errors_of_their_own() {
     ];
     for (word, expected) in words.iter().zip(expected.concat()) {
         let (mut decoder, mut record) = (zeroed(), dtof_record_t::default());
-        // SAFETY: each pointer leads to what it should.
+        // SAFETY: each pointer leads to an object of its type.
         unsafe {
             assert_eq!(dtof_aer_decoder_init(&mut decoder), OK);
             let status = dtof_aer_decode(&mut decoder, word.as_ptr(), &mut record);
@@ -121,7 +121,7 @@ fn an_event_that_does_not_fit_a_word_is_refused() {
         let (mut encoder, mut event) = (zeroed(), good);
         change(&mut event);
         let (mut bytes, mut length) = ([0; DTOF_EVENT_BYTES], 0);
-        // SAFETY: each pointer leads to what it should.
+        // SAFETY: each pointer leads to an object of its type.
         let status = unsafe {
             assert_eq!(dtof_aer_encoder_init(&mut encoder), OK);
             dtof_aer_encode(&mut encoder, &event, bytes.as_mut_ptr(), &mut length)

@@ -1,4 +1,4 @@
-"""Error against time, as a picture in the colours of all pictures, light and dark."""
+"""The chart of error against time, in the colours of all pictures, light and dark."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ import matplotlib
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
-from kept import PALETTE
+from stored import PALETTE
 
 TITLE = ("Outdoors, events come sooner than frames,", "from numpy nearly as from dtof")
 WIDTH, HEIGHT = 560, 720
-# The classes of the palette, by the colour that stands for each in light.
+# The classes of the palette, by their colours in light mode.
 CLASSES = {
     "#1f2328": "ink", "#59636e": "soft", "#0067b1": "c0", "#b3470b": "c1", "#0a7554": "c2",
     "#7a3db8": "c3", "#b0307f": "c4", "#8a6100": "c5",
@@ -26,7 +26,7 @@ PENS = {  # colour and mark
     "asynchronous, arrays": ("#0a7554", "D"),
     "dtof": ("#0067b1", "o"),
 }
-# A panel a scene: its name, its ticks, and where the names stand: at which dot, and how far from it.
+# A panel for each scene: title, ticks, and the positions of names: index of the dot, and offset.
 PANELS = {
     "outdoor": (
         "outdoors: bright and dim pixels", (100, 200, 500, 1000), (0.15, 0.2, 0.3, 0.4, 0.5),
@@ -46,7 +46,7 @@ PANELS = {
 
 
 def svg(rows) -> str:
-    """The picture as an SVG document that names its colours as classes."""
+    """The chart as an SVG document with colours as classes."""
     settings = {
         "svg.fonttype": "none", "svg.hashsalt": "dtof", "font.size": 14.5,
         "font.family": "sans-serif", "font.sans-serif": ["Liberation Sans", "DejaVu Sans"],
@@ -69,9 +69,9 @@ def svg(rows) -> str:
     return in_classes(drawn.getvalue())
 
 
-def draw(axes, rows, says, times, errors, places):
+def draw(axes, rows, title, times, errors, places):
     axes.set_facecolor("none")
-    axes.set_title(says, loc="left", fontsize=14.5, fontweight="bold", color=INK, pad=8)
+    axes.set_title(title, loc="left", fontsize=14.5, fontweight="bold", color=INK, pad=8)
     axes.set_xscale("log")
     axes.set_yscale("log")
     for method, (colour, mark) in PENS.items():
@@ -91,13 +91,13 @@ def draw(axes, rows, says, times, errors, places):
 
 
 def best(points):
-    """Those without another that is both sooner and more exact."""
+    """The Pareto frontier: points without another that is both sooner and more exact."""
     return [point for point in points
             if not any(other[0] < point[0] and other[1] < point[1] for other in points)]
 
 
 def in_classes(text: str) -> str:
-    """Colours become classes, so that a style sheet chooses them by the reader's scheme."""
+    """Replaces colours by classes, so that the style sheet follows the reader's colour scheme."""
     text = re.sub(r"<metadata>.*?</metadata>|<style.*?</style>", "", text, flags=re.DOTALL)
     text = re.sub(r"font-family: [^;\"]*;? ?", "", text)
 
@@ -112,7 +112,7 @@ def in_classes(text: str) -> str:
             return f'<{tag} class="paper"{rest}'
         if not found:
             return match.group()
-        (colour,) = found  # no thing has two
+        (colour,) = found  # an element has one colour
         style = style.replace(colour, "currentColor")
         return f'<{tag} class="{CLASSES[colour]}" style="{style}"{rest}'
 

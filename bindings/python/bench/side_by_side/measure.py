@@ -1,4 +1,4 @@
-"""Time, error and false alarms of each way, on the same photons."""
+"""Time, error and false alarms of each method, on the same photons."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from typing import Optional
 
 import numpy as np
 
-# One false alarm in so many laser cycles of a pixel: 1 % of exposures of 2000.
+# One false alarm per this many laser cycles of a pixel: 1 % of exposures of 2000.
 CYCLES_PER_ALARM = 200_000
 WRONG_BINS = 3.0
-# All reports until then are averaged, too.
-AFTER = 1000
-# Errors that are asked for, in bins.
+# Laser cycles from the start whose reports are averaged, for `mean_error_bins`.
+AVERAGED_CYCLES = 1000
+# Target errors, in bins.
 WITHIN = (0.4, 0.2)
 
 
 @dataclass
 class Row:
-    """A way with a setting, on a scene; the columns of the table that is kept.
+    """A method with a setting on a scene: a row of the stored table.
 
-    Times are laser cycles until the first right report. They are infinite where too few pixels ever
-    have one; in the mean such a pixel has waited for the whole run.
+    Times are laser cycles until the first right report. They are infinite if too few pixels have
+    one; in the mean such a pixel counts with the whole run.
     """
 
     scene: str
@@ -35,18 +35,18 @@ class Row:
     error_bins: float
     error_mm: float
     wrong: float  # share of the pixels whose first report is wrong
-    mean_error_bins: float  # of the mean of the reports until AFTER
-    false_alarms: Optional[float] = None  # over those that are allowed; of what is chosen
+    mean_error_bins: float  # of the mean of the reports in the first AVERAGED_CYCLES
+    false_alarms: Optional[float] = None  # relative to the limit; only for chosen settings
 
 
 def alarms(method, scene, photons, setting, threshold) -> float:
-    """False alarms over those that are allowed."""
+    """False alarms relative to the limit."""
     reports = method.reports(scene, photons, setting, threshold)[0].size
     return reports * CYCLES_PER_ALARM / (scene.pixels * photons.cycles)
 
 
-def least_threshold(method, scene, setting) -> Optional[float]:
-    """The lowest threshold with no more false alarms than are allowed, if there is one."""
+def lowest_threshold(method, scene, setting) -> Optional[float]:
+    """The lowest threshold within the limit of false alarms, if there is one."""
     low, high = 0, len(method.thresholds)
     while low < high:
         middle = (low + high) // 2
@@ -58,9 +58,9 @@ def least_threshold(method, scene, setting) -> Optional[float]:
 
 
 def scored(scene, reports) -> dict:
-    """Times, errors and wrong pixels, as :class:`Row` has them.
+    """Times, errors and wrong pixels, with the keys of :class:`Row`.
 
-    A pixel counts once: its first right report has the time and the error.
+    A pixel counts once, with time and error of its first right report.
     """
     pixel, cycle, position = reports
     pixel = pixel.astype(int)
@@ -75,7 +75,7 @@ def scored(scene, reports) -> dict:
     waited = np.full(scene.pixels, np.inf)
     waited[reporting] = cycle[at]
     half, nine_of_ten = np.quantile(waited, [0.5, 0.9], method="inverted_cdf")
-    early = cycle <= AFTER
+    early = cycle <= AVERAGED_CYCLES
     number = np.bincount(pixel[early], minlength=scene.pixels)
     total = np.bincount(pixel[early], error[early], minlength=scene.pixels)
     mean = total[number > 0] / number[number > 0]
@@ -91,11 +91,11 @@ def root_mean_square(values) -> float:
 
 
 def curve(method, scene) -> list[Row]:
-    """A row for each setting. The threshold of frames is found for each, of others for the first."""
+    """A row for each setting. Frames have a threshold for each setting, others one for all."""
     rows, threshold = [], None
     for setting in method.settings:
         if threshold is None or method.by_exposure:
-            threshold = least_threshold(method, scene, setting)
+            threshold = lowest_threshold(method, scene, setting)
         if threshold is not None:
             reports = method.reports(scene, scene.photons, setting, threshold)
             rows.append(Row(scene.name, method.name, setting, threshold, **scored(scene, reports)))
@@ -105,7 +105,7 @@ def curve(method, scene) -> list[Row]:
 
 
 def own_threshold(name, method, scene) -> Row:
-    """The first setting without a threshold that is found."""
+    """The first setting, with the default threshold."""
     setting = method.settings[0]
     reports = method.reports(scene, scene.photons, setting, None)
     many = alarms(method, scene, scene.empty_again, setting, None)
@@ -113,16 +113,16 @@ def own_threshold(name, method, scene) -> Row:
 
 
 def chosen(rows, within) -> Optional[Row]:
-    """The shortest mean time, of rows with at most so large an error in bins."""
+    """The row with the shortest mean time and an error of at most ``within`` bins."""
     exact = [row for row in rows if row.error_bins <= within and np.isfinite(row.nine_of_ten)]
     return min(exact, key=lambda row: row.mean, default=None)
 
 
 def times_at(rows, within) -> Optional[tuple[float, float, float]]:
-    """Mean time, that of half and that of nine in ten pixels, where the error is as large.
+    """The times (mean, half and nine in ten of the pixels) at an error of ``within`` bins.
 
-    Between two settings the curve is a line in logarithms. Where all of it is more exact, the
-    times are those of the soonest setting.
+    Interpolated in logarithms between two settings. If all settings are more exact, the times are
+    those of the soonest.
     """
     curve = [(row.error_bins, row.mean, row.half, row.nine_of_ten) for row in rows]
     exact = [tuple(point[1:]) for point in curve if point[0] <= within]
@@ -135,7 +135,7 @@ def times_at(rows, within) -> Optional[tuple[float, float, float]]:
 
 
 def photons_a_second(method, scene, row) -> float:
-    """Of processor time, the best of three."""
+    """Photons per second of processor time, the best of three."""
     times = []
     for _ in range(3):
         begun = time.process_time()

@@ -1,4 +1,4 @@
-"""The ways that are compared, each with the settings that make its curve."""
+"""The compared methods, each with the settings of its curve."""
 
 from __future__ import annotations
 
@@ -8,55 +8,58 @@ import tokenize
 from dataclasses import dataclass
 from typing import Any, Callable
 
-import dtof_way
-import numpy_way
+import with_dtof
+import with_numpy
 
-# Settings grow by the root of two.
+# Both kinds of setting grow by a factor of √2. Frames: laser cycles of a frame.
 EXPOSURES = (10, 14, 20, 28, 40, 56, 80, 112, 160, 224, 320, 450, 640, 900, 1280)
-LEAST = (5, 7, 10, 14, 20, 28, 40, 56, 80, 112, 160)
-DEVIATIONS = tuple(2 + step / 16 for step in range(161))
-POWERS = tuple(3 + step / 16 for step in range(97))
+# Asynchronous methods: the minimum number of photons of a peak.
+MIN_PHOTONS = (5, 7, 10, 14, 20, 28, 40, 56, 80, 112, 160)
+# Thresholds z, in standard deviations of the background.
+Z_THRESHOLDS = tuple(2 + step / 16 for step in range(161))
+# Thresholds k: chance reaches such a count with a probability below 10 ** -k.
+K_THRESHOLDS = tuple(3 + step / 16 for step in range(97))
 
 
 @dataclass(frozen=True)
 class Method:
-    """A way from photons to reports."""
+    """A method from photons to reports."""
 
     name: str
-    way: Callable
+    function: Callable
     arguments: Callable[[Any], dict]  # of a scene
     thresholds: tuple[float, ...]  # the higher, the fewer false alarms
-    by_exposure: bool  # frames; else by the least photons of a peak
+    by_exposure: bool  # the setting is the length of a frame, otherwise the minimum of photons
 
     @property
     def settings(self) -> tuple[int, ...]:
-        return EXPOSURES if self.by_exposure else LEAST
+        return EXPOSURES if self.by_exposure else MIN_PHOTONS
 
     def reports(self, scene, photons, setting, threshold):
         """Pixel, laser cycle and position in bins of every report."""
-        given = {"exposure" if self.by_exposure else "least": setting,
-                 "z" if self.thresholds is DEVIATIONS else "k": threshold}
-        return self.way(photons, **self.arguments(scene), **given)
+        settings = {"exposure" if self.by_exposure else "min_photons": setting,
+                    "z" if self.thresholds is Z_THRESHOLDS else "k": threshold}
+        return self.function(photons, **self.arguments(scene), **settings)
 
     @property
     def lines(self) -> int:
         """Lines of code of the function and of those it calls, without comments and imports."""
-        return sum(lines_of(function) for function in needed(self.way))
+        return sum(lines_of(function) for function in needed(self.function))
 
 
-def of_numpy(scene):
-    return {"pixels": scene.pixels, "bins": scene.bins, "reach": scene.reach}
+def numpy_arguments(scene):
+    return {"pixels": scene.pixels, "bins": scene.bins, "half_width": scene.centroid_half_width}
 
 
-def of_find_peaks(scene):
-    return {**of_numpy(scene), "least": scene.least_of_frames[0], "sigma": scene.sigma_bins}
+def find_peaks_arguments(scene):
+    return {**numpy_arguments(scene), "min_photons": scene.find_peaks_min_photons, "sigma": scene.sigma_bins}
 
 
-def of_frames(scene):
-    return {**of_numpy(scene), "least": scene.least_of_frames[1]}
+def frames_arguments(scene):
+    return {**numpy_arguments(scene), "min_photons": scene.frames_min_photons}
 
 
-def of_dtof(scene):
+def dtof_arguments(scene):
     pulse = {"sigma_bins": scene.sigma_bins}
     if scene.half_widths:
         pulse["half_widths"] = scene.half_widths
@@ -64,17 +67,18 @@ def of_dtof(scene):
 
 
 METHODS = (
-    Method("frames, find_peaks", numpy_way.frames_with_find_peaks, of_find_peaks, DEVIATIONS, True),
-    Method("frames, arrays", numpy_way.frames, of_frames, POWERS, True),
-    Method("asynchronous, arrays", numpy_way.asynchronous, of_numpy, POWERS, False),
-    Method("dtof", dtof_way.events, of_dtof, DEVIATIONS, False),
+    Method("frames, find_peaks", with_numpy.frames_with_find_peaks, find_peaks_arguments,
+           Z_THRESHOLDS, True),
+    Method("frames, arrays", with_numpy.frames, frames_arguments, K_THRESHOLDS, True),
+    Method("asynchronous, arrays", with_numpy.asynchronous, numpy_arguments, K_THRESHOLDS, False),
+    Method("dtof", with_dtof.events, dtof_arguments, Z_THRESHOLDS, False),
 )
-# What dtof does without a threshold that is found.
+# dtof with its default threshold.
 OWN_THRESHOLD = "dtof, its own threshold"
 
 
 def needed(function):
-    """A function and those of its module that it needs."""
+    """A function and the functions of its module that it calls."""
     found, left = [], [function]
     while left:
         function = left.pop()
@@ -88,7 +92,7 @@ def needed(function):
 
 
 def lines_of(function) -> int:
-    """Lines that are not empty, and neither comment nor docstring."""
+    """Lines of code, without empty lines, comments and docstrings."""
     lines, at_start = set(), True
     nothing = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
                tokenize.ENDMARKER}

@@ -13,14 +13,15 @@ import numpy as np
 import dtof
 
 MM_PER_PS = 0.149896229  # half the speed of light
-# Photons in the three best bins of a frame: the best of 5, 6, 7 and 10, and that on the recording.
-FRAMES_NEED, FIND_PEAKS_NEEDS = 6, 10
+# The minimum of photons in the three highest bins of a frame, the best of 5, 6, 7 and 10: in general, and
+# for find_peaks on the recording.
+FRAMES_MIN_PHOTONS, FIND_PEAKS_MIN_PHOTONS = 6, 10
 HALF_WIDTHS = 1.75, 4.0  # dtof's window for the recording, in bins
 
 
 @dataclass(frozen=True)
 class Photons:
-    """One element a photon, in order of laser cycle. Pixels without a target have no photons of one."""
+    """One element per photon, in order of laser cycle."""
 
     pixel: np.ndarray
     cycle: np.ndarray
@@ -33,22 +34,23 @@ class Photons:
 
 @dataclass(frozen=True)
 class Scene:
-    """Photons with targets, and others of the same background without."""
+    """Photons of targets and background, and photons of background only."""
 
     name: str
-    says: str
+    description: str
     pixels: int
     bins: int
     bin_width_ps: float
     sigma_bins: float  # of the pulse
     truth_mm: np.ndarray  # of each pixel
     photons: Photons
-    empty: Photons  # thresholds are found with these
-    empty_again: Photons  # and false alarms counted in these
-    reach: int  # bins each side of the peak in numpy's centroid: the better of 2 and 3
-    least_of_frames: tuple[int, int] = (FRAMES_NEED, FRAMES_NEED)  # with find_peaks, with arrays
+    empty: Photons  # to find thresholds
+    empty_again: Photons  # to count false alarms
+    centroid_half_width: int  # bins each side of the peak in numpy's centroid: the better of 2 and 3
+    find_peaks_min_photons: int = FRAMES_MIN_PHOTONS  # of a frame, with find_peaks
+    frames_min_photons: int = FRAMES_MIN_PHOTONS  # of a frame, with arrays
     half_widths: Optional[tuple[float, float]] = None  # dtof's window for a pulse that falls slowly
-    fit_offset: bool = False  # the zero of the sensor is not known
+    fit_offset: bool = False  # if the offset of the sensor is unknown
 
     @property
     def mm_per_bin(self) -> float:
@@ -77,13 +79,14 @@ def in_order(random, pixel, bin, cycles) -> Photons:
     return Photons(pixel[order], cycle[order], bin[order], cycles)
 
 
-def simulated(name, says, seed, range_mm, background, signal, bin_width_ps, reach, cycles, empty_cycles):
+def simulated(name, description, seed, range_mm, background, signal, bin_width_ps, centroid_half_width, cycles,
+              empty_cycles):
     bins, sigma = 128, 1.0
     random = np.random.default_rng(seed)
     position = range_mm / (bin_width_ps * MM_PER_PS)
     return Scene(
         name=name,
-        says=says,
+        description=description,
         pixels=range_mm.size,
         bins=bins,
         bin_width_ps=bin_width_ps,
@@ -92,12 +95,12 @@ def simulated(name, says, seed, range_mm, background, signal, bin_width_ps, reac
         photons=draw(random, background, cycles, bins, signal, position, sigma),
         empty=draw(random, background, empty_cycles, bins),
         empty_again=draw(random, background, empty_cycles, bins),
-        reach=reach,
+        centroid_half_width=centroid_half_width,
     )
 
 
 def bright(pixels=1024, cycles=4000, empty_cycles=8000) -> Scene:
-    """A room: every pixel sees its target well."""
+    """A room: every pixel has a bright target."""
     random = np.random.default_rng(1)
     return simulated(
         "bright",
@@ -114,7 +117,7 @@ def bright(pixels=1024, cycles=4000, empty_cycles=8000) -> Scene:
 
 
 def outdoor(pixels=1024, cycles=6000, empty_cycles=8000) -> Scene:
-    """Outdoors: the sun lights what the laser lights, and far dark surfaces are dim."""
+    """Outdoors: sunlight is reflected like the laser, and far dark surfaces are dim."""
     random = np.random.default_rng(3)
     range_mm = random.uniform(6000, 18_000, pixels)
     reflectivity = np.exp(random.uniform(np.log(0.1), np.log(0.8), pixels))
@@ -134,16 +137,16 @@ def outdoor(pixels=1024, cycles=6000, empty_cycles=8000) -> Scene:
 
 
 def scenes(file):
-    """Makes each scene when it is asked for."""
+    """A function for each scene."""
     return {"bright": bright, "outdoor": outdoor, "recording": lambda: recorded(file)}
 
 
 def recorded(file, parts=8, cycles=4000, empty_cycles=8000, added=0.01) -> Scene:
     """The centre zone of a TMF8820 in front of a plane, from 30 mm on.
 
-    Every recorded photon gets a random laser cycle of its capture, as ``dtof replay`` does it; the
-    brightest zone has half a photon a laser cycle. A pixel is one of ``parts`` spans of a capture,
-    which share no photon. Background is added, as the recording has next to none.
+    Every recorded photon gets a random laser cycle of its capture, as in ``dtof replay``; the
+    brightest zone has half a photon per laser cycle. A pixel is one of ``parts`` disjoint parts of a
+    capture. Background is added, because the recording has almost none.
     """
     log = dtof.load(file)
     zones, truth = log.counts[:, 0], log.truth_mm[:, 0, 4]
@@ -151,7 +154,7 @@ def recorded(file, parts=8, cycles=4000, empty_cycles=8000, added=0.01) -> Scene
     random = np.random.default_rng(5)
     lasted = zones.sum(2).max(1) / 0.5
     share = np.minimum(cycles / lasted, 1 / parts)
-    # The parts of a histogram, and what is left of it.
+    # The parts of a histogram, and the rest.
     shares = np.column_stack([share] * parts + [1 - parts * share])
     split = random.multinomial(zones[:, 4].astype("i8"), shares[:, None])[..., :parts]  # captures, bins, parts
     counts = split.transpose(0, 2, 1).reshape(-1, log.counts.shape[-1])
@@ -161,7 +164,7 @@ def recorded(file, parts=8, cycles=4000, empty_cycles=8000, added=0.01) -> Scene
     sun = draw(random, background, cycles, bins)
     return Scene(
         name="recording",
-        says=f"a TMF8820 and a plane at 30 to 400 mm, {len(truth)} captures of {parts} parts; "
+        description=f"a TMF8820 and a plane at 30 to 400 mm, {len(truth)} captures of {parts} parts; "
         f"background of {added} a bin added; bins of 92.1 ps",
         pixels=pixels,
         bins=bins,
@@ -176,8 +179,8 @@ def recorded(file, parts=8, cycles=4000, empty_cycles=8000, added=0.01) -> Scene
         ),
         empty=draw(random, background, empty_cycles, bins),
         empty_again=draw(random, background, empty_cycles, bins),
-        reach=2,
-        least_of_frames=(FIND_PEAKS_NEEDS, FRAMES_NEED),
+        centroid_half_width=2,
+        find_peaks_min_photons=FIND_PEAKS_MIN_PHOTONS,
         half_widths=HALF_WIDTHS,
         fit_offset=True,
     )

@@ -1,8 +1,8 @@
 """Depth events from single photons.
 
-Photons or histograms of a single-photon (SPAD) LiDAR become depth events, by the integers that a
-microcontroller or an FPGA would compute. Arrays come in and go out as numpy arrays; settings are
-keyword arguments with the names of the command line.
+Photons or histograms of a single-photon (SPAD) LiDAR become depth events, with the integer
+arithmetic of a microcontroller or an FPGA. Arrays are numpy arrays; settings are keyword
+arguments with the names of the command line.
 
 >>> import dtof, numpy
 >>> counts = numpy.random.default_rng(1).poisson(0.2, size=(8, 8, 128))

@@ -1,4 +1,4 @@
-"""Arrays as the native part takes them, and as it gives them."""
+"""Conversion of arrays for the native extension, and of its results."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy
 
 from ._native import Error
 
-# The layout of C, written down: what compilers align to differs between machines.
+# The C layout, spelt out: alignment differs between machines.
 EVENT = numpy.dtype(
     {
         "names": [
@@ -37,16 +37,17 @@ POINT = numpy.dtype(
     ]
 )
 
-Given = Union[str, "tuple[str, bytes, bytes]"]
+#: A file name, or the name, the .npy header and the data of an array.
+Input = Union[str, "tuple[str, bytes, bytes]"]
 
 
 class Array(NamedTuple):
-    """The array of pixels that events come from, as an AER file has it in its header.
+    """The array of pixels that events come from, as in the header of an AER file.
 
     ``bin_width_ps`` is in picoseconds, a multiple of 1/65536. ``offset_mm`` is in millimetres, a
-    multiple of 1/256, and added to every range. ``laser_millihertz`` counts laser cycles in 1000
-    seconds. ``start_us`` is when laser cycle 0 was, in microseconds since 1970-01-01 UTC. Either is
-    0 if it is not known.
+    multiple of 1/256, and added to every range. ``laser_millihertz`` is the number of laser
+    cycles in 1000 seconds. ``start_us`` is the time of laser cycle 0, in microseconds since
+    1970-01-01 UTC. Both are 0 if unknown.
     """
 
     bins: int
@@ -63,16 +64,16 @@ class Array(NamedTuple):
         return self.rows, self.columns
 
 
-def recording(given: Any, name: str) -> Given:
-    """A recording, a file or an array, for the native part. ``name`` is what errors call it."""
-    if isinstance(given, (str, os.PathLike)):
-        return os.fspath(given)
-    if isinstance(given, numpy.ma.MaskedArray):
+def native_input(value: Any, name: str) -> Input:
+    """A file or an array for the native extension. Errors call it ``name``."""
+    if isinstance(value, (str, os.PathLike)):
+        return os.fspath(value)
+    if isinstance(value, numpy.ma.MaskedArray):
         raise Error(f"{name}: a masked array; fill it first, as with .filled(0)")
     try:
-        array = numpy.asarray(given)
+        array = numpy.asarray(value)
     except (TypeError, ValueError) as error:
-        raise Error(f"{name}: no array: {_line(error)}") from error
+        raise Error(f"{name}: not an array: {_line(error)}") from error
     if array.dtype.hasobject:
         raise Error(f"{name}: an array of {array.dtype}: must be numbers")
     small = {"bool": "u1", "float16": "f4"}.get(array.dtype.name)
@@ -89,7 +90,7 @@ def recording(given: Any, name: str) -> Given:
 
 
 def photon_list(pixel: Any, cycle: Any, bin: Any) -> numpy.ndarray:
-    """A photon list, as small as it can be."""
+    """A photon list with the smallest possible types."""
     columns = {"pixel": pixel, "cycle": cycle, "bin": bin}
     columns = {name: _integers(name, values) for name, values in columns.items()}
     lengths = {values.size for values in columns.values() if values.ndim == 1}
@@ -109,7 +110,7 @@ def _integers(name: str, values: Any) -> numpy.ndarray:
     try:
         array = numpy.asarray(values)
     except (TypeError, ValueError, OverflowError) as error:
-        raise Error(f"photons: {name} is no array: {_line(error)}") from error
+        raise Error(f"photons: {name} is not an array: {_line(error)}") from error
     if array.dtype.kind not in "iu" or array.ndim > 1:
         raise Error(
             f"photons: {name} is {array.dtype} with {array.ndim} axes: must be integers with one"
@@ -118,7 +119,7 @@ def _integers(name: str, values: Any) -> numpy.ndarray:
 
 
 def _smallest(values: numpy.ndarray) -> numpy.dtype:
-    """A type that holds all of them. Those that cannot be keep theirs, and are refused later."""
+    """The smallest type for all values. Negative or larger values keep theirs and fail later."""
     if values.size and values.min() >= 0:
         for small in ("<u2", "<u4"):
             if values.max() <= numpy.iinfo(small).max:
@@ -127,12 +128,12 @@ def _smallest(values: numpy.ndarray) -> numpy.dtype:
 
 
 def events_of(records: bytearray) -> numpy.ndarray:
-    """Events, from the native part."""
+    """Events from the native extension."""
     return numpy.frombuffer(records, dtype=EVENT)
 
 
 def records_of(events: Any) -> bytes:
-    """Events, for the native part."""
+    """Events for the native extension."""
     events = numpy.asarray(events)
     if events.dtype.names is None or not set(EVENT.names or ()) <= set(events.dtype.names):
         raise Error(f"events: an array of {events.dtype}: must have the fields of dtof.EVENT")

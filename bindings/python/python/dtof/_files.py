@@ -9,7 +9,7 @@ from typing import Any, Optional
 import numpy
 
 from . import _native
-from ._arrays import Array, events_of, records_of, recording
+from ._arrays import Array, events_of, records_of, native_input
 from ._options import arguments
 from ._run import warn
 
@@ -18,12 +18,12 @@ from ._run import warn
 class Recording:
     """Histograms of a recording.
 
-    ``counts`` has captures, rows, columns and bins, photons of 64 bits. ``bin_width_ps`` is in
-    picoseconds, ``offset_mm`` in millimetres where the format says it. ``gate`` is the first and
-    the last bin that were measured in full, None for all. ``truth_mm`` is the true distance of
-    each pixel, captures by rows by columns and NaN without, None if the file has none. ``cycles``
-    are the laser cycles of a photon list. ``cut_off`` counts photons in bins that were cut off,
-    ``notes`` says what else was done.
+    ``counts`` has the axes captures, rows, columns and bins, and 64-bit photon counts.
+    ``bin_width_ps`` is in picoseconds, ``offset_mm`` in millimetres (None if the format has none).
+    ``gate`` is the first and the last bin that were measured completely, None for all bins.
+    ``truth_mm`` is the true distance of each pixel (captures, rows, columns; NaN if unknown), None
+    if the file has none. ``cycles`` is the number of laser cycles of a photon list. ``cut_off``
+    counts photons in bins that were cut off, ``notes`` lists other changes.
     """
 
     counts: numpy.ndarray
@@ -37,13 +37,13 @@ class Recording:
 
 
 def load(path: Any, **options: Any) -> Recording:
-    """Reads a recording of any format that ``dtof replay`` reads; photon lists are summed up.
+    """Reads a recording of any format that ``dtof replay`` reads; photon lists become histograms.
 
     ``axes``, ``array``, ``columns``, ``rebin``, ``bins`` and ``bin_width_ps`` are those of
-    :func:`replay`; without ``cycles`` all of a photon list is read. There are as many bins as a run
-    has: a power of two from 8 to 1024.
+    :func:`replay`. Without ``cycles`` the whole photon list is read. The number of bins is that of
+    a run: a power of two from 8 to 1024.
     """
-    loaded = _native.load(recording(path, "the array"), arguments(options))
+    loaded = _native.load(native_input(path, "the array"), arguments(options))
     warn(loaded["warnings"])
     shape = loaded["shape"]
     truth = loaded["truth_mm"]
@@ -62,18 +62,18 @@ def load(path: Any, **options: Any) -> Recording:
 
 
 def read_events(path: Any) -> tuple[numpy.ndarray, Array]:
-    """The depth events of an AER file, of :data:`dtof.EVENT`, and the array they come from.
+    """Reads the depth events of an AER file (:data:`dtof.EVENT`), and their array of pixels.
 
-    A damaged file is an error that names the byte.
+    Raises :class:`dtof.Error` with the position of the byte if the file is damaged.
     """
     records, array = _native.read_events(os.fspath(path))
     return events_of(records), Array(**array)
 
 
 def write_events(path: Any, events: Any, array: Array) -> None:
-    """Writes events as an AER file, whole or not at all.
+    """Writes events as an AER file, completely or not at all.
 
-    ``range_mm`` is not written: it follows from ``depth_bins`` and ``array``. An event that
-    ``array`` cannot have sent is an error that names it.
+    ``range_mm`` is not written: it follows from ``depth_bins`` and ``array``. Raises
+    :class:`dtof.Error` if an event is impossible for ``array``.
     """
     _native.write_events(os.fspath(path), records_of(events), array)

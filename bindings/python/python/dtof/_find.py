@@ -1,4 +1,4 @@
-"""Settings that suit a recording, a scene or a wanted rate of false alarms."""
+"""Settings for a recording, a scene or a required rate of false alarms."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any, Callable, Optional
 
 from . import _native
-from ._arrays import recording
+from ._arrays import native_input
 from ._options import arguments, settings_file
 from ._run import scene_of, warn
 
@@ -23,7 +23,7 @@ class _Settings:
     def save(self, path: Any) -> None:
         """Writes the settings file, for ``settings=path``. An existing file stays as it is."""
         if self.toml is None:
-            raise _native.Error("no settings: no method is as exact as wanted")
+            raise _native.Error("no settings: no method is as exact as required")
         try:
             with open(path, "x", encoding="utf-8") as file:
                 file.write(self.toml)
@@ -33,10 +33,10 @@ class _Settings:
 
 @dataclass(frozen=True)
 class Calibration(_Settings):
-    """What a recording tells of its sensor.
+    """The properties of a sensor, from a recording.
 
-    ``found`` names each result with its 95 % interval, ``remarks`` what the recording leaves open,
-    ``changes`` what differs from older settings. ``report`` is a page of HTML.
+    ``found`` has each result with its 95 % interval, ``remarks`` what the recording does not
+    determine, ``changes`` the differences from older settings. ``report`` is an HTML page.
     """
 
     settings: dict[str, Any]
@@ -51,9 +51,10 @@ class Calibration(_Settings):
 class Comparison(_Settings):
     """All methods on the same photons.
 
-    ``answer`` says which to take, in rows; ``able`` those that are as exact as wanted.
-    ``settings`` and ``toml`` are those of the one to take, None if there is none. ``methods`` and
-    ``stress`` are the rows of ``methods.csv`` and ``stress.csv``, ``chart`` an SVG document.
+    ``answer`` recommends a method, in rows; ``able`` lists the methods that are exact enough.
+    ``settings`` and ``toml`` are those of the recommended method, None if there is none.
+    ``methods`` and ``stress`` are the rows of ``methods.csv`` and ``stress.csv``, ``chart`` is an
+    SVG document.
     """
 
     settings: Optional[dict[str, Any]]
@@ -68,12 +69,12 @@ class Comparison(_Settings):
 def calibrate(recorded: Any, *, settings: Any = None, **options: Any) -> Calibration:
     """Finds background, pulse, cover glass, hot pixels and thresholds in histograms.
 
-    ``recorded`` is what :func:`replay` takes. ``target_mm`` is the distance of a flat target in
-    millimetres, ``glass`` says whether the nearest surface is a cover glass, ``settings`` names
-    older settings. Further options are those of ``dtof calibrate``.
+    ``recorded`` is a recording as for :func:`replay`. ``target_mm`` is the distance of a flat target
+    in millimetres. ``glass`` says whether the nearest surface is a cover glass. ``settings`` is a
+    file of older settings. Further options are those of ``dtof calibrate``.
     """
     older = None if settings is None else settings_file(settings)
-    found = _native.calibrate(recording(recorded, "the array"), older, arguments(options))
+    found = _native.calibrate(native_input(recorded, "the array"), older, arguments(options))
     warn(found["warnings"])
     return Calibration(
         settings=json.loads(found["settings"]),
@@ -93,19 +94,19 @@ def compare(
     progress: Optional[Callable[[str], Any]] = None,
     **options: Any,
 ) -> Comparison:
-    """Tries all methods on a recording or a scene, and says which to take.
+    """Compares all methods on a recording or a scene, and recommends one.
 
-    ``recorded`` is what :func:`replay` takes, ``scene`` what :func:`simulate` does; one of them is
-    needed. ``truth`` is the true range of each pixel in millimetres, an array or a file; 0 is
-    none. ``within`` is how many millimetres 68 % of the reports may be off. ``progress(step)`` is
+    Takes ``recorded``, a recording as for :func:`replay`, or ``scene``, as for :func:`simulate`.
+    ``truth`` is the true range of each pixel in millimetres, an array or a file; 0 means none.
+    ``within`` is the largest error of 68 % of the reports, in millimetres. ``progress(step)`` is
     called with each step. Further options are those of ``dtof compare``.
     """
-    given = _Compared(
-        recording=None if recorded is None else recording(recorded, "the array"),
-        truth=None if truth is None else recording(truth, "truth"),
+    compared = _CompareInput(
+        recording=None if recorded is None else native_input(recorded, "the array"),
+        truth=None if truth is None else native_input(truth, "truth"),
         scene=None if scene is None else scene_of(scene),
     )
-    found = _native.compare(given, arguments(options), progress)
+    found = _native.compare(compared, arguments(options), progress)
     warn(found["warnings"])
     return Comparison(
         settings=found["settings"] and json.loads(found["settings"]),
@@ -119,20 +120,20 @@ def compare(
 
 
 def tune(**options: Any) -> dict[str, Any]:
-    """Finds α or z and L1 for a wanted rate of false alarms, and says what to expect.
+    """Finds α or z and L1 for a required rate of false alarms, and the performance to expect.
 
-    ``background`` is photons a bin and laser cycle, ``signal`` photons a laser cycle,
-    ``sigma_bins`` the standard deviation of the pulse. Further options are those of ``dtof tune``.
-    Each result has ``value``, ``unit`` and ``source``; ``"options"`` is what the command line
-    takes.
+    ``background`` is in photons per bin and laser cycle, ``signal`` in photons per laser cycle,
+    ``sigma_bins`` is the standard deviation of the pulse. Further options are those of ``dtof
+    tune``. Each result has ``value``, ``unit`` and ``source``; ``"options"`` has the flags for the
+    command line.
     """
-    found, said = _native.tune(arguments(options))
-    return {**json.loads(found), "options": said}
+    found, flags = _native.tune(arguments(options))
+    return {**json.loads(found), "options": flags}
 
 
 @dataclass(frozen=True)
-class _Compared:
-    """What is compared, for the native part."""
+class _CompareInput:
+    """The input of a comparison, for the native extension."""
 
     recording: Any
     truth: Any

@@ -1,4 +1,4 @@
-"""What events say of each pixel, and where they are in space."""
+"""Maps of events per pixel, and events as points in space."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ def depth_map(
 ) -> numpy.ndarray:
     """The range of the last event of each pixel in millimetres, rows by columns; NaN without one.
 
-    With ``mean`` it is the mean of the last ten. An event of a block holds for those of its pixels
-    that have not reported since. ``echo`` is the one of each exposure that counts: ``"first"``,
+    With ``mean`` it is the mean of the last ten. An event of a block counts for all of its pixels
+    that have not reported since. ``echo`` selects the echo of each exposure: ``"first"``,
     ``"last"``, ``"strongest"`` or ``"all"``.
     """
     maps = _native.maps(records_of(events), array, arguments({"echo": echo}))
@@ -27,10 +27,10 @@ def depth_map(
 def reflectivity(
     events: Any, array: Array, *, of: str = "signal", echo: str = "strongest"
 ) -> numpy.ndarray:
-    """How bright surfaces are against each other, rows by columns; NaN without an event.
+    """The relative reflectivity of surfaces, rows by columns; NaN without an event.
 
-    ``of="signal"`` takes the signal photons a laser cycle, ``of="events"`` the number of events as
-    the paper does, both times the squared mean range.
+    ``of="signal"`` uses the signal photons per laser cycle, ``of="events"`` the number of events as
+    in the paper, both multiplied by the squared mean range.
     """
     if of not in ("signal", "events"):
         raise _native.Error(f'of {of!r}: must be "signal" or "events"')
@@ -42,9 +42,9 @@ def points(events: Any, array: Array, **options: Any) -> numpy.ndarray:
     """Events as points: an array of :data:`dtof.POINT`, x, y and z in metres, t_ns in nanoseconds.
 
     The records are those of ``dtof export --format pcd``. ``fov=(horizontal, vertical)`` is in
-    degrees (60 across the longer side), ``calibration`` a file with a ray for each pixel,
-    ``laser_hz`` the laser cycles a second (those of ``array``, or 10 MHz), ``echo`` the one of each
-    exposure (``"all"``).
+    degrees (default 60 across the longer side), ``calibration`` is a file with a ray for each
+    pixel, ``laser_hz`` the laser rate in hertz (default that of ``array``, or 10 MHz), ``echo``
+    selects the echo of each exposure (default ``"all"``).
     """
-    given = arguments(options)
-    return numpy.frombuffer(_native.points(records_of(events), array, given), dtype=POINT)
+    keywords = arguments(options)
+    return numpy.frombuffer(_native.points(records_of(events), array, keywords), dtype=POINT)

@@ -1,14 +1,14 @@
-"""The native part; `dtof` itself is what to use."""
+"""The native extension; use `dtof` instead."""
 
 from typing import Any, Callable, Optional, Union
 
 __version__: str
 
-_Given = Union[str, tuple[str, bytes, bytes]]
+_Input = Union[str, tuple[str, bytes, bytes]]
 _Keywords = list[tuple[str, str]]
 _Scene = Union[str, tuple[str, str]]
 _Progress = Optional[Callable[..., Any]]
-_Whole = Optional[tuple[int, int, int, bytes, int, int]]
+_Layout = Optional[tuple[int, int, int, bytes, int, int]]
 
 class Error(ValueError): ...
 
@@ -26,15 +26,15 @@ class Pixel:
     def settings(self) -> str: ...
 
 def replay(
-    input: _Given,
+    input: _Input,
     keywords: _Keywords,
     progress: _Progress,
-    whole: _Whole,
+    whole: _Layout,
     cycles: Optional[int] = None,
 ) -> dict[str, Any]: ...
 def simulate(scene: _Scene, keywords: _Keywords, progress: _Progress) -> dict[str, Any]: ...
-def load(input: _Given, keywords: _Keywords) -> dict[str, Any]: ...
-def calibrate(input: _Given, older: Optional[str], keywords: _Keywords) -> dict[str, Any]: ...
+def load(input: _Input, keywords: _Keywords) -> dict[str, Any]: ...
+def calibrate(input: _Input, older: Optional[str], keywords: _Keywords) -> dict[str, Any]: ...
 def compare(photons: Any, keywords: _Keywords, progress: _Progress) -> dict[str, Any]: ...
 def tune(keywords: _Keywords) -> tuple[str, str]: ...
 def read_events(path: str) -> tuple[bytearray, dict[str, Any]]: ...

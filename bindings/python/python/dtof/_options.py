@@ -1,4 +1,4 @@
-"""Keyword arguments as texts, which the native part reads as the program reads its flags."""
+"""Keyword arguments as text, which the native extension reads like the flags of the program."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import numpy
 from ._native import Error
 
 
-#: The name and the value of each option that is given.
-Given = list[tuple[str, str]]
+#: The name and the value of each option.
+Keywords = list[tuple[str, str]]
 
 
-def arguments(options: dict[str, Any]) -> Given:
-    """Options as texts, less those that are ``None`` and an empty mask."""
-    given = [(key, _text(key, value)) for key, value in options.items() if value is not None]
-    return [(key, text) for key, text in given if text or key not in ("mask", "laser_off")]
+def arguments(options: dict[str, Any]) -> Keywords:
+    """Options as text, without ``None`` values and an empty mask."""
+    texts = [(key, _text(key, value)) for key, value in options.items() if value is not None]
+    return [(key, text) for key, text in texts if text or key not in ("mask", "laser_off")]
 
 
-def flags(given: Given) -> list[str]:
-    """The same for the command line, less the settings file, in order."""
-    others = [(key.replace("_", "-"), text) for key, text in given if key != "settings"]
+def flags(keywords: Keywords) -> list[str]:
+    """The same as sorted flags of the command line, without the settings file."""
+    others = [(key.replace("_", "-"), text) for key, text in keywords if key != "settings"]
     return sorted("--laser-off" if name == "laser-off" else f"--{name}={text}" for name, text in others)
 
 

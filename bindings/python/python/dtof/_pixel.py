@@ -13,9 +13,9 @@ from ._options import arguments
 
 
 class Pixel:
-    """One pixel as firmware has it, to look at while it decides.
+    """One pixel as in the firmware, for inspection while it decides.
 
-    Options are those that say how pixels operate: ``rule``, ``alpha``, ``sigma_bins``, ``l1``,
+    Options are the settings of pixels: ``rule``, ``alpha``, ``sigma_bins``, ``l1``,
     ``l2``, ``x``, ``gate``, ``bin_width_ps``, ``offset_mm`` and so on.
 
     >>> pixel = Pixel(l1=40, l2=2000, x=4)
@@ -32,7 +32,7 @@ class Pixel:
         self._native = _native.Pixel(int(bins), int(address), arguments(options))
 
     def count(self, bin: Any) -> None:
-        """Counts a photon in ``bin``, or one in each of several. One past the last is rejected."""
+        """Counts a photon in ``bin``, or one in each of several bins. Bins past the last are rejected."""
         bins = numpy.atleast_1d(numpy.asarray(bin))
         if bins.size == 0:
             return
@@ -43,8 +43,8 @@ class Pixel:
         self._native.count(bins.tolist())
 
     def end_laser_cycles(self, cycles: int = 1) -> Optional[numpy.void]:
-        """Ends so many laser cycles, 1 to 65,535, and looks once if X have passed since the last
-        look. Gives the event, a record of :data:`dtof.EVENT`, or None."""
+        """Ends ``cycles`` laser cycles (1 to 65,535), and looks once if X have passed since the last
+        look. Returns the event, a record of :data:`dtof.EVENT`, or None."""
         record = self._native.end_laser_cycles(_whole("cycles", cycles, 65535))
         return None if record is None else events_of(record)[0]
 
@@ -65,12 +65,12 @@ class Pixel:
 
     @property
     def statistics(self) -> dict[str, int]:
-        """Photons by what became of them, events, and exposures that expired."""
+        """Counters of photons by their fate, of events, and of expired exposures."""
         return dict(self._native.statistics())
 
     @property
     def settings(self) -> dict[str, Any]:
-        """How it operates, as in a settings file."""
+        """The settings of the pixel, as in a settings file."""
         settings: dict[str, Any] = json.loads(self._native.settings)
         return settings
 

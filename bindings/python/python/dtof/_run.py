@@ -1,4 +1,4 @@
-"""Photons through the engine."""
+"""Replay of recordings and simulation of scenes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, Callable, Optional
 import numpy
 
 from . import _native
-from ._arrays import Array, events_of, photon_list, recording
+from ._arrays import Array, events_of, photon_list, native_input
 from ._maps import depth_map, points, reflectivity
 from ._options import arguments
 
@@ -20,11 +20,11 @@ Progress = Optional[Callable[[int, int], Any]]
 
 @dataclass(frozen=True)
 class Replay:
-    """What came of a run.
+    """The results of a run.
 
-    ``events`` is an array of :data:`dtof.EVENT`, in order of laser cycle, level and pixel.
-    ``statistics`` holds what ``summary.json`` holds; every loss is counted there. ``settings`` are
-    those of the run, ``toml`` the text of a settings file that says them.
+    ``events`` is an array of :data:`dtof.EVENT`, sorted by laser cycle, level and pixel.
+    ``statistics`` has the contents of ``summary.json``; every loss is counted there. ``settings``
+    are those of the run, ``toml`` is the same as the text of a settings file.
     """
 
     events: numpy.ndarray
@@ -61,22 +61,22 @@ def replay(
     its axis ``axis``; the one before it are columns and all others rows. ``axes`` names all of
     them instead: ``axes="captures,rows,columns,bins"``. At most 65,536 pixels and 4096 bins.
 
-    ``photons_per_cycle`` (1.0, in the brightest pixel) or ``recorded_cycles`` say how long
-    histograms were recorded. ``cycles`` (10,000) are replayed with the random numbers of ``seed``
-    (1). Other options of ``dtof replay`` are keywords, ``-`` being ``_``: ``rule="window",
+    ``photons_per_cycle`` (1.0, in the brightest pixel) or ``recorded_cycles`` determine how long
+    histograms were recorded. ``cycles`` (10,000) laser cycles are replayed with random ``seed`` (1).
+    Other options of ``dtof replay`` are keywords, with ``_`` instead of ``-``: ``rule="window",
     sigma_bins=0.8, gate=(12, 119), mask=[3, 70]``. An empty ``mask`` is the same as none.
-    ``settings`` names a settings file. The options of its report and its files are no keywords:
+    ``settings`` is the name of a settings file. Options of reports and files are not available:
     ``echo``, ``dynamic_depth``, ``threshold_mm``, ``reference`` and ``no_csv``.
 
-    ``progress(done, total)`` is called about 20 times a second with laser cycles. What it raises
-    ends the work, as Ctrl-C does.
+    ``progress(done, total)`` is called about 20 times a second with laser cycles. An exception in it
+    ends the run, as does Ctrl-C.
 
-    Raises :class:`dtof.Error` with the line that the program prints, keywords in place of flags.
+    Raises :class:`dtof.Error` with the message of the program, with keywords instead of flags.
     """
     if axis != -1:
         recorded = _bins_last(recorded, axis, options)
-    given = recording(recorded, "the array")
-    return ran(_native.replay(given, arguments(options), progress, None))
+    source = native_input(recorded, "the array")
+    return result(_native.replay(source, arguments(options), progress, None))
 
 
 def photons(
@@ -84,48 +84,47 @@ def photons(
 ) -> Replay:
     """Turns single photons into depth events.
 
-    ``pixel``, ``cycle`` and ``bin`` are integers from 0, one a photon, or one number for all;
-    laser cycles do not decrease. ``columns`` says how wide the array is (one row), ``bins`` how
-    many there are (128). All laser cycles up to the last photon are replayed, or as many as
-    ``cycles`` or a settings file says. Further options are those of :func:`replay`. The photons are
-    copied twice; for more than fits, save them with ``numpy.save`` and replay the file, with
-    ``cycles``.
+    ``pixel``, ``cycle`` and ``bin`` are integers from 0, one per photon, or one number for all
+    photons. Laser cycles must not decrease. ``columns`` is the width of the array (default: one
+    row), ``bins`` the number of bins (128). All laser cycles up to the last photon are replayed,
+    or as many as ``cycles`` or a settings file requests. Further options are those of
+    :func:`replay`. The photons are copied twice; if they do not fit into memory, save them with
+    ``numpy.save`` and replay the file, with ``cycles``.
     """
     listed = photon_list(pixel, cycle, bin)
-    # Laser cycles do not decrease. What cannot be is refused later.
+    # Laser cycles do not decrease. Invalid values are refused later.
     last = int(listed["cycle"][-1]) if listed.size else 0
     cycles = min(max(last, 0) + 1, 2**63 - 1)
-    given = recording(listed, "photons")
-    return ran(_native.replay(given, arguments(options), progress, None, cycles))
+    source = native_input(listed, "photons")
+    return result(_native.replay(source, arguments(options), progress, None, cycles))
 
 
 def simulate(scene: Any, *, progress: Progress = None, **options: Any) -> Replay:
     """Simulates a scene.
 
-    ``scene`` is the name of a scene file, or the text of one, which has several lines.
+    ``scene`` is the name of a scene file, or the text of one (several lines).
     ``array=(columns, rows)``, ``laser_off=True``, ``cycles`` and ``seed`` are those of ``dtof
     simulate``, further options those of :func:`replay`. ``statistics["against_truth"]`` compares
     the events with the scene.
     """
-    given = arguments(options)
-    return ran(_native.simulate(scene_of(scene), given, progress))
+    return result(_native.simulate(scene_of(scene), arguments(options), progress))
 
 
 def scene_of(scene: Any) -> Any:
-    """A scene for the native part: a text has more lines than one, a name has not."""
+    """A scene for the native extension: text has several lines, a file name has one."""
     if isinstance(scene, str) and "\n" in scene:
         return "the scene", scene
     return os.fspath(scene)
 
 
-def ran(done: dict[str, Any]) -> Replay:
-    """What the native part gives."""
+def result(done: dict[str, Any]) -> Replay:
+    """The result of a native run; issues its warnings."""
     warn(done["warnings"], callers=3)
-    return quietly(done)
+    return quiet_result(done)
 
 
-def quietly(done: dict[str, Any]) -> Replay:
-    """The same without its warnings."""
+def quiet_result(done: dict[str, Any]) -> Replay:
+    """The result of a native run, without its warnings."""
     return Replay(
         events=events_of(done["events"]),
         array=Array(**done["array"]),
@@ -136,9 +135,9 @@ def quietly(done: dict[str, Any]) -> Replay:
 
 
 def warn(lines: list[str], callers: int = 2) -> None:
-    """Says what is surely wrong with a recording.
+    """Issues warnings about a recording.
 
-    The line that is named is so many callers up: 2 if the user called what calls this.
+    They name the line ``callers`` levels up: 2 if the user called the caller of this function.
     """
     for line in lines:
         warnings.warn(line, UserWarning, stacklevel=callers + 1)

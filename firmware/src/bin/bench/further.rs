@@ -1,11 +1,11 @@
 //! A pixel that tracks, has echoes or feeds blocks, and what it does. The photons are those
 //! of [`State`], and in some exposures those of a second target.
 
+use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::fixed::types::U4F12;
 use dtof_core::{
-    Array, AsyncPixel, Binning, Block, BlockLevel, Count, EchoNumber, Feed, Histogram, LaserCycle,
-    Look, PixelAddress, PixelConfig, RangeGate, Statistics, WindowRule, count_in_blocks,
-    end_laser_cycles_of_blocks,
+    Array, AsyncPixel, BlockLevel, Count, EchoNumber, Histogram, LaserCycle, Look, PixelAddress,
+    PixelConfig, RangeGate, Statistics, WindowRule,
 };
 
 use crate::scene::{BINS, CYCLES, PHOTONS, State};
@@ -55,7 +55,7 @@ impl Features {
 pub struct Further {
     pub pixel: AsyncPixel<BINS>,
     blocks: [Block<BINS>; 3],
-    feed: Feed,
+    link: BlockLink,
     /// A window of 3 bins, X = 4, L1 = 40.
     config: PixelConfig<BINS, WindowRule>,
     statistics: Statistics,
@@ -70,9 +70,9 @@ impl Further {
         let binning = Binning::new(Array::new(1, 1)?, BlockLevel::MAX)?;
         let mut blocks = binning.blocks().map(Block::new);
         Some(Self {
-            pixel: AsyncPixel::new(PixelAddress(7)),
+            pixel: AsyncPixel::new(PixelAddress::new(7)),
             blocks: [blocks.next()?, blocks.next()?, blocks.next()?],
-            feed: binning.feed_of(PixelAddress(0)),
+            link: binning.link_of(PixelAddress::new(0)),
             config: Self::config(Features::NONE)?,
             statistics: Statistics::default(),
             codes: [0; PHOTONS as usize],
@@ -97,7 +97,7 @@ impl Further {
         *self = Self::new()?;
         self.codes = codes;
         self.config = Self::config(features)?;
-        self.feed.tick(levels == 0);
+        self.link.tick(levels == 0);
         let feeding = self.blocks.iter_mut().take(levels.saturating_sub(1));
         feeding.for_each(Block::tick);
         Some(())
@@ -128,7 +128,7 @@ impl Further {
     pub fn until_first_look(&mut self) {
         self.pixel.count_batch(&self.config, &self.codes);
         for &code in &self.codes {
-            count_in_blocks(&mut self.blocks, &self.feed, &self.config, code);
+            count_in_blocks(&mut self.blocks, &self.link, &self.config, code);
         }
         self.pass(0..CYCLES - 1);
     }
@@ -136,7 +136,7 @@ impl Further {
     /// The first look, whose event the link takes. Whether there was one.
     pub fn reports(&mut self) -> bool {
         let _ = self.end_laser_cycle(u32::from(CYCLES) - 1);
-        self.pixel.acknowledge().is_some()
+        self.pixel.take_event().is_some()
     }
 
     /// The same of the block of level 1.
@@ -160,14 +160,14 @@ impl Further {
 
     #[inline(always)]
     fn end_laser_cycle(&mut self, cycle: u32) -> Look {
-        let cycle = LaserCycle(cycle.into());
+        let cycle = LaserCycle::new(cycle.into());
         (self.pixel).end_laser_cycle(&self.config, &mut self.statistics, cycle)
     }
 
     #[inline(always)]
     fn end_laser_cycle_of_block(&mut self, cycle: u32) -> bool {
         let (blocks, statistics) = (self.blocks.get_mut(..1), &mut self.statistics);
-        let (blocks, cycle) = (blocks.unwrap_or_default(), LaserCycle(cycle.into()));
+        let (blocks, cycle) = (blocks.unwrap_or_default(), LaserCycle::new(cycle.into()));
         end_laser_cycles_of_blocks(blocks, &self.config, statistics, cycle, 1)
     }
 }
@@ -176,7 +176,7 @@ impl Further {
 pub extern "C" fn count(further: &mut Further, index: u32) -> u32 {
     if let Some(&code) = further.codes.get(index as usize) {
         further.pixel.count(&further.config, code);
-        count_in_blocks(&mut further.blocks, &further.feed, &further.config, code);
+        count_in_blocks(&mut further.blocks, &further.link, &further.config, code);
     }
     0
 }

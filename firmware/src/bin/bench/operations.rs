@@ -1,7 +1,8 @@
 //! The operations, each called as a program would call it.
 
 use dtof_core::fixed::types::U24F8;
-use dtof_core::{LaserCycle, Look, centroid};
+use dtof_core::paper::centroid;
+use dtof_core::{LaserCycle, Look};
 
 use crate::counter::{Counter, Operation};
 use crate::report;
@@ -110,10 +111,10 @@ extern "C" fn exposure_single(state: &mut State, _: u32) -> u32 {
         for &code in photons.next().unwrap_or_default() {
             state.pixel.count(&state.config, code);
         }
-        let (statistics, cycle) = (&mut state.statistics, LaserCycle(cycle.into()));
+        let (statistics, cycle) = (&mut state.statistics, LaserCycle::new(cycle.into()));
         let look = (state.pixel).end_laser_cycle(&state.config, statistics, cycle);
         if look == Look::Event {
-            state.event = state.pixel.acknowledge();
+            state.event = state.pixel.take_event();
         }
     }
     pack(state, 0)

@@ -2,7 +2,7 @@
 
 use core::hint::black_box;
 
-use dtof_core::isqrt;
+use dtof_core::paper::isqrt;
 
 use crate::State;
 use crate::counter::{Counter, Operation};

@@ -1,12 +1,14 @@
 //! The photons that the operations work on: exposures of 256 photons over 44 laser cycles
 //! into 128 bins, with and without a target.
 
+use dtof_core::events::{
+    DynamicDepthConfig, DynamicDepthPixel, Reference, Reflectivity, RunningMean,
+};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
-    AerEncoder, AnyRule, AsyncPixel, AverageRule, ConfigError, Count, DepthEstimator, DepthEvent,
-    DynamicDepthConfig, DynamicDepthPixel, Histogram, LaserCycle, Look, PaperRule, PixelAddress,
-    PixelConfig, RangeGate, RangeScale, Reference, Reflectivity, RunningMean, Statistics,
-    WindowRule,
+    AerEncoder, AnyRule, AsyncPixel, AverageRule, Count, DepthEstimator, DepthEvent, Histogram,
+    LaserCycle, Look, PaperRule, PixelAddress, PixelConfig, PixelConfigError, RangeGate,
+    RangeScale, Statistics, WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -78,7 +80,7 @@ impl State {
             reflectivity: Reflectivity::new(),
             average: AverageRule::new(const { U8F8::lit("4") }, Count::saturating(5)),
             codes: [0; PHOTONS as usize],
-            pixel: AsyncPixel::new(PixelAddress(7)),
+            pixel: AsyncPixel::new(PixelAddress::new(7)),
             statistics: Statistics::default(),
             histogram: Histogram::new(),
             foreign: [0; BINS],
@@ -93,7 +95,7 @@ impl State {
         l2: u16,
         minimum: u32,
         gate: RangeGate<BINS>,
-    ) -> Result<PixelConfig<BINS>, ConfigError> {
+    ) -> Result<PixelConfig<BINS>, PixelConfigError> {
         let rule = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(minimum));
         let config = PixelConfig::with_rule(rule).x(4).l1(l1).l2(l2);
         config.gate(gate).build()
@@ -122,7 +124,7 @@ impl State {
         if let Ok(config) = Self::config(40, 2000, 5, RangeGate::full()) {
             self.config = config;
         }
-        self.pixel = AsyncPixel::new(PixelAddress(7));
+        self.pixel = AsyncPixel::new(PixelAddress::new(7));
         self.histogram.clear();
         self.encoder = AerEncoder::new();
         self.event = None;
@@ -141,20 +143,20 @@ impl State {
         self.counted(number, true);
         self.wait_for_last_look();
         let _ = self.end_laser_cycle(u32::from(CYCLES) - 1);
-        self.event = self.pixel.acknowledge();
+        self.event = self.pixel.take_event();
     }
 
     /// Counts the pixel's photons again, through a gate.
     pub fn count_gated(&mut self) {
         self.config = self.gated;
-        self.pixel = AsyncPixel::new(PixelAddress(7));
+        self.pixel = AsyncPixel::new(PixelAddress::new(7));
         self.pixel.count_batch(&self.config, &self.codes);
     }
 
     /// Ends laser cycle `cycle`, looking if it is time.
     #[inline(always)]
     pub fn end_laser_cycle(&mut self, cycle: u32) -> Look {
-        let cycle = LaserCycle(cycle.into());
+        let cycle = LaserCycle::new(cycle.into());
         self.pixel
             .end_laser_cycle(&self.config, &mut self.statistics, cycle)
     }

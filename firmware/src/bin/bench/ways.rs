@@ -58,10 +58,10 @@ pub extern "C" fn exposure(state: &mut State, _: u32) -> u32 {
     for cycle in 0..CYCLES {
         let photons = photons.next().unwrap_or_default();
         state.pixel.count_batch(&state.config, photons);
-        let (statistics, cycle) = (&mut state.statistics, LaserCycle(cycle.into()));
+        let (statistics, cycle) = (&mut state.statistics, LaserCycle::new(cycle.into()));
         let look = (state.pixel).end_laser_cycle(&state.config, statistics, cycle);
         if look == Look::Event {
-            state.event = state.pixel.acknowledge();
+            state.event = state.pixel.take_event();
         }
     }
     pack(state, 0)

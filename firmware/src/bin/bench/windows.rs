@@ -2,9 +2,9 @@
 //! rules chosen when the program runs.
 
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
+use dtof_core::rule::detect;
 use dtof_core::{
     AnyRule, CentredWindow, Count, DepthEstimator, Detection, DetectionRule, RangeGate, WindowRule,
-    detect,
 };
 
 use crate::counter::{Counter, Operation};

@@ -25,13 +25,16 @@ use core::fmt::Write;
 use core::panic::PanicInfo;
 use core::ptr;
 
+use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
+use dtof_core::events::{
+    DynamicDepthConfig, DynamicDepthPixel, Reference, Reflectivity, RunningMean,
+};
+use dtof_core::paper::{ComparatorTree, Threshold, centroid, isqrt, quadrant_background};
+use dtof_core::rule::{ExcludedBins, detect, z_for_levels};
 use dtof_core::{
-    AerDecoder, AerEncoder, AerWord, AnyRule, Array, AsyncPixel, BinIndex, BinPosition, Binning,
-    Block, BlockLevel, ComparatorTree, Count, Count10, Count16, Count24, CounterWidth,
-    DetectionRule, DynamicDepthConfig, DynamicDepthPixel, EchoNumber, Feed, Flags, Histogram, Peak,
-    PeeledBins, RangeGate, Reference, Reflectivity, RunningMean, Statistics, SubBinOffset,
-    Threshold, centroid, count_in_blocks, detect, end_laser_cycles_of_blocks, isqrt,
-    quadrant_background, z_for, z_for_levels,
+    AerDecoder, AerEncoder, AerWord, AnyRule, Array, AsyncPixel, BinIndex, BinPosition, BlockLevel,
+    Count, Count10, Count16, Count24, CounterWidth, DetectionRule, EchoNumber, Flags, Histogram,
+    Peak, RangeGate, Statistics, SubBinOffset, z_for,
 };
 
 use values::{
@@ -67,7 +70,7 @@ fn for_bins<const BINS: usize>() {
 fn for_width<const BINS: usize, W: CounterWidth>() {
     thresholds::<W>();
     histograms::<BINS, W>();
-    peels::<BINS, W>();
+    excluded_bins::<BINS, W>();
     pixels::<BINS, W>();
 }
 
@@ -228,26 +231,26 @@ fn histograms<const BINS: usize, W: CounterWidth>() {
 }
 
 #[inline(never)]
-fn peels<const BINS: usize, W: CounterWidth>() {
+fn excluded_bins<const BINS: usize, W: CounterWidth>() {
     let gate = gate::<BINS>();
     let mut histogram = Histogram::<BINS, W>::new();
-    let mut peeled = PeeledBins::new(byte());
+    let mut excluded = ExcludedBins::new(byte());
     while more() {
         histogram.add_batch(some(&values::<u16, 16>(half)));
-        peeled.push(bin());
+        excluded.push(bin());
         keep((
-            peeled.echoes(),
-            peeled.contains(half()),
-            peeled.is_tail(bin()),
+            excluded.echoes(),
+            excluded.contains(half()),
+            excluded.is_tail(bin()),
         ));
-        keep((peeled.touches(half(), half()), peeled.bins_left(&gate)));
-        keep(peeled.empty(&mut histogram));
+        keep((excluded.touches(half(), half()), excluded.bins_left(&gate)));
+        keep(excluded.empty(&mut histogram));
         let (bin, count) = (bin(), count());
         let peak = Peak { bin, count };
-        keep(rule().detect_without(&histogram, &gate, peak, &peeled));
-        keep(average_rule().detect_without(&histogram, &gate, peak, &peeled));
+        keep(rule().detect(&histogram, &gate, peak, &excluded));
+        keep(average_rule().detect(&histogram, &gate, peak, &excluded));
         if let Some(rule) = window_rule() {
-            keep(rule.detect_without(&histogram, &gate, peak, &peeled));
+            keep(rule.detect(&histogram, &gate, peak, &excluded));
         }
     }
     keep(histogram);
@@ -267,8 +270,8 @@ fn blocks<const BINS: usize>() {
     let Some(binning) = Binning::new(array, level()) else {
         return;
     };
-    keep((binning.number_of_blocks(), Feed::NONE));
-    let mut feed = binning.feed_of(address());
+    keep((binning.number_of_blocks(), BlockLink::NONE));
+    let mut link = binning.link_of(address());
     let rule = window_rule().map_or(AnyRule::from(rule()), AnyRule::from);
     let rule = rule.of_blocks(level());
     let tracking = rule.tracking(&gate::<BINS>());
@@ -279,17 +282,17 @@ fn blocks<const BINS: usize>() {
         let mut blocks = [Block::new(place)];
         let mut statistics = Statistics::default();
         while more() {
-            count_in_blocks(&mut blocks, &feed, &config, half());
+            count_in_blocks(&mut blocks, &link, &config, half());
             let (cycle, cycles) = (cycle(), half());
             let look =
                 end_laser_cycles_of_blocks(&mut blocks, &config, &mut statistics, cycle, cycles);
             keep(look);
-            feed.tick(more());
-            feed.reported();
-            keep(feed.block());
+            link.tick(more());
+            link.reported();
+            keep(link.block());
             let [block] = &mut blocks;
             block.tick();
-            keep((block.request(), block.acknowledge()));
+            keep((block.has_event(), block.take_event()));
             keep((block.pixel().level(), block.pixel().address()));
         }
         keep(statistics);
@@ -328,7 +331,11 @@ fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
     }
     keep((config.x(), config.l1(), config.l2()));
     keep((*config.gate(), *config.rule(), *config.estimator()));
-    keep((config.is_one_hit(), config.echoes(), config.peel_reach()));
+    keep((
+        config.is_one_hit(),
+        config.echoes(),
+        config.echo_guard_bins(),
+    ));
     keep(config.echo_wait());
     keep(
         config
@@ -348,9 +355,9 @@ fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
         pixel.count_frame(config, &values::<u32, BINS>(word));
         keep(pixel.end_laser_cycle(config, &mut statistics, cycle()));
         keep(pixel.end_laser_cycles(config, &mut statistics, cycle(), half()));
-        keep((pixel.request(), pixel.exposure()));
+        keep((pixel.has_event(), pixel.exposure()));
         if more() {
-            keep(pixel.acknowledge());
+            keep(pixel.take_event());
         }
     }
     keep((pixel.address(), config.detect(pixel.histogram())));

@@ -5,12 +5,13 @@ use core::fmt::{self, Write};
 use core::hint::black_box;
 use core::sync::atomic::AtomicU32;
 
+use dtof_core::events::DynamicDepthEvent;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
+use dtof_core::rule::{Tracking, background_from_count};
 use dtof_core::{
     AverageRule, BinIndex, BinPosition, BlockLevel, CentredWindow, Count, DepthEstimator,
-    DepthEvent, DetectionRule, DynamicDepthEvent, EchoNumber, Flags, LaserCycle, PaperRule,
-    PixelAddress, PixelConfig, PixelConfigBuilder, RangeGate, RangeScale, SubBinOffset, Tracking,
-    WindowRule, whole_background,
+    DepthEvent, DetectionRule, EchoNumber, Flags, LaserCycle, PaperRule, PixelAddress, PixelConfig,
+    PixelConfigBuilder, RangeGate, RangeScale, SubBinOffset, WindowRule,
 };
 
 /// Valid or not.
@@ -72,7 +73,7 @@ pub fn background_level() -> U24F8 {
     if more() {
         U24F8::from_bits(word())
     } else {
-        whole_background(count())
+        background_from_count(count())
     }
 }
 
@@ -137,11 +138,11 @@ pub fn bin() -> BinIndex {
 }
 
 pub fn address() -> PixelAddress {
-    PixelAddress(half())
+    PixelAddress::new(half())
 }
 
 pub fn cycle() -> LaserCycle {
-    LaserCycle(double())
+    LaserCycle::new(double())
 }
 
 /// Whether to go round again.

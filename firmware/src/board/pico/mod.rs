@@ -4,7 +4,7 @@
 //! |---|---|
 //! | clock | 125 MHz from the crystal |
 //! | serial port | UART0, 1 Mbaud, 8 data bits, no parity, 1 stop bit |
-//! | USB | the same link as a serial port (CDC ACM): who has sent last is answered |
+//! | USB | the same link as a serial port (CDC ACM): the answer goes where the last byte came from |
 //! | GP0 | sends; pin 1, to RX of a USB adapter of 3.3 V |
 //! | GP1 | receives; pin 2, to TX of the adapter |
 //! | watchdog | resets after about a second |
@@ -12,7 +12,7 @@
 //!
 //! | GP2, GP3 | with the photon timer: the laser's pulse, the SPAD's pulses; pins 4 and 5 |
 //!
-//! One of the two cores runs. Of the boot ROM nothing is called once the image has started.
+//! One of the two cores runs. The image calls no function of the boot ROM once it has started.
 
 #[cfg(feature = "sensor-photon-timer")]
 mod photon_timer;
@@ -50,10 +50,10 @@ const CRYSTAL_HZ: u32 = 12_000_000;
 /// started the watchdog.
 const WATCHED: u32 = 0xd70f_0d06;
 
-/// What the chip's ROM loads first: it sets the flash up for reading.
+/// The chip's ROM loads this first: it sets the flash up for reading.
 #[unsafe(link_section = ".boot2")]
 #[used]
-#[allow(unsafe_code, reason = "its place is said by the section's name")]
+#[allow(unsafe_code, reason = "the name of the section places it")]
 static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_W25Q080;
 
 type UartPins = (
@@ -68,7 +68,7 @@ struct Port {
     tx: Writer<UART0, UartPins>,
     rx: Reader<UART0, UartPins>,
     usb: Usb,
-    /// The last byte came over USB: so does the host that is answered.
+    /// The last byte came over USB, so answers go there.
     over_usb: bool,
     usb_was_open: bool,
 }
@@ -128,7 +128,7 @@ impl Pico {
             &mut resets,
             &mut watchdog,
         ) else {
-            panic!("125 MHz cannot be had from this crystal");
+            panic!("this crystal does not give 125 MHz");
         };
 
         let mut timer = core.SYST;
@@ -149,7 +149,7 @@ impl Pico {
         let config = UartConfig::new(BAUD.Hz(), DataBits::Eight, None, StopBits::One);
         let uart = UartPeripheral::new(device.UART0, uart, &mut resets);
         let Ok(uart) = uart.enable(config, clocks.peripheral_clock.freq()) else {
-            panic!("{BAUD} baud cannot be had from this clock");
+            panic!("this clock does not give {BAUD} baud");
         };
         let (mut rx, tx) = uart.split();
         rx.enable_rx_interrupt();
@@ -218,7 +218,8 @@ pub(super) fn end() -> ! {
 }
 
 /// Whether the watchdog waits while a debugger halts the processor. Only once it has started:
-/// rp2040-hal writes the register anew when it starts it, and its own function would stop it.
+/// rp2040-hal overwrites the register when it starts the watchdog, and its own function would stop
+/// it.
 fn pause_watchdog_on_debug(pause: bool) {
     // SAFETY: the watchdog goes on, and nothing else writes the register meanwhile.
     #[allow(unsafe_code, reason = "rp2040-hal keeps the register")]
@@ -235,7 +236,7 @@ impl Board for Pico {
         MILLISECONDS.load(Ordering::Relaxed)
     }
 
-    /// Only while time goes on: without it no host would ever be taken for silent.
+    /// Feeds only while the clock runs: otherwise a host would never time out.
     fn feed_watchdog(&mut self) {
         let now_ms = self.now_ms();
         if now_ms != self.fed_ms {
@@ -258,14 +259,14 @@ impl Board for Pico {
         if photon_timer::RUNS.load(Ordering::Relaxed) {
             return;
         }
-        // An interrupt that is held back ends it all the same.
+        // A pending interrupt ends it even while interrupts are masked.
         cortex_m::asm::wfi();
     }
 }
 
 #[exception]
 fn SysTick() {
-    // Nobody else writes it, and this processor cannot add to memory in one step.
+    // Nothing else writes it, and this processor has no atomic addition.
     let now = MILLISECONDS.load(Ordering::Relaxed);
     MILLISECONDS.store(now.wrapping_add(1), Ordering::Relaxed);
 }
@@ -318,8 +319,8 @@ impl Port {
         self.send();
     }
 
-    /// Tells the main loop whether the host's port is open. Only that of the USB can tell. That it
-    /// closes counts whoever is answered, as noise at the UART may look like a host.
+    /// Tells the main loop whether the host's port is open. Only USB can tell. A close counts even
+    /// while answers go to the UART, as noise there may look like a host.
     fn look_at_line(&mut self) {
         let is_open = self.usb.listens();
         if self.usb_was_open && !is_open {

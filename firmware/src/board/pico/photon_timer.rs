@@ -1,12 +1,11 @@
 //! The photon timer: three state machines of PIO0 in step with each other.
 //!
 //! One makes the laser's pulse. The other two sample the SPAD's pin, each every other clock,
-//! as an instruction that samples and one that counts take two. All three have the same
-//! period and are started by the same write, so that the first sample is three clocks after
-//! the instruction that begins the pulse: the pulse leaves the chip one clock after its
-//! instruction, and a sample is what came into the chip two clocks before, which is how
-//! long its input takes to be in step with its clock. So bin 0 begins with the pulse, but for
-//! what pads and wires add.
+//! because sampling and counting take one instruction each. All three have the same
+//! period and are started by the same write. The first sample is three clocks after the
+//! instruction that begins the pulse: the pulse leaves the chip one clock after its instruction,
+//! and the input synchroniser delays a sample by two. So bin 0 begins with the pulse, except for
+//! the delays of pads and wires.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
@@ -38,7 +37,7 @@ pub type Pins = (
 type Installed = rp2040_hal::pio::InstalledProgram<PIO0>;
 type Machine<SM> = (UninitStateMachine<(PIO0, SM)>, Installed);
 
-/// A state machine at rest, and its program.
+/// The stopped state machines and their programs.
 struct Idle {
     laser: Machine<SM0>,
     even: Machine<SM1>,
@@ -47,7 +46,7 @@ struct Idle {
 
 type Ends<SM> = (Rx<(PIO0, SM)>, Tx<(PIO0, SM)>);
 
-/// The state machines in step.
+/// The running state machines.
 struct Steps {
     group: StateMachineGroup3<PIO0, SM0, SM1, SM2, Running>,
     laser: Ends<SM0>,
@@ -65,6 +64,29 @@ pub struct Hardware {
     pins: Pins,
 }
 
+/// The sampler of even clocks, or with one instruction more that of odd clocks. A cycle pushes the
+/// level before it as a word of its own, takes `y + 1` samples two clocks apart and rests for
+/// `osr + 2` clocks.
+macro_rules! sampler_program {
+    ($($first:literal)?) => {
+        pio::pio_asm!(
+            $($first,)?
+            ".wrap_target",
+            "    mov x, y",
+            "    in pins, 1",
+            "    push block",
+            "sample:",
+            "    in pins, 1",
+            "    jmp x-- sample",
+            "    mov x, osr",
+            "rest:",
+            "    jmp x-- rest",
+            ".wrap",
+        )
+        .program
+    };
+}
+
 impl SensorPort {
     /// A photon timer: the laser's pulse leaves at GP2, the SPAD's pulses come at GP3.
     ///
@@ -79,8 +101,8 @@ impl SensorPort {
         };
         let idle = Idle {
             laser: (laser, install(laser_program())),
-            even: (even, install(sampler_program())),
-            odd: (odd, install(late_sampler_program())),
+            even: (even, install(sampler_program!())),
+            odd: (odd, install(sampler_program!("    mov y, y"))),
         };
         let hardware = Hardware {
             idle: Some(idle),
@@ -94,10 +116,10 @@ impl SensorPort {
     }
 }
 
-/// Lets the laser rest from now on: the state machines go on when the processor fails.
+/// Holds the laser off from now on: the state machines go on when the processor fails.
 pub fn laser_off() {
     // SAFETY: the register is that of the laser's pin alone, and the image does nothing more.
-    #[allow(unsafe_code, reason = "nobody can hand over the pin here")]
+    #[allow(unsafe_code, reason = "there is no handle of the peripheral here")]
     let control = unsafe { &*IO_BANK0::PTR }.gpio(LASER.into()).gpio_ctrl();
     control.modify(|_, w| w.outover().low());
 }
@@ -133,44 +155,6 @@ fn laser_program() -> Program<32> {
         "    mov x, osr      side 0",
         "low:",
         "    jmp x-- low     side 0",
-        ".wrap",
-    )
-    .program
-}
-
-/// The level before as a word of its own, `y + 1` samples two clocks apart, a rest of
-/// `osr + 2` clocks.
-fn sampler_program() -> Program<32> {
-    pio::pio_asm!(
-        ".wrap_target",
-        "    mov x, y",
-        "    in pins, 1",
-        "    push block",
-        "sample:",
-        "    in pins, 1",
-        "    jmp x-- sample",
-        "    mov x, osr",
-        "rest:",
-        "    jmp x-- rest",
-        ".wrap",
-    )
-    .program
-}
-
-/// The same a clock later.
-fn late_sampler_program() -> Program<32> {
-    pio::pio_asm!(
-        "    mov y, y",
-        ".wrap_target",
-        "    mov x, y",
-        "    in pins, 1",
-        "    push block",
-        "sample:",
-        "    in pins, 1",
-        "    jmp x-- sample",
-        "    mov x, osr",
-        "rest:",
-        "    jmp x-- rest",
         ".wrap",
     )
     .program

@@ -135,7 +135,7 @@ impl SampleRings {
 
     /// How many laser cycles have come whole, since the start.
     pub fn completed(&mut self) -> u32 {
-        // What is read of the rings before is read before, and what is read after, after.
+        // The compiler may not move reads of the rings across this.
         compiler_fence(Ordering::SeqCst);
         let new = self.written().wrapping_sub(self.words) & (TURN - 1);
         compiler_fence(Ordering::SeqCst);
@@ -169,7 +169,7 @@ impl SampleRings {
 }
 
 fn clear_stalls() {
-    // SAFETY: only flags are cleared, which nobody else reads.
+    // SAFETY: this clears flags only, and nothing else reads them.
     #[allow(unsafe_code, reason = "rp2040-hal keeps the register to itself")]
     unsafe {
         (*PIO0::PTR).fdebug().write(|w| w.rxstall().bits(0xf));

@@ -1,4 +1,4 @@
-//! The link over USB: a serial port for the host (CDC ACM), beside the UART.
+//! The link over USB: a serial port for the host (CDC ACM), in addition to the UART.
 
 use heapless::Vec;
 use rp2040_hal::clocks::UsbClock;
@@ -59,7 +59,7 @@ impl Usb {
         }
     }
 
-    /// Fetches what has been received. Says whether there was something. Runs on each interrupt
+    /// Fetches what has been received. Returns whether there was something. Runs on each interrupt
     /// of the USB.
     pub fn receive(&mut self, port: &mut SerialInterrupt<'_>) -> bool {
         let mut received = false;
@@ -98,7 +98,7 @@ impl Usb {
             match self.class.write_packet(&self.packet) {
                 Ok(_) => self.packet.clear(),
                 Err(UsbError::WouldBlock) => return,
-                // Not set up by a host: nobody waits for it.
+                // No host has configured the device: nobody waits for the data.
                 Err(_) => self.packet.clear(),
             }
         }

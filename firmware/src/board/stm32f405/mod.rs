@@ -10,8 +10,8 @@
 //! | watchdog | the independent one, resets after about a second |
 //! | log | defmt over RTT, which the debugger reads |
 //!
-//! The Discovery's debugger has a serial port of its own, but it is wired to
-//! nothing; hence the adapter.
+//! The Discovery's debugger has a serial port of its own, but it is not
+//! connected; hence the adapter.
 //!
 //! The feature `pll-off` leaves the processor at 16 MHz from its internal
 //! oscillator, for emulators in which the PLL never starts. All else stays.
@@ -78,7 +78,7 @@ impl Stm32F405 {
             panic!("the board is started twice");
         };
         let cause = device.RCC.csr().read().bits();
-        // The flags add up otherwise.
+        // Otherwise the flags accumulate.
         device.RCC.csr().modify(|_, w| w.rmvf().clear());
         let reset_reason = reset_reason::take().unwrap_or(ResetReason::of_stm32f4(cause));
         let clocks = if cfg!(feature = "pll-off") {
@@ -100,7 +100,7 @@ impl Stm32F405 {
         let pins_c = device.GPIOC.split(&mut rcc);
         let config = SerialConfig::default().baudrate(BAUD.bps());
         let Ok(usart) = device.USART2.serial((pins.pa2, pins.pa3), config, &mut rcc) else {
-            panic!("{BAUD} baud cannot be had from this clock");
+            panic!("this clock does not give {BAUD} baud");
         };
         let (tx, mut rx) = usart.split();
         rx.listen();
@@ -164,7 +164,7 @@ impl Stm32F405 {
 /// the port has started nothing happens.
 pub(super) fn laser_off() {
     // SAFETY: a write of 1 concerns this pin alone, and the image does nothing more.
-    #[allow(unsafe_code, reason = "nobody can hand over the pin here")]
+    #[allow(unsafe_code, reason = "there is no handle of the peripheral here")]
     let port = unsafe { &*pac::GPIOC::PTR };
     port.bsrr().write(|w| w.br6().reset());
 }
@@ -179,7 +179,7 @@ impl Board for Stm32F405 {
         MILLISECONDS.load(Ordering::Relaxed)
     }
 
-    /// Only while time goes on: without it no host would ever be taken for silent.
+    /// Feeds only while the clock runs: otherwise a host would never time out.
     fn feed_watchdog(&mut self) {
         let now_ms = self.now_ms();
         if now_ms != self.fed_ms {
@@ -198,7 +198,7 @@ impl Board for Stm32F405 {
 
     fn sleep(&mut self) {
         if !SENSOR_READY.swap(false, Ordering::Relaxed) {
-            // An interrupt that is held back ends it all the same.
+            // A pending interrupt ends it even while interrupts are masked.
             cortex_m::asm::wfi();
         }
     }

@@ -62,7 +62,7 @@ impl SensorPort {
             overflow: 143,
             // A bit that is lost on the way is an error, not another depth.
             parity: true,
-            ..tdc7200::Settings::new(PixelAddress(0), 8_000, U16F16::lit("250"))
+            ..tdc7200::Settings::new(PixelAddress::new(0), 8_000, U16F16::lit("250"))
         }));
         const MODE_0: Mode = Mode {
             polarity: Polarity::IdleLow,
@@ -88,9 +88,9 @@ impl SensorPort {
     #[must_use]
     pub fn tmf882x(self, image: &'static [u8]) -> impl Sensor {
         const SETTINGS: tmf882x::Settings = if cfg!(feature = "sensor-tmf8828-8x8") {
-            tmf882x::Settings::of_8x8(PixelAddress(0))
+            tmf882x::Settings::of_8x8(PixelAddress::new(0))
         } else {
-            tmf882x::Settings::new(PixelAddress(0))
+            tmf882x::Settings::new(PixelAddress::new(0))
         };
         const CONFIG: tmf882x::Config = checked!(tmf882x::Config::new(SETTINGS));
         // The timer runs since the board has started.
@@ -104,7 +104,7 @@ impl SensorPort {
     #[must_use]
     pub fn tmf8829(self, image: &'static [u8]) -> impl Sensor {
         const CONFIG: tmf8829::Config = checked!(tmf8829::Config::new(tmf8829::Settings::new(
-            PixelAddress(0),
+            PixelAddress::new(0),
             tmf8829::Zones::Z16x16
         )));
         let delay = SystickDelay::new(SYST::get_current, self.rcc.clocks.hclk().raw());

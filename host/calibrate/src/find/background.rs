@@ -1,14 +1,14 @@
-//! The background of a histogram: what its bins hold where there is no peak.
+//! The background of a histogram: the mean count of the bins without a peak.
 //!
-//! Bins that hold certainly more than the others, alone or with both neighbours, are left out
-//! with a bin to either side, and the mean of the rest is taken. That goes on until nothing
-//! changes. It begins at the median, or in sparse histograms at the mean.
+//! Bins that hold significantly more than the mean, alone or with both neighbours, are left out, with one
+//! bin on either side. The mean of the rest is the next estimate. This is repeated until nothing changes.
+//! The first estimate is the median, or the mean of a sparse histogram.
 
-use super::limits::{is_more, median};
+use super::significance::{is_surely_more, median};
 
-/// A bin is left out by chance once in so many histograms.
+/// By chance a bin is left out in one of so many histograms.
 const ONE_IN: f64 = 100.0;
-/// It has come to rest long before.
+/// The most repetitions; it converges long before.
 const ROUNDS: usize = 40;
 
 /// The background of one histogram.
@@ -16,12 +16,12 @@ const ROUNDS: usize = 40;
 pub struct Level {
     /// Photons a bin.
     pub mean: f64,
-    /// For each bin whether it holds background alone.
+    /// For each bin whether it holds only background.
     pub clear: Vec<bool>,
 }
 
 impl Level {
-    /// Of a histogram.
+    /// Estimates the background of a histogram.
     #[must_use]
     pub fn of(counts: &[f64]) -> Self {
         let all = counts.iter().sum::<f64>() / counts.len() as f64;
@@ -30,7 +30,7 @@ impl Level {
         let mut clear = vec![true; counts.len()];
         for _ in 0..ROUNDS {
             let next = clear_bins(counts, mean);
-            // Peaks everywhere: the lowest level there is has to do.
+            // All bins are peaks: the last estimate has to do.
             if !next.contains(&true) {
                 break;
             }
@@ -44,13 +44,13 @@ impl Level {
         Self { mean, clear }
     }
 
-    /// Bins that hold background alone.
+    /// The number of bins that hold only background.
     #[must_use]
     pub fn clear_bins(&self) -> usize {
         self.clear.iter().filter(|&&clear| clear).count()
     }
 
-    /// Photons in them.
+    /// Photons in these bins.
     #[must_use]
     pub fn photons(&self) -> f64 {
         self.mean * self.clear_bins() as f64
@@ -68,7 +68,7 @@ fn clear_bins(counts: &[f64], mean: f64) -> Vec<bool> {
     for width in [1, 3] {
         for (first, window) in counts.windows(width).enumerate() {
             let sum = window.iter().sum();
-            if is_more(sum, mean * width as f64, one_in) {
+            if is_surely_more(sum, mean * width as f64, one_in) {
                 leave_out(first, first + width - 1);
             }
         }

@@ -1,87 +1,98 @@
-//! The cover glass: the nearest peak, at the same bin in nearly all pixels and captures, with
-//! something behind it in many.
+//! Crosstalk of the cover glass: the nearest peak, at the same bin in nearly all pixels and captures,
+//! with surfaces behind it in many of them.
 //!
-//! Whether a peak is common is decided in groups of histograms, so large that its mean height
-//! shows in each of them. In nine groups of ten it must have at least half of the median height,
-//! in groups along rows as well as along columns.
+//! A peak is common if groups of histograms share it. Groups are so large that its mean height shows in
+//! each. In nine groups of ten the peak must have at least half of the median height, in groups along
+//! rows as well as along columns.
 //!
-//! A gate begins where the glass no longer matters: at the first bin from which on its photons in
-//! an exposure of L2 laser cycles are below half a standard deviation of the background there.
+//! The gate begins where crosstalk no longer matters: from that bin on, its photons in an exposure of L2
+//! laser cycles are below half a standard deviation of the background.
 
-use super::common::Scene;
-use super::limits::median;
+use super::good_histograms::GoodHistograms;
 use super::peaks::Peak;
 use super::shape::{Fit, Window, best};
+use super::significance::median;
 
-/// Groups show the peak with so many standard deviations.
+/// Standard deviations with which a group shows the peak.
 const CLEAR: f64 = 5.0;
-/// There are at least so many groups, unless each is one histogram.
+/// The fewest groups, unless each is one histogram.
 const GROUPS: usize = 8;
-/// Of the groups so many must have it.
+/// The share of groups that must have the peak.
 const COMMON: f64 = 0.9;
-/// Fewer histograms do not tell a glass from the nearer of two surfaces.
+/// With fewer histograms, crosstalk cannot be told from the nearer of two surfaces.
 const SEVERAL: usize = 4;
-/// Something is behind it in at least this share of the histograms.
+/// At least this share of the histograms has a surface behind the crosstalk.
 const BEHIND: f64 = 0.1;
-/// Of the background, what a peak of all pixels together exceeds at least: backgrounds are not
-/// even to better than that.
+/// A peak of all pixels together exceeds the background at least by this factor: backgrounds are no
+/// flatter than that.
 const EVEN: f64 = 1.02;
-/// A Gaussian is not the whole glass if this many standard deviations are left behind it.
-const LEFT: f64 = 5.0;
+/// Crosstalk has a tail if the photons behind its Gaussian exceed it by this many standard deviations.
+const TAIL: f64 = 5.0;
 
-/// What the nearest common peak is.
+/// The nearest common peak.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Nearest {
     /// No peak is common to all pixels.
     NotCommon,
-    /// A cover glass.
+    /// Crosstalk of a cover glass.
     Glass(Glass),
-    /// A surface at this bin in all pixels, with nothing behind or in very few histograms: a wall
-    /// or a glass.
+    /// A surface at this bin in all pixels: a wall or crosstalk. Nothing lies behind it, or there are
+    /// very few histograms.
     WallOrGlass(usize),
-    /// The user says that it is no glass.
+    /// The user says that the peak at this bin is not crosstalk.
     Wall(usize),
 }
 
-/// The cover glass.
+impl Nearest {
+    /// The crosstalk, if that is what the peak is.
+    #[must_use]
+    pub const fn glass(&self) -> Option<&Glass> {
+        match self {
+            Self::Glass(glass) => Some(glass),
+            _ => None,
+        }
+    }
+}
+
+/// Crosstalk of the cover glass.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Glass {
     /// Its highest bin.
     pub top: usize,
-    /// The first bin from which on it does not matter; 0 if it never does.
+    /// The first bin from which on it does not matter; 0 if it never matters.
     pub end: usize,
-    /// Between what that lies.
+    /// The 95 % interval of `end`.
     pub end_between: (usize, usize),
     /// Photons a laser cycle and pixel.
     pub photons: f64,
-    /// The 95 % interval of that.
+    /// The 95 % interval of `photons`.
     pub photons_between: (f64, f64),
-    /// The same for each bin from 0 on, as far as it was seen.
+    /// Photons a laser cycle and pixel of each bin from 0 on, as far as crosstalk shows.
     pub shape: Vec<f64>,
-    /// Whether there is more behind it than a Gaussian pulse.
+    /// Whether it has more photons behind its top than a Gaussian.
     pub has_tail: bool,
 }
 
-/// Looks for it. `told` is what the user says about the nearest common peak, `l2` the laser
-/// cycles of an exposure.
+/// Finds the nearest common peak. `is_glass` is given if the user knows whether that is crosstalk;
+/// `l2` are the laser cycles of an exposure.
 #[must_use]
-pub fn nearest(scene: &Scene, told: Option<bool>, l2: f64) -> Nearest {
-    let Some(peak) = common(scene) else {
+pub fn nearest(good: &GoodHistograms, is_glass: Option<bool>, l2: f64) -> Nearest {
+    let Some(peak) = common(good) else {
         return Nearest::NotCommon;
     };
-    if told == Some(false) {
+    if is_glass == Some(false) {
         return Nearest::Wall(peak.top);
     }
-    if told != Some(true) && !has_something_behind(scene, &peak) {
+    if is_glass != Some(true) && !has_something_behind(good, &peak) {
         return Nearest::WallOrGlass(peak.top);
     }
-    Nearest::Glass(glass(scene, &peak, l2))
+    Nearest::Glass(glass(good, &peak, l2))
 }
 
 /// The nearest peak of all histograms together, if it is common.
-fn common(scene: &Scene) -> Option<Peak> {
-    let (counts, background) = scene.pooled();
-    // Peaks of a level that falls: what is above it, on top of its mean.
+fn common(good: &GoodHistograms) -> Option<Peak> {
+    let (counts, background) = good.pooled();
+    // The level may fall with the bins: the excess over it is put on its mean.
     let mean = background.iter().sum::<f64>() / background.len() as f64 * EVEN;
     let flat: Vec<f64> = counts
         .iter()
@@ -90,41 +101,41 @@ fn common(scene: &Scene) -> Option<Peak> {
         .collect();
     let peaks = Peak::all(&flat, mean);
     let peak = *peaks.first()?;
-    let is_common = scene.orders().iter().all(|order| {
-        let share = share_with(scene, order, peak.top);
+    let is_common = good.orders().iter().all(|order| {
+        let share = share_with(good, order, peak.top);
         share.is_some_and(|share| share >= COMMON)
     });
     is_common.then_some(peak)
 }
 
 /// The share of groups along `order` that have at least half of the median height at `top`;
-/// `None` if that does not show in groups of which there are enough.
-fn share_with(scene: &Scene, order: &[usize], top: usize) -> Option<f64> {
-    let around = top.saturating_sub(1)..=(top + 1).min(scene.bins() - 1);
-    // Photons above the background, laser cycles, and photons of all kinds.
+/// `None` if groups would have to be so large that there are too few.
+fn share_with(good: &GoodHistograms, order: &[usize], top: usize) -> Option<f64> {
+    let around = top.saturating_sub(1)..=(top + 1).min(good.bins() - 1);
+    // Signal photons, laser cycles and all photons.
     let of: Vec<[f64; 3]> = order
         .iter()
         .map(|&index| {
-            let trace = &scene.traces[index];
+            let trace = &good.traces[index];
             let sum: f64 = trace.counts[around.clone()].iter().sum();
-            let below: f64 = around.clone().map(|bin| scene.background(index, bin)).sum();
+            let below: f64 = around.clone().map(|bin| good.background(index, bin)).sum();
             [sum - below, trace.cycles, sum.max(below)]
         })
         .collect();
     let sum = |rows: &[[f64; 3]], column: usize| rows.iter().map(|row| row[column]).sum::<f64>();
     let mut height = sum(&of, 0) / sum(&of, 1);
     let mut group = 0;
-    // The mean height may be that of a few: then groups of their size do not show the median.
+    // A few histograms may give the mean its height: then larger groups are needed for the median.
     loop {
         let each = of.len() as f64;
         let clear = height * sum(&of, 1) / each / (sum(&of, 2) / each).max(1e-9).sqrt();
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-        let wanted = (CLEAR / clear).powi(2).ceil().clamp(1.0, 1e9) as usize;
-        if height <= 0.0 || (wanted > 1 && wanted * GROUPS > of.len()) {
+        let needed = (CLEAR / clear).powi(2).ceil().clamp(1.0, 1e9) as usize;
+        if height <= 0.0 || (needed > 1 && needed * GROUPS > of.len()) {
             return None;
         }
-        let is_shown = wanted <= group;
-        group = wanted.max(group);
+        let is_shown = needed <= group;
+        group = needed.max(group);
         let heights: Vec<f64> = of
             .chunks_exact(group)
             .map(|rows| sum(rows, 0) / sum(rows, 1))
@@ -137,13 +148,13 @@ fn share_with(scene: &Scene, order: &[usize], top: usize) -> Option<f64> {
     }
 }
 
-fn has_something_behind(scene: &Scene, glass: &Peak) -> bool {
-    if scene.traces.len() < SEVERAL {
+fn has_something_behind(good: &GoodHistograms, glass: &Peak) -> bool {
+    if good.traces.len() < SEVERAL {
         return false;
     }
-    let holds = |peak: &Peak| peak.first <= glass.top + 1 && peak.last + 1 >= glass.top;
-    let all = scene.traces.len() as f64;
-    let behind = scene.peaks.iter().filter(|peaks| {
+    let holds = |peak: &Peak| peak.is_near(glass.top);
+    let all = good.traces.len() as f64;
+    let behind = good.peaks.iter().filter(|peaks| {
         let mine = peaks.iter().position(holds);
         mine.is_some_and(|mine| peaks.len() > mine + 1)
     });
@@ -151,41 +162,40 @@ fn has_something_behind(scene: &Scene, glass: &Peak) -> bool {
         return true;
     }
     // Too dim for single pixels: all of them together.
-    let seen = scene.peaks.iter().filter(|peaks| peaks.iter().any(holds));
+    let seen = good.peaks.iter().filter(|peaks| peaks.iter().any(holds));
     if seen.count() as f64 >= COMMON * all {
         return false;
     }
-    let (counts, background) = scene.pooled();
+    let (counts, background) = good.pooled();
     let mean = background.iter().sum::<f64>() / background.len() as f64;
     let behind = Peak::all(&counts, mean * EVEN);
     behind.iter().any(|peak| peak.first > glass.last)
 }
 
-/// What all histograms hold of the glass, bin by bin.
+/// The crosstalk of all histograms together, bin by bin.
 struct Template {
-    /// Photons a laser cycle and their standard error, as far as enough histograms show it.
+    /// Photons a laser cycle and their standard error, as far as enough histograms show them.
     rates: Vec<(f64, f64)>,
     /// Photons, background photons and laser cycles of each bin.
     sums: Vec<[f64; 3]>,
 }
 
-fn template(scene: &Scene, glass: &Peak) -> Template {
-    let mut sums = vec![[0.0; 3]; scene.bins()];
+fn template(good: &GoodHistograms, glass: &Peak) -> Template {
+    let mut sums = vec![[0.0; 3]; good.bins()];
     let mut all = 0.0;
-    for (index, (trace, peaks)) in scene.traces.iter().zip(&scene.peaks).enumerate() {
+    for (index, (trace, peaks)) in good.traces.iter().zip(&good.peaks).enumerate() {
         all += trace.cycles;
-        let mut others = vec![false; scene.bins()];
+        let mut others = vec![false; good.bins()];
         for peak in peaks {
-            let is_glass = peak.first <= glass.top + 1 && peak.last + 1 >= glass.top;
-            if !is_glass {
-                let last = (peak.last + 2).min(scene.bins() - 1);
+            if !peak.is_near(glass.top) {
+                let last = (peak.last + 2).min(good.bins() - 1);
                 others[peak.first.saturating_sub(2)..=last].fill(true);
             }
         }
         for (bin, sum) in sums.iter_mut().enumerate() {
             if !others[bin] {
                 sum[0] += trace.counts[bin];
-                sum[1] += scene.background(index, bin);
+                sum[1] += good.background(index, bin);
                 sum[2] += trace.cycles;
             }
         }
@@ -203,10 +213,10 @@ fn template(scene: &Scene, glass: &Peak) -> Template {
     }
 }
 
-fn glass(scene: &Scene, peak: &Peak, l2: f64) -> Glass {
-    let template = template(scene, peak);
+fn glass(good: &GoodHistograms, peak: &Peak, l2: f64) -> Glass {
+    let template = template(good, peak);
     let rates = &template.rates;
-    let matters = 0.5 * (scene.rate / l2).sqrt();
+    let matters = 0.5 * (good.rate / l2).sqrt();
     let (sigma, fit) = gaussian(&template, peak);
     let model = |bin: usize| {
         let bin = u32::try_from(bin).unwrap_or(u32::MAX);
@@ -220,7 +230,7 @@ fn glass(scene: &Scene, peak: &Peak, l2: f64) -> Glass {
         (from..last).find(|&bin| below(bin)).unwrap_or(last)
     };
     let modelled = first_below(peak.top, &model);
-    let has_tail = is_left(rates, modelled, matters, &model);
+    let has_tail = exceeds_model(rates, modelled, matters, &model);
     let rate = |bin: usize| smooth(rates, bin, peak.top);
     let (end, end_between) = if has_tail {
         let at = |by: f64| {
@@ -239,7 +249,7 @@ fn glass(scene: &Scene, peak: &Peak, l2: f64) -> Glass {
         };
         (modelled, (at(high), at(low)))
     };
-    // Where it never matters no gate is needed.
+    // No gate is needed if it never matters.
     let highest = if has_tail {
         rate(peak.top).0
     } else {
@@ -256,8 +266,8 @@ fn glass(scene: &Scene, peak: &Peak, l2: f64) -> Glass {
     let (photons, variance) = of.fold((0.0, 0.0), |sum, rate| {
         (sum.0 + rate.0, sum.1 + rate.1 * rate.1)
     });
-    // One in a hundred is what the background may be off by.
-    let error = 1.96 * variance.sqrt() + 0.01 * scene.rate * seen as f64;
+    // The background may be off by 1 %.
+    let error = 1.96 * variance.sqrt() + 0.01 * good.rate * seen as f64;
     Glass {
         top: peak.top,
         end,
@@ -269,9 +279,9 @@ fn glass(scene: &Scene, peak: &Peak, l2: f64) -> Glass {
     }
 }
 
-/// The Gaussian that fits the top of the glass.
+/// The Gaussian that fits the crosstalk: σ and fit.
 fn gaussian(template: &Template, peak: &Peak) -> (f64, Fit) {
-    // As if all bins had the laser cycles of the top.
+    // Counts are scaled to the laser cycles of the top bin.
     let [_, below, cycles] = template.sums[peak.top];
     let counts: Vec<f64> = template
         .sums
@@ -292,9 +302,14 @@ fn gaussian(template: &Template, peak: &Peak) -> (f64, Fit) {
     (sigma, fits[0])
 }
 
-/// Whether rates from `from` on are more than the model's: in pieces that get longer, and so much
-/// that it matters.
-fn is_left(rates: &[(f64, f64)], from: usize, matters: f64, model: &dyn Fn(usize) -> f64) -> bool {
+/// Whether rates from `from` on exceed the model so much that it matters. Looks at groups of bins that
+/// get longer.
+fn exceeds_model(
+    rates: &[(f64, f64)],
+    from: usize,
+    matters: f64,
+    model: &dyn Fn(usize) -> f64,
+) -> bool {
     let mut start = from + 1;
     let mut length = 1;
     while start + length <= rates.len() && start < from + 24 {
@@ -306,7 +321,7 @@ fn is_left(rates: &[(f64, f64)], from: usize, matters: f64, model: &dyn Fn(usize
         if above < 0.25 * matters * length as f64 {
             return false;
         }
-        if above > LEFT * variance.sqrt() {
+        if above > TAIL * variance.sqrt() {
             return true;
         }
         start += length;
@@ -315,8 +330,8 @@ fn is_left(rates: &[(f64, f64)], from: usize, matters: f64, model: &dyn Fn(usize
     false
 }
 
-/// The rate of a bin, with as many others to either side as it is far from the top, divided by
-/// eight.
+/// The rate of a bin and its error, averaged over its neighbours: an eighth of its distance from the top
+/// on either side.
 fn smooth(rates: &[(f64, f64)], bin: usize, top: usize) -> (f64, f64) {
     let reach = bin.saturating_sub(top) / 8;
     let (first, last) = (bin - reach, (bin + reach).min(rates.len() - 1));

@@ -1,62 +1,61 @@
-//! How far the window of the depth should reach to either side of a pulse that is no Gaussian.
+//! The half widths of the depth window before and after a pulse that is not Gaussian.
 //!
-//! What few photons of the pulse come to is tried: some are drawn from each peak, and the
-//! estimator of the core places them with every pair of half widths. The pair with the least
-//! mean error suits. Its error is from where the widest window places all photons of the peak:
-//! that hardly depends on how the pulse lies in its bins. What a pair is off by for all peaks
-//! alike does not count: it goes into the offset.
+//! A few photons are drawn from each peak, and the estimator of the core places them with every pair of
+//! half widths. The pair with the least mean error wins. Errors are against the position that the widest
+//! window gives all photons of the peak, which hardly depends on how the pulse lies in its bins. An error
+//! that all peaks share does not count: it becomes part of the range offset.
 
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{CentredWindow, Histogram, RangeGate};
 use dtof_theory::random::trial_rng;
 use rand_distr::{Distribution, StandardUniform};
 
-use super::limits::median;
 use super::offset::place;
 use super::shape::{ABOUT, Window};
+use super::significance::median;
 
-/// Photons of the pulse that are drawn. Of 8 to 100 the same pair is the best of the TMF8820.
+/// Photons of the pulse that are drawn. From 8 to 100, the same pair is the best for a TMF8820.
 const PHOTONS: f64 = 16.0;
-/// About so many draws for each pair.
+/// Draws for each pair of half widths.
 const DRAWS: usize = 8192;
-/// Half widths are tried in steps of a quarter bin.
+/// Half widths are tried in steps of 64/256 bin.
 const STEP: usize = 64;
-/// Another error that is not below this share of that with equal half widths is none.
-const BETTER: f64 = 0.97;
+/// An asymmetric window must have less than this share of the error of a symmetric one.
+const GAIN: f64 = 0.97;
 
-/// A window that suits a pulse better than one with equal half widths.
+/// An asymmetric window that is better for a pulse than any symmetric one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Suited {
+pub struct AsymmetricWindow {
     /// The window.
     pub window: CentredWindow,
-    /// What 16 photons of the pulse are off by in the mean, in bins.
+    /// Mean absolute error of 16 photons of the pulse, in bins.
     pub error: f64,
-    /// The same of the best window with equal half widths.
-    pub equal: f64,
+    /// The same with the best symmetric window.
+    pub symmetric: f64,
 }
 
-/// Photons of a peak among its background, and where all of them lie.
-struct Drawn {
+/// Photons that were drawn from a peak and its background, and the position of the whole peak.
+struct Draw {
     histogram: Histogram<ABOUT>,
     background: U24F8,
     position: f64,
 }
 
-/// The best half widths for these peaks, whose core has the deviation `sigma`; `None` if equal ones
-/// do as well.
+/// The best window for these peaks, whose core has the standard deviation `sigma` bins; `None` if a
+/// symmetric one is as good.
 #[must_use]
-pub fn suited(peaks: &[Window], sigma: U8F8, seed: u64) -> Option<Suited> {
+pub fn asymmetric_window(peaks: &[Window], sigma: U8F8, seed: u64) -> Option<AsymmetricWindow> {
     let each = DRAWS.div_ceil(peaks.len().max(1));
-    let mut drawn = Vec::with_capacity(each * peaks.len());
+    let mut draws = Vec::with_capacity(each * peaks.len());
     for (trial, peak) in (0..).zip(peaks) {
-        draw(&mut drawn, peak, each, (seed, trial));
+        draw(&mut draws, peak, each, (seed, trial));
     }
     let error = |window: CentredWindow| {
-        let errors = drawn.iter().map(|drawn| {
-            let peak = drawn.histogram.peak();
+        let errors = draws.iter().map(|draw| {
+            let peak = draw.histogram.peak();
             let gate = RangeGate::full();
-            let depth = window.estimate(&drawn.histogram, &gate, peak, drawn.background);
-            f64::from(peak.bin.raw()) + f64::from(depth.offset.raw()) / 256.0 - drawn.position
+            let depth = window.estimate(&draw.histogram, &gate, peak, draw.background);
+            f64::from(peak.bin.raw()) + f64::from(depth.offset.raw()) / 256.0 - draw.position
         });
         let errors: Vec<f64> = errors.collect();
         let off = median(errors.iter().copied());
@@ -70,25 +69,25 @@ pub fn suited(peaks: &[Window], sigma: U8F8, seed: u64) -> Option<Suited> {
     };
     let pairs = widths().flat_map(|before| widths().map(move |after| (before, after)));
     let windows = pairs.filter_map(|(before, after)| CentredWindow::with_sides(before, after));
-    let (mut equal, mut best) = (error(core), (f64::INFINITY, core));
+    let (mut symmetric, mut best) = (error(core), (f64::INFINITY, core));
     for window in windows {
         let error = error(window);
         if window.before() == window.after() {
-            equal = equal.min(error);
+            symmetric = symmetric.min(error);
         } else if error < best.0 {
             best = (error, window);
         }
     }
     let (error, window) = best;
-    (error < BETTER * equal).then_some(Suited {
+    (error < GAIN * symmetric).then_some(AsymmetricWindow {
         window,
         error,
-        equal,
+        symmetric,
     })
 }
 
-/// Photons of one peak, `each` times.
-fn draw(drawn: &mut Vec<Drawn>, peak: &Window, each: usize, seed: (u64, u16)) {
+/// Draws photons of one peak `each` times.
+fn draw(draws: &mut Vec<Draw>, peak: &Window, each: usize, seed: (u64, u16)) {
     let counts = &peak.about_top;
     let mut below: Vec<f64> = Vec::with_capacity(counts.len());
     let mut all = 0.0;
@@ -116,7 +115,7 @@ fn draw(drawn: &mut Vec<Drawn>, peak: &Window, each: usize, seed: (u64, u16)) {
             let bin = below.partition_point(|&below| below <= place * all);
             histogram.add(u16::try_from(bin).unwrap_or(u16::MAX));
         }
-        drawn.push(Drawn {
+        draws.push(Draw {
             histogram,
             background: U24F8::saturating_from_num(background),
             position,
@@ -131,8 +130,8 @@ mod tests {
 
     const SIGMA: f64 = 0.7;
 
-    /// A pulse `number` sixteenths of a bin behind bin 20; `fall` is its standard deviation after
-    /// the highest place, `SIGMA` that before.
+    /// A pulse `number` sixteenths of a bin after the start of bin 20; its standard deviation is `SIGMA`
+    /// before its top and `fall` after it.
     fn counts(number: u32, fall: f64) -> Vec<f64> {
         let below = |z: f64| {
             let sigma = if z < 0.0 { SIGMA } else { fall };
@@ -143,20 +142,23 @@ mod tests {
         (0..64).map(|bin| 12.0 + 4000.0 * share(bin)).collect()
     }
 
-    /// Peaks at all places in their bins.
+    /// Peaks at all positions within a bin.
     fn peaks(fall: f64) -> Vec<Window> {
         let of = |number| Window::new(&counts(number, fall), 12.0, 100.0, (0, 20, 63));
         (0..16).map(of).collect()
     }
 
     #[test]
-    fn an_even_pulse_has_equal_half_widths() {
-        assert_eq!(suited(&peaks(SIGMA), U8F8::from_num(SIGMA), 1), None);
+    fn a_symmetric_pulse_has_a_symmetric_window() {
+        assert_eq!(
+            asymmetric_window(&peaks(SIGMA), U8F8::from_num(SIGMA), 1),
+            None
+        );
     }
 
-    /// Two Gaussians about one place are no Gaussian, and even.
+    /// The sum of two Gaussians with one centre is symmetric, but not a Gaussian.
     #[test]
-    fn an_even_pulse_with_tails_has_equal_half_widths() {
+    fn a_symmetric_pulse_with_tails_has_a_symmetric_window() {
         let of = |number: u32| {
             let place = 20.0 + f64::from(number) / 16.0;
             let share = |bin: u32| {
@@ -171,13 +173,17 @@ mod tests {
         };
         let peaks: Vec<Window> = (0..16).map(of).collect();
         for seed in 1..7 {
-            assert_eq!(suited(&peaks, U8F8::from_num(0.5), seed), None, "{seed}");
+            assert_eq!(
+                asymmetric_window(&peaks, U8F8::from_num(0.5), seed),
+                None,
+                "{seed}"
+            );
         }
     }
 
-    /// A glass nearby, of ten times the photons, changes nothing.
+    /// Crosstalk nearby with ten times the photons changes nothing.
     #[test]
-    fn other_peaks_have_no_part_in_it() {
+    fn other_peaks_change_nothing() {
         let alone = peaks(2.5 * SIGMA);
         let with_glass: Vec<Window> = (0..16u32)
             .map(|number| {
@@ -186,8 +192,8 @@ mod tests {
                 Window::new(&counts, 12.0, 100.0, (11, 20, 63))
             })
             .collect();
-        let found = suited(&with_glass, U8F8::from_num(SIGMA), 1).unwrap();
-        let alone = suited(&alone, U8F8::from_num(SIGMA), 1).unwrap();
+        let found = asymmetric_window(&with_glass, U8F8::from_num(SIGMA), 1).unwrap();
+        let alone = asymmetric_window(&alone, U8F8::from_num(SIGMA), 1).unwrap();
         assert!(
             (found.error / alone.error - 1.0).abs() < 0.05,
             "{found:?} {alone:?}"
@@ -196,21 +202,24 @@ mod tests {
     }
 
     #[test]
-    fn what_falls_slowly_has_a_wider_window_after_its_place() {
+    fn a_pulse_that_falls_slowly_has_a_wider_window_after_its_top() {
         let peaks = peaks(2.5 * SIGMA);
         for seed in 1..4 {
-            let found = suited(&peaks, U8F8::from_num(SIGMA), seed).unwrap();
+            let found = asymmetric_window(&peaks, U8F8::from_num(SIGMA), seed).unwrap();
             let window = found.window;
             assert!(window.after() > window.before() + U8F8::ONE, "{window:?}");
-            assert!(found.error < 0.95 * found.equal, "{found:?}");
-            assert_eq!(suited(&peaks, U8F8::from_num(SIGMA), seed), Some(found));
+            assert!(found.error < 0.95 * found.symmetric, "{found:?}");
+            assert_eq!(
+                asymmetric_window(&peaks, U8F8::from_num(SIGMA), seed),
+                Some(found)
+            );
         }
     }
 
     #[test]
-    fn no_peaks_have_none() {
-        assert_eq!(suited(&[], U8F8::ONE, 1), None);
+    fn without_peaks_there_is_no_window() {
+        assert_eq!(asymmetric_window(&[], U8F8::ONE, 1), None);
         let empty = Window::new(&[0.0; 64], 0.0, 1.0, (0, 20, 63));
-        assert_eq!(suited(&[empty], U8F8::ONE, 1), None);
+        assert_eq!(asymmetric_window(&[empty], U8F8::ONE, 1), None);
     }
 }

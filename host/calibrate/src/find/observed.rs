@@ -1,4 +1,4 @@
-//! What calibration looks at: whole histograms, and what is known of them.
+//! The input of a calibration: whole histograms, and how long they took.
 
 use anyhow::{Result, bail, ensure};
 use dtof_core::Array;
@@ -13,18 +13,18 @@ pub enum Length {
     /// So many that the brightest pixel of the capture averages this many photons a laser cycle:
     /// an assumption.
     PhotonsPerCycle(f64),
-    /// Nobody said. Taken as one photon a laser cycle, as a replay does.
+    /// Not known. The brightest pixel is taken to have one photon a laser cycle, as in a replay.
     Unknown,
 }
 
 impl Length {
-    /// Whether rates are true rates.
+    /// Whether laser cycles are known, so that rates are absolute.
     #[must_use]
     pub const fn is_known(self) -> bool {
         matches!(self, Self::Cycles(_))
     }
 
-    /// Laser cycles of a capture whose brightest pixel, of those that are not hot, holds `brightest` photons.
+    /// Laser cycles of a capture whose brightest pixel, hot pixels aside, holds `brightest` photons.
     fn cycles(self, brightest: u64) -> f64 {
         let brightest = brightest.max(1) as f64;
         match self {
@@ -44,49 +44,55 @@ pub struct Observed<'a> {
     pub captures: &'a [Capture],
     /// How long each capture lasted.
     pub length: Length,
-    /// Laser cycles of each pixel of each capture, where they differ, in the order of the pixels:
-    /// then they count, and `length` is what is said of them.
+    /// Laser cycles of each pixel of each capture, in the order of the pixels, where they differ.
+    /// They replace those of `length`.
     pub cycles: Option<&'a [u64]>,
     /// Picoseconds a bin.
     pub bin_width_ps: f64,
-    /// The true distance of each pixel of each capture in millimetres, where it is known: the
-    /// pixels of the first capture, then those of the next.
+    /// The true distance in millimetres of each pixel of each capture, in the same order, where it
+    /// is known.
     pub truth_mm: Option<&'a [Option<f64>]>,
 }
 
 /// One histogram.
 #[derive(Clone, Debug)]
 pub struct Trace {
-    /// Which capture.
-    pub capture: usize,
-    /// Which pixel of it.
+    /// The pixel, counted from 0 in each capture.
     pub pixel: usize,
-    /// Laser cycles it lasted, or is taken to have lasted.
+    /// Laser cycles, known or assumed.
     pub cycles: f64,
     /// Photons of each bin, corrected for pile-up where that is known.
     pub counts: Vec<f64>,
+    /// The true distance in millimetres, if it is known.
+    pub truth_mm: Option<f64>,
 }
 
 impl Observed<'_> {
-    /// Every histogram, checked. The `hot` pixels say nothing of how long a capture lasted.
+    /// All histograms. The `hot` pixels do not count where the brightest pixel gives the laser cycles.
     ///
     /// # Errors
-    /// If captures or histograms differ in size, or there is none.
+    /// Fails if there are no captures or too few bins, if captures or histograms differ in size, if a
+    /// pixel lasted no laser cycle, or if there is not one true distance for each histogram.
     pub fn traces(&self, hot: &[usize]) -> Result<Vec<Trace>> {
         let pixels = self.array.pixels() as usize;
         let bins = self.bins();
         ensure!(!self.captures.is_empty(), "no captures");
         ensure!(bins > 8, "{bins} bins are too few to calibrate by");
-        let mut traces = Vec::with_capacity(self.captures.len() * pixels);
+        let all = self.captures.len() * pixels;
+        if let Some(truth) = self.truth_mm {
+            let found = truth.len();
+            ensure!(found == all, "{found} true distances for {all} histograms");
+        }
+        let mut traces = Vec::with_capacity(all);
         for (index, capture) in self.captures.iter().enumerate() {
             let found = capture.len();
             ensure!(
                 found == pixels,
                 "capture {index} has {found} pixels, not {pixels}"
             );
-            let looked_at = capture.iter().enumerate();
-            let looked_at = looked_at.filter(|(pixel, _)| !hot.contains(pixel));
-            let totals = looked_at.map(|(_, counts)| counts.iter().sum::<u64>());
+            let others = capture.iter().enumerate();
+            let others = others.filter(|(pixel, _)| !hot.contains(pixel));
+            let totals = others.map(|(_, counts)| counts.iter().sum::<u64>());
             let cycles = self.length.cycles(totals.max().unwrap_or(0));
             for (pixel, counts) in capture.iter().enumerate() {
                 let own = self.cycles.map(|cycles| cycles.get(traces.len()).copied());
@@ -100,26 +106,19 @@ impl Observed<'_> {
                     found == bins,
                     "capture {index}, pixel {pixel} has {found} bins, not {bins}"
                 );
+                let truth_mm = self.truth_mm.and_then(|truth| truth[traces.len()]);
                 traces.push(Trace {
-                    capture: index,
                     pixel,
                     cycles,
+                    truth_mm,
                     counts: counts.iter().map(|&count| count as f64).collect(),
                 });
             }
         }
-        if let Some(truth) = self.truth_mm {
-            ensure!(
-                truth.len() == traces.len(),
-                "{} true distances for {} histograms",
-                truth.len(),
-                traces.len()
-            );
-        }
         Ok(traces)
     }
 
-    /// Bins of a histogram; 0 of none.
+    /// Bins of a histogram; 0 if there is none.
     #[must_use]
     pub fn bins(&self) -> usize {
         let first = self.captures.first().and_then(|capture| capture.first());

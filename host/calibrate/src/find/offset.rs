@@ -1,39 +1,38 @@
 //! The range offset, and the bin width, from targets at known distances.
 //!
-//! The core places the highest peak of each whole histogram, with the estimator that events will
-//! have, so that whatever that is off by is in the offset. With distances that are known for many
-//! histograms the width is the median of the slopes of all pairs (Theil and Sen), which outliers
-//! do not move.
+//! The core places the highest peak of each histogram with the estimator that events will have, so that
+//! the offset includes its bias. If many histograms have known distances, the bin width is the median of
+//! the slopes of all pairs (Theil and Sen), which is robust against outliers.
 
 use dtof_core::fixed::types::U24F8;
 use dtof_core::{BinPosition, CentredWindow, Count16, DepthEstimator, Histogram, RangeGate};
 
-use super::limits::{median, quantile};
 use super::observed::Trace;
+use super::significance::{median, quantile};
 use dtof_engine::with_bins;
 use dtof_photons::MM_PER_PS;
 
-/// Histograms with known distances that are fitted, at most, evenly chosen.
+/// The most histograms that are fitted, evenly chosen.
 const MOST: usize = 400;
-/// A bin width is fitted if distances reach over so many bins.
+/// A bin width is fitted if distances span so many bins.
 const LEAST_BINS: f64 = 20.0;
-/// Positions that belong to one flat target differ by so many bins, at most.
+/// Positions on one flat target differ by at most so many bins.
 const ONE_TARGET: f64 = 1.5;
 
-/// What distances say.
+/// The range offset, and the bin width if distances show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Offset {
-    /// Millimetres to be added to every range.
+    /// Millimetres to add to every range.
     pub mm: f64,
-    /// Its standard error is about so much.
+    /// Standard error of `mm`, in millimetres.
     pub error_mm: f64,
-    /// Picoseconds a bin, if distances tell.
+    /// Picoseconds a bin, if it was fitted.
     pub bin_width_ps: Option<f64>,
     /// Histograms it was found from.
     pub histograms: usize,
 }
 
-/// From pairs of position in bins and true distance in millimetres.
+/// Fits pairs of position in bins and true distance in millimetres; `None` without pairs.
 #[must_use]
 pub fn from_distances(pairs: &[(f64, f64)], bin_width_ps: f64) -> Option<Offset> {
     let step = pairs.len().div_ceil(MOST).max(1);
@@ -63,8 +62,8 @@ pub fn from_distances(pairs: &[(f64, f64)], bin_width_ps: f64) -> Option<Offset>
     })
 }
 
-/// From one target at `distance_mm`: the positions near the most common one count. `None` if that
-/// is not more than half of them.
+/// From one target at `distance_mm`. Only positions near the most common one are used; `None` if they
+/// are not more than half.
 #[must_use]
 pub fn from_target(positions: &[f64], distance_mm: f64, bin_width_ps: f64) -> Option<Offset> {
     let mut sorted = positions.to_vec();
@@ -93,22 +92,21 @@ pub fn position(
     gate: (u16, u16),
     window: CentredWindow,
 ) -> Option<f64> {
-    with_bins!(bins, BINS => of::<BINS>(trace, gate, window)).ok()?
+    with_bins!(bins, BINS => {
+        let gate = RangeGate::<BINS>::new(gate.0, gate.1).ok();
+        gate.map(|gate| place(&trace.counts, &gate, window))
+    })
+    .ok()?
 }
 
-fn of<const BINS: usize>(trace: &Trace, gate: (u16, u16), window: CentredWindow) -> Option<f64> {
-    let gate = RangeGate::<BINS>::new(gate.0, gate.1).ok()?;
-    Some(place(&trace.counts, &gate, window))
-}
-
-/// The same of counts of any size.
+/// The same for counts of any size.
 #[must_use]
 pub fn place<const BINS: usize>(
     counts: &[f64],
     gate: &RangeGate<BINS>,
     window: CentredWindow,
 ) -> f64 {
-    // In counters of 16 bits.
+    // Scaled to counters of 16 bits.
     let highest = counts.iter().copied().fold(0.0, f64::max);
     let scale = (60_000.0 / highest.max(1.0)).min(1.0);
     let mut frame = [0u32; BINS];

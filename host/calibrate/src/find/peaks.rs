@@ -1,21 +1,21 @@
-//! Peaks of a histogram: bins in a row that hold certainly more than the background.
+//! Peaks of a histogram: consecutive bins that hold significantly more than the background.
 //!
-//! A row with two tops is two peaks if the counts between them fall certainly, and below half of
-//! the lower top.
+//! Bins with two tops are two peaks if the counts between them are significantly lower, and less than
+//! half of the lower top.
 
-use super::limits::{is_less, is_more};
+use super::significance::{is_surely_less, is_surely_more};
 
-/// A bin belongs to a peak by chance once in so many bins.
+/// By chance one bin in so many belongs to a peak.
 const ONE_IN: f64 = 1e7;
 
-/// Bins that hold a peak.
+/// A peak.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Peak {
-    /// The first.
+    /// Its first bin.
     pub first: usize,
-    /// The fullest.
+    /// Its highest bin.
     pub top: usize,
-    /// The last.
+    /// Its last bin.
     pub last: usize,
     /// Photons above the background.
     pub photons: f64,
@@ -40,6 +40,12 @@ impl Peak {
         peaks
     }
 
+    /// Whether bin `top` lies in the peak or next to it.
+    #[must_use]
+    pub const fn is_near(&self, top: usize) -> bool {
+        self.first <= top + 1 && self.last + 1 >= top
+    }
+
     fn new(counts: &[f64], background: f64, first: usize, last: usize) -> Self {
         let top = highest(counts, first, last);
         let above = counts[first..=last].iter().map(|count| count - background);
@@ -52,15 +58,15 @@ impl Peak {
     }
 }
 
-/// For each bin whether it holds more than background, alone or with both neighbours. Of three
-/// that do only together those count that hold more than the mean.
+/// For each bin whether it holds significantly more than the background, alone or with both neighbours.
+/// In a group of three, only the bins above the background by a standard deviation count.
 fn standing(counts: &[f64], background: f64) -> Vec<bool> {
     let mut stands: Vec<bool> = counts
         .iter()
-        .map(|&count| is_more(count, background, ONE_IN))
+        .map(|&count| is_surely_more(count, background, ONE_IN))
         .collect();
     for (first, three) in counts.windows(3).enumerate() {
-        if is_more(three.iter().sum(), 3.0 * background, ONE_IN) {
+        if is_surely_more(three.iter().sum(), 3.0 * background, ONE_IN) {
             for (bin, &count) in (first..).zip(three) {
                 stands[bin] |= count > background + background.sqrt();
             }
@@ -79,7 +85,7 @@ fn highest(counts: &[f64], first: usize, last: usize) -> usize {
     top
 }
 
-/// Adds the peaks of the row `first..=last`.
+/// Adds the peaks among the bins `first..=last`.
 fn split(counts: &[f64], background: f64, first: usize, last: usize, peaks: &mut Vec<Peak>) {
     let (mut start, mut top, mut valley) = (first, first, first);
     for bin in first..=last {
@@ -96,7 +102,8 @@ fn split(counts: &[f64], background: f64, first: usize, last: usize, peaks: &mut
         let above = |bin: usize| counts[bin] - background;
         // The lower of the two tops, so far.
         let lower = above(top).min(above(bin));
-        if above(valley) < 0.5 * lower && is_less(counts[valley], lower + background, ONE_IN) {
+        if above(valley) < 0.5 * lower && is_surely_less(counts[valley], lower + background, ONE_IN)
+        {
             peaks.push(Peak::new(counts, background, start, valley - 1));
             (start, top, valley) = (valley, bin, bin);
         } else if counts[bin] > counts[top] {

@@ -1,33 +1,32 @@
-//! Pile-up: a TDC that takes one photon a laser cycle misses those behind the first.
+//! Pile-up: a TDC that records one photon a laser cycle misses all photons after the first.
 //!
-//! Of `N` laser cycles, `N_i` are left when bin `i` begins, those without a photon before it. With
-//! `h_i` photons in the bin, Coates' estimator of the photons that came is
-//! `N·ln(N_i / (N_i - h_i))`. With such a TDC the background of a bin goes with `N_i`, with any
-//! other it is even. So it goes with a power of `N_i`, which is 1 or 0: a straight line through
-//! the counts over `ln N_i`, in the bins that hold background alone, tells which.
+//! Of `N` laser cycles, `N_i` have no photon before bin `i`. With `h_i` photons in the bin, Coates'
+//! estimator of the photons that arrived is `N·ln(N_i / (N_i - h_i))`. With such a TDC the background of a
+//! bin is proportional to `N_i`; with any other it is constant. So it is proportional to a power of `N_i`,
+//! which is 1 or 0. A straight line through the counts of background bins over `ln N_i` decides.
 
 use super::background::Level;
 use super::observed::Trace;
 
-/// The power is on one side of 1/2 by so many standard deviations.
+/// Standard deviations between the power and 1/2 that decide.
 const DECIDES: f64 = 4.0;
 
-/// What the histograms say of the TDC.
+/// The kind of TDC, as histograms show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tdc {
-    /// One photon a laser cycle; this share of the photons that came is lost.
+    /// One photon a laser cycle. This share of the arriving photons is lost.
     OneHit(f64),
     /// More than one, or so little light that it makes no difference.
     SeveralHits,
-    /// Either; with one this share would be lost.
+    /// Not decided. With one photon a laser cycle this share would be lost.
     Unclear(f64),
 }
 
-/// Which TDC made `traces`, whose laser cycles are known.
+/// The TDC that recorded `traces`, whose laser cycles are known.
 #[must_use]
 pub fn tdc(traces: &[Trace]) -> Tdc {
     let (mut covariance, mut information) = (0.0, 0.0);
-    let (mut counted, mut came) = (0.0, 0.0);
+    let (mut counted, mut arrived) = (0.0, 0.0);
     for trace in traces {
         let total: f64 = trace.counts.iter().sum();
         if total > trace.cycles {
@@ -35,8 +34,8 @@ pub fn tdc(traces: &[Trace]) -> Tdc {
         }
         let (corrected, left) = coates(&trace.counts, trace.cycles);
         counted += total;
-        came += corrected.iter().sum::<f64>();
-        // Clear by either law, so that neither is favoured.
+        arrived += corrected.iter().sum::<f64>();
+        // Only bins that are background under both hypotheses, so that neither is favoured.
         let [plain, other] = [&trace.counts, &corrected].map(|counts| Level::of(counts).clear);
         let clear: Vec<(f64, f64)> = (0..left.len())
             .filter(|&bin| plain[bin] && other[bin] && left[bin] > 0.0)
@@ -50,8 +49,8 @@ pub fn tdc(traces: &[Trace]) -> Tdc {
             information += (log - middle).powi(2) * mean;
         }
     }
-    let lost = if came > 0.0 {
-        1.0 - counted / came
+    let lost = if arrived > 0.0 {
+        1.0 - counted / arrived
     } else {
         0.0
     };
@@ -65,20 +64,20 @@ pub fn tdc(traces: &[Trace]) -> Tdc {
     }
 }
 
-/// The photons that came in each bin, and the laser cycles that were left for it.
+/// For each bin the photons that arrived, and the laser cycles without a photon before it.
 #[must_use]
 pub fn coates(counts: &[f64], cycles: f64) -> (Vec<f64>, Vec<f64>) {
     let mut left = cycles;
     let bins = counts.iter().map(|&count| {
         let before = left;
         left = (left - count).max(0.0);
-        // With the last laser cycle gone nothing is known; half of one bounds the logarithm.
-        let came = if before > 0.0 {
+        // If no laser cycle is left, half of one bounds the logarithm.
+        let arrived = if before > 0.0 {
             cycles * (before / left.max(0.5)).ln().max(0.0)
         } else {
             0.0
         };
-        (came, before)
+        (arrived, before)
     });
     bins.unzip()
 }
@@ -88,7 +87,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn coates_gives_back_the_photons_that_came() {
+    fn coates_estimator_inverts_pile_up() {
         let rates = [0.1, 0.4, 0.05, 0.0, 0.9];
         let cycles = 1e6;
         let mut left = cycles;

@@ -1,47 +1,47 @@
 //! The pixels of an array: their background, and those that are hot or dead.
 
 use super::background::Level;
-use super::limits::{is_more, median, quantile};
 use super::observed::Trace;
+use super::significance::{is_surely_more, median, quantile};
 
-/// A hot pixel has more than so many times the background of the median one.
-pub const HOT: f64 = 10.0;
-/// One pixel in so many is named by chance, at most: none in a thousand of the largest arrays.
+/// A hot pixel has more than this many times the background of the median pixel.
+const HOT: f64 = 10.0;
+/// By chance at most one pixel in so many is called hot or dead: one in a thousand of the largest arrays.
 const ONE_IN: f64 = 65_536.0 * 1000.0;
 
-/// What the background of an array is.
+/// The background of an array, and its bad pixels.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pixels {
-    /// Photons a bin and laser cycle of the median pixel: the mean of the middle half of them.
+    /// Photons a bin and laser cycle: the mean of the middle half of the pixels.
     pub background: f64,
-    /// The 95 % interval of that.
+    /// The 95 % interval of `background`.
     pub between: (f64, f64),
-    /// What a tenth of the pixels lie below, and a tenth above.
+    /// The 10th and 90th percentile of the pixels.
     pub spread: (f64, f64),
-    /// Those with many times as much.
+    /// Hot pixels: with many times the background of the others.
     pub hot: Vec<usize>,
-    /// Those without a photon where others have enough to be sure.
+    /// Dead pixels: without a photon where others have enough for a decision.
     pub dead: Vec<usize>,
 }
 
 impl Pixels {
-    /// Of an array of `pixels`, with the level of each trace.
+    /// Classifies `pixels` pixels from the background of each trace.
     #[must_use]
     pub fn new(pixels: usize, traces: &[Trace], levels: &[Level]) -> Self {
         let mut of = vec![Sum::default(); pixels];
         for (trace, level) in traces.iter().zip(levels) {
             of[trace.pixel].add(trace, level);
         }
-        // Most of the pixels may be dead: those with photons say what is usual.
+        // Most of the pixels may be dead: the median is that of pixels with photons.
         let with_photons = of.iter().filter(|pixel| pixel.total > 0.0);
         let usual = median(with_photons.map(|pixel| pixel.total));
         let is_dead = |pixel: &Sum| pixel.total == 0.0 && usual > ONE_IN.ln();
         let alive = of.iter().filter(|pixel| !is_dead(pixel));
         let rate = median(alive.map(Sum::rate));
-        // One photon more: a median of 0 says little.
+        // One photon more, as the median may be 0.
         let is_hot = |pixel: &Sum| {
             let most = HOT * (rate * pixel.exposure + 1.0);
-            is_more(pixel.photons, most, ONE_IN)
+            is_surely_more(pixel.photons, most, ONE_IN)
         };
         let indices = |is: &dyn Fn(&Sum) -> bool| (0..pixels).filter(|&at| is(&of[at])).collect();
         let mut good: Vec<&Sum> = of
@@ -56,8 +56,8 @@ impl Pixels {
         let background = photons / exposure.max(1.0);
         let rates = || good.iter().map(|pixel| pixel.rate());
         let [low, high] = [0.16, 0.84].map(|share| quantile(rates(), share));
-        // The mean of the middle half of normal values has 1.2 times the variance of the mean; one
-        // pixel alone has no spread, but its photons.
+        // The mean of the middle half of normal values has 1.2 times the variance of the mean. A single
+        // pixel has no spread, but shot noise.
         let by_spread = 1.1 * (high - low) / 2.0 / (good.len().max(1) as f64).sqrt();
         let by_count = photons.sqrt() / exposure.max(1.0);
         let error = 1.96 * by_spread.max(by_count);

@@ -10,49 +10,50 @@
 
 use dtof_core::fixed::types::U8F8;
 
-use super::half_widths::{Suited, suited};
-use super::limits::median;
+use super::half_widths::{AsymmetricWindow, asymmetric_window};
 use super::shape::{Fit, Window, best};
+use super::significance::median;
 
-/// Peaks that are fitted, at most: more take time and hardly change anything.
-const MOST: usize = 256;
-/// Photons of a peak, at least, and how many times its own noise.
-const LEAST_PHOTONS: f64 = 30.0;
-const LEAST_SIGNAL: f64 = 8.0;
-/// A peak whose deviance lies so many standard deviations above its degrees of freedom is no
-/// Gaussian.
-const MISFIT: f64 = 4.5;
-/// A pulse is no Gaussian if the misfit of its peaks is more than this share of their photons.
-const UNEVEN: f64 = 0.03;
+/// The most peaks that are fitted: more take time and hardly change anything.
+const MAX_PEAKS: usize = 256;
+/// The fewest photons of a peak, and its lowest signal-to-noise ratio.
+const MIN_PHOTONS: f64 = 30.0;
+const MIN_SNR: f64 = 8.0;
+/// A Gaussian does not fit a peak whose deviance lies so many standard deviations above its degrees of
+/// freedom.
+const MAX_DEVIANCE_Z: f64 = 4.5;
+/// The pulse is not Gaussian if the median residual of its peaks is more than this share of their
+/// photons.
+const MAX_RESIDUAL: f64 = 0.03;
 
 /// The pulse.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Pulse {
     /// Standard deviation in bins.
     pub sigma: f64,
-    /// The 95 % interval of that.
+    /// The 95 % interval of `sigma`.
     pub between: (f64, f64),
-    /// Peaks it was found from.
+    /// The number of peaks that were fitted.
     pub peaks: usize,
-    /// Signal photons a laser cycle of the median one.
+    /// Signal photons a laser cycle of the median peak.
     pub signal: f64,
-    /// Share of the photons that come more than three σ after, and before, a Gaussian's.
+    /// The share of the photons that come more than 3σ after the Gaussian.
     pub tail: f64,
-    /// Whether σ is that of the core, as a Gaussian does not fit.
+    /// Whether `sigma` is that of the core, because a Gaussian does not fit the whole pulse.
     pub is_core: bool,
-    /// The window that suits a pulse that is no Gaussian, if equal half widths do not.
-    pub suited: Option<Suited>,
+    /// An asymmetric window for the depth, if it is better than a symmetric one.
+    pub asymmetric: Option<AsymmetricWindow>,
 }
 
-/// Finds the pulse from windows that hold one peak each; `None` if no peak is bright enough.
+/// Fits the pulse in windows that hold one peak each; `None` if no peak is bright enough.
 #[must_use]
 pub fn pulse(windows: &[Window], seed: u64) -> Option<Pulse> {
     let mut bright: Vec<&Window> = windows
         .iter()
-        .filter(|window| window.photons >= LEAST_PHOTONS && window.clearness() >= LEAST_SIGNAL)
+        .filter(|window| window.photons >= MIN_PHOTONS && window.snr() >= MIN_SNR)
         .collect();
-    bright.sort_by(|one, other| other.clearness().total_cmp(&one.clearness()));
-    bright.truncate(MOST);
+    bright.sort_by(|one, other| other.snr().total_cmp(&one.snr()));
+    bright.truncate(MAX_PEAKS);
     if bright.is_empty() {
         return None;
     }
@@ -61,20 +62,22 @@ pub fn pulse(windows: &[Window], seed: u64) -> Option<Pulse> {
     let fitting: Vec<Window> = all
         .iter()
         .zip(&fits)
-        .filter(|(_, fit)| fit.misfit() < MISFIT)
+        .filter(|(_, fit)| fit.deviance_z() < MAX_DEVIANCE_Z)
         .map(|(window, _)| window.narrowed(sigma))
         .collect();
-    let uneven = median(fits.iter().map(Fit::unevenness));
-    let is_core = 2 * fitting.len() < all.len() && uneven > UNEVEN;
+    let residual = median(fits.iter().map(Fit::residual_share));
+    let most_fit = 2 * fitting.len() >= all.len();
+    let is_core = !most_fit && residual > MAX_RESIDUAL;
     let kept = if is_core {
         all.iter().map(Window::core).collect()
-    } else if 2 * fitting.len() < all.len() {
-        all.clone()
-    } else {
+    } else if most_fit {
         fitting
+    } else {
+        all
     };
     let (sigma, fits) = best(&kept);
-    let suited = is_core.then(|| suited(&kept, U8F8::saturating_from_num(sigma), seed));
+    let core = is_core.then(|| U8F8::saturating_from_num(sigma));
+    let asymmetric = core.and_then(|core| asymmetric_window(&kept, core, seed));
     let between = super::shape::interval(&kept, sigma);
     let signals = kept
         .iter()
@@ -87,16 +90,16 @@ pub fn pulse(windows: &[Window], seed: u64) -> Option<Pulse> {
         signal: median(signals),
         tail: tail(&kept, &fits, sigma),
         is_core,
-        suited: suited.flatten(),
+        asymmetric,
     })
 }
 
-/// What comes late beyond a Gaussian, as a share of all.
+/// The share of the photons that come more than 3σ after the Gaussian.
 fn tail(windows: &[Window], fits: &[Fit], sigma: f64) -> f64 {
     let (mut late, mut all) = (0.0, 0.0);
     for (window, fit) in windows.iter().zip(fits) {
         let from = fit.position + 3.0 * sigma;
-        for (bin, count) in window.behind() {
+        for (bin, count) in window.after_top() {
             if bin as f64 >= from {
                 late += count - window.background;
             }

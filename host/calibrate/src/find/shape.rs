@@ -1,13 +1,13 @@
-//! A peak of one histogram, and the Gaussian that fits it for a given σ.
+//! A peak of one histogram, and the maximum-likelihood fit of a Gaussian.
 
 use dtof_theory::counts::normal;
 
-/// Fisher scoring has come to rest before.
+/// The most steps of Fisher scoring; it converges before.
 const STEPS: usize = 30;
-/// σ in bins that are tried.
+/// The lowest and the highest σ in bins that is tried.
 const SIGMAS: (f64, f64) = (0.12, 8.0);
 
-/// Bins about the top that are kept with a window.
+/// The bins around the top that a window keeps.
 pub const ABOUT: usize = 32;
 
 /// The part of a histogram that holds one peak.
@@ -15,23 +15,23 @@ pub const ABOUT: usize = 32;
 pub struct Window {
     /// Laser cycles of the histogram.
     pub cycles: f64,
-    /// Photons a bin without the peak.
+    /// Background photons a bin.
     pub background: f64,
-    /// Photons of the peak, about.
+    /// Photons of the peak above the background, before any fit.
     pub photons: f64,
-    /// Photons of so many bins about the top, in place of those of other peaks the background.
+    /// Counts of [`ABOUT`] bins around the top. Bins of other peaks hold the background instead.
     pub about_top: Vec<f64>,
-    /// Photons of the bins around it, up to the next peak.
+    /// Counts of the bins around the top, up to the next peaks.
     counts: Vec<f64>,
-    /// Which bin is the first of them.
+    /// The first bin of `counts`.
     start: usize,
-    /// Which of them is the top, and which are fitted.
+    /// The index of the top in `counts`, and the first and last index that is fitted.
     top: usize,
     fitted: (usize, usize),
 }
 
 impl Window {
-    /// The peak at `top`, alone in `first..=last`, of a histogram.
+    /// The peak at `top` of a histogram, which has no other peak in `first..=last`.
     #[must_use]
     pub fn new(
         counts: &[f64],
@@ -52,14 +52,14 @@ impl Window {
             .collect();
         let counts = counts[first..=last].to_vec();
         let top = top - first;
-        // Half of the height on either side, and as much again three times.
+        // The full width at half maximum, one and a half times on either side.
         let half = background + (counts[top] - background) / 2.0;
         let reach = |steps: &mut dyn Iterator<Item = usize>| {
             steps.take_while(|&bin| counts[bin] > half).count()
         };
         let before = reach(&mut (0..top).rev());
-        let behind = reach(&mut (top + 1..counts.len()));
-        let reach = 3 * (before + behind + 1) / 2 + 2;
+        let after = reach(&mut (top + 1..counts.len()));
+        let reach = 3 * (before + after + 1) / 2 + 2;
         let fitted = (
             top.saturating_sub(reach),
             (top + reach).min(counts.len() - 1),
@@ -78,14 +78,14 @@ impl Window {
         }
     }
 
-    /// The signal as a multiple of its noise.
+    /// The signal-to-noise ratio.
     #[must_use]
-    pub fn clearness(&self) -> f64 {
+    pub fn snr(&self) -> f64 {
         let all = self.counts[self.fitted.0..=self.fitted.1].iter();
         self.photons / all.sum::<f64>().max(1.0).sqrt()
     }
 
-    /// Where more of the background than needed was fitted, less.
+    /// With fewer background bins in the fit: at most those within 4σ and two more of the top.
     #[must_use]
     pub fn narrowed(&self, sigma: f64) -> Self {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
@@ -100,7 +100,7 @@ impl Window {
         }
     }
 
-    /// With the bins of at least a quarter of its height alone, and three at least.
+    /// With only the bins of at least a quarter of the height in the fit, and at least three.
     #[must_use]
     pub fn core(&self) -> Self {
         let quarter = self.background + (self.counts[self.top] - self.background) / 4.0;
@@ -124,8 +124,8 @@ impl Window {
         }
     }
 
-    /// The bins behind the top, with their photons.
-    pub fn behind(&self) -> impl Iterator<Item = (usize, f64)> {
+    /// The bins after the top, with their counts.
+    pub fn after_top(&self) -> impl Iterator<Item = (usize, f64)> {
         let bins = self.counts.iter().copied().enumerate().skip(self.top + 1);
         bins.map(|(bin, count)| (self.start + bin, count))
     }
@@ -136,7 +136,7 @@ impl Window {
         let (first, last) = self.fitted;
         let counts = &self.counts[first..=last];
         let mut amplitude = self.photons.max(1.0);
-        // From the start of the window.
+        // In bins from the start of the window.
         let mut position = self.centroid();
         let mut shares = vec![(0.0, 0.0); counts.len()];
         let mut information = 0.0;
@@ -200,7 +200,7 @@ impl Window {
     }
 }
 
-/// The share of the pulse in each bin from `first` on, and how it grows with the position.
+/// The share of the pulse in each bin from `first` on, and its derivative by the position.
 fn share(shares: &mut [(f64, f64)], first: usize, position: f64, sigma: f64) {
     let at = |bin: usize| {
         let z = (bin as f64 - position) / sigma;
@@ -215,12 +215,12 @@ fn share(shares: &mut [(f64, f64)], first: usize, position: f64, sigma: f64) {
     }
 }
 
-/// A Gaussian in a histogram.
+/// A Gaussian that was fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Fit {
     /// Its photons.
     pub amplitude: f64,
-    /// Where its middle is, in bins from the start of bin 0.
+    /// Its centre, in bins from the start of bin 0.
     pub position: f64,
     likelihood: f64,
     deviance: f64,
@@ -228,16 +228,15 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// How many standard deviations the deviance lies above what noise makes.
+    /// Standard deviations that the deviance lies above its expectation.
     #[must_use]
-    pub fn misfit(&self) -> f64 {
+    pub fn deviance_z(&self) -> f64 {
         (self.deviance - self.freedom) / (2.0 * self.freedom.max(1.0)).sqrt()
     }
 
-    /// What of the photons lies elsewhere than fitted, about: a root of a mean of squares,
-    /// without what noise makes.
+    /// The root mean square of the residuals as a share of the photons, less shot noise.
     #[must_use]
-    pub fn unevenness(&self) -> f64 {
+    pub fn residual_share(&self) -> f64 {
         ((self.deviance - self.freedom).max(0.0) / self.amplitude.max(1.0)).sqrt()
     }
 }
@@ -246,7 +245,7 @@ impl Fit {
 #[must_use]
 pub fn best(windows: &[Window]) -> (f64, Vec<Fit>) {
     let of = |log: f64| -total(windows, log.exp());
-    // Golden section; the likelihood has one maximum where peaks stand clear.
+    // Golden-section search; the likelihood has one maximum if peaks are clear.
     let golden = (5f64.sqrt() - 1.0) / 2.0;
     let (mut low, mut high) = (SIGMAS.0.ln(), SIGMAS.1.ln());
     let (mut left, mut right) = (high - golden * (high - low), low + golden * (high - low));
@@ -272,13 +271,13 @@ fn total(windows: &[Window], sigma: f64) -> f64 {
     each.sum()
 }
 
-/// The 95 % interval of `sigma`, from how fast the likelihood falls.
+/// The 95 % interval of `sigma`, from the curvature of the likelihood.
 #[must_use]
 pub fn interval(windows: &[Window], sigma: f64) -> (f64, f64) {
     let step = 0.02;
     let at = |by: f64| total(windows, sigma * f64::exp(by));
     let curvature = (2.0 * at(0.0) - at(step) - at(-step)) / (step * step);
-    // A flat likelihood says nothing.
+    // A flat likelihood has no curvature.
     let error = 1.96 / curvature.max(1.0).sqrt();
     (sigma * (-error).exp(), sigma * error.exp())
 }
@@ -289,7 +288,7 @@ mod tests {
     use dtof_theory::rates::bin_share;
 
     #[test]
-    fn the_exact_means_of_a_gaussian_give_it_back() {
+    fn a_gaussian_without_noise_is_found_again() {
         for (sigma, position) in [(0.5, 20.3), (0.8, 20.98), (1.6, 19.5)] {
             let counts: Vec<f64> = (0..64)
                 .map(|bin| 12.0 + 4000.0 * bin_share(bin, position, sigma))

@@ -1,6 +1,6 @@
 //! `dtof calibrate`: the settings of a sensor from a recording, or from the sensor itself.
 
-mod desk;
+mod from_device;
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -11,29 +11,28 @@ use dtof::path;
 use dtof_calibrate::remarks;
 use dtof_calibrate::report::{self, MARKS};
 use dtof_engine::settings::SettingsFile;
-use dtof_options::files::{Marked, write_marked};
+use dtof_options::files::{MarkedFile, write_marked};
 use dtof_options::rows::aligned;
 use dtof_run::calibrate::Options;
 
-use self::desk::{Desk, Gathered};
+use self::from_device::{DeviceArgs, FromDevice};
 use super::flags::Flags;
 use super::warn;
 
 #[derive(Args)]
 pub struct Calibrate {
-    /// A recording, of any format that `replay` reads
+    /// Recording in any format that `replay` reads
     #[arg(long, value_name = "FILE", value_parser = path(), conflicts_with = "device")]
     input: Option<PathBuf>,
     #[command(flatten)]
-    desk: Desk,
-    /// The settings file to write
+    from_device: DeviceArgs,
+    /// Settings file to write
     #[arg(long, value_name = "FILE", value_parser = path())]
     out: PathBuf,
-    /// The report to write [default: as the settings file, with .html]
+    /// Report to write [default: the name of the settings file, with .html]
     #[arg(long, value_name = "FILE", value_parser = path())]
     report: Option<PathBuf>,
-    /// Older settings of the sensor: what is not found now is taken from them, and the report says
-    /// what has changed
+    /// Older settings of the sensor. They fill in what is not found now, and the report compares them
     #[arg(long, value_name = "FILE", value_parser = path())]
     settings: Option<PathBuf>,
     #[command(flatten)]
@@ -47,28 +46,33 @@ impl Calibrate {
     pub fn run(&self) -> Result<()> {
         let older = self.settings.as_deref().map(SettingsFile::read);
         let older = older.transpose()?;
-        let said = self.options.0.said(older.as_ref())?;
-        let calibrated = self.calibrate(&said, older);
-        calibrated.map_err(|error| said.blame(error))
+        let requested = self.options.0.requested(older.as_ref())?;
+        let calibrated = self.calibrate(&requested, older);
+        calibrated.map_err(|error| requested.add_file_name(error))
     }
 
-    fn calibrate(&self, said: &SettingsFile, older: Option<SettingsFile>) -> Result<()> {
+    fn calibrate(&self, requested: &SettingsFile, older: Option<SettingsFile>) -> Result<()> {
         let name = self.input.as_ref().map(|input| input.display().to_string());
-        let name = name.or(self.desk.device.clone()).unwrap_or_default();
+        let name = name.or(self.from_device.device.clone()).unwrap_or_default();
         let (found, settings, collected) = match &self.input {
             Some(input) => {
-                self.desk.suits_file()?;
-                let of_file = self.options.0.calibrate(&input.into(), said.clone())?;
-                warn(input, of_file.warnings, self.quiet);
-                (of_file.found, of_file.settings, Vec::new())
+                self.from_device.check_unused()?;
+                let calibrated = self.options.0.calibrate(&input.into(), requested.clone())?;
+                warn(input, calibrated.warnings, self.quiet);
+                (calibrated.found, calibrated.settings, Vec::new())
             }
             None => {
-                let (given, asked) = (&self.options.0.given, self.options.0.asked());
-                let port = self.desk.open(given)?;
-                let desk = &self.desk;
-                let gathered = desk.calibrate((&name, port), said, &asked, self.quiet);
-                let Gathered { found, known, rows } = gathered.with_context(|| name.clone())?;
-                let settings = found.settings(said.clone().or(known))?;
+                let Options { given, calibration } = &self.options.0;
+                let port = self.from_device.open(given)?;
+                let device = &self.from_device;
+                let calibrated =
+                    device.calibrate((&name, port), requested, calibration, self.quiet);
+                let FromDevice {
+                    found,
+                    settings,
+                    rows,
+                } = calibrated.with_context(|| name.clone())?;
+                let settings = found.settings(requested.clone().or(settings))?;
                 (found, settings, rows)
             }
         };
@@ -83,12 +87,12 @@ impl Calibrate {
         );
         let inputs = [self.input.as_deref(), self.settings.as_deref()];
         let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
-        // The settings last: where they are, the report is.
+        // Settings are written last: if they exist, so does the report.
         let text = settings.to_toml()?;
-        let of = |place, text, mark| Marked { place, text, mark };
+        let marked = |place, text, mark| MarkedFile { place, text, mark };
         let files = [
-            of(place.as_path(), page.as_str(), MARKS[1]),
-            of(&self.out, &text, MARKS[0]),
+            marked(place.as_path(), page.as_str(), MARKS[1]),
+            marked(&self.out, &text, MARKS[0]),
         ];
         write_marked(&files, &inputs)?;
         if !self.quiet {

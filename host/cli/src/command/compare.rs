@@ -1,4 +1,4 @@
-//! `dtof compare`: which method for these photons.
+//! `dtof compare`: all methods on the same photons, and the best of them.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -10,8 +10,8 @@ use dtof::progress::Steps;
 use dtof_compare::page::{self, FILES};
 use dtof_options::Refused;
 use dtof_options::rows::aligned;
-use dtof_photons::medium::Medium;
-use dtof_run::compare::{Compared, Input, Options, Told};
+use dtof_photons::input::Input;
+use dtof_run::compare::{Callbacks, CompareInput, CompareResult, Options};
 use dtof_simulate::scene::Scene;
 
 use super::flags::Flags;
@@ -19,17 +19,17 @@ use super::warn;
 
 #[derive(Args)]
 pub struct Compare {
-    /// A recording, of any format that `replay` reads
+    /// Recording in any format that `replay` reads
     #[arg(long, value_name = "FILE", value_parser = path(), required_unless_present = "scene")]
     input: Option<PathBuf>,
-    /// A scene instead, a TOML file; docs/scenes.md lists its keys
+    /// Scene instead of a recording, a TOML file; docs/scenes.md lists its keys
     #[arg(long, value_name = "FILE", value_parser = path(), conflicts_with = "input")]
     scene: Option<PathBuf>,
-    /// The true range of each pixel in millimetres, an .npy array with as many numbers; 0 is
-    /// none [default: that of the file, if it has one]
+    /// True range of each pixel in millimetres, an .npy array with a number a pixel; 0 for unknown
+    /// [default: the file's, if it has one]
     #[arg(long, value_name = "FILE", value_parser = path(), conflicts_with = "scene")]
     truth: Option<PathBuf>,
-    /// The folder of the results
+    /// Folder of the results
     #[arg(long, value_name = "DIR", value_parser = path())]
     out: PathBuf,
     #[command(flatten)]
@@ -44,16 +44,18 @@ impl Compare {
         let name = self.input.as_deref().or(self.scene.as_deref());
         let name = name.ok_or_else(|| Refused::new("input", "is needed, or `scene`"))?;
         page::may_write(&self.out, &self.inputs())?;
-        let said = self.options.0.said(self.scene.is_some())?;
+        let requested = self.options.0.requested(self.scene.is_some())?;
         let input = match &self.scene {
-            Some(file) => Input::Scene(Box::new(Scene::read(file)?), file.display().to_string()),
-            None => Input::Recording(name.into(), self.truth.as_deref().map(Medium::from)),
+            Some(file) => {
+                CompareInput::Scene(Box::new(Scene::read(file)?), file.display().to_string())
+            }
+            None => CompareInput::Recording(name.into(), self.truth.as_deref().map(Input::from)),
         };
         let steps = Steps::new(self.quiet);
         let compared = self.options.0.compare(
             input,
-            &said,
-            &Told {
+            &requested,
+            &Callbacks {
                 warning: &|warning| warn(name, [warning], self.quiet),
                 step: &|step| {
                     steps.at(step);
@@ -62,16 +64,22 @@ impl Compare {
             },
         );
         steps.finish();
-        let Compared {
-            comparison: compared,
-            settings: taken,
+        let CompareResult {
+            comparison,
+            settings,
         } = compared?;
-        page::write(&compared, &self.out, name, taken.as_ref(), &self.inputs())?;
+        page::write(
+            &comparison,
+            &self.out,
+            name,
+            settings.as_ref(),
+            &self.inputs(),
+        )?;
         if !self.quiet {
             let mut out = io::stdout().lock();
             let report = self.out.join("report.html");
-            write!(out, "{}", aligned(&compared.rows()))?;
-            if taken.is_some() {
+            write!(out, "{}", aligned(&comparison.rows()))?;
+            if settings.is_some() {
                 writeln!(
                     out,
                     "\n{} has these settings.",
@@ -84,7 +92,7 @@ impl Compare {
         Ok(())
     }
 
-    /// The files that are read.
+    /// The input files.
     fn inputs(&self) -> Vec<&Path> {
         let files = [
             &self.input,

@@ -11,7 +11,7 @@ use dtof_events::{aer_file, events_csv};
 
 #[derive(Args)]
 pub struct Decode {
-    /// The file; `-` for standard input
+    /// AER file; `-` for standard input
     file: PathBuf,
 }
 
@@ -19,7 +19,7 @@ impl Decode {
     pub fn run(&self) -> Result<()> {
         let mut out = BufWriter::new(io::stdout().lock());
         let printed = self.print(&mut out);
-        // What was read before the damage is printed before the damage is named.
+        // Events before damage are printed before the error.
         let flushed = out.flush().map_err(anyhow::Error::from);
         printed.and(flushed)
     }
@@ -39,7 +39,7 @@ impl Decode {
         let header = *reader.header();
         let scale = RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?;
         let first = reader.next_event();
-        // The columns are those of the first event.
+        // The first event decides on the columns.
         let header = match &first {
             Ok(Some(event)) => events_csv::header(event.kind()),
             _ => events_csv::HEADER,

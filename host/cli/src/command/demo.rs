@@ -1,39 +1,36 @@
-//! `dtof demo`: a simulated scene that shows what blocks of pixels and several echoes are for.
+//! `dtof demo`: a simulated scene that shows the use of pixel blocks and of several echoes.
 
 use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Parser;
 use dtof::path;
-use dtof_engine::settings::Run;
-use dtof_options::numbers::{MOST_WHOLE, whole};
-use dtof_run::simulate::{Simulation, array, of_scene};
+use dtof_engine::settings::{RunSettings, SettingsFile};
+use dtof_options::numbers::{MAX_INTEGER, integer};
+use dtof_run::simulate::{Simulation, array, settings_of_scene};
 use dtof_simulate::demo;
 
-use super::simulate::Results;
+use super::dynamic_depth::DynamicDepthOptions;
+use super::job::{EngineOptions, ResultOptions};
+use super::simulate::Job;
 
 #[derive(Parser)]
 pub struct Demo {
-    /// The folder of the results
+    /// Folder of the results
     #[arg(long, default_value = "out/demo", value_parser = path())]
     out: PathBuf,
     /// Macropixels of the array [default: 64x32; 8x8 with --device]
     #[arg(long, value_name = "COLUMNSxROWS", value_parser = array)]
     array: Option<[u32; 2]>,
-    /// Decide on a device: tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated
-    /// device [default: this computer]
-    #[arg(long, value_name = "DEVICE")]
-    device: Option<String>,
-    /// Image that `--device qemu` runs [default: what `cargo xtask image mps2-an386` has built]
-    #[arg(long, value_name = "FILE", requires = "device")]
-    image: Option<PathBuf>,
-    /// Laser cycles of the scene
-    #[arg(long, value_name = "N", default_value_t = 4000, value_parser = whole(1..=MOST_WHOLE))]
+    #[command(flatten)]
+    engine: EngineOptions,
+    /// Laser cycles to simulate
+    #[arg(long, value_name = "N", default_value_t = 4000, value_parser = integer(1..=MAX_INTEGER))]
     cycles: u64,
-    /// Seed of the simulated photons.
-    #[arg(long, default_value_t = 1, value_parser = whole(0..=MOST_WHOLE))]
+    /// Seed of the simulated photons
+    #[arg(long, default_value_t = 1, value_parser = integer(0..=MAX_INTEGER))]
     seed: u64,
-    /// Print nothing but errors.
+    /// Print nothing but errors
     #[arg(long)]
     quiet: bool,
 }
@@ -44,15 +41,18 @@ impl Demo {
         let mut scene = demo::scene()?;
         if let Some(size) = self.array {
             scene.size = size;
-        } else if self.device.is_some() {
+        } else if self.engine.device.is_some() {
             scene.size = [8, 8];
         }
-        let said = Run {
-            cycles: Some(self.cycles),
-            seed: Some(self.seed),
-            ..Run::default()
+        let requested = SettingsFile {
+            run: RunSettings {
+                cycles: Some(self.cycles),
+                seed: Some(self.seed),
+                ..RunSettings::default()
+            },
+            ..SettingsFile::default()
         };
-        let said = of_scene(said.into(), &scene)?;
+        let requested = settings_of_scene(requested, &scene)?;
         let lead = format!(
             "A simulated scene of {}×{} macropixels. Every pixel reports a depth event the moment \
              its peak stands clear of the background, then starts over: that of the bright ball \
@@ -61,20 +61,22 @@ impl Demo {
              across.",
             scene.size[0], scene.size[1]
         );
-        let simulation = Simulation::new(scene, settings, said, None)?;
-        Results {
-            input: None,
-            light: Vec::new(),
-            file: None,
-            changes: None,
+        let results = ResultOptions {
+            out: self.out.clone(),
+            dynamic_depth: DynamicDepthOptions::default(),
             echo: None,
-            device: self.device.as_deref(),
-            image: self.image.as_deref(),
             no_csv: false,
-            out: &self.out,
-            lead: &lead,
             quiet: self.quiet,
+        };
+        Job {
+            simulation: Simulation::new(scene, settings, requested, None)?,
+            input: None,
+            scene_rows: Vec::new(),
+            settings_file: None,
+            engine: &self.engine,
+            results: &results,
+            lead: &lead,
         }
-        .of(simulation)
+        .run()
     }
 }

@@ -7,89 +7,89 @@ use clap::Args;
 use dtof_device::HostTimeout;
 use dtof_engine::settings::SettingsFile;
 use dtof_link::DynamicDepth;
-use dtof_options::numbers::whole;
+use dtof_options::numbers::integer;
 use dtof_run::given::Operation;
 
 use super::dynamic_depth;
 use super::flags::Flags;
 
-/// How long a device goes on without this program.
+/// Longest silence of this program.
 #[derive(Args)]
 pub struct HostOptions {
-    /// The device stops its sensor, and with it the laser, once this program has been silent for so
-    /// many seconds, 0.2 to 60. With 0 it never does, which a device refuses unless its firmware
-    /// was built with `laser-on-without-host` [default: 3]
+    /// Seconds of silence of this program after which the device stops its sensor, and with it the
+    /// laser: 0.2 to 60, or 0 for never, which needs firmware built with `laser-on-without-host`
+    /// [default: 3]
     #[arg(long, value_name = "SECONDS", value_parser = HostTimeout::from_seconds, allow_hyphen_values = true)]
     host_timeout: Option<HostTimeout>,
 }
 
 impl HostOptions {
-    /// Whether it was given.
+    /// Returns whether it was given.
     pub fn is_given(&self) -> bool {
         self.host_timeout.is_some()
     }
 
-    /// How long it is.
+    /// The timeout.
     pub fn timeout(&self) -> HostTimeout {
         self.host_timeout.unwrap_or_default()
     }
 }
 
-/// The device's image, its pixels and how they operate.
+/// The device's image, its pixels and their settings.
 #[derive(Args)]
 pub struct DeviceOptions {
-    /// Image that `--device qemu` runs [default: what `cargo xtask image mps2-an386` has built]
+    /// Image for `--device qemu` [default: the one built by `cargo xtask image mps2-an386`]
     #[arg(long, value_name = "FILE")]
     pub image: Option<PathBuf>,
-    /// Pixels of the sensor, with addresses from 0 [default: as the device says]
-    #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX))]
+    /// Number of pixels, with addresses from 0 [default: the device's own]
+    #[arg(long, value_name = "N", value_parser = integer(1..=u16::MAX))]
     pub pixels: Option<u16>,
-    /// Columns of the array that is drawn or recorded or has blocks, pixel = row × columns + column
-    /// [default: as high as wide]
-    #[arg(long, value_name = "N", value_parser = whole(1..=u16::MAX))]
+    /// Columns of the array for maps, recordings and blocks, pixel = row × columns + column
+    /// [default: as square as possible]
+    #[arg(long, value_name = "N", value_parser = integer(1..=u16::MAX))]
     pub columns: Option<u16>,
-    /// The device sends only changes of depth, with a polarity
+    /// Send only changes of depth, with their direction
     #[arg(long)]
     dynamic_depth: bool,
     #[command(flatten)]
     host: HostOptions,
     #[command(flatten)]
-    of_dynamic_depth: dynamic_depth::DynamicDepthFlags,
+    dynamic_depth_flags: dynamic_depth::DynamicDepthFlags,
     #[command(flatten)]
     operation: Flags<Operation>,
 }
 
 impl DeviceOptions {
-    /// What they say of sensor and detection, and a settings file.
+    /// Sensor and detection options, merged with the settings file.
     ///
     /// # Errors
-    /// What is wrong with the file.
-    pub fn said(&self) -> Result<SettingsFile> {
+    /// Fails if the file is wrong.
+    pub fn requested(&self) -> Result<SettingsFile> {
         let mut given = self.operation.0.given.clone();
         given.options.sensor.columns = self.columns.map(u32::from);
         given.merged()
     }
 
-    /// Whether any was given.
+    /// Returns whether any was given.
     ///
     /// # Errors
-    /// What is wrong with them.
+    /// Fails if one is wrong.
     pub fn are_given(&self) -> Result<bool> {
         let is_given = self.image.is_some() || self.pixels.is_some() || self.host.is_given();
-        let is_given = is_given || self.changes()?.is_some();
-        Ok(is_given || self.said()? != SettingsFile::default())
+        let is_given = is_given || self.dynamic_depth()?.is_some();
+        Ok(is_given || self.requested()? != SettingsFile::default())
     }
 
-    /// How long the device goes on without this program.
+    /// Longest silence of this program.
     pub fn host_timeout(&self) -> HostTimeout {
         self.host.timeout()
     }
 
-    /// Whether changes of depth are asked for, and which.
+    /// Dynamic depth, if it is on.
     ///
     /// # Errors
-    /// Options of them without them.
-    pub fn changes(&self) -> Result<Option<DynamicDepth>> {
-        self.of_dynamic_depth.wanted(self.dynamic_depth)
+    /// Fails if its flags are given without it.
+    pub fn dynamic_depth(&self) -> Result<Option<DynamicDepth>> {
+        self.dynamic_depth_flags.get_if(self.dynamic_depth)
     }
 }

@@ -7,14 +7,14 @@ use dtof_link::DynamicDepth;
 use dtof_options::Refused;
 use dtof_options::numbers::fixed;
 
-#[derive(Args)]
+#[derive(Args, Default)]
 pub struct DynamicDepthFlags {
-    /// Report when the mean depth of three events of a pixel moves by so many millimetres,
-    /// rounded to 1/256 [default: 100]
+    /// Dynamic depth: change of a pixel's mean depth over three events that is reported, in
+    /// millimetres, rounded to 1/256 [default: 100]
     #[arg(long, value_name = "MM", value_parser = fixed::<U24F8>, allow_hyphen_values = true)]
     threshold_mm: Option<U24F8>,
-    /// Compare with the mean at the previous event, as in the paper, which finds steps; or with
-    /// the last reported mean, which also finds slow motion [default: previous]
+    /// Dynamic depth: compare with the mean at the previous event, which finds steps, or with the
+    /// last reported mean, which also finds slow motion [default: previous]
     #[arg(long, value_enum)]
     reference: Option<Reference>,
 }
@@ -26,39 +26,39 @@ enum Reference {
 }
 
 /// Dynamic depth in a report.
-#[derive(Args)]
-pub struct Shown {
-    /// Show in the report when the depth of pixels changes, and to which side
+#[derive(Args, Default)]
+pub struct DynamicDepthOptions {
+    /// Show changes of depth in the report, with their direction
     #[arg(long)]
     dynamic_depth: bool,
     #[command(flatten)]
-    options: DynamicDepthFlags,
+    flags: DynamicDepthFlags,
 }
 
-impl Shown {
-    /// If it is asked for.
+impl DynamicDepthOptions {
+    /// Dynamic depth, if it is on.
     ///
     /// # Errors
-    /// Options without it.
-    pub fn wanted(&self) -> Result<Option<DynamicDepth>> {
-        self.options.wanted(self.dynamic_depth)
+    /// Fails if its flags are given without it.
+    pub fn get(&self) -> Result<Option<DynamicDepth>> {
+        self.flags.get_if(self.dynamic_depth)
     }
 }
 
 impl DynamicDepthFlags {
-    /// If it is asked for.
+    /// Dynamic depth, if it `is_on`.
     ///
     /// # Errors
-    /// Options without it.
-    pub fn wanted(&self, is_asked: bool) -> Result<Option<DynamicDepth>> {
-        if let Some(key) = self.given().filter(|_| !is_asked) {
-            bail!(Refused::new(key, "is of `dynamic_depth`"));
+    /// Fails if a flag is given and it is off.
+    pub fn get_if(&self, is_on: bool) -> Result<Option<DynamicDepth>> {
+        if let Some(key) = self.first_key().filter(|_| !is_on) {
+            bail!(Refused::new(key, "needs `dynamic_depth`"));
         }
-        Ok(is_asked.then(|| self.dynamic_depth()))
+        Ok(is_on.then(|| self.dynamic_depth()))
     }
 
-    /// The first that was given.
-    pub fn given(&self) -> Option<&'static str> {
+    /// The key of the first flag that was given.
+    pub fn first_key(&self) -> Option<&'static str> {
         let threshold = self.threshold_mm.map(|_| "threshold_mm");
         threshold.or(self.reference.map(|_| "reference"))
     }
@@ -69,8 +69,8 @@ impl DynamicDepthFlags {
             threshold_mm: self.threshold_mm.unwrap_or(default.threshold_mm),
             reference: match self.reference {
                 None => default.reference,
-                Some(Reference::Previous) => dtof_core::Reference::Previous,
-                Some(Reference::Reported) => dtof_core::Reference::Reported,
+                Some(Reference::Previous) => dtof_core::events::Reference::Previous,
+                Some(Reference::Reported) => dtof_core::events::Reference::Reported,
             },
         }
     }

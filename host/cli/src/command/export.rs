@@ -9,9 +9,9 @@ use dtof::path;
 use dtof::progress::Bar;
 use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::EventKind;
-use dtof_export::{Format, Options, Projected, export};
+use dtof_export::{Format, Options, ProjectionOptions, export};
 use dtof_options::Refused;
-use dtof_options::numbers::whole;
+use dtof_options::numbers::integer;
 use dtof_options::rows::grouped;
 
 use super::flags::{Flags, name};
@@ -19,25 +19,25 @@ use super::{dynamic_depth, warn};
 
 #[derive(Args)]
 pub struct Export {
-    /// The AER file
+    /// AER file
     #[arg(value_parser = path())]
     file: PathBuf,
-    /// The format; docs/export.md describes each
+    /// Format; docs/export.md describes each
     #[arg(long, value_parser = name::<Format>())]
     format: Format,
-    /// The file to write
+    /// File to write
     #[arg(long, value_name = "FILE", value_parser = path())]
     out: PathBuf,
-    /// A settings file: its rays and its laser rate hold unless an option says otherwise
+    /// Settings file whose [rays] and laser rate are used; options override them
     #[arg(long, value_name = "FILE", value_parser = path())]
     settings: Option<PathBuf>,
     #[command(flatten)]
-    projected: Flags<Projected>,
-    /// The kind of events to export from a file with both
+    projection: Flags<ProjectionOptions>,
+    /// Kind of events to export, if the file has depth events and changes of depth
     #[arg(long, value_parser = name::<EventKind>())]
     events: Option<EventKind>,
-    /// MCAP and ROS 2: microseconds of a point cloud [default: 1/100 of the run, 10 to 10,000]
-    #[arg(long, value_name = "N", value_parser = whole(1..=1_000_000_000_u64))]
+    /// MCAP and ROS 2: microseconds in a point cloud [default: 1/100 of the run, 10 to 10,000]
+    #[arg(long, value_name = "N", value_parser = integer(1..=1_000_000_000_u64))]
     slice_us: Option<u64>,
     #[command(flatten)]
     dynamic_depth: dynamic_depth::DynamicDepthFlags,
@@ -51,12 +51,11 @@ impl Export {
         self.check()?;
         let file = self.settings.as_deref().map(SettingsFile::read);
         let file = file.transpose()?.unwrap_or_default();
-        let projected = self.projected.0.clone();
         let options = Options {
             kind: self.events,
             slice_ns: self.slice_us.map(|us| us * 1000),
             dynamic_depth: self.dynamic_depth.dynamic_depth(),
-            ..projected.options(&file)?
+            ..self.projection.0.clone().options(file)?
         };
         let exported = export(
             &self.file,
@@ -70,14 +69,14 @@ impl Export {
         if exported.late > 0 {
             writeln!(
                 io::stderr(),
-                "{}: {} events came after more than 65,536 later ones: left out of {out}",
+                "{}: {} events were left out of {out}: more than 65,536 later events came before them",
                 self.file.display(),
                 grouped(exported.late)
             )?;
         }
         if let Some(damage) = exported.damage {
             bail!(
-                "{}: {damage}; {out} holds what came before: {written} events",
+                "{}: {damage}; {out} has the {written} events before the damage",
                 self.file.display()
             );
         }
@@ -86,34 +85,36 @@ impl Export {
             writeln!(
                 io::stdout(),
                 "{out}: {written} events ({})",
-                exported.assumed
+                exported.assumptions
             )?;
         }
         Ok(())
     }
 
-    /// No option is left unused.
+    /// Refuses options that the format does not use.
     fn check(&self) -> Result<()> {
         let evt2 = self.format == Format::Evt2;
         let slices = matches!(self.format, Format::Mcap | Format::Ros2);
-        let projected = &self.projected.0;
-        let points = "points, which evt2 has not";
-        for (key, has_use, of) in [
+        let projection = &self.projection.0.given.rays;
+        let points = "formats with points, unlike evt2";
+        for (key, is_used, formats) in [
             (self.slice_us.map(|_| "slice_us"), slices, "mcap and ros2"),
-            (self.dynamic_depth.given(), evt2, "evt2"),
+            (self.dynamic_depth.first_key(), evt2, "evt2"),
             (
-                projected.fov.map(|_| "field_of_view_degrees"),
+                projection
+                    .field_of_view_degrees
+                    .map(|_| "field_of_view_degrees"),
                 !evt2,
                 points,
             ),
             (
-                projected.calibration.as_ref().map(|_| "calibration"),
+                projection.calibration.as_ref().map(|_| "calibration"),
                 !evt2,
                 points,
             ),
         ] {
-            if let Some(key) = key.filter(|_| !has_use) {
-                bail!(Refused::new(key, format!("is only for {of}")));
+            if let Some(key) = key.filter(|_| !is_used) {
+                bail!(Refused::new(key, format!("is only for {formats}")));
             }
         }
         Ok(())

@@ -1,4 +1,4 @@
-//! The flags of jobs: the only place where an option of the library gets a name, a value's name and help.
+//! The flags of jobs. Only this file gives the options of the libraries a flag and its help.
 
 use std::ffi::{OsStr, OsString};
 
@@ -8,21 +8,21 @@ use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use dtof::flag;
 use dtof_engine::settings::{EstimatorName, RuleName};
 use dtof_events::echoes::Echo;
-use dtof_export::Projected;
+use dtof_export::ProjectionOptions;
 use dtof_options::{Named, Options, named, option_name};
 use dtof_run::given::Operation;
 use dtof_run::{calibrate, compare, replay, simulate, tune};
 
-/// Options of a job that flags give.
+/// The options of a job, read from flags.
 pub struct Flags<O>(pub O);
 
 /// The flags of a job.
 pub trait HasFlags: Options {
-    /// In the order of the help.
+    /// The flags, in the order of the help.
     fn flags() -> Vec<Flag>;
 }
 
-/// A flag of an option.
+/// The flag of an option.
 #[derive(Clone, Copy)]
 pub struct Flag {
     key: &'static str,
@@ -30,24 +30,24 @@ pub struct Flag {
     help: &'static str,
 }
 
-/// What follows a flag.
+/// The value of a flag.
 #[derive(Clone, Copy)]
 enum Value {
-    /// A text, called so in the help.
-    Called(&'static str),
-    /// The same, which may begin with a hyphen.
+    /// A text, with its name in the help.
+    Text(&'static str),
+    /// A text that may begin with a hyphen.
     Signed(&'static str),
     /// One of these names.
     OneOf(fn() -> Vec<PossibleValue>),
-    /// Nothing.
+    /// No value.
     Switch,
-    /// Nothing, or `=` and a text.
-    Yes(&'static str),
+    /// No value, or `=` and a text.
+    Optional(&'static str),
 }
 
-use Value::{Called, OneOf, Signed, Switch, Yes};
+use Value::{OneOf, Optional, Signed, Switch, Text};
 
-/// A table of flags: key, what follows it, help.
+/// A table of flags: key, value, help.
 macro_rules! flags {
     ($table:ident: $($key:ident $value:expr => $help:expr;)+) => {
         const $table: &[Flag] = &[$(Flag { key: stringify!($key), value: $value, help: $help }),+];
@@ -76,7 +76,7 @@ impl Flag {
             .long(flag(self.key)[2..].to_owned())
             .help(self.help);
         match self.value {
-            Called(name) => arg
+            Text(name) => arg
                 .value_name(name)
                 .value_parser(OsStringValueParser::new())
                 .allow_negative_numbers(true),
@@ -88,7 +88,7 @@ impl Flag {
                 .value_name(self.key.to_ascii_uppercase())
                 .value_parser(Hinted(names)),
             Switch => arg.action(ArgAction::SetTrue),
-            Yes(name) => arg
+            Optional(name) => arg
                 .value_name(name)
                 .num_args(0..=1)
                 .require_equals(true)
@@ -105,7 +105,7 @@ impl Flag {
     }
 }
 
-/// Any text; the help names these. The option refuses others.
+/// Accepts any text; the help lists these names. The option refuses others later.
 #[derive(Clone)]
 struct Hinted(fn() -> Vec<PossibleValue>);
 
@@ -156,158 +156,153 @@ pub fn name<T: Named + Send + Sync>() -> impl TypedValueParser<Value = T> {
 
 flags! {
     RECORDING:
-    axes Called("AXIS,AXIS,...") => "Arrays of histograms: what each axis is, of captures, rows, columns \
-        and bins [default: the last is bins, the one before columns, all others are rows]";
-    array Called("NAME") => ".npz: the array to read [default: the only one]";
-    columns Called("N") => "Photon lists: columns of the array, pixel = row × columns + column [default: \
+    axes Text("AXIS,AXIS,...") => "Arrays of histograms: meaning of each axis: captures, rows, columns or \
+        bins [default: the last is bins, the one before columns, all others are rows]";
+    array Text("NAME") => ".npz: name of the array [default: the only one]";
+    columns Text("N") => "Photon lists: columns of the array, pixel = row × columns + column [default: \
         one row]";
-    rebin Called("K") => "Add up so many neighbouring bins [default: 1]";
-    bins Called("N") => "Bins to use, after --rebin, a power of two from 8 to 1024. Of histograms with more \
-        the last are cut off [default: as many as there are, or the next power of two; 128 of photon lists]";
-    bin_width_ps Signed("PS") => "Picoseconds a bin of the file, rounded to 1/65536 [default: 250; of logs \
-        that of the sensor]";
-    offset_mm Signed("MM") => "Millimetres added to every range, rounded to 1/256 [default: 0; of logs that \
-        of the sensor]";
-    photons_per_cycle Called("R") => "Histograms: photons a laser cycle in the brightest pixel of each \
-        capture that is not masked [default: 1]";
-    recorded_cycles Called("N") => "Histograms: laser cycles that each capture lasted";
-    laser_hz Called("HZ") => "Laser cycles a second [default: not known]";
+    rebin Text("K") => "Number of neighbouring bins to add up [default: 1]";
+    bins Text("N") => "Number of bins after --rebin, a power of two from 8 to 1024. Longer histograms lose \
+        their last bins [default: the file's, or the next power of two; 128 for photon lists]";
+    bin_width_ps Signed("PS") => "Width of a bin of the file in picoseconds, rounded to 1/65536 [default: \
+        250; for logs the sensor's]";
+    offset_mm Signed("MM") => "Millimetres added to every range, rounded to 1/256 [default: 0; for logs the \
+        sensor's]";
+    photons_per_cycle Text("R") => "Histograms: photons a laser cycle in the brightest unmasked pixel of \
+        each capture [default: 1]";
+    recorded_cycles Text("N") => "Histograms: laser cycles of each capture";
+    laser_hz Text("HZ") => "Laser cycles a second [default: unknown]";
 }
 
 flags! {
     SENSOR:
-    settings Called("FILE") => "A TOML file with settings, as every run writes one; options override it. \
+    settings Text("FILE") => "Settings file in TOML, such as every run writes; options override it. \
         docs/settings.md lists its keys";
-    gate Called("FIRST..LAST") => "Only these bins may hold the peak, both inclusive [default: all]";
-    masked Called("PIXELS") => "Pixels that are left out, such as hot and dead ones, as 3,70";
-    sigma_bins Signed("S") => "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. The \
-        depth then comes from a window that suits it [default: the centroid of three bins]";
+    gate Text("FIRST..LAST") => "First and last bin that may hold the peak, as 20..119 [default: all bins]";
+    masked Text("PIXELS") => "Pixels to leave out, such as hot and dead ones, as 3,70";
+    sigma_bins Signed("S") => "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. It \
+        sets the window for the depth [default: the depth is the centroid of three bins]";
 }
 
 flags! {
     DETECTION:
-    rule OneOf(names::<RuleName>) => "The rule that decides whether a peak stands clear of the background \
-        [default: paper]";
-    alpha Signed("ALPHA") => "Rules paper and average: standard deviations of the background a peak must \
-        exceed it by, 0 to 255.996, rounded to 1/256 [default: 4]";
-    window Signed("BINS") => "Window rule: bins in the window, 1 to 7 [default: as suits --sigma-bins]";
-    z Signed("Z") => "Window rule: standard deviations of the background the photons in the window must \
-        exceed it by, 0 to 15.9998, rounded to 1/4096";
-    false_alarm Called("SHARE") => "Window rule, instead of --z: the share of exposures without a target \
-        that may end with an event, at most 0.1 [default: 0.01]";
-    estimator OneOf(names::<EstimatorName>) => "Where in its bins a peak lies [default: window if \
-        --sigma-bins or --half-widths are known, else centroid]";
-    half_widths Called("BEFORE,AFTER") => "How far the window that the depth comes from reaches before and \
-        after its place, in bins: 1 to 4 each, rounded to 1/256. More after than before suits a pulse that \
-        falls more slowly than it rises [default: both as suits --sigma-bins]";
-    min_count Called("N") => "Photons a reported peak, or the window around it, holds at least [default: 5]";
-    l1 Called("N") => "The exposure a decision must exceed, in laser cycles [default: 40]";
-    l2 Called("N") => "The exposure at which a pixel starts over without an event, in laser cycles \
+    rule OneOf(names::<RuleName>) => "Detection rule, which decides whether a peak is a target [default: paper]";
+    alpha Signed("ALPHA") => "Rules paper and average: threshold above the background in its standard \
+        deviations, 0 to 255.996, rounded to 1/256 [default: 4]";
+    window Signed("BINS") => "Window rule: bins in the window, 1 to 7 [default: from --sigma-bins]";
+    z Signed("Z") => "Window rule: threshold of the photons in the window above the background in its \
+        standard deviations, 0 to 15.9998, rounded to 1/4096 [default: from --false-alarm]";
+    false_alarm Text("SHARE") => "Window rule, instead of --z: share of exposures without a target that \
+        end with an event, at most 0.1 [default: 0.01]";
+    estimator OneOf(names::<EstimatorName>) => "Estimator of the position of a peak [default: window with \
+        --sigma-bins or --half-widths, else centroid]";
+    half_widths Text("BEFORE,AFTER") => "Estimator window: bins before and after its centre, 1 to 4 each, \
+        rounded to 1/256. A longer part after suits a pulse that falls more slowly than it rises [default: \
+        from --sigma-bins]";
+    min_count Text("N") => "Fewest photons in a reported peak, or in the window around it [default: 5]";
+    l1 Text("N") => "Shortest exposure: pixels decide after more than N laser cycles [default: 40]";
+    l2 Text("N") => "Longest exposure: a pixel without an event starts over after N laser cycles \
         [default: 2000]";
-    x Called("N") => "Laser cycles between looks [default: 4]";
-    binning Called("LEVELS") => "Adaptive binning: pixels that stay silent also count together, in blocks \
-        of 2x2 pixels, from level 2 on 4x4 and at level 3 8x8 [default: 0]";
-    patience Called("N") => "Adaptive binning: laser cycles without an event after which a pixel counts in \
-        its block, too [default: 64]";
-    tracking Yes("YES") => "Window rule: expect the next event of a pixel near its last, and spend half of \
-        the false alarms there";
-    echoes Called("N") => "Echoes that a pixel reports in an exposure, 1 to 4. From 2 on it goes on until \
-        it has them all, or has waited for the next [default: 1]";
-    echo_wait Called("TIMES") => "Two or more echoes: an exposure ends once it is so many times as long as \
-        it was at its last echo [default: it goes on until L2]";
+    x Text("N") => "Laser cycles between two decisions [default: 4]";
+    binning Text("LEVELS") => "Levels of adaptive binning, 0 to 3: pixels without events also count in \
+        blocks, at level 1 of 2x2 pixels, at 2 of 4x4 and at 3 of 8x8 [default: 0]";
+    patience Text("N") => "Adaptive binning: laser cycles without an event after which a pixel also counts \
+        in its block [default: 64]";
+    tracking Optional("YES") => "Window rule: expect the next event of a pixel near its last, with a lower \
+        threshold there and a higher one elsewhere";
+    echoes Text("N") => "Most echoes of a pixel in an exposure, 1 to 4. With 2 or more the exposure goes \
+        on until all are found or --echo-wait ends it [default: 1]";
+    echo_wait Text("TIMES") => "Two or more echoes: an exposure ends at this multiple of its length at \
+        the last echo [default: it ends at L2]";
 }
 
 flags! {
     FRAME:
-    frame Called("N") => "Simulate a frame-based sensor for comparison: every N laser cycles each pixel \
-        reads its highest bin, if that stands above the background";
+    frame Text("N") => "Simulate a frame-based sensor for comparison: every N laser cycles each pixel \
+        reports its highest bin, if that is above the background";
 }
 
 flags! {
     REPLAY:
-    cycles Called("N") => "Replay only the first N laser cycles [default: 10000]";
-    seed Called("N") => "Seed of the laser cycles that recorded photons are given [default: 1]";
+    cycles Text("N") => "Laser cycles to replay at most [default: 10000]";
+    seed Text("N") => "Seed of the laser cycles that recorded photons get [default: 1]";
 }
 
 flags! {
     ARRAY:
-    array Called("COLUMNSxROWS") => "Macropixels of the array that looks at the scene [default: the file's]";
-    laser_off Switch => "Without signal: photon-counts.svg is then a passive image";
+    array Text("COLUMNSxROWS") => "Macropixels of the array [default: the file's]";
+    laser_off Switch => "Simulate without signal: photon-counts.svg is then a passive image";
 }
 
 flags! {
     SIMULATE:
-    cycles Called("N") => "Laser cycles [default: the file's]";
-    seed Called("N") => "Seed of the simulated photons [default: 1]";
+    cycles Text("N") => "Laser cycles to simulate [default: the file's]";
+    seed Text("N") => "Seed of the simulated photons [default: 1]";
 }
 
 flags! {
     CALIBRATE:
-    target_mm Signed("MM") => "Distance of a flat target that most of the pixels see, in millimetres";
-    glass OneOf(yes_or_no) => "Whether the nearest surface, where all pixels have it at the same bin, is a \
-        cover glass";
-    false_alarm Called("SHARE") => "The share of exposures without a target that may end with an event, at \
-        most 0.1 [default: 0.01]";
-    seed Called("N") => "Seed of what is simulated [default: 1]";
+    target_mm Signed("MM") => "Distance in millimetres of a flat target that most pixels see";
+    glass OneOf(yes_or_no) => "Whether the nearest surface is a cover glass, if all pixels have it at the same bin";
+    false_alarm Text("SHARE") => "Share of exposures without a target that end with an event, at most 0.1 \
+        [default: 0.01]";
+    seed Text("N") => "Seed of the simulation [default: 1]";
 }
 
 flags! {
     ACCURACY:
-    within Called("MM") => "Millimetres that 68 % of the reports may be off at most [default: as frames of \
-        L2]";
-    false_alarm Called("SHARE") => "The share of exposures without a target that may end with an event, at \
-        most 0.1 [default: 0.01]";
+    within Text("MM") => "Largest error of 68 % of the reports in millimetres [default: that of frames \
+        of L2]";
+    false_alarm Text("SHARE") => "Share of exposures without a target that end with an event, at most 0.1 \
+        [default: 0.01]";
 }
 
 flags! {
     COMPARE:
-    cycles Called("N") => "Laser cycles to use at most [default: 10000; the scene's]";
-    seed Called("N") => "Seed of every random number [default: 1]";
+    cycles Text("N") => "Laser cycles to use at most [default: 10000 of a recording; the scene's]";
+    seed Text("N") => "Seed of every random number [default: 1]";
 }
 
 flags! {
     TUNE:
-    rule OneOf(names::<RuleName>) => "The rule to find settings for [default: paper]";
-    background Called("B") => "Background photons a bin and laser cycle (B)";
-    signal Called("A") => "Signal photons a laser cycle (A)";
-    snr Called("SNR") => "Instead: the SNR of the whole exposure, N·A / √(N·B) with N = L2";
+    rule OneOf(names::<RuleName>) => "Detection rule to tune [default: paper]";
+    background Text("B") => "Background photons a bin and laser cycle (B)";
+    signal Text("A") => "Signal photons a laser cycle (A)";
+    snr Text("SNR") => "Instead of --signal: SNR of the longest exposure, N·A / √(N·B) with N = L2";
     sigma_bins Signed("BINS") => "Standard deviation of the pulse in bins";
-    sigma_ps Called("PS") => "Instead: in picoseconds";
-    bins Called("N") => "Bins of a histogram, a power of two from 8 to 1024 [default: 128]";
-    bin_width_ps Signed("PS") => "Picoseconds a bin [default: 250]";
-    false_alarm Called("SHARE") => "The share of exposures without a target that may end with an event \
-        [default: 0.01]";
-    false_alarms_per_second Called("RATE") => "Instead: the false alarms of a pixel a second";
-    laser_hz Called("HZ") => "Laser cycles a second";
-    l1 Called("N") => "The exposure a decision must exceed, in laser cycles [default: the one with the \
-        shortest time to an event]";
-    l2 Called("N") => "The exposure at which a pixel starts over without an event, in laser cycles \
+    sigma_ps Text("PS") => "Instead of --sigma-bins: standard deviation of the pulse in picoseconds";
+    bins Text("N") => "Bins of a histogram, a power of two from 8 to 1024 [default: 128]";
+    bin_width_ps Signed("PS") => "Width of a bin in picoseconds [default: 250]";
+    false_alarm Text("SHARE") => "Share of exposures without a target that end with an event [default: 0.01]";
+    false_alarms_per_second Text("RATE") => "Instead of --false-alarm: false alarms of a pixel a second";
+    laser_hz Text("HZ") => "Laser cycles a second";
+    l1 Text("N") => "Shortest exposure: pixels decide after more than N laser cycles [default: the one \
+        with the shortest time to an event]";
+    l2 Text("N") => "Longest exposure: a pixel without an event starts over after N laser cycles \
         [default: 2000]";
-    x Called("N") => "Laser cycles between looks [default: 4]";
-    min_count Called("N") => "Photons a reported peak holds at least [default: 5]";
-    binning Called("LEVELS") => "Window rule: the largest blocks of adaptive binning, which share the false \
-        alarms with the pixels [default: 0]";
-    seed Called("N") => "Seed of the simulated exposures [default: 1]";
+    x Text("N") => "Laser cycles between two decisions [default: 4]";
+    min_count Text("N") => "Fewest photons in a reported peak [default: 5]";
+    binning Text("LEVELS") => "Window rule: levels of adaptive binning, 0 to 3; pixels and blocks share the \
+        false alarms [default: 0]";
+    seed Text("N") => "Seed of the simulated exposures [default: 1]";
 }
 
 flags! {
     DEVICE:
-    bin_width_ps Signed("PS") => "Picoseconds a bin, rounded to 1/65536 [default: as the device says, 250 \
-        if any will do]";
-    offset_mm Signed("MM") => "Millimetres added to every range, rounded to 1/256 [default: as the device \
-        says]";
+    bin_width_ps Signed("PS") => "Width of a bin in picoseconds, rounded to 1/65536 [default: the device's, \
+        or 250 if it has none]";
+    offset_mm Signed("MM") => "Millimetres added to every range, rounded to 1/256 [default: the device's]";
 }
 
 flags! {
-    PROJECTED:
-    field_of_view_degrees Signed("HxV") => "The field of view in degrees from edge to edge [default: 60 \
-        across the longer side, square pixels]";
-    calibration Called("FILE") => "A direction and a range bias for each pixel, a TOML file; docs/export.md \
-        has its keys";
-    laser_hz Called("HZ") => "Laser cycles a second, for a file that does not say or is wrong [default: \
-        what the file says, else 10000000 and a warning]";
-    echo OneOf(names::<Echo>) => "Which echo of each exposure of a pixel or block, of depth events \
-        [default: all]";
+    PROJECTION:
+    field_of_view_degrees Signed("HxV") => "Field of view in degrees from edge to edge [default: 60 along \
+        the longer side, with square pixels]";
+    calibration Text("FILE") => "TOML file with a direction and a range bias for each pixel; docs/export.md \
+        lists its keys";
+    laser_hz Text("HZ") => "Laser cycles a second, if the file has none or is wrong [default: the file's, \
+        else 10000000 with a warning]";
+    echo OneOf(names::<Echo>) => "Depth events: echo of each exposure of a pixel or block [default: all]";
 }
 
 /// The tables of the flags of each job, in the order of its help.
@@ -322,7 +317,7 @@ macro_rules! has_flags {
 }
 
 has_flags! {
-    Projected: PROJECTED;
+    ProjectionOptions: PROJECTION;
     Operation: DEVICE SENSOR DETECTION;
     replay::Options: RECORDING SENSOR DETECTION FRAME REPLAY;
     simulate::Options: ARRAY SENSOR DETECTION FRAME SIMULATE;
@@ -353,7 +348,7 @@ mod tests {
     #[test]
     fn every_option_of_a_job_has_its_flag() {
         keys_of::<Operation>();
-        keys_of::<Projected>();
+        keys_of::<ProjectionOptions>();
         keys_of::<replay::Options>();
         keys_of::<simulate::Options>();
         keys_of::<calibrate::Options>();

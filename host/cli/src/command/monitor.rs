@@ -9,27 +9,27 @@ use clap::Args;
 use console::Term;
 use dtof::{interrupt, path};
 use dtof_device::monitor::map::{LiveMap, SHOW_CURSOR};
-use dtof_device::monitor::{EventFile, Outputs, Task, monitor};
+use dtof_device::monitor::{EventFile, Outputs, monitor};
 use dtof_device::{Client, Setup};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::Refused;
-use dtof_options::numbers::whole;
+use dtof_options::numbers::integer;
 
 use super::device_options::DeviceOptions;
 
 #[derive(Args)]
 pub struct Monitor {
-    /// tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated device
+    /// Device: tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated device
     #[arg(long, value_name = "DEVICE")]
     device: String,
-    /// End after so many seconds [default: at Ctrl-C]
-    #[arg(long, value_name = "S", value_parser = whole(0..=u32::MAX))]
+    /// Seconds to run [default: until Ctrl-C]
+    #[arg(long, value_name = "S", value_parser = integer(0..=u32::MAX))]
     seconds: Option<u32>,
-    /// Draw the ranges of all pixels on standard error, which must be a terminal. Events still
-    /// go to standard output, unless that is a terminal, too
+    /// Draw the ranges of all pixels on standard error, which must be a terminal. Events go to
+    /// standard output unless that is a terminal as well
     #[arg(long)]
     map: bool,
-    /// Write the events into an AER file as well, for `dtof decode` and `dtof export`
+    /// AER file to write as well, for `dtof decode` and `dtof export`
     #[arg(long, value_name = "FILE.aer", value_parser = path())]
     record: Option<PathBuf>,
     #[command(flatten)]
@@ -38,45 +38,49 @@ pub struct Monitor {
 
 impl Monitor {
     pub fn run(&self) -> Result<()> {
-        let said = self.options.said()?;
-        let watched = self.watch(said.clone());
-        watched.map_err(|error| said.blame(error))
+        let requested = self.options.requested()?;
+        let watched = self.watch(requested.clone());
+        watched.map_err(|error| requested.add_file_name(error))
     }
 
-    fn watch(&self, said: SettingsFile) -> Result<()> {
-        let dynamic_depth = self.options.changes()?;
+    fn watch(&self, requested: SettingsFile) -> Result<()> {
+        let dynamic_depth = self.options.dynamic_depth()?;
         ensure!(
             !self.map || io::stderr().is_terminal(),
-            Refused::new("map", "draws on standard error, which is no terminal here")
+            Refused::new(
+                "map",
+                "draws on standard error, which is not a terminal here"
+            )
         );
-        let has_blocks = said.detection.binning.is_some_and(|levels| levels > 0);
+        let has_blocks = requested.detection.binning.is_some_and(|levels| levels > 0);
         ensure!(
             self.options.columns.is_none() || self.map || self.record.is_some() || has_blocks,
-            Refused::new("columns", "is of `map`, `record` and `binning`")
+            Refused::new("columns", "needs `map`, `record` or `binning`")
         );
         let image = self.options.image.as_deref();
         let name = || self.device.clone();
         let mut client = Client::new(dtof_device::open(&self.device, image)?).with_context(name)?;
-        interrupt::listen(|| {
+        interrupt::handle_ctrl_c(|| {
             if io::stderr().is_terminal() {
                 let _ = write!(io::stderr(), "{SHOW_CURSOR}");
             }
         })?;
-        let setup = Setup::of(&mut client, said, self.options.pixels).with_context(name)?;
+        let setup = Setup::of(&mut client, requested, self.options.pixels).with_context(name)?;
         super::warn(Path::new(&self.device), setup.warnings.clone(), false);
         let length = self
             .seconds
             .map(|seconds| Duration::from_secs(seconds.into()));
-        let (pixels, array) = (setup.pixels, setup.array);
         let mut map = self.map.then(|| {
-            let terminal = Term::stderr();
-            let asked = terminal.clone();
-            let room = move || {
-                let (lines, columns) = asked.size();
+            let size = || {
+                let (lines, columns) = Term::stderr().size();
                 (lines.into(), columns.into())
             };
-            let room = Box::new(room);
-            LiveMap::new(Box::new(terminal), room, pixels, array)
+            LiveMap::new(
+                Box::new(Term::stderr()),
+                Box::new(size),
+                setup.pixels,
+                setup.array,
+            )
         });
         let mut events: Box<dyn Write> = if self.map && io::stdout().is_terminal() {
             Box::new(io::sink())
@@ -87,16 +91,9 @@ impl Monitor {
             None => None,
             Some(file) => Some(EventFile::new(file, image.as_slice(), &setup.header())?),
         };
-        let task = Task {
-            settings: &setup.settings,
-            pixels,
-            columns: array.columns(),
-            dynamic_depth,
-            host_timeout: self.options.host_timeout(),
-        };
         let monitored = monitor(
             &mut client,
-            &task,
+            &setup.task(dynamic_depth, self.options.host_timeout()),
             |elapsed| interrupt::is_interrupted() || length.is_some_and(|length| elapsed >= length),
             &mut Outputs {
                 events: &mut events,
@@ -116,7 +113,7 @@ impl Monitor {
         };
         let recorded = recording.map_or(Ok(()), finish);
         match (monitored, recorded) {
-            // Why it ended, and where the events are.
+            // The first error says why it ended, the second where the events are.
             (Err(ended), Err(kept)) => bail!("{ended:#}; {kept:#}"),
             (monitored, recorded) => monitored.and(recorded),
         }

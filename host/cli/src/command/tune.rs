@@ -1,4 +1,4 @@
-//! `dtof tune`: the threshold and L1 for a wanted rate of false alarms.
+//! `dtof tune`: the threshold and L1 for a given rate of false alarms.
 
 use std::io::{self, Write};
 
@@ -12,7 +12,7 @@ use super::flags::Flags;
 pub struct Tune {
     #[command(flatten)]
     options: Flags<Options>,
-    /// Print JSON
+    /// Print the result as JSON
     #[arg(long)]
     json: bool,
 }

@@ -1,4 +1,4 @@
-//! `dtof view`: a device or a recording, live in a browser.
+//! `dtof view`: a device or a recording live in a browser.
 
 use std::io::{self, Write};
 use std::path::PathBuf;
@@ -7,37 +7,37 @@ use anyhow::{Result, ensure};
 use clap::Args;
 use dtof::{complain, flag, interrupt, path};
 use dtof_live::{Device, Feed, Folder, Foxglove, Origin, Playback, Served, Terminal};
-use dtof_options::numbers::{positive, whole};
+use dtof_options::numbers::{integer, laser_hz, positive};
 
 use super::device_options::DeviceOptions;
 
 #[derive(Args)]
 pub struct View {
-    /// An AER file, which is played at the rate of its laser
+    /// AER file to play at the rate of its laser
     #[arg(value_name = "FILE.aer", value_parser = path(), required_unless_present = "device", conflicts_with = "device")]
     file: Option<PathBuf>,
-    /// tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated device
+    /// Device: tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated device
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
-    /// Of a file: so many times as fast as it was [default: 1]
+    /// File: speed of playback relative to the recording [default: 1]
     #[arg(long, value_name = "N", value_parser = positive, conflicts_with = "device")]
     speed: Option<f64>,
-    /// Of a file: laser cycles a second, if it does not say or is wrong [default: as the file says]
-    #[arg(long, value_name = "HZ", value_parser = whole(1..=u64::MAX / 1000), conflicts_with = "device")]
+    /// File: laser cycles a second, if the file has none or is wrong [default: the file's]
+    #[arg(long, value_name = "HZ", value_parser = laser_hz, conflicts_with = "device")]
     laser_hz: Option<u64>,
-    /// The port of the page on this computer [default: any that is free]
-    #[arg(long, value_name = "PORT", value_parser = whole(0..=u16::MAX), default_value_t = 0, hide_default_value = true)]
+    /// Port of the page on this computer [default: any free port]
+    #[arg(long, value_name = "PORT", value_parser = integer(0..=u16::MAX), default_value_t = 0, hide_default_value = true)]
     port: u16,
-    /// The folder for recordings and settings that the page saves. Files there are not replaced
+    /// Folder for recordings and settings that the page saves. Existing files are not replaced
     /// [default: the page saves nothing]
     #[arg(long, value_name = "DIR", value_parser = path(), conflicts_with = "file")]
     out: Option<PathBuf>,
-    /// Also serve Foxglove, at a port of this computer, if built with the feature foxglove [default
-    /// without PORT: 8765]
-    #[arg(long, value_name = "PORT", value_parser = whole(0..=u16::MAX), num_args = 0..=1, require_equals = true,
+    /// Also serve Foxglove on this port of this computer; needs the feature foxglove [default without
+    /// PORT: 8765]
+    #[arg(long, value_name = "PORT", value_parser = integer(0..=u16::MAX), num_args = 0..=1, require_equals = true,
         default_missing_value = "8765")]
     foxglove: Option<u16>,
-    /// Pages of this origin may read, too, such as `http://localhost:8080`; may be repeated
+    /// Origin of other pages that may read, such as `http://localhost:8080`; may be repeated
     /// [default: Foxglove's pages only]
     #[arg(long, value_name = "ORIGIN", requires = "foxglove")]
     foxglove_origin: Vec<Origin>,
@@ -51,9 +51,9 @@ impl View {
             (Some(name), _) => {
                 let image = self.options.image.clone();
                 Feed::Device(Box::new(Device {
-                    said: self.options.said()?,
+                    requested: self.options.requested()?,
                     pixels: self.options.pixels,
-                    dynamic_depth: self.options.changes()?,
+                    dynamic_depth: self.options.dynamic_depth()?,
                     host_timeout: self.options.host_timeout(),
                     open: Box::new({
                         let name = name.clone();
@@ -66,7 +66,7 @@ impl View {
                 let file = file.unwrap_or_default();
                 ensure!(
                     !self.options.are_given()?,
-                    "{}: is what it was recorded with; leave out the options of a device",
+                    "{}: a recording has its own settings; leave out the options of a device",
                     file.display()
                 );
                 let speed = self.speed.unwrap_or(1.0);
@@ -75,7 +75,7 @@ impl View {
                 Feed::Playback(playback)
             }
         };
-        interrupt::listen(|| ())?;
+        interrupt::handle_ctrl_c(|| ())?;
         let foxglove = self.foxglove;
         let foxglove = foxglove.map(|port| Foxglove::bind(port, self.foxglove_origin));
         let foxglove = foxglove.transpose()?;

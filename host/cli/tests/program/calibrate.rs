@@ -1,7 +1,7 @@
 //! `dtof calibrate`, end to end: what it finds in a recording makes runs with a cover glass right,
 //! and tells when the glass has become brighter.
 
-use crate::common::{Scratch, npy, says};
+use crate::common::{Scratch, assert_contains, npy};
 use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 
@@ -49,34 +49,34 @@ fn a_cover_glass_is_gated_and_its_dirt_is_flagged() {
     let printed = scratch.printed(
         "calibrate --input glass.npy --recorded-cycles 8000 --target-mm 3000 --out dtof.toml",
     );
-    says(&printed, "cover glass");
+    assert_contains(&printed, "cover glass");
     let run = |name: &str, text: &str, options: &str| {
         let file = scratch.file(name, text);
         scratch.simulated(&file, options);
         scratch.summary()
     };
     let settings = "--settings dtof.toml --seed 9";
-    let told = |summary: &serde_json::Value| {
+    let share_and_flags = |summary: &serde_json::Value| {
         let share = &summary["against_truth"]["false_alarm_share"];
         (share.as_f64().unwrap(), summary["cover_glass"].clone())
     };
     let clean = scene(0.02, 5.0);
-    let (share, _) = told(&run("clean.toml", &clean, "--rule window --sigma-bins 1"));
+    let (share, _) = share_and_flags(&run("clean.toml", &clean, "--rule window --sigma-bins 1"));
     assert!(share > 0.9, "{share}");
-    let (share, flagged) = told(&run("clean.toml", &clean, settings));
+    let (share, flagged) = share_and_flags(&run("clean.toml", &clean, settings));
     assert!(share < 0.01 && flagged.is_null(), "{share} {flagged}");
-    let (share, flagged) = told(&run("dirty.toml", &scene(0.02, 6.5), settings));
+    let (share, flagged) = share_and_flags(&run("dirty.toml", &scene(0.02, 6.5), settings));
     assert!(share < 0.01, "{share}");
     let times = flagged[0].as_f64().unwrap();
     assert!((1.25..1.35).contains(&times), "{flagged}");
-    says(
+    assert_contains(
         &scratch.read("out/report.html"),
         "times as bright as when it was calibrated",
     );
-    // The sun alone is no dirt.
-    let (_, flagged) = told(&run("sunny.toml", &scene(0.08, 5.0), settings));
+    // Sunlight alone is not taken for dirt.
+    let (_, flagged) = share_and_flags(&run("sunny.toml", &scene(0.08, 5.0), settings));
     assert!(flagged.is_null(), "{flagged}");
-    // Nor is replay blind to it.
+    // Replay detects it, too.
     scratch.file("dirty.npy", recording(&scene(0.02, 6.5)));
     let line = "--settings dtof.toml --recorded-cycles 8000";
     let summary = scratch.replayed(&scratch.path("dirty.npy"), line);
@@ -85,7 +85,7 @@ fn a_cover_glass_is_gated_and_its_dirt_is_flagged() {
     assert!(summary["cover_glass"].is_null());
 }
 
-/// Nobody says how long it lasted: the brightest pixel does, and that is the hot one.
+/// The length is unknown, so it comes from the brightest pixel, which is the hot one.
 #[test]
 fn a_hot_pixel_changes_nothing_for_the_others() {
     let scratch = Scratch::new();

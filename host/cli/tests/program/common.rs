@@ -22,7 +22,7 @@ pub fn table(rows: &str) -> impl Iterator<Item = Vec<String>> {
     })
 }
 
-/// A folder of its own for one test.
+/// A temporary folder for one test.
 pub struct Scratch(TempDir);
 
 impl Scratch {
@@ -34,7 +34,7 @@ impl Scratch {
         self.0.path().join(name)
     }
 
-    /// Writes an input file, and makes its folder.
+    /// Writes an input file, and creates its folder.
     pub fn file(&self, name: &str, bytes: impl AsRef<[u8]>) -> PathBuf {
         let path = self.path(name);
         std::fs::create_dir_all(path.parent().unwrap()).unwrap();
@@ -55,12 +55,12 @@ impl Scratch {
         command
     }
 
-    /// What `dtof LINE` in this folder does.
+    /// The output of `dtof LINE` in this folder.
     pub fn run(&self, line: &str) -> Output {
         self.command(line).output().unwrap()
     }
 
-    /// What `dtof LINE` prints. It must succeed.
+    /// Standard output of `dtof LINE`, which must succeed.
     #[track_caller]
     pub fn printed(&self, line: &str) -> String {
         succeeded(self.run(line))
@@ -82,7 +82,7 @@ impl Scratch {
         ))
     }
 
-    /// As [`Self::replay`], which must succeed.
+    /// Like [`Self::replay`], which must succeed.
     #[track_caller]
     pub fn replayed(&self, input: &Path, options: &str) -> serde_json::Value {
         succeeded(self.replay(input, options));
@@ -97,7 +97,7 @@ impl Scratch {
             .collect()
     }
 
-    /// What the last run into `out` came to.
+    /// The summary of the last run into `out`.
     pub fn summary(&self) -> serde_json::Value {
         serde_json::from_str(&self.read("out/summary.json")).unwrap()
     }
@@ -110,14 +110,13 @@ impl Scratch {
         ))
     }
 
-    /// What [`Self::simulate`] prints. It must succeed.
+    /// Standard output of [`Self::simulate`], which must succeed.
     #[track_caller]
     pub fn simulated(&self, scene: &Path, options: &str) -> String {
         succeeded(self.simulate(scene, options))
     }
 
-    /// The program must have failed with one line that says all of `parts`, and
-    /// left nothing that could be taken for a result.
+    /// The program must have failed with one line that contains all of `parts`, and left no results.
     #[track_caller]
     pub fn refused(&self, output: &Output, parts: &[impl AsRef<str>]) {
         let message = String::from_utf8(output.stderr.clone()).unwrap();
@@ -125,7 +124,7 @@ impl Scratch {
         assert_eq!(message.lines().count(), 1, "not one line: {message}");
         assert!(!message.contains("panicked"), "{message}");
         for part in parts {
-            says(&message, part.as_ref());
+            assert_contains(&message, part.as_ref());
         }
         let left = std::fs::read_dir(self.path("out")).map_or(0, Iterator::count);
         assert_eq!(left, 0, "files were left in the output folder");
@@ -169,20 +168,20 @@ pub fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Says that `test` has not run for want of `what`, past the harness, which hides what passing tests
-/// print.
+/// Prints that `test` was skipped for lack of `what`. It bypasses the harness, which hides the output
+/// of passing tests.
 pub fn skipped(test: &str, what: &str) {
     // In one piece: other tests write at the same time.
     let _ = std::io::stderr().write_all(format!("SKIPPED: {test}: no {what}\n").as_bytes());
 }
 
-/// `text` must have `part` in it.
+/// Fails unless `text` contains `part`.
 #[track_caller]
-pub fn says(text: &str, part: &str) {
-    assert!(text.contains(part), "{text:?} does not say {part:?}");
+pub fn assert_contains(text: &str, part: &str) {
+    assert!(text.contains(part), "{text:?} does not contain {part:?}");
 }
 
-/// What a program printed that must have succeeded.
+/// Standard output of a program that must have succeeded.
 #[track_caller]
 pub fn succeeded(output: Output) -> String {
     let message = String::from_utf8_lossy(&output.stderr);

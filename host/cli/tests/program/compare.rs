@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::fs;
 
-use crate::common::{Scratch, names, npy, says};
+use crate::common::{Scratch, assert_contains, names, npy};
 
 const SCENE: &str = "columns = 8\nrows = 4\ncycles = 6000\nbackground = 0.02\nlaser_rate_mhz = 2\n\
      [[surface]]\nrange_mm = 2000\nsignal = 0.5\n";
@@ -15,7 +15,7 @@ const FILES: [&str; 5] = [
     "stress.csv",
 ];
 
-/// Four pixels with a pulse at 1.5 bins more each, and background; the third sees nothing.
+/// Four pixels with background and a pulse, each 1.5 bins after the last; the third has no pulse.
 fn photons(scratch: &Scratch) {
     let mut text = "pixel,cycle,bin\n".to_owned();
     let mut state = 1u64;
@@ -52,7 +52,7 @@ fn a_scene_has_an_answer_that_simulate_takes() {
         "instructions a laser cycle and pixel",
         "out/dtof.toml has these settings.",
     ] {
-        says(&printed, part);
+        assert_contains(&printed, part);
     }
     assert_eq!(names(&scratch.path("out")), FILES);
     scratch.printed("compare --scene scene.toml --within 12 --out again --quiet");
@@ -60,7 +60,7 @@ fn a_scene_has_an_answer_that_simulate_takes() {
         let read = |folder| fs::read(scratch.path(folder).join(name)).unwrap();
         assert!(read("out") == read("again"), "{name}");
     }
-    // The chart has what the table has, and names its unit.
+    // The chart shows the values of the table with their unit.
     let table = scratch.read("out/methods.csv");
     let chart = scratch.read("out/compare.svg");
     for part in [
@@ -69,18 +69,18 @@ fn a_scene_has_an_answer_that_simulate_takes() {
         "frames",
         "average of all bins",
     ] {
-        says(&table, part);
-        says(&chart, part);
+        assert_contains(&table, part);
+        assert_contains(&chart, part);
     }
-    says(&chart, "µs");
+    assert_contains(&chart, "µs");
     let stress = scratch.read("out/stress.csv");
-    says(
+    assert_contains(
         &stress,
         "\"a glass inside the gate, ten times the signal\",no,\"window of 3\"",
     );
-    says(&stress, "\"twice the background\",yes,\"window of 3\"");
+    assert_contains(&stress, "\"twice the background\",yes,\"window of 3\"");
 
-    // The settings have the time and the error that the answer says.
+    // The settings have the time and the error of the answer.
     scratch.printed("simulate --scene scene.toml --settings out/dtof.toml --seed 77 --out run");
     let summary: serde_json::Value =
         serde_json::from_str(&scratch.read("run/summary.json")).unwrap();
@@ -95,11 +95,11 @@ fn a_recording_without_truth_is_held_against_itself() {
     photons(&scratch);
     let line = "compare --input photons.csv --columns 2 --sigma-bins 0.7 --within 9 --out out";
     let printed = scratch.printed(line);
-    says(&printed, "take ");
-    says(&printed, "slowest tenth       of the pixels: ");
-    says(&scratch.read("out/compare.svg"), "laser cycles");
+    assert_contains(&printed, "take ");
+    assert_contains(&printed, "slowest tenth       of the pixels: ");
+    assert_contains(&scratch.read("out/compare.svg"), "laser cycles");
     let own = "errors are against the range of all photons of the pixel";
-    says(&scratch.read("out/report.html"), own);
+    assert_contains(&scratch.read("out/report.html"), own);
     // Pixel 2 has no target: its reports are counted apart.
     let truth = npy(
         "<f8",
@@ -110,8 +110,8 @@ fn a_recording_without_truth_is_held_against_itself() {
     );
     scratch.file("truth.npy", truth);
     let printed = scratch.printed(&format!("{line} --truth truth.npy"));
-    says(&printed, "take ");
-    says(
+    assert_contains(&printed, "take ");
+    assert_contains(
         &scratch.read("out/report.html"),
         "errors are against the true range",
     );
@@ -133,6 +133,8 @@ fn what_cannot_be_compared_is_refused() {
             "--within 4 | error: --input is needed
             --input photons.csv --scene scene.toml | cannot be used with
             --scene scene.toml --truth three.npy | cannot be used with
+            --scene scene.toml --columns 8 | --columns is for recordings, not for a scene
+            --scene scene.toml --photons-per-cycle 1 | --photons-per-cycle is for recordings
             --scene scene.toml --within 0 | must be a number above 0
             --scene scene.toml --false-alarm 0.5 | at most 0.1
             --scene scene.toml --settings key.toml | key.toml: rules is unknown; is it rule?
@@ -145,20 +147,20 @@ fn what_cannot_be_compared_is_refused() {
     // Runs and comparisons do not replace each other's files.
     scratch.printed("simulate --scene scene.toml --out run --quiet");
     let output = scratch.run("compare --scene scene.toml --out run");
-    says(
+    assert_contains(
         &String::from_utf8(output.stderr).unwrap(),
         "run: holds the results of a run",
     );
     scratch.file("compared/methods.csv", "");
     let output = scratch.run("simulate --scene scene.toml --out compared");
-    says(
+    assert_contains(
         &String::from_utf8(output.stderr).unwrap(),
         "compared: holds the results of a comparison",
     );
     scratch.file("out/methods.csv", "mine\n");
     let output = scratch.run("compare --scene scene.toml --out out");
     let message = String::from_utf8(output.stderr).unwrap();
-    says(&message, "out/methods.csv: was not written by this program");
+    assert_contains(&message, "out/methods.csv: was not written by this program");
     assert_eq!(scratch.read("out/methods.csv"), "mine\n");
     assert_eq!(names(&scratch.path("out")), ["methods.csv"]);
 }

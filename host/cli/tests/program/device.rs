@@ -6,7 +6,6 @@ mod cable;
 mod calibrate;
 mod calibrate_refused;
 mod clock;
-mod desk;
 mod engine;
 mod map;
 mod masked;
@@ -15,6 +14,7 @@ mod recording;
 #[cfg(target_os = "linux")]
 mod saved;
 mod stopped;
+mod wall_sensor;
 #[path = "../../../../firmware/tests/common/wire.rs"]
 mod wire;
 
@@ -25,23 +25,22 @@ use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, PaperRule};
 use dtof_device::Client;
 use dtof_engine::settings::Settings;
-use dtof_simulate::scene;
 
 fn client(name: &str) -> Client {
     Client::new(dtof_device::open(name, None).unwrap()).unwrap()
 }
 
-/// What the monitor asks of its devices.
+/// Settings for the monitor's devices.
 fn settings() -> Settings {
     Settings {
         rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
         l1: 40,
         x: 4,
-        ..scene::settings(0)
+        ..Settings::static_scene(0)
     }
 }
 
-/// Takes so many bytes, then nobody reads any more.
+/// An output that accepts so many bytes, then is closed.
 struct Closing(usize);
 
 impl Write for Closing {

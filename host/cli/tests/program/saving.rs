@@ -30,7 +30,7 @@ fn files(folder: &Path) -> Files {
     files
 }
 
-/// How often a test with chance in it goes: a few times, or more where time does not matter.
+/// Repetitions of a randomised test: a few, or more where time does not matter.
 fn times(few: u64, many: u64) -> u64 {
     match std::env::var_os("DTOF_LONG") {
         Some(_) => many,
@@ -38,11 +38,11 @@ fn times(few: u64, many: u64) -> u64 {
     }
 }
 
-/// A folder with inputs, the commands that write something, and what each has written with other
-/// settings before.
+/// A folder with inputs, the commands that write files, and what each has written before with other
+/// settings.
 struct Work {
     scratch: Scratch,
-    /// The names of the outputs with the commands, less the option that makes the difference.
+    /// Names of outputs with their commands, without the option that differs.
     commands: Vec<(&'static str, String)>,
 }
 
@@ -95,7 +95,7 @@ impl Work {
         let command = self.commands.iter().find(|(name, _)| *name == out);
         let (name, command) = command.unwrap();
         let other = match (*name, is_new) {
-            // The noise of the depth.
+            // Depth noise.
             ("events.raw", true) => "--threshold-mm 1",
             ("events.raw", _) => "--threshold-mm 8",
             (_, true) => "",
@@ -115,7 +115,7 @@ impl Work {
         }
     }
 
-    /// Has `out` written as an earlier run did.
+    /// Writes `out` as the earlier run did.
     fn earlier(&self, out: &str) -> Files {
         let _ = std::fs::remove_dir_all(self.scratch.path(out));
         let _ = std::fs::remove_file(self.scratch.path(out));
@@ -135,7 +135,7 @@ fn through(shell: &str, scratch: &Scratch, line: &str) -> Output {
     command.output().unwrap()
 }
 
-/// Names of files that are not whole.
+/// Names of incomplete files.
 fn partial(files: &Files) -> Vec<&String> {
     let partial = files.keys().filter(|name| name.ends_with(".partial"));
     partial.collect()

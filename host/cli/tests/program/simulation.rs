@@ -11,8 +11,7 @@ mod plain;
 use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 
-/// Standard deviations on either side that leave 0.1 % of a normal distribution
-/// out.
+/// Standard deviations on either side of the mean that leave out 0.1 % of a normal distribution.
 const DEVIATIONS: f64 = 3.290_527;
 
 /// Laser cycle and TDC code of each photon of a pixel.
@@ -53,7 +52,7 @@ fn histogram(photons: &Photons) -> [u32; 128] {
     bins
 }
 
-/// `measured` lies as near to `expected` as its standard deviation lets expect.
+/// Fails unless `measured` is within the expected deviation of `expected`.
 #[track_caller]
 fn near(what: &str, measured: f64, expected: f64, deviation: f64) {
     let off = (measured - expected) / deviation;
@@ -77,7 +76,7 @@ fn near_share(what: &str, measured: usize, total: usize, share: f64) {
     near(what, float(measured), float(total) * share, deviation);
 }
 
-/// Counts against what is expected of each: chi-square, as a normal deviate
+/// Compares counts with expected counts: chi-square as a normal deviate
 /// (Wilson and Hilferty).
 #[track_caller]
 fn near_counts(what: &str, measured: &[u32], expected: &[f64]) {
@@ -92,8 +91,8 @@ fn near_counts(what: &str, measured: &[u32], expected: &[f64]) {
 }
 
 /// The sum of `values`, each of a laser cycle, over a block of laser cycles, a
-/// hundredth of all. What hangs together within a block need not be known: the
-/// blocks show how far it spreads.
+/// hundredth of all. Values within a block may be correlated: the spread of the blocks gives the
+/// error.
 #[track_caller]
 fn near_in_blocks(
     what: &str,

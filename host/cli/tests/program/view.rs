@@ -26,24 +26,24 @@ use dtof_live::{Feed, Folder, Foxglove, Hub, Served, Terminal};
 
 /// A page that is served in this process until it is dropped.
 pub struct Live {
-    /// Of this computer.
+    /// Port of the page.
     pub port: u16,
-    /// Of Foxglove, if it is served.
+    /// Port of Foxglove, if it is served.
     pub foxglove: u16,
-    /// What is known.
+    /// State of the page.
     pub hub: Arc<Hub>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Live {
-    /// That of a feed; files go into a folder.
+    /// Serves a feed. Files are written into `folder`.
     #[must_use]
     pub fn of(feed: Feed, folder: Option<&Path>) -> Self {
         Self::with(feed, folder, None)
     }
 
-    /// The same, with Foxglove, whose data pages of these origins may read.
+    /// The same with Foxglove, for pages of these origins.
     #[must_use]
     pub fn with_foxglove(feed: Feed, folder: Option<&Path>, origins: &[&str]) -> Self {
         let origins = origins.iter().map(|origin| origin.parse().unwrap());
@@ -75,7 +75,7 @@ impl Live {
         }
     }
 
-    /// Ends it, with all that is recorded.
+    /// Ends the page and completes the recording.
     pub fn end(mut self) {
         self.join();
     }
@@ -101,7 +101,7 @@ fn port(address: &str) -> u16 {
     port.1.parse().unwrap()
 }
 
-/// Waits until something is so.
+/// Waits until a condition holds.
 #[track_caller]
 pub fn until(what: &str, mut is_so: impl FnMut() -> bool) {
     let since = Instant::now();

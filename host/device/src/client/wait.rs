@@ -1,41 +1,41 @@
-//! How long a device may keep the host waiting.
+//! Limits on the wait for an answer.
 
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, ensure};
 
-/// A device that speaks, and does not answer for so long, nor sends an event, is gone.
+/// Longest wait without an answer or an event.
 const ANSWER: Duration = Duration::from_secs(30);
-/// So is one that sends events, and does not answer for so long. A message of photons may make
-/// events for a minute on a slow line.
+/// Longest wait for an answer while events arrive. A message of photons may cause a minute of events
+/// on a slow line.
 const EVENTS_ALONE: Duration = Duration::from_secs(600);
 
-/// Waiting for an answer.
+/// A wait for an answer.
 #[derive(Clone, Copy)]
 pub(super) struct Wait {
     began: Instant,
-    /// The beginning, or the last event.
-    heard: Instant,
+    /// Time of the start or the last event.
+    last_event: Instant,
     arrived: u64,
 }
 
 impl Wait {
-    /// Begins after so many events have `arrived`.
+    /// Begins a wait; `arrived` events have come so far.
     pub fn new(arrived: u64) -> Self {
         let now = Instant::now();
         Self {
             began: now,
-            heard: now,
+            last_event: now,
             arrived,
         }
     }
 
-    /// Fails once a device has kept the host waiting for too long.
-    pub fn goes_on(&mut self, arrived: u64) -> Result<()> {
+    /// Fails if a limit is exceeded; `arrived` events have come so far.
+    pub fn check(&mut self, arrived: u64) -> Result<()> {
         if arrived > self.arrived {
-            (self.heard, self.arrived) = (Instant::now(), arrived);
+            (self.last_event, self.arrived) = (Instant::now(), arrived);
         }
-        within(self.heard, ANSWER)?;
+        within(self.last_event, ANSWER)?;
         within(self.began, EVENTS_ALONE)
     }
 }

@@ -8,32 +8,32 @@ use anyhow::{Context, Result, ensure};
 use tempfile::NamedTempFile;
 
 use dtof_events::aer_file::{Event, Header, Writer};
-use dtof_options::files::{aside, flushed, place_of};
+use dtof_options::files::{destination, flush_to_disk, temporary_file};
 
-/// A file on its way: written aside, and at its place once [`EventFile::finish`] has
-/// returned. What cannot be moved there stays aside: events do not come twice.
+/// An AER file that is being written. It has a temporary name until [`EventFile::finish`] moves it
+/// to its place. If it cannot be moved, the temporary file stays.
 ///
-/// Events that were written are in the file aside, whatever becomes of this program.
+/// Written events are in the temporary file even if the program is killed.
 pub struct EventFile {
     aer: Writer<BufWriter<NamedTempFile>>,
     path: PathBuf,
     aside: PathBuf,
     is_empty: bool,
-    /// What is at its place stays there.
+    /// An existing file is not replaced.
     is_new: bool,
-    /// The disk did not take an event: the file aside is not whole, and never will be.
+    /// An event could not be written, so the file cannot be completed.
     is_broken: bool,
 }
 
 impl EventFile {
-    /// Begins a file, which replaces none of `inputs`.
+    /// Begins a file that replaces none of `inputs`.
     ///
     /// # Errors
-    /// If nothing can be written in its folder, or what is at `path` is no file.
+    /// Fails if its folder cannot be written, or if `path` is something other than a file.
     pub fn new(path: &Path, inputs: &[&Path], header: &Header) -> Result<Self> {
-        let place = place_of(path, inputs)?;
+        let place = destination(path, inputs)?;
         let name = || path.display().to_string();
-        let mut file = aside(&place.folder, ".dtof-recording-").with_context(name)?;
+        let mut file = temporary_file(&place.folder, ".dtof-recording-").with_context(name)?;
         file.disable_cleanup(true);
         let aside = file.path().to_owned();
         let begun = Writer::new(BufWriter::new(file), header).and_then(|mut aer| {
@@ -41,7 +41,7 @@ impl EventFile {
             Ok(aer)
         });
         if begun.is_err() {
-            // Nothing is in it. That it cannot be removed is the lesser failure.
+            // The file is empty. A failure to remove it matters less than `begun`.
             let _ = fs::remove_file(&aside);
         }
         Ok(Self {
@@ -54,7 +54,7 @@ impl EventFile {
         })
     }
 
-    /// The same, which fails at its end if something has come to its place meanwhile.
+    /// The same, but `finish` fails if a file has appeared at its place meanwhile.
     #[must_use]
     pub fn that_replaces_nothing(mut self) -> Self {
         self.is_new = true;
@@ -64,24 +64,20 @@ impl EventFile {
     /// Writes events in the order they come.
     ///
     /// # Errors
-    /// If the disk does not take them.
+    /// Fails if the disk does not take them.
     pub fn write(&mut self, events: &[Event]) -> Result<()> {
-        if events.is_empty() {
-            return Ok(());
-        }
-        self.is_empty = false;
-        let mut all = events.iter();
-        let written = all.try_for_each(|event| self.aer.write(event));
+        self.is_empty &= events.is_empty();
+        let written = events.iter().try_for_each(|event| self.aer.write(event));
         let written = written.and_then(|()| self.aer.flush());
         self.is_broken |= written.is_err();
         written.with_context(|| self.path.display().to_string())
     }
 
-    /// Ends the file after a failure: what came before is kept, and if nothing came, so is
-    /// what was at its place.
+    /// Ends the file after a failure. Without any event the file is removed, and an older one at its
+    /// place stays.
     ///
     /// # Errors
-    /// Those of [`EventFile::finish`], or if the file cannot be removed.
+    /// Fails as [`EventFile::finish`] does, or if the file cannot be removed.
     pub fn finish_after_failure(self) -> Result<()> {
         if !self.is_empty {
             return self.finish();
@@ -93,7 +89,8 @@ impl EventFile {
     /// Ends the file and moves it to its place.
     ///
     /// # Errors
-    /// If the disk does not take it, or has not taken an event; says where the events are then.
+    /// Fails if the disk does not take it, or has not taken an event. The error says where the events
+    /// are.
     pub fn finish(self) -> Result<()> {
         let Self {
             aer,
@@ -105,7 +102,7 @@ impl EventFile {
         } = self;
         let moved = || -> Result<()> {
             ensure!(!is_broken, "the disk did not take an event");
-            let file = flushed(aer.finish()?)?;
+            let file = flush_to_disk(aer.finish()?)?;
             let moved = if is_new {
                 file.persist_noclobber(&path)
             } else {
@@ -142,7 +139,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let gone = folder.path().join("gone").join("events.aer");
         for (path, part) in [
-            (folder.path(), ": is there, and is no file"),
+            (folder.path(), ": exists and is not a file"),
             (&gone, ": there is no folder "),
         ] {
             let error = EventFile::new(path, &[], &HEADER).map(|_| ()).unwrap_err();

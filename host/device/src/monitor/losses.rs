@@ -3,16 +3,16 @@
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::{FaultRecord, Report};
 
-/// Since when losses count.
+/// Losses since a start.
 pub struct Losses<'a> {
-    /// What the device had counted then.
+    /// The device's counts at the start.
     pub first: &'a Report,
-    /// What this end of the link has counted since then.
+    /// The host's counts of the link since then.
     pub here: &'a LinkCounters,
 }
 
 impl Losses<'_> {
-    /// Each loss by its name.
+    /// Each loss with its name.
     #[must_use]
     pub fn counts(&self, report: &Report) -> [(&'static str, u64); 17] {
         let (pixels, blocks) = (&report.statistics, &report.blocks);
@@ -46,7 +46,7 @@ impl Losses<'_> {
         ]
     }
 
-    /// The losses, each with a comma before it. Counts of 0 are left out.
+    /// The losses other than 0, each after a comma.
     #[must_use]
     pub fn line(&self, report: &Report) -> String {
         let mut line = String::new();
@@ -111,7 +111,7 @@ mod tests {
         };
         let none = LinkCounters::default();
         assert_eq!(losses(&report(|_| 0), &report(|_| 0), &none), "");
-        // The counts of the link and of the sensor began before.
+        // The counts of link and sensor did not start at 0.
         assert_eq!(
             losses(&report(|at| 101 + at), &report(|_| 100), &none),
             ", saturated 105, saturated in blocks 114, rejected 106, gated out 107, unaddressed 102, \
@@ -119,7 +119,7 @@ mod tests {
              oversized frames 28, foreign frames 29, out of order 30, duplicates 31, \
              retransmissions 32, unknown messages 22, sensor errors 23 (last: no answer)"
         );
-        // Errors of before are not this one's.
+        // An error from before the start is not shown.
         assert_eq!(losses(&report(|_| 0), &Report::default(), &none), "");
 
         // Each end sees other frames.

@@ -9,57 +9,57 @@ use dtof_core::{Array, EchoNumber, RangeScale};
 
 use dtof_draw::picture::span;
 use dtof_events::aer_file::Event;
-use dtof_events::reports::LastReports;
+use dtof_events::last_events::LastEvents;
 use picture::{PLAIN, block, picture};
 
-/// How often it is drawn.
+/// Shortest interval between two drawings of [`LiveMap::draw_when_due`].
 const EVERY: Duration = Duration::from_millis(200);
 
 const HIDE_CURSOR: &str = "\x1b[?25l";
-/// Shows it again, however the program ends.
+/// Shows the cursor again, whichever way the program ends.
 pub const SHOW_CURSOR: &str = "\x1b[?25h";
 const CLEAR_REST: &str = "\x1b[K";
-/// Everything gone, and the cursor in the first line.
+/// Clears the terminal and moves the cursor to the first line.
 const CLEAR_ALL: &str = "\x1b[2J\x1b[H";
 
-/// Lines and columns of a terminal, asked for each time: its window may change.
-pub type Room = Box<dyn Fn() -> (usize, usize)>;
+/// Gives the lines and columns of a terminal. It is called for each drawing, as windows change size.
+pub type TerminalSize = Box<dyn Fn() -> (usize, usize)>;
 
-/// The picture and where it is drawn. The cursor is hidden as long as it lives.
+/// A picture on a terminal. The cursor is hidden until this is dropped.
 pub struct LiveMap {
     out: Box<dyn Write>,
-    room: Room,
+    size: TerminalSize,
     array: Array,
     ranges: Vec<Option<f64>>,
-    reports: Vec<LastReports>,
+    last_events: Vec<LastEvents>,
     /// The text below the picture.
     line: String,
-    /// Lines that are there from the last time, and the room there was.
+    /// Lines of the last drawing, and the terminal's size then.
     lines: usize,
-    before: (usize, usize),
+    last_size: (usize, usize),
     drawn: Option<Instant>,
 }
 
 impl LiveMap {
-    /// A picture of the first `pixels` of `array` on `out`, a terminal with so much `room`.
+    /// A picture of the first `pixels` of `array` on `out`, a terminal of this `size`.
     #[must_use]
-    pub fn new(out: Box<dyn Write>, room: Room, pixels: u16, array: Array) -> Self {
+    pub fn new(out: Box<dyn Write>, size: TerminalSize, pixels: u16, array: Array) -> Self {
         let pixels = usize::from(pixels);
         Self {
             out,
-            room,
+            size,
             array,
             ranges: vec![None; pixels],
-            reports: vec![LastReports::default(); pixels],
+            last_events: vec![LastEvents::default(); pixels],
             line: String::new(),
             lines: 0,
-            before: (0, 0),
+            last_size: (0, 0),
             drawn: None,
         }
     }
 
-    /// Takes events in. That of a block fills those of its pixels that [`LastReports`] tells.
-    /// Of several echoes the first is shown.
+    /// Adds events. An event of a block fills those of its pixels whose own event is not newer; see
+    /// [`LastEvents`]. The first of several echoes is shown.
     pub fn add(&mut self, events: &[Event], scale: &RangeScale) {
         for event in events {
             if event.echo() > EchoNumber::FIRST {
@@ -67,13 +67,13 @@ impl LiveMap {
             }
             let range_mm = scale.range(event.position()).to_num();
             for pixel in self.array.pixels_of(event.pixel(), event.level()) {
-                let pixel = usize::from(pixel.0);
-                let (Some(range), Some(reports)) =
-                    (self.ranges.get_mut(pixel), self.reports.get_mut(pixel))
+                let pixel = usize::from(pixel.raw());
+                let (Some(range), Some(last_events)) =
+                    (self.ranges.get_mut(pixel), self.last_events.get_mut(pixel))
                 else {
                     continue;
                 };
-                if reports.take_event(event) {
+                if last_events.record_event(event) {
                     *range = Some(range_mm);
                 }
             }
@@ -81,14 +81,14 @@ impl LiveMap {
     }
 
     /// Sets the text below the picture.
-    pub fn tell(&mut self, line: String) {
+    pub fn set_line(&mut self, line: String) {
         self.line = line;
     }
 
-    /// Draws if it is time to.
+    /// Draws unless the last drawing is less than 200 ms old.
     ///
     /// # Errors
-    /// Those of the terminal.
+    /// Fails if the terminal cannot be written.
     pub fn draw_when_due(&mut self) -> io::Result<()> {
         if self.drawn.is_some_and(|drawn| drawn.elapsed() < EVERY) {
             return Ok(());
@@ -96,22 +96,22 @@ impl LiveMap {
         self.draw()
     }
 
-    /// Draws over what was drawn before.
+    /// Draws over the last drawing.
     ///
     /// # Errors
-    /// Those of the terminal.
+    /// Fails if the terminal cannot be written.
     pub fn draw(&mut self) -> io::Result<()> {
-        let room = (self.room)();
-        // Two lines below the picture, and the one of the cursor. The last column stays free:
-        // a line that fills it would clear it, or go on in the next.
-        let (lines, columns) = (room.0.saturating_sub(3), room.1.saturating_sub(1));
+        let size = (self.size)();
+        // Three lines are for the text below the picture and the cursor. The last column stays
+        // free: a line that reaches it would be cleared there, or wrap.
+        let (lines, columns) = (size.0.saturating_sub(3), size.1.saturating_sub(1));
         let mut text = picture(&self.ranges, self.array.columns() as usize, lines, columns);
         text.push(legend(&self.ranges));
         text.push(self.line.clone());
         let back = match self.lines {
             0 => HIDE_CURSOR.to_owned(),
-            // Lines may be broken in another way now.
-            _ if room != self.before => CLEAR_ALL.to_owned(),
+            // The terminal may have wrapped lines anew.
+            _ if size != self.last_size => CLEAR_ALL.to_owned(),
             lines => format!("\r\x1b[{lines}A"),
         };
         self.out.write_all(back.as_bytes())?;
@@ -119,7 +119,7 @@ impl LiveMap {
             writeln!(self.out, "{}{CLEAR_REST}", cut(line, columns))?;
         }
         self.lines = text.len();
-        self.before = room;
+        self.last_size = size;
         self.drawn = Some(Instant::now());
         self.out.flush()
     }
@@ -132,7 +132,7 @@ impl Drop for LiveMap {
     }
 }
 
-/// The first `columns` characters of `line`, and all of its colours.
+/// The first `columns` characters of `line`, with all of its colour codes.
 fn cut(line: &str, columns: usize) -> String {
     let (mut seen, mut in_code) = (0, false);
     let kept = line.chars().filter(|&character| {

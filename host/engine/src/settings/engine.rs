@@ -1,46 +1,39 @@
-//! How the pixels operate, in the units the command line uses.
+//! The settings of an engine.
 
 use anyhow::{Result, ensure};
-use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
-    AnyRule, BlockLevel, CentredWindow, ConfigError, Count, DepthEstimator, EchoNumber, GateError,
-    PaperRule, PixelConfig, RangeGate, RangeScale, Threshold,
+    AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, GateError, PaperRule,
+    PixelConfig, PixelConfigError, RangeGate, RangeScale,
 };
 pub use dtof_link::AdaptiveBinning;
-use serde::Serialize;
-use serde::ser::{SerializeMap, Serializer};
 
 use dtof_options::Refused;
 
-/// Everything an engine and the output need beside the photons.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// The default of L2 in laser cycles.
+pub(crate) const DEFAULT_L2: u16 = 2000;
+
+/// Everything an engine and its output need beside the photons.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Bins of a histogram: a power of two from 8 to 1024.
     pub bins: usize,
     /// Picoseconds a bin.
-    #[serde(serialize_with = "number")]
     pub bin_width_ps: U16F16,
     /// Millimetres added to every range.
-    #[serde(serialize_with = "number")]
     pub offset_mm: I24F8,
     /// First and last bin that may hold the peak, both inclusive.
     pub gate: Option<(u16, u16)>,
     /// Addresses of pixels that are left out: hot and dead ones.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub masked: Vec<u16>,
     /// The rule that decides whether a peak stands clear.
-    #[serde(flatten, serialize_with = "rule")]
     pub rule: AnyRule,
     /// The standard deviation of the pulse in bins, if it is known.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "known")]
     pub sigma_bins: Option<U8F8>,
-    /// How far the window that the depth comes from reaches before and after its place, in bins,
-    /// if not as suits `sigma_bins`.
-    #[serde(skip_serializing_if = "Option::is_none", serialize_with = "sides")]
+    /// How far the depth window reaches before and after its centre, in bins, if not as suits
+    /// `sigma_bins`.
     pub half_widths: Option<CentredWindow>,
-    /// The depth comes from three bins, even if a window would suit the pulse.
-    #[serde(skip)]
+    /// The depth is the centroid of three bins, even if a window would suit the pulse.
     pub centroid: bool,
     /// The exposure a decision must exceed, in laser cycles.
     pub l1: u16,
@@ -49,87 +42,21 @@ pub struct Settings {
     /// Laser cycles between looks.
     pub x: u16,
     /// Blocks of pixels that decide together.
-    #[serde(flatten, serialize_with = "binning")]
     pub binning: Option<AdaptiveBinning>,
     /// Whether pixels expect their next event where the last was.
     pub tracking: bool,
     /// The last echo that a pixel reports in an exposure.
-    #[serde(serialize_with = "echo")]
     pub echoes: EchoNumber,
-    /// An exposure ends once it is so many times as long as it was at its last echo, without
-    /// it at L2.
+    /// An exposure ends once it is this many times as long as it was at its last echo; at L2 if
+    /// `None`.
     pub echo_wait: Option<u8>,
-    /// Whether the TDC takes one photon a laser cycle, so that events say when that
-    /// makes for pile-up.
+    /// Whether the TDC takes one photon a laser cycle, so that events are flagged for pile-up.
     pub one_hit_tdc: bool,
-    /// A frame-based sensor instead: all pixels read their highest bin every so many
-    /// laser cycles, and rule, minimum, L1, L2 and X mean nothing.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// A frame-based sensor instead: all pixels read their highest bin every so many laser cycles.
+    /// Rule, minimum, L1, L2 and X are not used.
     pub frame: Option<u16>,
     /// Seed of every random number.
     pub seed: u64,
-}
-
-/// A fixed-point number as a decimal one.
-fn number<S: Serializer>(number: &impl Fixed, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_f64(number.to_num())
-}
-
-/// A rule by its name, with its own numbers.
-fn rule<S: Serializer>(rule: &AnyRule, serializer: S) -> Result<S::Ok, S::Error> {
-    let mut fields = serializer.serialize_map(None)?;
-    match rule {
-        AnyRule::Paper(rule) => with_alpha(&mut fields, "paper", rule.threshold())?,
-        AnyRule::Average(rule) => with_alpha(&mut fields, "average", rule.threshold())?,
-        AnyRule::Window(rule) => {
-            fields.serialize_entry("rule", "window")?;
-            fields.serialize_entry("window", &rule.width())?;
-            fields.serialize_entry("z", &rule.z().to_num::<f64>())?;
-            fields.serialize_entry("min_count", &rule.minimum_count().raw())?;
-        }
-    }
-    fields.end()
-}
-
-/// A rule with a threshold.
-fn with_alpha<M: SerializeMap>(
-    fields: &mut M,
-    rule: &str,
-    threshold: &Threshold,
-) -> Result<(), M::Error> {
-    fields.serialize_entry("rule", rule)?;
-    fields.serialize_entry("alpha", &threshold.alpha().to_num::<f64>())?;
-    fields.serialize_entry("min_count", &threshold.minimum_count().raw())
-}
-
-/// A fixed-point number that is there.
-fn known<S: Serializer>(sigma: &Option<U8F8>, serializer: S) -> Result<S::Ok, S::Error> {
-    number(&sigma.unwrap_or_default(), serializer)
-}
-
-/// Both half widths of a window that is there.
-fn sides<S: Serializer>(window: &Option<CentredWindow>, serializer: S) -> Result<S::Ok, S::Error> {
-    let sides = window.map(|window| [window.before(), window.after()].map(U8F8::to_num::<f64>));
-    sides.serialize(serializer)
-}
-
-/// The levels of adaptive binning, 0 without, and how patient pixels are.
-fn binning<S: Serializer>(
-    binning: &Option<AdaptiveBinning>,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    let mut fields = serializer.serialize_map(None)?;
-    let levels = binning.map_or(0, |binning| binning.levels.raw());
-    fields.serialize_entry("binning", &levels)?;
-    if let Some(binning) = binning {
-        fields.serialize_entry("patience", &binning.patience)?;
-    }
-    fields.end()
-}
-
-/// The number of an echo.
-fn echo<S: Serializer>(echo: &EchoNumber, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.serialize_u8(echo.raw())
 }
 
 impl Settings {
@@ -147,7 +74,7 @@ impl Settings {
             half_widths: None,
             centroid: false,
             l1: 100,
-            l2: 2000,
+            l2: DEFAULT_L2,
             x: 10,
             binning: None,
             tracking: false,
@@ -159,18 +86,18 @@ impl Settings {
         }
     }
 
-    /// As a configuration of pixels for `BINS` bins.
+    /// The configuration of pixels with `BINS` bins.
     ///
     /// # Errors
-    /// The constraint the settings break.
+    /// Fails if the settings break a constraint.
     pub fn config<const BINS: usize>(&self) -> Result<PixelConfig<BINS, AnyRule>> {
         self.config_of(self.rule)
     }
 
-    /// The same for blocks of pixels.
+    /// The configuration of blocks of pixels.
     ///
     /// # Errors
-    /// The constraint the settings break.
+    /// Fails if the settings break a constraint.
     pub fn block_config<const BINS: usize>(&self) -> Result<PixelConfig<BINS, AnyRule>> {
         let levels = self
             .binning
@@ -193,40 +120,46 @@ impl Settings {
             .estimator(self.estimator())
             .one_hit_tdc(self.one_hit_tdc)
             .tracking(tracking)
-            .echoes(self.echoes, self.peel_reach())
+            .echoes(self.echoes, self.echo_guard_bins())
             .echo_wait(self.echo_wait_times())
             .build()
             .map_err(|error| self.refused(error).into())
     }
 
-    fn refused(&self, error: ConfigError) -> Refused {
+    fn refused(&self, error: PixelConfigError) -> Refused {
         let Self { x, l1, l2, .. } = self;
         match error {
-            ConfigError::ZeroX => Refused::value("x", x, "must be at least 1"),
-            ConfigError::XAboveL1 => {
+            PixelConfigError::ZeroX => Refused::value("x", x, "must be at least 1"),
+            PixelConfigError::XAboveL1 => {
                 Refused::value("x", x, format!("must not be greater than `l1` {l1}"))
             }
-            ConfigError::L2NotAboveL1 => {
-                Refused::value("l2", l2, format!("must be greater than `l1` {l1}"))
+            PixelConfigError::L2NotAboveL1 => {
+                let default = match *l2 {
+                    DEFAULT_L2 => "; 2000 is the default of `l2`",
+                    _ => "",
+                };
+                let reason = format!("must be greater than `l1` {l1}{default}");
+                Refused::value("l2", l2, reason)
             }
-            ConfigError::NoLook => Refused::value(
+            PixelConfigError::NoLook => Refused::value(
                 "x",
                 x,
                 format!("no multiple of it lies strictly between `l1` {l1} and `l2` {l2}"),
             ),
+            other => Refused::value("x", x, other.text()),
         }
     }
 
-    /// [`Self::echo_wait`] as pixels know it: without it the most, which is until L2.
+    /// [`Self::echo_wait`] for pixels: the maximum, which lasts until L2, if `None`.
     #[must_use]
     pub fn echo_wait_times(&self) -> u8 {
         self.echo_wait.unwrap_or(u8::MAX)
     }
 
-    /// Bins to either side of an echo's peak that are left out once it is reported: four
-    /// standard deviations of the pulse, taken to be a bin unless it is known.
+    /// The bins to either side of an echo's peak that are left out once it is reported: four
+    /// standard deviations of the pulse, or 4 bins if its width is not known.
     #[must_use]
-    pub fn peel_reach(&self) -> u8 {
+    pub fn echo_guard_bins(&self) -> u8 {
         let sigma = self.sigma_bins.unwrap_or(const { U8F8::lit("1") });
         // At most 7.
         u8::try_from((4 * u32::from(sigma.to_bits())).div_ceil(256)).unwrap_or(u8::MAX)
@@ -242,10 +175,10 @@ impl Settings {
             .map_or(DepthEstimator::Centroid3, DepthEstimator::CentredWindow)
     }
 
-    /// The gate among `BINS` bins.
+    /// The gate for `BINS` bins.
     ///
     /// # Errors
-    /// If it ends past the last, or is too narrow.
+    /// Fails if it ends past the last bin or is too narrow.
     pub fn range_gate<const BINS: usize>(&self) -> Result<RangeGate<BINS>> {
         Ok(match self.gate {
             None => RangeGate::full(),
@@ -255,10 +188,10 @@ impl Settings {
         })
     }
 
-    /// From bins to millimetres.
+    /// The scale from bins to millimetres.
     ///
     /// # Errors
-    /// The constraint the settings break.
+    /// Fails if the settings break a constraint.
     pub fn range_scale(&self) -> Result<RangeScale> {
         RangeScale::new(self.bin_width_ps, self.offset_mm).map_err(|error| {
             let reason = format!("with `offset_mm` {}: {error}", self.offset_mm);
@@ -267,7 +200,7 @@ impl Settings {
     }
 }
 
-/// There is no such gate in histograms of `bins` bins.
+/// The error of a gate in histograms of `bins` bins.
 pub(crate) fn no_gate((first, last): (u16, u16), bins: usize, error: &GateError) -> Refused {
     let reason = format!("with {bins} bins: {error}");
     Refused::value("gate", format_args!("{first}..{last}"), reason)

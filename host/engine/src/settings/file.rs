@@ -5,91 +5,26 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Error, Result, anyhow};
+use anyhow::{Context, Error, Result, anyhow, ensure};
 use serde::Serialize;
 use toml::{Table, Value};
 
-use super::{Detection, Rays, Run, Sensor};
-use dtof_options::{GivenByFile, NO_OPTION, Refused};
+use super::{DetectionSettings, RaySettings, RunSettings, SensorSettings};
+use dtof_options::{KeysOfFile, NO_OPTION, Refused};
 
 /// The first line of every file that this program writes.
 pub const MARK: &str = "# dtof settings";
 
-/// The keys of each section and what they are, in the order in which they are written.
-const SECTIONS: [(&str, &[(&str, &str)]); 4] = [
-    (
-        "sensor",
-        &[
-            ("laser_hz", "laser cycles a second"),
-            ("columns", "pixel = row * columns + column"),
-            ("bins", "of a histogram"),
-            ("bin_width_ps", "picoseconds a bin"),
-            ("offset_mm", "added to every range"),
-            ("gate", "first and last bin that may hold a peak"),
-            ("masked", "addresses of pixels that are left out"),
-            ("sigma_bins", "standard deviation of the pulse"),
-            ("one_hit_tdc", "the TDC takes one photon a laser cycle"),
-            (
-                "background",
-                "photons a bin and laser cycle of the median pixel",
-            ),
-            (
-                "glass",
-                "photons a laser cycle and pixel of the cover glass",
-            ),
-            ("glass_bins", "the same for each bin before the gate"),
-        ],
-    ),
+/// The sections with their keys and comments, in the order in which they are written.
+const SECTIONS: [(&str, &[&str], &[&str]); 4] = [
+    ("sensor", SensorSettings::KEYS, SensorSettings::COMMENTS),
     (
         "detection",
-        &[
-            ("rule", "paper, average or window"),
-            ("alpha", "standard deviations, of rules paper and average"),
-            ("window", "bins, of rule window"),
-            ("z", "standard deviations, of rule window"),
-            (
-                "false_alarm",
-                "share of exposures without a target, instead of z",
-            ),
-            ("estimator", "centroid or window"),
-            (
-                "half_widths",
-                "bins before and after the place, of estimator window",
-            ),
-            ("min_count", "photons"),
-            ("l1", "laser cycles that a decision must exceed"),
-            ("l2", "laser cycles at which a pixel starts over"),
-            ("x", "laser cycles between looks"),
-            ("binning", "levels of blocks"),
-            (
-                "patience",
-                "laser cycles until a silent pixel counts in its block",
-            ),
-            ("tracking", "expect the next event near the last"),
-            ("echoes", "of an exposure"),
-            ("echo_wait", "times the laser cycles of the last echo"),
-        ],
+        DetectionSettings::KEYS,
+        DetectionSettings::COMMENTS,
     ),
-    (
-        "rays",
-        &[
-            ("field_of_view_degrees", "horizontal, vertical"),
-            ("calibration", "file with a ray for each pixel"),
-        ],
-    ),
-    (
-        "run",
-        &[
-            ("cycles", "laser cycles"),
-            ("seed", "of every random number"),
-            ("photons_per_cycle", "in the brightest pixel of a recording"),
-            ("recorded_cycles", "laser cycles of a recording"),
-            ("frame", "laser cycles, of a frame-based sensor"),
-            ("axes", "of a recorded array"),
-            ("array", "of an archive"),
-            ("rebin", "neighbouring bins that are added up"),
-        ],
-    ),
+    ("rays", RaySettings::KEYS, RaySettings::COMMENTS),
+    ("run", RunSettings::KEYS, RunSettings::COMMENTS),
 ];
 
 /// The keys whose values are lists.
@@ -101,58 +36,59 @@ const LISTS: [&str; 5] = [
     "field_of_view_degrees",
 ];
 
-/// The keys whose values are texts.
+/// The keys whose values are strings.
 const TEXTS: [&str; 5] = ["rule", "estimator", "calibration", "axes", "array"];
 
-/// A settings file, or what the command line says of the same. All of it may be missing.
+/// A settings file, or the same settings from the command line. All of them may be missing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SettingsFile {
-    /// What is known of the sensor.
-    pub sensor: Sensor,
+    /// The sensor.
+    pub sensor: SensorSettings,
     /// How pixels decide.
-    pub detection: Detection,
-    /// Where pixels look.
-    pub rays: Rays,
+    pub detection: DetectionSettings,
+    /// The rays of the pixels.
+    pub rays: RaySettings,
     /// What is replayed or simulated.
-    pub run: Run,
-    /// The file that gave some of it.
+    pub run: RunSettings,
+    /// The file that set some of them.
     #[serde(skip)]
-    pub file: Option<GivenByFile>,
+    pub file: Option<KeysOfFile>,
 }
 
 impl SettingsFile {
     /// Reads a file.
     ///
     /// # Errors
-    /// One line with the name of the file, and the line or the key that is wrong.
+    /// Returns one line with the name of the file, and the line or the key that is wrong.
     pub fn read(path: &Path) -> Result<Self> {
         let name = || path.display().to_string();
         let text = fs::read_to_string(path).with_context(name)?;
         let mut file = Self::parse(&text).map_err(|error| match error.downcast_ref() {
             Some(Refused { key: Some(key), .. }) => {
-                let sections = SECTIONS.iter().map(|(section, _)| *section);
-                let keys = SECTIONS.iter().flat_map(|(_, keys)| *keys);
-                let keys = sections.chain(keys.map(|(key, _)| *key)).chain([&**key]);
+                let sections = SECTIONS.iter().map(|(section, ..)| *section);
+                let keys = SECTIONS
+                    .iter()
+                    .flat_map(|(_, keys, _)| keys.iter().copied());
+                let keys = sections.chain(keys).chain([&**key]);
                 let keys = keys.map(str::to_owned).collect();
                 let path = path.to_owned();
-                dtof_options::blamed(error, Some(&GivenByFile { path, keys }))
+                dtof_options::add_file_name(error, Some(&KeysOfFile { path, keys }))
             }
             _ => error.context(name()),
         })?;
-        // A path of the file is meant from where the file is.
+        // A relative path starts at the folder of the file.
         if let (Some(rays), Some(folder)) = (&mut file.rays.calibration, path.parent()) {
-            let whole = std::path::absolute(folder.join(&rays)).with_context(name)?;
-            *rays = whole.display().to_string();
+            *rays = std::path::absolute(folder.join(&rays)).with_context(name)?;
         }
-        let (path, keys) = (path.to_owned(), file.keys()?);
-        file.file = Some(GivenByFile { path, keys });
+        let (path, keys) = (path.to_owned(), file.keys().with_context(name)?);
+        file.file = Some(KeysOfFile { path, keys });
         Ok(file)
     }
 
-    /// The text of a file.
+    /// Parses the text of a file.
     ///
     /// # Errors
-    /// The line that is no TOML, or the key that is wrong.
+    /// Names the line that is not TOML, or the key that is wrong.
     pub fn parse(text: &str) -> Result<Self> {
         let sections: Table = toml::from_str(text).map_err(|error| {
             let before = error.span().and_then(|span| text.get(..span.start));
@@ -161,10 +97,10 @@ impl SettingsFile {
         })?;
         let mut file = Self::default();
         for (section, values) in &sections {
-            let Some((_, keys)) = SECTIONS.iter().find(|(known, _)| known == section) else {
+            let Some((_, keys, _)) = SECTIONS.iter().find(|(name, ..)| name == section) else {
                 return Err(match section_of(section) {
-                    Some(known) => Refused::new(section, format!("stands in [{known}]")),
-                    None => Refused::unknown(section, SECTIONS.map(|(section, _)| section)),
+                    Some(name) => Refused::new(section, format!("belongs in [{name}]")),
+                    None => Refused::unknown(section, SECTIONS.map(|(section, ..)| section)),
                 }
                 .into());
             };
@@ -173,15 +109,15 @@ impl SettingsFile {
                 return Err(Refused::new(section, reason).into());
             };
             for (key, value) in values {
-                if !keys.iter().any(|(known, _)| known == key) {
+                if !keys.contains(&&**key) {
                     return Err(match section_of(key) {
-                        Some(known) => Refused::new(key, format!("stands in [{known}]")),
-                        None => Refused::unknown(key, keys.iter().map(|(key, _)| *key)),
+                        Some(name) => Refused::new(key, format!("belongs in [{name}]")),
+                        None => Refused::unknown(key, keys.iter().copied()),
                     }
                     .into());
                 }
                 let is_empty = value.as_array().is_some_and(Vec::is_empty);
-                // No pixels and no photons: nothing is given.
+                // An empty list sets nothing.
                 if !(is_empty && matches!(&**key, "masked" | "glass_bins")) {
                     file.set_value(key, value)?;
                 }
@@ -191,7 +127,7 @@ impl SettingsFile {
         Ok(file)
     }
 
-    /// Sets a key to a value of a file.
+    /// Sets a key to a TOML value.
     fn set_value(&mut self, key: &str, value: &Value) -> Result<(), Refused> {
         let text = text_of(value);
         let refused = |reason| Refused::value(key, &text, reason);
@@ -204,8 +140,8 @@ impl SettingsFile {
         }
         self.set(key, &text).map_err(refused)?;
         match (TEXTS.contains(&key), is_text) {
-            (true, false) => Err(refused("must stand in quotes".to_owned())),
-            (false, true) => Err(refused("must not stand in quotes".to_owned())),
+            (true, false) => Err(refused("must be in quotes".to_owned())),
+            (false, true) => Err(refused("must not be in quotes".to_owned())),
             _ => Ok(()),
         }
     }
@@ -213,7 +149,7 @@ impl SettingsFile {
     /// Sets a key of any section.
     ///
     /// # Errors
-    /// Why it cannot be so.
+    /// Says what the value must be, or returns [`NO_OPTION`] for another key.
     pub fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
         match section_of(key) {
             Some("sensor") => self.sensor.set(key, text),
@@ -224,62 +160,86 @@ impl SettingsFile {
         }
     }
 
-    /// Are there two options of which only one can be given?
+    /// Checks that no two options exclude each other.
     ///
     /// # Errors
-    /// Which.
+    /// Names the two.
     pub fn check(&self) -> Result<(), Refused> {
-        self.detection.check()?;
-        self.rays.check()?;
-        self.run.check()
+        let Self {
+            detection,
+            rays,
+            run,
+            ..
+        } = self;
+        let z = detection.z.is_some() && detection.false_alarm.is_some();
+        let view = rays.field_of_view_degrees.is_some() && rays.calibration.is_some();
+        let length = run.photons_per_cycle.is_some() && run.recorded_cycles.is_some();
+        for (are_both, key, other) in [
+            (z, "z", "false_alarm"),
+            (view, "field_of_view_degrees", "calibration"),
+            (length, "photons_per_cycle", "recorded_cycles"),
+        ] {
+            if are_both {
+                let reason = format!("cannot be used with `{other}`");
+                return Err(Refused::new(key, reason));
+            }
+        }
+        Ok(())
     }
 
-    /// The keys that are given.
+    /// The keys that are set.
     ///
     /// # Errors
-    /// If a number is none.
+    /// Fails if a value cannot be written as TOML.
     pub fn keys(&self) -> Result<BTreeSet<String>> {
         let sections = Table::try_from(self)?;
         let tables = sections.values().filter_map(Value::as_table);
         Ok(tables.flat_map(Table::keys).cloned().collect())
     }
 
-    /// The option `key` is given by itself: the file has no part in it.
+    /// Records that an option sets `key`, so that errors do not name the file.
     pub fn override_key(&mut self, key: &str) {
         if let Some(file) = &mut self.file {
             file.keys.remove(key);
         }
     }
 
-    /// `error`, which names the file where it is about a key that the file gave.
-    #[must_use]
-    pub fn blame(&self, error: Error) -> Error {
-        dtof_options::blamed(error, self.file.as_ref())
+    /// Checks that the settings are for the bins of a device.
+    ///
+    /// # Errors
+    /// Fails if they have another number of bins.
+    pub fn check_bins(&self, bins: u16) -> Result<()> {
+        let own = self.sensor.bins.unwrap_or(bins);
+        ensure!(
+            own == bins,
+            "the settings are for {own} bins, the device has {bins}"
+        );
+        Ok(())
     }
 
-    /// These, and of `other` what these do not say.
+    /// Adds the name of the file to `error`, if the file set the key it is about.
+    #[must_use]
+    pub fn add_file_name(&self, error: Error) -> Error {
+        dtof_options::add_file_name(error, self.file.as_ref())
+    }
+
+    /// These settings, and those of `other` that they lack.
     #[must_use]
     pub fn or(self, mut other: Self) -> Self {
-        // Half widths are those of a pulse.
+        // Half widths belong to a pulse.
         let sigma = self.sensor.sigma_bins;
         if sigma.is_some() && sigma != other.sensor.sigma_bins {
             other.detection.half_widths = None;
         }
         let (file, own) = (other.file.take(), self.keys());
-        // A field of view replaces a calibration, and the other way round.
-        let rays = if self.rays == Rays::default() {
-            other.rays
-        } else {
-            self.rays
-        };
         let mut merged = Self {
             sensor: self.sensor.or(other.sensor),
             detection: self.detection.or(other.detection),
-            rays,
+            rays: self.rays.or(other.rays),
             run: self.run.or(other.run),
             file: self.file,
         };
-        // Of the file are keys that no option has set, nor dropped.
+        // The file still sets the keys that no option sets or drops.
         if let (None, Some(mut file), Ok(own), Ok(all)) = (&merged.file, file, own, merged.keys()) {
             file.keys
                 .retain(|key| all.contains(key) && !own.contains(key));
@@ -288,24 +248,24 @@ impl SettingsFile {
         merged
     }
 
-    /// Without what holds for one recording alone.
+    /// Drops what belongs to a single recording.
     #[must_use]
-    pub fn of_any_file(mut self) -> Self {
+    pub fn without_recording(mut self) -> Self {
         (self.run.axes, self.run.array, self.run.cycles) = (None, None, None);
         self
     }
 
-    /// The text of the file: what is said, a line a key, with what it is.
+    /// The text of the file: one line a key that is set, with its comment.
     ///
     /// # Errors
-    /// If a number is none.
+    /// Fails if a value cannot be written as TOML.
     pub fn to_toml(&self) -> Result<String> {
         let all = Table::try_from(self)?;
         let mut text = format!("{MARK}: `--settings FILE` takes them, options override them.\n");
-        for (section, keys) in SECTIONS {
-            let said = all.get(section).and_then(Value::as_table);
-            let lines = keys.iter().filter_map(|(key, comment)| {
-                let value = said?.get(*key)?;
+        for (section, keys, comments) in SECTIONS {
+            let given = all.get(section).and_then(Value::as_table);
+            let lines = keys.iter().zip(comments).filter_map(|(key, comment)| {
+                let value = given?.get(*key)?;
                 Some((format!("{key} = {value}"), comment))
             });
             let lines: Vec<_> = lines.collect();
@@ -321,22 +281,14 @@ impl SettingsFile {
     }
 }
 
-impl From<Run> for SettingsFile {
-    fn from(run: Run) -> Self {
-        Self {
-            run,
-            ..Self::default()
-        }
-    }
-}
-
 /// The section in which a key stands.
 fn section_of(key: &str) -> Option<&'static str> {
-    let has_key = |(_, keys): &&(_, &[(&str, _)])| keys.iter().any(|(known, _)| *known == key);
-    SECTIONS.iter().find(has_key).map(|(section, _)| *section)
+    let mut sections = SECTIONS.iter();
+    let section = sections.find(|(_, keys, _)| keys.contains(&key));
+    section.map(|(section, ..)| *section)
 }
 
-/// A value of a file as an option has it: the elements of a list after each other.
+/// A TOML value as text, as an option has it. Elements of a list are separated by commas.
 fn text_of(value: &Value) -> String {
     match value {
         Value::String(text) => text.clone(),
@@ -358,7 +310,7 @@ mod tests {
     use super::*;
 
     /// Every key of every section.
-    const WHOLE: &str = "
+    const ALL_KEYS: &str = "
 [sensor]
 laser_hz = 10_000_000
 columns = 16
@@ -401,14 +353,14 @@ rebin = 2
 
     #[test]
     fn what_is_written_reads_as_what_it_was() {
-        let file = SettingsFile::parse(WHOLE).unwrap();
+        let file = SettingsFile::parse(ALL_KEYS).unwrap();
         let text = file.to_toml().unwrap();
         assert_eq!(SettingsFile::parse(&text).unwrap(), file, "{text}");
         assert!(text.contains("sigma_bins = 0.8 "), "{text}");
-        // Each key is there, with its comment; those of other rules and choices are not.
+        // Each key is written with its comment, except those of other rules and choices.
         let others = ["alpha", "false_alarm", "calibration", "photons_per_cycle"];
-        for (_, keys) in SECTIONS {
-            for (key, comment) in keys {
+        for (_, keys, comments) in SECTIONS {
+            for (key, comment) in keys.iter().zip(comments) {
                 let line = text
                     .lines()
                     .find(|line| line.starts_with(&format!("{key} = ")));
@@ -424,21 +376,21 @@ rebin = 2
     }
 
     #[test]
-    fn what_holds_can_be_said_again() {
-        let file = SettingsFile::parse(WHOLE).unwrap();
+    fn settings_become_the_same_file() {
+        let file = SettingsFile::parse(ALL_KEYS).unwrap();
         let settings = file.settings(128).unwrap();
-        assert_eq!(file.with(&settings), file);
+        assert_eq!(file.with_settings(&settings), file);
         let file = SettingsFile::parse("[detection]\nrule = 'average'\nalpha = 6.3").unwrap();
         let settings = file.settings(64).unwrap();
-        let said = file.with(&settings);
-        assert_eq!(said.settings(64).unwrap(), settings);
-        assert_eq!(said.detection.alpha, file.detection.alpha);
-        assert_eq!((said.sensor.bins, said.run.seed), (Some(64), Some(1)));
+        let again = file.with_settings(&settings);
+        assert_eq!(again.settings(64).unwrap(), settings);
+        assert_eq!(again.detection.alpha, file.detection.alpha);
+        assert_eq!((again.sensor.bins, again.run.seed), (Some(64), Some(1)));
     }
 
     #[test]
     fn an_option_overrides_the_file() {
-        let file = SettingsFile::parse(WHOLE).unwrap();
+        let file = SettingsFile::parse(ALL_KEYS).unwrap();
         let over = |text: &str| {
             let options = SettingsFile::parse(text).unwrap();
             options.or(file.clone())
@@ -446,10 +398,10 @@ rebin = 2
         let of = |text: &str| over(&format!("[detection]\n{text}")).detection;
         assert_eq!(of("l1 = 8").l1, Some(8));
         assert_eq!(of("l1 = 8").z, file.detection.z);
-        // z and false_alarm say the same.
+        // z and false_alarm exclude each other.
         let share = of("false_alarm = 0.02");
         assert_eq!((share.z, share.false_alarm), (None, Some(0.02)));
-        // The numbers of another rule are not taken, those of any rule are.
+        // Numbers of another rule are dropped, those of any rule are kept.
         let paper = of("rule = 'paper'");
         assert_eq!((paper.z, paper.window, paper.tracking), (None, None, None));
         assert_eq!((paper.l1, paper.binning), (Some(40), Some(2)));
@@ -467,7 +419,7 @@ rebin = 2
     #[test]
     fn what_is_wrong_is_named() {
         for (text, reason) in [
-            ("l1 = 4", "l1 stands in [detection]"),
+            ("l1 = 4", "l1 belongs in [detection]"),
             ("[detection]\nl1 = []", "l1 : must be one value"),
             ("[detection]\nhalf_widths = []", "half_widths : must be"),
             ("[sensor]\ngate = []", "gate : must be FIRST..LAST"),
@@ -548,16 +500,16 @@ rebin = 2
             ("[sensor]\nmasked = ['']", "masked : must be a whole number"),
             (
                 "[sensor]\nmasked = ['3']",
-                "masked 3: must not stand in quotes",
+                "masked 3: must not be in quotes",
             ),
             (
                 "[sensor]\nmasked = [1, 70000, 3]",
                 "masked 1,70000,3: 70000 must be a whole number from 0 to 65535",
             ),
             ("[sensor]\nbins = [8]", "bins 8: must be one value"),
-            ("[detection]\nl1 = '40'", "l1 40: must not stand in quotes"),
+            ("[detection]\nl1 = '40'", "l1 40: must not be in quotes"),
             ("[detection]\nrule = true", "rule true: must be paper"),
-            ("[run]\narray = 5", "array 5: must stand in quotes"),
+            ("[run]\narray = 5", "array 5: must be in quotes"),
             (
                 "[run]\naxes = 'rows'",
                 "axes rows: one axis must be the bins",

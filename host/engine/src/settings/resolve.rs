@@ -1,21 +1,26 @@
-//! From what is said to what holds: defaults, and the thresholds of rules.
+//! From the settings file to the settings of an engine: defaults, and the thresholds of rules.
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{AnyRule, EchoNumber, HIGHEST_Z, RangeGate, z_for_levels};
+use dtof_core::paper::Threshold;
+use dtof_core::rule::{HIGHEST_Z, z_for_levels};
+use dtof_core::{AnyRule, EchoNumber, RangeGate};
 use dtof_theory::tune::window::one_in;
 
-use super::engine::{Settings, no_gate};
-use super::{Detection, EstimatorName, RuleName, Run, Sensor, SettingsFile};
+use super::engine::{DEFAULT_L2, Settings, no_gate};
+use super::{
+    DetectionSettings, EstimatorName, RuleName, RunSettings, SensorSettings, SettingsFile,
+};
 use dtof_options::Refused;
 
 impl SettingsFile {
-    /// What holds for histograms of `bins` bins.
+    /// The settings for histograms of `bins` bins.
     ///
     /// # Errors
-    /// What contradicts itself, by the names of options, or of a file and its keys.
+    /// Fails if settings contradict each other. Names options, or the file and its keys.
     pub fn settings(&self, bins: usize) -> Result<Settings> {
-        self.resolved(bins).map_err(|error| self.blame(error))
+        self.resolved(bins)
+            .map_err(|error| self.add_file_name(error))
     }
 
     fn resolved(&self, bins: usize) -> Result<Settings> {
@@ -24,10 +29,10 @@ impl SettingsFile {
         } = self;
         let x = detection.x.unwrap_or(4);
         let l1 = detection.l1.unwrap_or(40);
-        let l2 = detection.l2.unwrap_or(2000);
+        let l2 = detection.l2.unwrap_or(DEFAULT_L2);
         let z_for = |share| {
-            // Only how many bins the gate leaves counts; a number of bins that cannot be is
-            // refused by the engine.
+            // Only the number of bins within the gate matters here. The engine refuses an invalid
+            // number of bins.
             #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
             let last_bin = bins.clamp(8, 1024) as u16 - 1;
             let (first, last) = sensor.gate.unwrap_or((0, last_bin));
@@ -78,12 +83,12 @@ impl SettingsFile {
         })
     }
 
-    /// The file that says these settings, and the rest of this one.
+    /// A file with `settings`, and the rest of this one.
     #[must_use]
-    pub fn with(&self, settings: &Settings) -> Self {
+    pub fn with_settings(&self, settings: &Settings) -> Self {
         let masked = &settings.masked;
         Self {
-            sensor: Sensor {
+            sensor: SensorSettings {
                 bins: u16::try_from(settings.bins).ok(),
                 bin_width_ps: Some(settings.bin_width_ps),
                 offset_mm: Some(settings.offset_mm),
@@ -93,9 +98,9 @@ impl SettingsFile {
                 one_hit_tdc: settings.one_hit_tdc.then_some(true),
                 ..self.sensor.clone()
             },
-            detection: Detection::of(settings),
+            detection: DetectionSettings::from_settings(settings),
             rays: self.rays.clone(),
-            run: Run {
+            run: RunSettings {
                 seed: Some(settings.seed),
                 frame: settings.frame,
                 ..self.run.clone()
@@ -105,35 +110,29 @@ impl SettingsFile {
     }
 }
 
-impl Detection {
-    /// What says how the pixels of `settings` decide.
-    fn of(settings: &Settings) -> Self {
+impl DetectionSettings {
+    /// The detection section of `settings`.
+    fn from_settings(settings: &Settings) -> Self {
+        let with_alpha = |name, threshold: &Threshold| {
+            let detection = Self {
+                rule: Some(name),
+                alpha: Some(threshold.alpha()),
+                ..Self::default()
+            };
+            (detection, threshold.minimum_count())
+        };
         let (rule, minimum) = match settings.rule {
-            AnyRule::Paper(rule) => (
-                Self {
-                    rule: Some(RuleName::Paper),
-                    alpha: Some(rule.threshold().alpha()),
-                    ..Self::default()
-                },
-                rule.threshold().minimum_count(),
-            ),
-            AnyRule::Average(rule) => (
-                Self {
-                    rule: Some(RuleName::Average),
-                    alpha: Some(rule.threshold().alpha()),
-                    ..Self::default()
-                },
-                rule.threshold().minimum_count(),
-            ),
-            AnyRule::Window(rule) => (
-                Self {
+            AnyRule::Paper(rule) => with_alpha(RuleName::Paper, rule.threshold()),
+            AnyRule::Average(rule) => with_alpha(RuleName::Average, rule.threshold()),
+            AnyRule::Window(rule) => {
+                let detection = Self {
                     rule: Some(RuleName::Window),
                     window: Some(rule.width()),
                     z: Some(rule.z()),
                     ..Self::default()
-                },
-                rule.minimum_count(),
-            ),
+                };
+                (detection, rule.minimum_count())
+            }
         };
         let binning = settings.binning;
         let several = settings.echoes > EchoNumber::FIRST;

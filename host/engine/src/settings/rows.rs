@@ -1,6 +1,7 @@
-//! Settings as rows of text.
+//! Settings as a table.
 
-use dtof_core::{AnyRule, DepthEstimator, EchoNumber, Threshold};
+use dtof_core::paper::Threshold;
+use dtof_core::{AnyRule, DepthEstimator, EchoNumber};
 use dtof_options::rows::Row;
 
 use super::engine::Settings;
@@ -38,7 +39,7 @@ impl Settings {
             rows.push(row("tracking", text.to_owned()));
         }
         if self.echoes > EchoNumber::FIRST {
-            let reach = self.peel_reach();
+            let reach = self.echo_guard_bins();
             let (most, wait) = (self.echoes, self.echo_wait);
             let ends = wait.map_or(String::new(), |times| {
                 format!(", which ends after {times} times the laser cycles of the last")
@@ -68,7 +69,7 @@ impl Settings {
         }
     }
 
-    /// The name of what a pixel reports: one of them, and several.
+    /// The names of one report of a pixel and of several.
     #[must_use]
     pub const fn reports(&self) -> [&'static str; 2] {
         match self.frame {
@@ -117,7 +118,7 @@ fn with_alpha(background: &str, threshold: &Threshold) -> String {
     )
 }
 
-/// The threshold that a detection exceeds.
+/// The threshold of a rule in words.
 fn threshold(rule: &AnyRule) -> String {
     match rule {
         AnyRule::Paper(rule) => with_alpha("background", rule.threshold()),

@@ -1,32 +1,56 @@
 //! The other sections of a settings file: sensor, rays and run.
 
 use std::fmt::Display;
+use std::path::PathBuf;
 use std::str::FromStr;
 
-use dtof_core::CentredWindow;
 use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::{Array, CentredWindow};
 use serde::Serialize;
 use serde::ser::{Error as _, Serializer};
 
+use dtof_options::NO_OPTION;
 use dtof_options::numbers::{
-    MOST_WHOLE, bins, fixed, list, positive, real, shortest, truth, whole, within,
+    MAX_INTEGER, bins, boolean, fixed, integer, laser_hz, list, positive, shortest, within,
 };
-use dtof_options::{NO_OPTION, Refused};
 use dtof_photons::axes::Axes;
-use dtof_photons::geometry::{FieldOfView, FieldOfViewError};
+use dtof_photons::geometry::{FieldOfView, Rays, angles};
 
-/// Each field of `$these`, or that of `$others`.
-macro_rules! first_of {
-    ($these:expr, $others:expr; $($field:ident),+) => {
-        Self { $($field: $these.$field.or($others.$field)),+ }
+/// Defines the keys of a section in the order in which they are written: how each is read, and its
+/// comment in the file.
+macro_rules! section {
+    ($section:ident: $($key:ident = $read:expr, $comment:literal;)+) => {
+        impl $section {
+            /// The keys of the section.
+            pub const KEYS: &'static [&'static str] = &[$(stringify!($key)),+];
+            /// The comment of each key.
+            pub(super) const COMMENTS: &'static [&'static str] = &[$($comment),+];
+
+            /// Sets one of [`Self::KEYS`].
+            ///
+            /// # Errors
+            /// Says what the value must be.
+            pub(super) fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
+                match key {
+                    $(stringify!($key) => self.$key = Some($read(text)?),)+
+                    _ => return Err(NO_OPTION.to_owned()),
+                }
+                Ok(())
+            }
+
+            /// Each key of `self`, or that of `other` if `self` lacks it.
+            fn first_of(self, other: Self) -> Self {
+                Self { $($key: self.$key.or(other.$key)),+ }
+            }
+        }
     };
 }
-pub(super) use first_of;
+pub(super) use section;
 
 /// `[sensor]`: what is known of a sensor.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Sensor {
+pub struct SensorSettings {
     /// Laser cycles a second.
     pub laser_hz: Option<u64>,
     /// Columns of the array.
@@ -46,7 +70,7 @@ pub struct Sensor {
     /// Standard deviation of the pulse in bins.
     #[serde(serialize_with = "decimal")]
     pub sigma_bins: Option<U8F8>,
-    /// Whether the TDC takes one photon a laser cycle, so that events say when it piles up.
+    /// Whether the TDC takes one photon a laser cycle, so that events are flagged for pile-up.
     pub one_hit_tdc: Option<bool>,
     /// Background photons a bin and laser cycle of the median pixel.
     pub background: Option<f64>,
@@ -58,67 +82,56 @@ pub struct Sensor {
 
 /// `[rays]`: where pixels look.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Rays {
+pub struct RaySettings {
     /// Horizontal and vertical angle from edge to edge of the array.
     pub field_of_view_degrees: Option<[f64; 2]>,
-    /// A file with a ray and a bias for each pixel, beside the settings file.
-    pub calibration: Option<String>,
+    /// A file with a ray and a bias for each pixel. A relative path starts at the settings file.
+    pub calibration: Option<PathBuf>,
 }
 
 /// `[run]`: what is replayed or simulated.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Run {
+pub struct RunSettings {
     /// Laser cycles.
     pub cycles: Option<u64>,
-    /// Of every random number.
+    /// The seed of every random number.
     pub seed: Option<u64>,
-    /// Of recorded histograms: photons a laser cycle in the brightest pixel.
+    /// Recorded histograms: photons a laser cycle in the brightest pixel.
     pub photons_per_cycle: Option<f64>,
-    /// Of recorded histograms: laser cycles.
+    /// Recorded histograms: laser cycles.
     pub recorded_cycles: Option<u64>,
     /// Laser cycles of a frame, if it is a frame-based sensor.
     pub frame: Option<u16>,
-    /// Of recorded arrays: what each axis is.
+    /// Recorded arrays: the meaning of each axis.
     #[serde(serialize_with = "as_text")]
     pub axes: Option<Axes>,
-    /// Of archives: the name of the array.
+    /// Archives: the name of the array.
     pub array: Option<String>,
-    /// Of recordings: so many neighbouring bins are added up.
+    /// Recordings: how many neighbouring bins are summed.
     pub rebin: Option<u16>,
 }
 
-impl Sensor {
-    /// These, and of `other` what these do not say.
+section! {
+    SensorSettings:
+    laser_hz = laser_hz, "laser cycles a second";
+    columns = integer(1..=Array::MOST_PIXELS), "pixel = row * columns + column";
+    bins = bins, "of a histogram";
+    bin_width_ps = fixed, "picoseconds a bin";
+    offset_mm = fixed, "added to every range";
+    gate = gate, "first and last bin that may hold a peak";
+    masked = masked, "addresses of pixels that are left out";
+    sigma_bins = pulse, "standard deviation of the pulse";
+    one_hit_tdc = boolean, "the TDC takes one photon a laser cycle";
+    background = rate, "photons a bin and laser cycle of the median pixel";
+    glass = rate, "photons a laser cycle and pixel of the cover glass";
+    glass_bins = rates, "the same for each bin before the gate";
+}
+
+impl SensorSettings {
+    /// These settings, and those of `other` that they lack.
     #[must_use]
     pub fn or(self, other: Self) -> Self {
-        first_of!(
-            self, other; laser_hz, columns, bins, bin_width_ps, offset_mm, gate, masked,
-            sigma_bins, one_hit_tdc, background, glass, glass_bins
-        )
-    }
-
-    /// Sets a key of the section.
-    ///
-    /// # Errors
-    /// Why it cannot be so.
-    pub(super) fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
-        let rate = within(0.0..=1e6);
-        match key {
-            "laser_hz" => self.laser_hz = Some(whole(1..=1_000_000_000_000)(text)?),
-            "columns" => self.columns = Some(whole(1..=65_536)(text)?),
-            "bins" => self.bins = Some(bins(text)?),
-            "bin_width_ps" => self.bin_width_ps = Some(fixed(text)?),
-            "offset_mm" => self.offset_mm = Some(fixed(text)?),
-            "gate" => self.gate = Some(gate(text)?),
-            "masked" => self.masked = Some(list(text, &[','], whole(0..=u16::MAX))?),
-            "sigma_bins" => self.sigma_bins = Some(pulse(fixed(text)?)?),
-            "one_hit_tdc" => self.one_hit_tdc = Some(truth(text)?),
-            "background" => self.background = Some(rate(text)?),
-            "glass" => self.glass = Some(rate(text)?),
-            "glass_bins" => self.glass_bins = Some(list(text, &[','], rate)?),
-            _ => return Err(NO_OPTION.to_owned()),
-        }
-        Ok(())
+        self.first_of(other)
     }
 }
 
@@ -126,98 +139,111 @@ impl Sensor {
 fn gate(text: &str) -> Result<(u16, u16), String> {
     let ends = text.split_once("..").or_else(|| text.split_once(','));
     let ends = ends.and_then(|(first, last)| {
-        let bin = whole(0..=u16::MAX);
+        let bin = integer(0..=u16::MAX);
         Some((bin(first).ok()?, bin(last).ok()?))
     });
-    ends.ok_or("must be FIRST..LAST, as 20..119".to_owned())
+    let (first, last) = ends.ok_or("must be FIRST..LAST, as 20..119")?;
+    if first > last {
+        return Err("the first bin must come before the last".to_owned());
+    }
+    Ok((first, last))
 }
 
-/// `sigma`, if a pulse can be so wide: its standard deviation in bins.
-///
-/// # Errors
-/// If there is no such pulse.
-fn pulse(sigma: U8F8) -> Result<U8F8, String> {
+/// Reads addresses.
+fn masked(text: &str) -> Result<Vec<u16>, String> {
+    list(text, &[','], integer(0..=u16::MAX))
+}
+
+/// Reads the standard deviation of a pulse in bins.
+fn pulse(text: &str) -> Result<U8F8, String> {
     const WIDEST: U8F8 = CentredWindow::WIDEST_PULSE;
+    let sigma = fixed(text)?;
     if sigma == U8F8::ZERO || sigma > WIDEST {
         return Err(format!("must be above 0 and at most {WIDEST}"));
     }
     Ok(sigma)
 }
 
-impl Rays {
-    /// Sets a key of the section.
-    ///
-    /// # Errors
-    /// Why it cannot be so.
-    pub(super) fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
-        match key {
-            "field_of_view_degrees" => {
-                let none = || FieldOfViewError.to_string();
-                let angles = list(text, &['x', ','], |angle| real(angle).ok_or_else(none))?;
-                let angles = <[f64; 2]>::try_from(angles).map_err(|_| none())?;
-                FieldOfView::new(angles).map_err(|error| error.to_string())?;
-                self.field_of_view_degrees = Some(angles);
-            }
-            "calibration" => self.calibration = Some(text.to_owned()),
-            _ => return Err(NO_OPTION.to_owned()),
+/// Reads photons a laser cycle.
+fn rate(text: &str) -> Result<f64, String> {
+    within(0.0..=1e6)(text)
+}
+
+fn rates(text: &str) -> Result<Vec<f64>, String> {
+    list(text, &[','], rate)
+}
+
+section! {
+    RaySettings:
+    field_of_view_degrees = degrees, "horizontal, vertical";
+    calibration = file, "file with a ray for each pixel";
+}
+
+/// Reads the angles of a field of view.
+fn degrees(text: &str) -> Result<[f64; 2], String> {
+    let angles = angles(text).and_then(|angles| FieldOfView::new(angles).map(|_| angles));
+    angles.map_err(|error| error.to_string())
+}
+
+fn file(text: &str) -> Result<PathBuf, String> {
+    Ok(text.into())
+}
+
+impl RaySettings {
+    /// These settings, or `other` if there are none: a field of view replaces a calibration, and
+    /// the other way round.
+    #[must_use]
+    pub fn or(self, mut other: Self) -> Self {
+        if self != Self::default() {
+            other = Self::default();
         }
-        Ok(())
+        self.first_of(other)
     }
 
-    pub(super) fn check(&self) -> Result<(), Refused> {
-        if self.field_of_view_degrees.is_some() && self.calibration.is_some() {
-            return Err(Refused::new(
-                "field_of_view_degrees",
-                "cannot be used with `calibration`",
-            ));
+    /// The rays of an array, and where they come from: "60x32.2 degrees", or the calibration file.
+    ///
+    /// # Errors
+    /// Fails if the calibration file cannot be read or is for another array.
+    pub fn rays(&self, array: Array) -> anyhow::Result<(Rays, String)> {
+        if let Some(path) = &self.calibration {
+            return Ok((Rays::read(path, array)?, path.display().to_string()));
         }
-        Ok(())
+        let view = match self.field_of_view_degrees {
+            Some(degrees) => FieldOfView::new(degrees)?,
+            None => FieldOfView::default_for([array.columns(), array.rows()]),
+        };
+        Ok((Rays::pinhole(array, view), format!("{view} degrees")))
     }
 }
 
-impl Run {
-    /// These, and of `other` what these do not say.
+section! {
+    RunSettings:
+    cycles = integer(1..=MAX_INTEGER), "laser cycles";
+    seed = integer(0..=MAX_INTEGER), "of every random number";
+    photons_per_cycle = positive, "in the brightest pixel of a recording";
+    recorded_cycles = integer(1..=MAX_INTEGER), "laser cycles of a recording";
+    frame = integer(1..=u16::MAX), "laser cycles, of a frame-based sensor";
+    axes = str::parse, "of a recorded array";
+    array = name, "of an archive";
+    rebin = integer(1..=512), "neighbouring bins that are added up";
+}
+
+fn name(text: &str) -> Result<String, String> {
+    Ok(text.to_owned())
+}
+
+impl RunSettings {
+    /// These settings, and those of `other` that they lack. A recording has one length.
     #[must_use]
     pub fn or(self, mut other: Self) -> Self {
         if self.photons_per_cycle.is_some() || self.recorded_cycles.is_some() {
             (other.photons_per_cycle, other.recorded_cycles) = (None, None);
         }
-        first_of!(
-            self, other; cycles, seed, photons_per_cycle, recorded_cycles, frame, axes, array, rebin
-        )
-    }
-
-    /// Sets a key of the section.
-    ///
-    /// # Errors
-    /// Why it cannot be so.
-    pub(super) fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
-        match key {
-            "cycles" => self.cycles = Some(whole(1..=MOST_WHOLE)(text)?),
-            "seed" => self.seed = Some(whole(0..=MOST_WHOLE)(text)?),
-            "photons_per_cycle" => self.photons_per_cycle = Some(positive(text)?),
-            "recorded_cycles" => self.recorded_cycles = Some(whole(1..=MOST_WHOLE)(text)?),
-            "frame" => self.frame = Some(whole(1..=u16::MAX)(text)?),
-            "axes" => self.axes = Some(text.parse()?),
-            "array" => self.array = Some(text.to_owned()),
-            "rebin" => self.rebin = Some(whole(1..=512)(text)?),
-            _ => return Err(NO_OPTION.to_owned()),
-        }
-        Ok(())
-    }
-
-    pub(super) fn check(&self) -> Result<(), Refused> {
-        if self.photons_per_cycle.is_some() && self.recorded_cycles.is_some() {
-            return Err(Refused::new(
-                "photons_per_cycle",
-                "cannot be used with `recorded_cycles`",
-            ));
-        }
-        Ok(())
+        self.first_of(other)
     }
 }
 
-/// As a text, as an option has it.
+/// A value as text.
 fn as_text<T: Display, S: Serializer>(value: &Option<T>, serializer: S) -> Result<S::Ok, S::Error> {
     match value {
         None => serializer.serialize_none(),
@@ -225,7 +251,7 @@ fn as_text<T: Display, S: Serializer>(value: &Option<T>, serializer: S) -> Resul
     }
 }
 
-/// A fixed-point number as a decimal one, with as few digits as name it.
+/// A fixed-point number as a decimal one with the fewest digits.
 pub(super) fn decimal<T: Fixed + FromStr, S: Serializer>(
     number: &Option<T>,
     serializer: S,

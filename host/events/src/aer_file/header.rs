@@ -8,10 +8,10 @@ use super::Event;
 
 /// The first bytes of an AER file.
 pub const MAGIC: &str = "DTOF-AER";
-/// The header without the settings that may follow it.
+/// The header without the settings that may follow.
 pub(super) const HEADER_BYTES: u16 = 64;
 
-/// Everything a reader needs to turn words into ranges.
+/// What a reader needs to turn words into ranges.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Header {
     /// Bins of a histogram.
@@ -22,9 +22,9 @@ pub struct Header {
     pub bin_width_ps: U16F16,
     /// Millimetres added to every range.
     pub offset_mm: I24F8,
-    /// Laser cycles in a thousand seconds; 0 if that is not known.
+    /// Laser cycles in a thousand seconds; 0 if unknown.
     pub laser_millihertz: u64,
-    /// Microseconds from 1970-01-01 UTC to laser cycle 0; 0 if that is not known.
+    /// Microseconds from 1970-01-01 UTC to laser cycle 0; 0 if unknown.
     pub start_us: i64,
 }
 
@@ -77,12 +77,12 @@ impl Header {
         })
     }
 
-    /// Can an array with this header have sent the event?
+    /// Checks that the event can come from an array with this header.
     ///
     /// # Errors
-    /// Why not.
+    /// Says why not.
     pub fn check(&self, event: &Event) -> Result<()> {
-        let (pixel, pixels) = (event.pixel().0, self.array.pixels());
+        let (pixel, pixels) = (event.pixel().raw(), self.array.pixels());
         ensure!(u32::from(pixel) < pixels, "pixel {pixel} of {pixels}");
         let mut block = self.array.pixels_of(event.pixel(), event.level());
         ensure!(
@@ -92,7 +92,7 @@ impl Header {
         );
         let (bin, beyond) = match event {
             Event::Depth(event) => (event.peak_bin.raw().into(), self.bins.into()),
-            // A position lies up to one bin beyond that of the peak.
+            // A position is at most one bin beyond that of the peak.
             Event::DynamicDepth(event) => (
                 i64::from(event.position.raw() >> BinPosition::FRACTIONAL_BITS),
                 i64::from(self.bins) + 1,
@@ -103,7 +103,7 @@ impl Header {
     }
 }
 
-/// Bytes of a header that begins so, with its settings; `None` if it cannot be.
+/// The bytes of a header with its settings; `None` if they are not valid.
 pub(super) fn header_length(bytes: &[u8; HEADER_BYTES as usize]) -> Option<u16> {
     let length = u16::from_le_bytes([bytes[10], bytes[11]]);
     (length >= HEADER_BYTES && length.is_multiple_of(16)).then_some(length)

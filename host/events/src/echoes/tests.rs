@@ -3,6 +3,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::fixtures;
 use dtof_core::{BinIndex, Count};
+use dtof_options::Named;
 
 /// An echo of pixel `pixel` whose exposure began in laser cycle `begun`.
 fn echo(pixel: u16, begun: u64, exposure: u16, number: u8, bin: u16, peak: u32) -> DepthEvent {
@@ -14,9 +15,9 @@ fn echo(pixel: u16, begun: u64, exposure: u16, number: u8, bin: u16, peak: u32) 
     }
 }
 
-/// What is shown of `events` if each is followed by all that is decided.
+/// The events shown if all decided ones are taken after each event.
 fn shown(echo: Echo, most: EchoNumber, longest: u16, events: &[DepthEvent]) -> Vec<DepthEvent> {
-    let mut selection = Selection::new(echo, most, longest);
+    let mut selection = EchoSelection::new(echo, most, longest);
     let mut shown = Vec::new();
     for event in events {
         selection.push(*event);
@@ -51,7 +52,7 @@ fn one_of_each_exposure_is_shown_in_order_of_time() {
 
 #[test]
 fn events_wait_no_longer_than_an_exposure_lasts() {
-    let mut selection = Selection::new(Echo::Last, EchoNumber::LAST, 100);
+    let mut selection = EchoSelection::new(Echo::Last, EchoNumber::LAST, 100);
     selection.push(echo(0, 0, 50, 1, 20, 9));
     for begun in 0..=40 {
         selection.push(echo(1, begun, 60, 1, 30, 9));
@@ -59,15 +60,15 @@ fn events_wait_no_longer_than_an_exposure_lasts() {
     }
     selection.push(echo(2, 41, 61, 1, 30, 9)); // in laser cycle 101
     let first = selection.next().map(|event| event.pixel);
-    assert_eq!(first, Some(PixelAddress(0)));
-    // Those of pixel 1 begin anew each time, but for the last.
+    assert_eq!(first, Some(PixelAddress::new(0)));
+    // Each exposure of pixel 1 replaces the one before, and the last is still open.
     assert_eq!(selection.by_ref().count(), 40);
 }
 
 #[test]
 fn the_last_echo_of_an_exposure_is_decided_at_once() {
     let most = EchoNumber::new(2).unwrap();
-    let mut selection = Selection::new(Echo::Strongest, most, 2000);
+    let mut selection = EchoSelection::new(Echo::Strongest, most, 2000);
     selection.push(echo(0, 0, 50, 1, 20, 9));
     assert_eq!(selection.next(), None);
     selection.push(echo(0, 0, 60, 2, 30, 9));
@@ -94,7 +95,7 @@ fn pixels_and_blocks_are_chosen_alone() {
     assert_eq!(bins(&first), [20, 50]);
 }
 
-/// Exposures of four pixels, in order of time: for each its pixel, and its echoes.
+/// Exposures of four pixels in order of time, each as its echoes.
 fn exposures() -> impl Strategy<Value = Vec<Vec<DepthEvent>>> {
     let echoes = prop::collection::vec((1u16..60, 0u16..128, 0u32..40), 1..=4);
     let one = (0u16..4, 0u64..30, echoes);
@@ -118,9 +119,9 @@ fn exposures() -> impl Strategy<Value = Vec<Vec<DepthEvent>>> {
 }
 
 proptest! {
-    /// What is shown is the wanted one of each exposure, whatever comes between its echoes.
+    /// Each exposure shows its selected echo, whatever comes between its echoes.
     #[test]
-    fn each_exposure_shows_the_one_that_is_wanted(exposures in exposures()) {
+    fn each_exposure_shows_the_one_that_is_selected(exposures in exposures()) {
         let mut all: Vec<DepthEvent> = exposures.iter().flatten().copied().collect();
         all.sort_by_key(|event| event.cycle);
         let rate = |event: &DepthEvent| {
@@ -128,10 +129,10 @@ proptest! {
             signal.max(0.0) / f64::from(event.exposure)
         };
         let position = |event: &DepthEvent| f64::from(event.position().raw());
-        for wanted in Echo::NAMES.iter().map(|(_, echo, _)| echo) {
-            let shown = shown(*wanted, EchoNumber::LAST, 240, &all);
+        for echo in Echo::NAMES.iter().map(|(_, echo, _)| echo) {
+            let shown = shown(*echo, EchoNumber::LAST, 240, &all);
             prop_assert!(shown.is_sorted_by_key(|event| event.cycle));
-            if *wanted == Echo::All {
+            if *echo == Echo::All {
                 prop_assert_eq!(&shown, &all);
                 continue;
             }
@@ -141,18 +142,18 @@ proptest! {
                 let of: Vec<_> = of.collect();
                 prop_assert_eq!(of.len(), 1);
                 for other in exposure {
-                    let is_wanted = match wanted {
+                    let is_selected = match echo {
                         Echo::First => position(of[0]) <= position(other),
                         Echo::Last => position(of[0]) >= position(other),
                         _ => rate(of[0]) >= rate(other) - 1e-12,
                     };
-                    prop_assert!(is_wanted);
+                    prop_assert!(is_selected);
                 }
             }
         }
     }
 
-    /// Events in no order and of any number are neither held for ever nor shown twice.
+    /// Disordered events never block the queue and are never shown twice.
     #[test]
     fn damaged_streams_are_no_trouble(
         events in prop::collection::vec((0u16..3, 0u64..500, 0u16..200, 1u8..=4, 0u16..9), 0..60),
@@ -162,14 +163,14 @@ proptest! {
         let events: Vec<_> = events
             .into_iter()
             .map(|(pixel, cycle, exposure, number, bin)| DepthEvent {
-                cycle: LaserCycle(cycle),
+                cycle: LaserCycle::new(cycle),
                 exposure,
                 peak_bin: BinIndex::saturating(bin),
                 ..echo(pixel, 0, 1, number, 0, 9)
             })
             .collect();
-        for wanted in Echo::NAMES.iter().map(|(_, echo, _)| echo) {
-            let shown = shown(*wanted, EchoNumber::new(most).unwrap(), longest, &events);
+        for echo in Echo::NAMES.iter().map(|(_, echo, _)| echo) {
+            let shown = shown(*echo, EchoNumber::new(most).unwrap(), longest, &events);
             let mut rest = events.iter();
             prop_assert!(shown.iter().all(|event| rest.any(|other| other == event)));
         }

@@ -1,4 +1,4 @@
-//! The feed of a recording, at the rate of its laser.
+//! The feed of a recording, which is played at the rate of its laser.
 
 use std::fs::File;
 use std::io::BufReader;
@@ -8,48 +8,47 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow};
 use dtof_core::RangeScale;
 
-use super::{Command, Wish, Work, reply};
+use super::{Command, FeedContext, PageRequest, reply};
 use dtof_events::aer_file::{Event, Header, Reader};
 use dtof_events::clock::LaserClock;
 use dtof_options::Refused;
 
-/// How often events are handed on.
+/// Interval of batches.
 const EVERY: Duration = Duration::from_millis(20);
-/// Events that are handed on at a time, at most.
+/// Most events in a batch.
 const BATCH: usize = 65_536;
 
 /// An AER file.
 pub struct Playback {
     file: PathBuf,
     clock: LaserClock,
-    /// What is not as the file says.
+    /// A warning if the given laser rate differs from the file's.
     pub warning: Option<String>,
     speed: f64,
 }
 
-/// Where it is.
+/// The state of playback.
 struct Position {
     reader: Reader<BufReader<File>>,
-    header: Header,
-    /// Read, and not due yet.
+    /// The next event, which is not due yet.
     next: Option<Event>,
     /// Seconds of the recording that have been played.
     seconds: f64,
 }
 
 impl Playback {
-    /// A file, so many times as fast as it was. `laser_hz` is that of the laser, if the file does
-    /// not know, or is wrong.
+    /// Plays a file at `speed` times its own speed. `laser_hz` replaces the laser rate of the file.
     ///
     /// # Errors
-    /// If there is no such file, or nobody knows the rate.
+    /// Fails if the file cannot be read, or if neither it nor `laser_hz` gives the laser rate.
     pub fn new(file: PathBuf, laser_hz: Option<u64>, speed: f64) -> Result<Self> {
         let name = || file.display().to_string();
-        let header = open(&file).with_context(name)?.header;
+        let header = *open(&file).with_context(name)?.reader.header();
         RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?;
-        let said = laser_hz.map(LaserClock::new).transpose()?;
-        let (clock, warning) = LaserClock::known(said, LaserClock::of(&header), "the file");
-        let unknown = || Refused::input("does not say how fast its laser was; say `laser_hz`");
+        let requested = laser_hz.map(LaserClock::new).transpose()?;
+        let (clock, warning) =
+            LaserClock::prefer(requested, LaserClock::from_header(&header), "the file");
+        let unknown = || Refused::input("has no laser rate; give `laser_hz`");
         Ok(Self {
             clock: clock.ok_or_else(unknown).with_context(name)?,
             warning,
@@ -62,45 +61,45 @@ impl Playback {
         self.file.display().to_string()
     }
 
-    pub(super) fn run(self, work: &mut Work) {
-        if let Err(error) = self.play(work) {
+    pub(super) fn run(self, context: &mut FeedContext) {
+        if let Err(error) = self.play(context) {
             let reason = format!("{}: {error:#}", self.name());
-            work.hub.connection("failed", &reason);
-            while !work.is_stopped() {
-                if let Ok(command) = work.commands.recv_timeout(EVERY) {
-                    reply(command.answer, Err(anyhow!("{reason}")));
+            context.hub.set_connection("failed", &reason);
+            while !context.is_stopped() {
+                if let Ok(request) = context.requests.recv_timeout(EVERY) {
+                    reply(request.answer, Err(anyhow!("{reason}")));
                 }
             }
         }
     }
 
-    /// That of the file, with the rate at which it is played.
+    /// The header of the file, with the laser rate of playback.
     fn header(&self, at: &Position) -> Header {
         Header {
             laser_millihertz: self.clock.millihertz(),
-            ..at.header
+            ..*at.reader.header()
         }
     }
 
-    fn play(&self, work: &mut Work) -> Result<()> {
+    fn play(&self, context: &mut FeedContext) -> Result<()> {
         let mut at = open(&self.file)?;
-        work.hub.begin_recording(self.header(&at));
-        work.hub.connection("playing", "");
+        context.hub.begin_recording(self.header(&at));
+        context.hub.set_connection("playing", "");
         let (mut plays, mut turn) = (true, Instant::now());
-        while !work.is_stopped() {
-            while let Ok(command) = work.commands.try_recv() {
-                self.fulfil(command, &mut plays, &mut at, work)?;
+        while !context.is_stopped() {
+            while let Ok(request) = context.requests.try_recv() {
+                self.execute(request, &mut plays, &mut at, context)?;
             }
             let elapsed = turn.elapsed();
             turn = Instant::now();
             if plays {
                 if at.next.is_some() {
                     at.seconds += elapsed.as_secs_f64() * self.speed;
-                    self.hand_on(&mut at, work)?;
+                    self.send_due(&mut at, context)?;
                 }
                 if at.next.is_none() {
                     plays = false;
-                    work.hub.connection("ended", "");
+                    context.hub.set_connection("ended", "");
                 }
             }
             std::thread::sleep(EVERY);
@@ -108,11 +107,11 @@ impl Playback {
         Ok(())
     }
 
-    /// Hands on what is due.
-    fn hand_on(&self, at: &mut Position, work: &Work) -> Result<()> {
+    /// Sends the events that are due.
+    fn send_due(&self, at: &mut Position, context: &FeedContext) -> Result<()> {
         let mut batch = Vec::new();
         while let Some(event) = at.next {
-            let seconds = self.clock.nanoseconds(event.cycle().0) as f64 / 1e9;
+            let seconds = self.clock.nanoseconds(event.cycle().raw()) as f64 / 1e9;
             if seconds > at.seconds {
                 break;
             }
@@ -120,44 +119,46 @@ impl Playback {
             at.next = match at.reader.next_event() {
                 Ok(next) => next,
                 Err(error) => {
-                    // What came before the damage is good.
-                    work.hub.events(&batch, 0);
+                    // Events before the damage are good.
+                    context.hub.add_events(&batch);
                     return Err(error);
                 }
             };
             if batch.len() == BATCH {
-                // What is read more slowly than it was is played as fast as it can be.
+                // Reading is too slow for this speed, so playback time waits for it.
                 at.seconds = seconds;
                 break;
             }
         }
-        work.hub.events(&batch, 0);
-        work.hub.at(at.seconds);
+        context.hub.add_events(&batch);
+        context.hub.set_seconds(at.seconds);
         Ok(())
     }
 
-    fn fulfil(
+    fn execute(
         &self,
-        command: Command,
+        request: PageRequest,
         plays: &mut bool,
         at: &mut Position,
-        work: &Work,
+        context: &FeedContext,
     ) -> Result<()> {
-        let done = match command.wish {
-            Wish::Play(on) => {
+        let done = match request.command {
+            Command::Play(on) => {
                 if on && at.next.is_none() {
                     *at = open(&self.file)?;
-                    work.hub.begin_recording(self.header(at));
+                    context.hub.begin_recording(self.header(at));
                 }
                 *plays = on;
                 let state = if on { "playing" } else { "paused" };
-                work.hub.connection(state, "");
+                context.hub.set_connection(state, "");
                 Ok(format!("The recording is {state}."))
             }
-            Wish::Record(_) => Err(anyhow!("this is a recording already")),
-            Wish::Settings(_) | Wish::Save => Err(anyhow!("a recording has no settings to change")),
+            Command::Record(_) => Err(anyhow!("this is a recording already")),
+            Command::Settings(_) | Command::Save => {
+                Err(anyhow!("a recording has no settings to change"))
+            }
         };
-        reply(command.answer, done);
+        reply(request.answer, done);
         Ok(())
     }
 }
@@ -166,7 +167,6 @@ impl Playback {
 fn open(file: &PathBuf) -> Result<Position> {
     let mut reader = Reader::new(BufReader::new(File::open(file)?))?;
     Ok(Position {
-        header: *reader.header(),
         next: reader.next_event()?,
         reader,
         seconds: 0.0,

@@ -1,101 +1,89 @@
-//! A session with a device: events, reports, histograms and wishes, each in its turn.
+//! A session with a device: events, reports, histograms and commands in turn.
 
 use std::time::{Duration, Instant, SystemTime};
 
 use anyhow::{Context, Result, anyhow, ensure};
 use dtof_core::PixelAddress;
 use dtof_link::endpoint::LinkCounters;
-use dtof_link::{Configuration, DynamicDepth, Refusal, Report, Source};
+use dtof_link::{Configuration, Refusal, Report, Source};
 
-use super::{Answer, Command, Wish, Work, record, reply};
+use super::{Answer, Command, Device, FeedContext, PageRequest, reply};
 use crate::hub::Losses;
-use dtof_device::monitor::losses::{Losses as Lost, since};
+use dtof_device::monitor::losses::{self, since};
 use dtof_device::monitor::{check_masked, leave_out_masked};
-use dtof_device::setup::with_gate;
-use dtof_device::{Client, HostTimeout, Setup, Stopped, configuration};
-use dtof_engine::settings::{Rays, Run, Sensor, SettingsFile};
-use dtof_photons::masked;
+use dtof_device::{Client, Setup, Stopped};
+use dtof_engine::settings::{RaySettings, RunSettings, SensorSettings, SettingsFile};
 
-/// How often the device is asked what it does.
+/// Interval of the device's reports.
 const REPORTS: Duration = Duration::from_millis(500);
-/// How often it is asked for a histogram, of each pixel that is looked at in turn.
+/// Interval of histograms. The pixels that pages show take turns.
 const HISTOGRAMS: Duration = Duration::from_millis(50);
 
-/// What the command was given, and no page changes.
-#[derive(Clone, Copy, Debug)]
-pub struct Given {
-    /// Pixels of the device, as many as it says if not given.
-    pub pixels: Option<u16>,
-    /// It is to send changes of depth in place of depth events.
-    pub dynamic_depth: Option<DynamicDepth>,
-    /// It stops its sensor once this program has been silent for so long.
-    pub host_timeout: HostTimeout,
-}
-
-/// A device that sends events.
+/// A session with a device that sends events.
 pub struct Session<'a> {
     client: &'a mut Client,
     setup: Setup,
-    given: Given,
-    /// The sensor does not run any more, until settings are put in force.
+    device: &'a Device,
+    /// Set if the sensor has stopped. It starts again when settings are applied.
     stopped: Option<Stopped>,
-    /// The counts of both ends at the beginning.
+    /// The counts of device and host at the start.
     first: Report,
     here: LinkCounters,
-    /// The report before, and when.
+    /// Photons in the last report, and its time.
     last: (u64, Instant),
-    asked: bool,
+    /// A report was requested and has not arrived.
+    awaits_report: bool,
     reported: Instant,
     histogram: Option<Instant>,
     turn: usize,
 }
 
 impl<'a> Session<'a> {
-    /// Puts settings in force; from now on events come.
+    /// Configures the device with the `requested` settings. Events come from now on.
     pub fn begin(
         client: &'a mut Client,
-        said: SettingsFile,
-        given: Given,
-        work: &mut Work,
+        device: &'a Device,
+        requested: SettingsFile,
+        context: &mut FeedContext,
     ) -> Result<Self> {
-        let setup = Setup::of(client, said, given.pixels)?;
+        let setup = Setup::of(client, requested, device.pixels)?;
         check_masked(&setup.settings)?;
-        work.warn(&setup.warnings);
+        context.warn(&setup.warnings);
         let here = *client.counters();
         let mut session = Self {
             client,
             setup,
-            given,
+            device,
             stopped: None,
             first: Report::default(),
             here,
             last: (0, Instant::now()),
-            asked: false,
+            awaits_report: false,
             reported: Instant::now(),
             histogram: None,
             turn: 0,
         };
-        session.configure(session.setup.clone(), work)?;
+        session.configure(session.setup.clone(), context)?;
         session.first = session.client.report()?;
-        work.hub.connection("live", "");
+        context.hub.set_connection("live", "");
         let first = session.first;
-        session.check_running(&first, work);
+        session.check_running(&first, context);
         Ok(session)
     }
 
-    /// What was said, without what the device says.
-    pub fn asked(&self) -> SettingsFile {
-        self.setup.asked.clone()
+    /// The options, without the device's own values.
+    pub fn requested(&self) -> SettingsFile {
+        self.setup.requested.clone()
     }
 
-    /// Goes on until it is stopped: the device rests then.
+    /// Runs until it is stopped, then stops the sensor.
     ///
     /// # Errors
-    /// If the device is gone; says so if its sensor had stopped before.
-    pub fn run(&mut self, work: &mut Work) -> Result<()> {
-        let ended = self.go_on(work);
-        // What has arrived before the device was gone, too.
-        self.take(work);
+    /// Fails if the device is gone. The error also says if its sensor had stopped before.
+    pub fn run(&mut self, context: &mut FeedContext) -> Result<()> {
+        let ended = self.go_on(context);
+        // Events may have arrived before the device was gone.
+        self.take_events(context);
         match self.stopped {
             Some(stopped) => ended.context(stopped),
             None => ended,
@@ -103,136 +91,138 @@ impl<'a> Session<'a> {
     }
 
     /// Tells pages that the sensor has stopped.
-    fn check_running(&mut self, report: &Report, work: &Work) {
-        let Err(stopped) = Stopped::check(report, self.given.host_timeout) else {
+    fn check_running(&mut self, report: &Report, context: &FeedContext) {
+        let Err(stopped) = Stopped::check(report, self.device.host_timeout) else {
             return;
         };
         if self.stopped.replace(stopped).is_none() {
-            let reason = starts_again(&stopped.to_string());
-            work.hub.connection("stopped", &reason);
-            work.complain(&reason);
+            let reason = with_restart_hint(&stopped.to_string());
+            context.hub.set_connection("stopped", &reason);
+            context.complain(&reason);
         }
     }
 
-    fn go_on(&mut self, work: &mut Work) -> Result<()> {
-        while !work.is_stopped() {
-            if let Ok(command) = work.commands.try_recv() {
-                self.fulfil(command, work)?;
+    fn go_on(&mut self, context: &mut FeedContext) -> Result<()> {
+        while !context.is_stopped() {
+            if let Ok(request) = context.requests.try_recv() {
+                self.execute(request, context)?;
             }
-            if !self.asked && self.reported.elapsed() >= REPORTS {
+            if !self.awaits_report && self.reported.elapsed() >= REPORTS {
                 self.client.request_report()?;
-                self.asked = true;
+                self.awaits_report = true;
             }
-            // A report that comes while a request waits for room would be in its way.
+            // While a request waits for room in the window, a report would be unexpected.
             let due = self.histogram.is_none_or(|at| at.elapsed() >= HISTOGRAMS);
-            if due && !self.asked {
-                self.ask_for_histogram(work)?;
+            if due && !self.awaits_report {
+                self.request_histogram(context)?;
             }
-            self.exchange(work)?;
+            self.exchange(context)?;
         }
-        self.drain(work)?;
-        let resting = self.configuration(&self.setup, Source::Link)?;
-        let rested = self.client.configure(&resting);
-        self.take(work);
-        rested
+        self.drain(context)?;
+        let configuration = self.configuration(&self.setup, Source::Link)?;
+        let stopped = self.client.configure(&configuration);
+        self.take_events(context);
+        stopped
     }
 
-    /// Takes what has arrived.
-    fn exchange(&mut self, work: &mut Work) -> Result<()> {
+    /// Takes events, a report and histograms that have arrived.
+    fn exchange(&mut self, context: &mut FeedContext) -> Result<()> {
         let polled = self.client.poll_report();
-        // What came before the device was gone, too.
-        self.take(work);
+        // Events may have arrived before the device was gone.
+        self.take_events(context);
         if let Some(report) = polled? {
-            self.asked = false;
+            self.awaits_report = false;
             self.reported = Instant::now();
-            self.tell(&report, work);
+            self.show(&report, context);
         }
         while let Some(answer) = self.client.take_histogram() {
             self.histogram = Some(Instant::now());
-            work.hub.histogram(&answer);
+            context.hub.add_histogram(&answer);
         }
         Ok(())
     }
 
-    /// Waits for a report that is on its way.
-    fn drain(&mut self, work: &mut Work) -> Result<()> {
-        while self.asked {
-            self.exchange(work)?;
+    /// Waits for a requested report.
+    fn drain(&mut self, context: &mut FeedContext) -> Result<()> {
+        while self.awaits_report {
+            self.exchange(context)?;
         }
         Ok(())
     }
 
-    fn ask_for_histogram(&mut self, work: &Work) -> Result<()> {
-        let pixels = work.hub.watched();
-        let is_there = |pixel: &&u16| **pixel < self.setup.pixels;
-        let pixels: Vec<_> = pixels.iter().filter(is_there).collect();
+    fn request_histogram(&mut self, context: &FeedContext) -> Result<()> {
+        let pixels = context.hub.watched();
+        let exists = |pixel: &&u16| **pixel < self.setup.pixels;
+        let pixels: Vec<_> = pixels.iter().filter(exists).collect();
         if pixels.is_empty() {
             return Ok(());
         }
         self.turn = (self.turn + 1) % pixels.len();
-        // The next is asked for once this one has come: one is on its way at a time.
+        // One request at a time: the next is sent after the answer to this one.
         self.histogram = Some(Instant::now() + Duration::from_secs(1 << 30));
-        let pixel = PixelAddress(*pixels[self.turn]);
+        let pixel = PixelAddress::new(*pixels[self.turn]);
         self.client.request_histogram(pixel)
     }
 
-    /// Records and shows the events that have arrived, but for those of masked pixels.
-    fn take(&mut self, work: &mut Work) {
+    /// Records and shows the events that have arrived, except those of masked pixels.
+    fn take_events(&mut self, context: &mut FeedContext) {
         let mut events = self.client.take_events();
         if events.is_empty() {
             return;
         }
         let masked = leave_out_masked(&mut events, &self.setup.settings);
-        work.recorder.write(&events, &mut work.recorded);
-        work.hub.events(&events, masked);
-        work.tell_recorded();
+        context.recorder.write(&events);
+        context.hub.add_masked(masked);
+        context.hub.add_events(&events);
+        context.show_recording();
     }
 
-    fn tell(&mut self, report: &Report, work: &Work) {
-        self.check_running(report, work);
+    /// Shows rates and losses.
+    fn show(&mut self, report: &Report, context: &FeedContext) {
+        self.check_running(report, context);
         let photons = report.statistics.photons();
         let (before, at) = self.last;
         let seconds = at.elapsed().as_secs_f64().max(1e-3);
-        let lost = Lost {
+        let losses = losses::Losses {
             first: &self.first,
             here: &since(self.client.counters(), &self.here),
         };
-        work.hub.losses(Losses {
+        context.hub.set_losses(Losses {
             cycles: report.cycles,
             photons,
             photon_rate: photons.saturating_sub(before) as f64 / seconds,
-            counts: lost.counts(report).to_vec(),
-            last_fault: lost.last_fault(report),
+            counts: losses.counts(report).to_vec(),
+            last_fault: losses.last_fault(report),
         });
         self.last = (photons, Instant::now());
     }
 
-    fn fulfil(&mut self, command: Command, work: &mut Work) -> Result<()> {
-        let done = match command.wish {
-            Wish::Settings(text) => return self.change(&text, command.answer, work),
-            Wish::Save => {
-                let said = self.setup.said.with(&self.setup.settings);
-                let folder = work.recorder.folder();
-                let saved = self.client.exchange_during(|| folder.save(&said));
+    fn execute(&mut self, request: PageRequest, context: &mut FeedContext) -> Result<()> {
+        let done = match request.command {
+            Command::Settings(text) => return self.change(&text, request.answer, context),
+            Command::Save => {
+                let effective = self.setup.effective.with_settings(&self.setup.settings);
+                let folder = context.recorder.folder();
+                let saved = self.client.exchange_during(|| folder.save(&effective));
                 saved.map(|path| format!("Saved as {}.", path.display()))
             }
-            Wish::Record(on) => {
+            Command::Record(on) => {
                 let header = self.setup.header();
-                let (recorder, recorded) = (&mut work.recorder, &mut work.recorded);
-                let of = || record(recorder, recorded, on, Some(&header));
-                let done = self.client.exchange_during(of);
-                work.tell_recorded();
+                let recorder = &mut context.recorder;
+                let done = self
+                    .client
+                    .exchange_during(|| recorder.switch(on, Some(&header)));
+                context.show_recording();
                 done
             }
-            Wish::Play(_) => Err(anyhow!("a device does not wait")),
+            Command::Play(_) => Err(anyhow!("a device cannot be paused")),
         };
-        reply(command.answer, done);
+        context.reply(request.answer, done);
         Ok(())
     }
 
-    /// Puts other settings in force, unless they are wrong or the device refuses them: then the old
-    /// ones stay.
-    fn change(&mut self, text: &str, answer: Answer, work: &mut Work) -> Result<()> {
+    /// Applies other settings. If they are wrong or the device refuses them, the old ones stay.
+    fn change(&mut self, text: &str, answer: Answer, context: &mut FeedContext) -> Result<()> {
         let setup = match self.changed_setup(text) {
             Ok(setup) => setup,
             Err(error) => {
@@ -240,10 +230,10 @@ impl<'a> Session<'a> {
                 return Ok(());
             }
         };
-        self.drain(work)?;
-        match self.configure(setup, work) {
+        self.drain(context)?;
+        match self.configure(setup, context) {
             Ok(()) => {
-                reply(answer, Ok("The settings are in force.".to_owned()));
+                reply(answer, Ok("The settings are applied.".to_owned()));
                 Ok(())
             }
             Err(error) if error.downcast_ref::<Refusal>().is_some() => {
@@ -258,94 +248,75 @@ impl<'a> Session<'a> {
     }
 
     fn changed_setup(&self, text: &str) -> Result<Setup> {
-        let [asked, said] = [&self.setup.asked, &self.setup.said];
-        let [asked, said] = [Self::changed(asked, text)?, Self::changed(said, text)?];
-        let bins = self.client.bins();
-        let said = with_gate(said, self.setup.measured_bins, bins);
-        ensure!(
-            said.sensor.bins.is_none_or(|of| of == bins),
-            "the device has {bins} bins"
-        );
-        let setup = Setup {
-            settings: said.settings(bins.into())?,
-            said,
-            asked,
-            ..self.setup.clone()
-        };
-        masked::check(&setup.settings.masked, setup.pixels.into())?;
+        let requested = Self::changed(&self.setup.requested, text)?;
+        let setup = self.setup.with_requested(requested)?;
         check_masked(&setup.settings)?;
         self.configuration(&setup, Source::Sensor)?;
         Ok(setup)
     }
 
     fn configuration(&self, setup: &Setup, source: Source) -> Result<Configuration> {
-        let columns = setup.array.columns();
-        let (depth, host_timeout) = (self.given.dynamic_depth, self.given.host_timeout);
-        let (settings, pixels) = (&setup.settings, setup.pixels);
-        configuration(settings, pixels, columns, source, depth, host_timeout)
+        let device = self.device;
+        let task = setup.task(device.dynamic_depth, device.host_timeout);
+        task.configuration(source)
     }
 
-    /// Puts a setup in force. Events from before are taken as they were; a recording goes on in
-    /// another file, as laser cycles begin at 0.
-    fn configure(&mut self, mut setup: Setup, work: &mut Work) -> Result<()> {
+    /// Applies a setup. Earlier events keep the old setup. A recording goes on in another file, as
+    /// laser cycles begin at 0.
+    fn configure(&mut self, mut setup: Setup, context: &mut FeedContext) -> Result<()> {
         setup.began = SystemTime::now();
-        let wanted = self.configuration(&setup, Source::Sensor)?;
-        let configured = self.client.configure(&wanted);
-        self.take(work);
+        let configuration = self.configuration(&setup, Source::Sensor)?;
+        let configured = self.client.configure(&configuration);
+        self.take_events(context);
         configured?;
-        // A histogram that came meanwhile is one of before.
+        // A histogram that came meanwhile belongs to the old setup.
         while self.client.take_histogram().is_some() {
             self.histogram = None;
         }
-        // A disk that is full is told to pages.
-        let (recorder, recorded) = (&mut work.recorder, &mut work.recorded);
-        let _ = self.client.exchange_during(|| recorder.end_file(recorded));
-        work.hub.begin(&setup);
-        work.recorder.resume(&setup.header(), &mut work.recorded);
-        work.tell_recorded();
+        // Pages show a failure of the recorder.
+        let recorder = &mut context.recorder;
+        let _ = self.client.exchange_during(|| recorder.end_file());
+        context.hub.begin(&setup);
+        context.recorder.resume(&setup.header());
+        context.show_recording();
         self.last = (0, Instant::now());
         self.setup = setup;
         if self.stopped.take().is_some() {
-            work.hub.connection("live", "");
+            context.hub.set_connection("live", "");
         }
         Ok(())
     }
 
-    /// What was said before, with what a page says in place of it.
+    /// The settings `before`, changed by the text of a page.
     ///
     /// # Errors
-    /// What is wrong with the text, or that something cannot change while the device runs.
+    /// Fails if the text is wrong, or changes something that cannot change while the device runs.
     pub fn changed(before: &SettingsFile, text: &str) -> Result<SettingsFile> {
-        let new = SettingsFile::parse(text)?;
-        let changes = Sensor {
-            gate: new.sensor.gate,
-            masked: new.sensor.masked.clone(),
-            sigma_bins: new.sensor.sigma_bins,
-            one_hit_tdc: new.sensor.one_hit_tdc,
-            ..Sensor::default()
+        let mut new = SettingsFile::parse(text)?;
+        let sensor = SensorSettings {
+            gate: new.sensor.gate.take(),
+            masked: new.sensor.masked.take(),
+            sigma_bins: new.sensor.sigma_bins.take(),
+            one_hit_tdc: new.sensor.one_hit_tdc.take(),
+            ..before.sensor.clone()
         };
         ensure!(
-            new.sensor == changes && new.rays == Rays::default() && new.run == Run::default(),
+            new.sensor == SensorSettings::default()
+                && new.rays == RaySettings::default()
+                && new.run == RunSettings::default(),
             "only gate, masked, sigma_bins, one_hit_tdc and the keys of [detection] can change while \
              the device runs"
         );
         Ok(SettingsFile {
-            sensor: Sensor {
-                gate: changes.gate,
-                masked: changes.masked,
-                sigma_bins: changes.sigma_bins,
-                one_hit_tdc: changes.one_hit_tdc,
-                ..before.sensor.clone()
-            },
+            sensor,
             detection: new.detection,
-            rays: before.rays.clone(),
-            run: before.run.clone(),
             file: None,
+            ..before.clone()
         })
     }
 }
 
-/// Why a sensor has stopped, and what a reader of the page can do.
-pub fn starts_again(reason: &str) -> String {
-    format!("{reason}; the button \"Put in force\" starts it again")
+/// Why a sensor has stopped, and how a page restarts it.
+pub fn with_restart_hint(reason: &str) -> String {
+    format!("{reason}; the button \"Apply\" starts it again")
 }

@@ -1,4 +1,4 @@
-//! A client: its handshake, what it wants, and what it is sent.
+//! A client: its handshake, its subscriptions and the messages that it is sent.
 
 use std::pin::pin;
 use std::sync::Arc;
@@ -18,20 +18,20 @@ use tokio_tungstenite::{WebSocketStream, accept_hdr_async_with_config};
 
 use super::App;
 use super::frames::Frame;
-use super::protocol::{self, NAMES, Said, Severity, Subscription};
+use super::protocol::{self, ClientMessage, NAMES, Severity, Subscription};
 use super::topics::Topic;
 use dtof_options::rows::{grouped, printable};
 
-/// A handshake takes no longer.
+/// Longest handshake.
 const HANDSHAKE: Duration = Duration::from_secs(5);
-/// Bytes of what a client says at once, at most.
+/// Most bytes of a client's message.
 const MESSAGE: usize = 64 * 1024;
 
-/// Bytes that wait for a client, at most: some of the largest messages. Answers to pings beyond
-/// them are left out.
+/// Most bytes that wait for a client: some of the largest messages. Answers to pings beyond them are
+/// dropped.
 const WAITING: usize = 8 * 1024 * 1024;
 
-/// What ends a connection.
+/// The error that ends a connection.
 type Gone = tokio_tungstenite::tungstenite::Error;
 
 /// A client that is connected.
@@ -40,15 +40,15 @@ pub struct Client<'a, S> {
     socket: WebSocketStream<S>,
     frames: Receiver<Arc<Frame>>,
     subscriptions: Subscriptions<'a>,
-    /// The session that it was told.
+    /// The session that it was sent.
     session: Option<u64>,
-    /// Frames that there were for it, and those of them that it was too slow for.
+    /// Frames that it was sent, and frames that it was too slow for.
     sent: u64,
     missed: u64,
 }
 
 impl<'a, S: AsyncRead + AsyncWrite + Unpin> Client<'a, S> {
-    /// Shakes hands, unless it may not connect.
+    /// Shakes hands; `None` if the client may not connect or disconnects.
     pub async fn accept(app: &'a App, stream: S) -> Option<Self> {
         let config = WebSocketConfig::default()
             .read_buffer_size(4096)
@@ -73,45 +73,46 @@ impl<'a, S: AsyncRead + AsyncWrite + Unpin> Client<'a, S> {
         })
     }
 
-    /// Goes on until it is gone. How it went concerns nobody else.
+    /// Serves the client until it disconnects.
     pub async fn run(mut self) {
-        let _ = self.go_on().await;
+        // An error ends this connection only.
+        let _ = self.serve().await;
     }
 
-    async fn go_on(&mut self) -> Result<(), Gone> {
+    async fn serve(&mut self) -> Result<(), Gone> {
         loop {
             let next = {
-                let said = pin!(self.socket.next());
+                let received = pin!(self.socket.next());
                 let frame = pin!(self.frames.recv());
-                match select(said, frame).await {
-                    Either::Left((said, _)) => Either::Left(said),
+                match select(received, frame).await {
+                    Either::Left((received, _)) => Either::Left(received),
                     Either::Right((frame, _)) => Either::Right(frame),
                 }
             };
             match next {
-                Either::Left(Some(said)) => self.take(said?).await?,
+                Either::Left(Some(received)) => self.take(received?).await?,
                 Either::Right(Ok(frame)) => self.send(&frame).await?,
-                Either::Right(Err(RecvError::Lagged(frames))) => self.tell_missed(frames).await?,
+                Either::Right(Err(RecvError::Lagged(frames))) => self.report_missed(frames).await?,
                 Either::Left(None) | Either::Right(Err(RecvError::Closed)) => return Ok(()),
             }
         }
     }
 
-    async fn say(&mut self, text: String) -> Result<(), Gone> {
+    async fn send_text(&mut self, text: String) -> Result<(), Gone> {
         self.socket.send(Message::text(text)).await
     }
 
-    /// Sends what it wants of a frame.
+    /// Sends the messages of a frame that the client subscribes to.
     async fn send(&mut self, frame: &Frame) -> Result<(), Gone> {
         if self.session != Some(frame.session) {
             let session = format!("{}-{}", self.app.began_ms, frame.session);
-            self.say(protocol::server_info(&frame.name, &session))
+            self.send_text(protocol::server_info(&frame.name, &session))
                 .await?;
             if self.session.is_none() {
                 let Ok(advertise) = protocol::advertise() else {
                     return Err(Gone::ConnectionClosed);
                 };
-                self.say(advertise).await?;
+                self.send_text(advertise).await?;
             }
             self.session = Some(frame.session);
         }
@@ -125,34 +126,34 @@ impl<'a, S: AsyncRead + AsyncWrite + Unpin> Client<'a, S> {
         Ok(())
     }
 
-    /// Tells it how many frames it was too slow for.
-    async fn tell_missed(&mut self, frames: u64) -> Result<(), Gone> {
+    /// Sends a warning with the number of frames that the client was too slow for.
+    async fn report_missed(&mut self, frames: u64) -> Result<(), Gone> {
         self.missed += frames;
         let text = format!(
             "this client reads too slowly: {} of {} frames were left out",
             grouped(self.missed),
             grouped(self.sent + self.missed)
         );
-        self.say(protocol::status(Severity::Warning, "slow", &text))
+        self.send_text(protocol::status(Severity::Warning, "slow", &text))
             .await
     }
 
-    /// Takes what it says.
-    async fn take(&mut self, said: Message) -> Result<(), Gone> {
-        let done = match said {
+    /// Handles a message of the client.
+    async fn take(&mut self, received: Message) -> Result<(), Gone> {
+        let done = match received {
             Message::Text(text) => match serde_json::from_str(&text) {
-                Ok(said) => self.subscriptions.change(said),
-                Err(error) => Err(format!("this server knows no such message: {error}")),
+                Ok(message) => self.subscriptions.change(message),
+                Err(error) => Err(format!("unknown message: {error}")),
             },
-            Message::Binary(_) => Err("this server takes no data".to_owned()),
-            // The crate answers pings, and closes.
+            Message::Binary(_) => Err("this server accepts no data".to_owned()),
+            // The crate answers pings and close messages.
             _ => Ok(()),
         };
         match done {
             Ok(()) => Ok(()),
             Err(why) => {
                 let why = printable(&why);
-                self.say(protocol::status(Severity::Error, "said", &why))
+                self.send_text(protocol::status(Severity::Error, "invalid", &why))
                     .await
             }
         }
@@ -168,7 +169,8 @@ fn answer(app: &App, request: &Request, mut response: Response) -> Result<Respon
         refusal
     };
     let headers = request.headers();
-    app.origins.check(headers).map_err(|why| {
+    let check = app.origins.check(headers, app.terminal.name);
+    check.map_err(|why| {
         app.complain(&why);
         refuse(StatusCode::FORBIDDEN, why)
     })?;
@@ -188,23 +190,23 @@ fn answer(app: &App, request: &Request, mut response: Response) -> Result<Respon
     Ok(response)
 }
 
-/// What a client wants: its number for each topic.
+/// A client's subscription numbers, by topic.
 struct Subscriptions<'a> {
     app: &'a App,
     ids: [Option<u32>; Topic::ALL.len()],
 }
 
 impl Subscriptions<'_> {
-    /// All that can be done is done, also if something cannot.
-    fn change(&mut self, said: Said) -> Result<(), String> {
+    /// Changes all subscriptions that are valid. Returns the last error.
+    fn change(&mut self, message: ClientMessage) -> Result<(), String> {
         let mut wrong = None;
-        match said {
-            Said::Subscribe { subscriptions } => {
+        match message {
+            ClientMessage::Subscribe { subscriptions } => {
                 for subscription in subscriptions {
                     wrong = self.add(subscription).err().or(wrong);
                 }
             }
-            Said::Unsubscribe { subscription_ids } => {
+            ClientMessage::Unsubscribe { subscription_ids } => {
                 for id in subscription_ids {
                     wrong = self.remove(id).err().or(wrong);
                 }
@@ -214,8 +216,8 @@ impl Subscriptions<'_> {
     }
 
     fn add(&mut self, Subscription { id, channel_id }: Subscription) -> Result<(), String> {
-        let topic =
-            Topic::of(channel_id).ok_or_else(|| format!("there is no channel {channel_id}"))?;
+        let topic = Topic::from_id(channel_id)
+            .ok_or_else(|| format!("there is no channel {channel_id}"))?;
         if self.ids.contains(&Some(id)) {
             return Err(format!("there is a subscription {id} already"));
         }
@@ -225,7 +227,7 @@ impl Subscriptions<'_> {
             ));
         }
         self.ids[topic.index()] = Some(id);
-        self.app.wants(topic);
+        self.app.subscribe(topic);
         Ok(())
     }
 
@@ -233,7 +235,7 @@ impl Subscriptions<'_> {
         let at = self.ids.iter().position(|&one| one == Some(id));
         let at = at.ok_or_else(|| format!("there is no subscription {id}"))?;
         self.ids[at] = None;
-        self.app.wants_no_more(Topic::ALL[at]);
+        self.app.unsubscribe(Topic::ALL[at]);
         Ok(())
     }
 }
@@ -242,7 +244,7 @@ impl Drop for Subscriptions<'_> {
     fn drop(&mut self) {
         for (topic, id) in Topic::ALL.into_iter().zip(self.ids) {
             if id.is_some() {
-                self.app.wants_no_more(topic);
+                self.app.unsubscribe(topic);
             }
         }
     }

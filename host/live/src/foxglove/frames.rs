@@ -1,6 +1,6 @@
-//! Frames: what all clients together want of what has changed since the last one.
+//! Frames: the messages of all subscribed topics since the last frame.
 //!
-//! Times are those of laser cycles, as in an MCAP file.
+//! Messages carry the time of laser cycles, as in an MCAP file.
 
 mod images;
 mod log;
@@ -9,109 +9,96 @@ mod timing;
 use anyhow::Result;
 use dtof_core::RangeScale;
 
-use super::topics::{Lost, Topic, named};
-use crate::hub::{Hub, Seen, Wanted};
+use super::topics::{LossesMessage, Topic, named};
+use crate::hub::{Hub, Snapshot};
 use dtof_events::aer_file::{Event, EventKind};
-use dtof_export::Optics;
 use dtof_export::foxglove::{Time, cloud};
 use dtof_export::points::record;
 use dtof_export::projection::Projection;
 use images::Images;
-use log::Told;
+use log::StatusLog;
 use timing::Timing;
 
 /// A message of a topic.
 pub struct Message {
     pub topic: Topic,
-    /// Nanoseconds.
+    /// Time in nanoseconds.
     pub time: u64,
     pub data: Vec<u8>,
 }
 
-/// What there is to send.
+/// The messages of a tenth of a second.
 pub struct Frame {
     /// Changes when time begins again.
     pub session: u64,
-    /// The device or the recording.
+    /// Name of the device or the recording.
     pub name: String,
     pub messages: Vec<Message>,
 }
 
 /// Makes frames.
+#[derive(Default)]
 pub struct Frames {
-    /// Of the array and the settings that follow is made from.
+    /// Version of array and settings.
     version: Option<u64>,
-    /// None of an array that has no rays.
+    /// `None` if the array has no rays.
     projection: Option<Projection>,
     timing: Timing,
-    /// Where the next slice begins.
+    /// Start of the next slice in nanoseconds.
     slice: Option<u64>,
     images: Images,
-    lost: Lost,
+    losses: LossesMessage,
     left_out: u64,
-    told: Told,
+    log: StatusLog,
 }
 
 impl Frames {
-    /// Nothing is known yet.
-    pub fn new() -> Self {
-        Self {
-            version: None,
-            projection: None,
-            timing: Timing::unknown(),
-            slice: None,
-            images: Images::default(),
-            lost: Lost::default(),
-            left_out: 0,
-            told: Told::default(),
-        }
-    }
-
-    /// The next, of what is `wanted`; also of what has not changed if somebody is new.
-    pub fn next(&mut self, hub: &Hub, wanted: &dyn Fn(Topic) -> bool, is_new: bool) -> Frame {
-        let images = Topic::IMAGES.map(wanted);
-        let events = wanted(Topic::Events) || wanted(Topic::Statistics);
-        let seen = hub.seen(Wanted {
-            events,
-            pixels: images.contains(&true).then_some(self.images.change()),
-        });
-        if self.version != Some(seen.version) {
-            self.begin(&seen);
+    /// The next frame. With `resend` it also has values that have not changed.
+    pub fn next(
+        &mut self,
+        hub: &Hub,
+        is_subscribed: &dyn Fn(Topic) -> bool,
+        resend: bool,
+    ) -> Frame {
+        let images = Topic::IMAGES.map(is_subscribed);
+        let events = is_subscribed(Topic::Events) || is_subscribed(Topic::Statistics);
+        let known_change = images.contains(&true).then_some(self.images.change());
+        let snapshot = hub.snapshot(events, known_change);
+        if self.version != Some(snapshot.version) {
+            self.begin(&snapshot);
         }
         if !events {
             self.slice = None;
         }
-        self.left_out += seen.left_out;
-        self.timing.advance(&seen);
+        self.left_out += snapshot.dropped;
+        self.timing.advance(&snapshot);
         let mut messages = Vec::new();
-        // All can be encoded: they go into memory.
-        let _ = self.slice(&seen, wanted, &mut messages);
-        let _ = self.images(&seen, wanted, is_new, &mut messages);
-        if wanted(Topic::Losses) {
-            let _ = self.losses(&seen, is_new, &mut messages);
+        // Encoding into memory does not fail.
+        let _ = self.slice(&snapshot, is_subscribed, &mut messages);
+        let _ = self.images(&snapshot, is_subscribed, resend, &mut messages);
+        if is_subscribed(Topic::Losses) {
+            let _ = self.losses(&snapshot, resend, &mut messages);
         }
-        if wanted(Topic::Log) {
-            let _ = self
-                .told
-                .tell(&seen, self.timing.now(), is_new, &mut messages);
+        if is_subscribed(Topic::Log) {
+            let now = self.timing.now();
+            let _ = self.log.write(&snapshot, now, resend, &mut messages);
         }
         Frame {
-            session: seen.version,
-            name: seen.name,
+            session: snapshot.version,
+            name: snapshot.name,
             messages,
         }
     }
 
-    /// Array and settings are others, and laser cycles begin at 0.
-    fn begin(&mut self, seen: &Seen) {
-        self.version = Some(seen.version);
-        let header = seen.header.as_ref();
-        self.timing = header.map_or_else(Timing::unknown, Timing::of);
+    /// Begins with another array and other settings, at laser cycle 0.
+    fn begin(&mut self, snapshot: &Snapshot) {
+        self.version = Some(snapshot.version);
+        let header = snapshot.header.as_ref();
+        self.timing = header.map_or_else(Timing::default, Timing::of);
         self.slice = None;
         let array = header.map(|header| header.array);
         self.images = Images::of(array);
-        let rays = Optics::of(&seen.rays);
-        let rays = rays.and_then(|optics| array.map(|array| optics.rays(array)).transpose());
+        let rays = array.map(|array| snapshot.rays.rays(array)).transpose();
         let projection = |scale: RangeScale| {
             let (rays, _) = rays.as_ref().ok()?.as_ref()?;
             Some(Projection {
@@ -120,23 +107,23 @@ impl Frames {
                 clock: self.timing.clock(),
             })
         };
-        self.projection = seen.scale.and_then(projection);
-        self.told.no_points = rays.err().map(|error| format!("no points: {error:#}"));
+        self.projection = snapshot.scale.and_then(projection);
+        self.log.no_points = rays.err().map(|error| format!("no points: {error:#}"));
     }
 
-    /// The points of what has arrived, and the counts of it.
+    /// Points and counts of the events that have arrived.
     fn slice(
         &mut self,
-        seen: &Seen,
-        wanted: &dyn Fn(Topic) -> bool,
+        snapshot: &Snapshot,
+        is_subscribed: &dyn Fn(Topic) -> bool,
         messages: &mut Vec<Message>,
     ) -> Result<()> {
-        let timed = seen.events.iter().filter_map(|event| {
-            let cycle = event.cycle().0;
+        let timed = snapshot.events.iter().filter_map(|event| {
+            let cycle = event.cycle().raw();
             Some((self.timing.of_cycle(cycle)?, *event))
         });
         let mut timed: Vec<(u64, Event)> = timed.collect();
-        self.left_out += (seen.events.len() - timed.len()) as u64;
+        self.left_out += (snapshot.events.len() - timed.len()) as u64;
         timed.sort_by_key(|(time, _)| *time);
         let (Some((first, _)), Some((last, _))) = (timed.first(), timed.last()) else {
             return Ok(());
@@ -144,12 +131,12 @@ impl Frames {
         let begin = self.slice.unwrap_or(*first);
         let end = self.timing.end(*last).max(begin);
         self.slice = Some(end);
-        if wanted(Topic::Events) {
+        if is_subscribed(Topic::Events) {
             self.clouds(begin, &timed, messages)?;
         }
-        if wanted(Topic::Statistics) {
-            let statistics = seen.statistics.clone();
-            let statistics = statistics.over(begin, end - begin, seen.arrived);
+        if is_subscribed(Topic::Statistics) {
+            let statistics = snapshot.statistics.clone();
+            let statistics = statistics.over(begin, end - begin, snapshot.arrived);
             messages.push(Message {
                 topic: Topic::Statistics,
                 time: begin,
@@ -159,14 +146,14 @@ impl Frames {
         Ok(())
     }
 
-    /// The points of events, a message for each kind of them.
+    /// Points of events, a message for each kind.
     fn clouds(
         &mut self,
         begin: u64,
         timed: &[(u64, Event)],
         messages: &mut Vec<Message>,
     ) -> Result<()> {
-        // Of two of one time viewers show the last.
+        // Viewers show only the last of two messages of the same time.
         for (kind, time) in [
             (EventKind::Depth, begin),
             (EventKind::DynamicDepth, begin + 1),
@@ -192,20 +179,20 @@ impl Frames {
 
     fn images(
         &mut self,
-        seen: &Seen,
-        wanted: &dyn Fn(Topic) -> bool,
-        is_new: bool,
+        snapshot: &Snapshot,
+        is_subscribed: &dyn Fn(Topic) -> bool,
+        resend: bool,
         messages: &mut Vec<Message>,
     ) -> Result<()> {
-        let is_wanted = Topic::IMAGES.map(wanted).contains(&true);
-        let is_changed = self.images.take(seen.pixels.as_ref(), is_wanted);
+        let has_subscriber = Topic::IMAGES.map(is_subscribed).contains(&true);
+        let is_changed = self.images.update(snapshot.pixels.as_ref(), has_subscriber);
         let now = self.timing.now();
         for (topic, is_due) in [
-            (Topic::Range, is_changed || is_new),
-            (Topic::Reflectivity, is_changed || is_new),
+            (Topic::Range, is_changed || resend),
+            (Topic::Reflectivity, is_changed || resend),
             (Topic::Rate, self.images.has_new_rates()),
         ] {
-            if wanted(topic)
+            if is_subscribed(topic)
                 && is_due
                 && let Some(data) = self.images.message(topic, now)?
             {
@@ -216,29 +203,37 @@ impl Frames {
         Ok(())
     }
 
-    fn losses(&mut self, seen: &Seen, is_new: bool, messages: &mut Vec<Message>) -> Result<()> {
-        let losses = &seen.losses;
-        let lost = Lost {
-            timestamp: self.lost.timestamp,
+    fn losses(
+        &mut self,
+        snapshot: &Snapshot,
+        resend: bool,
+        messages: &mut Vec<Message>,
+    ) -> Result<()> {
+        let losses = &snapshot.losses;
+        let message = LossesMessage {
+            timestamp: self.losses.timestamp,
             cycles: losses.cycles,
             photons: losses.photons,
             photons_per_s: losses.photon_rate,
-            events: seen.arrived,
-            masked: seen.masked,
+            events: snapshot.arrived,
+            masked: snapshot.masked,
             points_left_out: self.left_out,
             last_fault: losses.last_fault.clone().unwrap_or_default(),
             counts: named(&losses.counts),
         };
-        if lost == self.lost && !is_new {
+        if message == self.losses && !resend {
             return Ok(());
         }
         let time = self.timing.now();
-        let timestamp = Time::of(time);
-        self.lost = Lost { timestamp, ..lost };
+        let timestamp = Time::from_nanoseconds(time);
+        self.losses = LossesMessage {
+            timestamp,
+            ..message
+        };
         messages.push(Message {
             topic: Topic::Losses,
             time,
-            data: serde_json::to_vec(&self.lost)?,
+            data: serde_json::to_vec(&self.losses)?,
         });
         Ok(())
     }

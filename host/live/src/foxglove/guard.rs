@@ -1,7 +1,7 @@
-//! Who may connect: programs of this computer, and pages of Foxglove.
+//! Admits programs of this computer and pages of Foxglove.
 //!
-//! A browser lets the pages of all sites connect to this computer, and says of which site a page
-//! is. It also says which name led to this computer: one of another site may have been led here.
+//! A browser lets pages of all sites connect to this computer. It sends the page's site as `Origin`,
+//! and as `Host` the name that led to this computer, which another site may have pointed here.
 
 use std::str::FromStr;
 
@@ -10,14 +10,14 @@ use hyper::header::{HOST, HeaderMap, HeaderValue, ORIGIN};
 use crate::guard::{HERE, NOT_HERE, one};
 use crate::origin::Origin;
 
-/// Foxglove in a browser, and as a program of its own whose pages are files.
+/// Foxglove in a browser, and Foxglove's own program, whose pages are files.
 const KNOWN: [&str; 2] = ["https://app.foxglove.dev", "file://"];
 
-/// Origins whose pages may connect.
+/// The origins whose pages may connect.
 pub struct Origins(Vec<String>);
 
 impl Origins {
-    /// Foxglove's, and these.
+    /// Foxglove's origins and `more`.
     pub fn new(more: &[Origin]) -> Self {
         let known = KNOWN.map(str::to_owned);
         Self(
@@ -28,25 +28,29 @@ impl Origins {
         )
     }
 
-    /// Checks the head of a request.
+    /// Checks the head of a request. `name` gives the name of an option from its key.
     ///
     /// # Errors
-    /// Why it is refused, in a line.
-    pub fn check(&self, headers: &HeaderMap<HeaderValue>) -> Result<(), String> {
+    /// Fails with a line that says why the request is refused.
+    pub fn check(
+        &self,
+        headers: &HeaderMap<HeaderValue>,
+        name: fn(&str) -> String,
+    ) -> Result<(), String> {
         let only = |name| one(headers, name).map_err(|(_, why)| why.to_owned());
         let host = only(&HOST)?.unwrap_or_default();
-        // Any port: that of a tunnel from another computer is another.
-        let name = host.rsplit_once(':').map_or(host, |(name, _)| name);
-        if !HERE.contains(&name) {
+        // Any port is right, as a tunnel from another computer may use a different one.
+        let host = host.rsplit_once(':').map_or(host, |(name, _)| name);
+        if !HERE.contains(&host) {
             return Err(NOT_HERE.to_owned());
         }
         match only(&ORIGIN)? {
-            // No browser.
+            // A program other than a browser.
             None => Ok(()),
             Some(origin) if self.0.iter().any(|known| known == origin) => Ok(()),
             Some(origin) => {
                 let hint = match Origin::from_str(origin) {
-                    Ok(_) => format!("; --foxglove-origin {origin} would let it"),
+                    Ok(_) => format!("; {} {origin} would allow it", name("foxglove_origin")),
                     Err(_) => String::new(),
                 };
                 Err(format!("a page of {origin} may not read{hint}"))
@@ -72,7 +76,7 @@ mod tests {
             all.append(name, value);
         }
         let more = ["http://localhost:8080".parse().unwrap()];
-        Origins::new(&more).check(&all).is_ok()
+        Origins::new(&more).check(&all, str::to_owned).is_ok()
     }
 
     #[test]
@@ -109,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn an_origin_is_what_browsers_say() {
+    fn an_origin_has_the_form_that_browsers_send() {
         for good in [
             "http://localhost:8080",
             "https://example.com",

@@ -1,6 +1,6 @@
 //! Messages between a server and Foxglove, subprotocol `foxglove.sdk.v1`.
 //!
-//! Source: the specification of Foxglove's websocket protocol, and the crate `foxglove`.
+//! Source: the specification of Foxglove's WebSocket protocol, and the crate `foxglove`.
 
 use anyhow::Result;
 use base64::Engine as _;
@@ -10,18 +10,18 @@ use serde_json::json;
 
 use super::topics::Topic;
 
-/// The names of the protocol, the preferred one first. It had another before; what is used here is
-/// the same in both.
+/// The names of the protocol, the current one first. The older protocol is the same as far as it is
+/// used here.
 pub const NAMES: [&str; 2] = ["foxglove.sdk.v1", "foxglove.websocket.v1"];
 
-/// How bad something is.
+/// Severity of a status message.
 #[derive(Clone, Copy, Debug)]
 pub enum Severity {
     Warning = 1,
     Error = 2,
 }
 
-/// Who serves, and which data: clients forget what they had of another session.
+/// The `serverInfo` message. Clients drop the data of other sessions.
 pub fn server_info(name: &str, session: &str) -> String {
     json!({
         "op": "serverInfo",
@@ -32,14 +32,14 @@ pub fn server_info(name: &str, session: &str) -> String {
     .to_string()
 }
 
-/// What there is to subscribe to.
+/// The `advertise` message with all topics.
 ///
 /// # Errors
-/// If a topic has no schema.
+/// Fails if a topic has no schema.
 pub fn advertise() -> Result<String> {
     let channels = Topic::ALL.map(|topic| {
         let channel = topic.channel()?;
-        // As text if it is text.
+        // A JSON schema is sent as text.
         let schema = match std::str::from_utf8(&channel.schema.data) {
             Ok(text) if channel.encoding == "json" => text.to_owned(),
             _ => BASE64.encode(&channel.schema.data),
@@ -57,7 +57,7 @@ pub fn advertise() -> Result<String> {
     Ok(json!({ "op": "advertise", "channels": channels? }).to_string())
 }
 
-/// A line for people, in place of one with the same `id`.
+/// A status line. It replaces one with the same `id`.
 pub fn status(severity: Severity, id: &str, message: &str) -> String {
     json!({ "op": "status", "level": severity as u8, "id": id, "message": message }).to_string()
 }
@@ -72,15 +72,15 @@ pub fn data(subscription: u32, time: u64, message: &[u8]) -> Vec<u8> {
     bytes
 }
 
-/// What a client says.
+/// A message of a client.
 #[derive(Debug, Deserialize)]
 #[serde(tag = "op", rename_all = "camelCase", rename_all_fields = "camelCase")]
-pub enum Said {
+pub enum ClientMessage {
     Subscribe { subscriptions: Vec<Subscription> },
     Unsubscribe { subscription_ids: Vec<u32> },
 }
 
-/// A number that the client chooses, and a channel.
+/// A subscription number, which the client chooses, and a channel.
 #[derive(Clone, Copy, Debug, Deserialize)]
 #[serde(rename_all = "camelCase")]
 pub struct Subscription {

@@ -1,4 +1,4 @@
-//! What there is to subscribe to.
+//! The topics.
 
 use std::collections::BTreeMap;
 
@@ -11,27 +11,27 @@ use serde::Serialize;
 use dtof_device::monitor::losses;
 use dtof_export::foxglove::{Channel, Time};
 
-/// A topic.
+/// A topic that clients can subscribe to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Topic {
     /// Points of a slice of time, as in an MCAP file.
     Events,
     /// Statistics of the same slice, as in an MCAP file.
     Statistics,
-    /// What was counted and lost so far.
+    /// Counts and losses so far.
     Losses,
-    /// Metres to the last event of each pixel.
+    /// Range in metres of the last event of each pixel.
     Range,
     /// Events a second of each pixel.
     Rate,
     /// The relative reflectivity of each pixel.
     Reflectivity,
-    /// What the device or the recording does, and why.
+    /// State of the device or the recording, and errors.
     Log,
 }
 
 impl Topic {
-    /// All of them, in the order of their numbers.
+    /// All topics in the order of their numbers.
     pub const ALL: [Self; 7] = [
         Self::Events,
         Self::Statistics,
@@ -42,65 +42,65 @@ impl Topic {
         Self::Log,
     ];
 
-    /// Those of images.
+    /// Topics with images.
     pub const IMAGES: [Self; 3] = [Self::Range, Self::Rate, Self::Reflectivity];
 
-    /// Its place among all.
+    /// Its index in [`Self::ALL`].
     pub fn index(self) -> usize {
         self as usize
     }
 
-    /// Its number, from 1.
+    /// Its channel number, from 1.
     pub fn id(self) -> u64 {
         self as u64 + 1
     }
 
-    /// The topic of this number.
-    pub fn of(id: u64) -> Option<Self> {
+    /// The topic of a channel number.
+    pub fn from_id(id: u64) -> Option<Self> {
         Self::ALL.into_iter().find(|topic| topic.id() == id)
     }
 
-    /// Its name, and what its messages are.
+    /// Its name and the schema of its messages.
     ///
     /// # Errors
-    /// If it has no schema.
+    /// Fails if it has no schema.
     pub fn channel(self) -> Result<Channel> {
         match self {
             Self::Events => Channel::events(),
             Self::Statistics => Channel::statistics(),
-            Self::Losses => Channel::json("/losses", "Losses", &Lost::nothing()),
-            Self::Range => Channel::of::<RawImage>("/range"),
-            Self::Rate => Channel::of::<RawImage>("/rate"),
-            Self::Reflectivity => Channel::of::<RawImage>("/reflectivity"),
-            Self::Log => Channel::of::<Log>("/log"),
+            Self::Losses => Channel::json("/losses", "Losses", &LossesMessage::empty()),
+            Self::Range => Channel::protobuf::<RawImage>("/range"),
+            Self::Rate => Channel::protobuf::<RawImage>("/rate"),
+            Self::Reflectivity => Channel::protobuf::<RawImage>("/reflectivity"),
+            Self::Log => Channel::protobuf::<Log>("/log"),
         }
     }
 }
 
-/// What was counted and lost so far.
+/// A message of `/losses`: counts and losses so far.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Lost {
-    /// When.
+pub struct LossesMessage {
+    /// Time of the message.
     pub timestamp: Time,
-    /// Laser cycles, and photons, since the settings are in force; photons a second.
+    /// Laser cycles and photons since the settings were applied, and photons a second.
     pub cycles: u64,
     pub photons: u64,
     pub photons_per_s: f64,
-    /// Events since the program began, and of masked pixels beside them.
+    /// Events since the program began, and events of masked pixels.
     pub events: u64,
     pub masked: u64,
-    /// Of these, while somebody was sent points: events that are no point of a message.
+    /// Events that were left out of point clouds.
     pub points_left_out: u64,
     /// The last error of the sensor.
     pub last_fault: String,
-    /// Each loss that the device counts, by its name.
+    /// Each loss of the device by its name.
     #[serde(flatten)]
     pub counts: BTreeMap<String, u64>,
 }
 
-impl Lost {
-    /// Nothing, with all names.
-    fn nothing() -> Self {
+impl LossesMessage {
+    /// All names, with counts of 0.
+    fn empty() -> Self {
         let report = Report::default();
         let losses = losses::Losses {
             first: &report,
@@ -113,7 +113,7 @@ impl Lost {
     }
 }
 
-/// Losses by names without spaces.
+/// Losses by name, with `_` for spaces.
 pub fn named(counts: &[(&'static str, u64)]) -> BTreeMap<String, u64> {
     let named = counts
         .iter()

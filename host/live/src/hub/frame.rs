@@ -1,4 +1,4 @@
-//! A frame: what a page is sent ten times a second, as one line of JSON.
+//! A frame: the line of JSON that a page is sent ten times a second.
 //!
 //! Tables are records of little-endian numbers in base64: see [`PIXEL`] and [`EVENT`].
 
@@ -12,23 +12,23 @@ use super::pages::{Page, Waiting};
 use super::pixels::Pixel;
 use super::{Kind, State};
 use dtof_device::PixelHistogram;
-use dtof_engine::look::Look;
+use dtof_engine::explain::Explanation;
 use dtof_events::aer_file::Event;
 
-/// Pixels in a frame, at most; the others are in the next.
+/// Most pixels in a frame. The others follow in the next.
 pub const MOST_PIXELS: usize = 4096;
 
 /// Bytes of a pixel: its number (2), level and echo (1), flags (1), events (4), range in
-/// millimetres, relative reflectivity, photons of the peak (floats of 4). The last two are NaN of
-/// a pixel that has had changes of depth only, as these do not measure light.
+/// millimetres, relative reflectivity, photons of the peak (floats of 4). The last two are NaN if
+/// the pixel has had changes of depth only, as these do not measure light.
 const PIXEL: usize = 20;
 /// Bytes of an event: laser cycle (8), range, photons of the peak (floats of 4), exposure (2),
 /// level and echo (1), flags (1), background (a float of 4). Of a change of depth, photons and
-/// background are NaN, and the exposure means nothing.
+/// background are NaN, and the exposure is meaningless.
 const EVENT: usize = 24;
 
 impl State {
-    /// What has changed for `page` since its last frame.
+    /// The changes since the last frame of `page`.
     pub(super) fn frame(&mut self, page: &mut Page) -> String {
         page.frames += 1;
         let rate = self.rate();
@@ -39,7 +39,7 @@ impl State {
             "masked": self.masked,
             "rate": rate,
             "losses": self.losses,
-            "recorded": self.recorded,
+            "recorded": self.recording,
             "seconds": self.seconds,
         });
         if page.version != self.version {
@@ -47,7 +47,7 @@ impl State {
             page.pixels = vec![0; self.pixels.len()];
             page.next = 0;
             page.arrived = self.events;
-            frame["about"] = self.about(page);
+            frame["source"] = self.source(page);
         }
         let (pixels, drawn, left) = self.changed(page);
         frame["pixels"] = pixels.into();
@@ -65,21 +65,24 @@ impl State {
             "arrived": arrived,
         });
         let mut text = frame.to_string();
-        let shot = self.shots.iter().find(|(of, _)| *of == pixel);
-        if let Some((_, shot)) = shot.filter(|(_, shot)| shot.number > page.shot) {
-            page.shot = shot.number;
+        let mut new = self
+            .histograms
+            .iter()
+            .filter(|new| new.number > page.histogram);
+        if let Some(new) = new.find(|new| new.pixel == pixel) {
+            page.histogram = new.number;
             text.pop();
-            // Writing into a text does not fail.
-            let _ = write!(text, ",\"histogram\":{}}}", shot.text);
+            // Writing into a String does not fail.
+            let _ = write!(text, ",\"histogram\":{}}}", new.json);
         }
         text
     }
 
-    /// Array and settings.
-    fn about(&self, page: &Page) -> serde_json::Value {
+    /// Name, array and settings of the source.
+    fn source(&self, page: &Page) -> serde_json::Value {
         let header = self.header.as_ref();
         let bins = header.map_or(0, |header| header.bins);
-        let mut about = json!({
+        let mut source = json!({
             "page": page.number,
             "name": self.name,
             "kind": self.kind,
@@ -92,24 +95,24 @@ impl State {
         });
         if self.kind == Kind::Device {
             let last_bin = u16::try_from(bins.max(1) - 1).unwrap_or(u16::MAX);
-            let (said, gate) = match &self.settings {
-                Some((said, settings)) => {
+            let (file, gate) = match &self.settings {
+                Some((file, settings)) => {
                     let gate = settings.gate.unwrap_or((0, last_bin));
-                    (&said.with(settings), Some(gate))
+                    (&file.with_settings(settings), Some(gate))
                 }
-                None => (&self.said, self.said.sensor.gate),
+                None => (&self.requested, self.requested.sensor.gate),
             };
-            about["settings"] = json!({
-                "sensor": said.sensor,
-                "detection": said.detection,
+            source["settings"] = json!({
+                "sensor": file.sensor,
+                "detection": file.detection,
                 "gate": gate,
             });
         }
-        about
+        source
     }
 
-    /// Pixels that have changed since the page was sent them, in turn; how many, and how many are
-    /// left for the next frame.
+    /// Records of pixels that have changed since the page was sent them; their number, and how many
+    /// are left for the next frame. Pixels take turns.
     fn changed(&self, page: &mut Page) -> (String, usize, usize) {
         let all = self.pixels.all();
         let mut records = Vec::new();
@@ -164,7 +167,7 @@ fn events(waiting: &[Waiting]) -> Vec<u8> {
             ),
             Event::DynamicDepth(_) => (f32::NAN, 0, f32::NAN),
         };
-        records.extend(event.cycle().0.to_le_bytes());
+        records.extend(event.cycle().raw().to_le_bytes());
         records.extend(range_mm.to_le_bytes());
         records.extend(peak.to_le_bytes());
         records.extend(exposure.to_le_bytes());
@@ -175,15 +178,15 @@ fn events(waiting: &[Waiting]) -> Vec<u8> {
     records
 }
 
-/// A histogram, and what the rule makes of it.
-pub(super) fn histogram(histogram: &PixelHistogram, look: Option<&Look>) -> String {
+/// A histogram, and the rule's decision on it.
+pub(super) fn histogram(histogram: &PixelHistogram, look: Option<&Explanation>) -> String {
     let counts = histogram
         .counts
         .iter()
         .flat_map(|count| count.to_le_bytes());
     json!({
-        "pixel": histogram.head.pixel.0,
-        "cycle": histogram.head.cycle.0,
+        "pixel": histogram.head.pixel.raw(),
+        "cycle": histogram.head.cycle.raw(),
         "exposure": histogram.head.exposure,
         "whole": histogram.head.is_whole,
         "counts": BASE64.encode(counts.collect::<Vec<u8>>()),
@@ -192,7 +195,7 @@ pub(super) fn histogram(histogram: &PixelHistogram, look: Option<&Look>) -> Stri
     .to_string()
 }
 
-/// Why there is none.
+/// The reason why a pixel has no histogram.
 pub(super) fn no_histogram(pixel: u16, reason: &str) -> String {
     json!({ "pixel": pixel, "none": reason }).to_string()
 }

@@ -1,4 +1,4 @@
-//! The pages that are open, and what waits for each.
+//! The open pages, and the events that wait for each.
 
 use std::collections::VecDeque;
 
@@ -6,29 +6,29 @@ use dtof_core::{Array, PixelAddress};
 
 use dtof_events::aer_file::Event;
 
-/// Pages that are open at a time, at most.
+/// Most pages that are open at a time.
 pub const MOST_PAGES: usize = 16;
 
-/// Events of its pixel in a frame, at most: the newest.
+/// Most events of a pixel in a frame: the newest.
 pub const MOST_EVENTS: usize = 256;
 
-/// What a page was sent.
-#[derive(Debug)]
+/// What a page has been sent.
+#[derive(Debug, Default)]
 pub struct Page {
     /// Its number.
     pub number: u64,
-    /// The last change of each pixel that it knows.
+    /// Number of the last change of each pixel that it was sent.
     pub(super) pixels: Vec<u64>,
-    /// Where the search for changes goes on.
+    /// The pixel at which the search for changes goes on.
     pub(super) next: usize,
     pub(super) version: u64,
-    pub(super) shot: u64,
+    pub(super) histogram: u64,
     pub(super) frames: u64,
-    /// Events that had arrived at its last frame.
+    /// Events up to its last frame.
     pub(super) arrived: u64,
 }
 
-/// An event of a pixel that a page looks at.
+/// An event of the pixel that a page shows.
 #[derive(Clone, Copy, Debug)]
 pub struct Waiting {
     pub event: Event,
@@ -39,9 +39,9 @@ pub struct Waiting {
 struct Open {
     number: u64,
     pixel: u16,
-    /// The newest, at most [`MOST_EVENTS`].
+    /// The newest events, at most [`MOST_EVENTS`].
     events: VecDeque<Waiting>,
-    /// All of them.
+    /// Events since the last frame.
     arrived: u64,
 }
 
@@ -66,12 +66,7 @@ impl Pages {
         });
         Some(Page {
             number: self.opened,
-            pixels: Vec::new(),
-            next: 0,
-            version: 0,
-            shot: 0,
-            frames: 0,
-            arrived: 0,
+            ..Page::default()
         })
     }
 
@@ -87,7 +82,7 @@ impl Pages {
         })
     }
 
-    /// Laser cycles begin at 0 again: what waits is not to be drawn among what comes.
+    /// Drops the events that wait, as laser cycles begin at 0 again.
     pub fn restart(&mut self) {
         for page in &mut self.open {
             page.events.clear();
@@ -99,7 +94,7 @@ impl Pages {
         self.open.retain(|open| open.number != page.number);
     }
 
-    /// The pixels that pages look at, each once.
+    /// The pixels that pages show, each once.
     pub fn watched(&self) -> Vec<u16> {
         let mut pixels: Vec<u16> = self.open.iter().map(|page| page.pixel).collect();
         pixels.sort_unstable();
@@ -111,21 +106,21 @@ impl Pages {
         self.open.len()
     }
 
-    /// Events that wait.
-    pub fn kept(&self) -> usize {
+    /// Number of events that wait.
+    pub fn waiting(&self) -> usize {
         self.open.iter().map(|page| page.events.len()).sum()
     }
 
-    /// Takes an event in for the pages that look at its pixel, or at one of its block.
+    /// Adds an event for the pages that show its pixel, or a pixel of its block.
     pub fn add(&mut self, event: &Event, range_mm: f32, array: Array) {
         for page in &mut self.open {
-            let pixel = PixelAddress(page.pixel);
-            let is_of = event.pixel() == pixel
+            let pixel = PixelAddress::new(page.pixel);
+            let is_shown = event.pixel() == pixel
                 || event.level().raw() > 0
                     && array
                         .pixels_of(event.pixel(), event.level())
                         .any(|other| other == pixel);
-            if !is_of {
+            if !is_shown {
                 continue;
             }
             page.arrived += 1;
@@ -137,7 +132,8 @@ impl Pages {
         }
     }
 
-    /// The pixel of a page, its events since the last time, and how many there were.
+    /// The pixel of a page, its events since the last frame, and their number before the oldest were
+    /// dropped.
     pub fn take(&mut self, page: &Page) -> (u16, Vec<Waiting>, u64) {
         let open = self.open.iter_mut().find(|open| open.number == page.number);
         open.map_or((0, Vec::new(), 0), |open| {

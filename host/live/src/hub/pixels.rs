@@ -1,17 +1,17 @@
-//! The last event of each pixel, and how many there were.
+//! The last event of each pixel, and its number of events.
 
 use dtof_core::{Array, EchoNumber};
 
 use dtof_events::aer_file::Event;
-use dtof_events::reports::LastReports;
+use dtof_events::last_events::LastEvents;
 
-/// Of so many events the mean signal is taken, about.
+/// The running mean of the signal covers about so many events.
 const MEAN_OF: f32 = 8.0;
 
-/// What is known of a pixel.
+/// State of a pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Pixel {
-    /// Of its last event, or of the block's that stands for it.
+    /// Range in millimetres of its last event, or of its block's.
     pub range_mm: f32,
     /// Photons of the peak.
     pub peak: u32,
@@ -23,9 +23,9 @@ pub struct Pixel {
     pub level_echo: u8,
     /// Flags.
     pub flags: u8,
-    /// The number of its last change; 0 before the first.
+    /// Number of its last change; 0 before the first.
     pub changed: u64,
-    reports: LastReports,
+    last_events: LastEvents,
 }
 
 /// All pixels of an array.
@@ -58,11 +58,11 @@ impl Pixels {
         self.changes
     }
 
-    /// Takes an event in. Of several echoes the first is kept; all are counted.
+    /// Adds an event. The first of several echoes is kept; all are counted.
     pub fn add(&mut self, event: &Event, range_mm: f32, array: Array) {
         self.changes += 1;
         for pixel in array.pixels_of(event.pixel(), event.level()) {
-            let Some(pixel) = self.all.get_mut(usize::from(pixel.0)) else {
+            let Some(pixel) = self.all.get_mut(usize::from(pixel.raw())) else {
                 continue;
             };
             if event.echo() > EchoNumber::FIRST {
@@ -70,7 +70,7 @@ impl Pixels {
                 pixel.changed = self.changes;
                 continue;
             }
-            if !pixel.reports.take_event(event) {
+            if !pixel.last_events.record_event(event) {
                 continue;
             }
             if let Event::Depth(event) = event {

@@ -1,4 +1,4 @@
-// The chosen pixel of a source that goes on, and the maps around it.
+// The chosen pixel of a live source, and the maps.
 
 function takeHistogram(news) {
   if (news.pixel !== chosen.pixel) return;
@@ -13,7 +13,7 @@ function drawMaps() {
   drawMap(element("range"), pixels.range, data.low, data.high, "mm", 0);
   const fastest = pixels.rate.reduce((most, rate) => Math.max(most, rate), 0);
   drawMap(element("rate"), pixels.rate, 0, fastest || 1, "/s", 1);
-  const isPeak = element("light-of").value === "peak";
+  const isPeak = element("light-quantity").value === "peak";
   const light = isPeak ? pixels.peak : pixels.reflectivity;
   const [, brightest] = span(light.filter((value) => !Number.isNaN(value)));
   drawMap(element("light"), light, 0, brightest, isPeak ? "photons" : "photons × m²", isPeak ? 0 : 3);
@@ -25,24 +25,25 @@ function drawMaps() {
 }
 
 function drawChosen() {
-  element("histogram").hidden = about?.kind === "recording";
+  element("histogram").hidden = source?.kind === "recording";
   element("histogram-note").textContent = histogramNote(chosen.histogram);
-  drawHistogram(element("histogram"), chosen.histogram, about?.settings?.gate);
+  drawHistogram(element("histogram"), chosen.histogram, source?.settings?.gate);
   element("ranges-note").textContent = rangesNote();
   const [first, last] = [chosen.events[0]?.cycle ?? 0, chosen.events.at(-1)?.cycle ?? 0];
-  drawRanges(element("ranges"), chosen.events, { laserHz: about?.laserHz, first, last });
+  drawRanges(element("ranges"), chosen.events, { laserHz: source?.laserHz, first, last });
   fillEvents(element("events"), chosen.events, (event) => number(event.cycle));
 }
 
-function histogramNote(shot) {
-  if (about?.kind === "recording") return "A recording has no histograms.";
-  if (!shot) return "No histogram yet; a device sends events first.";
-  if (shot.none) return `No histogram: ${shot.none}.`;
-  const { peak, needed, depends } = shot.look ?? {};
-  const kind = shot.whole ? "A whole histogram of the sensor" : `An exposure of ${number(shot.exposure)} laser cycles so far`;
+function histogramNote(histogram) {
+  if (source?.kind === "recording") return "A recording has no histograms.";
+  if (!histogram) return "No histogram yet; a device sends events first.";
+  const { none, whole, exposure, look } = histogram;
+  if (none) return `No histogram: ${none}.`;
+  const { peak, needed, depends } = look ?? {};
+  const kind = whole ? "A complete histogram from the sensor" : `An exposure of ${number(exposure)} laser cycles so far`;
   let needs = needsOf(needed);
-  if (depends) needs = "what the rule needs depends on the events before";
-  else if (needed === null) needs = "no number is enough for the rule";
+  if (depends) needs = "the required number depends on earlier events";
+  else if (needed === null) needs = "no number is enough";
   const rest = peak ? ` Peak: ${number(peak[1])} photons in bin ${peak[0]}; ${needs}.` : "";
   return `${kind}.${rest}`;
 }

@@ -1,4 +1,4 @@
-// What the reader does: choose pixels, pause, record, keys.
+// Controls: choosing a pixel, pausing, recording, keys.
 
 for (const id of ["range", "rate", "light"]) {
   element(id).addEventListener("click", (event) => {
@@ -19,11 +19,12 @@ function pause() {
   redraw();
 }
 
-const isOn = (id) => element(id).dataset.on === "true";
+/** Sends a button's command; its data-on says whether it switches on or off. */
+const press = (id) => command(`/${id}`, { on: element(id).dataset.on === "true" });
 const KEYS = {
   " ": pause,
-  r: () => about?.kind === "device" && element("record").click(),
-  p: () => about?.kind === "recording" && element("play").click(),
+  r: () => source?.kind === "device" && element("record").click(),
+  p: () => source?.kind === "recording" && element("play").click(),
   "?": () => element("keys").showModal(),
 };
 document.addEventListener("keydown", (event) => {
@@ -36,11 +37,11 @@ document.addEventListener("keydown", (event) => {
   key();
 });
 
-element("record").addEventListener("click", () => command("/record", { on: isOn("record") }));
-element("play").addEventListener("click", () => command("/play", { on: isOn("play") }));
+element("record").addEventListener("click", () => press("record"));
+element("play").addEventListener("click", () => press("play"));
 element("pause").addEventListener("click", pause);
 element("help").addEventListener("click", () => element("keys").showModal());
-element("light-of").addEventListener("input", redraw);
+element("light-quantity").addEventListener("input", redraw);
 dark.addEventListener("change", redraw);
 new ResizeObserver(redraw).observe(document.body);
-open();
+openStream();

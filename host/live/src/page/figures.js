@@ -1,4 +1,4 @@
-// Numbers: totals, losses, and how the source is.
+// Numbers: totals, losses and the state of the source.
 
 const STATES = {
   live: ["live", "good"], playing: ["playing", "good"], opening: ["opening", "still"],
@@ -6,7 +6,7 @@ const STATES = {
   ended: ["at its end", "still"], failed: ["failed", "bad"], lost: ["no connection", "bad"],
 };
 
-/** Sets a text, if it is another: what is the same is not read out again. */
+/** Sets a text if it has changed: screen readers read every set text. */
 function put(node, text) {
   if (node.textContent !== text) node.textContent = text;
 }
@@ -25,7 +25,7 @@ function showState({ state, reason, returned }) {
 function showTotals(frame, framesPerSecond) {
   const { losses, recorded } = frame;
   const rows = [["events", number(frame.events)], ["events a second", number(frame.rate)]];
-  if (about?.kind === "recording") {
+  if (source?.kind === "recording") {
     rows.push(["seconds", number(frame.seconds, 1)]);
   } else {
     rows.push(["photons a second", number(losses.photon_rate)], ["laser cycles", number(losses.cycles)]);
@@ -64,7 +64,7 @@ function showLosses({ counts, last_fault: fault }) {
   });
 }
 
-/** How many pixels and events this page draws of those that came. */
+/** Numbers of pixels and events that this frame draws. */
 function showDrawn({ pixels: drawn, left, events: arrived }) {
   const rest = left > 0 ? `, ${number(left)} in the next frames` : "";
   const thinned = arrived > drawn ? `${number(drawn)} of ${number(arrived)} events drawn` : `${number(arrived)} events drawn`;
@@ -72,7 +72,7 @@ function showDrawn({ pixels: drawn, left, events: arrived }) {
 }
 
 let newsTimer = 0;
-/** A line for all: what was done, or why not. */
+/** Shows a line: what was done, or why not. */
 function tell(text, isBad = false) {
   const news = element("news");
   news.textContent = text;
@@ -82,8 +82,8 @@ function tell(text, isBad = false) {
   if (!isBad) newsTimer = setTimeout(() => { news.hidden = true; }, 8000);
 }
 
-/** Asks the server; gives whether it did it, and what it says. */
-async function ask(path, body, kind = "application/json") {
+/** Posts a command; returns whether it was done, and the server's answer. */
+async function post(path, body, kind = "application/json") {
   try {
     const answer = await fetch(path, { method: "POST", headers: { "content-type": kind }, body });
     return { done: answer.ok, text: (await answer.text()).trim() };
@@ -93,6 +93,6 @@ async function ask(path, body, kind = "application/json") {
 }
 
 async function command(path, body) {
-  const { done, text } = await ask(path, JSON.stringify(body));
+  const { done, text } = await post(path, JSON.stringify(body));
   tell(text, !done);
 }

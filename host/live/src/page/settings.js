@@ -1,7 +1,7 @@
-// The settings form: what of dtof.toml a device takes while it runs.
+// The settings form: keys of dtof.toml that can change while a device runs.
 
 const number32 = (min, step) => ({ type: "number", min, step });
-/** Section, key, name, input, and of which rule. */
+/** Section, key, label, input, the rules that use it, and the index in a list. */
 const FIELDS = [
   ["detection", "rule", "rule", ["paper", "average", "window"]],
   ["detection", "alpha", "α, standard deviations", number32(0, "any"), ["paper", "average"]],
@@ -19,10 +19,10 @@ const FIELDS = [
   ["detection", "binning", "levels of blocks", number32(0, 1)],
   ["detection", "patience", "patience, laser cycles", number32(1, 1)],
 ];
-/** Names of the fields that hold what is not in force yet. */
+/** Names of the fields with edits that are not applied yet. */
 const edited = new Set();
-/** Keys that the device takes, and that the form has no field for, go along as they are. */
-const TAKEN = { sensor: ["masked", "sigma_bins", "one_hit_tdc"] };
+/** Sensor keys that are sent unchanged if the form has no field for them. */
+const KEPT = ["masked", "sigma_bins", "one_hit_tdc"];
 
 function makeFields() {
   for (const [section, key, name, input, rules, at] of FIELDS) {
@@ -41,8 +41,8 @@ function makeFields() {
   }
 }
 
-function inForce([section, key, , , , at]) {
-  const value = key === "gate" ? about?.settings?.gate : about?.settings?.[section]?.[key];
+function currentValue([section, key, , , , at]) {
+  const value = key === "gate" ? source?.settings?.gate : source?.settings?.[section]?.[key];
   return (at === undefined ? value : value?.[at]) ?? "";
 }
 
@@ -50,11 +50,11 @@ function fieldOf([section, key, , , , at]) {
   return element("settings").elements[`${section}.${key}${at ?? ""}`];
 }
 
-/** Fills the form with what is in force, and leaves alone what the reader has edited. */
+/** Fills the form with the current settings, except edited fields. */
 function fillSettings() {
   for (const field of FIELDS) {
     const input = fieldOf(field);
-    if (!edited.has(input.name)) input.value = inForce(field);
+    if (!edited.has(input.name)) input.value = currentValue(field);
   }
   markChanged();
 }
@@ -65,46 +65,49 @@ function markChanged() {
     const input = fieldOf(field);
     const label = input.closest("label");
     label.hidden = label.dataset.rules !== "" && !label.dataset.rules.split(",").includes(rule);
-    const isChanged = String(inForce(field)) !== input.value;
+    const isChanged = String(currentValue(field)) !== input.value;
     label.classList.toggle("changed", isChanged);
     if (!isChanged) edited.delete(input.name);
   }
 }
 
-/** The ends of the gate as they are typed. */
+/** The ends of the gate as typed. */
 function gateEnds() {
   return ["sensor.gate0", "sensor.gate1"].map((name) => element("settings").elements[name].value);
 }
 
-/** The settings as a TOML text; a value in JSON is the same in TOML. */
+/** The settings as TOML; these values are written alike in JSON and TOML. */
 function settingsText() {
-  const said = { sensor: {}, detection: { ...about?.settings?.detection } };
-  for (const key of TAKEN.sensor) said.sensor[key] = about?.settings?.sensor?.[key];
+  const settings = { sensor: {}, detection: { ...source?.settings?.detection } };
+  for (const key of KEPT) settings.sensor[key] = source?.settings?.sensor?.[key];
   const rule = element("settings").elements["detection.rule"].value;
-  // Half widths are those of a pulse and of an estimator, z and patience of a rule and of blocks.
-  const isOther = (name) => fieldOf(FIELDS.find(([, key]) => key === name)).value !== String(inForce(FIELDS.find(([, key]) => key === name)));
-  if (isOther("sigma_bins") || isOther("estimator")) delete said.detection.half_widths;
-  if (rule !== "window") delete said.detection.tracking;
+  // Half widths belong to a pulse and an estimator, tracking to the window rule.
+  const isChanged = (name) => {
+    const field = FIELDS.find(([, key]) => key === name);
+    return fieldOf(field).value !== String(currentValue(field));
+  };
+  if (isChanged("sigma_bins") || isChanged("estimator")) delete settings.detection.half_widths;
+  if (rule !== "window") delete settings.detection.tracking;
   for (const field of FIELDS) {
     const [section, key, , input, rules] = field;
     const { value } = fieldOf(field);
-    const isOf = !rules || rules.includes(rule);
+    const isUsed = !rules || rules.includes(rule);
     if (key === "gate") continue;
-    if (value === "" || !isOf) delete said[section][key];
-    else said[section][key] = Array.isArray(input) ? value : Number(value);
+    if (value === "" || !isUsed) delete settings[section][key];
+    else settings[section][key] = Array.isArray(input) ? value : Number(value);
   }
-  // Without ends it is all bins.
+  // A gate without ends has all bins.
   const gate = gateEnds();
-  said.sensor.gate = gate.includes("") ? null : gate.map(Number);
-  if (!(said.detection.binning > 0)) delete said.detection.patience;
-  if (!(said.detection.echoes > 1)) delete said.detection.echo_wait;
-  const lines = (section) => Object.entries(said[section])
+  settings.sensor.gate = gate.includes("") ? null : gate.map(Number);
+  if (!(settings.detection.binning > 0)) delete settings.detection.patience;
+  if (!(settings.detection.echoes > 1)) delete settings.detection.echo_wait;
+  const lines = (section) => Object.entries(settings[section])
     .filter(([, value]) => value !== null && value !== undefined)
     .map(([key, value]) => `${key} = ${JSON.stringify(value)}`);
   return ["[sensor]", ...lines("sensor"), "[detection]", ...lines("detection"), ""].join("\n");
 }
 
-/** Shows what the device says of settings, on the form itself. */
+/** Shows the device's answer on the form. */
 function showAnswer(text, isBad) {
   const answer = element("answer");
   answer.textContent = text;
@@ -116,17 +119,17 @@ makeFields();
 element("settings").addEventListener("submit", async (event) => {
   event.preventDefault();
   if (gateEnds().filter((end) => end === "").length === 1) {
-    showAnswer("Refused: a gate has both ends, or none for all bins", true);
+    showAnswer("Refused: a gate needs both ends, or none for all bins", true);
     return;
   }
-  showAnswer("The device is asked …", false);
-  const [before, sent] = [about, FIELDS.map((field) => fieldOf(field).value)];
-  const { done, text } = await ask("/settings", settingsText(), "application/toml");
+  showAnswer("Waiting for the device …", false);
+  const [before, sent] = [source, FIELDS.map((field) => fieldOf(field).value)];
+  const { done, text } = await post("/settings", settingsText(), "application/toml");
   showAnswer(done ? text : `Refused: ${text}`, !done);
   if (!done) return;
-  // What was sent is in force, perhaps rounded; what was edited meanwhile is not.
+  // The sent settings are applied, perhaps rounded. Later edits are not.
   FIELDS.map(fieldOf).forEach((input, at) => input.value === sent[at] && edited.delete(input.name));
-  if (about !== before) fillSettings();
+  if (source !== before) fillSettings();
 });
 element("undo").addEventListener("click", () => {
   edited.clear();

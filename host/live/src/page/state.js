@@ -1,12 +1,12 @@
-// What the page knows: the array, the last event of each pixel, the events of the chosen one.
+// The page's state: the array, the last event of each pixel, the events of the chosen pixel.
 
 const colours = HEX.match(/.{6}/g).map((hex) => `#${hex}`);
 const data = { columns: 0, rows: 0, sides: ["column", "row"], events: "events", low: 0, high: 0 };
-/** What the server said of the source once. */
-let about = null;
-/** By pixel. */
+/** Name, array and settings of the source. */
+let source = null;
+/** Values by pixel. */
 let pixels = emptyPixels(0);
-/** Those that have an event, for the cloud. */
+/** Pixels with an event, for the cloud. */
 let events = { count: 0, range: [], pixel: [], level: [], cycle: [] };
 let levels = new Uint8Array(0);
 let [nearest, farthest] = [0, 1];
@@ -19,12 +19,12 @@ function emptyPixels(count) {
   return {
     count,
     range: new Float32Array(count).fill(NaN),
-    /** Of light, NaN where it is not measured. */
+    /** Light: NaN if it is not measured. */
     reflectivity: new Float32Array(count).fill(NaN),
     peak: new Float32Array(count).fill(NaN),
     events: new Uint32Array(count),
     rate: new Float32Array(count),
-    /** Events at the last time that rates were told. */
+    /** Events at the last measurement of rates. */
     before: new Uint32Array(count),
   };
 }
@@ -33,14 +33,14 @@ function bytesOf(base64) {
   return new DataView(Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0)).buffer);
 }
 
-/** Takes in pixels that have changed: 20 bytes each. */
+/** Decodes changed pixels, 20 bytes each. */
 function takePixels(base64) {
   const bytes = bytesOf(base64);
   for (let at = 0; at < bytes.byteLength; at += 20) {
     const pixel = bytes.getUint16(at, true);
     if (pixel >= pixels.count) continue;
     pixels.events[pixel] = bytes.getUint32(at + 4, true);
-    // Those from before its first record are of no rate.
+    // Events before a pixel's first record do not count for its rate.
     if (Number.isNaN(pixels.range[pixel])) pixels.before[pixel] = pixels.events[pixel];
     pixels.range[pixel] = bytes.getFloat32(at + 8, true);
     pixels.reflectivity[pixel] = bytes.getFloat32(at + 12, true);
@@ -48,7 +48,7 @@ function takePixels(base64) {
   }
 }
 
-/** Takes in events of the chosen pixel: 24 bytes each. */
+/** Decodes events of the chosen pixel, 24 bytes each. */
 function takeEvents(base64) {
   const bytes = bytesOf(base64);
   for (let at = 0; at < bytes.byteLength; at += 24) {
@@ -69,9 +69,9 @@ function takeEvents(base64) {
   if (chosen.events.length > MOST_KEPT) chosen.events.splice(0, chosen.events.length - MOST_KEPT);
 }
 
-/** All pixels that the program knows come anew. */
-function takeAbout(news) {
-  about = news;
+/** Begins with another array or other settings. All pixels will be sent again. */
+function takeSource(news) {
+  source = news;
   Object.assign(data, { columns: news.columns, rows: news.rows });
   pixels = emptyPixels(news.columns * news.rows);
   // Laser cycles begin at 0 again.
@@ -80,7 +80,7 @@ function takeAbout(news) {
   [chosen.drawn, chosen.arrived] = [0, 0];
 }
 
-/** The rate of each pixel since the last time, `seconds` ago. */
+/** Measures the rate of each pixel over the last `seconds`. */
 function takeRates(seconds) {
   for (let pixel = 0; pixel < pixels.count; pixel++) {
     const more = Math.max(0, pixels.events[pixel] - pixels.before[pixel]);
@@ -89,15 +89,15 @@ function takeRates(seconds) {
   }
 }
 
-/** The pixels with an event as the cloud takes them, and the span of their colours. */
+/** Collects the pixels with an event for the cloud, and the span of their colours. */
 function takeCloud() {
-  const known = [];
+  const withEvent = [];
   for (let pixel = 0; pixel < pixels.count; pixel++) {
-    if (!Number.isNaN(pixels.range[pixel])) known.push(pixel);
+    if (!Number.isNaN(pixels.range[pixel])) withEvent.push(pixel);
   }
-  const range = Float32Array.from(known, (pixel) => pixels.range[pixel]);
-  const count = known.length;
-  events = { count, range, pixel: known, level: new Uint8Array(count), cycle: range };
+  const range = Float32Array.from(withEvent, (pixel) => pixels.range[pixel]);
+  const count = withEvent.length;
+  events = { count, range, pixel: withEvent, level: new Uint8Array(count), cycle: range };
   shown.last = count;
   [data.low, data.high] = span(range);
   levels = Uint8Array.from(range, (range) => level(range, data.low, data.high));

@@ -1,23 +1,23 @@
-// The stream of frames: taken in as they come, drawn when the screen is ready.
+// The stream of frames: decoded as they come, drawn when the screen is ready.
 
 let paused = false;
 let page = null;
-let asked = false;
+let isDrawing = false;
 let last = null;
 let times = [];
 let isChosen = false;
 let rated = performance.now();
-/** Whether the server is being told of the chosen pixel. */
+/** A request to show the chosen pixel is open. */
 let isWatching = false;
-/** The end of a recording that was told. */
-let toldEnd = "";
+/** The failed recording that was shown last. */
+let shownEnd = "";
 
-/** Everything, before the next picture of the screen. */
+/** Draws everything before the next repaint. */
 function redraw() {
-  if (asked) return;
-  asked = true;
+  if (isDrawing) return;
+  isDrawing = true;
   requestAnimationFrame(() => {
-    asked = false;
+    isDrawing = false;
     takeCloud();
     drawMaps();
     drawCloud();
@@ -28,17 +28,17 @@ function redraw() {
 function takeFrame(frame) {
   const now = performance.now();
   times = [...times.filter((time) => now - time < 2000), now];
-  if (frame.about) {
+  if (frame.source) {
     const isFirst = frame.frame === 1;
     if (isFirst) rated = now;
-    takeAbout(frame.about);
-    page = frame.about.page;
-    element("name").textContent = `dtof view: ${about.name}`;
-    document.title = `${about.name} · dtof view`;
-    const isDevice = about.kind === "device";
+    takeSource(frame.source);
+    page = frame.source.page;
+    element("name").textContent = `dtof view: ${source.name}`;
+    document.title = `${source.name} · dtof view`;
+    const isDevice = source.kind === "device";
     for (const part of document.querySelectorAll(".of-device")) part.hidden = !isDevice;
     for (const part of document.querySelectorAll(".of-recording")) part.hidden = isDevice;
-    // At first the one in the middle.
+    // The first choice is the middle pixel.
     const middle = Math.floor(data.rows / 2) * data.columns + Math.floor(data.columns / 2);
     choose(chosen.pixel < pixels.count && isChosen ? chosen.pixel : Math.min(middle, pixels.count - 1));
     isChosen = pixels.count > 0;
@@ -63,28 +63,28 @@ function takeFrame(frame) {
   const seconds = Math.max(0.1, (now - times[0]) / 1000);
   showTotals(frame, times.length > 1 ? (times.length - 1) / seconds : 0);
   showLosses(frame.losses);
-  tellEnd(frame.recorded);
+  showEnd(frame.recorded);
   if (paused) return;
   showDrawn(frame.drawn);
   redraw();
 }
 
-/** Tells once why a recording has ended. */
-function tellEnd({ file, events, error }) {
+/** Shows once why a recording has ended by itself. */
+function showEnd({ file, events, error }) {
   const end = error && `${file} ${events} ${error}`;
-  if (end && end !== toldEnd) tell(`The recording has ended: ${error}`, true);
-  toldEnd = end;
+  if (end && end !== shownEnd) tell(`The recording has ended: ${error}`, true);
+  shownEnd = end;
 }
 
-/** Has the server look at the chosen pixel. Frames ask again until it does. */
+/** Makes the server send the chosen pixel. Frames repeat the request until it does. */
 async function watch() {
   if (isWatching || page === null) return;
   isWatching = true;
-  await ask("/watch", JSON.stringify({ page, pixel: chosen.pixel }));
+  await post("/watch", JSON.stringify({ page, pixel: chosen.pixel }));
   isWatching = false;
 }
 
-/** Looks at another pixel. */
+/** Chooses another pixel. */
 function choose(pixel) {
   if (pixel < 0) return;
   element("pixel-name").value = `${pixel}: ${pixelName(pixel)}`;
@@ -94,15 +94,15 @@ function choose(pixel) {
   redraw();
 }
 
-function open() {
-  const source = new EventSource(`/stream?pixel=${chosen.pixel}`);
-  source.addEventListener("message", (event) => takeFrame(JSON.parse(event.data)));
-  source.addEventListener("error", () => {
-    // Why is not said here: a refused page looks like one whose server is gone.
+function openStream() {
+  const stream = new EventSource(`/stream?pixel=${chosen.pixel}`);
+  stream.addEventListener("message", (event) => takeFrame(JSON.parse(event.data)));
+  stream.addEventListener("error", () => {
+    // The browser does not give the cause: a refused page looks like one whose server is gone.
     const reason = "the program has ended, or too many pages are open; this page tries again every few seconds";
     showState({ state: "lost", reason, returned: 0 });
-    // One that was refused does not try again by itself; one that lost its way has another pixel.
-    source.close();
-    setTimeout(open, 2000);
+    // A refused stream does not reconnect by itself, and a reconnected one shows its first pixel.
+    stream.close();
+    setTimeout(openStream, 2000);
   });
 }

@@ -1,4 +1,4 @@
-//! Answers: whole ones, and the stream of a page's frames.
+//! Answers: complete ones, and the stream of a page's frames.
 
 use std::convert::Infallible;
 use std::pin::Pin;
@@ -16,19 +16,19 @@ use tokio::time::{Interval, MissedTickBehavior, interval};
 
 use crate::hub::{Hub, Page};
 
-/// Between two frames of a page.
+/// Interval of a page's frames.
 const FRAMES: Duration = Duration::from_millis(100);
 
-/// The page loads what this server gives, and nothing else.
+/// The page may load files of this server only.
 const POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; connect-src 'self'; \
                       img-src 'self' data:; base-uri 'none'; form-action 'none'; \
                       frame-ancestors 'none'";
 
-/// What an answer holds.
+/// Body of an answer.
 pub enum Content {
-    /// All of it.
-    Whole(Option<Bytes>),
-    /// The frames of a page, until it is gone.
+    /// A complete body, until it is sent.
+    Complete(Option<Bytes>),
+    /// The frames of a page, until it disconnects.
     Frames(Box<Frames>),
 }
 
@@ -40,11 +40,11 @@ pub struct Frames {
 }
 
 impl Frames {
-    /// Of a page that looks at a pixel; `None` if there are too many pages.
+    /// Frames of a page that shows a pixel; `None` if there are too many pages.
     pub fn new(hub: Arc<Hub>, pixel: u16) -> Option<Self> {
         let page = hub.join(pixel)?;
         let mut ticks = interval(FRAMES);
-        // A slow page has fewer frames, not later ones.
+        // A slow page gets fewer frames.
         ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
         Some(Self { hub, page, ticks })
     }
@@ -65,7 +65,7 @@ impl Body for Content {
         context: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<Bytes>, Infallible>>> {
         let bytes = match self.get_mut() {
-            Self::Whole(bytes) => bytes.take(),
+            Self::Complete(bytes) => bytes.take(),
             Self::Frames(frames) => {
                 std::task::ready!(frames.ticks.poll_tick(context));
                 let Frames { hub, page, .. } = &mut **frames;
@@ -76,12 +76,12 @@ impl Body for Content {
     }
 
     fn is_end_stream(&self) -> bool {
-        matches!(self, Self::Whole(None))
+        matches!(self, Self::Complete(None))
     }
 
     fn size_hint(&self) -> hyper::body::SizeHint {
         match self {
-            Self::Whole(bytes) => {
+            Self::Complete(bytes) => {
                 hyper::body::SizeHint::with_exact(bytes.as_ref().map_or(0, Bytes::len) as u64)
             }
             Self::Frames(_) => hyper::body::SizeHint::new(),
@@ -89,7 +89,7 @@ impl Body for Content {
     }
 }
 
-/// An answer with the headers that all have.
+/// An answer with the headers of all answers.
 pub fn answer(status: StatusCode, kind: &'static str, content: Content) -> Response<Content> {
     let mut response = Response::new(content);
     *response.status_mut() = status;
@@ -115,6 +115,6 @@ pub fn line(status: StatusCode, text: &str) -> Response<Content> {
     answer(
         status,
         "text/plain; charset=utf-8",
-        Content::Whole(Some(bytes)),
+        Content::Complete(Some(bytes)),
     )
 }

@@ -2,7 +2,6 @@
 
 use std::sync::LazyLock;
 
-use dtof_draw::palette;
 use dtof_report::shared;
 
 const HTML: &str = include_str!("../page/index.html");
@@ -11,12 +10,6 @@ static STYLE: LazyLock<String> =
     LazyLock::new(|| shared::STYLE.to_owned() + include_str!("../page/live.css"));
 
 static SCRIPT: LazyLock<String> = LazyLock::new(|| {
-    let colours: String = (0..=u8::MAX)
-        .map(|level| {
-            let [red, green, blue] = palette::level(level);
-            format!("{red:02x}{green:02x}{blue:02x}")
-        })
-        .collect();
     let own = [
         include_str!("../page/chosen.js"),
         include_str!("../page/figures.js"),
@@ -25,10 +18,10 @@ static SCRIPT: LazyLock<String> = LazyLock::new(|| {
         include_str!("../page/controls.js"),
     ];
     let script = shared::script(include_str!("../page/state.js"), &own);
-    format!("const HEX = \"{colours}\";\n{script}")
+    format!("const HEX = \"{}\";\n{script}", shared::colours())
 });
 
-/// The kind and the text of what is at `path`.
+/// Content type and text of the file at `path`.
 pub fn at(path: &str) -> Option<(&'static str, &'static str)> {
     Some(match path {
         "/" => ("text/html; charset=utf-8", HTML),

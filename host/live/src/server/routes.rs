@@ -1,4 +1,4 @@
-//! What is where.
+//! Paths and their answers.
 
 use std::sync::Arc;
 use std::sync::mpsc::{SyncSender, TrySendError};
@@ -13,22 +13,22 @@ use tokio::time::timeout;
 
 use super::answer::{Content, Frames, answer, line};
 use super::assets;
-use crate::feed::{Command, Wish};
+use crate::feed::{Command, PageRequest};
 use crate::guard;
 use crate::hub::Hub;
 use dtof_options::rows::printable;
 
-/// Bytes of a body, at most.
+/// Most bytes of a body.
 const BODY: usize = 64 * 1024;
-/// A body takes no longer to come.
+/// Longest wait for a body.
 const BODY_TIME: Duration = Duration::from_secs(5);
-/// A device takes no longer to answer. One that waits for its photons may take some seconds.
+/// Longest wait for an answer of the device, which may take some seconds.
 const ANSWER_TIME: Duration = Duration::from_secs(40);
 
-/// What all connections share.
+/// State that all connections share.
 pub struct App {
     pub hub: Arc<Hub>,
-    pub commands: SyncSender<Command>,
+    pub requests: SyncSender<PageRequest>,
     pub port: u16,
 }
 
@@ -68,7 +68,7 @@ impl App {
             },
             _ => line(
                 StatusCode::METHOD_NOT_ALLOWED,
-                "only GET and POST are known",
+                "only GET and POST are supported",
             ),
         }
     }
@@ -81,7 +81,7 @@ impl App {
         match assets::at(uri.path()) {
             Some((kind, text)) => {
                 let bytes = Bytes::from_static(text.as_bytes());
-                answer(StatusCode::OK, kind, Content::Whole(Some(bytes)))
+                answer(StatusCode::OK, kind, Content::Complete(Some(bytes)))
             }
             None => line(StatusCode::NOT_FOUND, "there is nothing here"),
         }
@@ -116,34 +116,34 @@ impl App {
         let refused = |(status, why): guard::Refused| (status, why.to_owned());
         guard::check_kind(request.headers(), kind).map_err(refused)?;
         let text = body(request).await?;
-        let wish = match path.as_str() {
-            "/settings" => Wish::Settings(text),
-            "/save" => read::<Nothing>(&text).map(|_| Wish::Save)?,
-            "/record" => Wish::Record(read::<Switch>(&text)?.on),
-            "/play" => Wish::Play(read::<Switch>(&text)?.on),
+        let command = match path.as_str() {
+            "/settings" => Command::Settings(text),
+            "/save" => read::<Nothing>(&text).map(|_| Command::Save)?,
+            "/record" => Command::Record(read::<Switch>(&text)?.on),
+            "/play" => Command::Play(read::<Switch>(&text)?.on),
             _ => {
                 let Watch { page, pixel } = read(&text)?;
                 return match self.hub.watch(page, pixel) {
-                    true => Ok(format!("Looking at pixel {pixel}.")),
+                    true => Ok(format!("Showing pixel {pixel}.")),
                     false => Err((StatusCode::NOT_FOUND, "there is no such page".to_owned())),
                 };
             }
         };
-        self.wish(wish).await
+        self.command(command).await
     }
 
-    /// Has the feed fulfil a wish.
-    async fn wish(&self, wish: Wish) -> Result<String, Refusal> {
+    /// Has the feed execute a command.
+    async fn command(&self, command: Command) -> Result<String, Refusal> {
         let (sender, receiver) = oneshot::channel();
-        let command = Command {
-            wish,
+        let request = PageRequest {
+            command,
             answer: sender,
         };
         let busy = |why: &str| (StatusCode::SERVICE_UNAVAILABLE, why.to_owned());
-        self.commands
-            .try_send(command)
+        self.requests
+            .try_send(request)
             .map_err(|error| match error {
-                TrySendError::Full(_) => busy("other wishes are waiting; try again"),
+                TrySendError::Full(_) => busy("too many commands are waiting; try again"),
                 TrySendError::Disconnected(_) => busy("the program is ending"),
             })?;
         match timeout(ANSWER_TIME, receiver).await {
@@ -160,16 +160,16 @@ async fn body(request: Request<Incoming>) -> Result<String, Refusal> {
     let bytes = match timeout(BODY_TIME, body).await {
         Err(_) => Err(refused(
             StatusCode::REQUEST_TIMEOUT,
-            "the body does not come",
+            "the body did not arrive in time",
         )),
         Ok(Err(_)) => Err(refused(
             StatusCode::PAYLOAD_TOO_LARGE,
-            "the body is broken, or longer than 64 kB",
+            "the body is incomplete, or longer than 64 kB",
         )),
         Ok(Ok(body)) => Ok(body.to_bytes()),
     }?;
     String::from_utf8(bytes.into())
-        .map_err(|_| refused(StatusCode::BAD_REQUEST, "the body is no text"))
+        .map_err(|_| refused(StatusCode::BAD_REQUEST, "the body is not UTF-8"))
 }
 
 fn read<'a, T: Deserialize<'a>>(text: &'a str) -> Result<T, Refusal> {

@@ -12,7 +12,7 @@ use toml::Spanned;
 use super::{Ray, unit};
 use crate::range::within;
 
-/// No file of 65,536 pixels is longer.
+/// No calibration file of 65,536 pixels is longer.
 const MOST_BYTES: u64 = 1 << 24;
 
 #[derive(Deserialize)]
@@ -28,7 +28,7 @@ pub fn read(path: &Path, array: Array) -> Result<Vec<Ray>> {
     let name = || path.display().to_string();
     let mut text = String::new();
     let file = File::open(path).with_context(name)?;
-    // Some files have no end.
+    // Some files, such as `/dev/zero`, have no end.
     let read = file.take(MOST_BYTES + 1).read_to_string(&mut text);
     ensure!(
         read.with_context(name)? as u64 <= MOST_BYTES,
@@ -47,22 +47,22 @@ pub(super) fn parse(text: &str, array: Array) -> Result<Vec<Ray>> {
         let at = error.span().map_or(0, |span| span.start);
         anyhow!("line {}: {}", line(at), error.message())
     })?;
-    let said = (*file.columns.get_ref(), file.rows);
+    let size = (*file.columns.get_ref(), file.rows);
     ensure!(
-        said == (array.columns(), array.rows()),
+        size == (array.columns(), array.rows()),
         "line {}: is of {}x{} pixels, the events are of {}x{}",
         line(file.columns.span().start),
-        said.0,
-        said.1,
+        size.0,
+        size.1,
         array.columns(),
         array.rows()
     );
-    let wanted = array.pixels() as usize;
-    // What is too much, or the last of what is there.
-    let last = file.pixels.get(wanted).or(file.pixels.last());
+    let expected = array.pixels() as usize;
+    // The first row too many, or the last row.
+    let last = file.pixels.get(expected).or(file.pixels.last());
     ensure!(
-        file.pixels.len() == wanted,
-        "line {}: {} pixels, should be {wanted}",
+        file.pixels.len() == expected,
+        "line {}: {} pixels, should be {expected}",
         line(last.map_or(0, |pixel| pixel.span().start)),
         file.pixels.len()
     );

@@ -28,7 +28,7 @@ fn the_edges_of_the_image_are_the_field_of_view_apart() {
             view.degrees()
                 .iter()
                 .zip(degrees)
-                .all(|(is, said)| (is - said).abs() < 1e-9)
+                .all(|(is, expected)| (is - expected).abs() < 1e-9)
         );
     }
 }
@@ -55,9 +55,9 @@ fn corners_are_exact() {
 
 #[test]
 fn x_is_to_the_right_and_y_down() {
-    let rays = Rays::pinhole(array(4, 2), FieldOfView::of([4, 2]));
+    let rays = Rays::pinhole(array(4, 2), FieldOfView::default_for([4, 2]));
     let point = |pixel| {
-        rays.point(PixelAddress(pixel), BlockLevel::PIXEL, 2000.0)
+        rays.point(PixelAddress::new(pixel), BlockLevel::PIXEL, 2000.0)
             .unwrap()
     };
     let [upper_left, upper_right, lower_left] = [point(0), point(3), point(4)];
@@ -65,16 +65,19 @@ fn x_is_to_the_right_and_y_down() {
     assert!(upper_right[0] > 0.0 && upper_right[1] < 0.0);
     assert!(lower_left[0] < 0.0 && lower_left[1] > 0.0);
     assert!((length(upper_left) - 2.0).abs() < 1e-15); // range along the ray, in metres
-    assert_eq!(rays.point(PixelAddress(8), BlockLevel::PIXEL, 1.0), None);
+    assert_eq!(
+        rays.point(PixelAddress::new(8), BlockLevel::PIXEL, 1.0),
+        None
+    );
 }
 
 #[test]
-fn an_array_sees_60_degrees_along_its_longer_side_unless_told() {
-    let degrees = FieldOfView::of([64, 32]).degrees();
+fn an_array_sees_60_degrees_along_its_longer_side_by_default() {
+    let degrees = FieldOfView::default_for([64, 32]).degrees();
     assert!((degrees[0] - 60.0).abs() < 1e-9 && (degrees[1] - 32.2).abs() < 0.01);
-    let degrees = FieldOfView::of([1, 256]).degrees();
+    let degrees = FieldOfView::default_for([1, 256]).degrees();
     assert!((degrees[1] - 60.0).abs() < 1e-9 && degrees[0] < 0.3);
-    let degrees = FieldOfView::of([1, 1]).degrees();
+    let degrees = FieldOfView::default_for([1, 1]).degrees();
     assert_eq!(degrees[0], degrees[1]);
 }
 
@@ -93,7 +96,7 @@ fn a_field_of_view_is_printed_as_it_is_read() {
     for text in ["60x40", "0.01x179", "100x32.2", "45.25x90"] {
         assert_eq!(text.parse::<FieldOfView>().unwrap().to_string(), text);
     }
-    let wide = FieldOfView::of([64, 32]);
+    let wide = FieldOfView::default_for([64, 32]);
     assert_eq!(
         format!("{wide} {wide:.6} {wide:.0}"),
         "60x32.2 60x32.204228 60x32"
@@ -107,11 +110,11 @@ fn a_calibration_gives_directions_and_takes_the_bias_off() {
     let rays = calibration::parse(text, array).unwrap();
     let rays = Rays { array, rays };
     assert_eq!(
-        rays.point(PixelAddress(0), BlockLevel::PIXEL, 1500.0),
+        rays.point(PixelAddress::new(0), BlockLevel::PIXEL, 1500.0),
         Some([0.0, 0.0, 1.5])
     );
     let [x, y, z] = rays
-        .point(PixelAddress(1), BlockLevel::PIXEL, 2012.5)
+        .point(PixelAddress::new(1), BlockLevel::PIXEL, 2012.5)
         .unwrap();
     assert!((x - 1.2).abs() < 1e-12 && y == 0.0 && (z - 1.6).abs() < 1e-12);
 }

@@ -8,14 +8,14 @@ use anyhow::{Context, Result, bail, ensure};
 use zip::ZipArchive;
 
 use super::header::Array;
-use super::histograms::{Histograms, of_array};
+use super::histograms::{Histograms, read_array};
 use crate::axes::Axes;
 use dtof_options::{Refused, plain};
 
-/// Reads the histograms of the array `name`; a single array needs no name.
+/// Reads the histograms of the array `name`. The name may be left out if there is only one array.
 ///
 /// # Errors
-/// What is wrong with the file, its name first.
+/// Returns what is wrong with the file, after its name.
 pub fn read(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histograms> {
     named(path, name, axes).with_context(|| path.display().to_string())
 }
@@ -29,7 +29,7 @@ fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histogr
         arrays.extend(name.strip_suffix(".npy").map(str::to_owned));
     }
     arrays.sort();
-    // A name may be any text, an error is one line.
+    // Names may have line breaks, but an error is one line.
     let list: Vec<String> = arrays.iter().map(|name| one_line(name)).collect();
     let list = list.join(", ");
     let chosen = match (name, &arrays[..]) {
@@ -53,7 +53,7 @@ fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histogr
     let entry = entry.with_context(|| format!("array {}", one_line(chosen)))?;
     let length = entry.size();
     let array = Array::read(BufReader::new(entry), length);
-    let histograms = array.and_then(|array| of_array(array, axes));
+    let histograms = array.and_then(|array| read_array(array, axes));
     histograms.with_context(|| format!("array {}", one_line(chosen)))
 }
 

@@ -1,40 +1,40 @@
-//! Recorded histograms: an array of whole numbers, one axis of which is the bins.
+//! Recorded histograms: an array of whole numbers with an axis of bins.
 
 use std::io::Read;
 
 use anyhow::{Context, Result, anyhow, ensure};
 
 use super::header::{Array, Number};
-use crate::axes::{Axes, Layout, index_of};
+use crate::axes::{Axes, AxisLayout, index_of};
 use crate::bins::MOST_BINS;
-use crate::medium::Medium;
+use crate::input::Input;
 use dtof_options::Refused;
 
 /// The histograms of one array.
 #[derive(Clone, Debug)]
 pub struct Histograms {
-    /// Where they lie.
-    pub layout: Layout,
+    /// The layout in the file.
+    pub layout: AxisLayout,
     /// Length of the first axis.
     pub first: usize,
-    /// A histogram a pixel, in the order of addresses.
+    /// One histogram a pixel, in the order of addresses.
     pub pixels: Vec<Vec<u64>>,
 }
 
-/// Reads the array of an `.npy` file, or one in memory. Integers of every size and floats that are whole
-/// numbers are read, little- and big-endian, in C and in Fortran order.
+/// Reads an `.npy` file, or an array in memory. The elements may be integers of any size or floats
+/// that are whole numbers, little- or big-endian, in C or Fortran order.
 ///
 /// # Errors
-/// What is wrong with the file, its name first.
-pub fn read(medium: &Medium, axes: Option<&Axes>) -> Result<Histograms> {
-    let array = Array::open(medium).and_then(|array| of_array(array, axes));
-    array.with_context(|| medium.to_string())
+/// Returns what is wrong with the file, after its name.
+pub fn read(input: &Input, axes: Option<&Axes>) -> Result<Histograms> {
+    let array = Array::open(input).and_then(|array| read_array(array, axes));
+    array.with_context(|| input.to_string())
 }
 
-/// The same of an array whose header has been read.
-pub(super) fn of_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Result<Histograms> {
+/// Reads the elements of an array whose header has been read.
+pub(super) fn read_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Result<Histograms> {
     let (shape, fortran) = (array.shape.clone(), array.fortran);
-    let layout = Layout::new(&shape, fortran, axes)?;
+    let layout = AxisLayout::new(&shape, fortran, axes)?;
     ensure!(
         layout.bins() <= MOST_BINS,
         Refused::input(format!(
@@ -51,7 +51,7 @@ pub(super) fn of_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Result<
     let counts = array.elements(|place, number| {
         let count = match number {
             Number::Integer(count) => unsigned(count),
-            Number::Float(count) => whole(count),
+            Number::Float(count) => whole_count(count),
         };
         count.map_err(|why| anyhow!("element {} is {why}", index_of(place, &shape, fortran)))
     })?;
@@ -66,19 +66,19 @@ fn unsigned(count: i128) -> Result<u64, String> {
     u64::try_from(count).map_err(|_| format!("negative: {count}"))
 }
 
-/// Above 2^53 not every whole number is a float: such a count is no count.
+/// Above 2^53, a float is not an exact count.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "a whole number from 0 to 2^53"
 )]
-fn whole(count: f64) -> Result<u64, String> {
+fn whole_count(count: f64) -> Result<u64, String> {
     const MOST: f64 = (1u64 << 53) as f64;
     if count < 0.0 {
         Err(format!("negative: {count}"))
     } else if count.fract() == 0.0 && count <= MOST {
         Ok(count as u64)
     } else {
-        Err(format!("{count}, which is no count of photons"))
+        Err(format!("{count}, which is not a number of photons"))
     }
 }

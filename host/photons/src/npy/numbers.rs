@@ -3,43 +3,43 @@
 use anyhow::{Context, Result, bail, ensure};
 
 use super::header::{Array, Number};
-use crate::medium::Medium;
+use crate::input::Input;
 
 /// The numbers of a picture.
 #[derive(Clone, Debug)]
 pub struct Numbers {
-    /// Lengths of the axes, the first that of the rows.
+    /// Lengths of the axes; the first is the rows.
     pub shape: Vec<u64>,
     /// The type of the elements.
-    pub element: Element,
-    /// All elements, the last axis the fastest. Integers beyond 2^53 are rounded.
+    pub element: ElementKind,
+    /// All elements; the last axis changes fastest. Integers above 2^53 are rounded.
     pub values: Vec<f64>,
 }
 
-/// What the elements of a picture are.
+/// The type of the elements of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Element {
+pub enum ElementKind {
     /// 32 or 64 bits.
     Float,
-    /// Of 8 bits without a sign.
+    /// 8 bits, unsigned.
     Byte,
     /// Any other integer.
     Integer,
 }
 
-/// Most elements of a picture: 4096 by 4096 in three colours.
+/// The most elements of a picture: 4096 by 4096 in three colours.
 const MOST_NUMBERS: u64 = 3 << 24;
 
-/// Reads a picture: floats of 32 or 64 bits, or integers, little- or big-endian.
+/// Reads a picture of floats of 32 or 64 bits, or of integers, little- or big-endian.
 ///
 /// # Errors
-/// What is wrong with the file, its name first.
-pub fn read(medium: &Medium) -> Result<Numbers> {
-    numbers_of(medium).with_context(|| medium.to_string())
+/// Returns what is wrong with the file, after its name.
+pub fn read(input: &Input) -> Result<Numbers> {
+    numbers_of(input).with_context(|| input.to_string())
 }
 
-fn numbers_of(medium: &Medium) -> Result<Numbers> {
-    let array = Array::open(medium)?;
+fn numbers_of(input: &Input) -> Result<Numbers> {
+    let array = Array::open(input)?;
     let (shape, fortran) = (array.shape.clone(), array.fortran);
     ensure!(
         !fortran || shape.len() < 2,
@@ -52,9 +52,9 @@ fn numbers_of(medium: &Medium) -> Result<Numbers> {
         "{count} elements: must be at most {MOST_NUMBERS}"
     );
     let kind = match (array.element.integer(), array.element.float()) {
-        (_, Some(_)) => Element::Float,
-        (Some((1, false)), _) => Element::Byte,
-        (Some(_), _) => Element::Integer,
+        (_, Some(_)) => ElementKind::Float,
+        (Some((1, false)), _) => ElementKind::Byte,
+        (Some(_), _) => ElementKind::Integer,
         (None, None) => bail!(
             "elements are {}: must be integers, or floats of 32 or 64 bits; convert them with \
              .astype(numpy.float32)",

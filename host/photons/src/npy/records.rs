@@ -1,31 +1,31 @@
-//! Recorded photons from a structured `.npy` array with the fields `pixel`, `cycle` and
-//! `bin`: integers of any type, in any order. Other fields are not read.
+//! Recorded photons from a structured `.npy` array with the fields `pixel`, `cycle` and `bin`,
+//! integers of any type in any order. Other fields are ignored.
 
 use std::io::{BufReader, Read};
 
 use anyhow::{Context, Result, bail, ensure};
 
 use super::header::{Elements, Field, Header};
-use crate::medium::Medium;
-use crate::photon_list::{Row, Rows};
+use crate::input::Input;
+use crate::photon_list::{PhotonReader, RawPhoton};
 
 /// The fields of a photon.
 const NAMES: [&str; 3] = ["pixel", "cycle", "bin"];
 /// Records read at a time.
 const BLOCK: usize = 1 << 13;
 
-/// Where a number lies in a record.
+/// An integer field of a record.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Number {
+struct IntegerField {
     offset: usize,
     is_big_endian: bool,
-    /// Bits of eight bytes that are not of the number.
+    /// How many of 64 bits the type does not have.
     unused: u32,
     is_signed: bool,
 }
 
-impl Number {
-    fn of(offset: usize, field: &Field) -> Result<Self> {
+impl IntegerField {
+    fn new(offset: usize, field: &Field) -> Result<Self> {
         let integer = field.element.as_ref();
         let integer = integer.and_then(|element| Some((element, element.integer()?)));
         let (element, (size, is_signed)) = integer.with_context(|| {
@@ -39,11 +39,12 @@ impl Number {
         })
     }
 
-    /// The number of a record at the start of `bytes`, after which there are seven more.
+    /// The value in the record at the start of `bytes`, which must be seven bytes longer than the
+    /// record.
     #[inline(always)]
     fn value(&self, bytes: &[u8]) -> Option<u64> {
         let bytes = *bytes[self.offset..].first_chunk::<8>()?;
-        // With its highest bit at the top.
+        // The highest bit of the value becomes bit 63.
         let value = match self.is_big_endian {
             true => u64::from_be_bytes(bytes) & (u64::MAX << self.unused),
             false => u64::from_le_bytes(bytes) << self.unused,
@@ -54,14 +55,14 @@ impl Number {
 }
 
 /// The records of a file.
-pub struct Records {
-    medium: Medium,
+pub struct RecordReader {
+    input: Input,
     file: BufReader<Box<dyn Read>>,
-    numbers: [Number; 3],
+    numbers: [IntegerField; 3],
     record: usize,
-    /// Some records, and eight bytes.
+    /// Some records, and eight more bytes.
     block: Vec<u8>,
-    /// Where in it the next record begins, and where the last ends.
+    /// The offset of the next record in the block, and the end of the last.
     next: usize,
     end: usize,
     /// Records before the block.
@@ -70,16 +71,16 @@ pub struct Records {
     after: u64,
 }
 
-/// The fields that are not read, if the file's elements are records.
+/// The fields that are ignored, if the elements are records.
 ///
 /// # Errors
-/// If it is no `.npy` file; its name first.
-pub fn other_fields(medium: &Medium) -> Result<Option<Vec<String>>> {
+/// Fails if it is not an `.npy` file; names it first.
+pub fn other_fields(input: &Input) -> Result<Option<Vec<String>>> {
     let header = || {
-        let (file, length) = medium.open()?;
+        let (file, length) = input.open()?;
         Header::read(&mut BufReader::new(file), length)
     };
-    let header = header().with_context(|| medium.to_string())?;
+    let header = header().with_context(|| input.to_string())?;
     let Elements::Records(fields) = header.elements else {
         return Ok(None);
     };
@@ -89,20 +90,20 @@ pub fn other_fields(medium: &Medium) -> Result<Option<Vec<String>>> {
     Ok(Some(others.collect()))
 }
 
-impl Records {
-    fn of_medium(medium: &Medium) -> Result<Self> {
-        let (file, length) = medium.open()?;
+impl RecordReader {
+    fn open_input(input: &Input) -> Result<Self> {
+        let (file, length) = input.open()?;
         let mut file = BufReader::with_capacity(1 << 16, file);
         let header = Header::read(&mut file, length)?;
         let &[records] = &header.shape[..] else {
             bail!("a list of photons has one axis, not {:?}", header.shape);
         };
         let Elements::Records(fields) = header.elements else {
-            bail!("the elements are no records");
+            bail!("the elements are not records");
         };
         let record = size(&fields)?;
         Ok(Self {
-            medium: medium.clone(),
+            input: input.clone(),
             file,
             numbers: numbers(&fields)?,
             record,
@@ -114,7 +115,7 @@ impl Records {
         })
     }
 
-    /// Reads on; `false` at the end.
+    /// Reads the next block. Returns `false` at the end.
     #[cold]
     fn read_block(&mut self) -> Result<bool> {
         self.before += (self.end / self.record) as u64;
@@ -129,13 +130,13 @@ impl Records {
     }
 }
 
-impl Rows for Records {
-    fn open(medium: &Medium) -> Result<Self> {
-        Self::of_medium(medium).with_context(|| medium.to_string())
+impl PhotonReader for RecordReader {
+    fn open(input: &Input) -> Result<Self> {
+        Self::open_input(input).with_context(|| input.to_string())
     }
 
     #[inline(always)]
-    fn next(&mut self) -> Result<Option<Row>> {
+    fn next(&mut self) -> Result<Option<RawPhoton>> {
         if self.next == self.end && !self.read_block()? {
             return Ok(None);
         }
@@ -151,7 +152,7 @@ impl Rows for Records {
     fn place(&self) -> String {
         let read = self.before + (self.next / self.record) as u64;
         let last = read.saturating_sub(1);
-        format!("{}: record {last}", self.medium)
+        format!("{}: record {last}", self.input)
     }
 }
 
@@ -166,12 +167,12 @@ fn size(fields: &[Field]) -> Result<usize> {
     Ok(usize::try_from(bytes)?)
 }
 
-fn numbers(fields: &[Field]) -> Result<[Number; 3]> {
+fn numbers(fields: &[Field]) -> Result<[IntegerField; 3]> {
     let mut found = [None; 3];
     let mut offset = 0;
     for field in fields {
-        if let Some(place) = NAMES.iter().position(|wanted| *wanted == field.name) {
-            found[place] = Some(Number::of(offset, field)?);
+        if let Some(place) = NAMES.iter().position(|known| *known == field.name) {
+            found[place] = Some(IntegerField::new(offset, field)?);
         }
         offset += usize::try_from(field.bytes)?;
     }
@@ -213,7 +214,7 @@ mod tests {
                 bytes: 8,
                 element,
             };
-            let number = Number::of(0, &field).unwrap();
+            let number = IntegerField::new(0, &field).unwrap();
             assert_eq!(number.value(&bytes), expected, "{descr}");
         }
     }

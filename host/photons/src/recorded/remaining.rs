@@ -1,38 +1,36 @@
-//! A histogram from which photons are drawn without putting them back.
+//! A histogram from which photons are drawn without replacement.
 
 use rand_core::Rng;
 use rand_distr::uniform::{UniformInt, UniformSampler};
 
-/// A bin: its photons have numbers, one bin after the other, and those drawn so far are the
-/// last of them.
+/// A bin. Its photons have consecutive numbers, and those drawn so far are the last of them.
 #[derive(Clone, Copy, Debug)]
 struct Bin {
-    /// One past the number of its last photon.
+    /// One past its last photon.
     end: u64,
-    /// One past the number of the last photon that is still there.
+    /// One past its last photon that has not been drawn.
     left: u64,
 }
 
-/// So many photons or fewer are a list.
+/// At most so many photons are kept as a list.
 const LIST: u64 = 1024;
 
 /// The photons of a histogram that have not been drawn.
 ///
-/// The photons of a bin are all alike, so it does not matter which of them is drawn. A number
-/// is drawn among all photons, and again if that photon is gone. When a quarter of them are
-/// gone the others are numbered anew. A table says in which bin to begin the search for a
-/// number. The last photons are a list.
+/// The photons of a bin are interchangeable. A number is drawn among all photons, and again if that
+/// photon is gone. When a quarter of them are gone, the others are renumbered. A table gives the
+/// bin at which to start the search for a number. The last photons are a list.
 #[derive(Clone, Debug)]
 pub struct Remaining {
     bins: Vec<Bin>,
-    /// Of each number, shifted right: the bin of the first that is shifted to the same.
+    /// The bin of the first number with the same upper bits, indexed by these bits.
     guide: Vec<u16>,
     shift: u32,
-    /// Photons with a number, drawn or not.
+    /// Photons that have a number, drawn or not.
     numbers: u64,
-    /// Those that have not been drawn.
+    /// Photons that have not been drawn.
     photons: u64,
-    /// The bins of all photons, once they are few.
+    /// The bin of each photon, once there are few.
     list: Vec<u16>,
 }
 
@@ -56,12 +54,12 @@ impl Remaining {
         remaining
     }
 
-    /// How many there are.
+    /// How many photons are left.
     pub fn photons(&self) -> u64 {
         self.photons
     }
 
-    /// Numbers the photons that are left, or lists them.
+    /// Renumbers the photons that are left, or lists them.
     fn number_anew(&mut self) {
         let (mut start, mut end) = (0, 0);
         for bin in &mut self.bins {
@@ -81,7 +79,7 @@ impl Remaining {
             self.shift += 1;
         }
         for (number, bin) in (0..=u16::MAX).zip(&self.bins) {
-            // Numbers before `bin.end` are of this bin or of one before.
+            // Numbers below `bin.end` are in this bin or an earlier one.
             while ((self.guide.len() as u64) << self.shift) < bin.end {
                 self.guide.push(number);
             }
@@ -98,7 +96,7 @@ impl Remaining {
         (self.bins, self.guide) = (Vec::new(), Vec::new());
     }
 
-    /// Draws a photon: its bin, or `None` if there is none left.
+    /// Draws a photon. Returns its bin, or `None` if none is left.
     #[inline]
     pub fn draw(&mut self, rng: &mut impl Rng) -> Option<u16> {
         if 4 * self.photons < 3 * self.numbers && self.list.is_empty() {
@@ -140,7 +138,7 @@ mod tests {
             counts in prop::collection::vec(prop_oneof![Just(0u64), 1u64..5, 1u64..300, 1u64..3000], 1..40),
             seed in any::<u64>(),
         ) {
-            let mut rng = pixel_rng(seed, PixelAddress(0));
+            let mut rng = pixel_rng(seed, PixelAddress::new(0));
             let mut remaining = Remaining::new(&counts);
             let mut drawn = vec![0; counts.len()];
             while let Some(bin) = remaining.draw(&mut rng) {
@@ -152,11 +150,11 @@ mod tests {
         }
     }
 
-    /// With replacement the first draws would be as likely; without, two draws from bins of
-    /// 1 and 3 photons are in different bins with probability 1/2, and not 3/8.
+    /// With replacement, single draws would have the same distribution. Without it, two draws from
+    /// bins of 1 and 3 photons differ with probability 1/2, not 3/8.
     #[test]
     fn a_photon_is_not_put_back() {
-        let mut rng = pixel_rng(1, PixelAddress(0));
+        let mut rng = pixel_rng(1, PixelAddress::new(0));
         let mut differ = 0i32;
         for _ in 0..40_000 {
             let mut remaining = Remaining::new(&[1, 0, 3]);
@@ -169,7 +167,7 @@ mod tests {
 
     #[test]
     fn all_photons_of_a_large_histogram_are_as_likely() {
-        let mut rng = pixel_rng(2, PixelAddress(0));
+        let mut rng = pixel_rng(2, PixelAddress::new(0));
         let counts: Vec<u64> = (0..1024).map(|bin| (bin % 4) << 28).collect();
         let mut remaining = Remaining::new(&counts);
         let mut drawn = [0i64; 4];

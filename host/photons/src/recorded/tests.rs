@@ -26,7 +26,7 @@ fn every_recorded_photon_is_used_exactly_once() {
     assert!(photons.is_sorted_by_key(|photon| photon.cycle));
 }
 
-/// Of two captures, one of which ends first.
+/// Two captures, one of which ends first.
 #[test]
 fn slices_of_any_length_hold_the_same_photons() {
     let photons = |lengths: &[u16]| {
@@ -106,7 +106,7 @@ fn bright(captures: u64) -> Vec<Capture> {
     captures.map(Iterator::collect).collect()
 }
 
-/// Whatever the parts are, and however many photons a chunk holds.
+/// For any parts, and any number of photons a chunk.
 #[test]
 fn parts_hold_the_photons_that_they_hold_in_the_whole() {
     let array = Array::new(4, 6).unwrap();
@@ -118,64 +118,72 @@ fn parts_hold_the_photons_that_they_hold_in_the_whole() {
         let all: Vec<Vec<u64>> = captures.iter().flatten().cloned().collect();
         let totals: Vec<u64> = all.iter().map(|counts| counts.iter().sum()).collect();
         let one = Array::new(4, 3).unwrap();
-        let mut whole = RecordedHistograms::new(one, &captures, length, 900, 5).unwrap();
-        let cycles = whole.cycles();
-        let expected = whole.next_slice(900).unwrap().pixels;
+        let mut complete = RecordedHistograms::new(one, &captures, length, 900, 5).unwrap();
+        let cycles = complete.cycles();
+        let expected = complete.next_slice(900).unwrap().pixels;
         for (first, end) in [(0, 8), (8, 12), (12, 24), (4, 20), (0, 24)] {
-            let known = Whole::new(array, 2, &totals, first).unwrap();
+            let layout = Layout::new(array, 2, &totals, first).unwrap();
             let histograms = [all[first..end].to_vec()];
-            let mut part = RecordedHistograms::part(&known, &histograms, length, 900, 5).unwrap();
+            let mut part =
+                RecordedHistograms::with_layout(&layout, &histograms, length, 900, 5).unwrap();
             let addresses = part.addresses();
-            assert_eq!(usize::from(addresses[0].0), first);
+            assert_eq!(usize::from(addresses[0].raw()), first);
             assert_eq!(part.array(), array);
             assert_eq!((part.cycles(), part.capture_rows()), (cycles, 3));
-            assert_eq!(part.recorded_cycles(), whole.recorded_cycles());
+            assert_eq!(part.recorded_cycles(), complete.recorded_cycles());
             let photons = part.next_slice(900).unwrap().pixels;
             assert_eq!(photons, expected[first..end]);
         }
     }
 }
 
-/// A dim part of a bright array is drawn in the chunks of the array.
+/// A dim part of a bright array has the chunks of the whole array.
 #[test]
 fn a_part_has_the_chunks_of_the_whole() {
     let array = Array::new(1, 2).unwrap();
     let captures = [vec![vec![4_000_000; 8], vec![900; 8]]];
     let length = RecordingLength::Cycles(4000);
-    let mut whole = RecordedHistograms::new(array, &captures, length, 600, 5).unwrap();
-    assert!(whole.chunk < 600);
-    let known = Whole::new(array, 1, &[32_000_000, 7200], 1).unwrap();
+    let mut complete = RecordedHistograms::new(array, &captures, length, 600, 5).unwrap();
+    assert!(complete.chunk < 600);
+    let layout = Layout::new(array, 1, &[32_000_000, 7200], 1).unwrap();
     let dim = [vec![vec![900; 8]]];
-    let mut part = RecordedHistograms::part(&known, &dim, length, 600, 5).unwrap();
-    assert_eq!(part.chunk, whole.chunk);
+    let mut part = RecordedHistograms::with_layout(&layout, &dim, length, 600, 5).unwrap();
+    assert_eq!(part.chunk, complete.chunk);
     assert_eq!(
         part.next_slice(600).unwrap().pixels[0],
-        whole.next_slice(600).unwrap().pixels[1]
+        complete.next_slice(600).unwrap().pixels[1]
     );
 }
 
 #[test]
 fn what_is_no_part_is_refused() {
     let array = Array::new(1, 2).unwrap();
-    let known = |first| Whole::new(array, 1, &[80, 16], first).unwrap();
-    let refused = |whole: &Whole, counts: &[u64]| {
+    let layout = |first| Layout::new(array, 1, &[80, 16], first).unwrap();
+    let refused = |layout: &Layout, counts: &[u64]| {
         let part = [counts.iter().map(|&count| vec![count; 8]).collect()];
         let length = RecordingLength::Cycles(10);
-        let refused = RecordedHistograms::part(whole, &part, length, 10, 1);
+        let refused = RecordedHistograms::with_layout(layout, &part, length, 10, 1);
         refused.unwrap_err().to_string()
     };
-    assert!(refused(&known(1), &[10]).contains("pixel 1 has 80 photons, but 16"));
-    assert!(refused(&known(1), &[2, 2]).contains("there is no pixel 2"));
-    assert!(Whole::new(array, 1, &[1], 0).is_err());
-    assert!(Whole::new(array, 0, &[1, 1], 0).is_err());
-    assert!(Whole::new(array, 3, &[1, 1], 0).is_err());
+    assert!(refused(&layout(1), &[10]).contains("pixel 1 has 80 photons, but 16"));
+    assert!(refused(&layout(1), &[2, 2]).contains("there is no pixel 2"));
+    assert!(Layout::new(array, 1, &[1], 0).is_err());
+    assert!(Layout::new(array, 0, &[1, 1], 0).is_err());
+    assert!(Layout::new(array, 3, &[1, 1], 0).is_err());
     let most = Array::new(256, 256).unwrap();
-    let refused = |captures: &[Capture]| Whole::of(most, captures).unwrap_err().to_string();
-    let whole = vec![vec![1; 8]; 65_536];
-    assert_eq!(refused(&[whole.clone(), whole]), "more than 65,536 pixels");
+    let refused = |captures: &[Capture]| {
+        Layout::from_captures(most, captures)
+            .unwrap_err()
+            .to_string()
+    };
+    let layout = vec![vec![1; 8]; 65_536];
+    assert_eq!(
+        refused(&[layout.clone(), layout]),
+        "more than 65,536 pixels"
+    );
     assert_eq!(
         refused(&[vec![]]),
-        "a capture has other than 65536 histograms"
+        "a capture does not have 65536 histograms"
     );
     assert_eq!(refused(&[]), "no captures");
 }
@@ -184,8 +192,8 @@ fn what_is_no_part_is_refused() {
 fn a_part_that_cuts_a_block_is_refused() {
     let array = Array::new(4, 10).unwrap();
     let cuts = |row: usize, end: usize, side: usize| {
-        let whole = Whole::new(array, 1, &[0; 40], row * 4).unwrap();
-        whole.has_whole_blocks((end - row) * 4, side).is_err()
+        let layout = Layout::new(array, 1, &[0; 40], row * 4).unwrap();
+        layout.has_whole_blocks((end - row) * 4, side).is_err()
     };
     for row in 0..10 {
         for end in row + 1..=10 {
@@ -197,20 +205,23 @@ fn a_part_that_cuts_a_block_is_refused() {
     }
 }
 
-/// A hot pixel that is masked says nothing of how long the recording lasted; of two captures each
-/// has its own.
+/// A hot pixel that is masked does not count for the length. Each of two captures has its own
+/// length.
 #[test]
 fn masked_pixels_do_not_set_the_length() {
     let array = Array::new(3, 1).unwrap();
     let row = |totals: [u64; 3]| totals.map(|total| vec![total; 8]).to_vec();
     let captures = [row([10, 5000, 20]), row([40, 3, 7])];
-    let lasted = |masked: Vec<u16>| {
-        let whole = Whole::of(array, &captures).unwrap().with_masked(masked);
+    let length = |masked: Vec<u16>| {
+        let layout = Layout {
+            masked,
+            ..Layout::from_captures(array, &captures).unwrap()
+        };
         let length = RecordingLength::PhotonsPerCycle(0.5);
-        let source = RecordedHistograms::part(&whole, &captures, length, u64::MAX, 1);
+        let source = RecordedHistograms::with_layout(&layout, &captures, length, u64::MAX, 1);
         source.unwrap().recorded_cycles()
     };
-    assert_eq!(lasted(vec![]), Some((640, 80_000)));
-    assert_eq!(lasted(vec![1]), Some((320, 640)));
-    assert_eq!(lasted(vec![1, 3]), Some((112, 320)));
+    assert_eq!(length(vec![]), Some((640, 80_000)));
+    assert_eq!(length(vec![1]), Some((320, 640)));
+    assert_eq!(length(vec![1, 3]), Some((112, 320)));
 }

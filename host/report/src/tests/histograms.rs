@@ -1,13 +1,15 @@
 use super::*;
-use dtof_core::{BinIndex, PeeledBins};
-use dtof_engine::decisions::{Decision, Kept};
+use dtof_core::BinIndex;
+use dtof_core::rule::ExcludedBins;
+use dtof_engine::decisions::{Decision, KeptPixels};
+use dtof_engine::explain::explain_decisions;
 use dtof_engine::host::host_engine;
-use dtof_engine::look::look_back;
+use dtof_engine::settings::Settings;
 use dtof_photons::source::PhotonSource;
-use dtof_simulate::{demo, scene};
+use dtof_simulate::demo;
 
-/// What a run of the demo on a small array is told of its last decisions, in so many bytes.
-fn decided(array: Array, room: usize) -> (Vec<Decision>, serde_json::Value, usize) {
+/// Runs the demo: its last decisions, the data for the script in at most `room` bytes, and their size.
+fn decisions_and_data(array: Array, room: usize) -> (Vec<Decision>, serde_json::Value, usize) {
     let settings = demo::settings(1).unwrap();
     let mut photons = demo::photons(array, 1, 2000).unwrap();
     let mut engine = host_engine(&settings, array, &photons.addresses()).unwrap();
@@ -16,7 +18,7 @@ fn decided(array: Array, room: usize) -> (Vec<Decision>, serde_json::Value, usiz
     let all = engine.decisions();
     let decisions = Decisions {
         settings: &settings,
-        kept: Kept::of(array, 128),
+        kept: KeptPixels::new(array, 128),
         all: &all,
         array,
     };
@@ -24,14 +26,13 @@ fn decided(array: Array, room: usize) -> (Vec<Decision>, serde_json::Value, usiz
     (all, data, bytes)
 }
 
-/// Each pixel has the histogram of its last event or its block's, to the photon, and nothing
-/// else is there.
+/// Each pixel has the exact histogram of its last event, or that of its block, and there are no others.
 #[test]
-fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
+fn the_histogram_of_the_last_event_of_each_pixel_is_in_the_data() {
     let array = Array::new(16, 8).unwrap();
-    let (all, data, bytes) = decided(array, usize::MAX);
+    let (all, data, bytes) = decisions_and_data(array, usize::MAX);
     let settings = demo::settings(1).unwrap();
-    let looks = look_back(&settings, &all);
+    let explanations = explain_decisions(&settings, &all);
     assert_eq!(data["every"], 1);
     assert_eq!(data["gate"], serde_json::json!([0, 127]));
     let text = data["packed"].as_str().unwrap();
@@ -42,7 +43,7 @@ fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
         let [pixel, kind, cycle, exposure] = [(); 4].map(|()| reader.number());
         let of = |decision: &Decision| {
             let event = decision.event;
-            let place = (u64::from(event.pixel.0), u64::from(event.level.raw()));
+            let place = (u64::from(event.pixel.raw()), u64::from(event.level.raw()));
             place == (pixel, kind >> 2 & 3)
         };
         let at = all.iter().position(of).unwrap();
@@ -50,13 +51,13 @@ fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
             Decision {
                 event,
                 counts,
-                peeled,
+                excluded,
                 ..
             },
-            look,
-        ) = (&all[at], &looks[at]);
+            explanation,
+        ) = (&all[at], &explanations[at]);
         assert_eq!(
-            (event.cycle.0, u64::from(event.exposure)),
+            (event.cycle.raw(), u64::from(event.exposure)),
             (cycle, exposure)
         );
         assert_eq!(
@@ -64,26 +65,27 @@ fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
             range_mm(event, &settings.range_scale().unwrap())
         );
         assert_eq!(reader.number(), u64::from(event.peak_bin.raw()));
-        assert_eq!(reader.number(), u64::from(look.needed.unwrap()) + 1);
-        assert!((reader.range() - look.background.unwrap()).abs() < 1e-9);
+        assert_eq!(reader.number(), u64::from(explanation.needed.unwrap()) + 1);
+        assert!((reader.range() - explanation.background.unwrap()).abs() < 1e-9);
         let width = reader.number();
         let first = reader.number();
         assert_eq!(
-            look.window
+            explanation
+                .window
                 .map(|(first, last)| (u64::from(first), u64::from(last))),
             Some((first, first + width - 1))
         );
-        let mut left_out = [false; 128];
+        let mut is_excluded = [false; 128];
         for _ in 0..reader.number() {
             let [first, last] = [(); 2].map(|()| usize::try_from(reader.number()).unwrap());
-            left_out[first..=last].fill(true);
+            is_excluded[first..=last].fill(true);
         }
-        assert!((0..128u16).all(|bin| left_out[usize::from(bin)] == peeled.contains(bin)));
+        assert!((0..128u16).all(|bin| is_excluded[usize::from(bin)] == excluded.contains(bin)));
         for &count in counts {
             assert_eq!(reader.number(), u64::from(count));
         }
         for pixel in array.pixels_of(event.pixel, event.level) {
-            let place = &mut covered[usize::from(pixel.0)];
+            let place = &mut covered[usize::from(pixel.raw())];
             *place = (*place).max(Some(cycle));
         }
     }
@@ -94,12 +96,12 @@ fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
             let Decision { event, .. } = decision;
             array
                 .pixels_of(event.pixel, event.level)
-                .any(|one| one.0 == pixel)
+                .any(|one| one.raw() == pixel)
         };
         let latest = all
             .iter()
             .filter(of)
-            .map(|decision| decision.event.cycle.0)
+            .map(|decision| decision.event.cycle.raw())
             .max();
         assert_eq!(covered, latest, "{pixel}");
     }
@@ -108,19 +110,19 @@ fn the_script_is_given_what_the_last_event_of_each_pixel_was_decided_from() {
 #[test]
 fn histograms_are_thinned_until_there_is_room() {
     let array = Array::new(16, 8).unwrap();
-    let (_, whole, bytes) = decided(array, usize::MAX);
-    let (_, part, fewer) = decided(array, bytes / 3);
+    let (_, whole, bytes) = decisions_and_data(array, usize::MAX);
+    let (_, part, fewer) = decisions_and_data(array, bytes / 3);
     assert!(fewer <= bytes / 3 && fewer > 0);
     assert!(whole["count"].as_u64() > part["count"].as_u64());
     assert!(part["every"] == 2 || part["every"] == 4, "{part}");
-    let (_, none, bytes) = decided(array, 0);
+    let (_, none, bytes) = decisions_and_data(array, 0);
     assert_eq!((&none["count"], bytes), (&0.into(), 0));
 }
 
 #[test]
 fn a_large_array_of_bright_pixels_stays_below_the_documented_size() {
     let array = Array::new(64, 64).unwrap();
-    let settings = scene::settings(0);
+    let settings = Settings::static_scene(0);
     let counts: Vec<u16> = (0..128)
         .map(|bin| if bin == 10 { 1023 } else { 800 + bin })
         .collect();
@@ -128,7 +130,7 @@ fn a_large_array_of_bright_pixels_stays_below_the_documented_size() {
         event: event(pixel, 1 << 40, 10),
         counts: counts.clone(),
         expected: Some(BinIndex::saturating(3)),
-        peeled: PeeledBins::NONE,
+        excluded: ExcludedBins::NONE,
     };
     let all: Vec<Decision> = (0..64 * 64).map(decision).collect();
     let mut sample = sample(Sample::LIMIT, 1 << 18);
@@ -136,13 +138,13 @@ fn a_large_array_of_bright_pixels_stays_below_the_documented_size() {
         array,
         decisions: Some(Decisions {
             settings: &settings,
-            kept: Kept::of(array, 128),
+            kept: KeptPixels::new(array, 128),
             all: &all,
             array,
         }),
         ..cloud(&mut sample, 1 << 41, ["event", "events"])
     };
     let page = html("t", "l", &[], &[], events);
-    assert!(page.len() < PAGE, "{}", page.len());
+    assert!(page.len() < MAX_PAGE, "{}", page.len());
     assert_eq!(data(&page)["histograms"]["count"], 64 * 64);
 }

@@ -1,10 +1,11 @@
-//! Dynamic depth of a run: when the depth of its pixels has changed, and to which side.
+//! Dynamic depth of a run: when the depth of its pixels has changed, and in which direction.
 //!
-//! The events are those of depth; what a pixel would send in their place (section III-E of
-//! the paper) is drawn over time, as in its Fig. 17 and 18.
+//! The run has depth events. The dynamic-depth events that pixels would send instead (section III-E of
+//! the paper) are drawn over time, as in its Fig. 17 and 18.
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, Polarity, RangeScale};
+use dtof_core::events::Polarity;
+use dtof_core::{DepthEvent, RangeScale};
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{Colour, Mark, Pen};
 use dtof_link::DynamicDepth;
@@ -15,10 +16,10 @@ use dtof_events::sample::Sample;
 use dtof_options::Refused;
 use dtof_options::rows::grouped;
 
-/// Changes of one side that are drawn, at most.
-const DRAWN: usize = 4096;
-/// To either side: its name, and its pen.
-const SIDES: [(&str, Pen); 2] = [
+/// The most changes of one direction that are drawn.
+const MAX_DRAWN: usize = 4096;
+/// The directions, each with its pen.
+const DIRECTIONS: [(&str, Pen); 2] = [
     ("nearer", pen(Colour::Orange, Mark::Down)),
     ("farther", pen(Colour::Blue, Mark::Up)),
 ];
@@ -34,15 +35,15 @@ pub struct Changes {
     scale: RangeScale,
     /// Depth events.
     events: u64,
-    /// Of either side, as [`SIDES`].
-    sides: [Sample; 2],
+    /// Of each direction, in the order of [`DIRECTIONS`].
+    directions: [Sample; 2],
 }
 
 impl Changes {
-    /// None yet.
+    /// No changes yet.
     ///
     /// # Errors
-    /// If the threshold is too low.
+    /// Fails if the threshold is too low.
     pub fn new(options: &DynamicDepth, scale: RangeScale) -> Result<Self> {
         let config = options.config(&scale);
         let config = config.map_err(|error| {
@@ -52,39 +53,37 @@ impl Changes {
             found: DepthChanges::new(config, Echo::All),
             scale,
             events: 0,
-            sides: [Sample::new(DRAWN), Sample::new(DRAWN)],
+            directions: [Sample::new(MAX_DRAWN), Sample::new(MAX_DRAWN)],
         })
     }
 
-    /// Takes the next depth event into account: of a pixel or a block, and of its echoes the
-    /// first.
+    /// Adds the next depth event, of a pixel or a block.
     pub fn add(&mut self, event: &DepthEvent) {
         self.events += 1;
         let Some(change) = self.found.observe(event) else {
             return;
         };
-        let [nearer, farther] = &mut self.sides;
-        let side = match change.polarity() {
+        let [nearer, farther] = &mut self.directions;
+        let direction = match change.polarity() {
             Polarity::Nearer => nearer,
             Polarity::Farther => farther,
         };
-        side.add(event, self.scale.range(change.position).to_num());
+        direction.add(event, self.scale.range(change.position).to_num());
     }
 
-    /// How many there are.
+    /// The number of changes.
     #[must_use]
     pub fn count(&self) -> u64 {
-        self.sides.iter().map(Sample::seen).sum()
+        self.directions.iter().map(Sample::seen).sum()
     }
 
-    /// The picture and what is to be said of it; nothing without a change. What it is made
-    /// from is called `several`.
+    /// The picture and its caption; nothing without a change. `several` is the plural of event.
     ///
     /// # Errors
-    /// If it cannot be drawn.
+    /// Fails if it cannot be drawn.
     pub fn picture(&self, cycles: u64, several: &str) -> Result<Option<(String, String)>> {
-        let dots = self.sides.each_ref().map(|side| -> Vec<Point> {
-            let events = side.events();
+        let dots = self.directions.each_ref().map(|direction| -> Vec<Point> {
+            let events = direction.events();
             events
                 .map(|event| Point::exact(thousands(event.cycle), event.range_mm))
                 .collect()
@@ -98,8 +97,8 @@ impl Changes {
             return Ok(None);
         }
         let room = (0.05 * (high - low)).max(1.0);
-        let key = SIDES.map(|(name, pen)| Key::new(pen, Style::Dots, name));
-        let series = SIDES.into_iter().zip(dots);
+        let key = DIRECTIONS.map(|(name, pen)| Key::new(pen, Style::Dots, name));
+        let series = DIRECTIONS.into_iter().zip(dots);
         let series = series.map(|((_, pen), dots)| Series::unnamed(pen, Style::Dots, dots));
         let count = grouped(self.count());
         let svg = chart(&Chart {
@@ -114,7 +113,7 @@ impl Changes {
                 series.filter(|series| !series.points.is_empty()).collect(),
             )],
         })?;
-        let thinned = self.sides.iter().map(Sample::one_of).max();
+        let thinned = self.directions.iter().map(Sample::one_of).max();
         let shown = match thinned {
             Some(k) if k > 1 => format!(" At least one of {} is shown.", grouped(k)),
             _ => String::new(),
@@ -155,13 +154,13 @@ mod tests {
 
     /// The mean of three moves by ten bins, 375 mm, at each of three events.
     #[test]
-    fn a_step_is_three_changes_of_its_side() {
+    fn a_step_is_three_changes_in_its_direction() {
         let changes = stepped(3000);
-        let seen = changes.sides.each_ref().map(Sample::seen);
+        let seen = changes.directions.each_ref().map(Sample::seen);
         assert_eq!((seen, changes.count()), ([3, 3], 6));
-        let cycles = |side: usize| changes.sides[side].events().map(|event| event.cycle);
+        let cycles = |side: usize| changes.directions[side].events().map(|event| event.cycle);
         assert!(cycles(0).eq([1000, 1050, 1100]) && cycles(1).eq([2000, 2050, 2100]));
-        let ranges: Vec<f64> = changes.sides[0]
+        let ranges: Vec<f64> = changes.directions[0]
             .events()
             .map(|event| event.range_mm)
             .collect();

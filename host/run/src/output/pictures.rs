@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use dtof_draw::picture::{Map, heat_map};
-use dtof_events::maps::{Maps, PixelHistory};
+use dtof_events::histories::{PixelHistories, PixelHistory};
 
 /// The files, in the order of [`pictures`].
 pub const NAMES: [&str; 6] = [
@@ -15,22 +15,26 @@ pub const NAMES: [&str; 6] = [
     "photon-counts.svg",
 ];
 
-/// A picture and the file it becomes.
+/// A picture and the name of its file.
 pub struct Picture {
     pub name: &'static str,
     pub svg: String,
-    /// For those of the report, which has one of each quantity.
+    /// The caption in the report, which shows one picture of each quantity.
     pub caption: Option<String>,
 }
 
-/// The maps of a run on an array with these `sides`, whose pixels report what is called
-/// `one` and `several`.
-pub fn pictures(maps: &Maps, sides: [&str; 2], [one, several]: [&str; 2]) -> Result<[Picture; 6]> {
+/// The maps of a run. `axis_names` are those of columns and rows; an event of a pixel is called `one`,
+/// and several of them `several`.
+pub fn pictures(
+    maps: &PixelHistories,
+    axis_names: [&str; 2],
+    [one, several]: [&str; 2],
+) -> Result<[Picture; 6]> {
     let draw_without = |missing, name, title: &str, unit, caption, values: Vec<Option<f64>>| {
         let svg = heat_map(&Map {
             title,
             unit,
-            sides,
+            axis_names,
             missing,
             columns: maps.array.columns() as usize,
             rows: maps.array.rows() as usize,
@@ -104,7 +108,7 @@ pub fn pictures(maps: &Maps, sides: [&str; 2], [one, several]: [&str; 2]) -> Res
     ])
 }
 
-/// `values` as shares of the highest.
+/// `values` relative to the highest.
 fn relative(mut values: Vec<Option<f64>>) -> Vec<Option<f64>> {
     let most = values.iter().flatten().copied().fold(0.0, f64::max);
     if most > 0.0 {
@@ -121,7 +125,7 @@ mod tests {
 
     #[test]
     fn every_picture_has_its_name_and_mark() {
-        let maps = Maps::new(Array::new(1, 1).unwrap());
+        let maps = PixelHistories::new(Array::new(1, 1).unwrap());
         let pictures = pictures(&maps, ["column", "row"], ["event", "events"]).unwrap();
         assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
         for picture in pictures {
@@ -130,7 +134,7 @@ mod tests {
     }
 
     #[test]
-    fn shares_are_those_of_the_highest() {
+    fn values_are_relative_to_the_highest() {
         let values = relative(vec![Some(1.0), None, Some(4.0), Some(0.0)]);
         assert_eq!(values, [Some(0.25), None, Some(1.0), Some(0.0)]);
         let dark = vec![None, Some(0.0)];

@@ -7,11 +7,11 @@ use dtof_theory::tune::{Request, average};
 use super::{Line, Options};
 
 impl Options {
-    /// α, L1 and what to expect of them; the options for it.
+    /// α and L1, what to expect of them, and the options for them.
     pub(super) fn average(&self, request: &Request) -> Result<(Vec<Line>, String)> {
         let tuned = average::tune(request)?;
         let alpha = format!(
-            "smallest for the false alarms wanted; simulation: seed {}, {} exposures without a target",
+            "lowest for these false alarms; simulation: seed {}, {} exposures without a target",
             self.seed, tuned.exposures
         );
         let mut lines = vec![

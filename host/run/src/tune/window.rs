@@ -9,13 +9,13 @@ use dtof_theory::tune::{Request, window};
 use super::{Line, Options, number};
 
 impl Options {
-    /// z, L1 and what to expect of them; the options for it.
+    /// z and L1, what to expect of them, and the options for them.
     pub(super) fn window(&self, request: &Request) -> Result<(Vec<Line>, String)> {
         let widest = CentredWindow::WIDEST_PULSE;
         ensure!(
             request.sigma <= widest.to_num::<f64>(),
             Refused::input(format!(
-                "a pulse of σ = {} bins is too wide for a window, which suits up to {widest}; take \
+                "a pulse of σ = {} bins is too wide for a window, which is for {widest} bins at most; take \
                  wider bins, or `rule` paper",
                 number(request.sigma)
             ))
@@ -39,7 +39,6 @@ impl Options {
             self.counted(tuned.false_alarms),
         ]);
         lines.extend(self.expected(request, &tuned.detections));
-        // As few digits as name them.
         let binning = match self.binning {
             0 => String::new(),
             levels => format!(" --binning {levels}"),

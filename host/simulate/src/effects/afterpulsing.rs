@@ -8,12 +8,12 @@ use serde::Deserialize;
 use super::limits::{LONGEST_PS, SHARE_OF_AFTERPULSES, Timing};
 use dtof_photons::range::within;
 
-/// Every avalanche, an afterpulse too, has one afterpulse with this probability
-/// p: p / (1 - p) a photon in all. It comes once the SPAD has recharged.
+/// Every avalanche has an afterpulse with this probability p, and so does an afterpulse: p / (1 -
+/// p) a photon in all. It comes after the SPAD has recharged.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Afterpulsing {
-    /// Of an avalanche.
+    /// The probability of an afterpulse of an avalanche.
     pub probability: f64,
     /// Picoseconds after the dead time in which it falls to 1/e.
     pub decay_ps: f64,
@@ -47,7 +47,7 @@ impl Trap {
         })
     }
 
-    /// An avalanche, after which the SPAD sees again at `recharged`.
+    /// Records an avalanche after which the SPAD recharges at `recharged`.
     pub(crate) fn fill(&mut self, recharged: f64) {
         if self.is_filled.sample(&mut self.rng) {
             let release = recharged + self.delay.sample(&mut self.rng);

@@ -15,7 +15,7 @@ use dtof_photons::range::within;
 pub struct CoverGlass {
     /// Photons a laser cycle.
     pub signal: f64,
-    /// Where they lie, in bins from the start of bin 0.
+    /// Their position in bins from the start of bin 0.
     pub position_bins: f64,
 }
 
@@ -28,7 +28,7 @@ impl CoverGlass {
 
 #[derive(Clone, Debug)]
 pub(crate) struct Crosstalk {
-    /// None if it is dark.
+    /// `None` without photons.
     photons: Option<Poisson<f64>>,
     pulse: Normal<f64>,
     rng: Pcg64,
@@ -44,7 +44,7 @@ impl Crosstalk {
         })
     }
 
-    /// Gives `photon` the position of each photon of a laser cycle, in bins.
+    /// Gives `photon` the position in bins of each photon of a laser cycle.
     pub(crate) fn draw(&mut self, mut photon: impl FnMut(f64)) {
         let Some(photons) = self.photons else { return };
         let mut left = photons.sample(&mut self.rng);

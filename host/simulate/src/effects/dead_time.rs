@@ -10,11 +10,11 @@ use serde::Deserialize;
 use super::limits::{LONGEST_PS, Timing};
 use dtof_photons::range::within;
 
-/// How long the SPAD is blind.
+/// The dead time.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DeadTime {
-    /// Picoseconds after each avalanche (τ). May last into later laser cycles.
+    /// Picoseconds after each avalanche (τ). It may last into later laser cycles.
     pub duration_ps: f64,
 }
 
@@ -39,7 +39,7 @@ impl Recharge {
         }
     }
 
-    /// If a photon at `time` starts an avalanche: when the SPAD sees again.
+    /// Returns when the SPAD has recharged, if a photon at `time` starts an avalanche.
     pub(crate) fn avalanche(&mut self, time: f64) -> Option<f64> {
         (time >= self.blind_until).then(|| {
             self.blind_until = time + self.duration;

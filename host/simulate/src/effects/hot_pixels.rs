@@ -18,7 +18,7 @@ pub struct HotPixels {
     /// Each pixel is hot with this probability.
     #[serde(default)]
     pub share: f64,
-    /// These are hot in any case.
+    /// The addresses of pixels that are hot in any case.
     #[serde(default)]
     pub pixels: Vec<u16>,
 }
@@ -34,9 +34,9 @@ impl HotPixels {
         Ok(())
     }
 
-    /// Is this pixel hot? Takes one random number.
+    /// Whether a pixel is hot. Draws one random number.
     pub(crate) fn is_hot(&self, pixel: PixelAddress, rng: &mut Pcg64) -> Result<bool> {
         let by_chance = Bernoulli::new(self.share)?.sample(rng);
-        Ok(by_chance || self.pixels.contains(&pixel.0))
+        Ok(by_chance || self.pixels.contains(&pixel.raw()))
     }
 }

@@ -13,7 +13,7 @@ use dtof_photons::range::within;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Jitter {
-    /// Its standard deviation in picoseconds.
+    /// The standard deviation in picoseconds.
     pub sigma_ps: f64,
 }
 
@@ -37,9 +37,8 @@ impl TimingError {
         })
     }
 
-    /// The measured time of `time`. An error across a laser pulse counts for
-    /// the laser cycle beside, which is as good as this one: the pulses come
-    /// `period` apart.
+    /// The measured time of `time`. An error past a laser pulse moves the photon to the next laser
+    /// cycle, which is simulated as the other end of this one.
     pub(crate) fn measured(&mut self, time: f64, period: f64) -> f64 {
         (time + self.error.sample(&mut self.rng)).rem_euclid(period)
     }

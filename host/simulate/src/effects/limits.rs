@@ -1,14 +1,14 @@
-//! The limits of the numbers of effects, and their time base.
+//! The ranges of the numbers of effects, and the time base.
 
 use std::ops::RangeInclusive;
 
 /// The most picoseconds an effect may last: 100 µs.
 pub(crate) const LONGEST_PS: f64 = 1e8;
 
-/// The limits of a share.
+/// The range of a share.
 pub(crate) const SHARE: RangeInclusive<f64> = 0.0..=1.0;
 
-/// Avalanches that have an afterpulse: all of them would never end.
+/// The range of the probability of an afterpulse: with 1 they would never end.
 pub(crate) const SHARE_OF_AFTERPULSES: RangeInclusive<f64> = 0.0..=0.9;
 
 /// From picoseconds to bins.

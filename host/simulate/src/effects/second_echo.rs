@@ -14,7 +14,7 @@ use dtof_photons::range::within;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SecondEcho {
-    /// How much of the signal comes from there.
+    /// The share of the signal from there.
     pub share: f64,
     /// How much farther away that is, in millimetres.
     pub behind_mm: f64,
@@ -28,13 +28,13 @@ impl SecondEcho {
 }
 
 #[derive(Clone, Debug)]
-pub(crate) struct Echo {
+pub(crate) struct EchoDelay {
     is_second: Bernoulli,
     behind: f64,
     rng: Pcg64,
 }
 
-impl Echo {
+impl EchoDelay {
     pub(crate) fn new(echo: &SecondEcho, timing: &Timing, rng: Pcg64) -> Result<Self> {
         Ok(Self {
             is_second: Bernoulli::new(echo.share)?,

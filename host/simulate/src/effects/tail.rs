@@ -1,5 +1,5 @@
-//! The pulse's tail: a laser and a SPAD that decay slowly. Recorded sensors show
-//! tens of bins.
+//! The pulse's tail: a laser and a SPAD that decay slowly. Tails of recorded sensors last tens of
+//! bins.
 
 use anyhow::Result;
 use rand_distr::{Bernoulli, Distribution, Exp};
@@ -9,14 +9,14 @@ use serde::Deserialize;
 use super::limits::SHARE;
 use dtof_photons::range::within;
 
-/// A share of the photons of the laser comes later, by an exponentially
-/// distributed time. The mean position moves by `share * decay_bins`.
+/// A share of the laser's photons is late by an exponentially distributed time. The mean position
+/// moves by `share * decay_bins`.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tail {
-    /// How much of the pulse's energy is in the tail.
+    /// The share of the pulse's energy in the tail.
     pub share: f64,
-    /// After so many bins it has fallen to 1/e.
+    /// The bins in which it falls to 1/e.
     pub decay_bins: f64,
 }
 
@@ -28,13 +28,13 @@ impl Tail {
 }
 
 #[derive(Clone, Debug)]
-pub(crate) struct Late {
+pub(crate) struct TailDelay {
     is_late: Bernoulli,
     delay: Exp<f64>,
     rng: Pcg64,
 }
 
-impl Late {
+impl TailDelay {
     pub(crate) fn new(tail: &Tail, rng: Pcg64) -> Result<Self> {
         Ok(Self {
             is_late: Bernoulli::new(tail.share)?,

@@ -1,4 +1,4 @@
-//! A TDC that takes so many photons a laser cycle.
+//! A TDC with a limited number of photons a laser cycle.
 
 use anyhow::{Result, ensure};
 use serde::Deserialize;
@@ -8,7 +8,7 @@ use serde::Deserialize;
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Tdc {
-    /// Photons it takes, the first ones.
+    /// How many photons it takes. They are the first of the laser cycle.
     pub hits_per_cycle: usize,
 }
 

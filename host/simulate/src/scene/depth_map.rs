@@ -1,67 +1,58 @@
 //! A depth map, and a picture of the same view, as a surface.
 //!
-//! A pixel sees the one sample that its middle lies in: the nearest. Samples are never mixed,
-//! so that there are no surfaces between those on the two sides of an edge.
+//! A pixel sees the sample in which its middle lies. Samples are never mixed, so there are no
+//! surfaces between the two sides of an edge.
 
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 
-use super::sight::Sight;
-use dtof_options::Named;
-use dtof_photons::npy::numbers::{self, Element, Numbers};
+use super::line_of_sight::LineOfSight;
+use dtof_options::named_values;
+use dtof_photons::npy::numbers::{self, ElementKind, Numbers};
 
 /// The highest reflectivity of a sample, as of other surfaces.
 const MOST_REFLECTIVITY: f64 = 100.0;
 
-/// What the values of a depth map are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Along {
-    /// Depth along the optical axis, as of depth cameras and renderers (z)
-    #[default]
-    Axis,
-    /// Range along the ray of each sample
-    Ray,
+named_values! {
+    /// The direction in which the values of a depth map are measured.
+    #[derive(Debug, Default, PartialEq, Eq)]
+    pub enum DepthAlong {
+        /// Depth along the optical axis, as of depth cameras and renderers (z)
+        #[default]
+        Axis = "axis",
+        /// Range along the ray of each sample
+        Ray = "ray",
+    }
 }
 
-impl Named for Along {
-    const NAMES: &'static [(&'static str, Self, &'static str)] = &[
-        (
-            "axis",
-            Self::Axis,
-            "Depth along the optical axis, as of depth cameras and renderers (z)",
-        ),
-        ("ray", Self::Ray, "Range along the ray of each sample"),
-    ];
-}
-
-/// How far away what each sample shows is, and how bright.
+/// The distance and the reflectivity of each sample.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DepthMap {
     /// Columns and rows.
     size: [u32; 2],
-    along: Along,
-    /// Row by row; none where there is no surface.
+    along: DepthAlong,
+    /// Row by row; `None` where there is no surface.
     depth_mm: Vec<Option<f64>>,
-    /// Of each sample; empty if all are white.
+    /// One for each sample; empty if all are white.
     reflectivity: Vec<f64>,
 }
 
 impl DepthMap {
-    /// Reads a depth map: floats are metres, integers millimetres. There is no surface where
-    /// it is 0, negative, infinite, or not a number.
+    /// Reads a depth map: floats are metres, integers millimetres. Values that are 0, negative,
+    /// infinite or not a number are not a surface.
     ///
     /// # Errors
-    /// One line with the name of the file and what is wrong with it.
-    pub fn read(path: &Path, along: Along) -> Result<Self> {
+    /// Returns one line with the name of the file and what is wrong with it.
+    pub fn read(path: &Path, along: DepthAlong) -> Result<Self> {
         let numbers = numbers::read(&path.into())?;
-        Self::of(&numbers, along).with_context(|| path.display().to_string())
+        Self::from_numbers(&numbers, along).with_context(|| path.display().to_string())
     }
 
-    fn of(numbers: &Numbers, along: Along) -> Result<Self> {
+    fn from_numbers(numbers: &Numbers, along: DepthAlong) -> Result<Self> {
         let unit_mm = match numbers.element {
-            Element::Float => 1000.0,
-            Element::Byte | Element::Integer => 1.0,
+            ElementKind::Float => 1000.0,
+            ElementKind::Byte | ElementKind::Integer => 1.0,
         };
         let values = numbers.values.iter().map(|value| value * unit_mm);
         let is_surface = |value: &f64| value.is_finite() && *value > 0.0;
@@ -84,11 +75,11 @@ impl DepthMap {
         })
     }
 
-    /// Reads the picture: one of bytes from black, 0, to white, 255, or one of floats, the
-    /// reflectivity itself, 0 to 100. Of colours it takes the mean.
+    /// Reads the picture: bytes from 0, black, to 255, white, or floats, the reflectivity from 0 to
+    /// 100. The mean of colours is used.
     ///
     /// # Errors
-    /// One line with the name of the file and what is wrong with it.
+    /// Returns one line with the name of the file and what is wrong with it.
     pub fn with_picture(mut self, path: &Path) -> Result<Self> {
         let numbers = numbers::read(&path.into())?;
         let reflectivity = reflectivity(&numbers, self.size);
@@ -103,27 +94,27 @@ impl DepthMap {
     }
 
     /// The range of what a pixel sees.
-    pub(super) fn range_mm(&self, sight: &Sight) -> Option<f64> {
+    pub(super) fn range_mm(&self, sight: &LineOfSight) -> Option<f64> {
         let depth_mm = self.depth_mm[self.sample(sight)]?;
         Some(match self.along {
-            Along::Axis => depth_mm / sight.ray[2],
-            Along::Ray => depth_mm,
+            DepthAlong::Axis => depth_mm / sight.ray[2],
+            DepthAlong::Ray => depth_mm,
         })
     }
 
     /// The reflectivity of what a pixel sees.
-    pub(super) fn reflectivity(&self, sight: &Sight) -> f64 {
+    pub(super) fn reflectivity(&self, sight: &LineOfSight) -> f64 {
         let reflectivity = self.reflectivity.get(self.sample(sight));
         reflectivity.copied().unwrap_or(1.0)
     }
 
-    /// No pixel sees anything nearer.
+    /// The smallest depth.
     pub(super) fn nearest_mm(&self) -> f64 {
         let depths = self.depth_mm.iter().flatten();
         depths.copied().fold(f64::INFINITY, f64::min)
     }
 
-    /// The sample that the most photons come back from: its reflectivity, and its depth.
+    /// The sample that sends the most photons back: its reflectivity and its depth.
     pub(super) fn brightest(&self) -> Option<(f64, f64)> {
         let samples = self.depth_mm.iter().enumerate();
         let seen = samples.filter_map(|(sample, depth_mm)| {
@@ -134,13 +125,13 @@ impl DepthMap {
         seen.max_by(|a, b| light(a).total_cmp(&light(b)))
     }
 
-    /// No pixel sees anything farther away.
+    /// The largest depth.
     pub(super) fn farthest_mm(&self) -> f64 {
         self.depth_mm.iter().flatten().copied().fold(0.0, f64::max)
     }
 
-    /// The sample that the middle of a pixel lies in; on a border the later one.
-    fn sample(&self, sight: &Sight) -> usize {
+    /// The index of the sample in which the middle of a pixel lies; on a border the later one.
+    fn sample(&self, sight: &LineOfSight) -> usize {
         let at = |index: u32, of: u32, samples: u32| {
             (2 * index as usize + 1) * samples as usize / (2 * of as usize)
         };
@@ -150,7 +141,7 @@ impl DepthMap {
     }
 }
 
-/// The reflectivity of each sample of a picture that is as large as the depth map.
+/// The reflectivity of each sample of a picture, which must be as large as the depth map.
 fn reflectivity(numbers: &Numbers, [columns, rows]: [u32; 2]) -> Result<Vec<f64>> {
     let shape = &numbers.shape;
     let colours = match shape[..] {
@@ -168,9 +159,9 @@ fn reflectivity(numbers: &Numbers, [columns, rows]: [u32; 2]) -> Result<Vec<f64>
         shape[1]
     );
     let white = match numbers.element {
-        Element::Byte => 255.0,
-        Element::Float => 1.0,
-        Element::Integer => anyhow::bail!(
+        ElementKind::Byte => 255.0,
+        ElementKind::Float => 1.0,
+        ElementKind::Integer => anyhow::bail!(
             "elements of a picture must be bytes or floats; convert them with .astype(numpy.uint8)"
         ),
     };

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, anyhow, ensure};
 use serde::Deserialize;
 
 use super::Scene;
-use super::surface::{Ball, Fan, Light, Plane, Rectangle, Shape, Surface};
+use super::surface::{Ball, Brightness, Fan, Plane, Rectangle, Shape, Surface};
 use crate::effects::Effects;
 use crate::effects::afterpulsing::Afterpulsing;
 use crate::effects::cover_glass::CoverGlass;
@@ -17,6 +17,8 @@ use crate::effects::jitter::Jitter;
 use crate::effects::second_echo::SecondEcho;
 use crate::effects::tail::Tail;
 use crate::effects::tdc::Tdc;
+use dtof_options::Refused;
+use dtof_options::numbers::bins_of;
 use dtof_photons::MM_PER_PS;
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::range::within;
@@ -98,18 +100,17 @@ impl Scene {
     /// Reads a scene file.
     ///
     /// # Errors
-    /// One line with the name of the file, and the line or the key that is
-    /// wrong.
+    /// Returns one line with the name of the file, and the line or the key that is wrong.
     pub fn read(path: &Path) -> Result<Self> {
         let name = || path.display().to_string();
         let text = fs::read_to_string(path).with_context(name)?;
         Self::parse(&text).with_context(name)
     }
 
-    /// The text of a scene file.
+    /// Parses the text of a scene file.
     ///
     /// # Errors
-    /// The line or the key that is wrong.
+    /// Names the line or the key that is wrong.
     pub fn parse(text: &str) -> Result<Self> {
         let file: SceneFile = toml::from_str(text).map_err(|error| {
             let before = error.span().and_then(|span| text.get(..span.start));
@@ -125,11 +126,7 @@ impl SceneFile {
         within("columns", self.columns.into(), 1.0..=65_535.0)?;
         within("rows", self.rows.into(), 1.0..=65_535.0)?;
         ensure!(self.cycles >= 1, "cycles 0: must be at least 1");
-        ensure!(
-            (8..=1024).contains(&self.bins) && self.bins.is_power_of_two(),
-            "bins {}: must be a power of two from 8 to 1024",
-            self.bins
-        );
+        bins_of(self.bins).map_err(|reason| Refused::value("bins", self.bins, reason))?;
         within("bin_width_ps", self.bin_width_ps, 1.0..=10_000.0)?;
         within("laser_rate_mhz", self.laser_rate_mhz, 0.01..=1000.0)?;
         within("background", self.background, 0.0..=100.0)?;
@@ -197,11 +194,11 @@ impl SurfaceEntry {
         let light = match (self.reflectivity, self.signal) {
             (Some(share), None) => {
                 within("reflectivity", share, 0.0..=100.0)?;
-                Light::Reflectivity(share)
+                Brightness::Reflectivity(share)
             }
             (None, Some(signal)) => {
                 within("signal", signal, 0.0..=10_000.0)?;
-                Light::Signal(signal)
+                Brightness::Signal(signal)
             }
             _ => anyhow::bail!("needs reflectivity or signal, and not both"),
         };
@@ -237,7 +234,7 @@ impl SurfaceEntry {
     }
 }
 
-/// A column or a row; it may lie beside the array.
+/// Checks a column and a row, which may be outside the array.
 fn place(key: &str, place: [f64; 2]) -> Result<()> {
     within(key, place[0], -1e6..=1e6)?;
     within(key, place[1], -1e6..=1e6)

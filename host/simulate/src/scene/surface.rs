@@ -1,31 +1,31 @@
-//! Surfaces: where they are, and where they go.
+//! Surfaces and their motion.
 
 use std::f64::consts::TAU;
 
 use serde::Deserialize;
 
 use super::depth_map::DepthMap;
-use super::sight::Sight;
+use super::line_of_sight::LineOfSight;
 
-/// Nothing is farther away.
+/// Larger distances are taken for infinite.
 const FARTHEST_MM: f64 = 1e9;
 
-/// Something that photons come back from.
+/// A surface that sends photons back.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surface {
     /// Its name in reports.
     pub name: String,
-    /// Millimetres away at the start, at the first column; for a ball its centre.
+    /// The distance in millimetres at the start, at the first column; for a ball, of its centre.
     pub range_mm: f64,
     /// The same at the last column of the layout.
     pub range_right_mm: f64,
     /// How many photons come back.
-    pub light: Light,
-    /// How much light passes each way, to the surface behind and back.
+    pub light: Brightness,
+    /// The share of light that passes, each way.
     pub transmittance: f64,
     /// Metres a second away from the sensor.
     pub velocity_m_per_s: f64,
-    /// Columns and rows a second across the array, to the right and down.
+    /// Motion across the array in columns and rows a second, to the right and down.
     pub drift_per_s: [f64; 2],
     /// Which places it covers.
     pub shape: Shape,
@@ -33,16 +33,15 @@ pub struct Surface {
 
 /// How many photons come back.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Light {
-    /// Of a surface with this share of a white one's, by the inverse square of
-    /// its range.
+pub enum Brightness {
+    /// The reflectivity; the photons fall with the square of the range.
     Reflectivity(f64),
     /// Signal photons a laser cycle, whatever the range.
     Signal(f64),
 }
 
-impl Light {
-    /// The same, by `factor`.
+impl Brightness {
+    /// The same brightness times `factor`.
     pub(super) fn times(self, factor: f64) -> Self {
         match self {
             Self::Reflectivity(share) => Self::Reflectivity(share * factor),
@@ -54,7 +53,7 @@ impl Light {
 /// Which places a surface covers at the start.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape {
-    /// All.
+    /// Everywhere.
     Everywhere,
     /// A rectangle of the array.
     Rectangle(Rectangle),
@@ -64,7 +63,7 @@ pub enum Shape {
     Fan(Fan),
     /// A plane, wherever a ray meets it.
     Plane(Plane),
-    /// All samples of a depth map that show something.
+    /// The samples of a depth map that have a depth.
     DepthMap(DepthMap),
 }
 
@@ -78,15 +77,15 @@ pub struct Rectangle {
     pub rows: [f64; 2],
 }
 
-/// A ball, of which the half that faces the sensor is seen.
+/// A ball, of which the half towards the sensor is visible.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Ball {
     /// Column and row.
     pub centre: [f64; 2],
-    /// How large it looks, in columns.
+    /// Its apparent radius in columns.
     pub radius: f64,
-    /// How large it is.
+    /// Its radius in millimetres.
     pub radius_mm: f64,
 }
 
@@ -96,12 +95,11 @@ pub struct Ball {
 pub struct Fan {
     /// Column and row.
     pub centre: [f64; 2],
-    /// How long the blades are, in columns.
+    /// The length of the blades in columns.
     pub radius: f64,
-    /// How many.
+    /// The number of blades.
     pub blades: u16,
-    /// How much of the circle they cover: the share of the time in which a
-    /// place sees one.
+    /// The share of the circle that they cover.
     pub blade_share: f64,
     /// Revolutions a minute.
     pub rpm: f64,
@@ -111,22 +109,25 @@ pub struct Fan {
 #[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Plane {
-    /// At right angles to it, of any length: x to the right, y down, z forward. Its z is
-    /// not 0.
+    /// The normal, of any length: x to the right, y down, z forward. Its z is not 0.
     pub normal: [f64; 3],
 }
 
 impl Surface {
-    /// Does what a pixel sees of it change?
+    /// Whether it changes with time.
     #[must_use]
     pub fn moves(&self) -> bool {
         let turns = matches!(&self.shape, Shape::Fan(fan) if fan.rpm != 0.0);
         turns || self.velocity_m_per_s != 0.0 || self.drift_per_s != [0.0; 2]
     }
 
-    /// How far away it is where a pixel looks, after `seconds`. None if it does not cover
-    /// the place.
-    pub(super) fn range_mm(&self, sight: &Sight, seconds: f64, layout: [u32; 2]) -> Option<f64> {
+    /// The range along a line of sight after `seconds`. `None` if the surface does not cover it.
+    pub(super) fn range_mm(
+        &self,
+        sight: &LineOfSight,
+        seconds: f64,
+        layout: [u32; 2],
+    ) -> Option<f64> {
         let [column, row] = self.at_start(sight.place, seconds);
         let nearer_mm = match &self.shape {
             Shape::Everywhere => 0.0,
@@ -149,29 +150,29 @@ impl Surface {
         Some(self.plane_mm(column, seconds, layout) - nearer_mm)
     }
 
-    /// How many photons come back from where a pixel looks.
-    pub(super) fn light(&self, sight: &Sight) -> Light {
+    /// The brightness along a line of sight.
+    pub(super) fn light(&self, sight: &LineOfSight) -> Brightness {
         match (&self.shape, self.light) {
-            (Shape::DepthMap(map), Light::Reflectivity(share)) => {
-                Light::Reflectivity(share * map.reflectivity(sight))
+            (Shape::DepthMap(map), Brightness::Reflectivity(share)) => {
+                Brightness::Reflectivity(share * map.reflectivity(sight))
             }
             (_, light) => light,
         }
     }
 
-    /// What the most photons come back from, and how far away it is, if all of it is
-    /// `nearest_mm` away or farther.
-    pub(super) fn brightest(&self, nearest_mm: f64) -> (Light, f64) {
-        if let (Shape::DepthMap(map), Light::Reflectivity(share)) = (&self.shape, self.light)
+    /// The brightness and the distance of the brightest place, if all of the surface is at least
+    /// `nearest_mm` away.
+    pub(super) fn brightest(&self, nearest_mm: f64) -> (Brightness, f64) {
+        if let (Shape::DepthMap(map), Brightness::Reflectivity(share)) = (&self.shape, self.light)
             && let Some((reflectivity, depth_mm)) = map.brightest()
         {
-            return (Light::Reflectivity(share * reflectivity), depth_mm);
+            return (Brightness::Reflectivity(share * reflectivity), depth_mm);
         }
         (self.light, nearest_mm)
     }
 
-    /// The least it can be at any place of the layout after `seconds`; of a plane the
-    /// least it is anywhere.
+    /// The nearest distance at any place of the layout after `seconds`. For a plane, the nearest
+    /// distance anywhere.
     pub(super) fn nearest_mm(&self, seconds: f64, layout: [u32; 2]) -> f64 {
         let nearer_mm = match &self.shape {
             Shape::Plane(plane) => return plane.distance(self.plane_mm(0.0, seconds, layout)),
@@ -187,7 +188,7 @@ impl Surface {
         ends[0].min(ends[1]) - nearer_mm
     }
 
-    /// The place that has moved to `place` by now.
+    /// Where the point now at `place` was at the start.
     fn at_start(&self, place: [f64; 2], seconds: f64) -> [f64; 2] {
         let [columns, rows] = self.drift_per_s;
         [place[0] - columns * seconds, place[1] - rows * seconds]
@@ -201,16 +202,16 @@ impl Surface {
 }
 
 impl Plane {
-    /// How far along a ray it is, if the optical axis meets it at `axis_mm`. None if the
+    /// The range of the plane along a ray, if the optical axis meets it at `axis_mm`. `None` if the
     /// ray leads away from it.
     fn along(&self, ray: [f64; 3], axis_mm: f64) -> Option<f64> {
         let towards: f64 = self.normal.iter().zip(ray).map(|(n, side)| n * side).sum();
         let range_mm = axis_mm * self.normal[2] / towards;
-        // Farther than that is parallel.
+        // A larger range means that the ray is parallel.
         (range_mm > 0.0 && range_mm < FARTHEST_MM).then_some(range_mm)
     }
 
-    /// How far from the lens it is.
+    /// The distance of the plane from the lens.
     fn distance(&self, axis_mm: f64) -> f64 {
         let [x, y, z] = self.normal;
         axis_mm * z.abs() / x.hypot(y).hypot(z)

@@ -1,11 +1,11 @@
-//! Which estimator for the events of a rule, as they come.
+//! Which estimator for the events of a rule.
 
 use std::fmt::Write as _;
 
 use anyhow::{Context, Result};
 
 use crate::studies::methods::event_depth::{self, ESTIMATORS, FIRST_LOOKS, Outcome};
-use crate::studies::methods::passage::Method as Rule;
+use crate::studies::methods::passage::Rule;
 use crate::sweep::Part;
 use crate::sweep::results::ends;
 use crate::sweep::values::Values;
@@ -13,30 +13,30 @@ use crate::sweep::values::Values;
 /// Outcomes with the paper's rule, or with windows.
 fn of(outcomes: &[Outcome], is_paper: bool) -> impl Iterator<Item = &Outcome> + Clone {
     let those = outcomes.iter();
-    those.filter(move |outcome| (outcome.method == Rule::Paper) == is_paper)
+    those.filter(move |outcome| (outcome.rule == Rule::Paper) == is_paper)
 }
 
-/// In how many the estimator of this number is surely the better.
+/// The number of outcomes in which this estimator is significantly better.
 fn better<'a>(outcomes: impl Iterator<Item = &'a Outcome>, number: usize) -> usize {
     let those = outcomes.filter(|outcome| outcome.better() == Some(number));
     those.count()
 }
 
-/// From the least to the largest error of the estimator of this number over the first's.
+/// The range of the ratio of this estimator's error to that of the first.
 fn range<'a>(outcomes: impl Iterator<Item = &'a Outcome>, number: usize) -> (f64, f64) {
     let ratios = outcomes.map(|outcome| {
-        let [first, second] = [0, number].map(|number| outcome.placed[number].error.value);
+        let [first, second] = [0, number].map(|number| outcome.errors[number].error.value);
         second / first
     });
     ends(ratios)
 }
 
-/// From the least to the largest error of the estimator of this number over the bound.
+/// The range of the ratio of this estimator's error to the bound.
 fn over_bound<'a>(outcomes: impl Iterator<Item = &'a Outcome>, number: usize) -> (f64, f64) {
-    ends(outcomes.map(|outcome| outcome.placed[number].over_bound.value))
+    ends(outcomes.map(|outcome| outcome.errors[number].over_bound.value))
 }
 
-/// The section, from the study of events.
+/// The section on the study of events.
 pub(super) fn section(values: &mut Values, part: &Part) -> Result<()> {
     let outcomes = event_depth::outcomes(part)?;
     let all = || outcomes.iter();
@@ -82,7 +82,7 @@ fn table<'a>(
          |---|---|---|---|---|---|---|---|---|---|---|---|---|\n"
     )?;
     for outcome in outcomes {
-        let [mass, centred] = outcome.placed;
+        let [mass, centred] = outcome.errors;
         let better = outcome.better().map(|number| ESTIMATORS.get(number));
         let better = match better {
             None => "either",
@@ -93,7 +93,7 @@ fn table<'a>(
             "| {} | {} | {} | {:.2} | {:.1} | {:.0} | {:.0} | {:.0} | {} | {:.2} | {} | {:.2} | {better} |",
             outcome.sigma,
             outcome.background,
-            outcome.method.label(),
+            outcome.rule.label(),
             outcome.threshold,
             100.0 * outcome.false_share.value,
             100.0 * outcome.event_share.value,

@@ -5,15 +5,15 @@ use anyhow::{Context, Result, bail};
 use super::{Entry, Estimator, Instructions, Rule};
 use crate::sweep::mean::Measured;
 
-/// What rules came to on recorded photons, below the documentation; a test of
-/// `host-tests` makes it from the public capture log.
+/// The results of the rules on recorded photons, relative to the documentation.
+/// `lab/tests/recorded_rules.rs` makes the file from the public capture log.
 pub const RECORDED: &str = "results/data/recorded_rules.csv";
 
-/// What the window with two half widths costs.
+/// The variant of the window with two half widths.
 const SKEW: &str = "centred window, 1.75 before and 4 after";
 
-/// The methods on recorded photons at equal rates of false alarms, without added
-/// background: the paper's rule, and window rules that take as many photons an event.
+/// The methods on recorded photons at equal rates of false alarms, without added background: the
+/// paper's rule, and window rules with as many photons per event.
 pub(super) fn recorded(counts: &Instructions, csv: &str) -> Result<Vec<Entry>> {
     let mut entries = Vec::new();
     for line in csv.lines().filter(|line| line.starts_with("0,")) {
@@ -36,11 +36,11 @@ pub(super) fn recorded(counts: &Instructions, csv: &str) -> Result<Vec<Entry>> {
         };
         let found = Rule::RULES.into_iter().find(|found| found.label() == rule);
         let rule = found.with_context(|| format!("{RECORDED}: {line}"))?;
-        // Window rules with the common minimum take fewer photons, and err more.
+        // Window rules with the default minimum need fewer photons, and have larger errors.
         if matches!(rule, Rule::Window(_)) && minimum == "5" {
             continue;
         }
-        // Of the rules with a skew window two are enough to see it by.
+        // Two rules with a skew window are enough for the chart.
         if estimator == "skew window" && !matches!(rule, Rule::Paper | Rule::Window(3)) {
             continue;
         }
@@ -58,7 +58,7 @@ pub(super) fn recorded(counts: &Instructions, csv: &str) -> Result<Vec<Entry>> {
             label: format!("{}, {estimator}", rule.label()),
             pen: rule.pen(),
             cost: counts.rule(rule)? + depth,
-            // How sure it is, is not known.
+            // There is no confidence interval.
             mean: Measured {
                 value: median,
                 interval: (median, median),

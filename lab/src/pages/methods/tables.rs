@@ -1,11 +1,11 @@
-//! The tables: what is chosen for a scene.
+//! The tables: the method chosen for a scene.
 
 use std::fmt::Write as _;
 
 use anyhow::{Context, Result};
 
 use super::{Entry, Instructions, chosen};
-use crate::studies::methods::depth_error::{self, Method as Estimator};
+use crate::studies::methods::depth_error::{self, Estimator};
 use crate::studies::methods::time_to_detect::{self, Outcome};
 use crate::sweep::Part;
 
@@ -20,7 +20,7 @@ pub(super) fn rules(counts: &Instructions, outcomes: &[Outcome]) -> Result<Strin
             let chosen = chosen(&entries)?;
             let paper = entries.first().context("no rules")?;
             let is_chosen =
-                |outcome: &&Outcome| is_here(outcome) && outcome.method.label() == chosen.label;
+                |outcome: &&Outcome| is_here(outcome) && outcome.rule.label() == chosen.label;
             let those: Vec<&Outcome> = outcomes.iter().filter(is_chosen).collect();
             let first = those.first().context("no outcome")?;
             let signal = time_to_detect::signal(sigma, background);
@@ -40,7 +40,7 @@ pub(super) fn rules(counts: &Instructions, outcomes: &[Outcome]) -> Result<Strin
     Ok(text)
 }
 
-/// What the estimators cost.
+/// The cost of the estimators.
 pub(super) fn estimators(all: &[Entry]) -> String {
     let rows = all
         .iter()

@@ -1,12 +1,13 @@
-//! False alarms of the rule, which has to estimate the background, at one look and
-//! over an exposure: what `dtof tune` interpolates.
+//! False alarms of the paper's rule with its estimated background, at one look and over an
+//! exposure: the data that `dtof tune` interpolates.
 
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict, ends};
 use crate::sweep::{self, Part, Point, PointTally, Study, Tally};
 use anyhow::{Context, Result};
+use dtof_core::Count;
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count, Threshold};
+use dtof_core::paper::Threshold;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{NEUTRAL, alpha as pen};
 use dtof_options::rows::grouped;
@@ -18,7 +19,7 @@ use rand_pcg::Pcg64;
 
 /// Exposures of a trial.
 const EXPOSURES: u32 = 50;
-/// Those of the figures.
+/// α of the figures.
 const ALPHAS: [u16; 3] = [3, 4, 5];
 /// The first look of the figures, in steps of X laser cycles, and the last of an
 /// exposure: 36 looks.
@@ -54,8 +55,8 @@ fn of_table(parameters: &Point) -> Result<repeated_looks::Point> {
     found.context("not a point of the table")
 }
 
-/// Exposures whose highest α that fires lies from that of `step` to the next, by
-/// the look `last`.
+/// The count of exposures whose highest firing α, up to the look `last`, lies between that of
+/// `step` and the next.
 fn name(last: u32, step: usize) -> String {
     format!("{last} {}", f64::from(alpha_bits(step)) / 256.0)
 }
@@ -66,7 +67,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let mut tally = Tally::from([("exposures".to_owned(), found.exposures)]);
     for (&last, events) in point.lasts.iter().zip(&found.events) {
         for (step, &count) in events.iter().enumerate() {
-            // Those of the next α are among them.
+            // Includes those of the next α.
             let higher = events.get(step + 1).copied().unwrap_or_default();
             if count > higher {
                 tally.insert(name(last, step), count - higher);
@@ -76,7 +77,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// The tally of a point, added up again.
+/// The tally of a point as cumulative counts.
 fn false_events(point: &PointTally) -> Result<(repeated_looks::Point, FalseAlarms)> {
     let of = of_table(&point.parameters)?;
     let mut sum = FalseAlarms::new(of.lasts.len());
@@ -91,8 +92,8 @@ fn false_events(point: &PointTally) -> Result<(repeated_looks::Point, FalseAlarm
     Ok((of, sum))
 }
 
-/// By background at the first look, exposures from the first look to `last` with a
-/// false alarm at α.
+/// The share of exposures with a false alarm at α up to the look `last`, by the background at the
+/// first look.
 fn shares(part: &Part, last: u32, alpha: u16) -> Result<Vec<(f64, Measured)>> {
     let mut shares = Vec::new();
     for point in part.at([("first_look", LOOKS.0.into())]) {
@@ -114,7 +115,7 @@ fn exact(background: f64, alpha: u16) -> f64 {
     SingleLook::new(128, background).false_alarm_probability(&threshold)
 }
 
-/// Eq. 10, all bins but the pulse's.
+/// Eq. 10, for all bins except that of the pulse.
 fn printed(alpha: u16) -> f64 {
     false_positive_rate(alpha.into(), 127)
 }
@@ -156,7 +157,7 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
         Ok(ends(values))
     };
     let (look, exposure) = (range(LOOKS.0)?, range(LOOKS.1)?);
-    // To a factor of 2 over all backgrounds.
+    // Within a factor of 2 over all backgrounds.
     let is_printed = |(low, high): (f64, f64)| {
         let printed = printed(4);
         Verdict::of(printed / 2.0 < low && high < 2.0 * printed)

@@ -1,11 +1,11 @@
-//! What the Gaussian form of the pass rate (Eq. 8) and of the false positive rate
-//! (Eq. 10) is off by, with the background known.
+//! The error of the Gaussian forms of the pass rate (Eq. 8) and the false positive rate (Eq. 10),
+//! with known background.
 
 use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target};
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict, ends};
 use crate::sweep::{Part, Point, Study, Tally, grid};
 use anyhow::Result;
-use dtof_core::isqrt;
+use dtof_core::paper::isqrt;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{STEPS, alpha as pen};
 use dtof_options::rows::grouped;
@@ -18,14 +18,14 @@ const BACKGROUNDS: [f64; 15] = [
     0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 200.0, 300.0,
 ];
 const ALPHAS: [u32; 4] = [2, 3, 4, 5];
-/// That of the pulse, the paper's for a hit rate of 99 %.
+/// The SNR of the pulse: the paper's value for a hit rate of 99 %.
 const SNR: f64 = 18.0;
 /// The paper's rule of thumb for Gaussian counts.
-const ENOUGH: f64 = 30.0;
+const GAUSSIAN_FROM: f64 = 30.0;
 /// Histograms of a trial.
 const HISTOGRAMS: u64 = 10_000;
 
-/// Held against Eq. 8 and 10 and their exact forms.
+/// Compared with Eq. 8 and 10 and their exact forms.
 pub const STUDY: Study = Study {
     name: "gaussian-error",
     about: "pass rate and false positive rate by background, Gaussian and exact",
@@ -71,7 +71,7 @@ enum Rate {
 }
 
 impl Rate {
-    /// What counts the pulses that passed α, or histograms with a background bin that did.
+    /// The count of pulses above the threshold, or of histograms with a background bin above it.
     fn name(self, alpha: u32) -> String {
         match self {
             Self::Pass => format!("pass {alpha}"),
@@ -124,7 +124,7 @@ fn results(part: &Part) -> Result<Results> {
 fn claims(part: &Part) -> Vec<Claim> {
     let exact = exact_against_simulation(part);
     // Over all backgrounds from 30 on, and over all α.
-    let enough = || fine_backgrounds().filter(|&background| background >= ENOUGH);
+    let enough = || fine_backgrounds().filter(|&background| background >= GAUSSIAN_FROM);
     let pass_off = enough()
         .flat_map(|background| ALPHAS.map(|alpha| (background, alpha)))
         .map(|(at, alpha)| (Rate::Pass.gaussian(at, alpha) - Rate::Pass.exact(at, alpha)).abs())
@@ -152,8 +152,8 @@ fn claims(part: &Part) -> Vec<Claim> {
                 false_off(4),
                 false_off(5)
             ),
-            // Both equations: probabilities to a twentieth, the rare ones to a factor
-            // of 2; one of the two is a part.
+            // Agrees if Eq. 8 holds to a twentieth and the rare events of Eq. 10 within a factor of
+            // 2; differs if one of them does.
             Verdict::graded(is_pass_near && is_false_near, is_pass_near || is_false_near),
         ),
         Claim::new(
@@ -163,7 +163,8 @@ fn claims(part: &Part) -> Vec<Claim> {
                  {high:.1e} from 0.1 on; exact and simulated differ at {} of {} points",
                 exact.outside, exact.points
             ),
-            // To a factor of 2 where the paper's own condition holds; to 5 in part.
+            // Agrees within a factor of 2 where the paper's condition holds; differs within a
+            // factor of 5.
             Verdict::graded(factor < 2.0, factor < 5.0),
         ),
         Claim::new(
@@ -174,7 +175,7 @@ fn claims(part: &Part) -> Vec<Claim> {
     ]
 }
 
-/// All simulated false positive rates beside the exact ones.
+/// All simulated false positive rates compared with the exact ones.
 fn exact_against_simulation(part: &Part) -> Comparison {
     let of = |rate: Rate| {
         part.points().iter().flat_map(move |point| {
@@ -222,7 +223,7 @@ fn rates(part: &Part, rate: Rate) -> Chart {
         }
         Rate::Pass => {
             let near = |alpha| {
-                let enough = fine_backgrounds().filter(|&background| background >= ENOUGH);
+                let enough = fine_backgrounds().filter(|&background| background >= GAUSSIAN_FROM);
                 let mut pairs = enough.map(|background| off(background, alpha));
                 pairs.all(|(exact, printed)| (exact - printed).abs() < 0.05)
             };
@@ -255,9 +256,9 @@ fn ratio() -> Chart {
         Series::named(format!("α = {alpha}"), pen(alpha), Style::Line, points)
     });
     let series = series.collect();
-    let ordered = ALPHAS
-        .windows(2)
-        .all(|pair| of(ENOUGH, pair[1]) < of(ENOUGH, pair[0]) && of(ENOUGH, pair[0]) < 1.0);
+    let ordered = ALPHAS.windows(2).all(|pair| {
+        of(GAUSSIAN_FROM, pair[1]) < of(GAUSSIAN_FROM, pair[0]) && of(GAUSSIAN_FROM, pair[0]) < 1.0
+    });
     Chart {
         finding: "The larger α, the more false alarms Eq. 10 misses".to_owned(),
         holds: ordered,
@@ -270,14 +271,14 @@ fn ratio() -> Chart {
     }
 }
 
-/// The most by which a root of a 10-bit count is too low after so many steps.
+/// The largest error of the root of a 10-bit count after this many steps.
 fn greatest_root_error(steps: u32) -> f64 {
     let errors = (0..=1023).map(|count| root_error_of(count, steps));
     errors.fold(0.0, f64::max)
 }
 
-/// By how much the root of `count` is too low after so many of the five steps of Alg. 1.
-/// Each step finds a bit of the root, from the highest down.
+/// How much too low the root of `count` is after this many of the five steps of Alg. 1. Each step
+/// finds one bit of the root, from the highest down.
 fn root_error_of(count: u32, steps: u32) -> f64 {
     let left = 5 - steps;
     f64::from(count).sqrt() - f64::from(isqrt::<5>(count) >> left << left)

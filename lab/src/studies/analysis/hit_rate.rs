@@ -4,7 +4,7 @@ use super::paper_setting::{Histograms, gaussian, means, target};
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally};
 use anyhow::Result;
-use dtof_core::ComparatorTree;
+use dtof_core::paper::ComparatorTree;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::NEUTRAL;
 use dtof_options::rows::grouped;
@@ -13,12 +13,12 @@ use rand_pcg::Pcg64;
 
 /// Mean background counts a bin (N·B): the paper's B = 0.05 at N = 2 to 2000.
 const BACKGROUNDS: [f64; 5] = [0.1, 1.0, 10.0, 30.0, 100.0];
-/// Counts a bin from which on the paper takes them as Gaussian.
-const ENOUGH: f64 = 30.0;
+/// The counts a bin from which the paper assumes Gaussian counts.
+const GAUSSIAN_FROM: f64 = 30.0;
 /// Histograms of a trial.
 const HISTOGRAMS: u64 = 1000;
 
-/// Held against Eq. 7 and its exact form.
+/// Compared with Eq. 7 and its exact form.
 pub const STUDY: Study = Study {
     name: "hit-rate",
     about: "how often the highest bin is the pulse's, by SNR and background",
@@ -30,8 +30,8 @@ pub const STUDY: Study = Study {
     results,
 };
 
-/// SNR 1 to 30 at all backgrounds; with and without the signal in the bins beside
-/// the pulse's, which Eq. 7 leaves out.
+/// SNR 1 to 30 at all backgrounds, with and without signal in the neighbours of the pulse's bin,
+/// which Eq. 7 leaves out.
 fn points() -> Vec<Point> {
     let snrs: Vec<f64> = (1..=30).map(f64::from).collect();
     grid([
@@ -60,25 +60,24 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     ]))
 }
 
-/// The exact probability that the peak is the pulse's bin, and that it is that or
-/// the other one at the edge.
+/// The exact probabilities that the peak is the pulse's bin, and that it is either bin at the edge.
 fn exact(means: &[f64]) -> (f64, f64) {
     let (target, _) = target();
     let hit = |bin| known_background::hit_probability(means, bin).unwrap_or_default();
     (hit(target), hit(target) + hit(target + 1))
 }
 
-/// What Eq. 7 says.
+/// The probability by Eq. 7.
 fn printed(background: f64, snr: f64) -> f64 {
     gaussian(background, snr).hit_probability()
 }
 
-/// The exact form of it.
+/// The exact form of Eq. 7.
 fn exact_hit(background: f64, snr: f64) -> f64 {
     exact(&means(background, snr, false)).0
 }
 
-/// The SNR from which on `hit_rate`, which grows with it, is 99 %.
+/// The SNR at which `hit_rate`, which grows with the SNR, is 99 %.
 fn snr_of_99_percent(hit_rate: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, 2000.0);
     while high - low > 1e-2 {
@@ -92,8 +91,8 @@ fn snr_of_99_percent(hit_rate: impl Fn(f64) -> f64) -> f64 {
     high
 }
 
-/// Those of the exact form, of Eq. 7, and of either bin at the edge with the
-/// signal of all bins.
+/// The SNR of 99 % by the exact form, by Eq. 7, and for either bin at the edge with signal in all
+/// bins.
 fn snrs_of_99_percent(background: f64) -> [f64; 3] {
     [
         snr_of_99_percent(|snr| exact_hit(background, snr)),
@@ -102,8 +101,7 @@ fn snrs_of_99_percent(background: f64) -> [f64; 3] {
     ]
 }
 
-/// The simulation without neighbours beside what `predicted` says at background
-/// and SNR.
+/// The simulation without neighbours compared with `predicted` at each background and SNR.
 fn comparison(part: &Part, backgrounds: &[f64], predicted: impl Fn(f64, f64) -> f64) -> Comparison {
     let mut pairs = Vec::new();
     for &background in backgrounds {
@@ -148,11 +146,11 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
     let exact = comparison(part, &BACKGROUNDS, exact_hit);
     let levels = BACKGROUNDS.map(snrs_of_99_percent);
     let of_level = |which: usize| by_background(&|index| format!("{:.1}", levels[index][which]));
-    // "Around 18": within 1 of it by Eq. 7, which the paper takes it from.
+    // "Around 18": within 1 by Eq. 7, from which the paper takes the number.
     let near_18 = levels.map(|[_, printed, _]| (printed - 18.0).abs() <= 1.0);
-    // Where the paper's own condition for Gaussian counts holds.
+    // Only where the paper's condition for Gaussian counts holds.
     let enough = BACKGROUNDS.iter().zip(&found);
-    let enough = enough.filter(|&(&background, _)| background >= ENOUGH);
+    let enough = enough.filter(|&(&background, _)| background >= GAUSSIAN_FROM);
     let most = enough.map(|(_, of)| of.largest).fold(0.0, f64::max);
     Ok(vec![
         Claim::new(
@@ -160,7 +158,7 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
             format!(
                 "off by up to {most:.3} from 30 background counts a bin on; 99 % intervals by background: {misses}"
             ),
-            // To what can be told apart on a plot: a fiftieth.
+            // Within a fiftieth, the resolution of a plot.
             Verdict::graded(most < 0.02, found.iter().any(|of| of.largest < 0.02)),
         ),
         Claim::new(
@@ -189,7 +187,7 @@ fn claims(part: &Part) -> Result<Vec<Claim>> {
 /// Backgrounds of the figures.
 const SHOWN: [f64; 3] = [1.0, 10.0, 100.0];
 
-/// A panel a background.
+/// A panel for each background.
 fn chart(part: &Part, neighbours: f64) -> Result<Chart> {
     let with_neighbours = neighbours > 0.0;
     let snrs = (1..=30).map(f64::from);

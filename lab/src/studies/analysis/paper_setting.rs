@@ -13,20 +13,20 @@ pub const BINS: usize = BINS_U32 as usize;
 const BINS_U32: u32 = 8;
 /// Bins that hold background only (`M_B`).
 pub const BACKGROUND_BINS: u32 = BINS_U32 - 1;
-/// Where the pulse lies, in bins from the start of bin 0.
+/// Position of the pulse, in bins from the start of bin 0.
 pub const POSITION: f64 = 4.0;
-/// Its standard deviation in bins.
+/// Standard deviation of the pulse in bins.
 pub const SIGMA: f64 = 1.5;
 
-/// The pulse's bin, the lower of the two at the edge, and its share of the pulse.
+/// The bin of the pulse (the lower of the two at the edge) and its share of the pulse.
 #[must_use]
 pub fn target() -> (usize, f64) {
     let (bin, share) = peak_share(BINS_U32, POSITION, SIGMA);
     (bin as usize, share)
 }
 
-/// Mean counts of each bin at a mean `background` a bin. Without `neighbours` only
-/// the pulse's bin holds signal, as Eq. 7 has it.
+/// Mean counts of each bin at a mean `background` a bin. Without `neighbours` only the pulse's bin
+/// holds signal, as in Eq. 7.
 #[must_use]
 pub fn means(background: f64, snr: f64, neighbours: bool) -> [f64; BINS] {
     // The histogram's signal is N·A, its background N·B.
@@ -46,7 +46,7 @@ pub fn means(background: f64, snr: f64, neighbours: bool) -> [f64; BINS] {
     })
 }
 
-/// What the paper's equations take of it.
+/// The input of the paper's equations.
 #[must_use]
 pub fn gaussian(background: f64, snr: f64) -> MeanCounts {
     let (_, share) = target();
@@ -61,10 +61,10 @@ pub fn gaussian(background: f64, snr: f64) -> MeanCounts {
 pub struct Histograms([Poisson<f64>; BINS]);
 
 impl Histograms {
-    /// Of the means `means`.
+    /// With the means `means`.
     ///
     /// # Errors
-    /// If a mean is not above 0.
+    /// Fails if a mean is not above 0.
     pub fn new(means: [f64; BINS]) -> Result<Self> {
         let mut laws = [Poisson::new(1.0)?; BINS];
         for (law, mean) in laws.iter_mut().zip(means) {
@@ -73,7 +73,7 @@ impl Histograms {
         Ok(Self(laws))
     }
 
-    /// The next one.
+    /// Draws a histogram.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

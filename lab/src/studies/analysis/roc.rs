@@ -1,12 +1,12 @@
-//! The receiver operating characteristic of the threshold (Eq. 8 and 10): α swept
-//! at several SNR.
+//! The receiver operating characteristic of the threshold (Eq. 8 and 10): a sweep of α at several
+//! SNRs.
 
 use super::paper_setting::{BACKGROUND_BINS, Histograms, gaussian, means, target};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally};
 use anyhow::Result;
-use dtof_core::ComparatorTree;
+use dtof_core::paper::ComparatorTree;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::STEPS;
 use dtof_options::rows::grouped;
@@ -22,7 +22,7 @@ const SNRS: [f64; 5] = [3.0, 6.0, 9.0, 12.0, 18.0];
 /// Histograms of a trial.
 const HISTOGRAMS: u64 = 1000;
 
-/// Held against the Gaussian and the exact curves.
+/// Compared with the Gaussian and the exact curves.
 pub const STUDY: Study = Study {
     name: "roc",
     about: "true and false positive rate as α is swept, at several SNR",
@@ -44,8 +44,8 @@ fn points() -> Vec<Point> {
     grid([("snr", &SNRS), ("alpha", &alphas)])
 }
 
-/// A true positive is a histogram whose peak is the pulse's bin and exceeds the
-/// threshold; a false one has a background bin that does.
+/// A true positive is a histogram whose peak is the pulse's bin and exceeds the threshold. A false
+/// positive has a background bin above the threshold.
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let histograms = Histograms::new(means(BACKGROUND, point["snr"], false))?;
     let level = threshold(BACKGROUND, point["alpha"]);
@@ -113,8 +113,8 @@ fn results(part: &Part) -> Result<Results> {
 }
 
 fn claims(part: &Part) -> Vec<Claim> {
-    // Both rates, simulated, at the smallest and the largest α of each SNR, and
-    // from each α to the next.
+    // Both simulated rates, at the smallest and the largest α of each SNR and between neighbouring
+    // α.
     let mut falls = true;
     let [mut rises, mut steps] = [0u32; 2];
     for snr in SNRS {
@@ -169,8 +169,8 @@ fn claims(part: &Part) -> Vec<Claim> {
                 ends(false_positives, 5.0),
                 steps
             ),
-            // Refuted if the exact rates fall, the simulated ones do from end to end, and
-            // as few steps rise as do by chance. It agrees if all of that is not so.
+            // Refuted if the exact rates fall, the simulated rates fall from end to end, and no
+            // more steps rise than by chance. Agrees if none of this holds.
             match (falls && exact_falls, is_chance(rises, steps)) {
                 (true, true) => Verdict::Refuted,
                 (false, false) => Verdict::Agrees,
@@ -185,9 +185,9 @@ fn claims(part: &Part) -> Vec<Claim> {
     ]
 }
 
-/// Whether so many of `steps` rise beyond both 99 % intervals in more than one of a
-/// thousand studies though no rate rises: to do so, one of the two must lie outside its
-/// interval on one side, which each does with at most 0.5 %.
+/// Whether chance explains `rises` of `steps` (in more than one of a thousand studies) if no rate
+/// rises. A step rises beyond both 99 % intervals only if one of the two rates lies outside its
+/// interval on one side, which has a probability of at most 0.5 % for each.
 fn is_chance(rises: u32, steps: u32) -> bool {
     binomial::at_least(rises.into(), steps.into(), 0.01) > 1e-3
 }

@@ -1,8 +1,8 @@
-//! What blocks report where their pixels do not see the same: edges, slants, and an object of
-//! a single pixel.
+//! Reports of blocks whose pixels see different depths: edges, slants, and objects of a single
+//! pixel.
 
-use super::field::{Field, Reports, verdict};
 use super::setting::{LEVELS, SIGMA, Setting, VERDICT_HEAD, by_level, verdict_cells};
+use super::simulated_array::{Reports, SimulatedArray, verdict};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
@@ -16,13 +16,13 @@ use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 
 const BACKGROUND: f64 = 0.05;
-/// Of the dim surface, and of what is brighter.
+/// Signal of the dim surface, and of the brighter one.
 const DIM: f64 = 0.05;
 const BRIGHT: f64 = 0.145;
 const PATIENCES: [f64; 3] = [40.0, 64.0, 250.0];
 const PENS: [Pen; 3] = [STEPS[2], STEPS[4], STEPS[6]];
 const ARRAY: Array = Array::new(32, 32).unwrap();
-/// Bins between two surfaces.
+/// Bins between the two surfaces.
 const STEP: f64 = 30.0;
 const BEFORE: u64 = 1000;
 const CYCLES: u64 = 2000;
@@ -56,7 +56,7 @@ fn points() -> Vec<Point> {
         ("levels", &LEVELS),
         ("patience", &PATIENCES),
     ]);
-    // Pixels alone are of interest for the objects.
+    // Single pixels are needed only for the objects.
     points.retain(|point| {
         let alone = point["scene"] == OBJECTS as f64 && point["patience"] == PATIENCES[0];
         point["levels"] > 0.0 || alone
@@ -64,7 +64,7 @@ fn points() -> Vec<Point> {
     points
 }
 
-/// What the pixels see: signal and place of each. The scene lies differently for each seed.
+/// Signal and position of each pixel. Each seed places the scene differently.
 fn scene(number: usize, rng: &mut Pcg64) -> Result<Vec<(f64, f64)>> {
     let unit = Uniform::new(0.0, 1.0)?;
     let near = 30.0 + unit.sample(rng);
@@ -79,7 +79,7 @@ fn scene(number: usize, rng: &mut Pcg64) -> Result<Vec<(f64, f64)>> {
             2 => (DIM, near + 0.3 * column),
             3 => (DIM, near + 0.6 * column),
             4 => (DIM, near + column),
-            // One pixel of 8 x 8, in another place of each block.
+            // One pixel of 8 x 8, at a different place in each block.
             _ if pixel % 8 == (pixel / 256) % 8 && (pixel / 32) % 8 == (pixel / 8) % 4 + 2 => {
                 (BRIGHT, near)
             }
@@ -103,14 +103,14 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         })
         .collect();
     let settings = setting.settings(setting.z())?;
-    let mut field = Field::new(ARRAY, &rates, &settings)?;
+    let mut array = SimulatedArray::new(ARRAY, &rates, &settings)?;
     let mut reports = Reports::new(ARRAY);
     let mut events = Vec::new();
-    field.run(BEFORE + CYCLES, rng, |event| events.push(*event))?;
+    array.run(BEFORE + CYCLES, rng, |event| events.push(*event))?;
     let mut tally = Tally::new();
     for event in &events {
         for pixel in reports.take(event) {
-            if event.cycle.0 < BEFORE {
+            if event.cycle.raw() < BEFORE {
                 continue;
             }
             let (signal, position) = seen[pixel];
@@ -129,7 +129,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// The share of wrong ones among the pixels that blocks of the levels cover.
+/// The share of wrong pixels among those that blocks of these levels cover.
 fn wrong(point: &PointTally) -> Measured {
     let sum = |verdict: &str| -> u64 { by_level(point, verdict)[1..].iter().sum() };
     Measured::share(sum("wrong"), sum("wrong") + sum("right"))

@@ -1,7 +1,7 @@
-//! Whether pixels and blocks have together the false alarms that were asked for.
+//! Whether pixels and blocks together have the requested rate of false alarms.
 
-use super::field::Field;
 use super::setting::{L2, LEVELS, ONE_IN, Setting, by_level, levels_name, with_one_patience_alone};
+use super::simulated_array::SimulatedArray;
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results, ends};
 use crate::sweep::{Part, Point, Study, Tally, grid};
@@ -19,7 +19,7 @@ const PATIENCES: [f64; 2] = [40.0, 1000.0];
 /// The pens of the patiences.
 const PENS: [Pen; 2] = [STEPS[1], STEPS[5]];
 const ARRAY: Array = Array::new(8, 8).unwrap();
-/// Laser cycles before what counts, in which feeds and exposures settle, and those that count.
+/// Laser cycles to settle, then windows that count.
 const BEFORE: u64 = 2000;
 const WINDOWS: u64 = 20;
 
@@ -49,16 +49,16 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let setting = Setting::of(point)?;
     let settings = setting.settings(setting.z())?;
     let rates = vec![Rates::without_target(point["background"]); ARRAY.pixels() as usize];
-    let mut field = Field::new(ARRAY, &rates, &settings)?;
-    field.run(BEFORE, rng, |_| {})?;
+    let mut array = SimulatedArray::new(ARRAY, &rates, &settings)?;
+    array.run(BEFORE, rng, |_| {})?;
     let mut tally = Tally::new();
     for _ in 0..WINDOWS {
         let mut events = Vec::new();
-        field.run(L2.into(), rng, |event| events.push(*event))?;
+        array.run(L2.into(), rng, |event| events.push(*event))?;
         let mut covered = vec![false; ARRAY.pixels() as usize];
         for event in &events {
             for pixel in ARRAY.pixels_of(event.pixel, event.level) {
-                covered[usize::from(pixel.0)] = true;
+                covered[usize::from(pixel.raw())] = true;
             }
             *tally.entry(format!("reports {}", event.level)).or_default() += 1;
         }
@@ -73,14 +73,14 @@ fn results(part: &Part) -> Result<Results> {
     let mut csv =
         "tracking,levels,patience,background,covered,low,high,reports 0,reports 1,reports 2,reports 3\n"
             .to_owned();
-    let wanted = 1.0 / f64::from(ONE_IN);
+    let requested = 1.0 / f64::from(ONE_IN);
     let mut panels = Vec::new();
     let mut shares = Vec::new();
     let mut fewest = u64::MAX;
     for tracking in [0.0, 1.0] {
         for levels in LEVELS {
             let at = [("tracking", tracking), ("levels", levels)];
-            let line = [BACKGROUNDS[0], BACKGROUNDS[2]].map(|x| Dot::exact(x, wanted));
+            let line = [BACKGROUNDS[0], BACKGROUNDS[2]].map(|x| Dot::exact(x, requested));
             let mut series = vec![Series::unnamed(REFERENCE, Style::Dashed, line.into())];
             for (patience, pen) in PATIENCES.into_iter().zip(PENS) {
                 let mut dots = Vec::new();
@@ -91,7 +91,7 @@ fn results(part: &Part) -> Result<Results> {
                     let covered: Measured = point.share("covered", "windows");
                     let reports = by_level(point, "reports");
                     fewest = fewest.min(reports.iter().sum());
-                    shares.push(covered.value / wanted);
+                    shares.push(covered.value / requested);
                     let background = point.parameter("background");
                     dots.push(covered.at(background));
                     let [a, b, c, d] = reports;

@@ -1,10 +1,10 @@
-//! How often a pixel of a dim wall is reported, by itself or in a block.
+//! How often a pixel of a dim wall is reported, alone or in a block.
 
-use super::field::{Field, Reports, verdict};
 use super::setting::{
     L2, LEVELS, SIGMA, Setting, VERDICT_HEAD, by_level, levels_name, verdict_cells,
     with_one_patience_alone,
 };
+use super::simulated_array::{Reports, SimulatedArray, verdict};
 use crate::sweep::mean::{Measured, Z_99};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
@@ -23,11 +23,11 @@ const SIGNALS: [f64; 6] = [0.025, 0.05, 0.1, 0.145, 0.3, 1.0];
 const PATIENCES: [f64; 3] = [40.0, 64.0, 250.0];
 const PENS: [Pen; 4] = [STEPS[0], STEPS[2], STEPS[4], STEPS[6]];
 const ARRAY: Array = Array::new(8, 8).unwrap();
-/// Laser cycles before what counts, and those that count.
+/// Laser cycles to settle, and those that count.
 const BEFORE: u64 = 1000;
 const CYCLES: u64 = 4000;
 
-/// Reports of a flat target over its signal, at equal false alarms.
+/// Reports of a flat target by its signal, at equal rates of false alarms.
 pub const STUDY: Study = Study {
     name: "binning-reports",
     about: "laser cycles between right reports of a pixel, for 0 to 3 levels of blocks",
@@ -58,8 +58,8 @@ fn points() -> Vec<Point> {
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let mut setting = Setting::of(point)?;
     let z = setting.z();
-    // A pixel that lends gives its photons away after the patience and starts anew: its own
-    // exposure is no longer. How its block does is not asked.
+    // A pixel that lends gives its photons away after the patience and starts over: its own
+    // exposure is no longer. Its block does not matter here.
     if point.contains_key("lend") {
         setting.l2 = setting.patience;
     }
@@ -71,10 +71,10 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         sigma: SIGMA,
     };
     let settings = setting.settings(z)?;
-    let mut field = Field::new(ARRAY, &vec![rates; ARRAY.pixels() as usize], &settings)?;
+    let mut array = SimulatedArray::new(ARRAY, &vec![rates; ARRAY.pixels() as usize], &settings)?;
     let mut events = Vec::new();
-    field.run(BEFORE, rng, |_| {})?;
-    field.run(CYCLES, rng, |event| events.push(*event))?;
+    array.run(BEFORE, rng, |_| {})?;
+    array.run(CYCLES, rng, |event| events.push(*event))?;
     let mut reports = Reports::new(ARRAY);
     let mut tally = Tally::new();
     let mut add = |what: &str, number: u64| *tally.entry(what.to_owned()).or_default() += number;
@@ -94,8 +94,8 @@ fn is_lent(point: &PointTally) -> bool {
     point.parameters.contains_key("lend")
 }
 
-/// Right events of a pixel itself over those of pixels alone: of pixels that share with two
-/// levels, or that lend.
+/// Right events of pixels that share with two levels, or that lend, relative to pixels without
+/// blocks.
 fn kept(part: &Part, is_lent: bool, patience: f64, signal: f64) -> Result<Measured> {
     let own = |point: &PointTally| point.count("right 0") as f64;
     let alone = part.one([
@@ -110,7 +110,7 @@ fn kept(part: &Part, is_lent: bool, patience: f64, signal: f64) -> Result<Measur
         part.at(at).find(|point| point.parameter("levels") == 2.0)
     };
     let (of, alone) = (own(of.context("no such point")?), own(alone).max(1.0));
-    // As if both counts were Poisson's.
+    // Treats both counts as Poisson.
     let half = Z_99 * (1.0 / of.max(1.0) + 1.0 / alone).sqrt();
     let value = of / alone;
     Ok(Measured {
@@ -119,7 +119,7 @@ fn kept(part: &Part, is_lent: bool, patience: f64, signal: f64) -> Result<Measur
     })
 }
 
-/// Pixels that lend beside those that share.
+/// Pixels that lend compared with pixels that share.
 fn lending(part: &Part) -> Result<(Figure, [String; 4])> {
     let ways = [
         (false, PATIENCES[1], STEPS[0], "share, patience 64"),
@@ -139,12 +139,12 @@ fn lending(part: &Part) -> Result<(Figure, [String; 4])> {
         Ok(kept(part, is_lent, patience, signal)?.value)
     };
     let of = |way, signal| -> Result<String> { Ok(format!("{:.0}", 100.0 * value(way, signal)?)) };
-    let told = [of(0, 0.145)?, of(2, 0.145)?, of(1, 0.145)?, of(2, 0.05)?];
+    let percentages = [of(0, 0.145)?, of(2, 0.145)?, of(1, 0.145)?, of(2, 0.05)?];
     let chart = Chart {
         finding: format!(
             "With a patience of 64 pixels that share keep {} % of their own events, pixels that lend \
              {} % (0.145 signal photons a laser cycle)",
-            told[0], told[1]
+            percentages[0], percentages[1]
         ),
         holds: value(0, 0.145)? > 2.0 * value(2, 0.145)?,
         note: format!(
@@ -161,10 +161,10 @@ fn lending(part: &Part) -> Result<(Figure, [String; 4])> {
         columns: 1,
         panels: vec![Panel::only(series)],
     };
-    Ok((Figure::new("binning-lend", &chart)?, told))
+    Ok((Figure::new("binning-lend", &chart)?, percentages))
 }
 
-/// Laser cycles between right reports of a pixel; of the pixel itself, and all.
+/// Laser cycles between right reports of a pixel: its own reports, and all.
 fn between(part: &Part, levels: f64, patience: f64, signal: f64) -> Result<[f64; 2]> {
     let patience = if levels > 0.0 { patience } else { PATIENCES[0] };
     let at = [

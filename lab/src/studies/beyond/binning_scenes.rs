@@ -1,7 +1,8 @@
-//! What blocks report of scenes from files: how much of it is wrong, and what it costs pixels.
+//! Reports of blocks in scenes from files: the share of wrong ones, and the events that pixels
+//! lose.
 
-use super::field::{Reports, is_right};
 use super::setting::{BINS, LEVELS, Setting, VERDICT_HEAD, levels_name};
+use super::simulated_array::{Reports, is_right};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
@@ -18,7 +19,7 @@ use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 
-/// A file of `scenes/`, with so much of its light, and laser cycles of a trial.
+/// A file of `scenes/`, a factor for its light, and the laser cycles of a trial.
 struct File {
     name: &'static str,
     text: &'static str,
@@ -26,8 +27,8 @@ struct File {
     cycles: u64,
 }
 
-/// By number. The tilted wall is too bright for blocks to have much to report, so there is a
-/// dim one as well.
+/// By number. The tilted wall is too bright for many reports of blocks, so there is a dim one as
+/// well.
 const SCENES: [File; 5] = [
     File {
         name: "fan",
@@ -60,16 +61,16 @@ const SCENES: [File; 5] = [
         cycles: 4000,
     },
 ];
-/// The tilted wall of the file; and those that the title is of.
+/// The tilted wall of the file, and the scenes of the title.
 const BRIGHT: usize = 2;
 const SLANT: usize = 3;
 const DEMO: usize = 4;
-/// Blocks with fewer reports are not drawn, nor is a scene that has only such: their share says little.
-const FEWEST: u64 = 1000;
-/// The longest exposure, and the patience that pixels have unless told otherwise.
+/// Blocks with fewer reports are not drawn: their share is uncertain.
+const MIN_REPORTS: u64 = 1000;
+/// The longest exposure, and the default patience.
 const L2: u16 = 2000;
 const PATIENCE: u16 = 64;
-/// Laser cycles before what counts.
+/// Laser cycles to settle.
 const BEFORE: u64 = 1000;
 const SLICE: u16 = 200;
 
@@ -91,7 +92,7 @@ fn points() -> Vec<Point> {
     grid([("scene", &scenes)])
 }
 
-/// The scene of the file, farther away by a part of a bin; a fan also stands elsewhere.
+/// The scene of the file, moved away by a random part of a bin. The centre of a fan is random, too.
 fn scene(file: &File, rng: &mut Pcg64) -> Result<Scene> {
     let unit = Uniform::new(0.0, 1.0)?;
     let mut scene = Scene::parse(file.text)?;
@@ -108,7 +109,7 @@ fn scene(file: &File, rng: &mut Pcg64) -> Result<Scene> {
     Ok(scene)
 }
 
-/// Pixels that right and wrong reports cover, of each level.
+/// Pixels covered by right and wrong reports, by level.
 type Counts = [[u64; 4]; 2];
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
@@ -126,9 +127,9 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let engine = host_engine(&setting.settings(setting.z())?, array, &addresses)?;
         runs.push((engine, Reports::new(array), Counts::default()));
     }
-    // Right is also what is seen through a surface. A pixel without a surface reports wrongly.
+    // A surface behind another one counts as right. A pixel without a surface cannot be right.
     let is_wrong = |event: &DepthEvent, pixel: usize| {
-        let views = scene.views(addresses[pixel], event.cycle.0);
+        let views = scene.hits(addresses[pixel], event.cycle.raw());
         let mut views = views.into_iter().flatten();
         !views.any(|view| is_right(event, view.range_mm / scene.mm_per_bin()))
     };
@@ -137,7 +138,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         for (engine, reports, counts) in &mut runs {
             for event in engine.run(&slice)? {
                 for pixel in reports.take(&event) {
-                    if event.cycle.0 >= BEFORE {
+                    if event.cycle.raw() >= BEFORE {
                         let verdict = usize::from(is_wrong(&event, pixel));
                         counts[verdict][usize::from(event.level.raw())] += 1;
                     }
@@ -158,16 +159,16 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// A scene with so many levels.
+/// A scene with this many levels.
 struct Outcome {
-    /// Of a pixel's own reports.
+    /// The share of wrong reports of single pixels.
     own_wrong: Measured,
-    /// Pixels that reports of blocks cover, and the share of those that are wrong.
+    /// Pixels covered by reports of blocks, and the wrong share.
     blocks: u64,
     blocks_wrong: Measured,
-    /// Right own reports over those of pixels alone.
+    /// Right reports of single pixels relative to a run without blocks.
     kept: f64,
-    /// Laser cycles of a pixel for a right report.
+    /// Laser cycles of a pixel per right report.
     between: f64,
     counts: Counts,
 }
@@ -207,7 +208,7 @@ fn results(part: &Part) -> Result<Results> {
             let outcome = Outcome::new(point, levels);
             own.push(outcome.own_wrong.at(levels));
             let wrong = outcome.blocks_wrong;
-            if outcome.blocks >= FEWEST {
+            if outcome.blocks >= MIN_REPORTS {
                 of_blocks.push(wrong.at(levels));
             }
             least_kept = least_kept.min(outcome.kept);
@@ -260,7 +261,7 @@ fn results(part: &Part) -> Result<Results> {
         holds: least_kept >= 0.95,
         note: format!(
             "Farther than 3 bins from what the pixel sees, of all pixels that a report stands for. Patience \
-             {PATIENCE}; bars hold 99 % as if reports were independent. Scenes whose blocks have fewer than {FEWEST} reports are left out."
+             {PATIENCE}; bars hold 99 % as if reports were independent. Scenes whose blocks have fewer than {MIN_REPORTS} reports are left out."
         ),
         x: Axis::linear("levels of blocks").within(0.0, 3.0),
         y: Axis::linear("wrong, %").percent(),

@@ -1,4 +1,4 @@
-//! How long an exposure waits for a second echo: what is found, and what the first costs.
+//! How long an exposure waits for a second echo: the echoes found, and the cost for the first.
 
 use super::light::Light;
 use super::setting::{BINS, L1, ONE_IN, SIGMA, X};
@@ -17,14 +17,14 @@ use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 
-/// The program's, with which two echoes are mostly used.
+/// The default of the program, which is common with two echoes.
 const L2: u16 = 2000;
 const WAITS: [f64; 5] = [2.0, 4.0, 8.0, 16.0, UNTIL_L2];
 const UNTIL_L2: f64 = 255.0;
 const BACKGROUNDS: [f64; 2] = [0.01, 0.05];
 /// Signal photons of the first surface a laser cycle.
 const FIRST: [f64; 2] = [0.145, 1.0];
-/// The second surface over the first.
+/// Ratio of the second surface to the first.
 const RATIOS: [(f64, &str, Pen); 5] = [
     (NONE, "no second", REFERENCE),
     (0.1, "1/10", STEPS[0]),
@@ -42,14 +42,14 @@ const SCENES: [(f64, f64); 4] = [
 ];
 /// Bins from the first surface to the second.
 const DISTANCE: f64 = 20.0;
-/// An event farther from a surface, in bins, is not of it.
+/// The largest distance of an event from its surface, in bins.
 const NEAR: f64 = 3.0;
-/// Bins to either side of an echo that are left out.
+/// Bins excluded on either side of an echo.
 const REACH: u8 = 4;
 /// Exposures of a trial.
 const EXPOSURES: u64 = 50;
 
-/// Both echoes, and the laser cycles of the first, over the wait.
+/// Both echoes, and the laser cycles of the first, by the wait.
 pub const STUDY: Study = Study {
     name: "echo-wait",
     about: "both surfaces of a pixel, and the laser cycles an event of the first, over the wait",
@@ -95,15 +95,18 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         surfaces.push((first * point["ratio"], far));
     }
     let light = Light::new(point["background"] * cycles, &surfaces)?;
-    let (mut pixel, mut statistics) = (AsyncPixel::<BINS>::new(PixelAddress(0)), Statistics::new());
-    let (mut cycle, mut exposures) = (LaserCycle(0), 0);
+    let (mut pixel, mut statistics) = (
+        AsyncPixel::<BINS>::new(PixelAddress::new(0)),
+        Statistics::new(),
+    );
+    let (mut cycle, mut exposures) = (LaserCycle::new(0), 0);
     let [mut firsts, mut both, mut wrong] = [0; 3];
     let mut seen = [false; 2];
     while exposures < EXPOSURES {
         pixel.count_batch(&config, &light.draw(rng));
-        cycle.0 += u64::from(X);
+        cycle = LaserCycle::new(cycle.raw() + u64::from(X));
         pixel.end_laser_cycles(&config, &mut statistics, cycle, X);
-        if let Some(event) = pixel.acknowledge() {
+        if let Some(event) = pixel.take_event() {
             let position = f64::from(event.position().raw()) / 256.0;
             let places = surfaces.iter().map(|&(_, place)| place);
             let of = places
@@ -124,29 +127,29 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     }
     Ok(tally([
         ("exposures", exposures),
-        ("cycles", cycle.0),
+        ("cycles", cycle.raw()),
         ("first", firsts),
         ("both", both),
         ("wrong", wrong),
     ]))
 }
 
-/// Exposures that had both surfaces.
+/// The share of exposures that found both surfaces.
 fn share(point: &PointTally) -> Measured {
     point.share("both", "exposures")
 }
 
-/// Laser cycles an event of the first surface.
+/// Laser cycles per event of the first surface.
 fn cycles_a_first(point: &PointTally) -> f64 {
     point.count("cycles") as f64 / point.count("first") as f64
 }
 
-/// What is not of a surface.
+/// False events per exposure.
 fn wrong(point: &PointTally) -> f64 {
     point.count("wrong") as f64 / point.count("exposures") as f64
 }
 
-/// Of all scenes with this ratio and wait, the least and the greatest.
+/// The smallest and the largest value over all scenes with this ratio and wait.
 fn range(part: &Part, ratio: f64, wait: f64, value: fn(&PointTally) -> f64) -> (f64, f64) {
     let points = part.at([("ratio", ratio), ("wait", wait)]);
     ends(points.map(value))
@@ -184,7 +187,7 @@ fn results(part: &Part) -> Result<Results> {
             .into(),
     });
     let half = found(part, 0.5, 4.0).0;
-    // How many times as often as until L2 a surface alone is reported.
+    // The rate of reports of a lone surface relative to a wait until L2.
     let mut gains = Vec::new();
     for (first, background) in SCENES {
         let cycles = |wait| -> Result<f64> {
@@ -240,7 +243,7 @@ fn results(part: &Part) -> Result<Results> {
     })
 }
 
-/// A row for each wait, with the least and the most of the scenes.
+/// A row for each wait, with the range over the scenes.
 fn table(part: &Part) -> Result<String> {
     let mut rows = String::new();
     for wait in WAITS {

@@ -1,4 +1,4 @@
-//! Several echoes of one exposure: two surfaces of one pixel, a glass before a wall.
+//! Several echoes of one exposure: two surfaces in one pixel, such as glass in front of a wall.
 
 use super::light::Light;
 use super::setting::{BINS, L1, L2, SIGMA, X};
@@ -18,20 +18,19 @@ use std::fmt::Write as _;
 
 /// Bins between two surfaces.
 const DISTANCES: [f64; 8] = [4.0, 5.0, 6.0, 8.0, 12.0, 16.0, 24.0, 48.0];
-/// The brighter over the other.
+/// Ratio of the brighter surface to the other.
 const RATIOS: [f64; 4] = [1.0, 2.0, 4.0, 10.0];
 const PENS: [Pen; 4] = [STEPS[0], STEPS[2], STEPS[4], STEPS[6]];
-/// Signal photons of each echo of equal brightness in a whole histogram, and the background
-/// of a bin.
-const WHOLE: (f64, f64) = (60.0, 1.0);
-/// Signal photons of the target a laser cycle where a pixel counts, and backgrounds a bin.
+/// Signal photons of the dimmer echo in a whole histogram, and background photons a bin.
+const WHOLE_HISTOGRAM: (f64, f64) = (60.0, 1.0);
+/// For counting pixels: signal photons of the target a laser cycle, and background photons a bin.
 const TARGET: f64 = 0.1;
 const BACKGROUNDS: [f64; 2] = [0.01, 0.05];
 const REACH: u8 = 4;
 /// Exposures of a trial.
 const EXPOSURES: u64 = 50;
 
-/// Both echoes over distance and ratio.
+/// Both echoes by distance and ratio.
 pub const STUDY: Study = Study {
     name: "echoes",
     about: "two surfaces of one pixel: both echoes over their distance and ratio",
@@ -71,7 +70,10 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let far = near + point["distance"];
         let mut found = Vec::new();
         if background == 0.0 {
-            let light = Light::new(WHOLE.1, &[(WHOLE.0 * ratio, near), (WHOLE.0, far)])?;
+            let light = Light::new(
+                WHOLE_HISTOGRAM.1,
+                &[(WHOLE_HISTOGRAM.0 * ratio, near), (WHOLE_HISTOGRAM.0, far)],
+            )?;
             let mut histogram = Histogram::<BINS>::new();
             histogram.add_batch(&light.draw(rng));
             config.detect_echoes(&mut histogram, |_, detection| {
@@ -81,13 +83,15 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             let cycles = f64::from(X);
             let surfaces = [(TARGET * ratio * cycles, near), (TARGET * cycles, far)];
             let light = Light::new(background * cycles, &surfaces)?;
-            let (mut pixel, mut statistics) =
-                (AsyncPixel::<BINS>::new(PixelAddress(0)), Statistics::new());
+            let (mut pixel, mut statistics) = (
+                AsyncPixel::<BINS>::new(PixelAddress::new(0)),
+                Statistics::new(),
+            );
             for step in 1..=u64::from(L2 / X) {
                 pixel.count_batch(&config, &light.draw(rng));
-                let now = LaserCycle(step * u64::from(X));
+                let now = LaserCycle::new(step * u64::from(X));
                 let look = pixel.end_laser_cycles(&config, &mut statistics, now, X);
-                found.extend(pixel.acknowledge().map(|event| event.position()));
+                found.extend(pixel.take_event().map(|event| event.position()));
                 if found.len() == 2 || matches!(look, Look::Ended | Look::Expired) {
                     break;
                 }
@@ -171,7 +175,7 @@ fn results(part: &Part) -> Result<Results> {
         note: format!(
             "σ {SIGMA} bin, ±{REACH} bins left out. Whole histograms hold {} signal photons of the dimmer \
              echo; pixels count {TARGET} of it a laser cycle, up to {L2} cycles, with the background a bin that the panel names (whole: 1).",
-            WHOLE.0
+            WHOLE_HISTOGRAM.0
         ),
         x: Axis::logarithmic("bins between the two"),
         y: Axis::linear("exposures with both, %")

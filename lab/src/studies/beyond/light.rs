@@ -13,7 +13,7 @@ pub struct Light {
 }
 
 impl Light {
-    /// Of a background a bin, and of the photons and the position of each surface.
+    /// With `background` photons a bin; a surface is its photons and its position.
     pub fn new(background: f64, surfaces: &[(f64, f64)]) -> Result<Self> {
         let surface = |&(photons, position): &(f64, f64)| {
             Ok((Poisson::new(photons)?, Normal::new(position, SIGMA)?))
@@ -24,7 +24,7 @@ impl Light {
         })
     }
 
-    /// The bins of the photons that come.
+    /// Draws photons; returns their bins.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

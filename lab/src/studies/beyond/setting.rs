@@ -1,33 +1,34 @@
-//! How the pixels of these studies decide, as a point says it, and what tallies and charts call
-//! it.
+//! The settings of pixels in these studies, from the parameters of a point, and their names in
+//! tallies and charts.
 
 use crate::sweep::{Point, PointTally, whole};
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
-use dtof_core::{BlockLevel, Count, EchoNumber, RangeGate, WindowRule, z_for_levels};
+use dtof_core::rule::z_for_levels;
+use dtof_core::{BlockLevel, Count, EchoNumber, RangeGate, WindowRule};
 use dtof_engine::settings::{AdaptiveBinning, Settings};
 
 /// Bins of a histogram.
 pub const BINS: usize = 128;
-/// Laser cycles between looks, the first look with N > L1, and the longest exposure.
+/// X, L1 and L2 in laser cycles.
 pub const X: u16 = 4;
 pub const L1: u16 = 40;
 pub const L2: u16 = 1000;
 /// Standard deviation of the pulse in bins.
 pub const SIGMA: f64 = 1.0;
-/// One of so many pixels is to be covered by a false report in L2 laser cycles.
+/// The limit: one pixel in this many is covered by a false report in L2 laser cycles.
 pub const ONE_IN: u32 = 100;
-/// Levels of blocks, as a point has them.
+/// Levels of blocks, as parameters of a point.
 pub const LEVELS: [f64; 4] = [0.0, 1.0, 2.0, 3.0];
 
-/// What is on beside the single pixel.
+/// The features beyond a single pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Setting {
     /// Levels of blocks.
     pub levels: BlockLevel,
     /// Laser cycles.
     pub patience: u16,
-    /// Whether pixels expect their next event.
+    /// Whether pixels track their target.
     pub tracking: bool,
     /// The longest exposure.
     pub l2: u16,
@@ -42,7 +43,7 @@ impl Setting {
         l2: L2,
     };
 
-    /// Of a point: what it does not name is off.
+    /// From a point; features without a parameter are off.
     pub fn of(point: &Point) -> Result<Self> {
         let named = |name| point.contains_key(name).then(|| whole(point, name));
         Ok(Self {
@@ -52,7 +53,7 @@ impl Setting {
         })
     }
 
-    /// With so many levels of blocks, 0 to 3.
+    /// With `levels` levels of blocks, 0 to 3.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -63,13 +64,13 @@ impl Setting {
         Ok(Self { levels, ..self })
     }
 
-    /// The z for it.
+    /// The z for these settings.
     pub fn z(&self) -> U4F12 {
         let gate = RangeGate::<BINS>::full();
         z_for_levels(ONE_IN, &gate, X, L1, self.l2, self.levels)
     }
 
-    /// With this z.
+    /// Settings of the engine with `z`.
     pub fn settings(&self, z: U4F12) -> Result<Settings> {
         Ok(Settings {
             bins: BINS,
@@ -98,7 +99,8 @@ impl Setting {
     }
 }
 
-/// Without blocks there is no patience: the points of pixels alone have `patience` only.
+/// Removes points without blocks except those with `patience`: the patience has no effect without
+/// blocks.
 pub fn with_one_patience_alone(mut points: Vec<Point>, patience: f64) -> Vec<Point> {
     points.retain(|point| point["levels"] > 0.0 || point["patience"] == patience);
     points
@@ -109,7 +111,7 @@ pub fn by_level(point: &PointTally, what: &str) -> [u64; 4] {
     [0, 1, 2, 3].map(|level| point.count(&format!("{what} {level}")))
 }
 
-/// Those of right and of wrong reports as cells of a table.
+/// The counts of right and wrong reports as cells of a table.
 pub fn verdict_cells(point: &PointTally) -> String {
     let counts = ["right", "wrong"].map(|verdict| by_level(point, verdict));
     let cells: Vec<String> = counts.iter().flatten().map(u64::to_string).collect();
@@ -119,7 +121,7 @@ pub fn verdict_cells(point: &PointTally) -> String {
 /// The head of these cells.
 pub const VERDICT_HEAD: &str = "right 0,right 1,right 2,right 3,wrong 0,wrong 1,wrong 2,wrong 3";
 
-/// What a chart calls pixels with so many levels of blocks.
+/// The name of pixels with this many levels of blocks in charts.
 pub fn levels_name(levels: f64) -> String {
     match levels {
         0.0 => "pixels alone".to_owned(),

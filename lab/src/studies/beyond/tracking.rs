@@ -1,7 +1,7 @@
-//! What tracking gains where the target stays, and what it costs where it does not.
+//! The gain of tracking for a target that stays, and its cost for one that does not.
 
-use super::field::{Field, is_right, verdict};
 use super::setting::{L2, SIGMA, Setting};
+use super::simulated_array::{SimulatedArray, is_right, verdict};
 use crate::sweep::mean::{Measured, Z_99, add_value};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
@@ -16,7 +16,7 @@ use std::fmt::Write as _;
 
 const BACKGROUNDS: [f64; 2] = [0.01, 0.05];
 const SIGNALS: [f64; 3] = [0.1, 0.145, 0.3];
-/// What the target does, by number.
+/// The motion of the target, by number.
 const STEADY: u16 = 0;
 const DRIFTS: u16 = 1;
 const JUMPS: u16 = 2;
@@ -26,11 +26,11 @@ const DRIFT: f64 = 0.1;
 /// A jump, in bins.
 const JUMP: f64 = 30.0;
 const ARRAY: Array = Array::new(8, 8).unwrap();
-/// Laser cycles with the target in its first place, and after that.
+/// Laser cycles with the target at its first position, and after that.
 const BEFORE: u64 = 3000;
 const AFTER: u64 = 3000;
-/// Of the question and of the answer: signal and background.
-const ASKED: (f64, f64) = (0.145, 0.05);
+/// Signal and background of the scene in the title.
+const HEADLINE: (f64, f64) = (0.145, 0.05);
 
 /// Tracking with steady, drifting, jumping and vanishing targets.
 pub const STUDY: Study = Study {
@@ -68,48 +68,51 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     };
     let signal = point["signal"];
     let settings = setting.settings(setting.z())?;
-    let mut field = Field::new(ARRAY, &rates(start, signal), &settings)?;
+    let mut array = SimulatedArray::new(ARRAY, &rates(start, signal), &settings)?;
     let mut events: Vec<DepthEvent> = Vec::new();
     let mut tally = Tally::new();
     if target == DRIFTS {
         let mut position = start;
-        while field.cycle() < BEFORE + AFTER {
-            field.set(&rates(position, signal))?;
-            field.run(100, rng, |event| events.push(*event))?;
+        while array.cycle() < BEFORE + AFTER {
+            array.set(&rates(position, signal))?;
+            array.run(100, rng, |event| events.push(*event))?;
             position += DRIFT;
         }
-        // The target moves while an event's photons come: half of what it has moved.
-        let at = |event: &DepthEvent| start + DRIFT * event.cycle.0 as f64 / 100.0;
-        for event in events.iter().filter(|event| event.cycle.0 >= u64::from(L2)) {
+        // The position at the end of the exposure; the motion during it is ignored.
+        let at = |event: &DepthEvent| start + DRIFT * event.cycle.raw() as f64 / 100.0;
+        for event in events
+            .iter()
+            .filter(|event| event.cycle.raw() >= u64::from(L2))
+        {
             let verdict = verdict(event, at(event));
             *tally.entry(verdict.to_owned()).or_default() += 1;
         }
         tally.insert("cycles".to_owned(), (BEFORE + AFTER - u64::from(L2)) * 64);
         return Ok(tally);
     }
-    field.run(BEFORE, rng, |event| events.push(*event))?;
+    array.run(BEFORE, rng, |event| events.push(*event))?;
     match target {
-        JUMPS => field.set(&rates(start + JUMP, signal))?,
-        VANISHES => field.set(&rates(start, 0.0))?,
+        JUMPS => array.set(&rates(start + JUMP, signal))?,
+        VANISHES => array.set(&rates(start, 0.0))?,
         _ => {}
     }
-    field.run(AFTER, rng, |event| events.push(*event))?;
+    array.run(AFTER, rng, |event| events.push(*event))?;
     let mut first = vec![None; ARRAY.pixels() as usize];
     for event in &events {
-        let pixel = usize::from(event.pixel.0);
-        if event.cycle.0 < BEFORE {
-            if event.cycle.0 >= u64::from(L2) && target == STEADY {
+        let pixel = usize::from(event.pixel.raw());
+        if event.cycle.raw() < BEFORE {
+            if event.cycle.raw() >= u64::from(L2) && target == STEADY {
                 count(&mut tally, event, start);
             }
             continue;
         }
         match target {
             JUMPS if is_right(event, start + JUMP) => {
-                first[pixel].get_or_insert(event.cycle.0 - BEFORE + 1);
+                first[pixel].get_or_insert(event.cycle.raw() - BEFORE + 1);
             }
             VANISHES => {
-                // Of a ghost: the thousand laser cycles in which it is still reported.
-                let later = (event.cycle.0 - BEFORE) / u64::from(L2);
+                // A ghost: counted by the thousand laser cycles since the target vanished.
+                let later = (event.cycle.raw() - BEFORE) / u64::from(L2);
                 let who = if is_right(event, start) {
                     "ghost"
                 } else {
@@ -138,7 +141,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// Right or wrong, and how far off.
+/// Counts a right or wrong event, and its error.
 fn count(tally: &mut Tally, event: &DepthEvent, position: f64) {
     if is_right(event, position) {
         *tally.entry("right".to_owned()).or_default() += 1;
@@ -150,7 +153,7 @@ fn count(tally: &mut Tally, event: &DepthEvent, position: f64) {
     }
 }
 
-/// Laser cycles a right event, with the 99 % interval of a count.
+/// Laser cycles per right event, with the 99 % interval of a count.
 fn cycles_an_event(point: &PointTally) -> Measured {
     let (cycles, right) = (point.count("cycles") as f64, point.count("right") as f64);
     let half = Z_99 * right.sqrt();
@@ -169,7 +172,7 @@ fn results(part: &Part) -> Result<Results> {
             ("tracking", tracking),
         ])
     };
-    // With tracking over without.
+    // Ratio with tracking to without.
     let gain = |target, scene| -> Result<f64> {
         let of = |tracking| -> Result<f64> {
             let point = one(target, scene, tracking)?;
@@ -229,7 +232,7 @@ fn results(part: &Part) -> Result<Results> {
             series,
         });
     }
-    let (steady, jump) = (gain(STEADY, ASKED)?, gain(JUMPS, ASKED)?);
+    let (steady, jump) = (gain(STEADY, HEADLINE)?, gain(JUMPS, HEADLINE)?);
     let chart = Chart {
         finding: format!(
             "A target that stays is reported in {steady:.2} times the laser cycles, one that jumps \
@@ -239,7 +242,7 @@ fn results(part: &Part) -> Result<Results> {
         note: format!(
             "With tracking over without, both with 1 % false alarms in {L2} laser cycles; the title \
              is of {} signal photons a cycle and a background of {} a bin.",
-            ASKED.0, ASKED.1
+            HEADLINE.0, HEADLINE.1
         ),
         x: Axis::logarithmic("signal photons a laser cycle"),
         y: Axis::linear("cycles an event, or to notice a jump, over those without")
@@ -257,11 +260,11 @@ fn results(part: &Part) -> Result<Results> {
         values: [
             ("steady", format!("{steady:.2}")),
             ("jump", format!("{jump:.2}")),
-            ("drift", format!("{:.2}", gain(DRIFTS, ASKED)?)),
+            ("drift", format!("{:.2}", gain(DRIFTS, HEADLINE)?)),
             ("few", format!("{:.2}", gain(STEADY, (0.145, 0.01))?)),
-            ("ghost with", percent(ghost(ASKED, 1.0, 1)?)),
-            ("ghost without", percent(ghost(ASKED, 0.0, 1)?)),
-            ("ghost later", percent(ghost(ASKED, 1.0, 2)?)),
+            ("ghost with", percent(ghost(HEADLINE, 1.0, 1)?)),
+            ("ghost without", percent(ghost(HEADLINE, 0.0, 1)?)),
+            ("ghost later", percent(ghost(HEADLINE, 1.0, 2)?)),
         ]
         .into(),
         tables: vec![("results/data/tracking.csv", csv)],

@@ -5,7 +5,7 @@ use dtof_core::{PixelAddress, RangeGate};
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 
-use super::stray::{Stray, StrayPhotons};
+use super::stray::{StrayLight, StrayPhotons};
 use super::{BINS, PERIOD, SIGMA};
 use dtof_simulate::SimulatedPixel;
 use dtof_simulate::effects::Effects;
@@ -13,8 +13,8 @@ use dtof_simulate::effects::limits::Timing;
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 
-/// Of the plain scene: background photons a bin and laser cycle, signal photons a
-/// laser cycle, and where they lie.
+/// The plain scene: background photons a bin and laser cycle, signal photons a laser cycle, and
+/// their position in bins.
 pub(super) const BACKGROUND: f64 = 0.05;
 pub(super) const SIGNAL: f64 = 0.5;
 pub(super) const PLACE: f64 = 80.3;
@@ -24,35 +24,35 @@ pub(super) const PLACE: f64 = 80.3;
 struct Pulse {
     signal: f64,
     position: f64,
-    /// Not the cover glass.
+    /// Whether it is a surface, not the cover glass.
     is_surface: bool,
 }
 
 /// A scene.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// What is special about it.
+    /// Its difference from the plain scene.
     pub name: String,
-    /// Against its failures; not measured.
+    /// Advice against its failures; not measured.
     pub advice: Option<&'static str>,
-    /// Why no flag tells wrong events, where none does.
+    /// Why no flag marks the wrong events, if none does.
     pub silence: Option<&'static str>,
-    /// What may hold the peak.
+    /// The range gate.
     pub gate: RangeGate<BINS>,
     /// Exposures of a trial.
     pub exposures: u64,
     background: f64,
     pulses: Vec<Pulse>,
     effects: Effects,
-    stray: Option<Stray>,
-    /// By what the background is multiplied after how many laser cycles.
+    stray: Option<StrayLight>,
+    /// A factor for the background, and the laser cycle from which it applies.
     change: (f64, u32),
-    /// Bins that the surfaces go in a laser cycle.
+    /// Motion of the surfaces in bins a laser cycle.
     drift: f64,
 }
 
 impl Case {
-    /// The plain one.
+    /// The plain scene, named `name`.
     pub(super) fn new(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
@@ -80,7 +80,7 @@ impl Case {
         self
     }
 
-    /// One more surface.
+    /// Adds a surface.
     pub(super) fn and(mut self, signal: f64, position: f64) -> Self {
         self.pulses.push(Pulse {
             signal,
@@ -90,13 +90,13 @@ impl Case {
         self
     }
 
-    /// The only surface.
+    /// Replaces the surfaces by one.
     pub(super) fn only(mut self, signal: f64, position: f64) -> Self {
         self.pulses.clear();
         self.and(signal, position)
     }
 
-    /// Something before the surface that is not looked for.
+    /// Adds a pulse in front of the surface that is not a target.
     pub(super) fn behind(mut self, signal: f64, position: f64) -> Self {
         self.pulses.push(Pulse {
             signal,
@@ -106,7 +106,7 @@ impl Case {
         self
     }
 
-    /// Nothing to look for.
+    /// Removes the target.
     pub(super) fn without_target(mut self) -> Self {
         self.pulses.clear();
         self.behind(0.0, PLACE)
@@ -122,13 +122,13 @@ impl Case {
         self
     }
 
-    /// Its background is multiplied by `factor` after laser cycle `cycle`.
+    /// Multiplies the background by `factor` after laser cycle `cycle`.
     pub(super) fn changing(mut self, factor: f64, cycle: u32) -> Self {
         self.change = (factor, cycle);
         self
     }
 
-    pub(super) fn with_stray(mut self, stray: Stray) -> Self {
+    pub(super) fn with_stray(mut self, stray: StrayLight) -> Self {
         self.stray = Some(stray);
         self
     }
@@ -143,24 +143,24 @@ impl Case {
         self
     }
 
-    /// Whether its TDC takes one hit a laser cycle, which pixels are told.
+    /// Whether its TDC takes one hit a laser cycle, a setting of the pixels.
     #[must_use]
     pub fn is_one_hit(&self) -> bool {
         self.effects.one_hit_tdc()
     }
 
-    /// Where the surfaces lie at the end of laser cycle number `cycle` of an
-    /// exposure, in bins from the start of bin 0.
+    /// The positions of the surfaces at the end of laser cycle `cycle` of an exposure, in bins from
+    /// the start of bin 0.
     pub fn surfaces(&self, cycle: u32) -> impl Iterator<Item = f64> {
         let surfaces = self.pulses.iter().filter(|pulse| pulse.is_surface);
         let moved = self.drift * f64::from(cycle);
         surfaces.map(move |pulse| pulse.position + moved)
     }
 
-    /// A pixel before it.
+    /// A simulated pixel in front of the scene.
     ///
     /// # Errors
-    /// If a rate or an effect is out of its range.
+    /// Fails if a rate or an effect is out of its range.
     pub fn pixel(&self, rng: &mut Pcg64) -> Result<CasePixel> {
         let timing = Timing {
             bins: u16::try_from(BINS)?,
@@ -175,7 +175,7 @@ impl Case {
                 position: pulse.position,
                 sigma: SIGMA,
             };
-            let (seed, address) = (rng.next_u64(), PixelAddress(0));
+            let (seed, address) = (rng.next_u64(), PixelAddress::new(0));
             let part = SimulatedPixel::new(&rates, timing.bins, pixel_rng(seed, address))?;
             parts.push((
                 part.with_effects(&self.effects, &timing, seed, address)?,
@@ -184,7 +184,7 @@ impl Case {
         }
         let stray = self.stray.map(|stray| {
             let seed = rng.next_u64();
-            StrayPhotons::new(stray, pixel_rng(seed, PixelAddress(0)))
+            StrayPhotons::new(stray, pixel_rng(seed, PixelAddress::new(0)))
         });
         Ok(CasePixel {
             parts,
@@ -195,8 +195,8 @@ impl Case {
     }
 }
 
-/// The photons of a scene: independent ones of each pulse, the first with the
-/// background, and stray ones.
+/// The photons of a scene: independent photons of each pulse, the first with the background, and
+/// stray light.
 pub struct CasePixel {
     parts: Vec<(SimulatedPixel, Rates)>,
     stray: Option<StrayPhotons>,
@@ -205,10 +205,10 @@ pub struct CasePixel {
 }
 
 impl CasePixel {
-    /// Gives `photon` the TDC codes of laser cycle number `cycle`, from 1.
+    /// Calls `photon` with the TDC codes of laser cycle `cycle`, counted from 1.
     ///
     /// # Errors
-    /// If the change leaves a rate negative.
+    /// Fails if the change makes a rate negative.
     pub fn next_cycle(&mut self, cycle: u32, mut photon: impl FnMut(u16)) -> Result<()> {
         let (factor, after) = self.change;
         let factor = if cycle > after { factor } else { 1.0 };

@@ -1,43 +1,41 @@
-//! The scenes in which a method may fail. Each differs from the plain one in one
-//! thing.
+//! The scenes in which a method may fail. Each differs from the plain scene in one respect.
 
 use anyhow::Result;
 use dtof_core::RangeGate;
 
 use super::L1;
 use super::case::{BACKGROUND, Case, PLACE, SIGNAL};
-use super::stray::Stray;
+use super::stray::StrayLight;
 use dtof_simulate::effects::Effects;
 use dtof_simulate::effects::dead_time::DeadTime;
 use dtof_simulate::effects::tail::Tail;
 use dtof_simulate::effects::tdc::Tdc;
 
-/// A signal that takes the window rule some 250 laser cycles.
+/// A signal for which the window rule needs some 250 laser cycles.
 const WEAK: f64 = 0.12;
-/// When the background of a weak signal changes, in laser cycles; and that of the plain one,
-/// which has its first look after 44.
+/// The laser cycle at which the background changes: with a weak signal, and in the plain scene,
+/// whose first look is after 44 laser cycles.
 const CHANGE: u32 = 200;
 const EARLY_CHANGE: u32 = 20;
-/// Raindrops are seen before this bin, 0.9 m away; a gate begins where their pulses have ended.
+/// Raindrops are seen up to this bin, 0.9 m away; a gate begins after the end of their pulses.
 const RAIN_ENDS: f64 = 24.0;
 const RAIN_GATE: u16 = 28;
-/// A cover glass.
+/// A cover glass: signal and position.
 const GLASS: (f64, f64) = (10.0 * SIGNAL, 3.5);
 /// Background counts a bin after L1 laser cycles.
 pub const BACKGROUNDS: [f64; 5] = [0.05, 0.5, 5.0, 50.0, 500.0];
 
-/// What the case of a background is called, with the signal of the plain scene or a
-/// weak one.
+/// The name of the case of a background, with the signal of the plain scene or a weak one.
 #[must_use]
 pub fn background_name(counts: f64, is_weak: bool) -> String {
     let weak = if is_weak { ", weak signal" } else { "" };
     format!("background {counts}{weak}")
 }
 
-/// All of them, in the order of the table.
+/// All cases, in the order of the table.
 ///
 /// # Errors
-/// If a gate does not fit the bins.
+/// Fails if a gate does not fit the bins.
 pub fn cases() -> Result<Vec<Case>> {
     let mut cases = vec![Case::new("plain"), Case::new("no target").without_target()];
     for is_weak in [false, true] {
@@ -48,7 +46,7 @@ pub fn cases() -> Result<Vec<Case>> {
                 .only(plain * (background / BACKGROUND).sqrt(), PLACE)
                 .with_background(background);
             if counts > 100.0 {
-                // 82 laser cycles fill a counter of background.
+                // The background fills a counter in 82 laser cycles.
                 case = case.advised("wider counters, or a rule that fires before they are full");
                 case.exposures = 2;
             }
@@ -137,9 +135,9 @@ pub fn cases() -> Result<Vec<Case>> {
     Ok(cases)
 }
 
-/// Rain, a veil, and the sun that comes out.
+/// Rain, a veil, and sunlight that changes.
 fn weather() -> Result<Vec<Case>> {
-    let drops = |each, photons| Stray::Drops {
+    let drops = |each, photons| StrayLight::Drops {
         each,
         photons,
         before: RAIN_ENDS,
@@ -150,10 +148,10 @@ fn weather() -> Result<Vec<Case>> {
     let two = "The histogram is that of two surfaces";
     let wide =
         "The histogram is that of a wide target before another one. No test of the width is built";
-    // A net or a curtain is 20 bins before the surface, and smoke begins there. Neither is what
-    // is looked for: their events are false.
+    // A net or a curtain is 20 bins in front of the surface, and smoke begins there. Neither is a
+    // target: their events are false.
     let veil = PLACE - 20.0;
-    let smoke = Stray::Smoke {
+    let smoke = StrayLight::Smoke {
         photons: 2.0 * SIGNAL,
         from: veil,
         decay: 10.0,
@@ -185,26 +183,27 @@ fn weather() -> Result<Vec<Case>> {
     ])
 }
 
-/// Another LiDAR of twice the signal. Clocks of one kind differ by some 20 parts in a million,
-/// 0.008 bins a laser cycle; other rates by any number, here 1 %.
+/// Another LiDAR with twice the signal. Clocks of the same rate differ by some 20 ppm, 0.008 bins a
+/// laser cycle. Different rates may differ by any amount, here 1 %.
 fn others() -> Vec<Case> {
     let photons = 2.0 * SIGNAL;
     let dither = "a random time from pulse to pulse: see the row with one";
     vec![
         Case::new("another LiDAR, clock 20 ppm off")
-            .with_stray(Stray::Laser {
+            .with_stray(StrayLight::Laser {
                 photons,
                 step: 0.008,
             })
             .advised(dither)
             .silent_as("The histogram is that of a target where the other pulse stays"),
-        Case::new("another LiDAR, rate 1 % off").with_stray(Stray::Laser { photons, step: 4.0 }),
+        Case::new("another LiDAR, rate 1 % off")
+            .with_stray(StrayLight::Laser { photons, step: 4.0 }),
         Case::new("another LiDAR, own pulses at random times")
-            .with_stray(Stray::Dithered { photons }),
+            .with_stray(StrayLight::Dithered { photons }),
     ]
 }
 
-/// Scenes in which photons hide each other.
+/// Scenes with pile-up: photons that hide later ones.
 fn pile_up() -> Vec<Case> {
     let one_hit = Effects {
         tdc: Some(Tdc { hits_per_cycle: 1 }),

@@ -1,5 +1,5 @@
-//! What the study of failures comes to: for every case and method a verdict, and
-//! whether flags tell the wrong events.
+//! The results of the study of failures: for every case and method a verdict, and whether wrong
+//! events are flagged.
 
 use anyhow::Result;
 
@@ -9,22 +9,20 @@ use crate::studies::scenes::one_pixel::PER_BIN;
 use crate::sweep::mean::Measured;
 use crate::sweep::{Part, PointTally};
 
-/// How a method does in a case.
+/// The verdict on a method in a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Verdict {
-    /// False alarms surely below 2 %, most exposures bring an event, and the error
-    /// is less than twice that of the plain scene. Without a target: no more than one
-    /// false alarm in 100 exposures.
+    /// False alarms significantly below 2 %, an event in most exposures, and an error of less than
+    /// twice that of the plain scene. Without a target: at most one false alarm in 100 exposures.
     Survives,
-    /// Neither of the others.
+    /// Neither survives nor fails.
     Degrades,
-    /// A tenth of the events or more is false, or half of the exposures or more are
-    /// without one.
+    /// At least a tenth of the events is false, or at least half of the exposures have no event.
     Fails,
 }
 
 impl Verdict {
-    /// As a table shows it.
+    /// Its name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -35,21 +33,21 @@ impl Verdict {
     }
 }
 
-/// Whether wrong events have a flag. Wrong are false alarms; and all, if the error is
-/// surely twice that of the plain scene or more.
+/// Whether wrong events are flagged. Wrong events are false alarms, or all events if the error is
+/// significantly at least twice that of the plain scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Warning {
-    /// It is not sure that there are more wrong events than one in 100 exposures, which
-    /// any threshold lets through.
+    /// Wrong events are not significantly above one in 100 exposures, which any threshold lets
+    /// through.
     NotNeeded,
-    /// There are, but not without a flag.
+    /// There are wrong events, and they are flagged.
     Flagged,
-    /// There are without a flag.
+    /// There are wrong events without a flag.
     Silent,
 }
 
 impl Warning {
-    /// As a table shows it.
+    /// Its name in tables.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -59,8 +57,8 @@ impl Warning {
         }
     }
 
-    /// Of so many wrong events of all `events`, in so many exposures. Where few exposures
-    /// bring an event it takes few to be wrong: more than a tenth of them, for sure.
+    /// Of `wrong` events, `flagged` have a flag. There are too many if they significantly exceed 1
+    /// % of the `exposures` or 10 % of the `events`.
     fn new(wrong: u64, flagged: u64, events: u64, exposures: u64) -> Self {
         let are_many = |wrong| {
             Measured::share(wrong, exposures).interval.0 > 0.01
@@ -79,42 +77,40 @@ impl Warning {
 /// A method in a case.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// What decides, and finds the depth.
+    /// The rule and the depth estimator.
     pub method: Method,
-    /// How many.
+    /// Number of events.
     pub events: u64,
-    /// False alarms an event, none without an event; without a target, false alarms an
-    /// exposure.
+    /// False alarms per event, `None` without events; without a target, false alarms per exposure.
     pub false_share: Option<Measured>,
-    /// Exposures without an event.
+    /// The share of exposures without an event.
     pub without: Measured,
-    /// Mean laser cycles of the exposure of an event; 0 if there are none.
+    /// Mean laser cycles of the exposures with an event; 0 without events.
     pub cycles: f64,
-    /// Root mean square error of the events that are not false, in bins; 0 if there
-    /// are none.
+    /// Root mean square error of the events that are not false, in bins; 0 without such events.
     pub error: f64,
-    /// Their mean error: below 0 if events are too near.
+    /// Their mean error in bins, negative if events are too near.
     pub mean_error: f64,
-    /// Whether the error is, for sure, twice that of the plain scene or more.
+    /// Whether the error is significantly at least twice that of the plain scene.
     pub is_far_off: bool,
-    /// Events whose peak counter was full, of all events.
+    /// The share of events with a full peak counter.
     pub saturated: f64,
-    /// Events whose window reached past the gate.
+    /// The share of events whose window reached past the gate.
     pub clipped: f64,
-    /// Events whose TDC took a hit in more than half of the laser cycles.
+    /// The share of events whose TDC took a hit in more than half of the laser cycles.
     pub piled_up: f64,
-    /// Events of another surface than the first.
+    /// The share of events from a surface other than the first.
     pub other_surface: f64,
-    /// How it does.
+    /// The verdict.
     pub verdict: Verdict,
-    /// Whether flags tell what is wrong.
+    /// Whether wrong events are flagged.
     pub warning: Warning,
 }
 
-/// Every method in every case.
+/// The outcomes of every method in every case.
 ///
 /// # Errors
-/// If `part` is not of this study.
+/// Fails if `part` is of another study.
 pub fn outcomes(part: &Part) -> Result<Vec<(Case, Vec<Outcome>)>> {
     let plain = part.one([("case", 0.0)])?;
     let of = |(case, point): (Case, &PointTally)| {
@@ -161,7 +157,7 @@ fn outcome(case: &Case, point: &PointTally, plain: &PointTally, method: Method) 
     let warning = if is_far_off {
         Warning::new(events, flagged, events, exposures)
     } else {
-        // Without a target every event is false, and how many there are is asked alone.
+        // Without a target every event is false; only their number matters.
         let of_events = if has_target { events } else { 0 };
         Warning::new(false_events, count("false flagged"), of_events, exposures)
     };

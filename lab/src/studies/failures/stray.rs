@@ -1,65 +1,65 @@
-//! Light that is neither the target's nor even: rain, smoke, another LiDAR.
+//! Stray light that is neither the target nor uniform background: rain, smoke, another LiDAR.
 
 use super::{BINS, PERIOD, SIGMA};
 use anyhow::Result;
 use rand_distr::{Distribution, Exp, Normal, Poisson, Uniform};
 use rand_pcg::Pcg64;
 
-/// What it comes from.
+/// The source of stray light.
 #[derive(Clone, Copy, Debug)]
-pub enum Stray {
-    /// Raindrops close by: seldom is one in the beam, and then it is bright. It crosses the beam
-    /// in a millisecond, so a laser of some kHz meets it once.
+pub enum StrayLight {
+    /// Raindrops close by: rarely in the beam, but bright. A drop crosses the beam in a
+    /// millisecond, so a laser of some kHz hits it once.
     Drops {
-        /// Laser cycles from one to the next, on average.
+        /// Mean laser cycles between two drops.
         each: f64,
         /// Photons of a drop.
         photons: f64,
-        /// Where they end, in bins. They lie evenly before that.
+        /// Drops lie evenly before this position, in bins.
         before: f64,
     },
-    /// Smoke or fog, which grows dim with its depth.
+    /// Smoke or fog, whose signal decays with depth.
     Smoke {
         /// Photons of a laser cycle.
         photons: f64,
-        /// Its first bin, and bins until it is 1/e as bright.
+        /// Its first bin, and the bins of a decay to 1/e.
         from: f64,
         decay: f64,
     },
-    /// Another LiDAR's pulses, from a random place of the period on: no clock keeps two together.
+    /// The pulses of another LiDAR, with a random phase and an unsynchronised clock.
     Laser {
         /// Photons of a pulse.
         photons: f64,
-        /// How many bins later its pulse comes in each laser cycle than in the one before.
+        /// Bins by which its pulse comes later in each laser cycle.
         step: f64,
     },
-    /// The same where the own laser pulses at random times: another place in each laser cycle.
+    /// The same with random times of the own laser pulses: a random position in each laser cycle.
     Dithered {
         /// Photons of a pulse.
         photons: f64,
     },
 }
 
-/// Its photons in an exposure.
+/// The stray photons of an exposure.
 pub struct StrayPhotons {
-    stray: Stray,
+    stray: StrayLight,
     rng: Pcg64,
-    /// Where the other laser's next pulse comes, in bins.
+    /// The position of the other laser's next pulse, in bins.
     place: f64,
 }
 
 impl StrayPhotons {
-    /// Of an exposure.
-    pub fn new(stray: Stray, mut rng: Pcg64) -> Result<Self> {
+    /// At the start of an exposure.
+    pub fn new(stray: StrayLight, mut rng: Pcg64) -> Result<Self> {
         let place = Uniform::new(0.0, PERIOD)?.sample(&mut rng);
         Ok(Self { stray, rng, place })
     }
 
-    /// Gives `photon` the TDC codes of the next laser cycle.
+    /// Calls `photon` with the TDC codes of the next laser cycle.
     pub fn next_cycle(&mut self, photon: impl FnMut(u16)) -> Result<()> {
         let rng = &mut self.rng;
         match self.stray {
-            Stray::Drops {
+            StrayLight::Drops {
                 each,
                 photons,
                 before,
@@ -69,7 +69,7 @@ impl StrayPhotons {
                     pulse(photons, place, rng, photon)?;
                 }
             }
-            Stray::Smoke {
+            StrayLight::Smoke {
                 photons,
                 from,
                 decay,
@@ -78,11 +78,11 @@ impl StrayPhotons {
                 let place = |rng: &mut Pcg64| width.sample(rng) + depth.sample(rng);
                 draw(photons, place, rng, photon)?;
             }
-            Stray::Laser { photons, step } => {
+            StrayLight::Laser { photons, step } => {
                 pulse(photons, self.place, rng, photon)?;
                 self.place = (self.place + step).rem_euclid(PERIOD);
             }
-            Stray::Dithered { photons } => {
+            StrayLight::Dithered { photons } => {
                 let place = Uniform::new(0.0, PERIOD)?.sample(rng);
                 pulse(photons, place, rng, photon)?;
             }
@@ -91,13 +91,14 @@ impl StrayPhotons {
     }
 }
 
-/// A pulse as wide as the own.
+/// Draws a pulse as wide as that of the own laser.
 fn pulse(photons: f64, place: f64, rng: &mut Pcg64, photon: impl FnMut(u16)) -> Result<()> {
     let place = Normal::new(place, SIGMA)?;
     draw(photons, |rng| place.sample(rng), rng, photon)
 }
 
-/// A Poisson number of photons, each in a `place`, of which those in the histogram count.
+/// Draws a Poisson number of photons at positions from `place`; those outside the histogram are
+/// lost.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,

@@ -1,13 +1,15 @@
-//! How well a pulse is placed, against the Cramér-Rao bound.
+//! The error of a pulse's position, compared with the Cramér-Rao bound.
 
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results, ends};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{U4F12, U8F8, U24F8};
+use dtof_core::paper::quadrant_background;
+use dtof_core::rule::{ExcludedBins, background_from_count};
 use dtof_core::{
     BinPosition, Count, Count10, DepthEstimator, DetectionRule, Histogram, Peak, RangeGate,
-    SubBinOffset, WindowRule, quadrant_background, whole_background,
+    SubBinOffset, WindowRule,
 };
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{self, Pen};
@@ -26,10 +28,10 @@ pub const SIGMAS: [f64; 7] = [0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5];
 pub const SIGNALS: [f64; 4] = [30.0, 60.0, 100.0, 200.0];
 /// Background counts a bin.
 pub const BACKGROUNDS: [f64; 4] = [0.5, 1.0, 2.0, 5.0];
-/// Positions of a trial, evenly over a bin.
+/// Positions of a trial, evenly spread over a bin.
 const POSITIONS: u32 = 64;
 
-/// The estimators of the core over the width of the pulse.
+/// The estimators of the core by the width of the pulse.
 pub const STUDY: Study = Study {
     name: "depth-error",
     about: "depth error against the Cramér-Rao bound, by pulse, signal and background",
@@ -41,23 +43,23 @@ pub const STUDY: Study = Study {
     results,
 };
 
-/// How a depth is found.
+/// A depth estimator.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Method {
+pub enum Estimator {
     /// The middle of the highest bin.
     HighestBin,
-    /// The paper's: centroid of three bins less the quadrant background.
+    /// The paper's: centroid of three bins minus the quadrant background.
     Paper,
-    /// The same less the mean of the bins outside a window.
+    /// The centroid of three bins minus the mean of the bins outside a window.
     CentreOfMass3,
     /// The centred window for a pulse of this standard deviation, in bins.
     CentredWindow(f64),
-    /// The centred window for the pulse there is.
+    /// The centred window for the actual pulse.
     OwnWindow,
 }
 
-impl Method {
-    /// All, and their names in tallies.
+impl Estimator {
+    /// All estimators, with their names in tallies.
     pub const ALL: [(Self, &str); 7] = [
         (Self::HighestBin, "highest"),
         (Self::Paper, "paper"),
@@ -68,7 +70,7 @@ impl Method {
         (Self::OwnWindow, "centred"),
     ];
 
-    /// What it looks like in a chart.
+    /// Its pen in a chart.
     #[must_use]
     pub fn pen(self) -> Pen {
         match self {
@@ -94,7 +96,7 @@ impl Method {
         }
     }
 
-    /// Where the pulse, whose standard deviation is `sigma`, lies.
+    /// The estimated position of a pulse of standard deviation `sigma`.
     fn position(self, histogram: &Histogram<BINS>, peak: Peak, sigma: f64) -> BinPosition {
         let gate = RangeGate::full();
         let centred = |sigma| DepthEstimator::for_pulse(U8F8::saturating_from_num::<f64>(sigma));
@@ -103,7 +105,7 @@ impl Method {
             Self::HighestBin => return BinPosition::of(peak.bin, SubBinOffset::CENTRE),
             Self::Paper => {
                 let background = quadrant_background(histogram.counts(), &gate, peak.bin);
-                (DepthEstimator::Centroid3, whole_background(background))
+                (DepthEstimator::Centroid3, background_from_count(background))
             }
             Self::CentreOfMass3 => (DepthEstimator::Centroid3, mean),
             Self::CentredWindow(for_sigma) => (centred(for_sigma), mean),
@@ -114,11 +116,12 @@ impl Method {
     }
 }
 
-/// As a window rule of five bins has it.
+/// The background of a window rule of five bins.
 fn mean_background(histogram: &Histogram<BINS>, peak: Peak) -> U24F8 {
-    // Any excess is a detection: only the background is wanted.
+    // Any excess is a detection: only the background is used.
     let rule = WindowRule::new(5, U4F12::ZERO, Count::default());
-    let background = rule.map(|rule| rule.detect(histogram, &RangeGate::full(), peak));
+    let background =
+        rule.map(|rule| rule.detect(histogram, &RangeGate::full(), peak, &ExcludedBins::NONE));
     background.ok().flatten().unwrap_or_default()
 }
 
@@ -140,7 +143,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let steps = 256 / POSITIONS;
     let mut tally = Tally::new();
     for index in 0..POSITIONS {
-        // In 1/256 bins, as the core counts.
+        // In 1/256 bin, as in the core.
         let place = (64 << 8) + index * steps + rng.next_u32() % steps;
         let rates = Rates {
             background: point["background"],
@@ -162,8 +165,8 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             count("elsewhere", 1);
             continue;
         }
-        for (method, name) in Method::ALL {
-            let position = method.position(&histogram, peak, sigma).raw();
+        for (estimator, name) in Estimator::ALL {
+            let position = estimator.position(&histogram, peak, sigma).raw();
             let square = u64::from(position.abs_diff(place.cast_signed())).pow(2);
             count(name, square);
             count(&format!("{name} fourths"), square.pow(2));
@@ -172,8 +175,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// Root mean square error of a method at a point, in bins, over the smallest
-/// possible.
+/// Ratio of the root mean square error of an estimator to the bound, at a point.
 #[must_use]
 pub fn over_bound(point: &PointTally, name: &str) -> Measured {
     let near = point.count("histograms") - point.count("elsewhere");
@@ -188,11 +190,11 @@ pub fn over_bound(point: &PointTally, name: &str) -> Measured {
     error.times(1.0 / 256.0 / bound.position_error())
 }
 
-/// Where most peaks lie outside the pulse, which are left out of its error, and their
-/// share.
+/// The point with the largest share of peaks outside the pulse, and that share. Such peaks are left
+/// out of the error.
 ///
 /// # Errors
-/// If there is no point.
+/// Fails if there is no point.
 pub fn elsewhere(part: &Part) -> Result<(&PointTally, f64)> {
     let shares = part.points().iter().map(|point| {
         let share = point.share("elsewhere", "histograms");
@@ -203,8 +205,7 @@ pub fn elsewhere(part: &Part) -> Result<(&PointTally, f64)> {
         .context("depth-error: no points")
 }
 
-/// Over all signals and backgrounds: the root mean square of [`over_bound`], and the
-/// least and the largest.
+/// Over all signals and backgrounds: the root mean square of [`over_bound`], and its range.
 fn summary(part: &Part, sigma: f64, name: &str) -> Measured {
     let ratios: Vec<f64> = part
         .at([("sigma", sigma)])
@@ -219,13 +220,13 @@ fn summary(part: &Part, sigma: f64, name: &str) -> Measured {
 
 fn results(part: &Part) -> Result<Results> {
     let bound = [SIGMAS[0], SIGMAS[SIGMAS.len() - 1]].map(|sigma| Dot::exact(sigma, 1.0));
-    let panels = Method::ALL.map(|(method, name)| {
+    let panels = Estimator::ALL.map(|(estimator, name)| {
         let dots = SIGMAS.map(|sigma| summary(part, sigma, name).at(sigma));
         Panel {
-            title: method.label(),
+            title: estimator.label(),
             series: vec![
                 Series::unnamed(palette::REFERENCE, Style::Dashed, bound.into()),
-                Series::unnamed(method.pen(), Style::JoinedDots, dots.into()),
+                Series::unnamed(estimator.pen(), Style::JoinedDots, dots.into()),
             ],
         }
     });
@@ -260,7 +261,7 @@ fn csv(part: &Part) -> Result<String> {
         let [sigma, signal, background] =
             ["sigma", "signal", "background"].map(|name| point.parameter(name));
         let elsewhere = point.share("elsewhere", "histograms").value;
-        for (_, name) in Method::ALL {
+        for (_, name) in Estimator::ALL {
             let error = over_bound(point, name).cells(3);
             writeln!(
                 csv,

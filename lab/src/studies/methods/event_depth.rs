@@ -1,13 +1,13 @@
-//! How well events are placed as they come: on the histograms that the rule has chosen.
+//! The depth error of events, on the histograms at which a rule fires.
 //!
-//! A rule stops as soon as a peak stands clear, so that the histogram of an event is not
-//! one of a fixed exposure: what was by chance high enough ended it.
+//! A rule ends the exposure as soon as a peak is high enough. So the histogram of an event differs
+//! from that of a fixed exposure: random excess counts ended it.
 
 mod outcome;
 mod pixel;
 
 use self::pixel::{Pixel, exposure};
-use crate::studies::methods::passage::Method;
+use crate::studies::methods::passage::Rule;
 use crate::studies::methods::time_to_detect::signal;
 use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::results::{Figure, Results};
@@ -23,20 +23,20 @@ use rand_core::Rng;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 
-pub use self::outcome::{Outcome, Placed, outcomes};
+pub use self::outcome::{DepthErrors, Outcome, outcomes};
 
 pub use crate::studies::methods::time_to_detect::{BACKGROUNDS, SIGMAS};
 
-/// The first looks, in laser cycles: when there may be few photons, and when most pulses
-/// have photons to spare. L1 is one less.
+/// The first looks, in laser cycles: early, with few photons, and late, with enough photons for
+/// most pulses. L1 is one less.
 pub const FIRST_LOOKS: [u32; 2] = [40, 400];
-/// The estimators, as tallies, tables and figures call them.
+/// The estimators: names in tallies, and in tables and figures.
 pub const ESTIMATORS: [(&str, &str); 2] =
     [("mass3", "centroid of 3"), ("centred", "centred window")];
-/// Exposures of a trial, the pulse in as many places, evenly over a bin.
+/// Exposures of a trial, with the pulse at positions evenly spread over a bin.
 const EXPOSURES: u32 = 64;
 
-/// The estimators on what the rules choose.
+/// The estimators on the events of the rules.
 pub const STUDY: Study = Study {
     name: "event-depth",
     about: "depth error of the events of a rule as they come, by pulse, background and estimator",
@@ -55,24 +55,24 @@ fn estimators(sigma: f64) -> [DepthEstimator; 2] {
 }
 
 /// The window rule that suits a pulse of `sigma` bins.
-fn suited(sigma: f64) -> Method {
-    Method::Window(WindowRule::width_for_pulse(U8F8::saturating_from_num(
+fn suited(sigma: f64) -> Rule {
+    Rule::Window(WindowRule::width_for_pulse(U8F8::saturating_from_num(
         sigma,
     )))
 }
 
-/// The paper's rule and the window's, at either first look.
+/// The paper's rule and the window rule, at both first looks.
 fn pixels(sigma: f64, background: f64) -> Result<Vec<Pixel>> {
     let mut pixels = Vec::new();
     for first in FIRST_LOOKS {
-        for method in [Method::Paper, suited(sigma)] {
-            pixels.push(Pixel::new(method, first, background)?);
+        for rule in [Rule::Paper, suited(sigma)] {
+            pixels.push(Pixel::new(rule, first, background)?);
         }
     }
     Ok(pixels)
 }
 
-/// Each scene with a target, and without to count false alarms.
+/// Each scene with a target, and without one to count false alarms.
 fn points() -> Vec<Point> {
     grid([
         ("sigma", &SIGMAS),
@@ -88,7 +88,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let steps = 256 / EXPOSURES;
     let mut tally = Tally::from([("exposures".to_owned(), EXPOSURES.into())]);
     for index in 0..EXPOSURES {
-        // In 1/256 bins, as the core counts.
+        // In 1/256 bin, as in the core.
         let place = (64 << 8) + index * steps + rng.next_u32() % steps;
         let rates = Rates {
             background,
@@ -115,7 +115,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             for (error, (estimator, _)) in errors.into_iter().zip(ESTIMATORS) {
                 add_error(&mut tally, &format!("{name} {estimator}"), error);
             }
-            // On the same event: surer than the two apart.
+            // On the same event: a paired difference is more precise.
             let [mass, centred] = errors.map(|error| error * error);
             add_value(&mut tally, &format!("{name} excess"), centred - mass);
         }
@@ -145,11 +145,11 @@ fn chart(outcomes: &[Outcome]) -> Chart {
     for (is_paper, rule) in [(true, "paper's rule"), (false, "window rule")] {
         for sigma in SIGMAS {
             let is_here = |outcome: &&Outcome| {
-                (outcome.method == Method::Paper) == is_paper && outcome.sigma == sigma
+                (outcome.rule == Rule::Paper) == is_paper && outcome.sigma == sigma
             };
             let series = pens.into_iter().enumerate().map(|(number, pen)| {
                 let dots = early().filter(is_here).map(|outcome| {
-                    let error = outcome.placed[number].error;
+                    let error = outcome.errors[number].error;
                     error.at(outcome.background)
                 });
                 Series::unnamed(pen, Style::JoinedDots, dots.collect())
@@ -165,8 +165,8 @@ fn chart(outcomes: &[Outcome]) -> Chart {
         .into_iter()
         .zip(pens)
         .map(|(text, pen)| Key::new(pen, Style::JoinedDots, text));
-    // The paper's rule chooses events with a centroid that the window betters.
-    let of_paper = || early().filter(|outcome| outcome.method == Method::Paper);
+    // Whether the window is better than the centroid for the events of the paper's rule.
+    let of_paper = || early().filter(|outcome| outcome.rule == Rule::Paper);
     let better = of_paper().filter(|outcome| outcome.better() == Some(1));
     let worse = of_paper().any(|outcome| outcome.better() == Some(0));
     Chart {
@@ -189,14 +189,14 @@ fn csv(outcomes: &[Outcome]) -> Result<String> {
     for outcome in outcomes {
         let better = outcome.better();
         for (index, (name, _)) in ESTIMATORS.into_iter().enumerate() {
-            let placed = outcome.placed[index];
+            let errors = outcome.errors[index];
             writeln!(
                 csv,
                 "{},{},{},{},{:.4},{:.4},{},{:.4},{:.4},{:.1},{:.1},{name},{},{},{:.3},{}",
                 outcome.first_look,
                 outcome.sigma,
                 outcome.background,
-                outcome.method.name(),
+                outcome.rule.name(),
                 outcome.threshold,
                 outcome.false_share.value,
                 outcome.events,
@@ -204,9 +204,9 @@ fn csv(outcomes: &[Outcome]) -> Result<String> {
                 outcome.in_pulse.value,
                 outcome.cycles,
                 outcome.signal,
-                placed.error.cells(4),
-                placed.bias.cells(4),
-                placed.over_bound.value,
+                errors.error.cells(4),
+                errors.bias.cells(4),
+                errors.over_bound.value,
                 match better {
                     Some(better) if better == index => "yes",
                     Some(_) => "no",

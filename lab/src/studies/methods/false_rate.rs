@@ -1,7 +1,7 @@
-//! How far one threshold holds: false alarms of an exposure when the background
-//! goes over orders of magnitude and the threshold stays.
+//! The false alarms of an exposure with a fixed threshold, over backgrounds of several orders of
+//! magnitude.
 
-use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Method, Passage, count_false};
+use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Passage, Rule, count_false};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid};
@@ -17,10 +17,10 @@ use std::fmt::Write as _;
 /// Mean background counts a bin at the first look, after 40 laser cycles; 25 times
 /// as many after 1000.
 const BACKGROUNDS: [f64; 9] = [0.4, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0];
-/// False alarms an exposure that are wanted, and the figures' names.
-const WANTED: [(f64, &str); 2] = [(0.01, "false-rate"), (0.001, "false-rate-low")];
-/// Exposures of a trial at each background to set the threshold by, and others to count
-/// its false alarms.
+/// Required false alarms per exposure, and the names of the figures.
+const TARGETS: [(f64, &str); 2] = [(0.01, "false-rate"), (0.001, "false-rate-low")];
+/// Exposures of a trial at each background: to calibrate the threshold, and to count its false
+/// alarms.
 const CALIBRATED: u64 = 20;
 const TESTED: u64 = 50;
 
@@ -40,14 +40,14 @@ fn points() -> Vec<Point> {
     grid([("first_mean", &BACKGROUNDS), ("tested", &[0.0, 1.0])])
 }
 
-/// So fine that two neighbours differ by a third in their false alarms.
+/// Neighbours differ by a third in their false alarms.
 fn ladders() -> Vec<Ladder> {
-    let ladder = |method| match method {
-        Method::Paper => Ladder::new(method, 16, 64, 8),
-        Method::Average => Ladder::new(method, 28, 88, 8),
-        _ => Ladder::new(method, 56, 88, 16),
+    let ladder = |rule| match rule {
+        Rule::Paper => Ladder::new(rule, 16, 64, 8),
+        Rule::Average => Ladder::new(rule, 28, 88, 8),
+        _ => Ladder::new(rule, 56, 88, 16),
     };
-    Method::RULES.map(ladder).to_vec()
+    Rule::RULES.map(ladder).to_vec()
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
@@ -65,38 +65,38 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 
 /// A rule with one threshold.
 struct Outcome {
-    method: Method,
+    rule: Rule,
     threshold: f64,
-    /// False alarms an exposure at each background.
+    /// False alarms per exposure at each background.
     shares: Vec<(f64, Measured)>,
 }
 
 impl Outcome {
-    /// The threshold with `wanted` false alarms an exposure on average over the
-    /// backgrounds, and its false alarms in other exposures.
-    fn new(ladder: &Ladder, part: &Part, wanted: f64) -> Self {
+    /// The threshold with `requested` false alarms per exposure on average over the backgrounds, and
+    /// its false alarms in separate exposures.
+    fn new(ladder: &Ladder, part: &Part, requested: f64) -> Self {
         let calibrated: Vec<&PointTally> = part.at([("tested", 0.0)]).collect();
-        let index = ladder.nearest(ladder.calibrated(&calibrated, wanted));
+        let index = ladder.nearest(ladder.calibrated(&calibrated, requested));
         let key = ladder.key(index, "false");
         let share = |point: &PointTally| {
             let share = point.share(&key, "exposures");
             (point.parameter("first_mean"), share)
         };
         Self {
-            method: ladder.method,
+            rule: ladder.rule,
             threshold: ladder.thresholds[index],
             shares: part.at([("tested", 1.0)]).map(share).collect(),
         }
     }
 
-    /// The largest factor between a share and `wanted`, up or down. Where there is no
-    /// false alarm at all, the one that is sure.
-    fn worst_factor(&self, wanted: f64) -> f64 {
-        let factor = |value: f64| (value / wanted).max(wanted / value);
+    /// The largest factor between a share and `requested`, up or down. If a background has no false
+    /// alarm, the closest ends of the intervals count instead: the factor is at least that.
+    fn worst_factor(&self, requested: f64) -> f64 {
+        let factor = |value: f64| (value / requested).max(requested / value);
         let factors = self.shares.iter().map(|(_, share)| {
             if !self.has_none() {
                 factor(share.value)
-            } else if share.holds(wanted) {
+            } else if share.contains(requested) {
                 1.0
             } else {
                 factor(share.interval.0).min(factor(share.interval.1))
@@ -105,14 +105,14 @@ impl Outcome {
         factors.fold(1.0, f64::max)
     }
 
-    /// Whether a background brought no false alarm.
+    /// Whether a background had no false alarm.
     fn has_none(&self) -> bool {
         self.shares.iter().any(|(_, share)| share.value == 0.0)
     }
 
-    /// A panel with what is `wanted`.
-    fn panel(&self, wanted: f64) -> Panel {
-        let symbol = if matches!(self.method, Method::Paper | Method::Average) {
+    /// A panel with a line at `requested`.
+    fn panel(&self, requested: f64) -> Panel {
+        let symbol = if matches!(self.rule, Rule::Paper | Rule::Average) {
             "α"
         } else {
             "z"
@@ -120,12 +120,12 @@ impl Outcome {
         let dots = self.shares.iter();
         let dots = dots.map(|(background, share)| share.at(*background));
         let ends = [BACKGROUNDS[0], BACKGROUNDS[BACKGROUNDS.len() - 1]];
-        let line = ends.map(|background| Dot::exact(background, wanted));
+        let line = ends.map(|background| Dot::exact(background, requested));
         Panel {
-            title: format!("{}, {symbol} {:.2}", self.method.short(), self.threshold),
+            title: format!("{}, {symbol} {:.2}", self.rule.short(), self.threshold),
             series: vec![
                 Series::unnamed(REFERENCE, Style::Dashed, line.into()),
-                Series::unnamed(self.method.pen(), Style::JoinedDots, dots.collect()),
+                Series::unnamed(self.rule.pen(), Style::JoinedDots, dots.collect()),
             ],
         }
     }
@@ -136,24 +136,29 @@ fn results(part: &Part) -> Result<Results> {
     let mut csv = "wanted,method,threshold,first_mean,share,low,high\n".to_owned();
     let exposures =
         |tested| anyhow::Ok(grouped(part.one([("tested", tested)])?.count("exposures")));
-    for (wanted, name) in WANTED {
+    for (requested, name) in TARGETS {
         let outcomes: Vec<Outcome> = ladders()
             .iter()
-            .map(|ladder| Outcome::new(ladder, part, wanted))
+            .map(|ladder| Outcome::new(ladder, part, requested))
             .collect();
         for outcome in &outcomes {
             for (background, share) in &outcome.shares {
-                let (method, threshold) = (outcome.method.name(), outcome.threshold);
+                let (rule, threshold) = (outcome.rule.name(), outcome.threshold);
                 let share = share.cells(6);
-                writeln!(csv, "{wanted},{method},{threshold:.3},{background},{share}")?;
+                writeln!(
+                    csv,
+                    "{requested},{rule},{threshold:.3},{background},{share}"
+                )?;
             }
         }
-        let percent = wanted * 100.0;
+        let percent = requested * 100.0;
         // The paper's is the first of the rules.
         // The paper's rule with the quadrants and with the average, then the windows.
         let (papers, windows) = outcomes.split_at(2);
         let worst = |outcomes: &[Outcome]| {
-            let factors = outcomes.iter().map(|outcome| outcome.worst_factor(wanted));
+            let factors = outcomes
+                .iter()
+                .map(|outcome| outcome.worst_factor(requested));
             factors.fold(1.0, f64::max)
         };
         let [quadrants, average] = [0, 1].map(|at| {
@@ -176,7 +181,7 @@ fn results(part: &Part) -> Result<Results> {
             x: Axis::logarithmic("background counts a bin at the first look"),
             y: Axis::logarithmic("exposures with a false alarm, %")
                 .percent()
-                .within(wanted / 1000.0, wanted * 10.0),
+                .within(requested / 1000.0, requested * 10.0),
             key: vec![Key::new(
                 REFERENCE,
                 Style::Dashed,
@@ -185,7 +190,7 @@ fn results(part: &Part) -> Result<Results> {
             columns: 3,
             panels: outcomes
                 .iter()
-                .map(|outcome| outcome.panel(wanted))
+                .map(|outcome| outcome.panel(requested))
                 .collect(),
         };
         figures.push(Figure::new(name, &chart)?);

@@ -1,12 +1,13 @@
-//! When a rule fires for the first time, for many thresholds at once: the rules of
-//! the core, and the likelihood ratio they are measured against.
+//! First-passage times for many thresholds at once: the rules of the core, and the likelihood ratio
+//! as their reference.
 
 mod ladder;
-mod method;
+mod rule;
 
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result};
+use dtof_core::rule::ExcludedBins;
 use dtof_core::{AnyRule, Count16, DetectionRule, Histogram, Peak, RangeGate};
 use rand_pcg::Pcg64;
 
@@ -15,7 +16,7 @@ use dtof_theory::bounds::likelihood_ratio::{Evidence, LikelihoodRatio};
 use dtof_theory::looks::exposure::{Exposures, Looks};
 
 pub use self::ladder::Ladder;
-pub use self::method::Method;
+pub use self::rule::Rule;
 
 /// Bins of the histograms.
 pub const BINS: usize = 128;
@@ -28,44 +29,44 @@ pub const LOOKS: Looks = Looks {
 /// The fewest photons of an event, in the peak or in the window.
 pub const MINIMUM_COUNT: u32 = 5;
 
-/// The decisions of one exposure.
-enum Decisions<'a> {
+/// A detector at all its thresholds, during one exposure.
+enum Detector<'a> {
     Rules(Vec<AnyRule>),
     Oracle(Vec<f64>, Evidence<'a>),
 }
 
-impl<'a> Decisions<'a> {
+impl<'a> Detector<'a> {
     fn new(ladder: &Ladder, oracle: Option<&'a LikelihoodRatio>) -> Result<Self> {
-        if ladder.method == Method::Oracle {
+        if ladder.rule == Rule::Oracle {
             let scene = oracle.context("no scene for the likelihood ratio")?;
             return Ok(Self::Oracle(ladder.thresholds.clone(), scene.evidence()));
         }
         let thresholds = ladder.thresholds.iter();
-        let rules = thresholds.map(|&threshold| ladder.method.rule(threshold, MINIMUM_COUNT));
+        let rules =
+            thresholds.map(|&threshold| ladder.rule.with_threshold(threshold, MINIMUM_COUNT));
         Ok(Self::Rules(rules.collect::<Result<_>>()?))
     }
 }
 
-/// How many laser cycles each threshold of each ladder took to fire, in simulated
-/// exposures.
+/// Simulates exposures and finds when each threshold of each ladder fires first.
 pub struct Passage<'a> {
     ladders: &'a [Ladder],
     exposures: Exposures,
     oracle: Option<&'a LikelihoodRatio>,
-    rules: Vec<Decisions<'a>>,
+    rules: Vec<Detector<'a>>,
 }
 
 impl<'a> Passage<'a> {
-    /// Of these ladders; `oracle` is needed if one is [`Method::Oracle`].
+    /// For `ladders`; `oracle` is required if one of them has [`Rule::Oracle`].
     ///
     /// # Errors
-    /// If a rule or the oracle is not possible.
+    /// Fails if a threshold is out of range or the oracle is missing.
     pub fn new(
         ladders: &'a [Ladder],
         exposures: Exposures,
         oracle: Option<&'a LikelihoodRatio>,
     ) -> Result<Self> {
-        let rules = ladders.iter().map(|ladder| Decisions::new(ladder, oracle));
+        let rules = ladders.iter().map(|ladder| Detector::new(ladder, oracle));
         Ok(Self {
             ladders,
             exposures,
@@ -74,13 +75,14 @@ impl<'a> Passage<'a> {
         })
     }
 
-    /// One exposure: for each ladder the laser cycles of the thresholds that fired,
-    /// from the lowest; fewer than there are thresholds if it expired first.
+    /// Simulates one exposure. For each ladder: the laser cycles at which the thresholds fired,
+    /// from the lowest threshold on. Thresholds that had not fired when the exposure expired are
+    /// missing.
     pub fn run(&mut self, rng: &mut Pcg64) -> Vec<Vec<u32>> {
         let mut passed = vec![Vec::new(); self.ladders.len()];
         let mut histogram = Histogram::<BINS, Count16>::new();
         for rules in &mut self.rules {
-            if let (Decisions::Oracle(_, evidence), Some(scene)) = (rules, self.oracle) {
+            if let (Detector::Oracle(_, evidence), Some(scene)) = (rules, self.oracle) {
                 *evidence = scene.evidence();
             }
         }
@@ -93,8 +95,8 @@ impl<'a> Passage<'a> {
             let mut all = true;
             for ((rules, passed), ladder) in rules.iter_mut().zip(&mut passed).zip(ladders) {
                 match rules {
-                    Decisions::Rules(rules) => climb(rules, &histogram, peak, cycles, passed),
-                    Decisions::Oracle(thresholds, evidence) => {
+                    Detector::Rules(rules) => climb(rules, &histogram, peak, cycles, passed),
+                    Detector::Oracle(thresholds, evidence) => {
                         for (bin, &photons) in (0..).zip(frame) {
                             if photons > 0 {
                                 evidence.add(bin, photons);
@@ -113,8 +115,8 @@ impl<'a> Passage<'a> {
     }
 }
 
-/// Notes the rules that fire for the first time. One that fires lets no lower
-/// threshold wait, so that only the next has to be asked.
+/// Adds the rules that fire for the first time. A rule that fires implies all lower thresholds, so
+/// only the next threshold is checked.
 fn climb(
     rules: &[AnyRule],
     histogram: &Histogram<BINS, Count16>,
@@ -123,16 +125,16 @@ fn climb(
     passed: &mut Vec<u32>,
 ) {
     while let Some(rule) = rules.get(passed.len())
-        && rule.detect(histogram, &RangeGate::full(), peak).is_some()
+        && rule
+            .detect(histogram, &RangeGate::full(), peak, &ExcludedBins::NONE)
+            .is_some()
     {
         passed.push(cycles);
     }
 }
 
-/// Target-free exposures: how many fired at each threshold, as `"false"`.
-///
-/// # Errors
-/// If a rate is not possible.
+/// Simulates exposures without a target and counts those that fired at each threshold, as
+/// `"false"`.
 pub fn count_false(passage: &mut Passage, exposures: u64, rng: &mut Pcg64) -> Tally {
     let mut fired: Vec<Vec<u64>> = passage
         .ladders
@@ -175,28 +177,28 @@ pub(crate) mod tests {
         Exposures::new(&rates, 128, LOOKS).unwrap()
     }
 
-    /// What a pixel reports first, if it does.
+    /// The first event of a pixel, if it has one.
     pub(crate) fn event<W: CounterWidth>(
         config: &PixelConfig<BINS, AnyRule>,
         frames: &[(u32, [u16; BINS])],
     ) -> Option<DepthEvent> {
-        let mut pixel = AsyncPixel::<BINS, W>::new(PixelAddress(0));
+        let mut pixel = AsyncPixel::<BINS, W>::new(PixelAddress::new(0));
         let mut before = 0;
         frames.iter().find_map(|(cycles, frame)| {
             pixel.count_frame(config, frame);
             let passed = u16::try_from(cycles - before).unwrap();
             before = *cycles;
-            let last = LaserCycle(before.into());
+            let last = LaserCycle::new(before.into());
             let _ = pixel.end_laser_cycles(config, &mut Statistics::new(), last, passed);
-            pixel.acknowledge()
+            pixel.take_event()
         })
     }
 
     #[test]
     fn thresholds_fire_when_a_pixel_reports() {
         let ladders = [
-            Ladder::new(Method::Paper, 8, 24, 4),
-            Ladder::new(Method::Window(3), 12, 24, 4),
+            Ladder::new(Rule::Paper, 8, 24, 4),
+            Ladder::new(Rule::Window(3), 12, 24, 4),
         ];
         let mut fired = 0;
         for seed in 0..20 {
@@ -212,7 +214,10 @@ pub(crate) mod tests {
             assert_eq!(frames.len(), 240);
             for (ladder, passed) in ladders.iter().zip(&passed) {
                 for (index, &threshold) in ladder.thresholds.iter().enumerate() {
-                    let rule = ladder.method.rule(threshold, MINIMUM_COUNT).unwrap();
+                    let rule = ladder
+                        .rule
+                        .with_threshold(threshold, MINIMUM_COUNT)
+                        .unwrap();
                     let config = PixelConfig::with_rule(rule).x(4).l1(39).l2(1000);
                     let event = event::<Count16>(&config.build().unwrap(), &frames);
                     let cycles = event.map(|event| event.exposure.into());

@@ -1,9 +1,10 @@
-//! How fast a pulse is found, against whoever knows everything but where it lies.
+//! How fast a pulse is detected, compared with a likelihood ratio test that knows everything except
+//! the position.
 
 mod time;
 
 use self::time::time;
-use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Method, Passage, count_false};
+use crate::studies::methods::passage::{BINS, LOOKS, Ladder, Passage, Rule, count_false};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, point};
@@ -18,7 +19,7 @@ use std::fmt::Write as _;
 
 /// Standard deviations of the pulse in bins.
 pub const SIGMAS: [f64; 3] = [0.5, 1.0, 1.5];
-/// The figure of each.
+/// The figure of each pulse.
 const FIGURES: [&str; 3] = [
     "time-to-detect-0.5",
     "time-to-detect-1.0",
@@ -26,17 +27,17 @@ const FIGURES: [&str; 3] = [
 ];
 /// Background photons a bin and laser cycle.
 pub const BACKGROUNDS: [f64; 3] = [0.01, 0.05, 0.2];
-/// Where in its bin the pulse lies, and what that is called.
+/// Positions of the pulse within its bin, and their names.
 pub const PLACES: [(f64, &str); 2] = [(0.5, "centred"), (0.0, "on an edge")];
-/// False alarms an exposure at which methods are compared.
+/// False alarms per exposure at which rules are compared.
 pub const FALSE_SHARE: f64 = 0.01;
-/// The signal is such that this many nats take 200 laser cycles, wherever the
-/// background: the likelihood ratio needs 100 to 300.
+/// Nats a laser cycle: determines the signal for each background. The likelihood ratio needs 100 to
+/// 300 laser cycles.
 const INFORMATION: f64 = 9.0 / 200.0;
 /// Exposures of a trial.
 const EXPOSURES: u64 = 50;
 
-/// Against the likelihood ratio, at equal false alarms.
+/// Compared with the likelihood ratio, at equal rates of false alarms.
 pub const STUDY: Study = Study {
     name: "time-to-detect",
     about: "laser cycles to an event against the likelihood ratio, by pulse and background",
@@ -48,8 +49,8 @@ pub const STUDY: Study = Study {
     results,
 };
 
-/// Exposures without a target for each scene the likelihood ratio knows, and with
-/// one at each place.
+/// Exposures without a target for each scene known to the likelihood ratio, and with a target at
+/// each position.
 fn points() -> Vec<Point> {
     let mut points = Vec::new();
     for scene in grid([("sigma", &SIGMAS), ("background", &BACKGROUNDS)]) {
@@ -63,20 +64,20 @@ fn points() -> Vec<Point> {
     points
 }
 
-/// Thresholds about those at which the methods are compared.
+/// Thresholds around those of the comparison.
 fn ladders() -> Vec<Ladder> {
-    let rules = Method::RULES.map(|method| match method {
-        Method::Paper => Ladder::new(method, 12, 24, 4),
-        Method::Average => Ladder::new(method, 18, 36, 4),
-        _ => Ladder::new(method, 15, 19, 4),
+    let rules = Rule::RULES.map(|rule| match rule {
+        Rule::Paper => Ladder::new(rule, 12, 24, 4),
+        Rule::Average => Ladder::new(rule, 18, 36, 4),
+        _ => Ladder::new(rule, 15, 19, 4),
     });
     let mut ladders = rules.to_vec();
-    ladders.push(Ladder::new(Method::Oracle, 5, 11, 1));
+    ladders.push(Ladder::new(Rule::Oracle, 5, 11, 1));
     ladders
 }
 
-/// The same at every place, as the likelihood ratio does not know it: that of
-/// halfway from the middle of a bin to its edge.
+/// The signal, the same for every position: that for a pulse halfway between the middle of a bin
+/// and its edge.
 #[must_use]
 pub fn signal(sigma: f64, background: f64) -> f64 {
     signal_for_information(background, 0.25, sigma, INFORMATION)
@@ -118,31 +119,30 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// How a method does in a scene.
+/// The result of a rule in a scene.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
     /// Standard deviation of the pulse in bins.
     pub sigma: f64,
-    /// Where in its bin the pulse lies.
+    /// Position of the pulse within its bin.
     pub place: &'static str,
     /// Background photons a bin and laser cycle.
     pub background: f64,
-    /// What decides.
-    pub method: Method,
-    /// With a share of [`FALSE_SHARE`] of false alarms.
+    /// The rule.
+    pub rule: Rule,
+    /// The threshold for a share of [`FALSE_SHARE`] of false alarms.
     pub threshold: f64,
-    /// Mean laser cycles to an event; an exposure that expires is followed by
-    /// another. The interval is that of the times, of the share that expires and of
-    /// the threshold together.
+    /// Mean laser cycles to an event, over as many exposures as it takes. The interval includes the
+    /// uncertainty of the times, of the share of expired exposures, and of the threshold.
     pub cycles: Measured,
-    /// `cycles` over those of the likelihood ratio.
+    /// Ratio of `cycles` to those of the likelihood ratio.
     pub ratio: Measured,
 }
 
-/// Every method in every scene with a target.
+/// The outcomes of every rule in every scene with a target.
 ///
 /// # Errors
-/// If `part` is not of this study.
+/// Fails if `part` is of another study.
 pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
     let mut outcomes = Vec::new();
     for sigma in SIGMAS {
@@ -156,12 +156,12 @@ pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
                 ])?;
                 let first = outcomes.len();
                 for ladder in ladders() {
-                    let method = ladder.method;
-                    // What does not know the pulse has no use for its width.
+                    let rule = ladder.rule;
+                    // Without a target, the rules do not depend on the pulse: all widths count.
                     let without = [("background", background), ("target", 0.0)];
                     let all = part.at(without);
                     let is_known = |point: &&PointTally| {
-                        method != Method::Oracle || point.is_at([("sigma", sigma)])
+                        rule != Rule::Oracle || point.is_at([("sigma", sigma)])
                     };
                     let points: Vec<&PointTally> = all.filter(is_known).collect();
                     let (threshold, cycles) = time(&ladder, &points, with_target);
@@ -169,14 +169,14 @@ pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
                         sigma,
                         place,
                         background,
-                        method,
+                        rule,
                         threshold,
                         cycles,
                         ratio: cycles,
                     });
                 }
-                // The likelihood ratio is the last. It sees the same photons; that the
-                // two are alike makes their ratio surer than this says.
+                // The likelihood ratio is the last. It sees the same photons; this correlation
+                // makes the interval of the ratio conservative.
                 let oracle = outcomes.last().map(|oracle| oracle.cycles);
                 for outcome in &mut outcomes[first..] {
                     outcome.ratio = outcome.cycles.over(oracle.unwrap_or(outcome.cycles));
@@ -187,14 +187,14 @@ pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
     Ok(outcomes)
 }
 
-/// `sigma` is in whole tenths.
-fn is(outcome: &Outcome, sigma: f64, method: Method) -> bool {
-    (outcome.sigma - sigma).abs() < 0.01 && outcome.method == method
+/// Whether an outcome is of `rule` with `sigma`, in tenths.
+fn is(outcome: &Outcome, sigma: f64, rule: Rule) -> bool {
+    (outcome.sigma - sigma).abs() < 0.01 && outcome.rule == rule
 }
 
-/// The mean of the ratios of a method over backgrounds and places of a pulse.
-fn mean_ratio(outcomes: &[Outcome], sigma: f64, method: Method) -> f64 {
-    let ratios = outcomes.iter().filter(|outcome| is(outcome, sigma, method));
+/// The mean ratio of a rule over backgrounds and positions of a pulse.
+fn mean_ratio(outcomes: &[Outcome], sigma: f64, rule: Rule) -> f64 {
+    let ratios = outcomes.iter().filter(|outcome| is(outcome, sigma, rule));
     let ratios: Vec<f64> = ratios.map(|outcome| outcome.ratio.value).collect();
     ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
 }
@@ -204,17 +204,17 @@ fn results(part: &Part) -> Result<Results> {
     let mut figures = Vec::new();
     let exposures = part.one([("target", 1.0)])?.count("exposures");
     for (name, sigma) in FIGURES.into_iter().zip(SIGMAS) {
-        let means = Method::RULES.map(|method| (method, mean_ratio(&outcomes, sigma, method)));
+        let means = Rule::RULES.map(|rule| (rule, mean_ratio(&outcomes, sigma, rule)));
         let best = means.into_iter().min_by(|a, b| a.1.total_cmp(&b.1));
-        let best = best.unwrap_or((Method::Paper, f64::NAN));
+        let best = best.unwrap_or((Rule::Paper, f64::NAN));
         let panels = PLACES.map(|(_, place)| {
-            let series = Method::RULES.map(|method| {
+            let series = Rule::RULES.map(|rule| {
                 let those = outcomes
                     .iter()
-                    .filter(|outcome| is(outcome, sigma, method) && outcome.place == place);
+                    .filter(|outcome| is(outcome, sigma, rule) && outcome.place == place);
                 let dots = those.map(|outcome| outcome.ratio.at(outcome.background));
-                let name = method.short();
-                Series::named(name, method.pen(), Style::JoinedDots, dots.collect())
+                let name = rule.short();
+                Series::named(name, rule.pen(), Style::JoinedDots, dots.collect())
             });
             Panel {
                 title: format!("pulse {}", place.replace("centred", "centred in its bin")),
@@ -222,7 +222,7 @@ fn results(part: &Part) -> Result<Results> {
             }
         });
         let bins = match best.0 {
-            Method::Window(width) => width.to_string(),
+            Rule::Window(width) => width.to_string(),
             _ => String::new(),
         };
         let chart = Chart {
@@ -258,7 +258,7 @@ fn csv(outcomes: &[Outcome]) -> Result<String> {
             outcome.sigma,
             outcome.place,
             outcome.background,
-            outcome.method.name(),
+            outcome.rule.name(),
             outcome.threshold,
             outcome.cycles.value,
             outcome.ratio.cells(3)

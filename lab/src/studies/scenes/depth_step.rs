@@ -1,8 +1,8 @@
-//! How soon a pixel reports a surface that is suddenly there, and what it reports
-//! of an exposure that saw two.
+//! How soon a pixel reports a surface that appears suddenly, and what it reports for an exposure
+//! that saw two surfaces.
 //!
-//! With the FPGA's settings. The first is held against "reduces latency" (abstract). The
-//! second is a question of ours: the paper speaks of no step within an exposure.
+//! With the FPGA's settings. The first is compared with "reduces latency" (abstract). The second is
+//! our own question: the paper does not mention a step within an exposure.
 
 use super::mixed::{self, add_pair, excess, is_sharp, neither};
 use super::one_pixel::{
@@ -25,30 +25,29 @@ use rand_pcg::Pcg64;
 
 /// Steps of a trial.
 const STEPS: u64 = 10;
-/// Laser cycles after it in which it must be reported.
+/// Laser cycles after a step within which it must be reported.
 const AFTER: u64 = 6000;
-/// Laser cycles after it by which every exposure over it has ended: L2, the
-/// longest frame.
+/// Laser cycles after a step until every exposure across it has ended: L2, the longest frame.
 const OVER: u64 = 2000;
-/// A reading so near has noticed the new surface; others are false.
+/// The largest distance of a reading that counts as the new surface.
 const NOTICED: i64 = 3 * PER_BIN;
 /// The pulse of the figures, with jitter.
 const SIGMA: f64 = FPGA_SIGMAS[1];
-/// Signal photons a laser cycle of the verdict, and its step in bins.
+/// For the verdict: signal photons a laser cycle, and the step in bins.
 const SIGNAL: f64 = 0.5;
 const EDGE: f64 = 20.0;
-/// Bins of the steps.
+/// The steps, in bins.
 const STEPS_BINS: [f64; 3] = [2.0, 4.0, EDGE];
-/// The share of exposures that a figure is about.
+/// The share of blurred exposures in the title of a figure.
 const LITTLE: f64 = 0.05;
-/// A claim agrees if it holds in signals that lie this far apart.
+/// A claim agrees if it holds over a range of signals of this factor.
 const RANGE: f64 = 5.0;
-/// Of the brightest pixel and of the dimmest.
+/// Signal of the brightest and of the dimmest pixel.
 const BRIGHT: f64 = 2.0;
 const DIM: f64 = 0.05;
 const SIGNALS: [f64; 6] = [DIM, 0.1, 0.2, SIGNAL, 1.0, BRIGHT];
 
-/// Held against "reduces latency".
+/// Compared with "reduces latency".
 pub const STUDY: Study = Study {
     name: "depth-step",
     about: "laser cycles to notice a step in depth, and readings of both surfaces at once",
@@ -84,7 +83,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             position,
             sigma: point["sigma"],
         };
-        let photons = pixel_rng(rng.next_u64(), PixelAddress(0));
+        let photons = pixel_rng(rng.next_u64(), PixelAddress::new(0));
         let pixel = SimulatedPixel::new(&rates(old), CODES, photons)?;
         let readings =
             |later, cycles| watch_step(&pixel, &config, &rates(later), at, cycles, phases);
@@ -98,8 +97,8 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// When `readings` notice a step from `old` to `new` at the start of laser cycle
-/// `at`. One that is not noticed counts as [`AFTER`] laser cycles, and apart.
+/// Adds the time until `readings` show a step from `old` to `new` at the start of laser cycle `at`.
+/// A step that is not noticed counts as [`AFTER`] laser cycles, and separately.
 fn add_step(tally: &mut Tally, sensor: &str, readings: &[Reading], at: u64, [old, new]: [i64; 2]) {
     let off = |reading: &Reading, surface: i64| (reading.position - surface).abs();
     let later = readings.iter().filter(|reading| reading.last >= at);
@@ -151,7 +150,7 @@ fn results(part: &Part) -> Result<Results> {
         let mut sensors = SENSORS.into_iter();
         sensors.all(|sensor| excess(point, sensor).interval.1 < LITTLE)
     };
-    // Where a reading has enough photons to be right without the step.
+    // Signals with enough photons for right readings without a step.
     let bright = |point: &&PointTally| point.parameter("signal") >= SIGNAL;
     let mut nearest = part.at([("step", STEPS_BINS[0])]).filter(bright);
     let blur = Chart {
@@ -181,7 +180,7 @@ fn results(part: &Part) -> Result<Results> {
     })
 }
 
-/// What there are of `what` at every signal of a step, from dim to bright.
+/// The count `what` at every signal of a step, from dim to bright.
 fn at_signals(part: &Part, step: f64, what: &str) -> String {
     let counts = part
         .at([("sigma", SIGMA), ("step", step)])
@@ -195,7 +194,7 @@ fn latency_claim(part: &Part) -> Result<Claim> {
     let events = frames[0];
     let bright = part.one([("sigma", SIGMA), ("step", EDGE), ("signal", BRIGHT)])?;
     let dim = part.one([("sigma", SIGMA), ("step", EDGE), ("signal", DIM)])?;
-    // Than frames of L2, with either pulse, from which signal on.
+    // The signal from which events are faster than frames of L2, with both pulses.
     let is_faster = |signal: f64| {
         let mut points = part.at([("step", EDGE), ("signal", signal)]);
         points.all(|point| {

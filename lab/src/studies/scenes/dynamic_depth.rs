@@ -1,46 +1,47 @@
-//! Dynamic depth: how many events it takes away, which changes it reports, and how many
-//! that there were not (section III-E).
+//! Dynamic depth: how many events it removes, which changes it reports, and how many of them are
+//! false (section III-E).
 //!
-//! On the PC, which the paper shows it with, and a car before the FPGA beside it. The paper
-//! gives neither brightness, speed nor distances. All are ours, and the brightness varies.
+//! On the PC, as in the paper, and additionally a car in front of the FPGA. The paper gives neither
+//! brightness, speed nor distances. These are our choices, with several brightnesses.
 
 mod claims;
+mod observed_pixel;
 mod outcome;
 mod results;
-mod watched;
 
 use anyhow::Result;
+use dtof_core::events::{DynamicDepthConfig, Reference};
 use dtof_core::fixed::types::{I24F8, U24F8};
-use dtof_core::{DynamicDepthConfig, PixelAddress, RangeScale, Reference};
+use dtof_core::{PixelAddress, RangeScale};
 use rand_core::Rng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 
-use self::watched::{Watched, true_steps};
+use self::observed_pixel::{ObservedPixel, true_steps};
 use super::systems::{Background, FPGA_SIGMAS, L1, PC_SIGMA, System};
 use crate::sweep::mean::add;
 use crate::sweep::{Point, Study, Tally, grid, point};
 use dtof_engine::host::host_engine;
 use dtof_photons::source::PhotonSource;
-use dtof_simulate::scene::{Light, Scene, Shape};
+use dtof_simulate::scene::{Brightness, Scene, Shape};
 
 /// Laser cycles handled at a time.
 const SLICE: u16 = 250;
-/// Of a frame (L2).
+/// Laser cycles of a frame (L2).
 const FRAME: u64 = 2000;
 /// The paper's threshold: millimetres by which a mean has to change.
 const THRESHOLD_MM: u32 = 100;
-/// Signal photons a laser cycle from everything in the scene; the paper does not say.
+/// Signal photons a laser cycle of all surfaces; the paper gives none.
 const SIGNALS: [f64; 6] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0];
-/// That of the FPGA's car.
+/// The signal of the FPGA's car.
 const FPGA_SIGNAL: f64 = 0.5;
-/// The paper compares with the mean before.
+/// What a mean is compared with; in the paper, the previous mean.
 const REFERENCES: [(Reference, &str); 2] = [
     (Reference::Previous, "previous"),
     (Reference::Reported, "reported"),
 ];
 
-/// Held against the paper's dynamic depth.
+/// Compared with the paper's dynamic depth.
 pub const STUDY: Study = Study {
     name: "dynamic-depth",
     about: "which changes of depth dynamic depth reports, and how many events it takes away",
@@ -62,15 +63,14 @@ fn points() -> Vec<Point> {
     points
 }
 
-/// What of a scene is ours, as the paper does not say.
+/// The properties of a scene that the paper does not give.
 struct Run {
-    /// The car's speed: within the run it goes half a metre before the PC, a third before
-    /// the FPGA.
+    /// The car's speed: it moves half a metre in a run on the PC, a third on the FPGA.
     metres_per_second: f64,
     /// Two edges of a fan at 120 rpm on the PC.
     cycles: u64,
     sigma: f64,
-    /// Bins before the nearest surface: the window begins there.
+    /// Bins between the start of the window and the nearest surface.
     before: f64,
 }
 
@@ -93,7 +93,7 @@ fn run(point: &Point) -> Run {
     }
 }
 
-/// The scene of a point on 8×8 of the macropixels, everything `shift` bins farther away.
+/// The scene of a point on 8×8 macropixels, moved away by `shift` bins.
 fn scene(point: &Point, shift: f64, goes_away: bool) -> Result<Scene> {
     let text = if point["fan"] > 0.0 {
         include_str!("../../../../scenes/fan.toml")
@@ -107,7 +107,7 @@ fn scene(point: &Point, shift: f64, goes_away: bool) -> Result<Scene> {
     };
     let shift_mm = (run.before + shift) * scene.mm_per_bin();
     for surface in &mut scene.surfaces {
-        surface.light = Light::Signal(point["signal"]);
+        surface.light = Brightness::Signal(point["signal"]);
         if surface.velocity_m_per_s != 0.0 {
             surface.velocity_m_per_s = run.metres_per_second;
             if !goes_away {
@@ -139,8 +139,8 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let mut ways = Vec::new();
         for (reference, name) in REFERENCES {
             let config = DynamicDepthConfig::new(U24F8::from_num(THRESHOLD_MM), &scale, reference)?;
-            let watched = Watched::new(config, THRESHOLD_MM.into());
-            ways.push((name, vec![watched; addresses.len()]));
+            let pixel = ObservedPixel::new(config, THRESHOLD_MM.into());
+            ways.push((name, vec![pixel; addresses.len()]));
         }
         rules.push((
             background,
@@ -153,10 +153,10 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let slice = photons.next_slice(SLICE)?;
         for (_, engine, ways) in &mut rules {
             for event in engine.run(&slice)? {
-                let first = (event.cycle.0 + 1).saturating_sub(event.exposure.into());
+                let first = (event.cycle.raw() + 1).saturating_sub(event.exposure.into());
                 let truth =
-                    [first, event.cycle.0].map(|cycle| range_mm(&scene, event.pixel, cycle));
-                let pixel = usize::from(event.pixel.0);
+                    [first, event.cycle.raw()].map(|cycle| range_mm(&scene, event.pixel, cycle));
+                let pixel = usize::from(event.pixel.raw());
                 for (_, pixels) in ways.iter_mut() {
                     pixels[pixel].observe(&event, truth);
                 }
@@ -167,20 +167,20 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let all_steps = steps(&scene, address, cycles, f64::from(THRESHOLD_MM));
         let is_still = steps(&scene, address, cycles, 0.0).is_empty();
         let surface = if is_still { "still" } else { "moving" };
-        // A frame of a pixel with a photon is a reading.
+        // Every frame of a pixel with a photon is a reading.
         add(&mut tally, surface, "frames", cycles / FRAME);
         for (background, _, ways) in &rules {
             for (reference, pixels) in ways {
                 let name = name(*background, reference);
-                pixels[pixel].add_to(&mut tally, &name, &all_steps, cycles);
-                pixels[pixel].add_of(&mut tally, &format!("{name} {surface}"));
+                pixels[pixel].add_steps(&mut tally, &name, &all_steps, cycles);
+                pixels[pixel].add_counts(&mut tally, &format!("{name} {surface}"));
             }
         }
     }
     Ok(tally)
 }
 
-/// What a tally calls a background and reference.
+/// The name of a background and reference in a tally.
 fn name(background: Background, reference: &str) -> String {
     format!("{} {reference}", background.name())
 }
@@ -192,7 +192,7 @@ fn steps(scene: &Scene, address: PixelAddress, cycles: u64, threshold_mm: f64) -
     true_steps(truth, threshold_mm)
 }
 
-/// What a pixel sees; 0 if it sees nothing.
+/// The range that a pixel sees in millimetres; 0 if none.
 fn range_mm(scene: &Scene, address: PixelAddress, cycle: u64) -> f64 {
     let view = scene.truth(address, cycle);
     view.map_or(0.0, |view| view.range_mm)
@@ -212,11 +212,11 @@ mod tests {
             let point = at(fpga, 0.0);
             let scene = scene(&point, 0.3, goes_away).unwrap();
             let cycles = run(&point).cycles;
-            let car = steps(&scene, PixelAddress(3 * 8 + 3), cycles, 100.0);
+            let car = steps(&scene, PixelAddress::new(3 * 8 + 3), cycles, 100.0);
             assert_eq!(car.len(), count, "{car:?}"); // strictly more than 0.1 m each
             let side = if goes_away { 1 } else { -1 };
             assert!(car.iter().all(|step| step.1 == side));
-            assert!(steps(&scene, PixelAddress(0), cycles, 100.0).is_empty());
+            assert!(steps(&scene, PixelAddress::new(0), cycles, 100.0).is_empty());
         }
     }
 
@@ -224,7 +224,7 @@ mod tests {
     fn the_fan_makes_two() {
         let scene = scene(&at(0.0, 1.0), 0.7, true).unwrap();
         for pixel in [11, 25, 52] {
-            let steps = steps(&scene, PixelAddress(pixel), 200_000, 100.0);
+            let steps = steps(&scene, PixelAddress::new(pixel), 200_000, 100.0);
             assert_eq!(steps.len(), 2);
             assert_eq!(steps[0].1, -steps[1].1);
         }
@@ -238,7 +238,7 @@ mod tests {
                 for pixel in 0..64 {
                     for cycle in [0, run(&point).cycles] {
                         let position =
-                            range_mm(&scene, PixelAddress(pixel), cycle) / scene.mm_per_bin();
+                            range_mm(&scene, PixelAddress::new(pixel), cycle) / scene.mm_per_bin();
                         assert!((1.5..f64::from(scene.bins) - 1.5).contains(&position));
                     }
                 }

@@ -1,5 +1,5 @@
-//! A fan at 120 rpm: how many exposures an edge passes, and what they report
-//! (transverse motion: section III-D on the PC, section IV-C on the FPGA).
+//! A fan at 120 rpm: how many exposures contain an edge, and what they report (transverse motion:
+//! section III-D on the PC, section IV-C on the FPGA).
 //!
 //! The paper gives the 120 rpm in section IV-C. Distances and brightness are ours.
 
@@ -15,14 +15,14 @@ use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{NEUTRAL, STEPS};
 use dtof_options::rows::grouped;
 use dtof_simulate::SimulatedPixel;
-use dtof_simulate::scene::{Fan, Light, Scene, Shape};
+use dtof_simulate::scene::{Brightness, Fan, Scene, Shape};
 use dtof_theory::random::pixel_rng;
 use rand_core::Rng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use std::f64::consts::TAU;
 
-/// Column and row of the pixels watched: near the tips of the blades.
+/// Column and row of the pixels, near the tips of the blades.
 const PIXELS: [(u16, u16); 8] = [
     (1, 7),
     (14, 8),
@@ -33,21 +33,20 @@ const PIXELS: [(u16, u16); 8] = [
     (3, 12),
     (12, 12),
 ];
-/// Laser cycles of a trial, from a random place of the fan on, which every pixel has
-/// for itself: readings of different pixels are independent.
+/// Laser cycles of a trial. Every pixel starts at its own random angle of the fan, so readings of
+/// different pixels are independent.
 const CYCLES: u64 = 100_000;
-/// Edges of a pixel that are looked at apart, each with its own place.
+/// Edges of a pixel that are simulated separately, each at its own angle.
 const EDGES: u32 = 4;
-/// Laser cycles after one by which every exposure over it has ended: L2, the
-/// longest frame.
+/// Laser cycles after an edge until every exposure across it has ended: L2, the longest frame.
 const OVER: u64 = 2000;
-/// Bins before the nearest surface of the PC's: the window begins there.
+/// Bins between the start of the PC's window and the nearest surface.
 const BEFORE: f64 = 2.0;
-/// The rotation is visible if so many events are nearer to what the pixel sees than to the
-/// other surface.
+/// The rotation is visible if at least this share of events is nearer to the surface seen than to
+/// the other one.
 const VISIBLE: f64 = 0.95;
 
-/// Held against "clearly visible" (PC) and "without motion blur" (FPGA).
+/// Compared with "clearly visible" (PC) and "without motion blur" (FPGA).
 pub const STUDY: Study = Study {
     name: "fan-motion",
     about: "exposures that an edge of a fan at 120 rpm passes, and what they report",
@@ -64,7 +63,7 @@ fn points() -> Vec<Point> {
     PULSES.map(of_system).into()
 }
 
-/// The fan of the file, everything `shift` bins farther away and as bright as there.
+/// The scene of the file, moved away by `shift` bins at equal brightness.
 fn scene(point: &Point, shift: f64) -> Result<Scene> {
     let system = System::of(point);
     let text = include_str!("../../../../scenes/fan.toml");
@@ -72,9 +71,9 @@ fn scene(point: &Point, shift: f64) -> Result<Scene> {
     let before = if system == PC { BEFORE } else { 0.0 };
     let shift_mm = (before + shift) * scene.mm_per_bin();
     for surface in &mut scene.surfaces {
-        if let Light::Reflectivity(share) = surface.light {
+        if let Brightness::Reflectivity(share) = surface.light {
             let metres = surface.range_mm / 1000.0;
-            surface.light = Light::Signal(scene.signal_at_one_metre * share / metres.powi(2));
+            surface.light = Brightness::Signal(scene.signal_at_one_metre * share / metres.powi(2));
         }
         surface.range_mm += shift_mm;
         surface.range_right_mm += shift_mm;
@@ -92,13 +91,13 @@ fn fan(scene: &Scene) -> Result<&Fan> {
     bail!("the scene has no fan")
 }
 
-/// Edges that pass a place in a laser cycle.
+/// Edges that pass a point in a laser cycle.
 fn edges_per_cycle(scene: &Scene) -> Result<f64> {
     let fan = fan(scene)?;
     Ok(2.0 * f64::from(fan.blades) * fan.rpm / 60.0 / (scene.laser_rate_mhz * 1e6))
 }
 
-/// Columns that the tip of a blade goes in a laser cycle.
+/// Columns that the tip of a blade moves in a laser cycle.
 fn tip_per_cycle(scene: &Scene) -> Result<f64> {
     let fan = fan(scene)?;
     Ok(TAU * fan.radius * fan.rpm / 60.0 / (scene.laser_rate_mhz * 1e6))
@@ -136,8 +135,8 @@ fn next_edge(scene: &Scene, address: PixelAddress, from: u64) -> Result<u64> {
     Ok(after)
 }
 
-/// Adds what is read over an edge, and over the same laser cycle if the pixel goes
-/// on to see what it saw before: a blade as often as the wall.
+/// Adds the readings across an edge, and those of the same laser cycle without the edge. The
+/// surface before the edge is a blade as often as the wall.
 fn add_edge<const BINS: usize>(
     tally: &mut Tally,
     config: &PixelConfig<BINS, AnyRule>,
@@ -147,7 +146,7 @@ fn add_edge<const BINS: usize>(
 ) -> Result<()> {
     let edge = next_edge(scene, address, Uniform::new(0, period(scene)?)?.sample(rng))?;
     let (before, after) = (scene.rates(address, edge - 1), scene.rates(address, edge));
-    // When it is there, after the start of the readings.
+    // Laser cycles from the start of the readings to the edge.
     let at = 2000 + Uniform::new(0, 4000_u64)?.sample(rng);
     let phases = phases(rng)?;
     let pixel = SimulatedPixel::new(&before, scene.bins, pixel_rng(rng.next_u64(), address))?;
@@ -161,10 +160,10 @@ fn add_edge<const BINS: usize>(
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    System::of(point).choose::<Trial>(watched::<8>, watched::<128>)(point, rng)
+    System::of(point).choose::<Trial>(trial_with_bins::<8>, trial_with_bins::<128>)(point, rng)
 }
 
-fn watched<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+fn trial_with_bins<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let scene = scene(point, Uniform::new(0.0, 1.0)?.sample(rng))?;
     let system = System::of(point);
     let config = system.settings(system.by, L1, 0).config::<BINS>()?;
@@ -172,7 +171,7 @@ fn watched<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let mut tally = Tally::new();
     let period = period(&scene)?;
     for (column, row) in PIXELS {
-        let address = PixelAddress(row * 16 + column);
+        let address = PixelAddress::new(row * 16 + column);
         for _ in 0..EDGES {
             add_edge(&mut tally, &config, &scene, address, rng)?;
         }
@@ -203,12 +202,12 @@ fn watched<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// What a sensor reports at a laser rate.
+/// The blur of a sensor at a laser rate.
 struct Blur {
     readings: u64,
-    /// Laser cycles of a mean exposure.
+    /// Mean exposure in laser cycles.
     exposure: f64,
-    /// Exposures that an edge passes.
+    /// The share of exposures that contain an edge.
     mixed: Measured,
 }
 
@@ -233,7 +232,7 @@ fn results(part: &Part) -> Result<Results> {
         let expected = blurs
             .iter()
             .map(|blur| Dot::exact(blur.exposure, blur.exposure * edges));
-        // Twice the expected share would be another law.
+        // Within a factor of two of the expected share.
         holds &= blurs.iter().all(|blur| {
             let (low, high) = blur.mixed.interval;
             let expected = blur.exposure * edges;
@@ -273,7 +272,7 @@ fn at(part: &Part, (fpga, sigma): (f64, f64)) -> Result<&PointTally> {
     part.one([("fpga", fpga), ("sigma", sigma)])
 }
 
-/// How far a tip goes in the exposure of an event, in pixels, and the text about it.
+/// The motion of a tip during the exposure of an event, in pixels, and the text about it.
 fn path(point: &PointTally) -> Result<(f64, String)> {
     let tip = tip_per_cycle(&scene(&point.parameters, 0.0)?)?;
     let (events, frames) = (blur(point, SENSORS[0]), blur(point, SENSORS[4]));
@@ -348,7 +347,7 @@ mod tests {
         // from one edge to the next.
         assert!((edges_per_cycle(&scene).unwrap() - 1e-5).abs() < 1e-12);
         for (column, row) in PIXELS {
-            let address = PixelAddress(row * 16 + column);
+            let address = PixelAddress::new(row * 16 + column);
             let surface = |cycle| scene.truth(address, cycle).unwrap().surface;
             let views: Vec<usize> = (0..600_000).step_by(100).map(surface).collect();
             let edges = views.windows(2).filter(|pair| pair[0] != pair[1]);
@@ -360,7 +359,7 @@ mod tests {
     fn the_next_edge_is_where_the_surface_changes() {
         let scene = scene(&points()[0], 0.0).unwrap();
         for (column, row) in PIXELS {
-            let address = PixelAddress(row * 16 + column);
+            let address = PixelAddress::new(row * 16 + column);
             let surface = |cycle| scene.truth(address, cycle).unwrap().surface;
             let edge = next_edge(&scene, address, 1234).unwrap();
             assert!((1235..=101_235).contains(&edge));

@@ -1,15 +1,15 @@
 //! False alarms and depth error of a board, by SNR, α and L1 (section III-C).
 //!
-//! The paper's board stands where the pulse lies on an edge between two bins of 8.75
-//! ns, in a window of 8 bins; mini-frames of 5 laser cycles; L2 = 2000. It gives neither
-//! X, nor the background, nor the pulse's width. Ours are X = 5 and, each with each,
-//! the background of its analysis (B = 0.05) and the one that its rule of thumb asks
-//! for at L1 = 20 (L1·B = 30, so 1.5; 10-bit counters are full there well before L2);
-//! pulses of 0.33 bins, that of a rectangle of 10 ns (1.2 % of 1/1.2 MHz), and of 1 bin,
-//! the lower end of what the paper names.
+//! The pulse of the paper's board lies on the edge between two bins of 8.75 ns, in a window of 8
+//! bins. Mini-frames have 5 laser cycles, L2 is 2000. The paper gives neither X, nor the
+//! background, nor the pulse width. We use X = 5 and all pairs of two backgrounds and two pulses.
+//! The backgrounds are that of its analysis (B = 0.05) and that of its rule of thumb at L1 = 20
+//! (L1·B = 30, so 1.5, with which 10-bit counters are full well before L2). The pulses have σ =
+//! 0.33 bins, that of a rectangle of 10 ns (1.2 % of 1/1.2 MHz), and 1 bin, the lower end of the
+//! paper's range.
 //!
-//! The background is the average of the 8 bins. At B = 0.05 that of two quadrants, of two
-//! bins each, is beside it: section IV introduces them for 128 bins.
+//! The background estimate is the average of the 8 bins. At B = 0.05 it is compared with two
+//! quadrants of two bins each, which section IV introduces for 128 bins.
 
 mod claims;
 mod setting;
@@ -36,13 +36,18 @@ use rand_pcg::Pcg64;
 const BINS: usize = 8;
 /// The board, in bins from the start of the window.
 const POSITION: u8 = 4;
-/// 114 MHz in metres of range.
+/// Metres of range in a bin of 8.75 ns (114 MHz).
 const METRES_A_BIN: f64 = 8750.0 * MM_PER_PS / 1000.0;
 /// Background photons a bin and laser cycle (B), and standard deviation of the pulse
 /// in bins.
-const SETTINGS: [(f64, f64); 4] = [(0.05, 1.0), (0.05, 0.33), (ENOUGH, 1.0), (ENOUGH, 0.33)];
-/// B with which L1 = 20 gives the paper's 30 background counts a bin.
-const ENOUGH: f64 = 1.5;
+const SETTINGS: [(f64, f64); 4] = [
+    (0.05, 1.0),
+    (0.05, 0.33),
+    (GAUSSIAN_BACKGROUND, 1.0),
+    (GAUSSIAN_BACKGROUND, 0.33),
+];
+/// The B that gives the paper's 30 background counts a bin at L1 = 20.
+const GAUSSIAN_BACKGROUND: f64 = 1.5;
 /// Normalised SNR, A/B.
 const SNRS: [f64; 5] = [1.0, 2.0, 5.0, 10.0, 20.0];
 const ALPHAS: [u16; 4] = [2, 4, 6, 8];
@@ -50,7 +55,7 @@ const L1S: [u16; 5] = [5, 10, 20, 40, 80];
 const L2: u16 = 2000;
 /// Laser cycles of a mini-frame, and X.
 const FRAME: u16 = 5;
-/// Mini-frames of a trial: 10,000 laser cycles, as the paper's recording has.
+/// Mini-frames of a trial: 10,000 laser cycles, as in the paper's recording.
 const FRAMES: u16 = 2000;
 
 /// With the pixel and the rule of the core.
@@ -67,7 +72,7 @@ pub const STUDY: Study = Study {
 
 fn points() -> Vec<Point> {
     let of_setting = |(background, sigma)| {
-        let averages: &[f64] = if background < ENOUGH {
+        let averages: &[f64] = if background < GAUSSIAN_BACKGROUND {
             &[1.0, 0.0]
         } else {
             &[1.0]
@@ -98,7 +103,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let share = bin_share(bin, POSITION.into(), point["sigma"]);
         *law = Poisson::new(f64::from(FRAME) * (background + signal * share))?;
     }
-    // The paper has no minimum count; a peak holds a photon.
+    // The paper has no minimum count.
     let alpha = U8F8::from_num(point["alpha"]);
     let minimum = Count::saturating(1);
     let rule: AnyRule = if point["average"] > 0.0 {
@@ -111,17 +116,17 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         .l1(whole(point, "l1"))
         .l2(L2)
         .build()?;
-    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
+    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress::new(0));
     let mut statistics = Statistics::new();
     let [mut false_events, mut squares, mut fourth_powers] = [0; 3];
     for frame in 1..=u64::from(FRAMES) {
         let counts = laws.map(|law| law.sample(rng) as u32);
         pixel.count_frame(&config, &counts);
-        let last = LaserCycle(frame * u64::from(FRAME) - 1);
+        let last = LaserCycle::new(frame * u64::from(FRAME) - 1);
         if pixel.end_laser_cycles(&config, &mut statistics, last, FRAME) != Look::Event {
             continue;
         }
-        if let Some(event) = pixel.acknowledge() {
+        if let Some(event) = pixel.take_event() {
             // In 1/256 bin.
             let error =
                 u64::from((event.position().raw() - i32::from(POSITION) * 256).unsigned_abs());
@@ -150,7 +155,7 @@ fn results(part: &Part) -> Result<Results> {
     })
 }
 
-/// Events that are false at α = 4 and L1 = 20, for both backgrounds and pulses.
+/// The share of false events at α = 4 and L1 = 20, for both backgrounds and pulses.
 fn table(part: &Part) -> String {
     let mut rows = String::new();
     for (is_average, background) in [(false, "two quadrants"), (true, "average of the 8 bins")] {
@@ -198,7 +203,7 @@ fn figures(part: &Part) -> Result<Vec<Figure>> {
             series: series.collect(),
         }
     });
-    // Point by point, of the same pulse and SNR.
+    // Compared point by point, at equal pulse and SNR.
     let more = [0, 1].into_iter().all(|pulse| {
         let [quadrants, averages] = [false, true]
             .map(|is_average| Setting::at_low_background(part, is_average)[pulse].by_snr(4, 20));
@@ -207,7 +212,7 @@ fn figures(part: &Part) -> Result<Vec<Figure>> {
             let same = quadrants.iter().find(|point| point.is_at([("snr", snr)]));
             let [more, fewer] =
                 [same, Some(average)].map(|point| point.map(|point| false_share(point)));
-            // Where there are any.
+            // Only where there are any.
             fewer.is_some_and(|fewer| fewer.value < 1e-3)
                 || more
                     .zip(fewer)

@@ -1,8 +1,8 @@
-//! How long a pixel takes from its first photon to its event (Table I), and what a
-//! processing element that four pixels share adds to that (sections IV-A and IV-B).
+//! The time from the first photon of a pixel to its event (Table I), and the delay of a processing
+//! element that four pixels share (sections IV-A and IV-B).
 //!
-//! The pulse has 120 ps (full width at half maximum) and, ours, a jitter of 70 ps:
-//! together 0.35 bins. Signal and background are ours, too.
+//! The pulse has 120 ps (full width at half maximum). We assume a jitter of 70 ps, together 0.35
+//! bins. Signal and background are our choices, too.
 
 mod claims;
 pub(crate) mod element;
@@ -28,7 +28,7 @@ use rand_pcg::Pcg64;
 const EVENTS: u64 = 20;
 /// Laser cycles of a trial, at most.
 const CYCLES: u64 = 20_000;
-/// Laser cycles from the first photon by which events are counted.
+/// Laser cycles from the first photon at which the share of events is counted.
 const BY: [u64; 17] = [
     20, 24, 28, 36, 40, 44, 48, 56, 64, 80, 100, 140, 200, 300, 500, 1000, 2000,
 ];
@@ -41,13 +41,12 @@ const SNRS: [f64; 7] = [4.0, 8.0, 12.0, 16.0, 24.0, 32.0, 64.0];
 /// Events of each pixel of an element, in a trial.
 const SHARED_EVENTS: u64 = 5;
 
-/// Laser cycles of the shortest exposure with an event: the first look with
-/// N > L1.
+/// Laser cycles of the shortest exposure with an event: the first look with N > L1.
 fn shortest_exposure(l1: u16) -> u16 {
     (l1 / PROTOTYPE_X + 1) * PROTOTYPE_X
 }
 
-/// Held against the paper's 2.4 µs.
+/// Compared with the paper's 2.4 µs.
 pub const STUDY: Study = Study {
     name: "latency",
     about: "laser cycles from the first photon after a reset to the event, by SNR and L1",
@@ -59,8 +58,7 @@ pub const STUDY: Study = Study {
     results,
 };
 
-/// The SNR is that of 40 laser cycles, whatever L1. A pixel alone, then four that
-/// share an element.
+/// The SNR always refers to 40 laser cycles. A single pixel, then four that share an element.
 fn points() -> Vec<Point> {
     let mut points = grid([
         ("shared", &[0.0]),
@@ -86,7 +84,11 @@ fn photons(point: &Point, rng: &mut Pcg64) -> Result<SimulatedPixel> {
         position: 60.5,
         sigma: SIGMA,
     };
-    SimulatedPixel::new(&rates, CODES, pixel_rng(rng.next_u64(), PixelAddress(0)))
+    SimulatedPixel::new(
+        &rates,
+        CODES,
+        pixel_rng(rng.next_u64(), PixelAddress::new(0)),
+    )
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
@@ -94,7 +96,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         return shared(point, rng);
     }
     let config = prototype(whole(point, "l1"))?;
-    let address = PixelAddress(0);
+    let address = PixelAddress::new(0);
     let mut photons = photons(point, rng)?;
     let mut pixel = AsyncPixel::<BINS>::new(address);
     let (mut tally, mut statistics) = (Tally::new(), Statistics::new());
@@ -104,8 +106,8 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             first.get_or_insert(cycle);
             pixel.count(&config, code);
         });
-        pixel.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
-        if pixel.acknowledge().is_none() {
+        pixel.end_laser_cycle(&config, &mut statistics, LaserCycle::new(cycle));
+        if pixel.take_event().is_none() {
             continue;
         }
         let end = cycle + 1;
@@ -120,7 +122,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// Four pixels that share an element: each reading of the paper gets the same photons.
+/// Four pixels that share an element: each interpretation of the paper gets the same photons.
 fn shared(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let config = prototype(whole(point, "l1"))?;
     let mut tally = Tally::new();
@@ -159,8 +161,8 @@ fn next(element: ProcessingElement) -> String {
     format!("next of {}", element.name)
 }
 
-/// Laser cycles to an event, its own included: `waited` since the event before,
-/// `latency` since the first photon after that.
+/// Adds the laser cycles to an event, including its own: `waited` since the previous event,
+/// `latency` since the first photon after it.
 fn add_waits(tally: &mut Tally, waited: u64, latency: u64) {
     let whole = |cycles: u64| i64::try_from(cycles).unwrap_or(i64::MAX);
     add_value(tally, "waited", whole(waited));
@@ -174,7 +176,7 @@ fn add_waits(tally: &mut Tally, waited: u64, latency: u64) {
     }
 }
 
-/// The share of events that are there `by` then, of all that could have been.
+/// The share of events within `by` laser cycles, of all possible events.
 fn share_by(point: &PointTally, what: &str, by: u64) -> Measured {
     let all = point.count("latency values") + point.count("events cut off");
     Measured::share(point.count(&format!("{what} by {by}")), all)
@@ -202,7 +204,7 @@ fn by_then(part: &Part) -> Chart {
         for by in BY.into_iter().filter(|&by| by >= 36) {
             let share = share_by(point, "latency", by);
             dots.push(share.at(by as f64));
-            // All events are there.
+            // All events have been reported.
             if share.value > 0.998 {
                 break;
             }
@@ -231,7 +233,7 @@ fn by_then(part: &Part) -> Chart {
     }
 }
 
-/// The points of four pixels that share an element, where no event was cut off.
+/// The points of four pixels that share an element, without truncated events.
 fn shared_points(part: &Part) -> impl Iterator<Item = &PointTally> + Clone {
     let points = part.at([("shared", 1.0)]);
     points.filter(|point| point.count("shared cut off") == 0)
@@ -268,8 +270,8 @@ fn processing(part: &Part) -> Chart {
     }
 }
 
-/// A row for each reading: X, histograms in the element, and laser cycles to the first
-/// event and to the next at three SNRs.
+/// A row for each interpretation: X, histograms in the element, and laser cycles to the first event
+/// and to the next at three SNRs.
 fn readings(part: &Part) -> String {
     let mut rows = String::new();
     for element in element::READINGS {

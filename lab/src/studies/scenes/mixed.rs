@@ -1,27 +1,23 @@
-//! Exposures that an edge passes, each beside one of the same photons without the
-//! edge: is it blurred?
+//! Motion blur: exposures that contain an edge, paired with exposures of the same photons without
+//! it.
 //!
-//! A laser cycle lies in a long exposure more often than in a short one, so that an
-//! exposure over an edge is longer than the next. The other of a pair is over the
-//! same laser cycle, of the same pixel with the same random numbers, and the edge
-//! left out.
+//! A given laser cycle lies in a long exposure more often than in a short one, so exposures with an
+//! edge are longer than average. The partner of a pair therefore covers the same laser cycle of the
+//! same pixel, with the same random numbers and without the edge.
 
 use super::one_pixel::{PER_BIN, Reading};
 use crate::sweep::mean::{Measured, Z_99, add};
 use crate::sweep::results::Verdict;
 use crate::sweep::{PointTally, Tally};
 
-/// The paper's bound of a false detection: half a bin from the surface.
+/// The paper's limit for a false detection: half a bin from the surface.
 const BELONGS: i64 = PER_BIN / 2;
-/// An edge that makes so few more of the exposures false does not blur: two
-/// percentage points.
+/// The largest excess of false exposures that does not count as blur: two percentage points.
 pub const MARGIN: f64 = 0.02;
 
-/// Adds the exposures over laser cycles `at - 1` and `at`, of readings in which the
-/// surface steps at the start of `at` and of readings in which it does not, and
-/// whether they belong to none of `surfaces`. Where one of the two was not read, as
-/// it expired, the pair counts apart; so does an edge that falls between two
-/// exposures.
+/// Adds a pair: the exposures that contain laser cycles `at - 1` and `at`, with a step of the
+/// surface at the start of `at` and without it, and whether each lies at none of `surfaces`. Pairs
+/// with an expired exposure, and edges between two exposures, are counted separately.
 pub fn add_pair(
     tally: &mut Tally,
     sensor: &str,
@@ -29,7 +25,7 @@ pub fn add_pair(
     at: u64,
     surfaces: &[i64],
 ) {
-    // The same in both, which differ from `at` on.
+    // The same in both, because they differ only from `at` on.
     if with.iter().any(|reading| reading.last + 1 == at) {
         add(tally, sensor, "between exposures", 1);
         return;
@@ -55,8 +51,8 @@ pub fn add_pair(
     add(tally, sensor, "clean alone", (clean && !mixed).into());
 }
 
-/// Of the exposures with an edge (`mixed`) or without (`clean`), those read as
-/// neither surface.
+/// The share of exposures with an edge (`mixed`) or without (`clean`) that are read as neither
+/// surface.
 pub fn neither(point: &PointTally, sensor: &str, exposures: &str) -> Measured {
     point.share(
         &format!("{sensor} {exposures}, neither"),
@@ -64,8 +60,8 @@ pub fn neither(point: &PointTally, sensor: &str, exposures: &str) -> Measured {
     )
 }
 
-/// How much more often an exposure with an edge is read as neither surface than the
-/// same without, with the 99 % interval of Agresti and Min for pairs.
+/// The excess: how much more often an exposure with an edge is read as neither surface than its
+/// partner, with the 99 % interval of Agresti and Min for pairs.
 pub fn excess(point: &PointTally, sensor: &str) -> Measured {
     let count = |what: &str| point.count(&format!("{sensor} {what}")) as f64;
     let pairs = count("pairs") + 2.0;
@@ -78,12 +74,12 @@ pub fn excess(point: &PointTally, sensor: &str) -> Measured {
     }
 }
 
-/// In percentage points.
+/// The excess in percentage points, as text.
 pub fn points(excess: Measured) -> String {
     excess.times(100.0).text(1)
 }
 
-/// The largest.
+/// The largest excess.
 pub fn worst(excesses: impl Iterator<Item = Measured>) -> Option<Measured> {
     excesses.max_by(|a, b| a.value.total_cmp(&b.value))
 }
@@ -122,7 +118,7 @@ mod tests {
         add(160, [&with, &without]);
         // An exposure that begins with the edge has one surface.
         add(100, [&with, &without]);
-        // Nothing was read over it.
+        // No reading covers the edge.
         add(180, [&with[..1], &without]);
         add(180, [&with, &without[..1]]);
         assert_eq!(tally["a between exposures"], 1);

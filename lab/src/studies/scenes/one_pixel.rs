@@ -1,5 +1,4 @@
-//! One pixel: its events, and what a frame-based sensor makes of the same
-//! photons.
+//! One pixel: its events, and the readings of a frame-based sensor from the same photons.
 
 use super::systems::FPGA;
 use anyhow::Result;
@@ -16,11 +15,11 @@ use rand_pcg::Pcg64;
 
 /// Bins of a histogram of the paper's prototype.
 pub const BINS: usize = CODES as usize;
-/// The same, as a TDC counts.
+/// The number of TDC codes.
 pub const CODES: u16 = FPGA.bins;
-/// Positions are counted in this part of a bin.
+/// Units of a position per bin.
 pub const PER_BIN: i64 = 1 << BinPosition::FRACTIONAL_BITS;
-/// Exposures of the frames that events are held against, in laser cycles.
+/// Exposures of the frames in comparison, in laser cycles.
 pub const FRAMES: [u64; 4] = [100, 500, 1000, 2000];
 /// The sensors that see the same photons: events, then [`FRAMES`].
 pub const SENSORS: [&str; 5] = [
@@ -31,7 +30,7 @@ pub const SENSORS: [&str; 5] = [
     "frames of 2000",
 ];
 
-/// The pen of a sensor, counted as [`SENSORS`].
+/// The pen of a sensor, by its index in [`SENSORS`].
 pub const fn pen(sensor: usize) -> Pen {
     match sensor {
         0 => palette::EVENTS,
@@ -47,28 +46,28 @@ pub fn prototype(l1: u16) -> Result<PixelConfig<BINS, AnyRule>> {
     FPGA.settings(FPGA.by, l1, 0).config()
 }
 
-/// A depth and the laser cycles it was exposed for.
+/// A depth and the laser cycles of its exposure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Reading {
     /// The first laser cycle of the exposure.
     pub first: u64,
-    /// The last: then it is reported.
+    /// The last laser cycle of the exposure, at which it is reported.
     pub last: u64,
     /// Bins from the start of bin 0, [`PER_BIN`] a bin.
     pub position: i64,
 }
 
 impl Reading {
-    /// What an event or a frame reports.
+    /// The reading of an event or a frame.
     pub fn of(event: &DepthEvent) -> Self {
         Self {
-            first: event.cycle.0 + 1 - u64::from(event.exposure),
-            last: event.cycle.0,
+            first: event.cycle.raw() + 1 - u64::from(event.exposure),
+            last: event.cycle.raw(),
             position: event.position().raw().into(),
         }
     }
 
-    /// How many laser cycles it was exposed for.
+    /// The exposure in laser cycles.
     pub const fn exposure(&self) -> u64 {
         self.last + 1 - self.first
     }
@@ -77,11 +76,10 @@ impl Reading {
 /// Frames of a pixel, the first from laser cycle `first` on.
 pub fn frames<const BINS: usize>(first: u64, length: u64) -> FramePixel<BINS> {
     let length = u16::try_from(length).unwrap_or(u16::MAX);
-    FramePixel::new(PixelAddress(0), first, length)
+    FramePixel::new(PixelAddress::new(0), first, length)
 }
 
-/// Ends a laser cycle of frames; without a gate, and with the same centre of mass as that
-/// of events.
+/// Ends a laser cycle of frames, without a gate and with the same centre of mass as events.
 pub fn end_laser_cycle<const BINS: usize>(
     frames: &mut FramePixel<BINS>,
     cycle: u64,
@@ -90,16 +88,15 @@ pub fn end_laser_cycle<const BINS: usize>(
     read.as_ref().map(Reading::of)
 }
 
-/// What each of [`SENSORS`] reports of `cycles` laser cycles. The frames of each
-/// length begin with the laser cycle of `phases`. `photons` gives the TDC codes of
-/// a laser cycle.
+/// The readings of each of [`SENSORS`] in `cycles` laser cycles. The frames of each length begin at
+/// the laser cycle of `phases`. `photons` returns the TDC codes of a laser cycle.
 pub fn watch<const BINS: usize>(
     cycles: u64,
     config: &PixelConfig<BINS, AnyRule>,
     phases: [u64; 4],
     mut photons: impl FnMut(u64, &mut dyn FnMut(u16)) -> Result<()>,
 ) -> Result<[Vec<Reading>; 5]> {
-    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress(0));
+    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress::new(0));
     let mut statistics = Statistics::new();
     let mut lengths = FRAMES.into_iter();
     let mut frames = phases.map(|first| frames::<BINS>(first, lengths.next().unwrap_or_default()));
@@ -111,9 +108,9 @@ pub fn watch<const BINS: usize>(
                 frame.count(&RangeGate::full(), cycle, code);
             }
         })?;
-        pixel.end_laser_cycle(config, &mut statistics, LaserCycle(cycle));
+        pixel.end_laser_cycle(config, &mut statistics, LaserCycle::new(cycle));
         let [events, of_frames @ ..] = &mut readings;
-        events.extend(pixel.acknowledge().as_ref().map(Reading::of));
+        events.extend(pixel.take_event().as_ref().map(Reading::of));
         for (readings, frame) in of_frames.iter_mut().zip(&mut frames) {
             readings.extend(end_laser_cycle(frame, cycle));
         }
@@ -130,7 +127,7 @@ pub fn phases(rng: &mut Pcg64) -> Result<[u64; 4]> {
     Ok(phases)
 }
 
-/// What the sensors report of `pixel`, which has the rates `later` from laser cycle `at` on.
+/// The readings of `pixel`, which has the rates `later` from laser cycle `at` on.
 pub fn watch_step<const BINS: usize>(
     pixel: &SimulatedPixel,
     config: &PixelConfig<BINS, AnyRule>,
@@ -149,7 +146,7 @@ pub fn watch_step<const BINS: usize>(
     })
 }
 
-/// Bins as a position, rounded to the nearest.
+/// Converts bins to a position, rounded to the nearest.
 #[allow(clippy::cast_possible_truncation, reason = "some hundred bins")]
 pub fn in_parts(bins: f64) -> i64 {
     (bins * PER_BIN as f64).round() as i64

@@ -1,7 +1,7 @@
-//! A surface that goes away and comes back: how far the depth reported lags behind
-//! (section III-D, radial motion; on the PC there, the FPGA stands beside it).
+//! A surface that moves away or closer: the lag of the reported depth (section III-D, radial
+//! motion, on the PC; here also on the FPGA).
 //!
-//! The paper gives neither speed nor brightness; both are ours, and varied.
+//! The paper gives neither speed nor brightness; both are our choices, with several values.
 
 use super::one_pixel::{PER_BIN, SENSORS, in_parts, pen, phases, watch};
 use super::systems::{FPGA, L1, PC, PULSES, System};
@@ -20,21 +20,21 @@ use rand_core::Rng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 
-/// Runs of a trial, half of them away and half towards the sensor. Either begin
-/// evenly spread over a bin: what the centre of mass errs by within a bin cancels,
-/// and so does what it always errs by, as the lower of equal bins is the peak.
+/// Runs of a trial, half of them away from and half towards the sensor. Both halves begin at
+/// positions evenly spread over a bin, so that the bias of the centre of mass within a bin cancels,
+/// as does its constant bias from the lower of equal bins.
 const RUNS: u32 = 20;
 /// Laser cycles of a run.
 const CYCLES: u64 = 8000;
-/// Where it begins, in bins: 3.3 m into the window of the PC, 1.9 m away from the FPGA.
+/// The start in bins: 3.3 m into the window of the PC, 1.9 m in front of the FPGA.
 const START: [f64; 2] = [2.5, 50.0];
-/// Readings farther off are false.
+/// The largest error of a reading that is not false.
 const FALSE: i64 = 2 * PER_BIN;
-/// Of the verdict: metres a second, and signal photons a laser cycle.
+/// For the verdict: metres a second, and signal photons a laser cycle.
 const FAST: f64 = 10.0;
 const SIGNALS: [f64; 3] = [0.2, SIGNAL, 2.0];
 const SIGNAL: f64 = 0.5;
-/// Held against "the depth of the peak events follows the programmed motion".
+/// Compared with "the depth of the peak events follows the programmed motion".
 pub const STUDY: Study = Study {
     name: "radial-motion",
     about: "how far the depth of a surface that goes away or comes nearer lags behind the truth",
@@ -65,10 +65,10 @@ fn bins_per_cycle(point: &Point) -> f64 {
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    System::of(point).choose::<Trial>(runs::<8>, runs::<128>)(point, rng)
+    System::of(point).choose::<Trial>(trial_with_bins::<8>, trial_with_bins::<128>)(point, rng)
 }
 
-fn runs<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+fn trial_with_bins<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let system = System::of(point);
     let config = system.settings(system.by, L1, 0).config::<BINS>()?;
     let speed = bins_per_cycle(point);
@@ -79,7 +79,7 @@ fn runs<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         let start =
             START[usize::from(system == FPGA)] + (f64::from(run / 2) + shift) / f64::from(RUNS / 2);
         let speed = direction * speed;
-        // The middle of a laser cycle stands for all of it.
+        // The position in the middle of the laser cycle.
         let rates = |cycle: u64| Rates {
             background: system.background,
             signal: point["signal"],
@@ -87,7 +87,7 @@ fn runs<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             sigma: point["sigma"],
         };
         let phases = phases(rng)?;
-        let photons = pixel_rng(rng.next_u64(), PixelAddress(0));
+        let photons = pixel_rng(rng.next_u64(), PixelAddress::new(0));
         let mut pixel = SimulatedPixel::new(&rates(0), system.bins, photons)?;
         let readings = watch(CYCLES, &config, phases, |cycle, photon| {
             pixel.set_rates(&rates(cycle))?;
@@ -112,13 +112,13 @@ fn runs<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     Ok(tally)
 }
 
-/// How a sensor fares at a point.
+/// The lag of a sensor at a point.
 struct Lag {
-    /// Behind the truth, in millimetres.
+    /// The lag behind the truth, in millimetres.
     mm: Measured,
     /// Standard deviation of a reading in millimetres.
     noise_mm: f64,
-    /// What the surface goes in a mean exposure, in millimetres.
+    /// The path of the surface in a mean exposure, in millimetres.
     path_mm: f64,
 }
 
@@ -233,7 +233,7 @@ mod tests {
     use crate::sweep::point;
     use rand_core::SeedableRng;
 
-    /// Frames have a known exposure, and so a known lag.
+    /// Frames have a fixed exposure, and so a known lag.
     #[test]
     fn frames_lag_by_half_of_their_exposure() {
         let parameters = point([

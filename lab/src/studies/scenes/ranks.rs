@@ -1,7 +1,6 @@
 //! Spearman's rank correlation.
 
-/// The ranks of `values`, doubled so that those of equals, their mean, are whole
-/// numbers too.
+/// Twice the ranks of `values`, so that the mean ranks of ties are integers.
 fn doubled_ranks(values: &[f64]) -> Vec<i64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
@@ -17,8 +16,7 @@ fn doubled_ranks(values: &[f64]) -> Vec<i64> {
     ranks
 }
 
-/// Spearman's rank correlation of pairs, equals at their mean rank. None if one
-/// side does not vary.
+/// Spearman's rank correlation of pairs, with mean ranks for ties. `None` if one side is constant.
 pub fn rank_correlation(a: &[f64], b: &[f64]) -> Option<f64> {
     let mean = i64::try_from(a.len()).ok()? + 1; // of doubled ranks
     let centred = |values| -> Vec<i64> {

@@ -1,17 +1,17 @@
-//! The static scene (section III-B): when, how often and how well pixels report,
-//! and what their events say of the reflectivity. Events stand beside frames of the same
-//! photons.
+//! The static scene (section III-B): when, how often and how precisely pixels report, and the
+//! reflectivity estimated from events. Compared with frames of the same photons.
 //!
-//! The PC with the average of all bins, and with quadrants beside it; boards before a wall,
-//! as bright as lets most pixels report, as the paper's do. One scene is the FPGA's
-//! (section IV-C), with its L1. Signals, distances and backgrounds are ours.
+//! On the PC with the average of all bins, and for comparison with quadrants. The scene has boards
+//! in front of a wall, bright enough for reports from most pixels, as in the paper. One scene is
+//! for the FPGA (section IV-C), with its L1. Signals, distances and backgrounds are our choices.
 
 mod claims;
 mod results;
 mod surfaces;
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, PixelAddress, RangeGate, Reflectivity};
+use dtof_core::events::Reflectivity;
+use dtof_core::{DepthEvent, PixelAddress, RangeGate};
 use rand_core::Rng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -23,39 +23,39 @@ use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::{Point, Study, Tally, Trial, point};
 use dtof_engine::host::host_engine;
 use dtof_photons::source::PhotonSource;
-use dtof_simulate::scene::{Light, Scene};
+use dtof_simulate::scene::{Brightness, Scene};
 
 const CYCLES: u64 = 10_000;
 /// Laser cycles of a frame (L2).
 const FRAME: u64 = 2000;
-/// Laser cycles handled at a time.
+/// Laser cycles processed at a time.
 const SLICE: u16 = 250;
 /// Events that are averaged.
 const MEAN_OF: usize = 10;
-/// A depth farther off is false and counts apart.
+/// The largest error of a depth; others are false and counted separately.
 const FALSE: i64 = 3 * PER_BIN / 2;
-/// Whole numbers of a correlation, a relative error, a reflectivity.
+/// Integer units of a correlation, a relative error, a reflectivity.
 const MILLION: f64 = 1e6;
-/// Pixels of a row over which a surface turns by one bin of range: the boards are as
-/// wide, so that they lie evenly in a bin, not on the edge of one.
+/// Surfaces are tilted by one bin of range per this many columns, the width of a board. So the
+/// pixels of a board are spread evenly over a bin.
 const PIXELS_A_BIN: f64 = 8.0;
 /// L1 of section III-B.
 const PC_L1: u16 = 100;
-/// Bins at which the surfaces of the PC's scene begin to turn, in the file's order: the
-/// wall, then the boards. All stay within the 8 bins.
+/// Bins at which the surfaces of the PC's scene begin, in the order of the file: the wall, then the
+/// boards. All stay within the 8 bins.
 const PC_BINS: [f64; 4] = [2.0, 1.0, 1.3, 1.6];
-/// B of the PC, that of the paper's analysis and the one of its rule of thumb, L1·B = 30.
-/// Then how many times the light of the file, so that most pixels report.
+/// B of the PC (that of the paper's analysis, and that of its rule of thumb, L1·B = 30), and a
+/// factor for the light of the file with which most pixels report.
 const PC_LIGHTS: [(f64, f64); 2] = [(PC.background, 2.0), (0.3, 4.0)];
 const DEPTHS: [&str; 3] = ["frame of 2000", "last event", "mean of ten"];
-/// What differs from one of these to the next of the same pixel.
+/// Differences between successive depths of a pixel.
 const NOISES: [&str; 3] = [
     "noise of frame of 2000",
     "noise of last event",
     "noise of mean of ten",
 ];
 
-/// Held against the paper's static scene.
+/// Compared with the paper's static scene.
 pub const STUDY: Study = Study {
     name: "static-scene",
     about: "first events, event rates, depth errors and reflectivity of static scenes",
@@ -90,8 +90,8 @@ fn points() -> Vec<Point> {
     points.into()
 }
 
-/// The boards before a wall: 64×32 macropixels on the PC, 32×16 on the FPGA. Every surface
-/// turns by a bin in [`PIXELS_A_BIN`] of 32, and is `shift` bins farther away.
+/// Boards in front of a wall: 64×32 macropixels on the PC, 32×16 on the FPGA. Every surface is
+/// tilted by a bin per [`PIXELS_A_BIN`] of 32 columns, and moved away by `shift` bins.
 fn scene(point: &Point, shift: f64) -> Result<Scene> {
     let system = System::of(point);
     let text = include_str!("../../../../scenes/static.toml");
@@ -103,9 +103,9 @@ fn scene(point: &Point, shift: f64) -> Result<Scene> {
     let bright = point["light"] * scene.signal_at_one_metre;
     for (surface, bins) in scene.surfaces.iter_mut().zip(PC_BINS) {
         if system == PC {
-            if let Light::Reflectivity(share) = surface.light {
+            if let Brightness::Reflectivity(share) = surface.light {
                 let metres = surface.range_mm / 1000.0;
-                surface.light = Light::Signal(bright * share / metres.powi(2));
+                surface.light = Brightness::Signal(bright * share / metres.powi(2));
             }
             surface.range_mm = bins * mm_per_bin;
         }
@@ -118,13 +118,13 @@ fn scene(point: &Point, shift: f64) -> Result<Scene> {
     Ok(scene)
 }
 
-/// What there is of a pixel.
+/// The positions reported by a pixel.
 #[derive(Default)]
 struct Pixel {
-    /// Of its events.
+    /// Positions of its events.
     positions: Vec<i64>,
     reflectivity: Reflectivity,
-    /// Of its frames.
+    /// Positions of its frames.
     frames: Vec<i64>,
 }
 
@@ -136,10 +136,10 @@ impl Pixel {
 }
 
 fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
-    System::of(point).choose::<Trial>(watched::<8>, watched::<128>)(point, rng)
+    System::of(point).choose::<Trial>(trial_with_bins::<8>, trial_with_bins::<128>)(point, rng)
 }
 
-fn watched<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+fn trial_with_bins<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let scene = scene(point, Uniform::new(0.0, 1.0)?.sample(rng))?;
     let system = System::of(point);
     let background = Background::ALL[usize::from(point["average"] == 0.0)];
@@ -159,10 +159,10 @@ fn watched<const BINS: usize>(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
         for event in engine.run(&slice)? {
             add(&mut tally, "events", "of all pixels", 1);
             for by in [100, 109, 110] {
-                let early = event.cycle.0 < by;
+                let early = event.cycle.raw() < by;
                 add(&mut tally, "events", &format!("by {by}"), early.into());
             }
-            pixels[usize::from(event.pixel.0)].add(&event);
+            pixels[usize::from(event.pixel.raw())].add(&event);
         }
         for ((pixel, frame), received) in pixels.iter_mut().zip(&mut frames).zip(&slice.pixels) {
             let mut codes = received.photons.iter().peekable();
@@ -212,9 +212,9 @@ fn add_pixel(tally: &mut Tally, scene: &Scene, address: PixelAddress, pixel: &Pi
     add_noises(tally, surface, pixel);
 }
 
-/// Adds what differs from one depth of a pixel to its next: what the centre of mass
-/// always errs by there drops out. All three depths are of the same pixels, those
-/// with twice [`MEAN_OF`] events and two frames, and no difference that is false.
+/// Adds the differences between successive depths of a pixel, in which the bias of the centre of
+/// mass cancels. All three depths use the same pixels: those with twice [`MEAN_OF`] events, two
+/// frames, and no false difference.
 fn add_noises(tally: &mut Tally, surface: &str, pixel: &Pixel) {
     let Some(at) = pixel.positions.len().checked_sub(2 * MEAN_OF) else {
         return;
@@ -248,8 +248,8 @@ fn add_depth(tally: &mut Tally, name: &str, error: i64) {
     }
 }
 
-/// Adds what is compared from pixel to pixel: ranks, and the reflectivity that
-/// follows from the events and the depth reported.
+/// Adds the comparisons between pixels: ranks, and the reflectivity estimated from events and
+/// reported depth.
 #[allow(clippy::cast_possible_truncation, reason = "some millions")]
 fn add_scene(tally: &mut Tally, scene: &Scene, addresses: &[PixelAddress], pixels: &[Pixel]) {
     let signals = addresses
@@ -265,7 +265,7 @@ fn add_scene(tally: &mut Tally, scene: &Scene, addresses: &[PixelAddress], pixel
         |pixel| pixel.reflectivity.signal().to_num(),
     ];
     for (name, estimate) in ESTIMATES.into_iter().zip(estimates) {
-        // Estimate and truth of pixels with an event, up to one scale for all.
+        // Estimate and truth of pixels with an event, up to a common scale.
         let pairs: Vec<(usize, f64, f64)> = addresses
             .iter()
             .zip(pixels)
@@ -298,8 +298,8 @@ fn add_scene(tally: &mut Tally, scene: &Scene, addresses: &[PixelAddress], pixel
 /// How the reflectivity is estimated, before it is multiplied by z².
 const ESTIMATES: [&str; 2] = ["events × z²", "count rate × z²"];
 
-/// The scale that brings `ratios` nearest to 1, and their root mean square
-/// distance from 1 then.
+/// The scale that brings `ratios` closest to 1, and their root mean square distance from 1 after
+/// scaling.
 fn common_scale(ratios: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let sum: f64 = ratios.clone().sum();
     let squares: f64 = ratios.clone().map(|ratio| ratio * ratio).sum();
@@ -334,7 +334,7 @@ mod tests {
         assert_eq!(mean_of_last(&positions[..3], 10), 2.0);
     }
 
-    /// The parts of a bin at which the pixels of a board lie, and all in the window.
+    /// Pixels of a board are spread evenly over a bin, and all lie in the window.
     #[test]
     fn boards_lie_evenly_in_a_bin() {
         for point in points() {
@@ -345,7 +345,7 @@ mod tests {
                 let mut phases: Vec<f64> = columns
                     .map(|column| {
                         let address = 8 * across * scene.size[0] + column;
-                        let address = PixelAddress(u16::try_from(address).unwrap());
+                        let address = PixelAddress::new(u16::try_from(address).unwrap());
                         let view = scene.truth(address, 0).unwrap();
                         assert_ne!(scene.surfaces[view.surface].name, "wall");
                         let position = view.range_mm / scene.mm_per_bin();

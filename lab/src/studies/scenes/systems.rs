@@ -1,4 +1,4 @@
-//! The paper's two systems, and what of their settings is the paper's.
+//! The paper's two systems, and the sources of their settings.
 //!
 //! | | PC (section III) | FPGA (section IV) | source |
 //! |---|---|---|---|
@@ -11,12 +11,12 @@
 //! | L2 | 2000; ours in III-D, III-E | 2000, ours | III-B |
 //! | X | 10; ours in III-D, III-E | 4 | III-B, IV-A |
 //!
-//! The paper has no minimum count: it is 1. It gives neither background nor signal of its
-//! scenes. Ours are B = 0.05, that of its analysis (II-C), and 0.02 for the FPGA. With an
-//! assumed jitter of 70 ps, ours, the pulse of the FPGA has σ = 0.35 bins.
+//! The paper has no minimum count: it is 1. It gives neither background nor signal of its scenes.
+//! We use B = 0.05, that of its analysis (II-C), and 0.02 for the FPGA. With a jitter of 70 ps, our
+//! assumption, the pulse of the FPGA has σ = 0.35 bins.
 //!
-//! The PC takes mini-frames of five laser cycles. A look each ten ends with one of them, so
-//! that photons counted one by one are the same.
+//! The PC takes mini-frames of five laser cycles. Every look falls on the end of a mini-frame, so
+//! counting single photons is equivalent.
 
 use crate::sweep::Point;
 use anyhow::Result;
@@ -24,32 +24,32 @@ use dtof_core::fixed::types::{U8F8, U16F16};
 use dtof_core::{AnyRule, AverageRule, Count, PaperRule};
 use dtof_engine::settings::Settings;
 use dtof_photons::MM_PER_PS;
-use dtof_simulate::scene::{self, Scene};
+use dtof_simulate::scene::Scene;
 
 /// Standard deviation of the PC's pulse in bins.
 pub const PC_SIGMA: f64 = 0.33;
-/// That of the FPGA's, and with a jitter of 70 ps.
+/// Standard deviation of the FPGA's pulse in bins, without and with a jitter of 70 ps.
 pub const FPGA_SIGMAS: [f64; 2] = [0.2, 0.35];
-/// Systems by `fpga`, with their pulses.
+/// Pairs of the parameter `fpga` and the pulse.
 pub const PULSES: [(f64, f64); 3] = [
     (0.0, PC_SIGMA),
     (1.0, FPGA_SIGMAS[0]),
     (1.0, FPGA_SIGMAS[1]),
 ];
-/// L1 of everything but the static scene.
+/// L1 of all studies except the static scene.
 pub const L1: u16 = 40;
 
-/// What the threshold stands on.
+/// The background estimate of the threshold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Background {
-    /// Of all bins.
+    /// The average of all bins.
     Average,
     /// The smaller of two quadrants.
     Quadrants,
 }
 
 impl Background {
-    /// Both, as [`Self::name`] has them.
+    /// Both estimates.
     pub const ALL: [Self; 2] = [Self::Average, Self::Quadrants];
 
     pub const fn name(self) -> &'static str {
@@ -68,7 +68,7 @@ impl Background {
     }
 }
 
-/// One of the two.
+/// A system.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct System {
     pub name: &'static str,
@@ -79,7 +79,7 @@ pub struct System {
     pub x: u16,
     /// Background photons a bin and laser cycle.
     pub background: f64,
-    /// What its threshold stands on.
+    /// The background estimate of its threshold.
     pub by: Background,
 }
 
@@ -106,12 +106,12 @@ pub const FPGA: System = System {
 };
 
 impl System {
-    /// What the point's `fpga` stands for.
+    /// The system of a point, by its parameter `fpga`.
     pub fn of(point: &Point) -> Self {
         if point["fpga"] > 0.0 { FPGA } else { PC }
     }
 
-    /// What is for this system, of the two: a function for its bins, say.
+    /// The value for this system, such as a function for its number of bins.
     pub fn choose<T>(self, pc: T, fpga: T) -> T {
         if self == PC { pc } else { fpga }
     }
@@ -126,7 +126,7 @@ impl System {
         self.bin_width_ps * MM_PER_PS
     }
 
-    /// Its settings with a background that need not be its own.
+    /// Its settings with the background estimate `by`.
     pub fn settings(&self, by: Background, l1: u16, seed: u64) -> Settings {
         Settings {
             bins: self.bins.into(),
@@ -134,11 +134,11 @@ impl System {
             rule: by.rule(),
             l1,
             x: self.x,
-            ..scene::settings(seed)
+            ..Settings::static_scene(seed)
         }
     }
 
-    /// The scene of a file before it, with a pulse of this standard deviation in bins.
+    /// The scene of a file with a pulse of this standard deviation in bins.
     pub fn scene(&self, text: &str, sigma: f64) -> Result<Scene> {
         Ok(Scene {
             bins: self.bins,
@@ -155,8 +155,8 @@ impl System {
 mod tests {
     use super::*;
 
-    /// A rectangle's standard deviation is its width over the root of 12; 1.2 % of a
-    /// period of 1/1.2 MHz. A Gaussian's FWHM is 2.3548 of them.
+    /// The standard deviation of a rectangle is its width over √12; the width is 1.2 % of 1/1.2
+    /// MHz. The FWHM of a Gaussian is 2.3548 standard deviations.
     #[test]
     fn pulses_are_as_wide_as_the_lasers() {
         let rectangle_ps = 0.012 * 1e6 / PC.laser_rate_mhz;

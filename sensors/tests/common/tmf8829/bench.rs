@@ -1,49 +1,35 @@
 //! A driver of a TMF8829 beside its chip.
 
-use std::rc::Rc;
-
+use dtof_chips::Tmf8829 as Chip;
+use dtof_chips::tmf8829::varied_counts;
 use dtof_core::PixelAddress;
 use dtof_sensors::tmf8829::{Config, Preset, Settings, Tmf8829, Zones};
 use dtof_sensors::{Polled, Sensor};
 
-use super::super::{Given, Notes};
+use super::super::{RecordingSink, SinkCall};
 use super::bus::Bus;
-use super::{Chip, Scene};
 
 pub const IMAGE: [u8; 1234] = [0x5A; 1234];
 pub const PRESETS: [Preset; 3] = [Preset::Standard, Preset::LongRange, Preset::HighAccuracy];
 
-/// Counts that differ in every bin and use all three bytes.
-pub fn some() -> Scene {
-    Rc::new(|measurement, zone, bins| {
-        let (zone, bins) = match zone {
-            Some((x, y)) => (64 * y + x, bins),
-            None => (5000 + bins, 64),
-        };
-        let seed = u32::try_from(zone).unwrap() * 7919 + measurement * 104_729;
-        let count = |bin: u32| (seed + bin).wrapping_mul(2_654_435_761) & 0xff_ffff;
-        (0..u32::try_from(bins).unwrap()).map(count).collect()
-    })
-}
-
 pub fn settings(zones: Zones) -> Settings {
-    Settings::new(PixelAddress(10), zones)
+    Settings::new(PixelAddress::new(10), zones)
 }
 
 pub struct Bench<const CHUNK: usize> {
     pub sensor: Tmf8829<'static, Bus, Bus, Bus, CHUNK>,
     pub bus: Bus,
-    pub sink: Notes,
+    pub sink: RecordingSink,
     pub now_ms: u32,
 }
 
 impl<const CHUNK: usize> Bench<CHUNK> {
     pub fn new(settings: Settings) -> Self {
-        let bus = Bus::new(Chip::new(&IMAGE, some()));
+        let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
         Self {
             sensor: sensor(&bus, settings, &IMAGE),
             bus,
-            sink: Notes::default(),
+            sink: RecordingSink::default(),
             // So that the milliseconds wrap in the middle of it.
             now_ms: u32::MAX - 5,
         }
@@ -75,7 +61,7 @@ impl<const CHUNK: usize> Bench<CHUNK> {
     }
 
     /// Polls until so many frames have come whole.
-    pub fn frames(&mut self, frames: usize) -> Vec<Given> {
+    pub fn frames(&mut self, frames: usize) -> Vec<SinkCall> {
         let until = self.bus.0.borrow().chip.sent.len() + frames;
         while self.bus.0.borrow().chip.sent.len() < until {
             self.poll();
@@ -84,7 +70,7 @@ impl<const CHUNK: usize> Bench<CHUNK> {
     }
 
     /// Gives a frame away instead of one of the chip's.
-    pub fn present(&mut self, bytes: &[u8], interrupt: u8) -> Vec<Given> {
+    pub fn present(&mut self, bytes: &[u8], interrupt: u8) -> Vec<SinkCall> {
         {
             let chip = &mut self.bus.0.borrow_mut().chip;
             chip.is_halted = true;

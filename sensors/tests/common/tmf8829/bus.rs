@@ -3,11 +3,11 @@
 use std::cell::RefCell;
 use std::rc::Rc;
 
+use dtof_chips::{Chip as _, Tmf8829 as Chip};
 use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
 use embedded_hal::i2c::{self, ErrorKind, I2c, NoAcknowledgeSource, Operation};
 
 use super::super::Broken;
-use super::Chip;
 
 /// What a bus does instead of the next transfer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -116,7 +116,7 @@ impl PinErrorType for Bus {
 impl InputPin for Bus {
     fn is_high(&mut self) -> Result<bool, Broken> {
         let wires = self.0.borrow();
-        let is_low = wires.chip.is_low() && !wires.is_unplugged;
+        let is_low = wires.chip.interrupts() && !wires.is_unplugged;
         Ok(wires.stuck.unwrap_or(!is_low))
     }
     fn is_low(&mut self) -> Result<bool, Broken> {

@@ -3,7 +3,8 @@
 use std::io::{Read, Write};
 
 use anyhow::{Context, Result, bail};
-use dtof_core::{AerWord, PixelConfig, ProcessorSettings};
+use dtof_core::pixel_processor::ProcessorSettings;
+use dtof_core::{AerWord, PixelConfig};
 
 /// What a clock brings to the pixel processor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -49,9 +50,9 @@ impl Command {
     }
 }
 
-/// What happened, and in which clock.
+/// What the simulation reports; each report comes with its clock.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Happened {
+pub enum Report {
     /// A look began.
     Look,
     /// The event of a macropixel left it.
@@ -64,8 +65,8 @@ pub enum Happened {
     End(bool),
 }
 
-impl Happened {
-    /// The next, and its clock.
+impl Report {
+    /// Reads the next report and its clock.
     pub fn read(from: &mut impl Read) -> Result<(u64, Self)> {
         let mut bytes = [0; 24];
         let ended = "the simulation ends too soon";
@@ -76,7 +77,7 @@ impl Happened {
             *part = u32::from_le_bytes(*word);
         }
         let [what, clock, one, other, ..] = parts;
-        let happened = match what {
+        let report = match what {
             0 => Self::Look,
             1 => Self::Leaves(u8::try_from(one)?),
             2 => {
@@ -87,7 +88,7 @@ impl Happened {
             4 => Self::End(one != 0),
             _ => bail!("the simulation tells {what}"),
         };
-        Ok((clock.into(), happened))
+        Ok((clock.into(), report))
     }
 }
 
@@ -104,17 +105,23 @@ pub mod register {
 }
 
 /// What the registers from `CONTROL` to `SIZE` hold: settings, run, and who packs.
-pub fn held(config: &PixelConfig<128>, packs: bool, pixels_log2: u32) -> Result<Vec<u32>> {
-    let mut held = vec![1 | u32::from(packs) << 1];
-    held.extend(ProcessorSettings::of(config)?.registers());
-    held.push(1 << pixels_log2);
-    Ok(held)
+pub fn register_values(
+    config: &PixelConfig<128>,
+    packs: bool,
+    pixels_log2: u32,
+) -> Result<Vec<u32>> {
+    let mut register_values = vec![1 | u32::from(packs) << 1];
+    register_values.extend(ProcessorSettings::of(config)?.registers());
+    register_values.push(1 << pixels_log2);
+    Ok(register_values)
 }
 
 /// The accesses that configure the pixel processor so, from its reset on. Once it runs, what is
 /// written changes nothing.
-pub fn settings(held: &[u32]) -> Vec<Access> {
-    let written = held.split_last().map_or(held, |(_, written)| written);
+pub fn settings(register_values: &[u32]) -> Vec<Access> {
+    let written = register_values
+        .split_last()
+        .map_or(register_values, |(_, written)| written);
     let mut accesses: Vec<Access> = (register::CONTROL..)
         .zip(written)
         .skip(1)

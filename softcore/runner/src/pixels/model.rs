@@ -3,12 +3,12 @@
 use std::collections::VecDeque;
 
 use anyhow::{Context, Result, bail, ensure};
+use dtof_core::pixel_processor::ProcessorEvent;
 use dtof_core::{
-    AerEncoder, AerWord, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig,
-    ProcessorEvent, Statistics,
+    AerEncoder, AerWord, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig, Statistics,
 };
 
-use super::command::{Command, Happened, register};
+use super::command::{Command, Report, register};
 use super::reads::Reads;
 use super::scene::{Events, Scene};
 
@@ -52,7 +52,7 @@ pub struct Model {
     taken: VecDeque<DepthEvent>,
     events: Events,
     /// What the registers of the settings hold.
-    held: Vec<u32>,
+    register_values: Vec<u32>,
     reads: Vec<u32>,
     counts: Vec<u32>,
     bins: Reads,
@@ -60,9 +60,9 @@ pub struct Model {
 
 impl Model {
     pub fn new(scene: &Scene) -> Result<Self> {
-        let pixel = |address| AsyncPixel::new(PixelAddress(address));
+        let pixel = |address| AsyncPixel::new(PixelAddress::new(address));
         Ok(Self {
-            held: scene.held()?,
+            register_values: scene.register_values()?,
             config: scene.config,
             pixels: (0..1 << scene.pixels_log2).map(pixel).collect(),
             encoder: AerEncoder::new(),
@@ -83,11 +83,11 @@ impl Model {
         })
     }
 
-    /// The next clock; `happened` gives what happened in clocks before a given one.
+    /// The next clock; `reports` has what the simulation reported before a given clock.
     pub fn clock(
         &mut self,
         command: &Command,
-        happened: &mut Told<impl FnMut() -> Result<(u64, Happened)>>,
+        reports: &mut Reports<impl FnMut() -> Result<(u64, Report)>>,
     ) -> Result<()> {
         if let Some((pixel, code)) = command.photon {
             self.outcome.photons += 1;
@@ -102,7 +102,7 @@ impl Model {
             self.cycles += 1;
             // The system has a register at its pins.
             let at = self.clock + 1 + u64::from(self.events == Events::System);
-            let looks = self.happened_until(at, happened)?;
+            let looks = self.apply_until(at, reports)?;
             let is_due = self.since_look >= self.config.x();
             ensure!(is_due || !looks, "clock {at}: a look that is not due");
             if looks {
@@ -122,21 +122,21 @@ impl Model {
     }
 
     /// Everything up to a look in clock `at`; whether there is one.
-    fn happened_until(
+    fn apply_until(
         &mut self,
         at: u64,
-        told: &mut Told<impl FnMut() -> Result<(u64, Happened)>>,
+        reports: &mut Reports<impl FnMut() -> Result<(u64, Report)>>,
     ) -> Result<bool> {
-        while let Some((clock, happened)) = told.next_until(at)? {
-            match happened {
-                Happened::Look => {
+        while let Some((clock, report)) = reports.next_until(at)? {
+            match report {
+                Report::Look => {
                     ensure!(
                         clock == at,
                         "clock {clock}: a look without the end of a laser cycle"
                     );
                     return Ok(true);
                 }
-                _ => self.apply(clock, happened)?,
+                _ => self.apply(clock, report)?,
             }
         }
         Ok(false)
@@ -148,7 +148,7 @@ impl Model {
     }
 
     fn look(&mut self) {
-        let last = LaserCycle(self.cycles - 1);
+        let last = LaserCycle::new(self.cycles - 1);
         let passed = std::mem::take(&mut self.since_look);
         let before = self.outcome.statistics.events;
         for pixel in &mut self.pixels {
@@ -158,25 +158,25 @@ impl Model {
         self.fired = self.outcome.statistics.events - before;
         self.bins.look(self.clock, &self.pixels);
         self.outcome.looks += 1;
-        self.looked.push_back((last.0, self.clock));
+        self.looked.push_back((last.raw(), self.clock));
         if self.looked.len() > REMEMBERED {
             self.looked.pop_front();
         }
     }
 
-    fn apply(&mut self, clock: u64, happened: Happened) -> Result<()> {
-        match happened {
-            Happened::Leaves(pixel) => {
+    fn apply(&mut self, clock: u64, report: Report) -> Result<()> {
+        match report {
+            Report::Leaves(pixel) => {
                 let pixel = self
                     .pixels
                     .get_mut(usize::from(pixel))
                     .context("no such macropixel")?;
-                let event = pixel.acknowledge();
+                let event = pixel.take_event();
                 let event = event.with_context(|| format!("clock {clock}: no event waits"))?;
                 if self.events == Events::Link || self.events == Events::System {
                     let (time, word) = self.encoder.encode(&event);
                     let mut looked = self.looked.iter().rev();
-                    let looked = looked.find(|(cycle, _)| *cycle == event.cycle.0);
+                    let looked = looked.find(|(cycle, _)| *cycle == event.cycle.raw());
                     let ended = looked.map(|&(_, clock)| clock);
                     let time = time.map(|time| (time, None));
                     self.words.extend(time.into_iter().chain([(word, ended)]));
@@ -185,7 +185,7 @@ impl Model {
                     self.compare_reads(clock)?;
                 }
             }
-            Happened::Word(word) => {
+            Report::Word(word) => {
                 let (expected, ended) = self.words.pop_front().unzip();
                 ensure!(
                     expected == Some(word),
@@ -194,12 +194,12 @@ impl Model {
                 let latency = ended.flatten().map(|ended| clock - ended);
                 self.outcome.latencies.extend(latency);
             }
-            Happened::Read(address, data) if address >= register::COUNTS => self.counts.push(data),
-            Happened::Read(address, data) if address >= register::HISTOGRAM => {
+            Report::Read(address, data) if address >= register::COUNTS => self.counts.push(data),
+            Report::Read(address, data) if address >= register::HISTOGRAM => {
                 self.bins.read(clock, address, data)?;
             }
-            Happened::Read(address, data) if address <= register::SIZE => {
-                let expected = self.held.get(usize::try_from(address)?).copied();
+            Report::Read(address, data) if address <= register::SIZE => {
+                let expected = self.register_values.get(usize::try_from(address)?).copied();
                 // Whether it runs yet is not in the model.
                 let known = if address == 0 { 3 } else { u32::MAX };
                 ensure!(
@@ -207,13 +207,13 @@ impl Model {
                     "clock {clock}: {data:x} in register {address}, not {expected:x?}"
                 );
             }
-            Happened::Read(address, data) => {
+            Report::Read(address, data) => {
                 if address == register::WAITING {
                     self.reads.clear();
                 }
                 self.reads.push(data);
             }
-            Happened::Look | Happened::End(_) => bail!("clock {clock}: {happened:?}"),
+            Report::Look | Report::End(_) => bail!("clock {clock}: {report:?}"),
         }
         Ok(())
     }
@@ -236,18 +236,18 @@ impl Model {
     /// What is left when all photons have come.
     pub fn end(
         mut self,
-        told: &mut Told<impl FnMut() -> Result<(u64, Happened)>>,
+        reports: &mut Reports<impl FnMut() -> Result<(u64, Report)>>,
     ) -> Result<Outcome> {
         loop {
-            match told.next()? {
-                (_, Happened::End(waits)) => {
+            match reports.next()? {
+                (_, Report::End(waits)) => {
                     ensure!(!waits && self.words.is_empty(), "words wait");
                     break;
                 }
-                (clock, happened) => self.apply(clock, happened)?,
+                (clock, report) => self.apply(clock, report)?,
             }
         }
-        let waits = self.pixels.iter().find(|pixel| pixel.request());
+        let waits = self.pixels.iter().find(|pixel| pixel.has_event());
         let waits = waits.map(AsyncPixel::address);
         ensure!(waits.is_none(), "the event of {waits:?} has not left");
         let ended_full = self.outcome.statistics.saturated;
@@ -292,12 +292,12 @@ impl Model {
 }
 
 /// What the simulation tells, one at a time.
-pub struct Told<F> {
+pub struct Reports<F> {
     read: F,
-    waiting: Option<(u64, Happened)>,
+    waiting: Option<(u64, Report)>,
 }
 
-impl<F: FnMut() -> Result<(u64, Happened)>> Told<F> {
+impl<F: FnMut() -> Result<(u64, Report)>> Reports<F> {
     pub const fn new(read: F) -> Self {
         Self {
             read,
@@ -305,26 +305,26 @@ impl<F: FnMut() -> Result<(u64, Happened)>> Told<F> {
         }
     }
 
-    pub fn next(&mut self) -> Result<(u64, Happened)> {
+    pub fn next(&mut self) -> Result<(u64, Report)> {
         match self.waiting.take() {
-            Some(told) => Ok(told),
+            Some(reports) => Ok(reports),
             None => (self.read)(),
         }
     }
 
     /// The next before clock `at`, or in it: an event that leaves in the clock of a look leaves
     /// after it.
-    fn next_until(&mut self, at: u64) -> Result<Option<(u64, Happened)>> {
-        let (clock, happened) = self.next()?;
-        let is_before = match happened {
-            Happened::End(_) => false,
-            Happened::Leaves(_) => clock < at,
+    fn next_until(&mut self, at: u64) -> Result<Option<(u64, Report)>> {
+        let (clock, report) = self.next()?;
+        let is_before = match report {
+            Report::End(_) => false,
+            Report::Leaves(_) => clock < at,
             _ => clock <= at,
         };
         if is_before {
-            return Ok(Some((clock, happened)));
+            return Ok(Some((clock, report)));
         }
-        self.waiting = Some((clock, happened));
+        self.waiting = Some((clock, report));
         Ok(None)
     }
 }

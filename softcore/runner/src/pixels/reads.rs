@@ -19,7 +19,7 @@ const UNTIL_ENDED: u64 = 64;
 struct Eight {
     pixel: usize,
     first: usize,
-    asked: u64,
+    requested_at: u64,
     /// What each has to be read as; `None` if its exposure ended meanwhile.
     expected: Option<Vec<RangeInclusive<u32>>>,
 }
@@ -30,7 +30,7 @@ pub struct Reads {
     recent: VecDeque<(u64, u8, u16)>,
     /// When the last exposure of each macropixel ended.
     ended: Vec<u64>,
-    asked: VecDeque<Eight>,
+    requests: VecDeque<Eight>,
     are_there: bool,
     read: Vec<u32>,
     /// How many were as they had to be.
@@ -60,7 +60,7 @@ impl Reads {
                 let mut eight = Eight {
                     pixel: address >> 4,
                     first: (address & 15) * 8,
-                    asked: clock,
+                    requested_at: clock,
                     expected: None,
                 };
                 let had_time = |&ended: &u64| ended == 0 || ended + UNTIL_ENDED < clock;
@@ -77,22 +77,22 @@ impl Reads {
                     });
                     eight.expected = Some(ranges.collect());
                 }
-                self.asked.push_back(eight);
+                self.requests.push_back(eight);
             }
             // They were there when the program asked before.
             Some(Access::Read(register::BINS)) => {
-                if let Some(mut eight) = self.asked.pop_back() {
+                if let Some(mut eight) = self.requests.pop_back() {
                     let ended = self
                         .ended
                         .get(eight.pixel)
-                        .is_some_and(|&ended| ended >= eight.asked);
+                        .is_some_and(|&ended| ended >= eight.requested_at);
                     let ranges = eight.expected.take().filter(|_| !ended);
                     let until = |(bin, range): (usize, RangeInclusive<u32>)| {
                         Some(*range.start()..=count(&eight, bin)?)
                     };
                     eight.expected = ranges
                         .map(|ranges| ranges.into_iter().enumerate().filter_map(until).collect());
-                    self.asked.push_back(eight);
+                    self.requests.push_back(eight);
                 }
             }
             _ => {}
@@ -120,7 +120,10 @@ impl Reads {
         if address < register::LAST_BINS {
             return Ok(());
         }
-        let eight = self.asked.pop_front().context("no bins were asked for")?;
+        let eight = self
+            .requests
+            .pop_front()
+            .context("no bins were asked for")?;
         let Some(expected) = eight.expected.as_ref().filter(|_| self.are_there) else {
             return Ok(());
         };

@@ -1,6 +1,6 @@
 //! What was simulated, as the files have it.
 
-use crate::line::Column::{self, Name, Percent, Told};
+use crate::line::Column::{self, Name, Percent, Unchecked};
 use crate::line::Line;
 
 /// A scene in which the pixel processor did what `dtof-core` does.
@@ -102,11 +102,11 @@ impl Line for Latency {
         Name,
         Percent(5.0),
         Name,
-        Told,
+        Unchecked,
         Percent(10.0),
         Percent(10.0),
-        Told,
-        Told,
+        Unchecked,
+        Unchecked,
     ];
 
     fn csv(&self) -> String {

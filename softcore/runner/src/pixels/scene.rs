@@ -8,7 +8,7 @@ use dtof_core::{Count, PaperRule, PixelConfig, RangeGate};
 use rand_pcg::Pcg64Mcg;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
-use super::command::{Access, Command, held, register, settings};
+use super::command::{Access, Command, register, register_values, settings};
 
 /// Clocks without photons: for the settings before, for what is under way behind.
 const REST: u64 = 3000;
@@ -95,8 +95,8 @@ pub fn config(
 
 impl Scene {
     /// What the registers of the settings hold.
-    pub fn held(&self) -> Result<Vec<u32>> {
-        held(&self.config, self.events == Events::Link, self.pixels_log2)
+    pub fn register_values(&self) -> Result<Vec<u32>> {
+        register_values(&self.config, self.events == Events::Link, self.pixels_log2)
     }
 }
 
@@ -112,7 +112,7 @@ pub struct Commands {
 
 impl Commands {
     pub fn new(scene: &Scene) -> Result<Self> {
-        let mut settings = settings(&scene.held()?);
+        let mut settings = settings(&scene.register_values()?);
         settings.reverse();
         if !scene.events.has_registers() {
             settings.clear();

@@ -6,8 +6,8 @@ use std::thread;
 
 use anyhow::{Context, Result, ensure};
 
-use super::command::Happened;
-use super::model::{Model, Outcome, Told};
+use super::command::Report;
+use super::model::{Model, Outcome, Reports};
 use super::scene::{Commands, Scene};
 
 /// Runs a scene in the simulation, and the same in `dtof-core`.
@@ -26,11 +26,11 @@ pub fn simulate(simulator: &mut Command, scene: &Scene) -> Result<Outcome> {
         }
         input.flush()
     });
-    let mut told = Told::new(|| Happened::read(&mut output));
+    let mut reports = Reports::new(|| Report::read(&mut output));
     let mut model = Model::new(scene)?;
     let outcome = Commands::new(scene)?
-        .try_for_each(|command| model.clock(&command, &mut told))
-        .and_then(|()| model.end(&mut told));
+        .try_for_each(|command| model.clock(&command, &mut reports))
+        .and_then(|()| model.end(&mut reports));
     if outcome.is_err() {
         // It may wait to be read.
         let _ = child.kill();

@@ -9,7 +9,7 @@ use anyhow::{Context, Result, ensure};
 
 use super::design::Kind;
 use super::report::{self, Placed};
-use crate::program::{self, Ran};
+use crate::program::{self, ProgramRun};
 use crate::rtl;
 use crate::target_folder;
 
@@ -121,7 +121,7 @@ impl<'a> Flow<'a> {
     }
 
     /// Runs a tool. It sees three folders, under the same names everywhere.
-    fn run(&self, tool: &str, folder: &Path, arguments: &[String]) -> Result<Ran> {
+    fn run(&self, tool: &str, folder: &Path, arguments: &[String]) -> Result<ProgramRun> {
         let softcore = self.root.join("softcore");
         let mounts = [
             ("/softcore", &*softcore),
@@ -136,7 +136,7 @@ impl<'a> Flow<'a> {
             .current_dir(folder)
             .args(arguments);
         let ran = program::run(&mut command, PATIENCE, None)?;
-        ensure!(ran.code == Some(0), "{tool}: {}", ran.said());
+        ensure!(ran.code == Some(0), "{tool}: {}", ran.output());
         Ok(ran)
     }
 }

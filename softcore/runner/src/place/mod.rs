@@ -139,10 +139,12 @@ fn place(flow: &Flow<'_>, kinds: &[Kind]) -> Result<Vec<Placements>> {
 /// `VexRiscv`'s cycles for what the tree does.
 fn cycles(root: &Path) -> Result<f64> {
     let rows: Vec<table::Row> = files::lines(root)?;
-    let is_it = |row: &&table::Row| row.core == "vexriscv,rv32im" && row.operation == page::SAME;
+    let is_it = |row: &&table::Row| {
+        row.core == "vexriscv,rv32im" && row.operation == page::PROCESSOR_DECISION
+    };
     let row = rows.iter().find(is_it);
     Ok(row
-        .with_context(|| format!("{}: no {}", table::Row::FILE, page::SAME))?
+        .with_context(|| format!("{}: no {}", table::Row::FILE, page::PROCESSOR_DECISION))?
         .cycles)
 }
 
@@ -201,7 +203,7 @@ mod tests {
         assert!(processors.clone().all(|row| row.megahertz < 100.0));
         let trees = rows.iter().filter(|row| row.clocks.is_some());
         assert_eq!(trees.clone().count(), LANES.len());
-        assert!(trees.clone().all(|row| row.lowest > 100.0));
+        assert!(trees.clone().all(|row| row.lowest_megahertz > 100.0));
     }
 
     #[test]
@@ -217,7 +219,7 @@ mod tests {
         assert!(is_like(&|_| ()));
         assert!(is_like(&|row| row.megahertz *= 1.02));
         assert!(!is_like(&|row| row.megahertz *= 1.04));
-        assert!(!is_like(&|row| row.used.tables += 1));
+        assert!(!is_like(&|row| row.used.lookup_tables += 1));
         assert!(!is_like(&|row| row.clocks = None));
         assert!(check(rows.clone(), &rows[1..], None).is_err());
         let of_four: Vec<Row> = rows.iter().filter(|row| row.is_of(4)).cloned().collect();

@@ -9,10 +9,10 @@ const PAGE: &str = include_str!("../../fpga.md");
 
 pub const DOCUMENT: &str = "docs/results/bench/fpga.md";
 
-/// The operation of the processor that the comparator tree does.
-pub const SAME: &str = "decision: whole histogram; no event";
+/// The operation of the bench in which a processor does the work of the comparator tree.
+pub const PROCESSOR_DECISION: &str = "decision: whole histogram; no event";
 
-/// The whole file; `VexRiscv` takes so many cycles for [`SAME`].
+/// The whole file; `VexRiscv` takes so many cycles for [`PROCESSOR_DECISION`].
 pub fn text(rows: &[Row], cycles: f64) -> String {
     PAGE.replace("{cells}\n", &cells(rows))
         .replace("{paths}\n", &paths(rows))
@@ -33,14 +33,14 @@ fn cells(rows: &[Row]) -> String {
         let _ = writeln!(
             text,
             "| {design} | {size} | {} | {} | {} | {} | {} | {} | {:.1} | {:.1} | {} |",
-            used.tables,
+            used.lookup_tables,
             used.flip_flops,
             row.registers,
             used.rams,
             used.multipliers,
-            used.table_rams,
+            used.lookup_table_rams,
             row.megahertz,
-            row.lowest,
+            row.lowest_megahertz,
             row.part
         );
     }

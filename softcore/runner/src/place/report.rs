@@ -48,7 +48,7 @@ struct End {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Used {
     /// Lookup tables of four inputs, `TRELLIS_COMB`.
-    pub tables: u64,
+    pub lookup_tables: u64,
     /// `TRELLIS_FF`.
     pub flip_flops: u64,
     /// Block RAMs of 18 kbit, `DP16KD`.
@@ -57,7 +57,7 @@ pub struct Used {
     pub multipliers: u64,
     /// RAMs of 16 words of four bits made of lookup tables, `TRELLIS_RAMW`. The tables are
     /// among the others.
-    pub table_rams: u64,
+    pub lookup_table_rams: u64,
 }
 
 /// The bits of all ports of a netlist's module but for the clock.
@@ -134,11 +134,11 @@ impl Placed {
         };
         Ok(Self {
             used: Used {
-                tables: used("TRELLIS_COMB")?,
+                lookup_tables: used("TRELLIS_COMB")?,
                 flip_flops: used("TRELLIS_FF")?,
                 rams: used("DP16KD")?,
                 multipliers: used("MULT18X18D")?,
-                table_rams: used("TRELLIS_RAMW")?,
+                lookup_table_rams: used("TRELLIS_RAMW")?,
             },
             megahertz: clock.achieved,
             logic,
@@ -201,11 +201,11 @@ mod tests {
     fn cells_clock_and_path_are_read() {
         let placed = Placed::of(REPORT).unwrap();
         let used = Used {
-            tables: 11,
+            lookup_tables: 11,
             flip_flops: 12,
             rams: 13,
             multipliers: 14,
-            table_rams: 15,
+            lookup_table_rams: 15,
         };
         assert_eq!(placed.used, used);
         assert!((placed.megahertz - 100.0).abs() < 1e-9);

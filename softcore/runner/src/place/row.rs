@@ -5,7 +5,7 @@ use anyhow::{Context, Result};
 use super::design::Kind;
 use super::flow::Placements;
 use super::report::Used;
-use crate::line::Column::{self, Name, Percent, Told};
+use crate::line::Column::{self, Name, Percent, Unchecked};
 use crate::line::Line;
 
 /// The figures of a design.
@@ -17,11 +17,11 @@ pub struct Row {
     pub used: Used,
     /// How many of the flip-flops are at most the registers at its ports.
     pub registers: u64,
-    /// The middle one of all seeds' clocks, in MHz, rounded to tenths.
+    /// The median clock of all seeds, in MHz, rounded to tenths.
     pub megahertz: f64,
-    /// The lowest of them.
-    pub lowest: f64,
-    /// Of the path that limits the middle one: ns in cells, rounded to tenths, and in wires.
+    /// The lowest clock of all seeds, in MHz.
+    pub lowest_megahertz: f64,
+    /// Of the path that limits the median clock: ns in cells, rounded to tenths, and in wires.
     pub logic: f64,
     pub wires: f64,
     /// Where that path starts and ends.
@@ -51,7 +51,7 @@ impl Row {
             used: middle.used,
             registers,
             megahertz: tenths(middle.megahertz),
-            lowest: tenths(lowest),
+            lowest_megahertz: tenths(lowest),
             logic: tenths(middle.logic),
             wires: tenths(middle.wires),
             from: middle.from,
@@ -68,7 +68,7 @@ impl Row {
 
     /// Lookup tables and flip-flops but for the registers at its ports.
     pub fn cells(&self) -> u64 {
-        self.used.tables + self.used.flip_flops.saturating_sub(self.registers)
+        self.used.lookup_tables + self.used.flip_flops.saturating_sub(self.registers)
     }
 }
 
@@ -87,8 +87,8 @@ impl Line for Row {
         Name,
         Percent(3.0),
         Percent(3.0),
-        Told,
-        Told,
+        Unchecked,
+        Unchecked,
         Name,
         Name,
         Name,
@@ -97,23 +97,28 @@ impl Line for Row {
 
     fn csv(&self) -> String {
         let Used {
-            tables,
+            lookup_tables,
             flip_flops,
             rams,
             multipliers,
-            table_rams,
+            lookup_table_rams,
         } = self.used;
         let (design, macropixels, part) = (&self.design, self.macropixels, &self.part);
         let cells = [
-            tables,
+            lookup_tables,
             flip_flops,
             self.registers,
             rams,
             multipliers,
-            table_rams,
+            lookup_table_rams,
         ]
         .map(|of| of.to_string());
-        let times = [self.megahertz, self.lowest, self.logic, self.wires];
+        let times = [
+            self.megahertz,
+            self.lowest_megahertz,
+            self.logic,
+            self.wires,
+        ];
         let (cells, times) = (
             cells.join(","),
             times.map(|of| format!("{of:.1}")).join(","),
@@ -130,12 +135,12 @@ impl Line for Row {
         let &[
             design,
             macropixels,
-            tables,
+            lookup_tables,
             flip_flops,
             registers,
             rams,
             multipliers,
-            table_rams,
+            lookup_table_rams,
             ref rest @ ..,
         ] = words
         else {
@@ -152,15 +157,15 @@ impl Line for Row {
             design: design.to_owned(),
             macropixels: macropixels.parse().ok()?,
             used: Used {
-                tables: tables.parse().ok()?,
+                lookup_tables: lookup_tables.parse().ok()?,
                 flip_flops: flip_flops.parse().ok()?,
                 rams: rams.parse().ok()?,
                 multipliers: multipliers.parse().ok()?,
-                table_rams: table_rams.parse().ok()?,
+                lookup_table_rams: lookup_table_rams.parse().ok()?,
             },
             registers: registers.parse().ok()?,
             megahertz: megahertz.parse().ok()?,
-            lowest: lowest.parse().ok()?,
+            lowest_megahertz: lowest.parse().ok()?,
             logic: logic.parse().ok()?,
             wires: wires.parse().ok()?,
             from: from.to_owned(),
@@ -179,11 +184,11 @@ mod tests {
     fn placed(megahertz: f64, to: &str) -> Placed {
         Placed {
             used: Used {
-                tables: 24_289,
+                lookup_tables: 24_289,
                 flip_flops: 2,
                 rams: 3,
                 multipliers: 4,
-                table_rams: 5,
+                lookup_table_rams: 5,
             },
             megahertz,
             logic: 6.04,

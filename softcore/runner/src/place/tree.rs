@@ -8,7 +8,8 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{ComparatorTree, Count, Count10, RangeGate, Threshold, isqrt, quadrant_background};
+use dtof_core::paper::{ComparatorTree, Threshold, isqrt, quadrant_background};
+use dtof_core::{Count, Count10, RangeGate};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
@@ -45,7 +46,7 @@ pub fn check(root: &Path, lanes: u32) -> Result<u64> {
     let lines: String = questions.iter().map(line).collect();
     fs::write(&file, lines).with_context(|| file.display().to_string())?;
     let ran = program::run(Command::new(simulation).arg(&file), PATIENCE, None)?;
-    ensure!(ran.code == Some(0), ran.said());
+    ensure!(ran.code == Some(0), ran.output());
     let (clocks, events) = compare(&questions, &ran.output)?;
     println!(
         "{name}: {} decisions as the model, {events} events, {clocks} clocks each",

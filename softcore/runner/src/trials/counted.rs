@@ -5,7 +5,7 @@ use dtof_softcore::stream::FEW;
 
 use super::events;
 use super::photons::Photon;
-use crate::program::Ran;
+use crate::program::ProgramRun;
 
 /// The report of the testbench and the program on a run.
 pub struct Counted {
@@ -30,7 +30,7 @@ pub struct Counted {
 impl Counted {
     /// # Errors
     /// If the run failed, or does not add up.
-    pub fn read(ran: &Ran) -> Result<Self> {
+    pub fn read(ran: &ProgramRun) -> Result<Self> {
         ensure!(ran.code == Some(0), "the run fails: {:?}", ran.code);
         let mut from_fifo = ran.errors.lines().filter_map(|line| {
             let numbers = line.strip_prefix("fifo: ")?.split([' ', ',']);
@@ -125,7 +125,7 @@ fifo: lowest fill of each tenth 0 0 0 0 0 0 0 0 1 0
 
     #[test]
     fn every_loss_is_noticed() {
-        let read = |output: &str, errors: &str| Counted::read(&Ran::success(output, errors));
+        let read = |output: &str, errors: &str| Counted::read(&ProgramRun::success(output, errors));
         let counted = read(OUTPUT, ERRORS).unwrap();
         assert!(counted.is_sustained() && counted.words == [15]);
         assert!(counted.check(4, &[]).is_err());
@@ -148,7 +148,7 @@ fifo: lowest fill of each tenth 0 0 0 0 0 0 0 0 1 0
         ] {
             assert!(read(output, errors).is_err(), "{output}{errors}");
         }
-        let mut failed = Ran::success(OUTPUT, ERRORS);
+        let mut failed = ProgramRun::success(OUTPUT, ERRORS);
         failed.code = Some(2);
         assert!(Counted::read(&failed).is_err());
     }

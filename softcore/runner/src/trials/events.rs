@@ -44,7 +44,7 @@ pub fn decided(
     let pixel = |number: u8| {
         let photons = photons.iter().filter(|photon| photon.pixel == number);
         Pixel {
-            pixel: AsyncPixel::new(PixelAddress(number.into())),
+            pixel: AsyncPixel::new(PixelAddress::new(number.into())),
             photons: photons.copied().collect::<Vec<_>>().into_iter().peekable(),
             looked: 0,
         }
@@ -61,13 +61,13 @@ pub fn decided(
                 pixel.count(&config, now);
                 let passed = u16::try_from(now - pixel.looked).unwrap_or(u16::MAX);
                 pixel.looked = now;
-                let last = LaserCycle(now - 1);
+                let last = LaserCycle::new(now - 1);
                 let looked = &mut pixel.pixel;
                 let _ = looked.end_laser_cycles(&config, &mut all, last, passed);
             }
             Mark::Taken(address) => {
-                let pixel = pixels.get_mut(usize::from(address.0));
-                let event = pixel.and_then(|pixel| pixel.pixel.acknowledge());
+                let pixel = pixels.get_mut(usize::from(address.raw()));
+                let event = pixel.and_then(|pixel| pixel.pixel.take_event());
                 events.push(event.with_context(|| format!("no event waits in {address:?}"))?);
             }
         }
@@ -136,7 +136,7 @@ mod tests {
         for now in (50..=200).step_by(50) {
             marks.push(Mark::Look(now).to_raw());
             marks.push(Mark::Look(now).to_raw());
-            marks.push(Mark::Taken(PixelAddress(1)).to_raw());
+            marks.push(Mark::Taken(PixelAddress::new(1)).to_raw());
         }
         let (events, _) = decided(2, &marks, &photons).unwrap();
         let mut encoder = AerEncoder::new();

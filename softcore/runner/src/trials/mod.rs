@@ -17,7 +17,7 @@ use crate::rtl::{Laser, Simulator};
 use crate::table::Row;
 use counted::Counted;
 use photons::{PER_PHOTON, Photon, Photons, photons};
-use sustained::Sustained;
+use sustained::SustainedRate;
 
 /// Photons of a run at the highest rate, about, or as many as come in so many laser cycles. At
 /// other rates a run has as many laser cycles.
@@ -80,7 +80,7 @@ pub struct Trials<'a> {
 
 /// The results of the trials.
 pub struct Found {
-    pub sustained: Vec<Sustained>,
+    pub sustained: Vec<SustainedRate>,
     /// Bytes of the stack with so many macropixels.
     pub stack: Vec<(u8, u64)>,
     /// Events and decisions put off with a link that is slow.
@@ -119,24 +119,24 @@ impl Trials<'_> {
         };
         // More than that it cannot count.
         let most = u64::from(PER_PHOTON) * CLOCKS / self.cycles.count.max(1);
-        let (mut held, mut failed) = (0, u32::try_from(most)?);
-        while failed - held > (held / PARTS).max(1) {
-            let rate = held.midpoint(failed);
+        let (mut highest, mut failed) = (0, u32::try_from(most)?);
+        while failed - highest > (highest / PARTS).max(1) {
+            let rate = highest.midpoint(failed);
             let (counted, _) = self.stream(&at(rate, cycles(rate)))?;
             if counted.is_sustained() {
-                held = rate;
+                highest = rate;
             } else {
                 failed = rate;
             }
         }
-        ensure!(held >= RATES[2], "no rate is sustained");
+        ensure!(highest >= RATES[2], "no rate is sustained");
         let mut sustained = Vec::new();
         for part in RATES {
-            let run = at(held / part, cycles(held));
+            let run = at(highest / part, cycles(highest));
             let counted = self.checked(&run)?;
             ensure!(counted.is_sustained(), "a lower rate is not sustained");
             let tenths = counted.cycles * u64::from(PIXELS) * 10;
-            sustained.push(Sustained {
+            sustained.push(SustainedRate {
                 core: self.core.to_owned(),
                 rate: run.rate,
                 between_looks: tenths.div_ceil(counted.looks.max(1)) as f64 / 10.0,
@@ -214,7 +214,7 @@ impl Trials<'_> {
         let limit = 2 * u64::from(run.length) * run.clocks + 50_000_000 + 10 * run.wait;
         let image = (self.image)(run.pixels);
         let ran = self.simulator.stream(&image, limit, &laser)?;
-        let counted = Counted::read(&ran).with_context(|| format!("{run:?}\n{}", ran.said()))?;
+        let counted = Counted::read(&ran).with_context(|| format!("{run:?}\n{}", ran.output()))?;
         let found = counted.strays;
         ensure!(found == strays, "{run:?}: {found} strays of {strays}");
         Ok((counted, photons))

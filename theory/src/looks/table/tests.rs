@@ -1,16 +1,16 @@
-//! The kept table against the grid.
+//! The table against the grid.
 
 use super::*;
 
 #[test]
-fn the_kept_table_is_of_this_grid() {
-    let table = Table::kept().unwrap();
+fn the_table_has_this_grid() {
+    let table = Table::load().unwrap();
     // Every point has rows.
     for point in points() {
         let of_point = |row: &&Row| (row.first_mean, row.first) == (point.first_mean, point.first);
         assert!(table.rows.iter().any(|row| of_point(&row)), "{point:?}");
     }
-    // In the order of the grid, none twice.
+    // In the order of the grid, without duplicates.
     let place = |row: &Row| (row.first_mean, row.first, row.last, row.alpha);
     assert!(
         table
@@ -21,15 +21,15 @@ fn the_kept_table_is_of_this_grid() {
 }
 
 #[test]
-fn another_grid_is_refused_in_one_line() {
-    let another = KEPT.replace("[2, 5, 11,", "[2, 6, 11,");
+fn another_grid_is_refused() {
+    let another = CSV.replace("[2, 5, 11,", "[2, 6, 11,");
     let error = Table::read(&another).unwrap_err().to_string();
     assert!(
         error.contains("another grid") && !error.contains('\n'),
         "{error}"
     );
-    let row = KEPT.lines().last().unwrap();
-    let with = |row: &str| format!("{KEPT}{row}\n");
+    let row = CSV.lines().last().unwrap();
+    let with = |row: &str| format!("{CSV}{row}\n");
     let fields: Vec<&str> = row.split(',').collect();
     for (field, value) in [(0, "7"), (1, "3"), (2, "100"), (3, "300")] {
         let mut bad = fields.clone();
@@ -43,19 +43,19 @@ fn another_grid_is_refused_in_one_line() {
 }
 
 #[test]
-fn few_events_leave_more_room_above() {
-    let table = Table::kept().unwrap();
+fn upper_limits_are_not_below_the_probability() {
+    let table = Table::load().unwrap();
     for row in &table.rows {
         let found = table.look_up(row.first_mean, row.first, row.last, row.intensity);
         let found = found.unwrap();
-        assert!(found.at_most >= found.probability, "{row:?}");
+        assert!(found.upper_limit >= found.probability, "{row:?}");
     }
 }
 
-/// A thousand exposures of other seeds, at four of the points.
+/// A thousand exposures with another seed, at four points.
 #[test]
-fn the_kept_table_is_what_is_simulated() {
-    let table = Table::kept().unwrap();
+fn the_table_equals_a_new_simulation() {
+    let table = Table::load().unwrap();
     let all = points();
     let of_grid = FIRST_MEANS.len() * FIRSTS.len();
     assert_eq!(all.len(), of_grid);
@@ -68,7 +68,7 @@ fn the_kept_table_is_what_is_simulated() {
         assert_eq!(tally.exposures, 2 * u64::from(TRIAL));
         let rows = rows(point, &tally);
         for row in &rows {
-            assert!((FEWEST_EVENTS..=950).contains(&row.events));
+            assert!((MIN_EVENTS..=950).contains(&row.events));
             let found = table.look_up(row.first_mean, row.first, row.last, row.intensity);
             let expected = found.unwrap().probability * tally.exposures as f64;
             let error = (row.events as f64 - expected).abs();

@@ -1,8 +1,8 @@
 """Many machines, with Dask distributed.
 
 Recordings, rows of one recording, or seeds are spread over the workers of a ``distributed.Client``.
-What comes back is what one machine gives, byte for byte, on any number of workers and whatever of
-them are lost on the way.
+The results equal those of a single machine, byte for byte, with any number of workers and even if
+workers are lost.
 
 >>> from distributed import Client
 >>> from dtof import cluster
@@ -10,10 +10,10 @@ them are lost on the way.
 ...     many = cluster.recordings(client, files, out="results", bin_width_ps=250)
 ...     print(many.totals["events"], many.failed)
 
-A worker uses as many threads for all of its tasks as it has (``dask worker --nthreads``), unless
-``RAYON_NUM_THREADS`` says otherwise. Work leaves its interpreter free, so that its heartbeats go
-on. A task that is cancelled, or whose client is gone, runs to its end if it has begun; what comes of
-it is dropped, files that it writes appear whole. One that has not begun is forgotten.
+The tasks of a worker share its threads (``dask worker --nthreads``), unless ``RAYON_NUM_THREADS``
+is set. Tasks release the GIL, so heartbeats continue. A running task that is cancelled, or whose
+client is gone, runs to its end; its result is dropped, and its files are complete. A task that has
+not begun is dropped.
 """
 
 try:

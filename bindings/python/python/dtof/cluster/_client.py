@@ -1,4 +1,4 @@
-"""What a client does: it looks at the workers, and waits for results."""
+"""The client side: checks workers, and waits for results."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .._native import Error, __version__
 
 Progress = Optional[Callable[[int, int], Any]]
 
-#: Counters of ``statistics`` that parts add up.
+#: Counters of ``statistics`` that are summed over parts.
 COUNTERS = (
     "photons", "events", "events_of_blocks", "pixels", "pixels_reporting", "held", "rejected",
     "saturated", "saturated_in_blocks", "gated_out", "masked", "deferred", "expired",
@@ -30,20 +30,20 @@ def totals(statistics: Iterable[dict[str, Any]]) -> dict[str, int]:
     return sums
 
 
-def look_at(client: Any, folder: Optional[str] = None) -> None:
+def check_workers(client: Any, folder: Optional[str] = None) -> None:
     """Checks that workers have this version of dtof, and ``folder``.
 
-    Tasks of workers that come later check it themselves.
+    Workers that join later are checked by their tasks.
     """
     if not isinstance(client, Client):
         raise Error(f"client: {type(client).__name__}: must be a distributed.Client")
     if client.asynchronous:
-        raise Error("client: is asynchronous: must be one that waits")
-    # Functions of Python itself: a worker without dtof has them, too.
+        raise Error("client: is asynchronous: must be synchronous")
+    # Only the standard library: a worker may lack dtof.
     for worker, version in client.run(metadata.version, "dtof", on_error="return").items():
         if isinstance(version, metadata.PackageNotFoundError):
             raise Error(f"worker {worker} has no dtof: install it there, too")
-        # A worker that is lost meanwhile says nothing.
+        # A worker that was lost meanwhile has no answer.
         if isinstance(version, str):
             check_version(f"worker {worker}", version)
     if folder is None:
@@ -54,7 +54,7 @@ def look_at(client: Any, folder: Optional[str] = None) -> None:
 
 
 def check_version(who: str, version: str, expected: str = __version__) -> None:
-    """Checks that ``version`` is ours."""
+    """Checks that ``version`` is the expected one."""
     if version != expected:
         raise Error(f"{who} has dtof {version}, not {expected}: install the same everywhere")
 
@@ -64,7 +64,7 @@ def wait_for(
 ) -> list[Any]:
     """The results of ``futures``, in their order.
 
-    The first error cancels the others and is raised, unless errors are kept as results.
+    The first error cancels the others and is raised, unless ``keep_errors`` keeps errors as results.
     """
     places = {future.key: place for place, future in enumerate(futures)}
     results: list[Any] = [None] * len(futures)
@@ -75,7 +75,7 @@ def wait_for(
                 if isinstance(result, Exception) and not keep_errors:
                     raise result
                 results[places[future.key]] = result
-                # Workers need not keep it.
+                # Frees the worker's memory.
                 future.release()
                 done += 1
                 if progress is not None:
@@ -88,7 +88,7 @@ def wait_for(
 
 
 def _results(client: Client, futures: list[Future[Any]]) -> list[Any]:
-    """Results, or the errors in their places."""
+    """The results; errors take the place of missing ones."""
     try:
         return list(client.gather(futures))
     except Exception:

@@ -1,4 +1,4 @@
-"""The folder of one recording: what an earlier run has left, and what comes new."""
+"""The results folder of one recording: reuse of an earlier run, and new results."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ import numpy
 from .. import _native
 from .._arrays import EVENT
 from .._files import write_events
-from .._options import Given, flags
+from .._options import Keywords, flags
 from .._run import Replay
 
-#: Kinds of files of events.
+#: Formats of event files.
 FORMATS = ("aer", "npy")
-#: What the program writes besides.
+#: Further files that the program writes.
 _OF_THE_PROGRAM = (
     "events.csv", "report.html", "depth-last.svg", "depth-mean.svg", "event-counts.svg",
     "reflectivity-events.svg", "reflectivity-signal.svg", "photon-counts.svg",
@@ -27,44 +27,44 @@ _OF_THE_PROGRAM = (
 
 
 class Folder:
-    """Where the results of one recording are to be.
+    """The results folder of one recording.
 
-    ``summary.json`` is written last and removed first, so that a folder that has it is complete.
+    ``summary.json`` is written last and removed first: a folder that has it is complete.
     """
 
-    def __init__(self, folder: str, events: str, file: str, said: Given) -> None:
+    def __init__(self, folder: str, events: str, file: str, keywords: Keywords) -> None:
         self._folder = folder
         self._events = f"events.{events}"
-        self._request = _request(file, said)
-        self._inputs = [file, *_settings(said)]
+        self._request = _request(file, keywords)
+        self._inputs = [file, *_settings(keywords)]
 
-    def kept(self) -> Optional[dict[str, Any]]:
-        """The statistics of an earlier run with the same request, if its files are as it left them."""
+    def kept_statistics(self) -> Optional[dict[str, Any]]:
+        """The statistics of an earlier run with the same request, if its files are unchanged."""
         summary = self._earlier()
-        asked = {**self._request, "events": self._events}
+        expected = {**self._request, "events": self._events}
         request = dict(summary.pop("request", None) or {}) if summary else {}
         hashes = request.pop("sha256", None)
-        return summary if request == asked and self._hashes() == hashes else None
+        return summary if request == expected and self._hashes() == hashes else None
 
     def write(self, run: Replay) -> None:
-        """Writes the files, each whole or not at all. Only results of this module are replaced."""
+        """Writes the files, each atomically. Replaces only results of this module."""
         self._earlier()
-        # They would stay, beside events that they do not show.
+        # They would stay beside events of another run.
         other = next((name for name in _OF_THE_PROGRAM if os.path.lexists(self._place(name))), None)
         if other is not None:
             raise _native.Error(f"{self._folder}: has {other} of another run: move the folder away")
-        for name, is_ours in _OURS.items():
+        for name, is_ours in _OWN_FILES.items():
             place = self._place(name)
             if not os.path.lexists(place):
                 continue
             if not (os.path.isfile(place) and is_ours(place)):
                 raise _native.Error(f"{place}: was not written by dtof: move it away")
             if any(os.path.samefile(place, name) for name in self._inputs):
-                raise _native.Error(f"{place}: is a file that is read")
+                raise _native.Error(f"{place}: is an input file")
         os.makedirs(self._folder, exist_ok=True)
         for name in ("summary.json", *(f"events.{other}" for other in FORMATS)):
             if name != self._events:
-                # Dask may repeat a task that still runs, and that one removes it first.
+                # Dask may run a task twice at a time, so the file may be gone.
                 with suppress(FileNotFoundError):
                     os.remove(self._place(name))
         events = self._place(self._events)
@@ -78,7 +78,7 @@ class Folder:
         self._put("summary.json", lambda file: file.write(summary.encode()))
 
     def _hashes(self) -> dict[str, Optional[str]]:
-        """The SHA-256 of each file but the summary, None where there is none."""
+        """The SHA-256 of each file except the summary, None for a missing file."""
         places = {name: self._place(name) for name in (self._events, "dtof.toml")}
         return {
             name: _hash(place) if os.path.isfile(place) else None for name, place in places.items()
@@ -102,53 +102,53 @@ class Folder:
         return summary
 
     def _put(self, name: str, write: Callable[[Any], Any]) -> None:
-        """Writes a file beside its place, and moves it there."""
-        aside = self._place(f".dtof-{uuid4().hex}.partial")
+        """Writes a temporary file, and moves it to its place."""
+        temporary = self._place(f".dtof-{uuid4().hex}.partial")
         try:
-            with open(aside, "xb") as file:
+            with open(temporary, "xb") as file:
                 write(file)
                 file.flush()
                 os.fsync(file.fileno())
-            os.replace(aside, self._place(name))
+            os.replace(temporary, self._place(name))
         except BaseException:
-            if os.path.exists(aside):
-                os.unlink(aside)
+            if os.path.exists(temporary):
+                os.unlink(temporary)
             raise
 
 
-def _settings(said: Given) -> list[str]:
-    return [text for key, text in said if key == "settings"]
+def _settings(keywords: Keywords) -> list[str]:
+    return [text for key, text in keywords if key == "settings"]
 
 
-def _request(file: str, said: Given) -> dict[str, Any]:
-    """All that the results depend on."""
+def _request(file: str, keywords: Keywords) -> dict[str, Any]:
+    """Everything that the results depend on."""
     try:
-        known = os.stat(file)
+        info = os.stat(file)
     except OSError as error:
         raise _native.Error(f"{file}: {error.strerror}") from error
-    settings = _settings(said)
+    settings = _settings(keywords)
     return {
         "version": _native.__version__,
         "file": file,
-        "bytes": known.st_size,
-        "modified_ns": known.st_mtime_ns,
-        "options": flags(said),
+        "bytes": info.st_size,
+        "modified_ns": info.st_mtime_ns,
+        "options": flags(keywords),
         "settings_sha256": [_hash(name) for name in settings],
     }
 
 
 def _hash(name: str) -> str:
     try:
-        of_file = hashlib.sha256()
+        digest = hashlib.sha256()
         with open(name, "rb") as file:
-            while some := file.read(1 << 20):
-                of_file.update(some)
-        return of_file.hexdigest()
+            while chunk := file.read(1 << 20):
+                digest.update(chunk)
+        return digest.hexdigest()
     except OSError as error:
         raise _native.Error(f"{name}: {error.strerror}") from error
 
 
-def _begins(mark: bytes) -> Callable[[str], bool]:
+def _starts_with(mark: bytes) -> Callable[[str], bool]:
     """Whether ``mark`` is near the start of a file."""
 
     def is_ours(place: str) -> bool:
@@ -165,8 +165,8 @@ def _holds_events(place: str) -> bool:
         return False
 
 
-_OURS: dict[str, Callable[[str], bool]] = {
-    "events.aer": _begins(b"DTOF-AER"),
+_OWN_FILES: dict[str, Callable[[str], bool]] = {
+    "events.aer": _starts_with(b"DTOF-AER"),
     "events.npy": _holds_events,
-    "dtof.toml": _begins(b"# dtof settings"),
+    "dtof.toml": _starts_with(b"# dtof settings"),
 }

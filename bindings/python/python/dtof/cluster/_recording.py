@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Optional
 
 from .. import _native
-from .._options import Given
-from .._run import quietly
+from .._options import Keywords
+from .._run import quiet_result
 from ._client import line
 from ._folder import Folder
 from ._worker import begin
@@ -15,24 +15,24 @@ from ._worker import begin
 
 @dataclass(frozen=True)
 class Task:
-    """What is to be done. What comes of it depends on nothing else but the files."""
+    """The parameters of a task. Its result depends only on these and the files."""
 
     version: str
     file: str
     folder: Optional[str]
     events: str
-    said: Given
+    keywords: Keywords
 
 
 class Done(NamedTuple):
-    """Fields of a ``Recorded``, and what is surely wrong with the recording."""
+    """Fields of a ``Recorded``, and warnings about the recording."""
 
     result: dict[str, Any]
     warnings: list[str]
 
 
-def do(task: Task) -> Done:
-    """Replays a recording. What is wrong with it is a result: no other worker could do better."""
+def run_task(task: Task) -> Done:
+    """Replays a recording. An error is a result: another worker would have the same."""
     begin(task.version)
     try:
         return _kept_or_new(task)
@@ -45,12 +45,12 @@ def do(task: Task) -> Done:
 def _kept_or_new(task: Task) -> Done:
     folder = None
     if task.folder is not None:
-        folder = Folder(task.folder, task.events, task.file, task.said)
-        kept = folder.kept()
-        if kept is not None:
-            return Done({"statistics": kept, "is_kept": True}, _warnings(kept))
-    done = _native.replay(task.file, task.said, None, None)
-    run = quietly(done)
+        folder = Folder(task.folder, task.events, task.file, task.keywords)
+        earlier = folder.kept_statistics()
+        if earlier is not None:
+            return Done({"statistics": earlier, "is_kept": True}, _warnings(earlier))
+    done = _native.replay(task.file, task.keywords, None, None)
+    run = quiet_result(done)
     if folder is None:
         return Done({"statistics": run.statistics, "run": run}, done["warnings"])
     folder.write(run)
@@ -58,7 +58,7 @@ def _kept_or_new(task: Task) -> Done:
 
 
 def _warnings(statistics: dict[str, Any]) -> list[str]:
-    """The lines that the run itself gave."""
+    """The warnings of the earlier run."""
     cut_off = statistics["cut_off"]
     lines = [f"{cut_off:,} photons in bins that were cut off"] if cut_off else []
     return [*statistics["warnings"], *lines]

@@ -13,21 +13,21 @@ from distributed import Client
 from .. import _native
 from .._options import arguments
 from .._run import Replay, warn
-from ._client import Progress, line, look_at, totals, wait_for
+from ._client import Progress, line, check_workers, totals, wait_for
 from ._folder import FORMATS
-from ._recording import Task, do
+from ._recording import Task, run_task
 
-#: How names of recordings end.
+#: Extensions of recordings.
 _ENDS = (".json.gz", ".json", ".npy", ".npz", ".csv")
 
 
 @dataclass(frozen=True)
 class Recorded:
-    """What came of one recording.
+    """The result of one recording.
 
-    ``error`` is the line that says why there is nothing, None if all went well. ``statistics`` hold
-    what ``summary.json`` holds. ``run`` are its events and settings, None if they are in the folder
-    ``folder``. ``is_kept`` says that an earlier run had left them there.
+    ``error`` is the message of a failure, None on success. ``statistics`` has the contents of
+    ``summary.json``. ``run`` has events and settings, None if they are in ``folder``. ``is_kept``
+    tells that an earlier run wrote them.
     """
 
     file: str
@@ -40,13 +40,13 @@ class Recorded:
 
 @dataclass(frozen=True)
 class Recordings:
-    """What came of many recordings: ``results`` are in the order in which they were given."""
+    """The results of many recordings, in the order of the files."""
 
     results: list[Recorded]
 
     @property
     def failed(self) -> list[Recorded]:
-        """Those with an error."""
+        """The results with an error."""
         return [one for one in self.results if one.error is not None]
 
     @cached_property
@@ -78,36 +78,36 @@ def recordings(
     ``files`` are names that every worker can read, of any format that :func:`dtof.replay` reads.
     ``options`` are its options, the same for all; a settings file is read by the workers.
 
-    Without ``out`` events come back, and have to fit into memory. ``out`` is a folder that all
-    workers share: there each recording gets a folder with ``events.aer`` (or ``events.npy``, an
+    Without ``out`` events are returned, and have to fit into memory. ``out`` is a folder that all
+    workers share: each recording gets a folder there with ``events.aer`` (or ``events.npy``, an
     array of :data:`dtof.EVENT`, with ``events="npy"``), ``dtof.toml`` and ``summary.json``, as from
-    ``dtof replay``; only statistics come back. ``names`` are the names of these folders, those of
-    the files without their ending if not given. ``summary.json`` is written last. A recording whose
-    folder has one, of this version and with equal options, settings, size and time of the file, is
-    not replayed again, if its files are as they were written; its warnings are given again. Other
-    results of this function are replaced, other files never. A folder that ``dtof replay`` wrote is
-    an error of its recording.
+    ``dtof replay``; only statistics are returned. ``names`` are the names of these folders, by
+    default those of the files without extension. ``summary.json`` is written last. A recording is
+    not replayed again if its folder has unchanged results of this version with the same options,
+    settings, and size and time of the file; its warnings are repeated. Other results of this
+    function are replaced, other files never. A folder that ``dtof replay`` wrote is an error of its
+    recording.
 
-    A recording that cannot be replayed is a result with an ``error``; the others go on.
-    ``progress(done, all)`` is called with each that is done.
+    A recording that cannot be replayed is a result with an ``error``; the others continue.
+    ``progress(done, all)`` is called after each recording.
     """
     given = _files(files)
     if options.get("settings") is not None:
         options["settings"] = os.path.abspath(options["settings"])
-    said = arguments(options)
-    _native.check_options(said)
+    keywords = arguments(options)
+    _native.check_options(keywords)
     if events not in FORMATS:
         raise _native.Error(f"events {events!r}: must be one of {', '.join(FORMATS)}")
     if out is None and names is not None:
-        raise _native.Error("names are those of folders: say out, too")
+        raise _native.Error("names are those of folders: give out, too")
     folder = None if out is None else os.path.abspath(out)
     folders: list[Optional[str]] = [None] * len(given)
     if folder is not None:
         folders = [os.path.join(folder, name) for name in _names(given, names)]
-    look_at(client, folder)
+    check_workers(client, folder)
     version = _native.__version__
-    tasks = [Task(version, file, place, events, said) for file, place in zip(given, folders)]
-    futures = client.map(do, tasks, pure=False)
+    tasks = [Task(version, file, place, events, keywords) for file, place in zip(given, folders)]
+    futures = client.map(run_task, tasks, pure=False)
     results = []
     for task, done in zip(tasks, wait_for(client, futures, progress, keep_errors=True)):
         if isinstance(done, Exception):
@@ -143,11 +143,11 @@ def _names(files: list[str], names: Optional[Iterable[str]]) -> list[str]:
         raise _native.Error(f"names: {len(given)} for {len(files)} files")
     seen: dict[str, str] = {}
     for file, name in zip(files, given):
-        # What separates names on one system does so for all.
+        # Separators of any system count on all systems.
         parts = name.replace("\\", "/").split("/")
         if os.path.isabs(name) or not all(parts) or {".", ".."} & set(parts) or "\0" in name:
-            raise _native.Error(f"names: {name!r} is no name of a folder in out")
-        # Some file systems do not tell them apart.
+            raise _native.Error(f"names: {name!r} is not the name of a folder in out")
+        # Some file systems ignore case.
         other = seen.setdefault(name.lower(), file)
         if other is not file:
             raise _native.Error(

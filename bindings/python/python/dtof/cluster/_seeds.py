@@ -14,9 +14,9 @@ from typing import Any, Optional
 from distributed import Client
 
 from .. import _native
-from .._options import Given, arguments, flags
-from .._run import quietly
-from ._client import Progress, look_at, totals, wait_for
+from .._options import Keywords, arguments, flags
+from .._run import quiet_result
+from ._client import Progress, check_workers, totals, wait_for
 from ._worker import begin
 
 #: Runs in a task.
@@ -27,10 +27,10 @@ _PART = 10
 class Seeds:
     """Runs of one scene with different seeds.
 
-    ``statistics`` are those of each run, as in ``summary.json``, in the order of ``seeds``, which
-    ascend. ``scene_sha256`` is that of the text of the scene and the options. Two of these add up, if
-    they are of one scene and the same options, and have no seed in common. What is told of all runs
-    depends on the runs alone, and not on what was added up in which order.
+    ``statistics`` are those of each run, as in ``summary.json``, in the ascending order of
+    ``seeds``. ``scene_sha256`` is the hash of the scene's text and the options. Two objects with the
+    same scene and options and disjoint seeds can be added. The results do not depend on the order
+    of additions.
     """
 
     seeds: list[int]
@@ -44,10 +44,10 @@ class Seeds:
 
     @cached_property
     def against_truth(self) -> dict[str, Any]:
-        """All events compared with the scene, and in ``surfaces`` those of each by its name.
+        """All events compared with the scene, and those of each surface in ``surfaces``.
 
-        ``events``, ``false_alarms`` and their share; of the others ``bias_mm``, the mean error, and
-        ``rms_mm``, the root mean square of the error, in millimetres. None if there are none.
+        ``events``, ``false_alarms`` and their share. For all other events ``bias_mm``, the mean
+        error, and ``rms_mm``, the root mean square error, in millimetres, or None without events.
         """
         runs = [one["against_truth"] for one in self.statistics]
         surfaces = [
@@ -90,15 +90,15 @@ def seeds(
     """Simulates ``scene`` with each of ``seeds``, spread over the workers of ``client``.
 
     ``scene`` is the name of a scene file, which this process reads, or the text of one; ``options``
-    are those of :func:`dtof.simulate`. Only statistics come back, about 3 kB a run: ``totals`` and
-    ``against_truth`` tell of all. ``seeds(client, scene, range(100))`` equals
+    are those of :func:`dtof.simulate`. Only statistics are returned, about 3 kB per run; ``totals`` and
+    ``against_truth`` summarise them. ``seeds(client, scene, range(100))`` equals
     ``seeds(client, scene, range(50)) + seeds(client, scene, range(50, 100))``.
 
-    ``progress(done, all)`` is called with each ten runs that are done.
+    ``progress(done, all)`` is called after every ten runs.
     """
-    look_at(client)
+    check_workers(client)
     if "seed" in options:
-        raise _native.Error("seed: say seeds instead")
+        raise _native.Error("seed: give seeds instead")
     if options.get("settings") is not None:
         options["settings"] = os.path.abspath(options["settings"])
     try:
@@ -108,24 +108,24 @@ def seeds(
     ordered = sorted(set(given))
     if not given or len(ordered) != len(given):
         twice = next((seed for seed in ordered if given.count(seed) > 1), None)
-        raise _native.Error("seeds: there are none" if twice is None else f"seed {twice}: is twice there")
-    said = arguments(options)
+        raise _native.Error("seeds: there are none" if twice is None else f"seed {twice}: is given twice")
+    keywords = arguments(options)
     text = _text(scene)
     parts = [ordered[at : at + _PART] for at in range(0, len(ordered), _PART)]
     version = _native.__version__
     futures = client.map(
-        _simulate, *zip(*((version, text, part, said) for part in parts)), pure=False
+        _simulate, *zip(*((version, text, part, keywords) for part in parts)), pure=False
     )
     statistics = [run for part in wait_for(client, futures, progress) for run in part]
-    return Seeds(ordered, statistics, _hash(text[1], said))
+    return Seeds(ordered, statistics, _hash(text[1], keywords))
 
 
 def _simulate(
-    version: str, scene: tuple[str, str], seeds: list[int], said: Given
+    version: str, scene: tuple[str, str], seeds: list[int], keywords: Keywords
 ) -> list[dict[str, Any]]:
     begin(version)
-    runs = (_native.simulate(scene, [*said, ("seed", str(seed))], None) for seed in seeds)
-    return [quietly(run).statistics for run in runs]
+    runs = (_native.simulate(scene, [*keywords, ("seed", str(seed))], None) for seed in seeds)
+    return [quiet_result(run).statistics for run in runs]
 
 
 def _text(scene: Any) -> tuple[str, str]:
@@ -141,13 +141,13 @@ def _text(scene: Any) -> tuple[str, str]:
         raise _native.Error(f"{name}: {reason}") from error
 
 
-def _hash(scene: str, said: Given) -> str:
-    """What tells runs apart. Those of a settings file are in their statistics."""
-    return hashlib.sha256(json.dumps([scene, flags(said)]).encode()).hexdigest()
+def _hash(scene: str, keywords: Keywords) -> str:
+    """The hash of scene and options. Settings of a file are part of the statistics."""
+    return hashlib.sha256(json.dumps([scene, flags(keywords)]).encode()).hexdigest()
 
 
 def _fixed(statistics: dict[str, Any]) -> dict[str, Any]:
-    """What all runs of a scene with the same options have in common."""
+    """The statistics that are equal in all runs of a scene with the same options."""
     settings = {key: value for key, value in statistics["settings"].items() if key != "seed"}
     truth = statistics["against_truth"]
     return {
@@ -158,7 +158,7 @@ def _fixed(statistics: dict[str, Any]) -> dict[str, Any]:
 
 
 def _errors(runs: list[dict[str, Any]]) -> dict[str, Optional[float]]:
-    """What runs say together. Sums of floats are exact until they are rounded once."""
+    """The errors of all runs. Sums of floats are exact and rounded once."""
     events = sum(run["events"] for run in runs)
     false_alarms = sum(run["false_alarms"] for run in runs)
     right = [run for run in runs if run["bias_mm"] is not None]

@@ -1,4 +1,4 @@
-"""Where a recording is split: at rows, which lie one after the other in the address space."""
+"""Splits a recording at rows, which are contiguous in the address space."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _NAMES = ("captures", "rows", "columns", "bins")
 
 @dataclass(frozen=True)
 class Part:
-    """Some rows. ``row`` is the first of them, ``block`` holds their histograms."""
+    """A range of rows. ``row`` is the first, ``block`` has their histograms."""
 
     name: str
     row: int
@@ -32,7 +32,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Split:
-    """A recording as parts, ``rows`` of all captures in all."""
+    """A recording in parts. ``rows`` is the total over all captures."""
 
     rows: int
     columns: int
@@ -41,7 +41,7 @@ class Split:
 
 
 def _axes(shape: tuple[int, ...], axes: Any, name: str) -> list[str]:
-    """The names of the axes; those that nobody names are rows."""
+    """The names of the axes; by default rows, columns and bins."""
     if axes is None:
         if len(shape) < 3:
             raise _native.Error(f"{name}: {len(shape)} axes: must be rows, columns and bins")
@@ -58,7 +58,7 @@ def _axes(shape: tuple[int, ...], axes: Any, name: str) -> list[str]:
 
 
 def _outer(names: list[str]) -> list[int]:
-    """The axes that make rows, the one that changes most slowly first."""
+    """The axes that form rows, the slowest first."""
     outer = [axis for axis, name in enumerate(names) if name in ("captures", "rows")]
     return sorted(outer, key=lambda axis: names[axis] != "captures")
 
@@ -66,21 +66,21 @@ def _outer(names: list[str]) -> list[int]:
 def split(array: Any, axes: Any, name: str) -> Split:
     """The chunks of a dask array as parts.
 
-    A chunk that is no rows by themselves is an error.
+    Raises :class:`dtof.Error` if a chunk is not a range of rows.
     """
     if not isinstance(array, dask.array.Array):
         kind = type(array).__name__
         raise _native.Error(f"{name}: {kind}: must be a dask array, or the name of an .npy file")
     if any(math.isnan(length) for length in array.shape):
-        raise _native.Error(f"{name}: the lengths of its chunks are not known: compute_chunk_sizes()")
+        raise _native.Error(f"{name}: the lengths of its chunks are not known: call compute_chunk_sizes()")
     if array.size == 0:
         raise _native.Error(f"{name}: an array of {array.shape} is empty")
     names = _axes(array.shape, axes, name)
     outer = _outer(names)
-    for axis, called in enumerate(names):
+    for axis, axis_name in enumerate(names):
         if axis not in outer and array.numblocks[axis] > 1:
             raise _native.Error(
-                f"{name}: chunks split the {called}: .rechunk({{{axis}: -1}}) makes them whole"
+                f"{name}: chunks split the {axis_name}: .rechunk({{{axis}: -1}}) makes them whole"
             )
     lengths = [array.shape[axis] for axis in outer]
     blocks = array.to_delayed()
@@ -115,7 +115,7 @@ def split(array: Any, axes: Any, name: str) -> Split:
 def blocks_of_file(
     client: Client, version: str, path: str, axes: Any, rows: Optional[int]
 ) -> dask.array.Array:
-    """An ``.npy`` file as a dask array, whose chunks workers read."""
+    """An ``.npy`` file as a dask array; workers read its chunks."""
     shape, dtype = client.submit(_header, version, path, pure=False).result()
     if rows is not None and (isinstance(rows, bool) or not isinstance(rows, int) or rows < 1):
         raise _native.Error(f"rows {rows!r}: must be a whole number from 1")
@@ -137,13 +137,13 @@ def blocks_of_file(
 
 
 def _opened(path: str) -> numpy.ndarray:
-    """The array of a file, which is read where it is looked at."""
+    """The array of a file, memory-mapped."""
     try:
         array = numpy.load(path, mmap_mode="r", allow_pickle=False)
     except OSError as error:
         raise _native.Error(f"{path}: {error.strerror or error}") from error
     except ValueError as error:
-        raise _native.Error(f"{path}: no .npy array: {' '.join(str(error).split())}") from error
+        raise _native.Error(f"{path}: not an .npy array: {' '.join(str(error).split())}") from error
     if not isinstance(array, numpy.ndarray):
         raise _native.Error(f"{path}: an archive: save its array with numpy.save")
     if array.dtype.names is not None:

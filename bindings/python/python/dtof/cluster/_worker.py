@@ -1,4 +1,4 @@
-"""What every task does first."""
+"""The start of every task."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from ._client import check_version
 
 
 def begin(version: str) -> None:
-    """Checks that client and worker are of one version, and takes as many threads as the worker has.
+    """Checks that client and worker have the same version, and sets the number of threads.
 
-    Tasks of a worker share these threads, as many as tasks run at a time.
+    All tasks of a worker share its threads.
     """
     worker = get_worker()
     check_version(f"worker {worker.address}", _native.__version__, version)

@@ -3,11 +3,11 @@
 use std::fs;
 
 use crate::common::aer::{HEADER, events, file};
-use crate::common::{Scratch, names, says};
-use dtof_photons::open::{Opening, open};
+use crate::common::{Scratch, assert_contains, names};
+use dtof_engine::settings::Settings;
+use dtof_photons::open::{ReadOptions, open};
 use dtof_run::output::Output;
 use dtof_run::summary::Summary;
-use dtof_simulate::scene;
 
 const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
 const SCENE: &str = "cycles = 100\n[[surface]]\nrange_mm = 1000\nsignal = 1\n";
@@ -38,7 +38,7 @@ fn kept(scratch: &Scratch, line: &str, name: &str, reason: &str) {
 }
 
 const REPLAY: &str = "replay --input photons.csv --out out";
-const READ: &str = "is the file that is read";
+const READ: &str = "is an input file";
 
 #[test]
 fn a_recording_in_the_output_folder_is_kept() {
@@ -59,7 +59,7 @@ fn a_recording_in_the_output_folder_is_kept() {
     let scratch = Scratch::new();
     scratch.file("out/events.csv", PHOTONS);
     let output = scratch.run("replay --input out/events.csv --out out/../out");
-    says(&String::from_utf8(output.stderr).unwrap(), READ);
+    assert_contains(&String::from_utf8(output.stderr).unwrap(), READ);
     assert_eq!(scratch.read("out/events.csv"), PHOTONS);
 }
 
@@ -118,7 +118,7 @@ fn a_file_of_somebody_else_is_kept() {
     kept(&scratch, "demo --cycles 200", name, "was not written");
 }
 
-/// Also after one that was ended between any two of its files.
+/// This also holds after a run that was ended between any two of its files.
 #[test]
 fn results_of_an_earlier_run_are_replaced() {
     let scratch = Scratch::new();
@@ -132,23 +132,23 @@ fn results_of_an_earlier_run_are_replaced() {
         scratch.replayed(&photons, "");
     }
     assert_eq!(scratch.read("out/notes.txt"), "mine\n");
-    // Another command's, too: they are of this program.
+    // This holds for files of another command of this program, too.
     let scene = scratch.file("scene.toml", SCENE);
     assert!(scratch.simulate(&scene, "--quiet").status.success());
 }
 
-/// What came into the way during a run stays, and so does all of the run before.
+/// Files that appear during a run stay, and so do all files of the earlier run.
 #[test]
 fn a_folder_that_cannot_be_completed_is_left_as_it_was() {
     let scratch = Scratch::new();
     let photons = scratch.file("photons.csv", PHOTONS);
     scratch.replayed(&photons, "");
-    let opening = Opening {
+    let options = ReadOptions {
         cycles: 1,
-        ..Opening::default()
+        ..ReadOptions::default()
     };
-    let source = open(&photons, &opening).unwrap().photons;
-    let settings = scene::settings(1);
+    let source = open(&photons, &options).unwrap().photons;
+    let settings = Settings::static_scene(1);
     let out = scratch.path("out");
     let summary = Summary::new(Default::default(), source.as_ref(), 0, &settings);
     let before = scratch.read("out/summary.json");

@@ -59,14 +59,14 @@ const MISTAKES: [Mistake; 5] = [
             "my.toml: rule window needs --window or --sigma-bins",
         ],
     },
-    // With a unit, and so no number of picoseconds.
+    // A number with a unit.
     Mistake {
         file: ["sensor", "bin_width_ps = '0.25ns'"],
         flags: "--bin-width-ps=0.25ns",
         keywords: &[("bin_width_ps", "0.25ns")],
         lines: [
-            "--bin-width-ps 0.25ns: must be a number from 0 to 65535.99998",
-            "my.toml: bin_width_ps 0.25ns: must be a number from 0 to 65535.99998",
+            "--bin-width-ps 0.25ns: must be a number from 0 to 65535.99998; write it without a unit",
+            "my.toml: bin_width_ps 0.25ns: must be a number from 0 to 65535.99998; write it without a unit",
         ],
     },
 ];
@@ -90,13 +90,13 @@ fn a_mistake_is_one_error_however_it_is_made() {
         assert_eq!(line, format!("error: {by_flag}\n"));
         let line = refused(&format!("{replay} --settings my.toml"));
         assert_eq!(line, format!("error: {by_file}\n"));
-        // What both say is the same value.
+        // Flag and file give the same value.
         let of_file = SettingsFile::parse(&text).and_then(|file| file.settings(128).map(drop));
         let of_file = of_file.unwrap_err().downcast::<Refused>().unwrap();
         let of_keywords = dtof_options::read::<Options>(mistake.keywords.iter().copied());
         let of_keywords = of_keywords
             .map_err(anyhow::Error::from)
-            .and_then(|options| options.said()?.settings(128).map(drop));
+            .and_then(|options| options.requested()?.settings(128).map(drop));
         let of_keywords = of_keywords.unwrap_err().downcast::<Refused>().unwrap();
         assert_eq!(of_file, of_keywords);
     }

@@ -53,7 +53,7 @@ fn numbers_that_cannot_be_are_refused_in_one_line() {
         ",
     );
     let tune = "tune --rule window --background 0.1 --signal 1 --sigma-bins 2";
-    scratch.refused(&scratch.run(tune), &["σ = 2 bins", "up to 1.75"]);
+    scratch.refused(&scratch.run(tune), &["σ = 2 bins", "for 1.75 bins at most"]);
 }
 
 #[test]
@@ -72,8 +72,8 @@ fn standard_input_and_output_are_no_files_of_that_name() {
             --record | monitor --device tcp:localhost:1 --record -
         ",
     ) {
-        let said = "standard input and output are not supported here";
-        scratch.refused(&scratch.run(&row[1]), &[&row[0], said]);
+        let reason = "standard input and output are not supported here";
+        scratch.refused(&scratch.run(&row[1]), &[&row[0], reason]);
     }
     assert!(!scratch.path("-").exists());
 }
@@ -116,7 +116,7 @@ fn a_serial_port_that_is_not_there_is_answered_with_those_that_are() {
             &[
                 "error: /dev/ttyNOWHERE: No",
                 "serial port",
-                "or say tcp:HOST:PORT, or qemu",
+                "or use tcp:HOST:PORT or qemu",
             ],
         );
     }

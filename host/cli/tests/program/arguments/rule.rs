@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, assert_contains};
 use serde_json::Value;
 
 /// A pulse over bins 60 and 61, and a background photon every third laser cycle.
@@ -39,8 +39,8 @@ fn without_an_option_it_is_the_papers_rule_and_centroid() {
     assert_eq!(replayed("--rule paper --alpha 4").1, events);
 }
 
-/// Equal half widths are what a pulse has; others give the same events at other depths. Another
-/// pulse that is said in an option has its own.
+/// A pulse has equal half widths. Others give the same events at other depths. A pulse from an
+/// option replaces the half widths of a file.
 #[test]
 fn half_widths_move_the_depth() {
     let (settings, even) = replayed("--half-widths 2.5,2.5");
@@ -51,7 +51,7 @@ fn half_widths_move_the_depth() {
     assert_eq!(settings["half_widths"], serde_json::json!([1.0, 4.0]));
     assert_eq!(skew.lines().count(), even.lines().count());
     assert_ne!(skew, even);
-    // Beside a pulse they hold as well.
+    // They may be combined with a pulse.
     assert_eq!(replayed("--half-widths 1,4 --sigma-bins 1").1, skew);
 
     let scratch = Scratch::new();
@@ -94,9 +94,9 @@ fn the_pulse_chooses_estimator_and_window() {
     assert!(settings.get("alpha").is_none());
     // The pulse lies evenly about 61.
     assert!(events.lines().count() > 50);
-    says(&events, ",61.0000,");
+    assert_contains(&events, ",61.0000,");
 
-    // With the paper's rule, too; and a window that is given stays.
+    // The same with the paper's rule. An explicit window stays.
     let (settings, _) = replayed("--sigma-bins 1");
     assert_eq!(settings["rule"], "paper");
     assert_eq!(settings["sigma_bins"], 1.0);
@@ -106,7 +106,7 @@ fn the_pulse_chooses_estimator_and_window() {
     assert_eq!(settings["estimator"], "centroid");
 }
 
-/// What `z_for` gives for one in 100 exposures: `core/tests/detect/window_z.rs` holds it.
+/// The result of `z_for` for one in 100 exposures, from `core/tests/detect/window_z.rs`.
 #[test]
 fn the_false_alarms_choose_z() {
     let z = |options: &str| {
@@ -120,7 +120,7 @@ fn the_false_alarms_choose_z() {
     assert_eq!(z(""), z_for(100, 0, 127, 40));
     assert_eq!(z("--false-alarm 0.01"), z(""));
     assert_eq!(z("--false-alarm 1e-3"), z_for(1000, 0, 127, 40));
-    // Of a share that is not one in a whole number, the next rarer one.
+    // A share that is not one in a whole number is rounded to the next rarer one.
     assert_eq!(z("--false-alarm 0.03"), z_for(34, 0, 127, 40));
     assert_eq!(z("--gate 20..119 --l1 8"), z_for(100, 20, 119, 8));
     assert!(z("--false-alarm 0.001") > z("") && z("") > z("--gate 20..119"));
@@ -152,7 +152,7 @@ fn what_was_used_is_printed_and_in_the_report() {
     let printed = String::from_utf8(output.stdout).unwrap();
     for text in [printed, scratch.read("out/report.html")] {
         for part in ["window of 3 bins", "4.5 standard deviations", "±2.5 bins"] {
-            says(&text, part);
+            assert_contains(&text, part);
         }
     }
 }

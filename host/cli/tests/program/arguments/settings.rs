@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, assert_contains};
 
 /// Four pixels of two rows with a pulse at bin 60 and background.
 fn photons(scratch: &Scratch) -> PathBuf {
@@ -36,12 +36,12 @@ fn a_run_is_repeated_from_its_folder() {
         assert!(read("first") == read("again"), "{name}");
     }
     assert!(scratch.read("first/events.csv").lines().count() > 100);
-    // An option overrides the file, and what it replaces goes.
+    // An option overrides the file, and removes the keys that it replaces.
     scratch.printed(&format!("{again} --rule paper --alpha 6 --tracking=false"));
     let toml = scratch.read("again/dtof.toml");
-    says(&toml, "rule = \"paper\"");
-    says(&toml, "alpha = 6.0");
-    says(&toml, "binning = 1");
+    assert_contains(&toml, "rule = \"paper\"");
+    assert_contains(&toml, "alpha = 6.0");
+    assert_contains(&toml, "binning = 1");
     assert!(
         !toml.contains("tracking") && !toml.contains("\nz ="),
         "{toml}"
@@ -66,7 +66,7 @@ fn a_simulation_and_its_export_are_repeated_too() {
             "{name}"
         );
     }
-    // Pixel 2 is left out; what it had is counted.
+    // Pixel 2 is left out, and its photons are counted.
     assert!(
         scratch
             .read("first/events.csv")
@@ -120,7 +120,7 @@ fn what_contradicts_the_file_is_refused() {
         "--settings wide.toml | wide.toml: 64 bins of 250 ps, but the scene has 128 of 250 ps",
     );
 
-    // What a file says is named by file and key, what an option says by the option.
+    // An error about a file names file and key, an error about an option its flag.
     scratch.file("gate.toml", "[sensor]\ngate = [100, 200]\n");
     scratch.file("mask.toml", "[sensor]\nmasked = [4]\n");
     scratch.file("l2.toml", "[detection]\nl2 = 20\nfalse_alarm = 1e-5\n");
@@ -157,7 +157,7 @@ fn what_contradicts_the_file_is_refused() {
     );
 }
 
-/// The width of an option is that of a bin of the recording, that of a file of a bin that is used.
+/// A bin width from an option is that of the recording's bins, one from a file that of rebinned bins.
 #[test]
 fn a_width_and_rebin_are_those_of_one_place_for_every_command() {
     let scratch = Scratch::new();
@@ -167,7 +167,7 @@ fn a_width_and_rebin_are_those_of_one_place_for_every_command() {
     let replay = "replay --input photons.csv --columns 2 --cycles 100 --out out";
     let calibrate = "calibrate --input photons.csv --columns 2 --out found.toml";
     for command in [replay, calibrate] {
-        let refused = "error: --rebin is for other bins than those of the settings file";
+        let refused = "error: --rebin changes the bins that the settings file is for";
         scratch.all_refused(
             command,
             &format!("--settings width.toml --rebin 2 | {refused}"),

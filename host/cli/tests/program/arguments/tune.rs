@@ -1,6 +1,6 @@
 //! `dtof tune` as a user runs it.
 
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, assert_contains};
 use serde_json::Value;
 
 /// What `dtof tune` prints with the options in `line`.
@@ -18,7 +18,7 @@ fn value(result: &Value, name: &str) -> f64 {
     result[name]["value"].as_f64().unwrap()
 }
 
-/// Each row: options, and parts of why they are refused.
+/// Each row: options, and parts of the expected refusal.
 #[track_caller]
 fn refused(rows: &str) {
     let rows = rows.replace("PIXEL", PIXEL).replace("WINDOW", WINDOW);
@@ -41,9 +41,9 @@ fn every_line_says_where_it_comes_from() {
     let (results, options) = text.split_once("\n\n").unwrap();
     every_line_has_a_source(results);
     for part in "seed 1|exposures a point|Eq. 11|mm rms|laser cycles| s ".split('|') {
-        says(results, part);
+        assert_contains(results, part);
     }
-    // What `dtof replay` takes.
+    // `dtof replay` accepts them.
     assert!(options.starts_with("--alpha "), "{options}");
     assert_eq!(options.lines().count(), 1);
     let l1 = options.split_whitespace().nth(3).unwrap();
@@ -64,7 +64,7 @@ fn the_options_it_prints_are_options_of_replay() {
     }
 }
 
-/// Another histogram than that of `replay` by itself is named.
+/// A histogram that differs from the default of `replay` is printed.
 #[test]
 fn the_histogram_is_one_of_the_options() {
     let last = |line: &str| text(line).lines().last().unwrap().to_owned();
@@ -80,14 +80,14 @@ fn fewer_false_alarms_take_a_higher_alpha_and_longer() {
     let seldom = json(&format!("{fixed} --false-alarm 0.0001"));
     assert!(value(&often, "alpha") < value(&seldom, "alpha"));
     assert!(value(&often, "cycles_to_event") < value(&seldom, "cycles_to_event"));
-    for (result, wanted) in [(&often, 0.1), (&seldom, 0.0001)] {
+    for (result, requested) in [(&often, 0.1), (&seldom, 0.0001)] {
         let found = value(result, "false_alarms");
-        assert!(found <= wanted);
+        assert!(found <= requested);
         assert!(value(result, "at_least") <= found && found <= value(result, "at_most"));
         // A multiple of 1/256.
         assert_eq!((value(result, "alpha") * 256.0).fract(), 0.0);
     }
-    // Too seldom for the table: the bound, which says so.
+    // Too rare for the table: the bound is used, and printed.
     for (result, start) in [
         (seldom, "formula: upper bound"),
         (often, "simulation: table"),
@@ -114,9 +114,9 @@ fn false_alarms_a_second_depend_on_the_laser() {
     // 0.01 an exposure of 2000 laser cycles at 1 MHz are 5 a second.
     let rate = "--false-alarms-per-second 5 --laser-hz 1e6";
     let result = json(&format!("{PIXEL} --l1 40 {rate}"));
-    let wanted = json(&format!("{PIXEL} --l1 40 --false-alarm 0.01"));
+    let requested = json(&format!("{PIXEL} --l1 40 --false-alarm 0.01"));
     // A little higher, as exposures with an event are shorter.
-    let [higher, alpha] = [result.clone(), wanted].map(|result| value(&result, "alpha"));
+    let [higher, alpha] = [result.clone(), requested].map(|result| value(&result, "alpha"));
     assert!(alpha <= higher && higher < alpha + 0.05, "{alpha} {higher}");
     let seconds = value(&result, "seconds_to_event") * 1e6;
     assert!((seconds - value(&result, "cycles_to_event")).abs() < 1e-6);
@@ -146,7 +146,7 @@ fn what_cannot_be_met_is_refused_in_one_line() {
             --background 0.05 --signal 1 --sigma-bins 100 | does not fit 128 bins
         ",
     );
-    // However large, in one short line, and without advice that does not help.
+    // Large values give one short line, without useless advice.
     for line in [
         "--background 1e308 --signal 1 --sigma-bins 0.8",
         "--background 0.05 --signal 1e308 --sigma-bins 0.8",
@@ -223,22 +223,28 @@ fn the_average_rule_has_an_alpha_by_simulation() {
 fn z_is_that_of_the_core_and_keeps_false_alarms_down() {
     let gate = dtof_core::RangeGate::<128>::full();
     for one_in in [10, 100, 1000] {
-        let wanted = 1.0 / f64::from(one_in);
-        let result = json(&format!("{WINDOW} --l1 40 --false-alarm {wanted}"));
+        let requested = 1.0 / f64::from(one_in);
+        let result = json(&format!("{WINDOW} --l1 40 --false-alarm {requested}"));
         let z = dtof_core::z_for(one_in, &gate, 4, 40, 2000).to_num::<f64>();
         assert_eq!(value(&result, "z"), z);
         // `z_for`: 0.4 to 1.2 times as many; 4 standard deviations of 4000 exposures.
-        let deviation = (wanted / 4000.0).sqrt();
+        let deviation = (requested / 4000.0).sqrt();
         let found = value(&result, "false_alarms");
         let source = result["false_alarms"]["source"].as_str().unwrap();
         assert!(source.contains("in 4000 exposures"), "{source}");
-        assert!(found < 1.2 * wanted + 4.0 * deviation, "{found} {wanted}");
-        assert!(found > 0.4 * wanted - 4.0 * deviation, "{found} {wanted}");
+        assert!(
+            found < 1.2 * requested + 4.0 * deviation,
+            "{found} {requested}"
+        );
+        assert!(
+            found > 0.4 * requested - 4.0 * deviation,
+            "{found} {requested}"
+        );
     }
 }
 
-/// A window with the z for 1 % false alarms is faster than the paper's rule with the α
-/// for it, and the centred window nearer.
+/// At 1 % false alarms the window rule is faster than the paper's rule, and the centred window is
+/// more exact.
 #[test]
 fn the_window_rule_is_faster_and_nearer() {
     let (paper, window) = (json(PIXEL), json(WINDOW));
@@ -261,7 +267,7 @@ fn the_window_rule_refuses_what_the_papers_does() {
             WINDOW --l1 40 --false-alarm 1e-300 | there is no z for so few
         ",
     );
-    // What the table still holds.
+    // The limits of the table.
     let rare = json(&format!("{WINDOW} --l1 40 --false-alarm 1e-6"));
     assert!((6.0..6.44).contains(&value(&rare, "z")));
 }

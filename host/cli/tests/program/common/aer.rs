@@ -1,12 +1,13 @@
 //! AER files to export.
 
+use dtof_core::events::DynamicDepthEvent;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
-    Array, BinIndex, BinPosition, BlockLevel, Count, DepthEvent, DynamicDepthEvent, EchoNumber,
-    Flags, LaserCycle, PixelAddress, SubBinOffset,
+    Array, BinIndex, BinPosition, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle,
+    PixelAddress, SubBinOffset,
 };
 use dtof_events::aer_file::{Event, Header, Writer};
-use dtof_export::{Exported, Format, Options, export};
+use dtof_export::{ExportSummary, Format, Options, export};
 
 use super::{Scratch, names};
 
@@ -30,13 +31,13 @@ pub fn depth(pixel: u16, cycle: u64, bin: u16) -> Event {
     Event::Depth(depth_event(pixel, cycle, bin))
 }
 
-/// The same by itself.
+/// The event alone.
 pub fn depth_event(pixel: u16, cycle: u64, bin: u16) -> DepthEvent {
     DepthEvent {
-        pixel: PixelAddress(pixel),
+        pixel: PixelAddress::new(pixel),
         level: BlockLevel::PIXEL,
         echo: EchoNumber::FIRST,
-        cycle: LaserCycle(cycle),
+        cycle: LaserCycle::new(cycle),
         exposure: 44,
         peak_bin: BinIndex::saturating(bin),
         offset: SubBinOffset::new(100).unwrap(),
@@ -50,9 +51,9 @@ pub fn depth_event(pixel: u16, cycle: u64, bin: u16) -> DepthEvent {
 pub fn dynamic(pixel: u16, cycle: u64, bin: i32, change: i32) -> Event {
     Event::DynamicDepth(
         DynamicDepthEvent::new(
-            PixelAddress(pixel),
+            PixelAddress::new(pixel),
             BlockLevel::PIXEL,
-            LaserCycle(cycle),
+            LaserCycle::new(cycle),
             BinPosition::new(bin * 256).unwrap(),
             change * 256,
             Flags::NONE,
@@ -61,7 +62,7 @@ pub fn dynamic(pixel: u16, cycle: u64, bin: i32, change: i32) -> Event {
     )
 }
 
-/// The bytes of a whole file.
+/// The bytes of a complete file.
 pub fn file(header: &Header, events: &[Event]) -> Vec<u8> {
     let mut writer = Writer::new(Vec::new(), header).unwrap();
     for event in events {
@@ -70,7 +71,7 @@ pub fn file(header: &Header, events: &[Event]) -> Vec<u8> {
     writer.finish().unwrap()
 }
 
-/// What comes below a header with this end.
+/// The bytes after the end of a header.
 pub fn below<'a>(bytes: &'a [u8], end: &str) -> &'a [u8] {
     let mut places = bytes.windows(end.len());
     let header = places.position(|part| part == end.as_bytes());
@@ -83,8 +84,8 @@ pub fn events() -> Vec<Event> {
     near.chain([depth(2047, 1 << 20, 60)]).collect()
 }
 
-/// Exports `bytes`, and gives what was written.
-pub fn exported(bytes: &[u8], format: Format, options: &Options) -> (Exported, Vec<u8>) {
+/// Exports `bytes` and returns the written file.
+pub fn exported(bytes: &[u8], format: Format, options: &Options) -> (ExportSummary, Vec<u8>) {
     let scratch = Scratch::new();
     let input = scratch.file("events.aer", bytes);
     let out = scratch.path("out");

@@ -14,12 +14,18 @@ use dtof_sensors::simulated::{Pulse, Settings, Simulated, SimulatedPixel};
 
 const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
 
-/// A sensor of so many pixels, each with a target so many bins behind that of the one before.
+/// A sensor of so many pixels. The target of each is some bins farther than that of the last pixel.
 pub fn sensor(pixels: u16, bins_apart: u16, cycles_per_second: u32) -> Simulated<'static> {
     let half = U8F24::lit("0.5");
     let pixels: Vec<_> = (0..pixels)
         .map(|pixel| {
-            SimulatedPixel::new(PixelAddress(pixel), 20 + bins_apart * pixel, half, half).unwrap()
+            SimulatedPixel::new(
+                PixelAddress::new(pixel),
+                20 + bins_apart * pixel,
+                half,
+                half,
+            )
+            .unwrap()
         })
         .collect();
     let settings = Settings {
@@ -31,7 +37,7 @@ pub fn sensor(pixels: u16, bins_apart: u16, cycles_per_second: u32) -> Simulated
     Simulated::new(pixels.leak(), PULSE, settings)
 }
 
-/// A TCP port of this computer, and its connections one after the other.
+/// A TCP port of this computer that serves one connection after another.
 pub fn listen(mut serve: impl FnMut(&mut TcpStream) -> bool + Send + 'static) -> String {
     let listener = TcpListener::bind("127.0.0.1:0").unwrap();
     let name = format!("tcp:{}", listener.local_addr().unwrap());
@@ -39,8 +45,8 @@ pub fn listen(mut serve: impl FnMut(&mut TcpStream) -> bool + Send + 'static) ->
     name
 }
 
-/// Runs `sidecar` until the host is gone, and says whether `lives` passed before. `poll` is
-/// called at each turn and once more when the host is gone.
+/// Runs `sidecar` until the host is gone. Returns whether `lives` passed before. `poll` is called in
+/// each turn and once more when the host is gone.
 pub fn serve(
     stream: &mut TcpStream,
     sidecar: &mut Sidecar<'_>,

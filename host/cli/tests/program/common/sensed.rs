@@ -8,7 +8,7 @@ use dtof_sensors::PhotonSink;
 pub struct Photons(Vec<PixelPhotons>);
 
 impl Photons {
-    /// None yet, of so many pixels.
+    /// No photons of so many pixels.
     pub fn new(pixels: u16) -> Self {
         Self(vec![PixelPhotons::default(); pixels.into()])
     }
@@ -25,7 +25,7 @@ impl Photons {
 
 impl PhotonSink for Photons {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
-        let pixel = &mut self.0[usize::from(pixel.0)];
+        let pixel = &mut self.0[usize::from(pixel.raw())];
         let cycle = pixel.cycles;
         pixel.photons.push(Photon { cycle, code });
     }

@@ -27,29 +27,29 @@ use rand_pcg::Pcg32;
 
 const PIXELS: u16 = 4;
 const PULSE: Pulse = Pulse::new(&[U0F32::lit("0.25"), U0F32::lit("0.5")]);
-/// A program that has not ended by then never will.
+/// Longest run of a program.
 const PATIENCE: Duration = Duration::from_secs(90);
 
-/// What happens to a connection.
+/// Faults of a connection.
 #[derive(Clone, Copy)]
 struct Plan {
     /// One fault in so many bytes; none if 0.
     one_in: u32,
-    /// The device hangs up, or is switched off and on, so long after its first event.
+    /// Time after the first event at which the device closes the connection or restarts.
     hangs_up_ms: Option<u32>,
     restarts_ms: Option<u32>,
 }
 
-/// What the device has done in a connection.
+/// The device's events in a connection.
 struct Sent {
     events: Vec<DepthEvent>,
-    /// The first of them that it knows to be delivered.
+    /// Number of the first ones that were acknowledged.
     delivered: usize,
     faults: u32,
     repeated: u32,
 }
 
-/// A device with a simulated sensor. It does not know of connections.
+/// A device with a simulated sensor, independent of connections.
 struct Device {
     sidecar: Sidecar<'static>,
     sensor: Simulated<'static>,
@@ -58,10 +58,10 @@ struct Device {
     rng: Pcg32,
 }
 
-/// As it is when it has been switched on.
+/// The device after power-on.
 fn sidecar_and_sensor() -> (Sidecar<'static>, Simulated<'static>) {
     let half = U8F24::lit("0.5");
-    let pixel = |pixel| SimulatedPixel::new(PixelAddress(pixel), 20 + 20 * pixel, half, half);
+    let pixel = |pixel| SimulatedPixel::new(PixelAddress::new(pixel), 20 + 20 * pixel, half, half);
     let pixels: Vec<_> = (0..PIXELS).map(|number| pixel(number).unwrap()).collect();
     let settings = Settings {
         seed: 1,
@@ -73,7 +73,7 @@ fn sidecar_and_sensor() -> (Sidecar<'static>, Simulated<'static>) {
     let sidecar = Sidecar::new(
         Box::leak(Box::new(heapless::Vec::<Pixel, { PIXELS as usize }>::new())),
         Box::leak(Box::new(heapless::Vec::<Block, 1>::new())),
-        Some(sensor.about()),
+        Some(sensor.info()),
     );
     (sidecar, sensor)
 }
@@ -90,12 +90,12 @@ impl Device {
         }
     }
 
-    /// One connection, until the host is gone or the device hangs up.
+    /// Serves one connection, until the host is gone or the device closes it.
     fn serve(&mut self, stream: &mut TcpStream, plan: Plan) -> Sent {
         let [mut down, mut up] = [(); 2].map(|()| Wire::new(plan.one_in));
         let mut tap = Tap::default();
         let before = self.sidecar.endpoint().counters().retransmitted;
-        // The host may go at any time.
+        // The host may disconnect at any time.
         let _ = self.carry(stream, plan, [&mut down, &mut up], &mut tap);
         let after = self.sidecar.endpoint().counters().retransmitted;
         Sent {
@@ -157,7 +157,7 @@ impl Device {
     }
 }
 
-/// A device whose connections go as planned, and what it does in each.
+/// A device with planned faults in each connection, and its events.
 fn device(seed: u64) -> (String, Sender<Plan>, Receiver<Sent>) {
     let (plan, plans) = mpsc::channel::<Plan>();
     let (done, sent) = mpsc::channel();
@@ -190,7 +190,7 @@ fn run(scratch: &Scratch, line: &str) -> ExitStatus {
     }
 }
 
-/// What there was in all connections.
+/// Totals of all connections.
 #[derive(Debug, Default)]
 struct Totals {
     sessions: u32,
@@ -213,7 +213,7 @@ impl Totals {
         self.undelivered += other.undelivered;
     }
 
-    /// One run of the program for so many seconds, held against what the device did.
+    /// One run of the program for so many seconds, compared with the device's events.
     fn session(&mut self, name: &str, seconds: u32, sent: impl FnOnce() -> Sent) {
         let scratch = Scratch::new();
         let line = format!("monitor --device {name} --seconds {seconds} --record events.aer");
@@ -225,7 +225,7 @@ impl Totals {
             assert_eq!(scratch.printed("decode events.aer"), printed);
             recorded(&path)
         } else {
-            // Without an event nothing is at its place, nor beside it.
+            // Without an event there is no file, not even a temporary one.
             assert!(
                 !status.success() && printed.lines().count() <= 1,
                 "{printed}"
@@ -270,8 +270,8 @@ impl Totals {
     }
 }
 
-/// Sessions one after the other on a bad wire for so long: one whole, one that the device
-/// ends, one in which it restarts, from the kind of the seed on.
+/// Sessions on a bad wire, one after another: a complete one, one that the device ends, one in which
+/// it restarts. The seed decides which comes first.
 fn sessions(seed: u32, length: Duration) -> Totals {
     let (name, plan, sent) = device(seed.into());
     let mut rng = Pcg32::seed_from_u64(seed.into());
@@ -286,7 +286,7 @@ fn sessions(seed: u32, length: Duration) -> Totals {
             restarts_ms: (kind % 3 == 2).then_some(some_ms),
         })
         .unwrap();
-        // A session that breaks ends long before its time.
+        // A broken session ends long before its time.
         let seconds = if kind % 3 == 0 { 1 } else { 60 };
         totals.session(&name, seconds, || sent.recv().unwrap());
         if started.elapsed() >= length {

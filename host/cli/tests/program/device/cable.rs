@@ -12,18 +12,18 @@ use crate::common::{Scratch, names};
 use crate::device::listen;
 use crate::device::monitor::{LONG, device, reference};
 
-/// What happens after some bytes of the device.
+/// A fault after some bytes of the device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Fault {
-    /// The connection ends in order.
+    /// The connection is closed.
     Vanishes,
-    /// It stays, and nothing comes.
+    /// The connection stays open without data.
     Stalls,
-    /// It ends with a reset.
+    /// The connection is reset.
     Resets,
-    /// A device of its own comes in place of the first, as after a reset.
+    /// Another device replaces the first, as after a reset.
     Restarts,
-    /// The device hears nothing more, and goes on.
+    /// The device receives nothing any more, and goes on.
     IsDeaf,
 }
 
@@ -33,7 +33,7 @@ fn connect(name: &str) -> TcpStream {
     stream
 }
 
-/// Copies what comes until one end is gone. What comes while the cable `is_cut` is lost.
+/// Copies bytes until one end is gone. Bytes are lost while the cable `is_cut`.
 fn copy(mut from: TcpStream, mut to: TcpStream, is_cut: &AtomicBool) -> io::Result<()> {
     let mut bytes = [0; 1024];
     loop {
@@ -59,7 +59,7 @@ fn cable(fault: Fault, cut: usize) -> String {
         });
         let mut left = cut;
         let mut byte = [0];
-        // Byte by byte, so that the cut is where it should be.
+        // Byte by byte, for an exact position of the cut.
         while left > 0 && device.read(&mut byte).unwrap_or(0) == 1 {
             if host.write_all(&byte).is_err() {
                 return false;
@@ -72,11 +72,11 @@ fn cable(fault: Fault, cut: usize) -> String {
             }
             Fault::Stalls => {
                 let mut rest = Vec::new();
-                // Until the host has enough of it.
+                // Until the host gives up.
                 let _ = device.read_to_end(&mut rest);
             }
             Fault::Resets => {
-                // What has arrived and is not read resets a connection that closes.
+                // Closing with unread bytes resets a connection.
                 let _ = device.shutdown(Shutdown::Both);
                 let _ = down.join();
                 thread::sleep(Duration::from_millis(300));
@@ -98,7 +98,7 @@ fn cable(fault: Fault, cut: usize) -> String {
     })
 }
 
-/// Watches and records the device behind such a cable, and gives the rows and the last line.
+/// Records the device behind such a cable. Returns the rows and the last line.
 #[track_caller]
 fn pulled(fault: Fault, cut: usize) -> (String, String) {
     let scratch = Scratch::new();
@@ -120,7 +120,7 @@ fn pulled(fault: Fault, cut: usize) -> (String, String) {
     assert!(error.starts_with(&format!("error: {name}: ")), "{error}");
     assert_eq!(names(&scratch.path("")), ["events.aer"]);
     if rows.lines().count() > 1 {
-        // Whole: it ends with an end word.
+        // A complete file ends with an end word.
         assert!(scratch.printed("decode events.aer") == rows);
         assert!(reference().starts_with(&rows), "{fault:?} {cut}");
     } else {
@@ -129,7 +129,7 @@ fn pulled(fault: Fault, cut: usize) -> (String, String) {
     (rows, error.to_owned())
 }
 
-/// All cuts at once, each with a device of its own.
+/// All cuts at once, each with its own device.
 fn pulled_at(faults: &[(Fault, &str)], cuts: &[usize]) {
     let all = faults
         .iter()
@@ -175,7 +175,7 @@ fn what_came_before_the_cable_was_pulled_is_recorded_whole() {
 fn a_device_that_hears_nothing_is_given_up() {
     let faults = [(Fault::IsDeaf, "the device does not answer for 30 seconds")];
     pulled_at(&faults, &[1202]);
-    // Photons that nobody takes, too.
+    // Unread photons, too.
     let scratch = Scratch::new();
     let scene = "columns = 2\nrows = 2\ncycles = 200_000\nbackground = 0.5\n\
                  [[surface]]\nrange_mm = 2000\nreflectivity = 0.8\n";

@@ -5,9 +5,9 @@ use std::process::{Command, Stdio};
 use std::thread;
 use std::time::Duration;
 
-use crate::common::{Scratch, names, says};
-use crate::device::desk::{
-    BACKGROUND, BRIGHT, Desk, HOT, LONG, PIXELS, POSITION, SIGMA, WALL, WHOLE_BIN_PS, device,
+use crate::common::{Scratch, assert_contains, names};
+use crate::device::wall_sensor::{
+    BACKGROUND, BRIGHT, HOT, LONG, PIXELS, POSITION, SIGMA, WALL, WHOLE_BIN_PS, WallSensor, device,
     photons,
 };
 use crate::device::{client, settings};
@@ -29,10 +29,10 @@ fn number(toml: &str, key: &str) -> f64 {
 #[test]
 fn the_sensor_on_the_desk_is_found_and_then_watched() {
     let scratch = Scratch::new();
-    let name = device(Desk::new(WALL), LONG);
+    let name = device(WallSensor::new(WALL), LONG);
     let line = format!("calibrate --device {name} --seconds 4 --target-mm 2000 --glass no");
     let printed = scratch.printed(&format!("{line} --out dtof.toml"));
-    says(&printed, "a pixel");
+    assert_contains(&printed, "a pixel");
     let toml = scratch.read("dtof.toml");
     let is_near = |key, truth: f64, within: f64| {
         let found = number(&toml, key);
@@ -49,10 +49,10 @@ fn the_sensor_on_the_desk_is_found_and_then_watched() {
     is_near("bin_width_ps", 250.0, 0.0);
     is_near("bins", 128.0, 0.0);
     is_near("columns", 4.0, 0.0);
-    says(&toml, &format!("masked = [{HOT}]"));
+    assert_contains(&toml, &format!("masked = [{HOT}]"));
     assert!(!toml.contains("gate = "), "{toml}");
 
-    // The settings work, and say where the wall is.
+    // The settings work: events are at the wall.
     let line = format!("monitor --device {name} --settings dtof.toml --seconds 1");
     let events = scratch.printed(&line);
     let mut rows = events.lines();
@@ -70,10 +70,10 @@ fn the_sensor_on_the_desk_is_found_and_then_watched() {
     let median = ranges[ranges.len() / 2];
     assert!((median - 2000.0).abs() < 0.1 * bin_mm, "{median}");
 
-    // Older settings say what has changed.
+    // The report compares older settings.
     let line = format!("calibrate --device {name} --seconds 1 --target-mm 2500 --glass no");
     let printed = scratch.printed(&format!("{line} --settings dtof.toml --out newer.toml"));
-    says(&printed, "Since the older settings:");
+    assert_contains(&printed, "Since the older settings:");
     assert_eq!(
         names(&scratch.path("")),
         ["dtof.html", "dtof.toml", "newer.html", "newer.toml"]
@@ -107,7 +107,11 @@ fn has_rate(collected: &Collected, pixel: u16, bins: std::ops::Range<usize>, rat
 #[test]
 fn photons_and_laser_cycles_are_those_of_the_sensor_however_bright_it_is() {
     for rates in [WALL, BRIGHT] {
-        let collected = collected(&device(Desk::new(rates), LONG), U16F16::lit("250"), 2.5);
+        let collected = collected(
+            &device(WallSensor::new(rates), LONG),
+            U16F16::lit("250"),
+            2.5,
+        );
         assert_eq!(collected.full, 0);
         for pixel in 0..PIXELS {
             let (signal, background) = rates(pixel);
@@ -120,12 +124,12 @@ fn photons_and_laser_cycles_are_those_of_the_sensor_however_bright_it_is() {
     }
 }
 
-/// Exposures are long by then, and full at once.
+/// Exposures are long then, and a counter fills at once.
 #[test]
 fn light_that_becomes_brighter_makes_exposures_shorter() {
-    let suddenly = Desk {
+    let suddenly = WallSensor {
         later: Some(photons(BRIGHT)),
-        ..Desk::new(|_| (0.02, 0.02))
+        ..WallSensor::new(|_| (0.02, 0.02))
     };
     let collected = collected(&device(suddenly, LONG), U16F16::lit("250"), 3.0);
     assert!(collected.full > 0);
@@ -137,9 +141,9 @@ fn light_that_becomes_brighter_makes_exposures_shorter() {
 
 #[test]
 fn whole_histograms_add_up_and_so_do_their_laser_cycles() {
-    let whole = Desk {
-        whole: Some((500, 0)),
-        ..Desk::new(WALL)
+    let whole = WallSensor {
+        histogram_cycles: Some((500, 0)),
+        ..WallSensor::new(WALL)
     };
     let name = device(whole, LONG);
     let collected = collected(&name, WHOLE_BIN_PS, 2.0);
@@ -169,7 +173,7 @@ fn whole_histograms_add_up_and_so_do_their_laser_cycles() {
 #[test]
 fn it_ends_when_there_are_photons_enough() {
     let scratch = Scratch::new();
-    let name = device(Desk::new(WALL), LONG);
+    let name = device(WallSensor::new(WALL), LONG);
     let line = format!("calibrate --device {name} --seconds 500 --photons 3000 --out dtof.toml");
     scratch.printed(&line);
     assert!(number(&scratch.read("dtof.toml"), "background") > 0.0);
@@ -179,7 +183,7 @@ fn it_ends_when_there_are_photons_enough() {
 #[test]
 fn ctrl_c_ends_it_with_what_there_is() {
     let scratch = Scratch::new();
-    let name = device(Desk::new(WALL), LONG);
+    let name = device(WallSensor::new(WALL), LONG);
     let line = format!("calibrate --device {name} --seconds 500 --out dtof.toml");
     let mut calibrate = scratch
         .command(&line)

@@ -6,9 +6,9 @@ use std::net::TcpStream;
 use std::thread;
 use std::time::{Duration, Instant};
 
-use crate::common::{Scratch, names, says};
-use crate::device::desk::{Desk, LONG, PIXELS, Rates, WALL, device};
+use crate::common::{Scratch, assert_contains, names};
 use crate::device::listen;
+use crate::device::wall_sensor::{LONG, PIXELS, Rates, WALL, WallSensor, device};
 use dtof_core::fixed::types::I24F8;
 use dtof_core::{LaserCycle, PixelAddress};
 use dtof_link::endpoint::{Endpoint, Message};
@@ -16,7 +16,7 @@ use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::greeting;
 use dtof_link::{HistogramHead, NoHistogram, Report, SensorRecord, message};
 
-/// Runs it, and gives its one line of error.
+/// Runs the program and returns its one line of error.
 #[track_caller]
 fn refused(options: &str) -> String {
     let scratch = Scratch::new();
@@ -30,17 +30,17 @@ fn refused(options: &str) -> String {
 
 #[test]
 fn options_that_do_not_suit_are_refused() {
-    let name = device(Desk::new(WALL), LONG);
+    let name = device(WallSensor::new(WALL), LONG);
     for (options, part) in [
         ("", "--input"),
-        ("--input x.npy --seconds 3", "--seconds is of --device"),
+        ("--input x.npy --seconds 3", "--seconds is for --device"),
         ("--input x.npy --device tcp:127.0.0.1:1", "--device"),
         (
             "--device DEVICE --axes bins",
-            "--axes is of recordings, not of a device",
+            "--axes is for recordings, not for a device",
         ),
-        ("--device DEVICE --rebin 2", "--rebin is of recordings"),
-        ("--device DEVICE --bins 64", "--bins is of recordings"),
+        ("--device DEVICE --rebin 2", "--rebin is for recordings"),
+        ("--device DEVICE --bins 64", "--bins is for recordings"),
         (
             "--device DEVICE --columns 5",
             "--columns 5: the device has 12 pixels",
@@ -52,48 +52,48 @@ fn options_that_do_not_suit_are_refused() {
         ),
     ] {
         let error = refused(&options.replace("DEVICE", &name));
-        says(&error, part);
+        assert_contains(&error, part);
     }
 }
 
 #[test]
 fn a_device_that_goes_or_gives_nothing_is_named() {
-    let gone = device(Desk::new(WALL), Duration::from_millis(900));
+    let gone = device(WallSensor::new(WALL), Duration::from_millis(900));
     let error = refused(&format!("--device {gone}"));
-    says(&error, &format!("error: {gone}: the device cannot be"));
+    assert_contains(&error, &format!("error: {gone}: the device cannot be"));
 
-    let unplugged = Desk {
+    let unplugged = WallSensor {
         is_there: false,
-        ..Desk::new(WALL)
+        ..WallSensor::new(WALL)
     };
     let name = device(unplugged.clone(), LONG);
     let error = refused(&format!("--device {name}"));
-    says(&error, "no laser cycle for 5 seconds; sensor errors ");
+    assert_contains(&error, "no laser cycle for 5 seconds; sensor errors ");
     assert!(error.ends_with(" (last: no answer)\n"), "{error}");
-    let whole = Desk {
-        whole: Some((500, 0)),
+    let whole = WallSensor {
+        histogram_cycles: Some((500, 0)),
         ..unplugged
     };
     let error = refused(&format!("--device {}", device(whole, LONG)));
     assert!(error.ends_with(" (last: no answer)\n"), "{error}");
 
     let dark: Rates = |_| (0.0, 0.0);
-    let mut dark = Desk::new(dark);
-    dark.whole = Some((u32::MAX, 0));
+    let mut dark = WallSensor::new(dark);
+    dark.histogram_cycles = Some((u32::MAX, 0));
     let error = refused(&format!("--device {}", device(dark, LONG)));
-    says(&error, "5 seconds");
+    assert_contains(&error, "5 seconds");
 }
 
-/// What a device says to a request for a histogram: message by message, or nothing, which it
-/// counts as not understood if it is old.
+/// A device that answers a request for a histogram with these messages. An old device counts the
+/// request as unknown.
 #[derive(Clone)]
 struct Fake {
-    says: Vec<(u8, Vec<u8>)>,
+    messages: Vec<(u8, Vec<u8>)>,
     is_old: bool,
 }
 
 impl Fake {
-    /// A port behind which it is.
+    /// The name of its port.
     fn device(self) -> String {
         listen(move |stream| {
             let mut end = Endpoint::device(greeting(128, PIXELS));
@@ -117,7 +117,7 @@ impl Fake {
                     }
                     _ => {
                         report.unknown += u32::from(self.is_old);
-                        for (kind, body) in &self.says {
+                        for (kind, body) in &self.messages {
                             end.offer(*kind, body).unwrap();
                         }
                         return;
@@ -130,7 +130,7 @@ impl Fake {
     }
 }
 
-/// Takes messages until the host is gone.
+/// Handles messages until the host is gone.
 fn talk(
     stream: &mut TcpStream,
     end: &mut Endpoint,
@@ -165,11 +165,11 @@ fn talk(
 #[test]
 fn nonsense_silence_and_older_firmware_are_named() {
     let histogram = |body: &[u8]| vec![(message::HISTOGRAM, body.to_vec())];
-    let none = |pixel, none: NoHistogram| histogram(&none.message(PixelAddress(pixel)));
+    let none = |pixel, none: NoHistogram| histogram(&none.message(PixelAddress::new(pixel)));
     let head = HistogramHead {
-        pixel: PixelAddress(0),
+        pixel: PixelAddress::new(0),
         is_whole: false,
-        cycle: LaserCycle(1),
+        cycle: LaserCycle::new(1),
         exposure: 9,
     };
     let mut body = heapless::Vec::new();
@@ -181,11 +181,11 @@ fn nonsense_silence_and_older_firmware_are_named() {
             false,
             "does not answer a request for a histogram",
         ),
-        (histogram(&[1, 2]), false, "a histogram that is none"),
+        (histogram(&[1, 2]), false, "an invalid histogram"),
         (
             none(3, NoHistogram::NoPixel),
             false,
-            "pixel 3 that nobody asked for",
+            "pixel 3, which was not requested",
         ),
         (
             none(0, NoHistogram::NoPixel),
@@ -205,24 +205,21 @@ fn nonsense_silence_and_older_firmware_are_named() {
         (
             vec![(message::SENSOR, vec![])],
             false,
-            "message 0x86 unasked",
+            "message 0x86, which was not requested",
         ),
         (vec![(message::EVENTS, vec![1; 16])], false, "error: "),
     ];
-    for (says_it, is_old, part) in answers {
-        let fake = Fake {
-            says: says_it,
-            is_old,
-        };
+    for (messages, is_old, part) in answers {
+        let fake = Fake { messages, is_old };
         let name = fake.device();
         let error = refused(&format!("--device {name}"));
-        says(&error, &format!("error: {name}: "));
-        says(&error, part);
+        assert_contains(&error, &format!("error: {name}: "));
+        assert_contains(&error, part);
     }
-    // One that takes the connection and says nothing at all.
+    // A device that accepts the connection and stays silent.
     let mute = listen(|stream| {
         thread::sleep(Duration::from_secs(20));
         stream.peer_addr().is_err()
     });
-    says(&refused(&format!("--device {mute}")), "no device answered");
+    assert_contains(&refused(&format!("--device {mute}")), "no device answered");
 }

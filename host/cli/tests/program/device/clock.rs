@@ -11,7 +11,7 @@ use std::time::{Duration, UNIX_EPOCH};
 use crate::device::settings;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{U16F16, U24F8};
-use dtof_device::monitor::{EventFile, Outputs, Task, monitor};
+use dtof_device::monitor::{EventFile, Outputs, monitor};
 use dtof_device::{Client, HostTimeout, Port, Setup};
 use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::Reader;
@@ -20,7 +20,7 @@ use dtof_export::{Format, Options, export};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::DynamicDepth;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
-use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault, simulated};
+use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo, simulated};
 
 const PIXELS: u16 = 16;
 const SECONDS: u32 = 4;
@@ -40,7 +40,7 @@ impl<S: Sensor> Device<S> {
         let pixels = Box::leak(Box::new(heapless::Vec::<_, { PIXELS as usize }>::new()));
         let blocks = Box::leak(Box::new(heapless::Vec::<_, 1>::new()));
         Self {
-            sidecar: Sidecar::new(pixels, blocks, Some(sensor.about())),
+            sidecar: Sidecar::new(pixels, blocks, Some(sensor.info())),
             sensor,
             deframer: Deframer::new(),
             now_ms: Arc::clone(now_ms),
@@ -73,25 +73,25 @@ impl<S: Sensor + Send> Port for Device<S> {
     }
 }
 
-/// Gives a whole histogram each 100 ms, of as many laser cycles as a TMF8820 integrates.
+/// Gives a histogram each 100 ms, of as many laser cycles as a TMF8820 integrates.
 #[derive(Default)]
-struct Whole {
+struct HistogramSensor {
     last_ms: Option<u32>,
 }
 
-impl Whole {
+impl HistogramSensor {
     const PERIOD_MS: u32 = 100;
     const CYCLES: u32 = 537 * 1024;
 }
 
-impl Sensor for Whole {
+impl Sensor for HistogramSensor {
     type Error = SensorFault;
 
-    fn about(&self) -> About {
-        About {
-            is_whole: true,
+    fn info(&self) -> SensorInfo {
+        SensorInfo {
+            gives_histograms: true,
             laser_millihertz: u64::from(Self::CYCLES) * 1_000_000 / u64::from(Self::PERIOD_MS),
-            ..About::new(1)
+            ..SensorInfo::new(1)
         }
     }
 
@@ -107,11 +107,11 @@ impl Sensor for Whole {
             return Ok(Polled::Idle);
         }
         self.last_ms = Some(now_ms);
-        // To and fro, so that there are changes of depth.
+        // The target moves back and forth, which gives changes of depth.
         let bin = if now_ms % 400 < 200 { 40 } else { 60 };
         let counts = std::array::from_fn(|at| if at == bin { 90_000 } else { 100 });
         sink.begin_frame(Self::CYCLES);
-        sink.histogram(PixelAddress(0), &counts);
+        sink.histogram(PixelAddress::new(0), &counts);
         Ok(Polled::Data)
     }
 }
@@ -120,20 +120,13 @@ impl Sensor for Whole {
 fn recorded(path: &Path, sensor: impl Sensor + Send + 'static) {
     let now_ms = Arc::new(AtomicU32::new(7));
     let mut client = Client::new(Box::new(Device::new(sensor, &now_ms))).unwrap();
-    let setup = Setup {
-        began: UNIX_EPOCH + Duration::from_micros(START_US),
-        settings: settings(),
-        ..Setup::of(&mut client, SettingsFile::default(), None).unwrap()
-    };
+    let mut setup = Setup::of(&mut client, SettingsFile::default(), None).unwrap();
+    setup.began = UNIX_EPOCH + Duration::from_micros(START_US);
+    setup.settings = settings();
     let mut recording = EventFile::new(path, &[], &setup.header()).unwrap();
-    let task = Task {
-        settings: &setup.settings,
-        pixels: setup.pixels,
-        columns: setup.array.columns(),
-        dynamic_depth: None,
-        // The clock of the device is the faster one.
-        host_timeout: HostTimeout::from_milliseconds(60_000).unwrap(),
-    };
+    // The device's clock is faster than this computer's.
+    let host_timeout = HostTimeout::from_milliseconds(60_000).unwrap();
+    let task = setup.task(None, host_timeout);
     let end_ms = now_ms.load(Ordering::Relaxed) + 1000 * SECONDS;
     let ended = monitor(
         &mut client,
@@ -167,14 +160,14 @@ fn last_of_evt2(raw: &[u8]) -> u64 {
     last.unwrap()
 }
 
-/// The first and the last log time of a file of point clouds, and when each says it is.
+/// The first and the last log time of a file of point clouds, and the time stamps in their messages.
 fn log_times(file: &[u8]) -> [u64; 2] {
     let messages = mcap::MessageStream::new(file).unwrap();
     let times: Vec<u64> = messages.map(|message| message.unwrap().log_time).collect();
     [times[0], *times.last().unwrap()]
 }
 
-/// The events of four seconds end within this of their end, in seconds.
+/// Largest deviation of the end of four seconds of events, in seconds.
 fn lasts_four_seconds(sensor: impl Sensor + Send + 'static, within: f64) {
     let folder = tempfile::tempdir().unwrap();
     let recording = folder.path().join("events.aer");
@@ -215,7 +208,7 @@ fn lasts_four_seconds(sensor: impl Sensor + Send + 'static, within: f64) {
         ..Options::default()
     };
     let (evt2, _) = exported(Format::Evt2, &changes);
-    // It has the changes of depth alone: each 200 ms.
+    // It has only the changes of depth, each 200 ms.
     ends_within("EVT2", last_of_evt2(&evt2) as f64 / 1e6, within + 0.3);
 
     for format in [Format::Mcap, Format::Ros2] {
@@ -226,7 +219,7 @@ fn lasts_four_seconds(sensor: impl Sensor + Send + 'static, within: f64) {
         assert!((0.0..0.2).contains(&since(first)), "{first}");
     }
 
-    // Another rate than the file's is taken, and said.
+    // A rate that differs from the file's is used, with a warning.
     let options = Options {
         clock: Some(LaserClock::new(1).unwrap()),
         ..Options::default()
@@ -243,5 +236,5 @@ fn four_seconds_of_photons_are_four_seconds() {
 
 #[test]
 fn four_seconds_of_whole_histograms_are_four_seconds() {
-    lasts_four_seconds(Whole::default(), 0.11);
+    lasts_four_seconds(HistogramSensor::default(), 0.11);
 }

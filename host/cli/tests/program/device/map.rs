@@ -6,12 +6,12 @@ use crate::common::Scratch;
 fn a_map_needs_a_terminal() {
     let output = Scratch::new().run("monitor --device tcp:127.0.0.1:1 --map");
     assert_eq!(output.status.code(), Some(1));
-    let error = b"error: --map draws on standard error, which is no terminal here\n";
+    let error = b"error: --map draws on standard error, which is not a terminal here\n";
     assert_eq!(output.stderr, error);
 }
 
-/// `script` of util-linux gives the command a terminal. Its shell is replaced by the
-/// command: some, interrupted with it, say so whatever the command returns.
+/// `script` of util-linux gives the command a terminal. The command replaces its shell: an interrupted
+/// shell would change the exit code.
 #[cfg(target_os = "linux")]
 #[test]
 fn a_map_is_drawn_on_a_terminal_and_ctrl_c_gives_the_cursor_back() {
@@ -32,7 +32,7 @@ fn a_map_is_drawn_on_a_terminal_and_ctrl_c_gives_the_cursor_back() {
         .unwrap();
     let mut screen = BufReader::new(terminal.stdout.take().unwrap());
     let mut drawn = String::new();
-    // Until a second has passed.
+    // Wait for a second.
     while !drawn.contains("events/s ") {
         assert!(screen.read_line(&mut drawn).unwrap() > 0, "{drawn}");
     }

@@ -24,7 +24,7 @@ fn events_of_masked_pixels_are_left_out_and_counted() {
     let is_masked = |row: &&str| pixel(row) == "1";
     assert!(events.lines().count() > 20 && !events.lines().any(|row| is_masked(&row)));
     assert!(statistics.contains(", events left out "), "{statistics}");
-    // Those of the other pixels are all there.
+    // The events of the other pixels are complete.
     let others = reference();
     let others: Vec<&str> = others.lines().filter(|row| !is_masked(row)).collect();
     assert!(
@@ -34,7 +34,7 @@ fn events_of_masked_pixels_are_left_out_and_counted() {
             .all(|(row, other)| row == *other)
     );
 
-    // Blocks would hold their photons.
+    // Blocks would count their photons.
     let blocks = Settings {
         binning: Some(AdaptiveBinning {
             levels: BlockLevel::saturating(1),

@@ -9,31 +9,32 @@ use std::time::{Duration, Instant};
 
 use crate::common::port;
 use crate::common::sensed::Photons;
-use crate::common::{Scratch, names, says};
+use crate::common::{Scratch, assert_contains, names};
 use crate::device::{Closing, client, listen, serve, settings};
 use anyhow::Result;
+use dtof_core::events::{DynamicDepthPixel, Reference};
 use dtof_core::fixed::types::{U16F16, U24F8};
-use dtof_core::{Array, DepthEvent, DynamicDepthPixel, PixelAddress, Reference};
-use dtof_device::monitor::{Outputs, Task, monitor};
-use dtof_device::{Client, HostTimeout};
+use dtof_core::{Array, DepthEvent, PixelAddress};
+use dtof_device::monitor::{Outputs, monitor};
+use dtof_device::{Client, HostTimeout, Task};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_events::events_csv;
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::DynamicDepth;
 use dtof_sensors::simulated::Simulated;
-use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
+use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 const PIXELS: u16 = 4;
 /// Longer than any test.
 pub const LONG: Duration = Duration::from_secs(60);
 
-/// Four pixels, slow enough that no hiccup of this computer puts a decision off.
+/// Four pixels, slow enough that no pause of this computer delays a decision.
 fn sensor() -> Simulated<'static> {
     port::sensor(PIXELS, 20, 500)
 }
 
-/// A sensor, if there is one on the bus, and whether it has been asked.
+/// A sensor, if there is one on the bus, and whether it has been polled.
 struct Noted {
     sensor: Option<Simulated<'static>>,
     asked: bool,
@@ -42,9 +43,9 @@ struct Noted {
 impl Sensor for Noted {
     type Error = SensorFault;
 
-    fn about(&self) -> About {
+    fn info(&self) -> SensorInfo {
         let sensor = self.sensor.as_ref();
-        sensor.map_or(About::new(PIXELS), Simulated::about)
+        sensor.map_or(SensorInfo::new(PIXELS), Simulated::info)
     }
 
     fn start(&mut self, bin_width: U16F16) {
@@ -68,8 +69,7 @@ pub fn device(has_sensor: bool, lives: Duration) -> String {
     device_of(Some(sensor()), has_sensor, lives).0
 }
 
-/// A device with this sensor, and whether it asks the sensor no more when the host
-/// is gone.
+/// A device with this sensor, and whether it stops polling the sensor when the host is gone.
 fn device_of(
     sensor: Option<Simulated<'static>>,
     has_sensor: bool,
@@ -83,8 +83,8 @@ fn device_of(
     let name = listen(move |stream| {
         let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
         let mut blocks = heapless::Vec::<_, 1>::new();
-        let about = has_sensor.then(|| sensor.about());
-        let mut sidecar = Sidecar::new(&mut pixels, &mut blocks, about);
+        let info = has_sensor.then(|| sensor.info());
+        let mut sidecar = Sidecar::new(&mut pixels, &mut blocks, info);
         let poll = |sidecar: &mut Sidecar<'_>, now| {
             sensor.asked = false;
             sidecar.poll_sensor(&mut sensor, now);
@@ -99,7 +99,7 @@ fn device_of(
 
 /// The events of the first 5,000 laser cycles.
 fn reference_events() -> Vec<DepthEvent> {
-    let addresses: Vec<_> = (0..PIXELS).map(PixelAddress).collect();
+    let addresses: Vec<_> = (0..PIXELS).map(PixelAddress::new).collect();
     let mut photons = Photons::new(PIXELS);
     sensor().laser_cycles(5_000, &mut photons);
     let mut engine = host_engine(&settings(), Array::new(4, 1).unwrap(), &addresses).unwrap();
@@ -117,7 +117,7 @@ pub fn reference() -> String {
     String::from_utf8(csv).unwrap()
 }
 
-/// What the device does for so long, without a picture: events, statistics, and how it ended.
+/// Events and statistics of a device for some time, without a picture, and the result.
 fn watched(
     client: &mut Client,
     dynamic_depth: Option<DynamicDepth>,
@@ -189,7 +189,7 @@ fn events_come_out_as_the_pixels_report_them_and_statistics_once_a_second() {
             |loss: &str| loss.starts_with("retransmissions ") || loss.starts_with("duplicates ");
         assert!(line.split(", ").skip(2).all(repeats), "{line}");
     }
-    // The sensor rests.
+    // The sensor is off.
     thread::sleep(Duration::from_millis(100));
     assert_eq!(client.report().unwrap().cycles, 0);
 }
@@ -201,7 +201,7 @@ fn a_sensor_that_does_not_answer_is_named() {
     ended.unwrap();
     let line = statistics.lines().next().unwrap();
     assert!(line.starts_with("events/s 0, photons/s 0, "), "{line}");
-    says(line, ", sensor errors ");
+    assert_contains(line, ", sensor errors ");
     assert!(line.ends_with(" (last: no answer)"), "{line}");
 }
 
@@ -225,13 +225,13 @@ fn a_reader_that_has_seen_enough_ends_it() {
 fn a_device_that_goes_or_has_no_sensor_is_an_error() {
     let mut gone = client(&device(true, Duration::from_millis(700)));
     let (events, _, error) = watched(&mut gone, None, Duration::MAX);
-    says(&format!("{:#}", error.unwrap_err()), "the device cannot be");
-    // What came before is there.
+    assert_contains(&format!("{:#}", error.unwrap_err()), "the device cannot be");
+    // Earlier events are there.
     assert!(events.len() > 200);
 
     let mut without = client(&device(false, LONG));
     let (.., error) = watched(&mut without, None, Duration::MAX);
-    says(
+    assert_contains(
         &format!("{:#}", error.unwrap_err()),
         "the device has no sensor",
     );
@@ -240,20 +240,24 @@ fn a_device_that_goes_or_has_no_sensor_is_an_error() {
 #[test]
 fn changes_of_depth_are_those_of_the_events() {
     let threshold_mm = U24F8::lit("5");
-    let wanted = DynamicDepth {
+    let dynamic_depth = DynamicDepth {
         threshold_mm,
         reference: Reference::Reported,
     };
     let name = device(true, LONG);
-    let (events, _, ended) = watched(&mut client(&name), Some(wanted), Duration::from_secs(2));
+    let (events, _, ended) = watched(
+        &mut client(&name),
+        Some(dynamic_depth),
+        Duration::from_secs(2),
+    );
     ended.unwrap();
     let scale = settings().range_scale().unwrap();
-    let config = wanted.config(&scale).unwrap();
+    let config = dynamic_depth.config(&scale).unwrap();
     let mut pixels = [const { DynamicDepthPixel::<{ DynamicDepth::MEAN_OF }>::new() }; 4];
     let mut csv = Vec::new();
     writeln!(csv, "{}", events_csv::DYNAMIC_DEPTH_HEADER).unwrap();
     for event in reference_events() {
-        if let Some(change) = pixels[usize::from(event.pixel.0)].observe(&config, &event) {
+        if let Some(change) = pixels[usize::from(event.pixel.raw())].observe(&config, &event) {
             events_csv::write_dynamic_depth(&mut csv, &change, &scale).unwrap();
         }
     }
@@ -276,7 +280,7 @@ fn ctrl_c_stops_the_sensor() {
         let id = monitor.id().to_string();
         let sent = Command::new("kill").args([signal, &id]).status().unwrap();
         assert!(sent.success());
-        // What comes until then is whole.
+        // Earlier output is complete.
         for row in events {
             assert_eq!(row.unwrap().split(',').count(), 11);
         }
@@ -326,6 +330,6 @@ fn the_command_prints_rows_and_says_when_the_device_is_gone() {
     let output = run(700, "60");
     assert_eq!(output.status.code(), Some(1));
     let error = String::from_utf8(output.stderr).unwrap();
-    says(&error, "error: tcp:127.0.0.1:");
+    assert_contains(&error, "error: tcp:127.0.0.1:");
     assert!(output.stdout.len() > 200);
 }

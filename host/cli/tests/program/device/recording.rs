@@ -10,12 +10,12 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use crate::common::aer::{HEADER, depth_event};
-use crate::common::says;
+use crate::common::assert_contains;
 use crate::device::{Closing, settings};
 use dtof_core::{AER_VERSION, AerEncoder};
 use dtof_device::monitor::map::LiveMap;
-use dtof_device::monitor::{EventFile, Outputs, Task, array, monitor};
-use dtof_device::{Client, HostTimeout, Port};
+use dtof_device::monitor::{EventFile, Outputs, array, monitor};
+use dtof_device::{Client, HostTimeout, Port, Task};
 use dtof_events::aer_file::{Event, Header, Reader};
 use dtof_events::events_csv;
 use dtof_link::endpoint::Endpoint;
@@ -25,8 +25,8 @@ use dtof_link::{Configuration, Report, Source, message};
 
 const PIXELS: u16 = 4;
 
-/// A device that sends an event with each answer to a request for statistics, from pixel
-/// `pixel`, and one from pixel 0 when it is to stop. After `lives` events it is gone.
+/// A device that sends an event of `pixel` with each report, and one of pixel 0 when it is told to
+/// stop. After `lives` events it is gone.
 struct Device {
     endpoint: Endpoint,
     deframer: Deframer,
@@ -86,7 +86,7 @@ impl Port for Device {
         std::thread::sleep(Duration::from_millis(1));
         let gone = self.sent.lock().unwrap().len() as u64 >= self.lives;
         while let Some((kind, body)) = self.answers.front() {
-            // The last thing it sends is an event.
+            // Its last message is an event.
             if gone && *kind != message::EVENTS || self.endpoint.offer(*kind, body).is_err() {
                 break;
             }
@@ -109,7 +109,7 @@ impl Port for Device {
     }
 }
 
-/// A terminal, for all to see.
+/// A terminal whose text the test can read.
 #[derive(Clone, Default)]
 struct Screen(Rc<RefCell<Vec<u8>>>);
 
@@ -122,7 +122,7 @@ impl Write for Screen {
     }
 }
 
-/// What the device sent, what was recorded of it, and why it ended.
+/// The events the device sent, the recording, and the error.
 struct Monitored {
     sent: Vec<Event>,
     recorded: Vec<Event>,
@@ -196,7 +196,7 @@ pub fn recorded(path: &Path) -> Vec<Event> {
 
 #[test]
 fn what_is_sent_is_recorded_also_when_nobody_reads_and_while_the_device_stops() {
-    // No room for the columns' names, for them alone, for everything.
+    // Room for nothing, for the column names only, for everything.
     for room in [0, 100, 100_000] {
         let run = monitored(3, u64::MAX, 2, room);
         assert_eq!(run.error, None);
@@ -212,7 +212,7 @@ fn what_is_sent_is_recorded_also_when_nobody_reads_and_while_the_device_stops() 
 fn what_was_sent_before_the_device_is_gone_is_recorded() {
     for lives in [1, 2] {
         let run = monitored(3, lives, 30, 100_000);
-        says(&run.error.unwrap(), "the device cannot be read from");
+        assert_contains(&run.error.unwrap(), "the device cannot be read from");
         assert_eq!(run.sent.len() as u64, lives);
         assert_eq!(run.recorded, run.sent);
     }

@@ -10,13 +10,13 @@ use std::time::Duration;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::common::{Scratch, names, says, skipped};
+use crate::common::{Scratch, assert_contains, names, skipped};
 use crate::device::monitor::{LONG, device, reference};
 
 const OLDER: &str = "older";
 
-/// The rows of the file that is left, which must be all there is beside the older one. It is not
-/// complete, and says so.
+/// The rows of the remaining temporary file, which must be the only file beside the older one. It is
+/// refused as incomplete.
 #[track_caller]
 fn left(scratch: &Scratch) -> String {
     let names = names(&scratch.path(""));
@@ -32,11 +32,11 @@ fn left(scratch: &Scratch) -> String {
     assert_eq!(decoded.status.code(), Some(1));
     let message = String::from_utf8(decoded.stderr).unwrap();
     assert_eq!(message.lines().count(), 1, "{message}");
-    says(&message, "the file ends ");
+    assert_contains(&message, "the file ends ");
     let rows = String::from_utf8(decoded.stdout).unwrap();
     assert!(reference().starts_with(&rows), "{rows}");
 
-    // Other programs get as much.
+    // Other programs can read as much.
     let exported = scratch.run(&format!("export {partial} --format csv --out points.csv"));
     assert_eq!(exported.status.code(), Some(1));
     let points = scratch.read("points.csv").lines().count();
@@ -44,17 +44,17 @@ fn left(scratch: &Scratch) -> String {
     rows
 }
 
-/// Whole rows of what was printed.
-fn whole(printed: &str) -> &str {
+/// Complete rows of the output.
+fn complete_lines(printed: &str) -> &str {
     &printed[..printed.rfind('\n').map_or(0, |end| end + 1)]
 }
 
 /// Rows below the names of the columns.
 fn events(rows: &str) -> usize {
-    whole(rows).lines().count().saturating_sub(1)
+    complete_lines(rows).lines().count().saturating_sub(1)
 }
 
-/// Kills a recording at a moment that the seed gives; rows that were printed and that are left.
+/// Kills a recording at a time that depends on the seed. Returns the printed and the remaining rows.
 fn killed(seed: u64) -> [usize; 2] {
     let scratch = Scratch::new();
     scratch.file("events.aer", OLDER);
@@ -66,7 +66,7 @@ fn killed(seed: u64) -> [usize; 2] {
     let command = command.stdout(Stdio::piped()).stderr(Stdio::null());
     let mut child = command.spawn().unwrap();
     let mut stdout = child.stdout.take().unwrap();
-    // The name of the first column: it has begun.
+    // The first column name shows that it has begun.
     stdout.read_exact(&mut [0; 5]).unwrap();
     let microseconds = Pcg32::seed_from_u64(seed).next_u32() % 1_500_000;
     thread::sleep(Duration::from_micros(microseconds.into()));
@@ -76,7 +76,7 @@ fn killed(seed: u64) -> [usize; 2] {
     child.wait().unwrap();
     let rows = left(&scratch);
     assert!(
-        rows.starts_with(whole(&printed)) || events(&printed) == 0,
+        rows.starts_with(complete_lines(&printed)) || events(&printed) == 0,
         "seed {seed}: printed, not saved"
     );
     [&printed[..], &rows].map(events)
@@ -106,7 +106,7 @@ fn what_was_printed_before_the_program_was_killed_is_in_the_file_it_left() {
     );
 }
 
-/// The disk takes so many bytes of a file.
+/// A disk that takes so many bytes of a file.
 fn full(bytes: usize) -> usize {
     let scratch = Scratch::new();
     scratch.file("events.aer", OLDER);
@@ -129,19 +129,19 @@ fn full(bytes: usize) -> usize {
         .filter(|line| !line.starts_with("events/s "));
     let error = errors.next().unwrap();
     assert_eq!(errors.next(), None, "{message}");
-    says(error, "events.aer: File too large");
+    assert_contains(error, "events.aer: File too large");
     if bytes < 64 {
-        // There is no header, and so nothing to keep.
+        // Without a header there is nothing to keep.
         assert_eq!(names(&scratch.path("")), ["events.aer"]);
         assert_eq!(scratch.read("events.aer"), OLDER);
         return 0;
     }
     let partial = names(&scratch.path("")).swap_remove(0);
-    says(error, &format!("{partial} has what was recorded"));
+    assert_contains(error, &format!("{partial} has what was recorded"));
     let printed = String::from_utf8(output.stdout).unwrap();
     let rows = left(&scratch);
-    assert!(rows.starts_with(whole(&printed)) || events(&printed) == 0);
-    // All that fits is there: the rest is less than a word, or than what one may need.
+    assert!(rows.starts_with(complete_lines(&printed)) || events(&printed) == 0);
+    // All that fits is there. The rest is shorter than an event with its time word.
     let saved = events(&rows);
     assert!(
         64 + 16 * saved + 32 + 16 > bytes,

@@ -8,26 +8,25 @@ use std::time::{Duration, Instant};
 
 use crate::common::port;
 use crate::common::{Scratch, names};
-use crate::device::desk::{self, Desk, WALL};
 use crate::device::monitor::LONG;
+use crate::device::wall_sensor::{self, WALL, WallSensor};
 use crate::device::{client, listen, serve, settings};
-use dtof_device::{Client, HostTimeout, Stopped, configuration};
+use dtof_device::{Client, HostTimeout, Stopped, Task};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::{Report, Source, StopReason};
 use dtof_sensors::Sensor;
 
 const PIXELS: u16 = 4;
 
-/// What a device tells of its sensor.
+/// A device's report on its sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Told {
+struct SensorState {
     starts: u32,
     stops: u32,
     reason: Option<StopReason>,
 }
 
-/// A device that goes on when a host has gone, and what it tells the next one: it is one device,
-/// with one connection after the other. Its last stop before was for this reason.
+/// One device that serves one connection after another. `reason` is that of its last stop before.
 fn device(reason: Option<StopReason>) -> String {
     device_of(500, reason)
 }
@@ -41,7 +40,7 @@ fn device_of(cycles_per_second: u32, reason: Option<StopReason>) -> String {
     let mut sensor = port::sensor(PIXELS, 20, cycles_per_second);
     let pixels = Box::leak(Box::new(heapless::Vec::<_, { PIXELS as usize }>::new()));
     let blocks = Box::leak(Box::new(heapless::Vec::<_, 1>::new()));
-    let mut sidecar = Sidecar::new(pixels, blocks, Some(sensor.about()));
+    let mut sidecar = Sidecar::new(pixels, blocks, Some(sensor.info()));
     sidecar.set_stop_reason(reason);
     listen(move |stream| {
         let poll = |sidecar: &mut Sidecar<'_>, now| sidecar.poll_sensor(&mut sensor, now);
@@ -50,17 +49,17 @@ fn device_of(cycles_per_second: u32, reason: Option<StopReason>) -> String {
     })
 }
 
-/// What the device tells a host that comes next.
-fn told(name: &str) -> Told {
+/// The device's report to the next host.
+fn sensor_state(name: &str) -> SensorState {
     let report: Report = client(name).report().unwrap();
-    Told {
+    SensorState {
         starts: report.sensor_starts,
         stops: report.sensor_stops,
         reason: StopReason::from_number(report.stop_reason),
     }
 }
 
-const ENDED: Told = Told {
+const ENDED: SensorState = SensorState {
     starts: 1,
     stops: 1,
     reason: Some(StopReason::EndOfSession),
@@ -73,8 +72,15 @@ fn longest() -> HostTimeout {
 
 /// Has the device take photons from its sensor.
 fn start(client: &mut Client, host_timeout: HostTimeout) {
-    let configured = configuration(&settings(), PIXELS, 2, Source::Sensor, None, host_timeout);
-    client.configure(&configured.unwrap()).unwrap();
+    let task = Task {
+        settings: &settings(),
+        pixels: PIXELS,
+        columns: 2,
+        dynamic_depth: None,
+        host_timeout,
+    };
+    let configuration = task.configuration(Source::Sensor).unwrap();
+    client.configure(&configuration).unwrap();
     assert_eq!(
         Stopped::check(&client.report().unwrap(), host_timeout),
         Ok(())
@@ -89,10 +95,10 @@ fn a_client_that_is_dropped_ends_its_session() {
     let since = Instant::now();
     drop(client);
     assert!(since.elapsed() < Duration::from_millis(290), "not answered");
-    assert_eq!(told(&name), ENDED);
+    assert_eq!(sensor_state(&name), ENDED);
 }
 
-/// A panic drops it, too.
+/// A panic also drops the client.
 #[test]
 fn a_thread_that_panics_ends_its_session() {
     let name = device(None);
@@ -105,7 +111,7 @@ fn a_thread_that_panics_ends_its_session() {
         }
     });
     assert!(ended.join().is_err());
-    assert_eq!(told(&name), ENDED);
+    assert_eq!(sensor_state(&name), ENDED);
 }
 
 /// `dtof LINE --device NAME` with its output in pipes.
@@ -115,14 +121,14 @@ fn spawned(scratch: &Scratch, line: &str, name: &str) -> std::process::Child {
     command.spawn().unwrap()
 }
 
-/// The whole of what it prints, in one read after the other.
+/// Reads all output.
 fn rest(mut from: impl Read) -> String {
     let mut text = String::new();
     from.read_to_string(&mut text).unwrap();
     text
 }
 
-/// A pager that is not read from, for one. What came until then is whole.
+/// For instance a pager that is not read. Earlier output is complete.
 #[test]
 fn an_output_that_blocks_stops_the_sensor_and_ends_the_command_with_the_reason() {
     let scratch = Scratch::new();
@@ -143,18 +149,18 @@ fn an_output_that_blocks_stops_the_sensor_and_ends_the_command_with_the_reason()
     assert!(events.len() > 1 << 16, "{}", events.len());
     assert!(scratch.printed("decode events.aer") == events);
     assert_eq!(names(&scratch.path("")), ["events.aer"]);
-    let expected = Told {
+    let expected = SensorState {
         reason: Some(StopReason::Silence),
         ..ENDED
     };
-    assert_eq!(told(&name), expected);
+    assert_eq!(sensor_state(&name), expected);
 }
 
 #[test]
 fn a_command_that_fails_stops_the_sensor() {
     let scratch = Scratch::new();
     let name = device(None);
-    // All that is written into it is lost.
+    // Its data is lost.
     let full = std::fs::File::options().write(true).open("/dev/full");
     let Ok(full) = full else {
         return;
@@ -164,22 +170,22 @@ fn a_command_that_fails_stops_the_sensor() {
     ));
     let status = command.stdout(full).stderr(Stdio::null()).status();
     assert_eq!(status.unwrap().code(), Some(1));
-    assert_eq!(told(&name), ENDED);
+    assert_eq!(sensor_state(&name), ENDED);
 }
 
 #[test]
 fn a_calibration_that_is_silent_ends_with_the_reason() {
-    let name = desk::device(Desk::new(WALL), LONG);
+    let name = wall_sensor::device(WallSensor::new(WALL), LONG);
     let timeout = HostTimeout::from_milliseconds(200).unwrap();
-    let mut asked = 0;
+    let mut calls = 0;
     let collected = dtof_device::histograms::collect(
         &mut client(&name),
         &settings(),
-        desk::PIXELS,
+        wall_sensor::PIXELS,
         timeout,
         |so_far| {
-            asked += 1;
-            if asked == 100 {
+            calls += 1;
+            if calls == 100 {
                 thread::sleep(Duration::from_millis(600));
             }
             so_far.elapsed > Duration::from_secs(3)
@@ -198,8 +204,8 @@ fn failing(reason: Option<StopReason>) -> String {
         let fresh = |reason| {
             let pixels = Box::leak(Box::new(heapless::Vec::<_, { PIXELS as usize }>::new()));
             let blocks = Box::leak(Box::new(heapless::Vec::<_, 1>::new()));
-            let about = port::sensor(PIXELS, 20, 500).about();
-            let mut sidecar = Sidecar::new(pixels, blocks, Some(about));
+            let info = port::sensor(PIXELS, 20, 500).info();
+            let mut sidecar = Sidecar::new(pixels, blocks, Some(info));
             sidecar.set_stop_reason(reason);
             sidecar
         };
@@ -292,7 +298,7 @@ fn host_timeouts_that_no_device_takes_are_refused() {
             &scratch.run(&line),
             &[
                 &name,
-                "--host-timeout 0 is for firmware that was built with laser-on-without-host",
+                "--host-timeout 0 needs firmware that was built with laser-on-without-host",
             ],
         );
     }
@@ -303,6 +309,6 @@ fn host_timeouts_that_no_device_takes_are_refused() {
         assert!(!scratch.run(line).status.success());
     }
     assert_eq!(names(&scratch.path("")), [""; 0]);
-    // It was never on.
-    assert_eq!(told(&name).starts, 0);
+    // The sensor was never on.
+    assert_eq!(sensor_state(&name).starts, 0);
 }

@@ -6,28 +6,28 @@ use dtof_core::Array;
 
 use super::event_camera::{evt2, mcap};
 use crate::common::aer::{HEADER, below, byte_of, depth, dynamic, events, exported, file};
-use crate::common::{Scratch, names, says};
+use crate::common::{Scratch, assert_contains, names};
 use dtof_events::aer_file::{Event, Header};
 use dtof_export::{Format, Options};
 
-/// How many whole points a file holds, which must be as many as it says.
+/// Number of points of a file, which must agree with its header.
 fn points(format: Format, bytes: &[u8]) -> u64 {
     let text = String::from_utf8_lossy(bytes);
-    let said = |key: &str| {
+    let count = |key: &str| {
         let line = text.lines().find_map(|line| line.strip_prefix(key));
         line.unwrap().parse::<usize>().unwrap()
     };
-    let records = |end: &str, said: usize| {
-        assert_eq!(below(bytes, end).len(), said * 31);
-        said
+    let records = |end: &str, count: usize| {
+        assert_eq!(below(bytes, end).len(), count * 31);
+        count
     };
     let points = match format {
         Format::Csv => {
             assert!(text.ends_with('\n'));
             text.lines().count() - 1
         }
-        Format::Pcd => records("DATA binary\n", said("POINTS ")),
-        Format::Ply => records("end_header\n", said("element vertex ")),
+        Format::Pcd => records("DATA binary\n", count("POINTS ")),
+        Format::Ply => records("end_header\n", count("element vertex ")),
         _ => panic!("{format:?} has a test of its own"),
     };
     points as u64
@@ -80,7 +80,7 @@ fn damage_is_named_with_its_byte_after_the_events_before_it_are_written() {
             (&changed(7, 0xc0), 4, ["byte 144: ", "unknown kind"]),
             // Pixel 65,280 of 2,048.
             (&changed(1, 0xff), 4, ["byte 144: pixel ", " of 2048"]),
-            // A photon more, which only the checksum knows.
+            // One photon more, which only the checksum detects.
             (&changed(8, 38), 12, ["byte 288: ", "checksum"]),
             (&longer, 12, ["byte 304: ", "bytes follow"]),
             // Bin 152 of 128: the peak bin has bits 52-61.
@@ -89,8 +89,8 @@ fn damage_is_named_with_its_byte_after_the_events_before_it_are_written() {
             let (exported, out) = exported(bytes, format, &Options::default());
             assert_eq!((exported.written, points(format, &out)), (written, written));
             let damage = exported.damage.unwrap();
-            says(&damage, parts[0]);
-            says(&damage, parts[1]);
+            assert_contains(&damage, parts[0]);
+            assert_contains(&damage, parts[1]);
         }
     }
 }
@@ -102,7 +102,7 @@ fn the_program_says_what_is_damaged_and_fails() {
     let output = scratch.run("export cut.aer --format csv --out x.csv");
     scratch.refused(
         &output,
-        &["cut.aer: byte 96: the file ends inside a word; x.csv holds what came before: 1 events"],
+        &["cut.aer: byte 96: the file ends inside a word; x.csv has the 1 events before the damage"],
     );
     assert_eq!(scratch.read("x.csv").lines().count(), 2);
 }
@@ -145,19 +145,19 @@ fn what_comes_before_a_time_that_is_damaged_is_exported_whole() {
     bytes[byte_of(1001) + 13] = 0x10;
     let formats = [Format::Pcd, Format::Ply, Format::Mcap, Format::Evt2];
     for (format, name) in formats.into_iter().zip(["PCD", "PLY", "MCAP", "EVT2"]) {
-        // The rest may be there, or not.
+        // The other events may be there or not.
         for bytes in [&bytes[..], &bytes[..byte_of(1003)]] {
             let (exported, _) = exported(bytes, format, &Options::default());
             assert_eq!(exported.written, 1000);
             let damage = exported.damage.unwrap();
-            says(
+            assert_contains(
                 &damage,
                 "byte 16080: laser cycle 1152921504607895552 lies beyond",
             );
-            says(&damage, name);
+            assert_contains(&damage, name);
         }
     }
-    // CSV holds any time: only the checksum knows.
+    // CSV has any time, so only the checksum detects this.
     let (exported, _) = exported(&bytes, Format::Csv, &Options::default());
     assert_eq!(exported.written, 1002);
     assert!(exported.damage.unwrap().contains("checksum"));
@@ -209,7 +209,7 @@ fn an_interrupted_export_leaves_no_output() {
     scratch.file("events.aer", file(&HEADER, &events));
     let mut dtof = scratch.command("export events.aer --format csv --out x.csv");
     let mut child = dtof.spawn().unwrap();
-    // Not before it writes.
+    // It fails only when it writes.
     while !names(&scratch.path(""))
         .iter()
         .any(|name| name.ends_with(".partial"))

@@ -5,7 +5,7 @@ use dtof_core::{BlockLevel, Count, EchoNumber};
 use dtof_events::aer_file::Event;
 
 use crate::common::aer::{HEADER, depth_event, dynamic, file};
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, assert_contains};
 
 /// An echo of a pixel whose exposure has lasted `exposure` laser cycles.
 fn echo(pixel: u16, cycle: u64, exposure: u16, number: u8, bin: u16, peak: u32) -> Event {
@@ -37,7 +37,7 @@ fn events() -> Vec<Event> {
     ]
 }
 
-/// Peak bins of what is exported.
+/// Peak bins of the exported events.
 fn exported(scratch: &Scratch, options: &str) -> Vec<u16> {
     let printed = scratch.printed(&format!(
         "export events.aer --format csv --out e.csv {options}"
@@ -48,7 +48,7 @@ fn exported(scratch: &Scratch, options: &str) -> Vec<u16> {
         .skip(1)
         .map(|line| line.split(',').nth(7).unwrap().parse().unwrap())
         .collect();
-    says(&printed, &format!("{} events", bins.len()));
+    assert_contains(&printed, &format!("{} events", bins.len()));
     bins
 }
 
@@ -64,7 +64,7 @@ fn one_echo_of_each_exposure_is_exported_in_the_order_of_the_file() {
     assert_eq!(exported(&scratch, "--echo strongest"), [50, 90, 80, 30]);
 }
 
-/// Headers have the number of points before the first: it is that of the echoes chosen.
+/// A header's number of points is that of the selected echoes.
 #[test]
 fn every_format_has_as_many_as_its_header_says() {
     let scratch = Scratch::new();
@@ -72,9 +72,9 @@ fn every_format_has_as_many_as_its_header_says() {
     scratch.file("events.aer", &whole);
     for (format, header) in [("pcd", "POINTS 4\n"), ("ply", "element vertex 4\n")] {
         let line = format!("export events.aer --format {format} --out points --echo last");
-        says(&scratch.printed(&line), "points: 4 events");
+        assert_contains(&scratch.printed(&line), "points: 4 events");
         let bytes = std::fs::read(scratch.path("points")).unwrap();
-        says(&String::from_utf8_lossy(&bytes), header);
+        assert_contains(&String::from_utf8_lossy(&bytes), header);
         let end = bytes
             .windows(7)
             .position(|part| part == b"binary\n" || part == b"header\n");
@@ -83,13 +83,13 @@ fn every_format_has_as_many_as_its_header_says() {
         assert_eq!(end / 31, 4, "{format}");
     }
     scratch.printed("export events.aer --format mcap --out e.mcap --echo first");
-    // A file that ends too early: what came before is chosen from.
+    // A file that ends too early: the echo is chosen among the events before.
     scratch.file("short.aer", &whole[..whole.len() - 32]);
     let output = scratch.run("export short.aer --format csv --out e.csv --echo last");
     assert!(!output.status.success());
-    says(
+    assert_contains(
         &String::from_utf8(output.stderr).unwrap(),
-        "e.csv holds what came before: 3 events",
+        "e.csv has the 3 events before the damage",
     );
     assert_eq!(scratch.read("e.csv").lines().count(), 4);
 }

@@ -3,11 +3,12 @@
 
 use crate::common::Scratch;
 use crate::common::aer::{HEADER, below, depth, depth_event, dynamic, exported, file};
+use dtof_core::events::Reference;
 use dtof_core::fixed::types::U24F8;
-use dtof_core::{Array, Flags, Reference};
+use dtof_core::{Array, Flags};
 use dtof_events::aer_file::Event;
 use dtof_events::clock::LaserClock;
-use dtof_export::{Exported, Format, Options};
+use dtof_export::{ExportSummary, Format, Options};
 
 /// Time, column, row and whether it is ON, of each event.
 pub fn evt2(bytes: &[u8]) -> Vec<(u64, u32, u32, bool)> {
@@ -35,14 +36,14 @@ pub fn evt2(bytes: &[u8]) -> Vec<(u64, u32, u32, bool)> {
 pub fn mcap(bytes: &[u8]) -> (u64, usize, usize) {
     let summary = mcap::Summary::read(bytes).unwrap().expect("a summary");
     let (clouds, statistics) = (messages(bytes, "/events"), statistics(bytes));
-    let said = summary.stats.unwrap().message_count;
-    assert_eq!(said, (clouds.len() + statistics.len()) as u64);
+    let message_count = summary.stats.unwrap().message_count;
+    assert_eq!(message_count, (clouds.len() + statistics.len()) as u64);
     let last = statistics.last();
     let last = last.map_or(0, |last| last["events_so_far"].as_u64().unwrap());
     (last, clouds.len(), statistics.len())
 }
 
-/// The log times of the messages of a topic, and what they are.
+/// The log times and data of the messages of a topic.
 fn messages(bytes: &[u8], topic: &str) -> Vec<(u64, Vec<u8>)> {
     let all = mcap::MessageStream::new(bytes).unwrap().map(Result::unwrap);
     all.filter(|message| message.channel.topic == topic)
@@ -68,7 +69,7 @@ pub fn changes() -> Vec<Event> {
 }
 
 /// The export of these events without an option.
-fn plain(events: &[Event], format: Format) -> (Exported, Vec<u8>) {
+fn plain(events: &[Event], format: Format) -> (ExportSummary, Vec<u8>) {
     exported(&file(&HEADER, events), format, &Options::default())
 }
 
@@ -127,7 +128,7 @@ fn changes_out_of_order_are_put_in_order() {
 
 #[test]
 fn changes_that_are_too_late_are_left_out_and_said() {
-    // More than can wait, then one from before them.
+    // More events than the buffer holds, then an earlier one.
     let mut events: Vec<Event> = (0..65_600)
         .map(|index| dynamic(1, 1000 + index * 10, 40, 1))
         .collect();
@@ -140,8 +141,9 @@ fn changes_that_are_too_late_are_left_out_and_said() {
         ));
         assert!(output.status.success());
         let message = String::from_utf8(output.stderr).unwrap();
-        let late = "events.aer: 1 events came after more than 65,536 later ones";
-        assert_eq!(message, format!("{late}: left out of {out}\n"));
+        let late = "more than 65,536 later events came before them";
+        let expected = format!("events.aer: 1 events were left out of {out}: {late}\n");
+        assert_eq!(message, expected);
     }
     let found = evt2(&std::fs::read(scratch.path("x.raw")).unwrap());
     assert!(found.len() == 65_600 && found.is_sorted_by_key(|event| event.0));
@@ -194,7 +196,7 @@ fn slices_have_a_cloud_and_statistics_each() {
     options.clock = Some(LaserClock::new(1_000_000_000).unwrap());
     let (_, out) = exported(&file(&HEADER, &events), Format::Mcap, &options);
     assert_eq!(mcap(&out), (70_000, 2, 1));
-    // Each has a time of its own: the beginning of the slice, its first point.
+    // Each has its own time: the start of the slice, or its first point.
     assert_eq!(times(&out, "/events"), [0, 65_536]);
     assert_eq!(times(&out, "/statistics"), [0]);
 }
@@ -230,11 +232,11 @@ fn flags_are_counted_each() {
     });
     let events: Vec<Event> = events.collect();
     let (_, out) = plain(&events, Format::Mcap);
-    let said = &statistics(&out)[0];
+    let slice = &statistics(&out)[0];
     for name in ["saturated", "clipped", "deferred", "pile_up"] {
-        assert_eq!(said[name], 8, "{name}");
+        assert_eq!(slice[name], 8, "{name}");
     }
-    assert_eq!(said["flagged"], 15);
+    assert_eq!(slice["flagged"], 15);
 }
 
 #[test]

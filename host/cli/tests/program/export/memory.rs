@@ -11,7 +11,7 @@ use dtof_events::aer_file::Writer;
 
 const FORMATS: [&str; 6] = ["csv", "csv --echo strongest", "pcd", "ply", "mcap", "evt2"];
 
-/// A file of so many events from all pixels, a change of depth each now and then.
+/// A file of so many events from all pixels, some of them changes of depth.
 fn write(path: &Path, events: u64) {
     let out = BufWriter::new(File::create(path).unwrap());
     let mut writer = Writer::new(out, &HEADER).unwrap();
@@ -37,8 +37,8 @@ fn peaks(events: u64) -> Vec<u64> {
 
 #[test]
 fn five_times_the_events_take_no_more_memory() {
-    // All that is ever held is there with the first 200,000. To hold the 800,000 others
-    // as the words they came as would take 12,800 kB.
+    // Memory is full with the first 200,000 events. The words of the other 800,000 would take
+    // 12,800 kB.
     for ((few, many), format) in peaks(200_000).iter().zip(peaks(1_000_000)).zip(FORMATS) {
         assert!(many < few + 3_000, "{format}: {few} kB, then {many} kB");
     }

@@ -21,35 +21,35 @@ fn rms(values: impl Iterator<Item = f64> + Clone) -> f64 {
 }
 
 /// An event: its point in millimetres, the range of it, and the truth.
-struct Seen {
+struct RangedEvent {
     point: Point,
     range_mm: f64,
     truth_mm: f64,
 }
 
 /// The events of the scene, and how many were false.
-fn events(scene: &Path, scratch: &Scratch) -> (Vec<Seen>, usize) {
+fn events(scene: &Path, scratch: &Scratch) -> (Vec<RangedEvent>, usize) {
     let truth = Scene::read(scene).unwrap();
     scratch.simulated(scene, "--alpha 8 --l1 100 --l2 2000 --x 10");
     scratch.printed("export out/events.aer --format csv --out wall.csv --fov 60x32");
     let text = scratch.read("wall.csv");
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
-    let seen = |line: &str| {
+    let event = |line: &str| {
         let cells: Vec<&str> = line.split(',').collect();
         let cell = |name| cells[names.iter().position(|is| *is == name).unwrap()];
         let number = |name| cell(name).parse::<f64>().unwrap();
-        let address = PixelAddress(cell("pixel").parse().unwrap());
+        let address = PixelAddress::new(cell("pixel").parse().unwrap());
         let view = truth.truth(address, cell("cycle").parse().unwrap());
-        Seen {
+        RangedEvent {
             point: ["x_m", "y_m", "z_m"].map(|side| number(side) * 1000.0),
             range_mm: number("range_mm"),
             truth_mm: view.unwrap().range_mm,
         }
     };
     let limit = FALSE_BEYOND_BINS * truth.mm_per_bin();
-    let is_right = |seen: &Seen| (seen.range_mm - seen.truth_mm).abs() < limit;
-    let (right, wrong): (Vec<Seen>, Vec<Seen>) = lines.map(seen).partition(is_right);
+    let is_right = |event: &RangedEvent| (event.range_mm - event.truth_mm).abs() < limit;
+    let (right, wrong): (Vec<RangedEvent>, Vec<RangedEvent>) = lines.map(event).partition(is_right);
     (right, wrong.len())
 }
 
@@ -67,27 +67,27 @@ fn a_tilted_wall_comes_back_as_a_plane() {
 
     // A point is as far from the plane as its range is wrong, seen along the normal.
     // Points are rounded to f32, ranges are printed with three decimals.
-    let distance = |seen: &Seen| dot(normal, seen.point) - through;
+    let distance = |event: &RangedEvent| dot(normal, event.point) - through;
     let mut across = Vec::new();
-    for seen in &events {
-        let ray = seen
+    for event in &events {
+        let ray = event
             .point
-            .map(|side| side / dot(seen.point, seen.point).sqrt());
-        let error = seen.range_mm - seen.truth_mm;
+            .map(|side| side / dot(event.point, event.point).sqrt());
+        let error = event.range_mm - event.truth_mm;
         across.push(error * dot(normal, ray));
-        assert!((distance(seen) - across[across.len() - 1]).abs() < 0.002);
+        assert!((distance(event) - across[across.len() - 1]).abs() < 0.002);
     }
     let from_plane = rms(events.iter().map(distance));
-    let depth_error = rms(events.iter().map(|seen| seen.range_mm - seen.truth_mm));
+    let depth_error = rms(events.iter().map(|event| event.range_mm - event.truth_mm));
     let expected = rms(across.iter().copied());
     assert!((from_plane - expected).abs() < 0.002 && from_plane < depth_error);
 
-    // The plane that fits the points best is the wall, but for the noise: with noise s and
-    // n points a slope is known to s / (spread × √n), a place to s / √n. Four standard
-    // deviations hold 99.99 % of outcomes.
+    // The plane that fits the points best is the wall within the noise: with noise s and n points,
+    // the deviation of a slope is s / (spread × √n), that of a position s / √n. Four standard
+    // deviations include 99.99 % of outcomes.
     let n = events.len() as f64;
     let [u, v] = in_plane(normal);
-    let place = |seen: &Seen| [dot(u, seen.point), dot(v, seen.point), distance(seen)];
+    let place = |event: &RangedEvent| [dot(u, event.point), dot(v, event.point), distance(event)];
     let places: Vec<Point> = events.iter().map(place).collect();
     let mean = [0, 1, 2].map(|axis| places.iter().map(|place| place[axis]).sum::<f64>() / n);
     let sum = |a: usize, b: usize| {

@@ -1,7 +1,7 @@
 //! `dtof export`: points, kinds of event, the result line, links.
 
 use crate::common::aer::{HEADER, depth, dynamic, events, exported, file};
-use crate::common::{Scratch, says, table};
+use crate::common::{Scratch, assert_contains, table};
 use dtof_core::{Array, BlockLevel, PixelAddress};
 use dtof_events::aer_file::EventKind;
 use dtof_export::{Format, Options};
@@ -95,9 +95,9 @@ end_header
         assert_eq!([x, y, z], point);
         assert_eq!(
             (intensity, pixel, flags),
-            (37.0, event.pixel().0.into(), [4, 0, 1])
+            (37.0, event.pixel().raw().into(), [4, 0, 1])
         );
-        assert_eq!(time, event.cycle().0 as f64 * 100.0);
+        assert_eq!(time, event.cycle().raw() as f64 * 100.0);
     }
 }
 
@@ -107,7 +107,7 @@ fn changes_of_depth_are_points_at_the_mean() {
     let (_, pcd) = exported(&file(&HEADER, &events), Format::Pcd, &Options::default());
     let (_, csv) = exported(&file(&HEADER, &events), Format::Csv, &Options::default());
     let header = String::from_utf8_lossy(&pcd);
-    says(&header, "FIELDS x y z change pixel flags level echo t_ns");
+    assert_contains(&header, "FIELDS x y z change pixel flags level echo t_ns");
     let ([x, y, z, change], pixel, ..) = record(&pcd[pcd.len() - 62..]);
     let metres = (40.0 * 250.0 * 0.149_896_229 - 12.5) / 1000.0;
     assert!((f64::from(x.hypot(y).hypot(z)) - metres).abs() < 1e-5);
@@ -180,7 +180,7 @@ fn a_link_stays_and_what_it_leads_to_is_replaced() {
     assert!(scratch.path("link.csv").is_symlink());
     assert_eq!(scratch.read("folder/points.csv").lines().count(), 13);
     let lost = scratch.run("export events.aer --format csv --out lost.csv");
-    scratch.refused(&lost, &["lost.csv: is a link to what is not there"]);
+    scratch.refused(&lost, &["lost.csv: is a broken link"]);
     assert!(scratch.path("lost.csv").is_symlink());
 }
 
@@ -192,7 +192,7 @@ fn the_calibration_of_the_documentation_is_one() {
     let scratch = Scratch::new();
     let rays = Rays::read(&scratch.file("rays.toml", text), Array::new(2, 1).unwrap()).unwrap();
     // Its second pixel measures 12.5 mm too little.
-    let point = rays.point(PixelAddress(1), BlockLevel::PIXEL, 987.5);
+    let point = rays.point(PixelAddress::new(1), BlockLevel::PIXEL, 987.5);
     let length = point.unwrap().iter().map(|side| side * side).sum::<f64>();
     assert!((length - 1.0).abs() < 1e-12, "{length}");
 }

@@ -32,9 +32,9 @@ fn options_that_cannot_be_are_refused_in_one_line() {
             events.aer --format las --out x | las
             none.aer --format csv --out x | none.aer: No such file
             folder --format csv --out x | folder: not a file
-            events.aer --format csv --out folder | folder: is there, and is no file
-            events.aer --format csv --out /dev/null | is no file
-            events.aer --format csv --out ./events.aer | is the file that is read
+            events.aer --format csv --out folder | folder: exists and is not a file
+            events.aer --format csv --out /dev/null | is not a file
+            events.aer --format csv --out ./events.aer | is an input file
             events.aer --format csv --out x --fov 60 | HORIZONTALxVERTICAL
             events.aer --format csv --out x --fov 0x10 | HORIZONTALxVERTICAL
             events.aer --format csv --out x --laser-hz 0 | --laser-hz
@@ -43,8 +43,8 @@ fn options_that_cannot_be_are_refused_in_one_line() {
             events.aer --format mcap --out x --slice-us 0 | --slice-us
             events.aer --format ply --out x --threshold-mm 3 | --threshold-mm is only for evt2
             events.aer --format mcap --out x --reference reported | --reference is only for evt2
-            events.aer --format evt2 --out x --fov 60x40 | --fov is only for points
-            events.aer --format evt2 --out x --calibration none.toml | --calibration is only for points
+            events.aer --format evt2 --out x --fov 60x40 | --fov is only for formats with points
+            events.aer --format evt2 --out x --calibration none.toml | --calibration is only for formats with points
             events.aer --format csv --out x --events dynamic-depth | 12 events, none of them a dynamic depth event
             events.aer --format csv --out x --calibration none.toml | none.toml: No such file
             events.aer --format csv --out x --calibration calibration.toml | calibration.toml: line 1: 0 pixels, should be 2048

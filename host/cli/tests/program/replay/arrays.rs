@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{Scratch, npy, says};
+use crate::common::{Scratch, assert_contains, npy};
 
 fn array(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/program/replay/numpy");
@@ -62,7 +62,7 @@ fn a_capture_has_a_length_of_its_own() {
     assert_eq!(summary["recorded_cycles"], serde_json::json!([80, 800]));
     let summary = scratch.replayed(&input, "--axes rows,bins");
     assert_eq!(summary["recorded_cycles"], serde_json::json!([800, 800]));
-    says(&scratch.read("out/event-counts.svg"), ">row<");
+    assert_contains(&scratch.read("out/event-counts.svg"), ">row<");
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn bins_are_padded_and_the_gate_leaves_out_what_was_added() {
     let input = scratch.file("h.npy", npy("|u1", "(1, 20)", &counts));
     let output = scratch.replay(&input, "");
     let said = String::from_utf8(output.stdout).unwrap();
-    says(&said, "empty bins added");
+    assert_contains(&said, "empty bins added");
     let summary = scratch.summary();
     assert_eq!(summary["recording"]["bins of the recording"], "20");
     assert_eq!(summary["recording"]["empty bins added"], "12");
@@ -106,7 +106,7 @@ fn bins_are_padded_and_the_gate_leaves_out_what_was_added() {
     assert_eq!(settings["bins"], 32);
     assert_eq!(settings["gate"], serde_json::json!([0, 19]));
     assert_eq!([&summary["photons"], &summary["gated_out"]], [219, 0]);
-    // A gate of one's own stands.
+    // An explicit gate stays.
     let summary = scratch.replayed(&input, "--gate 4..19");
     assert_eq!(summary["settings"]["gate"], serde_json::json!([4, 19]));
 }
@@ -131,11 +131,11 @@ fn neighbours_are_added_up_and_bins_cut_off_and_all_is_counted() {
     );
     assert_eq!(recording["bins cut off"], "the last 18, with 35 photons");
     assert!(scratch.events().iter().all(|event| event[3] == "6"));
-    // The sum of one bin is no sum of two: the gate leaves it out, and says so.
+    // The last bin has no partner, so the gate leaves it out with a warning.
     let summary = scratch.replayed(&input, "--rebin 2");
     assert_eq!(summary["settings"]["gate"], serde_json::json!([0, 32]));
     assert_eq!([&summary["gated_out"], &summary["cut_off"]], [1, 0]);
-    // Of lists, too.
+    // The same for photon lists.
     let rows = "0,0,255\n0,1,254\n0,2,12\n";
     let list = scratch.file("list.csv", format!("pixel,cycle,bin\n{rows}"));
     let summary = scratch.replayed(&list, "--rebin 4 --bins 64");
@@ -153,11 +153,11 @@ fn what_is_surely_wrong_is_said() {
             output.status.success() && said.lines().count() == 1,
             "{said}"
         );
-        says(&said, &format!("warning: {}: ", input.display()));
-        says(&said, part);
+        assert_contains(&said, &format!("warning: {}: ", input.display()));
+        assert_contains(&said, part);
         let warnings = &scratch.summary()["warnings"];
-        says(warnings[0].as_str().unwrap(), part);
-        says(&scratch.read("out/report.html"), part);
+        assert_contains(warnings[0].as_str().unwrap(), part);
+        assert_contains(&scratch.read("out/report.html"), part);
         let output = scratch.replay(input, &format!("{options} --quiet"));
         assert!(output.stderr.is_empty());
     };
@@ -204,7 +204,7 @@ fn arrays_that_hold_no_counts_are_refused() {
             no.npz | no.npz: not an .npz file
             plain.npy --axes rows,columns,bins | has 3 names, but the array [2, 2, 2, 8] has 4 axes
             plain.npy --axes rows,columns | one axis must be the bins
-            plain.npy --axes rows,rows,bins | rows is there twice
+            plain.npy --axes rows,rows,bins | rows is given twice
             plain.npy --axes x,bins | captures, rows, columns, bins
             plain.npy --axes bins,captures,rows,columns | 2 bins: must be from 8 to 4096
             plain.npy --columns 3 | --columns 3: plain.npy has 2; this is for photon lists
@@ -213,8 +213,8 @@ fn arrays_that_hold_no_counts_are_refused() {
             list.npy --axes bins | --axes is for arrays of histograms
             list.npy --recorded-cycles 5 | is for histograms
             list.npy --bins 32 | list.npy: record 0: bin 40 is past the last of 32 bins
-            list.npy --binning 1 | list.npy: --binning needs to know the array: say --columns
-            list.csv --binning 1 | list.csv: --binning needs to know the array: say --columns
+            list.npy --binning 1 | list.npy: --binning needs the array: give --columns
+            list.csv --binning 1 | list.csv: --binning needs the array: give --columns
             wide.npy | 5000 bins: must be at most 4096
             long.npy | 1500 bins are more than 1024: add up neighbours with --rebin 2
             plain.npy --rebin 400 | makes 0 whole bins of 8
@@ -291,7 +291,7 @@ fn events_csv_is_left_out_and_that_of_an_earlier_run_removed() {
     assert_eq!(with, without);
     assert!(!scratch.path("out/events.csv").exists());
     assert_eq!(fs::read(scratch.path("out/events.aer")).unwrap(), aer);
-    // Never what is not of a run.
+    // Files that no run has written stay.
     scratch.file("out/events.csv", "mine\n");
     let output = scratch.replay(&input, "--no-csv");
     assert!(!output.status.success());

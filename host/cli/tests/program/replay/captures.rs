@@ -1,6 +1,6 @@
 //! A capture log has zones and captures, where other arrays have columns and rows.
 
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, assert_contains};
 
 #[test]
 fn the_report_of_a_capture_log_calls_them_so() {
@@ -20,7 +20,7 @@ fn the_report_of_a_capture_log_calls_them_so() {
         let map = scratch.read("out/event-counts.svg");
         let report = scratch.read("out/report.html");
         for side in [across, down] {
-            says(&map, &format!(">{side}<"));
+            assert_contains(&map, &format!(">{side}<"));
         }
         let sides = format!("\"sides\":[\"{across}\",\"{down}\"]");
         assert_eq!(report.contains(&sides), has_events);

@@ -6,8 +6,8 @@ use std::sync::Arc;
 
 use dtof_core::Array;
 use dtof_core::fixed::types::U16F16;
-use dtof_photons::medium::{Medium, NpyArray};
-use dtof_photons::open::{BIN_WIDTH_PS, Counts, Opening, counts, open};
+use dtof_photons::input::{Input, NpyArray};
+use dtof_photons::open::{BIN_WIDTH_PS, Counts, ReadOptions, counts, open};
 use dtof_photons::{tmf8820, tmf8829};
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -17,14 +17,14 @@ use crate::common::Scratch;
 fn counts_of(name: &str, text: &str) -> Counts {
     let scratch = Scratch::new();
     let path = scratch.file(name, text);
-    counts(&path, &Opening::default()).unwrap()
+    counts(&path, &ReadOptions::default()).unwrap()
 }
 
 #[test]
 fn photon_lists_are_summed_over_their_laser_cycles() {
     let counts = counts_of(
         "a.csv",
-        // Not so many slices as that takes.
+        // The slices are longer than that.
         "pixel,cycle,bin\n2,0,5\n2,7,5\n0,70000000000000,127\n2,70000000000000,6\n",
     );
     assert_eq!(counts.array, Array::new(3, 1).unwrap());
@@ -35,18 +35,18 @@ fn photon_lists_are_summed_over_their_laser_cycles() {
     let sums: Vec<u64> = pixels.iter().map(|bins| bins.iter().sum()).collect();
     assert_eq!(sums, [1, 0, 3]);
     assert_eq!([pixels[2][5], pixels[2][6], pixels[0][127]], [2, 1, 1]);
-    assert_eq!(counts.known.bin_width_ps, BIN_WIDTH_PS);
-    assert!(!counts.known.has_shape);
+    assert_eq!(counts.metadata.bin_width_ps, BIN_WIDTH_PS);
+    assert!(!counts.metadata.has_shape);
 }
 
-/// A run takes as many laser cycles at a time as the brightest part of a list allows.
+/// A slice has as many laser cycles as the brightest part of a list allows.
 #[test]
 fn a_list_says_how_bright_its_brightest_part_is() {
     let scratch = Scratch::new();
     let rows = "0,300,5\n".repeat(512);
     let text = format!("pixel,cycle,bin\n0,0,1\n{rows}0,1000000000,1\n");
     let path = scratch.file("burst.csv", text);
-    let recording = open(&path, &Opening::default()).unwrap();
+    let recording = open(&path, &ReadOptions::default()).unwrap();
     assert_eq!(recording.photons.photons_per_cycle(), 2.0);
 }
 
@@ -60,7 +60,7 @@ fn the_truth_of_a_log_is_that_of_its_centre_zones() {
     let truth = counts.truth_mm.unwrap();
     let expected = |address: usize| (address == 9 + 4).then_some(250.0);
     assert_eq!(truth, (0..18).map(expected).collect::<Vec<_>>());
-    assert_eq!(counts.known.bin_width_ps, tmf8820::BIN_WIDTH_PS);
+    assert_eq!(counts.metadata.bin_width_ps, tmf8820::BIN_WIDTH_PS);
 }
 
 /// A log of two frames, two rows and two columns; `bin` gives the count of a bin in a column.
@@ -85,17 +85,17 @@ fn a_tmf8829_log_is_told_by_its_content_and_read_packed_or_not() {
     assert_eq!(plain.captures.len(), 2);
     assert_eq!(plain.captures[1][3][7], 107);
     // 218 of the sensor's own bins are 54 of four, and one of two.
-    assert_eq!(plain.known.gate, Some((0, 53)));
-    assert_eq!(plain.known.bin_width_ps, 4 * U16F16::lit("203.8"));
-    assert_eq!(plain.known.offset_mm, Some(tmf8829::OFFSET_MM));
+    assert_eq!(plain.metadata.gate, Some((0, 53)));
+    assert_eq!(plain.metadata.bin_width_ps, 4 * U16F16::lit("203.8"));
+    assert_eq!(plain.metadata.offset_mm, Some(tmf8829::OFFSET_MM));
     let scratch = Scratch::new();
-    // Its name says nothing about it.
+    // The name does not reveal the format.
     for name in ["b.json.gz", "b.json"] {
         let file = File::create(scratch.path(name)).unwrap();
         let mut packed = GzEncoder::new(file, Compression::default());
         packed.write_all(log.as_bytes()).unwrap();
         packed.finish().unwrap();
-        let packed = counts(&scratch.path(name), &Opening::default()).unwrap();
+        let packed = counts(&scratch.path(name), &ReadOptions::default()).unwrap();
         assert_eq!(packed.captures, plain.captures);
     }
 }
@@ -105,8 +105,8 @@ fn columns_that_are_all_the_same_are_read_once() {
     let counts = counts_of("a.json", &tmf8829_log(|_, place| place, ""));
     assert_eq!(counts.array, Array::new(1, 2).unwrap());
     assert_eq!(counts.captures[0].len(), 2);
-    assert_eq!(counts.known.gate, None);
-    let row = &counts.known.rows[0];
+    assert_eq!(counts.metadata.gate, None);
+    let row = &counts.metadata.rows[0];
     assert_eq!(row.0, "columns left out");
     assert_eq!(row.1, "1 of 2, each the same as the first");
 }
@@ -137,7 +137,7 @@ fn logs_that_are_damaged_are_refused() {
     );
 }
 
-/// A photon list that is held in memory gives the photons of its file, and the same errors.
+/// A photon list in memory gives the same photons and errors as a file.
 #[test]
 fn an_array_in_memory_is_read_as_its_file_is() {
     let scratch = Scratch::new();
@@ -157,19 +157,19 @@ fn an_array_in_memory_is_read_as_its_file_is() {
             header,
             data: Box::new(rows.concat()),
         };
-        [Medium::File(path), Medium::Array(Arc::new(array))]
+        [Input::File(path), Input::Array(Arc::new(array))]
     };
     let photons = list(&[[0, 0, 0, 0, 9], [3, 0, 1, 1, 127], [0, 0, 2, 1, 5]]);
-    let [file, memory] = photons.map(|medium| {
-        let mut recording = open(&medium, &Opening::default()).unwrap();
+    let [file, memory] = photons.map(|input| {
+        let mut recording = open(&input, &ReadOptions::default()).unwrap();
         let slice = recording.photons.next_slice(300).unwrap();
-        (recording.known, recording.photons.cycles(), slice.pixels)
+        (recording.metadata, recording.photons.cycles(), slice.pixels)
     });
     assert_eq!(file, memory);
     assert_eq!(file.1, 259);
     let refused = list(&[[0, 0, 1, 1, 0], [0, 0, 0, 1, 0]]);
-    let [file, memory] = refused.map(|medium| {
-        let error = open(&medium, &Opening::default()).err().unwrap();
+    let [file, memory] = refused.map(|input| {
+        let error = open(&input, &ReadOptions::default()).err().unwrap();
         format!("{error:#}")
     });
     assert_eq!(file, memory);

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::process::Output;
 
-use crate::common::{Scratch, npy, says, succeeded};
+use crate::common::{Scratch, assert_contains, npy, succeeded};
 
 const HEADER: &str =
     "cycle,pixel,exposure,peak_bin,depth_bins,range_mm,peak_count,background,flags,level,echo\n";
@@ -78,7 +78,7 @@ fn a_damaged_aer_file_is_named_with_its_offset() {
         scratch.refused(&decode(&bytes), &["damaged.aer: ", part]);
     }
     scratch.all_refused("decode", "none.aer | none.aer | No such file");
-    // Whatever bit is flipped, the file is never taken for whole.
+    // A file with any flipped bit is refused.
     for bit in (0..whole.len() * 8).step_by(37) {
         let mut damaged = whole.clone();
         damaged[bit / 8] ^= 1 << (bit % 8);
@@ -225,7 +225,7 @@ fn every_pixel_of_the_demo_reports_alone_or_in_a_block() {
     for picture in ["depth-mean", "reflectivity-events", "reflectivity-signal"] {
         assert!(read(&format!("{picture}.svg")).ends_with("</svg>\n"));
     }
-    // All surfaces are there: that behind the glass, and the dim one.
+    // All surfaces are reported, also the dim one and the one behind the glass.
     for surface in summary["against_truth"]["surfaces"].as_array().unwrap() {
         let (name, events) = (&surface["name"], surface["events"].as_u64().unwrap());
         let false_alarms = surface["false_alarms"].as_u64().unwrap();
@@ -343,6 +343,6 @@ fn a_run_too_short_for_an_event_says_so() {
     let scratch = Scratch::new();
     let input = scratch.file("photons.csv", steady(7, 60, 100));
     let output = scratch.replay(&input, "--cycles 40");
-    let said = String::from_utf8(output.stdout).unwrap();
-    says(&said, "the first decision comes after 44 laser cycles");
+    let stdout = String::from_utf8(output.stdout).unwrap();
+    assert_contains(&stdout, "the first decision comes after 44 laser cycles");
 }

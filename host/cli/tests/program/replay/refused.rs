@@ -4,7 +4,7 @@
 use std::fs::File;
 use std::process::Stdio;
 
-use crate::common::{Scratch, names, says, table};
+use crate::common::{Scratch, assert_contains, names, table};
 
 const CSV_HEADER: &str = "pixel,cycle,bin\n";
 /// One photon.
@@ -71,7 +71,7 @@ fn csv_files_that_are_not_photon_lists_are_refused() {
     }
 }
 
-/// An `.npy` file as it should be, or not.
+/// A valid or invalid `.npy` file.
 fn npy(header: &str, data: &[u8]) -> Vec<u8> {
     let padding = 64 - (10 + header.len() + 1) % 64;
     let length = u16::try_from(header.len() + padding + 1).unwrap();
@@ -190,14 +190,14 @@ fn settings_that_cannot_be_are_refused() {
             --alpha NaN | --alpha
             --alpha 0.001 | less than half
             --bins 100 | power of two
-            --threshold-mm 50 | --threshold-mm is of --dynamic-depth
+            --threshold-mm 50 | --threshold-mm needs --dynamic-depth
             --dynamic-depth --threshold-mm 0.01 | --threshold-mm 0.01: | less than 1/512 bin
             --bins 4 | power of two
             --bins 2048 | power of two
             --columns 0 | --columns
             --gate 0..128 | past the last bin
             --gate 20..26 | fewer than 8 bins
-            --gate 30..20 | fewer than 8 bins
+            --gate 30..20 | the first bin must come before the last
             --gate 20 | FIRST..LAST
             --min-count 0 | --min-count
             --min-count 1024 | --min-count
@@ -267,7 +267,7 @@ fn a_folder_in_the_place_of_a_result_is_refused() {
     let output = scratch.replay(&input, "");
     assert!(!output.status.success());
     let message = String::from_utf8(output.stderr).unwrap();
-    says(&message, "report.html: is there, and is no file");
+    assert_contains(&message, "report.html: exists and is not a file");
 }
 
 #[test]
@@ -296,7 +296,7 @@ fn output_that_cannot_be_written_is_an_error_not_a_panic() {
     };
     let output = run("replay --input photons.csv --out out", Stdio::piped());
     assert_eq!(output.status.code(), Some(1));
-    says(&String::from_utf8(output.stderr).unwrap(), "No space left");
+    assert_contains(&String::from_utf8(output.stderr).unwrap(), "No space left");
     let output = run("decode none", full().into());
     assert_eq!(output.status.code(), Some(1));
 }

@@ -16,7 +16,7 @@ use crate::common::{Scratch, npy, peak_kb};
 const PIXELS: u64 = 64 * 64;
 const BINS: u32 = 128;
 
-/// Numbers that look random, the same each time.
+/// Pseudo-random numbers with a fixed seed.
 struct Numbers(u64);
 
 impl Numbers {

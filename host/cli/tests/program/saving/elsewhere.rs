@@ -5,7 +5,7 @@ use std::io::Write;
 use super::{Files, files};
 use crate::common::{Scratch, npy};
 
-/// Names as somebody would choose them who wants to write elsewhere, as they stand in TOML.
+/// Hostile names that point outside of the folder, as written in TOML.
 const NAMES: [&str; 7] = [
     "../evil",
     "../../evil.csv",
@@ -16,8 +16,8 @@ const NAMES: [&str; 7] = [
     "\\u001b]0;evil\\u0007<script>",
 ];
 
-/// Runs `line` in a folder within a folder, and gives what is new anywhere but in `out`. A
-/// simulation without hostile settings must succeed.
+/// Runs `line` in a nested folder, and returns the new files outside of `out`. A simulation without
+/// hostile settings must succeed.
 #[track_caller]
 fn elsewhere(scratch: &Scratch, line: &str) -> Files {
     let before = files(&scratch.path(""));
@@ -86,7 +86,7 @@ fn names_in_scenes_settings_and_archives_lead_nowhere() {
             let found = elsewhere(&scratch, line);
             assert_eq!(found, Files::new(), "{name}: {line}");
             runs += 1;
-            // Some names are no name of an array.
+            // Some names are not valid names of arrays.
             let summary = scratch.path("a/b/out/summary.json");
             if line == "replay --input in.npz --out out" {
                 let summary = std::fs::read_to_string(&summary).unwrap_or_default();
@@ -110,7 +110,7 @@ fn links_in_the_folder_named_are_replaced_and_not_followed() {
         elsewhere(&scratch, &format!("{simulate} out")),
         Files::new()
     );
-    // Results of another run, which links lead to: as if they were of this folder.
+    // Links to results of another run count as files of this folder.
     std::fs::rename(scratch.path("a/b/out"), scratch.path("other")).unwrap();
     std::fs::create_dir(scratch.path("a/b/out")).unwrap();
     let link = |name: &str, to: &str| {

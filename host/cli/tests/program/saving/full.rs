@@ -4,9 +4,9 @@ use std::path::Path;
 use std::process::Command;
 
 use super::{Files, Work, files, partial, through, times};
-use crate::common::{npy, says, skipped};
+use crate::common::{assert_contains, npy, skipped};
 
-/// Whether the tools of a test are here; says so if not.
+/// Returns whether the tools of a test are installed, and prints the missing ones.
 fn is_there(test: &str, tool: &[&str]) -> bool {
     let ran = Command::new(tool[0]).args(&tool[1..]).output();
     let is_there = ran.is_ok_and(|ran| ran.status.success());
@@ -16,7 +16,7 @@ fn is_there(test: &str, tool: &[&str]) -> bool {
     is_there
 }
 
-/// One line, that of a full disk, which names one of `places`.
+/// Checks for one line about a full disk that names one of `places`.
 #[track_caller]
 fn is_named(message: &str, places: &[&str]) {
     assert_eq!(message.lines().count(), 1, "{message}");
@@ -29,7 +29,7 @@ fn is_named(message: &str, places: &[&str]) {
     );
 }
 
-/// Limits at which something else is too large each time, and some between.
+/// Size limits at which another file is too large each time, and some between.
 fn limits(new: &Files) -> Vec<usize> {
     let mut limits: Vec<usize> = new.values().map(|bytes| bytes.len() - 1).collect();
     let largest = limits.iter().copied().max().unwrap();
@@ -57,7 +57,7 @@ fn a_file_that_the_disk_does_not_take_is_named_and_all_else_stays() {
             .len()
             .div_ceil(usize::try_from(times(6, 100)).unwrap());
         work.earlier(out);
-        // The last alone lets all files through but the largest, which is written late.
+        // Only the last limit is enough for all files but the largest, which is written late.
         for limit in limits.into_iter().rev().step_by(every) {
             let shell = format!("trap '' XFSZ; exec prlimit --fsize={limit} \"$@\"");
             let output = through(&shell, &work.scratch, &work.line(out, true));
@@ -74,13 +74,13 @@ fn a_file_that_the_disk_does_not_take_is_named_and_all_else_stays() {
     );
 }
 
-/// A disk of its own, of so many kilobytes, with the earlier results in it.
+/// A small file system of so many kilobytes, with the earlier results.
 const DISK: &str = "mount -t tmpfs -o size=SIZEk none disk && cp -a before/. disk && \"$@\"
 status=$?
 cp -a disk/. after/
 exit $status";
 
-/// Not everybody may mount.
+/// Mounting needs privileges.
 #[test]
 #[ignore = "mounts a disk of its own"]
 fn a_disk_that_fills_up_changes_nothing_on_it() {
@@ -131,9 +131,9 @@ fn warnings_that_nobody_can_take_stop_nothing() {
     work.scratch
         .file("in.npy", npy("<u2", "(2, 2, 32)", &counts));
     let line = "replay --input in.npy --bins 16 --out warned";
-    let said = work.scratch.run(line);
+    let output = work.scratch.run(line);
     assert!(
-        String::from_utf8(said.stderr)
+        String::from_utf8(output.stderr)
             .unwrap()
             .contains("warning: ")
     );
@@ -153,5 +153,5 @@ fn a_table_that_nobody_can_take_is_an_error() {
     assert_eq!(output.status.code(), Some(1));
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(message.lines().count(), 1, "{message}");
-    says(&message, "No space left on device");
+    assert_contains(&message, "No space left on device");
 }

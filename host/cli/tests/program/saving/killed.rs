@@ -11,8 +11,8 @@ use rand_pcg::Pcg32;
 
 use super::{Files, Work, partial, times};
 
-/// Without files that are not whole, and never will be.
-fn whole(mut files: Files) -> Files {
+/// Removes files that are incomplete and will stay so.
+fn complete(mut files: Files) -> Files {
     files.retain(|name, _| !name.ends_with(".partial"));
     files
 }
@@ -24,8 +24,8 @@ fn begin(work: &Work, out: &str) -> Child {
     command.spawn().unwrap()
 }
 
-/// Each file is that of the earlier run or that of the new one, and with a summary all are of
-/// one run. Whether the new one is complete.
+/// Checks that each file belongs to the earlier or the new run, and all to one run if there is a
+/// summary. Returns whether the new run is complete.
 #[track_caller]
 fn check(found: &Files, earlier: &Files, new: &Files) -> bool {
     let has_summary = found
@@ -35,8 +35,8 @@ fn check(found: &Files, earlier: &Files, new: &Files) -> bool {
         assert!(found == earlier || found == new, "a mixture looks complete");
     }
     for (name, bytes) in found {
-        let whole = [earlier.get(name), new.get(name)];
-        assert!(whole.contains(&Some(bytes)), "{name} is not whole");
+        let complete = [earlier.get(name), new.get(name)];
+        assert!(complete.contains(&Some(bytes)), "{name} is not whole");
     }
     has_summary && found == new
 }
@@ -59,12 +59,12 @@ fn a_killed_run_leaves_nothing_that_looks_complete_and_is_not() {
             child.kill().unwrap();
             child.wait().unwrap();
             killed += 1;
-            let found = whole(work.written(out));
+            let found = complete(work.written(out));
             let is_new = check(&found, &earlier, &new);
             before += u32::from(found == earlier);
             between += u32::from(!is_new && found != earlier);
         }
-        // The next run is as if nothing had been, and takes away what the killed ones left.
+        // The next run succeeds and removes what the killed runs have left.
         assert!(begin(&work, out).wait().unwrap().success());
         let found = work.written(out);
         assert!(found == new, "{out}: left {:?}", partial(&found));
@@ -85,7 +85,7 @@ fn a_run_killed_while_files_move_to_their_places_has_no_summary() {
     let (mut between, all) = (0, times(5, 30));
     for _ in 0..all {
         work.earlier(out);
-        // The first that is moved, and so the first that is another file.
+        // This file is moved first.
         let events = work.scratch.path("simulated/events.aer");
         let ino = |events: &Path| std::fs::metadata(events).map_or(0, |file| file.ino());
         let earlier_ino = ino(&events);
@@ -95,11 +95,11 @@ fn a_run_killed_while_files_move_to_their_places_has_no_summary() {
         }
         child.kill().unwrap();
         child.wait().unwrap();
-        let found = whole(work.written(out));
+        let found = complete(work.written(out));
         let is_new = check(&found, &earlier, &new);
         between += u32::from(!is_new);
     }
-    // Some of them come in time.
+    // Some kills come before the end of a run.
     assert!(between > 0 || all < 30, "all of {all} came too late");
     println!(
         "faults: killed {all} times once files moved to their places: {between} times there was no \

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use dtof_core::PixelAddress;
 use dtof_photons::geometry::FieldOfView;
-use dtof_simulate::scene::{Along, DepthMap, Scene};
+use dtof_simulate::scene::{DepthAlong, DepthMap, Scene};
 use proptest::prelude::*;
 
-use crate::common::{Scratch, npy, says};
+use crate::common::{Scratch, assert_contains, npy};
 
 /// 32-bit floats as an array of rows and columns.
 fn floats(shape: &str, values: &[f32]) -> Vec<u8> {
@@ -18,7 +18,7 @@ fn floats(shape: &str, values: &[f32]) -> Vec<u8> {
     npy("<f4", shape, &data)
 }
 
-/// A scene that is a depth map, seen under right angles by an array as large.
+/// A scene from a depth map, with a field of view of 90 degrees and an array of the same size.
 fn scene(map: DepthMap) -> Scene {
     let size = map.size();
     let mut scene = Scene::parse("").unwrap();
@@ -29,20 +29,20 @@ fn scene(map: DepthMap) -> Scene {
 }
 
 fn read(path: &Path) -> Scene {
-    scene(DepthMap::read(path, Along::Axis).unwrap())
+    scene(DepthMap::read(path, DepthAlong::Axis).unwrap())
 }
 
-/// The range that each pixel sees.
+/// The range of each pixel.
 fn ranges(scene: &Scene) -> Vec<Option<f64>> {
     let pixels = (0..)
         .take(scene.array().unwrap().pixels() as usize)
-        .map(PixelAddress);
+        .map(PixelAddress::new);
     pixels
         .map(|pixel| scene.truth(pixel, 0).map(|view| view.range_mm))
         .collect()
 }
 
-/// Where 90 degrees of `of` pixels see pixel `index`, at distance 1.
+/// Coordinate of pixel `index` of `of` pixels over 90 degrees, at distance 1.
 fn at(index: u32, of: u32) -> f64 {
     2.0 * (f64::from(index) + 0.5) / f64::from(of) - 1.0
 }
@@ -53,7 +53,7 @@ fn a_depth_is_a_range_along_the_ray_and_what_is_none_is_no_surface() {
     let values = [0.5, f32::NAN, 2.0, 0.0, -1.0, f32::INFINITY, 0.25, 1.0];
     let path = scratch.file("depth.npy", floats("(2, 4)", &values));
     let axis = ranges(&read(&path));
-    let ray = ranges(&scene(DepthMap::read(&path, Along::Ray).unwrap()));
+    let ray = ranges(&scene(DepthMap::read(&path, DepthAlong::Ray).unwrap()));
     for (index, value) in (0u32..).zip(values) {
         let metres = Some(f64::from(value)).filter(|value| value.is_finite() && *value > 0.0);
         let (across, down) = (at(index % 4, 4), at(index / 4, 2));
@@ -134,14 +134,14 @@ proptest! {
             prop_assert!((map.unwrap() / formula - 1.0).abs() < 1e-12);
             prop_assert!((plane.unwrap() / formula - 1.0).abs() < 1e-9);
         }
-        for pixel in (0..).take(map.array().unwrap().pixels() as usize).map(PixelAddress) {
+        for pixel in (0..).take(map.array().unwrap().pixels() as usize).map(PixelAddress::new) {
             let (of_map, of_plane) = (map.rates(pixel, 0).signal, plane.rates(pixel, 0).signal);
             prop_assert!((of_map / of_plane - 1.0).abs() < 1e-9);
         }
     }
 }
 
-/// Every pixel of every array sees the sample that its middle lies in, and no mean of two.
+/// Every pixel of every array takes the sample at its centre, not a mean of two.
 #[test]
 fn another_array_sees_the_nearest_sample() {
     let scratch = Scratch::new();
@@ -149,7 +149,7 @@ fn another_array_sees_the_nearest_sample() {
         let values: Vec<f32> = (1..=samples).map(f32::from).collect();
         let shape = format!("(1, {samples})");
         let path = scratch.file("depth.npy", floats(&shape, &values));
-        let map = DepthMap::read(&path, Along::Ray).unwrap();
+        let map = DepthMap::read(&path, DepthAlong::Ray).unwrap();
         for columns in 1..=20u32 {
             let mut scene = scene(map.clone());
             scene.size = [columns, 3];
@@ -181,12 +181,12 @@ fn a_picture_is_the_reflectivity() {
         floats("(1, 3, 3)", &[1.0, 1.0, 1.0, 0.0, 0.2, 0.4, 0.6, 0.4, 0.2]),
     ];
     for picture in pictures {
-        let map = DepthMap::read(&depth, Along::Ray).unwrap();
+        let map = DepthMap::read(&depth, DepthAlong::Ray).unwrap();
         let picture = scratch.file("picture.npy", picture);
         let scene = scene(map.with_picture(&picture).unwrap());
         for (pixel, reflectivity) in expected.iter().enumerate() {
-            let pixel = PixelAddress(u16::try_from(pixel).unwrap());
-            let metres = [1.0, 2.0, 0.5f64][usize::from(pixel.0)];
+            let pixel = PixelAddress::new(u16::try_from(pixel).unwrap());
+            let metres = [1.0, 2.0, 0.5f64][usize::from(pixel.raw())];
             let signal = scene.rates(pixel, 0).signal;
             let formula = 4.0 * reflectivity / metres.powi(2);
             assert!((signal - formula).abs() < 1e-6, "{signal} and {formula}");
@@ -207,7 +207,7 @@ fn a_scene_file_and_a_depth_map_hide_one_another() {
     )
     .unwrap();
     scene
-        .add_depth_map(DepthMap::read(&path, Along::Ray).unwrap())
+        .add_depth_map(DepthMap::read(&path, DepthAlong::Ray).unwrap())
         .unwrap();
     let expected = [500.0, 1000.0, 3000.0, 3000.0].map(Some);
     assert_eq!(ranges(&scene), expected);
@@ -231,7 +231,7 @@ fn a_run_is_compared_with_the_depth_map_and_says_what_it_took() {
         "standard deviation 1 bins",
         "--fov 40",
     ] {
-        says(&printed, part);
+        assert_contains(&printed, part);
     }
     let summary = scratch.summary();
     let truth = &summary["against_truth"];

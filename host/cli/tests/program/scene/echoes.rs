@@ -1,6 +1,6 @@
 //! Runs with several echoes and with blocks: what maps, report and truth take of them.
 
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, assert_contains};
 
 /// Two surfaces in each of 8x4 pixels, the nearer one brighter.
 const TWO: &str = "columns = 8\nrows = 4\nbackground = 0.01\ncycles = 3000\n[[surface]]\n\
@@ -8,7 +8,7 @@ const TWO: &str = "columns = 8\nrows = 4\nbackground = 0.01\ncycles = 3000\n[[su
                    [second_echo]\nshare = 0.3\nbehind_mm = 1500\n";
 const RUN: &str = "--rule window --sigma-bins 1 --echoes 2 --seed 3";
 
-/// What a run says of the echoes shown, and the picture of the last range.
+/// The summary's row on echoes, and the picture of the last range.
 fn shown(options: &str) -> (String, String, Vec<Vec<String>>) {
     let scratch = Scratch::new();
     let scene = scratch.file("scene.toml", TWO);
@@ -17,7 +17,7 @@ fn shown(options: &str) -> (String, String, Vec<Vec<String>>) {
     (report, scratch.read("out/depth-last.svg"), scratch.events())
 }
 
-/// The least and the greatest number at the colours of a map, in millimetres: all others are
+/// The lowest and the highest number at the colours of a map, in millimetres. All other numbers are
 /// columns and rows.
 fn span(svg: &str) -> [f64; 2] {
     let texts = svg.split('>').filter_map(|part| part.split_once('<'));
@@ -32,11 +32,11 @@ fn span(svg: &str) -> [f64; 2] {
 #[test]
 fn maps_show_the_echo_that_is_asked_for_and_files_hold_all() {
     let (report, strongest, events) = shown("");
-    says(
+    assert_contains(
         &report,
         "all as events, the strongest of an exposure in the maps",
     );
-    says(
+    assert_contains(
         &report,
         &format!(
             "All {} events are shown.",
@@ -49,14 +49,14 @@ fn maps_show_the_echo_that_is_asked_for_and_files_hold_all() {
     assert_eq!(events, same);
     let (_, all, same) = shown("--echo all");
     assert_eq!(events, same);
-    says(&of_first, "the nearest of an exposure");
+    assert_contains(&of_first, "the nearest of an exposure");
     let exposures = events.iter().filter(|event| event[10] == "1").count();
     assert!(exposures < events.len());
     let shown = format!(
         "All {} events are shown.",
         dtof_options::rows::grouped(exposures as u64)
     );
-    says(&of_first, &shown);
+    assert_contains(&of_first, &shown);
     assert!(
         (900.0..1100.0).contains(&span(&first)[1]),
         "{:?}",
@@ -84,12 +84,12 @@ fn an_echo_of_the_second_surface_is_no_false_alarm_where_two_are_reported() {
         .iter()
         .filter(|event| event[5].parse::<f64>().unwrap() > 2000.0);
     assert!(far.count() > 500);
-    // With one echo it is the first surface alone, as before.
+    // With one echo only the first surface is reported.
     scratch.simulated(&scene, "--rule window --sigma-bins 1 --gate 50..127");
     assert!(share(&scratch.summary()["against_truth"]) > 0.9);
 }
 
-/// A dim plane turned by some bins over the array: a block is right for what its pixels see.
+/// A dim plane, tilted by some bins over the array: the range of a block suits its pixels.
 #[test]
 fn blocks_are_compared_with_what_their_pixels_see() {
     let scratch = Scratch::new();

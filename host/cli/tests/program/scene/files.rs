@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, assert_contains};
 use dtof_core::PixelAddress;
 use dtof_simulate::scene::Scene;
 
@@ -78,16 +78,16 @@ fn a_surface_beyond_the_last_bin_is_named() {
     let printed = |range| scratch.simulated(&file(range), "");
     // 128 bins of 250 ps are 4797 mm.
     let far = printed("range_mm = 4790\nrange_right_mm = 4800\n");
-    says(
+    assert_contains(
         &far,
         "1 of 4 pixels at the start or the end: no photons from 4797 mm on",
     );
     assert!(!printed("range_mm = 4790\n").contains("beyond the last bin"));
     let moving = printed("range_mm = 4796\nvelocity_m_per_s = 1000\n");
-    says(&moving, "4 of 4 pixels at");
+    assert_contains(&moving, "4 of 4 pixels at");
 }
 
-/// Events of a TDC that takes one hit say when that makes for pile-up.
+/// Events of a one-hit TDC carry a flag if pile-up is likely.
 #[test]
 fn pile_up_is_flagged_where_the_tdc_takes_one_hit() {
     let scratch = Scratch::new();
@@ -116,8 +116,8 @@ fn the_document_lists_every_key_and_its_examples_are_scenes() {
     let document = fs::read_to_string(repository("docs/scenes.md")).unwrap();
     let keys_of = |text: &str| -> Vec<String> {
         let error = Scene::parse(text).unwrap_err().to_string();
-        let known = error.split_once("expected").unwrap().1.to_owned();
-        let names = known.split('`').skip(1).step_by(2);
+        let expected = error.split_once("expected").unwrap().1.to_owned();
+        let names = expected.split('`').skip(1).step_by(2);
         names.map(str::to_owned).collect()
     };
     let mut keys = keys_of("nonsense = 1\n");
@@ -176,7 +176,7 @@ fn the_documents_defaults_are_those_of_an_empty_file() {
     assert_eq!(defaults, 13);
 }
 
-/// A frame has an event of each pixel with a target, at its end, and nothing between.
+/// A frame has an event of each pixel with a target, at its end and not before.
 #[test]
 fn frames_read_all_pixels_at_once() {
     let scratch = Scratch::new();
@@ -202,7 +202,7 @@ fn frames_read_all_pixels_at_once() {
     }
 }
 
-/// `dtof export` has to be told what is not its default, and `simulate` says what.
+/// `simulate` prints the options that `dtof export` needs in addition to its defaults.
 #[test]
 fn the_options_that_export_needs_are_said() {
     let scratch = Scratch::new();
@@ -214,7 +214,7 @@ fn the_options_that_export_needs_are_said() {
     for (more, array, hz, degrees, options) in [
         ("", "8x4", 10_000_000, natural, None),
         ("", "16x8", 10_000_000, natural, None),
-        // The scene stays as wide as it is.
+        // The field of view stays.
         ("", "4x4", 10_000_000, natural, Some("--fov 60x32.204228")),
         (slow, "8x4", 1_250_000, [60.0, 32.0], of_slow),
     ] {
@@ -236,7 +236,7 @@ fn the_options_that_export_needs_are_said() {
     }
 }
 
-/// Another array before a scene sees the same plane under the same angles.
+/// Another array sees the same plane under the same angles.
 #[test]
 fn another_array_sees_as_much_of_a_plane() {
     let text = "columns = 64\nrows = 32\n[[surface]]\nrange_mm = 2000\nsignal = 1\n\
@@ -248,7 +248,7 @@ fn another_array_sees_as_much_of_a_plane() {
     };
     let range = |scene: &Scene, column: u16, row: u16| {
         let columns = u16::try_from(scene.size[0]).unwrap();
-        let pixel = PixelAddress(row * columns + column);
+        let pixel = PixelAddress::new(row * columns + column);
         scene.truth(pixel, 0).unwrap().range_mm
     };
     // A pixel of 8x8 is eight columns and four rows of 64x32; its middle is a corner of the

@@ -11,7 +11,7 @@ fn refused(text: &str, parts: &[impl AsRef<str>]) {
     scratch.refused(&output, parts);
 }
 
-/// Each row: a scene file, and parts of what is said of it.
+/// Each row: a scene file, and parts of the expected error.
 #[track_caller]
 fn all_refused(rows: &str) {
     for row in table(rows) {

@@ -1,9 +1,9 @@
 //! Events of a simulated scene against what its pixels saw.
 
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, assert_contains};
 use dtof_options::rows::grouped;
 
-/// The line of what was printed that has `name`.
+/// The printed line with `name`.
 #[track_caller]
 fn row<'a>(printed: &'a str, name: &str) -> &'a str {
     let found = printed.lines().find(|line| line.contains(name));
@@ -35,11 +35,11 @@ fn events_of_a_moving_target_are_compared_with_the_truth_of_their_laser_cycle() 
     let rms = of("rms_mm");
     assert!(rms < 30.0 && of("bias_mm").abs() < rms, "{truth}");
     assert!((rms..3.0 * rms).contains(&of("within_95_mm")), "{truth}");
-    says(
+    assert_contains(
         row("rocket, false alarms"),
         " events (0 %), more than 3 bins",
     );
-    says(
+    assert_contains(
         row("rocket, errors of the others"),
         &format!("rms {rms:.1} mm"),
     );
@@ -60,7 +60,7 @@ fn every_event_is_compared_with_the_truth() {
     let ranges = ranges(&scratch).into_iter();
     let mut right: Vec<f64> = ranges.map(|range| range - 1000.0).collect();
     let events = right.len();
-    // Three bins are 112 mm: what is not false is nearer than that.
+    // Three bins are 112 mm. True events are nearer than that.
     right.retain(|error| error.abs() < 112.4);
     let false_alarms = events - right.len();
     assert!(false_alarms > 50 && right.len() > 500, "{printed}");
@@ -84,8 +84,8 @@ fn every_event_is_compared_with_the_truth() {
     assert_eq!(truth["surfaces"][0]["name"], "wall");
     assert_eq!(truth["surfaces"][0]["rms_mm"], truth["rms_mm"]);
     let count = format!("{} of ", grouped(false_alarms as u64));
-    says(row(&printed, "wall, false alarms"), &count);
-    // The background lies everywhere.
+    assert_contains(row(&printed, "wall, false alarms"), &count);
+    // Background is in all bins.
     assert!(truth["cover_glass"].is_null() && !printed.contains("--gate"));
 }
 
@@ -105,10 +105,10 @@ fn events_without_a_surface_are_false_alarms() {
     assert!(of_none["events"].as_u64() > Some(5), "{of_none}");
     assert_eq!(of_none["events"], of_none["false_alarms"]);
     assert!(of_none["rms_mm"].is_null());
-    // The row of all, which names no surface.
+    // The row of all surfaces.
     let all = row(&printed, "  false alarms");
     let count = summary["against_truth"]["false_alarms"].as_u64().unwrap();
-    says(all, &format!("{} of ", grouped(count)));
+    assert_contains(all, &format!("{} of ", grouped(count)));
 }
 
 #[test]
@@ -130,12 +130,12 @@ fn a_cover_glass_is_named_with_the_gate_that_leaves_it_out() {
     let gate = gate.lines().next().unwrap();
     scratch.simulated(&scene, &format!("--gate {gate}"));
     let truth = &scratch.summary()["against_truth"];
-    // Of the background one now and then.
+    // Background causes one now and then.
     assert!(truth["false_alarm_share"].as_f64() < Some(0.01), "{truth}");
     assert!(truth["events"].as_u64() > Some(100), "{truth}");
     assert!(truth["cover_glass"].is_null());
 
-    // Where the target lies in the light of the glass no gate parts them.
+    // No gate separates a target from the light of the glass.
     let near = scratch.read("scene.toml").replace("1000", "320");
     let near = scratch.file("near.toml", near);
     scratch.simulated(&near, "");

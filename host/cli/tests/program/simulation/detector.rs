@@ -57,12 +57,12 @@ fn dead_time_goes_on_between_histograms() {
     let expected = 128.0 * 1000.0 * 0.05 / (1.0 + 0.05 * 80.0);
     let ones = photons.iter().map(|(cycle, _)| (*cycle, 1.0));
     near_in_blocks("photons", ones, CYCLES, expected);
-    // Nor is one end of the histogram better off than the other.
+    // Both ends of the histogram lose the same share.
     let expected = [float(photons.len()) / 128.0; 128];
     near_counts("bins", &histogram(&photons), &expected);
 }
 
-/// A dead time as long as all of the pulse lets only its first photon through.
+/// A dead time as long as the pulse passes only its first photon.
 #[test]
 fn pile_up_hides_what_comes_late() {
     let scene = "[[surface]]\nsignal = 2\nposition_bins = 60.5\n";
@@ -176,7 +176,7 @@ fn afterpulses_come_after_the_dead_time_at_their_own_pace() {
     near_in_blocks("delays", delays, 1_000_000, expected);
 }
 
-/// What is trapped in one laser cycle is released at its time in a later one.
+/// Charge that is trapped in one laser cycle is released in a later one.
 #[test]
 fn afterpulses_cross_laser_cycles() {
     let (signal, probability, decay) = (0.1, 0.05, 100.0_f64);
@@ -204,7 +204,7 @@ fn afterpulses_cross_laser_cycles() {
     let left = 1.0 - probability;
     let until = |time: f64| probability / left * (1.0 - (-left * time / decay).exp());
     let own = |n: f64| until(128.0 * n + 32.5) - until(128.0 * n + 0.5);
-    // And there are those of other pulses.
+    // Other pulses add theirs.
     let others: f64 = (0..50).map(|n| signal * own(n.into())).sum();
     let expected = 1e4 * signal * (own(1.0) + others);
     near_in_blocks("pairs", (0..).zip(pairs), 1_000_000, expected);
@@ -224,7 +224,7 @@ fn the_variance_of_jitter_adds() {
     near_mean("mean", &photons, 60.3, expected);
 }
 
-/// As many are measured into the histogram as out of it.
+/// As many photons move into the histogram as out of it.
 #[test]
 fn jitter_leaves_the_background_even() {
     for laser_rate_mhz in [10.0, 31.25] {

@@ -2,15 +2,15 @@
 
 use dtof_core::PixelAddress;
 use dtof_simulate::demo;
-use dtof_simulate::scene::{Scene, View};
+use dtof_simulate::scene::{Hit, Scene};
 
 use super::{array, float, near_count, near_mean, pixel};
 
 /// One bin of 250 ps, in millimetres.
 const MM_PER_BIN: f64 = 37.474_057_25;
 
-fn view(scene: &Scene, pixel: u16, cycle: u64) -> View {
-    scene.truth(PixelAddress(pixel), cycle).unwrap()
+fn view(scene: &Scene, pixel: u16, cycle: u64) -> Hit {
+    scene.truth(PixelAddress::new(pixel), cycle).unwrap()
 }
 
 #[test]
@@ -105,8 +105,8 @@ fn the_nearest_surface_is_seen_and_nothing_where_there_is_none() {
     assert_eq!(view(&scene, 0, 0).surface, 0);
     assert_eq!(view(&scene, 1, 0).surface, 1);
     assert_eq!(view(&scene, 1, 11).surface, 0); // the second is 1010 mm away
-    assert_eq!(scene.truth(PixelAddress(2), 0), None);
-    assert_eq!(scene.rates(PixelAddress(2), 0).signal, 0.0);
+    assert_eq!(scene.truth(PixelAddress::new(2), 0), None);
+    assert_eq!(scene.rates(PixelAddress::new(2), 0).signal, 0.0);
     assert!(array(text, 1000)[2].is_empty());
 }
 
@@ -119,8 +119,8 @@ fn another_array_looks_at_the_same_scene() {
     };
     for row in 0..8 {
         for column in 0..16 {
-            let small_pixel = PixelAddress(row * 16 + column);
-            let same_place = PixelAddress(row * 4 * 64 + column * 4);
+            let small_pixel = PixelAddress::new(row * 16 + column);
+            let same_place = PixelAddress::new(row * 4 * 64 + column * 4);
             assert_eq!(small.truth(small_pixel, 0), demo.truth(same_place, 0));
         }
     }

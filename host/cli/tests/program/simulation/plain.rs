@@ -17,7 +17,7 @@ const SCENE: &str = "columns = 64\nrows = 32\nbackground = 0.02\n\
     [[surface]]\nrange_mm = 1550\nreflectivity = 0.9\n\
     ball = { centre = [46, 17], radius = 10, radius_mm = 300 }\n";
 
-/// Its photons before there were scene files and effects.
+/// Its photons, from before scene files and effects existed.
 #[test]
 fn the_photons_of_a_plain_scene_are_what_they_were_bit_for_bit() {
     for (columns, rows, expected) in [
@@ -46,7 +46,7 @@ fn the_photons_of_a_plain_scene_are_what_they_were_bit_for_bit() {
 
 /// The plain model in one function, as it was before effects.
 fn plain(background: f64, signal: f64, position: f64, cycles: u64) -> Photons {
-    let mut rng = pixel_rng(1, PixelAddress(0));
+    let mut rng = pixel_rng(1, PixelAddress::new(0));
     let total = background * 128.0 + signal;
     let pulse = Normal::new(position, 1.0).unwrap();
     let bin = Uniform::new(0, 128).unwrap();
@@ -88,13 +88,13 @@ fn without_effects_a_scene_is_the_plain_model() {
         (0.01, 3.0, 128.), // half behind it
     ] {
         let scene = Scene::parse(&text(background, signal, position)).unwrap();
-        let position = scene.rates(PixelAddress(0), 0).position;
+        let position = scene.rates(PixelAddress::new(0), 0).position;
         let photons = pixel(&text(background, signal, position), 5000);
         assert_eq!(photons, plain(background, signal, position, 5000));
     }
 }
 
-/// Each effect, with numbers at which it does nothing.
+/// Each effect, with values without an effect.
 const IDLE: [&str; 8] = [
     "[tail]\nshare = 0\ndecay_bins = 10\n",
     "[second_echo]\nshare = 0\nbehind_mm = 500\n",
@@ -119,7 +119,7 @@ fn effects_that_do_nothing_change_nothing() {
     }
 }
 
-/// Each effect, with numbers at which it does something.
+/// Each effect, with values that have an effect.
 const BUSY: [&str; 8] = [
     "[tail]\nshare = 0.4\ndecay_bins = 10\n",
     "[second_echo]\nshare = 0.3\nbehind_mm = 500\n",
@@ -147,7 +147,7 @@ fn effects_do_something_whatever_the_length_of_a_slice() {
     }
 }
 
-/// Light effects draw numbers of their own: what they do not touch stays.
+/// Light effects draw their own random numbers, so other photons stay.
 #[test]
 fn an_effect_leaves_the_photons_alone_that_are_not_its_own() {
     let text = text(0.02, 0.5, 60.25);

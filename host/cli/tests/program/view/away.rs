@@ -2,7 +2,7 @@
 
 use std::sync::atomic::Ordering;
 
-use crate::common::{Scratch, names, says};
+use crate::common::{Scratch, assert_contains, names};
 use crate::view::device::{feed, plugged};
 use crate::view::http::{Stream, post};
 use crate::view::{Live, until};
@@ -17,13 +17,13 @@ fn a_device_that_is_unplugged_comes_back_and_so_does_the_recording() {
     let mut page = Stream::open(live.port, 2);
     page.until("live", |frame| frame["connection"]["state"] == "live");
     let answer = post(live.port, "/record", "{\"on\":true}");
-    says(&answer.body, "events.aer");
+    assert_contains(&answer.body, "events.aer");
     page.until("recorded", |frame| {
         frame["recorded"]["events"].as_u64() > Some(20)
     });
     device.pull.store(true, Ordering::Relaxed);
     let frame = page.until("gone", |frame| frame["connection"]["state"] == "gone");
-    says(
+    assert_contains(
         frame["connection"]["reason"].as_str().unwrap(),
         "the device ",
     );
@@ -45,7 +45,7 @@ fn a_device_that_is_unplugged_comes_back_and_so_does_the_recording() {
     live.end();
     assert_eq!(names(&out), ["events-2.aer", "events.aer"]);
     let mut recorded = 0;
-    // What each device says of itself.
+    // Each device's own values.
     for (name, offset_mm) in [("events.aer", 0), ("events-2.aer", 100)] {
         let mut reader = Reader::new(std::fs::File::open(out.join(name)).unwrap()).unwrap();
         assert_eq!(reader.header().offset_mm, offset_mm, "{name}");
@@ -64,35 +64,35 @@ fn a_device_that_was_never_there_is_named() {
     let live = Live::of(feed("tcp:127.0.0.1:1", ""), None);
     let mut page = Stream::open(live.port, 0);
     let frame = page.until("gone", |frame| frame["connection"]["state"] == "gone");
-    says(
+    assert_contains(
         frame["connection"]["reason"].as_str().unwrap(),
         "tcp:127.0.0.1:1: ",
     );
     let answer = post(live.port, "/save", "{}");
     assert_eq!(answer.status, 422);
-    says(&answer.body, "there is no device: tcp:127.0.0.1:1: ");
+    assert_contains(&answer.body, "there is no device: tcp:127.0.0.1:1: ");
     // Settings are tried at once, and the reason is that of the device.
     let answer = post(live.port, "/settings", "[detection]\nl1 = 50\n");
     assert_eq!(answer.status, 422);
-    says(&answer.body, "tcp:127.0.0.1:1: ");
+    assert_contains(&answer.body, "tcp:127.0.0.1:1: ");
     let begun = std::time::Instant::now();
     live.end();
     assert!(begun.elapsed() < std::time::Duration::from_secs(5));
 }
 
-/// Settings that the device refuses from the beginning can be mended on the page.
+/// Settings that the device refuses at the start can be corrected on the page.
 #[test]
 fn settings_are_mended_while_the_device_refuses_them() {
     let live = Live::of(feed(&plugged().name, "[detection]\nl1 = 60\nl2 = 3"), None);
     let mut page = Stream::open(live.port, 0);
     let frame = page.until("refused", |frame| frame["connection"]["state"] == "gone");
-    says(
+    assert_contains(
         frame["connection"]["reason"].as_str().unwrap(),
         "refuses the configuration",
     );
-    // They are in the form, to be mended.
-    let told = Stream::open(live.port, 2).frame();
-    assert_eq!(told["about"]["settings"]["detection"]["l2"], 3);
+    // The form shows them for correction.
+    let frame = Stream::open(live.port, 2).frame();
+    assert_eq!(frame["source"]["settings"]["detection"]["l2"], 3);
     let mut answer = post(live.port, "/settings", "[detection]\nl1 = 60\n");
     until("taken", || {
         if answer.status != 200 {

@@ -13,7 +13,7 @@ use dtof_engine::settings::SettingsFile;
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::StopReason;
 use dtof_live::{Device, Feed};
-use dtof_sensors::{About, Sensor};
+use dtof_sensors::{Sensor, SensorInfo};
 
 const PIXELS: u16 = 16;
 
@@ -24,13 +24,13 @@ pub struct Plugged {
     pub pull: Arc<AtomicBool>,
     /// The firmware panics when this is set. The cable stays plugged.
     pub panics: Arc<AtomicBool>,
-    /// So many times the sensor was started.
+    /// Number of starts of the sensor.
     pub starts: Arc<AtomicU32>,
-    /// It runs.
+    /// The sensor runs.
     pub runs: Arc<AtomicBool>,
 }
 
-/// Each time it is plugged in its sensor stands 100 mm farther away.
+/// Each time it is plugged in, its target is 100 mm farther away.
 pub fn plugged() -> Plugged {
     let times = AtomicI32::new(0);
     let pull = Arc::new(AtomicBool::new(false));
@@ -46,11 +46,11 @@ pub fn plugged() -> Plugged {
         let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
         let mut blocks = heapless::Vec::<_, 4>::new();
         let mut sensor = sensor(PIXELS, 5, 1000);
-        let about = About {
+        let info = SensorInfo {
             offset: I24F8::from_num(100 * times.fetch_add(1, Ordering::Relaxed)),
-            ..sensor.about()
+            ..sensor.info()
         };
-        let mut sidecar = Sidecar::new(&mut pixels, &mut blocks, Some(about));
+        let mut sidecar = Sidecar::new(&mut pixels, &mut blocks, Some(info));
         // It was reset with the cable.
         if panicked.swap(false, Ordering::Relaxed) {
             sidecar.set_stop_reason(Some(StopReason::Panic));
@@ -65,7 +65,7 @@ pub fn plugged() -> Plugged {
             } else if panicked.swap(false, Ordering::Relaxed) {
                 let pixels = Box::leak(Box::new(heapless::Vec::<_, { PIXELS as usize }>::new()));
                 let blocks = Box::leak(Box::new(heapless::Vec::<_, 4>::new()));
-                *sidecar = Sidecar::new(pixels, blocks, Some(about));
+                *sidecar = Sidecar::new(pixels, blocks, Some(info));
                 sidecar.set_stop_reason(Some(StopReason::Panic));
                 was_running = false;
             }
@@ -104,7 +104,7 @@ fn feed_of(
     Feed::Device(Box::new(Device {
         name: name.to_owned(),
         open: Box::new(open),
-        said: SettingsFile::parse(settings).unwrap(),
+        requested: SettingsFile::parse(settings).unwrap(),
         pixels: None,
         dynamic_depth: None,
         host_timeout,
@@ -130,8 +130,8 @@ impl Port for Mute {
     }
 }
 
-/// The feed of the device of this name, which stops its sensor once it has heard nothing for 200 ms;
-/// and what makes it hear nothing.
+/// The feed of a device that stops its sensor after 200 ms of silence, and a switch that silences the
+/// host.
 pub fn feed_that_may_be_mute(name: &str) -> (Feed, Arc<AtomicBool>) {
     let is_mute = Arc::new(AtomicBool::new(false));
     let (port, mute) = (name.to_owned(), Arc::clone(&is_mute));

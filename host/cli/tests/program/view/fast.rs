@@ -26,15 +26,15 @@ pub struct Fast {
     encoder: AerEncoder,
     answers: VecDeque<(u8, Vec<u8>)>,
     began: Instant,
-    /// Events a second; without it as many as the link takes.
+    /// Events a second; by default as many as the link takes.
     rate: Option<u64>,
     runs: Option<Instant>,
-    /// When it began to run first.
+    /// Time of its first start.
     pub ran: Arc<OnceLock<Instant>>,
     /// All events are of pixel 0.
     pub is_one_pixel: bool,
     since: u64,
-    /// Of all sessions.
+    /// Events of all sessions.
     cycle: u64,
 }
 
@@ -100,15 +100,15 @@ impl Fast {
             }
             message::HISTOGRAM_REQUEST => {
                 let head = HistogramHead {
-                    pixel: PixelAddress(u16::from_le_bytes(body.try_into().unwrap())),
+                    pixel: PixelAddress::new(u16::from_le_bytes(body.try_into().unwrap())),
                     is_whole: false,
-                    cycle: LaserCycle(self.cycle + 40),
+                    cycle: LaserCycle::new(self.cycle + 40),
                     exposure: 40,
                 };
                 let mut counts: Vec<u32> = (0..128)
-                    .map(|bin| (bin * 7 + head.pixel.0) as u32 % 3)
+                    .map(|bin| (bin * 7 + head.pixel.raw()) as u32 % 3)
                     .collect();
-                let peak = usize::from(Self::bin(head.pixel.0, self.cycle));
+                let peak = usize::from(Self::bin(head.pixel.raw(), self.cycle));
                 counts[peak] = 37;
                 counts[peak + 1] = 20;
                 for message in head.messages(&counts) {
@@ -137,7 +137,7 @@ impl Fast {
         (90.0 - high) as u16
     }
 
-    /// A message of as many events as fit, if they are due.
+    /// A message with as many due events as fit.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -183,7 +183,7 @@ impl Port for Fast {
         let mut length = 0;
         let now = self.now_ms();
         loop {
-            // What cannot go waits; events come after answers, and none is lost.
+            // Events wait for room and follow answers. None is lost.
             while let Some((kind, body)) = self.answers.front() {
                 if self.endpoint.offer(*kind, body).is_err() {
                     break;
@@ -214,17 +214,17 @@ impl Port for Fast {
     }
 }
 
-/// The feed of such a device.
+/// The feed of this device.
 pub fn feed(rate: Option<u64>) -> Feed {
     feed_of(move || Fast::new(rate))
 }
 
-/// The feed of the device that is made when it is opened.
+/// The feed of a device that is created when its port is opened.
 pub fn feed_of(make: impl Fn() -> Fast + Send + 'static) -> Feed {
     let device = Device {
         name: "a fast device".to_owned(),
         open: Box::new(move || Ok(Box::new(make()))),
-        said: SettingsFile::default(),
+        requested: SettingsFile::default(),
         pixels: None,
         dynamic_depth: None,
         host_timeout: HostTimeout::default(),

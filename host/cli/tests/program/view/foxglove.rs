@@ -34,7 +34,7 @@ fn play(scratch: &Scratch, name: &str, header: &Header, events: &[Event]) -> Fee
     Feed::Playback(Playback::new(path, None, 1.0).unwrap())
 }
 
-/// The points of clouds, all together: 31 bytes each.
+/// All points of point clouds, 31 bytes each.
 fn points<'a>(clouds: impl Iterator<Item = &'a [u8]>) -> Vec<Vec<u8>> {
     let records = clouds.flat_map(|cloud| {
         assert_eq!(field(cloud, 2).text(), "dtof_optical");

@@ -23,7 +23,7 @@ pub fn connect(port: u16) -> TcpStream {
     stream
 }
 
-/// A request with these headers, whatever they are, and no others but the length.
+/// A request with these headers and its length only.
 pub fn request(port: u16, line: &str, headers: &[(&str, &str)], body: &str) -> Answer {
     let mut stream = connect(port);
     let mut text = format!("{line} HTTP/1.1\r\nConnection: close\r\n");
@@ -37,7 +37,7 @@ pub fn request(port: u16, line: &str, headers: &[(&str, &str)], body: &str) -> A
         .write_all(format!("{text}\r\n{body}").as_bytes())
         .unwrap();
     let mut bytes = Vec::new();
-    // A server that has read enough may close before all is sent.
+    // The server may close before everything is sent.
     let _ = stream.read_to_end(&mut bytes);
     let text = String::from_utf8(bytes).unwrap();
     let (head, body) = text.split_once("\r\n\r\n").expect("an answer");
@@ -48,13 +48,13 @@ pub fn request(port: u16, line: &str, headers: &[(&str, &str)], body: &str) -> A
     }
 }
 
-/// As the page itself asks.
+/// A GET request of the page.
 pub fn get(port: u16, path: &str) -> Answer {
     let host = format!("127.0.0.1:{port}");
     request(port, &format!("GET {path}"), &[("Host", &host)], "")
 }
 
-/// As the page itself says something.
+/// A POST request of the page.
 pub fn post(port: u16, path: &str, body: &str) -> Answer {
     let host = format!("127.0.0.1:{port}");
     let kind = if path == "/settings" { "toml" } else { "json" };
@@ -95,7 +95,7 @@ impl Stream {
             );
             if let Some(frame) = line.strip_prefix("data: ") {
                 let frame: Value = serde_json::from_str(frame).unwrap();
-                if let Some(page) = frame["about"]["page"].as_u64() {
+                if let Some(page) = frame["source"]["page"].as_u64() {
                     self.page = page;
                 }
                 return frame;
@@ -103,7 +103,7 @@ impl Stream {
         }
     }
 
-    /// The first frame that is so.
+    /// The first frame for which a condition holds.
     #[track_caller]
     pub fn until(&mut self, what: &str, is_so: impl Fn(&Value) -> bool) -> Value {
         for _ in 0..600 {

@@ -7,11 +7,11 @@ use crate::view::Live;
 use crate::view::fast::{Fast, feed_of};
 use crate::view::http::Stream;
 
-/// Not in step with the frames of a page.
+/// An interval that does not coincide with frames.
 const RATE: u64 = 37;
 
-/// Milliseconds of `events` events, sorted: from the port of the device to what pages are made of,
-/// and to the socket of a page.
+/// Sorted milliseconds of `events` events, from the device's port to the hub and to the socket of a
+/// page.
 fn run(events: u64) -> [Vec<f64>; 2] {
     let ran: Arc<OnceLock<Instant>> = Arc::default();
     let begins = Arc::clone(&ran);
@@ -33,7 +33,7 @@ fn run(events: u64) -> [Vec<f64>; 2] {
         late.as_secs_f64() * 1000.0
     };
     let mut sent = Vec::new();
-    // The first are of the time before this page.
+    // The first events are older than this page.
     let mut seen = first["events"].as_u64().unwrap();
     let known = std::thread::scope(|scope| {
         let hub = &live.hub;
@@ -63,7 +63,7 @@ fn run(events: u64) -> [Vec<f64>; 2] {
     })
 }
 
-/// That below which so many of a hundred are.
+/// A percentile.
 fn percentile(times: &[f64], of: usize) -> f64 {
     times[(times.len() - 1) * of / 100]
 }
@@ -71,7 +71,7 @@ fn percentile(times: &[f64], of: usize) -> f64 {
 #[test]
 fn an_event_reaches_a_page() {
     let [known, sent] = run(20);
-    // A frame is due each 100 ms. This computer may have more to do.
+    // A frame is due each 100 ms. This computer may be busy.
     assert!(known[0] < 50.0, "{known:?}");
     assert!(percentile(&sent, 50) < 1000.0, "{sent:?}");
     assert!(known[0] <= sent[0]);

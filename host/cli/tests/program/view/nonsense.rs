@@ -11,11 +11,11 @@ use crate::view::device::{feed, plugged};
 use crate::view::http::{Stream, connect, get, post};
 use crate::view::{Live, until};
 
-/// One server for all inputs, which have to leave it as it was.
+/// One server gets all inputs and must not change.
 static LIVE: LazyLock<Mutex<Live>> =
     LazyLock::new(|| Mutex::new(Live::of(feed(&plugged().name, ""), None)));
 
-/// Sends it, and hangs up.
+/// Sends bytes and closes the connection.
 fn send(port: u16, bytes: &[u8]) {
     let mut stream = connect(port);
     // A server that has read enough closes.
@@ -87,7 +87,7 @@ fn heads_and_bodies_are_bounded() {
         post(live.port, "/settings", &"#".repeat(70_000)).status,
         413
     );
-    // A body that is as long as it may be.
+    // A body of the largest size.
     let answer = post(
         live.port,
         "/settings",
@@ -99,7 +99,7 @@ fn heads_and_bodies_are_bounded() {
 #[test]
 fn those_who_are_slow_are_given_up_and_others_served() {
     let live = Live::of(feed(&plugged().name, ""), None);
-    // More than may be connected; the first are given up after some seconds, then comes the last.
+    // More connections than allowed. The first are closed after some seconds, then the last is served.
     let half = format!(
         "POST /settings HTTP/1.1\r\nHost: localhost:{}\r\n",
         live.port
@@ -122,7 +122,7 @@ fn those_who_are_slow_are_given_up_and_others_served() {
     drop(slow);
 }
 
-/// It is given up, and its place is free.
+/// The server closes it, and its place is free.
 #[test]
 fn a_page_that_reads_nothing_is_given_up() {
     let feed = crate::view::fast::feed(Some(100_000));
@@ -134,10 +134,10 @@ fn a_page_that_reads_nothing_is_given_up() {
         live.port
     );
     stuck.write_all(request.as_bytes()).unwrap();
-    let is_waiting = || live.hub.kept()[1] > 0;
+    let is_waiting = || live.hub.memory()[1] > 0;
     until("a page", is_waiting);
-    // Its events are dropped with it.
+    // Its waiting events are dropped.
     until("given up", || live.hub.pages() == 0);
-    assert_eq!(live.hub.kept()[1], 0);
+    assert_eq!(live.hub.memory()[1], 0);
     drop(stuck);
 }

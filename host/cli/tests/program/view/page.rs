@@ -1,6 +1,6 @@
 //! The page itself: what is served, how, and to whom.
 
-use crate::common::says;
+use crate::common::assert_contains;
 use crate::view::Live;
 use crate::view::device::{feed, plugged};
 use crate::view::http::{Stream, get, post, request};
@@ -15,7 +15,7 @@ fn the_page_is_served_with_its_headers() {
     ] {
         let answer = get(live.port, path);
         assert_eq!(answer.status, 200, "{path}");
-        says(&answer.body, part);
+        assert_contains(&answer.body, part);
         for header in [
             &format!("content-type: {kind}; charset=utf-8"),
             "content-security-policy: default-src 'none'; script-src 'self'; style-src 'self'; \
@@ -24,7 +24,7 @@ fn the_page_is_served_with_its_headers() {
             "referrer-policy: no-referrer",
             "cache-control: no-store",
         ] {
-            says(&answer.head, header);
+            assert_contains(&answer.head, header);
         }
     }
     // The policy allows neither scripts nor styles within the page.
@@ -90,7 +90,7 @@ fn no_other_site_can_ask_or_say_anything() {
             ],
         ] {
             let answer = request(live.port, &line, headers, "{}");
-            // Without a host a request is none.
+            // A request without a host is invalid.
             let is_none = headers.iter().all(|(name, _)| *name != "Host");
             assert!(
                 answer.status == 403 || is_none && answer.status == 400,
@@ -98,7 +98,7 @@ fn no_other_site_can_ask_or_say_anything() {
             );
         }
     }
-    // A form of another site, which sends no origin in an old browser, and kinds that forms send.
+    // Forms of other sites: old browsers send no origin, and forms have certain content types only.
     for kind in [
         "application/x-www-form-urlencoded",
         "text/plain",
@@ -137,10 +137,10 @@ fn two_pages_look_at_different_pixels() {
         ranges.push(frame["pixel"]["events"].as_str().unwrap().to_owned());
     }
     assert_ne!(ranges[0], ranges[1]);
-    // One goes to another pixel; the other stays.
+    // One page shows another pixel; the other page stays.
     let number = pages[0].1.page;
-    let told = format!("{{\"page\":{number},\"pixel\":12}}");
-    assert_eq!(post(live.port, "/watch", &told).status, 200);
+    let body = format!("{{\"page\":{number},\"pixel\":12}}");
+    assert_eq!(post(live.port, "/watch", &body).status, 200);
     pages[0]
         .1
         .until("pixel 12", |frame| frame["histogram"]["pixel"] == 12);

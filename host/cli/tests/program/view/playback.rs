@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use crate::common::aer::{HEADER, depth, file};
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, assert_contains};
 use crate::view::Live;
 use crate::view::http::{Stream, post};
 use dtof_events::aer_file::Header;
@@ -31,22 +31,22 @@ fn a_recording_is_played_at_its_rate_paused_and_played_again() {
         None,
     );
     let mut page = Stream::open(live.port, 5);
-    let frame = page.until("begun", |frame| frame["about"]["laserHz"] == 1000.0);
-    assert_eq!(frame["about"]["kind"], "recording");
+    let frame = page.until("begun", |frame| frame["source"]["laserHz"] == 1000.0);
+    assert_eq!(frame["source"]["kind"], "recording");
     let frame = page.until("some", |frame| frame["events"].as_u64() >= Some(2));
     // One each quarter of a second.
     assert!(begun.elapsed() > Duration::from_millis(450) && frame["events"].as_u64() < Some(10));
-    says(&post(live.port, "/play", "{\"on\":false}").body, "paused");
+    assert_contains(&post(live.port, "/play", "{\"on\":false}").body, "paused");
     let frame = page.until("paused", |frame| frame["connection"]["state"] == "paused");
     for _ in 0..5 {
         assert_eq!(page.frame()["events"], frame["events"]);
     }
-    says(&post(live.port, "/play", "{\"on\":true}").body, "playing");
+    assert_contains(&post(live.port, "/play", "{\"on\":true}").body, "playing");
     let frame = page.until("the end", |frame| frame["connection"]["state"] == "ended");
     assert_eq!(frame["events"], 10);
     post(live.port, "/play", "{\"on\":true}");
     page.until("again", |frame| frame["events"] == 20);
-    // What a recording does not do is said.
+    // Commands that a recording does not support are refused.
     for (path, body, reason) in [
         (
             "/settings",
@@ -75,7 +75,7 @@ fn a_recording_is_played_faster_and_a_damaged_one_is_named() {
     Stream::open(live.port, 0).until("the end", |frame| frame["events"] == 10);
     assert!(begun.elapsed() < Duration::from_secs(30));
 
-    // A bit that only the checksum tells, and an end in the middle.
+    // A bit that only the checksum detects, and a truncated file.
     let cut = bytes[..64 + 16 * 5 + 7].to_vec();
     bytes[64 + 16 * 5] ^= 1;
     for (bytes, events) in [(bytes, 10), (cut, 4)] {
@@ -87,8 +87,8 @@ fn a_recording_is_played_faster_and_a_damaged_one_is_named() {
         let frame = Stream::open(live.port, 0)
             .until("failed", |frame| frame["connection"]["state"] == "failed");
         let reason = frame["connection"]["reason"].as_str().unwrap();
-        says(reason, "damaged.aer: byte ");
-        // Those before it came.
+        assert_contains(reason, "damaged.aer: byte ");
+        // The events before the damage are shown.
         assert_eq!(frame["events"], events);
     }
 }
@@ -100,12 +100,12 @@ fn the_command_says_what_is_wrong() {
     scratch.file("none.aer", "no");
     scratch.all_refused(
         "view",
-        "slow.aer | slow.aer: does not say how fast its laser was; say --laser-hz
+        "slow.aer | slow.aer: has no laser rate; give --laser-hz
          none.aer | none.aer: not an AER file
          gone.aer | gone.aer: 
          --out x | <FILE.aer> is needed
          slow.aer --device qemu | cannot be used with
-         slow.aer --laser-hz 5 --alpha 4 | slow.aer: is what it was recorded with
+         slow.aer --laser-hz 5 --alpha 4 | slow.aer: a recording has its own settings
          slow.aer --laser-hz 5 --pixels 4 | leave out the options of a device
          slow.aer --out x | cannot be used with
          slow.aer --speed 0 | must be a number above 0
@@ -148,7 +148,7 @@ fn the_command_prints_its_address_and_ends_at_ctrl_c() {
         output.status.success() && output.stderr.is_empty(),
         "{output:?}"
     );
-    // Two do not share a port.
+    // Two programs cannot share a port.
     let holder = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     let taken = holder.local_addr().unwrap().port();
     let output = scratch.run(&format!("view events.aer --port {taken}"));

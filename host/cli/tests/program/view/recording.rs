@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::io::BufReader;
 use std::time::{SystemTime, UNIX_EPOCH};
 
-use crate::common::{Scratch, names, says};
+use crate::common::{Scratch, assert_contains, names};
 use crate::view::http::{Stream, post};
 use crate::view::{Live, fast};
 use dtof_events::aer_file::Reader;
@@ -25,8 +25,8 @@ fn a_recording_holds_all_events_while_drawing_is_thinned() {
     let live = Live::of(feed, Some(&out));
     let mut page = Stream::open(live.port, 0);
     page.until("live", |frame| frame["connection"]["state"] == "live");
-    // All of a session: recording goes on with new settings, from laser cycle 0 on.
-    says(
+    // Recording goes on with new settings in another file, from laser cycle 0.
+    assert_contains(
         &post(live.port, "/record", "{\"on\":true}").body,
         "events-2.aer",
     );
@@ -67,9 +67,9 @@ fn a_recording_holds_all_events_while_drawing_is_thinned() {
     let mut events = 0;
     while let Some(event) = reader.next_event().unwrap() {
         events += 1;
-        assert_eq!(event.cycle().0, 10 * events, "an event is missing");
+        assert_eq!(event.cycle().raw(), 10 * events, "an event is missing");
     }
-    says(&answer, &format!("Saved {} events as ", grouped(events)));
+    assert_contains(&answer, &format!("Saved {} events as ", grouped(events)));
     assert_eq!(names(&out), ["events-2.aer", "events-3.aer", "events.aer"]);
     assert_eq!(fs::read(out.join("events.aer")).unwrap(), b"older");
 }
@@ -92,9 +92,9 @@ fn a_recording_that_goes_on_at_the_end_is_whole() {
         Reader::new(BufReader::new(File::open(out.join("events.aer")).unwrap())).unwrap();
     let (mut first, mut events) = (None, 0);
     while let Some(event) = reader.next_event().unwrap() {
-        first.get_or_insert(event.cycle().0 / 10);
+        first.get_or_insert(event.cycle().raw() / 10);
         events += 1;
     }
-    // From the first one to the last that arrived.
+    // From the first to the last event.
     assert_eq!(first.unwrap() - 1 + events, hub.arrived());
 }

@@ -1,4 +1,4 @@
-//! Settings that a page puts in force, and those that are refused.
+//! Settings that a page applies, and settings that are refused.
 
 use crate::common::{Scratch, names};
 use crate::view::Live;
@@ -6,24 +6,24 @@ use crate::view::device::{feed, plugged};
 use crate::view::http::{Stream, post};
 
 #[test]
-fn settings_are_put_in_force_or_refused_with_the_reason() {
+fn settings_are_applied_or_refused_with_the_reason() {
     let scratch = Scratch::new();
     let out = scratch.path("out");
     let live = Live::of(feed(&plugged().name, "[detection]\nalpha = 4"), Some(&out));
     let mut page = Stream::open(live.port, 0);
     let is_alpha = |frame: &serde_json::Value, alpha: f64| {
-        frame["about"]["settings"]["detection"]["alpha"].as_f64() == Some(alpha)
+        frame["source"]["settings"]["detection"]["alpha"].as_f64() == Some(alpha)
     };
     page.until("the first settings", |frame| is_alpha(frame, 4.0));
-    let wanted = "[sensor]\ngate = [8, 120]\n[detection]\nrule = \"paper\"\nalpha = 6\nl1 = 60\n";
-    let answer = post(live.port, "/settings", wanted);
+    let settings = "[sensor]\ngate = [8, 120]\n[detection]\nrule = \"paper\"\nalpha = 6\nl1 = 60\n";
+    let answer = post(live.port, "/settings", settings);
     assert_eq!(
         (answer.status, &answer.body[..]),
-        (200, "The settings are in force.\n")
+        (200, "The settings are applied.\n")
     );
     let frame = page.until("new settings", |frame| is_alpha(frame, 6.0));
     assert_eq!(
-        frame["about"]["settings"]["gate"],
+        frame["source"]["settings"]["gate"],
         serde_json::json!([8, 120])
     );
     assert_eq!(frame["connection"]["state"], "live");
@@ -31,9 +31,9 @@ fn settings_are_put_in_force_or_refused_with_the_reason() {
         frame["drawn"]["events"].as_u64() > Some(0)
     });
 
-    // Wrong in themselves, as they do not suit each other, and as the device has it.
+    // Wrong values, values that contradict each other, and values that the device refuses.
     for (text, reason) in [
-        ("alpha = 4", "alpha stands in [detection]"),
+        ("alpha = 4", "alpha belongs in [detection]"),
         (
             "[detection]\nalpha = 999",
             "alpha 999: must be a number from 0",
@@ -54,7 +54,7 @@ fn settings_are_put_in_force_or_refused_with_the_reason() {
         ),
         (
             "[sensor]\ngate = [100, 90]",
-            "the device refuses the configuration: ",
+            "the first bin must come before the last",
         ),
         (
             "[detection]\nrule = \"paper\"\ntracking = true",
@@ -70,7 +70,7 @@ fn settings_are_put_in_force_or_refused_with_the_reason() {
         assert!(answer.body.contains(reason), "{text}: {answer:?}");
         assert_eq!(answer.body.lines().count(), 1, "{answer:?}");
     }
-    // The old ones are still in force.
+    // The old settings still apply.
     let frame = page.until("events", |frame| {
         frame["drawn"]["events"].as_u64() > Some(0)
     });
@@ -86,7 +86,7 @@ fn settings_are_put_in_force_or_refused_with_the_reason() {
         (saved.sensor.gate, saved.detection.l1),
         (Some((8, 120)), Some(60))
     );
-    // It is what another program starts with.
+    // Another program can start with the file.
     assert_eq!(saved.settings(128).unwrap().l1, 60);
 }
 
@@ -102,6 +102,6 @@ fn without_a_folder_nothing_is_written() {
     let answer = post(live.port, "/play", "{\"on\":true}");
     assert_eq!(
         (answer.status, &answer.body[..]),
-        (422, "a device does not wait\n")
+        (422, "a device cannot be paused\n")
     );
 }

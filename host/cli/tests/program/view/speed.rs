@@ -7,8 +7,7 @@ use crate::view::http::{Stream, post};
 use crate::view::{Live, device, fast};
 use dtof_live::{MOST_EVENTS, MOST_PIXELS};
 
-/// Two pages and a recording for so long. Gives frames a second of each page and recorded events a
-/// second.
+/// Runs two pages and a recording. Returns frames a second of each page and recorded events a second.
 fn run(length: Duration, rate: Option<u64>) -> ([f64; 2], f64) {
     let scratch = Scratch::new();
     let feed = fast::feed(rate);
@@ -33,7 +32,7 @@ fn run(length: Duration, rate: Option<u64>) -> ([f64; 2], f64) {
             })
         });
         while begun.elapsed() < length {
-            let [pixels, waiting, histograms] = live.hub.kept();
+            let [pixels, waiting, histograms] = live.hub.memory();
             assert_eq!(pixels, usize::from(fast::PIXELS));
             assert!(waiting <= 3 * MOST_EVENTS && histograms <= 3);
             std::thread::sleep(Duration::from_millis(50));

@@ -1,10 +1,10 @@
-//! A sensor that has stopped stays off until settings are put in force on the page.
+//! A sensor that has stopped stays off until settings are applied on the page.
 
 use std::sync::atomic::Ordering;
 use std::thread;
 use std::time::Duration;
 
-use crate::common::{Scratch, names, says};
+use crate::common::{Scratch, assert_contains, names};
 use crate::view::device::{Plugged, feed, feed_that_may_be_mute, plugged};
 use crate::view::http::{Stream, post};
 use crate::view::{Live, until};
@@ -14,11 +14,11 @@ use crate::view::{Live, until};
 fn stopped(page: &mut Stream) -> String {
     let frame = page.until("stopped", |frame| frame["connection"]["state"] == "stopped");
     let reason = frame["connection"]["reason"].as_str().unwrap();
-    let told = reason.strip_suffix("; the button \"Put in force\" starts it again");
-    told.unwrap_or_else(|| panic!("{reason}")).to_owned()
+    let stripped = reason.strip_suffix("; the button \"Apply\" starts it again");
+    stripped.unwrap_or_else(|| panic!("{reason}")).to_owned()
 }
 
-/// The sensor stays off, and starts when settings are put in force.
+/// The sensor stays off, and starts when settings are applied.
 #[track_caller]
 fn stays_off_until_settings_are_put_in_force(live: &Live, page: &mut Stream, device: &Plugged) {
     let starts = device.starts.load(Ordering::Relaxed);
@@ -66,7 +66,7 @@ fn after_a_silence_of_the_host() {
     );
     stays_off_until_settings_are_put_in_force(&live, &mut page, &device);
     live.end();
-    // The recording of before is whole, and another has begun.
+    // The earlier recording is complete, and another has begun.
     let names = names(&out);
     assert!(
         names.contains(&"events.aer".to_owned()) && names.contains(&"events-2.aer".to_owned()),
@@ -102,9 +102,9 @@ fn after_its_cable_was_pulled() {
     });
     device.pull.store(true, Ordering::Relaxed);
     let frame = page.until("gone", |frame| frame["connection"]["state"] == "gone");
-    says(
+    assert_contains(
         frame["connection"]["reason"].as_str().unwrap(),
-        "the button \"Put in force\" starts it again",
+        "the button \"Apply\" starts it again",
     );
     stays_off_until_settings_are_put_in_force(&live, &mut page, &device);
     live.end();

@@ -1,17 +1,17 @@
 //! Ranges as lines of text with colours.
 //!
-//! A character shows two squares, one above the other: the upper half of a block in one
-//! colour, on the other colour. Colours are those of the maps, and span what is shown.
+//! A character shows two squares, one above the other: its ink colours the upper half, its
+//! background the lower one. The colour scale is that of the maps and spans the shown ranges.
 
 use dtof_draw::palette;
 use dtof_draw::picture::levels;
 
 pub(super) const PLAIN: &str = "\x1b[0m";
 
-/// `ranges` in mm, `columns` in a row, as at most so many lines, each at most as wide. A pixel is as
-/// many squares wide and high as there is room for. Where all numbers fit, each pixel has its range
-/// in it. Where there is too little room, only every second pixel of every second row is shown, or
-/// every third, and so on. Pixels without a range are left empty.
+/// Draws `ranges` in mm, `columns` in a row, as at most `most_lines` lines of `most_columns`
+/// characters. Pixels are drawn as large as fits. If all numbers fit, each pixel shows its range. If
+/// there is too little room, only every second pixel of every second row is shown, or every third,
+/// and so on. Pixels without a range are empty.
 #[must_use]
 pub(super) fn picture(
     ranges: &[Option<f64>],
@@ -58,7 +58,7 @@ pub(super) fn picture(
     (0..lines).map(line).collect()
 }
 
-/// So many characters with the colours of an upper and a lower pixel.
+/// `width` characters in the colours of an upper and a lower pixel.
 pub(super) fn block(upper: Option<u8>, lower: Option<u8>, width: usize) -> String {
     match (upper, lower) {
         (None, None) => format!("{PLAIN}{}", " ".repeat(width)),
@@ -70,7 +70,7 @@ pub(super) fn block(upper: Option<u8>, lower: Option<u8>, width: usize) -> Strin
     }
 }
 
-/// A number in the middle of so many characters, black or white on the pixel's colour.
+/// A number centred in `width` characters, black or white on the pixel's colour.
 fn number(number: &str, level: u8, width: usize) -> String {
     let [red, green, blue] = palette::level(level).map(u32::from);
     // ITU-R BT.601.

@@ -29,7 +29,7 @@ fn two_rows_share_a_line_and_no_range_is_empty() {
     assert_eq!(lines.len(), 2);
     assert_eq!(characters(&lines[0]), "▀▄");
     assert_eq!(characters(&lines[1]), "  ");
-    // The upper pixel in front, the lower one behind.
+    // The upper pixel is the ink, the lower one the background.
     let ([r, g, b], [red, green, blue]) = (palette::level(0), palette::level(255));
     let expected = format!("\x1b[38;2;{r};{g};{b}m\x1b[48;2;{red};{green};{blue}m▀");
     assert!(lines[0].starts_with(&expected), "{:?}", lines[0]);
@@ -57,7 +57,7 @@ fn too_little_room_leaves_pixels_out() {
 }
 
 proptest! {
-    /// As large as the room allows, and no larger. Each number stands once, where it fits.
+    /// The picture is as large as the room allows. Each number appears once if it fits.
     #[test]
     fn a_picture_fills_its_room(
         rows in 1..20usize,
@@ -108,7 +108,7 @@ fn a_small_array_has_its_ranges_in_it() {
     assert_eq!(lines[3].matches(dark).count(), 1);
 }
 
-/// What was written, for all to see.
+/// A terminal whose text the test can read.
 #[derive(Clone, Default)]
 struct Screen(Rc<RefCell<Vec<u8>>>);
 
@@ -145,12 +145,12 @@ fn it_is_drawn_in_place_and_gives_the_cursor_back() {
 
     let [known, foreign] = [3, 4].map(|pixel| Event::Depth(event(pixel, 9, 40)));
     map.add(&[known, foreign], &scale());
-    map.tell("events/s 12, and so much more than fits here".to_owned());
+    map.set_line("events/s 12, and so much more than fits here".to_owned());
     map.draw_when_due().unwrap();
     assert_eq!(screen.taken(), "", "not so soon");
     map.draw().unwrap();
     let second = screen.taken();
-    // Back over these lines, and the same lines again.
+    // The cursor moves up over these lines, and they are drawn again.
     assert!(second.starts_with("\r\x1b[21A"));
     assert_eq!(second.matches('\n').count(), 21);
     let second = characters(&second);
@@ -161,11 +161,11 @@ fn it_is_drawn_in_place_and_gives_the_cursor_back() {
     assert_eq!(screen.taken(), format!("{PLAIN}{SHOW_CURSOR}"));
 }
 
-/// 5x3 pixels, the last two of which are not there.
+/// An array of 5x3 without its last two pixels.
 #[test]
 fn a_block_fills_its_pixels_that_have_not_reported_since() {
     let mut map = LiveMap::new(Box::new(io::sink()), Box::new(|| (24, 40)), 13, array(5, 3));
-    let of = |pixel, level, cycle, bin| {
+    let block_event = |pixel, level, cycle, bin| {
         let level = BlockLevel::new(level).unwrap();
         let event = event(pixel, cycle, bin); // over 40 laser cycles
         Event::Depth(DepthEvent { level, ..event })
@@ -180,21 +180,35 @@ fn a_block_fills_its_pixels_that_have_not_reported_since() {
         });
         bins.collect()
     };
-    map.add(&[of(6, 0, 100, 10), of(0, 1, 139, 20)], &scale());
+    map.add(
+        &[block_event(6, 0, 100, 10), block_event(0, 1, 139, 20)],
+        &scale(),
+    );
     // The pixel's event lies in the block's exposure, laser cycles 100 to 139.
     assert_eq!(shown(&map), [20, 20, 0, 0, 0, 20, 10, 0, 0, 0, 0, 0, 0]);
-    map.add(&[of(0, 1, 141, 21)], &scale());
+    map.add(&[block_event(0, 1, 141, 21)], &scale());
     assert_eq!(shown(&map), [21, 21, 0, 0, 0, 21, 21, 0, 0, 0, 0, 0, 0]);
-    // At the edges only those that are there.
+    // At the edges, blocks fill only existing pixels.
     map.add(
-        &[of(0, 2, 180, 30), of(4, 3, 200, 40), of(14, 1, 200, 50)],
+        &[
+            block_event(0, 2, 180, 30),
+            block_event(4, 3, 200, 40),
+            block_event(14, 1, 200, 50),
+        ],
         &scale(),
     );
     let second = Event::Depth(DepthEvent {
         echo: EchoNumber::new(2).unwrap(),
         ..fixtures::event(12, 300, 60)
     });
-    map.add(&[second, of(10, 1, 300, 70), of(3, 0, 300, 9)], &scale());
+    map.add(
+        &[
+            second,
+            block_event(10, 1, 300, 70),
+            block_event(3, 0, 300, 9),
+        ],
+        &scale(),
+    );
     assert_eq!(
         shown(&map),
         [21, 21, 30, 9, 0, 21, 21, 30, 30, 0, 70, 70, 30]
@@ -205,16 +219,16 @@ fn a_block_fills_its_pixels_that_have_not_reported_since() {
 fn no_line_is_wider_than_the_terminal_whose_size_may_change() {
     let screen = Screen::default();
     let room = Rc::new(Cell::new((24, 100)));
-    let asked = Rc::clone(&room);
+    let size = Rc::clone(&room);
     let mut map = LiveMap::new(
         Box::new(screen.clone()),
-        Box::new(move || asked.get()),
+        Box::new(move || size.get()),
         64,
         array(8, 8),
     );
     map.ranges.fill(Some(123_456.0));
     map.ranges[0] = Some(1.0);
-    map.tell("events/s 12".repeat(50));
+    map.set_line("events/s 12".repeat(50));
     for (lines, columns) in [
         (24, 100),
         (24, 101),
@@ -237,7 +251,7 @@ fn no_line_is_wider_than_the_terminal_whose_size_may_change() {
         assert!(drawn.lines().all(|line| {
             line.rfind(PLAIN) >= line.rfind("\x1b[38") && line.ends_with(CLEAR_REST)
         }));
-        // In place as long as it stays so.
+        // The next drawing is in place while the size stays.
         map.draw().unwrap();
         assert!(screen.taken().starts_with("\r\x1b["));
     }

@@ -1,4 +1,4 @@
-//! Maps as images: a number for each pixel, NaN where there is none.
+//! Maps as images: a number for each pixel, or NaN.
 
 use std::time::{Duration, Instant};
 
@@ -10,16 +10,16 @@ use crate::foxglove::topics::Topic;
 use crate::hub::Pixel;
 use dtof_export::foxglove::{FRAME, Time, encoded};
 
-/// Rates are those of so long.
+/// Rates are measured over this time.
 const RATE: Duration = Duration::from_secs(1);
 
-/// What is known of all pixels.
+/// Values of all pixels.
 #[derive(Default)]
 pub struct Images {
     array: Option<Array>,
     pixels: Vec<Pixel>,
     change: Option<u64>,
-    /// The counts at the beginning of the second, and when that was.
+    /// Events of each pixel at the start of the second, and its time.
     counts: Option<(Vec<u32>, Instant)>,
     /// Events a second of each pixel.
     rates: Vec<f32>,
@@ -27,7 +27,7 @@ pub struct Images {
 }
 
 impl Images {
-    /// No events yet, of an array if there is one.
+    /// Images of an array, if there is one, without events.
     pub fn of(array: Option<Array>) -> Self {
         Self {
             array,
@@ -35,26 +35,26 @@ impl Images {
         }
     }
 
-    /// The last change that is known, or one that there is not.
+    /// Number of the last change, or a number that no change has.
     pub fn change(&self) -> u64 {
         self.change.unwrap_or(u64::MAX)
     }
 
-    /// Takes pixels in if they have changed. Says whether they have.
-    pub fn take(&mut self, seen: Option<&(Vec<Pixel>, u64)>, is_wanted: bool) -> bool {
-        if !is_wanted {
-            // The rates of a time that was not seen are not those of a second.
+    /// Updates the pixels, if there are new ones, and the rates. Returns whether there are new pixels.
+    pub fn update(&mut self, new: Option<&(Vec<Pixel>, u64)>, has_subscriber: bool) -> bool {
+        if !has_subscriber {
+            // Rates need counts of a whole second.
             (self.counts, self.has_new_rates) = (None, false);
             return false;
         }
-        if let Some((pixels, change)) = seen {
+        if let Some((pixels, change)) = new {
             self.pixels.clone_from(pixels);
             self.change = Some(*change);
         }
         self.has_new_rates = false;
         let counts = || self.pixels.iter().map(|pixel| pixel.count);
         match &self.counts {
-            // Of another array.
+            // The array has changed.
             Some((before, _)) if before.len() != self.pixels.len() => self.counts = None,
             Some((before, since)) if since.elapsed() >= RATE => {
                 let elapsed = since.elapsed().as_secs_f32();
@@ -67,10 +67,10 @@ impl Images {
             Some(_) => {}
             None => self.counts = Some((counts().collect(), Instant::now())),
         }
-        seen.is_some()
+        new.is_some()
     }
 
-    /// Whether rates were found.
+    /// Returns whether the last update has measured rates.
     pub fn has_new_rates(&self) -> bool {
         self.has_new_rates
     }
@@ -78,7 +78,7 @@ impl Images {
     /// The image of a topic, if there is an array.
     ///
     /// # Errors
-    /// If it cannot be encoded.
+    /// Fails if it cannot be encoded.
     pub fn message(&self, topic: Topic, time: u64) -> Result<Option<Vec<u8>>> {
         let Some(array) = self.array.filter(|_| !self.pixels.is_empty()) else {
             return Ok(None);
@@ -86,20 +86,17 @@ impl Images {
         let (width, height) = (array.columns(), array.rows());
         let value = |(number, pixel): (usize, &Pixel)| match topic {
             Topic::Rate => self.rates.get(number).copied().unwrap_or(f32::NAN),
-            // No event yet that tells it.
+            // No event yet.
             _ if pixel.level_echo == 0 => f32::NAN,
             Topic::Range => pixel.range_mm / 1000.0,
-            // No event is reported of a peak of 0 photons: changes of depth do not measure light.
+            // Changes of depth do not measure light. Depth events have a peak above 0.
             _ if pixel.peak == 0 => f32::NAN,
             _ => pixel.reflectivity,
         };
         let values = self.pixels.iter().enumerate().map(value);
-        let values = values
-            .chain(std::iter::repeat(f32::NAN))
-            .take(array.pixels() as usize);
         let data: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
         let image = RawImage {
-            timestamp: Time::of(time).stamp(),
+            timestamp: Time::from_nanoseconds(time).stamp(),
             frame_id: FRAME.to_owned(),
             width,
             height,

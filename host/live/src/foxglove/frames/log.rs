@@ -1,4 +1,4 @@
-//! What the device or the recording does, and why, in lines.
+//! State of the device or the recording, and errors, as lines.
 
 use anyhow::Result;
 use foxglove::messages::Log;
@@ -6,72 +6,56 @@ use foxglove::messages::log::Level;
 
 use super::Message;
 use crate::foxglove::topics::Topic;
-use crate::hub::{Connection, Seen};
+use crate::hub::{Connection, Snapshot};
 use dtof_export::foxglove::{Time, encoded};
 use dtof_options::rows::printable;
 
-/// What was told.
+/// Writes lines when a state changes.
 #[derive(Default)]
-pub struct Told {
-    connection: Option<Connection>,
-    fault: Option<String>,
-    recording: String,
-    /// Why there are no points, if there are none, and whether it was told.
+pub struct StatusLog {
+    /// Why there are no points, if there are none.
     pub no_points: Option<String>,
-    told_no_points: Option<String>,
+    /// The last lines on source, sensor, recording and points.
+    last: [Option<(Level, String)>; 4],
 }
 
-impl Told {
-    /// Tells what is new; all of it if somebody is.
+impl StatusLog {
+    /// Writes the lines that have changed, or all with `resend`.
     ///
     /// # Errors
-    /// If it cannot be encoded.
-    pub fn tell(
+    /// Fails if a message cannot be encoded.
+    pub fn write(
         &mut self,
-        seen: &Seen,
+        snapshot: &Snapshot,
         time: u64,
-        is_new: bool,
+        resend: bool,
         messages: &mut Vec<Message>,
     ) -> Result<()> {
-        let mut lines = Vec::new();
-        let connection = &seen.connection;
-        if is_new || self.connection.as_ref() != Some(connection) {
-            let level = match connection.state {
-                "gone" | "stopped" | "failed" => Level::Error,
-                _ => Level::Info,
-            };
-            let mut line = connection.state.to_owned();
-            if !connection.reason.is_empty() {
-                line += &format!(": {}", connection.reason);
-            }
-            lines.push((level, line));
-            self.connection = Some(connection.clone());
-        }
-        let fault = &seen.losses.last_fault;
-        if is_new || self.fault != *fault {
-            let line = fault.iter().map(|fault| format!("sensor: {fault}"));
-            lines.extend(line.map(|line| (Level::Warning, line)));
-            self.fault.clone_from(fault);
-        }
-        let recording = &seen.recording_error;
-        if (is_new || self.recording != *recording) && !recording.is_empty() {
-            lines.push((Level::Error, format!("recording: {recording}")));
-        }
-        self.recording.clone_from(recording);
-        if is_new || self.told_no_points != self.no_points {
-            let lines_of = self
-                .no_points
-                .iter()
-                .map(|line| (Level::Error, line.clone()));
-            lines.extend(lines_of);
-            self.told_no_points.clone_from(&self.no_points);
-        }
-        for (level, line) in lines {
+        let Connection { state, reason, .. } = &snapshot.connection;
+        let level = match *state {
+            "gone" | "stopped" | "failed" => Level::Error,
+            _ => Level::Info,
+        };
+        let source = match &reason[..] {
+            "" => (*state).to_owned(),
+            reason => format!("{state}: {reason}"),
+        };
+        let fault = snapshot.losses.last_fault.as_ref();
+        let recording = &snapshot.recording_error;
+        let lines = [
+            Some((level, source)),
+            fault.map(|fault| (Level::Warning, format!("sensor: {fault}"))),
+            (!recording.is_empty()).then(|| (Level::Error, format!("recording: {recording}"))),
+            self.no_points.clone().map(|line| (Level::Error, line)),
+        ];
+        let changed = lines.iter().zip(&self.last);
+        let changed = changed.filter(|(line, last)| resend || line != last);
+        for (level, line) in changed.filter_map(|(line, _)| line.as_ref()) {
             let log = Log {
-                timestamp: Time::of(time).stamp(),
-                level: level.into(),
-                message: printable(&line),
-                name: seen.name.clone(),
+                timestamp: Time::from_nanoseconds(time).stamp(),
+                level: (*level).into(),
+                message: printable(line),
+                name: snapshot.name.clone(),
                 ..Log::default()
             };
             messages.push(Message {
@@ -80,6 +64,7 @@ impl Told {
                 data: encoded(&log)?,
             });
         }
+        self.last = lines;
         Ok(())
     }
 }

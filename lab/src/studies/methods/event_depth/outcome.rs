@@ -1,23 +1,23 @@
-//! What the events of a rule come to in a scene.
+//! The results of a rule in a scene.
 
 use anyhow::Result;
 
 use super::pixel::Pixel;
 use super::{BACKGROUNDS, ESTIMATORS, SIGMAS, pixels};
-use crate::studies::methods::passage::Method;
+use crate::studies::methods::passage::Rule;
 use crate::sweep::mean::Measured;
 use crate::sweep::{Part, PointTally};
 use dtof_theory::bounds::cramer_rao::Pulse;
 
-/// An estimator on the events whose peak is in the pulse.
+/// The errors of an estimator on the events whose peak is in the pulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Placed {
+pub struct DepthErrors {
     /// Root mean square error, in bins.
     pub error: Measured,
-    /// Mean error, in bins: below 0 is too near.
+    /// Mean error, in bins; negative is too near.
     pub bias: Measured,
-    /// `error` over the Cramér-Rao bound of a fixed exposure with the events' mean counts.
-    /// Events are not of a fixed exposure: they may be below it.
+    /// Ratio of `error` to the Cramér-Rao bound of a fixed exposure with the mean counts of the
+    /// events. It may be below 1, because the exposure of events is not fixed.
     pub over_bound: Measured,
 }
 
@@ -28,33 +28,32 @@ pub struct Outcome {
     pub sigma: f64,
     /// Background photons a bin and laser cycle.
     pub background: f64,
-    /// When the rule looks first, in laser cycles.
+    /// The first look, in laser cycles.
     pub first_look: u32,
-    /// What decides.
-    pub method: Method,
+    /// The rule.
+    pub rule: Rule,
     /// α or z.
     pub threshold: f64,
-    /// Events an exposure without a target.
+    /// Events per exposure without a target.
     pub false_share: Measured,
-    /// How many.
+    /// Number of events.
     pub events: u64,
-    /// Events an exposure.
+    /// Events per exposure with a target.
     pub event_share: Measured,
-    /// Of the events, those whose peak is in the pulse. What follows is of these.
+    /// The share of events whose peak is in the pulse. The fields below refer to these.
     pub in_pulse: Measured,
     /// Mean laser cycles.
     pub cycles: f64,
     /// Mean photons of the pulse.
     pub signal: f64,
-    /// As [`ESTIMATORS`].
-    pub placed: [Placed; 2],
-    /// Mean square error of the second estimator less that of the first, event by event,
-    /// in bins².
+    /// The errors of [`ESTIMATORS`].
+    pub errors: [DepthErrors; 2],
+    /// Mean of the paired difference of squared errors, second estimator minus first, in bins².
     pub excess: Measured,
 }
 
 impl Outcome {
-    /// The number of the estimator that is better, if one surely is.
+    /// The index of the significantly better estimator, if there is one.
     #[must_use]
     pub fn better(&self) -> Option<usize> {
         let (low, high) = self.excess.interval;
@@ -80,10 +79,10 @@ impl Outcome {
             sigma,
         };
         let bound = bound.position_error();
-        let placed = ESTIMATORS.map(|(estimator, _)| {
+        let errors = ESTIMATORS.map(|(estimator, _)| {
             let name = format!("{name} {estimator}");
             let error = Measured::root_mean_square(with, &name).times(1.0 / 256.0);
-            Placed {
+            DepthErrors {
                 error,
                 bias: Measured::mean(with, &name).times(1.0 / 256.0),
                 over_bound: error.times(1.0 / bound),
@@ -93,7 +92,7 @@ impl Outcome {
             sigma,
             background,
             first_look: pixel.first_look,
-            method: pixel.method,
+            rule: pixel.rule,
             threshold: pixel.threshold,
             false_share,
             events,
@@ -101,7 +100,7 @@ impl Outcome {
             in_pulse: Measured::share(near, events),
             cycles,
             signal,
-            placed,
+            errors,
             excess: Measured::mean(with, &format!("{name} excess")).times(1.0 / 65536.0),
         }
     }
@@ -110,7 +109,7 @@ impl Outcome {
 /// Every rule in every scene, by first look, pulse and background.
 ///
 /// # Errors
-/// If `part` is not of this study.
+/// Fails if `part` is of another study.
 pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
     let mut outcomes = Vec::new();
     for sigma in SIGMAS {
@@ -118,10 +117,10 @@ pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
             let scene = [("sigma", sigma), ("background", background)];
             let with = part.one([scene[0], scene[1], ("target", 1.0)])?;
             for pixel in pixels(sigma, background)? {
-                // What does not know the pulse is the same for all.
+                // The paper's rule does not depend on the pulse: all parts count.
                 let all = part.at([scene[1], ("target", 0.0)]);
                 let without: Vec<&PointTally> = all
-                    .filter(|point| pixel.method == Method::Paper || point.is_at([scene[0]]))
+                    .filter(|point| pixel.rule == Rule::Paper || point.is_at([scene[0]]))
                     .collect();
                 outcomes.push(Outcome::new((sigma, background), &pixel, &without, with));
             }
@@ -137,10 +136,10 @@ mod tests {
     use crate::sweep::mean::{add, add_error, add_value};
     use crate::sweep::tally;
 
-    /// 400 events in 1000 exposures, 40 of them elsewhere; the centre of mass is half a bin
-    /// off to either side, the window `centred` parts of 256, too far.
+    /// 400 events in 1000 exposures, 40 of them elsewhere. The centre of mass is half a bin off to
+    /// either side, the window `centred` / 256 bins too far.
     fn outcome(centred: i64) -> Outcome {
-        let pixel = Pixel::new(Method::Paper, 40, 0.05).unwrap();
+        let pixel = Pixel::new(Rule::Paper, 40, 0.05).unwrap();
         let mut with = tally([("exposures", 1000)]);
         let sums = [
             ("events", 400),
@@ -169,7 +168,7 @@ mod tests {
         assert!((outcome.event_share.value - 0.4).abs() < 1e-12);
         assert!((outcome.in_pulse.value - 0.9).abs() < 1e-12);
         assert_eq!((outcome.cycles, outcome.signal), (200.0, 60.0));
-        let [mass, centred] = outcome.placed;
+        let [mass, centred] = outcome.errors;
         let value = |of: f64, expected: f64| assert!((of - expected).abs() < 1e-9, "{of}");
         value(mass.error.value, 0.5);
         value(mass.bias.value, 0.0);

@@ -1,28 +1,29 @@
-//! Pixels that watch the same photons until each has had its event.
+//! Pixels that count the same photons until each has had its event.
 
 use anyhow::{Context, Result};
-use dtof_core::{AnyRule, DepthEstimator, Histogram, RangeGate, detect, z_for};
+use dtof_core::rule::detect;
+use dtof_core::{AnyRule, DepthEstimator, Histogram, RangeGate, z_for};
 use rand_pcg::Pcg64;
 
 use super::{BACKGROUNDS, FIRST_LOOKS};
-use crate::studies::methods::passage::{BINS, LOOKS, MINIMUM_COUNT, Method};
+use crate::studies::methods::passage::{BINS, LOOKS, MINIMUM_COUNT, Rule};
 use dtof_theory::looks::exposure::Exposures;
 use dtof_theory::rates::Rates;
 
-/// For each of [`FIRST_LOOKS`] and [`BACKGROUNDS`] the least α, in 1/16, with at most 1 %
-/// false alarms an exposure. There is none with 1 %: counts are whole, so that their
-/// share falls in steps.
+/// For each of [`FIRST_LOOKS`] and [`BACKGROUNDS`]: the smallest α, in steps of 1/16, with at most
+/// 1 % false alarms an exposure. No α has exactly 1 %, because integer counts make the share fall
+/// in steps.
 const ALPHAS: [[f64; 3]; 2] = [[5.0, 4.0, 3.5], [3.6875, 3.1875, 3.0]];
 
-/// A rule with its threshold, and when it looks first.
+/// A rule with its threshold and its first look.
 #[derive(Clone, Copy, Debug)]
 pub struct Pixel {
-    /// What decides.
-    pub method: Method,
-    /// The first laser cycle it may fire after.
+    /// The rule.
+    pub rule: Rule,
+    /// The first look, in laser cycles.
     pub first_look: u32,
-    /// The core's rule.
-    pub rule: AnyRule,
+    /// The core's rule with that threshold.
+    pub core_rule: AnyRule,
     /// α or z.
     pub threshold: f64,
 }
@@ -31,11 +32,11 @@ impl Pixel {
     /// With 1 % false alarms an exposure at this background.
     ///
     /// # Errors
-    /// If the background or the first look is not one of the study's.
-    pub fn new(method: Method, first_look: u32, background: f64) -> Result<Self> {
-        let threshold = match method {
-            Method::Window(_) => {
-                // As the commands take it, L1 being one less than the first look.
+    /// Fails if the background or the first look is not one of the study's.
+    pub fn new(rule: Rule, first_look: u32, background: f64) -> Result<Self> {
+        let threshold = match rule {
+            Rule::Window(_) => {
+                // As in the commands; L1 is one less than the first look.
                 let [x, l1, l2] = [LOOKS.x, first_look - 1, LOOKS.expiry()].map(u16::try_from);
                 z_for(100, &RangeGate::<BINS>::full(), x?, l1?, l2?).to_num()
             }
@@ -49,17 +50,17 @@ impl Pixel {
             }
         };
         Ok(Self {
-            method,
+            rule,
             first_look,
-            rule: method.rule(threshold, MINIMUM_COUNT)?,
+            core_rule: rule.with_threshold(threshold, MINIMUM_COUNT)?,
             threshold,
         })
     }
 
-    /// What tallies call it.
+    /// Its name in tallies.
     #[must_use]
     pub fn name(&self) -> String {
-        format!("{} {}", self.method.name(), self.first_look)
+        format!("{} {}", self.rule.name(), self.first_look)
     }
 }
 
@@ -68,20 +69,20 @@ impl Pixel {
 pub struct Event {
     /// Laser cycles of its exposure.
     pub cycles: u32,
-    /// Photons of the pulse in it, wherever they lie.
+    /// Photons of the pulse in all bins.
     pub signal: u64,
     /// The highest bin.
     pub peak: u16,
-    /// Where the pulse lies, in 1/256 bin from the start of bin 0, by each estimator of
-    /// [`ESTIMATORS`](super::ESTIMATORS).
+    /// The position by each of [`ESTIMATORS`](super::ESTIMATORS), in 1/256 bin from the start of
+    /// bin 0.
     pub positions: [i32; 2],
 }
 
-/// One exposure of the same photons for all `pixels`, with the events of those that have
-/// one. `estimators` find the depth on the histogram of the event.
+/// Simulates one exposure of the same photons for all `pixels`. Returns the event of each pixel, if
+/// it has one; `estimators` find the depth on its histogram.
 ///
 /// # Errors
-/// If a rate is not possible.
+/// Fails if a rate is negative or not a number.
 pub fn exposure(
     rates: &Rates,
     pixels: &[Pixel],
@@ -89,7 +90,7 @@ pub fn exposure(
     rng: &mut Pcg64,
 ) -> Result<Vec<Option<Event>>> {
     let bins = u16::try_from(BINS)?;
-    // Apart from the background, to be counted.
+    // Separate from the background, so that they can be counted.
     let mut pulse = Vec::new();
     if rates.signal > 0.0 {
         let rates = Rates {
@@ -122,7 +123,7 @@ pub fn exposure(
             if cycles < pixel.first_look {
                 continue;
             }
-            let detect = |estimator| detect(&histogram, &gate, &pixel.rule, estimator);
+            let detect = |estimator| detect(&histogram, &gate, &pixel.core_rule, estimator);
             let [Some(mass), Some(centred)] = estimators.each_ref().map(detect) else {
                 continue;
             };
@@ -178,13 +179,13 @@ mod tests {
         all
     }
 
-    /// Of both rules and first looks, with both estimators.
+    /// Both rules and first looks, with both estimators.
     #[test]
     fn events_are_those_of_a_pixel() {
         let mut pixels = Vec::new();
         for first in FIRST_LOOKS {
-            for method in [Method::Paper, Method::Window(3)] {
-                pixels.push(Pixel::new(method, first, RATES.background).unwrap());
+            for rule in [Rule::Paper, Rule::Window(3)] {
+                pixels.push(Pixel::new(rule, first, RATES.background).unwrap());
             }
         }
         let both = estimators(RATES.sigma);
@@ -195,7 +196,7 @@ mod tests {
             for (pixel, event) in pixels.iter().zip(events) {
                 for (index, estimator) in both.into_iter().enumerate() {
                     let l1 = u16::try_from(pixel.first_look - 1).unwrap();
-                    let config = PixelConfig::with_rule(pixel.rule).l1(l1).l2(1000);
+                    let config = PixelConfig::with_rule(pixel.core_rule).l1(l1).l2(1000);
                     let config = config.estimator(estimator).build().unwrap();
                     let here = event.map(|event| (event.cycles, event.positions[index]));
                     let there = of_core::<Count10>(&config, &frames)

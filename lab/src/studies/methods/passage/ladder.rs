@@ -1,54 +1,53 @@
-//! A method with many thresholds, and the one of a share of false alarms.
+//! A rule with many thresholds, and the choice of one by its share of false alarms.
 
-use super::Method;
+use super::Rule;
 use crate::sweep::PointTally;
 
-/// A method with ascending thresholds.
+/// A rule with ascending thresholds.
 #[derive(Clone, Debug)]
 pub struct Ladder {
-    /// What decides.
-    pub method: Method,
-    /// Equally spaced, by powers of two: exact in every format.
+    /// The rule.
+    pub rule: Rule,
+    /// Thresholds in equal steps of a power of two, so they are exact in every format.
     pub thresholds: Vec<f64>,
 }
 
 impl Ladder {
-    /// Thresholds from `first` to `last`, counted in steps of which `steps` make 1.
+    /// Thresholds from `first` to `last`, in units of 1 / `steps`.
     #[must_use]
-    pub fn new(method: Method, first: u32, last: u32, steps: u32) -> Self {
+    pub fn new(rule: Rule, first: u32, last: u32, steps: u32) -> Self {
         let thresholds = first..=last;
         Self {
-            method,
+            rule,
             thresholds: thresholds
                 .map(|step| f64::from(step) / f64::from(steps))
                 .collect(),
         }
     }
 
-    /// What a tally calls `what` at threshold number `index`.
+    /// The name of the count `what` at threshold `index` in a tally.
     #[must_use]
     pub fn key(&self, index: usize, what: &str) -> String {
-        format!("{} {} {what}", self.method.name(), self.thresholds[index])
+        format!("{} {} {what}", self.rule.name(), self.thresholds[index])
     }
 
-    /// The threshold at which `share` of the exposures fire, from the counts
-    /// `"false"` of `points`, in `exposures`: between two thresholds the share falls
-    /// by equal factors. The first or the last if it lies beyond.
+    /// The threshold at which `share` of the exposures fire, from the counts `"false"` of `points`.
+    /// Interpolated in the logarithm of the share; clamped to the first and the last threshold.
     #[must_use]
     pub fn calibrated(&self, points: &[&PointTally], share: f64) -> f64 {
         let exposures: u64 = points.iter().map(|point| point.count("exposures")).sum();
-        let wanted = (share * exposures as f64).ln();
+        let requested = (share * exposures as f64).ln();
         let found = |index: usize| {
             let key = self.key(index, "false");
             let count: u64 = points.iter().map(|point| point.count(&key)).sum();
-            // None is less than one.
+            // Zero counts as one half.
             (count as f64).max(0.5).ln()
         };
         for index in 1..self.thresholds.len() {
             let (before, after) = (found(index - 1), found(index));
-            if after <= wanted {
-                let between = if before > wanted {
-                    (before - wanted) / (before - after)
+            if after <= requested {
+                let between = if before > requested {
+                    (before - requested) / (before - after)
                 } else {
                     0.0
                 };
@@ -59,7 +58,7 @@ impl Ladder {
         self.thresholds.last().copied().unwrap_or_default()
     }
 
-    /// The number of the threshold nearest to `threshold`.
+    /// The index of the threshold nearest to `threshold`.
     #[must_use]
     pub fn nearest(&self, threshold: f64) -> usize {
         let above = self.thresholds.partition_point(|&at| at < threshold);
@@ -75,8 +74,7 @@ impl Ladder {
         }
     }
 
-    /// `value` of the thresholds' numbers, linear between the two beside
-    /// `threshold`.
+    /// `value` at `threshold`, interpolated linearly between its two neighbours.
     pub fn interpolated(&self, threshold: f64, value: impl Fn(usize) -> f64) -> f64 {
         let above = self.thresholds.partition_point(|&at| at < threshold);
         let above = above.clamp(1, self.thresholds.len() - 1);
@@ -93,7 +91,7 @@ mod tests {
 
     #[test]
     fn the_threshold_of_a_share_lies_between_its_neighbours() {
-        let ladder = Ladder::new(Method::Window(2), 12, 14, 4);
+        let ladder = Ladder::new(Rule::Window(2), 12, 14, 4);
         let mut tally = Tally::from([("exposures".to_owned(), 1000)]);
         for (index, count) in [1000, 100, 1].into_iter().enumerate() {
             tally.insert(ladder.key(index, "false"), count);

@@ -1,4 +1,4 @@
-//! How long a rule takes to an event, and how sure that is.
+//! The time to an event, and its uncertainty.
 
 use super::FALSE_SHARE;
 use crate::studies::methods::passage::{LOOKS, Ladder};
@@ -15,15 +15,14 @@ fn mean_and_variance(ladder: &Ladder, threshold: f64, point: &PointTally) -> (f6
     let [events, cycles, squares] = ["events", "cycles", "squares"].map(of);
     let events = events.max(1.0);
     let mean = cycles / events;
-    // Of a ratio of sums: the squares of what each exposure has above `mean` times its
-    // events. Those without an event lasted to the end.
+    // The variance of a ratio of sums. Exposures without an event lasted until they expired.
     let with_event = cycles - (exposures - events) * f64::from(LOOKS.expiry());
     let above = squares - 2.0 * mean * with_event + mean * mean * events;
     (mean, above.max(0.0) / (events * events))
 }
 
-/// Mean laser cycles to an event with [`FALSE_SHARE`] false alarms in the exposures of
-/// `without`, the threshold, and what both are sure of.
+/// Mean laser cycles to an event, with its interval, and the threshold with a share of
+/// [`FALSE_SHARE`] of false alarms in the exposures of `without`.
 pub(super) fn time(
     ladder: &Ladder,
     without: &[&PointTally],
@@ -31,7 +30,7 @@ pub(super) fn time(
 ) -> (f64, Measured) {
     let threshold = ladder.calibrated(without, FALSE_SHARE);
     let (value, variance) = mean_and_variance(ladder, threshold, with_target);
-    // As many exposures are false or fewer, or more, by what they are sure of.
+    // The thresholds at the ends of the interval of the false alarms.
     let exposures: u64 = without.iter().map(|point| point.count("exposures")).sum();
     #[allow(
         clippy::cast_possible_truncation,
@@ -53,7 +52,7 @@ pub(super) fn time(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::studies::methods::passage::Method;
+    use crate::studies::methods::passage::Rule;
     use crate::sweep::Tally;
 
     fn tally(counts: [(&str, u64); 4], ladder: &Ladder) -> PointTally {
@@ -66,11 +65,11 @@ mod tests {
         tally.into()
     }
 
-    /// Half of the exposures expire: as many as there are events, and the delta method's
-    /// variance for that share, 1/2, of 100 is (1/4)/100/(1/2)⁴.
+    /// Half of 100 exposures expire. The delta method's variance for that share, 1/2, is
+    /// (1/4)/100/(1/2)⁴.
     #[test]
-    fn what_expires_is_as_unsure_as_its_share() {
-        let ladder = Ladder::new(Method::Window(2), 15, 19, 4);
+    fn expired_exposures_widen_the_interval() {
+        let ladder = Ladder::new(Rule::Window(2), 15, 19, 4);
         let expiry = u64::from(LOOKS.expiry());
         let (cycles, squares) = (50 * (100 + expiry), 50 * (100 * 100 + expiry * expiry));
         let counts = [
@@ -88,11 +87,11 @@ mod tests {
         );
     }
 
-    /// Times of 100, 110, … that vary by nothing, and false alarms that fall by a factor
-    /// of four a threshold: a hundred times the exposures, about a tenth of the interval.
+    /// Times of 100, 110, … without variance, and false alarms that fall by a factor of four per
+    /// threshold: a hundred times the exposures have about a tenth of the interval.
     #[test]
-    fn a_time_is_as_unsure_as_its_threshold() {
-        let ladder = Ladder::new(Method::Window(2), 15, 19, 4);
+    fn an_uncertain_threshold_widens_the_interval() {
+        let ladder = Ladder::new(Rule::Window(2), 15, 19, 4);
         let half = |exposures: u64| {
             let mut without = tally([("exposures", exposures); 4], &ladder);
             let mut with = tally(
@@ -114,8 +113,8 @@ mod tests {
             assert!((threshold - 4.25).abs() < 1e-3 && (time.value - 120.0).abs() < 0.1);
             (time.interval.1 - time.interval.0) / 2.0
         };
-        // A factor of e in false alarms is 10 / ln 4 = 7.2 laser cycles, and a hundred of
-        // them are sure to 26 %.
+        // A factor of e in false alarms is 10 / ln 4 = 7.2 laser cycles, and a count of a hundred
+        // is uncertain by 26 %.
         let (few, many) = (half(10_000), half(1_000_000));
         assert!((1.4..2.6).contains(&few), "{few}");
         assert!((8.0..12.0).contains(&(few / many)), "{few} {many}");

@@ -1,4 +1,4 @@
-//! What the paper says of dynamic depth.
+//! The paper's claims on dynamic depth.
 
 use super::super::systems::Background;
 use super::outcome::{Outcome, REMOVED, SCENES, at_text, by_range, holding, on_pc, outcome};
@@ -9,7 +9,7 @@ use crate::sweep::results::{Claim, Verdict};
 use anyhow::Result;
 use dtof_options::rows::grouped;
 
-/// Changes an event below which a wall is silent.
+/// Changes per event below which a wall counts as silent.
 const SILENT: f64 = 1e-4;
 
 /// `text` of the car and of the fan at every signal.
@@ -56,7 +56,7 @@ fn times(measured: Measured) -> String {
     }
 }
 
-/// What of the steps of the car is found.
+/// The steps of the car that are found.
 fn motion(of: &Outcome) -> String {
     let delay = if of.delay.value.is_nan() {
         String::new()
@@ -161,7 +161,7 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
                 with_both(part, |of| times(of.still.a_frame(of.still.events))),
                 with_both(part, |of| times(of.still.a_frame(of.still.changes)))
             ),
-            // The paper itself has dynamic depth for it.
+            // The paper itself uses dynamic depth to achieve this.
             Verdict::graded(
                 by_range(&fewer_events[0]) == Verdict::Agrees,
                 !redundant[0].is_empty(),

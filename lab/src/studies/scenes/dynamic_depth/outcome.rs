@@ -1,4 +1,4 @@
-//! What a way of finding changes comes to.
+//! The results of a method of change detection.
 
 use super::super::systems::Background;
 use super::{REFERENCES, SIGNALS, name};
@@ -6,21 +6,21 @@ use crate::sweep::mean::{Measured, Z_99};
 use crate::sweep::results::Verdict;
 use crate::sweep::{Part, PointTally};
 
-/// The paper's least share of events taken away.
+/// The smallest share of removed events in the paper.
 pub const REMOVED: f64 = 0.7;
-/// A claim agrees if it holds in signals that lie this far apart.
+/// A claim agrees if it holds over a range of signals of this factor.
 const RANGE: f64 = 5.0;
 pub const SCENES: [(f64, &str); 2] = [(0.0, "car"), (1.0, "fan")];
 
-/// How a way of finding changes fares at a point.
+/// The results of a method of change detection at a point.
 pub struct Outcome {
-    /// Events that are not followed by a change.
+    /// The share of events that do not cause a change.
     pub removed: Measured,
-    /// The others.
+    /// The share of events that cause a change.
     pub left: Measured,
-    /// True steps that are reported.
+    /// The share of true steps that are reported.
     pub found: Measured,
-    /// Changes that there were not.
+    /// The share of false changes.
     pub is_false: Measured,
     /// Laser cycles from a step to its report.
     pub delay: Measured,
@@ -31,7 +31,7 @@ pub struct Outcome {
     pub moving: Surface,
 }
 
-/// Pixels before which nothing moves, or the others.
+/// The counts of all still pixels, or of all others.
 pub struct Surface {
     pub pixels: u64,
     pub frames: u64,
@@ -40,8 +40,8 @@ pub struct Surface {
 }
 
 impl Surface {
-    /// What there is of it for each reading of a frame of 2000. Events come more evenly
-    /// than Poisson's law has it, whose interval this is.
+    /// `count` per reading of a frame of 2000, with a Poisson interval. Events come more regularly,
+    /// so the interval is conservative.
     pub fn a_frame(&self, count: u64) -> Measured {
         let value = count as f64 / self.frames as f64;
         let half = Z_99 * (count.max(1) as f64).sqrt() / self.frames as f64;
@@ -78,7 +78,7 @@ pub fn outcome(point: &PointTally, background: Background, reference: &str) -> O
     }
 }
 
-/// The paper's way on the PC, at every signal of a scene.
+/// The paper's method on the PC, at every signal of a scene.
 pub fn on_pc(
     part: &Part,
     fan: f64,
@@ -101,8 +101,8 @@ pub fn holding(part: &Part, background: Background, holds: impl Fn(&Outcome) -> 
     holding.map(|(car, _)| car.0).collect()
 }
 
-/// Agrees if it holds over a range of [`RANGE`] with nothing left out, differs in less,
-/// refuted if nowhere.
+/// Agrees if the claim holds over a contiguous range of [`RANGE`], differs if it holds anywhere,
+/// otherwise refuted.
 pub fn by_range(holding: &[f64]) -> Verdict {
     let is_range = |from: f64| {
         let mut range = SIGNALS

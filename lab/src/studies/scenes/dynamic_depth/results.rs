@@ -69,7 +69,7 @@ fn left(part: &Part) -> Result<Figure> {
     Figure::new("dynamic-depth", &chart)
 }
 
-/// What a pixel reports beside the frames of a sensor that sees the same photons.
+/// The reports of a pixel compared with the frames of a sensor that sees the same photons.
 fn a_frame(part: &Part) -> Result<Figure> {
     let cars = on_pc(part, 0.0, Background::Average, 0);
     let dots = |of: fn(&Outcome) -> Measured| -> Vec<Dot> {

@@ -1,18 +1,18 @@
-//! What the paper says of section III-C's figure, and of what follows from it.
+//! The paper's claims on the figure of section III-C, and its conclusions.
 
 use super::setting::{NOTHING, Setting, error, false_share};
-use super::{ALPHAS, ENOUGH, L1S, SNRS};
+use super::{ALPHAS, GAUSSIAN_BACKGROUND, L1S, SNRS};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Verdict, ends};
 use crate::sweep::{Part, PointTally};
 
-/// An SNR this many times another is a range in which a claim can hold.
+/// The smallest ratio of SNRs over which a claim has to hold.
 const RANGE: f64 = 5.0;
 
 pub fn claims(part: &Part) -> Vec<Claim> {
     let all = Setting::all(part);
     let settings = |of: &dyn Fn(Setting) -> String| all.map(|setting| setting.text(of)).join("; ");
-    // Of the settings that have false alarms.
+    // Only settings with false alarms.
     let falls =
         |of: &dyn Fn(Setting) -> Option<Option<bool>>| in_all(all.into_iter().filter_map(of));
     let verdict = |holds: fn(Setting) -> Option<bool>| in_all(all.map(holds));
@@ -80,7 +80,7 @@ pub fn claims(part: &Part) -> Vec<Claim> {
     ]
 }
 
-/// Whether the false alarms do not depend on the SNR, to a factor of 2: agrees over all SNRs in
+/// Whether false alarms are independent of the SNR within a factor of 2. Agrees over all SNRs in
 /// every setting, differs over a range of [`RANGE`] with each pulse at the paper's B.
 fn snr(part: &Part) -> Claim {
     let mut here = Vec::new();
@@ -94,7 +94,7 @@ fn snr(part: &Part) -> Claim {
         let (from, to, factor) = widest_level(&shares);
         is_level &= shares.first().map(|share| share.0) == Some(from)
             && shares.last().map(|share| share.0) == Some(to);
-        is_part &= setting.background >= ENOUGH || to / from >= RANGE;
+        is_part &= setting.background >= GAUSSIAN_BACKGROUND || to / from >= RANGE;
         here.push(format!(
             "B {}, σ {}: {}; within a factor of {factor:.1} from A/B = {from} to {to}",
             setting.background,
@@ -123,15 +123,15 @@ fn snr(part: &Part) -> Claim {
     )
 }
 
-/// The widest range of `x` in which no two values differ by more than a factor of 2, and the
-/// factor there.
+/// The widest range of x in which no two values differ by more than a factor of 2, and the factor
+/// in that range.
 fn widest_level(values: &[(f64, f64)]) -> (f64, f64, f64) {
     let mut widest = (1.0, 1.0, 1.0);
     for first in 0..values.len() {
         for last in first..values.len() {
             let (low, high) = ends(values[first..=last].iter().map(|value| value.1));
             let (from, to) = (values[first].0, values[last].0);
-            // Where there are none, nothing is alike.
+            // Without false alarms there is nothing to compare.
             if low > 0.0 && high <= 2.0 * low && to / from > widest.1 / widest.0 {
                 widest = (from, to, high / low);
             }
@@ -140,8 +140,8 @@ fn widest_level(values: &[(f64, f64)]) -> (f64, f64, f64) {
     widest
 }
 
-/// Whether α leaves the error alone, to a tenth, for L1 above 20: of the places at the
-/// background that the paper's own condition asks for. Differs if in more than half of them.
+/// Whether α changes the error by less than a tenth for L1 above 20, at the background that the
+/// paper's condition requires. Differs if so at more than half of the points.
 fn alpha(part: &Part) -> Claim {
     let of = |background: f64| {
         let settings = Setting::all(part).into_iter();
@@ -150,18 +150,18 @@ fn alpha(part: &Part) -> Claim {
         let alike = factors.iter().filter(|&&factor| factor <= 1.1).count();
         (alike, factors.len(), ends(factors).1)
     };
-    let (alike, all, most) = of(ENOUGH);
+    let (alike, all, most) = of(GAUSSIAN_BACKGROUND);
     let (few_alike, few_all, few_most) = of(0.05);
     Claim::new(
         "alpha",
         format!(
-            "between α = 2 and 8 at one SNR, pulse and L1 (40 and 80) the RMSE differs by at most a tenth at {alike} of {all} places with B = {ENOUGH} (at most {most:.2} times), and at {few_alike} of {few_all} with B = 0.05 ({few_most:.2} times)"
+            "between α = 2 and 8 at one SNR, pulse and L1 (40 and 80) the RMSE differs by at most a tenth at {alike} of {all} places with B = {GAUSSIAN_BACKGROUND} (at most {most:.2} times), and at {few_alike} of {few_all} with B = 0.05 ({few_most:.2} times)"
         ),
         Verdict::graded(alike == all, 2 * alike > all),
     )
 }
 
-/// Whether L1 of 20 or 40 brings 30 counts a bin: by arithmetic.
+/// Whether an L1 of 20 or 40 gives 30 counts a bin, by arithmetic.
 fn gaussian() -> Claim {
     let counts = [20.0, 40.0].map(|l1| l1 * 0.05);
     Claim::new(
@@ -173,7 +173,7 @@ fn gaussian() -> Claim {
             30.0 / 20.0,
             30.0 / 40.0
         ),
-        // The B of its setup is not known.
+        // The B of the paper's setup is unknown.
         Verdict::graded(counts.iter().all(|&counts| counts >= 30.0), true),
     )
 }
@@ -186,8 +186,8 @@ fn bins(point: &PointTally) -> String {
     format!("{:.3}", error(point).value)
 }
 
-/// Whether a claim holds everywhere, nowhere, or in some places; what could not be told
-/// (`None`) leaves it open, unless places that could be told differ.
+/// Whether a claim holds everywhere, nowhere, or in some places. Undecided places (`None`) leave it
+/// open, unless decided places differ.
 fn in_all(holds: impl IntoIterator<Item = Option<bool>>) -> Verdict {
     let [mut open, mut held, mut failed] = [false; 3];
     for holds in holds {
@@ -205,9 +205,9 @@ fn in_all(holds: impl IntoIterator<Item = Option<bool>>) -> Verdict {
     }
 }
 
-/// Whether the whole interval lies below 0.1 %, or above; `None` if it holds it.
+/// Whether the whole interval lies below 0.1 %, or above; `None` if it contains 0.1 %.
 fn below_a_thousandth(share: Measured) -> Option<bool> {
-    (!share.holds(0.001)).then_some(share.value < 0.001)
+    (!share.contains(0.001)).then_some(share.value < 0.001)
 }
 
 impl Setting<'_> {
@@ -229,9 +229,9 @@ impl Setting<'_> {
         self.false_at_5(at).map(text).join(", ")
     }
 
-    /// Whether the last share lies surely below the first and none surely above the one
-    /// before it. It does not if one does; what is not sure is open. `None` without any false
-    /// alarm to begin with.
+    /// Whether the shares fall: the last is significantly below the first, and none is
+    /// significantly above its predecessor. `Some(None)` if undecided, `None` without any false
+    /// alarm.
     fn falls<const N: usize>(self, at: [(u16, u16); N]) -> Option<Option<bool>> {
         let shares: Vec<Measured> = self.false_at_5(at).into_iter().flatten().collect();
         let [first, .., last] = shares[..] else {
@@ -261,7 +261,7 @@ impl Setting<'_> {
                     .collect();
                 if errors.len() > 1 {
                     let (low, high) = ends(errors);
-                    // Two full counters of a pulse on their edge err by nothing: no evidence.
+                    // Two full counters of a pulse on their edge have no error: not counted.
                     if low > 0.0 {
                         factors.push(high / low);
                     }

@@ -1,4 +1,4 @@
-//! What one background and pulse width say of the claims.
+//! The claims at one background and pulse width.
 
 use super::{SETTINGS, SNRS};
 use crate::sweep::mean::Measured;
@@ -19,14 +19,14 @@ pub fn error(point: &PointTally) -> Measured {
 #[derive(Clone, Copy)]
 pub struct Setting<'a> {
     pub part: &'a Part,
-    /// Of all bins, or of two quadrants.
+    /// Whether the background is the average of all bins; otherwise that of two quadrants.
     pub is_average: bool,
     pub background: f64,
     pub sigma: f64,
 }
 
 impl<'a> Setting<'a> {
-    /// All with the average of all bins.
+    /// All settings with the average of all bins.
     pub fn all(part: &'a Part) -> [Self; SETTINGS.len()] {
         SETTINGS.map(|(background, sigma)| Self {
             part,
@@ -36,7 +36,7 @@ impl<'a> Setting<'a> {
         })
     }
 
-    /// Those of the paper's B, which have both backgrounds.
+    /// The settings with the paper's B, which have both background estimates.
     pub fn at_low_background(part: &'a Part, is_average: bool) -> [Self; 2] {
         let [first, second, ..] = Self::all(part);
         [first, second].map(|setting| Self {
@@ -45,8 +45,7 @@ impl<'a> Setting<'a> {
         })
     }
 
-    /// The points of an α and L1, by SNR. Those with fewer than 50 events say
-    /// nothing, so that there may be fewer than SNRs, or none.
+    /// The points of an α and L1, by SNR. Points with fewer than 50 events are left out.
     pub fn by_snr(self, alpha: u16, l1: u16) -> Vec<&'a PointTally> {
         let points = self.part.at([
             ("average", f64::from(self.is_average)),
@@ -62,9 +61,9 @@ impl<'a> Setting<'a> {
         self.by_snr(alpha, l1).into_iter().map(of).collect()
     }
 
-    /// Whether the error at the highest SNR lies below that at the lowest, intervals
-    /// included, and it never rises by more than a twentieth, for L1 above 20. `None`
-    /// with fewer than two points of an L1.
+    /// Whether, for L1 above 20, the error at the highest SNR is significantly below that at the
+    /// lowest, and never rises by more than a twentieth. `None` with fewer than two points of an
+    /// L1.
     pub fn error_falls_with_snr(self) -> Option<bool> {
         let mut falls = true;
         for l1 in [40, 80] {
@@ -78,8 +77,8 @@ impl<'a> Setting<'a> {
         Some(falls)
     }
 
-    /// The errors at several L1, averaged over the SNRs that have one at each of them,
-    /// α = 4, and how many SNRs those are. `None` without one.
+    /// The errors at several L1 with α = 4, averaged over the SNRs that have a point at each L1,
+    /// and the number of these SNRs. `None` without such an SNR.
     pub fn mean_errors<const N: usize>(self, l1s: [u16; N]) -> Option<([f64; N], usize)> {
         let by_l1 = l1s.map(|l1| self.by_snr(4, l1));
         let at = |points: &[&PointTally], snr| {
@@ -96,8 +95,8 @@ impl<'a> Setting<'a> {
         (!common.is_empty()).then(|| (by_l1.map(mean), common.len()))
     }
 
-    /// Whether the error falls less from L1 = 40 to 80 than from 20 to 40: by a laser cycle
-    /// more, as any convex curve does, or by a share for twice the L1.
+    /// Whether the error falls less from L1 = 40 to 80 than from 20 to 40: per laser cycle, as on
+    /// any convex curve, or per doubling of L1.
     pub fn gain_diminishes(self, by_doubling: bool) -> Option<bool> {
         let ([at_20, at_40, at_80], _) = self.mean_errors([20, 40, 80])?;
         Some(if by_doubling {
@@ -107,7 +106,7 @@ impl<'a> Setting<'a> {
         })
     }
 
-    /// What `of` gives for every point of an α and L1, each after its SNR.
+    /// The texts of `of` for every point of an α and L1, each with its SNR.
     pub fn list(self, alpha: u16, l1: u16, of: fn(&PointTally) -> String) -> String {
         let points = self.by_snr(alpha, l1).into_iter();
         let texts: Vec<String> = points
@@ -120,11 +119,11 @@ impl<'a> Setting<'a> {
         }
     }
 
-    /// What `of` gives, after the setting.
+    /// The text of `of`, after the setting.
     pub fn text(self, of: impl Fn(Self) -> String) -> String {
         format!("B {}, σ {}: {}", self.background, self.sigma, of(self))
     }
 }
 
-/// Where no point has enough events.
+/// The text if no point has enough events.
 pub const NOTHING: &str = "fewer than 50 events";

@@ -1,4 +1,4 @@
-//! What the paper says of its latency.
+//! The paper's claims on latency.
 
 use super::element::{AT_ONCE, PIPELINE, READINGS};
 use super::{PROTOTYPE_X, RATE_MHZ, first, next, shared_points, shortest_exposure};
@@ -10,9 +10,9 @@ use dtof_options::rows::grouped;
 
 /// The paper's latency, in microseconds.
 const PRINTED_US: f64 = 2.4;
-/// That of the fastest other system of Table I.
+/// The latency of the fastest other system of Table I.
 const OTHERS_US: f64 = 128.0;
-/// Frames a second in Table I, and the latency that stands below.
+/// Frames a second in Table I, and the latency given below them.
 const FRAME_BASED: [(f64, f64); 2] = [(250.0, 4_000.0), (50.0, 20_000.0)];
 /// Parts of the 128×64 imager, one of which is connected at a time (section IV-B).
 const SUBGROUPS: u16 = 64;
@@ -25,8 +25,8 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
     Ok(vec![processing(part), root(), exposure(part)?, table(part)])
 }
 
-/// Whether with the pipeline every first event comes four laser cycles after that of a
-/// decision at once, of the same photons.
+/// Whether the pipeline delays every first event by four laser cycles, compared with an immediate
+/// decision on the same photons.
 pub fn is_later_by_the_delay(part: &Part) -> bool {
     let mut points = part.at([("shared", 1.0)]);
     points.all(|point| {
@@ -71,12 +71,12 @@ fn processing(part: &Part) -> Claim {
             },
             readings.join(", ")
         ),
-        // In no reading does an event come as soon; in one no look is lost.
+        // Every interpretation delays events; with one of them no look is lost.
         Verdict::graded(PIPELINE.delay == 0, is_later && PIPELINE.x() == PROTOTYPE_X),
     )
 }
 
-/// By arithmetic: the longer of two stages sets how often a histogram can enter.
+/// By arithmetic: the longer of two stages limits the rate of histograms.
 fn root() -> Claim {
     let (bins, groups) = TREE;
     let first_stage = bins / groups;
@@ -141,7 +141,7 @@ fn exposure(part: &Part) -> Result<Claim> {
     ))
 }
 
-/// The other systems: a frame's latency is its period. Ours with the pipeline.
+/// The other systems, with the period of a frame as latency, and this one with the pipeline.
 fn table(part: &Part) -> Claim {
     let is_period = |(rate, latency): (f64, f64)| (1e6 / rate - latency).abs() < 1e-6;
     let periods = FRAME_BASED.into_iter().all(is_period);
@@ -165,7 +165,7 @@ fn table(part: &Part) -> Claim {
     )
 }
 
-/// What it means that a pixel has one of so many laser cycles.
+/// The consequences if a pixel has only one of [`SUBGROUPS`] laser cycles.
 pub fn subgroups() -> String {
     let cycles = u32::from(shortest_exposure(40)) * u32::from(SUBGROUPS);
     format!(
@@ -187,8 +187,8 @@ mod tests {
             "156 kHz a subgroup, and its first look after 2,816 laser cycles, 282 µs"
         );
         assert_eq!(root().verdict, Verdict::Agrees);
-        // The readings of 2.4 µs: the look at L1 = 20, its threshold or half of L1 = 40 and
-        // four laser cycles.
+        // Interpretations of 2.4 µs: the look at L1 = 20, or L1 = 20 (half of 40) plus four laser
+        // cycles.
         let four = PIPELINE.delay;
         let readings = [shortest_exposure(20), 20 + four, 40 / 2 + four];
         assert!(

@@ -1,14 +1,14 @@
 //! The processing element that four pixels share (sections IV-A and IV-B, Fig. 22).
 //!
-//! Pixels hand in their histograms in turn, and count on meanwhile. When the answer is an
-//! event, the pixel is cleared then: photons since its histogram was taken are dropped, and
-//! the next exposure begins with the laser cycle after the answer. The paper does not say
-//! when a pixel is cleared; this is ours.
+//! Pixels submit their histograms in turn, and continue to count. If the answer is an event, the
+//! pixel is cleared at that time: photons since its histogram was submitted are dropped, and the
+//! next exposure begins with the laser cycle after the answer. The paper does not say when a pixel
+//! is cleared; this is our choice.
 //!
-//! The paper says that a look comes every X = 4 laser cycles, that a histogram takes four
-//! laser cycles in the element, and that it has two stages. With one histogram
-//! a stage the three do not go together. X = 4 takes a new histogram each laser cycle, so four
-//! in the element at once: a pipeline of four. See [`READINGS`] for the others.
+//! According to the paper a look comes every X = 4 laser cycles, a histogram takes four laser
+//! cycles in the element, and the element has two stages. With one histogram per stage these
+//! contradict each other. X = 4 requires a new histogram each laser cycle, so four in the element
+//! at once: a pipeline of four. See [`READINGS`] for the other interpretations.
 
 use crate::studies::scenes::one_pixel::BINS;
 use dtof_core::{AnyRule, Histogram, PixelConfig};
@@ -16,26 +16,26 @@ use dtof_core::{AnyRule, Histogram, PixelConfig};
 /// Pixels that share an element.
 pub const PIXELS: u16 = 4;
 
-/// How long histograms take.
+/// The timing of a processing element.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ProcessingElement {
-    /// What it is called.
+    /// Its name.
     pub name: &'static str,
-    /// Laser cycles from one histogram that enters to the next.
+    /// Laser cycles between two histograms that enter.
     pub interval: u16,
-    /// Laser cycles from a histogram that enters to its answer, at most [`Self::x`].
+    /// Laser cycles from the entry of a histogram to its answer, at most [`Self::x`].
     pub delay: u16,
 }
 
-/// Decides at once, as the core does.
+/// Decides immediately, as the core does.
 pub const AT_ONCE: ProcessingElement = ProcessingElement::new("decided at once", 1, 0);
-/// A pipeline of four laser cycles that takes a histogram in each: X = 4.
+/// A pipeline of four laser cycles that accepts a histogram in each: X = 4.
 pub const PIPELINE: ProcessingElement = ProcessingElement::new("pipeline of four", 1, 4);
 /// Two stages of two laser cycles each, in parallel: X = 8.
 pub const SHORT_STAGES: ProcessingElement = ProcessingElement::new("stages of two", 2, 4);
 /// Two stages of four laser cycles each, in parallel: X = 16.
 pub const LONG_STAGES: ProcessingElement = ProcessingElement::new("stages of four", 4, 8);
-/// What the paper's words can mean, after the decision at once.
+/// Possible interpretations of the paper, after the immediate decision.
 pub const READINGS: [ProcessingElement; 4] = [AT_ONCE, PIPELINE, SHORT_STAGES, LONG_STAGES];
 
 impl ProcessingElement {
@@ -53,32 +53,31 @@ impl ProcessingElement {
         PIXELS * self.interval
     }
 
-    /// Histograms in it at once, at most.
+    /// The most histograms in the element at once.
     pub const fn in_flight(self) -> u16 {
         self.delay.div_ceil(self.interval)
     }
 
-    /// Whether the histogram of the pixel number `turn` enters at the end of laser cycle
-    /// `cycle`.
+    /// Whether the histogram of pixel `turn` enters at the end of laser cycle `cycle`.
     fn takes(self, turn: u16, cycle: u64) -> bool {
         let (interval, x) = (u64::from(self.interval), u64::from(self.x()));
         cycle % x == u64::from(turn + 1) * interval - 1
     }
 }
 
-/// A pixel that has its histogram looked at by an element.
+/// A pixel that shares a processing element.
 pub struct SharedPixel {
     element: ProcessingElement,
-    /// Its number among those of the element.
+    /// Its index among the pixels of the element.
     turn: u16,
     histogram: Histogram<BINS>,
     exposure: u16,
-    /// The laser cycle at whose end the answer is there, and whether it is an event.
+    /// The laser cycle at whose end the answer is ready, and whether it is an event.
     answer: Option<(u64, bool)>,
 }
 
 impl SharedPixel {
-    /// One that is empty.
+    /// An empty pixel.
     pub const fn new(element: ProcessingElement, turn: u16) -> Self {
         Self {
             element,
@@ -94,7 +93,7 @@ impl SharedPixel {
         self.histogram.add(code);
     }
 
-    /// Ends laser cycle `cycle`. Gives whether it brings an event.
+    /// Ends laser cycle `cycle`. Returns whether there is an event.
     pub fn end_laser_cycle(&mut self, config: &PixelConfig<BINS, AnyRule>, cycle: u64) -> bool {
         self.exposure = self.exposure.saturating_add(1);
         if self.is_event(cycle) {
@@ -109,11 +108,11 @@ impl SharedPixel {
         }
         let is_peak = config.detect(&self.histogram).is_some();
         self.answer = Some((cycle + u64::from(self.element.delay), is_peak));
-        // Without a delay it is there.
+        // Without a delay the answer is ready.
         self.is_event(cycle)
     }
 
-    /// Takes the answer that is due, and starts over if it is an event.
+    /// Takes the answer if it is ready, and restarts the pixel if it is an event.
     fn is_event(&mut self, cycle: u64) -> bool {
         let answer = self.answer.take_if(|(due, _)| *due == cycle);
         let is_event = answer.is_some_and(|(_, is_event)| is_event);
@@ -152,7 +151,7 @@ mod tests {
         })
     }
 
-    /// From power-up a pixel waits for its turn; from event to event it is always the same.
+    /// After power-up a pixel waits for its turn; the time between events is constant.
     #[test]
     fn first_events_and_the_next_come_when_the_turn_says() {
         let firsts = READINGS.map(|element| events(element, 40).map(|ends| ends[0]));
@@ -171,7 +170,7 @@ mod tests {
     fn looks_and_histograms_in_the_element_are_those_of_each_reading() {
         let looks = READINGS.map(|element| (element.x(), element.in_flight()));
         assert_eq!(looks, [(4, 0), (4, 4), (8, 2), (16, 2)]);
-        // A laser cycle has the histogram of one pixel, or of none.
+        // At most one histogram enters in a laser cycle.
         for element in READINGS {
             for cycle in 0..64 {
                 let taken = (0..PIXELS).filter(|&turn| element.takes(turn, cycle));
@@ -188,7 +187,7 @@ mod tests {
         let config = prototype(40).unwrap();
         let mut rng = Pcg64::seed_from_u64(1);
         for case in 0..50 {
-            let mut core = AsyncPixel::<BINS>::new(PixelAddress(0));
+            let mut core = AsyncPixel::<BINS>::new(PixelAddress::new(0));
             let [mut at_once, mut pipeline] =
                 [AT_ONCE, PIPELINE].map(|element| SharedPixel::new(element, 3));
             let mut statistics = Statistics::new();
@@ -204,8 +203,8 @@ mod tests {
                         pipeline.count(code);
                     }
                 }
-                core.end_laser_cycle(&config, &mut statistics, LaserCycle(cycle));
-                let is_event = core.acknowledge().is_some();
+                core.end_laser_cycle(&config, &mut statistics, LaserCycle::new(cycle));
+                let is_event = core.take_event().is_some();
                 assert_eq!(is_event, at_once.end_laser_cycle(&config, cycle));
                 if is_event {
                     first.get_or_insert(cycle);

@@ -1,4 +1,4 @@
-//! What the paper says of its static scene.
+//! The paper's claims on its static scene.
 
 use super::super::systems::{Background, System};
 use super::surfaces::surfaces;
@@ -9,16 +9,16 @@ use crate::sweep::{Part, PointTally};
 use anyhow::Result;
 use dtof_options::rows::grouped;
 
-/// Of the file.
+/// Surfaces of the file.
 const BRIGHTEST: &str = "white board";
 const WALL: &str = "wall";
 
-/// The PC with the paper's background: what the verdicts are of.
+/// Whether a point is the PC with the paper's background estimate, on which the verdicts are based.
 fn is_papers(point: &PointTally) -> bool {
     point.is_at([("fpga", 0.0), ("average", 1.0)])
 }
 
-/// For each scene what `text` makes of it.
+/// The texts of `text` for each scene.
 fn of_each(part: &Part, mut text: impl FnMut(&PointTally) -> Result<String>) -> Result<String> {
     let mut texts = Vec::new();
     for point in part.points() {
@@ -35,8 +35,8 @@ fn of_each(part: &Part, mut text: impl FnMut(&PointTally) -> Result<String>) -> 
     Ok(texts.join("; "))
 }
 
-/// What is said of the noise of a depth against that of the frame, and their ratio
-/// on every surface of which half of the pixels or more say it.
+/// The text on the noise of a depth relative to that of the frame, and the ratios on surfaces where
+/// at least half of the pixels have enough events.
 fn noises(part: &Part, depth: &str) -> Result<(String, Vec<Measured>)> {
     let mut all = Vec::new();
     let text = of_each(part, |point| {
@@ -76,7 +76,7 @@ fn noises(part: &Part, depth: &str) -> Result<(String, Vec<Measured>)> {
     Ok((text, all))
 }
 
-/// Whether a depth is noisier than the frame, by the ratios of the surfaces.
+/// Whether a depth is noisier than the frame on every surface.
 fn noisier(ratios: &[Measured]) -> Verdict {
     let all = |holds: fn(&Measured) -> bool| !ratios.is_empty() && ratios.iter().all(holds);
     if all(|ratio| ratio.interval.0 > 1.0) {
@@ -90,8 +90,7 @@ fn noisier(ratios: &[Measured]) -> Verdict {
     }
 }
 
-/// Whether a depth is as noisy as the frame, within half as much again, by the
-/// worst surface.
+/// Whether the noise of a depth is at most 1.5 times that of the frame on the worst surface.
 fn comparable(ratios: &[Measured]) -> Verdict {
     let any = |least: f64| ratios.iter().any(|ratio| ratio.interval.0 > least);
     if any(2.0) {
@@ -105,7 +104,7 @@ fn comparable(ratios: &[Measured]) -> Verdict {
     }
 }
 
-/// Events of a surface for each reading of a frame of 2000.
+/// Events of a surface per reading of a frame of 2000.
 fn a_frame(point: &PointTally, surface: &str) -> Measured {
     let events = Measured::mean(point, &format!("{surface}, events"));
     let pixels = point.count(&format!("{surface}, events values")) as f64;
@@ -129,7 +128,7 @@ fn frame_rate(part: &Part, papers: &[&PointTally]) -> Result<Claim> {
 
 fn redundant(part: &Part, papers: &[&PointTally]) -> Result<Claim> {
     let rate = |point: &PointTally| a_frame(point, WALL);
-    // Of all events, and of all readings of frames.
+    // Shares of all events, and of all readings of frames.
     let shares = |point: &PointTally| -> Result<[Measured; 2]> {
         let [mut events, mut frames] = [0, 0];
         for (surface, _) in surfaces(point)? {

@@ -13,21 +13,21 @@ use dtof_draw::palette::STEPS;
 use dtof_options::rows::grouped;
 use std::f64::consts::SQRT_2;
 
-/// What a chart over the signal of every surface shows.
-struct Shown<'a> {
+/// A chart over the signal of every surface.
+struct SurfaceChart<'a> {
     finding: &'a str,
     y: Axis,
-    /// How the tally of a surface ends, and what that is called.
+    /// Suffixes of a surface's tally, and the titles of their panels.
     names: &'a [(&'a str, &'a str)],
     note: &'a str,
 }
 
-/// A panel for each of the names, measured by `measured` for the tally
-/// `"surface, name"`, on the PC with the average at both backgrounds. The finding holds
-/// if `holds` of the dots of all panels at each background.
+/// A panel for each name, with `measured` of the tally `"surface, name"`, on the PC with the
+/// average at both backgrounds. The finding holds if `holds` is true for the dots of all panels at
+/// each background.
 fn by_signal(
     part: &Part,
-    shown: Shown,
+    shown: SurfaceChart,
     measured: impl Fn(&PointTally, &str) -> Measured,
     holds: impl Fn(&[Vec<Dot>]) -> bool,
 ) -> Result<Chart> {
@@ -75,8 +75,8 @@ fn by_signal(
     })
 }
 
-/// Whether every dot lies below that of the other at the same signal, where both are
-/// known to half of their value.
+/// Whether every dot lies below its counterpart at the same signal, if both are known within half
+/// of their value.
 fn is_below(dots: &[Dot], others: &[Dot]) -> bool {
     let is_known = |dot: &&Dot| {
         let (low, high) = dot.interval.unwrap_or((dot.y, dot.y));
@@ -93,7 +93,7 @@ fn is_below(dots: &[Dot], others: &[Dot]) -> bool {
 pub fn results(part: &Part) -> Result<Results> {
     let events = by_signal(
         part,
-        Shown {
+        SurfaceChart {
             finding: "Brighter surfaces report more often, at most once in 110 laser cycles",
             y: Axis::linear("events of a pixel in 10,000 laser cycles, mean"),
             names: &[("events", "")],
@@ -109,7 +109,7 @@ pub fn results(part: &Part) -> Result<Results> {
     let names = |names: [&'static str; 3]| [0, 1, 2].map(|at| (names[at], DEPTHS[at]));
     let depth = by_signal(
         part,
-        Shown {
+        SurfaceChart {
             finding: "The mean of ten events errs less than the last event",
             y: Axis::logarithmic("root mean square error, bins"),
             names: &names(DEPTHS),
@@ -120,7 +120,7 @@ pub fn results(part: &Part) -> Result<Results> {
     )?;
     let noise = by_signal(
         part,
-        Shown {
+        SurfaceChart {
             finding: "The last event is noisier than a frame, and than the mean of ten",
             y: Axis::logarithmic("standard deviation, bins"),
             names: &names(NOISES),
@@ -135,7 +135,7 @@ pub fn results(part: &Part) -> Result<Results> {
     let by_events = (ESTIMATES[0], "by the number of events, as in the paper");
     let reflectivity = by_signal(
         part,
-        Shown {
+        SurfaceChart {
             finding: "Photons an exposure tell the reflectivity better than the number of events",
             y: Axis::linear("estimate over truth, after one scale for the scene"),
             names: &[by_events, (ESTIMATES[1], "by photons and exposure")],

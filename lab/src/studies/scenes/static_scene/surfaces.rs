@@ -1,4 +1,4 @@
-//! What pixels of the scene see.
+//! The surfaces of the scene.
 
 use super::scene;
 use crate::sweep::PointTally;
@@ -10,7 +10,7 @@ pub fn surfaces(point: &PointTally) -> Result<Vec<(String, f64)>> {
     let scene = scene(&point.parameters, 0.0)?;
     let mut sums = vec![(0.0, 0.0); scene.surfaces.len()];
     let pixels = scene.array()?.pixels() as usize;
-    for address in (0..u16::MAX).take(pixels).map(PixelAddress) {
+    for address in (0..u16::MAX).take(pixels).map(PixelAddress::new) {
         if let Some(view) = scene.truth(address, 0) {
             let (sum, count) = &mut sums[view.surface];
             *sum += scene.rates(address, 0).signal;

@@ -15,9 +15,9 @@ pub const PROTOCOL: &str = "foxglove.sdk.v1";
 /// A client that has shaken hands.
 pub struct Client {
     pub socket: WebSocket<TcpStream>,
-    /// What the server said of itself, newest last.
+    /// The server's information messages, newest last.
     pub infos: Vec<Value>,
-    /// What the server complained of.
+    /// The server's status messages.
     pub statuses: Vec<Value>,
     /// Channels by their topics.
     pub channels: BTreeMap<String, Value>,
@@ -31,7 +31,7 @@ pub struct Data {
     pub bytes: Vec<u8>,
 }
 
-/// Shakes hands, with more headers; or gives the status with which it is refused.
+/// Shakes hands with more headers, or returns the status of the refusal.
 pub fn shake(port: u16, more: &[(&'static str, &str)]) -> Result<WebSocket<TcpStream>, u16> {
     let mut request = format!("ws://127.0.0.1:{port}/")
         .into_client_request()
@@ -82,7 +82,7 @@ impl Client {
         self.say(&json!({ "op": "subscribe", "subscriptions": subscriptions }));
     }
 
-    /// To all.
+    /// Subscribes to all topics.
     pub fn subscribe_all(&mut self) {
         let topics: Vec<String> = self.channels.keys().cloned().collect();
         self.subscribe(&topics.iter().map(String::as_str).collect::<Vec<_>>());
@@ -93,16 +93,16 @@ impl Client {
         self.say(&json!({ "op": "unsubscribe", "subscriptionIds": [id] }));
     }
 
-    /// Reads what comes next, and gives it if it is data.
+    /// Reads the next message and returns it if it has data.
     pub fn read(&mut self) -> Option<Data> {
         match self.socket.read().unwrap() {
             Message::Text(text) => {
-                let said: Value = serde_json::from_str(&text).unwrap();
-                match said["op"].as_str().unwrap() {
-                    "serverInfo" => self.infos.push(said),
-                    "status" => self.statuses.push(said),
+                let message: Value = serde_json::from_str(&text).unwrap();
+                match message["op"].as_str().unwrap() {
+                    "serverInfo" => self.infos.push(message),
+                    "status" => self.statuses.push(message),
                     "advertise" => {
-                        for channel in said["channels"].as_array().unwrap() {
+                        for channel in message["channels"].as_array().unwrap() {
                             let topic = channel["topic"].as_str().unwrap().to_owned();
                             assert!(self.channels.insert(topic, channel.clone()).is_none());
                         }
@@ -127,7 +127,7 @@ impl Client {
         }
     }
 
-    /// All data until something is so.
+    /// All data until a condition holds.
     #[track_caller]
     pub fn until(&mut self, what: &str, mut is_so: impl FnMut(&Data) -> bool) -> Vec<Data> {
         let (since, mut all) = (Instant::now(), Vec::new());

@@ -12,7 +12,7 @@ use tungstenite::Message;
 use super::client::{Client, PROTOCOL, shake};
 use super::{of, play, points, recording};
 use crate::common::aer::{depth, file};
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, assert_contains};
 use crate::view::http::{Stream, post};
 use crate::view::{Live, fast, until};
 use dtof_events::aer_file::{Header, Reader};
@@ -30,12 +30,12 @@ fn pages_of_other_sites_read_nothing() {
         let refused = shake(live.foxglove, &[protocol, ("origin", origin)]);
         assert_eq!(refused.unwrap_err(), 403, "{origin}");
     }
-    // A name of another site that leads here.
+    // A name of another site that points here.
     let refused = shake(live.foxglove, &[protocol, ("host", "example.com:8765")]);
     assert_eq!(refused.unwrap_err(), 403);
     for origin in ["https://app.foxglove.dev", "file://", origin] {
         let mut socket = shake(live.foxglove, &[protocol, ("origin", origin)]).unwrap();
-        says(socket.read().unwrap().to_text().unwrap(), "serverInfo");
+        assert_contains(socket.read().unwrap().to_text().unwrap(), "serverInfo");
     }
     for offered in ["chat", "foxglove.sdk.v2", "foxglove.sdk.v11"] {
         let refused = shake(live.foxglove, &[("sec-websocket-protocol", offered)]);
@@ -63,14 +63,14 @@ fn clients_want_different_things_leave_and_come_back() {
     clients[1].next("/range");
     clients[1].unsubscribe("/range");
     clients[1].subscribe(&["/rate"]);
-    // The first image is of a second.
+    // The first rates cover a second.
     clients[1].next("/rate");
     let later = clients[1].until("losses", |data| data.topic == "/losses");
     assert!(of(&later, "/range").next().is_none());
-    // What nobody wants is not kept.
+    // Events without a subscriber are not kept.
     let [first, second] = clients;
     drop(first);
-    until("nothing is kept", || live.hub.kept()[1] == 0);
+    until("nothing is kept", || live.hub.memory()[1] == 0);
     std::thread::sleep(Duration::from_secs(1));
     let mut again = Client::open(live.foxglove);
     assert_eq!(
@@ -78,12 +78,12 @@ fn clients_want_different_things_leave_and_come_back() {
         second.infos.last().unwrap()["sessionId"]
     );
     again.subscribe(&["/statistics"]);
-    // Of what has come since, not of the time in which nobody asked.
+    // Only events since the subscription are sent.
     let first = again.next("/statistics").json();
     assert!(first["duration_s"].as_f64() < Some(0.9), "{first}");
     again.subscribe(&["/events", "/log"]);
     assert!(!points([&again.next("/events").bytes[..]].into_iter()).is_empty());
-    // More than may be connected at a time: the last comes when another has gone.
+    // More clients than allowed: the last is served when another has gone.
     drop((again, second));
     let mut many: Vec<Client> = (0..MOST_CLIENTS)
         .map(|_| Client::open(live.foxglove))
@@ -96,7 +96,7 @@ fn clients_want_different_things_leave_and_come_back() {
     last.join().unwrap();
 }
 
-/// Neither memory nor the recording: and it is given up.
+/// A slow client affects neither memory nor the recording, and is disconnected.
 #[test]
 fn a_client_that_reads_nothing_costs_nothing() {
     let scratch = Scratch::new();
@@ -110,34 +110,34 @@ fn a_client_that_reads_nothing_costs_nothing() {
     good.subscribe(&["/statistics", "/losses"]);
     let most = 65_536 + 3 * 256;
     let lost = good.until("much more", |data| {
-        assert!(live.hub.kept()[1] <= most);
+        assert!(live.hub.memory()[1] <= most);
         data.topic == "/losses" && data.json()["events"].as_u64() > Some(1_000_000)
     });
     assert!(lost.len() > 3);
     until("a client less", || {
-        // It was given up: what is left in the buffers of the socket comes, and then its end.
+        // Disconnected: the rest of the socket's buffers arrives, then the end.
         let _ = good.read();
         is_closed(&mut stuck)
     });
     let before = good.next("/losses").json()["events"].as_u64().unwrap();
     let answer = post(live.port, "/record", "{\"on\":false}").body;
-    says(&answer, "Saved ");
+    assert_contains(&answer, "Saved ");
     let file = fs::read_dir(&out).unwrap().next().unwrap().unwrap().path();
     let mut reader = Reader::new(BufReader::new(File::open(file).unwrap())).unwrap();
     let (mut events, mut last) = (0, 0);
     while let Some(event) = reader.next_event().unwrap() {
-        // Each ten laser cycles after the one before: none is missing.
-        assert!(last == 0 || event.cycle().0 == last + 10);
-        last = event.cycle().0;
+        // Events are ten laser cycles apart: none is missing.
+        assert!(last == 0 || event.cycle().raw() == last + 10);
+        last = event.cycle().raw();
         events += 1;
     }
     assert!(events >= 1_000_000 && before >= 1_000_000, "{events}");
     live.end();
 }
 
-/// Whether the server has closed, without reading what it has sent.
+/// Returns whether the server has closed, without reading its data.
 fn is_closed(client: &mut Client) -> bool {
-    // A server that has closed answers nothing but a reset.
+    // A closed connection answers with a reset only.
     let stream = client.socket.get_mut();
     stream.write_all(&[0x89, 0x80, 0, 0, 0, 0]).is_err()
 }
@@ -160,10 +160,10 @@ fn a_client_that_reads_slowly_is_told_what_it_missed() {
         (&status["level"], &status["id"]),
         (&json!(1), &json!("slow"))
     );
-    says(status["message"].as_str().unwrap(), "frames were left out");
+    assert_contains(status["message"].as_str().unwrap(), "frames were left out");
 }
 
-/// Half a megabyte of images ten times a second, which nobody takes.
+/// Half a megabyte of images ten times a second that the client does not read.
 #[cfg(target_os = "linux")]
 #[test]
 fn memory_does_not_grow_while_a_client_reads_nothing() {
@@ -177,14 +177,14 @@ fn memory_does_not_grow_while_a_client_reads_nothing() {
     let mut programs = [(); 2].map(|()| Program::start(&scratch, "view large.aer --foxglove=0"));
     let mut stuck = Client::open(programs[0].port);
     stuck.subscribe_all();
-    // Each ping wants an answer, which nobody takes either.
+    // Each ping causes an answer that is not read either.
     let mut asks = Client::open(programs[0].port);
     let stream = asks.socket.get_mut();
     stream
         .set_write_timeout(Some(Duration::from_secs(1)))
         .unwrap();
     let ping = Message::Ping(vec![0; 125].into());
-    // Less than until they are given up.
+    // Shorter than the time until they are disconnected.
     let begun = Instant::now();
     while begun.elapsed() < Duration::from_secs(8) && asks.socket.send(ping.clone()).is_ok() {}
     std::thread::sleep(Duration::from_secs(8).saturating_sub(begun.elapsed()));
@@ -197,7 +197,7 @@ fn memory_does_not_grow_while_a_client_reads_nothing() {
     }
 }
 
-/// The program, as somebody starts it.
+/// The running program.
 struct Program {
     child: Child,
     out: BufReader<ChildStdout>,
@@ -234,16 +234,16 @@ impl Program {
         peak.unwrap().parse().unwrap()
     }
 
-    /// Ends it, and gives what it said on standard error.
+    /// Ends the program and returns its standard error.
     fn end(&mut self) -> String {
         self.child.kill().unwrap();
-        let mut said = String::new();
+        let mut printed = String::new();
         let mut stderr = self.child.stderr.take().unwrap();
-        stderr.read_to_string(&mut said).unwrap();
+        stderr.read_to_string(&mut printed).unwrap();
         self.child.wait().unwrap();
-        // Nothing but the addresses.
+        // Standard output has the addresses only.
         assert_eq!(self.out.read_line(&mut String::new()).unwrap(), 0);
-        said
+        printed
     }
 }
 
@@ -264,9 +264,9 @@ fn the_command_says_where_foxglove_connects_and_what_is_wrong() {
          events.aer --foxglove --foxglove-origin * | must be http://HOST",
     );
     let mut program = Program::start(&scratch, "view events.aer --speed 0.1 --foxglove=0");
-    says(&program.page, "http://127.0.0.1:");
+    assert_contains(&program.page, "http://127.0.0.1:");
     Client::open(program.port);
-    // Who started the program is told why a page cannot connect, once.
+    // The terminal shows once why a page cannot connect.
     for _ in 0..2 {
         let headers = [
             ("sec-websocket-protocol", PROTOCOL),
@@ -274,7 +274,7 @@ fn the_command_says_where_foxglove_connects_and_what_is_wrong() {
         ];
         assert_eq!(shake(program.port, &headers).unwrap_err(), 403);
     }
-    let said = program.end();
-    assert_eq!(said.lines().count(), 1, "{said}");
-    says(&said, "--foxglove-origin http://localhost:9 ");
+    let printed = program.end();
+    assert_eq!(printed.lines().count(), 1, "{printed}");
+    assert_contains(&printed, "--foxglove-origin http://localhost:9 ");
 }

@@ -9,7 +9,7 @@ use super::client::{Client, Data};
 use super::protobuf::{field, fields};
 use super::{START_US, of, play, points, recording};
 use crate::common::aer::{depth, dynamic};
-use crate::common::{Scratch, says};
+use crate::common::{Scratch, assert_contains};
 use crate::view::device::{feed, plugged};
 use crate::view::http::{Stream, post};
 use crate::view::{Live, until};
@@ -61,7 +61,7 @@ fn what_is_played_is_what_is_exported() {
     assert_eq!(topics, TOPICS);
     let info = client.infos[0].clone();
     assert_eq!(info["capabilities"], json!([]));
-    says(info["name"].as_str().unwrap(), "events.aer");
+    assert_contains(info["name"].as_str().unwrap(), "events.aer");
     client.subscribe_all();
     let mut last = BTreeMap::new();
     let all = client.until("the end", |data| {
@@ -117,7 +117,7 @@ fn what_is_played_is_what_is_exported() {
     for data in &sent {
         assert_eq!(stamp(&data.bytes), data.time);
     }
-    // Several slices, each from the end of the last on.
+    // Each slice begins at the end of the last.
     let statistics: Vec<Value> = of(&all, "/statistics").map(Data::json).collect();
     assert!(statistics.len() >= 3, "{statistics:?}");
     let keys = |value: &Value| {
@@ -156,7 +156,7 @@ fn what_is_played_is_what_is_exported() {
         assert_eq!(sum(&statistics), sum(&counts), "{count}");
     }
 
-    // Maps of what came last.
+    // Maps of the last events.
     let range = image(&last["/range"]);
     assert_eq!(range.iter().filter(|range| !range.is_nan()).count(), 200);
     for record in &exported {
@@ -187,14 +187,14 @@ fn what_is_played_is_what_is_exported() {
     let lines: Vec<String> = of(&all, "/log")
         .map(|data| field(&data.bytes, 3).text().to_owned())
         .collect();
-    // Whether the client came before the file was open or after.
+    // The client may connect before or after the file is opened.
     assert!(lines.iter().any(|line| line == "playing"), "{lines:?}");
     assert_eq!(lines.last().unwrap(), "ended");
     assert_eq!(last["/losses"].json()["points_left_out"], 0);
     assert!(client.statuses.is_empty(), "{:?}", client.statuses);
 
     let sessions = client.infos.len();
-    // Played again, time begins again: another session of the same channels.
+    // When played again, time begins again: a new session with the same channels.
     post(live.port, "/play", "{\"on\":true}");
     client.until("again", |data| {
         data.topic == "/statistics" && data.json()["events_so_far"].as_u64() > Some(200)
@@ -256,7 +256,7 @@ fn a_device_tells_every_loss_and_why_it_is_gone() {
             .collect::<Vec<_>>()
     };
     assert_eq!(keys(&lost), keys(&schema["properties"]));
-    // Those of the page.
+    // The same totals as on the page.
     let mut page = Stream::open(live.port, 0);
     let frame = page.until("losses", |frame| {
         frame["losses"]["photons"].as_u64() > Some(0)

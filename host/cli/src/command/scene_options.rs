@@ -1,4 +1,4 @@
-//! The options of `dtof simulate` that say what the array sees beside a scene file.
+//! The options of `dtof simulate` that complete or replace a scene file.
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +8,7 @@ use dtof::path;
 use dtof_options::numbers::within;
 use dtof_options::rows::Row;
 use dtof_photons::geometry::FieldOfView;
-use dtof_simulate::scene::{Along, DepthMap, Scene};
+use dtof_simulate::scene::{DepthAlong, DepthMap, Scene};
 
 use super::flags::name;
 
@@ -16,21 +16,21 @@ use super::flags::name;
 const BACKGROUND: f64 = 0.02;
 
 #[derive(Args)]
-pub struct View {
-    /// A depth map as a surface, alone or with those of --scene: an .npy array of rows and
-    /// columns, floats in metres or integers in millimetres. No surface where it is 0, negative,
+pub struct SceneOptions {
+    /// Depth map as a surface, alone or with those of --scene: an .npy array of rows and columns,
+    /// floats in metres or integers in millimetres. There is no surface where it is 0, negative,
     /// infinite or NaN
     #[arg(long, value_name = "FILE", value_parser = path())]
     pub depth: Option<PathBuf>,
-    /// What the depth map holds
-    #[arg(long, value_parser = name::<Along>(), default_value = "axis", requires = "depth")]
-    depth_along: Along,
-    /// The reflectivity of the depth map: an .npy picture as large, grey or of three colours,
-    /// bytes from 0 to 255 or floats, white being 1 [default: white]
+    /// Meaning of the depth map
+    #[arg(long, value_parser = name::<DepthAlong>(), default_value = "axis", requires = "depth")]
+    depth_along: DepthAlong,
+    /// Reflectivity of the depth map: an .npy picture of the same size, grey or of three colours,
+    /// bytes from 0 to 255 or floats with 1 for white [default: white]
     #[arg(long, value_name = "FILE", value_parser = path(), requires = "depth")]
     albedo: Option<PathBuf>,
-    /// Horizontal and vertical angle in degrees, from edge to edge of the array [default: the
-    /// scene file's, or 60 along the longer side, with square pixels]
+    /// Field of view, horizontal and vertical in degrees, from edge to edge of the array [default:
+    /// the scene file's, or 60 along the longer side, with square pixels]
     #[arg(long, value_name = "HxV", allow_hyphen_values = true)]
     fov: Option<FieldOfView>,
     /// Signal photons a laser cycle from a white surface at one metre [default: the scene file's,
@@ -45,11 +45,11 @@ pub struct View {
     pulse_sigma_bins: Option<f64>,
 }
 
-impl View {
-    /// The scene of `file`, or one with its defaults and some background, as the options change it.
+impl SceneOptions {
+    /// The scene of `file`, or an empty one with some background, as the options change it.
     ///
     /// # Errors
-    /// What is wrong with a file.
+    /// Fails if a file is wrong.
     pub fn scene(&self, file: Option<&Path>) -> Result<Scene> {
         let mut scene = match file {
             Some(file) => Scene::read(file)?,
@@ -79,27 +79,30 @@ impl View {
         Ok(scene)
     }
 
-    /// The files of the scene, for people.
-    pub fn input(&self, file: Option<&Path>) -> String {
+    /// Names of the scene's files, for the report.
+    pub fn files(&self, file: Option<&Path>) -> String {
         let files = [file, self.depth.as_deref(), self.albedo.as_deref()];
         let names = files.into_iter().flatten();
         let names: Vec<_> = names.map(|file| file.display().to_string()).collect();
         names.join(", ")
     }
 
-    /// What no file says, and what of it was assumed.
+    /// Rows of the report on the values that belong to a depth map.
     pub fn rows(&self, scene: &Scene) -> Vec<Row> {
         if self.depth.is_none() {
             return Vec::new();
         }
         let row = |name: &str, value: String| (name.to_owned(), value);
         let along = match self.depth_along {
-            Along::Axis => "depth along the optical axis",
-            Along::Ray => "range along the ray",
+            DepthAlong::Axis => "depth along the optical axis",
+            DepthAlong::Ray => "range along the ray",
         };
         vec![
             row("depth map", along.to_owned()),
-            row("field of view", format!("{} degrees", scene.view())),
+            row(
+                "field of view",
+                format!("{} degrees", scene.effective_field_of_view()),
+            ),
             row(
                 "signal",
                 format!(

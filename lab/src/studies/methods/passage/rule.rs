@@ -1,26 +1,25 @@
-//! What decides, and what it is called.
+//! Detection rules, and their names.
 
 use anyhow::{Result, bail};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{AnyRule, AverageRule, Count, PaperRule, WindowRule};
 use dtof_draw::palette::{self, Pen};
 
-/// What decides.
+/// A detection rule, or the likelihood ratio as a reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Method {
+pub enum Rule {
     /// The paper's rule; its threshold is α.
     Paper,
-    /// The same over the average of all bins.
+    /// The same with the average of all bins as background; its threshold is α.
     Average,
-    /// The core's window rule with as many bins; its threshold is z.
+    /// The core's window rule with this many bins; its threshold is z.
     Window(u8),
-    /// The largest likelihood ratio of a scene that is known; its threshold is in
-    /// nats.
+    /// The generalised likelihood ratio test for a known scene; its threshold is in nats.
     Oracle,
 }
 
-impl Method {
-    /// Those that a pixel can run.
+impl Rule {
+    /// The rules that a pixel can run.
     pub const RULES: [Self; 7] = [
         Self::Paper,
         Self::Average,
@@ -34,8 +33,8 @@ impl Method {
     /// The core's rule with this threshold and minimum count.
     ///
     /// # Errors
-    /// If there is none.
-    pub fn rule(self, threshold: f64, minimum: u32) -> Result<AnyRule> {
+    /// Fails if the threshold is out of range, or for [`Self::Oracle`].
+    pub fn with_threshold(self, threshold: f64, minimum: u32) -> Result<AnyRule> {
         let minimum = Count::saturating(minimum);
         Ok(match self {
             Self::Paper => PaperRule::new(U8F8::saturating_from_num(threshold), minimum).into(),
@@ -58,7 +57,7 @@ impl Method {
         }
     }
 
-    /// What it looks like in a chart.
+    /// Its pen in a chart.
     #[must_use]
     pub const fn pen(self) -> Pen {
         match self {
@@ -69,7 +68,7 @@ impl Method {
         }
     }
 
-    /// Its name where there is little room: a window's is its width.
+    /// Its short name; that of a window is its width.
     #[must_use]
     pub fn short(self) -> String {
         match self {

@@ -1,4 +1,4 @@
-//! A sensor on the desk: a flat wall before pixels one of which is hot, on the firmware's sidecar
+//! A simulated sensor in front of a flat wall, with one hot pixel. The firmware's sidecar runs it
 //! behind a TCP port of this computer.
 
 use std::num::NonZeroU16;
@@ -9,7 +9,7 @@ use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{U0F32, U8F24, U16F16};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_sensors::simulated::{self, Pulse, Simulated, SimulatedPixel};
-use dtof_sensors::{About, PhotonSink, Polled, Sensor, SensorFault};
+use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 /// Longer than any test.
 pub const LONG: Duration = Duration::from_secs(600);
@@ -20,14 +20,14 @@ pub const HOT: u16 = 5;
 pub const SIGNAL: f64 = 0.4;
 pub const BACKGROUND: f64 = 0.25;
 pub const HOT_BACKGROUND: f64 = 3.5;
-/// Of the pulse, in bins.
+/// Standard deviation and position of the pulse in bins.
 pub const SIGMA: f64 = 0.9;
 pub const POSITION: f64 = 44.8;
-/// The first bin of the pulse, and how many it has.
+/// The first bin of the pulse, and its number of bins.
 pub const FIRST: u16 = 40;
 pub const WIDTH: u16 = 10;
 
-/// The share of the pulse in each of its bins: the Gaussian, added up in small steps.
+/// The share of the pulse in each of its bins: a Gaussian, summed in small steps.
 fn shares() -> Vec<f64> {
     let step = |bin: u16, part: u16| {
         let at = f64::from(FIRST + bin) + (f64::from(part) + 0.5) / 1000.0 - POSITION;
@@ -39,10 +39,10 @@ fn shares() -> Vec<f64> {
     bins.iter().map(|bin| bin / all).collect()
 }
 
-/// Of bins of a sensor that gives whole histograms.
+/// Bin width of a sensor that counts histograms itself.
 pub const WHOLE_BIN_PS: U16F16 = U16F16::lit("100");
 
-/// Of each pixel: photons a laser cycle of signal and background.
+/// Photons a laser cycle of signal and background, by pixel.
 pub type Rates = fn(u16) -> (f64, f64);
 
 pub const WALL: Rates = |pixel| {
@@ -62,7 +62,7 @@ pub fn photons(rates: Rates) -> Simulated<'static> {
     let rate = U8F24::from_num::<f64>;
     let pixel = |pixel| {
         let (signal, background) = rates(pixel);
-        let address = PixelAddress(pixel);
+        let address = PixelAddress::new(pixel);
         SimulatedPixel::new(address, FIRST, rate(signal), rate(background)).unwrap()
     };
     let pixels: Vec<_> = (0..PIXELS).map(pixel).collect();
@@ -77,36 +77,36 @@ pub fn photons(rates: Rates) -> Simulated<'static> {
     Simulated::new(pixels.leak(), Pulse::new(&shares.leak()[..last]), settings)
 }
 
-/// A sensor that may be unplugged, or add up what it sees and give whole histograms of it.
+/// A sensor that may be unplugged, or count histograms itself.
 #[derive(Clone)]
-pub struct Desk {
+pub struct WallSensor {
     pub photons: Simulated<'static>,
-    /// What it sees after a second.
+    /// Its photons after the first second.
     pub later: Option<Simulated<'static>>,
     pub is_there: bool,
-    /// Laser cycles of a histogram, and those that have ended.
-    pub whole: Option<(u32, u32)>,
+    /// A sensor that counts histograms: laser cycles of a histogram, and of the current one so far.
+    pub histogram_cycles: Option<(u32, u32)>,
     pub counts: Vec<[u32; 128]>,
 }
 
-impl Desk {
+impl WallSensor {
     pub fn new(rates: Rates) -> Self {
         Self {
             photons: photons(rates),
             later: None,
             is_there: true,
-            whole: None,
+            histogram_cycles: None,
             counts: vec![[0; 128]; PIXELS.into()],
         }
     }
 }
 
-/// Adds photons up.
+/// Sums photons into histograms.
 struct Adding<'a>(&'a mut [[u32; 128]], u32);
 
 impl PhotonSink for Adding<'_> {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
-        self.0[usize::from(pixel.0)][usize::from(code)] += 1;
+        self.0[usize::from(pixel.raw())][usize::from(code)] += 1;
     }
     fn end_laser_cycles(&mut self, cycles: u16) {
         self.1 += u32::from(cycles);
@@ -115,14 +115,14 @@ impl PhotonSink for Adding<'_> {
     fn histogram(&mut self, _: PixelAddress, _: &[u32; 128]) {}
 }
 
-impl Sensor for Desk {
+impl Sensor for WallSensor {
     type Error = SensorFault;
 
-    fn about(&self) -> About {
-        About {
-            is_whole: self.whole.is_some(),
-            bin_width: self.whole.map(|_| WHOLE_BIN_PS),
-            ..self.photons.about()
+    fn info(&self) -> SensorInfo {
+        SensorInfo {
+            gives_histograms: self.histogram_cycles.is_some(),
+            bin_width: self.histogram_cycles.map(|_| WHOLE_BIN_PS),
+            ..self.photons.info()
         }
     }
 
@@ -139,7 +139,7 @@ impl Sensor for Desk {
         if let Some(later) = self.later.take_if(|_| now_ms > 1_000) {
             self.photons = later;
         }
-        let Some((length, ended)) = &mut self.whole else {
+        let Some((length, ended)) = &mut self.histogram_cycles else {
             let Ok(polled) = self.photons.poll(now_ms, sink);
             return Ok(polled);
         };
@@ -150,7 +150,7 @@ impl Sensor for Desk {
             return Ok(Polled::Idle);
         }
         sink.begin_frame(std::mem::take(ended));
-        for (pixel, counts) in (0..).map(PixelAddress).zip(&mut self.counts) {
+        for (pixel, counts) in (0..).map(PixelAddress::new).zip(&mut self.counts) {
             sink.histogram(pixel, counts);
             *counts = [0; 128];
         }
@@ -158,13 +158,13 @@ impl Sensor for Desk {
     }
 }
 
-/// A device that hangs up after `lives`, and is there again.
-pub fn device(sensor: Desk, lives: Duration) -> String {
+/// A device that closes its connection after `lives` and then listens again.
+pub fn device(sensor: WallSensor, lives: Duration) -> String {
     listen(move |stream| {
         let mut pixels = heapless::Vec::<_, { PIXELS as usize }>::new();
         let mut blocks = heapless::Vec::<_, 1>::new();
         let mut sensor = sensor.clone();
-        let mut sidecar = Sidecar::new(&mut pixels, &mut blocks, Some(sensor.about()));
+        let mut sidecar = Sidecar::new(&mut pixels, &mut blocks, Some(sensor.info()));
         let poll = |sidecar: &mut Sidecar<'_>, now| sidecar.poll_sensor(&mut sensor, now);
         let _ = serve(stream, &mut sidecar, lives, poll);
         true

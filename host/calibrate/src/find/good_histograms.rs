@@ -1,4 +1,4 @@
-//! All good histograms of a recording, with what is known of each.
+//! The histograms of good pixels, with background and peaks of each.
 
 use dtof_core::Array;
 
@@ -6,13 +6,13 @@ use super::background::Level;
 use super::observed::Trace;
 use super::peaks::Peak;
 
-/// A slope of the background counts from this many standard deviations on.
+/// Standard deviations from which on a slope of the background is taken as real.
 const SLOPE: f64 = 6.0;
 
 /// The histograms of pixels that are neither hot nor dead.
 #[derive(Clone, Debug)]
-pub struct Scene {
-    /// Of one capture.
+pub struct GoodHistograms {
+    /// The array of one capture.
     array: Array,
     /// Background photons a bin and laser cycle.
     pub rate: f64,
@@ -22,12 +22,12 @@ pub struct Scene {
     pub levels: Vec<Level>,
     /// The peaks of each.
     pub peaks: Vec<Vec<Peak>>,
-    /// The background of each bin, as a multiple of its mean.
+    /// The background of each bin, relative to the mean over all bins.
     trend: Vec<f64>,
 }
 
-impl Scene {
-    /// With at least one histogram.
+impl GoodHistograms {
+    /// `rate` is the background in photons a bin and laser cycle. There is at least one histogram.
     #[must_use]
     pub fn new(array: Array, rate: f64, traces: Vec<Trace>, levels: Vec<Level>) -> Self {
         let peaks = traces.iter().zip(&levels);
@@ -50,13 +50,13 @@ impl Scene {
         self.trend.len()
     }
 
-    /// Background photons that bin `bin` of histogram `index` holds on average.
+    /// Mean number of background photons in bin `bin` of histogram `index`.
     #[must_use]
     pub fn background(&self, index: usize, bin: usize) -> f64 {
         self.levels[index].mean * self.trend[bin]
     }
 
-    /// The sums of all counts, and of all backgrounds.
+    /// The sums over all histograms of the counts of each bin, and of the background of each bin.
     #[must_use]
     pub fn pooled(&self) -> (Vec<f64>, Vec<f64>) {
         let mut counts = vec![0.0; self.bins()];
@@ -76,7 +76,7 @@ impl Scene {
         self.traces.iter().map(|trace| trace.cycles).sum()
     }
 
-    /// The histograms along rows, and along columns.
+    /// The indices of the histograms in the order of rows, and in that of columns.
     #[must_use]
     pub fn orders(&self) -> [Vec<usize>; 2] {
         let columns = self.array.columns() as usize;
@@ -84,14 +84,14 @@ impl Scene {
         let along_rows = order.clone();
         order.sort_by_key(|&index| {
             let trace = &self.traces[index];
-            (trace.pixel % columns, trace.pixel / columns, trace.capture)
+            (trace.pixel % columns, trace.pixel / columns)
         });
         [along_rows, order]
     }
 }
 
-/// A straight line through the bins that hold background in most histograms, if they reach over
-/// most of them and it falls or rises surely.
+/// Fits a straight line through the bins that hold background in most histograms. The trend is flat
+/// if these bins span too little, or if the slope is not significant.
 fn trend(traces: &[Trace], levels: &[Level]) -> Vec<f64> {
     let bins = levels.first().map_or(0, |level| level.clear.len());
     // Counts and expectation of each bin.

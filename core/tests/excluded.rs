@@ -9,19 +9,18 @@
 
 use std::collections::BTreeSet;
 
-use dtof_core::{
-    BinIndex, Count10, Count16, Count24, CounterWidth, Histogram, PeeledBins, RangeGate,
-};
+use dtof_core::rule::ExcludedBins;
+use dtof_core::{BinIndex, Count10, Count16, Count24, CounterWidth, Histogram, RangeGate};
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-fn peeled(peaks: &[u16], reach: u8) -> PeeledBins {
-    let mut peeled = PeeledBins::new(reach);
+fn excluded(peaks: &[u16], reach: u8) -> ExcludedBins {
+    let mut excluded = ExcludedBins::new(reach);
     for &peak in peaks {
-        peeled.push(BinIndex::new(peak).unwrap());
+        excluded.push(BinIndex::new(peak).unwrap());
     }
-    peeled
+    excluded
 }
 
 /// The bins up to `reach` from one of the peaks, those before bin 0 and past the last too.
@@ -32,7 +31,7 @@ fn set(peaks: &[u16], reach: u8) -> BTreeSet<i32> {
 
 /// Every answer, for a histogram of `BINS` bins.
 fn check<const BINS: usize>(peaks: &[u16], reach: u8) {
-    let (found, set) = (peeled(peaks, reach), set(peaks, reach));
+    let (found, set) = (excluded(peaks, reach), set(peaks, reach));
     assert_eq!(usize::from(found.echoes()), peaks.len());
     for bin in 0..BINS as u16 {
         let at = i32::from(bin);
@@ -87,7 +86,7 @@ fn all_peaks_of_sixteen_bins() {
 #[test]
 fn bins_as_far_as_can_be() {
     for reach in [0, 1, u8::MAX] {
-        let found = peeled(&[1023], reach);
+        let found = excluded(&[1023], reach);
         for bin in [0, 767, 768, 769, 1022, 1023, u16::MAX] {
             let contains = bin <= 1023 + u16::from(reach) && bin >= 1023 - u16::from(reach);
             assert_eq!(found.contains(bin), contains, "{bin} {reach}");
@@ -98,17 +97,17 @@ fn bins_as_far_as_can_be() {
 
 #[test]
 fn there_are_no_more_than_three() {
-    let mut found = peeled(&[1, 11, 21], 2);
+    let mut found = excluded(&[1, 11, 21], 2);
     let before = found;
     found.push(BinIndex::saturating(31));
     assert_eq!((found, found.echoes()), (before, 3));
-    assert!(!PeeledBins::NONE.contains(0) && PeeledBins::NONE.echoes() == 0);
+    assert!(!ExcludedBins::NONE.contains(0) && ExcludedBins::NONE.echoes() == 0);
 }
 
 /// Counts photons, empties some bins, counts on and empties again. The other histogram never
 /// has the photons of the bins left out, but for those that met a full counter.
 fn emptied<const BINS: usize, W: CounterWidth>(peaks: &[u16], reach: u8, rng: &mut Pcg32) {
-    let (found, set) = (peeled(peaks, reach), set(peaks, reach));
+    let (found, set) = (excluded(peaks, reach), set(peaks, reach));
     let mut histogram = Histogram::<BINS, W>::new();
     let mut without = Histogram::<BINS, W>::new();
     let (mut offered, mut held) = (0u64, 0u64);
@@ -184,7 +183,7 @@ fn the_peak_is_found_again_wherever_it_is() {
             for bin in 0..8u16 {
                 let mut histogram = Histogram::<8>::new();
                 histogram.add_batch(&[bin, bin, 0, 1, 2, 3, 4, 5, 6, 7]);
-                peeled(&[peak], reach).empty(&mut histogram);
+                excluded(&[peak], reach).empty(&mut histogram);
                 let left = |bin: &u16| bin.abs_diff(peak) > u16::from(reach);
                 let highest = Some(bin).filter(left).map(|bin| (bin, 3));
                 let highest = highest.or_else(|| (0..8).find(left).map(|bin| (bin, 1)));

@@ -1,4 +1,4 @@
-//! Calibration of the sensor on the desk: the device's histograms in place of a recording.
+//! Calibration from the histograms of a device.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -7,13 +7,13 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::progress::Bar;
 use dtof::{complain, interrupt};
-use dtof_calibrate::{Asked, Calibration, Length, Observed, calibrate};
+use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate};
 use dtof_device::histograms::{Collected, SoFar, collect};
 use dtof_device::monitor::array;
 use dtof_device::{Client, Port, Stopped};
-use dtof_engine::settings::{Sensor, SettingsFile};
+use dtof_engine::settings::{SensorSettings, SettingsFile};
 use dtof_options::Refused;
-use dtof_options::numbers::{MOST_WHOLE, whole};
+use dtof_options::numbers::{MAX_INTEGER, integer};
 use dtof_options::progress::Progress;
 use dtof_options::rows::{Row, grouped};
 use dtof_photons::open::BIN_WIDTH_PS;
@@ -22,53 +22,53 @@ use dtof_run::given::Given;
 use crate::command::device_options::HostOptions;
 use crate::command::warn;
 
-/// How long photons are collected, unless somebody says.
+/// Default length of a collection.
 const SECONDS: u32 = 10;
 
 #[derive(Args)]
-pub struct Desk {
-    /// Calibrate the sensor of this device: tcp:HOST:PORT, a serial port, or `qemu`, which starts an
+pub struct DeviceArgs {
+    /// Device whose sensor is calibrated: tcp:HOST:PORT, a serial port, or `qemu`, which starts an
     /// emulated device
     #[arg(long, value_name = "DEVICE")]
     pub device: Option<String>,
-    /// Image that `--device qemu` runs [default: what `cargo xtask image mps2-an386` has built]
+    /// Image for `--device qemu` [default: the one built by `cargo xtask image mps2-an386`]
     #[arg(long, value_name = "FILE")]
     image: Option<PathBuf>,
-    /// Collect photons of the device for so many seconds, or until Ctrl-C [default: 10]
-    #[arg(long, value_name = "S", value_parser = whole(1..=86_400_u32))]
+    /// Device: longest collection in seconds; Ctrl-C ends it sooner [default: 10]
+    #[arg(long, value_name = "S", value_parser = integer(1..=86_400_u32))]
     seconds: Option<u32>,
-    /// End sooner, when the median pixel of the device has so many photons
-    #[arg(long, value_name = "N", value_parser = whole(1..=MOST_WHOLE))]
+    /// Device: photons of the median pixel that end the collection sooner
+    #[arg(long, value_name = "N", value_parser = integer(1..=MAX_INTEGER))]
     photons: Option<u64>,
     #[command(flatten)]
     host: HostOptions,
 }
 
-/// What was found, from whatever it is.
-pub struct Gathered {
+/// The calibration of a device.
+pub struct FromDevice {
     pub found: Calibration,
-    /// What file or device say of the sensor.
-    pub known: SettingsFile,
-    /// How much was collected.
+    /// The device's own settings.
+    pub settings: SettingsFile,
+    /// Rows of the report on the collection.
     pub rows: Vec<Row>,
 }
 
-impl Desk {
-    /// Options that say nothing about a recording are refused.
+impl DeviceArgs {
+    /// Refuses the options of a device, for a recording.
     ///
     /// # Errors
-    /// If there are any.
-    pub fn suits_file(&self) -> Result<()> {
-        let of_devices = [
+    /// Fails if any is given.
+    pub fn check_unused(&self) -> Result<()> {
+        let device_options = [
             ("image", self.image.is_some()),
             ("seconds", self.seconds.is_some()),
             ("photons", self.photons.is_some()),
             ("host_timeout", self.host.is_given()),
         ];
-        for (key, is_there) in of_devices {
+        for (key, is_given) in device_options {
             ensure!(
-                !is_there,
-                Refused::new(key, "is of `device`, not of recordings")
+                !is_given,
+                Refused::new(key, "is for `device`, not for recordings")
             );
         }
         Ok(())
@@ -77,7 +77,7 @@ impl Desk {
     /// Opens the device.
     ///
     /// # Errors
-    /// If none is named, there is none, or options that are given do not suit it.
+    /// Fails if no device is given, it cannot be opened, or an option is not for devices.
     pub fn open(&self, given: &Given) -> Result<Box<dyn Port>> {
         let name = self.device.as_deref();
         let name = name.ok_or_else(|| Refused::new("input", "is needed, or `device`"))?;
@@ -85,51 +85,47 @@ impl Desk {
         dtof_device::open(name, self.image.as_deref())
     }
 
-    /// Collects and calibrates.
+    /// Collects histograms and calibrates.
     ///
     /// # Errors
-    /// If the device or an option does not suit, or nothing comes.
+    /// Fails if the device or an option does not suit, or if the collection fails.
     pub fn calibrate(
         &self,
         (name, port): (&str, Box<dyn Port>),
-        said: &SettingsFile,
-        asked: &Asked,
+        requested: &SettingsFile,
+        options: &CalibrationOptions,
         quiet: bool,
-    ) -> Result<Gathered> {
+    ) -> Result<FromDevice> {
         let mut client = Client::new(port)?;
-        interrupt::listen(|| ())?;
+        interrupt::handle_ctrl_c(|| ())?;
         let sensor = client.sensor()?.context("the device has no sensor")?;
         let pixels = sensor.pixels.min(client.pixels());
         ensure!(pixels > 0, "the device has no pixels");
         let bins = client.bins();
-        ensure!(
-            said.sensor.bins.is_none_or(|said| said == bins),
-            "the settings are for {} bins, the device has {bins}",
-            said.sensor.bins.unwrap_or_default(),
-        );
-        let array = array(pixels, said.sensor.columns);
+        requested.check_bins(bins)?;
+        let array = array(pixels, requested.sensor.columns);
         let array = array.filter(|array| array.pixels() == u32::from(pixels));
         let array = array.ok_or_else(|| {
             let reason = format!("the device has {pixels} pixels, which do not fill such rows");
-            Refused::value("columns", said.sensor.columns.unwrap_or(1), reason)
+            Refused::value("columns", requested.sensor.columns.unwrap_or(1), reason)
         })?;
-        let known = SettingsFile {
-            sensor: Sensor {
+        let own = SettingsFile {
+            sensor: SensorSettings {
                 laser_hz: Some(sensor.laser_millihertz / 1000).filter(|&hz| hz > 0),
                 columns: Some(array.columns()),
                 bins: Some(bins),
                 bin_width_ps: Some(sensor.bin_width.unwrap_or(BIN_WIDTH_PS)),
                 offset_mm: Some(sensor.offset).filter(|offset| !offset.is_zero()),
-                ..Sensor::default()
+                ..SensorSettings::default()
             },
             ..SettingsFile::default()
         };
-        let bin_width_ps = said.sensor.bin_width_ps.or(known.sensor.bin_width_ps);
-        // Bins alone: how pixels decide is not for this.
+        let bin_width_ps = requested.sensor.bin_width_ps.or(own.sensor.bin_width_ps);
+        // Histograms need no settings but the bin width.
         let settings = SettingsFile {
-            sensor: Sensor {
+            sensor: SensorSettings {
                 bin_width_ps,
-                ..Sensor::default()
+                ..SensorSettings::default()
             },
             ..SettingsFile::default()
         };
@@ -159,19 +155,19 @@ impl Desk {
             bin_width_ps: settings.bin_width_ps.to_num(),
             truth_mm: None,
         };
-        let found = calibrate(&observed, asked)?;
+        let found = calibrate(&observed, options)?;
         ensure!(
             found.pulse.is_some() || !interrupt::is_interrupted(),
             "ended too soon: no peak is bright enough to measure the pulse; nothing is written"
         );
-        Ok(Gathered {
+        Ok(FromDevice {
             found,
-            known,
+            settings: own,
             rows: vec![row(&collected.cycles)],
         })
     }
 
-    /// Shows how far `collect` is, and tells it when to end.
+    /// Runs `collect` with a progress bar, and ends it.
     fn collect(
         &self,
         quiet: bool,
@@ -198,7 +194,7 @@ impl Desk {
     }
 }
 
-/// How much was collected.
+/// Least and most laser cycles of a pixel.
 fn row(cycles: &[u64]) -> Row {
     let [least, most] = [cycles.iter().min(), cycles.iter().max()];
     let [least, most] = [least, most].map(|end| grouped(end.copied().unwrap_or(0)));

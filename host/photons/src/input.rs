@@ -6,18 +6,18 @@ use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Bytes that are read, more than once.
+/// Data that can be read more than once.
 #[derive(Clone, Debug)]
-pub enum Medium {
+pub enum Input {
     /// A file.
     File(PathBuf),
     /// An array in memory.
     Array(Arc<NpyArray>),
 }
 
-/// What an `.npy` file would hold.
+/// The content of an `.npy` file, in memory.
 pub struct NpyArray {
-    /// What errors call it.
+    /// Its name in errors.
     pub name: String,
     /// The header, as `numpy.lib.format` writes it.
     pub header: Vec<u8>,
@@ -31,7 +31,7 @@ impl fmt::Debug for NpyArray {
     }
 }
 
-/// The elements of an array, from one of them on.
+/// The elements of an array, from index `next` on.
 struct Elements {
     array: Arc<NpyArray>,
     next: usize,
@@ -47,11 +47,11 @@ impl Read for Elements {
     }
 }
 
-impl Medium {
-    /// All bytes from the first on, and how many they are.
+impl Input {
+    /// All bytes from the start, and their number.
     ///
     /// # Errors
-    /// If the file cannot be read.
+    /// Fails if the file cannot be read.
     pub fn open(&self) -> io::Result<(Box<dyn Read>, u64)> {
         match self {
             Self::File(path) => {
@@ -71,10 +71,10 @@ impl Medium {
         }
     }
 
-    /// Whether it holds the same when it is read once more.
+    /// Returns whether a second read gives the same data.
     ///
     /// # Errors
-    /// If there is no such file.
+    /// Fails if there is no such file.
     pub fn can_be_read_twice(&self) -> io::Result<bool> {
         match self {
             Self::File(path) => Ok(path.metadata()?.is_file()),
@@ -82,7 +82,7 @@ impl Medium {
         }
     }
 
-    /// The file, if it is one.
+    /// The path, if it is a file.
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
         match self {
@@ -92,8 +92,8 @@ impl Medium {
     }
 }
 
-/// As errors call it.
-impl fmt::Display for Medium {
+/// The name in errors.
+impl fmt::Display for Input {
     fn fmt(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
         match self {
             Self::File(path) => path.display().fmt(formatter),
@@ -102,21 +102,21 @@ impl fmt::Display for Medium {
     }
 }
 
-impl From<&Path> for Medium {
+impl From<&Path> for Input {
     fn from(path: &Path) -> Self {
         Self::File(path.to_owned())
     }
 }
 
-impl From<&PathBuf> for Medium {
+impl From<&PathBuf> for Input {
     fn from(path: &PathBuf) -> Self {
         Self::File(path.clone())
     }
 }
 
-impl From<&Self> for Medium {
-    fn from(medium: &Self) -> Self {
-        medium.clone()
+impl From<&Self> for Input {
+    fn from(input: &Self) -> Self {
+        input.clone()
     }
 }
 
@@ -126,19 +126,19 @@ mod tests {
 
     #[test]
     fn an_array_reads_as_its_file_would_again_and_again() {
-        let medium = Medium::Array(Arc::new(NpyArray {
+        let input = Input::Array(Arc::new(NpyArray {
             name: "counts".to_owned(),
             header: b"header".to_vec(),
             data: Box::new(b"elements".to_vec()),
         }));
         for _ in 0..2 {
-            let (mut bytes, length) = medium.open().unwrap();
+            let (mut bytes, length) = input.open().unwrap();
             let mut all = Vec::new();
             bytes.read_to_end(&mut all).unwrap();
             assert_eq!(all, b"headerelements");
             assert_eq!(length, 14);
         }
-        assert_eq!(medium.to_string(), "counts");
-        assert!(medium.can_be_read_twice().unwrap() && medium.file().is_none());
+        assert_eq!(input.to_string(), "counts");
+        assert!(input.can_be_read_twice().unwrap() && input.file().is_none());
     }
 }

@@ -1,8 +1,8 @@
-//! Where a pixel looks.
+//! The line of sight of a pixel.
 
-/// Where a pixel looks.
+/// The line of sight of a pixel.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Sight {
+pub(super) struct LineOfSight {
     /// Its column and row.
     pub pixel: [u32; 2],
     /// Columns and rows of its array.

@@ -1,16 +1,17 @@
-//! The events of a run, pixel by pixel.
+//! The history of each pixel in a run.
 
 use std::collections::VecDeque;
 
+use dtof_core::events::Reflectivity;
 use dtof_core::fixed::types::I24F8;
-use dtof_core::{Array, BlockLevel, DepthEvent, PixelAddress, RangeScale, Reflectivity};
+use dtof_core::{Array, BlockLevel, DepthEvent, PixelAddress, RangeScale};
 
 use crate::events_csv::range_mm;
-use crate::reports::LastReports;
+use crate::last_events::LastEvents;
 use dtof_options::rows::{Row, grouped};
 use dtof_photons::source::Slice;
 
-/// How many events the mean map averages, as in the paper's figure.
+/// How many events the mean range averages (the paper's depth map of ten events).
 pub const MEAN_OF: usize = 10;
 
 /// The ranges of one pixel.
@@ -18,12 +19,13 @@ pub const MEAN_OF: usize = 10;
 pub struct PixelHistory {
     /// Millimetres of the last [`MEAN_OF`] events, or fewer, oldest first.
     recent: VecDeque<f64>,
-    /// How bright the surface is, by the pixel's own events.
+    /// The brightness of the surface, from the pixel's own events.
     reflectivity: Reflectivity,
-    /// All events, those of blocks that stand for the pixel included.
+    /// The number of events, including those of blocks that stand for the pixel.
     pub events: u64,
-    reports: LastReports,
-    /// All photons, whatever became of them.
+    /// When it last had an event, of its own or of a block.
+    last_events: LastEvents,
+    /// The number of photons, used or not.
     pub photons: u64,
 }
 
@@ -41,20 +43,19 @@ impl PixelHistory {
         self.recent.back().copied()
     }
 
-    /// The mean range of the last [`MEAN_OF`] events, or of as many as there
-    /// are.
+    /// The mean range of up to [`MEAN_OF`] last events.
     #[must_use]
     pub fn mean_mm(&self) -> Option<f64> {
         let count = self.recent.len();
         (count > 0).then(|| self.recent.iter().sum::<f64>() / count as f64)
     }
 
-    /// Blocks say nothing of how bright a pixel is.
+    /// Events of blocks say nothing about the brightness of a pixel.
     fn has_own_events(&self) -> bool {
         self.reflectivity.events() > 0
     }
 
-    /// Relative reflectivity as the paper has it, events × range², at the mean range.
+    /// The paper's relative reflectivity, events × range², at the mean range.
     #[must_use]
     pub fn reflectivity_of_events(&self) -> Option<f64> {
         self.has_own_events().then_some(())?;
@@ -72,17 +73,17 @@ impl PixelHistory {
     }
 }
 
-/// All pixels of an array, row by row.
+/// The histories of all pixels of an array.
 #[derive(Clone, Debug)]
-pub struct Maps {
+pub struct PixelHistories {
     /// The array.
     pub array: Array,
     /// One for each address.
     pub pixels: Vec<PixelHistory>,
 }
 
-impl Maps {
-    /// Nothing yet.
+impl PixelHistories {
+    /// Starts without events.
     #[must_use]
     pub fn new(array: Array) -> Self {
         Self {
@@ -91,33 +92,34 @@ impl Maps {
         }
     }
 
-    /// Takes one event into account. That of a block holds for those of its pixels that
-    /// [`LastReports`] tells.
+    /// Adds an event. That of a block counts for the pixels for which it stands (see
+    /// [`LastEvents`]).
     pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
         let range_mm = range_mm(event, scale);
         let exposure = event.exposure.into();
         for address in self.array.pixels_of(event.pixel, event.level) {
-            let pixel = &mut self.pixels[usize::from(address.0)];
-            if pixel.reports.take(event.level, event.cycle, exposure) {
+            let pixel = &mut self.pixels[usize::from(address.raw())];
+            let stands_for_pixel = pixel.last_events.record(event.level, event.cycle, exposure);
+            if stands_for_pixel {
                 pixel.push(range_mm);
                 pixel.events += 1;
             }
-        }
-        if event.level == BlockLevel::PIXEL {
-            self.pixels[usize::from(event.pixel.0)]
-                .reflectivity
-                .add(event);
+            if event.level == BlockLevel::PIXEL {
+                pixel.reflectivity.add(event);
+            }
         }
     }
 
-    /// Takes the photons of `pixels` into account.
+    /// Adds the photons of `pixels`. Addresses outside the array are ignored.
     pub fn count(&mut self, pixels: &[PixelAddress], slice: &Slice) {
         for (address, received) in pixels.iter().zip(&slice.pixels) {
-            self.pixels[usize::from(address.0)].photons += received.photons.len() as u64;
+            if let Some(pixel) = self.pixels.get_mut(usize::from(address.raw())) {
+                pixel.photons += received.photons.len() as u64;
+            }
         }
     }
 
-    /// What is known of each pixel, as a row of a table.
+    /// One row a pixel, for people: what to call a column and a row, and one event and several.
     #[must_use]
     pub fn rows(&self, [column, row]: [&str; 2], [one, several]: [&str; 2]) -> Vec<Row> {
         let columns = self.array.columns() as usize;
@@ -140,12 +142,11 @@ impl Maps {
         rows.collect()
     }
 
-    /// Of the pixels with an event, those with the most, the median number and the
-    /// fewest, and the two halfway between; fewer if there are fewer. The lower address
-    /// comes first where two have as many.
+    /// Up to five pixels with events: the one with the most, the median, the one with the fewest,
+    /// and the two halfway between. Of equal ones the lower address comes first.
     #[must_use]
     pub fn spread(&self) -> Vec<PixelAddress> {
-        let all = (0..=u16::MAX).map(PixelAddress).zip(&self.pixels);
+        let all = (0..=u16::MAX).map(PixelAddress::new).zip(&self.pixels);
         let mut pixels: Vec<_> = all.filter(|(_, pixel)| pixel.events > 0).collect();
         pixels.sort_by_key(|(_, pixel)| std::cmp::Reverse(pixel.events));
         let Some(last) = pixels.len().checked_sub(1) else {
@@ -176,31 +177,31 @@ mod tests {
 
     #[test]
     fn a_block_stands_for_its_pixels_that_have_not_reported_since() {
-        let mut maps = Maps::new(Array::new(3, 3).unwrap());
+        let mut histories = PixelHistories::new(Array::new(3, 3).unwrap());
         let scale = fixtures::scale();
         let of_block = |pixel, cycle, bin, level| DepthEvent {
             level: BlockLevel::new(level).unwrap(),
             ..fixtures::event(pixel, cycle, bin) // over 40 laser cycles
         };
-        maps.add(&of_block(4, 100, 10, 0), &scale);
-        maps.add(&of_block(0, 140, 20, 1), &scale); // from 101 on
-        maps.add(&of_block(1, 150, 30, 0), &scale);
-        maps.add(&of_block(0, 189, 40, 2), &scale); // from 150 on
-        maps.add(&of_block(0, 190, 50, 1), &scale); // from 151 on
-        let last = maps.pixels.iter().map(|pixel| {
+        histories.add(&of_block(4, 100, 10, 0), &scale);
+        histories.add(&of_block(0, 140, 20, 1), &scale); // from 101 on
+        histories.add(&of_block(1, 150, 30, 0), &scale);
+        histories.add(&of_block(0, 189, 40, 2), &scale); // from 150 on
+        histories.add(&of_block(0, 190, 50, 1), &scale); // from 151 on
+        let last = histories.pixels.iter().map(|pixel| {
             let range = pixel.last_mm().unwrap();
             (range / 37.474 - 0.5).round()
         });
         assert!(last.eq([50.0, 50.0, 40.0, 50.0, 50.0, 40.0, 40.0, 40.0, 40.0]));
-        let events = maps.pixels.iter().map(|pixel| pixel.events);
+        let events = histories.pixels.iter().map(|pixel| pixel.events);
         assert!(events.eq([3, 3, 1, 3, 4, 1, 1, 1, 1]));
-        let reporting = maps.pixels.iter().filter(|pixel| pixel.events > 0);
+        let reporting = histories.pixels.iter().filter(|pixel| pixel.events > 0);
         assert_eq!(reporting.count(), 9);
     }
 
     #[test]
     fn photons_are_those_of_their_pixel() {
-        let mut maps = Maps::new(Array::new(3, 1).unwrap());
+        let mut histories = PixelHistories::new(Array::new(3, 1).unwrap());
         let photon = Photon { cycle: 0, code: 5 };
         let received = |photons| PixelPhotons {
             cycles: 1,
@@ -211,21 +212,21 @@ mod tests {
             pixels: vec![received(2), received(7)],
         };
         for _ in 0..2 {
-            maps.count(&[0, 2].map(PixelAddress), &slice);
+            histories.count(&[0, 2].map(PixelAddress::new), &slice);
         }
-        let photons = maps.pixels.iter().map(|pixel| pixel.photons);
+        let photons = histories.pixels.iter().map(|pixel| pixel.photons);
         assert!(photons.eq([4, 0, 14]));
     }
 
     #[test]
     fn a_row_says_what_is_known_of_a_pixel() {
-        let mut maps = Maps::new(Array::new(2, 2).unwrap());
+        let mut histories = PixelHistories::new(Array::new(2, 2).unwrap());
         let at = |pixel, cycle, bin| fixtures::event(pixel, cycle, bin);
         for event in [at(3, 50, 10), at(3, 99, 12), at(0, 120, 10)] {
-            maps.add(&event, &fixtures::scale());
+            histories.add(&event, &fixtures::scale());
         }
-        maps.pixels[3].photons = 12_345;
-        let rows = maps.rows(["zone", "capture"], ["event", "events"]);
+        histories.pixels[3].photons = 12_345;
+        let rows = histories.rows(["zone", "capture"], ["event", "events"]);
         let texts = rows.iter().map(|(name, text)| format!("{name}: {text}"));
         let bins = |bins: f64| bins * 37.474;
         let [last, mean] = [bins(12.5), bins(11.5)];
@@ -242,18 +243,19 @@ mod tests {
     #[test]
     fn the_spread_goes_from_most_to_fewest_events() {
         let with = |events: &[u64]| {
-            let mut maps = Maps::new(Array::new(u32::try_from(events.len()).unwrap(), 1).unwrap());
-            for (pixel, events) in maps.pixels.iter_mut().zip(events) {
+            let mut histories =
+                PixelHistories::new(Array::new(u32::try_from(events.len()).unwrap(), 1).unwrap());
+            for (pixel, events) in histories.pixels.iter_mut().zip(events) {
                 pixel.events = *events;
             }
-            maps.spread()
+            histories.spread()
         };
         assert_eq!(with(&[0, 0]), []);
-        assert_eq!(with(&[0, 3]), [PixelAddress(1)]);
-        assert_eq!(with(&[3, 3]), [0, 1].map(PixelAddress));
+        assert_eq!(with(&[0, 3]), [PixelAddress::new(1)]);
+        assert_eq!(with(&[3, 3]), [0, 1].map(PixelAddress::new));
         assert_eq!(
             with(&[5, 0, 9, 1, 3, 7, 2, 8, 4, 6]),
-            [2, 5, 0, 4, 3].map(PixelAddress)
+            [2, 5, 0, 4, 3].map(PixelAddress::new)
         );
     }
 }

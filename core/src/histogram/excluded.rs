@@ -1,26 +1,27 @@
-//! Bins that are left out because their echo was reported: peel and hold.
+//! Bins that are excluded because their echo was reported.
 //!
-//! A pixel that reports several echoes empties the bins around each, and leaves them out
-//! for the rest of the exposure. What is left is decided upon as before. Four times the
-//! standard deviation of the pulse is a reach that suits: less leaves parts of a bright
-//! pulse behind, more swallows a second surface close by (`docs/results/figures.md`).
+//! A pixel that reports several echoes empties the bins around each, and excludes them for
+//! the rest of the exposure. It decides on the other bins as before. A good reach is four
+//! times the standard deviation of the pulse. A smaller one leaves parts of a bright pulse,
+//! a larger one hides a second surface close by (`docs/results/figures.md`).
 //!
 //! ```
-//! use dtof_core::{BinIndex, Histogram, PeeledBins, RangeGate};
+//! use dtof_core::{BinIndex, Histogram, RangeGate};
+//! use dtof_core::rule::ExcludedBins;
 //!
 //! let mut histogram = Histogram::<128>::new();
 //! histogram.add_batch(&[40, 40, 40, 41, 44, 90, 90]);
-//! let mut peeled = PeeledBins::new(4);
-//! peeled.push(histogram.peak().bin);
-//! assert_eq!(peeled.empty(&mut histogram), 5); // bins 36 to 44
+//! let mut excluded = ExcludedBins::new(4);
+//! excluded.push(histogram.peak().bin);
+//! assert_eq!(excluded.empty(&mut histogram), 5); // bins 36 to 44
 //! assert_eq!((histogram.peak().bin.raw(), histogram.total()), (90, 2));
-//! assert_eq!(peeled.bins_left(&RangeGate::<128>::new(40, 119)?), Some(75));
-//! assert!(peeled.is_tail(BinIndex::saturating(46)));
+//! assert_eq!(excluded.bins_left(&RangeGate::<128>::new(40, 119)?), Some(75));
+//! assert!(excluded.is_tail(BinIndex::saturating(46)));
 //! # Ok::<(), dtof_core::GateError>(())
 //! ```
 //!
 //! Cost: 8 bytes a pixel. On a Cortex-M4, 128 bins and with a window of 3 bins a look at a
-//! pixel that holds an echo takes 594 instructions, any other 191.
+//! pixel after an echo takes 592 instructions, any other 195.
 
 use core::ops::RangeInclusive;
 
@@ -29,23 +30,23 @@ use super::counter::CounterWidth;
 use super::gate::RangeGate;
 use crate::units::{BinIndex, EchoNumber};
 
-/// Echoes that have been peeled, at most: the last one ends the exposure.
+/// The most echoes with excluded bins: the last echo ends the exposure.
 const MOST: usize = EchoNumber::LAST.raw() as usize - 1;
 
 /// The bins around the echoes that were reported in an exposure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub struct PeeledBins {
+pub struct ExcludedBins {
     peaks: [u16; MOST],
     number: u8,
     reach: u8,
 }
 
-impl PeeledBins {
-    /// None, and none to come.
+impl ExcludedBins {
+    /// No bins.
     pub const NONE: Self = Self::new(0);
 
-    /// None yet; around each echo `reach` bins to either side of its peak.
+    /// No bins yet. Each echo will exclude `reach` bins to either side of its peak.
     #[must_use]
     pub const fn new(reach: u8) -> Self {
         Self {
@@ -55,7 +56,7 @@ impl PeeledBins {
         }
     }
 
-    /// Leaves out the bins around an echo, too. Nothing after the third.
+    /// Excludes the bins around one more echo. Does nothing after the third.
     pub fn push(&mut self, peak: BinIndex) {
         if let Some(place) = self.peaks.get_mut(usize::from(self.number)) {
             *place = peak.raw();
@@ -63,20 +64,20 @@ impl PeeledBins {
         }
     }
 
-    /// Around how many echoes.
+    /// The number of echoes.
     #[inline]
     #[must_use]
     pub const fn echoes(&self) -> u8 {
         self.number
     }
 
-    /// Whether `bin` is left out.
+    /// Whether `bin` is excluded.
     #[must_use]
     pub fn contains(&self, bin: u16) -> bool {
         self.touches(bin, 0)
     }
 
-    /// Whether one of the bins up to `beside` from `bin` is left out.
+    /// Whether one of the bins up to `beside` from `bin` is excluded.
     #[must_use]
     pub fn touches(&self, bin: u16, beside: u16) -> bool {
         let reach = u16::from(self.reach).saturating_add(beside);
@@ -93,8 +94,8 @@ impl PeeledBins {
         behind.any(|behind| (1..=reach).contains(&behind))
     }
 
-    /// How many of the gated bins are not left out. `None` if they are fewer than
-    /// [`RangeGate::MIN_BINS`], too few to decide.
+    /// The number of gated bins that are not excluded. `None` if fewer than
+    /// [`RangeGate::MIN_BINS`], too few for a decision.
     #[inline(always)]
     #[must_use]
     pub fn bins_left<const BINS: usize>(&self, gate: &RangeGate<BINS>) -> Option<u32> {
@@ -106,7 +107,7 @@ impl PeeledBins {
         (left >= u32::from(RangeGate::<BINS>::MIN_BINS)).then_some(left)
     }
 
-    /// How many of these bins are left out.
+    /// How many of `bins` are excluded.
     #[inline(never)]
     #[must_use]
     pub(crate) fn bins_among(&self, bins: RangeInclusive<u16>) -> u32 {
@@ -121,7 +122,7 @@ impl PeeledBins {
         count
     }
 
-    /// Empties the bins of `histogram`: how many photons they held.
+    /// Empties these bins of `histogram`. Returns the photons they held.
     pub fn empty<const BINS: usize, W: CounterWidth>(
         &self,
         histogram: &mut Histogram<BINS, W>,

@@ -1,7 +1,7 @@
-"""What a researcher writes today: photons to ranges with numpy and scipy.
+"""Photons to ranges with numpy and scipy, as a researcher writes it today.
 
-Photons come in order of laser cycle. Each way gives the pixel, the laser cycles until then and the
-position in bins of every report.
+Photons are in order of laser cycle. Each method returns pixel, laser cycle and position in bins of
+every report.
 """
 
 import numpy as np
@@ -16,7 +16,7 @@ def keys(photons, bins):
 
 
 def spans(cycle, cycles, length):
-    """Where the photons of every ``length`` laser cycles lie."""
+    """The slices of photons of every ``length`` laser cycles."""
     edges = np.searchsorted(cycle, np.arange(0, cycles + 1, length))
     return [slice(*pair) for pair in zip(edges, edges[1:])]
 
@@ -26,9 +26,9 @@ def histograms(keys, pixels, bins):
     return np.bincount(keys, minlength=pixels * bins).reshape(pixels, bins)
 
 
-def centroid(counts, peak, background, reach):
-    """The mean position of the photons around the peak of each row, less the background."""
-    around = peak[:, None] + np.arange(-reach, reach + 1)
+def centroid(counts, peak, background, half_width):
+    """The centroid around the peak of each row, minus the background."""
+    around = peak[:, None] + np.arange(-half_width, half_width + 1)
     inside = (around >= 0) & (around < counts.shape[1])
     near = np.take_along_axis(counts, around.clip(0, counts.shape[1] - 1), axis=1)
     signal = np.where(inside, near - background[:, None], 0)
@@ -50,14 +50,14 @@ def highest(counts):
     return peak + 1, height, background
 
 
-def frames_with_find_peaks(photons, pixels, bins, exposure, least, z, sigma, reach):
-    """Frames: smoothed with the pulse, then scipy looks for peaks of ``z`` standard deviations."""
+def frames_with_find_peaks(photons, pixels, bins, exposure, min_photons, z, sigma, half_width):
+    """Frames: smoothed with the pulse, then peaks of ``z`` standard deviations by scipy."""
     key, reports = keys(photons, bins), []
-    variance = 1 / (2 * np.sqrt(np.pi) * sigma)  # of smoothed counts, over their mean
+    variance = 1 / (2 * np.sqrt(np.pi) * sigma)  # of smoothed counts, relative to their mean
     for frame, span in enumerate(spans(photons.cycle, photons.cycles, exposure)):
         counts = histograms(key[span], pixels, bins)
         _, height, background = highest(counts)
-        pixel = np.flatnonzero(height >= least)
+        pixel = np.flatnonzero(height >= min_photons)
         counts, background = counts[pixel], background[pixel]
         smooth = gaussian_filter1d(counts.astype(float), sigma, axis=1)
         threshold = background + z * np.sqrt(background * variance)
@@ -65,40 +65,40 @@ def frames_with_find_peaks(photons, pixels, bins, exposure, least, z, sigma, rea
             peaks, found = find_peaks(smooth[row], height=threshold[row])
             if peaks.size:
                 peak = peaks[[found["peak_heights"].argmax()]]
-                position = centroid(counts[[row]], peak, background[[row]], reach)
+                position = centroid(counts[[row]], peak, background[[row]], half_width)
                 reports.append((pixel[[row]], [(frame + 1) * exposure], position))
     return joined(reports)
 
 
 def stands_clear(height, expected, k):
-    """Whether Poisson counts are as high by chance in less than one of ``10 ** k`` cases."""
+    """Whether Poisson counts reach ``height`` with a probability below ``10 ** -k``."""
     return gammainc(np.maximum(height, 1), expected) < 10.0**-k
 
 
-def frames(photons, pixels, bins, exposure, least, k, reach):
+def frames(photons, pixels, bins, exposure, min_photons, k, half_width):
     """Frames without a loop over pixels."""
     key, reports = keys(photons, bins), []
     for frame, span in enumerate(spans(photons.cycle, photons.cycles, exposure)):
         counts = histograms(key[span], pixels, bins)
         peak, height, background = highest(counts)
-        pixel = np.flatnonzero(stands_clear(height, 3 * background, k) & (height >= least))
-        position = centroid(counts[pixel], peak[pixel], background[pixel], reach)
+        pixel = np.flatnonzero(stands_clear(height, 3 * background, k) & (height >= min_photons))
+        position = centroid(counts[pixel], peak[pixel], background[pixel], half_width)
         reports.append((pixel, np.full(pixel.size, (frame + 1) * exposure), position))
     return joined(reports)
 
 
-def asynchronous(photons, pixels, bins, least, k, reach, x=4, l2=2000):
-    """Each pixel reports as soon as its peak stands clear, and starts over then."""
+def asynchronous(photons, pixels, bins, min_photons, k, half_width, x=4, l2=2000):
+    """Each pixel reports as soon as its peak is significant, and then starts over."""
     key, reports = keys(photons, bins), []
     counts, began = np.zeros((pixels, bins), int), np.zeros(pixels, int)
     for look, span in enumerate(spans(photons.cycle, photons.cycles, x)):
         counts += histograms(key[span], pixels, bins)
         now = (look + 1) * x
         peak, height, background = highest(counts)
-        clear = stands_clear(height, 3 * background, k) & (height >= least)
+        clear = stands_clear(height, 3 * background, k) & (height >= min_photons)
         pixel = np.flatnonzero(clear)
         if pixel.size:
-            position = centroid(counts[pixel], peak[pixel], background[pixel], reach)
+            position = centroid(counts[pixel], peak[pixel], background[pixel], half_width)
             reports.append((pixel, np.full(pixel.size, now), position))
         over = clear | (now - began >= l2)
         counts[over], began[over] = 0, now

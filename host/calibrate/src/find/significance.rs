@@ -1,13 +1,13 @@
-//! How sure a photon count says that its mean is another one.
+//! Significance of a photon count, and quantiles.
 //!
-//! With a Poisson number of mean `m`, `k` photons or more have at most the probability
-//! `exp(-(k·ln(k/m) - (k - m)))` if `k > m`, and so have `k` or fewer if `k < m` (Chernoff).
-//! That bound always holds, so that what is called certain is at least as certain.
+//! The Chernoff bound for a Poisson number of mean `m`: the probability of `k` or more, if `k > m`, and
+//! of `k` or fewer, if `k < m`, is at most `exp(-(k·ln(k/m) - (k - m)))`. The bound always holds, so a
+//! count is at least as significant as it says.
 
-/// ln of what the probability of `count`, or of one farther from `mean`, is at most, with its
-/// sign turned.
+/// The exponent of the Chernoff bound: the probability of `count`, or of a count farther from `mean`,
+/// is at most `exp(-exponent)`.
 #[must_use]
-pub fn doubt(count: f64, mean: f64) -> f64 {
+pub fn chernoff_exponent(count: f64, mean: f64) -> f64 {
     if mean <= 0.0 {
         return if count > 0.0 { f64::INFINITY } else { 0.0 };
     }
@@ -19,25 +19,25 @@ pub fn doubt(count: f64, mean: f64) -> f64 {
     (entropy - (count - mean)).max(0.0)
 }
 
-/// Whether `count` is more than `mean` lets expect but once in `one_in`.
+/// Whether `count` is above `mean`, and so far that chance explains it less than once in `one_in`.
 #[must_use]
-pub fn is_more(count: f64, mean: f64, one_in: f64) -> bool {
-    count > mean && doubt(count, mean) > one_in.ln()
+pub fn is_surely_more(count: f64, mean: f64, one_in: f64) -> bool {
+    count > mean && chernoff_exponent(count, mean) > one_in.ln()
 }
 
-/// Whether it is less.
+/// The same for a count below `mean`.
 #[must_use]
-pub fn is_less(count: f64, mean: f64, one_in: f64) -> bool {
-    count < mean && doubt(count, mean) > one_in.ln()
+pub fn is_surely_less(count: f64, mean: f64, one_in: f64) -> bool {
+    count < mean && chernoff_exponent(count, mean) > one_in.ln()
 }
 
-/// The middle of `values`, the lower of two; 0 of none.
+/// The median, the lower of two middle values; 0 if there are none.
 #[must_use]
 pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
     quantile(values, 0.5)
 }
 
-/// What a share of `values` lies below; 0 of none.
+/// The value that a `share` of `values` lies below; 0 if there are none.
 #[must_use]
 pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {
     let mut values: Vec<f64> = values.into_iter().collect();
@@ -59,7 +59,7 @@ mod tests {
             let law = Poisson::new(mean);
             let mut below = 0.0;
             for count in 0..law.last().min(1500) {
-                let bound = (-doubt(count.into(), mean)).exp() * (1.0 + 1e-9);
+                let bound = (-chernoff_exponent(count.into(), mean)).exp() * (1.0 + 1e-9);
                 below += law.mass(count);
                 let probability = if f64::from(count) > mean {
                     law.at_least(count)
@@ -76,8 +76,8 @@ mod tests {
 
     #[test]
     fn nothing_is_more_than_nothing() {
-        assert!(!is_more(0.0, 0.0, 1e6) && !is_less(0.0, 0.0, 1e6));
-        assert!(is_more(1.0, 0.0, 1e6) && is_less(0.0, 20.0, 1e6));
+        assert!(!is_surely_more(0.0, 0.0, 1e6) && !is_surely_less(0.0, 0.0, 1e6));
+        assert!(is_surely_more(1.0, 0.0, 1e6) && is_surely_less(0.0, 20.0, 1e6));
         assert_eq!(median([3.0, 1.0, 2.0]), 2.0);
         assert_eq!(median([]), 0.0);
     }

@@ -3,24 +3,24 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use dtof_photons::medium::{Medium, NpyArray};
+use dtof_photons::input::{Input, NpyArray};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 
 /// A recording as Python gives it.
 #[derive(FromPyObject)]
-pub enum Given {
+pub enum PyInput {
     /// The name of a file.
     File(PathBuf),
-    /// What an array is called, the header of its `.npy` file, and its elements.
+    /// The name of an array, the header of its `.npy` file, and its elements.
     Array(String, Vec<u8>, PyBackedBytes),
 }
 
-impl From<Given> for Medium {
-    fn from(given: Given) -> Self {
+impl From<PyInput> for Input {
+    fn from(given: PyInput) -> Self {
         match given {
-            Given::File(path) => Self::File(path),
-            Given::Array(name, header, data) => Self::Array(Arc::new(NpyArray {
+            PyInput::File(path) => Self::File(path),
+            PyInput::Array(name, header, data) => Self::Array(Arc::new(NpyArray {
                 name,
                 header,
                 data: Box::new(data),

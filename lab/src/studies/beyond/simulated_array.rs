@@ -5,7 +5,7 @@ use anyhow::Result;
 use dtof_core::{Array, DepthEvent, PixelAddress};
 use dtof_engine::group::{Configs, Group};
 use dtof_engine::settings::Settings;
-use dtof_events::reports::LastReports;
+use dtof_events::last_events::LastEvents;
 use dtof_photons::source::{Photon, PixelPhotons};
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
@@ -14,7 +14,7 @@ use rand_pcg::Pcg64;
 
 /// Laser cycles drawn at a time.
 const SLICE: u16 = 100;
-/// An event farther from the surface, in bins, is wrong.
+/// The largest distance of a right event from its surface, in bins.
 pub const NEAR: f64 = 3.0;
 
 /// The photons of a pixel in X laser cycles.
@@ -36,8 +36,8 @@ impl Law {
         })
     }
 
-    /// Adds photons to `photons`, all in laser cycle `cycle` of the slice: pixels look after
-    /// every X of them, so that it does not matter in which.
+    /// Adds photons to `photons`, all in laser cycle `cycle` of the slice. Pixels look every X
+    /// laser cycles, so the exact cycle does not matter.
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -67,27 +67,27 @@ impl Law {
     }
 }
 
-/// An array and what decides on its photons.
-pub struct Field {
+/// An array and the engine that decides on its photons.
+pub struct SimulatedArray {
     laws: Vec<Law>,
     configs: Configs<BINS>,
     groups: Vec<Group<BINS>>,
     cycle: u64,
 }
 
-impl Field {
-    /// An array of pixels with these rates, row by row.
+impl SimulatedArray {
+    /// An array of pixels with `rates`, row by row.
     pub fn new(array: Array, rates: &[Rates], settings: &Settings) -> Result<Self> {
         let addresses: Vec<PixelAddress> = (0..=u16::MAX)
             .take(array.pixels() as usize)
-            .map(PixelAddress)
+            .map(PixelAddress::new)
             .collect();
         let groups = match settings.binning {
-            Some(binning) => Group::of_array(array, binning, &addresses)?,
+            Some(binning) => Group::for_array(array, binning, &addresses)?,
             None => {
                 let numbered = addresses.iter().enumerate();
                 numbered
-                    .map(|(number, &address)| Group::of_pixel(number, address))
+                    .map(|(number, &address)| Group::single(number, address))
                     .collect()
             }
         };
@@ -108,13 +108,14 @@ impl Field {
         self.cycle
     }
 
-    /// The surfaces change.
+    /// Changes the rates.
     pub fn set(&mut self, rates: &[Rates]) -> Result<()> {
         self.laws = rates.iter().map(Law::new).collect::<Result<_>>()?;
         Ok(())
     }
 
-    /// The next `cycles` laser cycles, a multiple of [`SLICE`]: events in order of time.
+    /// Runs the next `cycles` laser cycles, a multiple of [`SLICE`]. Returns the events in order of
+    /// time.
     pub fn run(
         &mut self,
         cycles: u64,
@@ -146,37 +147,39 @@ impl Field {
     }
 }
 
-/// When pixels reported last, by themselves or in a block.
+/// When each pixel reported last, alone or in a block.
 pub struct Reports {
     array: Array,
-    last: Vec<LastReports>,
+    last: Vec<LastEvents>,
 }
 
 impl Reports {
-    /// None yet.
+    /// Before any report.
     pub fn new(array: Array) -> Self {
         Self {
             array,
-            last: vec![LastReports::default(); array.pixels() as usize],
+            last: vec![LastEvents::default(); array.pixels() as usize],
         }
     }
 
-    /// Takes an event, and gives the pixels that it stands for.
+    /// Adds an event, and returns the pixels it stands for.
     pub fn take(&mut self, event: &DepthEvent) -> Vec<usize> {
         let pixels = self.array.pixels_of(event.pixel, event.level);
         pixels
-            .map(|pixel| usize::from(pixel.0))
-            .filter(|&pixel| self.last[pixel].take(event.level, event.cycle, event.exposure.into()))
+            .map(|pixel| usize::from(pixel.raw()))
+            .filter(|&pixel| {
+                self.last[pixel].record(event.level, event.cycle, event.exposure.into())
+            })
             .collect()
     }
 }
 
-/// Whether an event lies where `position` is, in bins.
+/// Whether an event lies at `position`, in bins.
 pub fn is_right(event: &DepthEvent, position: f64) -> bool {
     (f64::from(event.position().raw()) / 256.0 - position).abs() <= NEAR
 }
 
-/// The same as a tally calls it.
+/// The name of the verdict in a tally.
 pub fn verdict(event: &DepthEvent, position: f64) -> &'static str {
     if is_right(event, position) {
         "right"

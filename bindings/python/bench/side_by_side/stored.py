@@ -1,4 +1,4 @@
-"""The tables that are kept: what was measured, and how fast."""
+"""The stored tables: results and speed."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PALETTE = ROOT / "draw/src/palette.css"
 
 @dataclass
 class Speed:
-    """Photons a second, in millions, with the setting of the larger error."""
+    """Millions of photons a second, with the setting for the larger error."""
 
     scene: str
     method: str
@@ -28,7 +28,7 @@ class Speed:
 
 
 def text(row) -> dict:
-    """Figures of five digits, so that a last bit does not matter."""
+    """A row as text, with five digits, so that rounding does not matter."""
     shown = asdict(row)
     for name, value in shown.items():
         if value is None:
@@ -64,19 +64,19 @@ def read(path, kind) -> list:
 
 
 def with_others(path, new, scenes) -> list:
-    """The new rows, and the kept ones of other scenes, in the order of the scenes."""
+    """The new rows, and the stored rows of other scenes, in the order of the scenes."""
     measured = {row.scene for row in new}
     rows = new + [row for row in read(path, type(new[0])) if row.scene not in measured]
     return sorted(rows, key=lambda row: scenes.index(row.scene))
 
 
 def differences(measured, scenes) -> list[str]:
-    """What differs from the kept rows of these scenes."""
+    """The differences from the stored rows of these scenes."""
     old = [text(row) for row in read(ROWS, Row) if row.scene in scenes]
     new = [text(row) for row in measured]
     if len(old) != len(new):
-        return [f"{len(new)} rows, {len(old)} are kept"]
+        return [f"{len(new)} rows, {len(old)} are stored"]
     return [
-        f"{was['scene']}, {was['method']}, {was['setting']}: {name} {now[name]}, kept {was[name]}"
+        f"{was['scene']}, {was['method']}, {was['setting']}: {name} {now[name]}, stored {was[name]}"
         for was, now in zip(old, new) for name in was if was[name] != now[name]
     ]

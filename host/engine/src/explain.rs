@@ -1,9 +1,10 @@
-//! What the rule makes of a histogram, with the integers of the core.
+//! Explains a decision: the threshold, background and window of the rule for a histogram.
 
 use dtof_core::fixed::types::U24F8;
+use dtof_core::rule::ExcludedBins;
 use dtof_core::{
     AnyRule, BinIndex, BlockLevel, Count, Count10, Count16, Count24, CounterWidth, DetectionRule,
-    EchoNumber, Histogram, Peak, PeeledBins, PixelConfig, RangeGate,
+    EchoNumber, Histogram, Peak, PixelConfig, RangeGate,
 };
 use serde::Serialize;
 
@@ -12,89 +13,93 @@ use super::frame;
 use super::settings::Settings;
 use crate::with_bins;
 
-/// A look at a histogram.
+/// The peak of a histogram and what the rule needs to report it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Look {
+pub struct Explanation {
     /// The highest bin within the gate, and its photons.
     pub peak: (u16, u32),
-    /// The fewest photons in that bin, all others as they are, that the rule reports; `None` if
-    /// no counter holds as many.
+    /// The fewest photons in that bin with which the rule reports it, all other bins being equal;
+    /// `None` if no counter holds so many.
     pub needed: Option<u32>,
-    /// What is needed depends on the events before, as the pixel tracks or reports more than one
-    /// echo: it is not told then.
+    /// The threshold depends on earlier events, as the pixel tracks or reports several echoes.
+    /// `needed` and `background` are `None` then.
     pub depends: bool,
-    /// The background a bin as the rule has it, at the photons of the peak or, if these are too
-    /// few, at the number needed.
+    /// The background a bin according to the rule, at the photons of the peak or at `needed`,
+    /// whichever is more.
     pub background: Option<f64>,
-    /// Where the quadrants begin, and where the last ends.
+    /// The first bin of each quadrant, and the end of the last.
     pub quadrants: [u16; 5],
-    /// First and last bin of the window with the peak that has the most photons, of that rule.
+    /// Window rule: the first and the last bin of the window with the most photons that contains
+    /// the peak.
     pub window: Option<(u16, u16)>,
 }
 
-/// Looks at `counts`, a histogram that came whole from a sensor or an exposure so far; `None` if
-/// the settings are for other histograms.
+/// Explains `counts`: a complete histogram of a sensor, or an exposure so far. Returns `None` if
+/// the settings are for another number of bins.
 #[must_use]
-pub fn look(settings: &Settings, counts: &[u32], is_whole: bool) -> Option<Look> {
+pub fn explain(settings: &Settings, counts: &[u32], is_whole: bool) -> Option<Explanation> {
     let bins = counts.len();
-    let look = match is_whole {
-        false => with_bins!(bins, BINS => of::<BINS, Count10>(settings, counts)),
-        // All counters together have to fit 32 bits.
+    let explanation = match is_whole {
+        false => with_bins!(bins, BINS => explain_bins::<BINS, Count10>(settings, counts)),
+        // The sum of all counters must fit into 32 bits.
         true => {
-            with_bins!(bins, of 8 16 32 64 128 256, BINS => of::<BINS, Count24>(settings, counts))
-                .or_else(|_| with_bins!(bins, BINS => of::<BINS, Count16>(settings, counts)))
+            with_bins!(bins, of 8 16 32 64 128 256, BINS => explain_bins::<BINS, Count24>(settings, counts))
+                .or_else(|_| with_bins!(bins, BINS => explain_bins::<BINS, Count16>(settings, counts)))
         }
     };
-    let look = look.ok()??;
-    // Whole histograms are not tracked, and their first echo is decided from themselves.
+    let explanation = explanation.ok()??;
+    // Complete histograms are not tracked, and their first echo does not depend on others.
     let depends = !is_whole && (settings.tracking || settings.echoes != EchoNumber::FIRST);
     Some(match depends {
-        false => look,
-        true => Look {
+        false => explanation,
+        true => Explanation {
             depends,
             needed: None,
             background: None,
-            ..look
+            ..explanation
         },
     })
 }
 
-fn of<const BINS: usize, W: CounterWidth>(settings: &Settings, counts: &[u32]) -> Option<Look> {
+fn explain_bins<const BINS: usize, W: CounterWidth>(
+    settings: &Settings,
+    counts: &[u32],
+) -> Option<Explanation> {
     let counts: &[u32; BINS] = counts.try_into().ok()?;
     let config = settings.config::<BINS>().ok()?;
     let peak = histogram::<BINS, W>(counts, config.gate()).peak();
     let bin = peak.bin.raw();
-    let shown = Shown {
+    let input = DecisionInput {
         rule: *config.rule(),
         gate: *config.gate(),
         counts: *counts,
-        peeled: PeeledBins::NONE,
+        excluded: ExcludedBins::NONE,
         peak: (bin, peak.count.raw()),
         at: bin,
     };
-    Some(shown.look::<W>())
+    Some(input.explain::<W>())
 }
 
-/// Looks once more at what events were decided from, one after the other, as their pixels and
-/// blocks did: `needed` is at most the photons of the peak.
+/// Explains past decisions, each as its pixel or block made it. `needed` is at most the photons of
+/// the peak.
 #[must_use]
-pub fn look_back(settings: &Settings, decisions: &[Decision]) -> Vec<Look> {
-    let looks = with_bins!(settings.bins, BINS => all::<BINS>(settings, decisions));
-    looks.ok().flatten().unwrap_or_default()
+pub fn explain_decisions(settings: &Settings, decisions: &[Decision]) -> Vec<Explanation> {
+    let explanations = with_bins!(settings.bins, BINS => all::<BINS>(settings, decisions));
+    explanations.ok().flatten().unwrap_or_default()
 }
 
-fn all<const BINS: usize>(settings: &Settings, decisions: &[Decision]) -> Option<Vec<Look>> {
+fn all<const BINS: usize>(settings: &Settings, decisions: &[Decision]) -> Option<Vec<Explanation>> {
     let (pixels, blocks) = (settings.config().ok()?, settings.block_config().ok()?);
-    let looks = decisions.iter().map(|decision| {
-        let of_pixel = decision.event.level == BlockLevel::PIXEL;
-        let config: &PixelConfig<BINS, AnyRule> = if of_pixel { &pixels } else { &blocks };
-        let shown = Shown::of(config, decision, settings.frame.is_some())?;
-        Some(match of_pixel && settings.frame.is_none() {
-            true => shown.look::<Count10>(),
-            false => shown.look::<Count16>(),
+    let explanations = decisions.iter().map(|decision| {
+        let is_pixel = decision.event.level == BlockLevel::PIXEL;
+        let config: &PixelConfig<BINS, AnyRule> = if is_pixel { &pixels } else { &blocks };
+        let input = DecisionInput::new(config, decision, settings.frame.is_some())?;
+        Some(match is_pixel && settings.frame.is_none() {
+            true => input.explain::<Count10>(),
+            false => input.explain::<Count16>(),
         })
     });
-    looks.collect()
+    explanations.collect()
 }
 
 fn histogram<const BINS: usize, W: CounterWidth>(
@@ -106,23 +111,22 @@ fn histogram<const BINS: usize, W: CounterWidth>(
     histogram
 }
 
-/// A histogram, and how it is decided upon.
-struct Shown<const BINS: usize> {
+/// A histogram and the configuration that decides on it.
+struct DecisionInput<const BINS: usize> {
     rule: AnyRule,
     gate: RangeGate<BINS>,
     counts: [u32; BINS],
     /// The bins around earlier echoes.
-    peeled: PeeledBins,
+    excluded: ExcludedBins,
     /// The bin of the peak, and its photons.
     peak: (u16, u32),
-    /// The bin that the rule is asked about: where a pixel that tracks expects its event, else
-    /// the peak.
+    /// The bin that the rule tests: where a pixel that tracks expects its event, else the peak.
     at: u16,
 }
 
-impl<const BINS: usize> Shown<BINS> {
-    /// What `decision` was decided from, by `config` or as a frame.
-    fn of(
+impl<const BINS: usize> DecisionInput<BINS> {
+    /// The input of `decision`, by `config` or as a frame.
+    fn new(
         config: &PixelConfig<BINS, AnyRule>,
         decision: &Decision,
         is_frame: bool,
@@ -132,30 +136,30 @@ impl<const BINS: usize> Shown<BINS> {
             *count = kept.into();
         }
         let peak = decision.event.peak_bin.raw();
-        let mut shown = Self {
+        let mut input = Self {
             rule: *config.rule(),
             gate: *config.gate(),
-            peeled: decision.peeled,
+            excluded: decision.excluded,
             peak: (peak, *counts.get(usize::from(peak))?),
             at: peak,
             counts,
         };
         if is_frame {
-            shown.rule = frame::ANY.into();
+            input.rule = frame::ANY.into();
         }
         if let (Some(tracking), Some(expected)) = (config.tracking(), decision.expected) {
-            shown.rule = *tracking.near();
-            shown.at = expected.raw();
-            let is_near = shown.gate.contains(shown.at);
-            if !is_near || shown.answer::<Count16>(shown.peak.1).is_none() {
-                shown.rule = *tracking.far();
-                shown.at = peak;
+            input.rule = *tracking.near();
+            input.at = expected.raw();
+            let is_near = input.gate.contains(input.at);
+            if !is_near || input.answer::<Count16>(input.peak.1).is_none() {
+                input.rule = *tracking.far();
+                input.at = peak;
             }
         }
-        Some(shown)
+        Some(input)
     }
 
-    /// The rule's answer if the peak bin held so many.
+    /// The rule's answer if the peak bin had so many photons.
     fn answer<W: CounterWidth>(&self, photons: u32) -> Option<U24F8> {
         let mut counts = self.counts;
         *counts.get_mut(usize::from(self.peak.0))? = photons;
@@ -164,17 +168,12 @@ impl<const BINS: usize> Shown<BINS> {
             bin: BinIndex::saturating(self.at),
             count: Count::saturating(*counts.get(usize::from(self.at))?),
         };
-        match self.peeled.echoes() {
-            0 => self.rule.detect(&histogram, &self.gate, peak),
-            _ => {
-                let Self { rule, gate, .. } = self;
-                rule.detect_without(&histogram, gate, peak, &self.peeled)
-            }
-        }
+        self.rule
+            .detect(&histogram, &self.gate, peak, &self.excluded)
     }
 
-    fn look<W: CounterWidth>(&self) -> Look {
-        // More photons in the peak never make it less clear.
+    fn explain<W: CounterWidth>(&self) -> Explanation {
+        // The rule is monotonic in the photons of the peak, so bisection finds the threshold.
         let (mut low, mut high) = (0, W::MAX);
         let mut needed = self.answer::<W>(high).map(|_| high);
         while needed.is_some() && low < high {
@@ -186,7 +185,7 @@ impl<const BINS: usize> Shown<BINS> {
             needed = Some(high);
         }
         let background = needed.and_then(|needed| self.answer::<W>(needed.max(self.peak.1)));
-        Look {
+        Explanation {
             peak: self.peak,
             needed,
             depends: false,
@@ -203,7 +202,7 @@ impl<const BINS: usize> Shown<BINS> {
     }
 }
 
-/// The window of so many bins with the peak in `bin` that has the most photons.
+/// The window of `width` bins that contains `bin` and has the most photons.
 fn window<const BINS: usize>(
     counts: &[u32; BINS],
     bin: u16,
@@ -216,7 +215,7 @@ fn window<const BINS: usize>(
         let bins = usize::from(start)..usize::from(start + width);
         counts[bins].iter().map(|&count| u64::from(count)).sum()
     };
-    // Of several the first.
+    // The first, if several have as many.
     let start = (first..=last).rev().max_by_key(|&start| sum(start))?;
     Some((start, start + width - 1))
 }
@@ -225,7 +224,8 @@ fn window<const BINS: usize>(
 mod tests {
     use super::*;
     use dtof_core::fixed::types::U8F8;
-    use dtof_core::{AverageRule, PaperRule, WindowRule, detect};
+    use dtof_core::rule::detect;
+    use dtof_core::{AverageRule, PaperRule, WindowRule};
     use proptest::prelude::*;
 
     fn counts() -> impl Strategy<Value = Vec<u32>> {
@@ -237,7 +237,7 @@ mod tests {
     }
 
     proptest! {
-        /// The rule itself reports at the number that is told, and with one photon less does not.
+        /// The rule reports at `needed` photons, and not with one photon less.
         #[test]
         fn the_number_needed_is_the_first_that_is_reported(counts in counts(), which in 0..3, gate in 0..60_u16) {
             let alpha = U8F8::lit("4");
@@ -251,8 +251,8 @@ mod tests {
                 gate: Some((gate, 127)),
                 ..Settings::static_scene(0)
             };
-            let look = look(&settings, &counts, false).unwrap();
-            let (bin, peak) = look.peak;
+            let explanation = explain(&settings, &counts, false).unwrap();
+            let (bin, peak) = explanation.peak;
             let within = &counts[usize::from(gate)..];
             prop_assert_eq!(peak, *within.iter().max().unwrap());
             let config = settings.config::<128>().unwrap();
@@ -261,12 +261,12 @@ mod tests {
                 counts[usize::from(bin)] = photons;
                 let mut histogram = Histogram::<128>::new();
                 histogram.add_frame(&counts, config.gate());
-                // Another bin may be the highest then.
+                // Another bin may be the highest with these photons.
                 let is_peak = histogram.peak().bin.raw() == bin;
                 let found = detect(&histogram, config.gate(), config.rule(), config.estimator());
                 (is_peak, found.is_some())
             };
-            let needed = look.needed.unwrap();
+            let needed = explanation.needed.unwrap();
             if let (true, reported) = reports(needed) {
                 prop_assert!(reported);
             }
@@ -274,28 +274,28 @@ mod tests {
                 prop_assert!(!reported);
             }
             prop_assert_eq!(reports(peak).1, peak >= needed);
-            if let Some((first, last)) = look.window {
+            if let Some((first, last)) = explanation.window {
                 prop_assert!(first >= gate && last < 128 && last - first == 2);
                 prop_assert!((first..=last).contains(&bin));
                 let sum = |first: u16| (first..first + 3).map(|bin| counts[usize::from(bin)]).sum::<u32>();
                 let starts = (gate..126).filter(|start| (*start..start + 3).contains(&bin));
                 prop_assert_eq!(starts.map(sum).max(), Some(sum(first)));
             }
-            prop_assert_eq!(look.window.is_some(), which == 2);
+            prop_assert_eq!(explanation.window.is_some(), which == 2);
         }
     }
 
     #[test]
     fn a_threshold_that_depends_on_events_is_not_told() {
         let counts: Vec<u32> = (0..128).map(|bin| u32::from(bin == 40) * 50).collect();
-        let look = |settings: Settings| look(&settings, &counts, false).unwrap();
+        let explained = |settings: Settings| explain(&settings, &counts, false).unwrap();
         let window = WindowRule::new(3, "4.5".parse().unwrap(), Count::saturating(5)).unwrap();
         let plain = Settings {
             rule: window.into(),
             ..Settings::static_scene(0)
         };
-        let told = look(plain.clone());
-        assert!(told.needed.is_some() && !told.depends);
+        let first = explained(plain.clone());
+        assert!(first.needed.is_some() && !first.depends);
         let tracks = Settings {
             tracking: true,
             ..plain.clone()
@@ -305,17 +305,24 @@ mod tests {
             ..plain
         };
         for settings in [tracks, echoes] {
-            let look = look(settings);
+            let explanation = explained(settings);
             assert_eq!(
-                (look.needed, look.background, look.depends),
+                (
+                    explanation.needed,
+                    explanation.background,
+                    explanation.depends
+                ),
                 (None, None, true)
             );
-            assert_eq!((look.peak, look.window), (told.peak, told.window));
+            assert_eq!(
+                (explanation.peak, explanation.window),
+                (first.peak, first.window)
+            );
         }
     }
 
     #[test]
     fn other_histograms_have_no_look() {
-        assert_eq!(look(&Settings::static_scene(0), &[1; 100], false), None);
+        assert_eq!(explain(&Settings::static_scene(0), &[1; 100], false), None);
     }
 }

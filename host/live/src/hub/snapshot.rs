@@ -1,84 +1,76 @@
-//! What is known now, for messages to those who are no pages.
+//! A snapshot of the state, for messages to Foxglove.
 
 use dtof_core::RangeScale;
 
 use super::pixels::Pixel;
 use super::slice::Slice;
 use super::{Connection, Hub, Losses};
-use dtof_engine::settings::Rays;
+use dtof_engine::settings::RaySettings;
 use dtof_events::aer_file::{Event, Header};
 use dtof_export::foxglove::Statistics;
 
-/// What somebody wants to see.
-#[derive(Clone, Copy, Debug, Default)]
-pub struct Wanted {
-    /// Events, and counts of them.
-    pub events: bool,
-    /// Pixels, if they have changed since this change.
-    pub pixels: Option<u64>,
-}
-
-/// What is known now.
-pub struct Seen {
+/// The current state.
+pub struct Snapshot {
     /// Changes with array and settings.
     pub version: u64,
     pub name: String,
-    /// None before laser cycles begin.
+    /// `None` before laser cycles begin.
     pub header: Option<Header>,
     pub scale: Option<RangeScale>,
-    pub rays: Rays,
+    pub rays: RaySettings,
     pub connection: Connection,
     pub losses: Losses,
-    /// Why recording ended by itself.
+    /// Why recording has ended by itself.
     pub recording_error: String,
-    /// Where a recording is.
+    /// Playback time of a recording.
     pub seconds: f64,
-    /// All events since the beginning, and of these those of masked pixels.
+    /// Events since the start, and events of masked pixels.
     pub arrived: u64,
     pub masked: u64,
-    /// Events since it was asked last, the counts of all, and how many were left out.
+    /// Events since the last snapshot, the counts of all events, and the number of dropped ones.
     pub events: Vec<Event>,
     pub statistics: Statistics,
-    pub left_out: u64,
+    pub dropped: u64,
     /// All pixels, and the number of their last change.
     pub pixels: Option<(Vec<Pixel>, u64)>,
 }
 
 impl Hub {
-    /// What is known now. Events are kept for the next time as long as they are wanted.
-    pub(crate) fn seen(&self, wanted: Wanted) -> Seen {
+    /// Takes a snapshot. With `collects_events` the next one has the events until then. It has the
+    /// pixels if their last change is not `known_change`; with `None` it has none.
+    pub(crate) fn snapshot(&self, collects_events: bool, known_change: Option<u64>) -> Snapshot {
         let mut state = self.state();
         let state = &mut *state;
-        let (events, statistics, left_out) = match &mut state.slice {
+        let (events, statistics, dropped) = match &mut state.slice {
             Some(slice) => slice.take(),
             None => <_>::default(),
         };
-        if !wanted.events {
+        if !collects_events {
             state.slice = None;
         } else if state.slice.is_none() {
             state.slice = Some(Slice::new(state.pixels.len()));
         }
-        let said = match &state.settings {
-            Some((said, _)) => said,
-            None => &state.said,
+        let file = match &state.settings {
+            Some((file, _)) => file,
+            None => &state.requested,
         };
         let changes = state.pixels.changes();
-        let pixels = wanted.pixels.filter(|&known| known != changes);
-        Seen {
+        let pixels = known_change.filter(|&known| known != changes);
+        Snapshot {
             version: state.version,
             name: state.name.clone(),
             header: state.header,
             scale: state.scale,
-            rays: said.rays.clone(),
+            rays: file.rays.clone(),
             connection: state.connection.clone(),
             losses: state.losses.clone(),
-            recording_error: state.recorded.error.clone(),
+            recording_error: state.recording.error.clone(),
             seconds: state.seconds,
             arrived: state.events,
             masked: state.masked,
             events,
             statistics,
-            left_out,
+            dropped,
             pixels: pixels.map(|_| (state.pixels.all().to_vec(), changes)),
         }
     }

@@ -1,20 +1,21 @@
-//! One pixel, and whether what its dynamic depth says is so.
+//! One pixel with dynamic depth, compared with the truth.
 
 use std::collections::VecDeque;
 
-use dtof_core::{DepthEvent, DynamicDepthConfig, DynamicDepthPixel, Polarity, Reference};
+use dtof_core::DepthEvent;
+use dtof_core::events::{DynamicDepthConfig, DynamicDepthPixel, Polarity, Reference};
 
 use crate::sweep::Tally;
 use crate::sweep::mean::{add, add_value};
 
-/// Events a mean is of: the paper's.
+/// Events of a mean, as in the paper.
 const MEAN_OF: usize = 3;
-/// Laser cycles after a step within which it has to be found; one that comes later in
-/// the run is left out.
+/// Laser cycles after a step within which it has to be found; steps closer to the end of the run
+/// are left out.
 const WITHIN: u64 = 20_000;
 
-/// When the truth moves by more than `threshold_mm` from where it last did so, and to
-/// which side.
+/// The laser cycles and signs of steps: the truth differs by more than `threshold_mm` from its
+/// value at the previous step.
 pub fn true_steps(truth: impl Iterator<Item = (u64, f64)>, threshold_mm: f64) -> Vec<(u64, i8)> {
     let mut reference = None;
     let mut steps = Vec::new();
@@ -33,12 +34,13 @@ pub fn true_steps(truth: impl Iterator<Item = (u64, f64)>, threshold_mm: f64) ->
 #[derive(Clone, Copy)]
 struct Change {
     cycle: u64,
-    side: i8,
-    /// Whether the truth has moved to this side by half the threshold meanwhile.
+    /// 1 if farther, -1 if nearer.
+    sign: i8,
+    /// Whether the truth has moved in this direction by at least half the threshold meanwhile.
     is_true: bool,
 }
 
-/// From the nearest to the farthest.
+/// The nearest and the farthest range.
 #[derive(Clone, Copy)]
 struct Extent {
     low: f64,
@@ -54,21 +56,21 @@ impl Extent {
     }
 }
 
-/// A pixel with its dynamic depth, and what it saw meanwhile.
+/// A pixel with its dynamic depth, and the true ranges it saw.
 #[derive(Clone)]
-pub struct Watched {
+pub struct ObservedPixel {
     config: DynamicDepthConfig,
     threshold_mm: f64,
     pixel: DynamicDepthPixel<MEAN_OF>,
-    /// In the exposures of the last events: those of the mean, and the one before.
+    /// Extents in the exposures of the last events: those of the mean, and the previous one.
     recent: VecDeque<Extent>,
-    /// Since the exposures of the mean that was reported last.
+    /// The extent since the exposures of the mean reported last.
     since: Option<Extent>,
     changes: Vec<Change>,
     events: u64,
 }
 
-impl Watched {
+impl ObservedPixel {
     /// Before any event.
     pub fn new(config: DynamicDepthConfig, threshold_mm: f64) -> Self {
         Self {
@@ -82,8 +84,7 @@ impl Watched {
         }
     }
 
-    /// Takes an event of the pixel in, and how far away what it saw was at both ends
-    /// of its exposure.
+    /// Adds an event of the pixel, with the true ranges at both ends of its exposure.
     pub fn observe(&mut self, event: &DepthEvent, [first, last]: [f64; 2]) {
         self.events += 1;
         let seen = Extent {
@@ -103,34 +104,34 @@ impl Watched {
             Reference::Previous => Extent::of(self.recent.iter().copied()),
             Reference::Reported => self.since,
         };
-        let (side, moved) = match (change.polarity(), before.zip(Extent::of(newest()))) {
+        let (sign, moved) = match (change.polarity(), before.zip(Extent::of(newest()))) {
             (Polarity::Nearer, Some((before, now))) => (-1, before.high - now.low),
             (Polarity::Farther, Some((before, now))) => (1, now.high - before.low),
             (_, None) => return,
         };
         self.changes.push(Change {
-            cycle: change.cycle.0,
-            side,
+            cycle: change.cycle.raw(),
+            sign,
             is_true: moved > self.threshold_mm / 2.0,
         });
         self.since = Extent::of(newest());
     }
 
     /// Adds the pixel, its events and changes to the counts of `name`.
-    pub fn add_of(&self, tally: &mut Tally, name: &str) {
+    pub fn add_counts(&self, tally: &mut Tally, name: &str) {
         add(tally, name, "pixels", 1);
         add(tally, name, "events", self.events);
         add(tally, name, "changes", self.changes.len() as u64);
     }
 
-    /// Adds what was reported, beside the true `steps` of a run of `cycles` laser
-    /// cycles, to the counts of `name`.
-    pub fn add_to(&self, tally: &mut Tally, name: &str, steps: &[(u64, i8)], cycles: u64) {
+    /// Adds the changes, compared with the true `steps` of a run of `cycles` laser cycles, to the
+    /// counts of `name`.
+    pub fn add_steps(&self, tally: &mut Tally, name: &str, steps: &[(u64, i8)], cycles: u64) {
         let count = |amount: usize| amount as u64;
         add(tally, name, "changes", count(self.changes.len()));
         let is_false = self.changes.iter().filter(|change| !change.is_true);
         add(tally, name, "false", count(is_false.count()));
-        for (index, &(at, side)) in steps.iter().enumerate() {
+        for (index, &(at, sign)) in steps.iter().enumerate() {
             if at + WITHIN > cycles {
                 break;
             }
@@ -139,7 +140,7 @@ impl Watched {
             let until = next.map_or(cycles, |next| next.0 - early(steps, index + 1));
             let until = until.min(at + WITHIN);
             let found = self.changes.iter().find(|change| {
-                (from..until).contains(&change.cycle) && change.side == side && change.is_true
+                (from..until).contains(&change.cycle) && change.sign == sign && change.is_true
             });
             add(tally, name, "steps", 1);
             if let Some(found) = found {
@@ -150,16 +151,16 @@ impl Watched {
     }
 }
 
-/// Laser cycles before a step from which on it may be found: a mean that goes slowly is
-/// noisy and may be there earlier, by up to half of what the step has taken. A step to
-/// the other side than its neighbour is one at once.
+/// Laser cycles before a step from which it may be found. The mean of a slow motion is noisy and
+/// may cross the threshold early, by up to half of the duration of the step. A step that changes
+/// direction has no such margin.
 fn early(steps: &[(u64, i8)], index: usize) -> u64 {
-    let (at, side) = steps[index];
+    let (at, sign) = steps[index];
     let (since, neighbour) = match index.checked_sub(1) {
         Some(before) => (steps[before].0, Some(&steps[before])),
         None => (0, steps.get(1)),
     };
-    let goes_on = neighbour.is_some_and(|neighbour| neighbour.1 == side);
+    let goes_on = neighbour.is_some_and(|neighbour| neighbour.1 == sign);
     if goes_on { (at - since) / 2 } else { 0 }
 }
 
@@ -174,17 +175,17 @@ mod tests {
     use super::*;
 
     /// A pixel of 250 ps bins that sees these bins, an event each 100 laser cycles.
-    fn watched(bins: &[u16], truth: &[u16]) -> Watched {
+    fn observed(bins: &[u16], truth: &[u16]) -> ObservedPixel {
         let scale = RangeScale::new(U16F16::from_num(250), I24F8::ZERO).unwrap();
         let threshold = U24F8::from_num(100);
         let config = DynamicDepthConfig::new(threshold, &scale, Reference::Previous).unwrap();
-        let mut watched = Watched::new(config, 100.0);
+        let mut pixel = ObservedPixel::new(config, 100.0);
         for (cycle, (&bin, &truth)) in (1..).zip(bins.iter().zip(truth)) {
             let event = DepthEvent {
-                pixel: PixelAddress(0),
+                pixel: PixelAddress::new(0),
                 level: BlockLevel::PIXEL,
                 echo: EchoNumber::FIRST,
-                cycle: LaserCycle(cycle * 100),
+                cycle: LaserCycle::new(cycle * 100),
                 exposure: 44,
                 peak_bin: BinIndex::saturating(bin),
                 offset: SubBinOffset::CENTRE,
@@ -192,15 +193,15 @@ mod tests {
                 background: Count::saturating(1),
                 flags: Flags::NONE,
             };
-            watched.observe(&event, [f64::from(truth) * 37.474; 2]);
+            pixel.observe(&event, [f64::from(truth) * 37.474; 2]);
         }
-        watched
+        pixel
     }
 
-    fn tallied(watched: &Watched, steps: &[(u64, i8)]) -> Tally {
+    fn tallied(pixel: &ObservedPixel, steps: &[(u64, i8)]) -> Tally {
         let mut tally = Tally::new();
-        watched.add_to(&mut tally, "a", steps, 100_000);
-        watched.add_of(&mut tally, "a still");
+        pixel.add_steps(&mut tally, "a", steps, 100_000);
+        pixel.add_counts(&mut tally, "a still");
         tally
     }
 
@@ -210,12 +211,12 @@ mod tests {
             .map(|index| if index < 10 { 20 } else { 40 })
             .collect();
         // The step is just after the tenth event.
-        let tally = tallied(&watched(&bins, &bins), &[(1001, 1)]);
+        let tally = tallied(&observed(&bins, &bins), &[(1001, 1)]);
         assert_eq!((tally["a changes"], tally["a false"]), (3, 0));
         assert_eq!((tally["a steps"], tally["a delay values"]), (1, 1));
         assert_eq!(tally["a delay above 0"], 99);
-        // To the other side it is not that step.
-        let tally = tallied(&watched(&bins, &bins), &[(1001, -1)]);
+        // A step in the other direction is not found.
+        let tally = tallied(&observed(&bins, &bins), &[(1001, -1)]);
         assert_eq!((tally["a steps"], tally.get("a delay values")), (1, None));
     }
 
@@ -223,7 +224,7 @@ mod tests {
     fn a_false_event_makes_changes_to_both_sides_that_are_false() {
         let mut bins = vec![20; 20];
         bins[10] = 90;
-        let tally = tallied(&watched(&bins, &[20; 20]), &[]);
+        let tally = tallied(&observed(&bins, &[20; 20]), &[]);
         // It comes and goes.
         assert_eq!((tally["a changes"], tally["a false"]), (2, 2));
         assert_eq!((tally["a still pixels"], tally["a still changes"]), (1, 2));

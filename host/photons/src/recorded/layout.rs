@@ -1,40 +1,40 @@
-//! What a part of a recording has to know of the whole, to be replayed as it is there.
+//! The layout of a recording, which a part of it needs to replay the same photons.
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::Array;
 
 use super::{Capture, totals};
 
-/// The recording that a part is of.
+/// The layout of a whole recording.
 ///
-/// The random numbers of a pixel depend on the seed and its address. How many laser cycles a
-/// capture lasted depends on its brightest pixel, and how many are drawn at a time on all pixels:
-/// the photons of each say both.
+/// The random numbers of a pixel depend on the seed and its address. The length of a capture
+/// depends on its brightest pixel, and the length of a chunk on all pixels. Both follow from the
+/// photons of each pixel.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Whole {
-    /// Its array.
+pub struct Layout {
+    /// The array of all captures.
     pub array: Array,
-    /// Of each capture the photons of each pixel, in the order of addresses.
+    /// The photons of each pixel of each capture, in the order of addresses.
     pub captures: Vec<Vec<u64>>,
     /// The address of the first pixel of the part.
     pub first: usize,
-    /// Photons in bins that were cut off before.
+    /// Photons in bins that were cut off.
     pub cut_off: u64,
-    /// Addresses of pixels that say nothing of how long it lasted, such as hot ones.
+    /// Addresses of pixels that do not count for the length, such as hot ones.
     pub masked: Vec<u16>,
 }
 
-impl Whole {
-    /// The whole of `totals`, the photons of each of its pixels, in so many captures.
+impl Layout {
+    /// The layout of `captures` captures whose pixels have `totals` photons.
     ///
     /// # Errors
-    /// If there is no such array.
+    /// Fails if the pixels do not fill the captures of the array.
     pub fn new(array: Array, captures: usize, totals: &[u64], first: usize) -> Result<Self> {
         ensure!(
             captures > 0
                 && totals.len() == array.pixels() as usize
                 && (array.rows() as usize).is_multiple_of(captures),
-            "{} pixels in {captures} captures are no {} rows of {} columns",
+            "{} pixels in {captures} captures do not make {} rows of {} columns",
             totals.len(),
             array.rows(),
             array.columns()
@@ -51,26 +51,20 @@ impl Whole {
         })
     }
 
-    /// The same, its length said by the pixels that are not `masked`.
-    #[must_use]
-    pub fn with_masked(self, masked: Vec<u16>) -> Self {
-        Self { masked, ..self }
-    }
-
-    /// All of `captures`, each of `array`.
+    /// The layout of `captures`, each of `array`.
     ///
     /// # Errors
-    /// If there are no captures, more pixels than addresses, or more photons in a histogram than
-    /// can be counted.
-    pub fn of(array: Array, captures: &[Capture]) -> Result<Self> {
+    /// Fails if there are no captures, more pixels than addresses, or too many photons in a
+    /// histogram.
+    pub fn from_captures(array: Array, captures: &[Capture]) -> Result<Self> {
         ensure!(!captures.is_empty(), "no captures");
         let pixels = array.pixels() as usize;
-        let are_whole = captures.iter().all(|capture| capture.len() == pixels);
-        ensure!(are_whole, "a capture has other than {pixels} histograms");
+        let are_complete = captures.iter().all(|capture| capture.len() == pixels);
+        ensure!(are_complete, "a capture does not have {pixels} histograms");
         let rows = u32::try_from(captures.len())?.saturating_mul(array.rows());
-        let whole = Array::new(array.columns(), rows);
+        let layout = Array::new(array.columns(), rows);
         Ok(Self {
-            array: whole.context("more than 65,536 pixels")?,
+            array: layout.context("more than 65,536 pixels")?,
             captures: captures.iter().map(totals).collect::<Result<_>>()?,
             first: 0,
             cut_off: 0,
@@ -78,37 +72,31 @@ impl Whole {
         })
     }
 
-    /// The same, less so many photons in bins that were cut off.
-    #[must_use]
-    pub fn with_cut_off(self, cut_off: u64) -> Self {
-        Self { cut_off, ..self }
-    }
-
     /// Rows of a capture.
     pub(super) fn capture_rows(&self) -> Result<u32> {
         Ok(self.array.rows() / u32::try_from(self.captures.len().max(1))?)
     }
 
-    /// Pixels with so many photons each are this part of it.
+    /// Checks that `totals` are the photons of the pixels from `first` on.
     pub(super) fn check(&self, totals: &[u64]) -> Result<()> {
-        let mut there = self.captures.iter().flatten().skip(self.first);
+        let mut totals_of_layout = self.captures.iter().flatten().skip(self.first);
         for (number, total) in totals.iter().enumerate() {
             let pixel = self.first + number;
-            let of_whole = there.next();
-            let of_whole = of_whole.with_context(|| format!("there is no pixel {pixel}"))?;
+            let expected = totals_of_layout.next();
+            let expected = expected.with_context(|| format!("there is no pixel {pixel}"))?;
             ensure!(
-                total == of_whole,
-                "pixel {pixel} has {total} photons, but {of_whole} when all were counted: did the \
+                total == expected,
+                "pixel {pixel} has {total} photons, but {expected} when all were counted: did the \
                  recording change?"
             );
         }
         Ok(())
     }
 
-    /// Blocks of `side` pixels a side are in the part of `pixels` pixels whole, or not at all.
+    /// Checks that no block of `side` pixels a side is only partly among the `pixels` of the part.
     ///
     /// # Errors
-    /// If one is in it by half.
+    /// Fails if a block is cut.
     pub fn has_whole_blocks(&self, pixels: usize, side: usize) -> Result<()> {
         let columns = self.array.columns() as usize;
         let (begin, end) = (self.first, self.first + pixels);

@@ -1,0 +1,31 @@
+//! What an event was decided from.
+
+use crate::histogram::Histogram;
+use crate::histogram::counter::CounterWidth;
+use crate::histogram::excluded::ExcludedBins;
+use crate::units::BinIndex;
+
+/// What the decision for an event was made from: enough to make it again. The observer of
+/// [`AsyncPixel::end_laser_cycles_with`](crate::AsyncPixel::end_laser_cycles_with) gets it.
+///
+/// Exhaustive, because a program that decides on whole histograms builds it from its fields.
+#[derive(Clone, Debug)]
+pub struct DecisionInput<'a, const BINS: usize, W: CounterWidth> {
+    /// The histogram of the exposure. The bins around its earlier echoes are empty.
+    pub histogram: &'a Histogram<BINS, W>,
+    /// Where a pixel that tracks expected the event.
+    pub expected: Option<BinIndex>,
+    /// The bins around the earlier echoes.
+    pub excluded: ExcludedBins,
+}
+
+impl<'a, const BINS: usize, W: CounterWidth> DecisionInput<'a, BINS, W> {
+    /// From the histogram alone.
+    pub(super) const fn plain(histogram: &'a Histogram<BINS, W>) -> Self {
+        Self {
+            histogram,
+            expected: None,
+            excluded: ExcludedBins::NONE,
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! The options of commands that write a folder of results, and of those that can decide on a device.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+use clap::Args;
+use dtof::path;
+use dtof_device::{Client, DeviceEngine};
+use dtof_engine::Engine;
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::{Settings, SettingsFile};
+use dtof_events::echoes::Echo;
+use dtof_options::Refused;
+use dtof_photons::source::PhotonSource;
+use dtof_run::output::Output;
+
+use super::dynamic_depth::DynamicDepthOptions;
+use super::flags::name;
+
+/// The folder of the results, and what goes into it.
+#[derive(Args)]
+pub struct ResultOptions {
+    /// Folder of the results
+    #[arg(long, value_name = "DIR", value_parser = path())]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub dynamic_depth: DynamicDepthOptions,
+    /// Echo of each exposure that maps and report show; the files of events hold all
+    /// [default: the strongest in the maps, all in the report]
+    #[arg(long, value_parser = name::<Echo>())]
+    pub echo: Option<Echo>,
+    /// Do not write events.csv
+    #[arg(long)]
+    pub no_csv: bool,
+    /// Print nothing but errors
+    #[arg(long)]
+    pub quiet: bool,
+}
+
+impl ResultOptions {
+    /// Prepares the folder for a job that reads `input` and a settings file.
+    ///
+    /// # Errors
+    /// Fails if an option does not suit the others, or the folder cannot be written.
+    pub fn output(
+        &self,
+        settings: &Settings,
+        photons: &dyn PhotonSource,
+        input: Option<&Path>,
+        effective: SettingsFile,
+        settings_file: Option<&Path>,
+    ) -> Result<Output> {
+        Ok(Output::create(&self.out, settings, photons, input)?
+            .with_settings(effective, settings_file)?
+            .with_changes(self.dynamic_depth.get()?.as_ref())?
+            .with_echo(self.echo, settings)
+            .without_csv(self.no_csv))
+    }
+}
+
+/// The computer or device that decides.
+#[derive(Args)]
+pub struct EngineOptions {
+    /// Device that decides: tcp:HOST:PORT, a serial port, or `qemu`, which starts an emulated
+    /// device [default: this computer]
+    #[arg(long, value_name = "DEVICE")]
+    pub device: Option<String>,
+    /// Image for `--device qemu` [default: the one built by `cargo xtask image mps2-an386`]
+    #[arg(long, value_name = "FILE", requires = "device")]
+    image: Option<PathBuf>,
+}
+
+impl EngineOptions {
+    /// The engine for `photons`.
+    ///
+    /// # Errors
+    /// Fails if the settings do not suit the engine, or the device cannot be opened.
+    pub fn engine(
+        &self,
+        settings: &Settings,
+        photons: &dyn PhotonSource,
+    ) -> Result<Box<dyn Engine>> {
+        let (array, addresses) = (photons.array(), photons.addresses());
+        let Some(device) = &self.device else {
+            return host_engine(settings, array, &addresses);
+        };
+        // Checked before the device is opened.
+        ensure!(
+            settings.frame.is_none(),
+            Refused::new("frame", "is not for a device, which reports events")
+        );
+        let port = dtof_device::open(device, self.image.as_deref())?;
+        let client = Client::new(port).with_context(|| device.clone())?;
+        let engine = DeviceEngine::new(client, settings, array, &addresses)?;
+        Ok(Box::new(engine))
+    }
+}
