@@ -35,9 +35,12 @@ use fixed::types::U8F8;
 
 use crate::check::impl_error;
 use crate::depth::DepthEstimator;
-use crate::detect::{Detection, DetectionRule, PaperRule, Tracking, detect, detect_at};
+use crate::detect::{
+    Detection, DetectionRule, LiveCounts, PaperRule, Tracking, detect, detect_at, detection_in,
+};
+use crate::flags::Flags;
 use crate::histogram::Histogram;
-use crate::histogram::counter::CounterWidth;
+use crate::histogram::counter::{CounterWidth, PhotonCount};
 use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
 use crate::units::{BinIndex, Count, EchoNumber};
@@ -53,7 +56,7 @@ pub struct PixelConfig<const BINS: usize, R: DetectionRule = PaperRule> {
     l1: u16,
     l2: u16,
     gate: RangeGate<BINS>,
-    is_one_hit: bool,
+    dead_time: u16,
     echoes: EchoNumber,
     echo_guard_bins: u8,
     echo_wait: u8,
@@ -111,7 +114,7 @@ impl<const BINS: usize> PixelConfig<BINS> {
 
 impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
     /// With another rule. The defaults: X is 4, L1 is 40, L2 is 2000, no gate, the paper's
-    /// depth, and a TDC that takes every photon.
+    /// depth, and a TDC without a dead time.
     pub const fn with_rule(rule: R) -> PixelConfigBuilder<BINS, R> {
         PixelConfigBuilder(Self {
             x: 4,
@@ -120,7 +123,7 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
             gate: RangeGate::full(),
             rule,
             estimator: DepthEstimator::Centroid3,
-            is_one_hit: false,
+            dead_time: 0,
             tracking: None,
             echoes: EchoNumber::FIRST,
             echo_guard_bins: 0,
@@ -128,18 +131,16 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
         })
     }
 
-    /// The same configuration for a TDC that takes one photon a laser cycle, for programs
-    /// that read this from their sensor. See [`PixelConfigBuilder::one_hit_tdc`].
+    /// The same configuration for a TDC with another dead time, for programs that read it from
+    /// their sensor. See [`PixelConfigBuilder::dead_time`].
     #[must_use]
-    pub const fn with_one_hit_tdc(self) -> Self {
-        Self {
-            is_one_hit: true,
-            ..self
-        }
+    pub const fn with_dead_time(self, dead_time: u16) -> Self {
+        Self { dead_time, ..self }
     }
 
     /// The detection in `histogram`, if its highest bin stands clear of the background.
-    /// `histogram` must hold gated bins only.
+    /// `histogram` must hold gated bins only. It is not weighed by a dead time:
+    /// [`Self::detect_echoes`] does that.
     #[inline(always)]
     #[must_use]
     pub fn detect<W: CounterWidth>(&self, histogram: &Histogram<BINS, W>) -> Option<Detection> {
@@ -167,24 +168,91 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
         )
     }
 
-    /// Calls `echo` for each echo of a whole histogram, at most [`Self::echoes`], the highest
-    /// peak first. Empties the bins around all but the last.
+    /// The decision of a pixel on live counts, and whether bins were left out.
+    #[inline(never)]
+    pub(crate) fn detect_live<W: CounterWidth>(
+        &self,
+        counts: &LiveCounts<'_, BINS, W>,
+        expected: Option<BinIndex>,
+    ) -> (Option<Detection>, bool) {
+        let decision = match (&self.tracking, expected) {
+            (Some(tracking), Some(expected)) => tracking.detect_live(counts, expected),
+            _ => self.rule.detect_live(counts, None),
+        };
+        let detection = decision.window.map(|window| {
+            let mut detection = detection_in(counts, &window, &self.estimator);
+            if decision.is_blind {
+                detection.depth.flags |= Flags::PILE_UP;
+            }
+            detection
+        });
+        (detection, decision.is_blind)
+    }
+
+    /// Adds a histogram that was counted elsewhere, as [`Histogram::add_frame`] does with the gate
+    /// of this configuration. With a dead time that the rule weighs, the photons before the gate
+    /// stay in their counters.
+    pub fn add_frame<C: PhotonCount, W: CounterWidth>(
+        &self,
+        histogram: &mut Histogram<BINS, W>,
+        frame: &[C; BINS],
+    ) -> u32 {
+        let gated_out = histogram.add_frame(frame, &self.gate);
+        if self.weighs_dead_time() {
+            histogram.keep_frame_before(self.gate.first(), frame);
+        }
+        gated_out
+    }
+
+    /// Calls `echo` for each echo of a whole histogram of `cycles` laser cycles, at most
+    /// [`Self::echoes`], the highest peak first. [`Self::add_frame`] has filled it.
+    ///
+    /// Without a dead time, the bins around all echoes but the last are empty after it, and
+    /// `cycles` does not matter. With one, returns whether a decision left bins out: because they
+    /// were hardly ever live, because the counts contradict the dead time, or all of them because a
+    /// counter is full. Then there is no detection, as the depth could be wrong.
     pub fn detect_echoes<W: CounterWidth>(
         &self,
         histogram: &mut Histogram<BINS, W>,
+        cycles: u32,
         mut echo: impl FnMut(EchoNumber, &Detection),
-    ) {
+    ) -> bool {
         let mut excluded = ExcludedBins::new(self.echo_guard_bins);
         let mut number = EchoNumber::FIRST;
-        while let Some(detection) = self.detect_further(histogram, None, &excluded) {
+        let mut is_blind = false;
+        loop {
+            let detection = if self.weighs_dead_time() {
+                let Some(counts) = self.live_counts(histogram, cycles, &excluded) else {
+                    return true;
+                };
+                let (detection, left_out) = self.detect_live(&counts, None);
+                is_blind |= left_out;
+                detection
+            } else {
+                excluded.empty(histogram);
+                self.detect_further(histogram, None, &excluded)
+            };
+            let Some(detection) = detection else {
+                return is_blind;
+            };
             echo(number, &detection);
             let next = self.echo_after(number, &mut excluded, detection.peak.bin);
             let Some(next) = next else {
-                return;
+                return is_blind;
             };
             number = next;
-            excluded.empty(histogram);
         }
+    }
+
+    /// The counts of a histogram to weigh; `None` if they cannot be.
+    #[inline(always)]
+    pub(crate) fn live_counts<'a, W: CounterWidth>(
+        &'a self,
+        histogram: &'a Histogram<BINS, W>,
+        cycles: u32,
+        excluded: &'a ExcludedBins,
+    ) -> Option<LiveCounts<'a, BINS, W>> {
+        LiveCounts::new(histogram, &self.gate, excluded, cycles, self.dead_time)
     }
 
     /// Excludes the bins around echo `number`, which has its peak in `bin`. Returns the
@@ -275,10 +343,23 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
         }
     }
 
-    /// Whether the TDC takes one photon a laser cycle.
+    /// The bins for which the TDC is blind after a photon.
     #[must_use]
-    pub const fn is_one_hit(&self) -> bool {
-        self.is_one_hit
+    pub const fn dead_time(&self) -> u16 {
+        self.dead_time
+    }
+
+    /// Whether only the first photon of a laser cycle counts.
+    #[must_use]
+    pub const fn is_first_photon_only(&self) -> bool {
+        self.dead_time as usize >= BINS
+    }
+
+    /// Whether the rule weighs bins by their live laser cycles: it can, and there is a dead time.
+    #[inline(always)]
+    #[must_use]
+    pub fn weighs_dead_time(&self) -> bool {
+        self.dead_time > 0 && self.rule.weighs_dead_time()
     }
 }
 
@@ -340,16 +421,24 @@ impl<const BINS: usize, R: DetectionRule> PixelConfigBuilder<BINS, R> {
         self
     }
 
-    /// Whether the TDC takes the first photon of a laser cycle only. An event then gets
-    /// [`Flags::PILE_UP`](crate::Flags::PILE_UP) if its exposure has more photons than
-    /// half its laser cycles. Photons outside the gate count, too.
+    /// The TDC is blind for so many bins after each photon. With as many as the histogram has, or
+    /// more, it takes the first photon of a laser cycle only. 0, the default, is a TDC that takes
+    /// every photon.
     ///
-    /// At that half, 0.7 photons arrive in a laser cycle. A Gaussian pulse without background
-    /// then reads too near by 0.2 of its standard deviation. False alarms begin above four
-    /// fifths (`docs/results/failures.md`). Photon counting usually keeps to 5 %. That limits
-    /// the depth error to a hundredth of the pulse, far below that of an event's few photons.
-    pub const fn one_hit_tdc(mut self, is_one_hit: bool) -> Self {
-        self.0.is_one_hit = is_one_hit;
+    /// The window rule weighs each bin by the laser cycles in which it was live: see [`LiveCounts`].
+    /// Photons before the gate then stay in their counters, because they blind the TDC, and
+    /// [`Detection`] says what peak and background are. An exposure with a full counter ends without
+    /// a decision: [`Statistics::ended_full`](crate::Statistics::ended_full). Blocks of pixels are
+    /// not weighed.
+    ///
+    /// Other rules, and blocks, take every bin as live. With them an event of a TDC of the first
+    /// photon gets [`Flags::PILE_UP`] if its exposure has more photons than half its laser cycles;
+    /// photons outside the gate count, too. At that half, 0.7 photons arrive in a laser cycle. A
+    /// Gaussian pulse without background then reads too near by 0.2 of its standard deviation, and
+    /// false alarms begin above four fifths (`docs/results/failures.md`). A shorter dead time has no
+    /// effect on them: use the window rule.
+    pub const fn dead_time(mut self, bins: u16) -> Self {
+        self.0.dead_time = bins;
         self
     }
 

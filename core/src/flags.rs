@@ -21,10 +21,12 @@ impl Flags {
     /// Bit 2: a decision was deferred while the slot was full, so the exposure may be
     /// longer than necessary.
     pub const DEFERRED: Self = Self(1 << 2);
-    /// Bit 3: the TDC takes one hit a laser cycle and took one in more than half of the
-    /// exposure's, so early photons hide late ones. The depth is biased towards the
+    /// Bit 3: early photons hid late ones. With the window rule, which weighs bins by their live
+    /// laser cycles, it means that bins were left out because they were hardly ever live, and a
+    /// target there was not seen. With other rules and in blocks it means that a TDC of the first
+    /// photon took one in more than half of the laser cycles: the depth is biased towards the
     /// sensor, and the peak may not be a target. See
-    /// [`PixelConfig::with_one_hit_tdc`](crate::PixelConfig::with_one_hit_tdc).
+    /// [`PixelConfigBuilder::dead_time`](crate::PixelConfigBuilder::dead_time).
     pub const PILE_UP: Self = Self(1 << 3);
 
     /// Bit 4: the peak lies on the tail of an echo that was reported earlier in the same

@@ -85,7 +85,9 @@
 //! - **CFAR**: a test with a constant false-alarm rate, whatever the background.
 //! - **Peak event**, here *depth event*: a detection that a pixel reports.
 //! - **Centroid**: the centre of the photons of some bins.
-//! - **Dead time**, **pile-up**: the TDC takes one photon and misses those after it.
+//! - **Dead time**: bins for which a TDC is blind after a photon; all of them if it takes the
+//!   first photon of a laser cycle only. **Pile-up**: early photons hide late ones.
+//! - **Live**: a bin is live in the laser cycles in which the TDC is not blind there.
 //! - **Dynamic depth**: events of changes of depth only, with a polarity.
 //! - **AER**: address-event representation; REQ and ACK are its handshake, REQ the paper's.
 

@@ -90,7 +90,7 @@ impl ProcessorSettings {
         let [first, second, middle, fourth, end] = config.gate().quadrant_starts();
         Ok(Self([
             (config.l1() as u32) << 16 | config.x() as u32,
-            (config.is_one_hit() as u32) << 16 | config.l2() as u32,
+            (config.is_first_photon_only() as u32) << 16 | config.l2() as u32,
             minimum_count << 16 | threshold.alpha().to_bits() as u32,
             (fourth as u32) << 24 | (middle as u32) << 16 | (second as u32) << 8 | first as u32,
             end as u32,

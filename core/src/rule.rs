@@ -30,7 +30,10 @@
 //! # Ok::<(), PixelConfigError>(())
 //! ```
 
-pub use crate::detect::{HIGHEST_Z, Tracking, background_from_count, detect, z_for_levels};
+pub use crate::detect::{
+    HIGHEST_Z, LiveCounts, LiveDecision, LiveWindow, Tracking, background_from_count, detect,
+    z_for_levels,
+};
 pub use crate::histogram::counter::PhotonCount;
 pub use crate::histogram::excluded::ExcludedBins;
 pub use crate::pixel::DecisionInput;

@@ -18,7 +18,7 @@ fn settings_are_where_the_registers_have_them() {
         .l1(0x1234)
         .l2(0xfedc)
         .gate(RangeGate::new(10, 125).unwrap())
-        .one_hit_tdc(true)
+        .dead_time(u16::MAX)
         .build()
         .unwrap();
     let registers = ProcessorSettings::of(&config).unwrap().registers();

@@ -46,9 +46,10 @@
 use fixed::types::{U8F8, U24F8};
 
 use super::estimate::DepthEstimate;
+use super::rates::Rates;
 use super::window_weights::Weights;
 use crate::flags::Flags;
-use crate::histogram::counter::CounterWidth;
+use crate::histogram::counter::{Count10, CounterWidth};
 use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
 use crate::histogram::{Histogram, Peak, mean};
@@ -65,9 +66,9 @@ pub struct CentredWindow {
 
 /// Bins that a window can reach, from [`PEAK`] before the peak bin on: an offset of -2
 /// to 2 bins, and 4 more on each side.
-const REACH: usize = 2 * PEAK;
+pub(super) const REACH: usize = 2 * PEAK;
 /// The index of the peak bin among them.
-const PEAK: usize = 6;
+pub(super) const PEAK: usize = 6;
 /// The same as a number of bins of the histogram.
 const BEFORE: u16 = 6;
 /// A window moves no farther than the start of the bin two before the peak bin, or two after.
@@ -257,13 +258,38 @@ impl CentredWindow {
             }
         }
         let mut depth = self.depth::<W>(&bins, peak.count);
-        let middle = (i32::from(peak.bin.raw()) << 8) + i32::from(depth.offset.raw());
+        depth.flags |= self.clipped(gate, peak.bin, depth.offset);
+        depth
+    }
+
+    /// The depth of the pulse about the bin `peak` from the light of the bins.
+    pub(super) fn of_rates<const BINS: usize>(
+        &self,
+        rates: &Rates,
+        gate: &RangeGate<BINS>,
+        peak: BinIndex,
+    ) -> DepthEstimate {
+        // Relative counts are never full.
+        let mut depth = self.depth::<Count10>(&rates.bins, Count::saturating(0));
+        depth.flags |= self.clipped(gate, peak, depth.offset);
+        depth
+    }
+
+    /// [`Flags::CLIPPED`] if the window about the place reaches past the gate.
+    fn clipped<const BINS: usize>(
+        &self,
+        gate: &RangeGate<BINS>,
+        peak: BinIndex,
+        offset: SubBinOffset,
+    ) -> Flags {
+        let middle = (i32::from(peak.raw()) << 8) + i32::from(offset.raw());
         let start = middle - i32::from(self.before.to_bits());
         let end = middle + i32::from(self.after.to_bits());
         if start < i32::from(gate.first()) << 8 || end > i32::from(gate.last() + 1) << 8 {
-            depth.flags |= Flags::CLIPPED;
+            Flags::CLIPPED
+        } else {
+            Flags::NONE
         }
-        depth
     }
 
     /// The place where the photons of `bins` balance.

@@ -16,10 +16,12 @@ use fixed::types::{U8F8, U24F8};
 use super::centred_window::CentredWindow;
 use super::centroid::centroid;
 use super::estimate::DepthEstimate;
+use super::rates::Rates;
 use crate::histogram::counter::CounterWidth;
 use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
 use crate::histogram::{Histogram, Peak};
+use crate::units::BinIndex;
 
 /// How the place of the pulse within its bins is estimated.
 ///
@@ -71,6 +73,20 @@ impl DepthEstimator {
             Self::CentredWindow(window) => {
                 window.estimate_without(histogram, gate, peak, background, excluded)
             }
+        }
+    }
+
+    /// The depth of the bin `peak` from the light of the bins about it.
+    #[inline(never)]
+    pub(crate) fn estimate_rates<const BINS: usize>(
+        &self,
+        rates: &Rates,
+        gate: &RangeGate<BINS>,
+        peak: BinIndex,
+    ) -> DepthEstimate {
+        match self {
+            Self::Centroid3 => rates.centroid(gate, peak),
+            Self::CentredWindow(window) => window.of_rates(rates, gate, peak),
         }
     }
 

@@ -25,6 +25,7 @@
 use fixed::types::U24F8;
 
 use super::average::AverageRule;
+use super::live::{LiveCounts, LiveDecision};
 use super::quadrant::PaperRule;
 use super::rule::DetectionRule;
 use super::tracking::Tracking;
@@ -33,7 +34,7 @@ use crate::histogram::counter::CounterWidth;
 use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
 use crate::histogram::{Histogram, Peak};
-use crate::units::BlockLevel;
+use crate::units::{BinIndex, BlockLevel};
 
 /// One of the rules.
 ///
@@ -107,6 +108,22 @@ impl DetectionRule for AnyRule {
             Self::Paper(rule) => once(rule, histogram, gate, peak, excluded),
             Self::Average(rule) => once(rule, histogram, gate, peak, excluded),
             Self::Window(rule) => once(rule, histogram, gate, peak, excluded),
+        }
+    }
+
+    #[inline(always)]
+    fn weighs_dead_time(&self) -> bool {
+        matches!(self, Self::Window(_))
+    }
+
+    fn detect_live<const BINS: usize, W: CounterWidth>(
+        &self,
+        counts: &LiveCounts<'_, BINS, W>,
+        expected: Option<BinIndex>,
+    ) -> LiveDecision {
+        match self {
+            Self::Window(rule) => rule.detect_live(counts, expected),
+            _ => LiveDecision::NONE,
         }
     }
 }

@@ -24,23 +24,28 @@
 
 use fixed::types::U24F8;
 
+use super::live::{LiveCounts, LiveWindow};
 use super::rule::DetectionRule;
-use crate::depth::{DepthEstimate, DepthEstimator};
+use crate::depth::{Counted, DepthEstimate, DepthEstimator, Rates};
 use crate::event::DepthEvent;
 use crate::flags::Flags;
 use crate::histogram::counter::CounterWidth;
 use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
 use crate::histogram::{Histogram, Peak};
-use crate::units::{BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress};
+use crate::units::{
+    BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress,
+};
 
 /// A peak that stands clear of the background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Detection {
-    /// The highest bin.
+    /// The highest bin. Of a TDC with a dead time the bin with the most light, and the photons
+    /// that were counted there.
     pub peak: Peak,
-    /// The background a bin, as the rule estimates it, rounded to whole counts.
+    /// The background a bin, as the rule estimates it, rounded to whole counts. Of a TDC with a
+    /// dead time that of the peak's bin, in the laser cycles that it was live.
     pub background: Count,
     /// Where in its bins the pulse lies.
     pub depth: DepthEstimate,
@@ -155,6 +160,65 @@ pub(crate) fn detection_at<const BINS: usize, W: CounterWidth>(
     Detection {
         peak,
         background: rounded(background),
+        depth,
+    }
+}
+
+/// The detection in a window of live counts.
+///
+/// The peak is the bin of the window with the most light, its count that of the photons as they were
+/// counted. The background is what the bins outside have a live laser cycle, in the laser cycles that
+/// the peak was live: photons, too.
+#[inline(never)]
+pub(crate) fn detection_in<const BINS: usize, W: CounterWidth>(
+    counts: &LiveCounts<'_, BINS, W>,
+    window: &LiveWindow,
+    estimator: &DepthEstimator,
+) -> Detection {
+    let (gate, excluded) = (counts.gate(), counts.excluded());
+    let (first, width) = (window.first, window.width);
+    let (bin, counted) =
+        (first + 1..first + width).fold((first, counts.counted(first)), |(bin, highest), other| {
+            let counted = counts.counted(other);
+            // The lowest bin wins a tie, as everywhere.
+            if counted.photons * highest.live > highest.photons * counted.live {
+                (other, counted)
+            } else {
+                (bin, highest)
+            }
+        });
+    let peak = Peak {
+        bin: BinIndex::saturating(bin),
+        count: Count::saturating(u32::try_from(counted.photons).unwrap_or(u32::MAX)),
+    };
+    let outside = Counted {
+        photons: window.photons_outside.into(),
+        live: window.live_outside,
+    };
+    let mut is_clipped = excluded.touches(bin, estimator.reach());
+    let rates = Rates::about(peak.bin, outside, |other| {
+        if !gate.contains(other) || excluded.contains(other) {
+            return None;
+        }
+        let counted = counts.counted(other);
+        let is_known = !counts.is_left_out(counted.live, 1);
+        is_clipped |= !is_known && other.abs_diff(bin) <= estimator.reach();
+        is_known.then_some(counted)
+    });
+    let mut depth = estimator.estimate_rates(&rates, gate, peak.bin);
+    if is_clipped {
+        depth.flags |= Flags::CLIPPED;
+    }
+    if excluded.is_tail(peak.bin) {
+        depth.flags |= Flags::TAIL;
+    }
+    // 32 + 28 bits.
+    let half = outside.live / 2;
+    let expected = (outside.photons * counted.live + half).checked_div(outside.live);
+    let background = u32::try_from(expected.unwrap_or(0)).unwrap_or(u32::MAX);
+    Detection {
+        peak,
+        background: Count::saturating(background),
         depth,
     }
 }

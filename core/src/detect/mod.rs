@@ -6,6 +6,7 @@
 //! | `quadrant` | the paper's rule, with its `background`, `threshold` and square `root` |
 //! | `average` | the same threshold over the average of all bins |
 //! | `window`, `window_z` | the window rule, a CFAR test over all photons of the pulse, and its z |
+//! | `live` | how often each bin was live, for a TDC with a dead time |
 //! | `tracking` | the window rule with a lower threshold where the last event was |
 //! | `any_rule` | a rule that is chosen at run time |
 //! | `decision` | one decision on one histogram |
@@ -16,6 +17,7 @@ mod average;
 mod background;
 mod comparator_tree;
 mod decision;
+mod live;
 mod quadrant;
 mod root;
 mod rule;
@@ -28,8 +30,9 @@ pub use any_rule::AnyRule;
 pub use average::AverageRule;
 pub use background::quadrant_background;
 pub use comparator_tree::ComparatorTree;
-pub(crate) use decision::detect_at;
 pub use decision::{Detection, detect};
+pub(crate) use decision::{detect_at, detection_in};
+pub use live::{LiveCounts, LiveDecision, LiveWindow};
 pub use quadrant::PaperRule;
 pub use root::isqrt;
 pub use rule::{DetectionRule, background_from_count};

@@ -5,11 +5,12 @@
 
 use fixed::types::U24F8;
 
+use super::live::{LiveCounts, LiveDecision};
 use crate::histogram::counter::CounterWidth;
 use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
 use crate::histogram::{Histogram, Peak};
-use crate::units::Count;
+use crate::units::{BinIndex, Count};
 
 /// Decides from one histogram. An implementation holds its configuration only; all state
 /// is in the histogram.
@@ -26,6 +27,22 @@ pub trait DetectionRule: Copy {
         peak: Peak,
         excluded: &ExcludedBins,
     ) -> Option<U24F8>;
+
+    /// Whether [`Self::detect_live`] decides for a TDC with a dead time.
+    #[inline(always)]
+    fn weighs_dead_time(&self) -> bool {
+        false
+    }
+
+    /// Decides from live counts, only on windows that contain `expected` if that is given. By
+    /// default no rule does.
+    fn detect_live<const BINS: usize, W: CounterWidth>(
+        &self,
+        _counts: &LiveCounts<'_, BINS, W>,
+        _expected: Option<BinIndex>,
+    ) -> LiveDecision {
+        LiveDecision::NONE
+    }
 }
 
 /// A background of whole counts, as [`DetectionRule::detect`] gives it. Exact.

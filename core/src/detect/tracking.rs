@@ -23,6 +23,7 @@
 //! and with a window of 3 bins it takes 405 instructions, without tracking 195.
 
 use super::decision::{Detection, detect_at, detection_at};
+use super::live::{LiveCounts, LiveDecision};
 use super::rule::DetectionRule;
 use crate::depth::DepthEstimator;
 use crate::histogram::counter::CounterWidth;
@@ -111,5 +112,19 @@ impl<R: DetectionRule> Tracking<R> {
             estimator,
             excluded,
         )
+    }
+    /// The same from live counts.
+    pub(crate) fn detect_live<const BINS: usize, W: CounterWidth>(
+        &self,
+        counts: &LiveCounts<'_, BINS, W>,
+        expected: BinIndex,
+    ) -> LiveDecision {
+        if counts.gate().contains(expected.raw()) {
+            let near = self.near.detect_live(counts, Some(expected));
+            if near.window.is_some() {
+                return near;
+            }
+        }
+        self.far.detect_live(counts, None)
     }
 }

@@ -42,6 +42,7 @@
 
 use fixed::types::{U4F12, U8F8, U24F8};
 
+use super::live::{LiveCounts, LiveDecision};
 use super::rule::DetectionRule;
 use super::tracking::Tracking;
 use super::window_z::{block_z, tracking_z};
@@ -50,7 +51,7 @@ use crate::histogram::counter::CounterWidth;
 use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
 use crate::histogram::{Histogram, Peak, mean};
-use crate::units::{BlockLevel, Count};
+use crate::units::{BinIndex, BlockLevel, Count};
 
 /// The sum of a window around the peak against the photons of all bins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -239,5 +240,23 @@ impl DetectionRule for WindowRule {
         }
         let outside = histogram.total().wrapping_sub(inside);
         mean(outside, bins_outside)
+    }
+    #[inline(always)]
+    fn weighs_dead_time(&self) -> bool {
+        true
+    }
+
+    #[inline(always)]
+    fn detect_live<const BINS: usize, W: CounterWidth>(
+        &self,
+        counts: &LiveCounts<'_, BINS, W>,
+        expected: Option<BinIndex>,
+    ) -> LiveDecision {
+        counts.best_window(
+            self.width.into(),
+            self.z.to_bits(),
+            self.minimum_count.raw(),
+            expected,
+        )
     }
 }

@@ -131,6 +131,19 @@ impl ExcludedBins {
         histogram.empty(ranges)
     }
 
+    /// The photons of these bins, as far as they are gated.
+    pub(crate) fn photons<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+    ) -> u32 {
+        let mut photons = 0u32;
+        for bin in (gate.first()..=gate.last()).filter(|&bin| self.contains(bin)) {
+            photons = photons.wrapping_add(histogram.count(bin.into()).unwrap_or(0));
+        }
+        photons
+    }
+
     fn peaks(&self) -> &[u16] {
         self.peaks
             .get(..usize::from(self.number))

@@ -7,7 +7,9 @@
 //! photons offered = total + saturated + rejected
 //! ```
 //!
-//! Photons outside the range gate never enter the histogram.
+//! Photons outside the range gate never enter the histogram. The pixels of a TDC with a
+//! [dead time](crate::PixelConfigBuilder::dead_time) keep those before the gate in their
+//! counters, but not in the total and the peak.
 //!
 //! The highest bin is tracked while counting. Counts only grow, so the key
 //! `(count << log2(BINS)) - bin` of the highest bin is the maximum of the keys of all
@@ -334,6 +336,33 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     #[must_use]
     pub const fn saturated(&self) -> u32 {
         self.saturated
+    }
+
+    /// Counts the photons of `codes` before bin `first`, which the gate leaves out, in their
+    /// counters alone: not in the total, and not as a peak. They blind a TDC with a dead time all
+    /// the same. A full counter stays full.
+    #[inline(never)]
+    pub(crate) fn keep_before(&mut self, first: u16, codes: &[u16]) {
+        for &code in codes.iter().filter(|&&code| code < first) {
+            if let Some(counter) = self.counts.get_mut(usize::from(code)) {
+                *counter = W::counter(((*counter).into() + 1).min(W::MAX));
+            }
+        }
+    }
+
+    /// The same with a histogram that was counted elsewhere.
+    #[inline(never)]
+    pub(crate) fn keep_frame_before<C: PhotonCount>(&mut self, first: u16, frame: &[C; BINS]) {
+        let bins = self.counts.iter_mut().zip(frame).take(first.into());
+        for (counter, &photons) in bins {
+            let count = (*counter).into().saturating_add(photons.into());
+            *counter = W::counter(count.min(W::MAX));
+        }
+    }
+
+    /// Leaves photons out of the total.
+    pub(crate) const fn leave_out(&mut self, photons: u32) {
+        self.total = self.total.wrapping_sub(photons);
     }
 
     /// Empties the bins of some ranges. Returns the photons they held, which are no longer in

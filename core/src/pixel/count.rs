@@ -10,14 +10,14 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     #[inline]
     pub fn count<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, code: u16) {
         let gated_out = self.histogram.add_gated(code, config.gate());
-        self.leave_out(gated_out);
+        self.leave_out(config, &[code], gated_out);
     }
 
     /// Counts one photon for each TDC code, as [`Self::count`] does.
     #[inline]
     pub fn count_batch<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, codes: &[u16]) {
         let gated_out = self.histogram.add_gated_batch(codes, config.gate());
-        self.leave_out(gated_out);
+        self.leave_out(config, codes, gated_out);
     }
 
     /// Counts the photons of a whole mini-frame, a histogram over one or more
@@ -29,15 +29,29 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         frame: &[C; BINS],
     ) {
         let gated_out = self.histogram.add_frame(frame, config.gate());
-        self.leave_out(gated_out);
+        if gated_out > 0 {
+            self.gated_out = self.gated_out.wrapping_add(gated_out);
+            if self.weighs_dead_time(config) {
+                let first = config.gate().first();
+                self.histogram.keep_frame_before(first, frame);
+            }
+        }
     }
 
-    /// Counts photons outside the gate.
+    /// Counts photons outside the gate, so many of `codes`.
     #[inline(always)]
-    fn leave_out(&mut self, photons: u32) {
+    fn leave_out<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        codes: &[u16],
+        photons: u32,
+    ) {
         // Most often none.
         if photons > 0 {
             self.gated_out = self.gated_out.wrapping_add(photons);
+            if self.weighs_dead_time(config) {
+                self.histogram.keep_before(config.gate().first(), codes);
+            }
         }
     }
 }

@@ -11,21 +11,25 @@ use crate::units::BinIndex;
 /// Exhaustive, because a program that decides on whole histograms builds it from its fields.
 #[derive(Clone, Debug)]
 pub struct DecisionInput<'a, const BINS: usize, W: CounterWidth> {
-    /// The histogram of the exposure. The bins around its earlier echoes are empty.
+    /// The histogram of the exposure. The bins around its earlier echoes are empty. With a dead
+    /// time they are not, and the bins before the gate have their photons, too.
     pub histogram: &'a Histogram<BINS, W>,
     /// Where a pixel that tracks expected the event.
     pub expected: Option<BinIndex>,
     /// The bins around the earlier echoes.
     pub excluded: ExcludedBins,
+    /// Laser cycles of the exposure.
+    pub cycles: u32,
 }
 
 impl<'a, const BINS: usize, W: CounterWidth> DecisionInput<'a, BINS, W> {
     /// From the histogram alone.
-    pub(super) const fn plain(histogram: &'a Histogram<BINS, W>) -> Self {
+    pub(super) const fn plain(histogram: &'a Histogram<BINS, W>, cycles: u32) -> Self {
         Self {
             histogram,
             expected: None,
             excluded: ExcludedBins::NONE,
+            cycles,
         }
     }
 }

@@ -175,8 +175,11 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         if self.exposure <= config.l1() {
             return Look::TooEarly;
         }
+        if self.weighs_dead_time(config) {
+            return self.look_further::<R, true>(config, statistics, cycle, observe);
+        }
         if self.state != State::NONE {
-            return self.look_further(config, statistics, cycle, observe);
+            return self.look_further::<R, false>(config, statistics, cycle, observe);
         }
         if self.exposure >= config.l2() {
             statistics.expired += 1;
@@ -186,14 +189,14 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         let Some(detection) = config.detect(&self.histogram) else {
             return Look::NoPeak;
         };
-        observe(&DecisionInput::plain(&self.histogram));
+        observe(&DecisionInput::plain(&self.histogram, self.exposure.into()));
         self.report(config, statistics, cycle, &detection)
     }
 
     /// A look with state: an event waits, an echo was reported, an event is expected, or a
-    /// decision was deferred.
+    /// decision was deferred. With `LIVE` any look, weighed by a dead time.
     #[inline(never)]
-    fn look_further<R: DetectionRule>(
+    fn look_further<R: DetectionRule, const LIVE: bool>(
         &mut self,
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
@@ -203,7 +206,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         let mut longest = config.l2();
         if self.state.contains(State::HAS_ECHO) {
             // Photons that have come since the last look.
-            self.empty_excluded(statistics);
+            self.leave_out_excluded::<R, LIVE>(config, statistics);
             // The slot has the last echo, even if that was taken.
             longest = config.end_after_echo(self.event.exposure);
         }
@@ -217,14 +220,26 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         }
         let expected = self.state.contains(State::EXPECTING);
         let expected = expected.then_some(self.expected);
-        let Some(detection) = config.detect_further(&self.histogram, expected, &self.excluded)
-        else {
+        let (histogram, excluded) = (&self.histogram, &self.excluded);
+        let detection = if LIVE {
+            let Some(counts) = config.live_counts(histogram, self.exposure.into(), excluded) else {
+                statistics.ended_full += 1;
+                return self.end(config, statistics);
+            };
+            let (detection, is_blind) = config.detect_live(&counts, expected);
+            statistics.blind_looks += u64::from(is_blind);
+            detection
+        } else {
+            config.detect_further(histogram, expected, excluded)
+        };
+        let Some(detection) = detection else {
             return Look::NoPeak;
         };
         observe(&DecisionInput {
-            histogram: &self.histogram,
+            histogram,
             expected,
-            excluded: self.excluded,
+            excluded: *excluded,
+            cycles: self.exposure.into(),
         });
         self.report(config, statistics, cycle, &detection)
     }
@@ -246,14 +261,21 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         if self.state.contains(State::DEFERRED) {
             self.event.flags |= Flags::DEFERRED;
         }
-        if config.is_one_hit() && 2 * self.photons() > u64::from(self.exposure) * level.pixels() {
+        if config.is_first_photon_only()
+            && !self.weighs_dead_time(config)
+            && 2 * self.photons() > u64::from(self.exposure) * level.pixels()
+        {
             self.event.flags |= Flags::PILE_UP;
         }
         statistics.events += 1;
         self.state.set(State::REQUESTING);
         if config.echoes() > EchoNumber::FIRST {
             if self.goes_on(config) {
-                self.empty_excluded(statistics);
+                if self.weighs_dead_time(config) {
+                    self.leave_out_excluded::<R, true>(config, statistics);
+                } else {
+                    self.leave_out_excluded::<R, false>(config, statistics);
+                }
             } else {
                 self.end(config, statistics);
             }
@@ -278,11 +300,30 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         next.is_some()
     }
 
-    /// Empties the bins around the echoes of this exposure.
-    fn empty_excluded(&mut self, statistics: &mut Statistics) {
-        let photons = self.excluded.empty(&mut self.histogram);
+    /// Leaves the bins around the echoes of this exposure out: empties them, or with `LIVE`
+    /// leaves their photons in their counters.
+    fn leave_out_excluded<R: DetectionRule, const LIVE: bool>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+    ) {
+        let photons = if LIVE {
+            let photons = self.excluded.photons(&self.histogram, config.gate());
+            let more = photons.wrapping_sub(self.excluded_photons);
+            self.histogram.leave_out(more);
+            more
+        } else {
+            self.excluded.empty(&mut self.histogram)
+        };
         self.excluded_photons = self.excluded_photons.wrapping_add(photons);
         statistics.excluded += u64::from(photons);
+    }
+
+    /// Whether it weighs bins by their live laser cycles: not in a block, which has those of
+    /// several pixels.
+    #[inline(always)]
+    fn weighs_dead_time<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> bool {
+        config.weighs_dead_time() && matches!(self.event.level, BlockLevel::PIXEL)
     }
 
     /// Ends an exposure that may have had an event.

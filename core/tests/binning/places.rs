@@ -135,7 +135,7 @@ fn a_block_piles_up_when_its_pixels_do() {
         let side = 1 << number;
         let binning = Binning::new(Array::new(side, side).unwrap(), level(number)).unwrap();
         let mut config = PixelConfig::<32>::paper().l2(4000).build().unwrap();
-        config = config.with_one_hit_tdc();
+        config = config.with_dead_time(u16::MAX);
         for (more, piles_up) in [(0, false), (1, true)] {
             let mut links: Vec<BlockLink> = (0..pixels)
                 .map(|pixel| binning.link_of(PixelAddress::new(pixel)))

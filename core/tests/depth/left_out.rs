@@ -54,7 +54,7 @@ proptest! {
         let mut found = Vec::new();
         let mut whole = Histogram::<BINS, Count10>::new();
         whole.add_frame(&photons, &gate);
-        config.detect_echoes(&mut whole, |_, detection| found.push(*detection));
+        config.detect_echoes(&mut whole, 1, |_, detection| found.push(*detection));
 
         let mut excluded = ExcludedBins::new(guard);
         for detection in found {

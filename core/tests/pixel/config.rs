@@ -48,7 +48,7 @@ fn what_is_not_set_is_the_papers() {
     let rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5));
     assert_eq!((CONFIG.rule(), CONFIG.gate()), (&rule, &RangeGate::full()));
     assert_eq!(CONFIG.estimator(), &DepthEstimator::Centroid3);
-    assert!(!CONFIG.is_one_hit());
+    assert!(!CONFIG.is_first_photon_only());
 }
 
 #[test]
@@ -57,13 +57,13 @@ fn every_setting_arrives() {
     let estimator = DepthEstimator::for_pulse(U8F8::ONE);
     let config = PixelConfig::<64>::paper().x(7).l1(9).l2(99).gate(gate);
     let last = EchoNumber::new(3).unwrap();
-    let config = config.estimator(estimator).one_hit_tdc(true);
+    let config = config.estimator(estimator).dead_time(u16::MAX);
     let config = config.echoes(last, 5).echo_wait(6).build().unwrap();
     assert_eq!((config.echoes(), config.echo_guard_bins()), (last, 5));
     assert_eq!(config.echo_wait(), 6);
     assert_eq!((config.x(), config.l1(), config.l2()), (7, 9, 99));
     assert_eq!((config.gate(), config.estimator()), (&gate, &estimator));
-    assert!(config.is_one_hit());
+    assert!(config.is_first_photon_only());
 }
 
 #[test]

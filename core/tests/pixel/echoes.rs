@@ -207,7 +207,7 @@ proptest! {
             model.empty_held();
         }
         let mut echoes = Vec::new();
-        config.detect_echoes(&mut histogram, |number, found| {
+        config.detect_echoes(&mut histogram, 1, |number, found| {
             let bin = usize::from(found.peak.bin.raw());
             echoes.push((number.raw(), bin, found.background.raw()));
         });

@@ -8,6 +8,7 @@
 
 mod config;
 mod counted;
+mod dead_time;
 mod echoes;
 mod flow_chart;
 mod model;

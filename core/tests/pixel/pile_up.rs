@@ -10,8 +10,8 @@ use crate::model::Lone;
 fn pile_up_is_more_than_a_photon_in_every_other_laser_cycle() {
     let gate = RangeGate::new(1, 15).unwrap();
     let multi = PixelConfig::<16>::paper().gate(gate).build().unwrap();
-    let one_hit = multi.with_one_hit_tdc();
-    assert!(one_hit.is_one_hit() && !multi.is_one_hit());
+    let one_hit = multi.with_dead_time(u16::MAX);
+    assert!(one_hit.is_first_photon_only() && !multi.is_first_photon_only());
     // In the peak, gated out, past the last bin.
     for (photons, is_flagged) in [
         ([22, 0, 0], false),
@@ -39,7 +39,7 @@ fn pile_up_is_more_than_a_photon_in_every_other_laser_cycle() {
 #[test]
 fn photons_that_met_a_full_counter_pile_up_too() {
     let config = PixelConfig::<8>::paper().l2(4000).build();
-    let config = config.unwrap().with_one_hit_tdc();
+    let config = config.unwrap().with_dead_time(u16::MAX);
     for (photons, is_flagged) in [(1500, false), (1501, true)] {
         let mut pixel = Lone::<8>::new(0);
         (0..photons).for_each(|_| pixel.pixel.count(&config, 5));

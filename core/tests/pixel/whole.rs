@@ -54,11 +54,16 @@ impl Settings {
             .l1(self.l1);
         let config = config
             .l2(self.l2)
-            .one_hit_tdc(self.is_one_hit)
+            .dead_time(if self.flags_pile_up() { u16::MAX } else { 0 })
             .tracking(tracking);
         let echoes = EchoNumber::new(self.echoes).unwrap();
         let config = config.echoes(echoes, self.reach).echo_wait(self.wait);
         config.build().unwrap()
+    }
+
+    /// The window rule weighs bins instead: `dead_time` tests that.
+    fn flags_pile_up(&self) -> bool {
+        self.is_one_hit && !matches!(self.rule, Rule::Window(..))
     }
 
     /// z near the last event, and elsewhere: what the configuration says.
@@ -298,7 +303,7 @@ impl Pixel {
             peak == 1023,
             bin == first || bin == last || beside_held,
             self.now.put_off,
-            self.settings.is_one_hit && 2 * self.now.in_bins > self.now.exposure,
+            self.settings.flags_pile_up() && 2 * self.now.in_bins > self.now.exposure,
             self.peaks.iter().any(behind),
         ];
         let flags = (0..)

@@ -1,0 +1,121 @@
+//! The light of the bins about a peak, of a TDC with a dead time.
+//!
+//! A bin that was live in `l` laser cycles and had a photon in `c` of them has the light
+//! `-ln(1 - c/l)` a laser cycle. This corrects both what earlier photons hid and what a photon
+//! hides in its own bin.
+//!
+//! The logarithm is exact to 1 in 5,000: `l/(l - c)` is halved until it is below 2, and
+//! `ln(x) = 2·(y + y³/3 + y⁵/5)` with `y = (x - 1)/(x + 1)` does the rest. A bin with a photon in
+//! each laser cycle counts as half a cycle short of that.
+//!
+//! An estimator needs ratios only, so the highest of the bins becomes 1023.
+
+use super::centred_window::{PEAK, REACH};
+use super::centroid::offset_of;
+use super::estimate::DepthEstimate;
+use crate::flags::Flags;
+use crate::histogram::counter::{Count10, CounterWidth};
+use crate::histogram::gate::RangeGate;
+use crate::units::BinIndex;
+
+/// The light of the bins that a window can reach.
+pub(crate) struct Rates {
+    /// Bins from [`PEAK`] before the peak bin on, relative to the highest, which is 1023.
+    pub(super) bins: [u16; REACH],
+    /// That of the background, in the same unit.
+    pub(super) background: u16,
+}
+
+/// The counts of a bin, or of several together: photons and live laser cycles.
+#[derive(Clone, Copy, Default)]
+pub(crate) struct Counted {
+    pub(crate) photons: u64,
+    pub(crate) live: u64,
+}
+
+impl Rates {
+    /// `counted` gives the counts of a bin, or `None` where they are unknown: such a bin has the
+    /// light of the `background`.
+    pub(crate) fn about(
+        peak: BinIndex,
+        background: Counted,
+        mut counted: impl FnMut(u16) -> Option<Counted>,
+    ) -> Self {
+        let background = background.light();
+        let mut light = [background; REACH];
+        let first = usize::from(peak.raw()).wrapping_sub(PEAK);
+        for (number, light) in light.iter_mut().enumerate() {
+            // A bin before bin 0 wraps, and is not counted.
+            let bin = u16::try_from(first.wrapping_add(number)).ok();
+            if let Some(counted) = bin.and_then(&mut counted) {
+                *light = counted.light();
+            }
+        }
+        let highest = u64::from(light.iter().fold(1, |highest, &light| highest.max(light)));
+        #[allow(clippy::cast_possible_truncation, reason = "at most 1023")]
+        let relative = |light: u32| {
+            let relative = (u64::from(light) * u64::from(Count10::MAX) + highest / 2) / highest;
+            relative as u16
+        };
+        Self {
+            bins: light.map(relative),
+            background: relative(background),
+        }
+    }
+
+    /// The centroid of the bin `peak` and its neighbours, minus the background. A neighbour outside
+    /// the gate counts as empty.
+    pub(super) fn centroid<const BINS: usize>(
+        &self,
+        gate: &RangeGate<BINS>,
+        peak: BinIndex,
+    ) -> DepthEstimate {
+        let [.., left, centre, right] = self
+            .bins
+            .first_chunk::<{ PEAK + 2 }>()
+            .copied()
+            .unwrap_or_default();
+        let has_left = gate.contains(peak.raw().wrapping_sub(1));
+        let has_right = gate.contains(peak.raw() + 1);
+        let above = |light: u16| u32::from(light.saturating_sub(self.background));
+        let neighbour = |is_gated, light| if is_gated { above(light) } else { 0 };
+        let flags = if has_left && has_right {
+            Flags::NONE
+        } else {
+            Flags::CLIPPED
+        };
+        DepthEstimate {
+            offset: offset_of(
+                neighbour(has_left, left),
+                above(centre),
+                neighbour(has_right, right),
+            ),
+            flags,
+        }
+    }
+}
+
+impl Counted {
+    /// The light a laser cycle in 1/2²⁴: up to 2³⁰.
+    fn light(self) -> u32 {
+        // In half cycles, so that the rest is at least 1.
+        let whole = 2 * self.live.max(1);
+        let mut rest = whole.saturating_sub(2 * self.photons).max(1);
+        let mut halvings = 0;
+        while 2 * rest <= whole {
+            rest *= 2;
+            halvings += 1;
+        }
+        // At most 1/3; 39 + 24 bits.
+        let y = ((whole - rest) << 24) / (whole + rest);
+        let square = (y * y) >> 24;
+        let third = (y * square) >> 24;
+        let fifth = (third * square) >> 24;
+        let logarithm = halvings * LN_2 + 2 * (y + third / 3 + fifth / 5);
+        // At most 39 · ln 2.
+        u32::try_from(logarithm).unwrap_or(u32::MAX)
+    }
+}
+
+/// ln 2 in 1/2²⁴.
+const LN_2: u64 = 11_629_080;
