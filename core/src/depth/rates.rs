@@ -4,8 +4,8 @@
 //! `-ln(1 - c/l)` a laser cycle. This corrects both what earlier photons hid and what a photon
 //! hides in its own bin.
 //!
-//! The logarithm is exact to 1 in 5,000: `l/(l - c)` is halved until it is below 2, and
-//! `ln(x) = 2·(y + y³/3 + y⁵/5)` with `y = (x - 1)/(x + 1)` does the rest. A bin with a photon in
+//! The logarithm is exact to 1 in 40,000: `l/(l - c)` is halved until it is below 2, and
+//! `ln(x) = 2·(y + y³/3 + y⁵/5 + y⁷/7)` with `y = (x - 1)/(x + 1)` does the rest. A bin with a photon in
 //! each laser cycle counts as half a cycle short of that.
 //!
 //! An estimator needs ratios only, so the highest of the bins becomes 1023.
@@ -111,7 +111,8 @@ impl Counted {
         let square = (y * y) >> 24;
         let third = (y * square) >> 24;
         let fifth = (third * square) >> 24;
-        let logarithm = halvings * LN_2 + 2 * (y + third / 3 + fifth / 5);
+        let seventh = (fifth * square) >> 24;
+        let logarithm = halvings * LN_2 + 2 * (y + third / 3 + fifth / 5 + seventh / 7);
         // At most 39 · ln 2.
         u32::try_from(logarithm).unwrap_or(u32::MAX)
     }
@@ -119,3 +120,42 @@ impl Counted {
 
 /// ln 2 in 1/2²⁴.
 const LN_2: u64 = 11_629_080;
+
+#[cfg(test)]
+mod tests {
+    use super::Counted;
+
+    /// Few photons, many, all, and more than there were laser cycles.
+    #[test]
+    #[allow(
+        clippy::float_arithmetic,
+        clippy::disallowed_types,
+        reason = "the formula"
+    )]
+    fn light_is_the_logarithm() {
+        let mut live: u64 = 1;
+        while live < 1 << 38 {
+            for photons in [
+                0,
+                1,
+                live / 1000,
+                live / 10,
+                live / 2,
+                live - live / 100,
+                live,
+                2 * live,
+            ] {
+                let rest = (live as f64 - photons as f64).max(0.5);
+                let light = libm::log(live as f64 / rest);
+                let found = f64::from(Counted { photons, live }.light()) / f64::from(1 << 24);
+                // Rounded down ten times.
+                let most = light / 40_000.0 + 10.0 / f64::from(1 << 24);
+                assert!(
+                    (found - light).abs() <= most,
+                    "{photons} of {live}: {found}, {light}"
+                );
+            }
+            live = live * 3 / 2 + 1;
+        }
+    }
+}

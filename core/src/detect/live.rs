@@ -305,7 +305,8 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         for start in first..=last {
             lowest = lowest.min(live);
             if photons >= minimum {
-                let expected = ((u64::from(live) * share) >> shift).max(1);
+                // Rounded up: a window of all light has no excess.
+                let expected = (u64::from(live).wrapping_mul(share) >> shift) + 1;
                 let excess = (u64::from(photons) << 8).saturating_sub(expected);
                 let square = excess.saturating_mul(excess);
                 let is_better = || {

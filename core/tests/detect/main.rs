@@ -10,6 +10,7 @@ mod any_rule;
 mod average;
 mod background;
 mod common;
+mod live;
 #[path = "../common/parallel.rs"]
 mod parallel;
 mod peak;

@@ -31,7 +31,10 @@ impl Settings {
         let rule = PaperRule::new(U8F8::from_bits(self.alpha), minimum);
         let gate = RangeGate::new(self.first as u16, self.last as u16).unwrap();
         let config = PixelConfig::with_rule(rule).gate(gate).x(self.x);
-        let config = config.l1(self.l1).l2(self.l2).dead_time(if self.is_one_hit { u16::MAX } else { 0 });
+        let config = config
+            .l1(self.l1)
+            .l2(self.l2)
+            .dead_time(if self.is_one_hit { u16::MAX } else { 0 });
         config.build().unwrap()
     }
 }
