@@ -136,7 +136,7 @@ pub use flags::Flags;
 pub use histogram::counter::{Count10, Count16, Count24, CounterWidth};
 pub use histogram::gate::{GateError, RangeGate};
 pub use histogram::{Histogram, Peak};
-pub use pixel::{AsyncPixel, Look};
+pub use pixel::{AsyncPixel, Look, OncePerBin};
 pub use statistics::Statistics;
 pub use units::{
     BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,

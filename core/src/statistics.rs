@@ -22,7 +22,7 @@
 //! assert_eq!(statistics.photons(), 2 * 50);
 //! ```
 //!
-//! Cost: 88 bytes an array, and none a pixel.
+//! Cost: 96 bytes an array, and none a pixel.
 
 use core::ops::AddAssign;
 
@@ -46,6 +46,8 @@ pub struct Statistics {
     pub rejected: u64,
     /// Photons outside the range gate.
     pub gated_out: u64,
+    /// Photons in a bin that had one in the same laser cycle, where they [count once](crate::OncePerBin).
+    pub repeated: u64,
     /// Events put into the slot.
     pub events: u64,
     /// Decisions deferred because the slot was full.
@@ -72,6 +74,7 @@ impl Statistics {
             saturated: 0,
             rejected: 0,
             gated_out: 0,
+            repeated: 0,
             events: 0,
             deferred: 0,
             expired: 0,
@@ -84,7 +87,12 @@ impl Statistics {
     /// Photons offered, counted or not.
     #[must_use]
     pub const fn photons(&self) -> u64 {
-        self.counted + self.excluded + self.saturated + self.rejected + self.gated_out
+        self.counted
+            + self.excluded
+            + self.saturated
+            + self.rejected
+            + self.gated_out
+            + self.repeated
     }
 
     /// Adds the photons of a histogram, and those outside the gate, as
@@ -113,6 +121,7 @@ impl AddAssign for Statistics {
         self.saturated += other.saturated;
         self.rejected += other.rejected;
         self.gated_out += other.gated_out;
+        self.repeated += other.repeated;
         self.events += other.events;
         self.deferred += other.deferred;
         self.expired += other.expired;

@@ -1,6 +1,7 @@
 //! Distributions of counts, and their numerics.
 
 pub mod binomial;
+pub mod dead_time;
 pub mod normal;
 pub mod poisson;
 pub mod quadrature;

@@ -13,7 +13,7 @@
 //! | [`looks::detections`] | the time to a detection | simulation |
 //! | [`bounds::likelihood_ratio`] | the fastest possible detection, with the scene known | exact |
 //! | [`bounds::cramer_rao`] | the smallest error of a pulse's position | exact |
-//! | [`counts`] | Poisson, normal and binomial laws | exact |
+//! | [`counts`] | Poisson, normal and binomial laws, and what a dead time hides | exact |
 //! | [`tune`] | settings for a required false-alarm rate | all of these |
 //! | [`random`] | random numbers of a pixel or a trial | |
 

@@ -40,10 +40,12 @@
 mod count;
 mod input;
 mod look;
+mod once_per_bin;
 
 pub use self::input::DecisionInput;
 pub use self::look::Look;
 use self::look::State;
+pub use self::once_per_bin::OncePerBin;
 use crate::config::PixelConfig;
 use crate::detect::{Detection, DetectionRule};
 use crate::event::DepthEvent;

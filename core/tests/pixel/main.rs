@@ -12,5 +12,6 @@ mod dead_time;
 mod echoes;
 mod flow_chart;
 mod model;
+mod once_per_bin;
 mod pile_up;
 mod whole;
