@@ -142,7 +142,7 @@ fn recorded_histograms_come_out_as_recorded_and_give_the_sensors_distances() {
                 let mut histogram = Histogram::<128, Count24>::new();
                 histogram.add_frame(&all, &gate);
                 let mut nearest = f64::INFINITY;
-                config.detect_echoes(&mut histogram, |_, detection| {
+                config.detect_echoes(&mut histogram, 0, |_, detection| {
                     let range = scale.range(detection.position()).to_num::<f64>();
                     for distance in distances {
                         nearest = nearest.min((range - distance).abs());

@@ -374,11 +374,13 @@ fn photons_of_several_pixels_are_no_pile_up_of_their_block() {
             }),
             ..base
         };
-        let (mut device, mut host) = configured(&requested);
-        let mut sensor = Scripted {
-            calls,
-            is_one_hit: true,
-        };
+        let mut device = device_with_blocks::<64, 21>(Some(SensorInfo {
+            dead_time: u16::MAX,
+            ..SensorInfo::new(256)
+        }));
+        let mut host = Host::new(1, 0);
+        host.configure(&mut device, 0, &requested);
+        let mut sensor = scripted(calls);
         host.run(&mut device, &mut sensor, 0..1_000, 4);
         let of_block = host.events.iter().find(|event| event.level.raw() == 1);
         let event = of_block.expect("an event of the block");

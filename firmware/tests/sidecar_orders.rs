@@ -2,8 +2,7 @@
 
 mod common;
 
-use common::host::{CONFIGURATION, Call, Host, Scripted, configured, device};
-use dtof_core::Flags;
+use common::host::{CONFIGURATION, Host, device};
 use dtof_core::fixed::types::U16F16;
 use dtof_link::{Configuration, Refusal, SensorRecord, Source, message};
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
@@ -26,6 +25,7 @@ impl Sensor for OrderLog {
         SensorInfo {
             bin_width: Some(U16F16::lit("160")),
             laser_millihertz: 0x0102_0304_0506_0708,
+            dead_time: 0x0a14,
             ..SensorInfo::new(3)
         }
     }
@@ -108,19 +108,20 @@ fn the_host_is_told_what_the_sensor_is() {
         offset: info.offset,
         laser_millihertz: info.laser_millihertz,
         bins: info.bins,
+        dead_time: info.dead_time,
     };
     let mut host = Host::new(1, 0);
     let mut with_one = device::<8>(Some(info));
     let body = host.answer(&mut with_one, 0, message::SENSOR_REQUEST, &[]);
-    // Then the range of bin 0, the laser rate, the bins, and what is reserved.
+    // Then the range of bin 0, the laser rate, the bins, the dead time, and what is reserved.
     let rate = [8, 7, 6, 5, 4, 3, 2, 1];
-    let bins = [128, 0];
+    let bins_and_dead_time = [128, 0, 0x14, 0x0a];
     let expected = [
         [3, 0, 0, 0, 160, 0].as_slice(),
         &[0; 4],
         &rate,
-        &bins,
-        &[0; 4],
+        &bins_and_dead_time,
+        &[0; 2],
     ]
     .concat();
     assert_eq!(body, expected);
@@ -131,24 +132,4 @@ fn the_host_is_told_what_the_sensor_is() {
     let body = host.answer(&mut bare, 0, message::SENSOR_REQUEST, &[]);
     assert_eq!(SensorRecord::from_le_bytes(&body), Some(None));
     assert_eq!(SensorRecord::from_le_bytes(&body[1..]), None);
-}
-
-#[test]
-fn events_of_a_sensor_that_gives_one_photon_a_laser_cycle_say_so_at_high_rates() {
-    for is_one_hit in [false, true] {
-        // A photon in 20 of 24 laser cycles, then in 11 of 24.
-        let call = |cycle: u64| {
-            let is_dark = if cycle < 24 { cycle < 4 } else { cycle < 37 };
-            let mut calls = vec![Call::Photon(0, 40), Call::End(1)];
-            calls.drain(..usize::from(is_dark));
-            calls
-        };
-        let calls = (0..48).map(call).map(Some);
-        let mut sensor = Scripted { calls, is_one_hit };
-        let (mut device, mut host) = configured::<8>(&CONFIGURATION);
-        host.run(&mut device, &mut sensor, 0..100, 4);
-        let flags: Vec<Flags> = host.events.iter().map(|event| event.flags).collect();
-        let first = [Flags::NONE, Flags::PILE_UP][usize::from(is_one_hit)];
-        assert_eq!(flags, [first, Flags::NONE]);
-    }
 }

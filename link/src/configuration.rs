@@ -40,8 +40,10 @@ pub struct Configuration {
     pub l2: u16,
     /// First and last bin that may hold the peak, both inclusive.
     pub gate: (u16, u16),
-    /// Whether the TDC takes one photon a laser cycle, so that events are flagged for pile-up.
-    pub one_hit_tdc: bool,
+    /// Bins for which the TDC is blind after a photon; `None`: those that the sensor says. With as
+    /// many as the histogram has, or more, only the first photon of a laser cycle counts. See
+    /// [`Self::dead_time_in_force`].
+    pub dead_time: Option<u16>,
     /// The number of pixels; their addresses begin at 0.
     pub pixels: u16,
     /// Pixels in a row of the array.
@@ -83,8 +85,8 @@ const DEPTH_EVENTS: u8 = 0;
 const DYNAMIC_DEPTH_EVENTS: u8 = 1;
 const PREVIOUS: u8 = 0;
 const REPORTED: u8 = 1;
-const ANY_HITS: u8 = 0;
-const ONE_HIT: u8 = 1;
+const DEAD_TIME_OF_SENSOR: u8 = 0;
+const DEAD_TIME_GIVEN: u8 = 1;
 const NOT_TRACKING: u8 = 0;
 const TRACKING: u8 = 1;
 
@@ -133,7 +135,10 @@ impl Configuration {
             Source::Link => FROM_LINK,
             Source::Sensor => FROM_SENSOR,
         };
-        let hits = if self.one_hit_tdc { ONE_HIT } else { ANY_HITS };
+        let (dead_time_from, dead_time) = match self.dead_time {
+            None => (DEAD_TIME_OF_SENSOR, 0),
+            Some(dead_time) => (DEAD_TIME_GIVEN, dead_time),
+        };
         let binning = self.binning.unwrap_or(AdaptiveBinning {
             levels: BlockLevel::PIXEL,
             patience: 0,
@@ -167,7 +172,7 @@ impl Configuration {
             .chain(after.to_le_bytes())
             .chain([output, reference])
             .chain(threshold.to_le_bytes())
-            .chain([hits])
+            .chain([dead_time_from])
             .chain(self.columns.to_le_bytes())
             .chain([binning.levels.raw()])
             .chain(binning.patience.to_le_bytes())
@@ -177,8 +182,9 @@ impl Configuration {
                 self.echo_guard_bins,
                 self.echo_wait,
             ])
+            .chain(self.host_timeout_ms.to_le_bytes())
             // The bytes after it are reserved.
-            .chain(self.host_timeout_ms.to_le_bytes());
+            .chain(dead_time.to_le_bytes());
         let mut bytes = [0; Self::BYTES];
         for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
@@ -186,7 +192,29 @@ impl Configuration {
         bytes
     }
 
-    /// Reads the record. Fields of another rule, estimator or output are ignored.
+    /// The dead time that a device with `bins` bins a histogram applies. `of_sensor` is that of its
+    /// sensor, 0 without one. 0 is none.
+    ///
+    /// The rules of paper and average, and blocks of pixels, take every bin as live. With them only
+    /// a TDC of the first photon has an effect, which is a flag: a shorter dead time is refused, or
+    /// not taken from the sensor. Photons from the link have that of the configuration or none.
+    ///
+    /// # Errors
+    /// Fails with [`Refusal::DeadTime`] if the configuration has a dead time of less than a
+    /// histogram with another rule than the window rule, or with blocks.
+    pub fn dead_time_in_force(&self, of_sensor: u16, bins: u16) -> Result<u16, Refusal> {
+        let is_weighed = matches!(self.rule, AnyRule::Window(_)) && self.binning.is_none();
+        let has_effect = |dead_time| dead_time == 0 || dead_time >= bins || is_weighed;
+        match (self.dead_time, self.source) {
+            (Some(dead_time), _) if has_effect(dead_time) => Ok(dead_time),
+            (Some(_), _) => Err(Refusal::DeadTime),
+            (None, Source::Sensor) if has_effect(of_sensor) => Ok(of_sensor),
+            (None, _) => Ok(0),
+        }
+    }
+
+    /// Reads the record. Fields of another rule, estimator or output are ignored, and the dead
+    /// time if it is that of the sensor.
     ///
     /// # Errors
     /// Fails at the first field that every device refuses.
@@ -210,12 +238,13 @@ impl Configuration {
         let after = U8F8::from_le_bytes(fields.next()?);
         let [output, reference] = fields.next()?;
         let threshold_mm = U24F8::from_le_bytes(fields.next()?);
-        let [hits] = fields.next()?;
+        let [dead_time_from] = fields.next()?;
         let columns = u16::from_le_bytes(fields.next()?);
         let [levels] = fields.next()?;
         let patience = u16::from_le_bytes(fields.next()?);
         let [tracking, echoes, echo_guard_bins, echo_wait] = fields.next()?;
         let host_timeout_ms = u16::from_le_bytes(fields.next()?);
+        let dead_time = u16::from_le_bytes(fields.next()?);
         let Fields(reserved) = fields;
 
         let changes = |reference| DynamicDepth {
@@ -250,9 +279,9 @@ impl Configuration {
             l1,
             l2,
             gate: (gate_first, gate_last),
-            one_hit_tdc: match hits {
-                ANY_HITS => false,
-                ONE_HIT => true,
+            dead_time: match dead_time_from {
+                DEAD_TIME_OF_SENSOR => None,
+                DEAD_TIME_GIVEN => Some(dead_time),
                 _ => return Err(Refusal::Unknown),
             },
             pixels,

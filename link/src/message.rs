@@ -12,7 +12,7 @@
 //! | 0x82 | host | refused | a [`Refusal`](crate::Refusal), 1 byte |
 //! | 0x83 | host | events | AER words of 16 bytes |
 //! | 0x84 | host | synchronised | the same, after all that came before it |
-//! | 0x85 | host | statistics | [`Report`](crate::Report), 210 bytes |
+//! | 0x85 | host | statistics | [`Report`](crate::Report), 226 bytes |
 //! | 0x86 | host | sensor | [`SensorRecord`](crate::SensorRecord), 24 bytes |
 //! | 0x87 | host | histogram | [`HistogramPart`](crate::HistogramPart), or why there is none |
 //!

@@ -9,7 +9,7 @@ numbered! {
     /// Why a configuration is refused.
     Refusal {
         /// The record has the wrong length, or an unknown source, rule, estimator, output,
-        /// reference, number of hits, levels, tracking or number of echoes.
+        /// reference, origin of the dead time, levels, tracking or number of echoes.
         Unknown = 1: "the configuration is not one this device knows",
         /// X is 0.
         ZeroX = 2: PixelConfigError::ZeroX.text(),
@@ -50,6 +50,9 @@ numbered! {
         HostTimeout = 19: "the host timeout must be 200 to 60000 ms",
         /// A reserved field is not 0.
         Reserved = 20: "a reserved field is not 0",
+        /// A dead time shorter than a histogram with another rule than the window rule, or with
+        /// blocks of pixels.
+        DeadTime = 21: "the dead time needs the window rule, without blocks",
     }
 }
 

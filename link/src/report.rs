@@ -40,14 +40,23 @@ pub struct Report {
 
 impl Report {
     /// Bytes of the record.
-    pub const BYTES: usize = Self::WIDE * 8 + Self::NARROW * 4 + 2;
+    pub const BYTES: usize = Self::WIDE * 8 + Self::NARROW * 4 + 2 + Self::LAST * 8;
     /// Numbers of 8 bytes.
     const WIDE: usize = 20;
     /// Numbers of 4 bytes.
     const NARROW: usize = 12;
+    /// Numbers of 8 bytes after all others.
+    const LAST: usize = 2;
 
-    /// The numbers in the order of the record: those of 8 bytes, then those of 4.
-    const fn numbers(&mut self) -> ([&mut u64; Self::WIDE], [&mut u32; Self::NARROW]) {
+    /// The numbers in the order of the record: those of 8 bytes, those of 4, and after two bytes
+    /// the last ones of 8. Blocks have none of these, as no dead time weighs them.
+    const fn numbers(
+        &mut self,
+    ) -> (
+        [&mut u64; Self::WIDE],
+        [&mut u32; Self::NARROW],
+        [&mut u64; Self::LAST],
+    ) {
         let (pixels, blocks) = (&mut self.statistics, &mut self.blocks);
         let link = &mut self.link;
         (
@@ -87,18 +96,20 @@ impl Report {
                 &mut link.duplicate,
                 &mut link.retransmitted,
             ],
+            [&mut pixels.ended_full, &mut pixels.blind_looks],
         )
     }
 
     /// The bytes to send.
     #[must_use]
     pub fn to_le_bytes(mut self) -> Vec<u8, { Self::BYTES }> {
-        let last = [self.last_sensor_error, self.stop_reason];
-        let (wide, narrow) = self.numbers();
+        let codes = [self.last_sensor_error, self.stop_reason];
+        let (wide, narrow, last) = self.numbers();
         let wide = wide.into_iter().flat_map(|number| number.to_le_bytes());
         let narrow = narrow.into_iter().flat_map(|number| number.to_le_bytes());
+        let last = last.into_iter().flat_map(|number| number.to_le_bytes());
         let mut bytes = Vec::new();
-        for byte in wide.chain(narrow).chain(last) {
+        for byte in wide.chain(narrow).chain(codes).chain(last) {
             // There is room for each. `collect` could panic.
             let _ = bytes.push(byte);
         }
@@ -109,15 +120,18 @@ impl Report {
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Self> {
         let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
-        let (numbers, &[last_sensor_error, stop_reason]) = bytes.split_last_chunk()?;
+        let (rest, lasts) = bytes.split_last_chunk::<{ Self::LAST * 8 }>()?;
+        let (numbers, &[last_sensor_error, stop_reason]) = rest.split_last_chunk()?;
         let (eights, fours) = numbers.split_at_checked(Self::WIDE * 8)?;
         let mut report = Self {
             last_sensor_error,
             stop_reason,
             ..Self::default()
         };
-        let (wide, narrow) = report.numbers();
-        for (number, bytes) in wide.into_iter().zip(eights.as_chunks().0) {
+        let (wide, narrow, last) = report.numbers();
+        let (eights, lasts) = (eights.as_chunks().0, lasts.as_chunks().0);
+        let numbers = wide.into_iter().zip(eights);
+        for (number, bytes) in numbers.chain(last.into_iter().zip(lasts)) {
             *number = u64::from_le_bytes(*bytes);
         }
         for (number, bytes) in narrow.into_iter().zip(fours.as_chunks().0) {

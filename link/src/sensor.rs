@@ -18,6 +18,9 @@ pub struct SensorRecord {
     pub laser_millihertz: u64,
     /// Bins that can hold photons. Those after them are not measured.
     pub bins: u16,
+    /// Bins for which its TDC is blind after a photon; `u16::MAX` if it takes only the first photon
+    /// of a laser cycle, 0 if there is none or it is unknown.
+    pub dead_time: u16,
 }
 
 impl SensorRecord {
@@ -36,8 +39,9 @@ impl SensorRecord {
         let mut bytes = [0; Self::BYTES];
         let rate = sensor.laser_millihertz.to_le_bytes();
         let fields = [a, b, c, d, e, f, g, h, i, j].into_iter().chain(rate);
-        // The last four bytes are reserved.
+        // The last two bytes are reserved.
         let fields = fields.chain(sensor.bins.to_le_bytes());
+        let fields = fields.chain(sensor.dead_time.to_le_bytes());
         for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
         }
@@ -51,7 +55,8 @@ impl SensorRecord {
         let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
         let (&[a, b, c, d, e, f, g, h, i, j], rest) = bytes.split_first_chunk()?;
         let (&rate, rest) = rest.split_first_chunk()?;
-        let (&bins, reserved) = rest.split_first_chunk()?;
+        let (&bins, rest) = rest.split_first_chunk()?;
+        let (&dead_time, reserved) = rest.split_first_chunk()?;
         if reserved.iter().any(|&byte| byte != 0) {
             return None;
         }
@@ -63,6 +68,7 @@ impl SensorRecord {
             offset: I24F8::from_le_bytes([g, h, i, j]),
             laser_millihertz: u64::from_le_bytes(rate),
             bins: u16::from_le_bytes(bins),
+            dead_time: u16::from_le_bytes(dead_time),
         }))
     }
 }

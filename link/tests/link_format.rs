@@ -85,7 +85,7 @@ fn a_host_configures_with_the_golden_frame() {
         l1: 40,
         l2: 2000,
         gate: (10, 119),
-        one_hit_tdc: true,
+        dead_time: Some(128),
         pixels: 64,
         columns: 8,
         binning: Some(AdaptiveBinning {
@@ -176,7 +176,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
         source,
         prop::option::of(binning),
         echoes,
-        any::<(bool, bool, [u8; 2])>(),
+        any::<(Option<u16>, bool, [u8; 2])>(),
         any::<[u16; 7]>(),
         (
             any::<u32>(),
@@ -192,12 +192,12 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                 source,
                 binning,
                 echoes,
-                flags_and_bytes,
+                more,
                 numbers,
                 wide_numbers,
             )| {
                 let [x, l1, l2, first, last, pixels, columns] = numbers;
-                let (one_hit_tdc, tracking, [echo_guard_bins, echo_wait]) = flags_and_bytes;
+                let (dead_time, tracking, [echo_guard_bins, echo_wait]) = more;
                 let (width, offset, host_timeout_ms) = wide_numbers;
                 Configuration {
                     rule,
@@ -206,7 +206,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                     l1,
                     l2,
                     gate: (first, last),
-                    one_hit_tdc,
+                    dead_time,
                     pixels,
                     columns,
                     binning,
@@ -261,14 +261,14 @@ proptest! {
         choices in prop::array::uniform6(0u8..3), rule in 0u8..4, width in 0u8..9,
         before in 200u16..1100, after in 200u16..1100, levels in 0u8..5, patience in 0u16..9, echoes in 0u8..6,
         host_timeout in prop_oneof![Just(0u16), 190u16..210, 59_990u16..60_010, any::<u16>()],
-        reserved in prop::option::of((52usize..67, 1u8..)),
+        reserved in prop::option::of((54usize..67, 1u8..)),
     ) {
         let mut bytes = numbers;
         bytes[2..4].copy_from_slice(&minimum_count.to_le_bytes());
-        let [source, estimator, dynamic_depth, reference, hits, tracking] = choices;
+        let [source, estimator, dynamic_depth, reference, dead_time, tracking] = choices;
         for (at, value) in [
             (24, source), (25, rule), (26, width), (29, estimator), (34, dynamic_depth),
-            (35, reference), (40, hits), (43, levels), (46, tracking), (47, echoes),
+            (35, reference), (40, dead_time), (43, levels), (46, tracking), (47, echoes),
         ] {
             bytes[at] = value;
         }
@@ -276,13 +276,13 @@ proptest! {
         bytes[32..34].copy_from_slice(&after.to_le_bytes());
         bytes[44..46].copy_from_slice(&patience.to_le_bytes());
         bytes[50..52].copy_from_slice(&host_timeout.to_le_bytes());
-        bytes[52..].fill(0);
+        bytes[54..].fill(0);
         if let Some((at, value)) = reserved {
             bytes[at] = value;
         }
         let found = Configuration::from_le_bytes(&bytes);
         let is_off_limits = host_timeout != 0 && !(200..=60_000).contains(&host_timeout);
-        let unknown = source == 2 || rule == 3 || estimator == 2 || dynamic_depth == 2 || hits == 2
+        let unknown = source == 2 || rule == 3 || estimator == 2 || dynamic_depth == 2 || dead_time == 2
             || (dynamic_depth == 1 && reference == 2)
             || levels == 4 || tracking == 2 || !(1..=4).contains(&echoes);
         prop_assert_eq!(
@@ -293,6 +293,8 @@ proptest! {
                 || is_off_limits || reserved.is_some()
         );
         if let Ok(configuration) = found {
+            let given = u16::from_le_bytes([bytes[52], bytes[53]]);
+            prop_assert_eq!(configuration.dead_time, (dead_time == 1).then_some(given));
             let again = Configuration::from_le_bytes(&configuration.to_le_bytes());
             prop_assert_eq!(again, Ok(configuration));
         }
@@ -307,8 +309,8 @@ proptest! {
 
     #[test]
     fn sensors_come_back(
-        pixels: u16, width: u32, offset: i32, laser_millihertz: u64, bins: u16,
-        at in 20usize..24, value in 1u8..,
+        pixels: u16, width: u32, offset: i32, laser_millihertz: u64, bins: u16, dead_time: u16,
+        at in 22usize..24, value in 1u8..,
     ) {
         let sensor = SensorRecord {
             pixels,
@@ -316,6 +318,7 @@ proptest! {
             offset: I24F8::from_bits(offset),
             laser_millihertz,
             bins,
+            dead_time,
         };
         let mut bytes = SensorRecord::to_le_bytes(Some(&sensor));
         let expected = (pixels > 0).then_some(sensor);

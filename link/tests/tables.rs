@@ -60,7 +60,7 @@ fn a_report_lies_as_the_document_says() {
         statistics.expired_deferred = first + 8;
         statistics
     };
-    let report = Report {
+    let mut report = Report {
         cycles: 1,
         unaddressed: 2,
         statistics: statistics(3),
@@ -82,9 +82,12 @@ fn a_report_lies_as_the_document_says() {
         last_sensor_error: 33,
         stop_reason: 34,
     };
+    report.statistics.ended_full = 35;
+    report.statistics.blind_looks = 36;
     let wide = (1u64..=20).flat_map(u64::to_le_bytes);
     let narrow = (21u32..=32).flat_map(u32::to_le_bytes);
-    let expected: Vec<u8> = wide.chain(narrow).chain([33, 34]).collect();
+    let last = (35u64..=36).flat_map(u64::to_le_bytes);
+    let expected: Vec<u8> = wide.chain(narrow).chain([33, 34]).chain(last).collect();
     assert_eq!(report.to_le_bytes(), expected[..]);
 }
 
@@ -109,7 +112,7 @@ fn are_documented<T: Display>(all: &[T], number: impl Fn(&T) -> u8, table: &str)
 #[test]
 fn every_refusal_has_its_own_number_and_reason() {
     let all: Vec<Refusal> = (0..=255).filter_map(Refusal::from_number).collect();
-    assert_eq!(all.len(), 20);
+    assert_eq!(all.len(), 21);
     are_documented(&all, |&refusal| refusal as u8, "\n| reason | |\n");
 }
 

@@ -24,7 +24,8 @@ const SENSOR: Config = checked!(Config::new(Settings {
     first_bin_ps: 240_000,
     ..Settings::new(PixelAddress::new(0), 8_000, BIN_WIDTH)
 }));
-const PIXEL: PixelConfig<128> = checked!(PixelConfig::paper().one_hit_tdc(true).build());
+// One stop a laser cycle: the first photon only.
+const PIXEL: PixelConfig<128> = checked!(PixelConfig::paper().dead_time(u16::MAX).build());
 
 /// Takes the photons of one macropixel.
 struct Macropixel {

@@ -78,13 +78,6 @@ pub trait Sensor {
     /// The description for a host.
     fn info(&self) -> SensorInfo;
 
-    /// Whether it gives only the first photon of a laser cycle, so that at high rates
-    /// early photons hide late ones. Events then carry a flag:
-    /// [`PixelConfig::with_one_hit_tdc`](dtof_core::PixelConfig::with_one_hit_tdc).
-    fn is_one_hit(&self) -> bool {
-        false
-    }
-
     /// Starts with a new configuration. The driver abandons the present measurement and begins
     /// again. A sensor that measures times makes its TDC codes `bin_width` picoseconds wide, which
     /// is above 0. A sensor with bins of its own ignores it.
@@ -120,11 +113,16 @@ pub struct SensorInfo {
     /// Laser cycles in a thousand seconds; 0 if unknown. If the sensor pauses between measurements
     /// this is the mean rate, so that laser cycle ÷ rate is a time.
     pub laser_millihertz: u64,
+    /// Bins for which its TDC is blind after a photon, so that early photons hide late ones;
+    /// `u16::MAX` if it takes only the first photon of a laser cycle, 0 if there is none or it is
+    /// unknown. See
+    /// [`PixelConfigBuilder::dead_time`](dtof_core::PixelConfigBuilder::dead_time).
+    pub dead_time: u16,
 }
 
 impl SensorInfo {
-    /// A sensor of photons with 128 bins of any width from the laser pulse on and an unknown laser
-    /// rate.
+    /// A sensor of photons with 128 bins of any width from the laser pulse on, an unknown laser
+    /// rate and no dead time.
     #[must_use]
     pub const fn new(pixels: u16) -> Self {
         Self {
@@ -134,6 +132,7 @@ impl SensorInfo {
             offset: I24F8::ZERO,
             gives_histograms: false,
             laser_millihertz: 0,
+            dead_time: 0,
         }
     }
 

@@ -25,6 +25,8 @@
 #define PIXELS 64u
 #define BIN_WIDTH_PS_Q16 (250u << 16)
 #define LASER_HZ 1000u
+/* Bins for which the TDC is blind after a photon: none. */
+#define DEAD_TIME 0u
 
 static dtof_link_t link_to_host;
 static dtof_pixel_t pixels[PIXELS];
@@ -102,7 +104,8 @@ static dtof_status_t configure(const dtof_message_t *message)
     dtof_device_config_t requested;
     dtof_checked_config_t checked;
     dtof_scale_t scale;
-    dtof_status_t status = dtof_device_config_read(message->body, message->length, &requested);
+    dtof_status_t status = dtof_device_config_read(message->body, message->length, DEAD_TIME,
+                                                   &requested);
     if (status == DTOF_OK && (requested.pixels == 0 || requested.pixels > PIXELS)) {
         status = DTOF_ERROR_PIXELS;
     }
@@ -175,8 +178,8 @@ static void act(const dtof_message_t *message)
     case DTOF_MESSAGE_SENSOR_REQUEST:
         answer_kind = DTOF_MESSAGE_SENSOR;
         answer_length = DTOF_SENSOR_BYTES;
-        check("sensor", dtof_sensor_write(PIXELS, DTOF_BINS, BIN_WIDTH_PS_Q16, LASER_HZ * 1000u, 0,
-                                          answer));
+        check("sensor", dtof_sensor_write(PIXELS, DTOF_BINS, DEAD_TIME, BIN_WIDTH_PS_Q16,
+                                          LASER_HZ * 1000u, 0, answer));
         break;
     case DTOF_MESSAGE_HISTOGRAM_REQUEST: {
         uint8_t reason = is_configured ? DTOF_NO_HISTOGRAM_PIXEL : DTOF_NO_HISTOGRAM_CONFIGURATION;

@@ -81,14 +81,16 @@
 // A decision was deferred while the slot was full.
 #define DTOF_FLAG_DEFERRED 4
 
-// The TDC takes one hit per laser cycle, and took one in more than half of the cycles.
+// Early photons hid late ones. With the window rule and a dead time: bins were left out, because
+// the TDC was hardly ever live there. With other rules: it takes the first photon of a laser cycle,
+// and took one in more than half of the cycles.
 #define DTOF_FLAG_PILE_UP 8
 
 // The peak lies on the tail of an echo that was reported before.
 #define DTOF_FLAG_TAIL 16
 
 // Bytes of a dtof_statistics_t.
-#define DTOF_STATISTICS_SIZE 80
+#define DTOF_STATISTICS_SIZE 104
 
 // The same in words of 64 bits.
 #define DTOF_STATISTICS_WORDS (DTOF_STATISTICS_SIZE / 8)
@@ -258,7 +260,7 @@
 #define DTOF_SENSOR_BYTES 24
 
 // Bytes of the body of STATISTICS.
-#define DTOF_REPORT_BYTES 210
+#define DTOF_REPORT_BYTES 226
 
 // Photons come over the link.
 #define DTOF_SOURCE_LINK 0
@@ -323,6 +325,8 @@ enum dtof_status_t
     DTOF_ERROR_TRACKING = 21,
     // The number of echoes is not 1 to 4.
     DTOF_ERROR_ECHOES = 22,
+    // A dead time of 1 to DTOF_BINS - 1 needs the window rule, and no blocks of pixels.
+    DTOF_ERROR_DEAD_TIME = 23,
     // The bin width is 0, or so small that a bin rounds to 0 mm.
     DTOF_ERROR_ZERO_BIN_WIDTH = 30,
     // 1024 bins of this width and the offset reach beyond 8388 m.
@@ -434,14 +438,16 @@ typedef struct dtof_config_t {
     uint16_t before_q8;
     // How far the centred window reaches after its centre, in 1/256 bin: 256 to 1024.
     uint16_t after_q8;
+    // Bins for which the TDC is blind after a photon; 0: it never is. With DTOF_BINS or more, only
+    // the first photon of a laser cycle counts. The window rule weighs bins by it. The other rules
+    // take only 0 and DTOF_BINS or more, which sets DTOF_FLAG_PILE_UP at high rates.
+    uint16_t dead_time;
     // DTOF_RULE_...
     uint8_t rule;
     // The window of the window rule, in bins: 1 to 7.
     uint8_t window;
     // DTOF_ESTIMATOR_...
     uint8_t estimator;
-    // Not 0: the TDC takes one photon per laser cycle, and events have the flag for pile-up.
-    uint8_t one_hit_tdc;
     // Not 0: pixels expect the next event at the bin of the last. Needs the window rule.
     uint8_t tracking;
     // The last echo that a pixel reports in an exposure: 1 to 4.
@@ -484,6 +490,11 @@ typedef struct dtof_counts_t {
     uint64_t expired;
     // Of these, exposures with a deferred decision.
     uint64_t expired_deferred;
+    // Exposures that ended because a counter was full, so that a dead time could not be weighed.
+    uint64_t ended_full;
+    // Decisions that left bins out, because the TDC was hardly ever live there, or all bins,
+    // because the counts contradict its dead time or a counter of a dtof_histogram_t is full.
+    uint64_t blind_looks;
 } dtof_counts_t;
 
 // Bin width and range offset: dtof_scale_init makes it. Other functions only read it. It may be
@@ -654,7 +665,7 @@ const char *dtof_version(void);
 uint16_t dtof_bins(void);
 
 // The body of DTOF_MESSAGE_REFUSED for a configuration that was refused with the error `status`:
-// 1 to 20. Errors without a number of their own give 1, "not known".
+// 1 to 21. Errors without a number of their own give 1, "not known".
 //
 // Threads: any.
 uint8_t dtof_refusal_of(uint8_t status);
@@ -665,8 +676,8 @@ uint8_t dtof_refusal_of(uint8_t status);
 const char *dtof_status_text(uint8_t status);
 
 // Fills in the paper's settings: its rule with an alpha of 4 and at least 5 photons, its depth
-// estimator, X = 4, L1 = 40, L2 = 2000, all bins, one echo. The window rule gets z = 4.47 and a
-// window of 3 bins, and the centred window 2.5 bins to either side.
+// estimator, X = 4, L1 = 40, L2 = 2000, all bins, no dead time, one echo. The window rule gets
+// z = 4.47 and a window of 3 bins, and the centred window 2.5 bins to either side.
 //
 // Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
 // Threads: no other thread uses `config` during the call.
@@ -690,7 +701,7 @@ dtof_status_t dtof_config_false_alarms(struct dtof_config_t *config, uint32_t on
 
 // Checks settings and builds the configuration from them.
 //
-// Errors: each of DTOF_ERROR_RULE to DTOF_ERROR_ECHOES, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+// Errors: each of DTOF_ERROR_RULE to DTOF_ERROR_DEAD_TIME, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
 // After an error `checked` is unchanged.
 // Threads: no other thread uses `checked` during the call.
 dtof_status_t dtof_config_check(const struct dtof_config_t *config,
@@ -820,9 +831,11 @@ dtof_status_t dtof_histogram_fill(struct dtof_histogram_t *histogram,
                                   const uint32_t *counts);
 
 // Looks for events in a filled histogram. X, L1 and L2 have no effect here. `events` has room
-// for DTOF_ECHOES events; `found` gets their number, at most the echoes of `config`. `pixel`,
-// `cycle` and `exposure` (laser cycles) are copied into the events. With several echoes, the bins
-// around all but the last are emptied, so fill the histogram again before the next call.
+// for DTOF_ECHOES events; `found` gets their number, at most the echoes of `config`. `pixel` and
+// `cycle` are copied into the events. `exposure` is the number of laser cycles in the histogram, by
+// which a dead time weighs bins; an event holds 65,535 at most. `config` must be that of
+// dtof_histogram_fill. With several echoes, the bins around all but the last are emptied, so fill
+// the histogram again before the next call.
 //
 // Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
 // Threads: no other thread uses `histogram` or `statistics` during the call.
@@ -831,7 +844,7 @@ dtof_status_t dtof_histogram_detect(struct dtof_histogram_t *histogram,
                                     uint64_t cycle,
                                     struct dtof_statistics_t *statistics,
                                     uint16_t pixel,
-                                    uint16_t exposure,
+                                    uint32_t exposure,
                                     struct dtof_event_t *events,
                                     size_t *found);
 
@@ -964,20 +977,25 @@ dtof_status_t dtof_link_set_stop_reason(struct dtof_link_t *link,
                                         uint8_t reason);
 
 // Reads the body of CONFIGURE. Blocks of pixels and dynamic depth are refused, as this library
-// has neither.
+// has neither. `sensor_dead_time` is that of dtof_sensor_write. The settings get it if the host
+// leaves the dead time to the sensor and the rule can use it.
 //
 // Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_BLOCKS,
 // DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
-// DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT, DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH,
-// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT. dtof_refusal_of gives the answer to the host for each.
+// DTOF_ERROR_DEAD_TIME, DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT,
+// DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+// dtof_refusal_of gives the answer to the host for each.
 // Threads: no other thread uses `config` during the call.
 dtof_status_t dtof_device_config_read(const uint8_t *body,
                                       size_t length,
+                                      uint16_t sensor_dead_time,
                                       struct dtof_device_config_t *config);
 
 // Writes the body of SENSOR, DTOF_SENSOR_BYTES:
 // - `pixels`: pixels of the sensor, 0 without a sensor
 // - `bins`: bins that the sensor measures, up to DTOF_BINS
+// - `dead_time`: bins for which its TDC is blind after a photon; 65,535 if it takes only the first
+//   photon of a laser cycle, 0 if there is none or it is unknown
 // - `bin_width_ps_q16`: 0 if the host sets the width
 // - `laser_millihertz`: 0 if unknown
 // - `offset_mm_q8`: the range of the start of bin 0
@@ -986,6 +1004,7 @@ dtof_status_t dtof_device_config_read(const uint8_t *body,
 // Threads: any.
 dtof_status_t dtof_sensor_write(uint16_t pixels,
                                 uint16_t bins,
+                                uint16_t dead_time,
                                 uint32_t bin_width_ps_q16,
                                 uint64_t laser_millihertz,
                                 int32_t offset_mm_q8,

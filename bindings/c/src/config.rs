@@ -11,8 +11,8 @@ use dtof_core::{
 use crate::memory::{data_ref, initialise, object, put, status};
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{
-    DTOF_ERROR_ECHOES, DTOF_ERROR_ESTIMATOR, DTOF_ERROR_HALF_WIDTH, DTOF_ERROR_MINIMUM_COUNT,
-    DTOF_ERROR_RULE, DTOF_ERROR_TRACKING, DTOF_ERROR_ZERO_X,
+    DTOF_ERROR_DEAD_TIME, DTOF_ERROR_ECHOES, DTOF_ERROR_ESTIMATOR, DTOF_ERROR_HALF_WIDTH,
+    DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_RULE, DTOF_ERROR_TRACKING, DTOF_ERROR_ZERO_X,
 };
 use crate::version::DTOF_BINS;
 
@@ -55,14 +55,16 @@ pub struct dtof_config_t {
     pub before_q8: u16,
     /// How far the centred window reaches after its centre, in 1/256 bin: 256 to 1024.
     pub after_q8: u16,
+    /// Bins for which the TDC is blind after a photon; 0: it never is. With DTOF_BINS or more, only
+    /// the first photon of a laser cycle counts. The window rule weighs bins by it. The other rules
+    /// take only 0 and DTOF_BINS or more, which sets DTOF_FLAG_PILE_UP at high rates.
+    pub dead_time: u16,
     /// DTOF_RULE_...
     pub rule: u8,
     /// The window of the window rule, in bins: 1 to 7.
     pub window: u8,
     /// DTOF_ESTIMATOR_...
     pub estimator: u8,
-    /// Not 0: the TDC takes one photon per laser cycle, and events have the flag for pile-up.
-    pub one_hit_tdc: u8,
     /// Not 0: pixels expect the next event at the bin of the last. Needs the window rule.
     pub tracking: u8,
     /// The last echo that a pixel reports in an exposure: 1 to 4.
@@ -94,8 +96,8 @@ object!(dtof_checked_config_t, Config, tag 0xd6,
     size DTOF_CHECKED_CONFIG_SIZE, align DTOF_CHECKED_CONFIG_ALIGN, unused_below 8);
 
 /// Fills in the paper's settings: its rule with an alpha of 4 and at least 5 photons, its depth
-/// estimator, X = 4, L1 = 40, L2 = 2000, all bins, one echo. The window rule gets z = 4.47 and a
-/// window of 3 bins, and the centred window 2.5 bins to either side.
+/// estimator, X = 4, L1 = 40, L2 = 2000, all bins, no dead time, one echo. The window rule gets
+/// z = 4.47 and a window of 3 bins, and the centred window 2.5 bins to either side.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
 /// Threads: no other thread uses `config` during the call.
@@ -113,10 +115,10 @@ pub unsafe extern "C" fn dtof_config_paper(config: *mut dtof_config_t) -> dtof_s
         gate_last: DTOF_BINS as u16 - 1,
         before_q8: const { U8F8::lit("2.5").to_bits() },
         after_q8: const { U8F8::lit("2.5").to_bits() },
+        dead_time: 0,
         rule: DTOF_RULE_PAPER,
         window: 3,
         estimator: DTOF_ESTIMATOR_CENTROID,
-        one_hit_tdc: 0,
         tracking: 0,
         echoes: 1,
         peel_reach: 0,
@@ -179,7 +181,7 @@ pub unsafe extern "C" fn dtof_config_false_alarms(
 
 /// Checks settings and builds the configuration from them.
 ///
-/// Errors: each of DTOF_ERROR_RULE to DTOF_ERROR_ECHOES, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// Errors: each of DTOF_ERROR_RULE to DTOF_ERROR_DEAD_TIME, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
 /// After an error `checked` is unchanged.
 /// Threads: no other thread uses `checked` during the call.
 #[unsafe(no_mangle)]
@@ -230,9 +232,14 @@ fn config_of(settings: &dtof_config_t) -> Result<Config, dtof_status_t> {
         .l2(settings.l2)
         .gate(gate)
         .estimator(estimator)
-        .one_hit_tdc(settings.one_hit_tdc != 0)
+        .dead_time(settings.dead_time)
         .tracking(tracking)
         .echoes(echoes, settings.peel_reach)
-        .echo_wait(settings.echo_wait);
-    Ok(config.build()?)
+        .echo_wait(settings.echo_wait)
+        .build()?;
+    let is_short = config.dead_time() > 0 && !config.is_first_photon_only();
+    if is_short && !config.weighs_dead_time() {
+        return Err(DTOF_ERROR_DEAD_TIME);
+    }
+    Ok(config)
 }

@@ -14,7 +14,9 @@ pub const DTOF_FLAG_SATURATED: u8 = 1;
 pub const DTOF_FLAG_CLIPPED: u8 = 2;
 /// A decision was deferred while the slot was full.
 pub const DTOF_FLAG_DEFERRED: u8 = 4;
-/// The TDC takes one hit per laser cycle, and took one in more than half of the cycles.
+/// Early photons hid late ones. With the window rule and a dead time: bins were left out, because
+/// the TDC was hardly ever live there. With other rules: it takes the first photon of a laser cycle,
+/// and took one in more than half of the cycles.
 pub const DTOF_FLAG_PILE_UP: u8 = 8;
 /// The peak lies on the tail of an echo that was reported before.
 pub const DTOF_FLAG_TAIL: u8 = 16;

@@ -61,16 +61,18 @@ pub unsafe extern "C" fn dtof_histogram_fill(
         unsafe { initialise(histogram, size, Counted::new())? };
         // SAFETY: the same promise.
         let histogram = unsafe { object_mut(histogram)? };
-        let gated_out = histogram.add_frame(counts, config.gate());
+        let gated_out = config.add_frame(histogram, counts);
         statistics.add_photons_of(histogram, gated_out);
         Ok(())
     })
 }
 
 /// Looks for events in a filled histogram. X, L1 and L2 have no effect here. `events` has room
-/// for DTOF_ECHOES events; `found` gets their number, at most the echoes of `config`. `pixel`,
-/// `cycle` and `exposure` (laser cycles) are copied into the events. With several echoes, the bins
-/// around all but the last are emptied, so fill the histogram again before the next call.
+/// for DTOF_ECHOES events; `found` gets their number, at most the echoes of `config`. `pixel` and
+/// `cycle` are copied into the events. `exposure` is the number of laser cycles in the histogram, by
+/// which a dead time weighs bins; an event holds 65,535 at most. `config` must be that of
+/// dtof_histogram_fill. With several echoes, the bins around all but the last are emptied, so fill
+/// the histogram again before the next call.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
 /// Threads: no other thread uses `histogram` or `statistics` during the call.
@@ -81,7 +83,7 @@ pub unsafe extern "C" fn dtof_histogram_detect(
     cycle: u64,
     statistics: *mut dtof_statistics_t,
     pixel: u16,
-    exposure: u16,
+    exposure: u32,
     events: *mut dtof_event_t,
     found: *mut usize,
 ) -> dtof_status_t {
@@ -99,8 +101,9 @@ pub unsafe extern "C" fn dtof_histogram_detect(
         check(found)?;
         let mut places = events.iter_mut();
         let mut number = 0;
-        config.detect_echoes(histogram, |echo, detection| {
-            let event = detection.event(PixelAddress::new(pixel), LaserCycle::new(cycle), exposure);
+        let held = u16::try_from(exposure).unwrap_or(u16::MAX);
+        let is_blind = config.detect_echoes(histogram, exposure, |echo, detection| {
+            let event = detection.event(PixelAddress::new(pixel), LaserCycle::new(cycle), held);
             if let Some(place) = places.next() {
                 *place = (&DepthEvent { echo, ..event }).into();
                 number += 1;
@@ -108,6 +111,7 @@ pub unsafe extern "C" fn dtof_histogram_detect(
         });
         statistics.events += number as u64;
         statistics.expired += u64::from(number == 0);
+        statistics.blind_looks += u64::from(is_blind);
         // SAFETY: the same promise.
         unsafe { put(found, number) }
     })

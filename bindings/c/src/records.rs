@@ -14,12 +14,13 @@ use crate::memory::{array_mut, data_ref, data_slice, object_ref, put, status};
 use crate::statistics::dtof_statistics_t;
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::DTOF_ERROR_BLOCKS;
+use crate::version::DTOF_BINS;
 
 /// Bytes of the body of SENSOR.
 pub const DTOF_SENSOR_BYTES: usize = 24;
 const _: () = assert!(DTOF_SENSOR_BYTES == SensorRecord::BYTES);
 /// Bytes of the body of STATISTICS.
-pub const DTOF_REPORT_BYTES: usize = 210;
+pub const DTOF_REPORT_BYTES: usize = 226;
 const _: () = assert!(DTOF_REPORT_BYTES == Report::BYTES);
 
 /// Photons come over the link.
@@ -49,17 +50,20 @@ pub struct dtof_device_config_t {
 }
 
 /// Reads the body of CONFIGURE. Blocks of pixels and dynamic depth are refused, as this library
-/// has neither.
+/// has neither. `sensor_dead_time` is that of dtof_sensor_write. The settings get it if the host
+/// leaves the dead time to the sensor and the rule can use it.
 ///
 /// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_BLOCKS,
 /// DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
-/// DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT, DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH,
-/// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT. dtof_refusal_of gives the answer to the host for each.
+/// DTOF_ERROR_DEAD_TIME, DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT,
+/// DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+/// dtof_refusal_of gives the answer to the host for each.
 /// Threads: no other thread uses `config` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_device_config_read(
     body: *const u8,
     length: usize,
+    sensor_dead_time: u16,
     config: *mut dtof_device_config_t,
 ) -> dtof_status_t {
     status(|| {
@@ -72,8 +76,10 @@ pub unsafe extern "C" fn dtof_device_config_read(
         if requested.dynamic_depth.is_some() {
             return Err(Refusal::Unknown.into());
         }
+        #[allow(clippy::cast_possible_truncation, reason = "at most 256")]
+        let dead_time = requested.dead_time_in_force(sensor_dead_time, DTOF_BINS as u16)?;
         let read = dtof_device_config_t {
-            pixel: settings_of(&requested),
+            pixel: settings_of(&requested, dead_time),
             bin_width_ps_q16: requested.bin_width_ps.to_bits(),
             offset_mm_q8: requested.offset_mm.to_bits(),
             pixels: requested.pixels,
@@ -89,7 +95,7 @@ pub unsafe extern "C" fn dtof_device_config_read(
 }
 
 /// The settings of the pixels in a configuration.
-fn settings_of(requested: &Configuration) -> dtof_config_t {
+fn settings_of(requested: &Configuration, dead_time: u16) -> dtof_config_t {
     let mut settings = dtof_config_t {
         x: requested.x,
         l1: requested.l1,
@@ -97,7 +103,7 @@ fn settings_of(requested: &Configuration) -> dtof_config_t {
         gate_first: requested.gate.0,
         gate_last: requested.gate.1,
         estimator: DTOF_ESTIMATOR_CENTROID,
-        one_hit_tdc: requested.one_hit_tdc.into(),
+        dead_time,
         tracking: requested.tracking.into(),
         echoes: requested.echoes.raw(),
         peel_reach: requested.echo_guard_bins,
@@ -130,6 +136,8 @@ fn settings_of(requested: &Configuration) -> dtof_config_t {
 /// Writes the body of SENSOR, DTOF_SENSOR_BYTES:
 /// - `pixels`: pixels of the sensor, 0 without a sensor
 /// - `bins`: bins that the sensor measures, up to DTOF_BINS
+/// - `dead_time`: bins for which its TDC is blind after a photon; 65,535 if it takes only the first
+///   photon of a laser cycle, 0 if there is none or it is unknown
 /// - `bin_width_ps_q16`: 0 if the host sets the width
 /// - `laser_millihertz`: 0 if unknown
 /// - `offset_mm_q8`: the range of the start of bin 0
@@ -140,6 +148,7 @@ fn settings_of(requested: &Configuration) -> dtof_config_t {
 pub unsafe extern "C" fn dtof_sensor_write(
     pixels: u16,
     bins: u16,
+    dead_time: u16,
     bin_width_ps_q16: u32,
     laser_millihertz: u64,
     offset_mm_q8: i32,
@@ -154,6 +163,7 @@ pub unsafe extern "C" fn dtof_sensor_write(
             offset: I24F8::from_bits(offset_mm_q8),
             laser_millihertz,
             bins,
+            dead_time,
         };
         *body = SensorRecord::to_le_bytes((pixels > 0).then_some(&sensor));
         Ok(())

@@ -8,7 +8,7 @@ use crate::memory::{initialise, object, object_ref, put, status};
 use crate::status::dtof_status_t;
 
 /// Bytes of a dtof_statistics_t.
-pub const DTOF_STATISTICS_SIZE: usize = 80;
+pub const DTOF_STATISTICS_SIZE: usize = 104;
 /// The same in words of 64 bits.
 pub const DTOF_STATISTICS_WORDS: usize = DTOF_STATISTICS_SIZE / 8;
 /// Its alignment.
@@ -46,6 +46,11 @@ pub struct dtof_counts_t {
     pub expired: u64,
     /// Of these, exposures with a deferred decision.
     pub expired_deferred: u64,
+    /// Exposures that ended because a counter was full, so that a dead time could not be weighed.
+    pub ended_full: u64,
+    /// Decisions that left bins out, because the TDC was hardly ever live there, or all bins,
+    /// because the counts contradict its dead time or a counter of a dtof_histogram_t is full.
+    pub blind_looks: u64,
 }
 
 /// Sets all counts to 0.
@@ -80,6 +85,8 @@ pub unsafe extern "C" fn dtof_statistics_read(
             deferred: of.deferred,
             expired: of.expired,
             expired_deferred: of.expired_deferred,
+            ended_full: of.ended_full,
+            blind_looks: of.blind_looks,
         };
         // SAFETY: the same promise.
         unsafe { put(counts, read) }

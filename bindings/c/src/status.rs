@@ -49,6 +49,8 @@ pub enum dtof_status_t {
     DTOF_ERROR_TRACKING = 21,
     /// The number of echoes is not 1 to 4.
     DTOF_ERROR_ECHOES = 22,
+    /// A dead time of 1 to DTOF_BINS - 1 needs the window rule, and no blocks of pixels.
+    DTOF_ERROR_DEAD_TIME = 23,
 
     /// The bin width is 0, or so small that a bin rounds to 0 mm.
     DTOF_ERROR_ZERO_BIN_WIDTH = 30,
@@ -158,7 +160,7 @@ impl From<AerError> for dtof_status_t {
 }
 
 /// Each refusal of the link with its errors.
-const REFUSALS: [(Refusal, dtof_status_t); 21] = [
+const REFUSALS: [(Refusal, dtof_status_t); 22] = [
     (Refusal::Unknown, DTOF_ERROR_CONFIGURATION),
     (Refusal::ZeroX, DTOF_ERROR_ZERO_X),
     (Refusal::XAboveL1, DTOF_ERROR_X_ABOVE_L1),
@@ -180,6 +182,7 @@ const REFUSALS: [(Refusal, dtof_status_t); 21] = [
     (Refusal::Tracking, DTOF_ERROR_TRACKING),
     (Refusal::HostTimeout, DTOF_ERROR_HOST_TIMEOUT),
     (Refusal::Reserved, DTOF_ERROR_RESERVED_FIELD),
+    (Refusal::DeadTime, DTOF_ERROR_DEAD_TIME),
 ];
 
 impl From<Refusal> for dtof_status_t {
@@ -191,7 +194,7 @@ impl From<Refusal> for dtof_status_t {
 }
 
 /// The body of DTOF_MESSAGE_REFUSED for a configuration that was refused with the error `status`:
-/// 1 to 20. Errors without a number of their own give 1, "not known".
+/// 1 to 21. Errors without a number of their own give 1, "not known".
 ///
 /// Threads: any.
 #[unsafe(no_mangle)]
@@ -212,7 +215,7 @@ pub extern "C" fn dtof_status_text(status: u8) -> *const c_char {
 }
 
 /// The text of every status. A test compares it with the enum.
-const TEXTS: [(dtof_status_t, &CStr); 43] = [
+const TEXTS: [(dtof_status_t, &CStr); 44] = [
     (DTOF_OK, c"done"),
     (DTOF_ERROR_NULL, c"a pointer is null"),
     (DTOF_ERROR_ALIGNMENT, c"a pointer is not aligned"),
@@ -256,6 +259,10 @@ const TEXTS: [(dtof_status_t, &CStr); 43] = [
     ),
     (DTOF_ERROR_TRACKING, c"tracking needs the window rule"),
     (DTOF_ERROR_ECHOES, c"the echoes must be 1 to 4"),
+    (
+        DTOF_ERROR_DEAD_TIME,
+        c"the dead time needs the window rule, without blocks",
+    ),
     (DTOF_ERROR_ZERO_BIN_WIDTH, c"the bin width is zero"),
     (DTOF_ERROR_RANGE, c"ranges would lie beyond 8388 m"),
     (DTOF_ERROR_POSITION, c"the position is out of range"),

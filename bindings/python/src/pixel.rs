@@ -137,6 +137,8 @@ impl Pixel {
             ("gated_out", of.gated_out),
             ("events", of.events),
             ("expired", of.expired),
+            ("ended_full", of.ended_full),
+            ("blind_looks", of.blind_looks),
         ]
     }
 

@@ -107,7 +107,9 @@ impl Counted {
             halvings += 1;
         }
         // At most 1/3; 39 + 24 bits.
-        let y = ((whole - rest) << 24) / (whole + rest);
+        let y = ((whole - rest) << 24)
+            .checked_div(whole + rest)
+            .unwrap_or(0);
         let square = (y * y) >> 24;
         let third = (y * square) >> 24;
         let fifth = (third * square) >> 24;

@@ -27,6 +27,7 @@
 //! measurement of radiative lifetimes", J. Phys. E 1 (1968) 878, for the first photon of a
 //! laser cycle; the sum of D bins for shorter dead times and the test are ours.
 
+use core::marker::PhantomData;
 use core::ops::{Range, RangeInclusive};
 
 use crate::depth::Counted;
@@ -78,14 +79,13 @@ struct Totals {
     live: u64,
 }
 
-/// A window and its excess over the background, in 1/256 photon.
+/// A window, and the photons expected in it, in 1/256.
 #[derive(Clone, Copy)]
 struct Candidate {
     first: usize,
     photons: u32,
     live: u32,
     expected: u64,
-    excess: u64,
 }
 
 impl LiveDecision {
@@ -185,29 +185,20 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         minimum: u32,
         expected: Option<BinIndex>,
     ) -> LiveDecision {
-        // A TDC of the first photon has no sum of bins that ends: two thirds of the time.
-        if usize::from(self.dead_time) >= BINS {
-            self.best::<true>(width, z, minimum, expected)
-        } else {
-            self.best::<false>(width, z, minimum, expected)
-        }
-    }
-
-    #[inline(always)]
-    fn best<const FIRST_ONLY: bool>(
-        &self,
-        width: u16,
-        z: u16,
-        minimum: u32,
-        expected: Option<BinIndex>,
-    ) -> LiveDecision {
-        let Some(totals) = self.totals::<FIRST_ONLY>() else {
+        let Some(totals) = self.totals() else {
             return LiveDecision::BLIND;
         };
         let z_squared = u32::from(z) * u32::from(z);
-        let (candidate, lowest) =
-            self.largest_excess::<FIRST_ONLY>(width, z_squared, minimum, expected, totals);
-        let window = candidate.filter(|one| one.stands_clear(z_squared, totals.live));
+        // Below half of z² no window of less than a quarter of the light is a detection.
+        let most = 4 * u64::from(width) * u64::from(self.cycles);
+        let half = u64::from(z_squared >> 17);
+        let levels = Levels {
+            excess: if totals.live < most { 0 } else { half },
+            least: self.least_live(width.into()),
+            minimum,
+        };
+        let (best, is_blind) = self.largest_excess(width, expected, &totals, &levels);
+        let window = best.filter(|one| one.stands_clear(z_squared, totals.live));
         LiveDecision {
             window: window.map(|window| LiveWindow {
                 #[allow(clippy::cast_possible_truncation, reason = "less than 1024")]
@@ -216,7 +207,7 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
                 photons_outside: totals.photons.wrapping_sub(window.photons),
                 live_outside: totals.live.wrapping_sub(window.live.into()),
             }),
-            is_blind: self.is_left_out(lowest.into(), width),
+            is_blind,
         }
     }
 
@@ -227,121 +218,159 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         count.map_or(0, |&count| count.into())
     }
 
-    /// Photons of the bins that blind `bin`. Saturates.
-    fn blind(&self, bin: usize) -> u32 {
-        let first = bin.saturating_sub(self.dead_time.into());
-        let bins = self.histogram.counts().get(first..bin).unwrap_or_default();
+    /// Photons of some bins. Saturates.
+    #[inline(never)]
+    fn photons(&self, bins: Range<usize>) -> u32 {
+        let bins = self.histogram.counts().get(bins).unwrap_or_default();
         bins.iter()
             .fold(0, |sum: u32, &count| sum.saturating_add(count.into()))
     }
 
-    /// One pass over the gated bins. `None` if a bin was blind in more laser cycles than there
-    /// were.
-    #[inline(always)]
-    fn totals<const FIRST_ONLY: bool>(&self) -> Option<Totals> {
-        let gated = self.gate.bins();
-        let dead_time = usize::from(self.dead_time);
-        let has_excluded = self.excluded.echoes() > 0;
-        let mut blind = self.blind(gated.start);
-        let (mut photons, mut live_sum) = (0u32, 0u64);
-        let counts = self.histogram.counts().get(gated.clone())?;
-        for (bin, &count) in gated.zip(counts) {
-            let live = self.cycles.checked_sub(blind)?;
-            let count: u32 = count.into();
-            #[allow(clippy::cast_possible_truncation, reason = "less than 1024")]
-            if !(has_excluded && self.excluded.contains(bin as u16)) {
-                photons = photons.wrapping_add(count);
-                live_sum += u64::from(live);
-            }
-            // At most 28 bits and 24.
-            blind += count;
-            if !FIRST_ONLY {
-                blind = blind.wrapping_sub(self.count(bin.wrapping_sub(dead_time)));
-            }
-        }
-        (live_sum > 0).then_some(Totals {
-            photons,
-            live: live_sum,
-        })
+    /// Photons of the bins that blind `bin`. Saturates.
+    fn blind(&self, bin: usize) -> u32 {
+        self.photons(bin.saturating_sub(self.dead_time.into())..bin)
     }
 
-    /// The window with the largest excess, and the lowest sum of live laser cycles of a window.
+    /// One pass over the gated bins. `None` if a bin was blind in more laser cycles than there
+    /// were.
+    #[inline(never)]
+    fn totals(&self) -> Option<Totals> {
+        let gated = self.gate.bins();
+        let dead_time = usize::from(self.dead_time);
+        let all = self.histogram.counts();
+        let counts = all.get(gated.clone())?;
+        // Bins that no photon has ceased to blind yet: all of them if only the first photon counts.
+        let from = dead_time.saturating_sub(gated.start).min(counts.len());
+        let (early, late) = counts.split_at_checked(from)?;
+        let ended = all.get((gated.start + from).saturating_sub(dead_time)..)?;
+        let (mut photons, mut blind) = (0u32, self.blind(gated.start));
+        let mut blind_sum = Sum::<W>::ZERO;
+        for &count in early {
+            blind_sum.add(blind);
+            photons = photons.wrapping_add(count.into());
+            // At most 28 bits and 24.
+            blind = blind.wrapping_add(count.into());
+        }
+        let mut highest = blind;
+        for (&count, &ended) in late.iter().zip(ended) {
+            blind_sum.add(blind);
+            highest = highest.max(blind);
+            photons = photons.wrapping_add(count.into());
+            blind = blind.wrapping_add(count.into()).wrapping_sub(ended.into());
+        }
+        if late.is_empty() {
+            // The photons of the last bin blind none.
+            let last = early.last().map_or(0, |&count| count.into());
+            highest = blind.wrapping_sub(last);
+        }
+        if highest > self.cycles {
+            return None;
+        }
+        let bins = counts.len() as u64;
+        let live = (u64::from(self.cycles) * bins).wrapping_sub(blind_sum.total());
+        let mut totals = Totals { photons, live };
+        if self.excluded.echoes() > 0 {
+            self.leave_out_excluded(&mut totals);
+        }
+        (totals.live > 0).then_some(totals)
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn leave_out_excluded(&self, totals: &mut Totals) {
+        let bins = self.gate.first()..=self.gate.last();
+        for bin in bins.filter(|&bin| self.excluded.contains(bin)) {
+            totals.photons = totals.photons.wrapping_sub(self.count(bin.into()));
+            totals.live = totals.live.wrapping_sub(self.live(bin).into());
+        }
+    }
+
+    /// Finds the window with the largest excess, and whether one was left out.
     ///
     /// From one window to the next the live laser cycles lose the photons of the window, and gain
     /// those of the window a dead time before it.
-    #[inline(always)]
-    fn largest_excess<const FIRST_ONLY: bool>(
+    #[inline(never)]
+    fn largest_excess(
         &self,
         width: u16,
-        z_squared: u32,
-        minimum: u32,
         expected: Option<BinIndex>,
-        totals: Totals,
-    ) -> (Option<Candidate>, u32) {
+        totals: &Totals,
+        levels: &Levels,
+    ) -> (Option<Candidate>, bool) {
         let starts = self.starts(width, expected);
-        let least = self.least_live(width.into());
+        let (first, last) = (usize::from(*starts.start()), usize::from(*starts.end()));
         let width = usize::from(width);
         let dead_time = usize::from(self.dead_time);
-        let (first, last) = (usize::from(*starts.start()), usize::from(*starts.end()));
-        let counts = self.histogram.counts();
-        let sum = |bins: Range<usize>| {
-            let bins = counts.get(bins).unwrap_or_default().iter();
-            bins.fold(0u32, |sum, &count| sum.wrapping_add(count.into()))
-        };
-        let mut photons = sum(first..first + width);
-        let bins = first..first + width;
-        let mut live = bins.fold(0u32, |sum, bin| {
-            sum.wrapping_add(self.cycles.saturating_sub(self.blind(bin)))
+        // Where photons cease to blind a bin of the window, and all of it.
+        let split = (dead_time + 1).saturating_sub(width).max(first).min(last);
+        let end = dead_time.max(split).min(last);
+        let counts = |bins: Range<usize>| self.histogram.counts().get(bins).unwrap_or_default();
+        let live = (first..first + width).fold(0u32, |sum, bin| {
+            sum.wrapping_add(self.cycles.wrapping_sub(self.blind(bin)))
         });
-        let ended = |bin: usize| bin.saturating_sub(dead_time);
-        let mut before = sum(ended(first)..ended(first + width));
-
-        let (share, shift) = totals.share::<W>();
-        #[allow(clippy::cast_possible_truncation, reason = "live is less than 2³²")]
-        let quarter = (totals.live / 4).min(u32::MAX.into()) as u32;
-        // Below half of z² no window of less than a quarter of the light is a detection.
-        let mut best_score = (u64::from(z_squared >> 16) / 2, 1);
-        let (mut best, mut lowest) = (None, u32::MAX);
-        for start in first..=last {
-            lowest = lowest.min(live);
-            if photons >= minimum {
-                // Rounded up: a window of all light has no excess.
-                let expected = (u64::from(live).wrapping_mul(share) >> shift) + 1;
-                let excess = (u64::from(photons) << 8).saturating_sub(expected);
-                let square = excess.saturating_mul(excess);
-                let is_better = || {
-                    is_higher::<W>((square, expected), best_score)
-                        || best.is_none() && live > quarter
-                };
-                if excess > 0
-                    && is_better()
-                    && live >= least
-                    && !self.touches_excluded(start, width)
-                {
-                    best_score = (square, expected);
-                    best = Some(Candidate {
-                        first: start,
-                        photons,
-                        live,
-                        expected,
-                        excess,
-                    });
-                }
-            }
-            live = live.wrapping_sub(photons);
-            if !FIRST_ONLY {
-                live = live.wrapping_add(before);
-                let leaving = start.wrapping_sub(dead_time);
-                before = before
-                    .wrapping_add(self.count(leaving.wrapping_add(width)))
-                    .wrapping_sub(self.count(leaving));
-            }
-            photons = photons
-                .wrapping_add(self.count(start + width))
-                .wrapping_sub(self.count(start));
+        let mut scan = Scan {
+            levels: *levels,
+            share: totals.share::<W>(),
+            start: first,
+            photons: self.photons(first..first + width),
+            live,
+            before: 0,
+            best: None,
+        };
+        let pairs = |bins: Range<usize>| {
+            let entering = counts(bins.start + width..bins.end + width);
+            counts(bins).iter().zip(entering)
+        };
+        for (&leaving, &entering) in pairs(first..split) {
+            scan.visit(self, width);
+            scan.step(leaving, entering);
         }
-        (best, lowest)
+        // Up to here they only fell.
+        let mut lowest = scan.live;
+        scan.before = self
+            .photons(split.saturating_sub(dead_time)..(split + width).saturating_sub(dead_time));
+        let blinding = counts((split + width).saturating_sub(dead_time)..BINS);
+        for ((&leaving, &entering), &more) in pairs(split..end).zip(blinding) {
+            scan.visit(self, width);
+            lowest = lowest.min(scan.live);
+            scan.step(leaving, entering);
+            scan.before = scan.before.wrapping_add(more.into());
+        }
+        let ended = pairs(end.saturating_sub(dead_time)..last.saturating_sub(dead_time));
+        for ((&leaving, &entering), (&less, &more)) in pairs(end..last).zip(ended) {
+            scan.visit(self, width);
+            lowest = lowest.min(scan.live);
+            scan.step(leaving, entering);
+            scan.before = scan
+                .before
+                .wrapping_add(more.into())
+                .wrapping_sub(less.into());
+        }
+        scan.visit(self, width);
+        lowest = lowest.min(scan.live);
+        (scan.best, lowest < levels.least)
     }
+
+    /// The level that a better window than this one exceeds. `None` if this one has too few photons
+    /// or live laser cycles, or touches an echo.
+    #[cold]
+    #[inline(never)]
+    fn next_level(&self, window: &Candidate, width: usize, levels: &Levels) -> Option<u64> {
+        if window.photons < levels.minimum
+            || window.live < levels.least
+            || self.touches_excluded(window.first, width)
+        {
+            return None;
+        }
+        let excess = excess(window.photons, window.expected);
+        let level = excess.saturating_mul(excess).checked_div(window.expected)?;
+        Some(if W::BITS <= 10 {
+            level.min(u32::MAX.into())
+        } else {
+            level
+        })
+    }
+
     /// Where windows may start: in the gate, and so that they contain `expected`.
     #[inline(always)]
     fn starts(&self, width: u16, expected: Option<BinIndex>) -> RangeInclusive<u16> {
@@ -370,6 +399,105 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         #[allow(clippy::cast_possible_truncation, reason = "less than 1024")]
         let is_excluded = |bin: usize| self.excluded.contains(bin as u16);
         self.excluded.echoes() > 0 && bins.any(is_excluded)
+    }
+}
+
+/// What a window has to exceed.
+#[derive(Clone, Copy)]
+struct Levels {
+    /// The square of the excess over the expected photons, in 1/256.
+    excess: u64,
+    /// Live laser cycles: fewer are left out.
+    least: u32,
+    /// The fewest photons.
+    minimum: u32,
+}
+
+/// A pass over windows: the present one, and the best so far.
+struct Scan {
+    levels: Levels,
+    share: (u64, u32),
+    start: usize,
+    photons: u32,
+    live: u32,
+    /// Photons of the window a dead time before.
+    before: u32,
+    best: Option<Candidate>,
+}
+
+impl Scan {
+    /// Compares the present window with the best.
+    #[inline(always)]
+    fn visit<const BINS: usize, W: CounterWidth>(
+        &mut self,
+        counts: &LiveCounts<'_, BINS, W>,
+        width: usize,
+    ) {
+        let (photons, live) = (self.photons, self.live);
+        let expected = u64::from(live).wrapping_mul(self.share.0) >> self.share.1;
+        // Rounded up: a window of all light has no excess.
+        let expected = if W::BITS <= 10 {
+            #[allow(clippy::cast_possible_truncation, reason = "28 bits")]
+            u64::from((expected as u32).wrapping_add(1))
+        } else {
+            expected + 1
+        };
+        if exceeds::<W>(photons, expected, self.levels.excess) {
+            let candidate = Candidate {
+                first: self.start,
+                photons,
+                live,
+                expected,
+            };
+            if let Some(level) = counts.next_level(&candidate, width, &self.levels) {
+                self.levels.excess = level;
+                self.best = Some(candidate);
+            }
+        }
+    }
+
+    /// Goes on to the next window.
+    #[inline(always)]
+    fn step(&mut self, leaving: impl Into<u32>, entering: impl Into<u32>) {
+        self.start += 1;
+        self.live = self
+            .live
+            .wrapping_sub(self.photons)
+            .wrapping_add(self.before);
+        self.photons = self
+            .photons
+            .wrapping_add(entering.into())
+            .wrapping_sub(leaving.into());
+    }
+}
+
+/// A sum of one number a bin. Of counters of 10 bits it fits a word.
+struct Sum<W> {
+    narrow: u32,
+    wide: u64,
+    width: PhantomData<W>,
+}
+
+impl<W: CounterWidth> Sum<W> {
+    const ZERO: Self = Self {
+        narrow: 0,
+        wide: 0,
+        width: PhantomData,
+    };
+
+    #[inline(always)]
+    fn add(&mut self, value: u32) {
+        // 10 + 10 bits of photons, in 10 bits of bins.
+        if W::BITS <= 10 {
+            self.narrow = self.narrow.wrapping_add(value);
+        } else {
+            self.wide += u64::from(value);
+        }
+    }
+
+    #[inline(always)]
+    fn total(&self) -> u64 {
+        self.wide + u64::from(self.narrow)
     }
 }
 
@@ -409,18 +537,35 @@ impl Candidate {
         let less = (variance * square_of_sixth).checked_div(variance + square_of_sixth);
         let spread = variance - less.unwrap_or(0);
         // Far above any variance.
-        let above = self.excess.saturating_sub(skew).min(1 << 31);
+        let above = excess(self.photons, self.expected)
+            .saturating_sub(skew)
+            .min(1 << 31);
         above * above > (u64::from(z_squared >> 12) * spread) >> 4
     }
 }
 
-/// Whether the first of two squares of an excess is higher for its expected photons.
+/// The excess of `photons` over the `expected` ones, in 1/256.
 #[inline(always)]
-fn is_higher<W: CounterWidth>(one: (u64, u64), other: (u64, u64)) -> bool {
+fn excess(photons: u32, expected: u64) -> u64 {
+    (u64::from(photons) << 8).saturating_sub(expected)
+}
+
+/// Whether the square of the excess is more than `level` times the `expected` photons, all in 1/256.
+#[inline(always)]
+fn exceeds<W: CounterWidth>(photons: u32, expected: u64, level: u64) -> bool {
     if W::BITS <= 10 {
-        // 42 + 21 bits.
-        one.0 * other.1 > other.0 * one.1
+        // A window has 13 bits of photons, and all bins have 20.
+        #[allow(
+            clippy::cast_possible_truncation,
+            reason = "28 bits, and a level of 32"
+        )]
+        let (expected, level) = (expected as u32, level as u32);
+        let Some(excess) = (photons << 8).checked_sub(expected) else {
+            return false;
+        };
+        u64::from(excess) * u64::from(excess) > u64::from(level) * u64::from(expected)
     } else {
-        u128::from(one.0) * u128::from(other.1) > u128::from(other.0) * u128::from(one.1)
+        let excess = u128::from(excess(photons, expected));
+        excess * excess > u128::from(level) * u128::from(expected)
     }
 }

@@ -177,11 +177,8 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         if self.exposure <= config.l1() {
             return Look::TooEarly;
         }
-        if self.weighs_dead_time(config) {
-            return self.look_further::<R, true>(config, statistics, cycle, observe);
-        }
-        if self.state != State::NONE {
-            return self.look_further::<R, false>(config, statistics, cycle, observe);
+        if self.state != State::NONE || config.dead_time() > 0 {
+            return self.look_on(config, statistics, cycle, observe);
         }
         if self.exposure >= config.l2() {
             statistics.expired += 1;
@@ -195,9 +192,25 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         self.report(config, statistics, cycle, &detection)
     }
 
+    /// A look with state or with a dead time.
+    #[inline(never)]
+    fn look_on<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        cycle: LaserCycle,
+        observe: impl FnOnce(&DecisionInput<'_, BINS, W>),
+    ) -> Look {
+        if self.weighs_dead_time(config) {
+            self.look_further::<R, true>(config, statistics, cycle, observe)
+        } else {
+            self.look_further::<R, false>(config, statistics, cycle, observe)
+        }
+    }
+
     /// A look with state: an event waits, an echo was reported, an event is expected, or a
     /// decision was deferred. With `LIVE` any look, weighed by a dead time.
-    #[inline(never)]
+    #[inline(always)]
     fn look_further<R: DetectionRule, const LIVE: bool>(
         &mut self,
         config: &PixelConfig<BINS, R>,

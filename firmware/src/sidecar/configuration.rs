@@ -4,7 +4,7 @@ use dtof_core::binning::{Binning, BlockLink};
 use dtof_core::{AnyRule, Array, PixelAddress, PixelConfig, RangeGate, RangeScale};
 use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source, StopReason};
 
-use super::{Block, Pixel, Sidecar};
+use super::{BINS, Block, Pixel, Sidecar};
 
 impl Sidecar<'_> {
     /// Applies the configuration in `body`: all pixels begin an exposure. The last configuration
@@ -27,6 +27,9 @@ impl Sidecar<'_> {
             return Err(Refusal::Pixels);
         }
         let gate = RangeGate::new(first, last)?;
+        let of_sensor = self.sensor.map_or(0, |sensor| sensor.dead_time);
+        #[allow(clippy::cast_possible_truncation, reason = "128")]
+        let dead_time = requested.dead_time_in_force(of_sensor, BINS as u16)?;
         let config_of = |rule: AnyRule| {
             let tracking = rule.tracking(&gate).filter(|_| requested.tracking);
             if requested.tracking && tracking.is_none() {
@@ -38,7 +41,7 @@ impl Sidecar<'_> {
                 .l2(requested.l2)
                 .gate(gate)
                 .estimator(requested.estimator)
-                .one_hit_tdc(requested.one_hit_tdc)
+                .dead_time(dead_time)
                 .tracking(tracking)
                 .echoes(requested.echoes, requested.echo_guard_bins)
                 .echo_wait(requested.echo_wait);

@@ -10,6 +10,7 @@ pub(super) const fn sensor(info: &SensorInfo) -> SensorRecord {
         offset: info.offset,
         laser_millihertz: info.laser_millihertz,
         bins: info.bins,
+        dead_time: info.dead_time,
     }
 }
 

@@ -81,13 +81,6 @@ impl Sidecar<'_> {
         if should_run && !self.started {
             sensor.start(self.bin_width);
             self.sensor_starts = self.sensor_starts.saturating_add(1);
-            if sensor.is_one_hit() {
-                self.config = self.config.map(PixelConfig::with_one_hit_tdc);
-                let one_hit = |(config, patience): (PixelConfig<_, _>, _)| {
-                    (config.with_one_hit_tdc(), patience)
-                };
-                self.binning = self.binning.map(one_hit);
-            }
             (self.started, self.running) = (true, true);
         } else if !should_run && self.running {
             sensor.stop();
@@ -122,15 +115,17 @@ impl Sidecar<'_> {
         let cycle = LaserCycle::new(self.cycle.saturating_sub(1));
         let exposure = u16::try_from(self.frame_cycles).unwrap_or(u16::MAX);
         let mut histogram = Histogram::<BINS, Count24>::new();
-        let gated_out = histogram.add_frame(counts, config.gate());
+        let gated_out = config.add_frame(&mut histogram, counts);
         self.statistics.add_photons_of(&histogram, gated_out);
         if has_room_for_events(&self.words, config.echoes().raw().into()) {
             let mut events = 0;
-            config.detect_echoes(&mut histogram, |echo, detection| {
-                let event = detection.event(pixel, cycle, exposure);
-                self.enqueue(&DepthEvent { echo, ..event });
-                events += 1;
-            });
+            let is_blind =
+                config.detect_echoes(&mut histogram, self.frame_cycles, |echo, detection| {
+                    let event = detection.event(pixel, cycle, exposure);
+                    self.enqueue(&DepthEvent { echo, ..event });
+                    events += 1;
+                });
+            self.statistics.blind_looks += u64::from(is_blind);
             self.statistics.events += events;
             self.statistics.expired += u64::from(events == 0);
         } else {

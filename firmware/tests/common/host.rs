@@ -23,7 +23,7 @@ pub const CONFIGURATION: Configuration = Configuration {
     l1: 20,
     l2: 200,
     gate: (0, 127),
-    one_hit_tdc: false,
+    dead_time: None,
     pixels: 8,
     columns: 8,
     binning: None,
@@ -56,7 +56,15 @@ pub fn device_with_blocks<const PIXELS: usize, const BLOCKS: usize>(
 
 /// A device with a sensor, and a host that has configured it.
 pub fn configured<const PIXELS: usize>(requested: &Configuration) -> (Sidecar<'static>, Host) {
-    let mut device = device::<PIXELS>(Some(SensorInfo::new(256)));
+    configured_with::<PIXELS>(SensorInfo::new(256), requested)
+}
+
+/// The same with another sensor.
+pub fn configured_with<const PIXELS: usize>(
+    sensor: SensorInfo,
+    requested: &Configuration,
+) -> (Sidecar<'static>, Host) {
+    let mut device = device::<PIXELS>(Some(sensor));
     let mut host = Host::new(1, 0);
     host.configure(&mut device, 0, requested);
     (device, host)
@@ -205,18 +213,13 @@ pub enum Call {
     Histogram(u16, Box<[u32; 128]>),
 }
 
-/// Gives the next item each time it is asked; `None` is an error. It may give the first
-/// photon of a laser cycle only.
+/// Gives the next item each time it is asked; `None` is an error.
 pub struct Scripted<I> {
     pub calls: I,
-    pub is_one_hit: bool,
 }
 
 pub fn scripted<I>(calls: I) -> Scripted<I> {
-    Scripted {
-        calls,
-        is_one_hit: false,
-    }
+    Scripted { calls }
 }
 
 impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
@@ -224,10 +227,6 @@ impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
 
     fn info(&self) -> SensorInfo {
         SensorInfo::new(256)
-    }
-
-    fn is_one_hit(&self) -> bool {
-        self.is_one_hit
     }
 
     fn start(&mut self, _: U16F16) {}

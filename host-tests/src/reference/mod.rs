@@ -20,6 +20,7 @@
 //! | Module         | Contents                                       |
 //! |----------------|------------------------------------------------|
 //! | `window`       | the window rule                                |
+//! | `live`         | the window rule for a TDC with a dead time     |
 //! | `echoes`       | a pixel with echoes and tracking               |
 //! | `blocks`       | adaptive binning                               |
 //!
@@ -30,6 +31,7 @@ mod blocks;
 mod depth;
 mod echoes;
 mod histogram;
+mod live;
 mod peak;
 mod pixel;
 mod square_root;
@@ -41,6 +43,7 @@ pub use blocks::{BinnedArray, Reporter};
 pub use depth::{centroid, range_mm};
 pub use echoes::{Echo, EchoConfig, EchoPixel};
 pub use histogram::Histogram;
+pub use live::{LiveHistogram, LiveTest};
 pub use peak::peak;
 pub use pixel::{Background, Config, Event, Look, Pixel};
 pub use square_root::floor_square_root;

@@ -203,7 +203,7 @@ fn the_slowest_pixels_of_the_answer_lie_between_those_of_its_trials() {
         for (outcome, slow) in outcomes.iter_mut().zip(slow) {
             outcome.figures.slow_cycles = slow;
         }
-        let methods = Method::all(U8F8::ONE, 2);
+        let methods = Method::all(U8F8::ONE, 2, 0);
         answer(&methods, &outcomes, 10.0).candidates[0].slow_cycles
     };
     assert!((slowest([200.0, 800.0]) - 400.0).abs() < 1e-3);
@@ -233,7 +233,7 @@ fn outcome(method: usize, effort: u16, cycles: f64, error_mm: f64, instructions:
 
 #[test]
 fn the_cheapest_of_the_nearly_fastest_is_taken() {
-    let methods = Method::all(U8F8::ONE, 2);
+    let methods = Method::all(U8F8::ONE, 2, 0);
     let frames = methods.len() - 1;
     assert_eq!(methods[frames].kind, Kind::Frames);
     let all = [

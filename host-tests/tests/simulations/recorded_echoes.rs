@@ -183,7 +183,7 @@ fn the_distances_of_a_newer_sensor_are_among_the_echoes() {
             let mut histogram = Histogram::<64, Count16>::new();
             histogram.add_frame(bins, &gate);
             let mut right = 0;
-            config.detect_echoes(&mut histogram, |echo, detection| {
+            config.detect_echoes(&mut histogram, 1, |echo, detection| {
                 let event = detection.event(PixelAddress::new(0), LaserCycle::new(0), 1);
                 let range = scale.range(event.position()).to_num::<f64>();
                 let error = (range - distance).abs();

@@ -142,9 +142,10 @@ impl AllHistograms {
         let mut traces = observed.traces(hot)?;
         let last_bin = cut_unmeasured(&mut traces);
         let tdc = observed.length.is_known().then(|| pile_up::tdc(&traces));
-        if let Some(Tdc::OneHit(_)) = tdc {
+        if let Some(Tdc::DeadTime { bins, .. }) = tdc {
             for trace in &mut traces {
-                trace.counts = pile_up::coates(&trace.counts, trace.cycles).0;
+                trace.counts =
+                    dtof_theory::counts::dead_time::arrived(&trace.counts, trace.cycles, bins);
             }
         }
         let levels = traces.iter().map(|trace| Level::of(&trace.counts));

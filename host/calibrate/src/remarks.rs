@@ -97,18 +97,18 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
         );
     }
     match found.tdc {
-        Some(Tdc::OneHit(lost)) => {
-            let even = if lost > 0.1 {
-                " Rules expect a constant background: near bins have more of it and give false alarms. Less \
-                 light helps, or a gate."
+        Some(Tdc::DeadTime { bins, lost }) => {
+            let tdc = if bins >= found.bins {
+                "that records one photon a laser cycle".to_owned()
             } else {
-                ""
+                format!("that is blind for {bins} bins after a photon")
             };
             remark(
                 "pile-up",
                 format!(
-                    "The background falls as with a TDC that records one photon a laser \
-                     cycle: {:.1} % of the photons are lost. Rates are corrected for that.{even}",
+                    "The background falls as with a TDC {tdc}: {:.1} % of the photons are lost. Rates are \
+                     corrected for that, and dead_time lets the window rule weigh bins by how often \
+                     they were live.",
                     lost * 100.0
                 ),
             );

@@ -33,7 +33,10 @@ impl Calibration {
                 Some(detection) => Some(detection.sigma_bins),
                 None => before.sensor.sigma_bins,
             },
-            one_hit_tdc: matches!(self.tdc, Some(Tdc::OneHit(_))).then_some(true),
+            dead_time: match self.tdc {
+                Some(Tdc::DeadTime { bins, .. }) => Some(u16::try_from(bins)?),
+                _ => None,
+            },
             background: whole(self.pixels.background),
             glass: glass.and_then(|glass| whole(glass.photons)),
             glass_bins: glass.filter(|_| is_absolute).map(|glass| {
@@ -64,6 +67,7 @@ impl Calibration {
             rays: before.rays,
             run: before.run,
             file: before.file,
+            dead_time_of_sensor: None,
         };
         Ok(found.without_recording())
     }

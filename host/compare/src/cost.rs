@@ -20,6 +20,8 @@ pub const PAPER: f64 = 90.68;
 pub const AVERAGE: f64 = 32.0;
 /// The same with tracking (`look; tracking; no event`).
 pub const TRACKING: f64 = 405.45;
+/// The same with a window of 3 and a dead time (`look; dead for 20 bins; no event`).
+pub const DEAD_TIME: f64 = 4000.0;
 /// The same for a block (`look; block; no event`).
 pub const BLOCK_LOOK: f64 = 247.28;
 /// An exposure that L2 ends (`look at L2`).
@@ -46,6 +48,7 @@ pub const fn window(bins: u8) -> f64 {
 fn look(method: &Method) -> f64 {
     match method.kind {
         Kind::Frames => 0.0,
+        Kind::Events { weighs: true, .. } => DEAD_TIME,
         Kind::Events { tracking: true, .. } => TRACKING,
         Kind::Events { rule, .. } => match rule {
             Rule::Paper => PAPER,

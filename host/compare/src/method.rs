@@ -57,6 +57,8 @@ pub enum Kind {
         levels: u8,
         /// Whether half of the false alarms are spent near the last event.
         tracking: bool,
+        /// Whether the rule weighs bins by the dead time of the TDC.
+        weighs: bool,
     },
     /// Readings of frames.
     Frames,
@@ -83,6 +85,7 @@ impl Method {
                 rule,
                 levels: 0,
                 tracking: false,
+                weighs: false,
             },
             centroid: false,
             pen,
@@ -90,9 +93,9 @@ impl Method {
     }
 
     /// All methods for a pulse of standard deviation `sigma` bins, in an array that has blocks of up to
-    /// `most_levels` levels. Frames are the last.
+    /// `most_levels` levels, of a TDC with this dead time. Frames are the last.
     #[must_use]
-    pub fn all(sigma: U8F8, most_levels: u8) -> Vec<Self> {
+    pub fn all(sigma: U8F8, most_levels: u8, dead_time: u16) -> Vec<Self> {
         let width = WindowRule::width_for_pulse(sigma);
         let window = Rule::Window(width);
         let name = format!("window of {width}");
@@ -107,16 +110,28 @@ impl Method {
                 centroid: true,
                 ..Self::events(format!("{name}, centroid"), window, palette::window(2))
             },
-            Self::events(name, window, palette::window(3)),
+            Self::events(name.clone(), window, palette::window(3)),
         ];
         let more = |name: &str, levels, tracking, pen| Self {
             kind: Kind::Events {
                 rule: window,
                 levels,
                 tracking,
+                weighs: false,
             },
             ..Self::events(name, window, pen)
         };
+        if dead_time > 0 {
+            methods.push(Self {
+                kind: Kind::Events {
+                    rule: window,
+                    levels: 0,
+                    tracking: false,
+                    weighs: true,
+                },
+                ..Self::events(format!("{name}, dead time"), window, palette::window(4))
+            });
+        }
         methods.push(more("tracking", 0, true, palette::window(5)));
         if most_levels > 0 {
             methods.push(more("blocks of 2×2", 1, false, palette::window(7)));
@@ -167,6 +182,12 @@ impl Method {
         )
     }
 
+    /// Whether it weighs bins by the dead time of the TDC.
+    #[must_use]
+    pub const fn weighs(&self) -> bool {
+        matches!(self.kind, Kind::Events { weighs: true, .. })
+    }
+
     /// The settings `like`, with this method. `effort` is the minimum count of a peak, or the laser cycles
     /// of a frame.
     ///
@@ -183,6 +204,7 @@ impl Method {
             binning: None,
             tracking: false,
             frame: None,
+            dead_time: if self.weighs() { like.dead_time } else { 0 },
             ..like.clone()
         };
         Ok(match self.kind {

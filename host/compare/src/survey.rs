@@ -8,6 +8,7 @@ use super::tally::first_and_last;
 use dtof_engine::settings::Settings;
 use dtof_engine::slices::next_cycles;
 use dtof_photons::source::PhotonSource;
+use dtof_theory::counts::dead_time::arrived;
 
 /// There is a target if a window exceeds the background by so many standard deviations.
 const CLEAR: f64 = 6.0;
@@ -23,7 +24,7 @@ pub struct PixelLight {
     pub position: Option<f64>,
 }
 
-/// Counts all photons of `source`: the light of each pixel.
+/// Counts all photons of `source`: the light of each pixel, corrected for the dead time of the settings.
 ///
 /// # Errors
 /// Fails if the gate is invalid or the photons cannot be read.
@@ -56,7 +57,11 @@ pub fn survey(
     }
     let all = addresses.into_iter().zip(histograms).zip(cycles);
     let all = all.map(|((address, histogram), cycles)| {
-        let mut pixel = of_pixel(&histogram[first..=last], cycles, sigma);
+        let mut counts: Vec<f64> = histogram.iter().map(|&count| count as f64).collect();
+        if settings.dead_time > 0 {
+            counts = arrived(&counts, cycles as f64, settings.dead_time.into());
+        }
+        let mut pixel = of_pixel(&counts[first..=last], cycles, sigma);
         pixel.position = pixel.position.map(|position| position + first as f64);
         (address, pixel)
     });
@@ -70,16 +75,16 @@ pub fn survey(
     clippy::cast_sign_loss,
     reason = "a few bins"
 )]
-fn of_pixel(bins: &[u64], cycles: u64, sigma: f64) -> PixelLight {
+fn of_pixel(bins: &[f64], cycles: u64, sigma: f64) -> PixelLight {
     let width = ((6.0 * sigma).ceil() as usize + 1).min(bins.len() / 2);
     let windows = bins.windows(width).enumerate();
-    let highest = windows.max_by_key(|(_, window)| window.iter().sum::<u64>());
-    let (start, window) = highest.unwrap_or((0, &[]));
-    let in_window: u64 = window.iter().sum();
-    let all: u64 = bins.iter().sum();
-    let each = (all - in_window) as f64 / (bins.len() - width) as f64;
+    let sums = windows.map(|(start, window)| (start, window, window.iter().sum::<f64>()));
+    let highest = sums.max_by(|one, other| one.2.total_cmp(&other.2));
+    let (start, window, in_window) = highest.unwrap_or((0, &[], 0.0));
+    let all: f64 = bins.iter().sum();
+    let each = (all - in_window) / (bins.len() - width) as f64;
     let expected = each * width as f64;
-    let above = in_window as f64 - expected;
+    let above = in_window - expected;
     let cycles_f = cycles.max(1) as f64;
     PixelLight {
         background: each / cycles_f,
@@ -87,7 +92,7 @@ fn of_pixel(bins: &[u64], cycles: u64, sigma: f64) -> PixelLight {
         position: (above > CLEAR * expected.max(1.0).sqrt()).then(|| {
             let places = window.iter().enumerate();
             let sum: f64 = places
-                .map(|(place, &count)| (place as f64 + 0.5) * (count as f64 - each))
+                .map(|(place, &count)| (place as f64 + 0.5) * (count - each))
                 .sum();
             start as f64 + sum / above
         }),

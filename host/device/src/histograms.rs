@@ -127,6 +127,8 @@ impl Collecting<'_> {
         let settings = Settings {
             rule: highest.into(),
             gate: None,
+            // The rule does not weigh bins, and no event is used.
+            dead_time: 0,
             x: X,
             l1: X,
             l2: self.l2,

@@ -67,7 +67,7 @@ impl Task<'_> {
             l1: settings.l1,
             l2: settings.l2,
             gate: settings.gate.unwrap_or((0, last_bin)),
-            one_hit_tdc: settings.one_hit_tdc,
+            dead_time: Some(settings.dead_time),
             pixels: self.pixels,
             columns: u16::try_from(self.columns)?,
             binning: settings.binning,

@@ -53,6 +53,7 @@ impl Setup {
             offset: I24F8::ZERO,
             laser_millihertz: 0,
             bins: client.bins(),
+            dead_time: 0,
         });
         let report = client.report()?;
         let pixels = pixels.unwrap_or(sensor.pixels.min(client.pixels()));
@@ -77,6 +78,7 @@ impl Setup {
                 offset_mm: Some(sensor.offset),
                 ..SensorSettings::default()
             },
+            dead_time_of_sensor: Some(sensor.dead_time),
             ..SettingsFile::default()
         });
         effective.check_bins(bins)?;
@@ -154,6 +156,7 @@ mod tests {
                 offset: I24F8::ZERO,
                 laser_millihertz: 0,
                 bins: measured,
+                dead_time: 0,
             };
             let mut settings = SettingsFile::default();
             settings.sensor.gate = requested;
@@ -165,5 +168,44 @@ mod tests {
         let requested = Some((8, 127));
         assert_eq!(gate(requested, 117), (requested, requested));
         assert_eq!(gate(None, 0), (None, None));
+    }
+
+    #[test]
+    fn the_dead_time_is_the_sensors_unless_it_is_given() {
+        let setup = |text: &str, of_sensor| {
+            let sensor = SensorRecord {
+                pixels: 4,
+                bin_width: None,
+                offset: I24F8::ZERO,
+                laser_millihertz: 0,
+                bins: 128,
+                dead_time: of_sensor,
+            };
+            Setup::new(sensor, 128, SettingsFile::parse(text).unwrap(), 4).unwrap()
+        };
+        let window = "[detection]\nrule = 'window'\nwindow = 3\n";
+        for (text, of_sensor, used) in [
+            (window.to_owned(), 20, (20, true)),
+            (window.to_owned(), u16::MAX, (128, true)),
+            (format!("{window}[sensor]\ndead_time = 3"), 20, (3, false)),
+            (format!("{window}[sensor]\ndead_time = 0"), 20, (0, false)),
+            // The paper's rule cannot use it.
+            (String::new(), 20, (0, false)),
+        ] {
+            let setup = setup(&text, of_sensor);
+            let settings = &setup.settings;
+            assert_eq!(
+                (settings.dead_time, settings.is_dead_time_of_sensor),
+                used,
+                "{text}"
+            );
+            let task = setup.task(None, HostTimeout::default());
+            let configuration = task.configuration(dtof_link::Source::Sensor).unwrap();
+            assert_eq!(configuration.dead_time, Some(used.0));
+            // Another rule, and what the sensor says is used or not.
+            let requested = SettingsFile::parse(window).unwrap();
+            let changed = setup.with_requested(requested).unwrap().settings;
+            assert_eq!(changed.dead_time, of_sensor.min(128));
+        }
     }
 }

@@ -11,7 +11,8 @@ use dtof_core::{Array, BinIndex, CounterWidth, DepthEvent, PixelAddress};
 pub struct Decision {
     /// The event.
     pub event: DepthEvent,
-    /// The histogram of its exposure. The bins around earlier echoes are empty.
+    /// The histogram of its exposure. The bins around earlier echoes are empty, except with a dead
+    /// time, which has the photons before the gate, too.
     pub counts: Vec<u16>,
     /// The bin where a pixel that tracks expected its event.
     pub expected: Option<BinIndex>,

@@ -1,7 +1,7 @@
 //! Explains a decision: the threshold, background and window of the rule for a histogram.
 
 use dtof_core::fixed::types::U24F8;
-use dtof_core::rule::ExcludedBins;
+use dtof_core::rule::{ExcludedBins, LiveCounts, LiveWindow};
 use dtof_core::{
     AnyRule, BinIndex, BlockLevel, Count, Count10, Count16, Count24, CounterWidth, DetectionRule,
     EchoNumber, Histogram, Peak, PixelConfig, RangeGate,
@@ -30,21 +30,30 @@ pub struct Explanation {
     /// The first bin of each quadrant, and the end of the last.
     pub quadrants: [u16; 5],
     /// Window rule: the first and the last bin of the window with the most photons that contains
-    /// the peak.
+    /// the peak. With a dead time, the window that the rule reports.
     pub window: Option<(u16, u16)>,
+    /// The dead time by which bins are weighed; 0 if they are not. With one, `needed` is `None`, and
+    /// `background` is that of the peak's bin: that of any bin is proportional to its live laser
+    /// cycles.
+    pub dead_time: u16,
 }
 
-/// Explains `counts`: a complete histogram of a sensor, or an exposure so far. Returns `None` if
-/// the settings are for another number of bins.
+/// Explains `counts` of so many laser cycles: a complete histogram of a sensor, or an exposure so far.
+/// Returns `None` if the settings are for another number of bins.
 #[must_use]
-pub fn explain(settings: &Settings, counts: &[u32], is_whole: bool) -> Option<Explanation> {
+pub fn explain(
+    settings: &Settings,
+    counts: &[u32],
+    cycles: u32,
+    is_whole: bool,
+) -> Option<Explanation> {
     let bins = counts.len();
     let explanation = match is_whole {
-        false => with_bins!(bins, BINS => explain_bins::<BINS, Count10>(settings, counts)),
+        false => with_bins!(bins, BINS => explain_bins::<BINS, Count10>(settings, counts, cycles)),
         // The sum of all counters must fit into 32 bits.
         true => {
-            with_bins!(bins, of 8 16 32 64 128 256, BINS => explain_bins::<BINS, Count24>(settings, counts))
-                .or_else(|_| with_bins!(bins, BINS => explain_bins::<BINS, Count16>(settings, counts)))
+            with_bins!(bins, of 8 16 32 64 128 256, BINS => explain_bins::<BINS, Count24>(settings, counts, cycles))
+                .or_else(|_| with_bins!(bins, BINS => explain_bins::<BINS, Count16>(settings, counts, cycles)))
         }
     };
     let explanation = explanation.ok()??;
@@ -64,9 +73,20 @@ pub fn explain(settings: &Settings, counts: &[u32], is_whole: bool) -> Option<Ex
 fn explain_bins<const BINS: usize, W: CounterWidth>(
     settings: &Settings,
     counts: &[u32],
+    cycles: u32,
 ) -> Option<Explanation> {
     let counts: &[u32; BINS] = counts.try_into().ok()?;
     let config = settings.config::<BINS>().ok()?;
+    if settings.weighs_dead_time() {
+        let input = LiveInput {
+            config: &config,
+            counts: *counts,
+            excluded: ExcludedBins::NONE,
+            expected: None,
+            cycles,
+        };
+        return Some(input.explain::<W>());
+    }
     let peak = histogram::<BINS, W>(counts, config.gate()).peak();
     let bin = peak.bin.raw();
     let input = DecisionInput {
@@ -93,6 +113,16 @@ fn all<const BINS: usize>(settings: &Settings, decisions: &[Decision]) -> Option
     let explanations = decisions.iter().map(|decision| {
         let is_pixel = decision.event.level == BlockLevel::PIXEL;
         let config: &PixelConfig<BINS, AnyRule> = if is_pixel { &pixels } else { &blocks };
+        if is_pixel && settings.weighs_dead_time() {
+            let input = LiveInput {
+                config,
+                counts: counts_of(decision),
+                excluded: decision.excluded,
+                expected: decision.expected,
+                cycles: decision.event.exposure.into(),
+            };
+            return Some(input.explain::<Count10>());
+        }
         let input = DecisionInput::new(config, decision, settings.frame.is_some())?;
         Some(match is_pixel && settings.frame.is_none() {
             true => input.explain::<Count10>(),
@@ -109,6 +139,82 @@ fn histogram<const BINS: usize, W: CounterWidth>(
     let mut histogram = Histogram::new();
     histogram.add_frame(counts, gate);
     histogram
+}
+
+fn counts_of<const BINS: usize>(decision: &Decision) -> [u32; BINS] {
+    let mut counts = [0; BINS];
+    for (count, &kept) in counts.iter_mut().zip(&decision.counts) {
+        *count = kept.into();
+    }
+    counts
+}
+
+/// A histogram with a dead time, and the configuration that weighs its bins.
+struct LiveInput<'a, const BINS: usize> {
+    config: &'a PixelConfig<BINS, AnyRule>,
+    /// With the photons before the gate and around earlier echoes.
+    counts: [u32; BINS],
+    excluded: ExcludedBins,
+    /// Where a pixel that tracks expects its event.
+    expected: Option<BinIndex>,
+    cycles: u32,
+}
+
+impl<const BINS: usize> LiveInput<'_, BINS> {
+    fn explain<W: CounterWidth>(&self) -> Explanation {
+        let Self { config, cycles, .. } = self;
+        let mut histogram = Histogram::<BINS, W>::new();
+        config.add_frame(&mut histogram, &self.counts);
+        let (gate, dead_time) = (config.gate(), config.dead_time());
+        let counts = LiveCounts::new(&histogram, gate, &self.excluded, *cycles, dead_time);
+        let window = counts.as_ref().and_then(|counts| self.window(counts));
+        let count = |bin: u16| histogram.count(bin.into()).unwrap_or(0);
+        let highest = histogram.peak();
+        let mut explanation = Explanation {
+            peak: (highest.bin.raw(), highest.count.raw()),
+            needed: None,
+            depends: false,
+            background: None,
+            quadrants: gate.quadrant_starts(),
+            window: window.map(|window| (window.first, window.first + window.width - 1)),
+            dead_time,
+        };
+        let Some(counts) = counts else {
+            return explanation;
+        };
+        if let Some((first, last)) = explanation.window {
+            let light = |bin: u16| f64::from(count(bin)) / f64::from(counts.live(bin).max(1));
+            // The first, if several have as much light.
+            let bins = (first..=last).rev();
+            let peak = bins.max_by(|&one, &other| light(one).total_cmp(&light(other)));
+            explanation.peak = peak.map_or(explanation.peak, |bin| (bin, count(bin)));
+        }
+        let (photons, live) = match window {
+            Some(window) => (window.photons_outside.into(), window.live_outside),
+            None => {
+                let bins = (gate.first()..=gate.last()).filter(|&bin| !self.excluded.contains(bin));
+                bins.fold((0, 0), |(photons, live), bin| {
+                    let [more, longer] = [count(bin), counts.live(bin)].map(u64::from);
+                    (photons + more, live + longer)
+                })
+            }
+        };
+        let live_of_peak = f64::from(counts.live(explanation.peak.0));
+        explanation.background = (live > 0).then(|| photons as f64 / live as f64 * live_of_peak);
+        explanation
+    }
+
+    /// The window that the rule reports.
+    fn window<W: CounterWidth>(&self, counts: &LiveCounts<'_, BINS, W>) -> Option<LiveWindow> {
+        let tracking = self.config.tracking();
+        if let (Some(tracking), Some(expected)) = (tracking, self.expected) {
+            let is_near = counts.gate().contains(expected.raw());
+            let near = is_near.then(|| tracking.near().detect_live(counts, Some(expected)));
+            let near = near.and_then(|decision| decision.window);
+            return near.or_else(|| tracking.far().detect_live(counts, None).window);
+        }
+        self.config.rule().detect_live(counts, None).window
+    }
 }
 
 /// A histogram and the configuration that decides on it.
@@ -131,10 +237,7 @@ impl<const BINS: usize> DecisionInput<BINS> {
         decision: &Decision,
         is_frame: bool,
     ) -> Option<Self> {
-        let mut counts = [0; BINS];
-        for (count, &kept) in counts.iter_mut().zip(&decision.counts) {
-            *count = kept.into();
-        }
+        let counts = counts_of(decision);
         let peak = decision.event.peak_bin.raw();
         let mut input = Self {
             rule: *config.rule(),
@@ -198,6 +301,7 @@ impl<const BINS: usize> DecisionInput<BINS> {
                 }
                 AnyRule::Paper(_) | AnyRule::Average(_) => None,
             },
+            dead_time: 0,
         }
     }
 }
@@ -251,7 +355,7 @@ mod tests {
                 gate: Some((gate, 127)),
                 ..Settings::static_scene(0)
             };
-            let explanation = explain(&settings, &counts, false).unwrap();
+            let explanation = explain(&settings, &counts, 60, false).unwrap();
             let (bin, peak) = explanation.peak;
             let within = &counts[usize::from(gate)..];
             prop_assert_eq!(peak, *within.iter().max().unwrap());
@@ -288,7 +392,7 @@ mod tests {
     #[test]
     fn a_threshold_that_depends_on_events_is_not_told() {
         let counts: Vec<u32> = (0..128).map(|bin| u32::from(bin == 40) * 50).collect();
-        let explained = |settings: Settings| explain(&settings, &counts, false).unwrap();
+        let explained = |settings: Settings| explain(&settings, &counts, 60, false).unwrap();
         let window = WindowRule::new(3, "4.5".parse().unwrap(), Count::saturating(5)).unwrap();
         let plain = Settings {
             rule: window.into(),
@@ -321,8 +425,61 @@ mod tests {
         }
     }
 
+    /// 1000 laser cycles of a TDC that is blind for 20 bins. One in a hundred live laser cycles has a
+    /// photon in each bin, and every second one in bin 60.
+    #[test]
+    fn the_background_of_a_dead_time_follows_the_live_laser_cycles() {
+        let mut counts = vec![0_u32; 128];
+        let mut live = vec![0_u32; 128];
+        for bin in 0..128_usize {
+            live[bin] = 1000 - counts[bin.saturating_sub(20)..bin].iter().sum::<u32>();
+            counts[bin] = live[bin] / if bin == 60 { 2 } else { 100 };
+        }
+        let rule = WindowRule::new(3, "4.5".parse().unwrap(), Count::saturating(5)).unwrap();
+        let explained = |gate| {
+            let settings = Settings {
+                rule: rule.into(),
+                dead_time: 20,
+                gate,
+                ..Settings::static_scene(0)
+            };
+            explain(&settings, &counts, 1000, false).unwrap()
+        };
+        for gate in [None, Some((30, 127))] {
+            let explanation = explained(gate);
+            assert_eq!(explanation.peak, (60, counts[60]), "{gate:?}");
+            let (first, last) = explanation.window.unwrap();
+            assert!((58..=60).contains(&first) && last == first + 2);
+            assert_eq!((explanation.needed, explanation.dead_time), (None, 20));
+            let background = explanation.background.unwrap();
+            let expected = f64::from(live[60]) / 100.0;
+            // The counts above are rounded down to whole photons.
+            assert!(
+                background <= expected && background > 0.9 * expected,
+                "{background}"
+            );
+        }
+        // Without a detection it is that of all gated bins.
+        let explanation = explained(Some((70, 127)));
+        assert_eq!(explanation.window, None);
+        assert!(explanation.background.is_some());
+        // A full counter before the gate: nothing is known.
+        counts[3] = 1023;
+        let settings = Settings {
+            rule: rule.into(),
+            dead_time: 20,
+            gate: Some((30, 127)),
+            ..Settings::static_scene(0)
+        };
+        let explanation = explain(&settings, &counts, 1000, false).unwrap();
+        assert_eq!((explanation.window, explanation.background), (None, None));
+    }
+
     #[test]
     fn other_histograms_have_no_look() {
-        assert_eq!(explain(&Settings::static_scene(0), &[1; 100], false), None);
+        assert_eq!(
+            explain(&Settings::static_scene(0), &[1; 100], 60, false),
+            None
+        );
     }
 }

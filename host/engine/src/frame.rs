@@ -1,5 +1,6 @@
 //! A frame-based sensor to compare with: the same photons and histograms, but every pixel reads its
-//! highest bin at the same time, if it is above the background. Pile-up is not flagged.
+//! highest bin at the same time, if it is above the background. Bins are not weighed by a dead time, and
+//! pile-up is not flagged.
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::U8F8;
@@ -81,6 +82,7 @@ impl<const BINS: usize> FramePixel<BINS> {
                 histogram: &self.histogram,
                 expected: None,
                 excluded: ExcludedBins::NONE,
+                cycles: self.length.into(),
             });
             last.record_event(event);
         }

@@ -237,7 +237,8 @@ impl Hub {
             Ok(histogram) => {
                 let settings = state.settings.as_ref();
                 let look = settings.and_then(|(_, settings)| {
-                    explain(settings, &histogram.counts, histogram.head.is_whole)
+                    let head = &histogram.head;
+                    explain(settings, &histogram.counts, head.exposure, head.is_whole)
                 });
                 let json = frame::histogram(histogram, look.as_ref());
                 (histogram.head.pixel.raw(), json)

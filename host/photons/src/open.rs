@@ -52,6 +52,8 @@ pub struct ReadOptions {
     pub layout: Option<Layout>,
     /// Pixels that do not count for the length of histograms.
     pub masked: Vec<u16>,
+    /// Histograms: the bins of the run for which the TDC was blind after a photon.
+    pub dead_time: u16,
 }
 
 impl Default for ReadOptions {
@@ -68,6 +70,7 @@ impl Default for ReadOptions {
             seed: 1,
             layout: None,
             masked: Vec::new(),
+            dead_time: 0,
         }
     }
 }
@@ -103,7 +106,8 @@ impl Counts {
     /// its photons have laser cycles.
     ///
     /// # Errors
-    /// Fails if there are more pixels than addresses, or more photons than can be counted.
+    /// Fails if there are more pixels than addresses, more photons than can be counted, or photons in
+    /// the dead time of others.
     pub fn photons(&self, options: &ReadOptions) -> Result<RecordedHistograms> {
         let length = options.length;
         let length = length.unwrap_or(RecordingLength::PhotonsPerCycle(1.0));
@@ -115,7 +119,9 @@ impl Counts {
         layout.masked.clone_from(&options.masked);
         let photons =
             RecordedHistograms::with_layout(&layout, &self.captures, length, cycles, seed);
-        Ok(photons?.with_axis_names(self.axis_names))
+        let (masked, dead_time) = (&options.masked, options.dead_time);
+        let photons = photons?.with_dead_time(&self.captures, masked, dead_time)?;
+        Ok(photons.with_axis_names(self.axis_names))
     }
 }
 

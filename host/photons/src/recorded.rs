@@ -5,7 +5,11 @@
 //! the chunk with equal probability, so their number is binomial. Which photons they are is a draw
 //! without replacement, and each gets a random laser cycle of the chunk. The chunk length depends
 //! on the recording alone, so slices of any length hold the same photons.
+//!
+//! The photons of a TDC with a dead time are drawn laser cycle by laser cycle: see
+//! [`RecordedHistograms::with_dead_time`].
 
+mod hits;
 mod layout;
 mod remaining;
 #[cfg(test)]
@@ -18,6 +22,7 @@ use rand_distr::{Binomial, Distribution};
 use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
+use self::hits::Hits;
 pub use self::layout::Layout;
 use self::remaining::Remaining;
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
@@ -129,6 +134,7 @@ impl RecordedHistograms {
             photons_per_cycle += mean(remaining.photons(), recorded);
             pixels.push(RecordedPixel {
                 remaining,
+                hits: None,
                 cycles_left: recorded,
                 rng: pixel_rng(seed, PixelAddress::new(address)),
                 chunk: PixelPhotons::default(),
@@ -152,6 +158,40 @@ impl RecordedHistograms {
             first,
             pixels,
         })
+    }
+
+    /// The photons of a TDC that was blind for `dead_time` bins after each, as `captures` have them: no
+    /// laser cycle has a photon in the dead time of another. With 0 nothing changes.
+    ///
+    /// # Errors
+    /// Fails if a pixel that is not `masked` has more photons in a bin than laser cycles in which it was
+    /// live.
+    pub fn with_dead_time(
+        mut self,
+        captures: &[Capture],
+        masked: &[u16],
+        dead_time: u16,
+    ) -> Result<Self> {
+        if dead_time == 0 {
+            return Ok(self);
+        }
+        let pixels = self.pixels.iter_mut().zip(captures.iter().flatten());
+        for (address, (pixel, counts)) in (self.first..=u16::MAX).zip(pixels) {
+            let hits = Hits::new(counts, dead_time);
+            let cycles = pixel.cycles_left;
+            if let Some((bin, live)) = hits.contradiction(cycles)
+                && !masked.contains(&address)
+            {
+                let reason = format!(
+                    "bin {bin} of pixel {address} has {} photons, but was live in {live} of {cycles} laser \
+                     cycles; give the laser cycles with `recorded_cycles`",
+                    counts[bin]
+                );
+                return Err(Refused::value("dead_time", dead_time, reason).into());
+            }
+            pixel.hits = Some(hits);
+        }
+        Ok(self)
     }
 
     /// Renames columns and rows.
@@ -276,6 +316,8 @@ impl PhotonSource for RecordedHistograms {
 struct RecordedPixel {
     /// Photons of the laser cycles after the chunk.
     remaining: Remaining,
+    /// The same with a dead time, instead.
+    hits: Option<Hits>,
     cycles_left: u64,
     rng: Pcg64,
     /// The chunk: its laser cycles and photons.
@@ -288,7 +330,11 @@ struct RecordedPixel {
 impl RecordedPixel {
     fn photons_left(&self) -> u64 {
         let in_chunk = self.chunk.photons.len() - self.replayed_photons;
-        self.remaining.photons() + in_chunk as u64
+        let remaining = match &self.hits {
+            Some(hits) => hits.photons(),
+            None => self.remaining.photons(),
+        };
+        remaining + in_chunk as u64
     }
 
     /// The next `cycles` laser cycles, from chunks of `chunk` laser cycles.
@@ -325,6 +371,18 @@ impl RecordedPixel {
         self.chunk.cycles = cycles;
         self.chunk.photons.clear();
         if cycles == 0 {
+            return Ok(());
+        }
+        if let Some(hits) = &mut self.hits {
+            for cycle in 0..cycles {
+                let photons = &mut self.chunk.photons;
+                #[allow(clippy::cast_possible_truncation, reason = "at most 1024 bins")]
+                hits.draw(self.cycles_left, &mut self.rng, |bin| {
+                    let code = bin as u16;
+                    photons.push(Photon { cycle, code });
+                });
+                self.cycles_left -= 1;
+            }
             return Ok(());
         }
         let share = f64::from(cycles) / self.cycles_left as f64;

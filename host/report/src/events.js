@@ -65,7 +65,7 @@ function decode(next, count) {
 }
 
 /** What the last event of each pixel and block was decided from. */
-function decodeDecisions({ packed, count, bins, quadrants }) {
+function decodeDecisions({ packed, count, bins, quadrants, deadTime }) {
   const next = numbersOf(packed);
   const ranges = (many) => Array.from({ length: many }, () => [next(), next()]);
   return Array.from({ length: count }, () => {
@@ -74,12 +74,15 @@ function decodeDecisions({ packed, count, bins, quadrants }) {
     const first = width > 0 ? next() : 0;
     const leftOut = ranges(next());
     const counts = Array.from({ length: bins }, next);
+    const level = (kind >> 2) & 3;
     const look = {
       peak: [bin, counts[bin]], needed: needed < 0 ? null : needed, background, quadrants,
       window: width > 0 ? [first, first + width - 1] : null,
+      // Blocks are not weighed.
+      dead_time: level === 0 ? deadTime : 0,
     };
     return { pixel, cycle, exposure, range, counts, leftOut, look,
-      level: (kind >> 2) & 3, echo: (kind & 3) + 1, flags: kind >> 4 };
+      level, echo: (kind & 3) + 1, flags: kind >> 4 };
   });
 }
 

@@ -56,6 +56,7 @@ impl Decisions<'_> {
             "quadrants": looks.first().map(|look| look.quadrants),
             "every": kept.step,
             "count": count,
+            "deadTime": if self.settings.weighs_dead_time() { self.settings.dead_time } else { 0 },
             "packed": packed.base64(),
         });
         (data, packed.len())

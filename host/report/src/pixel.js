@@ -97,7 +97,8 @@ function histogramNote() {
   }
   const { decision } = chosen;
   if (!decision) return `No histogram: the pixel has no ${data.event}.`;
-  const { peak: [bin, photons], needed, background } = decision.look;
+  const { peak: [bin, photons], needed, background, dead_time: deadTime } = decision.look;
+  const where = deadTime > 0 ? "there" : "a bin";
   const whose = decision.level > 0 || decision.echo > 1 ? ` (${kindName(decision)})` : "";
   // A report of one echo of an exposure has the histogram of whichever came last.
   const isOfIt = (event) => event.cycle === decision.cycle && event.echo === decision.echo;
@@ -105,7 +106,7 @@ function histogramNote() {
   const hidden = isShown ? "," : `, echo ${decision.echo}, which is not shown,`;
   return `Histogram of the last ${data.event}${whose}${hidden} at ${timeOf(decision.cycle)}, of ${number(decision.exposure)} ` +
     `laser cycles: ${fixed(decision.range, 1)} mm. Peak: ${number(photons)} photons in bin ${bin}; ` +
-    `${needsOf(needed)}, with ${number(background, 2)} of background a bin.`;
+    `${needsOf(needed, deadTime)}, with ${number(background, 2)} of background ${where}.`;
 }
 
 function drawPixel() {

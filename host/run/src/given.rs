@@ -9,6 +9,8 @@ use dtof_options::{Options, Refused};
 
 /// The settings file, and options of the sensor that hold for any input.
 pub const SENSOR: &[&str] = &["settings", "gate", "masked", "sigma_bins"];
+/// The dead time of a TDC.
+pub const TDC: &[&str] = &["dead_time"];
 /// The option for a frame-based sensor instead of asynchronous pixels.
 pub const FRAME: &[&str] = &["frame"];
 
@@ -111,6 +113,7 @@ impl Options for Operation {
     const KEYS: &'static [&'static [&'static str]] = &[
         &["bin_width_ps", "offset_mm"],
         SENSOR,
+        TDC,
         DetectionSettings::KEYS,
     ];
 

@@ -118,6 +118,7 @@ pub fn read_options(requested: &SettingsFile) -> ReadOptions {
         seed: seed.unwrap_or(1),
         layout: None,
         masked: requested.sensor.masked.clone().unwrap_or_default(),
+        dead_time: requested.sensor.dead_time.unwrap_or(0),
     }
 }
 

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, ensure};
 
-use super::given::{FRAME, Given, SENSOR, of_given};
+use super::given::{FRAME, Given, SENSOR, TDC, of_given};
 use super::recording::{RECORDING, read_options, settings_of_file};
 use super::run::{RunResult, Sink, run};
 use dtof_engine::Engine;
@@ -27,6 +27,7 @@ impl dtof_options::Options for Options {
     const KEYS: &'static [&'static [&'static str]] = &[
         RECORDING,
         SENSOR,
+        TDC,
         DetectionSettings::KEYS,
         FRAME,
         &["cycles", "seed"],
@@ -123,6 +124,14 @@ impl Options {
         ensure!(
             metadata.has_shape || settings.binning.is_none(),
             refused(Refused::new("binning", "needs the array: give `columns`"))
+        );
+        ensure!(
+            metadata.is_list || options.length.is_some() || !settings.weighs_dead_time(),
+            Refused::value(
+                "dead_time",
+                settings.dead_time,
+                "needs `recorded_cycles`: histograms are weighed by them"
+            )
         );
         if let Some(binning) = settings.binning {
             let ([column, row], side) = (photons.axis_names(), 1 << binning.levels.raw());

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, ensure};
 use dtof_core::DepthEvent;
 use dtof_core::fixed::types::U16F16;
 
-use super::given::{FRAME, Given, SENSOR, of_given};
+use super::given::{FRAME, Given, SENSOR, TDC, of_given};
 use super::run::{RunResult, Sink, run};
 use super::truth::SceneComparison;
 use dtof_engine::Engine;
@@ -32,6 +32,7 @@ impl dtof_options::Options for Options {
     const KEYS: &'static [&'static [&'static str]] = &[
         &["array", "laser_off"],
         SENSOR,
+        TDC,
         DetectionSettings::KEYS,
         FRAME,
         &["cycles", "seed"],
@@ -175,7 +176,6 @@ pub fn settings_of_scene(requested: SettingsFile, scene: &Scene) -> Result<Setti
             bin_width_ps: Some(width),
             // The ranges of simulated photons need no offset.
             offset_mm: None,
-            one_hit_tdc: scene.effects.one_hit_tdc().then_some(true),
             ..requested.sensor
         },
         rays: RaySettings {
@@ -192,6 +192,7 @@ pub fn settings_of_scene(requested: SettingsFile, scene: &Scene) -> Result<Setti
             cycles: requested.run.cycles.or(Some(scene.cycles)),
             ..requested.run
         },
+        dead_time_of_sensor: Some(scene.effects.tdc_dead_time()),
         ..requested
     })
 }

@@ -61,6 +61,12 @@ pub struct Summary {
     pub expired: u64,
     /// Of these, exposures with a decision put off.
     pub expired_deferred: u64,
+    /// Exposures that ended because a counter was full, so that bins could not be weighed by a dead
+    /// time.
+    pub ended_full: u64,
+    /// Decisions that left out bins where the TDC was hardly ever live, or all of them because the
+    /// counts contradict its dead time.
+    pub blind_looks: u64,
     /// Recorded photons that were not replayed, as they lie after the last
     /// laser cycle.
     pub not_replayed: u64,
@@ -124,7 +130,14 @@ fn settings<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, 
     map.serialize_entry("tracking", &settings.tracking)?;
     map.serialize_entry("echoes", &settings.echoes.raw())?;
     map.serialize_entry("echo_wait", &settings.echo_wait)?;
-    map.serialize_entry("one_hit_tdc", &settings.one_hit_tdc)?;
+    map.serialize_entry("dead_time", &settings.dead_time)?;
+    if settings.dead_time > 0 {
+        let source = match settings.is_dead_time_of_sensor {
+            true => "sensor",
+            false => "settings",
+        };
+        map.serialize_entry("dead_time_from", source)?;
+    }
     if let Some(frame) = settings.frame {
         map.serialize_entry("frame", &frame)?;
     }
@@ -173,6 +186,8 @@ impl Summary {
             deferred: statistics.deferred + blocks.deferred,
             expired: statistics.expired,
             expired_deferred: statistics.expired_deferred,
+            ended_full: statistics.ended_full,
+            blind_looks: statistics.blind_looks,
             not_replayed: source.not_replayed(),
             cover_glass: None,
             cut_off: 0,
@@ -239,6 +254,8 @@ impl Summary {
             ),
             ("photons with a code past the last bin", self.rejected),
             ("decisions put off", self.deferred),
+            ("exposures ended by a full counter", self.ended_full),
+            ("decisions without bins hardly ever live", self.blind_looks),
             ("recorded photons not replayed", self.not_replayed),
             ("recorded photons in bins cut off", self.cut_off),
         ];

@@ -14,6 +14,7 @@ use super::effects::jitter::TimingError;
 use super::effects::limits::Timing;
 use super::effects::second_echo::EchoDelay;
 use super::effects::tail::TailDelay;
+use super::effects::tdc::Tdc;
 use super::stream::Stream;
 use dtof_theory::rates::Rates;
 
@@ -36,7 +37,7 @@ pub(super) struct Detector {
     recharge: Recharge,
     trap: Option<Trap>,
     jitter: Option<TimingError>,
-    hits: usize,
+    tdc: Tdc,
     /// Photons a laser cycle that effects add.
     added: f64,
     /// The most avalanches a photon.
@@ -61,7 +62,6 @@ impl Detector {
         let dead_time = effects.dead_time.as_ref();
         let afterpulsing = effects.afterpulsing.as_ref();
         let jitter = effects.jitter.as_ref();
-        let tdc = effects.tdc.as_ref();
         let rng = |stream: Stream| stream.rng(seed, pixel);
         let end = f64::from(timing.bins);
 
@@ -101,7 +101,7 @@ impl Detector {
             jitter: jitter
                 .map(|jitter| TimingError::new(jitter, timing, rng(Stream::Jitter)))
                 .transpose()?,
-            hits: tdc.map_or(usize::MAX, |tdc| tdc.hits_per_cycle),
+            tdc: effects.tdc.clone().unwrap_or_default(),
             times: Vec::new(),
             avalanches: Vec::new(),
         })
@@ -148,10 +148,8 @@ impl Detector {
             self.avalanches.sort_unstable_by(f64::total_cmp);
         }
         let inside = self.avalanches.iter().filter(|time| **time < self.end);
-        inside
-            .take(self.hits)
-            .map(|time| code(*time))
-            .for_each(photon);
+        let codes = inside.map(|time| code(*time));
+        self.tdc.hits(codes).for_each(photon);
     }
 
     /// Finds the photons and trapped charges that start an avalanche.

@@ -38,7 +38,7 @@ pub struct Effects {
     pub afterpulsing: Option<Afterpulsing>,
     /// Times are not measured exactly.
     pub jitter: Option<Jitter>,
-    /// The TDC takes so many photons a laser cycle.
+    /// The TDC takes so many photons a laser cycle, or is blind after each.
     pub tdc: Option<Tdc>,
 }
 
@@ -49,10 +49,11 @@ impl Effects {
         *self != Self::default()
     }
 
-    /// Whether the TDC takes one photon a laser cycle.
+    /// The dead time of the TDC in bins: [`u16::MAX`] if only the first photon of a laser cycle counts,
+    /// 0 if it has none.
     #[must_use]
-    pub fn one_hit_tdc(&self) -> bool {
-        self.tdc.as_ref().is_some_and(|tdc| tdc.hits_per_cycle == 1)
+    pub fn tdc_dead_time(&self) -> u16 {
+        self.tdc.as_ref().map_or(0, Tdc::dead_time)
     }
 
     /// Checks that all numbers are in their ranges.

@@ -154,7 +154,7 @@ impl Method {
             .l2(L2)
             .gate(case.gate)
             .estimator(estimator)
-            .one_hit_tdc(case.is_one_hit())
+            .dead_time(case.dead_time())
             .build()?;
         Ok((config, AsyncPixel::new(PixelAddress::new(0))))
     }

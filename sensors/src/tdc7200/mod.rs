@@ -349,11 +349,12 @@ where
             offset: self.config.offset(),
             gives_histograms: false,
             laser_millihertz: settings.laser_millihertz,
+            dead_time: match settings.stops {
+                Stops::One => u16::MAX,
+                // The first stops only; how long the TDC is blind between them is unknown.
+                Stops::Two | Stops::Three | Stops::Four | Stops::Five => 0,
+            },
         }
-    }
-
-    fn is_one_hit(&self) -> bool {
-        matches!(self.config.settings().stops, Stops::One)
     }
 
     fn start(&mut self, bin_width: U16F16) {

@@ -315,6 +315,7 @@ impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
             offset: OFFSET,
             gives_histograms: true,
             laser_millihertz: self.config.laser_millihertz(),
+            dead_time: 0,
         }
     }
 

@@ -4,7 +4,8 @@ use dtof_c::dtof_status_t::*;
 use dtof_c::*;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
 use dtof_core::{
-    AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, PixelAddress, WindowRule,
+    AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule, PixelAddress,
+    WindowRule,
 };
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
@@ -109,7 +110,7 @@ fn configuration() -> Configuration {
         l1: 41,
         l2: 1999,
         gate: (3, 120),
-        one_hit_tdc: true,
+        dead_time: Some(20),
         pixels: 9,
         columns: 3,
         binning: None,
@@ -126,9 +127,14 @@ fn configuration() -> Configuration {
 }
 
 fn read(body: &[u8]) -> Result<dtof_device_config_t, dtof_status_t> {
+    read_with(body, 0)
+}
+
+fn read_with(body: &[u8], sensor_dead_time: u16) -> Result<dtof_device_config_t, dtof_status_t> {
     let mut config = dtof_device_config_t::default();
+    let (bytes, length) = (body.as_ptr(), body.len());
     // SAFETY: both pointers lead to objects of their types.
-    match unsafe { dtof_device_config_read(body.as_ptr(), body.len(), &mut config) } {
+    match unsafe { dtof_device_config_read(bytes, length, sensor_dead_time, &mut config) } {
         OK => Ok(config),
         error => Err(error),
     }
@@ -183,10 +189,10 @@ fn the_hosts_configuration_becomes_settings() {
             gate_last: 120,
             before_q8: 448,
             after_q8: 1024,
+            dead_time: 20,
             rule: DTOF_RULE_WINDOW,
             window: 3,
             estimator: DTOF_ESTIMATOR_CENTRED_WINDOW,
-            one_hit_tdc: 1,
             tracking: 1,
             echoes: 4,
             peel_reach: 6,
@@ -200,6 +206,35 @@ fn the_hosts_configuration_becomes_settings() {
     };
     assert_eq!(config, expected);
     assert!(checked(&config.pixel).is_ok());
+}
+
+#[test]
+fn the_dead_time_is_the_hosts_or_else_the_sensors() {
+    let alpha = U8F8::lit("4");
+    let paper = Configuration {
+        rule: PaperRule::new(alpha, Count::saturating(5)).into(),
+        tracking: false,
+        ..configuration()
+    };
+    let window = configuration();
+    let refused = Err(DTOF_ERROR_DEAD_TIME);
+    for (base, dead_time, of_sensor, expected) in [
+        (window, Some(20), 7, Ok(20)),
+        (window, Some(0), 7, Ok(0)),
+        (window, None, 7, Ok(7)),
+        (window, None, 0, Ok(0)),
+        (paper, Some(20), 7, refused),
+        (paper, Some(128), 7, Ok(128)),
+        (paper, Some(0), u16::MAX, Ok(0)),
+        (paper, None, 7, Ok(0)),
+        (paper, None, u16::MAX, Ok(u16::MAX)),
+    ] {
+        let requested = Configuration { dead_time, ..base };
+        let read = read_with(&requested.to_le_bytes(), of_sensor);
+        assert_eq!(read.map(|config| config.pixel.dead_time), expected);
+        // It is one that the check takes.
+        assert!(read.is_err() || checked(&read.unwrap().pixel).is_ok());
+    }
 }
 
 #[test]
@@ -254,7 +289,7 @@ fn records_are_those_of_the_link() {
     // SAFETY: each pointer leads to an object of its type.
     unsafe {
         let room = sensor.as_mut_ptr();
-        let written = dtof_sensor_write(9, 100, 250 << 16, 1_000_000, -256, room);
+        let written = dtof_sensor_write(9, 100, 20, 250 << 16, 1_000_000, -256, room);
         assert_eq!(written, OK);
         let room = body.as_mut_ptr();
         assert_eq!(dtof_report_write(&report, &done, &pair.device, room), OK);
@@ -265,6 +300,7 @@ fn records_are_those_of_the_link() {
         offset: I24F8::lit("-1"),
         laser_millihertz: 1_000_000,
         bins: 100,
+        dead_time: 20,
     };
     assert_eq!(SensorRecord::from_le_bytes(&sensor), Some(Some(expected)));
     let read = Report::from_le_bytes(&body).unwrap();

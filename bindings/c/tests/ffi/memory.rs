@@ -11,8 +11,8 @@ use dtof_c::*;
 use proptest::prelude::*;
 
 use crate::{
-    OK, config, decoder, encoder, exposure, histogram, link, paper, pixel, scale, statistics,
-    zeroed,
+    OK, checked, config, decoder, encoder, exposure, histogram, link, paper, pixel, scale,
+    statistics, zeroed,
 };
 
 /// Uninitialised memory.
@@ -119,7 +119,7 @@ fn functions_write_to_uninitialised_memory() {
         assert_eq!(dtof_link_take(at, message.at()), DTOF_ERROR_NO_MESSAGE);
 
         let room = sensor.at().cast::<u8>();
-        assert_eq!(dtof_sensor_write(1, 0, 0, 0, 0, room), OK);
+        assert_eq!(dtof_sensor_write(1, 0, 0, 0, 0, 0, room), OK);
         assert_eq!(sensor.read()[..2], [1, 0]);
         let room = report.at();
         let of = dtof_report_t::default();
@@ -391,9 +391,9 @@ fn null_pointers_to_bytes_are_refused() {
             dtof_link_offer(&mut link, DTOF_MESSAGE_EVENTS, none, 1),
             dtof_link_state(&link, ptr::null_mut()),
             dtof_link_silent_ms(&link, 0, ptr::null_mut()),
-            dtof_sensor_write(1, 0, 0, 0, 0, none),
+            dtof_sensor_write(1, 0, 0, 0, 0, 0, none),
             dtof_report_write(&zeroed(), &statistics(), &link, none),
-            dtof_device_config_read(none, 1, &mut zeroed()),
+            dtof_device_config_read(none, 1, 0, &mut zeroed()),
             dtof_no_histogram_write(0, 1, none, &mut length),
             dtof_no_histogram_write(0, 1, room, ptr::null_mut()),
             dtof_counts_write([0; DTOF_BINS].as_ptr(), 0, 0, 0, 0, room, ptr::null_mut()),
@@ -409,7 +409,7 @@ fn null_pointers_to_bytes_are_refused() {
         );
         assert_eq!(dtof_crc32(&mut 0, room, usize::MAX), DTOF_ERROR_LENGTH);
         assert_eq!(
-            dtof_device_config_read(room, usize::MAX, &mut zeroed()),
+            dtof_device_config_read(room, usize::MAX, 0, &mut zeroed()),
             DTOF_ERROR_LENGTH
         );
     }
@@ -429,8 +429,10 @@ proptest! {
     fn any_bytes_are_a_pixel_a_histogram_a_scale_and_statistics(
         mut bytes in prop::collection::vec(any::<u8>(), DTOF_HISTOGRAM_SIZE - 4),
         ones in any::<bool>(),
+        dead_time in prop_oneof![Just(0u16), Just(20), Just(u16::MAX)],
         code in any::<u16>(),
         cycles in any::<u16>(),
+        exposure in any::<u32>(),
         last in any::<u64>(),
     ) {
         if ones {
@@ -446,7 +448,8 @@ proptest! {
             memory.0[4..4 + bytes.len()].write_copy_of_slice(&bytes);
         }
         let [mut pixel, mut histogram, mut scale, mut read] = memories;
-        let (config, mut done) = (config(), statistics());
+        let settings = dtof_config_t { rule: DTOF_RULE_WINDOW, dead_time, echoes: 2, ..paper() };
+        let (config, mut done) = (checked(&settings).unwrap(), statistics());
         let mut events = [dtof_event_t::default(); DTOF_ECHOES];
         let mut body = [0; DTOF_BODY_BYTES];
         // SAFETY: all memory is long enough and aligned for each type.
@@ -462,7 +465,7 @@ proptest! {
             let _ = dtof_pixel_histogram_write(pixel.at(), 0, last, room, &mut 0);
             let first = events.as_mut_ptr();
             let _ = dtof_histogram_detect(
-                histogram.at(), &config, last, &mut done, 0, cycles, first, &mut 0,
+                histogram.at(), &config, last, &mut done, 0, exposure, first, &mut 0,
             );
             let _ = dtof_range(scale.at(), 0, &mut 0);
             let _ = dtof_statistics_read(read.at(), &mut zeroed());

@@ -18,7 +18,8 @@ fn settings() -> impl Strategy<Value = dtof_config_t> {
     let rule = (0u8..3, 1u8..8, 256u16..2048, 4096u16..30000, 3u32..12);
     let depth = (0u8..2, 256u16..1025, 256u16..1025);
     let cycles = (1u16..8, 8u16..30, 40u16..200, 0u16..60, 60u16..128);
-    let more = (0u8..2, 0u8..2, 1u8..5, 0u8..6, 0u8..8);
+    let dead_time = prop_oneof![Just(0u16), 1u16..128, Just(128), Just(u16::MAX)];
+    let more = (dead_time, 0u8..2, 1u8..5, 0u8..6, 0u8..8);
     (rule, depth, cycles, more).prop_map(|(rule, depth, cycles, more)| dtof_config_t {
         rule: rule.0,
         window: rule.1,
@@ -33,7 +34,11 @@ fn settings() -> impl Strategy<Value = dtof_config_t> {
         l2: cycles.2,
         gate_first: cycles.3,
         gate_last: cycles.4,
-        one_hit_tdc: more.0,
+        // Others refuse a shorter one.
+        dead_time: match more.0 {
+            1..128 if rule.0 != DTOF_RULE_WINDOW => 0,
+            dead_time => dead_time,
+        },
         tracking: more.1 & u8::from(rule.0 == DTOF_RULE_WINDOW),
         echoes: more.2,
         peel_reach: more.3,
@@ -63,7 +68,7 @@ fn config_of(settings: &dtof_config_t) -> Option<PixelConfig<128, AnyRule>> {
     let config = PixelConfig::with_rule(rule).estimator(estimator);
     let config = config.x(settings.x).l1(settings.l1).l2(settings.l2);
     let config = config.gate(gate).tracking(tracking);
-    let config = config.one_hit_tdc(settings.one_hit_tdc == 1);
+    let config = config.dead_time(settings.dead_time);
     let config = config.echoes(EchoNumber::new(settings.echoes)?, settings.peel_reach);
     config.echo_wait(settings.echo_wait).build().ok()
 }
@@ -72,7 +77,7 @@ fn plain(event: &DepthEvent) -> dtof_event_t {
     event.into()
 }
 
-fn read(statistics: &dtof_statistics_t) -> [u64; 9] {
+fn read(statistics: &dtof_statistics_t) -> [u64; 11] {
     let mut counts = dtof_counts_t::default();
     // SAFETY: both pointers lead to objects of their types.
     assert_eq!(unsafe { dtof_statistics_read(statistics, &mut counts) }, OK);
@@ -86,10 +91,12 @@ fn read(statistics: &dtof_statistics_t) -> [u64; 9] {
         counts.deferred,
         counts.expired,
         counts.expired_deferred,
+        counts.ended_full,
+        counts.blind_looks,
     ]
 }
 
-fn numbers(of: &Statistics) -> [u64; 9] {
+fn numbers(of: &Statistics) -> [u64; 11] {
     let photons = [
         of.counted,
         of.excluded,
@@ -98,7 +105,11 @@ fn numbers(of: &Statistics) -> [u64; 9] {
         of.gated_out,
     ];
     let events = [of.events, of.deferred, of.expired, of.expired_deferred];
-    [&photons[..], &events].concat().try_into().unwrap()
+    let losses = [of.ended_full, of.blind_looks];
+    [&photons[..], &events, &losses]
+        .concat()
+        .try_into()
+        .unwrap()
 }
 
 /// Laser cycles of a pixel; under Miri each costs 0.1 s.
@@ -181,6 +192,7 @@ proptest! {
         settings in settings(),
         background in prop::collection::vec(0u32..40, 128),
         pulses in prop::collection::vec((0usize..128, 0u32..40_000_000), 0..4),
+        exposure in prop_oneof![1u32..100_000, 1u32..=u32::MAX],
     ) {
         let Some(config) = config_of(&settings) else {
             return Ok(());
@@ -191,16 +203,18 @@ proptest! {
             counts[bin] += photons;
         }
         let mut histogram = Histogram::<128, Count24>::new();
-        let gated_out = histogram.add_frame(&counts, config.gate());
+        let gated_out = config.add_frame(&mut histogram, &counts);
         let mut statistics = Statistics::new();
         statistics.add_photons_of(&histogram, gated_out);
         let mut expected = Vec::new();
-        config.detect_echoes(&mut histogram, |echo, detection| {
-            let event = detection.event(PixelAddress::new(9), LaserCycle::new(1 << 40), 7);
+        let held = u16::try_from(exposure).unwrap_or(u16::MAX);
+        let is_blind = config.detect_echoes(&mut histogram, exposure, |echo, detection| {
+            let event = detection.event(PixelAddress::new(9), LaserCycle::new(1 << 40), held);
             expected.push(plain(&DepthEvent { echo, ..event }));
         });
         statistics.events += expected.len() as u64;
         statistics.expired += u64::from(expected.is_empty());
+        statistics.blind_looks += u64::from(is_blind);
 
         let (mut room, mut done) = (zeroed::<dtof_histogram_t>(), crate::statistics());
         let (mut events, mut found) = ([dtof_event_t::default(); DTOF_ECHOES], 9);
@@ -211,7 +225,7 @@ proptest! {
             let status = dtof_histogram_fill(&mut room, size, &checked, &mut done, counts);
             prop_assert_eq!(status, OK);
             dtof_histogram_detect(
-                &mut room, &checked, 1 << 40, &mut done, 9, 7, first, &mut found,
+                &mut room, &checked, 1 << 40, &mut done, 9, exposure, first, &mut found,
             )
         };
         prop_assert_eq!(status, OK);
@@ -255,7 +269,7 @@ fn a_misaligned_pointer_to_the_number_of_events_leaves_the_pixels_as_they_were()
         assert_eq!([0, 1].map(|pixel| exposure(first.add(pixel))), [40; 2]);
     }
     assert_eq!(fired, [9; 2]);
-    assert_eq!(read(&done), [0; 9]);
+    assert_eq!(read(&done), [0; 11]);
 }
 
 #[test]

@@ -16,7 +16,7 @@ fn each_setting_that_cannot_be_has_its_own_error() {
     let window: Change = |config| config.rule = DTOF_RULE_WINDOW;
     let centred: Change = |config| config.estimator = DTOF_ESTIMATOR_CENTRED_WINDOW;
     let none: Change = |_| {};
-    let wrong: [(Change, Change, dtof_status_t); 19] = [
+    let wrong: [(Change, Change, dtof_status_t); 22] = [
         (none, |config| config.rule = 3, DTOF_ERROR_RULE),
         (none, |config| config.estimator = 2, DTOF_ERROR_ESTIMATOR),
         (none, |config| config.x = 0, DTOF_ERROR_ZERO_X),
@@ -68,6 +68,13 @@ fn each_setting_that_cannot_be_has_its_own_error() {
         (none, |config| config.tracking = 1, DTOF_ERROR_TRACKING),
         (none, |config| config.echoes = 0, DTOF_ERROR_ECHOES),
         (none, |config| config.echoes = 5, DTOF_ERROR_ECHOES),
+        (none, |config| config.dead_time = 1, DTOF_ERROR_DEAD_TIME),
+        (none, |config| config.dead_time = 127, DTOF_ERROR_DEAD_TIME),
+        (
+            |config| config.rule = DTOF_RULE_AVERAGE,
+            |config| config.dead_time = 20,
+            DTOF_ERROR_DEAD_TIME,
+        ),
     ];
     for (before, change, error) in wrong {
         let mut config = paper();
@@ -75,6 +82,23 @@ fn each_setting_that_cannot_be_has_its_own_error() {
         assert!(checked(&config).is_ok());
         change(&mut config);
         assert_eq!(checked(&config).err(), Some(error));
+    }
+    // These have an effect.
+    for dead_time in [128, u16::MAX] {
+        let config = dtof_config_t {
+            dead_time,
+            ..paper()
+        };
+        assert!(checked(&config).is_ok());
+    }
+    for dead_time in [1, 127, 128, u16::MAX] {
+        let rule = DTOF_RULE_WINDOW;
+        let config = dtof_config_t {
+            rule,
+            dead_time,
+            ..paper()
+        };
+        assert!(checked(&config).is_ok());
     }
 }
 
@@ -212,7 +236,7 @@ fn every_status_has_a_text_of_its_own() {
     let numbers = of_enum.lines().filter_map(|line| line.split_once(" = "));
     let numbers = numbers.map(|(_, number)| number.trim_end_matches(',').parse::<u8>().unwrap());
     let numbers: BTreeSet<u8> = numbers.collect();
-    assert_eq!(numbers.len(), 43);
+    assert_eq!(numbers.len(), 44);
     let mut texts = BTreeSet::new();
     for number in 0..=u8::MAX {
         // SAFETY: each pointer leads to a text of the library.
@@ -231,7 +255,7 @@ fn every_status_has_a_text_of_its_own() {
 fn every_reason_of_the_link_has_a_status_and_comes_back() {
     for number in 1..=u8::MAX {
         let Some(refusal) = Refusal::from_number(number) else {
-            assert!(number > 20);
+            assert!(number > 21);
             break;
         };
         let status = dtof_status_t::from(refusal);

@@ -16,7 +16,7 @@ class Pixel:
     """One pixel as in the firmware, for inspection while it decides.
 
     Options are the settings of pixels: ``rule``, ``alpha``, ``sigma_bins``, ``l1``,
-    ``l2``, ``x``, ``gate``, ``bin_width_ps``, ``offset_mm`` and so on.
+    ``l2``, ``x``, ``gate``, ``dead_time``, ``bin_width_ps``, ``offset_mm`` and so on.
 
     >>> pixel = Pixel(l1=40, l2=2000, x=4)
     >>> for cycle in range(44):
@@ -65,7 +65,8 @@ class Pixel:
 
     @property
     def statistics(self) -> dict[str, int]:
-        """Counters of photons by their fate, of events, and of expired exposures."""
+        """Counters of photons by their fate, of events, of expired exposures, and of what a dead time
+        hides: exposures that a full counter ended, and decisions without bins hardly ever live."""
         return dict(self._native.statistics())
 
     @property

@@ -1,5 +1,6 @@
-//! A pixel that tracks, has echoes or feeds blocks, and what it does. The photons are those
-//! of [`State`], and in some exposures those of a second target.
+//! A pixel that tracks, has echoes, feeds blocks or has a dead time, and what it does. The photons
+//! are those of [`State`], in some exposures those of a second target, and with a dead time those
+//! that a TDC takes of a flat background.
 
 use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::fixed::types::U4F12;
@@ -7,6 +8,8 @@ use dtof_core::{
     Array, AsyncPixel, BlockLevel, Count, EchoNumber, Histogram, LaserCycle, Look, PixelAddress,
     PixelConfig, RangeGate, Statistics, WindowRule,
 };
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
 
 use crate::scene::{BINS, CYCLES, PHOTONS, State};
 
@@ -16,6 +19,10 @@ const PHOTONS_A_LOOK: usize = 24;
 const X: u16 = 4;
 /// The exposure at the second look.
 const SECOND_LOOK: u16 = CYCLES + X;
+/// The exposure at the first look of a pixel with a dead time.
+const LONG: u16 = 1000;
+/// Photons of its background that arrive in a laser cycle.
+const BACKGROUND: u32 = 6;
 
 /// What a pixel is configured for.
 #[derive(Clone, Copy)]
@@ -23,14 +30,18 @@ pub struct Features {
     pub tracks: bool,
     /// 1 or 2.
     pub echoes: u8,
+    pub l1: u16,
     pub l2: u16,
+    pub dead_time: u16,
 }
 
 impl Features {
     pub const NONE: Self = Self {
         tracks: false,
         echoes: 1,
+        l1: 40,
         l2: 2000,
+        dead_time: 0,
     };
     pub const TRACKING: Self = Self {
         tracks: true,
@@ -40,6 +51,15 @@ impl Features {
         echoes: 2,
         ..Self::NONE
     };
+
+    /// The first look comes after [`LONG`].
+    pub const fn dead_time(dead_time: u16) -> Self {
+        Self {
+            l1: LONG - X,
+            dead_time,
+            ..Self::NONE
+        }
+    }
 
     /// Exposures end at the second look.
     pub const fn short(self) -> Self {
@@ -56,7 +76,7 @@ pub struct Further {
     pub pixel: AsyncPixel<BINS>,
     blocks: [Block<BINS>; 3],
     link: BlockLink,
-    /// A window of 3 bins, X = 4, L1 = 40.
+    /// A window of 3 bins, X = 4.
     config: PixelConfig<BINS, WindowRule>,
     statistics: Statistics,
     codes: [u16; PHOTONS as usize],
@@ -84,7 +104,11 @@ impl Further {
     fn config(features: Features) -> Option<PixelConfig<BINS, WindowRule>> {
         let rule = WindowRule::new(3, const { U4F12::lit("4.4") }, Count::saturating(5)).ok()?;
         let tracking = rule.tracking(&RangeGate::<BINS>::full());
-        let config = PixelConfig::with_rule(rule).x(X).l1(40).l2(features.l2);
+        let config = PixelConfig::with_rule(rule)
+            .x(X)
+            .l1(features.l1)
+            .l2(features.l2);
+        let config = config.dead_time(features.dead_time);
         let config = config.tracking(features.tracks.then_some(tracking));
         // Four standard deviations of a pulse of 0.5 bins.
         let config = config.echoes(EchoNumber::new(features.echoes)?, 2);
@@ -144,6 +168,30 @@ impl Further {
         self.end_laser_cycle_of_block(u32::from(CYCLES) - 1)
     }
 
+    /// Counts a long exposure, and lets its laser cycles pass up to the look but the last. Each bin
+    /// has the photons of the laser cycles in which it was live, with noise as large as their root.
+    pub fn until_long_look(&mut self, number: u32) {
+        let mut random = Pcg32::seed_from_u64(u64::from(number));
+        let mut counts = [0; BINS];
+        for bin in 0..BINS {
+            let before = bin.saturating_sub(self.config.dead_time().into())..bin;
+            let blind: u16 = counts.get(before).unwrap_or_default().iter().sum();
+            let live = u32::from(LONG.saturating_sub(blind));
+            #[allow(clippy::cast_possible_truncation, reason = "128")]
+            let expected = live * BACKGROUND / BINS as u32;
+            let root = expected.isqrt();
+            let noise = random.next_u32() % (2 * root + 1);
+            let count = (expected + noise).saturating_sub(root).min(live);
+            if let Some(place) = counts.get_mut(bin) {
+                *place = u16::try_from(count).unwrap_or_default();
+            }
+        }
+        self.pixel.count_frame(&self.config, &counts);
+        let (statistics, last) = (&mut self.statistics, LaserCycle::new(0));
+        let _ = (self.pixel).end_laser_cycles(&self.config, statistics, last, LONG - X);
+        self.pass(LONG - X..LONG - 1);
+    }
+
     /// Some photons more, and the laser cycles up to the second look but its last.
     pub fn until_second_look(&mut self) {
         let codes = self.codes.get(..PHOTONS_A_LOOK).unwrap_or_default();
@@ -191,14 +239,12 @@ pub extern "C" fn look_of_block(further: &mut Further, cycle: u32) -> u32 {
 
 /// How many echoes there are among counts that come from elsewhere.
 pub extern "C" fn echoes(further: &mut Further, _: u32) -> u32 {
-    let gate = further.config.gate();
-    further.histogram.add_frame(&further.foreign, gate);
+    let (config, histogram) = (&further.config, &mut further.histogram);
+    config.add_frame(histogram, &further.foreign);
     let mut echoes = 0;
-    further
-        .config
-        .detect_echoes(&mut further.histogram, |_, detection| {
-            core::hint::black_box(detection.depth.offset);
-            echoes += 1;
-        });
+    config.detect_echoes(histogram, CYCLES.into(), |_, detection| {
+        core::hint::black_box(detection.depth.offset);
+        echoes += 1;
+    });
     echoes
 }

@@ -1,5 +1,5 @@
-//! What blocks, tracking and several echoes take: photons, looks, events, ends of exposures,
-//! and whole histograms. All with a window of 3 bins.
+//! What blocks, tracking, several echoes and a dead time take: photons, looks, events, ends of
+//! exposures, and whole histograms. All with a window of 3 bins.
 
 use dtof_core::Look;
 
@@ -126,6 +126,13 @@ fn second_of_block(
     Some(())
 }
 
+/// The first look of a long exposure to background alone.
+fn long(further: &mut Further, _: &mut State, number: u32, features: Features) -> Option<()> {
+    further.empty(features, 1)?;
+    further.until_long_look(number);
+    Some(())
+}
+
 /// Counts that come from elsewhere, with so many targets.
 fn whole<const TARGETS: u8>(
     further: &mut Further,
@@ -195,7 +202,7 @@ const BOTH: Features = Features {
     ..ECHOES
 };
 
-const ROWS: [Row; 17] = [
+const ROWS: [Row; 19] = [
     row(
         "look; window of 3; no event",
         PLAIN,
@@ -233,6 +240,18 @@ const ROWS: [Row; 17] = [
         "look; two echoes, tracking; first held, no event",
         BOTH,
         second_of_tracked,
+        Look::NoPeak,
+    ),
+    row(
+        "look; dead time; first photon only; no event",
+        Features::dead_time(u16::MAX),
+        long,
+        Look::NoPeak,
+    ),
+    row(
+        "look; dead time of 20 bins; no event",
+        Features::dead_time(20),
+        long,
         Look::NoPeak,
     ),
     of_block("decision", "look; block; no event", first::<0>),

@@ -327,12 +327,14 @@ fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
         return;
     };
     if more() {
-        config = config.with_one_hit_tdc();
+        config = config.with_dead_time(half());
     }
     keep((config.x(), config.l1(), config.l2()));
     keep((*config.gate(), *config.rule(), *config.estimator()));
     keep((
-        config.is_one_hit(),
+        config.dead_time(),
+        config.is_first_photon_only(),
+        config.weighs_dead_time(),
         config.echoes(),
         config.echo_guard_bins(),
     ));
@@ -344,7 +346,12 @@ fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
     );
     let mut histogram = Histogram::<BINS, W>::new();
     histogram.add_batch(some(&values::<u16, 16>(half)));
-    config.detect_echoes(&mut histogram, |echo, detection| keep((echo, *detection)));
+    keep(config.add_frame(&mut histogram, &values::<u32, BINS>(word)));
+    keep(
+        config.detect_echoes(&mut histogram, word(), |echo, detection| {
+            keep((echo, *detection));
+        }),
+    );
     let config = &config;
     let mut statistics = Statistics::default();
     let mut pixel = AsyncPixel::<BINS, W>::new(address());

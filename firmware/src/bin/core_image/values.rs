@@ -22,7 +22,7 @@ pub fn settings<const BINS: usize, R: DetectionRule>(rule: R) -> PixelConfigBuil
         .l2(half())
         .gate(gate())
         .estimator(estimator())
-        .one_hit_tdc(more())
+        .dead_time(half())
         .tracking(more().then(|| Tracking::new(rule, rule, half())))
         .echoes(echo(), byte())
         .echo_wait(byte())

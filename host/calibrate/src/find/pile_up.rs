@@ -1,104 +1,244 @@
-//! Pile-up: a TDC that records one photon a laser cycle misses all photons after the first.
+//! Pile-up: after a photon a TDC with a dead time misses all others for some bins, or to the end of the
+//! laser cycle.
 //!
-//! Of `N` laser cycles, `N_i` have no photon before bin `i`. With `h_i` photons in the bin, Coates'
-//! estimator of the photons that arrived is `N·ln(N_i / (N_i - h_i))`. With such a TDC the background of a
-//! bin is proportional to `N_i`; with any other it is constant. So it is proportional to a power of `N_i`,
-//! which is 1 or 0. A straight line through the counts of background bins over `ln N_i` decides.
+//! Of `N` laser cycles, bin `b` was live in `live(b) = N - Σ counts of the D bins before b`. With a dead
+//! time of D bins the background of a bin is proportional to that; with none it is constant. It falls over
+//! the histogram, and has a hole behind each bright bin.
+//!
+//! Both are compared by the background's photons alone, given their number in each histogram: bin by bin,
+//! how likely is it that so many of those left fall into this bin? With none it is one in as many as there
+//! are bins left; with a dead time the bin's share of the live laser cycles to come, as the photons so far
+//! let expect. The share of a bin is fixed before its own photons are used. So the ratio of the two
+//! likelihoods exceeds 1000 in at most one of 1000 recordings without a dead time, whatever their light
+//! (Ville's inequality), also as a mean over dead times. A straight line through counts over live laser
+//! cycles, which are sums of the same counts, has no such bound.
+//!
+//! The dead time is then the one with the highest likelihood. Something else than a dead time may make a
+//! background fall, so the fall must be neither half nor twice as steep.
 
 use super::background::Level;
 use super::observed::Trace;
 
-/// Standard deviations between the power and 1/2 that decide.
-const DECIDES: f64 = 4.0;
+use dtof_theory::counts::dead_time::{arrived, live};
+
+/// The ratio of likelihoods that decides, as a logarithm: 1000.
+const DECIDES: f64 = 6.91;
+/// The most histograms that are used, spread over the recording.
+const MOST: usize = 4096;
+/// The same to find the dead time itself.
+const MOST_TO_REFINE: usize = 512;
 
 /// The kind of TDC, as histograms show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Tdc {
-    /// One photon a laser cycle. This share of the arriving photons is lost.
-    OneHit(f64),
-    /// More than one, or so little light that it makes no difference.
+    /// It has a dead time.
+    DeadTime {
+        /// Bins for which it is blind after a photon: all of the histogram if only the first photon of a
+        /// laser cycle counts.
+        bins: usize,
+        /// The share of the arriving photons that is lost.
+        lost: f64,
+    },
+    /// It takes several photons a laser cycle, or there is so little light that it makes no difference.
     SeveralHits,
     /// Not decided. With one photon a laser cycle this share would be lost.
     Unclear(f64),
 }
 
+/// A histogram, and which of its bins hold only background.
+struct Background<'a> {
+    counts: &'a [f64],
+    cycles: f64,
+    clear: Vec<bool>,
+}
+
 /// The TDC that recorded `traces`, whose laser cycles are known.
 #[must_use]
 pub fn tdc(traces: &[Trace]) -> Tdc {
-    let (mut covariance, mut information) = (0.0, 0.0);
-    let (mut counted, mut arrived) = (0.0, 0.0);
-    for trace in traces {
-        let total: f64 = trace.counts.iter().sum();
-        if total > trace.cycles {
-            return Tdc::SeveralHits;
-        }
-        let (corrected, left) = coates(&trace.counts, trace.cycles);
-        counted += total;
-        arrived += corrected.iter().sum::<f64>();
-        // Only bins that are background under both hypotheses, so that neither is favoured.
-        let [plain, other] = [&trace.counts, &corrected].map(|counts| Level::of(counts).clear);
-        let clear: Vec<(f64, f64)> = (0..left.len())
-            .filter(|&bin| plain[bin] && other[bin] && left[bin] > 0.0)
-            .map(|bin| (left[bin].ln(), trace.counts[bin]))
-            .collect();
-        let bins = clear.len().max(1) as f64;
-        let middle = clear.iter().map(|bin| bin.0).sum::<f64>() / bins;
-        let mean = clear.iter().map(|bin| bin.1).sum::<f64>() / bins;
-        for (log, count) in clear {
-            covariance += (log - middle) * count;
-            information += (log - middle).powi(2) * mean;
-        }
+    let bins = traces.first().map_or(0, |trace| trace.counts.len());
+    let step = traces.len().div_ceil(MOST).max(1);
+    let used = traces.iter().step_by(step);
+    let backgrounds: Vec<Background> = used.map(Background::of).collect();
+    let sum = |dead_time| {
+        let ratios = backgrounds.iter().map(|one| one.log_ratio(dead_time));
+        ratios.sum::<f64>()
+    };
+    let candidates = candidates(bins);
+    let ratios: Vec<f64> = candidates.iter().map(|&bins| sum(bins)).collect();
+    let highest = ratios.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let mean = ratios
+        .iter()
+        .map(|ratio| (ratio - highest).exp())
+        .sum::<f64>()
+        / ratios.len() as f64;
+    if highest + mean.ln() > DECIDES {
+        let best = ratios.iter().position(|&ratio| ratio >= highest);
+        let dead_time = refined(&backgrounds, &candidates, best.unwrap_or(0));
+        let lost = lost(traces, dead_time);
+        return match has_the_slope(&backgrounds, dead_time) {
+            true => Tdc::DeadTime {
+                bins: dead_time,
+                lost,
+            },
+            false => Tdc::Unclear(lost),
+        };
     }
-    let lost = if arrived > 0.0 {
-        1.0 - counted / arrived
+    match ratios.last() {
+        Some(&first_only) if first_only > -DECIDES => Tdc::Unclear(lost(traces, bins)),
+        _ => Tdc::SeveralHits,
+    }
+}
+
+/// Dead times to try: each up to 8, then steps of an eighth, and all bins.
+fn candidates(bins: usize) -> Vec<usize> {
+    let next = |&dead_time: &usize| Some(dead_time + (dead_time / 8).max(1));
+    let steps = std::iter::successors(Some(1), next);
+    let mut candidates: Vec<usize> = steps.take_while(|&dead_time| dead_time < bins).collect();
+    candidates.push(bins);
+    candidates
+}
+
+/// The dead time with the highest likelihood, between the neighbours of candidate number `best`.
+fn refined(backgrounds: &[Background], candidates: &[usize], best: usize) -> usize {
+    let low = best
+        .checked_sub(1)
+        .map_or(1, |before| candidates[before] + 1);
+    let high = candidates
+        .get(best + 1)
+        .map_or(candidates[best], |&next| next - 1);
+    let step = backgrounds.len().div_ceil(MOST_TO_REFINE).max(1);
+    let likelihood = |dead_time: usize| {
+        let used = backgrounds.iter().step_by(step);
+        used.map(|one| one.log_likelihood(dead_time, 1.0))
+            .sum::<f64>()
+    };
+    let scored: Vec<(usize, f64)> = (low..=high).map(|bins| (bins, likelihood(bins))).collect();
+    let highest = scored
+        .iter()
+        .fold(f64::NEG_INFINITY, |highest, one| highest.max(one.1));
+    // A longest dead time that is hardly less likely is the end of the laser cycle.
+    let all = candidates.last().copied().unwrap_or(1);
+    let likely = |one: &&(usize, f64)| one.1 >= highest || one.0 == all && one.1 > highest - 3.0;
+    scored.iter().rfind(likely).map_or(all, |one| one.0)
+}
+
+/// Whether the background falls neither half nor twice as steeply as with this dead time.
+fn has_the_slope(backgrounds: &[Background], dead_time: usize) -> bool {
+    let likelihood = |power| {
+        let likelihoods = backgrounds
+            .iter()
+            .map(|one| one.log_likelihood(dead_time, power));
+        likelihoods.sum::<f64>()
+    };
+    let here = likelihood(1.0);
+    here > likelihood(0.5) && here > likelihood(2.0)
+}
+
+/// The share of the photons that a TDC with this dead time loses.
+fn lost(traces: &[Trace], dead_time: usize) -> f64 {
+    let (counted, came) = traces.iter().fold((0.0, 0.0), |(counted, came), trace| {
+        let photons = trace.counts.iter().sum::<f64>();
+        let all = arrived(&trace.counts, trace.cycles, dead_time);
+        (counted + photons, came + all.iter().sum::<f64>())
+    });
+    if came > 0.0 {
+        1.0 - counted / came
     } else {
         0.0
-    };
-    let from_half = (covariance - 0.5 * information) / information.max(1e-12).sqrt();
-    if from_half > DECIDES {
-        Tdc::OneHit(lost)
-    } else if from_half < -DECIDES {
-        Tdc::SeveralHits
-    } else {
-        Tdc::Unclear(lost)
     }
 }
 
-/// For each bin the photons that arrived, and the laser cycles without a photon before it.
-#[must_use]
-pub fn coates(counts: &[f64], cycles: f64) -> (Vec<f64>, Vec<f64>) {
-    let mut left = cycles;
-    let bins = counts.iter().map(|&count| {
-        let before = left;
-        left = (left - count).max(0.0);
-        // If no laser cycle is left, half of one bounds the logarithm.
-        let arrived = if before > 0.0 {
-            cycles * (before / left.max(0.5)).ln().max(0.0)
-        } else {
-            0.0
-        };
-        (arrived, before)
-    });
-    bins.unzip()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn coates_estimator_inverts_pile_up() {
-        let rates = [0.1, 0.4, 0.05, 0.0, 0.9];
-        let cycles = 1e6;
-        let mut left = cycles;
-        let counts = rates.map(|rate: f64| {
-            let count = left * -(-rate).exp_m1();
-            left -= count;
-            count
-        });
-        let (came, _) = coates(&counts, cycles);
-        for (came, rate) in came.iter().zip(rates) {
-            assert!((came / cycles - rate).abs() < 1e-9);
+impl<'a> Background<'a> {
+    fn of(trace: &'a Trace) -> Self {
+        let counts = &trace.counts;
+        // Only bins that are background without a dead time and with the longest that is possible, so that
+        // neither is favoured.
+        let mut clear = Level::of(counts).clear;
+        if counts.iter().sum::<f64>() <= trace.cycles {
+            let other = Level::of(&arrived(counts, trace.cycles, counts.len())).clear;
+            clear
+                .iter_mut()
+                .zip(other)
+                .for_each(|(clear, other)| *clear &= other);
         }
+        Self {
+            counts,
+            cycles: trace.cycles,
+            clear,
+        }
+    }
+
+    /// The logarithm of the likelihood with a dead time over that without.
+    fn log_ratio(&self, dead_time: usize) -> f64 {
+        let bins = self.counts.len();
+        let is_clear = |bin: usize| f64::from(u8::from(self.clear[bin]));
+        let mut before = vec![0.0; bins + 1];
+        for bin in 0..bins {
+            before[bin + 1] = before[bin] + is_clear(bin);
+        }
+        // Background bins that a photon of a bin blinds.
+        let blinded = |bin: usize| before[(bin + dead_time + 1).min(bins)] - before[bin + 1];
+        // What photons yet to come blind: of background bins each, and of the others.
+        let (mut each, mut others) = (0.0, 0.0);
+        let (mut left_bins, mut left) = (0.0, 0.0);
+        for bin in 0..bins {
+            if self.clear[bin] {
+                each += blinded(bin);
+                left += self.counts[bin];
+                left_bins += 1.0;
+            } else {
+                others += self.counts[bin] * blinded(bin);
+            }
+        }
+        // What photons that have come blind from here on, and here.
+        let (mut known, mut blind, mut ratio) = (0.0, 0.0, 0.0);
+        for bin in 0..bins {
+            let count = self.counts[bin];
+            if self.clear[bin] {
+                let live = self.cycles - blind;
+                if live < 0.0 {
+                    return f64::NEG_INFINITY;
+                }
+                if left_bins > 1.0 && left > 0.0 {
+                    let to_come =
+                        left_bins * self.cycles - known - others - each * left / left_bins;
+                    let even = 1.0 / left_bins;
+                    let share = live / to_come.max(live.max(1.0));
+                    let share = share.clamp(0.1 * even, (10.0 * even).min(0.5 + 0.5 * even));
+                    ratio += count * (share / even).ln()
+                        + (left - count) * ((1.0 - share) / (1.0 - even)).ln();
+                }
+                left -= count;
+                left_bins -= 1.0;
+                each -= blinded(bin);
+                known -= blind;
+            } else {
+                others -= count * blinded(bin);
+            }
+            known += count * blinded(bin);
+            blind += count
+                - bin
+                    .checked_sub(dead_time)
+                    .map_or(0.0, |bin| self.counts[bin]);
+        }
+        ratio
+    }
+
+    /// The logarithm of the likelihood that each background photon lies where it does, if a bin's share is
+    /// this power of its live laser cycles.
+    fn log_likelihood(&self, dead_time: usize, power: f64) -> f64 {
+        let live = live(self.counts, self.cycles, dead_time);
+        let clear = live
+            .iter()
+            .zip(self.counts)
+            .zip(&self.clear)
+            .filter(|(_, clear)| **clear);
+        let (mut sum, mut photons, mut all) = (0.0, 0.0, 0.0);
+        for ((&live, &count), _) in clear {
+            sum += count * power * live.max(0.5).ln();
+            photons += count;
+            all += live.max(0.5).powf(power);
+        }
+        sum - photons * all.max(f64::MIN_POSITIVE).ln()
     }
 }

@@ -185,6 +185,13 @@ flags! {
 }
 
 flags! {
+    TDC:
+    dead_time Text("BINS") => "Bins for which the TDC is blind after a photon, 0 to 65535. With all bins of a \
+        histogram it takes the first photon of a laser cycle only. Fewer are for the window rule without \
+        --binning [default: the sensor's, else 0]";
+}
+
+flags! {
     DETECTION:
     rule OneOf(names::<RuleName>) => "Detection rule, which decides whether a peak is a target [default: paper]";
     alpha Signed("ALPHA") => "Rules paper and average: threshold above the background in its standard \
@@ -318,9 +325,9 @@ macro_rules! has_flags {
 
 has_flags! {
     ProjectionOptions: PROJECTION;
-    Operation: DEVICE SENSOR DETECTION;
-    replay::Options: RECORDING SENSOR DETECTION FRAME REPLAY;
-    simulate::Options: ARRAY SENSOR DETECTION FRAME SIMULATE;
+    Operation: DEVICE SENSOR TDC DETECTION;
+    replay::Options: RECORDING SENSOR TDC DETECTION FRAME REPLAY;
+    simulate::Options: ARRAY SENSOR TDC DETECTION FRAME SIMULATE;
     calibrate::Options: RECORDING CALIBRATE;
     compare::Options: ACCURACY RECORDING SENSOR COMPARE;
     tune::Options: TUNE;

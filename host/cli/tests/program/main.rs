@@ -5,6 +5,7 @@ mod common;
 mod arguments;
 mod calibrate;
 mod compare;
+mod dead_time;
 mod device;
 mod export;
 mod replay;

@@ -14,7 +14,7 @@ pub struct Losses<'a> {
 impl Losses<'_> {
     /// Each loss with its name.
     #[must_use]
-    pub fn counts(&self, report: &Report) -> [(&'static str, u64); 17] {
+    pub fn counts(&self, report: &Report) -> [(&'static str, u64); 19] {
         let (pixels, blocks) = (&report.statistics, &report.blocks);
         let (first, here) = (self.first, self.here);
         let there = since(&report.link, &first.link);
@@ -34,6 +34,8 @@ impl Losses<'_> {
                 "expired and deferred",
                 pixels.expired_deferred + blocks.expired_deferred,
             ),
+            ("ended by a full counter", pixels.ended_full),
+            ("blind looks", pixels.blind_looks),
             ("lost bytes", overrun.into()),
             ("corrupt frames", both(|link| link.corrupt)),
             ("oversized frames", both(|link| link.oversized)),
@@ -106,7 +108,8 @@ mod tests {
         let report = |number: fn(u64) -> u64| {
             let wide = (0..20).flat_map(|at| number(at).to_le_bytes());
             let narrow = (20..32).flat_map(|at| u32::try_from(number(at)).unwrap().to_le_bytes());
-            let bytes: Vec<u8> = wide.chain(narrow).chain([1, 0]).collect();
+            let last = (32..34).flat_map(|at| number(at).to_le_bytes());
+            let bytes: Vec<u8> = wide.chain(narrow).chain([1, 0]).chain(last).collect();
             Report::from_le_bytes(&bytes).unwrap()
         };
         let none = LinkCounters::default();
@@ -115,7 +118,8 @@ mod tests {
         assert_eq!(
             losses(&report(|at| 101 + at), &report(|_| 100), &none),
             ", saturated 105, saturated in blocks 114, rejected 106, gated out 107, unaddressed 102, \
-             deferred 227, expired 110, expired and deferred 231, lost bytes 21, corrupt frames 27, \
+             deferred 227, expired 110, expired and deferred 231, ended by a full counter 133, blind looks 134, \
+             lost bytes 21, corrupt frames 27, \
              oversized frames 28, foreign frames 29, out of order 30, duplicates 31, \
              retransmissions 32, unknown messages 22, sensor errors 23 (last: no answer)"
         );

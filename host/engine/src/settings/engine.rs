@@ -50,8 +50,11 @@ pub struct Settings {
     /// An exposure ends once it is this many times as long as it was at its last echo; at L2 if
     /// `None`.
     pub echo_wait: Option<u8>,
-    /// Whether the TDC takes one photon a laser cycle, so that events are flagged for pile-up.
-    pub one_hit_tdc: bool,
+    /// Bins for which the TDC is blind after a photon, at most [`Self::bins`]: then it takes the
+    /// first photon of a laser cycle only. 0 if it takes every photon.
+    pub dead_time: u16,
+    /// Whether sensor or scene say [`Self::dead_time`], and not the settings.
+    pub is_dead_time_of_sensor: bool,
     /// A frame-based sensor instead: all pixels read their highest bin every so many laser cycles.
     /// Rule, minimum, L1, L2 and X are not used.
     pub frame: Option<u16>,
@@ -80,7 +83,8 @@ impl Settings {
             tracking: false,
             echoes: EchoNumber::FIRST,
             echo_wait: None,
-            one_hit_tdc: false,
+            dead_time: 0,
+            is_dead_time_of_sensor: false,
             frame: None,
             seed,
         }
@@ -118,12 +122,18 @@ impl Settings {
             .l2(self.l2)
             .gate(gate)
             .estimator(self.estimator())
-            .one_hit_tdc(self.one_hit_tdc)
+            .dead_time(self.dead_time)
             .tracking(tracking)
             .echoes(self.echoes, self.echo_guard_bins())
             .echo_wait(self.echo_wait_times())
             .build()
             .map_err(|error| self.refused(error).into())
+    }
+
+    /// Whether pixels weigh bins by the laser cycles in which they were live.
+    #[must_use]
+    pub fn weighs_dead_time(&self) -> bool {
+        self.dead_time > 0 && matches!(self.rule, AnyRule::Window(_)) && self.frame.is_none()
     }
 
     fn refused(&self, error: PixelConfigError) -> Refused {

@@ -10,6 +10,7 @@ use serde::Serialize;
 use toml::{Table, Value};
 
 use super::{DetectionSettings, RaySettings, RunSettings, SensorSettings};
+use dtof_options::numbers::boolean;
 use dtof_options::{KeysOfFile, NO_OPTION, Refused};
 
 /// The first line of every file that this program writes.
@@ -39,6 +40,9 @@ const LISTS: [&str; 5] = [
 /// The keys whose values are strings.
 const TEXTS: [&str; 5] = ["rule", "estimator", "calibration", "axes", "array"];
 
+/// A key of older files: `true` is a TDC of the first photon of a laser cycle.
+const ONE_HIT: &str = "one_hit_tdc";
+
 /// A settings file, or the same settings from the command line. All of them may be missing.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct SettingsFile {
@@ -50,6 +54,9 @@ pub struct SettingsFile {
     pub rays: RaySettings,
     /// What is replayed or simulated.
     pub run: RunSettings,
+    /// The dead time that sensor or scene say, in bins, for settings without one.
+    #[serde(skip)]
+    pub dead_time_of_sensor: Option<u16>,
     /// The file that set some of them.
     #[serde(skip)]
     pub file: Option<KeysOfFile>,
@@ -109,7 +116,7 @@ impl SettingsFile {
                 return Err(Refused::new(section, reason).into());
             };
             for (key, value) in values {
-                if !keys.contains(&&**key) {
+                if section_of(key) != Some(section) {
                     return Err(match section_of(key) {
                         Some(name) => Refused::new(key, format!("belongs in [{name}]")),
                         None => Refused::unknown(key, keys.iter().copied()),
@@ -122,6 +129,12 @@ impl SettingsFile {
                     file.set_value(key, value)?;
                 }
             }
+        }
+        let sensor = sections.get("sensor").and_then(Value::as_table);
+        if sensor
+            .is_some_and(|sensor| sensor.contains_key(ONE_HIT) && sensor.contains_key("dead_time"))
+        {
+            return Err(Refused::new(ONE_HIT, "cannot be used with `dead_time`").into());
         }
         file.check()?;
         Ok(file)
@@ -152,6 +165,12 @@ impl SettingsFile {
     /// Says what the value must be, or returns [`NO_OPTION`] for another key.
     pub fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
         match section_of(key) {
+            Some("sensor") if key == ONE_HIT => {
+                if boolean(text)? {
+                    self.sensor.dead_time = Some(u16::MAX);
+                }
+                Ok(())
+            }
             Some("sensor") => self.sensor.set(key, text),
             Some("detection") => self.detection.set(key, text),
             Some("rays") => self.rays.set(key, text),
@@ -237,6 +256,7 @@ impl SettingsFile {
             detection: self.detection.or(other.detection),
             rays: self.rays.or(other.rays),
             run: self.run.or(other.run),
+            dead_time_of_sensor: self.dead_time_of_sensor.or(other.dead_time_of_sensor),
             file: self.file,
         };
         // The file still sets the keys that no option sets or drops.
@@ -283,6 +303,9 @@ impl SettingsFile {
 
 /// The section in which a key stands.
 fn section_of(key: &str) -> Option<&'static str> {
+    if key == ONE_HIT {
+        return Some("sensor");
+    }
     let mut sections = SECTIONS.iter();
     let section = sections.find(|(_, keys, _)| keys.contains(&key));
     section.map(|(section, ..)| *section)
@@ -320,7 +343,7 @@ offset_mm = -179.5
 gate = [12, 127]
 masked = [3, 70]
 sigma_bins = 0.8
-one_hit_tdc = true
+dead_time = 128
 background = 0.05
 glass = 0.4
 glass_bins = [0.0, 0.1, 0.3]
@@ -417,6 +440,87 @@ rebin = 2
     }
 
     #[test]
+    fn a_dead_time_is_that_of_the_settings_or_of_the_sensor() {
+        let settings = |text: &str, of_sensor| {
+            let mut file = SettingsFile::parse(text).unwrap();
+            file.dead_time_of_sensor = of_sensor;
+            file.settings(128).map(|settings| {
+                // What is written gives the same.
+                let written = file.with_settings(&settings).to_toml().unwrap();
+                let mut again = SettingsFile::parse(&written).unwrap();
+                again.dead_time_of_sensor = of_sensor;
+                assert!(!written.contains("one_hit_tdc"), "{written}");
+                assert_eq!(again.settings(128).unwrap().dead_time, settings.dead_time);
+                (settings.dead_time, settings.is_dead_time_of_sensor)
+            })
+        };
+        let window = "[detection]\nrule = 'window'\nwindow = 3\n";
+        for (text, of_sensor, dead_time) in [
+            (window.to_owned(), None, (0, false)),
+            (
+                format!("{window}[sensor]\ndead_time = 20"),
+                None,
+                (20, false),
+            ),
+            (
+                format!("{window}[sensor]\ndead_time = 20"),
+                Some(7),
+                (20, false),
+            ),
+            (
+                format!("{window}[sensor]\ndead_time = 0"),
+                Some(7),
+                (0, false),
+            ),
+            (window.to_owned(), Some(7), (7, true)),
+            // All bins, as many as there are.
+            (window.to_owned(), Some(u16::MAX), (128, true)),
+            ("[sensor]\ndead_time = 500".to_owned(), None, (128, false)),
+            (
+                "[sensor]\none_hit_tdc = true".to_owned(),
+                None,
+                (128, false),
+            ),
+            (
+                "[sensor]\none_hit_tdc = false".to_owned(),
+                Some(128),
+                (128, true),
+            ),
+            (
+                "[detection]\nbinning = 1".to_owned(),
+                Some(128),
+                (128, true),
+            ),
+            // One of the sensor that cannot be used is not.
+            (String::new(), Some(127), (0, false)),
+            (format!("{window}binning = 1"), Some(7), (0, false)),
+            (format!("{window}[run]\nframe = 9"), Some(7), (0, false)),
+        ] {
+            assert_eq!(settings(&text, of_sensor).unwrap(), dead_time, "{text}");
+        }
+        for (text, reason) in [
+            ("[sensor]\ndead_time = 127".to_owned(), "is for rule window"),
+            (
+                "[sensor]\ndead_time = 1\n[detection]\nrule = 'average'".to_owned(),
+                "is for rule window",
+            ),
+            (
+                format!("{window}binning = 1\n[sensor]\ndead_time = 20"),
+                "cannot be used with binning",
+            ),
+            (
+                format!("{window}[sensor]\ndead_time = 20\n[run]\nframe = 9"),
+                "cannot be used with frame",
+            ),
+        ] {
+            let error = settings(&text, None).unwrap_err().to_string();
+            assert!(error.starts_with("dead_time "), "{error}");
+            let expected = format!(": {reason}, unless it is 128 bins or more");
+            assert!(error.ends_with(&expected), "{error}");
+        }
+    }
+
+    #[test]
     fn what_is_wrong_is_named() {
         for (text, reason) in [
             ("l1 = 4", "l1 belongs in [detection]"),
@@ -489,6 +593,22 @@ rebin = 2
             (
                 "[sensor]\none_hit_tdc = 1",
                 "one_hit_tdc 1: must be true or false",
+            ),
+            (
+                "[sensor]\none_hit_tdc = true\ndead_time = 20",
+                "one_hit_tdc cannot be used with dead_time",
+            ),
+            (
+                "[detection]\none_hit_tdc = true",
+                "one_hit_tdc belongs in [sensor]",
+            ),
+            (
+                "[sensor]\ndead_time = -1",
+                "dead_time -1: must be a whole number from 0 to 65535",
+            ),
+            (
+                "[sensor]\ndead_time = 2.5",
+                "dead_time 2.5: must be a whole number from 0 to 65535",
             ),
             ("[sensor]\ngate = 3", "gate 3: must be a list"),
             ("[sensor]\ngate = [3]", "gate 3: must be FIRST..LAST"),

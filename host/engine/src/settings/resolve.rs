@@ -50,6 +50,7 @@ impl SettingsFile {
             Ok(z)
         };
         let (echoes, echo_wait) = detection.several()?;
+        let dead_time = self.dead_time(bins)?;
         let has_window = sensor.sigma_bins.is_some() || detection.half_widths.is_some();
         ensure!(
             detection.estimator != Some(EstimatorName::Window) || has_window,
@@ -77,7 +78,8 @@ impl SettingsFile {
             tracking: detection.tracking.unwrap_or(false),
             echoes,
             echo_wait,
-            one_hit_tdc: sensor.one_hit_tdc.unwrap_or(false),
+            dead_time,
+            is_dead_time_of_sensor: dead_time > 0 && sensor.dead_time.is_none(),
             frame: self.run.frame,
             seed: self.run.seed.unwrap_or(1),
         })
@@ -95,7 +97,11 @@ impl SettingsFile {
                 gate: settings.gate,
                 masked: (!masked.is_empty()).then(|| masked.clone()),
                 sigma_bins: settings.sigma_bins,
-                one_hit_tdc: settings.one_hit_tdc.then_some(true),
+                dead_time: match settings.dead_time {
+                    // Written only if it overrides the sensor's.
+                    0 => self.sensor.dead_time.filter(|&bins| bins == 0),
+                    bins => Some(bins),
+                },
                 ..self.sensor.clone()
             },
             detection: DetectionSettings::from_settings(settings),
@@ -105,7 +111,42 @@ impl SettingsFile {
                 frame: settings.frame,
                 ..self.run.clone()
             },
+            dead_time_of_sensor: self.dead_time_of_sensor,
             file: self.file.clone(),
+        }
+    }
+
+    /// The dead time of the settings, or else that of the sensor if it can be used.
+    ///
+    /// Only the window rule weighs bins by their live laser cycles, and only those of pixels. For all
+    /// others a TDC of the first photon is known, but no shorter dead time.
+    fn dead_time(&self, bins: usize) -> Result<u16, Refused> {
+        let whole = u16::try_from(bins).unwrap_or(u16::MAX);
+        let Self { detection, run, .. } = self;
+        let obstacles = [
+            (
+                detection.rule != Some(RuleName::Window),
+                "is for `rule` window",
+            ),
+            (
+                detection.binning.unwrap_or(0) > 0,
+                "cannot be used with `binning`",
+            ),
+            (run.frame.is_some(), "cannot be used with `frame`"),
+        ];
+        let obstacle = obstacles.iter().find(|(is_there, _)| *is_there);
+        let is_short = |dead_time: u16| (1..whole).contains(&dead_time);
+        match (self.sensor.dead_time, obstacle) {
+            (Some(dead_time), Some((_, reason))) if is_short(dead_time) => {
+                let reason = format!("{reason}, unless it is {bins} bins or more");
+                Err(Refused::value("dead_time", dead_time, reason))
+            }
+            (Some(dead_time), _) => Ok(dead_time.min(whole)),
+            (None, _) => {
+                let of_sensor = self.dead_time_of_sensor.unwrap_or(0);
+                let is_used = obstacle.is_none() || !is_short(of_sensor);
+                Ok(if is_used { of_sensor.min(whole) } else { 0 })
+            }
         }
     }
 }

@@ -85,9 +85,9 @@ impl Settings {
         self.frame.map_or((l1 / x + 1) * x, u64::from)
     }
 
-    /// Rule, or frame, and estimator.
+    /// Rule, or frame, estimator, and dead time if there is one.
     #[must_use]
-    pub fn detection_rows(&self) -> [Row; 2] {
+    pub fn detection_rows(&self) -> Vec<Row> {
         let decision = match self.frame {
             None => ("threshold".to_owned(), threshold(&self.rule)),
             Some(length) => (
@@ -106,7 +106,20 @@ impl Settings {
                 }
             }
         };
-        [decision, ("depth".to_owned(), depth)]
+        let mut rows = vec![decision, ("depth".to_owned(), depth)];
+        if self.dead_time > 0 && self.frame.is_none() {
+            let bins = self.dead_time;
+            let text = match usize::from(bins) >= self.bins {
+                true => "all bins after the first photon of a laser cycle".to_owned(),
+                false => format!("{bins} bins after each photon"),
+            };
+            let source = match self.is_dead_time_of_sensor {
+                true => "the sensor",
+                false => "the settings",
+            };
+            rows.push(("dead time".to_owned(), format!("{text}, from {source}")));
+        }
+        rows
     }
 }
 

@@ -12,7 +12,7 @@ use serde::ser::{Error as _, Serializer};
 
 use dtof_options::NO_OPTION;
 use dtof_options::numbers::{
-    MAX_INTEGER, bins, boolean, fixed, integer, laser_hz, list, positive, shortest, within,
+    MAX_INTEGER, bins, fixed, integer, laser_hz, list, positive, shortest, within,
 };
 use dtof_photons::axes::Axes;
 use dtof_photons::geometry::{FieldOfView, Rays, angles};
@@ -70,8 +70,9 @@ pub struct SensorSettings {
     /// Standard deviation of the pulse in bins.
     #[serde(serialize_with = "decimal")]
     pub sigma_bins: Option<U8F8>,
-    /// Whether the TDC takes one photon a laser cycle, so that events are flagged for pile-up.
-    pub one_hit_tdc: Option<bool>,
+    /// Bins for which the TDC is blind after a photon; as many as the histogram has, or more, if it
+    /// takes the first photon of a laser cycle only.
+    pub dead_time: Option<u16>,
     /// Background photons a bin and laser cycle of the median pixel.
     pub background: Option<f64>,
     /// Photons a laser cycle and pixel that the cover glass sends back, before the gate.
@@ -121,7 +122,7 @@ section! {
     gate = gate, "first and last bin that may hold a peak";
     masked = masked, "addresses of pixels that are left out";
     sigma_bins = pulse, "standard deviation of the pulse";
-    one_hit_tdc = boolean, "the TDC takes one photon a laser cycle";
+    dead_time = integer(0..=u16::MAX), "bins for which the TDC is blind after a photon";
     background = rate, "photons a bin and laser cycle of the median pixel";
     glass = rate, "photons a laser cycle and pixel of the cover glass";
     glass_bins = rates, "the same for each bin before the gate";

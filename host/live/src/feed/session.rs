@@ -297,14 +297,14 @@ impl<'a> Session<'a> {
             gate: new.sensor.gate.take(),
             masked: new.sensor.masked.take(),
             sigma_bins: new.sensor.sigma_bins.take(),
-            one_hit_tdc: new.sensor.one_hit_tdc.take(),
+            dead_time: new.sensor.dead_time.take(),
             ..before.sensor.clone()
         };
         ensure!(
             new.sensor == SensorSettings::default()
                 && new.rays == RaySettings::default()
                 && new.run == RunSettings::default(),
-            "only gate, masked, sigma_bins, one_hit_tdc and the keys of [detection] can change while \
+            "only gate, masked, sigma_bins, dead_time and the keys of [detection] can change while \
              the device runs"
         );
         Ok(SettingsFile {

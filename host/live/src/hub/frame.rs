@@ -13,6 +13,7 @@ use super::pixels::Pixel;
 use super::{Kind, State};
 use dtof_device::PixelHistogram;
 use dtof_engine::explain::Explanation;
+use dtof_engine::settings::SensorSettings;
 use dtof_events::aer_file::Event;
 
 /// Most pixels in a frame. The others follow in the next.
@@ -95,15 +96,29 @@ impl State {
         });
         if self.kind == Kind::Device {
             let last_bin = u16::try_from(bins.max(1) - 1).unwrap_or(u16::MAX);
-            let (file, gate) = match &self.settings {
+            let (file, gate, requested) = match &self.settings {
                 Some((file, settings)) => {
                     let gate = settings.gate.unwrap_or((0, last_bin));
-                    (&file.with_settings(settings), Some(gate))
+                    let requested = file.sensor.dead_time;
+                    (&file.with_settings(settings), Some(gate), requested)
                 }
-                None => (&self.requested, self.requested.sensor.gate),
+                None => {
+                    let sensor = &self.requested.sensor;
+                    (&self.requested, sensor.gate, sensor.dead_time)
+                }
+            };
+            // The dead time that is requested, so that the form does not take the sensor's as requested.
+            let used = self
+                .settings
+                .as_ref()
+                .map(|(_, settings)| json!([settings.dead_time, settings.is_dead_time_of_sensor]));
+            source["deadTime"] = json!(used);
+            let sensor = SensorSettings {
+                dead_time: requested,
+                ..file.sensor.clone()
             };
             source["settings"] = json!({
-                "sensor": file.sensor,
+                "sensor": sensor,
                 "detection": file.detection,
                 "gate": gate,
             });

@@ -39,11 +39,11 @@ function histogramNote(histogram) {
   if (!histogram) return "No histogram yet; a device sends events first.";
   const { none, whole, exposure, look } = histogram;
   if (none) return `No histogram: ${none}.`;
-  const { peak, needed, depends } = look ?? {};
+  const { peak, needed, depends, dead_time: deadTime } = look ?? {};
   const kind = whole ? "A complete histogram from the sensor" : `An exposure of ${number(exposure)} laser cycles so far`;
-  let needs = needsOf(needed);
+  let needs = needsOf(needed, deadTime);
   if (depends) needs = "the required number depends on earlier events";
-  else if (needed === null) needs = "no number is enough";
+  else if (needed === null && !deadTime) needs = "no number is enough";
   const rest = peak ? ` Peak: ${number(peak[1])} photons in bin ${peak[0]}; ${needs}.` : "";
   return `${kind}.${rest}`;
 }

@@ -30,6 +30,8 @@ function showTotals(frame, framesPerSecond) {
   } else {
     rows.push(["photons a second", number(losses.photon_rate)], ["laser cycles", number(losses.cycles)]);
   }
+  const [deadTime, isOfSensor] = source?.deadTime ?? [0];
+  if (deadTime > 0) rows.push(["TDC dead time", `${number(deadTime)} bins, from the ${isOfSensor ? "sensor" : "settings"}`]);
   if (frame.masked > 0) rows.push(["events left out", number(frame.masked)]);
   rows.push(["frames a second", number(framesPerSecond, 1)]);
   if (recorded.file) {

@@ -14,6 +14,7 @@ const FIELDS = [
   ["sensor", "gate", "gate, first", { type: "number", min: 0, step: 1 }, null, 0],
   ["sensor", "gate", "gate, last", { type: "number", min: 0, step: 1 }, null, 1],
   ["sensor", "sigma_bins", "pulse σ, bins", number32(0, "any")],
+  ["sensor", "dead_time", "TDC dead time, bins", number32(0, 1)],
   ["detection", "estimator", "estimator", ["", "centroid", "window"]],
   ["detection", "echoes", "echoes", number32(1, 1)],
   ["detection", "binning", "levels of blocks", number32(0, 1)],
@@ -22,7 +23,7 @@ const FIELDS = [
 /** Names of the fields with edits that are not applied yet. */
 const edited = new Set();
 /** Sensor keys that are sent unchanged if the form has no field for them. */
-const KEPT = ["masked", "sigma_bins", "one_hit_tdc"];
+const KEPT = ["masked", "sigma_bins", "dead_time"];
 
 function makeFields() {
   for (const [section, key, name, input, rules, at] of FIELDS) {

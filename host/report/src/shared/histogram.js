@@ -9,7 +9,7 @@ function drawHistogram(canvas, shot, gate) {
   if (!shot?.counts) return;
   const box = { left: 46, right: width - 12, top: 24, bottom: height - 36 };
   const bins = shot.counts.length;
-  const { peak = [0, 0], needed = null, background = null, quadrants = [] } = shot.look ?? {};
+  const { peak = [0, 0], needed = null, background = null, quadrants = [], dead_time: deadTime = 0 } = shot.look ?? {};
   // A threshold that no photons would reach is not to flatten the rest.
   const most = Math.max(1, ...shot.counts);
   const top = Math.max(4, most, needed !== null && needed < 8 * most + 16 ? needed : 0) * 1.1;
@@ -70,10 +70,34 @@ function drawHistogram(canvas, shot, gate) {
   // Names on the side away from the peak.
   const side = isLeft ? "right" : "left";
   if (needed !== null && needed > 0 && needed < top) mark(lines, box, y(needed), ink, `${number(needed)} needed`, [], side);
-  if (background > 0) {
+  if (background > 0 && deadTime > 0) {
+    const live = liveOf(shot.counts, shot.exposure, deadTime);
+    const levels = live.map((cycles) => (background * cycles) / live[peak[0]]);
+    lines.strokeStyle = lines.fillStyle = soft;
+    lines.lineWidth = 1.5;
+    lines.setLineDash([4, 4]);
+    lines.beginPath();
+    for (let bin = first; bin <= last; bin++) {
+      lines.lineTo(x(bin), y(levels[bin]));
+      lines.lineTo(x(bin + 1), y(levels[bin]));
+    }
+    lines.stroke();
+    lines.setLineDash([]);
+    lines.textAlign = side;
+    const end = y(levels[side === "right" ? last : first]);
+    writeOver(lines, `background ${number(background, 1)} at the peak`, side === "right" ? box.right - 2 : box.left + 4, end - 4);
+  } else if (background > 0) {
     const isFree = !needed || y(background) - y(needed) > 16;
     mark(lines, box, y(background), soft, isFree ? `background ${number(background, 1)}` : "", [4, 4], side);
   }
+}
+
+/** Laser cycles in which each bin was live: all but those with a photon in the bins of the dead time before it. */
+function liveOf(counts, cycles, deadTime) {
+  return counts.map((_, bin) => {
+    const before = counts.slice(Math.max(0, bin - deadTime), bin);
+    return Math.max(0, cycles - before.reduce((sum, count) => sum + count, 0));
+  });
 }
 
 /** A level line with its name. */
@@ -107,6 +131,7 @@ function axisOf(lines, box, top, soft, line) {
 }
 
 /** What the rule needs in the bin of the peak, all others as they are. Of a window the others may be enough. */
-function needsOf(needed) {
+function needsOf(needed, deadTime) {
+  if (deadTime > 0) return "the rule weighs each bin by the laser cycles in which it was live";
   return needed === 0 ? "the bins beside it are enough for the rule" : `the rule needs ${number(needed)}`;
 }

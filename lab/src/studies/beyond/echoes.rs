@@ -76,7 +76,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
             )?;
             let mut histogram = Histogram::<BINS>::new();
             histogram.add_batch(&light.draw(rng));
-            config.detect_echoes(&mut histogram, |_, detection| {
+            config.detect_echoes(&mut histogram, 1, |_, detection| {
                 found.push(detection.position());
             });
         } else {

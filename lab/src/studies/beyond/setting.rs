@@ -92,7 +92,8 @@ impl Setting {
             tracking: self.tracking,
             echoes: EchoNumber::FIRST,
             echo_wait: None,
-            one_hit_tdc: false,
+            dead_time: 0,
+            is_dead_time_of_sensor: false,
             frame: None,
             seed: 0,
         })

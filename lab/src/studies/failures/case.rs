@@ -143,10 +143,10 @@ impl Case {
         self
     }
 
-    /// Whether its TDC takes one hit a laser cycle, a setting of the pixels.
+    /// The dead time of its TDC in bins, a setting of the pixels.
     #[must_use]
-    pub fn is_one_hit(&self) -> bool {
-        self.effects.one_hit_tdc()
+    pub fn dead_time(&self) -> u16 {
+        self.effects.tdc_dead_time()
     }
 
     /// The positions of the surfaces at the end of laser cycle `cycle` of an exposure, in bins from

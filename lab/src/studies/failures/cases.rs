@@ -206,7 +206,10 @@ fn others() -> Vec<Case> {
 /// Scenes with pile-up: photons that hide later ones.
 fn pile_up() -> Vec<Case> {
     let one_hit = Effects {
-        tdc: Some(Tdc { hits_per_cycle: 1 }),
+        tdc: Some(Tdc {
+            hits_per_cycle: Some(1),
+            dead_time_bins: None,
+        }),
         ..Effects::default()
     };
     let background = |photons: f64| (photons - SIGNAL) / 128.0;

@@ -85,12 +85,13 @@ pub fn config(
     alpha: U8F8,
     minimum: u32,
     [first, last]: [u16; 2],
-    is_one_hit: bool,
+    takes_first_photon: bool,
 ) -> Result<PixelConfig<128>> {
     let rule = PaperRule::new(alpha, Count::saturating(minimum));
     let gate = RangeGate::new(first, last)?;
     let builder = PixelConfig::with_rule(rule).x(x).l1(l1).l2(l2).gate(gate);
-    Ok(builder.one_hit_tdc(is_one_hit).build()?)
+    let dead_time = if takes_first_photon { u16::MAX } else { 0 };
+    Ok(builder.dead_time(dead_time).build()?)
 }
 
 impl Scene {

@@ -108,6 +108,7 @@ impl Fake {
                             offset: I24F8::ZERO,
                             laser_millihertz: 20_000_000,
                             bins: 128,
+                            dead_time: 0,
                         };
                         let sensor = SensorRecord::to_le_bytes(Some(&sensor));
                         (message::SENSOR, sensor.to_vec())

@@ -74,6 +74,9 @@ fn numbers_that_cannot_be_are_named_by_key() {
         [afterpulsing]\nprobability = 0\ndecay_ps = 0 | [afterpulsing]: decay_ps 0
         [jitter]\nsigma_ps = inf | [jitter]: sigma_ps inf
         [tdc]\nhits_per_cycle = 0 | [tdc]: hits_per_cycle 0
+        [tdc]\ndead_time_bins = 0 | [tdc]: dead_time_bins 0
+        [tdc] | [tdc]: needs hits_per_cycle or dead_time_bins, and not both
+        [tdc]\nhits_per_cycle = 1\ndead_time_bins = 5 | [tdc]: needs hits_per_cycle or
     "#,
     );
 }

@@ -128,6 +128,30 @@ fn two_hits_a_laser_cycle_are_the_first_two() {
     assert!(hits.len() < plain.len());
 }
 
+#[test]
+fn a_tdc_is_blind_for_its_dead_time_after_each_photon() {
+    let scene = "background = 0.05\n";
+    let mut plain = pixel(scene, 5000);
+    plain.sort_unstable();
+    for dead_time in [1, 20, 127] {
+        let hits = pixel(
+            &format!("{scene}[tdc]\ndead_time_bins = {dead_time}\n"),
+            5000,
+        );
+        let mut last = None;
+        let expected = plain.iter().filter(|&&(cycle, code)| {
+            let is_blind =
+                last.is_some_and(|(before, hit)| before == cycle && code <= hit + dead_time);
+            if !is_blind {
+                last = Some((cycle, code));
+            }
+            !is_blind
+        });
+        assert!(hits.iter().eq(expected), "{dead_time}");
+        assert!(hits.len() < plain.len());
+    }
+}
+
 /// p an avalanche, afterpulses included: p / (1 - p) a photon.
 #[test]
 fn afterpulses_are_as_many_as_their_probability_says() {

@@ -83,6 +83,7 @@ impl Fast {
                     offset: I24F8::ZERO,
                     laser_millihertz: 1_000_000_000,
                     bins: 128,
+                    dead_time: 0,
                 };
                 (
                     message::SENSOR,

@@ -40,7 +40,7 @@ fn settings_are_applied_or_refused_with_the_reason() {
         ),
         (
             "[sensor]\nbins = 64",
-            "only gate, masked, sigma_bins, one_hit_tdc",
+            "only gate, masked, sigma_bins, dead_time",
         ),
         ("[rays]\ncalibration = \"/etc/passwd\"", "only gate, masked"),
         ("[sensor]\nmasked = [99]", "masked 99: there are 16 pixels"),

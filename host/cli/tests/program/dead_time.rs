@@ -1,0 +1,231 @@
+//! A TDC that is blind for some bins after each photon, end to end.
+
+use std::fmt::Write;
+use std::path::PathBuf;
+
+use dtof_photons::source::PhotonSource;
+use dtof_simulate::scene::Scene;
+use serde_json::Value;
+
+use crate::common::{Scratch, assert_contains, npy};
+
+/// Where the pulse lies in bins.
+const PLACE: f64 = 80.3;
+const WINDOW: &str = "--rule window --window 3 --sigma-bins 1";
+
+/// 5.5 background photons a laser cycle in 128 bins, and 0.5 of a pulse.
+fn scene(tdc: &str) -> String {
+    format!(
+        "cycles = 20_000\nbackground = 0.043\n[[surface]]\nposition_bins = {PLACE}\nsignal = 0.5\n{tdc}"
+    )
+}
+
+/// The photons of [`scene`] as a list, of a TDC with a dead time of 100 bins.
+fn photons(scratch: &Scratch) -> PathBuf {
+    let scene = Scene::parse(&scene("[tdc]\ndead_time_bins = 100\n")).unwrap();
+    let mut source = scene.photons(1, scene.cycles).unwrap();
+    let slice = source.next_slice(20_000).unwrap();
+    let mut text = "pixel,cycle,bin\n".to_owned();
+    for photon in &slice.pixels[0].photons {
+        writeln!(text, "0,{},{}", photon.cycle, photon.code).unwrap();
+    }
+    scratch.file("photons.csv", text)
+}
+
+/// How many events there are, and the share that is more than three bins off.
+fn events(scratch: &Scratch) -> (usize, f64) {
+    let events = scratch.events();
+    let is_wrong = |event: &&Vec<String>| (event[4].parse::<f64>().unwrap() - PLACE).abs() > 3.0;
+    let wrong = events.iter().filter(is_wrong).count();
+    println!("{wrong} of {} events are wrong", events.len());
+    (events.len(), wrong as f64 / events.len() as f64)
+}
+
+/// The dead time that was used, and who says it.
+fn used(summary: &Value) -> (u64, Option<&str>) {
+    let settings = &summary["settings"];
+    let bins = settings["dead_time"].as_u64().unwrap();
+    (
+        bins,
+        settings
+            .get("dead_time_from")
+            .map(|from| from.as_str().unwrap()),
+    )
+}
+
+/// The same refusal by a flag and by a file.
+#[test]
+fn a_dead_time_that_cannot_be_used_is_refused() {
+    let scratch = Scratch::new();
+    photons(&scratch);
+    let short = scratch.file("short.toml", "[sensor]\ndead_time = 20\n");
+    scratch.file("negative.toml", "[sensor]\ndead_time = -1\n");
+    scratch.file(
+        "both.toml",
+        "[sensor]\none_hit_tdc = true\ndead_time = 20\n",
+    );
+    scratch.all_refused(
+        "replay --out out --input photons.csv",
+        "
+        --dead-time 20 | --dead-time 20: is for --rule window, unless it is 128 bins or more
+        --dead-time 127 --rule average | --dead-time 127: is for --rule window
+        --dead-time 1 --rule window --window 3 --binning 1 | --dead-time 1: cannot be used with --binning
+        --dead-time 1 --frame 100 | --dead-time 1: is for --rule window
+        --dead-time -1 | --dead-time -1: must be a whole number from 0 to 65535
+        --dead-time 65536 | --dead-time 65536: must be a whole number from 0 to 65535
+        --dead-time 2.5 | --dead-time 2.5: must be a whole number
+        --dead-time ten | --dead-time ten: must be a whole number
+        --settings short.toml | short.toml: dead_time 20: is for --rule window
+        --settings short.toml --rule average | short.toml: dead_time 20: is for --rule window
+        --settings negative.toml | negative.toml: dead_time -1: must be a whole number from 0
+        --settings both.toml | both.toml: one_hit_tdc cannot be used with dead_time
+        ",
+    );
+    // 0 overrides the file, and all bins are for any rule.
+    let with = |options: &str| {
+        let options = format!("--settings {} {options}", short.display());
+        scratch.replayed(&scratch.path("photons.csv"), &options)
+    };
+    assert_eq!(used(&with("--dead-time 0")), (0, None));
+    assert_eq!(used(&with("--dead-time 200")), (128, Some("settings")));
+    assert_eq!(used(&with(WINDOW)), (20, Some("settings")));
+}
+
+#[test]
+fn the_key_of_older_files_is_a_tdc_of_the_first_photon() {
+    let scratch = Scratch::new();
+    let input = photons(&scratch);
+    scratch.file("old.toml", "[sensor]\none_hit_tdc = true\n");
+    let summary = scratch.replayed(&input, "--settings old.toml");
+    assert_eq!(used(&summary), (128, Some("settings")));
+    let written = scratch.read("out/dtof.toml");
+    assert_contains(&written, "dead_time = 128");
+    assert!(!written.contains("one_hit"), "{written}");
+}
+
+#[test]
+fn recorded_photons_are_weighed() {
+    let scratch = Scratch::new();
+    let input = photons(&scratch);
+    let options = format!("{WINDOW} --cycles 20000 --dead-time 100");
+    let summary = scratch.replayed(&input, &options);
+    assert_eq!(used(&summary), (100, Some("settings")));
+    let (count, wrong) = events(&scratch);
+    assert!(count >= 10 && wrong <= 0.1);
+    // The same settings give the same events, unless the dead time is switched off: then the near bins
+    // look like a target.
+    let first = scratch.read("out/events.csv");
+    scratch.file("again.toml", scratch.read("out/dtof.toml"));
+    scratch.replayed(&input, "--settings again.toml");
+    assert_eq!(scratch.read("out/events.csv"), first);
+    scratch.replayed(&input, "--settings again.toml --dead-time 0");
+    assert!(scratch.read("out/dtof.toml").contains("dead_time = 0"));
+    let (_, wrong) = events(&scratch);
+    assert!(wrong > 0.5);
+}
+
+/// A full counter before the gate: its exposures end, and are counted.
+#[test]
+fn what_cannot_be_weighed_is_counted() {
+    let scratch = Scratch::new();
+    let mut text = "pixel,cycle,bin\n".to_owned();
+    for cycle in 0..4000 {
+        writeln!(text, "0,{cycle},3").unwrap();
+    }
+    let input = scratch.file("photons.csv", text);
+    let options = "--rule window --window 3 --gate 10..127 --dead-time 20";
+    let summary = scratch.replayed(&input, options);
+    assert_eq!(
+        (&summary["ended_full"], &summary["events"]),
+        (&3.into(), &0.into())
+    );
+    // Of the first photon only, all bins of the gate are always blind.
+    let summary = scratch.replayed(
+        &input,
+        &format!("{options} --dead-time 128").replace("--dead-time 20 ", ""),
+    );
+    assert!(summary["blind_looks"].as_u64().unwrap() > 100, "{summary}");
+    let printed = scratch.printed(&format!("replay --out again --input photons.csv {options}"));
+    assert_contains(&printed, "exposures ended by a full counter");
+    assert_contains(&printed, "20 bins after each photon, from the settings");
+}
+
+/// Photons of 20,000 laser cycles, as a TDC with a dead time counts them on average.
+fn histogram(dead_time: usize) -> [u32; 128] {
+    let mut counts = [0_u32; 128];
+    for bin in 0..128 {
+        let blind: u32 = counts[usize::saturating_sub(bin, dead_time)..bin]
+            .iter()
+            .sum();
+        let from_place = bin as f64 + 0.5 - PLACE;
+        let light = 5.5 / 128.0 + 0.5 * 0.4 * (-from_place * from_place / 2.0).exp();
+        let share = 1.0 - (-light).exp();
+        #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+        let count = (f64::from(20_000 - blind) * share).round() as u32;
+        counts[bin] = count;
+    }
+    counts
+}
+
+#[test]
+fn recorded_histograms_are_weighed() {
+    for (dead_time, most) in [(20, 100), (128, 1900)] {
+        let scratch = Scratch::new();
+        let bytes: Vec<u8> = histogram(dead_time)
+            .iter()
+            .flat_map(|count| count.to_le_bytes())
+            .collect();
+        let input = scratch.file("recorded.npy", npy("<u4", "(1, 128)", &bytes));
+        let options = format!("{WINDOW} --dead-time {dead_time} --cycles 20000 --recorded-cycles");
+        let summary = scratch.replayed(&input, &format!("{options} 20000"));
+        assert_eq!(summary["not_replayed"], 0);
+        let (count, wrong) = events(&scratch);
+        assert!(count >= 20_000 / most && wrong <= 0.1, "{dead_time}");
+        let replay =
+            format!("replay --out no --input recorded.npy {WINDOW} --dead-time {dead_time}");
+        let refused = |options: &str, part: &str| {
+            let output = scratch.run(&format!("{replay} {options}"));
+            let error = String::from_utf8(output.stderr).unwrap();
+            assert!(
+                !output.status.success() && error.lines().count() == 1,
+                "{error}"
+            );
+            assert_contains(&error, part);
+        };
+        let few = format!("--dead-time {dead_time}: bin ");
+        refused("--recorded-cycles 9000", &few);
+        if dead_time == 128 {
+            refused("", "--dead-time 128: needs --recorded-cycles");
+        }
+    }
+}
+
+#[test]
+fn a_scene_says_the_dead_time_of_its_tdc() {
+    let scratch = Scratch::new();
+    let simulated = |tdc: &str, options: &str| {
+        let scene = scratch.file("scene.toml", scene(tdc));
+        scratch.simulated(&scene, options);
+        let summary = scratch.summary();
+        let (bins, from) = used(&summary);
+        (bins, from.map(str::to_owned), events(&scratch).1)
+    };
+    let blind = "[tdc]\ndead_time_bins = 100\n";
+    let (bins, from, wrong) = simulated(blind, WINDOW);
+    assert_eq!((bins, from.as_deref()), (100, Some("sensor")));
+    assert!(wrong <= 0.1);
+    // Switched off, the near bins look like a target.
+    let (bins, _, wrong) = simulated(blind, &format!("{WINDOW} --dead-time 0"));
+    assert!(bins == 0 && wrong > 0.5);
+    let (bins, from, _) = simulated(blind, &format!("{WINDOW} --dead-time 9"));
+    assert_eq!((bins, from.as_deref()), (9, Some("settings")));
+    // Not where it cannot be used, and not where there is none.
+    assert_eq!(simulated(blind, "").0, 0);
+    assert_eq!(simulated(blind, &format!("{WINDOW} --binning 1")).0, 0);
+    let (bins, _, wrong) = simulated("", WINDOW);
+    assert!(bins == 0 && wrong <= 0.02);
+    let (bins, from, wrong) = simulated("[tdc]\nhits_per_cycle = 1\n", WINDOW);
+    assert_eq!((bins, from.as_deref()), (128, Some("sensor")));
+    assert!(wrong <= 0.1);
+    assert_eq!(simulated("[tdc]\nhits_per_cycle = 2\n", WINDOW).0, 0);
+}
