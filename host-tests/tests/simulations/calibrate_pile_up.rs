@@ -69,7 +69,7 @@ fn without_laser_cycles_the_tdc_is_unknown() {
 
 #[test]
 fn with_hardly_a_photon_either_tdc_is_possible() {
-    let found = found(0.00001, "", Length::Cycles);
+    let found = found(0.000_001, "", Length::Cycles);
     assert!(
         matches!(found.tdc, Some(Tdc::Unclear(_))),
         "{:?}",
@@ -77,6 +77,11 @@ fn with_hardly_a_photon_either_tdc_is_possible() {
     );
 }
 
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "small numbers"
+)]
 /// Histograms of `pixels` pixels under flat light, of a TDC that is blind for `dead_time` bins.
 fn flat(
     rng: &mut Pcg32,
@@ -134,7 +139,7 @@ fn a_dead_time_is_found_by_itself() {
     ] {
         let capture = flat(&mut rng, 64, cycles, light, dead_time);
         let Some(Tdc::DeadTime { bins, .. }) = tdc_of(capture, cycles.into()) else {
-            panic!("none of {dead_time}");
+            panic!("none of {dead_time} at {light}");
         };
         assert!(
             bins.abs_diff(dead_time) <= dead_time / 20,
@@ -158,6 +163,11 @@ fn flat_counts_have_no_dead_time() {
         let found = (0..seeds).filter(|&seed| {
             let mut rng = Pcg32::seed_from_u64(seed);
             let poisson = Poisson::new(light).unwrap();
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "small numbers"
+            )]
             let mut draw = || poisson.sample(&mut rng) as u64;
             let pixels = if bins > 128 {
                 slow_or_quick(pixels, 256)

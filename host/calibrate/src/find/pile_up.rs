@@ -16,13 +16,22 @@
 //! The dead time is then the one with the highest likelihood. Something else than a dead time may make a
 //! background fall, so the fall must be neither half nor twice as steep.
 
-use super::background::Level;
+use std::ops::Range;
+
 use super::observed::Trace;
+use super::significance::is_surely_more;
 
 use dtof_theory::counts::dead_time::{arrived, live};
 
 /// The ratio of likelihoods that decides, as a logarithm: 1000.
 const DECIDES: f64 = 6.91;
+/// By chance a bin is left out in fewer than one of so many histograms.
+const ONE_IN: f64 = 100.0;
+/// The most repetitions to find bins without a peak.
+const ROUNDS: usize = 10;
+/// Bins beside a window that are left out, and those behind them that it is compared with: for narrow
+/// pulses, and for wide ones and tails.
+const SIDES: [(usize, usize); 3] = [(2, 8), (8, 32), (24, 96)];
 /// The most histograms that are used, spread over the recording.
 const MOST: usize = 4096;
 /// The same to find the dead time itself.
@@ -45,10 +54,11 @@ pub enum Tdc {
     Unclear(f64),
 }
 
-/// A histogram, and which of its bins hold only background.
+/// A histogram, and its background.
 struct Background<'a> {
     counts: &'a [f64],
     cycles: f64,
+    /// Bins without a peak.
     clear: Vec<bool>,
 }
 
@@ -134,6 +144,53 @@ fn has_the_slope(backgrounds: &[Background], dead_time: usize) -> bool {
     here > likelihood(0.5) && here > likelihood(2.0)
 }
 
+/// Bins that hold no more than the bins around them, on the brighter side: those of a pulse or its tail do.
+/// A background that falls is left whole, so that neither hypothesis is favoured.
+fn clear_bins(counts: &[f64]) -> Vec<bool> {
+    let bins = counts.len();
+    let mut clear = vec![true; bins];
+    for _ in 0..ROUNDS {
+        let mut sums = vec![(0.0, 0.0); bins + 1];
+        for bin in 0..bins {
+            let (photons, number) = sums[bin];
+            let kept = f64::from(u8::from(clear[bin]));
+            sums[bin + 1] = (photons + kept * counts[bin], number + kept);
+        }
+        // The most photons a bin that some bins let expect.
+        let level = |bins: Range<usize>| {
+            let photons = sums[bins.end].0 - sums[bins.start].0;
+            let number = sums[bins.end].1 - sums[bins.start].1;
+            (number >= 4.0).then(|| (photons + 2.0 * photons.sqrt() + 3.0) / number)
+        };
+        let mut next = vec![true; bins];
+        for (guard, reach) in SIDES {
+            for width in [1, 3] {
+                for (first, window) in counts.windows(width).enumerate() {
+                    let last = first + width - 1;
+                    let before = first.saturating_sub(guard);
+                    let after = (last + 1 + guard).min(bins);
+                    let sides = [
+                        level(before.saturating_sub(reach)..before),
+                        level(after..(after + reach).min(bins)),
+                    ];
+                    let level = sides.into_iter().flatten().reduce(f64::max);
+                    let all = window.iter().sum();
+                    let one_in = ONE_IN * bins as f64;
+                    if level.is_some_and(|level| is_surely_more(all, level * width as f64, one_in))
+                    {
+                        next[first.saturating_sub(1)..(last + 2).min(bins)].fill(false);
+                    }
+                }
+            }
+        }
+        if next == clear {
+            break;
+        }
+        clear = next;
+    }
+    clear
+}
+
 /// The share of the photons that a TDC with this dead time loses.
 fn lost(traces: &[Trace], dead_time: usize) -> f64 {
     let (counted, came) = traces.iter().fold((0.0, 0.0), |(counted, came), trace| {
@@ -150,21 +207,10 @@ fn lost(traces: &[Trace], dead_time: usize) -> f64 {
 
 impl<'a> Background<'a> {
     fn of(trace: &'a Trace) -> Self {
-        let counts = &trace.counts;
-        // Only bins that are background without a dead time and with the longest that is possible, so that
-        // neither is favoured.
-        let mut clear = Level::of(counts).clear;
-        if counts.iter().sum::<f64>() <= trace.cycles {
-            let other = Level::of(&arrived(counts, trace.cycles, counts.len())).clear;
-            clear
-                .iter_mut()
-                .zip(other)
-                .for_each(|(clear, other)| *clear &= other);
-        }
         Self {
-            counts,
+            counts: &trace.counts,
             cycles: trace.cycles,
-            clear,
+            clear: clear_bins(&trace.counts),
         }
     }
 
