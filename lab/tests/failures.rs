@@ -9,6 +9,10 @@ fn of<'a>(all: &'a [(Case, Vec<Outcome>)], name: &str) -> &'a [Outcome] {
     &found.unwrap_or_else(|| panic!("no case {name}")).1
 }
 
+fn is_window(outcome: &Outcome) -> bool {
+    outcome.method.rule == Rule::Window
+}
+
 /// The lower end of the interval of false alarms.
 fn surely_false(outcome: &Outcome) -> f64 {
     outcome.false_share.map_or(0.0, |share| share.interval.0)
@@ -46,10 +50,27 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
         Rule::Window | Rule::Average(_) => of.without.value < 0.1,
         Rule::Paper(_) => of.without.value > 0.3,
     });
-    // Only the first photon of a cycle counts: the rising edge becomes the peak, and every event is
-    // flagged.
-    check(&["one hit, 6 photons"], |of| {
-        surely_false(of) > 0.8 && of.piled_up > 0.999 && of.warning == Warning::Flagged
+    // A dead time that nobody has set: a slope becomes the peak, and no flag says so.
+    for tdc in ["first photon only", "dead for 20 bins", "dead for 5 bins"] {
+        for photons in ["3 photons a laser cycle", "6 photons a laser cycle"] {
+            let name = format!("{tdc}, {photons}");
+            // Set, the window rule goes on where the light is left.
+            check(&[&format!("{name}, set")], |of| {
+                !is_window(of) || surely_false(of) < 0.02 && of.without.value < 0.5
+            });
+        }
+        check(&[&format!("{tdc}, 6 photons, no target, set")], |of| {
+            !is_window(of) || of.verdict == Verdict::Survives
+        });
+        check(
+            &[&format!(
+                "{tdc}, 6 photons, 2 of them crosstalk before the gate, set"
+            )],
+            |of| !is_window(of) || surely_false(of) < 0.02,
+        );
+    }
+    check(&["first photon only, 6 photons a laser cycle"], |of| {
+        !is_window(of) || surely_false(of) > 0.8 && of.warning == Warning::Silent
     });
     check(&["one hit, 1.5 photons", "one hit, 2 photons"], |of| {
         of.piled_up > 0.95

@@ -101,10 +101,13 @@ static int print_statistics(dtof_statistics_t *statistics)
     print_field(", saturated: ", (int64_t)counts.saturated);
     print_field(", rejected: ", (int64_t)counts.rejected);
     print_field(", gated_out: ", (int64_t)counts.gated_out);
+    print_field(", repeated: ", (int64_t)counts.repeated);
     print_field(", events: ", (int64_t)counts.events);
     print_field(", deferred: ", (int64_t)counts.deferred);
     print_field(", expired: ", (int64_t)counts.expired);
     print_field(", expired_deferred: ", (int64_t)counts.expired_deferred);
+    print_field(", ended_full: ", (int64_t)counts.ended_full);
+    print_field(", blind_looks: ", (int64_t)counts.blind_looks);
     print(" }\n");
     return 0;
 }

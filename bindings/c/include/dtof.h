@@ -470,7 +470,7 @@ typedef struct dtof_statistics_t {
     uint64_t opaque[DTOF_STATISTICS_WORDS];
 } dtof_statistics_t;
 
-// The counts of a dtof_statistics_t. The first five add up to all photons.
+// The counts of a dtof_statistics_t. The first six add up to all photons.
 typedef struct dtof_counts_t {
     // Photons counted in a bin, in exposures that have ended.
     uint64_t counted;
@@ -482,6 +482,8 @@ typedef struct dtof_counts_t {
     uint64_t rejected;
     // Photons outside the range gate.
     uint64_t gated_out;
+    // Photons in a bin that had one in the same laser cycle: 0, as C counts every photon.
+    uint64_t repeated;
     // Events.
     uint64_t events;
     // Decisions deferred because the slot was full.

@@ -24,7 +24,7 @@ pub struct dtof_statistics_t {
 object!(dtof_statistics_t, Statistics, tag 0xdb,
     size DTOF_STATISTICS_SIZE, align DTOF_STATISTICS_ALIGN, unused_below 1);
 
-/// The counts of a dtof_statistics_t. The first five add up to all photons.
+/// The counts of a dtof_statistics_t. The first six add up to all photons.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct dtof_counts_t {
@@ -38,6 +38,8 @@ pub struct dtof_counts_t {
     pub rejected: u64,
     /// Photons outside the range gate.
     pub gated_out: u64,
+    /// Photons in a bin that had one in the same laser cycle: 0, as C counts every photon.
+    pub repeated: u64,
     /// Events.
     pub events: u64,
     /// Decisions deferred because the slot was full.
@@ -81,6 +83,7 @@ pub unsafe extern "C" fn dtof_statistics_read(
             saturated: of.saturated,
             rejected: of.rejected,
             gated_out: of.gated_out,
+            repeated: of.repeated,
             events: of.events,
             deferred: of.deferred,
             expired: of.expired,

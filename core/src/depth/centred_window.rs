@@ -46,7 +46,7 @@
 use fixed::types::{U8F8, U24F8};
 
 use super::estimate::DepthEstimate;
-use super::rates::Rates;
+use super::rates::{PEAK, REACH, Rates};
 use super::window_weights::Weights;
 use crate::flags::Flags;
 use crate::histogram::counter::{Count10, CounterWidth};
@@ -64,12 +64,7 @@ pub struct CentredWindow {
     weights: Weights,
 }
 
-/// Bins that a window can reach, from [`PEAK`] before the peak bin on: an offset of -2
-/// to 2 bins, and 4 more on each side.
-pub(super) const REACH: usize = 2 * PEAK;
-/// The index of the peak bin among them.
-pub(super) const PEAK: usize = 6;
-/// The same as a number of bins of the histogram.
+/// [`PEAK`] as a number of bins of the histogram.
 const BEFORE: u16 = 6;
 /// A window moves no farther than the start of the bin two before the peak bin, or two after.
 const ENDS: [usize; 2] = [PEAK - 2, PEAK + 2];

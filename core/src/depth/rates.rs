@@ -10,13 +10,18 @@
 //!
 //! An estimator needs ratios only, so the highest of the bins becomes 1023.
 
-use super::centred_window::{PEAK, REACH};
 use super::centroid::offset_of;
 use super::estimate::DepthEstimate;
 use crate::flags::Flags;
 use crate::histogram::counter::{Count10, CounterWidth};
 use crate::histogram::gate::RangeGate;
 use crate::units::BinIndex;
+
+/// Bins that a window can reach, from [`PEAK`] before the peak bin on: an offset of -2
+/// to 2 bins, and 4 more on each side.
+pub(super) const REACH: usize = 2 * PEAK;
+/// The index of the peak bin among them.
+pub(super) const PEAK: usize = 6;
 
 /// The light of the bins that a window can reach.
 pub(crate) struct Rates {

@@ -222,8 +222,14 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
     #[inline(never)]
     fn photons(&self, bins: Range<usize>) -> u32 {
         let bins = self.histogram.counts().get(bins).unwrap_or_default();
-        bins.iter()
-            .fold(0, |sum: u32, &count| sum.saturating_add(count.into()))
+        bins.iter().fold(0, |sum: u32, &count| {
+            // 10 + 10 bits fit.
+            if W::BITS <= 10 {
+                sum.wrapping_add(count.into())
+            } else {
+                sum.saturating_add(count.into())
+            }
+        })
     }
 
     /// Photons of the bins that blind `bin`. Saturates.
@@ -243,25 +249,25 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         let from = dead_time.saturating_sub(gated.start).min(counts.len());
         let (early, late) = counts.split_at_checked(from)?;
         let ended = all.get((gated.start + from).saturating_sub(dead_time)..)?;
-        let (mut photons, mut blind) = (0u32, self.blind(gated.start));
+        let photons = self.photons(gated.clone());
+        let mut blind = self.blind(gated.start);
         let mut blind_sum = Sum::<W>::ZERO;
         for &count in early {
             blind_sum.add(blind);
-            photons = photons.wrapping_add(count.into());
             // At most 28 bits and 24.
             blind = blind.wrapping_add(count.into());
         }
-        let mut highest = blind;
+        let last = early.last().map_or(0, |&count| count.into());
+        // The photons of the last bin blind none.
+        let mut highest = if late.is_empty() {
+            blind.wrapping_sub(last)
+        } else {
+            blind
+        };
         for (&count, &ended) in late.iter().zip(ended) {
             blind_sum.add(blind);
             highest = highest.max(blind);
-            photons = photons.wrapping_add(count.into());
             blind = blind.wrapping_add(count.into()).wrapping_sub(ended.into());
-        }
-        if late.is_empty() {
-            // The photons of the last bin blind none.
-            let last = early.last().map_or(0, |&count| count.into());
-            highest = blind.wrapping_sub(last);
         }
         if highest > self.cycles {
             return None;

@@ -10,14 +10,22 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     #[inline]
     pub fn count<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, code: u16) {
         let gated_out = self.histogram.add_gated(code, config.gate());
-        self.leave_out(config, &[code], gated_out);
+        // Most often it is gated.
+        if gated_out > 0 {
+            self.leave_out(config, code);
+        }
     }
 
     /// Counts one photon for each TDC code, as [`Self::count`] does.
     #[inline]
     pub fn count_batch<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, codes: &[u16]) {
         let gated_out = self.histogram.add_gated_batch(codes, config.gate());
-        self.leave_out(config, codes, gated_out);
+        if gated_out > 0 {
+            self.gated_out = self.gated_out.wrapping_add(gated_out);
+            if self.weighs_dead_time(config) {
+                self.histogram.keep_before(config.gate().first(), codes);
+            }
+        }
     }
 
     /// Counts the photons of a whole mini-frame, a histogram over one or more
@@ -38,20 +46,22 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         }
     }
 
-    /// Counts photons outside the gate, so many of `codes`.
+    /// Counts a photon outside the gate.
     #[inline(always)]
-    fn leave_out<R: DetectionRule>(
-        &mut self,
-        config: &PixelConfig<BINS, R>,
-        codes: &[u16],
-        photons: u32,
-    ) {
-        // Most often none.
-        if photons > 0 {
-            self.gated_out = self.gated_out.wrapping_add(photons);
-            if self.weighs_dead_time(config) {
-                self.histogram.keep_before(config.gate().first(), codes);
-            }
+    fn leave_out<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, code: u16) {
+        self.gated_out = self.gated_out.wrapping_add(1);
+        if config.weighs_dead_time() {
+            self.keep(config, code);
+        }
+    }
+
+    /// Counts a photon before the gate in its counter alone.
+    // Out of line: the photon then needs no place in memory where there is no dead time.
+    #[cold]
+    #[inline(never)]
+    fn keep<R: DetectionRule>(&mut self, config: &PixelConfig<BINS, R>, code: u16) {
+        if self.weighs_dead_time(config) {
+            self.histogram.keep_before(config.gate().first(), &[code]);
         }
     }
 }

@@ -155,18 +155,43 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         cycles: u16,
         observe: impl FnOnce(&DecisionInput<'_, BINS, W>),
     ) -> Look {
+        self.end_cycles::<R, true>(config, statistics, last, cycles, observe)
+    }
+
+    /// The same for a block of pixels, whose photons are of several TDCs: a dead time is not weighed.
+    #[inline]
+    pub(crate) fn end_laser_cycles_of_block<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        last: LaserCycle,
+        cycles: u16,
+        observe: impl FnOnce(&DecisionInput<'_, BINS, W>),
+    ) -> Look {
+        self.end_cycles::<R, false>(config, statistics, last, cycles, observe)
+    }
+
+    #[inline(always)]
+    fn end_cycles<R: DetectionRule, const OF_PIXEL: bool>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        last: LaserCycle,
+        cycles: u16,
+        observe: impl FnOnce(&DecisionInput<'_, BINS, W>),
+    ) -> Look {
         // A saturated exposure is at least L2, and so expires.
         self.exposure = self.exposure.saturating_add(cycles);
         self.since_look = self.since_look.saturating_add(cycles);
         if self.since_look < config.x() {
             return Look::NotDue;
         }
-        self.look(config, statistics, last, observe)
+        self.look::<R, OF_PIXEL>(config, statistics, last, observe)
     }
 
     /// Checks N and decides.
     #[inline]
-    fn look<R: DetectionRule>(
+    fn look<R: DetectionRule, const OF_PIXEL: bool>(
         &mut self,
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
@@ -177,8 +202,8 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         if self.exposure <= config.l1() {
             return Look::TooEarly;
         }
-        if self.state != State::NONE || config.dead_time() > 0 {
-            return self.look_on(config, statistics, cycle, observe);
+        if self.state != State::NONE || OF_PIXEL && config.weighs_dead_time() {
+            return self.look_on::<R, OF_PIXEL>(config, statistics, cycle, observe);
         }
         if self.exposure >= config.l2() {
             statistics.expired += 1;
@@ -194,14 +219,14 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
 
     /// A look with state or with a dead time.
     #[inline(never)]
-    fn look_on<R: DetectionRule>(
+    fn look_on<R: DetectionRule, const OF_PIXEL: bool>(
         &mut self,
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
         cycle: LaserCycle,
         observe: impl FnOnce(&DecisionInput<'_, BINS, W>),
     ) -> Look {
-        if self.weighs_dead_time(config) {
+        if OF_PIXEL && self.weighs_dead_time(config) {
             self.look_further::<R, true>(config, statistics, cycle, observe)
         } else {
             self.look_further::<R, false>(config, statistics, cycle, observe)

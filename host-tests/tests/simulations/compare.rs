@@ -49,6 +49,14 @@ fn costs_are_the_counted_instructions() {
         (cost::AVERAGE, counted("average; no event")),
         (cost::TRACKING, counted("look; tracking; no event")),
         (cost::BLOCK_LOOK, counted("look; block; no event")),
+        (
+            cost::DEAD_TIME,
+            counted("look; dead time of 20 bins; no event"),
+        ),
+        (
+            cost::FIRST_PHOTON,
+            counted("look; dead time; first photon only; no event"),
+        ),
         (cost::EXPIRY, counted("look at L2")),
         (
             cost::EVENT,

@@ -11,19 +11,21 @@ use dtof_engine::settings::Settings;
 pub const PHOTON: f64 = 10.22;
 /// Asking whether it also counts in blocks (`count and count_in_blocks; feeds none`, less
 /// `AsyncPixel::count`).
-pub const FEED: f64 = 31.56 - 28.56;
+pub const FEED: f64 = 32.56 - 28.56;
 /// Counting it in a block (`count and count_in_blocks; 1 level`, less `feeds none`).
-pub const BLOCK_PHOTON: f64 = 58.99 - 31.56;
+pub const BLOCK_PHOTON: f64 = 61.99 - 32.56;
 /// A look without an event with the paper's rule (`kept peak; no event`).
 pub const PAPER: f64 = 90.68;
 /// The same with the average of all bins (`average; no event`).
 pub const AVERAGE: f64 = 32.0;
 /// The same with tracking (`look; tracking; no event`).
-pub const TRACKING: f64 = 405.45;
-/// The same with a window of 3 and a dead time (`look; dead for 20 bins; no event`).
-pub const DEAD_TIME: f64 = 4000.0;
+pub const TRACKING: f64 = 410.23;
+/// The same with a dead time (`look; dead time of 20 bins; no event`).
+pub const DEAD_TIME: f64 = 7052.80;
+/// The same with a dead time of all bins (`look; dead time; first photon only; no event`).
+pub const FIRST_PHOTON: f64 = 4038.23;
 /// The same for a block (`look; block; no event`).
-pub const BLOCK_LOOK: f64 = 247.28;
+pub const BLOCK_LOOK: f64 = 254.13;
 /// An exposure that L2 ends (`look at L2`).
 pub const EXPIRY: f64 = 108.0;
 /// An event with its peak and the depth from three bins (`kept peak; event and depth`), and its word
@@ -45,9 +47,12 @@ pub const fn window(bins: u8) -> f64 {
 }
 
 /// A look without an event.
-fn look(method: &Method) -> f64 {
+fn look(method: &Method, settings: &Settings) -> f64 {
     match method.kind {
         Kind::Frames => 0.0,
+        Kind::Events { weighs: true, .. } if usize::from(settings.dead_time) >= settings.bins => {
+            FIRST_PHOTON
+        }
         Kind::Events { weighs: true, .. } => DEAD_TIME,
         Kind::Events { tracking: true, .. } => TRACKING,
         Kind::Events { rule, .. } => match rule {
@@ -89,7 +94,7 @@ pub fn instructions(
     };
     let events = pixels.events + blocks.events;
     let sum = PHOTON * pixels.photons() as f64
-        + look(method) * looks
+        + look(method, settings) * looks
         + (EVENT + depth) * events as f64
         + EXPIRY * pixels.expired as f64
         + of_blocks;

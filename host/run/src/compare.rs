@@ -5,13 +5,13 @@ use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 
 use super::calibrate::calibrate_counts;
-use super::given::{Given, SENSOR, of_given};
+use super::given::{Given, SENSOR, TDC, of_given};
 use super::recording::{RECORDING, bin_width_warning, read_options, settings_of_file, warnings};
 use super::simulate::settings_of_scene;
 use dtof_calibrate::CalibrationOptions;
 use dtof_compare::truth::Truth;
 use dtof_compare::{Comparison, Task, compare};
-use dtof_engine::settings::{SettingsFile, share};
+use dtof_engine::settings::{RuleName, SettingsFile, share};
 use dtof_options::numbers::{MAX_INTEGER, integer, positive};
 use dtof_options::{Refused, plain};
 use dtof_photons::input::Input;
@@ -36,6 +36,7 @@ impl dtof_options::Options for Options {
         &["within", "false_alarm"],
         RECORDING,
         SENSOR,
+        TDC,
         &["cycles", "seed"],
     ];
 
@@ -266,5 +267,9 @@ fn subject_of_scene(scene: Scene, name: &str, requested: SettingsFile) -> Result
 fn with_short_exposures(mut requested: SettingsFile) -> SettingsFile {
     let x = requested.detection.x.unwrap_or(4);
     requested.detection.l1.get_or_insert(x);
+    if requested.sensor.dead_time.is_some() || requested.dead_time_of_sensor.is_some() {
+        // Only the window rule weighs a dead time; all rules are tried.
+        requested.detection.rule.get_or_insert(RuleName::Window);
+    }
     requested
 }

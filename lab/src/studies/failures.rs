@@ -15,7 +15,7 @@ use anyhow::{Context, Result};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     AnyRule, AsyncPixel, AverageRule, Count, DepthEstimator, DepthEvent, Flags, LaserCycle, Look,
-    PaperRule, PixelAddress, PixelConfig, Statistics, WindowRule, z_for,
+    OncePerBin, PaperRule, PixelAddress, PixelConfig, Statistics, WindowRule, z_for,
 };
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette::{self, Pen};
@@ -45,7 +45,7 @@ const FALSE: i64 = 3 * PER_BIN;
 pub const STUDY: Study = Study {
     name: "failures",
     about: "false alarms, missing and wrong events in scenes that are not plain, and their flags",
-    revision: 5,
+    revision: 6,
     few_seeds: 30,
     all_seeds: 200,
     points,
@@ -154,7 +154,7 @@ impl Method {
             .l2(L2)
             .gate(case.gate)
             .estimator(estimator)
-            .dead_time(case.dead_time())
+            .dead_time(case.dead_time)
             .build()?;
         Ok((config, AsyncPixel::new(PixelAddress::new(0))))
     }
@@ -188,7 +188,11 @@ fn exposure(case: &Case, rng: &mut Pcg64, tally: &mut Tally) -> Result<()> {
         codes.clear();
         photons.next_cycle(cycle, |code| codes.push(code))?;
         waiting.retain_mut(|(name, (config, pixel))| {
-            pixel.count_batch(config, &codes);
+            if case.once_per_bin {
+                pixel.count_once_per_bin(config, &mut OncePerBin::<{ BINS / 32 }>::new(), &codes);
+            } else {
+                pixel.count_batch(config, &codes);
+            }
             let now = LaserCycle::new(cycle.into());
             let look = pixel.end_laser_cycle(config, &mut Statistics::new(), now);
             if let Some(event) = pixel.take_event() {

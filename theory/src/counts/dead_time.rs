@@ -39,7 +39,7 @@ mod tests {
 
     #[test]
     fn the_estimate_inverts_the_dead_time() {
-        let rates = [0.1, 0.4, 0.05, 0.0, 0.9];
+        let rates: [f64; 5] = [0.1, 0.4, 0.05, 0.0, 0.9];
         let cycles = 1e6;
         for dead_time in 1..=5 {
             let mut counts: Vec<f64> = Vec::new();

@@ -77,7 +77,7 @@ fn plain(event: &DepthEvent) -> dtof_event_t {
     event.into()
 }
 
-fn read(statistics: &dtof_statistics_t) -> [u64; 11] {
+fn read(statistics: &dtof_statistics_t) -> [u64; 12] {
     let mut counts = dtof_counts_t::default();
     // SAFETY: both pointers lead to objects of their types.
     assert_eq!(unsafe { dtof_statistics_read(statistics, &mut counts) }, OK);
@@ -87,6 +87,7 @@ fn read(statistics: &dtof_statistics_t) -> [u64; 11] {
         counts.saturated,
         counts.rejected,
         counts.gated_out,
+        counts.repeated,
         counts.events,
         counts.deferred,
         counts.expired,
@@ -96,13 +97,14 @@ fn read(statistics: &dtof_statistics_t) -> [u64; 11] {
     ]
 }
 
-fn numbers(of: &Statistics) -> [u64; 11] {
+fn numbers(of: &Statistics) -> [u64; 12] {
     let photons = [
         of.counted,
         of.excluded,
         of.saturated,
         of.rejected,
         of.gated_out,
+        of.repeated,
     ];
     let events = [of.events, of.deferred, of.expired, of.expired_deferred];
     let losses = [of.ended_full, of.blind_looks];
@@ -269,7 +271,7 @@ fn a_misaligned_pointer_to_the_number_of_events_leaves_the_pixels_as_they_were()
         assert_eq!([0, 1].map(|pixel| exposure(first.add(pixel))), [40; 2]);
     }
     assert_eq!(fired, [9; 2]);
-    assert_eq!(read(&done), [0; 11]);
+    assert_eq!(read(&done), [0; 12]);
 }
 
 #[test]

@@ -329,7 +329,7 @@ has_flags! {
     replay::Options: RECORDING SENSOR TDC DETECTION FRAME REPLAY;
     simulate::Options: ARRAY SENSOR TDC DETECTION FRAME SIMULATE;
     calibrate::Options: RECORDING CALIBRATE;
-    compare::Options: ACCURACY RECORDING SENSOR COMPARE;
+    compare::Options: ACCURACY RECORDING SENSOR TDC COMPARE;
     tune::Options: TUNE;
 }
 

@@ -49,6 +49,10 @@ pub struct Case {
     change: (f64, u32),
     /// Motion of the surfaces in bins a laser cycle.
     drift: f64,
+    /// The dead time of the TDC in bins, as pixels are set to; 0 if they are not.
+    pub dead_time: u16,
+    /// Whether photons of one laser cycle in one bin count once.
+    pub once_per_bin: bool,
 }
 
 impl Case {
@@ -66,6 +70,8 @@ impl Case {
             stray: None,
             change: (1.0, 0),
             drift: 0.0,
+            dead_time: 0,
+            once_per_bin: false,
         }
         .and(SIGNAL, PLACE)
     }
@@ -122,6 +128,17 @@ impl Case {
         self
     }
 
+    /// Sets pixels to the dead time of the TDC.
+    pub(super) fn set_to_dead_time(mut self) -> Self {
+        self.dead_time = self.effects.tdc_dead_time();
+        self
+    }
+
+    pub(super) fn counting_once_per_bin(mut self) -> Self {
+        self.once_per_bin = true;
+        self
+    }
+
     /// Multiplies the background by `factor` after laser cycle `cycle`.
     pub(super) fn changing(mut self, factor: f64, cycle: u32) -> Self {
         self.change = (factor, cycle);
@@ -141,12 +158,6 @@ impl Case {
     pub(super) fn drifting(mut self, drift: f64) -> Self {
         self.drift = drift;
         self
-    }
-
-    /// The dead time of its TDC in bins, a setting of the pixels.
-    #[must_use]
-    pub fn dead_time(&self) -> u16 {
-        self.effects.tdc_dead_time()
     }
 
     /// The positions of the surfaces at the end of laser cycle `cycle` of an exposure, in bins from

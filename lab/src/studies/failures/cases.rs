@@ -7,7 +7,7 @@ use super::L1;
 use super::case::{BACKGROUND, Case, PLACE, SIGNAL};
 use super::stray::StrayLight;
 use dtof_simulate::effects::Effects;
-use dtof_simulate::effects::dead_time::DeadTime;
+use dtof_simulate::effects::cover_glass::CoverGlass;
 use dtof_simulate::effects::tail::Tail;
 use dtof_simulate::effects::tdc::Tdc;
 
@@ -94,7 +94,7 @@ pub fn cases() -> Result<Vec<Case>> {
             ..Effects::default()
         }),
     ]);
-    cases.extend(pile_up());
+    cases.extend(pile_up()?);
     let glass = "The histogram is that of a bright target at 3.5 bins before another one. A gate needs to know of the glass";
     let moved = "The histogram is that of a still target, where it was on average. The event tells its exposure";
     let smeared = "In 390 laser cycles, the window's, the target goes 2 bins. That widens the pulse from σ 1 to 1.15, and \
@@ -142,7 +142,7 @@ fn weather() -> Result<Vec<Case>> {
         photons,
         before: RAIN_ENDS,
     };
-    let gate = "a gate from where the drops end: see the rows with one";
+    let gate = "photons that count once a bin and laser cycle, or a gate from where the drops end: see these rows";
     let echoes = "several echoes: take the last";
     let drop = "The histogram is that of a near target. It does not tell that all photons came in one laser cycle";
     let two = "The histogram is that of two surfaces";
@@ -163,6 +163,28 @@ fn weather() -> Result<Vec<Case>> {
             .with_stray(drops(200.0, 30.0))
             .advised(gate)
             .silent_as(drop),
+        Case::new("rain, a drop of 3 photons each 20 laser cycles, once per bin")
+            .with_stray(drops(20.0, 3.0))
+            .counting_once_per_bin(),
+        Case::new("rain, a drop of 30 photons each 200 laser cycles, once per bin")
+            .with_stray(drops(200.0, 30.0))
+            .counting_once_per_bin(),
+        Case::new("heavy rain, a drop of 30 photons each 50 laser cycles")
+            .with_stray(drops(50.0, 30.0))
+            .advised(gate)
+            .silent_as(drop),
+        Case::new("heavy rain, a drop of 30 photons each 50 laser cycles, once per bin")
+            .with_stray(drops(50.0, 30.0))
+            .counting_once_per_bin(),
+        Case::new("weak signal, rain of 30 photons each 200 laser cycles")
+            .only(WEAK, PLACE)
+            .with_stray(drops(200.0, 30.0))
+            .advised(gate)
+            .silent_as(drop),
+        Case::new("weak signal, rain of 30 photons each 200 laser cycles, once per bin")
+            .only(WEAK, PLACE)
+            .with_stray(drops(200.0, 30.0))
+            .counting_once_per_bin(),
         Case::new("the same rain, gate from bin 28")
             .with_stray(drops(200.0, 30.0))
             .gated(gated),
@@ -203,44 +225,75 @@ fn others() -> Vec<Case> {
     ]
 }
 
-/// Scenes with pile-up: photons that hide later ones.
-fn pile_up() -> Vec<Case> {
-    let one_hit = Effects {
-        tdc: Some(Tdc {
-            hits_per_cycle: Some(1),
-            dead_time_bins: None,
-        }),
+/// Scenes with pile-up: photons that hide later ones. Pixels are set to the dead time of the TDC where the
+/// name says so.
+fn pile_up() -> Result<Vec<Case>> {
+    let tdc = |tdc: Tdc| Effects {
+        tdc: Some(tdc),
         ..Effects::default()
     };
-    let background = |photons: f64| (photons - SIGNAL) / 128.0;
+    let one_hit = tdc(Tdc {
+        hits_per_cycle: Some(1),
+        dead_time_bins: None,
+    });
+    let dead_for = |bins| {
+        tdc(Tdc {
+            hits_per_cycle: None,
+            dead_time_bins: Some(bins),
+        })
+    };
+    let tdcs = [
+        ("first photon only".to_owned(), one_hit.clone()),
+        ("dead for 20 bins".to_owned(), dead_for(20)),
+        ("dead for 5 bins".to_owned(), dead_for(5)),
+    ];
+    let background = |photons: f64| photons / 128.0;
+    let slope = "The histogram is that of a near target";
+    let set = "the dead time as a setting: see the next row";
     let mut cases = Vec::new();
-    for photons in [0.7, 1.5, 2.0, 6.0] {
+    for photons in [0.7, 1.5, 2.0] {
         let case = Case::new(format!("one hit, {photons} photons a laser cycle"))
-            .with_background(background(photons))
+            .with_background(background(photons - SIGNAL))
             .with_effects(one_hit.clone());
-        cases.push(if photons > 1.0 {
-            case.advised("less light")
-        } else {
-            case
-        });
+        cases.push(case.set_to_dead_time());
     }
     for photons in [0.7, 3.0] {
-        cases.push(
-            Case::new(format!("one hit, a pulse of {photons} photons alone"))
-                .only(photons, PLACE)
-                .with_background(0.001)
-                .with_effects(one_hit.clone()),
-        );
+        let case = Case::new(format!("one hit, a pulse of {photons} photons alone"))
+            .only(photons, PLACE)
+            .with_background(0.001)
+            .with_effects(one_hit.clone());
+        cases.push(case.set_to_dead_time());
     }
-    cases.push(
-        Case::new("dead time 20 bins, 6 photons a laser cycle")
-            .with_background(background(6.0))
-            .with_effects(Effects {
-                dead_time: Some(DeadTime {
-                    duration_ps: 5000.0,
-                }),
-                ..Effects::default()
+    let mut both = |case: Case| {
+        cases.push(case.clone().advised(set).silent_as(slope));
+        let mut case = case.set_to_dead_time();
+        case.name += ", set";
+        cases.push(case);
+    };
+    for (name, tdc) in &tdcs {
+        for photons in [1.0, 3.0, 6.0, 12.0] {
+            let plural = if photons > 1.0 { "s" } else { "" };
+            let name = format!("{name}, {photons} photon{plural} a laser cycle");
+            let case = Case::new(name).with_background(background(photons - SIGNAL));
+            both(case.with_effects(tdc.clone()));
+        }
+    }
+    for (name, tdc) in &tdcs {
+        let case = Case::new(format!("{name}, 6 photons, no target")).without_target();
+        let case = case.with_background(background(6.0));
+        both(case.with_effects(tdc.clone()));
+    }
+    for (name, tdc) in &tdcs {
+        let name = format!("{name}, 6 photons, 2 of them crosstalk before the gate");
+        let case = Case::new(name).with_background(background(4.0 - SIGNAL));
+        let effects = Effects {
+            cover_glass: Some(CoverGlass {
+                signal: 2.0,
+                position_bins: 3.5,
             }),
-    );
-    cases
+            ..tdc.clone()
+        };
+        both(case.with_effects(effects).gated(RangeGate::new(8, 127)?));
+    }
+    Ok(cases)
 }
