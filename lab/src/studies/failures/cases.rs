@@ -249,6 +249,8 @@ fn pile_up() -> Result<Vec<Case>> {
     ];
     let background = |photons: f64| photons / 128.0;
     let slope = "The histogram is that of a near target";
+    let single = "The histogram is that of a near target. The rule compares single bins with one level; the window rule \
+                  weighs them";
     let set = "the dead time as a setting: see the next row";
     let mut cases = Vec::new();
     for photons in [0.7, 1.5, 2.0] {
@@ -266,7 +268,7 @@ fn pile_up() -> Result<Vec<Case>> {
     }
     let mut both = |case: Case| {
         cases.push(case.clone().advised(set).silent_as(slope));
-        let mut case = case.set_to_dead_time();
+        let mut case = case.set_to_dead_time().silent_as(single);
         case.name += ", set";
         cases.push(case);
     };
