@@ -146,10 +146,14 @@ fn check(draw: &Draw, counts: &[u32; BINS], decision: &LiveDecision, tally: &mut
         "only the integers detect {window:?}"
     );
     let best = best.unwrap();
-    // Another window with almost the same score.
+    // Another window with almost the same score: the integers round what is expected up to 1/256 photon.
+    let rounded = LiveTest {
+        expected: best.expected + 1.0 / 256.0,
+        ..*best
+    };
     let is_other = (window.start, found.width) != (best.start, draw.width.into());
     assert!(
-        !is_other || window.score() > 0.99 * best.score() - 0.1,
+        !is_other || window.score() > 0.99 * rounded.score() - 0.1,
         "{window:?} in place of {best:?}"
     );
     tally.close += u32::from(is_other || window.clearance() <= 0.0);
