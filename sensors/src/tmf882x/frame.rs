@@ -151,3 +151,26 @@ pub(super) enum Taken {
     /// It completed the histogram of this channel.
     Histogram { channel: u8 },
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Every number and half: a number that no packet has is that of no set.
+    #[test]
+    fn packets_of_64_zones_are_numbered_through_both_halves() {
+        for (sent, half) in
+            (0..=u8::MAX).flat_map(|sent| (0..=u8::MAX).map(move |half| (sent, half)))
+        {
+            let mut bytes = [0; PACKET];
+            bytes[..HEADER].copy_from_slice(&[RAW_HISTOGRAM, 0, 0, 0, sent, 128, half]);
+            let number = |is_captured| Packet::of(&bytes, is_captured).map(|packet| packet.number);
+            let expected = match (half, sent) {
+                (0, 0..30) => sent,
+                (1, 0..30) => sent + 30,
+                _ => 255,
+            };
+            assert_eq!((number(true), number(false)), (Ok(expected), Ok(sent)));
+        }
+    }
+}
