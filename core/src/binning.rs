@@ -279,12 +279,11 @@ pub fn end_laser_cycles_of_blocks_with<const BINS: usize, R: DetectionRule>(
     let mut fired = false;
     for (number, block) in blocks.iter_mut().enumerate() {
         let block = block.as_mut();
-        let look =
-            block
-                .pixel
-                .end_laser_cycles_of_block(config, statistics, last, cycles, |input| {
-                    observe(number, input);
-                });
+        let look = block
+            .pixel
+            .end_cycles::<R, false>(config, statistics, last, cycles, |input| {
+                observe(number, input);
+            });
         if look == Look::Event {
             block.link.reported();
             fired = true;

@@ -50,7 +50,7 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
         Rule::Window | Rule::Average(_) => of.without.value < 0.1,
         Rule::Paper(_) => of.without.value > 0.3,
     });
-    // A dead time that nobody has set: a slope becomes the peak, and no flag says so.
+    // A dead time that is not set: a slope becomes the peak, and no flag says so.
     for tdc in ["first photon only", "dead for 20 bins", "dead for 5 bins"] {
         for photons in ["3 photons a laser cycle", "6 photons a laser cycle"] {
             let name = format!("{tdc}, {photons}");

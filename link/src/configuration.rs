@@ -4,8 +4,8 @@ use dtof_core::events::Reference;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::paper::Threshold;
 use dtof_core::{
-    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule,
-    WindowRule,
+    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, DetectionRule,
+    EchoNumber, PaperRule, WindowRule,
 };
 
 use crate::adaptive_binning::AdaptiveBinning;
@@ -203,7 +203,7 @@ impl Configuration {
     /// Fails with [`Refusal::DeadTime`] if the configuration has a dead time of less than a
     /// histogram with another rule than the window rule, or with blocks.
     pub fn dead_time_in_force(&self, of_sensor: u16, bins: u16) -> Result<u16, Refusal> {
-        let is_weighed = matches!(self.rule, AnyRule::Window(_)) && self.binning.is_none();
+        let is_weighed = self.rule.weighs_dead_time() && self.binning.is_none();
         let has_effect = |dead_time| dead_time == 0 || dead_time >= bins || is_weighed;
         match (self.dead_time, self.source) {
             (Some(dead_time), _) if has_effect(dead_time) => Ok(dead_time),

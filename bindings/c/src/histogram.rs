@@ -101,9 +101,9 @@ pub unsafe extern "C" fn dtof_histogram_detect(
         check(found)?;
         let mut places = events.iter_mut();
         let mut number = 0;
-        let held = u16::try_from(exposure).unwrap_or(u16::MAX);
+        let in_event = u16::try_from(exposure).unwrap_or(u16::MAX);
         let is_blind = config.detect_echoes(histogram, exposure, |echo, detection| {
-            let event = detection.event(PixelAddress::new(pixel), LaserCycle::new(cycle), held);
+            let event = detection.event(PixelAddress::new(pixel), LaserCycle::new(cycle), in_event);
             if let Some(place) = places.next() {
                 *place = (&DepthEvent { echo, ..event }).into();
                 number += 1;

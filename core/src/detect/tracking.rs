@@ -113,8 +113,10 @@ impl<R: DetectionRule> Tracking<R> {
             excluded,
         )
     }
-    /// The same from live counts.
-    pub(crate) fn detect_live<const BINS: usize, W: CounterWidth>(
+    /// Decides from live counts: on the windows that contain the bin `expected` with the near rule, and
+    /// else on all with the far rule.
+    #[must_use]
+    pub fn detect_live<const BINS: usize, W: CounterWidth>(
         &self,
         counts: &LiveCounts<'_, BINS, W>,
         expected: BinIndex,

@@ -158,21 +158,10 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         self.end_cycles::<R, true>(config, statistics, last, cycles, observe)
     }
 
-    /// The same for a block of pixels, whose photons are of several TDCs: a dead time is not weighed.
-    #[inline]
-    pub(crate) fn end_laser_cycles_of_block<R: DetectionRule>(
-        &mut self,
-        config: &PixelConfig<BINS, R>,
-        statistics: &mut Statistics,
-        last: LaserCycle,
-        cycles: u16,
-        observe: impl FnOnce(&DecisionInput<'_, BINS, W>),
-    ) -> Look {
-        self.end_cycles::<R, false>(config, statistics, last, cycles, observe)
-    }
-
+    /// The same for a pixel, or for a block of pixels: its photons are of several TDCs, so that a dead
+    /// time is not weighed.
     #[inline(always)]
-    fn end_cycles<R: DetectionRule, const OF_PIXEL: bool>(
+    pub(crate) fn end_cycles<R: DetectionRule, const OF_PIXEL: bool>(
         &mut self,
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,

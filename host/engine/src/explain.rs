@@ -206,12 +206,8 @@ impl<const BINS: usize> LiveInput<'_, BINS> {
 
     /// The window that the rule reports.
     fn window<W: CounterWidth>(&self, counts: &LiveCounts<'_, BINS, W>) -> Option<LiveWindow> {
-        let tracking = self.config.tracking();
-        if let (Some(tracking), Some(expected)) = (tracking, self.expected) {
-            let is_near = counts.gate().contains(expected.raw());
-            let near = is_near.then(|| tracking.near().detect_live(counts, Some(expected)));
-            let near = near.and_then(|decision| decision.window);
-            return near.or_else(|| tracking.far().detect_live(counts, None).window);
+        if let (Some(tracking), Some(expected)) = (self.config.tracking(), self.expected) {
+            return tracking.detect_live(counts, expected).window;
         }
         self.config.rule().detect_live(counts, None).window
     }

@@ -3,8 +3,8 @@
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
-    AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, GateError, PaperRule,
-    PixelConfig, PixelConfigError, RangeGate, RangeScale,
+    AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, DetectionRule, EchoNumber,
+    GateError, PaperRule, PixelConfig, PixelConfigError, RangeGate, RangeScale,
 };
 pub use dtof_link::AdaptiveBinning;
 
@@ -133,7 +133,7 @@ impl Settings {
     /// Whether pixels weigh bins by the laser cycles in which they were live.
     #[must_use]
     pub fn weighs_dead_time(&self) -> bool {
-        self.dead_time > 0 && matches!(self.rule, AnyRule::Window(_)) && self.frame.is_none()
+        self.dead_time > 0 && self.rule.weighs_dead_time() && self.frame.is_none()
     }
 
     fn refused(&self, error: PixelConfigError) -> Refused {
