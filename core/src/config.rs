@@ -208,9 +208,10 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
     /// [`Self::echoes`], the highest peak first. [`Self::add_frame`] has filled it.
     ///
     /// Without a dead time, the bins around all echoes but the last are empty after it, and
-    /// `cycles` does not matter. With one, returns whether a decision left bins out: because they
-    /// were hardly ever live, because the counts contradict the dead time, or all of them because a
-    /// counter is full. Then there is no detection, as the depth could be wrong.
+    /// `cycles` does not matter. With one that the rule weighs, returns whether a target may be hidden:
+    /// a gated bin was blind or had a photon in nearly all laser cycles ([`Flags::PILE_UP`]), the
+    /// counts contradict the dead time, or a counter is full. In the last two cases there is no
+    /// detection, as the depth could be wrong.
     pub fn detect_echoes<W: CounterWidth>(
         &self,
         histogram: &mut Histogram<BINS, W>,
@@ -424,6 +425,10 @@ impl<const BINS: usize, R: DetectionRule> PixelConfigBuilder<BINS, R> {
     /// The TDC is blind for so many bins after each photon. With as many as the histogram has, or
     /// more, it takes the first photon of a laser cycle only. 0, the default, is a TDC that takes
     /// every photon.
+    ///
+    /// Round it down to whole bins: one bin too many makes a false target behind a bright bin, where
+    /// the dead time ends, and one bin too few hardly matters. It must end before the next laser
+    /// pulse, because bins are weighed as if the TDC were live at each pulse.
     ///
     /// The window rule weighs each bin by the laser cycles in which it was live: see [`LiveCounts`].
     /// Photons before the gate then stay in their counters, because they blind the TDC, and

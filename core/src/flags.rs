@@ -16,16 +16,19 @@ impl Flags {
     /// bin, and the depth is biased towards the middle of the bin.
     pub const SATURATED: Self = Self(1);
     /// Bit 1: the depth window reaches past the range gate, so the depth is biased into
-    /// the gate; or the position is limited to two bins from the peak bin.
+    /// the gate; or it reaches bins that are left out, because they lie around an earlier echo of
+    /// the exposure or were hardly ever live; or the position is limited to two bins from the
+    /// peak bin.
     pub const CLIPPED: Self = Self(1 << 1);
     /// Bit 2: a decision was deferred while the slot was full, so the exposure may be
     /// longer than necessary.
     pub const DEFERRED: Self = Self(1 << 2);
     /// Bit 3: early photons hid late ones. With the window rule, which weighs bins by their live
-    /// laser cycles, it means that bins were left out because they were hardly ever live, and a
-    /// target there was not seen. With other rules and in blocks it means that a TDC of the first
-    /// photon took one in more than half of the laser cycles: the depth is biased towards the
-    /// sensor, and the peak may not be a target. See
+    /// laser cycles, it means that a gated bin was blind or had a photon in nearly all of the
+    /// exposure: fewer than one laser cycle in 1024 is left over, or too few for the rule's minimum
+    /// of photons. A target there or behind it may be missed. With other rules and in blocks it
+    /// means that a TDC of the first photon took one in more than half of the laser cycles: the
+    /// depth is biased towards the sensor, and the peak may not be a target. See
     /// [`PixelConfigBuilder::dead_time`](crate::PixelConfigBuilder::dead_time).
     pub const PILE_UP: Self = Self(1 << 3);
 

@@ -102,7 +102,7 @@ impl Rates {
 
 impl Counted {
     /// The light a laser cycle in 1/2²⁴: up to 2³⁰.
-    fn light(self) -> u32 {
+    pub(crate) fn light(self) -> u32 {
         // In half cycles, so that the rest is at least 1.
         let whole = 2 * self.live.max(1);
         let mut rest = whole.saturating_sub(2 * self.photons).max(1);

@@ -33,9 +33,7 @@ use crate::histogram::counter::CounterWidth;
 use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
 use crate::histogram::{Histogram, Peak};
-use crate::units::{
-    BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress,
-};
+use crate::units::{BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress};
 
 /// A peak that stands clear of the background.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -177,20 +175,8 @@ pub(crate) fn detection_in<const BINS: usize, W: CounterWidth>(
 ) -> Detection {
     let (gate, excluded) = (counts.gate(), counts.excluded());
     let (first, width) = (window.first, window.width);
-    let (bin, counted) =
-        (first + 1..first + width).fold((first, counts.counted(first)), |(bin, highest), other| {
-            let counted = counts.counted(other);
-            // The lowest bin wins a tie, as everywhere.
-            if counted.photons * highest.live > highest.photons * counted.live {
-                (other, counted)
-            } else {
-                (bin, highest)
-            }
-        });
-    let peak = Peak {
-        bin: BinIndex::saturating(bin),
-        count: Count::saturating(u32::try_from(counted.photons).unwrap_or(u32::MAX)),
-    };
+    let peak = counts.brightest(first, width);
+    let bin = peak.bin.raw();
     let outside = Counted {
         photons: window.photons_outside.into(),
         live: window.live_outside,
@@ -214,7 +200,8 @@ pub(crate) fn detection_in<const BINS: usize, W: CounterWidth>(
     }
     // 32 + 28 bits.
     let half = outside.live / 2;
-    let expected = (outside.photons * counted.live + half).checked_div(outside.live);
+    let live = u64::from(counts.live(bin));
+    let expected = (outside.photons * live + half).checked_div(outside.live);
     let background = u32::try_from(expected.unwrap_or(0)).unwrap_or(u32::MAX);
     Detection {
         peak,

@@ -8,7 +8,11 @@
 //! live(b) = N - Σ counts of the D bins before b
 //! ```
 //!
-//! which is exact, whatever the light. Under a flat background each photon lies in a window
+//! That is exact, whatever the light, if D is whole bins and the TDC is live again at the next laser
+//! pulse. Of a dead time in between, or of one that is not well known, D is the next lower number: one
+//! bin too few hardly matters, one too many makes a target of the bin D behind a bright one.
+//!
+//! Under a flat background each photon lies in a window
 //! with the probability `p = Σ live(window) / Σ live(all gated bins)`. So the window rule
 //! compares a window's photons with `T·p` instead of `T·w/B`:
 //!
@@ -17,10 +21,10 @@
 //! ```
 //!
 //! All gated windows are looked at, because the highest bin is often the front of the slope.
-//! The window with the largest `(S - E)²/E` is tested.
+//! Of those above the threshold the one with the largest `(S - E)²/E` is reported.
 //!
-//! A window that was live in fewer than one of [`LiveCounts::LEAST_SHARE`] laser cycles is
-//! left out. Bins around an echo that was reported are left out, too, but their photons go on
+//! A window that was live in fewer than one of [`LiveCounts::LEAST_SHARE`] laser cycles, or in fewer than
+//! the rule's minimum of photons, is left out. Bins around an echo that was reported are left out, too, but their photons go on
 //! blinding the bins behind them, as those before the gate do.
 //!
 //! Source: the estimator of P. B. Coates, "The correction for photon 'pile-up' in the
@@ -31,11 +35,11 @@ use core::marker::PhantomData;
 use core::ops::{Range, RangeInclusive};
 
 use crate::depth::Counted;
-use crate::histogram::Histogram;
 use crate::histogram::counter::CounterWidth;
 use crate::histogram::excluded::ExcludedBins;
 use crate::histogram::gate::RangeGate;
-use crate::units::BinIndex;
+use crate::histogram::{Histogram, Peak};
+use crate::units::{BinIndex, Count};
 
 /// The counts of one exposure with what is needed to weigh them.
 #[derive(Clone, Copy, Debug)]
@@ -53,8 +57,8 @@ pub struct LiveCounts<'a, const BINS: usize, W: CounterWidth> {
 pub struct LiveDecision {
     /// The detection.
     pub window: Option<LiveWindow>,
-    /// Whether windows were left out, because they were hardly ever live; or all of them, because
-    /// the counts contradict the dead time.
+    /// Whether a gated bin was blind or had a photon in nearly all laser cycles, so that windows there
+    /// or behind it are left out; or all are, because the counts contradict the dead time.
     pub is_blind: bool,
 }
 
@@ -77,6 +81,8 @@ pub struct LiveWindow {
 struct Totals {
     photons: u32,
     live: u64,
+    /// The fewest laser cycles in which a bin was live and had no photon.
+    fewest_empty: u32,
 }
 
 /// A window, and the photons expected in it, in 1/256.
@@ -112,7 +118,7 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
     /// bins.
     ///
     /// `None` if a counter is full, so that it is unknown how often the bins behind it were
-    /// live; and above [`Self::MAX_CYCLES`].
+    /// live; and of more laser cycles than [`Self::MAX_CYCLES`].
     #[inline(always)]
     #[must_use]
     pub fn new(
@@ -160,6 +166,33 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         self.cycles.saturating_sub(self.blind(bin.into()))
     }
 
+    /// The bin with the most light of the `width` bins from `first` on, the lowest of several, and its
+    /// photons. A bin that is left out has none.
+    #[must_use]
+    pub fn brightest(&self, first: u16, width: u16) -> Peak {
+        let light = |bin| {
+            let counted = self.counted(bin);
+            if self.is_left_out(counted.live, 1) {
+                0
+            } else {
+                counted.light()
+            }
+        };
+        let bins = first + 1..first + width;
+        let (bin, _) = bins.fold((first, light(first)), |highest, bin| {
+            let other = light(bin);
+            if other > highest.1 {
+                (bin, other)
+            } else {
+                highest
+            }
+        });
+        Peak {
+            bin: BinIndex::saturating(bin),
+            count: Count::saturating(self.count(bin.into())),
+        }
+    }
+
     /// The photons of a bin, and the laser cycles in which it was live.
     pub(crate) fn counted(&self, bin: u16) -> Counted {
         Counted {
@@ -192,13 +225,15 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         // Below half of z² no window of less than a quarter of the light is a detection.
         let most = 4 * u64::from(width) * u64::from(self.cycles);
         let half = u64::from(z_squared >> 17);
+        let least = self.least_live(width.into()).max(minimum);
         let levels = Levels {
             excess: if totals.live < most { 0 } else { half },
-            least: self.least_live(width.into()),
+            least,
             minimum,
+            z_squared,
+            live: totals.live,
         };
-        let (best, is_blind) = self.largest_excess(width, expected, &totals, &levels);
-        let window = best.filter(|one| one.stands_clear(z_squared, totals.live));
+        let window = self.largest_excess(width, expected, &totals, &levels);
         LiveDecision {
             window: window.map(|window| LiveWindow {
                 #[allow(clippy::cast_possible_truncation, reason = "less than 1024")]
@@ -207,7 +242,8 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
                 photons_outside: totals.photons.wrapping_sub(window.photons),
                 live_outside: totals.live.wrapping_sub(window.live.into()),
             }),
-            is_blind,
+            // At most 28 + 3 bits.
+            is_blind: totals.fewest_empty.wrapping_mul(width.into()) < least,
         }
     }
 
@@ -237,8 +273,8 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         self.photons(bin.saturating_sub(self.dead_time.into())..bin)
     }
 
-    /// One pass over the gated bins. `None` if a bin was blind in more laser cycles than there
-    /// were.
+    /// One pass over the gated bins. `None` if a bin was blind or had a photon in more laser cycles
+    /// than there were.
     #[inline(never)]
     fn totals(&self) -> Option<Totals> {
         let gated = self.gate.bins();
@@ -257,24 +293,21 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
             // At most 28 bits and 24.
             blind = blind.wrapping_add(count.into());
         }
-        let last = early.last().map_or(0, |&count| count.into());
-        // The photons of the last bin blind none.
-        let mut highest = if late.is_empty() {
-            blind.wrapping_sub(last)
-        } else {
-            blind
-        };
+        let mut highest = blind;
         for (&count, &ended) in late.iter().zip(ended) {
             blind_sum.add(blind);
+            blind = blind.wrapping_add(count.into());
             highest = highest.max(blind);
-            blind = blind.wrapping_add(count.into()).wrapping_sub(ended.into());
+            blind = blind.wrapping_sub(ended.into());
         }
-        if highest > self.cycles {
-            return None;
-        }
+        let fewest_empty = self.cycles.checked_sub(highest)?;
         let bins = counts.len() as u64;
         let live = (u64::from(self.cycles) * bins).wrapping_sub(blind_sum.total());
-        let mut totals = Totals { photons, live };
+        let mut totals = Totals {
+            photons,
+            live,
+            fewest_empty,
+        };
         if self.excluded.echoes() > 0 {
             self.leave_out_excluded(&mut totals);
         }
@@ -291,7 +324,7 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         }
     }
 
-    /// Finds the window with the largest excess, and whether one was left out.
+    /// Finds the window with the largest excess of those above the threshold.
     ///
     /// From one window to the next the live laser cycles lose the photons of the window, and gain
     /// those of the window a dead time before it.
@@ -302,7 +335,7 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         expected: Option<BinIndex>,
         totals: &Totals,
         levels: &Levels,
-    ) -> (Option<Candidate>, bool) {
+    ) -> Option<Candidate> {
         let starts = self.starts(width, expected);
         let (first, last) = (usize::from(*starts.start()), usize::from(*starts.end()));
         let width = usize::from(width);
@@ -331,21 +364,17 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
             scan.visit(self, width);
             scan.step(leaving, entering);
         }
-        // Up to here they only fell.
-        let mut lowest = scan.live;
         scan.before = self
             .photons(split.saturating_sub(dead_time)..(split + width).saturating_sub(dead_time));
         let blinding = counts((split + width).saturating_sub(dead_time)..BINS);
         for ((&leaving, &entering), &more) in pairs(split..end).zip(blinding) {
             scan.visit(self, width);
-            lowest = lowest.min(scan.live);
             scan.step(leaving, entering);
             scan.before = scan.before.wrapping_add(more.into());
         }
         let ended = pairs(end.saturating_sub(dead_time)..last.saturating_sub(dead_time));
         for ((&leaving, &entering), (&less, &more)) in pairs(end..last).zip(ended) {
             scan.visit(self, width);
-            lowest = lowest.min(scan.live);
             scan.step(leaving, entering);
             scan.before = scan
                 .before
@@ -353,18 +382,18 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
                 .wrapping_sub(less.into());
         }
         scan.visit(self, width);
-        lowest = lowest.min(scan.live);
-        (scan.best, lowest < levels.least)
+        scan.best
     }
 
     /// The level that a better window than this one exceeds. `None` if this one has too few photons
-    /// or live laser cycles, or touches an echo.
+    /// or live laser cycles, touches an echo, or does not stand clear.
     #[cold]
     #[inline(never)]
     fn next_level(&self, window: &Candidate, width: usize, levels: &Levels) -> Option<u64> {
         if window.photons < levels.minimum
             || window.live < levels.least
             || self.touches_excluded(window.first, width)
+            || !window.stands_clear(levels.z_squared, levels.live)
         {
             return None;
         }
@@ -408,7 +437,7 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
     }
 }
 
-/// What a window has to exceed.
+/// What a window has to reach, or exceed.
 #[derive(Clone, Copy)]
 struct Levels {
     /// The square of the excess over the expected photons, in 1/256.
@@ -417,6 +446,10 @@ struct Levels {
     least: u32,
     /// The fewest photons.
     minimum: u32,
+    /// In 1/2²⁴.
+    z_squared: u32,
+    /// The live laser cycles of all bins.
+    live: u64,
 }
 
 /// A pass over windows: the present one, and the best so far.

@@ -289,6 +289,21 @@ fn counts_that_contradict_the_dead_time_are_no_event() {
         assert_eq!(lone.end(100), look, "{dead_time}");
         assert_eq!(lone.statistics.blind_looks, blind);
     }
+    // More than one photon a laser cycle in two bins next to each other, and in the last bin.
+    let mut pair = [0u32; 16];
+    pair[6..10].copy_from_slice(&[300, 900, 900, 300]);
+    let mut last = [0u32; 16];
+    last[15] = 600;
+    for (counts, dead_time) in [(pair, 1), (last, 16)] {
+        for (cycles, is_blind) in [(500, true), (2000, false)] {
+            let mut histogram = Histogram::<16, Count16>::new();
+            let config = small(0).dead_time(dead_time).build().unwrap();
+            assert_eq!(config.add_frame(&mut histogram, &counts), 0);
+            let mut events = 0;
+            let found = config.detect_echoes(&mut histogram, cycles, |_, _| events += 1);
+            assert_eq!((found, events), (is_blind, u32::from(!is_blind)));
+        }
+    }
 }
 
 /// An event that leaves nothing to the bins behind it says that they are blind.
@@ -308,6 +323,30 @@ fn an_event_before_blind_bins_is_flagged() {
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].peak.bin.raw(), 10);
         assert_eq!(found[0].depth.flags.contains(Flags::PILE_UP), is_blind);
+    }
+}
+
+/// In a short exposure: a window of two bins that was live twice never has the minimum of 3 photons.
+/// A pixel that expects its next event says so too.
+#[test]
+fn a_pixel_flags_bins_in_which_no_target_can_be_seen() {
+    for (live, is_blind) in [(1, true), (2, false)] {
+        for tracks in [false, true] {
+            let builder = small(0).dead_time(16);
+            let rule = *builder.build().unwrap().rule();
+            let tracking = rule.tracking(&RangeGate::<16>::full());
+            let mut lone = Lone::new(builder.tracking(tracks.then_some(tracking)));
+            for exposure in 1..=2 {
+                let mut counts = [0; 16];
+                counts[10] = 44 - live;
+                lone.count(counts, 0);
+                assert_eq!(lone.end(44), Look::Event);
+                let event = lone.pixel.take_event().unwrap();
+                assert_eq!(event.flags.contains(Flags::PILE_UP), is_blind);
+                let blind_looks = if is_blind { exposure } else { 0 };
+                assert_eq!(lone.statistics.blind_looks, blind_looks);
+            }
+        }
     }
 }
 

@@ -183,11 +183,8 @@ impl<const BINS: usize> LiveInput<'_, BINS> {
             return explanation;
         };
         if let Some((first, last)) = explanation.window {
-            let light = |bin: u16| f64::from(count(bin)) / f64::from(counts.live(bin).max(1));
-            // The first, if several have as much light.
-            let bins = (first..=last).rev();
-            let peak = bins.max_by(|&one, &other| light(one).total_cmp(&light(other)));
-            explanation.peak = peak.map_or(explanation.peak, |bin| (bin, count(bin)));
+            let peak = counts.brightest(first, last - first + 1);
+            explanation.peak = (peak.bin.raw(), peak.count.raw());
         }
         let (photons, live) = match window {
             Some(window) => (window.photons_outside.into(), window.live_outside),

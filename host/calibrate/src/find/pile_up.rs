@@ -9,12 +9,13 @@
 //! how likely is it that so many of those left fall into this bin? With none it is one in as many as there
 //! are bins left; with a dead time the bin's share of the live laser cycles to come, as the photons so far
 //! let expect. The share of a bin is fixed before its own photons are used. So the ratio of the two
-//! likelihoods exceeds 1000 in at most one of 1000 recordings without a dead time, whatever their light
-//! (Ville's inequality), also as a mean over dead times. A straight line through counts over live laser
-//! cycles, which are sums of the same counts, has no such bound.
+//! likelihoods exceeds 1000 in at most one of 1000 recordings of flat light without a dead time, however
+//! bright it is (Ville's inequality), also as a mean over dead times. A straight line through counts over
+//! live laser cycles, which are sums of the same counts, has no such bound.
 //!
-//! The dead time is then the one with the highest likelihood. Something else than a dead time may make a
-//! background fall, so the fall must be neither half nor twice as steep.
+//! The dead time is then the shortest of those with about the highest likelihood, or all bins if that is one
+//! of them. Something else than a dead time may make a background fall, so the fall must be neither half nor
+//! twice as steep.
 
 use std::ops::Range;
 
@@ -108,7 +109,8 @@ fn candidates(bins: usize) -> Vec<usize> {
     candidates
 }
 
-/// The dead time with the highest likelihood, between the neighbours of candidate number `best`.
+/// The dead time with the highest likelihood, between the neighbours of candidate number `best`. The
+/// shortest of those that are hardly less likely: a bin too many makes targets, a bin too few does not.
 fn refined(backgrounds: &[Background], candidates: &[usize], best: usize) -> usize {
     let low = best
         .checked_sub(1)
@@ -126,10 +128,13 @@ fn refined(backgrounds: &[Background], candidates: &[usize], best: usize) -> usi
     let highest = scored
         .iter()
         .fold(f64::NEG_INFINITY, |highest, one| highest.max(one.1));
-    // A longest dead time that is hardly less likely is the end of the laser cycle.
+    let mut likely = scored.iter().filter(|one| one.1 > highest - 3.0);
     let all = candidates.last().copied().unwrap_or(1);
-    let likely = |one: &&(usize, f64)| one.1 >= highest || one.0 == all && one.1 > highest - 3.0;
-    scored.iter().rfind(likely).map_or(all, |one| one.0)
+    // A longest dead time is the end of the laser cycle.
+    if likely.clone().any(|one| one.0 == all) {
+        return all;
+    }
+    likely.next().map_or(all, |one| one.0)
 }
 
 /// Whether the background falls neither half nor twice as steeply as with this dead time.
