@@ -30,8 +30,8 @@ use crate::histogram::Histogram;
 use crate::histogram::counter::CounterWidth;
 
 /// Counts of what pixels have done since they were made. Photons offered are
-/// `counted + excluded + saturated + rejected + gated_out` (short of 2³² losses of one
-/// kind within one exposure).
+/// `counted + excluded + saturated + rejected + gated_out + repeated` (short of 2³² losses of
+/// one kind within one exposure).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
@@ -52,15 +52,17 @@ pub struct Statistics {
     pub events: u64,
     /// Decisions deferred because the slot was full.
     pub deferred: u64,
-    /// Exposures that reached L2 without an event.
+    /// Exposures without an event: those that reached L2, and those that ended because a counter
+    /// was full.
     pub expired: u64,
     /// Of these, exposures with a deferred decision: they might have had an event.
     pub expired_deferred: u64,
     /// Exposures that ended because a counter was full, so that it was unknown how often the bins
     /// behind it were live. Those without an event are in `expired`, too. Only with a dead time.
     pub ended_full: u64,
-    /// Decisions that left bins out because the TDC was hardly ever live there, or all bins because
-    /// the counts contradict its dead time.
+    /// Decisions in which a gated bin was blind or had a photon in nearly all laser cycles, as
+    /// [`Flags::PILE_UP`](crate::Flags::PILE_UP) says; or in more laser cycles than there were, so
+    /// that the counts contradict the dead time. A whole histogram with a full counter is one, too.
     pub blind_looks: u64,
 }
 
@@ -84,7 +86,7 @@ impl Statistics {
         }
     }
 
-    /// Photons offered, counted or not.
+    /// Photons offered, counted or not: repeated ones, too.
     #[must_use]
     pub const fn photons(&self) -> u64 {
         self.counted

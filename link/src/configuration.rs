@@ -44,6 +44,9 @@ pub struct Configuration {
     /// many as the histogram has, or more, only the first photon of a laser cycle counts. See
     /// [`Self::dead_time_in_force`].
     pub dead_time: Option<u16>,
+    /// Whether photons of one laser cycle in one bin count once. A device whose sensor gives histograms
+    /// refuses it with that as the source.
+    pub once_per_bin: bool,
     /// The number of pixels; their addresses begin at 0.
     pub pixels: u16,
     /// Pixels in a row of the array.
@@ -87,6 +90,8 @@ const PREVIOUS: u8 = 0;
 const REPORTED: u8 = 1;
 const DEAD_TIME_OF_SENSOR: u8 = 0;
 const DEAD_TIME_GIVEN: u8 = 1;
+const EVERY_PHOTON: u8 = 0;
+const ONCE_PER_BIN: u8 = 1;
 const NOT_TRACKING: u8 = 0;
 const TRACKING: u8 = 1;
 
@@ -148,6 +153,11 @@ impl Configuration {
         } else {
             NOT_TRACKING
         };
+        let once_per_bin = if self.once_per_bin {
+            ONCE_PER_BIN
+        } else {
+            EVERY_PHOTON
+        };
 
         let first = [
             alpha.to_bits(),
@@ -183,8 +193,9 @@ impl Configuration {
                 self.echo_wait,
             ])
             .chain(self.host_timeout_ms.to_le_bytes())
+            .chain(dead_time.to_le_bytes())
             // The bytes after it are reserved.
-            .chain(dead_time.to_le_bytes());
+            .chain([once_per_bin]);
         let mut bytes = [0; Self::BYTES];
         for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
@@ -245,6 +256,7 @@ impl Configuration {
         let [tracking, echoes, echo_guard_bins, echo_wait] = fields.next()?;
         let host_timeout_ms = u16::from_le_bytes(fields.next()?);
         let dead_time = u16::from_le_bytes(fields.next()?);
+        let [once_per_bin] = fields.next()?;
         let Fields(reserved) = fields;
 
         let changes = |reference| DynamicDepth {
@@ -282,6 +294,11 @@ impl Configuration {
             dead_time: match dead_time_from {
                 DEAD_TIME_OF_SENSOR => None,
                 DEAD_TIME_GIVEN => Some(dead_time),
+                _ => return Err(Refusal::Unknown),
+            },
+            once_per_bin: match once_per_bin {
+                EVERY_PHOTON => false,
+                ONCE_PER_BIN => true,
                 _ => return Err(Refusal::Unknown),
             },
             pixels,

@@ -9,7 +9,7 @@ numbered! {
     /// Why a configuration is refused.
     Refusal {
         /// The record has the wrong length, or an unknown source, rule, estimator, output,
-        /// reference, origin of the dead time, levels, tracking or number of echoes.
+        /// reference, origin of the dead time, levels, tracking, number of echoes or way to count.
         Unknown = 1: "the configuration is not one this device knows",
         /// X is 0.
         ZeroX = 2: PixelConfigError::ZeroX.text(),
@@ -53,6 +53,8 @@ numbered! {
         /// A dead time shorter than a histogram with another rule than the window rule, or with
         /// blocks of pixels.
         DeadTime = 21: "the dead time needs the window rule, without blocks",
+        /// Once a bin, of a sensor that gives histograms.
+        OncePerBin = 22: "the sensor gives histograms, where photons cannot count once per bin",
     }
 }
 

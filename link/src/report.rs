@@ -46,10 +46,11 @@ impl Report {
     /// Numbers of 4 bytes.
     const NARROW: usize = 12;
     /// Numbers of 8 bytes after all others.
-    const LAST: usize = 2;
+    const LAST: usize = 3;
 
     /// The numbers in the order of the record: those of 8 bytes, those of 4, and after two bytes
-    /// the last ones of 8. Blocks have none of these, as no dead time weighs them.
+    /// the last ones of 8. Blocks have none of these: no dead time weighs them, and what counts once in a
+    /// pixel counts once in its blocks.
     const fn numbers(
         &mut self,
     ) -> (
@@ -96,7 +97,11 @@ impl Report {
                 &mut link.duplicate,
                 &mut link.retransmitted,
             ],
-            [&mut pixels.ended_full, &mut pixels.blind_looks],
+            [
+                &mut pixels.ended_full,
+                &mut pixels.blind_looks,
+                &mut pixels.repeated,
+            ],
         )
     }
 

@@ -17,6 +17,7 @@ fn configuration(rule: AnyRule) -> Configuration {
         l2: 2000,
         gate: (0, 127),
         dead_time: None,
+        once_per_bin: false,
         pixels: 64,
         columns: 8,
         binning: None,

@@ -86,6 +86,7 @@ fn a_host_configures_with_the_golden_frame() {
         l2: 2000,
         gate: (10, 119),
         dead_time: Some(128),
+        once_per_bin: true,
         pixels: 64,
         columns: 8,
         binning: Some(AdaptiveBinning {
@@ -176,7 +177,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
         source,
         prop::option::of(binning),
         echoes,
-        any::<(Option<u16>, bool, [u8; 2])>(),
+        any::<(Option<u16>, [bool; 2], [u8; 2])>(),
         any::<[u16; 7]>(),
         (
             any::<u32>(),
@@ -197,7 +198,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                 wide_numbers,
             )| {
                 let [x, l1, l2, first, last, pixels, columns] = numbers;
-                let (dead_time, tracking, [echo_guard_bins, echo_wait]) = more;
+                let (dead_time, [once_per_bin, tracking], [echo_guard_bins, echo_wait]) = more;
                 let (width, offset, host_timeout_ms) = wide_numbers;
                 Configuration {
                     rule,
@@ -207,6 +208,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                     l2,
                     gate: (first, last),
                     dead_time,
+                    once_per_bin,
                     pixels,
                     columns,
                     binning,
@@ -258,17 +260,18 @@ proptest! {
     #[test]
     fn what_any_bytes_configure_comes_back(
         numbers in any::<[u8; Configuration::BYTES]>(), minimum_count in 1u16..=1023,
-        choices in prop::array::uniform6(0u8..3), rule in 0u8..4, width in 0u8..9,
+        choices in prop::array::uniform7(0u8..3), rule in 0u8..4, width in 0u8..9,
         before in 200u16..1100, after in 200u16..1100, levels in 0u8..5, patience in 0u16..9, echoes in 0u8..6,
         host_timeout in prop_oneof![Just(0u16), 190u16..210, 59_990u16..60_010, any::<u16>()],
-        reserved in prop::option::of((54usize..67, 1u8..)),
+        reserved in prop::option::of((55usize..67, 1u8..)),
     ) {
         let mut bytes = numbers;
         bytes[2..4].copy_from_slice(&minimum_count.to_le_bytes());
-        let [source, estimator, dynamic_depth, reference, dead_time, tracking] = choices;
+        let [source, estimator, dynamic_depth, reference, dead_time, tracking, once_per_bin] = choices;
         for (at, value) in [
             (24, source), (25, rule), (26, width), (29, estimator), (34, dynamic_depth),
             (35, reference), (40, dead_time), (43, levels), (46, tracking), (47, echoes),
+            (54, once_per_bin),
         ] {
             bytes[at] = value;
         }
@@ -276,14 +279,14 @@ proptest! {
         bytes[32..34].copy_from_slice(&after.to_le_bytes());
         bytes[44..46].copy_from_slice(&patience.to_le_bytes());
         bytes[50..52].copy_from_slice(&host_timeout.to_le_bytes());
-        bytes[54..].fill(0);
+        bytes[55..].fill(0);
         if let Some((at, value)) = reserved {
             bytes[at] = value;
         }
         let found = Configuration::from_le_bytes(&bytes);
         let is_off_limits = host_timeout != 0 && !(200..=60_000).contains(&host_timeout);
         let unknown = source == 2 || rule == 3 || estimator == 2 || dynamic_depth == 2 || dead_time == 2
-            || (dynamic_depth == 1 && reference == 2)
+            || once_per_bin == 2 || (dynamic_depth == 1 && reference == 2)
             || levels == 4 || tracking == 2 || !(1..=4).contains(&echoes);
         prop_assert_eq!(
             found.is_err(),
@@ -294,6 +297,7 @@ proptest! {
         );
         if let Ok(configuration) = found {
             let given = u16::from_le_bytes([bytes[52], bytes[53]]);
+            prop_assert_eq!(configuration.once_per_bin, once_per_bin == 1);
             prop_assert_eq!(configuration.dead_time, (dead_time == 1).then_some(given));
             let again = Configuration::from_le_bytes(&configuration.to_le_bytes());
             prop_assert_eq!(again, Ok(configuration));

@@ -84,9 +84,10 @@ fn a_report_lies_as_the_document_says() {
     };
     report.statistics.ended_full = 35;
     report.statistics.blind_looks = 36;
+    report.statistics.repeated = 37;
     let wide = (1u64..=20).flat_map(u64::to_le_bytes);
     let narrow = (21u32..=32).flat_map(u32::to_le_bytes);
-    let last = (35u64..=36).flat_map(u64::to_le_bytes);
+    let last = (35u64..=37).flat_map(u64::to_le_bytes);
     let expected: Vec<u8> = wide.chain(narrow).chain([33, 34]).chain(last).collect();
     assert_eq!(report.to_le_bytes(), expected[..]);
 }
@@ -112,7 +113,7 @@ fn are_documented<T: Display>(all: &[T], number: impl Fn(&T) -> u8, table: &str)
 #[test]
 fn every_refusal_has_its_own_number_and_reason() {
     let all: Vec<Refusal> = (0..=255).filter_map(Refusal::from_number).collect();
-    assert_eq!(all.len(), 21);
+    assert_eq!(all.len(), 22);
     are_documented(&all, |&refusal| refusal as u8, "\n| reason | |\n");
 }
 

@@ -30,13 +30,15 @@
 
 static dtof_link_t link_to_host;
 static dtof_pixel_t pixels[PIXELS];
+static dtof_once_per_bin_t bins[PIXELS];
 static dtof_checked_config_t config;
 static dtof_statistics_t statistics;
 static dtof_aer_encoder_t encoder;
 static dtof_report_t report;
 static int is_configured, sensor_runs;
-/* From the configuration: how long the host may be silent. */
+/* From the configuration: how long the host may be silent, and whether photons count once per bin. */
 static uint16_t host_timeout_ms;
+static uint8_t once_per_bin;
 
 /* Words that wait for the link. */
 static uint8_t words[15 * DTOF_WORD_BYTES];
@@ -129,8 +131,10 @@ static dtof_status_t configure(const dtof_message_t *message)
     stop_sensor(DTOF_STOP_CONFIGURATION);
     config = checked;
     host_timeout_ms = requested.host_timeout_ms;
+    once_per_bin = requested.once_per_bin;
     for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
         check("pixel", dtof_pixel_init(&pixels[pixel], sizeof pixels[pixel], pixel));
+        check("bins", dtof_once_per_bin_init(&bins[pixel], sizeof bins[pixel]));
     }
     check("statistics", dtof_statistics_init(&statistics));
     report.cycles = 0;
@@ -277,6 +281,17 @@ static void work(void)
     }
 }
 
+/* Counts a photon as the host has configured it. */
+static void count(uint16_t pixel, uint16_t code)
+{
+    if (once_per_bin) {
+        check("photon", dtof_pixel_count_once_per_bin(&pixels[pixel], &config, &bins[pixel],
+                                                      &statistics, &code, 1));
+    } else {
+        check("photon", dtof_pixel_count(&pixels[pixel], &config, code));
+    }
+}
+
 /* A laser cycle: a target in each pixel, two bins farther per row, and background. */
 static void simulate(void)
 {
@@ -287,8 +302,9 @@ static void simulate(void)
         code = (drawn >> 31) ? (uint16_t)(30 + 2 * (pixel / 8))
                              : (uint16_t)((drawn >> 16) % DTOF_BINS);
         if ((drawn >> 28) % 4 == 0) {
-            check("photon", dtof_pixel_count(&pixels[pixel], &config, code));
+            count(pixel, code);
         }
+        check("bins", dtof_once_per_bin_end_laser_cycle(&bins[pixel]));
     }
     check("laser cycle", dtof_pixels_end_laser_cycles(pixels, PIXELS, report.cycles, &config,
                                                      &statistics, 1, NULL));

@@ -116,6 +116,15 @@
 // Its alignment.
 #define DTOF_PIXEL_ALIGN 8
 
+// Bytes of a dtof_once_per_bin_t.
+#define DTOF_ONCE_PER_BIN_SIZE (4 + (4 * ((DTOF_BINS + 31) / 32)))
+
+// The same in words of 32 bits.
+#define DTOF_ONCE_PER_BIN_WORDS (DTOF_ONCE_PER_BIN_SIZE / 4)
+
+// Its alignment.
+#define DTOF_ONCE_PER_BIN_ALIGN 4
+
 // Bytes of a dtof_histogram_t.
 #define DTOF_HISTOGRAM_SIZE (20 + (4 * DTOF_BINS))
 
@@ -260,7 +269,7 @@
 #define DTOF_SENSOR_BYTES 24
 
 // Bytes of the body of STATISTICS.
-#define DTOF_REPORT_BYTES 226
+#define DTOF_REPORT_BYTES 234
 
 // Photons come over the link.
 #define DTOF_SOURCE_LINK 0
@@ -375,6 +384,8 @@ enum dtof_status_t
     DTOF_ERROR_HOST_TIMEOUT = 77,
     // A reserved field of the configuration is not 0.
     DTOF_ERROR_RESERVED_FIELD = 78,
+    // Photons cannot count once per bin, as the sensor gives histograms.
+    DTOF_ERROR_ONCE_PER_BIN = 79,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -482,7 +493,7 @@ typedef struct dtof_counts_t {
     uint64_t rejected;
     // Photons outside the range gate.
     uint64_t gated_out;
-    // Photons in a bin that had one in the same laser cycle: 0, as C counts every photon.
+    // Photons in a bin that had one in the same laser cycle, with dtof_pixel_count_once_per_bin.
     uint64_t repeated;
     // Events.
     uint64_t events;
@@ -539,6 +550,14 @@ typedef struct dtof_event_t {
     // DTOF_FLAG_..., added up: below 32.
     uint8_t flags;
 } dtof_event_t;
+
+// The bins of one pixel that have had a photon in the present laser cycle:
+// dtof_once_per_bin_init makes it. Each pixel whose photons count once per bin needs its own.
+//
+// One thread or interrupt at a time may use it.
+typedef struct dtof_once_per_bin_t {
+    uint32_t opaque[DTOF_ONCE_PER_BIN_WORDS];
+} dtof_once_per_bin_t;
 
 // A histogram of DTOF_BINS counters of 24 bits. Each call of dtof_histogram_fill initialises it
 // anew. One thread or interrupt at a time may use it.
@@ -628,6 +647,10 @@ typedef struct dtof_device_config_t {
     uint16_t host_timeout_ms;
     // DTOF_SOURCE_...
     uint8_t source;
+    // 1 if the host asks that photons of one laser cycle in one bin count once: count them with
+    // dtof_pixel_count_once_per_bin. If your sensor gives histograms, refuse it with
+    // DTOF_ERROR_ONCE_PER_BIN.
+    uint8_t once_per_bin;
 } dtof_device_config_t;
 
 // The counts that a device keeps beside its statistics.
@@ -667,7 +690,7 @@ const char *dtof_version(void);
 uint16_t dtof_bins(void);
 
 // The body of DTOF_MESSAGE_REFUSED for a configuration that was refused with the error `status`:
-// 1 to 21. Errors without a number of their own give 1, "not known".
+// 1 to 22. Errors without a number of their own give 1, "not known".
 //
 // Threads: any.
 uint8_t dtof_refusal_of(uint8_t status);
@@ -819,6 +842,36 @@ dtof_status_t dtof_pixel_take_event(struct dtof_pixel_t *pixel,
 dtof_status_t dtof_pixel_add_photons(const struct dtof_pixel_t *pixel,
                                      struct dtof_statistics_t *statistics);
 
+// Initialises it at the beginning of a laser cycle. `size` is `sizeof *once_per_bin`.
+//
+// Errors: DTOF_ERROR_SIZE if the library was built for another number of bins,
+// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+// Threads: no other thread uses `once_per_bin` during the call.
+dtof_status_t dtof_once_per_bin_init(struct dtof_once_per_bin_t *once_per_bin, size_t size);
+
+// Ends a laser cycle, with photons or without. Call it for each pixel, beside
+// dtof_pixel_end_laser_cycles or dtof_pixels_end_laser_cycles.
+//
+// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+// Threads: no other thread uses `once_per_bin` during the call.
+dtof_status_t dtof_once_per_bin_end_laser_cycle(struct dtof_once_per_bin_t *once_per_bin);
+
+// Counts `number` photons of the present laser cycle as dtof_pixel_count_batch does, except those
+// in a bin that has had one: `statistics` counts them as repeated. The photons of a laser cycle may
+// come in several calls. Raindrops, which send many photons back in one laser cycle, are then
+// hardly ever events. Targets with more than half a photon a laser cycle in a bin lose a fifth
+// of their light or more.
+//
+// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
+// DTOF_ERROR_NOT_INITIALISED. `codes` may be null if `number` is 0.
+// Threads: no other thread uses `pixel`, `once_per_bin` or `statistics` during the call.
+dtof_status_t dtof_pixel_count_once_per_bin(struct dtof_pixel_t *pixel,
+                                            const struct dtof_checked_config_t *config,
+                                            struct dtof_once_per_bin_t *once_per_bin,
+                                            struct dtof_statistics_t *statistics,
+                                            const uint16_t *codes,
+                                            size_t number);
+
 // Fills a histogram with `counts`, the photons of DTOF_BINS bins, and adds them to `statistics`:
 // photons outside the gate as gated out, those above 16,777,215 in a bin as saturated. `size` is
 // `sizeof *histogram`.
@@ -837,7 +890,8 @@ dtof_status_t dtof_histogram_fill(struct dtof_histogram_t *histogram,
 // `cycle` are copied into the events. `exposure` is the number of laser cycles in the histogram, by
 // which a dead time weighs bins; an event holds 65,535 at most. `config` must be that of
 // dtof_histogram_fill. With several echoes, the bins around all but the last are emptied, so fill
-// the histogram again before the next call.
+// the histogram again before the next call. With a dead time and the window rule they are not:
+// their photons stay in their counters, and are left out.
 //
 // Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
 // Threads: no other thread uses `histogram` or `statistics` during the call.

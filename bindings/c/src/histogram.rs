@@ -72,7 +72,8 @@ pub unsafe extern "C" fn dtof_histogram_fill(
 /// `cycle` are copied into the events. `exposure` is the number of laser cycles in the histogram, by
 /// which a dead time weighs bins; an event holds 65,535 at most. `config` must be that of
 /// dtof_histogram_fill. With several echoes, the bins around all but the last are emptied, so fill
-/// the histogram again before the next call.
+/// the histogram again before the next call. With a dead time and the window rule they are not:
+/// their photons stay in their counters, and are left out.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
 /// Threads: no other thread uses `histogram` or `statistics` during the call.

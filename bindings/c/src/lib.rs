@@ -26,6 +26,7 @@
 //! | `config` | settings, and the configuration built from them |
 //! | `event`, `statistics`, `range` | plain values, counts, millimetres |
 //! | `pixel`, `histogram` | pixels, and histograms counted by the sensor |
+//! | `once_per_bin` | photons of one laser cycle in one bin that count once |
 //! | `aer` | events as words of 16 bytes |
 //! | `link`, `records`, `histogram_message` | the device's end of the link, and the bodies of its messages |
 
@@ -49,6 +50,7 @@ mod histogram;
 mod histogram_message;
 mod link;
 mod memory;
+mod once_per_bin;
 mod pixel;
 mod range;
 mod records;
@@ -62,6 +64,7 @@ pub use event::*;
 pub use histogram::*;
 pub use histogram_message::*;
 pub use link::*;
+pub use once_per_bin::*;
 pub use pixel::*;
 pub use range::*;
 pub use records::*;

@@ -20,7 +20,7 @@ use crate::version::DTOF_BINS;
 pub const DTOF_SENSOR_BYTES: usize = 24;
 const _: () = assert!(DTOF_SENSOR_BYTES == SensorRecord::BYTES);
 /// Bytes of the body of STATISTICS.
-pub const DTOF_REPORT_BYTES: usize = 226;
+pub const DTOF_REPORT_BYTES: usize = 234;
 const _: () = assert!(DTOF_REPORT_BYTES == Report::BYTES);
 
 /// Photons come over the link.
@@ -47,6 +47,10 @@ pub struct dtof_device_config_t {
     pub host_timeout_ms: u16,
     /// DTOF_SOURCE_...
     pub source: u8,
+    /// 1 if the host asks that photons of one laser cycle in one bin count once: count them with
+    /// dtof_pixel_count_once_per_bin. If your sensor gives histograms, refuse it with
+    /// DTOF_ERROR_ONCE_PER_BIN.
+    pub once_per_bin: u8,
 }
 
 /// Reads the body of CONFIGURE. Blocks of pixels and dynamic depth are refused, as this library
@@ -88,6 +92,7 @@ pub unsafe extern "C" fn dtof_device_config_read(
                 Source::Link => DTOF_SOURCE_LINK,
                 Source::Sensor => DTOF_SOURCE_SENSOR,
             },
+            once_per_bin: requested.once_per_bin.into(),
         };
         // SAFETY: the same promise.
         unsafe { put(config, read) }

@@ -104,6 +104,8 @@ pub enum dtof_status_t {
     DTOF_ERROR_HOST_TIMEOUT = 77,
     /// A reserved field of the configuration is not 0.
     DTOF_ERROR_RESERVED_FIELD = 78,
+    /// Photons cannot count once per bin, as the sensor gives histograms.
+    DTOF_ERROR_ONCE_PER_BIN = 79,
 }
 
 use dtof_status_t::*;
@@ -160,7 +162,7 @@ impl From<AerError> for dtof_status_t {
 }
 
 /// Each refusal of the link with its errors.
-const REFUSALS: [(Refusal, dtof_status_t); 22] = [
+const REFUSALS: [(Refusal, dtof_status_t); 23] = [
     (Refusal::Unknown, DTOF_ERROR_CONFIGURATION),
     (Refusal::ZeroX, DTOF_ERROR_ZERO_X),
     (Refusal::XAboveL1, DTOF_ERROR_X_ABOVE_L1),
@@ -183,6 +185,7 @@ const REFUSALS: [(Refusal, dtof_status_t); 22] = [
     (Refusal::HostTimeout, DTOF_ERROR_HOST_TIMEOUT),
     (Refusal::Reserved, DTOF_ERROR_RESERVED_FIELD),
     (Refusal::DeadTime, DTOF_ERROR_DEAD_TIME),
+    (Refusal::OncePerBin, DTOF_ERROR_ONCE_PER_BIN),
 ];
 
 impl From<Refusal> for dtof_status_t {
@@ -194,7 +197,7 @@ impl From<Refusal> for dtof_status_t {
 }
 
 /// The body of DTOF_MESSAGE_REFUSED for a configuration that was refused with the error `status`:
-/// 1 to 21. Errors without a number of their own give 1, "not known".
+/// 1 to 22. Errors without a number of their own give 1, "not known".
 ///
 /// Threads: any.
 #[unsafe(no_mangle)]
@@ -215,7 +218,7 @@ pub extern "C" fn dtof_status_text(status: u8) -> *const c_char {
 }
 
 /// The text of every status. A test compares it with the enum.
-const TEXTS: [(dtof_status_t, &CStr); 44] = [
+const TEXTS: [(dtof_status_t, &CStr); 45] = [
     (DTOF_OK, c"done"),
     (DTOF_ERROR_NULL, c"a pointer is null"),
     (DTOF_ERROR_ALIGNMENT, c"a pointer is not aligned"),
@@ -317,4 +320,8 @@ const TEXTS: [(dtof_status_t, &CStr); 44] = [
         c"the host timeout must be 200 to 60000 ms",
     ),
     (DTOF_ERROR_RESERVED_FIELD, c"a reserved field is not 0"),
+    (
+        DTOF_ERROR_ONCE_PER_BIN,
+        c"the sensor gives histograms, where photons cannot count once per bin",
+    ),
 ];

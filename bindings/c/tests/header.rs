@@ -7,7 +7,7 @@ use std::path::Path;
 use cbindgen::{Builder, Config};
 
 /// In the order of the header.
-const SOURCES: [&str; 12] = [
+const SOURCES: [&str; 13] = [
     "version",
     "status",
     "config",
@@ -15,6 +15,7 @@ const SOURCES: [&str; 12] = [
     "statistics",
     "range",
     "pixel",
+    "once_per_bin",
     "histogram",
     "aer",
     "link",

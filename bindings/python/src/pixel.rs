@@ -2,7 +2,8 @@
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::{
-    AnyRule, AsyncPixel, DepthEvent, LaserCycle, PixelAddress, PixelConfig, RangeScale, Statistics,
+    AnyRule, AsyncPixel, DepthEvent, LaserCycle, OncePerBin, PixelAddress, PixelConfig, RangeScale,
+    Statistics,
 };
 use dtof_engine::settings::Settings;
 use dtof_engine::with_bins;
@@ -23,9 +24,14 @@ trait AnyPixel: Send + Sync {
     fn statistics(&self) -> Statistics;
 }
 
+/// Those of the widest histogram.
+type Bins = OncePerBin<{ OncePerBin::words(1024) }>;
+
 struct PixelOf<const BINS: usize> {
     config: PixelConfig<BINS, AnyRule>,
     pixel: AsyncPixel<BINS>,
+    /// If photons count once per bin.
+    bins: Option<Bins>,
     statistics: Statistics,
 }
 
@@ -34,6 +40,7 @@ impl<const BINS: usize> PixelOf<BINS> {
         Ok(Box::new(Self {
             config: settings.config()?,
             pixel: AsyncPixel::new(address),
+            bins: settings.once_per_bin.then(Bins::new),
             statistics: Statistics::new(),
         }))
     }
@@ -41,10 +48,23 @@ impl<const BINS: usize> PixelOf<BINS> {
 
 impl<const BINS: usize> AnyPixel for PixelOf<BINS> {
     fn count(&mut self, bins: &[u16]) {
-        self.pixel.count_batch(&self.config, bins);
+        let Some(seen) = &mut self.bins else {
+            self.pixel.count_batch(&self.config, bins);
+            return;
+        };
+        // Photons past the last bin are all rejected.
+        let photons = bins.iter().copied();
+        let first: Vec<u16> = photons
+            .filter(|&bin| usize::from(bin) >= BINS || seen.is_first(bin))
+            .collect();
+        self.pixel.count_batch(&self.config, &first);
+        self.statistics.repeated += (bins.len() - first.len()) as u64;
     }
 
     fn end(&mut self, last: LaserCycle, cycles: u16) -> Option<DepthEvent> {
+        if let Some(seen) = &mut self.bins {
+            seen.end_laser_cycle();
+        }
         let statistics = &mut self.statistics;
         self.pixel
             .end_laser_cycles(&self.config, statistics, last, cycles);
@@ -135,6 +155,7 @@ impl Pixel {
             ("saturated", of.saturated),
             ("rejected", of.rejected),
             ("gated_out", of.gated_out),
+            ("repeated", of.repeated),
             ("events", of.events),
             ("expired", of.expired),
             ("ended_full", of.ended_full),

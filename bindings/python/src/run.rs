@@ -84,11 +84,12 @@ fn run_replay(
     let mut replay = options.open_part(input, requested, layout)?;
     let mut records = Records::of(&replay.settings, &replay.photons)?;
     let result = replay.run(input, &mut records, &mut { control })?;
+    let of_run = result.warnings.clone();
     Ok(Finished {
         records,
         result,
         requested: replay.requested.with_settings(&replay.settings),
-        warnings: warnings(&replay.metadata).collect(),
+        warnings: warnings(&replay.metadata).chain(of_run).collect(),
     })
 }
 
@@ -121,10 +122,10 @@ fn run_simulation(
     let mut records = Records::of(settings, photons)?;
     let result = simulation.run(engine.as_mut(), &mut records, &mut { control })?;
     Ok(Finished {
+        warnings: result.warnings.clone(),
         records,
         result,
         requested: simulation.requested.with_settings(&simulation.settings),
-        warnings: Vec::new(),
     })
 }
 

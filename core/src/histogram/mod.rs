@@ -137,19 +137,28 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
     pub(crate) fn add_gated_batch(&mut self, codes: &[u16], gate: &RangeGate<BINS>) -> u32 {
         // Bins from 0 on save an instruction a photon.
         if gate.is_full() {
-            self.add_gated_inlined(codes, &RangeGate::full())
+            self.add_gated_where(codes, &RangeGate::full(), |_| true)
         } else {
-            self.add_gated_inlined(codes, gate)
+            self.add_gated_where(codes, gate, |_| true)
         }
     }
 
+    /// The same of the photons for which `counts` is true. The total has the others as well.
     #[inline(always)]
-    fn add_gated_inlined(&mut self, codes: &[u16], gate: &RangeGate<BINS>) -> u32 {
+    pub(crate) fn add_gated_where(
+        &mut self,
+        codes: &[u16],
+        gate: &RangeGate<BINS>,
+        mut counts: impl FnMut(u16) -> bool,
+    ) -> u32 {
         // Local, so that they stay in registers.
         let (mut peak_key, mut saturated, mut rejected, mut gated_out) = (self.peak_key, 0, 0, 0);
         let counters = self.counts.get_mut(gate.bins()).unwrap_or_default();
         let first = usize::from(gate.first());
         let mut count = |&code: &u16| {
+            if !counts(code) {
+                return;
+            }
             // One comparison: bins before the first wrap to the far end.
             match counters.get_mut(usize::from(code).wrapping_sub(first)) {
                 Some(counter) => {

@@ -29,9 +29,9 @@ proptest! {
         let (mut gated_out, mut rejected) = (0, 0);
         for cycle in &cycles {
             for codes in cycle.chunks(split) {
-                pixel.count_once_per_bin(&config, &mut bins, codes);
+                pixel.count_once_per_bin(&config, &mut statistics, &mut bins, codes);
             }
-            bins.end_laser_cycle(&mut statistics);
+            bins.end_laser_cycle();
             let set: BTreeSet<u16> = cycle.iter().copied().filter(|&code| code < 64).collect();
             for code in set {
                 if code < first {
@@ -87,8 +87,8 @@ fn run(signal: f64, has_rain: bool, is_once: bool, events: f64) -> Outcome {
             codes.extend((0..photons).map(|_| pulse.sample(&mut rng) as u16));
         }
         if is_once {
-            pixel.count_once_per_bin(&config, &mut bins, &codes);
-            bins.end_laser_cycle(&mut statistics);
+            pixel.count_once_per_bin(&config, &mut statistics, &mut bins, &codes);
+            bins.end_laser_cycle();
         } else {
             pixel.count_batch(&config, &codes);
         }

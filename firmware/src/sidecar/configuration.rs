@@ -20,6 +20,9 @@ impl Sidecar<'_> {
             if !sensor.has_bins_of(requested.bin_width_ps) {
                 return Err(Refusal::BinWidth);
             }
+            if requested.once_per_bin && sensor.gives_histograms {
+                return Err(Refusal::OncePerBin);
+            }
             // Bins that are not measured would count as bins without background.
             last = last.min(sensor.bins.saturating_sub(1));
         }
@@ -77,6 +80,7 @@ impl Sidecar<'_> {
         self.dynamic_depth = dynamic_depth;
         self.bin_width = requested.bin_width_ps;
         self.source = requested.source;
+        self.once_per_bin = requested.once_per_bin;
         self.host_timeout_ms = requested.host_timeout_ms;
         self.stopping.get_or_insert(StopReason::Configuration);
         self.started = false;

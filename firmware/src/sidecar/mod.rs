@@ -27,7 +27,8 @@ use dtof_core::binning::{BlockLink, BlockPlace};
 use dtof_core::events::{DynamicDepthConfig, DynamicDepthPixel};
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{
-    AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, PixelAddress, PixelConfig, Statistics,
+    AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, OncePerBin, PixelAddress, PixelConfig,
+    Statistics,
 };
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
@@ -56,6 +57,8 @@ type Answer = (u8, Vec<u8, BODY_BYTES>);
 #[derive(Debug)]
 pub struct Pixel {
     detector: AsyncPixel<BINS>,
+    /// Used if photons count once per bin.
+    bins: OncePerBin<{ OncePerBin::words(BINS) }>,
     feed: BlockLink,
     dynamic_depth: DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>,
 }
@@ -64,6 +67,7 @@ impl Pixel {
     const fn new(address: PixelAddress, feed: BlockLink) -> Self {
         Self {
             detector: AsyncPixel::new(address),
+            bins: OncePerBin::new(),
             feed,
             dynamic_depth: DynamicDepthPixel::new(),
         }
@@ -120,6 +124,8 @@ pub struct Sidecar<'a> {
     /// Of the configuration in force, for sensors that measure times.
     bin_width: U16F16,
     source: Source,
+    /// Of the configuration in force: photons of one laser cycle in one bin count once.
+    once_per_bin: bool,
     sensor: Option<SensorInfo>,
     /// The sensor has been started and not been stopped.
     running: bool,
@@ -193,6 +199,7 @@ impl<'a> Sidecar<'a> {
             dynamic_depth: None,
             bin_width: U16F16::ZERO,
             source: Source::Link,
+            once_per_bin: false,
             sensor,
             running: false,
             started: false,

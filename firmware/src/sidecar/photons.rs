@@ -68,6 +68,10 @@ impl Sidecar<'_> {
             self.unaddressed += 1;
             return;
         };
+        if self.once_per_bin && !pixel.bins.is_first(code) {
+            self.statistics.repeated += 1;
+            return;
+        }
         pixel.detector.count(config, code);
         if let Some((config, _)) = &self.binning {
             count_in_blocks(self.blocks, &pixel.feed, config, code);
@@ -93,6 +97,9 @@ impl Sidecar<'_> {
         let mut fired = false;
         for pixel in self.pixels.iter_mut() {
             let (detector, statistics) = (&mut pixel.detector, &mut self.statistics);
+            if self.once_per_bin {
+                pixel.bins.end_laser_cycle();
+            }
             if detector.end_laser_cycles(config, statistics, last, ended) == Look::Event {
                 pixel.feed.reported();
                 fired = true;

@@ -24,6 +24,7 @@ pub const CONFIGURATION: Configuration = Configuration {
     l2: 200,
     gate: (0, 127),
     dead_time: None,
+    once_per_bin: false,
     pixels: 8,
     columns: 8,
     binning: None,

@@ -38,6 +38,10 @@ fn costs_are_the_counted_instructions() {
     for (cost, counted) in [
         (cost::PHOTON, counted("AsyncPixel::count_batch")),
         (
+            cost::ONCE_PER_BIN,
+            counted("AsyncPixel::count_once_per_bin"),
+        ),
+        (
             cost::FEED,
             counted(&format!("{feeds}feeds none")) - counted("AsyncPixel::count"),
         ),
@@ -211,7 +215,7 @@ fn the_slowest_pixels_of_the_answer_lie_between_those_of_its_trials() {
         for (outcome, slow) in outcomes.iter_mut().zip(slow) {
             outcome.figures.slow_cycles = slow;
         }
-        let methods = Method::all(U8F8::ONE, 2, 0);
+        let methods = Method::all(U8F8::ONE, 2, &Settings::static_scene(1));
         answer(&methods, &outcomes, 10.0).candidates[0].slow_cycles
     };
     assert!((slowest([200.0, 800.0]) - 400.0).abs() < 1e-3);
@@ -241,7 +245,7 @@ fn outcome(method: usize, effort: u16, cycles: f64, error_mm: f64, instructions:
 
 #[test]
 fn the_cheapest_of_the_nearly_fastest_is_taken() {
-    let methods = Method::all(U8F8::ONE, 2, 0);
+    let methods = Method::all(U8F8::ONE, 2, &Settings::static_scene(1));
     let frames = methods.len() - 1;
     assert_eq!(methods[frames].kind, Kind::Frames);
     let all = [

@@ -21,6 +21,7 @@ use dtof_engine::settings::Settings;
 use dtof_link::{AdaptiveBinning, FaultRecord, Source};
 use dtof_photons::source::PhotonSource;
 use dtof_simulate::demo;
+use dtof_simulate::effects::tdc::Tdc;
 
 use crate::emulator::{Board, Emulator, End, Laser, Overflow, QEMU};
 use crate::{dtof, enabled, histograms, root, skipped, stack, succeed, target_folder, version};
@@ -53,6 +54,8 @@ fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
         (with_windows(), 5300, 150),
         (with_all(), 2000, 0),
         (with_all(), 500, 150),
+        (with_dead_time(), 2000, 0),
+        (once_per_bin(), 1000, 0),
     ] {
         let reads_every = Duration::from_millis(reads_every);
         used.push(agrees(
@@ -101,6 +104,8 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
         agrees(board, &image, &settings(), array, 200, Duration::ZERO)?,
         agrees(board, &image, &with_windows(), array, 200, Duration::ZERO)?,
         agrees(board, &image, &with_all(), array, 400, Duration::ZERO)?,
+        agrees(board, &image, &with_dead_time(), array, 400, Duration::ZERO)?,
+        agrees(board, &image, &once_per_bin(), array, 400, Duration::ZERO)?,
         senses(board, &image)?,
     ];
     stack::check(&image, &used)?;
@@ -284,6 +289,23 @@ pub fn with_all() -> Settings {
     }
 }
 
+/// A TDC that is dead for 20 bins after each photon, with tracking and two echoes.
+pub fn with_dead_time() -> Settings {
+    Settings {
+        binning: None,
+        dead_time: 20,
+        ..with_all()
+    }
+}
+
+/// Blocks, and photons that count once per bin.
+pub fn once_per_bin() -> Settings {
+    Settings {
+        once_per_bin: true,
+        ..with_all()
+    }
+}
+
 /// A board and this computer find the same events and counts in the demo's scene, for every rule and
 /// for slow hosts. Returns the bytes of
 /// stack used.
@@ -315,7 +337,15 @@ pub fn decides_alike(
     cycles: u16,
 ) -> Result<String> {
     let start = Instant::now();
-    let mut photons = demo::photons(array, settings.seed, cycles.into())?;
+    let mut scene = demo::scene()?;
+    scene.size = [array.columns(), array.rows()];
+    // The photons of such a TDC.
+    let dead_time_bins = (settings.dead_time > 0).then_some(settings.dead_time);
+    scene.effects.tdc = dead_time_bins.map(|bins| Tdc {
+        dead_time_bins: Some(bins),
+        ..Tdc::default()
+    });
+    let mut photons = scene.photons(settings.seed, cycles.into())?;
     let addresses = photons.addresses();
     let slice = photons.next_slice(cycles)?;
     let mut on_host = host_engine(settings, array, &addresses)?;
@@ -329,6 +359,12 @@ pub fn decides_alike(
         "the counts differ from this computer's"
     );
     let [pixels, blocks] = statistics;
+    ensure!(!events.is_empty(), "no events");
+    ensure!(
+        settings.once_per_bin == (pixels.repeated > 0),
+        "{} photons in a bin that had one",
+        pixels.repeated
+    );
     ensure!(
         settings.binning.is_some() == (blocks.events > 0),
         "{} events of blocks",

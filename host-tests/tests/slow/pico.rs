@@ -20,7 +20,7 @@ use dtof_photons::source::{Photon, PixelPhotons, Slice};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::boards::{decides_alike, settings, with_all};
+use crate::boards::{decides_alike, once_per_bin, settings, with_all, with_dead_time};
 use crate::rp2040::{NODE, NPM, Rp2040, image, install, run, write_edges};
 use crate::{enabled, root, stack, target_folder};
 
@@ -51,6 +51,8 @@ fn pico_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     for (settings, cycles, over_usb) in [
         (settings(), 500, false),
         (with_all(), 500, false),
+        (with_dead_time(), 500, false),
+        (once_per_bin(), 300, false),
         (settings(), 200, true),
     ] {
         let mut board = if over_usb {

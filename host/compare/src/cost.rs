@@ -9,6 +9,8 @@ use dtof_engine::settings::Settings;
 
 /// Counting a photon (`AsyncPixel::count_batch`).
 pub const PHOTON: f64 = 10.22;
+/// Counting it if it is the first of its bin in a laser cycle (`AsyncPixel::count_once_per_bin`).
+pub const ONCE_PER_BIN: f64 = 28.57;
 /// Asking whether it also counts in blocks (`count and count_in_blocks; feeds none`, less
 /// `AsyncPixel::count`).
 pub const FEED: f64 = 32.56 - 28.56;
@@ -21,9 +23,9 @@ pub const AVERAGE: f64 = 32.0;
 /// The same with tracking (`look; tracking; no event`).
 pub const TRACKING: f64 = 410.23;
 /// The same with a dead time (`look; dead time of 20 bins; no event`).
-pub const DEAD_TIME: f64 = 7052.80;
+pub const DEAD_TIME: f64 = 6975.64;
 /// The same with a dead time of all bins (`look; dead time; first photon only; no event`).
-pub const FIRST_PHOTON: f64 = 4038.23;
+pub const FIRST_PHOTON: f64 = 4170.06;
 /// The same for a block (`look; block; no event`).
 pub const BLOCK_LOOK: f64 = 247.88;
 /// An exposure that L2 ends (`look at L2`).
@@ -93,7 +95,12 @@ pub fn instructions(
         DepthEstimator::CentredWindow(_) => CENTRED,
     };
     let events = pixels.events + blocks.events;
-    let sum = PHOTON * pixels.photons() as f64
+    let photon = if settings.once_per_bin {
+        ONCE_PER_BIN
+    } else {
+        PHOTON
+    };
+    let sum = photon * pixels.photons() as f64
         + look(method, settings) * looks
         + (EVENT + depth) * events as f64
         + EXPIRY * pixels.expired as f64

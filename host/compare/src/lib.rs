@@ -123,7 +123,7 @@ impl<'a> Methods<'a> {
     fn new(task: &Task<'a>, light: &Light, most_levels: u8) -> Result<Self> {
         let settings = task.settings;
         let pulse = dtof_core::fixed::types::U8F8::saturating_from_num(light.sigma);
-        let methods = Method::all(pulse, most_levels, settings.dead_time);
+        let methods = Method::all(pulse, most_levels, settings);
         let mut rules: Vec<Rule> = methods.iter().filter_map(Method::rule).collect();
         rules.dedup();
         let simulated = Thresholds::simulate(&rules, settings, light.background, settings.seed)?;

@@ -59,6 +59,8 @@ pub enum Kind {
         tracking: bool,
         /// Whether the rule weighs bins by the dead time of the TDC.
         weighs: bool,
+        /// Whether photons of one laser cycle in one bin count once.
+        once_per_bin: bool,
     },
     /// Readings of frames.
     Frames,
@@ -86,6 +88,7 @@ impl Method {
                 levels: 0,
                 tracking: false,
                 weighs: false,
+                once_per_bin: false,
             },
             centroid: false,
             pen,
@@ -93,9 +96,10 @@ impl Method {
     }
 
     /// All methods for a pulse of standard deviation `sigma` bins, in an array that has blocks of up to
-    /// `most_levels` levels, of a TDC with this dead time. Frames are the last.
+    /// `most_levels` levels. With a dead time in `like`, or photons that count once per bin, the window is
+    /// tried with it and without. Frames are the last.
     #[must_use]
-    pub fn all(sigma: U8F8, most_levels: u8, dead_time: u16) -> Vec<Self> {
+    pub fn all(sigma: U8F8, most_levels: u8, like: &Settings) -> Vec<Self> {
         let width = WindowRule::width_for_pulse(sigma);
         let window = Rule::Window(width);
         let name = format!("window of {width}");
@@ -118,18 +122,32 @@ impl Method {
                 levels,
                 tracking,
                 weighs: false,
+                once_per_bin: false,
             },
             ..Self::events(name, window, pen)
         };
-        if dead_time > 0 {
+        if like.dead_time > 0 {
             methods.push(Self {
                 kind: Kind::Events {
                     rule: window,
                     levels: 0,
                     tracking: false,
                     weighs: true,
+                    once_per_bin: false,
                 },
                 ..Self::events(format!("{name}, dead time"), window, palette::window(4))
+            });
+        }
+        if like.once_per_bin {
+            methods.push(Self {
+                kind: Kind::Events {
+                    rule: window,
+                    levels: 0,
+                    tracking: false,
+                    weighs: false,
+                    once_per_bin: true,
+                },
+                ..Self::events(format!("{name}, once per bin"), window, palette::window(6))
             });
         }
         methods.push(more("tracking", 0, true, palette::window(5)));
@@ -205,6 +223,13 @@ impl Method {
             tracking: false,
             frame: None,
             dead_time: if self.weighs() { like.dead_time } else { 0 },
+            once_per_bin: matches!(
+                self.kind,
+                Kind::Events {
+                    once_per_bin: true,
+                    ..
+                }
+            ),
             ..like.clone()
         };
         Ok(match self.kind {

@@ -129,6 +129,8 @@ impl Collecting<'_> {
             gate: None,
             // The rule does not weigh bins, and no event is used.
             dead_time: 0,
+            // Every photon is counted.
+            once_per_bin: false,
             x: X,
             l1: X,
             l2: self.l2,

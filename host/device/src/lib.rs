@@ -68,6 +68,7 @@ impl Task<'_> {
             l2: settings.l2,
             gate: settings.gate.unwrap_or((0, last_bin)),
             dead_time: Some(settings.dead_time),
+            once_per_bin: settings.once_per_bin,
             pixels: self.pixels,
             columns: u16::try_from(self.columns)?,
             binning: settings.binning,

@@ -8,6 +8,7 @@ use super::Engine;
 use super::decisions::Decision;
 use super::frame::FrameEngine;
 use super::group::{Configs, Done, Group};
+use super::once_per_bin::OncePerBinEngine;
 use crate::settings::Settings;
 use crate::with_bins;
 use dtof_photons::source::Slice;
@@ -55,7 +56,7 @@ impl<const BINS: usize> HostEngine<BINS> {
                     .collect()
             }
         };
-        Ok(Box::new(Self {
+        let engine = Box::new(Self {
             configs: Configs {
                 pixels: settings.config()?,
                 blocks: settings.block_config()?,
@@ -64,7 +65,12 @@ impl<const BINS: usize> HostEngine<BINS> {
             groups,
             pixels: Statistics::new(),
             blocks: Statistics::new(),
-        }))
+        });
+        Ok(if settings.once_per_bin {
+            Box::new(OncePerBinEngine::new(engine, BINS))
+        } else {
+            engine
+        })
     }
 }
 

@@ -6,7 +6,9 @@ use dtof_core::fixed::types::U8F8;
 
 use super::calibrate::calibrate_counts;
 use super::given::{Given, SENSOR, TDC, of_given};
-use super::recording::{RECORDING, bin_width_warning, read_options, settings_of_file, warnings};
+use super::recording::{
+    RECORDING, bin_width_warning, check_once_per_bin, read_options, settings_of_file, warnings,
+};
 use super::simulate::settings_of_scene;
 use dtof_calibrate::CalibrationOptions;
 use dtof_compare::truth::Truth;
@@ -37,7 +39,7 @@ impl dtof_options::Options for Options {
         RECORDING,
         SENSOR,
         TDC,
-        &["cycles", "seed"],
+        &["once_per_bin", "cycles", "seed"],
     ];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
@@ -215,6 +217,8 @@ impl Options {
     ) -> Result<Subject> {
         let counts = counts(&input, &read_options(&requested))?;
         self.given.suits(&input, &counts.metadata)?;
+        let is_once_per_bin = requested.detection.once_per_bin == Some(true);
+        check_once_per_bin(is_once_per_bin, counts.metadata.is_list)?;
         let width = bin_width_warning(&counts.metadata, &requested);
         warnings(&counts.metadata)
             .chain(width)

@@ -1,6 +1,7 @@
 #![doc = include_str!("../README.md")]
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
+mod bright;
 pub mod calibrate;
 pub mod compare;
 pub mod given;

@@ -28,6 +28,18 @@ pub const RECORDING: &[&str] = &[
 /// The options for the laser cycles of recorded histograms.
 const LENGTH: &[&str] = &["photons_per_cycle", "recorded_cycles"];
 
+/// Refuses photons that count once per bin, if that is on and the recording is no list of photons.
+///
+/// # Errors
+/// Returns the reason.
+pub(super) fn check_once_per_bin(is_on: bool, is_list: bool) -> Result<(), Refused> {
+    if is_on && !is_list {
+        let reason = "needs photons: a histogram does not say which came in one laser cycle";
+        return Err(Refused::new("once_per_bin", reason));
+    }
+    Ok(())
+}
+
 impl Given {
     /// The options over the file, for a recording.
     ///

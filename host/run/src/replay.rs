@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, ensure};
 
 use super::given::{FRAME, Given, SENSOR, TDC, of_given};
-use super::recording::{RECORDING, read_options, settings_of_file};
+use super::recording::{RECORDING, check_once_per_bin, read_options, settings_of_file};
 use super::run::{RunResult, Sink, run};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
@@ -71,7 +71,8 @@ impl Replay {
         result.summary.input = Some(input.to_string());
         result.summary.cut_off = self.metadata.cut_off;
         result.summary.recording.clone_from(&self.metadata.rows);
-        result.summary.warnings.clone_from(&self.metadata.warnings);
+        let warnings = self.metadata.warnings.iter().cloned();
+        result.summary.warnings.extend(warnings);
         Ok(result)
     }
 }
@@ -133,6 +134,8 @@ impl Options {
                 "needs `recorded_cycles`: histograms are weighed by them"
             )
         );
+        let is_once_per_bin = settings.once_per_bin && settings.frame.is_none();
+        check_once_per_bin(is_once_per_bin, metadata.is_list)?;
         if let Some(binning) = settings.binning {
             let ([column, row], side) = (photons.axis_names(), 1 << binning.levels.raw());
             ensure!(

@@ -3,6 +3,7 @@
 use anyhow::Result;
 use dtof_core::DepthEvent;
 
+use crate::bright::Brightness;
 use crate::glass::watch_glass;
 use crate::summary::Summary;
 use dtof_engine::Engine;
@@ -33,6 +34,8 @@ pub struct RunResult {
     pub summary: Summary,
     /// Its photons bin by bin, if the settings have the crosstalk of the cover glass.
     pub bins: Option<Vec<u64>>,
+    /// Warnings about its photons, which are also in the summary.
+    pub warnings: Vec<String>,
 }
 
 /// Runs all of `source` with `settings`, which resolve `requested`, into `sinks`.
@@ -50,6 +53,9 @@ pub fn run(
     let mut has_reported = vec![false; array.pixels() as usize];
     let has_glass = requested.sensor.glass_bins.is_some();
     let mut bins = has_glass.then(|| vec![0; settings.bins]);
+    let addresses = source.addresses();
+    let is_once_per_bin = settings.once_per_bin && settings.frame.is_none();
+    let mut brightness = is_once_per_bin.then(|| Brightness::new(addresses.len(), settings.bins));
     for sink in &mut *sinks {
         sink.begin(source, engine);
     }
@@ -67,6 +73,9 @@ pub fn run(
             if let Some(bins) = &mut bins {
                 add_photons(slice, bins);
             }
+            if let Some(brightness) = &mut brightness {
+                brightness.add(slice);
+            }
             for sink in &mut *sinks {
                 sink.take(slice, &events)?;
             }
@@ -80,7 +89,14 @@ pub fn run(
     let reporting = has_reported.into_iter().filter(|&has| has).count();
     let mut summary = Summary::new(engine.statistics(), source, reporting, settings);
     watch_glass(requested, bins.as_deref(), &mut summary);
-    Ok(RunResult { summary, bins })
+    let warning = brightness.and_then(|brightness| brightness.warning(&addresses));
+    let warnings: Vec<String> = warning.into_iter().collect();
+    summary.warnings.clone_from(&warnings);
+    Ok(RunResult {
+        summary,
+        bins,
+        warnings,
+    })
 }
 
 /// Photons past the last bin are left out; statistics count them.

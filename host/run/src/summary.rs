@@ -33,7 +33,7 @@ pub struct Summary {
     pub recorded_cycles: Option<(u64, u64)>,
     /// Laser cycles.
     pub cycles: u64,
-    /// Photons offered to the pixels: counted, saturated, rejected or gated out.
+    /// Photons offered to the pixels: counted, saturated, rejected, gated out or repeated.
     pub photons: u64,
     /// Depth events.
     pub events: u64,
@@ -53,6 +53,8 @@ pub struct Summary {
     pub saturated_in_blocks: u64,
     /// Photons outside the range gate.
     pub gated_out: u64,
+    /// Photons that did not count, as they were not the first of their bin in a laser cycle.
+    pub repeated: u64,
     /// Photons of pixels that are left out.
     pub masked: u64,
     /// Decisions put off because the event before was not taken yet.
@@ -64,8 +66,8 @@ pub struct Summary {
     /// Exposures that ended because a counter was full, so that bins could not be weighed by a dead
     /// time.
     pub ended_full: u64,
-    /// Decisions that left out bins where the TDC was hardly ever live, or all of them because the
-    /// counts contradict its dead time.
+    /// Decisions where a bin was blind or had a photon in nearly all laser cycles, or on counts that
+    /// contradict the dead time.
     pub blind_looks: u64,
     /// Recorded photons that were not replayed, as they lie after the last
     /// laser cycle.
@@ -138,6 +140,7 @@ fn settings<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, 
         };
         map.serialize_entry("dead_time_from", source)?;
     }
+    map.serialize_entry("once_per_bin", &settings.once_per_bin)?;
     if let Some(frame) = settings.frame {
         map.serialize_entry("frame", &frame)?;
     }
@@ -182,6 +185,7 @@ impl Summary {
             saturated: statistics.saturated,
             saturated_in_blocks: blocks.saturated,
             gated_out: statistics.gated_out,
+            repeated: statistics.repeated,
             masked: source.masked(),
             deferred: statistics.deferred + blocks.deferred,
             expired: statistics.expired,
@@ -246,6 +250,7 @@ impl Summary {
         // Only losses that have occurred.
         let losses = [
             ("photons outside the range gate", self.gated_out),
+            ("photons after the first of a bin", self.repeated),
             ("photons of pixels left out", self.masked),
             ("photons lost to full counters", self.saturated),
             (
@@ -255,7 +260,10 @@ impl Summary {
             ("photons with a code past the last bin", self.rejected),
             ("decisions put off", self.deferred),
             ("exposures ended by a full counter", self.ended_full),
-            ("decisions without bins hardly ever live", self.blind_looks),
+            (
+                "decisions where bins were hardly ever live",
+                self.blind_looks,
+            ),
             ("recorded photons not replayed", self.not_replayed),
             ("recorded photons in bins cut off", self.cut_off),
         ];

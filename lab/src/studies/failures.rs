@@ -45,7 +45,7 @@ const FALSE: i64 = 3 * PER_BIN;
 pub const STUDY: Study = Study {
     name: "failures",
     about: "false alarms, missing and wrong events in scenes that are not plain, and their flags",
-    revision: 6,
+    revision: 7,
     few_seeds: 30,
     all_seeds: 200,
     points,
@@ -189,7 +189,8 @@ fn exposure(case: &Case, rng: &mut Pcg64, tally: &mut Tally) -> Result<()> {
         photons.next_cycle(cycle, |code| codes.push(code))?;
         waiting.retain_mut(|(name, (config, pixel))| {
             if case.once_per_bin {
-                pixel.count_once_per_bin(config, &mut OncePerBin::<{ BINS / 32 }>::new(), &codes);
+                let bins = &mut OncePerBin::<{ BINS / 32 }>::new();
+                pixel.count_once_per_bin(config, &mut Statistics::new(), bins, &codes);
             } else {
                 pixel.count_batch(config, &codes);
             }

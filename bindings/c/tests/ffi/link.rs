@@ -15,7 +15,7 @@ use dtof_link::{
     Source, StopReason,
 };
 
-use crate::{OK, checked, config, link, pixel, statistics, zeroed};
+use crate::{OK, checked, config, link, once_per_bin, pixel, statistics, zeroed};
 
 /// A host, a device, and the wire between them.
 struct Pair {
@@ -111,6 +111,7 @@ fn configuration() -> Configuration {
         l2: 1999,
         gate: (3, 120),
         dead_time: Some(20),
+        once_per_bin: true,
         pixels: 9,
         columns: 3,
         binning: None,
@@ -203,6 +204,7 @@ fn the_hosts_configuration_becomes_settings() {
         pixels: 9,
         host_timeout_ms: 700,
         source: DTOF_SOURCE_SENSOR,
+        once_per_bin: 1,
     };
     assert_eq!(config, expected);
     assert!(checked(&config.pixel).is_ok());
@@ -234,6 +236,20 @@ fn the_dead_time_is_the_hosts_or_else_the_sensors() {
         assert_eq!(read.map(|config| config.pixel.dead_time), expected);
         // It is one that the check takes.
         assert!(read.is_err() || checked(&read.unwrap().pixel).is_ok());
+    }
+}
+
+#[test]
+fn the_host_says_whether_photons_count_once_per_bin() {
+    let mut record = configuration().to_le_bytes();
+    for (byte, expected) in [
+        (0, Ok(0)),
+        (1, Ok(1)),
+        (2, Err(DTOF_ERROR_CONFIGURATION)),
+        (255, Err(DTOF_ERROR_CONFIGURATION)),
+    ] {
+        record[54] = byte;
+        assert_eq!(read(&record).map(|config| config.once_per_bin), expected);
     }
 }
 
@@ -285,9 +301,12 @@ fn records_are_those_of_the_link() {
         last_sensor_error: 6,
         stop_reason: DTOF_STOP_WATCHDOG,
     };
-    let done = statistics();
+    let (mut done, codes) = (statistics(), [60u16; 8]);
     // SAFETY: each pointer leads to an object of its type.
     unsafe {
+        let (pixel, bins, first) = (&mut pixel(0), &mut once_per_bin(), codes.as_ptr());
+        let counted = dtof_pixel_count_once_per_bin(pixel, &config(), bins, &mut done, first, 8);
+        assert_eq!(counted, OK);
         let room = sensor.as_mut_ptr();
         let written = dtof_sensor_write(9, 100, 20, 250 << 16, 1_000_000, -256, room);
         assert_eq!(written, OK);
@@ -313,6 +332,7 @@ fn records_are_those_of_the_link() {
         (4, 5, 6)
     );
     assert_eq!((read.sensor_starts, read.sensor_stops), (7, 8));
+    assert_eq!(read.statistics.repeated, 7);
     let reason = StopReason::from_number(read.stop_reason);
     assert_eq!(reason, Some(StopReason::Watchdog));
     assert_eq!(read.link.frames, pair.state().frames);

@@ -43,6 +43,12 @@ fn pixel(address: u16) -> dtof_pixel_t {
     initialised(|pixel| unsafe { dtof_pixel_init(pixel, size_of::<dtof_pixel_t>(), address) })
 }
 
+fn once_per_bin() -> dtof_once_per_bin_t {
+    let size = size_of::<dtof_once_per_bin_t>();
+    // SAFETY: the pointer leads to an object of its type.
+    initialised(|bins| unsafe { dtof_once_per_bin_init(bins, size) })
+}
+
 fn statistics() -> dtof_statistics_t {
     // SAFETY: the pointer leads to statistics.
     initialised(|statistics| unsafe { dtof_statistics_init(statistics) })

@@ -11,8 +11,8 @@ use dtof_c::*;
 use proptest::prelude::*;
 
 use crate::{
-    OK, checked, config, decoder, encoder, exposure, histogram, link, paper, pixel, scale,
-    statistics, zeroed,
+    OK, checked, config, decoder, encoder, exposure, histogram, link, once_per_bin, paper, pixel,
+    scale, statistics, zeroed,
 };
 
 /// Uninitialised memory.
@@ -41,7 +41,7 @@ fn functions_write_to_uninitialised_memory() {
     let (mut scale, mut range, mut link) = (Room::new(), Room::new(), Room::new());
     let (mut encoder, mut decoder, mut record) = (Room::new(), Room::new(), Room::new());
     let (mut length, mut state, mut counts) = (Room::new(), Room::new(), Room::new());
-    let mut silent = Room::new();
+    let (mut silent, mut bins) = (Room::new(), Room::new());
     let mut wire = Room::<[u8; DTOF_WIRE_BYTES]>::new();
     let mut body = Room::<[u8; DTOF_BODY_BYTES]>::new();
     let mut events = Room::<[dtof_event_t; DTOF_ECHOES]>::new();
@@ -67,7 +67,15 @@ fn functions_write_to_uninitialised_memory() {
             dtof_pixel_count_batch(pixel.at(), &config, first, number),
             OK
         );
-        let (one, last) = (pixel.at(), 44);
+        assert_eq!(
+            dtof_once_per_bin_init(bins.at(), DTOF_ONCE_PER_BIN_SIZE),
+            OK
+        );
+        let (one, bins) = (pixel.at(), bins.at());
+        let counted = dtof_pixel_count_once_per_bin(one, &config, bins, done, first, number);
+        assert_eq!(counted, OK);
+        assert_eq!(dtof_once_per_bin_end_laser_cycle(bins), OK);
+        let last = 44;
         let ended = dtof_pixel_end_laser_cycles(one, &config, 40, done, 40, look.at());
         assert_eq!((ended, look.read()), (OK, dtof_look_t::DTOF_LOOK_TOO_EARLY));
         let ended = dtof_pixels_end_laser_cycles(one, 1, last, &config, done, 4, fired.at());
@@ -76,7 +84,8 @@ fn functions_write_to_uninitialised_memory() {
         assert_eq!(dtof_pixel_take_event(one, event.at()), OK);
         assert_eq!(dtof_pixel_add_photons(one, done), OK);
         assert_eq!(dtof_statistics_read(done, counts.at()), OK);
-        assert_eq!(counts.read().events, 1);
+        let counts = counts.read();
+        assert_eq!((counts.events, counts.repeated), (1, 19));
 
         let size = DTOF_HISTOGRAM_SIZE;
         let filled = dtof_histogram_fill(histogram.at(), size, &config, done, wide.as_ptr());
@@ -170,7 +179,7 @@ type Call = fn(*mut u8) -> dtof_status_t;
 
 /// Each function that takes an initialised object: its name, the type, and a call.
 #[rustfmt::skip]
-const TAKES: [(&str, &str, Call); 35] = {
+const TAKES: [(&str, &str, Call); 40] = {
     const CODES: *const u16 = [0u16; DTOF_BINS].as_ptr();
     const COUNTS: *const u32 = [0u32; DTOF_BINS].as_ptr();
     const NO_LOOK: *mut dtof_look_t = ptr::null_mut();
@@ -185,6 +194,11 @@ const TAKES: [(&str, &str, Call); 35] = {
         ("dtof_pixel_count_batch", "dtof_checked_config_t", |p| dtof_pixel_count_batch(&mut pixel(0), p.cast(), CODES, 1)),
         ("dtof_pixel_count_frame", "dtof_pixel_t", |p| dtof_pixel_count_frame(p.cast(), &config(), CODES)),
         ("dtof_pixel_count_frame", "dtof_checked_config_t", |p| dtof_pixel_count_frame(&mut pixel(0), p.cast(), CODES)),
+        ("dtof_once_per_bin_end_laser_cycle", "dtof_once_per_bin_t", |p| dtof_once_per_bin_end_laser_cycle(p.cast())),
+        ("dtof_pixel_count_once_per_bin", "dtof_pixel_t", |p| dtof_pixel_count_once_per_bin(p.cast(), &config(), &mut once_per_bin(), &mut statistics(), CODES, 1)),
+        ("dtof_pixel_count_once_per_bin", "dtof_checked_config_t", |p| dtof_pixel_count_once_per_bin(&mut pixel(0), p.cast(), &mut once_per_bin(), &mut statistics(), CODES, 1)),
+        ("dtof_pixel_count_once_per_bin", "dtof_once_per_bin_t", |p| dtof_pixel_count_once_per_bin(&mut pixel(0), &config(), p.cast(), &mut statistics(), CODES, 1)),
+        ("dtof_pixel_count_once_per_bin", "dtof_statistics_t", |p| dtof_pixel_count_once_per_bin(&mut pixel(0), &config(), &mut once_per_bin(), p.cast(), CODES, 1)),
         ("dtof_pixel_end_laser_cycles", "dtof_pixel_t", |p| dtof_pixel_end_laser_cycles(p.cast(), &config(), 0, &mut statistics(), 1, NO_LOOK)),
         ("dtof_pixel_end_laser_cycles", "dtof_checked_config_t", |p| dtof_pixel_end_laser_cycles(&mut pixel(0), p.cast(), 0, &mut statistics(), 1, NO_LOOK)),
         ("dtof_pixel_end_laser_cycles", "dtof_statistics_t", |p| dtof_pixel_end_laser_cycles(&mut pixel(0), &config(), 0, p.cast(), 1, NO_LOOK)),
@@ -252,6 +266,7 @@ fn an_object_without_the_tag_of_its_type_is_refused() {
         ("dtof_scale_t", Memory::with(scale())),
         ("dtof_checked_config_t", Memory::with(config())),
         ("dtof_pixel_t", Memory::with(pixel(0))),
+        ("dtof_once_per_bin_t", Memory::with(once_per_bin())),
         ("dtof_histogram_t", Memory::with(histogram())),
         ("dtof_aer_encoder_t", Memory::with(encoder())),
         ("dtof_aer_decoder_t", Memory::with(decoder())),
@@ -317,7 +332,7 @@ fn one_pixel_without_a_tag_leaves_all_as_they_were() {
 
 /// Pointers of the functions, each with the alignment of its type.
 #[rustfmt::skip]
-const POINTERS: [(usize, Call); 32] = {
+const POINTERS: [(usize, Call); 38] = {
     // SAFETY: the tests pass null and misaligned pointers only.
     unsafe {[
         (4, |p| dtof_config_paper(p.cast())),
@@ -329,6 +344,12 @@ const POINTERS: [(usize, Call); 32] = {
         (4, |p| dtof_range(p.cast(), 0, &mut 0)),
         (4, |p| dtof_range(&scale(), 0, p.cast())),
         (8, |p| dtof_pixel_init(p.cast(), DTOF_PIXEL_SIZE, 0)),
+        (4, |p| dtof_once_per_bin_init(p.cast(), DTOF_ONCE_PER_BIN_SIZE)),
+        (4, |p| dtof_once_per_bin_end_laser_cycle(p.cast())),
+        (8, |p| dtof_pixel_count_once_per_bin(p.cast(), &zeroed(), &mut zeroed(), &mut zeroed(), &0, 1)),
+        (4, |p| dtof_pixel_count_once_per_bin(&mut pixel(0), &config(), p.cast(), &mut zeroed(), &0, 1)),
+        (8, |p| dtof_pixel_count_once_per_bin(&mut pixel(0), &config(), &mut once_per_bin(), p.cast(), &0, 1)),
+        (2, |p| dtof_pixel_count_once_per_bin(&mut pixel(0), &config(), &mut once_per_bin(), &mut statistics(), p.cast(), 1)),
         (8, |p| dtof_pixel_take_event(p.cast(), &mut zeroed())),
         (8, |p| dtof_pixel_take_event(&mut pixel(0), p.cast())),
         (8, |p| dtof_pixel_add_photons(p.cast(), &mut zeroed())),
@@ -426,7 +447,7 @@ fn version_and_bins_are_those_of_the_build() {
 proptest! {
     /// A program may have overwritten all but the tags.
     #[test]
-    fn any_bytes_are_a_pixel_a_histogram_a_scale_and_statistics(
+    fn any_bytes_are_a_pixel_a_histogram_a_scale_bins_and_statistics(
         mut bytes in prop::collection::vec(any::<u8>(), DTOF_HISTOGRAM_SIZE - 4),
         ones in any::<bool>(),
         dead_time in prop_oneof![Just(0u16), Just(20), Just(u16::MAX)],
@@ -442,12 +463,13 @@ proptest! {
             Memory::with(pixel(0)),
             Memory::with(histogram()),
             Memory::with(scale()),
+            Memory::with(once_per_bin()),
             Memory::with(statistics()),
         ];
         for memory in &mut memories {
             memory.0[4..4 + bytes.len()].write_copy_of_slice(&bytes);
         }
-        let [mut pixel, mut histogram, mut scale, mut read] = memories;
+        let [mut pixel, mut histogram, mut scale, mut bins, mut read] = memories;
         let settings = dtof_config_t { rule: DTOF_RULE_WINDOW, dead_time, echoes: 2, ..paper() };
         let (config, mut done) = (checked(&settings).unwrap(), statistics());
         let mut events = [dtof_event_t::default(); DTOF_ECHOES];
@@ -455,6 +477,10 @@ proptest! {
         // SAFETY: all memory is long enough and aligned for each type.
         unsafe {
             let _ = dtof_pixel_count(pixel.at(), &config, code);
+            let _ = dtof_pixel_count_once_per_bin(
+                pixel.at(), &config, bins.at(), &mut done, [code; 40].as_ptr(), 40,
+            );
+            let _ = dtof_once_per_bin_end_laser_cycle(bins.at());
             let _ = dtof_pixel_count_frame(pixel.at(), &config, [code; DTOF_BINS].as_ptr());
             let _ = dtof_pixel_end_laser_cycles(
                 pixel.at(), &config, last, &mut done, cycles, ptr::null_mut(),

@@ -6,12 +6,12 @@ use dtof_c::*;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
 use dtof_core::{
     AnyRule, AsyncPixel, AverageRule, BinPosition, CentredWindow, Count, Count24, DepthEstimator,
-    DepthEvent, EchoNumber, Histogram, LaserCycle, PaperRule, PixelAddress, PixelConfig, RangeGate,
-    RangeScale, Statistics, WindowRule, z_for,
+    DepthEvent, EchoNumber, Histogram, LaserCycle, OncePerBin, PaperRule, PixelAddress,
+    PixelConfig, RangeGate, RangeScale, Statistics, WindowRule, z_for,
 };
 use proptest::prelude::*;
 
-use crate::{OK, checked, exposure, paper, pixel, statistics, zeroed};
+use crate::{OK, checked, exposure, once_per_bin, paper, pixel, statistics, zeroed};
 
 /// Random settings, most of them valid.
 fn settings() -> impl Strategy<Value = dtof_config_t> {
@@ -129,7 +129,8 @@ proptest! {
         settings in settings(),
         photons in photons(),
         taken in prop::collection::vec(any::<bool>(), CYCLES),
-        batches in any::<bool>(),
+        way in 0u8..3,
+        split in 0usize..3,
     ) {
         let Some(config) = config_of(&settings) else {
             prop_assert!(checked(&settings).is_err());
@@ -138,12 +139,29 @@ proptest! {
         let checked = checked(&settings).unwrap();
         let (mut mine, mut done) = ([pixel(5), pixel(6)], statistics());
         let mut others = [5, 6].map(|address| AsyncPixel::<128>::new(PixelAddress::new(address)));
+        let mut my_bins = [once_per_bin(), once_per_bin()];
+        let mut other_bins = [OncePerBin::<4>::new(); 2];
         let mut statistics = Statistics::new();
         // SAFETY: each pointer leads to an object of its type.
         unsafe {
             for ((cycle, codes), taken) in (0..).zip(&photons).zip(taken) {
-                for (mine, other) in mine.iter_mut().zip(&mut others) {
-                    if batches {
+                let bins = my_bins.iter_mut().zip(&mut other_bins);
+                for ((mine, other), (my_bins, other_bins)) in mine.iter_mut().zip(&mut others).zip(bins) {
+                    if way == 2 {
+                        let (before, after) = codes.split_at(split.min(codes.len()));
+                        for codes in [before, after] {
+                            let (first, number) = (codes.as_ptr(), codes.len());
+                            let status = dtof_pixel_count_once_per_bin(
+                                mine, &checked, my_bins, &mut done, first, number,
+                            );
+                            prop_assert_eq!(status, OK);
+                        }
+                        prop_assert_eq!(dtof_once_per_bin_end_laser_cycle(my_bins), OK);
+                        other.count_once_per_bin(&config, &mut statistics, other_bins, codes);
+                        other_bins.end_laser_cycle();
+                        continue;
+                    }
+                    if way == 1 {
                         let (first, number) = (codes.as_ptr(), codes.len());
                         let status = dtof_pixel_count_batch(mine, &checked, first, number);
                         prop_assert_eq!(status, OK);
@@ -272,6 +290,41 @@ fn a_misaligned_pointer_to_the_number_of_events_leaves_the_pixels_as_they_were()
     }
     assert_eq!(fired, [9; 2]);
     assert_eq!(read(&done), [0; 12]);
+}
+
+#[test]
+fn photons_of_one_laser_cycle_in_one_bin_count_once() {
+    let config = crate::config();
+    let (mut pixel, mut bins, mut done) = (pixel(0), once_per_bin(), statistics());
+    let mut count = |bins: &mut dtof_once_per_bin_t, codes: &[u16]| {
+        let (pixel, first, number) = (&mut pixel, codes.as_ptr(), codes.len());
+        // SAFETY: each pointer leads to an object of its type.
+        let status = unsafe {
+            dtof_pixel_count_once_per_bin(pixel, &config, bins, &mut done, first, number)
+        };
+        assert_eq!(status, OK);
+    };
+    // One laser cycle in two calls, and another one. Photons past the last bin are rejected.
+    count(&mut bins, &[60, 61, 60, 200, 200]);
+    count(&mut bins, &[60, 127, 0, 127]);
+    // SAFETY: the pointer leads to an object of its type.
+    assert_eq!(unsafe { dtof_once_per_bin_end_laser_cycle(&mut bins) }, OK);
+    count(&mut bins, &[60]);
+    // The bins of another pixel are its own.
+    count(&mut once_per_bin(), &[60]);
+    // SAFETY: both pointers lead to objects of their types.
+    assert_eq!(unsafe { dtof_pixel_add_photons(&pixel, &mut done) }, OK);
+    let [
+        counted,
+        excluded,
+        saturated,
+        rejected,
+        gated_out,
+        repeated,
+        ..,
+    ] = read(&done);
+    assert_eq!((counted, rejected, repeated), (6, 2, 3));
+    assert_eq!([excluded, saturated, gated_out], [0; 3]);
 }
 
 #[test]

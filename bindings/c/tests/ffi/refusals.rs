@@ -8,7 +8,9 @@ use dtof_c::dtof_status_t::*;
 use dtof_c::*;
 use dtof_link::Refusal;
 
-use crate::{OK, checked, config, histogram, link, paper, pixel, scale, statistics, zeroed};
+use crate::{
+    OK, checked, config, histogram, link, once_per_bin, paper, pixel, scale, statistics, zeroed,
+};
 
 #[test]
 fn each_setting_that_cannot_be_has_its_own_error() {
@@ -136,6 +138,19 @@ fn pointers_and_numbers_are_checked() {
         assert_eq!(batch(null(), 0), OK);
         assert_eq!(batch(codes.wrapping_byte_add(1), 1), DTOF_ERROR_ALIGNMENT);
         assert_eq!(batch(codes, usize::MAX / 2), DTOF_ERROR_LENGTH);
+        let once = |codes, number| {
+            let (pixel, statistics) = (&mut crate::pixel(0), &mut crate::statistics());
+            let bins = &mut once_per_bin();
+            dtof_pixel_count_once_per_bin(pixel, &config, bins, statistics, codes, number)
+        };
+        assert_eq!(once(null(), 1), DTOF_ERROR_NULL);
+        assert_eq!(once(null(), 0), OK);
+        assert_eq!(once(codes.wrapping_byte_add(1), 1), DTOF_ERROR_ALIGNMENT);
+        assert_eq!(once(codes, usize::MAX / 2), DTOF_ERROR_LENGTH);
+        let mut bins = once_per_bin();
+        let size = DTOF_ONCE_PER_BIN_SIZE;
+        assert_eq!(dtof_once_per_bin_init(&mut bins, size - 4), DTOF_ERROR_SIZE);
+        assert_eq!(dtof_once_per_bin_init(&mut bins, size), OK);
         assert_eq!(
             dtof_pixel_count_frame(&mut pixel, &config, null()),
             DTOF_ERROR_NULL
@@ -236,7 +251,7 @@ fn every_status_has_a_text_of_its_own() {
     let numbers = of_enum.lines().filter_map(|line| line.split_once(" = "));
     let numbers = numbers.map(|(_, number)| number.trim_end_matches(',').parse::<u8>().unwrap());
     let numbers: BTreeSet<u8> = numbers.collect();
-    assert_eq!(numbers.len(), 44);
+    assert_eq!(numbers.len(), 45);
     let mut texts = BTreeSet::new();
     for number in 0..=u8::MAX {
         // SAFETY: each pointer leads to a text of the library.
@@ -255,7 +270,7 @@ fn every_status_has_a_text_of_its_own() {
 fn every_reason_of_the_link_has_a_status_and_comes_back() {
     for number in 1..=u8::MAX {
         let Some(refusal) = Refusal::from_number(number) else {
-            assert!(number > 21);
+            assert!(number > 22);
             break;
         };
         let status = dtof_status_t::from(refusal);

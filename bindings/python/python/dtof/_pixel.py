@@ -16,7 +16,8 @@ class Pixel:
     """One pixel as in the firmware, for inspection while it decides.
 
     Options are the settings of pixels: ``rule``, ``alpha``, ``sigma_bins``, ``l1``,
-    ``l2``, ``x``, ``gate``, ``dead_time``, ``bin_width_ps``, ``offset_mm`` and so on.
+    ``l2``, ``x``, ``gate``, ``dead_time``, ``once_per_bin``, ``bin_width_ps``, ``offset_mm`` and so on.
+    With ``once_per_bin=True``, photons of one laser cycle in one bin count once.
 
     >>> pixel = Pixel(l1=40, l2=2000, x=4)
     >>> for cycle in range(44):
@@ -32,7 +33,8 @@ class Pixel:
         self._native = _native.Pixel(int(bins), int(address), arguments(options))
 
     def count(self, bin: Any) -> None:
-        """Counts a photon in ``bin``, or one in each of several bins. Bins past the last are rejected."""
+        """Counts a photon in ``bin``, or one in each of several bins. Bins past the last are rejected.
+        All photons up to the next :meth:`end_laser_cycles` are of one laser cycle."""
         bins = numpy.atleast_1d(numpy.asarray(bin))
         if bins.size == 0:
             return
@@ -44,7 +46,10 @@ class Pixel:
 
     def end_laser_cycles(self, cycles: int = 1) -> Optional[numpy.void]:
         """Ends ``cycles`` laser cycles (1 to 65,535), and looks once if X have passed since the last
-        look. Returns the event, a record of :data:`dtof.EVENT`, or None."""
+        look. Returns the event, a record of :data:`dtof.EVENT`, or None.
+
+        With ``once_per_bin=True``, all photons since the last call are of one laser cycle, even if
+        ``cycles`` is more than 1."""
         record = self._native.end_laser_cycles(_whole("cycles", cycles, 65535))
         return None if record is None else events_of(record)[0]
 
@@ -66,7 +71,9 @@ class Pixel:
     @property
     def statistics(self) -> dict[str, int]:
         """Counters of photons by their fate, of events, of expired exposures, and of what a dead time
-        hides: exposures that a full counter ended, and decisions without bins hardly ever live."""
+        hides: exposures that a full counter ended, and decisions without bins hardly ever live.
+        With ``once_per_bin=True``, ``repeated`` counts the photons of a laser cycle after the first of
+        their bin."""
         return dict(self._native.statistics())
 
     @property

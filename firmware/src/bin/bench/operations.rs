@@ -2,11 +2,11 @@
 
 use dtof_core::fixed::types::U24F8;
 use dtof_core::paper::centroid;
-use dtof_core::{LaserCycle, Look};
+use dtof_core::{LaserCycle, Look, OncePerBin};
 
 use crate::counter::{Counter, Operation};
 use crate::report;
-use crate::scene::{CYCLES, EXPOSURES, PHOTONS, PHOTONS_A_CYCLE, State};
+use crate::scene::{BINS, CYCLES, EXPOSURES, PHOTONS, PHOTONS_A_CYCLE, State};
 use crate::ways::{add_batch, clear, count_batch, exposure, look, pack};
 
 /// Measures all.
@@ -20,9 +20,10 @@ pub fn run(counter: &Counter, state: &mut State) {
         }
     }
     report::line("photon", "AsyncPixel::count", total, photons);
-    let of_photons: [(&str, Operation, Prepare); 3] = [
+    let of_photons: [(&str, Operation, Prepare); 4] = [
         ("AsyncPixel::count_batch", count_batch, empty),
         ("AsyncPixel::count_batch; gate", count_batch, gated),
+        ("AsyncPixel::count_once_per_bin", count_once_per_bin, empty),
         ("Histogram::add_batch", add_batch, empty),
     ];
     for (variant, way, prepare) in of_photons {
@@ -42,6 +43,19 @@ pub fn run(counter: &Counter, state: &mut State) {
         let total = exposures(counter, state, way, prepare);
         report::line(operation, variant, total, EXPOSURES);
     }
+}
+
+/// Laser cycles of 16 photons.
+extern "C" fn count_once_per_bin(state: &mut State, _: u32) -> u32 {
+    let mut bins = OncePerBin::<{ OncePerBin::words(BINS) }>::new();
+    for codes in state.codes.chunks(16) {
+        let (config, statistics) = (&state.config, &mut state.statistics);
+        state
+            .pixel
+            .count_once_per_bin(config, statistics, &mut bins, codes);
+        bins.end_laser_cycle();
+    }
+    0
 }
 
 /// All exposures together.

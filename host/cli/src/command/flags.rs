@@ -221,6 +221,8 @@ flags! {
         on until all are found or --echo-wait ends it [default: 1]";
     echo_wait Text("TIMES") => "Two or more echoes: an exposure ends at this multiple of its length at \
         the last echo [default: it ends at L2]";
+    once_per_bin Optional("YES") => "Photons of one laser cycle in one bin count once, so that raindrops are \
+        no targets. For photons, not for histograms";
 }
 
 flags! {
@@ -266,6 +268,8 @@ flags! {
 
 flags! {
     COMPARE:
+    once_per_bin Optional("YES") => "Also try photons of one laser cycle in one bin that count once. For \
+        photons, not for histograms";
     cycles Text("N") => "Laser cycles to use at most [default: 10000 of a recording; the scene's]";
     seed Text("N") => "Seed of every random number [default: 1]";
 }

@@ -109,12 +109,11 @@ fn a_recording_without_truth_is_held_against_itself() {
             .concat(),
     );
     scratch.file("truth.npy", truth);
-    let printed = scratch.printed(&format!("{line} --truth truth.npy"));
+    let printed = scratch.printed(&format!("{line} --once-per-bin --truth truth.npy"));
     assert_contains(&printed, "take ");
-    assert_contains(
-        &scratch.read("out/report.html"),
-        "errors are against the true range",
-    );
+    let report = scratch.read("out/report.html");
+    assert_contains(&report, "errors are against the true range");
+    assert_contains(&report, "window of 2, once per bin");
 }
 
 #[test]

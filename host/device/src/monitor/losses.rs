@@ -14,7 +14,7 @@ pub struct Losses<'a> {
 impl Losses<'_> {
     /// Each loss with its name.
     #[must_use]
-    pub fn counts(&self, report: &Report) -> [(&'static str, u64); 19] {
+    pub fn counts(&self, report: &Report) -> [(&'static str, u64); 20] {
         let (pixels, blocks) = (&report.statistics, &report.blocks);
         let (first, here) = (self.first, self.here);
         let there = since(&report.link, &first.link);
@@ -27,6 +27,7 @@ impl Losses<'_> {
             ("saturated in blocks", blocks.saturated),
             ("rejected", pixels.rejected),
             ("gated out", pixels.gated_out),
+            ("repeated", pixels.repeated),
             ("unaddressed", report.unaddressed),
             ("deferred", pixels.deferred + blocks.deferred),
             ("expired", pixels.expired),

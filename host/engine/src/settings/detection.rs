@@ -56,6 +56,8 @@ pub struct DetectionSettings {
     pub echoes: Option<u8>,
     /// An exposure ends at this multiple of its length at the last echo, 2 to 254 [default: at L2]
     pub echo_wait: Option<u8>,
+    /// Photons of one laser cycle in one bin count once
+    pub once_per_bin: Option<bool>,
 }
 
 named_values! {
@@ -102,6 +104,7 @@ section! {
     tracking = boolean, "expect the next event near the last";
     echoes = integer(1..=EchoNumber::LAST.raw()), "of an exposure";
     echo_wait = integer(2..=u8::MAX - 1), "times the laser cycles of the last echo";
+    once_per_bin = boolean, "photons of one laser cycle in one bin count once";
 }
 
 impl DetectionSettings {

@@ -55,6 +55,8 @@ pub struct Settings {
     pub dead_time: u16,
     /// Whether sensor or scene say [`Self::dead_time`], and not the settings.
     pub is_dead_time_of_sensor: bool,
+    /// Whether photons of one laser cycle in one bin count once. Not used with [`Self::frame`].
+    pub once_per_bin: bool,
     /// A frame-based sensor instead: all pixels read their highest bin every so many laser cycles.
     /// Rule, minimum, L1, L2 and X are not used.
     pub frame: Option<u16>,
@@ -85,6 +87,7 @@ impl Settings {
             echo_wait: None,
             dead_time: 0,
             is_dead_time_of_sensor: false,
+            once_per_bin: false,
             frame: None,
             seed,
         }

@@ -362,6 +362,7 @@ patience = 64
 tracking = true
 echoes = 2
 echo_wait = 4
+once_per_bin = true
 [rays]
 field_of_view_degrees = [60.0, 40.0]
 [run]

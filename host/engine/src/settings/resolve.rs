@@ -80,6 +80,7 @@ impl SettingsFile {
             echo_wait,
             dead_time,
             is_dead_time_of_sensor: dead_time > 0 && sensor.dead_time.is_none(),
+            once_per_bin: detection.once_per_bin.unwrap_or(false),
             frame: self.run.frame,
             seed: self.run.seed.unwrap_or(1),
         })
@@ -195,6 +196,7 @@ impl DetectionSettings {
             tracking: settings.tracking.then_some(true),
             echoes: several.then(|| settings.echoes.raw()),
             echo_wait: settings.echo_wait.filter(|_| several),
+            once_per_bin: settings.once_per_bin.then_some(true),
             ..rule
         }
     }

@@ -94,6 +94,7 @@ impl Setting {
             echo_wait: None,
             dead_time: 0,
             is_dead_time_of_sensor: false,
+            once_per_bin: false,
             frame: None,
             seed: 0,
         })

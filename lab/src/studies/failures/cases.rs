@@ -1,6 +1,6 @@
 //! The scenes in which a method may fail. Each differs from the plain scene in one respect.
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use dtof_core::RangeGate;
 
 use super::L1;
@@ -296,6 +296,18 @@ fn pile_up() -> Result<Vec<Case>> {
             ..tdc.clone()
         };
         both(case.with_effects(effects).gated(RangeGate::new(8, 127)?));
+    }
+    let long = "The bin behind the dead time of the crosstalk was live more often than the setting says, so that it \
+                has more photons than expected";
+    let of_20 = cases.iter().rfind(|case| case.dead_time == 20).cloned();
+    for (dead_time, reason) in [(19, single), (21, long)] {
+        let mut case = of_20.clone().context("a TDC that is dead for 20 bins")?;
+        case.name += &format!(" to {dead_time}");
+        case.dead_time = dead_time;
+        cases.push(
+            case.silent_as(reason)
+                .advised("one bin less than the dead time"),
+        );
     }
     Ok(cases)
 }

@@ -17,7 +17,7 @@ Progress = Optional[Callable[[int, int], Any]]
 COUNTERS = (
     "photons", "events", "events_of_blocks", "pixels", "pixels_reporting", "held", "rejected",
     "saturated", "saturated_in_blocks", "gated_out", "masked", "deferred", "expired",
-    "expired_deferred", "ended_full", "blind_looks", "not_replayed", "cut_off",
+    "expired_deferred", "ended_full", "blind_looks", "repeated", "not_replayed", "cut_off",
 )
 
 

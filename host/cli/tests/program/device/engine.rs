@@ -18,6 +18,7 @@ use dtof_firmware::sidecar::Sidecar;
 use dtof_link::AdaptiveBinning;
 use dtof_photons::source::PhotonSource;
 use dtof_simulate::demo;
+use dtof_simulate::effects::tdc::Tdc;
 
 const PIXELS: usize = 64;
 /// Number of blocks of 8x8 pixels in three levels.
@@ -57,10 +58,15 @@ fn device(lives: Option<Duration>) -> String {
     })
 }
 
-/// All events of `cycles` laser cycles of the demo's scene.
-fn events(engine: &mut dyn Engine, cycles: u64) -> anyhow::Result<Vec<DepthEvent>> {
-    let array = Array::new(8, 8).unwrap();
-    let mut photons = demo::photons(array, 1, cycles)?;
+/// All events of `cycles` laser cycles of the demo's scene, with a TDC of this dead time.
+fn events(engine: &mut dyn Engine, cycles: u64, dead_time: u16) -> anyhow::Result<Vec<DepthEvent>> {
+    let mut scene = demo::scene()?;
+    scene.size = [8, 8];
+    scene.effects.tdc = (dead_time > 0).then(|| Tdc {
+        dead_time_bins: Some(dead_time),
+        ..Tdc::default()
+    });
+    let mut photons = scene.photons(1, cycles)?;
     let mut events = Vec::new();
     for _ in 0..cycles / 250 {
         events.extend(engine.run(&photons.next_slice(250)?)?);
@@ -101,8 +107,8 @@ fn same_events(
     client.reads_every = reads_every;
     let mut on_device = DeviceEngine::new(client, settings, ARRAY, &addresses(64)).unwrap();
     let mut on_host = host_engine(settings, ARRAY, &addresses(64)).unwrap();
-    let expected = events(on_host.as_mut(), cycles).unwrap();
-    let actual = events(&mut on_device, cycles).unwrap();
+    let expected = events(on_host.as_mut(), cycles, settings.dead_time).unwrap();
+    let actual = events(&mut on_device, cycles, settings.dead_time).unwrap();
     assert!(!expected.is_empty() && actual == expected);
     assert_eq!(on_device.statistics(), on_host.statistics());
     assert_eq!(on_device.report().cycles, cycles);
@@ -154,6 +160,29 @@ fn blocks_tracking_and_echoes_are_the_same_on_a_device() {
 }
 
 #[test]
+fn dead_times_and_photons_once_per_bin_are_the_same_on_a_device() {
+    let all = with_all();
+    let without_blocks = Settings {
+        binning: None,
+        ..all.clone()
+    };
+    for dead_time in [1, 20, 128] {
+        let settings = Settings {
+            dead_time,
+            ..without_blocks.clone()
+        };
+        same_events(&settings, 2_000, Duration::ZERO, 50_000);
+    }
+    let every = same_events(&all, 1_000, Duration::ZERO, 100_000);
+    let once = Settings {
+        once_per_bin: true,
+        ..all
+    };
+    let once = same_events(&once, 1_000, Duration::ZERO, 100_000);
+    assert!(every != once);
+}
+
+#[test]
 fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
     let name = device(None);
     let refused = |settings: &Settings, pixels: u16| {
@@ -187,7 +216,7 @@ fn a_device_that_restarts_is_noticed() {
     let name = device(Some(Duration::from_millis(200)));
     let mut engine = DeviceEngine::new(client(&name), &settings(), ARRAY, &addresses(64)).unwrap();
     let error = loop {
-        if let Err(error) = events(&mut engine, 250) {
+        if let Err(error) = events(&mut engine, 250, 0) {
             break error;
         }
     };

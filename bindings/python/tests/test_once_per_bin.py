@@ -1,0 +1,194 @@
+"""Right events in rain if photons of one laser cycle in one bin count once, with photons that numpy draws.
+
+A drop sends tens of photons back in one laser cycle. Nothing here is shared with the simulator.
+"""
+
+import warnings
+from math import sqrt
+
+import numpy
+import pytest
+
+import dtof
+
+BINS = 128
+PLACE = 80.3
+BACKGROUND = 0.05 * BINS
+DROP, DROP_EVERY = 30, 200
+WINDOW = {"rule": "window", "window": 3, "sigma_bins": 1, "x": 4, "l1": 40, "l2": 2000, "false_alarm": 0.01}
+
+
+def pulses(random, mean, places):
+    """Laser cycle and bin of the photons of a pulse of one bin in each laser cycle, ``mean`` on average."""
+    photons = random.poisson(mean, places.size)
+    cycle = numpy.repeat(numpy.arange(places.size), photons)
+    return cycle, numpy.floor(random.normal(places[cycle], 1)).astype(int)
+
+
+def drops(random, cycles):
+    """Laser cycle and bin of the photons of drops: one in 200 laser cycles, in a random place."""
+    wet = numpy.flatnonzero(random.random(cycles) < 1 / DROP_EVERY)
+    drop, bin = pulses(random, DROP, random.integers(4, 64, wet.size))
+    return wet[drop], bin
+
+
+def photons(random, signal, has_rain, cycles):
+    """Laser cycle and bin of each photon: an even background, a target, and drops. None is past bin 127."""
+    number = random.poisson(BACKGROUND, cycles)
+    parts = [
+        (numpy.repeat(numpy.arange(cycles), number), random.integers(0, BINS, number.sum())),
+        pulses(random, signal, numpy.full(cycles, PLACE)),
+    ]
+    if has_rain:
+        parts.append(drops(random, cycles))
+    cycle, bin = (numpy.concatenate(part) for part in zip(*parts))
+    inside = (bin >= 0) & (bin < BINS)
+    order = numpy.argsort(cycle[inside], kind="stable")
+    return cycle[inside][order], bin[inside][order]
+
+
+def interval(count, of):
+    """The interval of Wilson for a share, that of 95 %."""
+    share, z = count / of, 1.96
+    middle = (share + z * z / (2 * of)) / (1 + z * z / of)
+    half = z * sqrt(share * (1 - share) / of + z * z / (4 * of * of)) / (1 + z * z / of)
+    return max(0, middle - half), middle + half
+
+
+class Run:
+    """Events of a target: wrong are those more than three bins off."""
+
+    def __init__(self, name, photons, cycles, once_per_bin):
+        cycle, bin = photons
+        self.done = dtof.photons(
+            numpy.zeros_like(bin), cycle, bin, cycles=cycles, columns=1, once_per_bin=once_per_bin, **WINDOW
+        )
+        is_wrong = numpy.abs(self.done.events["depth_bins"] - PLACE) > 3
+        self.wrong = is_wrong.mean()
+        low, high = interval(is_wrong.sum(), is_wrong.size)
+        # Laser cycles from one right event to the next, with the interval of 95 % of their mean.
+        waits = numpy.diff(self.done.events["cycle"][~is_wrong].astype(float))
+        self.wait = waits.mean()
+        half = 1.96 * waits.std() / sqrt(waits.size)
+        print(
+            f"{name}: {is_wrong.sum()} of {is_wrong.size} wrong ({100 * low:.2f} to {100 * high:.2f} %), "
+            f"{self.wait:.1f} ± {half:.1f} laser cycles a right event"
+        )
+
+
+def test_the_generator_has_drops():
+    random = numpy.random.default_rng(1)
+    cycle, bin = drops(random, 400_000)
+    wet, number = numpy.unique(cycle, return_counts=True)
+    # 2000 drops with a standard deviation of 45, of 30 photons.
+    assert abs(wet.size - 2000) < 180
+    assert abs(number.mean() - DROP) < 0.5
+    assert bin.min() < 4 and 62 < bin.max() < PLACE - 8
+    spread = [bin[cycle == one].std() for one in wet[:300]]
+    assert abs(numpy.mean(spread) - 1) < 0.06
+    cycle, _ = photons(random, 0.5, False, 20_000)
+    assert abs(cycle.size / 20_000 - 6.9) < 0.1
+
+
+@pytest.mark.parametrize("signal,cycles", [(0.5, 300_000), (0.145, 1_200_000)])
+def test_rain_makes_no_events(signal, cycles):
+    random = numpy.random.default_rng(2)
+    dry = photons(random, signal, False, cycles)
+    wet = photons(random, signal, True, cycles)
+    counted, once, dry_counted, dry_once = (
+        Run(f"signal {signal}, {light}, {'once per bin' if is_once else 'every photon'}", of, cycles, is_once)
+        for light, of in (("rain", wet), ("dry", dry))
+        for is_once in (False, True)
+    )
+    assert counted.wrong > 0.1
+    assert once.wrong <= 0.012
+    assert dry_once.wait <= 1.15 * dry_counted.wait
+    assert once.done.statistics["settings"]["once_per_bin"] is True
+    assert counted.done.statistics["settings"]["once_per_bin"] is False
+
+
+def test_photons_that_repeat_are_as_if_they_were_not_there():
+    cycle, bin = photons(numpy.random.default_rng(3), 0.5, True, 20_000)
+    pixel = numpy.arange(bin.size) % 3
+    once = dtof.photons(pixel, cycle, bin, once_per_bin=True, cycles=20_000, columns=3, **WINDOW)
+    cycle, pixel, bin = numpy.unique([cycle, pixel, bin], axis=1)
+    without = dtof.photons(pixel, cycle, bin, cycles=20_000, columns=3, **WINDOW)
+    assert len(once.events) > 50
+    assert (once.events == without.events).all()
+    # Each photon is counted as one of them.
+    assert once.statistics["repeated"] > 1000 and without.statistics["repeated"] == 0
+    assert once.statistics["photons"] - once.statistics["repeated"] == without.statistics["photons"]
+
+
+def test_a_pixel_decides_as_a_replay():
+    cycle, bin = photons(numpy.random.default_rng(4), 0.5, True, 8000)
+    options = {**WINDOW, "once_per_bin": True}
+    done = dtof.photons(numpy.zeros_like(bin), cycle, bin, cycles=8000, **options)
+    pixel = dtof.Pixel(**options)
+    ends = numpy.searchsorted(cycle, numpy.arange(8001))
+    events = []
+    for now in range(8000):
+        # In two parts: they are of one laser cycle.
+        of_cycle = bin[ends[now]:ends[now + 1]]
+        pixel.count(of_cycle[:4])
+        pixel.count(of_cycle[4:])
+        event = pixel.end_laser_cycles()
+        if event is not None:
+            events.append(event)
+    assert (numpy.array(events, dtype=dtof.EVENT) == done.events).all()
+    assert pixel.settings["detection"]["once_per_bin"] is True
+    assert pixel.statistics["repeated"] > 500 and len(events) > 20
+    for name in ("photons", "rejected", "gated_out", "repeated", "events", "expired"):
+        assert pixel.statistics[name] == done.statistics[name]
+
+
+def test_a_pixel_counts_one_photon_a_bin_up_to_the_end_of_laser_cycles():
+    pixel = dtof.Pixel(once_per_bin=True)
+    pixel.count([5, 5, 9])
+    pixel.count(5)
+    # All are of one of the three.
+    pixel.end_laser_cycles(3)
+    pixel.count([5, 5])
+    assert pixel.histogram[[5, 9]].tolist() == [2, 1] and pixel.histogram.sum() == 3
+    assert pixel.statistics["repeated"] == 3 and pixel.statistics["photons"] == 6
+    every = dtof.Pixel()
+    every.count([5, 5, 9])
+    assert every.histogram.sum() == 3 and every.statistics["repeated"] == 0
+
+
+@pytest.mark.parametrize("bins", [8, 16, 32, 1024])
+def test_photons_past_the_last_bin_are_rejected_each(bins):
+    pixel = dtof.Pixel(bins=bins, once_per_bin=True)
+    pixel.count([bins, bins, bins + 1, 65_535, 65_535, 3, 3])
+    assert pixel.statistics["rejected"] == 5
+    assert pixel.statistics["repeated"] == 1
+    assert pixel.histogram.sum() == 1
+
+
+def test_histograms_and_other_values_are_refused():
+    counts = numpy.full((1, BINS), 5)
+    with pytest.raises(dtof.Error, match="^once_per_bin needs photons"):
+        dtof.replay(counts, once_per_bin=True)
+    assert dtof.replay(counts, once_per_bin=False, cycles=100).statistics["repeated"] == 0
+    for call in (
+        lambda: dtof.photons([0], [0], [5], columns=1, once_per_bin="maybe"),
+        lambda: dtof.replay(counts, once_per_bin="maybe"),
+        lambda: dtof.Pixel(once_per_bin="maybe"),
+    ):
+        with pytest.raises(dtof.Error, match="^once_per_bin maybe: must be true or false"):
+            call()
+
+
+def test_more_than_half_a_photon_in_a_bin_is_warned_of():
+    def run(rate, **options):
+        number = numpy.random.default_rng(5).poisson([rate, 0.2], (2000, 2))
+        cycle, pixel = numpy.repeat(numpy.argwhere(number + 1), number.ravel(), axis=0).T
+        return dtof.photons(pixel, cycle, 60, columns=2, cycles=2000, **options)
+
+    with pytest.warns(UserWarning, match="1 of 2 pixels have .* pixel 0 0.[67].* in bin 60") as warned:
+        run(0.7, once_per_bin=True)
+    assert len(warned) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run(0.7)
+        run(0.4, once_per_bin=True)
