@@ -74,7 +74,7 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     });
     check(&["one hit, 1.5 photons", "one hit, 2 photons"], |of| {
         if is_window(of) {
-            surely_false(of) < 0.02 && of.piled_up == 0.0
+            surely_false(of) < 0.02 && of.piled_up < 0.2
         } else {
             of.piled_up > 0.95
         }

@@ -17,6 +17,7 @@ mod compare_scenes;
 mod dead_time;
 mod depth_map;
 mod engine;
+mod motion;
 mod pipeline;
 mod recorded;
 mod recorded_echoes;
