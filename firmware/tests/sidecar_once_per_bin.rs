@@ -28,7 +28,7 @@ fn requested() -> Configuration {
     }
 }
 
-/// The pixels and codes of the photons of each laser cycle, in any order: an even background with two
+/// The pixels and codes of the photons of each laser cycle, pixel by pixel: an even background with two
 /// past the last bin, a target in bin 70, and now and then 30 photons of a drop in two bins.
 fn photons(cycles: usize) -> Vec<Vec<(u16, u16)>> {
     let mut random = Pcg32::seed_from_u64(1);
@@ -45,6 +45,7 @@ fn photons(cycles: usize) -> Vec<Vec<(u16, u16)>> {
             let (pixel, place) = (below(2), below(60));
             photons.extend((0..30).map(|_| (pixel, place + below(2))));
         }
+        photons.sort_by_key(|photon| photon.0);
         photons
     };
     (0..cycles).map(|_| cycle()).collect()

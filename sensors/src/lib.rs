@@ -34,7 +34,8 @@ pub use self::fault::SensorFault;
 
 /// Where a sensor's photons go.
 pub trait PhotonSink {
-    /// One photon of `pixel` in the present laser cycle.
+    /// One photon of `pixel` in the present laser cycle. All photons of a pixel come one after another, in
+    /// any order of bins.
     fn photon(&mut self, pixel: PixelAddress, code: u16);
     /// The present laser cycle and `cycles - 1` empty ones after it have ended.
     fn end_laser_cycles(&mut self, cycles: u16);

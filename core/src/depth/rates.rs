@@ -56,14 +56,24 @@ impl Rates {
                 *light = counted.light();
             }
         }
+        Self::relative(&light, background)
+    }
+
+    /// Relative to the highest bin. The same for all counters.
+    #[inline(never)]
+    fn relative(light: &[u32; REACH], background: u32) -> Self {
         let highest = u64::from(light.iter().fold(1, |highest, &light| highest.max(light)));
         #[allow(clippy::cast_possible_truncation, reason = "at most 1023")]
         let relative = |light: u32| {
             let relative = (u64::from(light) * u64::from(Count10::MAX) + highest / 2) / highest;
             relative as u16
         };
+        let mut bins = [0; REACH];
+        for (bin, &light) in bins.iter_mut().zip(light) {
+            *bin = relative(light);
+        }
         Self {
-            bins: light.map(relative),
+            bins,
             background: relative(background),
         }
     }
@@ -102,6 +112,7 @@ impl Rates {
 
 impl Counted {
     /// The light a laser cycle in 1/2²⁴: up to 2³⁰.
+    #[inline(never)]
     pub(crate) fn light(self) -> u32 {
         // In half cycles, so that the rest is at least 1.
         let whole = 2 * self.live.max(1);

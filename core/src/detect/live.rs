@@ -168,28 +168,24 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
 
     /// The bin with the most light of the `width` bins from `first` on, the lowest of several, and its
     /// photons. A bin that is left out has none.
+    #[inline(never)]
     #[must_use]
     pub fn brightest(&self, first: u16, width: u16) -> Peak {
-        let light = |bin| {
+        let (mut brightest, mut highest) = (first, 0);
+        for bin in first..first.saturating_add(width) {
             let counted = self.counted(bin);
-            if self.is_left_out(counted.live, 1) {
+            let light = if self.is_left_out(counted.live, 1) {
                 0
             } else {
                 counted.light()
+            };
+            if light > highest {
+                (brightest, highest) = (bin, light);
             }
-        };
-        let bins = first + 1..first + width;
-        let (bin, _) = bins.fold((first, light(first)), |highest, bin| {
-            let other = light(bin);
-            if other > highest.1 {
-                (bin, other)
-            } else {
-                highest
-            }
-        });
+        }
         Peak {
-            bin: BinIndex::saturating(bin),
-            count: Count::saturating(self.count(bin.into())),
+            bin: BinIndex::saturating(brightest),
+            count: Count::saturating(self.count(brightest.into())),
         }
     }
 
@@ -563,6 +559,7 @@ impl Totals {
 impl Candidate {
     /// The test of the module's documentation. `live` are the live laser cycles of all bins, and
     /// `z_squared` is in 1/2²⁴.
+    #[inline(never)]
     fn stands_clear(&self, z_squared: u32, live: u64) -> bool {
         // 31 + 16 bits, at most 1.
         let share = (u64::from(self.live) << 16).checked_div(live);

@@ -57,8 +57,6 @@ type Answer = (u8, Vec<u8, BODY_BYTES>);
 #[derive(Debug)]
 pub struct Pixel {
     detector: AsyncPixel<BINS>,
-    /// Used if photons count once per bin.
-    bins: OncePerBin<{ OncePerBin::words(BINS) }>,
     feed: BlockLink,
     dynamic_depth: DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>,
 }
@@ -67,7 +65,6 @@ impl Pixel {
     const fn new(address: PixelAddress, feed: BlockLink) -> Self {
         Self {
             detector: AsyncPixel::new(address),
-            bins: OncePerBin::new(),
             feed,
             dynamic_depth: DynamicDepthPixel::new(),
         }
@@ -126,6 +123,9 @@ pub struct Sidecar<'a> {
     source: Source,
     /// Of the configuration in force: photons of one laser cycle in one bin count once.
     once_per_bin: bool,
+    /// Then the bins of the pixel whose photons come now, which has this number.
+    bins: OncePerBin<{ OncePerBin::words(BINS) }>,
+    bins_of: usize,
     sensor: Option<SensorInfo>,
     /// The sensor has been started and not been stopped.
     running: bool,
@@ -200,6 +200,8 @@ impl<'a> Sidecar<'a> {
             bin_width: U16F16::ZERO,
             source: Source::Link,
             once_per_bin: false,
+            bins: OncePerBin::new(),
+            bins_of: 0,
             sensor,
             running: false,
             started: false,
@@ -393,6 +395,7 @@ impl<'a> Sidecar<'a> {
 
     fn restart_counts(&mut self) {
         self.cycle = 0;
+        self.bins.end_laser_cycle();
         self.frame_cycles = 0;
         self.since_look = 0;
         self.since_tick = 0;

@@ -63,14 +63,20 @@ impl Sidecar<'_> {
         }
     }
 
-    pub(super) fn count(&mut self, pixel: usize, code: u16) {
-        let (Some(pixel), Some(config)) = (self.pixels.get_mut(pixel), &self.config) else {
+    pub(super) fn count(&mut self, number: usize, code: u16) {
+        let (Some(pixel), Some(config)) = (self.pixels.get_mut(number), &self.config) else {
             self.unaddressed += 1;
             return;
         };
-        if self.once_per_bin && !pixel.bins.is_first(code) {
-            self.statistics.repeated += 1;
-            return;
+        if self.once_per_bin {
+            if self.bins_of != number {
+                self.bins.end_laser_cycle();
+                self.bins_of = number;
+            }
+            if !self.bins.is_first(code) {
+                self.statistics.repeated += 1;
+                return;
+            }
         }
         pixel.detector.count(config, code);
         if let Some((config, _)) = &self.binning {
@@ -94,12 +100,10 @@ impl Sidecar<'_> {
         };
         self.cycle += u64::from(ended);
         let last = LaserCycle::new(self.cycle.saturating_sub(1));
+        self.bins.end_laser_cycle();
         let mut fired = false;
         for pixel in self.pixels.iter_mut() {
             let (detector, statistics) = (&mut pixel.detector, &mut self.statistics);
-            if self.once_per_bin {
-                pixel.bins.end_laser_cycle();
-            }
             if detector.end_laser_cycles(config, statistics, last, ended) == Look::Event {
                 pixel.feed.reported();
                 fired = true;

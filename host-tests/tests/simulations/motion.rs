@@ -31,6 +31,11 @@ struct Event {
 }
 
 /// Events of a target with `signal` photons a laser cycle that moves `speed` bins in each.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "numbers of photons, and bins"
+)]
 fn events(signal: f64, speed: f64, number: usize, seed: u64) -> Vec<Event> {
     let gate = RangeGate::<BINS>::full();
     let z = z_for(100, &gate, 4, 40, 2000);
@@ -87,6 +92,11 @@ fn events(signal: f64, speed: f64, number: usize, seed: u64) -> Vec<Event> {
 
 /// How many photons within four bins of the peak, but not in its three middle ones, are more than the
 /// latter and the background let expect, in standard deviations.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "numbers of photons, and bins"
+)]
 fn width(counts: &[f64; BINS], position: f64) -> f64 {
     let middle = (position as usize).clamp(9, BINS - 10);
     let sum = |reach: usize| counts[middle - reach..=middle + reach].iter().sum::<f64>();
