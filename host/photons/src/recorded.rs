@@ -184,7 +184,7 @@ impl RecordedHistograms {
             {
                 let reason = format!(
                     "bin {bin} of pixel {address} has {} photons, but was live in {live} of {cycles} laser \
-                     cycles; give the laser cycles with `recorded_cycles`",
+                     cycles; give the laser cycles with `recorded_cycles`, or a shorter dead time",
                     counts[bin]
                 );
                 return Err(Refused::value("dead_time", dead_time, reason).into());

@@ -113,7 +113,7 @@ fn a_recording_without_truth_is_held_against_itself() {
     assert_contains(&printed, "take ");
     let report = scratch.read("out/report.html");
     assert_contains(&report, "errors are against the true range");
-    assert_contains(&report, "window of 2, once per bin");
+    assert_contains(&report, "window of 3, once per bin");
 }
 
 #[test]

@@ -109,7 +109,7 @@ mod tests {
         let report = |number: fn(u64) -> u64| {
             let wide = (0..20).flat_map(|at| number(at).to_le_bytes());
             let narrow = (20..32).flat_map(|at| u32::try_from(number(at)).unwrap().to_le_bytes());
-            let last = (32..34).flat_map(|at| number(at).to_le_bytes());
+            let last = (32..35).flat_map(|at| number(at).to_le_bytes());
             let bytes: Vec<u8> = wide.chain(narrow).chain([1, 0]).chain(last).collect();
             Report::from_le_bytes(&bytes).unwrap()
         };
@@ -118,7 +118,7 @@ mod tests {
         // The counts of link and sensor did not start at 0.
         assert_eq!(
             losses(&report(|at| 101 + at), &report(|_| 100), &none),
-            ", saturated 105, saturated in blocks 114, rejected 106, gated out 107, unaddressed 102, \
+            ", saturated 105, saturated in blocks 114, rejected 106, gated out 107, repeated 135, unaddressed 102, \
              deferred 227, expired 110, expired and deferred 231, ended by a full counter 133, blind looks 134, \
              lost bytes 21, corrupt frames 27, \
              oversized frames 28, foreign frames 29, out of order 30, duplicates 31, \

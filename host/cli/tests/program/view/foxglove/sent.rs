@@ -262,7 +262,7 @@ fn a_device_tells_every_loss_and_why_it_is_gone() {
         frame["losses"]["photons"].as_u64() > Some(0)
     });
     let counts = frame["losses"]["counts"].as_array().unwrap();
-    assert_eq!(counts.len(), 19);
+    assert_eq!(counts.len(), 20);
     for name in counts.iter().map(|count| count[0].as_str().unwrap()) {
         assert!(lost[name.replace(' ', "_")].is_u64(), "{name}: {lost}");
     }
