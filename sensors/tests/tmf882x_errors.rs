@@ -209,12 +209,15 @@ fn an_application_that_refuses_never_ends_or_shows_another_page() {
         bench.identify(0x03, &[0x08, 0xFF]);
     };
     let mut bench = Bench::<128>::new(settings(), IMAGE);
-    begin(&mut bench, false);
-    let refused = Error::Refused {
-        command: Command::Stop,
-        status: 0x06,
-    };
-    assert_eq!(bench.poll(&[read(0x41, 0x08, &[0x06])]), Err(refused));
+    // From 0x10 on a status is a command that is under way.
+    for (reset, status) in [(false, 0x06), (true, 0x0F)] {
+        begin(&mut bench, reset);
+        let refused = Error::Refused {
+            command: Command::Stop,
+            status,
+        };
+        assert_eq!(bench.poll(&[read(0x41, 0x08, &[status])]), Err(refused));
+    }
 
     begin(&mut bench, true);
     bench.work(&[
@@ -240,9 +243,11 @@ fn an_application_that_refuses_never_ends_or_shows_another_page() {
     };
     assert_eq!(bench.poll(&[read(0x41, 0x08, &[0x00])]), Err(refused));
 
-    begin(&mut bench, true);
-    let busy = [read(0x41, 0x08, &[0xFF])];
-    times_out(&mut bench, 50, &busy, Waiting::Command(Command::Stop));
+    for status in [0x10, 0xFF] {
+        begin(&mut bench, true);
+        let busy = [read(0x41, 0x08, &[status])];
+        times_out(&mut bench, 50, &busy, Waiting::Command(Command::Stop));
+    }
     starts_over(&mut bench);
 }
 
