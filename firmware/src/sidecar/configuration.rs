@@ -4,6 +4,7 @@ use dtof_core::binning::{Binning, BlockLink};
 use dtof_core::{AnyRule, Array, PixelAddress, PixelConfig, RangeGate, RangeScale};
 use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source, StopReason};
 
+use super::photons::BinsOfPixel;
 use super::{BINS, Block, Pixel, Sidecar};
 
 impl Sidecar<'_> {
@@ -80,7 +81,7 @@ impl Sidecar<'_> {
         self.dynamic_depth = dynamic_depth;
         self.bin_width = requested.bin_width_ps;
         self.source = requested.source;
-        self.once_per_bin = requested.once_per_bin;
+        self.once_per_bin = requested.once_per_bin.then(BinsOfPixel::default);
         self.host_timeout_ms = requested.host_timeout_ms;
         self.stopping.get_or_insert(StopReason::Configuration);
         self.started = false;

@@ -27,8 +27,7 @@ use dtof_core::binning::{BlockLink, BlockPlace};
 use dtof_core::events::{DynamicDepthConfig, DynamicDepthPixel};
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{
-    AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, OncePerBin, PixelAddress, PixelConfig,
-    Statistics,
+    AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, PixelAddress, PixelConfig, Statistics,
 };
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
@@ -39,7 +38,7 @@ use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
 use heapless::vec::{Vec, VecView};
 
-use self::photons::Photons;
+use self::photons::{BinsOfPixel, Photons};
 
 /// Bins of every histogram.
 pub const BINS: usize = 128;
@@ -121,11 +120,8 @@ pub struct Sidecar<'a> {
     /// Of the configuration in force, for sensors that measure times.
     bin_width: U16F16,
     source: Source,
-    /// Of the configuration in force: photons of one laser cycle in one bin count once.
-    once_per_bin: bool,
-    /// Then the bins of the pixel whose photons come now, which has this number.
-    bins: OncePerBin<{ OncePerBin::words(BINS) }>,
-    bins_of: usize,
+    /// Of the configuration in force, if photons of one laser cycle in one bin count once.
+    once_per_bin: Option<BinsOfPixel>,
     sensor: Option<SensorInfo>,
     /// The sensor has been started and not been stopped.
     running: bool,
@@ -199,9 +195,7 @@ impl<'a> Sidecar<'a> {
             dynamic_depth: None,
             bin_width: U16F16::ZERO,
             source: Source::Link,
-            once_per_bin: false,
-            bins: OncePerBin::new(),
-            bins_of: 0,
+            once_per_bin: None,
             sensor,
             running: false,
             started: false,
@@ -384,6 +378,7 @@ impl<'a> Sidecar<'a> {
         self.config = None;
         self.binning = None;
         self.dynamic_depth = None;
+        self.once_per_bin = None;
         self.source = Source::Link;
         self.photons = None;
         self.answer = None;
@@ -395,7 +390,6 @@ impl<'a> Sidecar<'a> {
 
     fn restart_counts(&mut self) {
         self.cycle = 0;
-        self.bins.end_laser_cycle();
         self.frame_cycles = 0;
         self.since_look = 0;
         self.since_tick = 0;

@@ -1,10 +1,10 @@
 //! Photons into pixels, and photons messages of the link.
 
 use dtof_core::binning::{count_in_blocks, end_laser_cycles_of_blocks};
-use dtof_core::{LaserCycle, Look};
+use dtof_core::{LaserCycle, Look, OncePerBin};
 use heapless::vec::Vec;
 
-use super::Sidecar;
+use super::{BINS, Sidecar};
 use dtof_link::Token;
 use dtof_link::endpoint::BODY_BYTES;
 
@@ -26,6 +26,30 @@ impl Photons {
             pixel: 0,
             cycles: 0,
         }
+    }
+}
+
+/// The bins of the pixel whose photons come now, which have had one in this laser cycle.
+#[derive(Debug, Default)]
+pub(super) struct BinsOfPixel {
+    bins: OncePerBin<{ OncePerBin::words(BINS) }>,
+    pixel: usize,
+}
+
+impl BinsOfPixel {
+    /// Whether a photon of this pixel is the first of its bin. Photons of a pixel come one after another.
+    // Out of line: a photon that counts anyhow would take longer with it.
+    #[inline(never)]
+    fn is_first(&mut self, pixel: usize, code: u16) -> bool {
+        if self.pixel != pixel {
+            self.end_laser_cycle();
+            self.pixel = pixel;
+        }
+        self.bins.is_first(code)
+    }
+
+    fn end_laser_cycle(&mut self) {
+        self.bins.end_laser_cycle();
     }
 }
 
@@ -68,15 +92,11 @@ impl Sidecar<'_> {
             self.unaddressed += 1;
             return;
         };
-        if self.once_per_bin {
-            if self.bins_of != number {
-                self.bins.end_laser_cycle();
-                self.bins_of = number;
-            }
-            if !self.bins.is_first(code) {
-                self.statistics.repeated += 1;
-                return;
-            }
+        if let Some(bins) = &mut self.once_per_bin
+            && !bins.is_first(number, code)
+        {
+            self.statistics.repeated += 1;
+            return;
         }
         pixel.detector.count(config, code);
         if let Some((config, _)) = &self.binning {
@@ -100,7 +120,9 @@ impl Sidecar<'_> {
         };
         self.cycle += u64::from(ended);
         let last = LaserCycle::new(self.cycle.saturating_sub(1));
-        self.bins.end_laser_cycle();
+        if let Some(bins) = &mut self.once_per_bin {
+            bins.end_laser_cycle();
+        }
         let mut fired = false;
         for pixel in self.pixels.iter_mut() {
             let (detector, statistics) = (&mut pixel.detector, &mut self.statistics);
