@@ -243,7 +243,10 @@ fn functions(file: &object::File) -> Result<BTreeMap<u32, Function>> {
                 let is_code = |at| code.range(..=at).next_back().is_none_or(|(_, &code)| code);
                 let index = usize::try_from((at - start) / 2)?;
                 let rest = halfwords.get(index..).unwrap_or_default();
-                let is_table = || code.get(&(at + 2)) == Some(&false);
+                let jumps_by_table = || {
+                    let table = small::table_of_jump(rest);
+                    table.is_some_and(|bytes| code.get(&(at + bytes)) == Some(&false))
+                };
                 let (effect, bytes) = match rest {
                     [_, ..] if !is_code(at) => (Effect::None, 2),
                     &[first, second, ..] if thumb::is_wide(first) => {
@@ -252,9 +255,7 @@ fn functions(file: &object::File) -> Result<BTreeMap<u32, Function>> {
                     &[first, ..] => {
                         let effect = match thumb::narrow(at, first) {
                             Effect::SetsStackPointer => small::frame(&halfwords, start, index),
-                            Effect::GoesAnywhere if small::is_jump(first) && is_table() => {
-                                Some(Effect::None)
-                            }
+                            Effect::GoesAnywhere if jumps_by_table() => Some(Effect::None),
                             effect => Some(effect),
                         };
                         (effect.unwrap_or(Effect::SetsStackPointer), 2)

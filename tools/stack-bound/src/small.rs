@@ -45,10 +45,17 @@ pub fn frame(code: &[u16], start: u32, index: usize) -> Option<Effect> {
     }
 }
 
-/// Whether this is `add pc, rX` or `mov pc, rX`. With constants right behind it, it is a jump
-/// by a table within the function.
-pub fn is_jump(code: u16) -> bool {
-    matches!(code & 0xff87, 0x4487 | 0x4687)
+/// How many bytes behind itself the first of these instructions, `add pc, rX` or `mov pc, rX`, has its
+/// table, if one stands there: constants then make it a jump within the function. An instruction
+/// that does nothing may align the table.
+pub fn table_of_jump(code: &[u16]) -> Option<u32> {
+    const NOP: u16 = 0x46c0;
+    match code {
+        [jump, next, ..] if matches!(jump & 0xff87, 0x4487 | 0x4687) => {
+            Some(if *next == NOP { 4 } else { 2 })
+        }
+        _ => None,
+    }
 }
 
 #[cfg(test)]
@@ -84,9 +91,15 @@ mod tests {
     }
 
     #[test]
-    fn knows_jumps_by_register() {
-        assert!(is_jump(0x4487) && is_jump(0x4497) && is_jump(0x4687));
+    fn a_table_stands_behind_a_jump_or_is_aligned() {
+        for jump in [0x4487, 0x4497, 0x4687] {
+            assert_eq!(table_of_jump(&[jump, 5]), Some(2));
+            assert_eq!(table_of_jump(&[jump, 0x46c0, 5]), Some(4));
+            assert_eq!(table_of_jump(&[jump]), None);
+        }
         // bx lr, blx r3, add sp, r6
-        assert!(!is_jump(0x4770) && !is_jump(0x4798) && !is_jump(0x44b5));
+        for other in [0x4770, 0x4798, 0x44b5] {
+            assert_eq!(table_of_jump(&[other, 5]), None);
+        }
     }
 }
