@@ -15,7 +15,7 @@ pub const ONCE_PER_BIN: f64 = 28.57;
 /// `AsyncPixel::count`).
 pub const FEED: f64 = 32.56 - 28.56;
 /// Counting it in a block (`count and count_in_blocks; 1 level`, less `feeds none`).
-pub const BLOCK_PHOTON: f64 = 61.99 - 32.56;
+pub const BLOCK_PHOTON: f64 = 59.99 - 32.56;
 /// A look without an event with the paper's rule (`kept peak; no event`).
 pub const PAPER: f64 = 90.68;
 /// The same with the average of all bins (`average; no event`).
