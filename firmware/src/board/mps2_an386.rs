@@ -123,12 +123,13 @@ impl Mps2An386 {
     }
 }
 
-/// Pushes what a call saves, again and again, as recursion without end does. It is a loop in
-/// assembly: `cargo xtask sizes` refuses an image with a function that calls itself.
+/// Pushes return addresses, again and again, as recursion without end does: a word at a time, so that
+/// every word of the stack is taken wherever it begins. It is a loop in assembly: `cargo xtask sizes`
+/// refuses an image with a function that calls itself.
 #[unsafe(naked)]
 #[allow(unsafe_code, reason = "it takes all of the stack")]
 extern "C" fn overflow() -> ! {
-    core::arch::naked_asm!("nop", "0: push {{r0-r7, lr}}", "b 0b")
+    core::arch::naked_asm!("nop", "0: push {{lr}}", "b 0b")
 }
 
 /// Switches LED0 off, which stands for a laser.
