@@ -10,6 +10,7 @@ use dtof_firmware::sidecar::Sidecar;
 use dtof_link::endpoint::KEEP_ALIVE_MS;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::{Configuration, Refusal, Source, StopReason, message};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write, WriteReady};
 use proptest::prelude::*;
@@ -32,7 +33,7 @@ impl Sensor for Laser {
         SensorInfo::new(8)
     }
 
-    fn start(&mut self, _: U16F16) {
+    fn start(&mut self, _: U16F16, _: Dither) {
         self.is_on = true;
         self.started += 1;
     }

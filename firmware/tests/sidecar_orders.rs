@@ -5,6 +5,7 @@ mod common;
 use common::host::{CONFIGURATION, Host, device};
 use dtof_core::fixed::types::U16F16;
 use dtof_link::{Configuration, Refusal, SensorRecord, Source, message};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 /// A sensor that notes what it is told.
@@ -30,7 +31,7 @@ impl Sensor for OrderLog {
         }
     }
 
-    fn start(&mut self, bin_width: U16F16) {
+    fn start(&mut self, bin_width: U16F16, _: Dither) {
         self.0.push(Order::Start(bin_width));
     }
 
@@ -109,6 +110,7 @@ fn the_host_is_told_what_the_sensor_is() {
         laser_millihertz: info.laser_millihertz,
         bins: info.bins,
         dead_time: info.dead_time,
+        most_dither: 0,
     };
     let mut host = Host::new(1, 0);
     let mut with_one = device::<8>(Some(info));

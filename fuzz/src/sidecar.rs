@@ -11,6 +11,7 @@ use dtof_link::endpoint::{BODY_BYTES, Endpoint};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
 use dtof_link::{Configuration, Report, Source, Token};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 use crate::Input;
@@ -133,7 +134,7 @@ impl Sensor for Laser {
         SensorInfo::new(16)
     }
 
-    fn start(&mut self, _: U16F16) {
+    fn start(&mut self, _: U16F16, _: Dither) {
         self.is_on = true;
         self.starts += 1;
     }

@@ -47,6 +47,12 @@ pub struct Configuration {
     /// Whether photons of one laser cycle in one bin count once. A device whose sensor gives histograms
     /// refuses it with that as the source.
     pub once_per_bin: bool,
+    /// By how many bins the longest laser cycle is longer than the shortest: the range of the laser's random
+    /// lengths. 0: all laser cycles are as long. A device refuses more than its sensor can, and any where the
+    /// photons come from the link.
+    pub dither_bins: u16,
+    /// The seed of these lengths. LiDARs side by side need different ones.
+    pub dither_seed: u64,
     /// The number of pixels; their addresses begin at 0.
     pub pixels: u16,
     /// Pixels in a row of the array.
@@ -194,8 +200,10 @@ impl Configuration {
             ])
             .chain(self.host_timeout_ms.to_le_bytes())
             .chain(dead_time.to_le_bytes())
+            .chain([once_per_bin])
+            .chain(self.dither_bins.to_le_bytes())
             // The bytes after it are reserved.
-            .chain([once_per_bin]);
+            .chain(self.dither_seed.to_le_bytes());
         let mut bytes = [0; Self::BYTES];
         for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
@@ -257,6 +265,8 @@ impl Configuration {
         let host_timeout_ms = u16::from_le_bytes(fields.next()?);
         let dead_time = u16::from_le_bytes(fields.next()?);
         let [once_per_bin] = fields.next()?;
+        let dither_bins = u16::from_le_bytes(fields.next()?);
+        let dither_seed = u64::from_le_bytes(fields.next()?);
         let Fields(reserved) = fields;
 
         let changes = |reference| DynamicDepth {
@@ -301,6 +311,8 @@ impl Configuration {
                 ONCE_PER_BIN => true,
                 _ => return Err(Refusal::Unknown),
             },
+            dither_bins,
+            dither_seed,
             pixels,
             columns,
             binning: match BlockLevel::new(levels).ok_or(Refusal::Unknown)? {

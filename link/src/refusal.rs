@@ -55,6 +55,8 @@ numbered! {
         DeadTime = 21: "the dead time needs the window rule, without blocks",
         /// Once a bin, of a sensor that gives histograms.
         OncePerBin = 22: "the sensor gives histograms, where photons cannot count once per bin",
+        /// A dither that is odd, more than the sensor can, or with photons from the link.
+        Dither = 23: "the sensor cannot dither its laser by so many bins",
     }
 }
 

@@ -21,6 +21,8 @@ pub struct SensorRecord {
     /// Bins for which its TDC is blind after a photon; `u16::MAX` if it takes only the first photon
     /// of a laser cycle, 0 if there is none or it is unknown.
     pub dead_time: u16,
+    /// The largest range of the laser's dither, in bins; 0 if it cannot.
+    pub most_dither: u8,
 }
 
 impl SensorRecord {
@@ -39,9 +41,10 @@ impl SensorRecord {
         let mut bytes = [0; Self::BYTES];
         let rate = sensor.laser_millihertz.to_le_bytes();
         let fields = [a, b, c, d, e, f, g, h, i, j].into_iter().chain(rate);
-        // The last two bytes are reserved.
         let fields = fields.chain(sensor.bins.to_le_bytes());
         let fields = fields.chain(sensor.dead_time.to_le_bytes());
+        // One byte is reserved.
+        let fields = fields.chain([0, sensor.most_dither]);
         for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
         }
@@ -49,17 +52,17 @@ impl SensorRecord {
     }
 
     /// Reads the record: `Some(None)` if the device has no sensor, `None` if the length is
-    /// wrong or a reserved byte is not 0.
+    /// wrong or the reserved byte is not 0.
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<Option<Self>> {
         let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
         let (&[a, b, c, d, e, f, g, h, i, j], rest) = bytes.split_first_chunk()?;
         let (&rate, rest) = rest.split_first_chunk()?;
         let (&bins, rest) = rest.split_first_chunk()?;
-        let (&dead_time, reserved) = rest.split_first_chunk()?;
-        if reserved.iter().any(|&byte| byte != 0) {
+        let (&dead_time, rest) = rest.split_first_chunk()?;
+        let &[0, most_dither] = rest else {
             return None;
-        }
+        };
         let pixels = u16::from_le_bytes([a, b]);
         let bin_width = U16F16::from_le_bytes([c, d, e, f]);
         Some((pixels > 0).then_some(Self {
@@ -69,6 +72,7 @@ impl SensorRecord {
             laser_millihertz: u64::from_le_bytes(rate),
             bins: u16::from_le_bytes(bins),
             dead_time: u16::from_le_bytes(dead_time),
+            most_dither,
         }))
     }
 }

@@ -18,6 +18,8 @@ fn configuration(rule: AnyRule) -> Configuration {
         gate: (0, 127),
         dead_time: None,
         once_per_bin: false,
+        dither_bins: 0,
+        dither_seed: 0,
         pixels: 64,
         columns: 8,
         binning: None,

@@ -87,6 +87,8 @@ fn a_host_configures_with_the_golden_frame() {
         gate: (10, 119),
         dead_time: Some(128),
         once_per_bin: true,
+        dither_bins: 64,
+        dither_seed: 0x0102_0304_0506_0708,
         pixels: 64,
         columns: 8,
         binning: Some(AdaptiveBinning {
@@ -183,6 +185,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
             any::<u32>(),
             any::<i32>(),
             prop_oneof![Just(0), Configuration::HOST_TIMEOUTS_MS],
+            any::<(u16, u64)>(),
         ),
     )
         .prop_map(
@@ -199,7 +202,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
             )| {
                 let [x, l1, l2, first, last, pixels, columns] = numbers;
                 let (dead_time, [once_per_bin, tracking], [echo_guard_bins, echo_wait]) = more;
-                let (width, offset, host_timeout_ms) = wide_numbers;
+                let (width, offset, host_timeout_ms, (dither_bins, dither_seed)) = wide_numbers;
                 Configuration {
                     rule,
                     estimator,
@@ -209,6 +212,8 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                     gate: (first, last),
                     dead_time,
                     once_per_bin,
+                    dither_bins,
+                    dither_seed,
                     pixels,
                     columns,
                     binning,
@@ -263,7 +268,7 @@ proptest! {
         choices in prop::array::uniform7(0u8..3), rule in 0u8..4, width in 0u8..9,
         before in 200u16..1100, after in 200u16..1100, levels in 0u8..5, patience in 0u16..9, echoes in 0u8..6,
         host_timeout in prop_oneof![Just(0u16), 190u16..210, 59_990u16..60_010, any::<u16>()],
-        reserved in prop::option::of((55usize..67, 1u8..)),
+        reserved in prop::option::of((65usize..67, 1u8..)),
     ) {
         let mut bytes = numbers;
         bytes[2..4].copy_from_slice(&minimum_count.to_le_bytes());
@@ -279,7 +284,7 @@ proptest! {
         bytes[32..34].copy_from_slice(&after.to_le_bytes());
         bytes[44..46].copy_from_slice(&patience.to_le_bytes());
         bytes[50..52].copy_from_slice(&host_timeout.to_le_bytes());
-        bytes[55..].fill(0);
+        bytes[65..].fill(0);
         if let Some((at, value)) = reserved {
             bytes[at] = value;
         }
@@ -299,6 +304,8 @@ proptest! {
             let given = u16::from_le_bytes([bytes[52], bytes[53]]);
             prop_assert_eq!(configuration.once_per_bin, once_per_bin == 1);
             prop_assert_eq!(configuration.dead_time, (dead_time == 1).then_some(given));
+            prop_assert_eq!(configuration.dither_bins, u16::from_le_bytes([bytes[55], bytes[56]]));
+            prop_assert_eq!(&configuration.dither_seed.to_le_bytes()[..], &bytes[57..65]);
             let again = Configuration::from_le_bytes(&configuration.to_le_bytes());
             prop_assert_eq!(again, Ok(configuration));
         }
@@ -314,7 +321,7 @@ proptest! {
     #[test]
     fn sensors_come_back(
         pixels: u16, width: u32, offset: i32, laser_millihertz: u64, bins: u16, dead_time: u16,
-        at in 22usize..24, value in 1u8..,
+        most_dither: u8,
     ) {
         let sensor = SensorRecord {
             pixels,
@@ -323,13 +330,15 @@ proptest! {
             laser_millihertz,
             bins,
             dead_time,
+            most_dither,
         };
-        let mut bytes = SensorRecord::to_le_bytes(Some(&sensor));
+        let bytes = SensorRecord::to_le_bytes(Some(&sensor));
         let expected = (pixels > 0).then_some(sensor);
         prop_assert_eq!(SensorRecord::from_le_bytes(&bytes), Some(expected));
         prop_assert_eq!(SensorRecord::from_le_bytes(&bytes[1..]), None);
-        bytes[at] = value;
-        prop_assert_eq!(SensorRecord::from_le_bytes(&bytes), None);
+        let mut reserved = bytes;
+        reserved[22] = 1;
+        prop_assert_eq!(SensorRecord::from_le_bytes(&reserved), None);
     }
 
     #[test]

@@ -17,6 +17,7 @@
     clippy::unwrap_used
 )]
 
+pub mod dither;
 mod fault;
 pub mod i2c;
 pub mod protocol;
@@ -30,6 +31,7 @@ pub mod tmf882x;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 
+use self::dither::Dither;
 pub use self::fault::SensorFault;
 
 /// Where a sensor's photons go.
@@ -81,8 +83,9 @@ pub trait Sensor {
 
     /// Starts with a new configuration. The driver abandons the present measurement and begins
     /// again. A sensor that measures times makes its TDC codes `bin_width` picoseconds wide, which
-    /// is above 0. A sensor with bins of its own ignores it.
-    fn start(&mut self, bin_width: U16F16);
+    /// is above 0. A sensor with bins of its own ignores it. The range of `dither` is at most
+    /// [`SensorInfo::most_dither`].
+    fn start(&mut self, bin_width: U16F16, dither: Dither);
 
     /// Stops the sensor, as far as that is possible at once and without an answer. It is not polled
     /// before the next [`Self::start`].
@@ -119,6 +122,8 @@ pub struct SensorInfo {
     /// unknown. See
     /// [`PixelConfigBuilder::dead_time`](dtof_core::PixelConfigBuilder::dead_time).
     pub dead_time: u16,
+    /// The largest range of [dither](dither), in its bins; 0 if it cannot.
+    pub most_dither: u8,
 }
 
 impl SensorInfo {
@@ -134,6 +139,7 @@ impl SensorInfo {
             gives_histograms: false,
             laser_millihertz: 0,
             dead_time: 0,
+            most_dither: 0,
         }
     }
 

@@ -16,6 +16,7 @@ use dtof_chips::tmf8829::varied_counts;
 use dtof_chips::{Chip as _, Tmf8829 as Chip};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
+use dtof_sensors::dither::Dither;
 use dtof_sensors::tmf882x::{self, Tmf882x};
 use dtof_sensors::tmf8829::{Config, Tmf8829, Zones};
 use dtof_sensors::{Polled, Sensor};
@@ -105,7 +106,7 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
     sensor.stop();
     assert!(!waiting.0.borrow().chip.is_measuring);
     awaited.start_async();
-    sensor.start(U16F16::ZERO);
+    sensor.start(U16F16::ZERO, Dither::OFF);
     assert_eq!(
         blocking.0.borrow().log.last(),
         waiting.0.borrow().log.last()

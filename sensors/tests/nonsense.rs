@@ -11,6 +11,7 @@ use common::{Line, RecordingSink, SinkCall};
 use dtof_chips::{Chip, Tdc7200 as TdcChip, Tmf882x as TmfChip};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
+use dtof_sensors::dither::Dither;
 use dtof_sensors::tdc7200::{self, Calibration, CalibrationPeriods, Tdc7200};
 use dtof_sensors::tmf882x::{self, Tmf882x};
 use dtof_sensors::{Sensor, SensorFault};
@@ -183,7 +184,7 @@ where
     S::Error: Into<SensorFault>,
 {
     let (mut sink, mut errors) = (RecordingSink::default(), 0);
-    sensor.start(U16F16::lit("250"));
+    sensor.start(U16F16::lit("250"), Dither::OFF);
     for now_ms in 0..3000 {
         if bus.chance(bus.one_in.get()) {
             let is_high = bus.rng.borrow_mut().next_u32() & 1 == 0;

@@ -12,6 +12,7 @@ use common::tdc7200::{
 use common::{Broken, Line, RecordingSink, SinkCall};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::tdc7200::{
     CalibrationPeriods, Config, ConfigError, Counts, Edge, Error, Mode, Settings, Stops, Tdc7200,
 };
@@ -43,7 +44,7 @@ fn measures_in_mode_1() {
 fn each_start_brings_it_up_with_bins_of_its_width() {
     let mut bench = armed();
     for (bin_width, code) in [(500, 14), (250, 28)] {
-        bench.sensor.start(U16F16::from_num(bin_width));
+        bench.sensor.start(U16F16::from_num(bin_width), Dither::OFF);
         assert!(!bench.sensor.is_armed());
         bench.bring_up(MODE_1, ARM_1);
         assert_eq!(bench.serve(&example()), Ok(Polled::Data));
@@ -61,7 +62,7 @@ fn stopped_it_is_off_until_it_is_started() {
     bench.enable.driven.take();
     bench.sensor.stop();
     assert_eq!(*bench.enable.driven.borrow(), [false]);
-    bench.sensor.start(U16F16::lit("250"));
+    bench.sensor.start(U16F16::lit("250"), Dither::OFF);
     bench.recover();
 }
 

@@ -9,6 +9,7 @@ use common::tmf8828::{Bus, Chip, MAP, count, zone};
 use common::{Broken, RecordingSink, SinkCall};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::tmf882x::{Config, DeviceError, Error, Settings, Tmf882x};
 use dtof_sensors::{Polled, Sensor};
 use embedded_hal::i2c::ErrorKind;
@@ -304,7 +305,7 @@ fn no_fault_puts_a_histogram_into_another_zone_unreported() {
         }
         assert_eq!(wrong, 0, "seed {seed}");
         assert!(bench.sensor.is_measuring());
-        bench.sensor.start(U16F16::ZERO);
+        bench.sensor.start(U16F16::ZERO, Dither::OFF);
         bench.bring_up();
     }
     assert!(

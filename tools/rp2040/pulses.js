@@ -31,6 +31,8 @@ export class Pulses {
     this.rise = 0;
     this.lastHigh = null;
     this.longest = 0;
+    /** How often each time from one pulse's beginning to the next came, in clocks. */
+    this.intervals = new Map();
   }
 
   /** The level from clock `clock` on. Gives whether a pulse begins. */
@@ -40,6 +42,10 @@ export class Pulses {
     }
     this.isHigh = isHigh;
     if (isHigh) {
+      if (this.count > 0) {
+        const interval = clock - this.rise;
+        this.intervals.set(interval, (this.intervals.get(interval) ?? 0) + 1);
+      }
       this.count++;
       this.first ??= clock;
       this.rise = clock;
@@ -61,6 +67,7 @@ export class Pulses {
       firstHighMs: this.first === null ? null : milliseconds(this.first),
       lastHighMs: lastHigh === null ? null : milliseconds(lastHigh),
       isHigh,
+      intervals: [...this.intervals].map(([clocks, count]) => [clocks * CLOCK_NS, count]),
     };
   }
 }

@@ -182,7 +182,7 @@ static void act(const dtof_message_t *message)
     case DTOF_MESSAGE_SENSOR_REQUEST:
         answer_kind = DTOF_MESSAGE_SENSOR;
         answer_length = DTOF_SENSOR_BYTES;
-        check("sensor", dtof_sensor_write(PIXELS, DTOF_BINS, DEAD_TIME, BIN_WIDTH_PS_Q16,
+        check("sensor", dtof_sensor_write(PIXELS, DTOF_BINS, DEAD_TIME, 0, BIN_WIDTH_PS_Q16,
                                           LASER_HZ * 1000u, 0, answer));
         break;
     case DTOF_MESSAGE_HISTOGRAM_REQUEST: {

@@ -386,6 +386,8 @@ enum dtof_status_t
     DTOF_ERROR_RESERVED_FIELD = 78,
     // Photons cannot count once per bin, as the sensor gives histograms.
     DTOF_ERROR_ONCE_PER_BIN = 79,
+    // The laser cannot be dithered by so many bins.
+    DTOF_ERROR_DITHER = 80,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -651,6 +653,12 @@ typedef struct dtof_device_config_t {
     // dtof_pixel_count_once_per_bin. If your sensor gives histograms, refuse it with
     // DTOF_ERROR_ONCE_PER_BIN.
     uint8_t once_per_bin;
+    // The range of the laser's dither in bins, 0 for none: each laser cycle lasts as long as the mean, less half
+    // of it, and a random number of bins from 0 to it. Refuse it with DTOF_ERROR_DITHER if it is more than your
+    // laser can.
+    uint16_t dither_bins;
+    // The seed of these random numbers.
+    uint64_t dither_seed;
 } dtof_device_config_t;
 
 // The counts that a device keeps beside its statistics.
@@ -1052,6 +1060,7 @@ dtof_status_t dtof_device_config_read(const uint8_t *body,
 // - `bins`: bins that the sensor measures, up to DTOF_BINS
 // - `dead_time`: bins for which its TDC is blind after a photon; 65,535 if it takes only the first
 //   photon of a laser cycle, 0 if there is none or it is unknown
+// - `most_dither`: the largest range of the laser's dither in bins, 0 if it cannot
 // - `bin_width_ps_q16`: 0 if the host sets the width
 // - `laser_millihertz`: 0 if unknown
 // - `offset_mm_q8`: the range of the start of bin 0
@@ -1061,6 +1070,7 @@ dtof_status_t dtof_device_config_read(const uint8_t *body,
 dtof_status_t dtof_sensor_write(uint16_t pixels,
                                 uint16_t bins,
                                 uint16_t dead_time,
+                                uint8_t most_dither,
                                 uint32_t bin_width_ps_q16,
                                 uint64_t laser_millihertz,
                                 int32_t offset_mm_q8,

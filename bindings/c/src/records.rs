@@ -51,6 +51,12 @@ pub struct dtof_device_config_t {
     /// dtof_pixel_count_once_per_bin. If your sensor gives histograms, refuse it with
     /// DTOF_ERROR_ONCE_PER_BIN.
     pub once_per_bin: u8,
+    /// The range of the laser's dither in bins, 0 for none: each laser cycle lasts as long as the mean, less half
+    /// of it, and a random number of bins from 0 to it. Refuse it with DTOF_ERROR_DITHER if it is more than your
+    /// laser can.
+    pub dither_bins: u16,
+    /// The seed of these random numbers.
+    pub dither_seed: u64,
 }
 
 /// Reads the body of CONFIGURE. Blocks of pixels and dynamic depth are refused, as this library
@@ -93,6 +99,8 @@ pub unsafe extern "C" fn dtof_device_config_read(
                 Source::Sensor => DTOF_SOURCE_SENSOR,
             },
             once_per_bin: requested.once_per_bin.into(),
+            dither_bins: requested.dither_bins,
+            dither_seed: requested.dither_seed,
         };
         // SAFETY: the same promise.
         unsafe { put(config, read) }
@@ -143,6 +151,7 @@ fn settings_of(requested: &Configuration, dead_time: u16) -> dtof_config_t {
 /// - `bins`: bins that the sensor measures, up to DTOF_BINS
 /// - `dead_time`: bins for which its TDC is blind after a photon; 65,535 if it takes only the first
 ///   photon of a laser cycle, 0 if there is none or it is unknown
+/// - `most_dither`: the largest range of the laser's dither in bins, 0 if it cannot
 /// - `bin_width_ps_q16`: 0 if the host sets the width
 /// - `laser_millihertz`: 0 if unknown
 /// - `offset_mm_q8`: the range of the start of bin 0
@@ -154,6 +163,7 @@ pub unsafe extern "C" fn dtof_sensor_write(
     pixels: u16,
     bins: u16,
     dead_time: u16,
+    most_dither: u8,
     bin_width_ps_q16: u32,
     laser_millihertz: u64,
     offset_mm_q8: i32,
@@ -169,6 +179,7 @@ pub unsafe extern "C" fn dtof_sensor_write(
             laser_millihertz,
             bins,
             dead_time,
+            most_dither,
         };
         *body = SensorRecord::to_le_bytes((pixels > 0).then_some(&sensor));
         Ok(())

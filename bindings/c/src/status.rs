@@ -106,6 +106,8 @@ pub enum dtof_status_t {
     DTOF_ERROR_RESERVED_FIELD = 78,
     /// Photons cannot count once per bin, as the sensor gives histograms.
     DTOF_ERROR_ONCE_PER_BIN = 79,
+    /// The laser cannot be dithered by so many bins.
+    DTOF_ERROR_DITHER = 80,
 }
 
 use dtof_status_t::*;
@@ -162,7 +164,7 @@ impl From<AerError> for dtof_status_t {
 }
 
 /// Each refusal of the link with its errors.
-const REFUSALS: [(Refusal, dtof_status_t); 23] = [
+const REFUSALS: [(Refusal, dtof_status_t); 24] = [
     (Refusal::Unknown, DTOF_ERROR_CONFIGURATION),
     (Refusal::ZeroX, DTOF_ERROR_ZERO_X),
     (Refusal::XAboveL1, DTOF_ERROR_X_ABOVE_L1),
@@ -186,6 +188,7 @@ const REFUSALS: [(Refusal, dtof_status_t); 23] = [
     (Refusal::Reserved, DTOF_ERROR_RESERVED_FIELD),
     (Refusal::DeadTime, DTOF_ERROR_DEAD_TIME),
     (Refusal::OncePerBin, DTOF_ERROR_ONCE_PER_BIN),
+    (Refusal::Dither, DTOF_ERROR_DITHER),
 ];
 
 impl From<Refusal> for dtof_status_t {
@@ -218,7 +221,7 @@ pub extern "C" fn dtof_status_text(status: u8) -> *const c_char {
 }
 
 /// The text of every status. A test compares it with the enum.
-const TEXTS: [(dtof_status_t, &CStr); 45] = [
+const TEXTS: [(dtof_status_t, &CStr); 46] = [
     (DTOF_OK, c"done"),
     (DTOF_ERROR_NULL, c"a pointer is null"),
     (DTOF_ERROR_ALIGNMENT, c"a pointer is not aligned"),
@@ -323,5 +326,9 @@ const TEXTS: [(dtof_status_t, &CStr); 45] = [
     (
         DTOF_ERROR_ONCE_PER_BIN,
         c"the sensor gives histograms, where photons cannot count once per bin",
+    ),
+    (
+        DTOF_ERROR_DITHER,
+        c"the sensor cannot dither its laser by so many bins",
     ),
 ];

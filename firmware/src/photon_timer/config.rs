@@ -3,6 +3,8 @@
 use core::error::Error;
 use core::fmt;
 
+use dtof_sensors::dither::Dither;
+
 /// Bins of a laser cycle.
 pub const BINS: u32 = 128;
 
@@ -10,12 +12,14 @@ pub const BINS: u32 = 128;
 pub const CLOCK_HZ: u32 = 125_000_000;
 
 /// Clocks of a laser cycle in addition to those of its bins: each shift register samples the
-/// level before, passes it on, and starts again.
-const BESIDE: u32 = 5;
+/// level before, passes it on, takes what its dither adds, and starts again.
+const BESIDE: u32 = 8;
 
-/// The shortest pulse and the shortest pause of the laser: an instruction each to load a
-/// counter and to count.
+/// The shortest pulse of the laser: an instruction each to load a counter and to count.
 const SHORTEST: u32 = 2;
+
+/// The shortest pause of the laser: it also takes what the dither adds, and counts it.
+const SHORTEST_PAUSE: u32 = 5;
 
 /// Clocks of the longest pulse within limits: 1 µs.
 const MOST_PULSE: u32 = 125;
@@ -35,6 +39,7 @@ pub struct Settings {
 /// Checked [`Settings`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Config {
+    /// The mean.
     period: u32,
     pulse: u32,
 }
@@ -42,13 +47,13 @@ pub struct Config {
 /// Settings that cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ConfigError {
-    /// A laser cycle would be shorter than the bins, and 5 clocks: above 943,396 a second.
+    /// A laser cycle would be shorter than the bins, and 8 clocks: above 922,509 a second.
     TooFast,
     /// Fewer than 1 a second.
     TooSlow,
     /// The laser's pulse is 0.
     NoPulse,
-    /// The laser's pulse takes the whole laser cycle, less 2 clocks.
+    /// The laser's pulse takes the whole laser cycle, less 5 clocks.
     LongPulse,
     /// The laser's pulse is longer than 1 µs, without the feature `laser-beyond-limits`.
     PulseBeyondLimit,
@@ -61,7 +66,7 @@ impl ConfigError {
     #[must_use]
     pub const fn text(self) -> &'static str {
         match self {
-            Self::TooFast => "a laser cycle is shorter than its bins: at most 943396 a second",
+            Self::TooFast => "a laser cycle is shorter than its bins: at most 922509 a second",
             Self::TooSlow => "there is to be a laser cycle a second or more",
             Self::NoPulse => "the laser's pulse is 0 ns",
             Self::LongPulse => "the laser's pulse leaves no pause in its laser cycle",
@@ -127,16 +132,41 @@ impl Config {
         }
         let clocks = pulse_ns.div_ceil(1_000_000_000 / CLOCK_HZ);
         let pulse = if clocks < SHORTEST { SHORTEST } else { clocks };
-        if pulse > period - SHORTEST {
+        if pulse > period - SHORTEST_PAUSE {
             return Err(ConfigError::LongPulse);
         }
         Ok(Self { period, pulse })
     }
 
-    /// Clocks from one laser pulse to the next.
+    /// Clocks from one laser pulse to the next in the mean; without dither always.
     #[must_use]
     pub const fn period(&self) -> u32 {
         self.period
+    }
+
+    /// The largest range of a dither: the shortest laser cycle has room for the bins, and keeps the limits
+    /// of the laser.
+    #[must_use]
+    pub const fn most_dither(&self) -> u8 {
+        let bins = BINS + BESIDE;
+        let pulse = self.pulse + SHORTEST_PAUSE;
+        let duty = if cfg!(feature = "laser-beyond-limits") {
+            0
+        } else {
+            self.pulse * LEAST_CLOCKS_A_CLOCK
+        };
+        let mut least = if bins > pulse { bins } else { pulse };
+        if duty > least {
+            least = duty;
+        }
+        // Both halves of the range.
+        let range = 2 * self.period.saturating_sub(least);
+        if range > Dither::MOST as u32 {
+            return Dither::MOST;
+        }
+        #[allow(clippy::cast_possible_truncation, reason = "at most 254")]
+        let range = range as u8;
+        range
     }
 
     /// Clocks that the laser's pin is high.
@@ -164,16 +194,26 @@ impl Config {
         CLOCK_HZ as u64 * 1000 / self.period as u64
     }
 
-    /// The start values of the two counters of the laser's pulse: pulse and pause.
+    /// The start values of the two counters of the laser's pulse, pulse and pause, for a dither of this
+    /// range, which is at most [`Self::most_dither`]. The dither adds to the pause.
     #[must_use]
-    pub const fn laser_counters(&self) -> [u32; 2] {
-        [self.pulse - SHORTEST, self.period - self.pulse - SHORTEST]
+    pub const fn laser_counters(&self, range: u16) -> [u32; 2] {
+        let shortest = self.shortest(range);
+        [
+            self.pulse - SHORTEST,
+            shortest.saturating_sub(self.pulse + SHORTEST_PAUSE),
+        ]
     }
 
-    /// The start values of the two counters of a shift register: bins and pause.
+    /// The start value of the counter of a shift register's pause, likewise.
     #[must_use]
-    pub const fn sampler_counters(&self) -> [u32; 2] {
-        [BINS / 2 - 1, self.period - BINS - BESIDE]
+    pub const fn sampler_counter(&self, range: u16) -> u32 {
+        self.shortest(range).saturating_sub(BINS + BESIDE)
+    }
+
+    /// Clocks of the shortest laser cycle.
+    const fn shortest(&self, range: u16) -> u32 {
+        self.period.saturating_sub(range as u32 / 2)
     }
 }
 
@@ -191,34 +231,78 @@ mod tests {
         config(laser_hz, pulse_ns)?.within_limits()
     }
 
+    /// The clocks of a laser cycle to which the dither adds so many: of the laser and of a shift register.
+    fn clocks(config: &Config, range: u16, added: u32) -> [u32; 2] {
+        // A counter from n takes n + 1 clocks, and 1 to load. What the dither adds takes 2 to load.
+        let [pulse, pause] = config.laser_counters(range);
+        let laser = (1 + pulse + 1) + (1 + pause + 1) + (2 + added + 1);
+        assert_eq!(1 + pulse + 1, config.pulse());
+        // To load, the level before, to hand over; 2 a bin of its own.
+        let rest = config.sampler_counter(range);
+        let sampler = 3 + 2 * 64 + (1 + rest + 1) + (2 + added + 1);
+        [laser, sampler]
+    }
+
     #[test]
     fn counters_make_the_clocks_that_are_asked_for() {
-        for laser_hz in [1, 1000, 99_999, 100_000, 250_000, 943_396] {
+        for laser_hz in [1, 1000, 99_999, 100_000, 250_000, 922_509] {
             for pulse_ns in [1, 8, 9, 16, 17, 100, 1000] {
                 let config = config(laser_hz, pulse_ns).unwrap();
                 let off = i64::from(config.period()) * i64::from(laser_hz) - 125_000_000;
                 assert!(2 * off.abs() <= i64::from(laser_hz), "{laser_hz}");
                 assert_eq!(config.pulse(), pulse_ns.div_ceil(8).max(2));
-                // A counter from n takes n + 1 clocks, and 1 to load.
-                let [pulse, pause] = config.laser_counters();
-                assert_eq!((1 + pulse + 1) + (1 + pause + 1), config.period());
-                assert_eq!(1 + pulse + 1, config.pulse());
-                // To load, the level before, to hand over; 2 a bin of its own; to load, rest.
-                let [bins, rest] = config.sampler_counters();
-                assert_eq!(3 + 2 * (bins + 1) + 1 + rest + 1, config.period());
+                assert_eq!(clocks(&config, 0, 0), [config.period(); 2]);
             }
         }
     }
 
     #[test]
+    fn the_longest_and_the_shortest_laser_cycle_lie_as_far_from_the_mean() {
+        for laser_hz in [1, 99_999, 100_000, 192_307, 800_000, 922_509] {
+            let Ok(config) = limited(laser_hz, 16) else {
+                panic!()
+            };
+            let most = config.most_dither();
+            let most = u16::from(most);
+            assert!(most <= 254 && most % 2 == 0);
+            for range in [0, 2, 64, 128, 254] {
+                if range <= most {
+                    let half = u32::from(range) / 2;
+                    assert_eq!(clocks(&config, range, 0), [config.period() - half; 2]);
+                    assert_eq!(
+                        clocks(&config, range, 2 * half),
+                        [config.period() + half; 2]
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_dither_leaves_room_for_the_bins_and_the_limits_of_the_laser() {
+        let most = |laser_hz, pulse_ns| limited(laser_hz, pulse_ns).unwrap().most_dither();
+        assert_eq!(most(100_000, 100), 254);
+        // 156 clocks, of which 136 are taken.
+        assert_eq!(most(800_000, 16), 40);
+        assert_eq!(most(922_509, 16), 0);
+        // 650 clocks are 50 pulses of 13; 660 leave ten.
+        let limits = cfg!(feature = "laser-beyond-limits");
+        assert_eq!(most(192_308, 104), if limits { 254 } else { 0 });
+        assert_eq!(most(189_394, 104), if limits { 254 } else { 20 });
+        // The pulse and the shortest pause: 10 µs less 1,200 clocks.
+        let long = config(100_000, 1200 * 8).unwrap();
+        assert_eq!(long.most_dither(), if limits { 90 } else { 0 });
+    }
+
+    #[test]
     fn what_cannot_be_is_refused() {
         assert_eq!(config(0, 100), Err(ConfigError::TooSlow));
-        assert_eq!(config(943_397, 100), Err(ConfigError::TooFast));
+        assert_eq!(config(922_510, 100), Err(ConfigError::TooFast));
         assert_eq!(config(u32::MAX, 100), Err(ConfigError::TooFast));
         assert_eq!(config(100_000, 0), Err(ConfigError::NoPulse));
         // 10 µs are 1250 clocks.
-        assert!(config(100_000, 1248 * 8).is_ok());
-        assert_eq!(config(100_000, 1248 * 8 + 1), Err(ConfigError::LongPulse));
+        assert!(config(100_000, 1245 * 8).is_ok());
+        assert_eq!(config(100_000, 1245 * 8 + 1), Err(ConfigError::LongPulse));
         assert_eq!(config(100_000, u32::MAX), Err(ConfigError::LongPulse));
     }
 
@@ -254,7 +338,7 @@ mod tests {
         assert_eq!(limited(20_002, 1000), beyond);
         // The shortest pulse at any rate.
         assert!(limited(800_000, 16).is_ok());
-        assert!(limited(943_396, 1).is_ok());
+        assert!(limited(922_509, 1).is_ok());
         assert_eq!(limited(800_000, 100), beyond);
     }
 

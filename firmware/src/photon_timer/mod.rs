@@ -8,7 +8,10 @@
 //! |---|---|
 //! | 0 | the laser's pulse begins at its pin |
 //! | 0 to 127 | bins 0 to 127 of [`BIN_PS`] |
-//! | 128 to the next | not sampled: at least 5 clocks, see [`Config::unsampled_clocks`] |
+//! | 128 to the next | not sampled: at least 8 clocks, see [`Config::unsampled_clocks`] |
+//!
+//! With [dither](Dither) the clocks from one laser pulse to the next are random; their mean is kept. The bins
+//! begin with the laser's pulse in any case.
 //!
 //! Laser cycles whose samples are overwritten before they are read are lost. They are counted
 //! ([`PhotonTimer::lost`]) and reported as an error. No laser cycle is read half old and half new.
@@ -18,6 +21,7 @@ mod samples;
 
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 use heapless::Vec;
 
@@ -38,8 +42,8 @@ pub trait Sampler {
     /// The number of last complete laser cycles whose samples are certainly in memory.
     const KEPT: u32;
 
-    /// Begins with laser cycle 0.
-    fn start(&mut self, config: &Config);
+    /// Begins with laser cycle 0. The range of `dither` is at most [`Config::most_dither`].
+    fn start(&mut self, config: &Config, dither: Dither);
     /// Switches the laser off.
     fn stop(&mut self);
     /// How many laser cycles are complete.
@@ -55,6 +59,7 @@ pub trait Sampler {
 pub struct PhotonTimer<S> {
     sampler: S,
     config: Config,
+    dither: Dither,
     /// The laser fires. It starts after a pause of a whole laser cycle, so that no laser cycle is
     /// shorter than configured.
     fires: bool,
@@ -90,6 +95,7 @@ impl<S: Sampler> PhotonTimer<S> {
         Self {
             sampler,
             config,
+            dither: Dither::OFF,
             fires: false,
             off_since: None,
             next: 0,
@@ -159,11 +165,13 @@ impl<S: Sampler> Sensor for PhotonTimer<S> {
             bin_width: Some(U16F16::from_num(BIN_PS)),
             offset: I24F8::ZERO,
             laser_millihertz: self.config.laser_millihertz(),
+            most_dither: self.config.most_dither(),
             ..SensorInfo::new(1)
         }
     }
 
-    fn start(&mut self, _: U16F16) {
+    fn start(&mut self, _: U16F16, dither: Dither) {
+        self.dither = dither;
         self.rest();
     }
 
@@ -178,7 +186,7 @@ impl<S: Sampler> Sensor for PhotonTimer<S> {
             if now_ms.wrapping_sub(since) <= self.config.period().div_ceil(CLOCK_HZ / 1000) {
                 return Ok(Polled::Idle);
             }
-            self.sampler.start(&self.config);
+            self.sampler.start(&self.config, self.dither);
             (self.fires, self.next) = (true, 0);
         }
         for round in 0..BATCHES {

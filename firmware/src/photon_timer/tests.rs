@@ -84,7 +84,7 @@ struct Ring {
 impl Sampler for Ring {
     const KEPT: u32 = 40;
 
-    fn start(&mut self, _: &Config) {
+    fn start(&mut self, _: &Config, _: Dither) {
         self.completed = 0;
         self.starts += 1;
         self.stalls_at = self.stalls_at.filter(|_| self.starts < 2);
@@ -162,7 +162,7 @@ fn timer(cycles: Vec<Levels>, steps: Vec<u32>) -> PhotonTimer<Ring> {
         starts: 0,
     };
     let mut timer = PhotonTimer::new(ring, Config::new(SETTINGS).unwrap());
-    timer.start(U16F16::from_num(BIN_PS));
+    timer.start(U16F16::from_num(BIN_PS), Dither::OFF);
     assert_eq!(timer.poll(0, &mut Seen::default()), Ok(Polled::Idle));
     timer
 }
@@ -261,7 +261,7 @@ struct Stalling {
 impl Sampler for Stalling {
     const KEPT: u32 = 40;
 
-    fn start(&mut self, _: &Config) {
+    fn start(&mut self, _: &Config, _: Dither) {
         assert!(!self.fires, "it has not rested");
         self.fires = true;
         self.starts += 1;
@@ -295,7 +295,7 @@ fn between_two_starts_the_laser_rests_for_a_laser_cycle() {
         let config = Config::new(settings).unwrap();
         for configures in [false, true] {
             let mut timer = PhotonTimer::new(Stalling::default(), config);
-            timer.start(U16F16::from_num(BIN_PS));
+            timer.start(U16F16::from_num(BIN_PS), Dither::OFF);
             // Where the milliseconds begin anew, too.
             let begin = u32::MAX - 1000;
             let mut started = Vec::new();
@@ -307,7 +307,7 @@ fn between_two_starts_the_laser_rests_for_a_laser_cycle() {
                     if timer.sampler.starts > before {
                         started.push(ms);
                         if configures {
-                            timer.start(U16F16::from_num(BIN_PS));
+                            timer.start(U16F16::from_num(BIN_PS), Dither::OFF);
                         }
                     }
                 }
@@ -326,4 +326,5 @@ fn says_what_it_is() {
     assert_eq!((info.pixels, info.gives_histograms), (1, false));
     assert_eq!(info.bin_width, Some(U16F16::from_num(8000)));
     assert_eq!(info.laser_millihertz, 100_000_000);
+    assert_eq!(info.most_dither, 254);
 }

@@ -3,6 +3,7 @@
 use dtof_core::binning::{Binning, BlockLink};
 use dtof_core::{AnyRule, Array, PixelAddress, PixelConfig, RangeGate, RangeScale};
 use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source, StopReason};
+use dtof_sensors::dither::Dither;
 
 use super::photons::BinsOfPixel;
 use super::{BINS, Block, Pixel, Sidecar};
@@ -16,6 +17,7 @@ impl Sidecar<'_> {
             return Err(Refusal::HostTimeout);
         }
         let (first, mut last) = requested.gate;
+        let mut most_dither = 0;
         if requested.source == Source::Sensor {
             let sensor = self.sensor.ok_or(Refusal::NoSensor)?;
             if !sensor.has_bins_of(requested.bin_width_ps) {
@@ -24,11 +26,17 @@ impl Sidecar<'_> {
             if requested.once_per_bin && sensor.gives_histograms {
                 return Err(Refusal::OncePerBin);
             }
+            most_dither = sensor.most_dither;
             // Bins that are not measured would count as bins without background.
             last = last.min(sensor.bins.saturating_sub(1));
         }
         if requested.pixels == 0 || usize::from(requested.pixels) > self.pixels.capacity() {
             return Err(Refusal::Pixels);
+        }
+        let dither = Dither::new(requested.dither_bins, requested.dither_seed);
+        let dither = dither.map_err(|_| Refusal::Dither)?;
+        if dither.range() > u16::from(most_dither) {
+            return Err(Refusal::Dither);
         }
         let gate = RangeGate::new(first, last)?;
         let of_sensor = self.sensor.map_or(0, |sensor| sensor.dead_time);
@@ -80,6 +88,7 @@ impl Sidecar<'_> {
         self.binning = binning.map(|(_, config, patience)| (config, patience));
         self.dynamic_depth = dynamic_depth;
         self.bin_width = requested.bin_width_ps;
+        self.dither = dither;
         self.source = requested.source;
         self.once_per_bin = requested.once_per_bin.then(BinsOfPixel::default);
         self.host_timeout_ms = requested.host_timeout_ms;

@@ -33,6 +33,7 @@ use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
 use dtof_link::{Configuration, DynamicDepth, Report, SensorRecord, Source, StopReason};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::{SensorFault, SensorInfo};
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
@@ -119,6 +120,7 @@ pub struct Sidecar<'a> {
     dynamic_depth: Option<DynamicDepthConfig>,
     /// Of the configuration in force, for sensors that measure times.
     bin_width: U16F16,
+    dither: Dither,
     source: Source,
     /// Of the configuration in force, if photons of one laser cycle in one bin count once.
     once_per_bin: Option<BinsOfPixel>,
@@ -194,6 +196,7 @@ impl<'a> Sidecar<'a> {
             binning: None,
             dynamic_depth: None,
             bin_width: U16F16::ZERO,
+            dither: Dither::OFF,
             source: Source::Link,
             once_per_bin: None,
             sensor,

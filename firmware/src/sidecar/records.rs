@@ -11,6 +11,7 @@ pub(super) const fn sensor(info: &SensorInfo) -> SensorRecord {
         laser_millihertz: info.laser_millihertz,
         bins: info.bins,
         dead_time: info.dead_time,
+        most_dither: info.most_dither,
     }
 }
 

@@ -79,7 +79,7 @@ impl Sidecar<'_> {
             self.set_stop_reason(self.stopping);
         }
         if should_run && !self.started {
-            sensor.start(self.bin_width);
+            sensor.start(self.bin_width, self.dither);
             self.sensor_starts = self.sensor_starts.saturating_add(1);
             (self.started, self.running) = (true, true);
         } else if !should_run && self.running {

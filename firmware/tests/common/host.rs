@@ -13,6 +13,7 @@ use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
 use dtof_link::{Configuration, Report, Source};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 /// A configuration that takes photons from the sensor.
@@ -25,6 +26,8 @@ pub const CONFIGURATION: Configuration = Configuration {
     gate: (0, 127),
     dead_time: None,
     once_per_bin: false,
+    dither_bins: 0,
+    dither_seed: 0,
     pixels: 8,
     columns: 8,
     binning: None,
@@ -230,7 +233,7 @@ impl<I: Iterator<Item = Option<Vec<Call>>>> Sensor for Scripted<I> {
         SensorInfo::new(256)
     }
 
-    fn start(&mut self, _: U16F16) {}
+    fn start(&mut self, _: U16F16, _: Dither) {}
 
     fn stop(&mut self) {}
 

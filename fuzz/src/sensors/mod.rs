@@ -9,6 +9,7 @@ mod tmf882x;
 use dtof_chips::Chip;
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
+use dtof_sensors::dither::Dither;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault};
 
 use self::bus::Bus;
@@ -92,7 +93,7 @@ where
             2 => bus.set_line(bus::Line::Low),
             3 => {
                 model.restart();
-                sensor.start(U16F16::lit("250"));
+                sensor.start(U16F16::lit("250"), Dither::OFF);
             }
             4 => {
                 model.restart();

@@ -115,7 +115,7 @@ fn the_highest_rate_of_each_pulse_keeps_the_duty() {
     for (ns, khz) in pulses.iter().zip(rates) {
         let clocks = (ns * f64::from(CLOCK_HZ) / 1e9).ceil();
         assert!(clocks <= LONGEST);
-        let period = (CLOCKS_A_CLOCK * clocks).max(f64::from(BINS + 5));
+        let period = (CLOCKS_A_CLOCK * clocks).max(f64::from(BINS + 8));
         let hz = f64::from(CLOCK_HZ) / period;
         assert!((khz - down(hz / 1e3, 1)).abs() < 1e-9, "{ns} ns: {hz} Hz");
     }

@@ -17,11 +17,12 @@ use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_link::{FaultRecord, Report, Source};
 use dtof_photons::source::{Photon, PixelPhotons, Slice};
+use dtof_sensors::dither::Dither;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 use crate::boards::{decides_alike, once_per_bin, settings, with_all, with_dead_time};
-use crate::rp2040::{NODE, NPM, Rp2040, image, install, run, write_edges};
+use crate::rp2040::{Laser, NODE, NPM, Rp2040, image, install, run, write_edges};
 use crate::{enabled, root, stack, target_folder};
 
 /// The SPAD's pin.
@@ -100,19 +101,31 @@ fn photons(hits: usize, target: u16, cycles: usize, random: &mut Pcg32) -> Cycle
 /// laser cycle also has pulses that do not count: one after the last bin, and one that begins before
 /// bin 0 if the first bins are free.
 fn edges(cycles: &Cycles, period_ns: u64, random: &mut Pcg32) -> Vec<(u64, u8, bool)> {
+    dithered_edges(cycles, period_ns, Dither::OFF, random)
+}
+
+/// The same with laser cycles of random lengths.
+fn dithered_edges(
+    cycles: &Cycles,
+    period_ns: u64,
+    dither: Dither,
+    random: &mut Pcg32,
+) -> Vec<(u64, u8, bool)> {
     let mut edges = Vec::new();
+    let shortest = period_ns - BIN_NS * u64::from(dither.range() / 2);
+    let mut start = 0;
     let mut pulse = |from: u64| edges.extend([(from, SPAD, true), (from + PULSE_NS, SPAD, false)]);
-    for (number, cycle) in (0..).zip(cycles) {
-        let start = number * period_ns;
+    for ((number, cycle), added) in (0u64..).zip(cycles).zip(dither.added()) {
         if number % 16 == 7 && cycle.first().is_none_or(|&bin| bin > 5) {
             pulse(start - BIN_NS);
         }
         for &bin in cycle {
             pulse(start + BIN_NS * u64::from(bin) + u64::from(random.next_u32() % 8));
         }
-        if number % 16 == 9 && period_ns > 1100 {
+        if number % 16 == 9 && shortest > 1120 {
             pulse(start + 1048);
         }
+        start += shortest + BIN_NS * u64::from(added);
     }
     edges
 }
@@ -232,21 +245,91 @@ fn pico_times_all_photons_of_a_laser_cycle() -> Result<()> {
         );
         ensure!((of_first == usize::from(TARGET)) == (hits < 4));
 
-        let [found, expected] = events(&image, &cycles, &edges)?;
+        let [found, expected] = events(&image, &senses(), &cycles, &edges)?;
         ensure!(!expected.is_empty() && found == expected, "other events");
         println!("{} events, each as on this computer", found.len());
     }
     Ok(())
 }
 
+#[test]
+fn pico_dithers_its_laser_and_decides_as_this_computer() -> Result<()> {
+    let Some(_alone) = enabled("the Pico's dither in rp2040js", &[NODE, NPM]) else {
+        return Ok(());
+    };
+    install()?;
+    let image = image(&["photon-timer"], None)?;
+    const PERIOD_NS: u64 = 10_000;
+    for (range, seed) in [(128, 7), (2, 1), (254, u64::MAX), (0, 5)] {
+        let mut random = Pcg32::seed_from_u64(seed);
+        let cycles = photons(3, 90, 1500, &mut random);
+        let dither = Dither::new(range, seed)?;
+        let edges = dithered_edges(&cycles, PERIOD_NS, dither, &mut random);
+        let with_dither = |settings: Settings| Settings {
+            dither_bins: range,
+            dither_seed: seed,
+            ..settings
+        };
+
+        let mut timer = Timer::start(&image, &edges, &with_dither(gathers()))?;
+        let report = timer.wait(1600)?;
+        let found = timer.histogram()?;
+        ensure!(found == counts(&cycles), "{range}: {found:?}");
+        ensure!(report.sensor_errors == 0 && report.statistics.rejected == 0);
+        let done = timer.board.stop()?;
+        check_intervals(&done.laser, PERIOD_NS, dither)?;
+
+        let settings = with_dither(senses());
+        let [found, expected] = events(&image, &settings, &cycles, &edges)?;
+        ensure!(
+            !expected.is_empty() && found == expected,
+            "{range}: other events"
+        );
+        println!(
+            "dither of {range} bins: {} events, each as on this computer, {} pulses",
+            found.len(),
+            done.laser.pulses
+        );
+    }
+    Ok(())
+}
+
+/// The times from pulse to pulse are uniform: none is shorter or longer than the range allows, their mean is
+/// that without dither, and no length is rare or frequent.
+fn check_intervals(laser: &Laser, period_ns: u64, dither: Dither) -> Result<()> {
+    ensure!(laser.longest_ns == 104, "{laser:?}");
+    let half = BIN_NS * u64::from(dither.range()) / 2;
+    let lengths = u64::from(dither.range()) + 1;
+    let total: u64 = laser.intervals.values().sum();
+    // The last pulse may not have ended.
+    ensure!(total + 1 == laser.pulses && total > 1500, "{laser:?}");
+    let (shortest, longest) = (period_ns - half, period_ns + half);
+    let expected = total as f64 / lengths as f64;
+    let (mut sum, mut squares) = (0, 0.0);
+    for length in (shortest..=longest).filter(|length| (length - shortest).is_multiple_of(BIN_NS)) {
+        let count = laser.intervals.get(&length).copied().unwrap_or(0);
+        sum += count;
+        squares += (count as f64 - expected).powi(2) / expected;
+    }
+    ensure!(sum == total, "of another length: {laser:?}");
+    // All lengths come again after 1,024 laser cycles, so that a deviation of one round is that of all: chi-square
+    // has a mean of the rounds times its degrees of freedom. Each length and its mirror image come as often.
+    let (freedom, rounds) = (lengths as f64 - 1.0, total.div_ceil(1024) as f64);
+    ensure!(
+        squares <= rounds * (freedom + 5.0 * (4.0 * freedom).sqrt()),
+        "chi-square {squares} of {freedom} in {rounds} rounds: {laser:?}"
+    );
+    Ok(())
+}
+
 /// The events of the board and of this computer for the same photons.
 fn events(
     image: &Path,
+    settings: &Settings,
     cycles: &Cycles,
     edges: &[(u64, u8, bool)],
 ) -> Result<[Vec<dtof_core::DepthEvent>; 2]> {
-    let settings = senses();
-    let mut timer = Timer::start(image, edges, &settings)?;
+    let mut timer = Timer::start(image, edges, settings)?;
     // An exposure ends with as many dark laser cycles.
     let all = u16::try_from(cycles.len())? + settings.l2 + 10;
     let report = timer.wait(all.into())?;
@@ -255,7 +338,7 @@ fn events(
     timer.board.stop()?;
 
     let array = Array::new(1, 1).unwrap();
-    let mut engine = host_engine(&settings, array, &[PixelAddress::new(0)])?;
+    let mut engine = host_engine(settings, array, &[PixelAddress::new(0)])?;
     let photons = (0..)
         .zip(cycles)
         .flat_map(|(cycle, bins)| bins.iter().map(move |&code| Photon { cycle, code }));
@@ -279,19 +362,26 @@ fn pico_keeps_up_with_a_laser_and_counts_what_it_loses() -> Result<()> {
         return Ok(());
     };
     install()?;
-    // The rates of docs/boards.md, and one that is too high. Its pulse is the shortest, for the limits
-    // of the laser.
-    for (hits, laser_hz, pulse_ns, keeps_up) in [
-        (1, 138_889, 100, true),
-        (3, 100_000, 100, true),
-        (6, 78_125, 100, true),
-        (6, 800_000, 16, false),
+    // The rates of docs/boards.md, with the dither that a host asks for, and one that is too high. Its pulse is
+    // the shortest, for the limits of the laser.
+    for (hits, laser_hz, pulse_ns, range, keeps_up) in [
+        (1, 138_889, 100, 128, true),
+        (3, 100_000, 100, 128, true),
+        (6, 78_125, 100, 128, true),
+        (6, 800_000, 16, 0, false),
     ] {
         let image = image(&["photon-timer"], Some((laser_hz, pulse_ns)))?;
         let mut random = Pcg32::seed_from_u64(1);
         let cycles = photons(hits, 90, 5000, &mut random);
         let period = BIN_NS * u64::from((125_000_000 + laser_hz / 2) / laser_hz);
-        let mut timer = Timer::start(&image, &edges(&cycles, period, &mut random), &senses())?;
+        let dither = Dither::new(range, 3)?;
+        let settings = Settings {
+            dither_bins: range,
+            dither_seed: dither.seed(),
+            ..senses()
+        };
+        let edges = dithered_edges(&cycles, period, dither, &mut random);
+        let mut timer = Timer::start(&image, &edges, &settings)?;
         let report = timer.wait(if keeps_up { 5000 } else { 2000 })?;
         let done = timer.board.stop()?;
         println!("{hits} photons, {laser_hz} laser cycles a second: {report:?}; {done:?}");

@@ -1,5 +1,6 @@
 //! Runs images of the Pico with `tools/rp2040`.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -89,6 +90,8 @@ pub struct Laser {
     pub last_high_ms: Option<f64>,
     /// Whether it is high at the end.
     pub is_high: bool,
+    /// Nanoseconds from one pulse's beginning to the next, and how often they came.
+    pub intervals: BTreeMap<u64, u64>,
 }
 
 /// A start of the image.
@@ -221,6 +224,9 @@ fn done(report: &str, output: Vec<u8>, success: bool) -> Result<Done> {
             longest_ns: number(laser, "longestNs")?,
             last_high_ms: laser["lastHighMs"].as_f64(),
             is_high: flag(laser, "isHigh")?,
+            intervals: serde_json::from_value::<Vec<(u64, u64)>>(laser["intervals"].clone())?
+                .into_iter()
+                .collect(),
         },
         last_input_ms: time("lastInputMs"),
         dtr_low_ms: time("dtrLowMs"),

@@ -23,6 +23,8 @@ impl Calibration {
         let glass = self.glass().filter(|_| self.gate.0 > 0);
         let sensor = SensorSettings {
             laser_hz: before.sensor.laser_hz,
+            dither_bins: before.sensor.dither_bins,
+            dither_seed: before.sensor.dither_seed,
             columns: before.sensor.columns,
             bins: u16::try_from(self.bins).ok(),
             bin_width_ps: Some(width.context("the bin width is too large")?),

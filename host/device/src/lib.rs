@@ -60,6 +60,11 @@ impl Task<'_> {
         );
         let last_bin = u16::try_from(settings.bins)?.checked_sub(1);
         let last_bin = last_bin.context("the settings have no bins")?;
+        // A laser that is not the device's is not its to dither.
+        let dither_bins = match source {
+            Source::Link => 0,
+            Source::Sensor => settings.dither_bins,
+        };
         Ok(Configuration {
             rule: settings.rule,
             estimator: settings.estimator(),
@@ -69,6 +74,8 @@ impl Task<'_> {
             gate: settings.gate.unwrap_or((0, last_bin)),
             dead_time: Some(settings.dead_time),
             once_per_bin: settings.once_per_bin,
+            dither_bins,
+            dither_seed: settings.dither_seed,
             pixels: self.pixels,
             columns: u16::try_from(self.columns)?,
             binning: settings.binning,

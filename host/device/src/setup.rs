@@ -17,6 +17,10 @@ use dtof_events::clock::LaserClock;
 use dtof_options::Refused;
 use dtof_photons::masked;
 
+/// The range of the dither of a sensor that can. With 128 another LiDAR as bright as the target makes no more false
+/// alarms than its absence would, except in the dark: see `docs/results/methods.md`.
+const DITHER_BINS: u16 = 128;
+
 /// How a device operates.
 #[derive(Clone, Debug)]
 pub struct Setup {
@@ -54,6 +58,7 @@ impl Setup {
             laser_millihertz: 0,
             bins: client.bins(),
             dead_time: 0,
+            most_dither: 0,
         });
         let report = client.report()?;
         let pixels = pixels.unwrap_or(sensor.pixels.min(client.pixels()));
@@ -72,10 +77,16 @@ impl Setup {
 
     fn new(sensor: SensorRecord, bins: u16, requested: SettingsFile, pixels: u16) -> Result<Self> {
         ensure!(pixels > 0, "the device has no pixels");
+        check_dither(requested.sensor.dither_bins, sensor.most_dither.into())?;
+        let began = SystemTime::now();
+        let micros = began.duration_since(UNIX_EPOCH).unwrap_or_default();
         let mut effective = requested.clone().or(SettingsFile {
             sensor: SensorSettings {
                 bin_width_ps: sensor.bin_width,
                 offset_mm: Some(sensor.offset),
+                dither_bins: Some(DITHER_BINS.min(sensor.most_dither.into())),
+                // Two devices of one kind have different lengths.
+                dither_seed: u64::try_from(micros.as_micros()).ok(),
                 ..SensorSettings::default()
             },
             dead_time_of_sensor: Some(sensor.dead_time),
@@ -109,7 +120,7 @@ impl Setup {
             array,
             laser_millihertz: clock.map_or(0, |clock| clock.millihertz()),
             warnings: warning.into_iter().collect(),
-            began: SystemTime::now(),
+            began,
             sensor,
             bins,
         })
@@ -143,6 +154,18 @@ impl Setup {
     }
 }
 
+/// Refuses more dither than the sensor can have.
+fn check_dither(requested: Option<u16>, most: u16) -> Result<(), Refused> {
+    let reason = match most {
+        0 => "this device cannot dither its laser".to_owned(),
+        _ => format!("this device can dither its laser by at most {most} bins"),
+    };
+    match requested {
+        Some(bins) if bins > most => Err(Refused::value("dither_bins", bins, reason)),
+        _ => Ok(()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -157,6 +180,7 @@ mod tests {
                 laser_millihertz: 0,
                 bins: measured,
                 dead_time: 0,
+                most_dither: 0,
             };
             let mut settings = SettingsFile::default();
             settings.sensor.gate = requested;
@@ -171,6 +195,40 @@ mod tests {
     }
 
     #[test]
+    fn a_laser_that_can_is_dithered_by_128_bins_unless_another_range_is_given() {
+        let ranges = |text: &str, most_dither| {
+            let sensor = SensorRecord {
+                pixels: 1,
+                bin_width: None,
+                offset: I24F8::ZERO,
+                laser_millihertz: 0,
+                bins: 128,
+                dead_time: 0,
+                most_dither,
+            };
+            let requested = SettingsFile::parse(text).unwrap();
+            let setup = Setup::new(sensor, 128, requested, 1).map_err(|error| error.to_string())?;
+            let task = setup.task(None, HostTimeout::default());
+            let sources = [dtof_link::Source::Sensor, dtof_link::Source::Link];
+            Ok::<_, String>(sources.map(|source| {
+                let configuration = task.configuration(source).unwrap();
+                (configuration.dither_bins, configuration.dither_seed)
+            }))
+        };
+        let bins = |text, most| ranges(text, most).map(|ranges| ranges.map(|(bins, _)| bins));
+        assert_eq!(bins("", 254), Ok([128, 0]));
+        assert_eq!(bins("", 40), Ok([40, 0]));
+        assert_eq!(bins("", 0), Ok([0, 0]));
+        assert_eq!(bins("[sensor]\ndither_bins = 0", 254), Ok([0, 0]));
+        assert_ne!(ranges("", 254).unwrap()[0].1, 0, "the clock's seed");
+        let given = "[sensor]\ndither_bins = 64\ndither_seed = 9";
+        assert_eq!(ranges(given, 64).unwrap()[0], (64, 9));
+        let refused = |most| ranges(given, most).unwrap_err();
+        assert!(refused(62).contains("at most 62 bins"), "{}", refused(62));
+        assert!(refused(0).contains("cannot dither"), "{}", refused(0));
+    }
+
+    #[test]
     fn the_dead_time_is_the_sensors_unless_it_is_given() {
         let setup = |text: &str, of_sensor| {
             let sensor = SensorRecord {
@@ -180,6 +238,7 @@ mod tests {
                 laser_millihertz: 0,
                 bins: 128,
                 dead_time: of_sensor,
+                most_dither: 0,
             };
             Setup::new(sensor, 128, SettingsFile::parse(text).unwrap(), 4).unwrap()
         };

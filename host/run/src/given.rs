@@ -11,6 +11,8 @@ use dtof_options::{Options, Refused};
 pub const SENSOR: &[&str] = &["settings", "gate", "masked", "sigma_bins"];
 /// The dead time of a TDC.
 pub const TDC: &[&str] = &["dead_time"];
+/// The dither of a laser that a device fires.
+pub const DITHER: &[&str] = &["dither_bins", "dither_seed"];
 /// The option for a frame-based sensor instead of asynchronous pixels.
 pub const FRAME: &[&str] = &["frame"];
 
@@ -114,6 +116,7 @@ impl Options for Operation {
         &["bin_width_ps", "offset_mm"],
         SENSOR,
         TDC,
+        DITHER,
         DetectionSettings::KEYS,
     ];
 

@@ -155,7 +155,7 @@ impl Sink for SceneComparison<'_> {
     }
 }
 
-/// The requested settings, with histograms, TDC, rays and laser rate of the scene.
+/// The requested settings, with histograms, laser, TDC and rays of the scene.
 ///
 /// # Errors
 /// Fails if the settings are for another number of bins or another bin width.
@@ -176,6 +176,8 @@ pub fn settings_of_scene(requested: SettingsFile, scene: &Scene) -> Result<Setti
             bin_width_ps: Some(width),
             // The ranges of simulated photons need no offset.
             offset_mm: None,
+            dither_bins: Some(scene.dither_bins),
+            dither_seed: Some(requested.run.seed.unwrap_or(1)),
             ..requested.sensor
         },
         rays: RaySettings {

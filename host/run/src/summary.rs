@@ -141,6 +141,10 @@ fn settings<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, 
         map.serialize_entry("dead_time_from", source)?;
     }
     map.serialize_entry("once_per_bin", &settings.once_per_bin)?;
+    if settings.dither_bins > 0 {
+        map.serialize_entry("dither_bins", &settings.dither_bins)?;
+        map.serialize_entry("dither_seed", &settings.dither_seed)?;
+    }
     if let Some(frame) = settings.frame {
         map.serialize_entry("frame", &frame)?;
     }

@@ -12,6 +12,7 @@ use super::effects::cover_glass::Crosstalk;
 use super::effects::dead_time::Recharge;
 use super::effects::jitter::TimingError;
 use super::effects::limits::Timing;
+use super::effects::other_lidar::OtherPulses;
 use super::effects::second_echo::EchoDelay;
 use super::effects::tail::TailDelay;
 use super::effects::tdc::Tdc;
@@ -30,6 +31,7 @@ pub(super) struct Detector {
     second_echo: Option<EchoDelay>,
     cover_glass: Option<Crosstalk>,
     tail: Option<TailDelay>,
+    other: Option<OtherPulses>,
     /// The additional background of a hot pixel.
     hot: Option<Background>,
     /// Background after the histogram, if it can change the histogram.
@@ -75,12 +77,14 @@ impl Detector {
         let gap_rate = if timed { multiple } else { 0.0 } * rates.background;
         let gap = Background::new(gap_rate, end, timing.period, rng(Stream::Gap))?;
 
+        let other = effects.other_lidar.as_ref();
+        let other_rate = other.map_or(0.0, |other| other.photons);
         let rate = |part: &Option<Background>| part.as_ref().map_or(0.0, |part| part.mean);
         let glass_rate = cover_glass.map_or(0.0, |glass| glass.signal);
         Ok(Self {
             end,
             period: timing.period,
-            added: rate(&hot) + rate(&gap) + glass_rate,
+            added: rate(&hot) + rate(&gap) + glass_rate + other_rate,
             avalanches_each: afterpulsing.map_or(1.0, |after| 1.0 / (1.0 - after.probability)),
             within_bin: rng(Stream::WithinBin),
             second_echo: second_echo
@@ -91,6 +95,9 @@ impl Detector {
                 .transpose()?,
             tail: tail
                 .map(|tail| TailDelay::new(tail, rng(Stream::Tail)))
+                .transpose()?,
+            other: other
+                .map(|other| OtherPulses::new(other, rates.sigma, timing, seed, pixel))
                 .transpose()?,
             hot,
             gap,
@@ -118,6 +125,9 @@ impl Detector {
         times.clear();
         if let Some(glass) = &mut self.cover_glass {
             glass.draw(|time| times.push(time + tail.as_mut().map_or(0.0, TailDelay::delay)));
+        }
+        if let Some(other) = &mut self.other {
+            other.draw(|time| times.push(time));
         }
         for background in [&mut self.hot, &mut self.gap].into_iter().flatten() {
             background.draw(|time| times.push(time));

@@ -6,6 +6,7 @@ pub mod dead_time;
 pub mod hot_pixels;
 pub mod jitter;
 pub mod limits;
+pub mod other_lidar;
 pub mod second_echo;
 pub mod tail;
 pub mod tdc;
@@ -17,6 +18,7 @@ use self::cover_glass::CoverGlass;
 use self::dead_time::DeadTime;
 use self::hot_pixels::HotPixels;
 use self::jitter::Jitter;
+use self::other_lidar::OtherLidar;
 use self::second_echo::SecondEcho;
 use self::tail::Tail;
 use self::tdc::Tdc;
@@ -30,6 +32,8 @@ pub struct Effects {
     pub second_echo: Option<SecondEcho>,
     /// Laser light that never leaves the sensor.
     pub cover_glass: Option<CoverGlass>,
+    /// The pulses of another LiDAR.
+    pub other_lidar: Option<OtherLidar>,
     /// Pixels with more background.
     pub hot_pixels: Option<HotPixels>,
     /// After an avalanche the SPAD is blind.
@@ -68,7 +72,7 @@ impl Effects {
                 })+
             };
         }
-        check!(tail second_echo cover_glass hot_pixels dead_time afterpulsing jitter tdc);
+        check!(tail second_echo cover_glass other_lidar hot_pixels dead_time afterpulsing jitter tdc);
         Ok(())
     }
 }

@@ -57,6 +57,8 @@ pub struct Scene {
     pub background: f64,
     /// Standard deviation of the pulse in bins.
     pub pulse_sigma_bins: f64,
+    /// By how many bins the longest laser cycle is longer than the shortest.
+    pub dither_bins: u16,
     /// Signal photons a laser cycle from a white surface at one metre.
     pub signal_at_one_metre: f64,
     /// In the order of the file.
@@ -229,6 +231,7 @@ impl Scene {
             bins: self.bins,
             bin_width_ps: self.bin_width_ps,
             period: 1e6 / self.laser_rate_mhz / self.bin_width_ps,
+            dither_bins: self.dither_bins,
         }
     }
 

@@ -20,6 +20,9 @@ pub(super) enum Stream {
     Jitter,
     /// Photons from behind a surface that lets light through.
     Behind,
+    /// The photons of another LiDAR, and the time of its first pulse.
+    OtherLidar,
+    OtherLidarStart,
 }
 
 impl Stream {

@@ -5,6 +5,7 @@ use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
 use embedded_hal::i2c::I2c;
 
 use super::{Done, Driver, Failure, Protocol, Request};
+use crate::dither::Dither;
 use crate::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN>
@@ -74,7 +75,7 @@ where
         self.protocol.info()
     }
 
-    fn start(&mut self, _: U16F16) {
+    fn start(&mut self, _: U16F16, _: Dither) {
         self.protocol.restart();
     }
 

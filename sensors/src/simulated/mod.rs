@@ -25,6 +25,7 @@ use dtof_core::fixed::types::{U0F32, U8F24, U16F16};
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
+use crate::dither::Dither;
 use crate::{PhotonSink, Polled, Sensor, SensorInfo};
 
 pub use self::scene::scene;
@@ -237,7 +238,7 @@ impl Sensor for Simulated<'_> {
         }
     }
 
-    fn start(&mut self, _: U16F16) {
+    fn start(&mut self, _: U16F16, _: Dither) {
         self.last_ms = None;
         self.due = 0;
     }

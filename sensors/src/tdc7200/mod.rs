@@ -51,6 +51,7 @@ use self::registers::{
     RESULTS, START_MEAS, TIME1, WRITE,
 };
 use self::results::Results;
+use crate::dither::Dither;
 use crate::timer::Since;
 use crate::{PhotonSink, Polled, Sensor, SensorInfo};
 
@@ -349,6 +350,7 @@ where
             offset: self.config.offset(),
             gives_histograms: false,
             laser_millihertz: settings.laser_millihertz,
+            most_dither: 0,
             dead_time: match settings.stops {
                 Stops::One => u16::MAX,
                 // The first stops only; how long the TDC is blind between them is unknown.
@@ -357,7 +359,7 @@ where
         }
     }
 
-    fn start(&mut self, bin_width: U16F16) {
+    fn start(&mut self, bin_width: U16F16, _: Dither) {
         self.config.set_bin_width(bin_width);
         self.state = State::Off;
     }

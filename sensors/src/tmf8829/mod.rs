@@ -316,6 +316,7 @@ impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
             gives_histograms: true,
             laser_millihertz: self.config.laser_millihertz(),
             dead_time: 0,
+            most_dither: 0,
         }
     }
 

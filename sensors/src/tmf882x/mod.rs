@@ -297,6 +297,7 @@ impl<const CHUNK: usize> Protocol for Tmf882xProtocol<'_, CHUNK> {
             offset,
             gives_histograms: true,
             laser_millihertz: self.config.laser_millihertz(),
+            most_dither: 0,
             dead_time: 0,
         }
     }

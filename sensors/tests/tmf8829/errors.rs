@@ -6,6 +6,7 @@ use crate::common::{Broken, SinkCall};
 use dtof_chips::Chip;
 use dtof_chips::tmf8829::frame;
 use dtof_core::fixed::types::U16F16;
+use dtof_sensors::dither::Dither;
 use dtof_sensors::tmf8829::{BootCommand, Command, DeviceError, Error, Settings, Waiting, Zones};
 use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
@@ -406,7 +407,7 @@ fn a_stop_stops_the_chip_and_a_start_begins_anew() {
     bench.sensor.stop();
     assert!(!bench.bus.0.borrow().chip.is_measuring);
     let log = bench.bus.0.borrow().log.len();
-    bench.sensor.start(U16F16::ZERO);
+    bench.sensor.start(U16F16::ZERO, Dither::OFF);
     recovers(&mut bench);
     bench.sensor.stop();
     bench.sensor.stop();
@@ -432,7 +433,7 @@ fn a_stop_that_the_chip_does_not_acknowledge_switches_it_off() {
         bench.sensor.stop();
         assert!(!bench.bus.0.borrow().chip.is_measuring);
         bench.bus.0.borrow_mut().is_unplugged = false;
-        bench.sensor.start(U16F16::ZERO);
+        bench.sensor.start(U16F16::ZERO, Dither::OFF);
         recovers(&mut bench);
     }
 }

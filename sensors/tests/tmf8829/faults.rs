@@ -9,6 +9,7 @@ use dtof_chips::Chip;
 use dtof_chips::tmf8829::{order, shape};
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::Sensor;
+use dtof_sensors::dither::Dither;
 use dtof_sensors::tmf8829::{DeviceError, Error, Zones};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -214,7 +215,7 @@ fn survive(zones: Zones, seed: u64) -> (u32, u32, u32) {
         oracle.end(polled.is_err(), goes_on);
         let errors = bench.sensor.counts().errors;
         if polls == 30_000 {
-            bench.sensor.start(U16F16::ZERO);
+            bench.sensor.start(U16F16::ZERO, Dither::OFF);
             oracle.last = None;
             oracle.frame = None;
         }

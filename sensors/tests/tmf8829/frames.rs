@@ -7,6 +7,7 @@ use crate::common::tmf8829::bench::{Bench, PRESETS, settings};
 use dtof_chips::tmf8829::{Scene, frame, order, shape, varied_counts};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::tmf8829::{Preset, Results, Settings, Zones, snr};
 use dtof_sensors::{Sensor, Target};
 use proptest::prelude::*;
@@ -120,7 +121,7 @@ fn zones_are_where_the_tables_have_them() {
         let mut bench = Bench::<252>::new(settings(zones));
         bench.bring_up();
         let mode = [0, 2, 3, 4, 5][zones as usize];
-        bench.sensor.start(U16F16::ZERO);
+        bench.sensor.start(U16F16::ZERO, Dither::OFF);
         bench.bring_up();
         let given = bench.present(&frame(0x20 | mode, slot, 1, &[0; 25_344], 1), 8);
         let second_row = if zones == Zones::Z8x8 { 4 } else { 8 };
@@ -201,7 +202,7 @@ fn constructed_frames_are_read_as_agreed() {
     let mut bench = Bench::<128>::new(peaks(results));
     bench.bring_up();
     bench.frames(1);
-    bench.sensor.start(U16F16::ZERO);
+    bench.sensor.start(U16F16::ZERO, Dither::OFF);
     bench.bring_up();
     let given = bench.present(&a, 1);
     let expected = [(0, 4000, 40), (1, 1, 41), (63, 65535, 255)];
@@ -224,7 +225,7 @@ fn constructed_frames_are_read_as_agreed() {
     assert_eq!(b.len(), 609);
     let mut bench = Bench::<128>::new(peaks(all));
     bench.bring_up();
-    bench.sensor.start(U16F16::ZERO);
+    bench.sensor.start(U16F16::ZERO, Dither::OFF);
     bench.bring_up();
     let expected = Target {
         signal: Some(8_388_352),
@@ -253,7 +254,7 @@ fn constructed_frames_are_read_as_agreed() {
         ..settings(Zones::Z8x8)
     });
     bench.bring_up();
-    bench.sensor.start(U16F16::ZERO);
+    bench.sensor.start(U16F16::ZERO, Dither::OFF);
     bench.bring_up();
     let given = bench.present(&c, 8);
     let counts = given.iter().filter_map(|given| match given {

@@ -112,6 +112,8 @@ fn configuration() -> Configuration {
         gate: (3, 120),
         dead_time: Some(20),
         once_per_bin: true,
+        dither_bins: 128,
+        dither_seed: u64::MAX - 5,
         pixels: 9,
         columns: 3,
         binning: None,
@@ -205,6 +207,8 @@ fn the_hosts_configuration_becomes_settings() {
         host_timeout_ms: 700,
         source: DTOF_SOURCE_SENSOR,
         once_per_bin: 1,
+        dither_bins: 128,
+        dither_seed: u64::MAX - 5,
     };
     assert_eq!(config, expected);
     assert!(checked(&config.pixel).is_ok());
@@ -308,7 +312,7 @@ fn records_are_those_of_the_link() {
         let counted = dtof_pixel_count_once_per_bin(pixel, &config(), bins, &mut done, first, 8);
         assert_eq!(counted, OK);
         let room = sensor.as_mut_ptr();
-        let written = dtof_sensor_write(9, 100, 20, 250 << 16, 1_000_000, -256, room);
+        let written = dtof_sensor_write(9, 100, 20, 40, 250 << 16, 1_000_000, -256, room);
         assert_eq!(written, OK);
         let room = body.as_mut_ptr();
         assert_eq!(dtof_report_write(&report, &done, &pair.device, room), OK);
@@ -320,6 +324,7 @@ fn records_are_those_of_the_link() {
         laser_millihertz: 1_000_000,
         bins: 100,
         dead_time: 20,
+        most_dither: 40,
     };
     assert_eq!(SensorRecord::from_le_bytes(&sensor), Some(Some(expected)));
     let read = Report::from_le_bytes(&body).unwrap();

@@ -128,7 +128,7 @@ fn functions_write_to_uninitialised_memory() {
         assert_eq!(dtof_link_take(at, message.at()), DTOF_ERROR_NO_MESSAGE);
 
         let room = sensor.at().cast::<u8>();
-        assert_eq!(dtof_sensor_write(1, 0, 0, 0, 0, 0, room), OK);
+        assert_eq!(dtof_sensor_write(1, 0, 0, 0, 0, 0, 0, room), OK);
         assert_eq!(sensor.read()[..2], [1, 0]);
         let room = report.at();
         let of = dtof_report_t::default();
@@ -412,7 +412,7 @@ fn null_pointers_to_bytes_are_refused() {
             dtof_link_offer(&mut link, DTOF_MESSAGE_EVENTS, none, 1),
             dtof_link_state(&link, ptr::null_mut()),
             dtof_link_silent_ms(&link, 0, ptr::null_mut()),
-            dtof_sensor_write(1, 0, 0, 0, 0, 0, none),
+            dtof_sensor_write(1, 0, 0, 0, 0, 0, 0, none),
             dtof_report_write(&zeroed(), &statistics(), &link, none),
             dtof_device_config_read(none, 1, 0, &mut zeroed()),
             dtof_no_histogram_write(0, 1, none, &mut length),

@@ -2,14 +2,19 @@
 //!
 //! One makes the laser's pulse. The other two sample the SPAD's pin, each every other clock,
 //! because sampling and counting take one instruction each. All three have the same
-//! period and are started by the same write. The first sample is three clocks after the
+//! period and are started by the same write. What the dither adds to a laser cycle comes to all three by DMA,
+//! from one table that is read over and over. The first sample is three clocks after the
 //! instruction that begins the pulse: the pulse leaves the chip one clock after its instruction,
 //! and the input synchroniser delays a sample by two. So bin 0 begins with the pulse, except for
 //! the delays of pads and wires.
 
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use pio::{Instruction, InstructionOperands, MovDestination, MovOperation, MovSource, Program};
+use dtof_sensors::dither::Dither;
+use pio::{
+    Instruction, InstructionOperands, JmpCondition, MovDestination, MovOperation, MovSource,
+    Program,
+};
 use rp2040_hal::gpio::bank0::{Gpio2, Gpio3};
 use rp2040_hal::gpio::{FunctionPio0, OutputOverride, Pin, PullDown};
 use rp2040_hal::pac::{IO_BANK0, PIO0, RESETS};
@@ -19,7 +24,7 @@ use rp2040_hal::pio::{
 };
 
 use super::SensorPort;
-use super::sample_rings::{self, SampleRings};
+use super::sample_rings::{self, Queue, SampleRings};
 use crate::photon_timer::{Config, PhotonTimer, Sampler, Samples};
 
 /// The timer runs.
@@ -37,7 +42,7 @@ pub type Pins = (
 type Installed = rp2040_hal::pio::InstalledProgram<PIO0>;
 type Machine<SM> = (UninitStateMachine<(PIO0, SM)>, Installed);
 
-/// The stopped state machines and their programs.
+/// The stopped state machines and their programs. The samplers share one.
 struct Idle {
     laser: Machine<SM0>,
     even: Machine<SM1>,
@@ -64,27 +69,34 @@ pub struct Hardware {
     pins: Pins,
 }
 
-/// The sampler of even clocks, or with one instruction more that of odd clocks. A cycle pushes the
-/// level before it as a word of its own, takes `y + 1` samples two clocks apart and rests for
-/// `osr + 2` clocks.
-macro_rules! sampler_program {
-    ($($first:literal)?) => {
-        pio::pio_asm!(
-            $($first,)?
-            ".wrap_target",
-            "    mov x, y",
-            "    in pins, 1",
-            "    push block",
-            "sample:",
-            "    in pins, 1",
-            "    jmp x-- sample",
-            "    mov x, osr",
-            "rest:",
-            "    jmp x-- rest",
-            ".wrap",
-        )
-        .program
-    };
+/// The sampler of odd clocks; that of even clocks begins one instruction later. A cycle pushes the level
+/// before it as a word of its own, takes 64 samples two clocks apart, in two loops because a counter can be set
+/// to 31 at most, and rests for `y + 2` clocks and as many more as the dither adds.
+fn sampler_program() -> Program<32> {
+    pio::pio_asm!(
+        "    mov y, y",
+        ".wrap_target",
+        "    set x, 30",
+        "    in pins, 1",
+        "    push block",
+        "first:",
+        "    in pins, 1",
+        "    jmp x-- first",
+        "    in pins, 1",
+        "    set x, 31",
+        "second:",
+        "    in pins, 1",
+        "    jmp x-- second",
+        "    mov x, y",
+        "rest:",
+        "    jmp x-- rest",
+        "    pull block",
+        "    out x, 8",
+        "added:",
+        "    jmp x-- added",
+        ".wrap",
+    )
+    .program
 }
 
 impl SensorPort {
@@ -99,10 +111,15 @@ impl SensorPort {
             Ok(installed) => installed,
             Err(_) => panic!("the programs of the photon timer do not fit"),
         };
+        let laser = (laser, install(laser_program()));
+        let of_odd = install(sampler_program());
+        // SAFETY: the program is never uninstalled.
+        #[allow(unsafe_code, reason = "two state machines run one program")]
+        let of_even = unsafe { of_odd.share() };
         let idle = Idle {
-            laser: (laser, install(laser_program())),
-            even: (even, install(sampler_program!())),
-            odd: (odd, install(sampler_program!("    mov y, y"))),
+            laser,
+            even: (even, of_even),
+            odd: (odd, of_odd),
         };
         let hardware = Hardware {
             idle: Some(idle),
@@ -144,7 +161,7 @@ unsafe extern "C" fn __pre_init() {
     )
 }
 
-/// High for `y + 2` clocks, low for `osr + 2`.
+/// High for `y + 2` clocks, low for `isr + 5` and as many more as the dither adds.
 fn laser_program() -> Program<32> {
     pio::pio_asm!(
         ".side_set 1",
@@ -152,36 +169,38 @@ fn laser_program() -> Program<32> {
         "    mov x, y        side 1",
         "high:",
         "    jmp x-- high    side 1",
-        "    mov x, osr      side 0",
+        "    mov x, isr      side 0",
         "low:",
         "    jmp x-- low     side 0",
+        "    pull block      side 0",
+        "    out x, 8        side 0",
+        "added:",
+        "    jmp x-- added   side 0",
         ".wrap",
     )
     .program
 }
 
-/// Puts the first of two numbers into Y and the second into OSR.
+/// Puts a number into a register.
 fn preset<SM: StateMachineIndex>(
     machine: &mut StateMachine<(PIO0, SM), Stopped>,
     tx: &mut Tx<(PIO0, SM)>,
-    [y, osr]: [u32; 2],
+    destination: MovDestination,
+    number: u32,
 ) {
+    tx.write(number);
     let pull = InstructionOperands::PULL {
         if_empty: false,
         block: false,
     };
-    let to_y = InstructionOperands::MOV {
-        destination: MovDestination::Y,
+    let mov = InstructionOperands::MOV {
+        destination,
         op: MovOperation::None,
         source: MovSource::OSR,
     };
-    machine.clear_fifos();
-    tx.write(y);
-    for operands in [pull, to_y] {
+    for operands in [pull, mov] {
         machine.exec_instruction(now(operands));
     }
-    tx.write(osr);
-    machine.exec_instruction(now(pull));
 }
 
 /// An instruction that leaves the laser's pin low.
@@ -193,37 +212,59 @@ const fn now(operands: InstructionOperands) -> Instruction {
     }
 }
 
+/// A sampler that begins `skipped` instructions later.
 fn sampler<SM: StateMachineIndex>(
     (machine, program): Machine<SM>,
-    counters: [u32; 2],
+    skipped: u8,
+    rest: u32,
 ) -> (StateMachine<(PIO0, SM), Stopped>, Ends<SM>) {
+    let begin = InstructionOperands::JMP {
+        condition: JmpCondition::Always,
+        address: program.offset() + skipped,
+    };
     let (mut machine, rx, mut tx) = PIOBuilder::from_installed_program(program)
         .in_pin_base(SPAD)
         .in_shift_direction(ShiftDirection::Right)
+        .out_shift_direction(ShiftDirection::Right)
         .autopush(true)
         .build(machine);
-    preset(&mut machine, &mut tx, counters);
+    machine.clear_fifos();
+    preset(&mut machine, &mut tx, MovDestination::Y, rest);
+    machine.exec_instruction(now(begin));
     (machine, (rx, tx))
 }
 
 impl Sampler for Hardware {
     const KEPT: u32 = sample_rings::KEPT;
 
-    fn start(&mut self, config: &Config) {
+    fn start(&mut self, config: &Config, dither: Dither) {
         self.stop();
         let Some(Idle { laser, even, odd }) = self.idle.take() else {
             return;
         };
+        // The queues take the numbers of the registers first.
+        self.rings.stop(&mut self.resets);
+        let range = dither.range();
         let (machine, program) = laser;
         let (mut laser, rx, mut tx) = PIOBuilder::from_installed_program(program)
             .side_set_pin_base(LASER)
+            .out_shift_direction(ShiftDirection::Right)
             .build(machine);
         laser.set_pindirs([(LASER, PinDir::Output)]);
-        preset(&mut laser, &mut tx, config.laser_counters());
-        let (even, even_ends) = sampler(even, config.sampler_counters());
-        let (odd, odd_ends) = sampler(odd, config.sampler_counters());
-        self.rings
-            .start(&mut self.resets, &even_ends.0, &odd_ends.0);
+        laser.clear_fifos();
+        let [pulse, pause] = config.laser_counters(range);
+        preset(&mut laser, &mut tx, MovDestination::Y, pulse);
+        preset(&mut laser, &mut tx, MovDestination::ISR, pause);
+        let rest = config.sampler_counter(range);
+        let (even, even_ends) = sampler(even, 1, rest);
+        let (odd, odd_ends) = sampler(odd, 0, rest);
+        let samples = [Queue::read(&even_ends.0), Queue::read(&odd_ends.0)];
+        let added = [
+            Queue::write(&tx),
+            Queue::write(&even_ends.1),
+            Queue::write(&odd_ends.1),
+        ];
+        self.rings.start(samples, added, dither);
         self.pins.0.set_output_override(OutputOverride::DontInvert);
         self.steps = Some(Steps {
             group: laser.with(even).with(odd).start(),

@@ -1,15 +1,20 @@
-//! The samples of the photon timer on their way into memory, without the processor.
+//! The samples of the photon timer on their way into memory, and its dither out of it, without the
+//! processor.
 //!
 //! Each of the two shift registers fills a ring, by two DMA channels that take turns: while
 //! one counts down, the other waits, and is started by its end. Both write through the same
 //! ring. How far they are is read from their counters at any time, so that nothing has to be
 //! done at any time. The ring's size divides what a channel transfers, so that it begins where
 //! the other has ended. See the datasheet of RP2040, sections 2.5 and 3.5.
+//!
+//! In the same way two channels for each state machine send it what the dither adds to each laser cycle, a byte
+//! from a table. A byte comes four times in a word of the queue (section 2.1.4).
 
-use core::sync::atomic::{AtomicU32, Ordering, compiler_fence};
+use core::sync::atomic::{AtomicU8, AtomicU32, Ordering, compiler_fence};
 
+use dtof_sensors::dither::Dither;
 use rp2040_hal::pac::{DMA, PIO0, RESETS};
-use rp2040_hal::pio::{Rx, SM1, SM2};
+use rp2040_hal::pio::{Rx, StateMachineIndex, Tx};
 
 use crate::photon_timer::Samples;
 
@@ -49,6 +54,37 @@ impl Ring {
 static EVEN: Ring = Ring::new();
 static ODD: Ring = Ring::new();
 
+/// What the dither adds to each laser cycle. Aligned to its size.
+#[repr(align(1024))]
+struct Table([AtomicU8; Dither::LENGTHS]);
+
+const _: () = assert!(align_of::<Table>() == size_of::<Table>());
+
+static TABLE: Table = Table([const { AtomicU8::new(0) }; Dither::LENGTHS]);
+
+/// A queue of a state machine, and what requests a transfer.
+#[derive(Clone, Copy)]
+pub struct Queue {
+    address: u32,
+    request: u8,
+}
+
+impl Queue {
+    pub fn read<SM: StateMachineIndex>(queue: &Rx<(PIO0, SM)>) -> Self {
+        Self {
+            address: queue.fifo_address() as u32,
+            request: queue.dreq_value(),
+        }
+    }
+
+    pub fn write<SM: StateMachineIndex>(queue: &Tx<(PIO0, SM)>) -> Self {
+        Self {
+            address: queue.fifo_address() as u32,
+            request: queue.dreq_value(),
+        }
+    }
+}
+
 /// Both rings and what fills them.
 pub struct SampleRings {
     dma: DMA,
@@ -59,6 +95,20 @@ pub struct SampleRings {
 
 /// Channels 0 and 1 fill one ring, 2 and 3 the other.
 const PAIRS: [u32; 2] = [0, 2];
+/// Channels that send the dither to the laser and to both shift registers.
+const DITHER_PAIRS: [u32; 3] = [4, 6, 8];
+
+// Bits of a channel's control register (2.5.7, CH0_CTRL_TRIG).
+const ENABLE: u32 = 1 << 0;
+const HIGH_PRIORITY: u32 = 1 << 1;
+const WORDS_OF_4_BYTES: u32 = 2 << 2;
+const INCREMENT_READ: u32 = 1 << 4;
+const INCREMENT_WRITE: u32 = 1 << 5;
+const RING_SIZE: u32 = 6;
+const RING_OF_WRITES: u32 = 1 << 10;
+const CHAIN_TO: u32 = 11;
+const REQUEST: u32 = 15;
+const QUIET: u32 = 1 << 21;
 
 impl SampleRings {
     pub const fn new(dma: DMA) -> Self {
@@ -69,17 +119,41 @@ impl SampleRings {
         }
     }
 
-    /// Begins with empty rings.
-    pub fn start(&mut self, resets: &mut RESETS, even: &Rx<(PIO0, SM1)>, odd: &Rx<(PIO0, SM2)>) {
+    /// Ends all transfers.
+    #[allow(clippy::unused_self, reason = "of these rings")]
+    pub fn stop(&mut self, resets: &mut RESETS) {
         // All counters are 0 then, and nothing is under way.
         resets.reset().modify(|_, w| w.dma().set_bit());
         resets.reset().modify(|_, w| w.dma().clear_bit());
         while resets.reset_done().read().dma().bit_is_clear() {}
+    }
+
+    /// Begins with empty rings: the samples of the even and the odd clocks, and what `dither` adds for the
+    /// laser and for both shift registers. It has been stopped.
+    pub fn start(&mut self, samples: [Queue; 2], added: [Queue; 3], dither: Dither) {
         clear_stalls();
-        self.fill(PAIRS[0], even.fifo_address(), even.dreq_value(), &EVEN);
-        self.fill(PAIRS[1], odd.fifo_address(), odd.dreq_value(), &ODD);
-        let first = PAIRS.map(|channel| 1 << channel).iter().sum();
-        // SAFETY: these two channels have just been set up.
+        for (place, added) in TABLE.0.iter().zip(dither.added()) {
+            place.store(added, Ordering::Relaxed);
+        }
+        // The DMA reads the table after this.
+        compiler_fence(Ordering::SeqCst);
+        for ((first, from), ring) in PAIRS.into_iter().zip(samples).zip([&EVEN, &ODD]) {
+            let control = HIGH_PRIORITY
+                | WORDS_OF_4_BYTES
+                | INCREMENT_WRITE
+                | RING_OF_WRITES
+                | RING_BITS << RING_SIZE;
+            let to = ring.0.as_ptr() as u32;
+            self.transfer(first, [from.address, to], control, from.request);
+        }
+        for (first, to) in DITHER_PAIRS.into_iter().zip(added) {
+            let control = HIGH_PRIORITY | INCREMENT_READ | Dither::LENGTHS.ilog2() << RING_SIZE;
+            let from = TABLE.0.as_ptr() as u32;
+            self.transfer(first, [from, to.address], control, to.request);
+        }
+        let pairs = PAIRS.into_iter().chain(DITHER_PAIRS);
+        let first = pairs.map(|channel| 1 << channel).sum();
+        // SAFETY: these channels have just been set up.
         #[allow(unsafe_code, reason = "every write that starts the DMA is unsafe")]
         self.dma
             .multi_chan_trigger()
@@ -88,31 +162,18 @@ impl SampleRings {
         self.cycles = 0;
     }
 
-    /// Sets two channels up that fill a ring from a queue.
-    fn fill(&mut self, first: u32, from: *const u32, request: u8, ring: &'static Ring) {
-        const ENABLE: u32 = 1 << 0;
-        const HIGH_PRIORITY: u32 = 1 << 1;
-        const WORD: u32 = 2 << 2;
-        const INCREMENT_WRITE: u32 = 1 << 5;
-        const RING_OF_WRITES: u32 = 1 << 10 | RING_BITS << 6;
-        const QUIET: u32 = 1 << 21;
+    /// Sets two channels up that take turns to transfer from one address to another.
+    fn transfer(&mut self, first: u32, [from, to]: [u32; 2], control: u32, request: u8) {
         for (channel, other) in [(first, first + 1), (first + 1, first)] {
             let registers = self.dma.ch(channel as usize);
-            let control = ENABLE
-                | HIGH_PRIORITY
-                | WORD
-                | INCREMENT_WRITE
-                | RING_OF_WRITES
-                | other << 11
-                | u32::from(request) << 15
-                | QUIET;
-            // SAFETY: the channel reads a queue of the PIO, and writes words within the ring,
-            // which lives as long as the image and is aligned to its size. The ring is read
-            // through atomics only.
-            #[allow(unsafe_code, reason = "the DMA writes to memory")]
+            let control =
+                ENABLE | control | other << CHAIN_TO | u32::from(request) << REQUEST | QUIET;
+            // SAFETY: the channel reads a queue of the PIO and writes words within a ring, or reads bytes
+            // within the table and writes a queue. Rings and table live as long as the image, are
+            // aligned to their sizes, and are accessed through atomics only.
+            #[allow(unsafe_code, reason = "the DMA accesses memory")]
             unsafe {
-                registers.ch_read_addr().write(|w| w.bits(from as u32));
-                let to = ring.0.as_ptr() as u32;
+                registers.ch_read_addr().write(|w| w.bits(from));
                 registers.ch_write_addr().write(|w| w.bits(to));
                 registers.ch_trans_count().write(|w| w.bits(TURN));
                 registers.ch_al1_ctrl().write(|w| w.bits(control));

@@ -192,6 +192,13 @@ flags! {
 }
 
 flags! {
+    DITHER:
+    dither_bins Text("BINS") => "Dither against other LiDARs: the longest laser cycle takes so many bins more \
+        than the shortest, an even number up to 254; 0 is off [default: 128, or as many as the sensor can]";
+    dither_seed Text("N") => "Seed of the random lengths of laser cycles [default: from the clock]";
+}
+
+flags! {
     DETECTION:
     rule OneOf(names::<RuleName>) => "Detection rule, which decides whether a peak is a target [default: paper]";
     alpha Signed("ALPHA") => "Rules paper and average: threshold above the background in its standard \
@@ -329,7 +336,7 @@ macro_rules! has_flags {
 
 has_flags! {
     ProjectionOptions: PROJECTION;
-    Operation: DEVICE SENSOR TDC DETECTION;
+    Operation: DEVICE SENSOR TDC DITHER DETECTION;
     replay::Options: RECORDING SENSOR TDC DETECTION FRAME REPLAY;
     simulate::Options: ARRAY SENSOR TDC DETECTION FRAME SIMULATE;
     calibrate::Options: RECORDING CALIBRATE;

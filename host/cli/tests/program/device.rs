@@ -6,6 +6,7 @@ mod cable;
 mod calibrate;
 mod calibrate_refused;
 mod clock;
+mod dither;
 mod engine;
 mod map;
 mod masked;

@@ -6,6 +6,7 @@
 mod detector;
 mod light;
 mod motion;
+mod other_lidar;
 mod plain;
 
 use dtof_photons::source::PhotonSource;
@@ -20,7 +21,11 @@ type Photons = Vec<(u64, u16)>;
 /// The photons of each pixel of the scene `text`, with `slice` laser cycles at a
 /// time.
 fn sliced(text: &str, cycles: u64, slice: u16) -> Vec<Photons> {
-    let mut source = Scene::parse(text).unwrap().photons(1, cycles).unwrap();
+    seeded(text, 1, cycles, slice)
+}
+
+fn seeded(text: &str, seed: u64, cycles: u64, slice: u16) -> Vec<Photons> {
+    let mut source = Scene::parse(text).unwrap().photons(seed, cycles).unwrap();
     let mut pixels = vec![Vec::new(); source.array().pixels() as usize];
     for _ in 0..cycles / u64::from(slice) {
         let slice = source.next_slice(slice).unwrap();

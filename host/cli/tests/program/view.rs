@@ -2,10 +2,10 @@
 //! nonsense, and a device that sends 100,000 events a second.
 
 mod away;
-mod device;
+pub mod device;
 mod fast;
 mod foxglove;
-mod http;
+pub mod http;
 mod latency;
 mod nonsense;
 mod page;

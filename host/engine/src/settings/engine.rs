@@ -57,6 +57,11 @@ pub struct Settings {
     pub is_dead_time_of_sensor: bool,
     /// Whether photons of one laser cycle in one bin count once. Not used with [`Self::frame`].
     pub once_per_bin: bool,
+    /// The range of the laser's dither in bins: by how much its longest cycle is longer than its shortest.
+    /// Decisions do not depend on it.
+    pub dither_bins: u16,
+    /// The seed of the lengths of laser cycles.
+    pub dither_seed: u64,
     /// A frame-based sensor instead: all pixels read their highest bin every so many laser cycles.
     /// Rule, minimum, L1, L2 and X are not used.
     pub frame: Option<u16>,
@@ -88,6 +93,8 @@ impl Settings {
             dead_time: 0,
             is_dead_time_of_sensor: false,
             once_per_bin: false,
+            dither_bins: 0,
+            dither_seed: 0,
             frame: None,
             seed,
         }

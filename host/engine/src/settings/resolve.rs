@@ -81,6 +81,8 @@ impl SettingsFile {
             dead_time,
             is_dead_time_of_sensor: dead_time > 0 && sensor.dead_time.is_none(),
             once_per_bin: detection.once_per_bin.unwrap_or(false),
+            dither_bins: sensor.dither_bins.unwrap_or(0),
+            dither_seed: sensor.dither_seed.unwrap_or(0),
             frame: self.run.frame,
             seed: self.run.seed.unwrap_or(1),
         })

@@ -23,6 +23,11 @@ impl Settings {
             let pixels: Vec<String> = self.masked.iter().map(u16::to_string).collect();
             rows.push(row("pixels left out", pixels.join(", ")));
         }
+        if self.dither_bins > 0 {
+            let (half, seed) = (self.dither_bins / 2, self.dither_seed);
+            let text = format!("laser cycles are up to {half} bins longer or shorter, seed {seed}");
+            rows.push(row("dither", text));
+        }
         rows.extend(self.detection_rows());
         if let Some(binning) = self.binning {
             let side = 1 << binning.levels.raw();

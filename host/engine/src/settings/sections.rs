@@ -7,6 +7,7 @@ use std::str::FromStr;
 use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{Array, CentredWindow};
+use dtof_sensors::dither::Dither;
 use serde::Serialize;
 use serde::ser::{Error as _, Serializer};
 
@@ -73,6 +74,10 @@ pub struct SensorSettings {
     /// Bins for which the TDC is blind after a photon; as many as the histogram has, or more, if it
     /// takes the first photon of a laser cycle only.
     pub dead_time: Option<u16>,
+    /// By how many bins the longest laser cycle is longer than the shortest.
+    pub dither_bins: Option<u16>,
+    /// The seed of the laser cycles' lengths.
+    pub dither_seed: Option<u64>,
     /// Background photons a bin and laser cycle of the median pixel.
     pub background: Option<f64>,
     /// Photons a laser cycle and pixel that the cover glass sends back, before the gate.
@@ -123,6 +128,8 @@ section! {
     masked = masked, "addresses of pixels that are left out";
     sigma_bins = pulse, "standard deviation of the pulse";
     dead_time = integer(0..=u16::MAX), "bins for which the TDC is blind after a photon";
+    dither_bins = dither, "by which the longest laser cycle is longer than the shortest";
+    dither_seed = integer(0..=MAX_INTEGER), "of the lengths of laser cycles";
     background = rate, "photons a bin and laser cycle of the median pixel";
     glass = rate, "photons a laser cycle and pixel of the cover glass";
     glass_bins = rates, "the same for each bin before the gate";
@@ -133,6 +140,15 @@ impl SensorSettings {
     #[must_use]
     pub fn or(self, other: Self) -> Self {
         self.first_of(other)
+    }
+}
+
+/// Reads the range of a dither.
+fn dither(text: &str) -> Result<u16, String> {
+    let range = integer(0..=Dither::MOST.into())(text)?;
+    match Dither::new(range, 0) {
+        Ok(_) => Ok(range),
+        Err(error) => Err(error.to_string()),
     }
 }
 

@@ -113,6 +113,8 @@ impl State {
                 .as_ref()
                 .map(|(_, settings)| json!([settings.dead_time, settings.is_dead_time_of_sensor]));
             source["deadTime"] = json!(used);
+            let dither = self.settings.as_ref();
+            source["ditherBins"] = json!(dither.map(|(_, settings)| settings.dither_bins));
             let sensor = SensorSettings {
                 dead_time: requested,
                 ..file.sensor.clone()

@@ -32,6 +32,7 @@ function showTotals(frame, framesPerSecond) {
   }
   const [deadTime, isOfSensor] = source?.deadTime ?? [0];
   if (deadTime > 0) rows.push(["TDC dead time", `${number(deadTime)} bins, from the ${isOfSensor ? "sensor" : "settings"}`]);
+  if (source?.ditherBins > 0) rows.push(["laser dither", `${number(source.ditherBins)} bins`]);
   if (frame.masked > 0) rows.push(["events left out", number(frame.masked)]);
   rows.push(["frames a second", number(framesPerSecond, 1)]);
   if (recorded.file) {

@@ -18,6 +18,9 @@ pub struct Timing {
     pub bins: u16,
     /// Picoseconds a bin.
     pub bin_width_ps: f64,
-    /// From one laser pulse to the next, in bins; at least `bins`.
+    /// From one laser pulse to the next in the mean, in bins; at least `bins`.
     pub period: f64,
+    /// By how many bins the longest laser cycle is longer than the shortest: see
+    /// [`Dither`](dtof_sensors::dither::Dither).
+    pub dither_bins: u16,
 }

@@ -14,6 +14,7 @@ use crate::effects::cover_glass::CoverGlass;
 use crate::effects::dead_time::DeadTime;
 use crate::effects::hot_pixels::HotPixels;
 use crate::effects::jitter::Jitter;
+use crate::effects::other_lidar::OtherLidar;
 use crate::effects::second_echo::SecondEcho;
 use crate::effects::tail::Tail;
 use crate::effects::tdc::Tdc;
@@ -22,6 +23,7 @@ use dtof_options::numbers::bins_of;
 use dtof_photons::MM_PER_PS;
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::range::within;
+use dtof_sensors::dither::Dither;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -34,12 +36,14 @@ struct SceneFile {
     laser_rate_mhz: f64,
     background: f64,
     pulse_sigma_bins: f64,
+    dither_bins: u16,
     signal_at_one_metre: f64,
     field_of_view_degrees: Option<[f64; 2]>,
     surface: Vec<SurfaceEntry>,
     tail: Option<Tail>,
     second_echo: Option<SecondEcho>,
     cover_glass: Option<CoverGlass>,
+    other_lidar: Option<OtherLidar>,
     hot_pixels: Option<HotPixels>,
     dead_time: Option<DeadTime>,
     afterpulsing: Option<Afterpulsing>,
@@ -58,12 +62,14 @@ impl Default for SceneFile {
             laser_rate_mhz: 10.0,
             background: 0.0,
             pulse_sigma_bins: 1.0,
+            dither_bins: 0,
             signal_at_one_metre: 4.0,
             field_of_view_degrees: None,
             surface: Vec::new(),
             tail: None,
             second_echo: None,
             cover_glass: None,
+            other_lidar: None,
             hot_pixels: None,
             dead_time: None,
             afterpulsing: None,
@@ -131,6 +137,8 @@ impl SceneFile {
         within("laser_rate_mhz", self.laser_rate_mhz, 0.01..=1000.0)?;
         within("background", self.background, 0.0..=100.0)?;
         within("pulse_sigma_bins", self.pulse_sigma_bins, 0.0..=1000.0)?;
+        Dither::new(self.dither_bins, 0)
+            .map_err(|error| Refused::value("dither_bins", self.dither_bins, error.to_string()))?;
         within("signal_at_one_metre", self.signal_at_one_metre, 0.0..=1e6)?;
         let mm_per_bin = self.bin_width_ps * MM_PER_PS;
         let surfaces = (1..).zip(self.surface).map(|(number, entry)| {
@@ -150,12 +158,14 @@ impl SceneFile {
             laser_rate_mhz: self.laser_rate_mhz,
             background: self.background,
             pulse_sigma_bins: self.pulse_sigma_bins,
+            dither_bins: self.dither_bins,
             signal_at_one_metre: self.signal_at_one_metre,
             surfaces: surfaces.collect::<Result<_>>()?,
             effects: Effects {
                 tail: self.tail,
                 second_echo: self.second_echo,
                 cover_glass: self.cover_glass,
+                other_lidar: self.other_lidar,
                 hot_pixels: self.hot_pixels,
                 dead_time: self.dead_time,
                 afterpulsing: self.afterpulsing,
@@ -164,9 +174,10 @@ impl SceneFile {
             },
         };
         let period = scene.timing().period;
+        let shortest = period - f64::from(scene.dither_bins) / 2.0;
         ensure!(
-            period >= f64::from(scene.bins),
-            "laser_rate_mhz {}: the next laser pulse comes after {period:.1} bins, before the last \
+            shortest >= f64::from(scene.bins),
+            "laser_rate_mhz {}: the next laser pulse comes after {shortest:.1} bins, before the last \
              of {}",
             scene.laser_rate_mhz,
             scene.bins

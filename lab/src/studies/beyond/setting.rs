@@ -95,6 +95,8 @@ impl Setting {
             dead_time: 0,
             is_dead_time_of_sensor: false,
             once_per_bin: false,
+            dither_bins: 0,
+            dither_seed: 0,
             frame: None,
             seed: 0,
         })

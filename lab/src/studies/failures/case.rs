@@ -177,6 +177,7 @@ impl Case {
             bins: u16::try_from(BINS)?,
             bin_width_ps: 250.0,
             period: PERIOD,
+            dither_bins: 0,
         };
         let mut parts = Vec::new();
         for (index, pulse) in self.pulses.iter().enumerate() {

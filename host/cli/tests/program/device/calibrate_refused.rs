@@ -109,6 +109,7 @@ impl Fake {
                             laser_millihertz: 20_000_000,
                             bins: 128,
                             dead_time: 0,
+                            most_dither: 0,
                         };
                         let sensor = SensorRecord::to_le_bytes(Some(&sensor));
                         (message::SENSOR, sensor.to_vec())

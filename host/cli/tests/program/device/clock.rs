@@ -20,6 +20,7 @@ use dtof_export::{Format, Options, export};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::DynamicDepth;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo, simulated};
 
 const PIXELS: u16 = 16;
@@ -95,7 +96,7 @@ impl Sensor for HistogramSensor {
         }
     }
 
-    fn start(&mut self, _: U16F16) {
+    fn start(&mut self, _: U16F16, _: Dither) {
         self.last_ms = None;
     }
 

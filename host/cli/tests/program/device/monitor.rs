@@ -22,6 +22,7 @@ use dtof_engine::settings::Settings;
 use dtof_events::events_csv;
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::DynamicDepth;
+use dtof_sensors::dither::Dither;
 use dtof_sensors::simulated::Simulated;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
@@ -48,10 +49,10 @@ impl Sensor for Noted {
         sensor.map_or(SensorInfo::new(PIXELS), Simulated::info)
     }
 
-    fn start(&mut self, bin_width: U16F16) {
+    fn start(&mut self, bin_width: U16F16, dither: Dither) {
         self.sensor
             .iter_mut()
-            .for_each(|sensor| sensor.start(bin_width));
+            .for_each(|sensor| sensor.start(bin_width, dither));
     }
 
     fn stop(&mut self) {}

@@ -8,6 +8,7 @@ use crate::device::{listen, serve};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{U0F32, U8F24, U16F16};
 use dtof_firmware::sidecar::Sidecar;
+use dtof_sensors::dither::Dither;
 use dtof_sensors::simulated::{self, Pulse, Simulated, SimulatedPixel};
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
@@ -126,8 +127,8 @@ impl Sensor for WallSensor {
         }
     }
 
-    fn start(&mut self, bin_width: U16F16) {
-        self.photons.start(bin_width);
+    fn start(&mut self, bin_width: U16F16, dither: Dither) {
+        self.photons.start(bin_width, dither);
     }
 
     fn stop(&mut self) {}

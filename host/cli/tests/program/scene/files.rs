@@ -173,7 +173,7 @@ fn the_documents_defaults_are_those_of_an_empty_file() {
             defaults += 1;
         }
     }
-    assert_eq!(defaults, 13);
+    assert_eq!(defaults, 14);
 }
 
 /// A frame has an event of each pixel with a target, at its end and not before.

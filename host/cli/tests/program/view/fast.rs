@@ -84,6 +84,7 @@ impl Fast {
                     laser_millihertz: 1_000_000_000,
                     bins: 128,
                     dead_time: 0,
+                    most_dither: 0,
                 };
                 (
                     message::SENSOR,
