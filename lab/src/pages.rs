@@ -10,6 +10,7 @@ pub mod methods;
 mod movie;
 mod timing;
 
+use crate::studies::beyond::dither;
 use crate::studies::failures::STUDY as FAILURES;
 use crate::studies::methods::{depth_error, event_depth, time_to_detect};
 use crate::sweep::results::{Claim, Figure};
@@ -103,7 +104,14 @@ pub fn documents(
         fs::read_to_string(&path).with_context(|| path.display().to_string())
     };
     let (counts, recorded) = (read(methods::INSTRUCTIONS)?, read(methods::RECORDED)?);
-    let methods = methods::documents(&counts, &recorded, time, depth, events)?;
+    let methods = methods::documents(
+        &counts,
+        &recorded,
+        time,
+        depth,
+        events,
+        part(dither::STUDY)?,
+    )?;
     documents.extend(methods);
     let mut values = Values::default();
     for (study, results) in &all {

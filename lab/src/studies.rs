@@ -10,7 +10,8 @@ use anyhow::{Context, Result};
 
 use self::analysis::{false_events, gaussian_error, hit_rate, roc};
 use self::beyond::{
-    binning_edges, binning_rate, binning_reports, binning_scenes, echo_wait, echoes, tracking,
+    binning_edges, binning_rate, binning_reports, binning_scenes, dither, echo_wait, echoes,
+    tracking,
 };
 use self::methods::{depth_error, event_depth, false_rate, time_to_detect};
 use self::scenes::{
@@ -42,6 +43,7 @@ pub const ALL: &[Study] = &[
     tracking::STUDY,
     echoes::STUDY,
     echo_wait::STUDY,
+    dither::STUDY,
     failures::STUDY,
 ];
 

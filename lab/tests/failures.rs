@@ -106,16 +106,25 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     let steps = ["background × 4 at 20", "background / 4 at 20"];
     check(&steps, |of| surely_false(of) < 0.02);
     // A pulse that stays looks like a target, and no flag distinguishes it; the same holds for a
-    // veil. Random pulse times spread the other laser's pulse.
-    check(&["another LiDAR, clock"], |of| {
-        surely_false(of) > 0.1 && of.warning == Warning::Silent
-    });
+    // veil. With dither the other laser's pulse wanders.
+    for clock in ["of the same clock", "clock 20 ppm off"] {
+        let twice = format!("another LiDAR, {clock}, 2 × the signal");
+        let without_target = format!("{twice}, no target");
+        check(&[&twice, &without_target], |of| {
+            surely_false(of) > 0.1 && of.warning == Warning::Silent
+        });
+        for name in [twice, without_target] {
+            check(&[&format!("{name}, dither of 128")], |of| {
+                surely_false(of) < 0.02 && of.verdict != Verdict::Fails
+            });
+        }
+    }
     check(&["veil of twice the signal"], |of| {
         surely_false(of) > 0.8 && of.warning == Warning::Silent
     });
-    let spread = ["another LiDAR, rate", "another LiDAR, own pulses"];
+    let other_rate = "another LiDAR, rate 1 % off";
     let rain = ["rain, a drop of 3 photons", "the same rain, gate"];
-    check(&[spread, rain].concat(), |of| {
+    check(&[&[other_rate], &rain[..]].concat(), |of| {
         surely_false(of) < 0.02 && of.verdict != Verdict::Fails
     });
     // A target that moves during the exposure is reported at an earlier position.

@@ -71,6 +71,7 @@ fn cell(outcome: &Outcome) -> String {
 
 fn worst(outcome: &Outcome) -> String {
     match outcome.false_share {
+        Some(share) if !outcome.has_target => format!("{} false", percent(share.value)),
         Some(share) if share.value >= 0.1 && outcome.without.value < 0.9 => {
             format!("{:.0} % false", share.value * 100.0)
         }

@@ -1,6 +1,7 @@
 //! Which method for which scene: time and error from the studies, against the cost in instructions.
 
 mod events;
+mod other_lidar;
 mod recorded;
 mod tables;
 
@@ -255,6 +256,7 @@ pub fn documents(
     time: &Part,
     depth: &Part,
     events: &Part,
+    dither: &Part,
 ) -> Result<Vec<(PathBuf, String)>> {
     let counts = Instructions(instructions);
     let outcomes = time_to_detect::outcomes(time)?;
@@ -314,6 +316,7 @@ pub fn documents(
         values.set(name, worst.parameter(name));
     }
     events::section(&mut values, events)?;
+    other_lidar::section(&mut values, dither)?;
     let text = values.fill(include_str!("methods.md"))?;
     Ok(vec![
         ("figures/cost-time-to-detect.svg".into(), decision_svg),

@@ -1,10 +1,10 @@
 //! Where methods fail: scenes that violate the plain model, and whether the flags of events show
 //! it.
 
-mod case;
+pub(super) mod case;
 pub mod cases;
 mod outcome;
-mod stray;
+pub(super) mod stray;
 
 use self::cases::{BACKGROUNDS, background_name, cases};
 use crate::studies::scenes::one_pixel::{PER_BIN, in_parts};
@@ -39,13 +39,13 @@ const SIGMA: f64 = 1.0;
 /// Bins between two pulses of the laser: 100 ns.
 const PERIOD: f64 = 400.0;
 /// An event farther from every surface is false: 1 + 2σ bins, at least 2.
-const FALSE: i64 = 3 * PER_BIN;
+pub(super) const FALSE: i64 = 3 * PER_BIN;
 
 /// Compared with the plain scene.
 pub const STUDY: Study = Study {
     name: "failures",
     about: "false alarms, missing and wrong events in scenes that are not plain, and their flags",
-    revision: 7,
+    revision: 8,
     few_seeds: 30,
     all_seeds: 200,
     points,
@@ -133,7 +133,10 @@ impl Method {
     }
 
     /// A pixel that runs this method in `case`.
-    fn pixel(self, case: &Case) -> Result<(PixelConfig<BINS, AnyRule>, AsyncPixel<BINS>)> {
+    pub(super) fn pixel(
+        self,
+        case: &Case,
+    ) -> Result<(PixelConfig<BINS, AnyRule>, AsyncPixel<BINS>)> {
         let minimum = Count::saturating(MINIMUM_COUNT);
         let rule: AnyRule = match self.rule {
             Rule::Paper(alpha) => PaperRule::new(U8F8::from_num(alpha), minimum).into(),

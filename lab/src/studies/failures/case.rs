@@ -15,8 +15,8 @@ use dtof_theory::rates::Rates;
 
 /// The plain scene: background photons a bin and laser cycle, signal photons a laser cycle, and
 /// their position in bins.
-pub(super) const BACKGROUND: f64 = 0.05;
-pub(super) const SIGNAL: f64 = 0.5;
+pub(in crate::studies) const BACKGROUND: f64 = 0.05;
+pub(in crate::studies) const SIGNAL: f64 = 0.5;
 pub(super) const PLACE: f64 = 80.3;
 
 /// A Gaussian pulse.
@@ -57,7 +57,7 @@ pub struct Case {
 
 impl Case {
     /// The plain scene, named `name`.
-    pub(super) fn new(name: impl Into<String>) -> Self {
+    pub(in crate::studies) fn new(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
             advice: None,
@@ -113,12 +113,12 @@ impl Case {
     }
 
     /// Removes the target.
-    pub(super) fn without_target(mut self) -> Self {
+    pub(in crate::studies) fn without_target(mut self) -> Self {
         self.pulses.clear();
         self.behind(0.0, PLACE)
     }
 
-    pub(super) fn with_background(mut self, background: f64) -> Self {
+    pub(in crate::studies) fn with_background(mut self, background: f64) -> Self {
         self.background = background;
         self
     }
@@ -145,7 +145,7 @@ impl Case {
         self
     }
 
-    pub(super) fn with_stray(mut self, stray: StrayLight) -> Self {
+    pub(in crate::studies) fn with_stray(mut self, stray: StrayLight) -> Self {
         self.stray = Some(stray);
         self
     }

@@ -22,6 +22,8 @@ const RAIN_ENDS: f64 = 24.0;
 const RAIN_GATE: u16 = 28;
 /// A cover glass: signal and position.
 const GLASS: (f64, f64) = (10.0 * SIGNAL, 3.5);
+/// The range of a dither, in bins.
+const DITHER: u16 = 128;
 /// Background counts a bin after L1 laser cycles.
 pub const BACKGROUNDS: [f64; 5] = [0.05, 0.5, 5.0, 50.0, 500.0];
 
@@ -207,24 +209,47 @@ fn weather() -> Result<Vec<Case>> {
     ])
 }
 
-/// Another LiDAR with twice the signal. Clocks of the same rate differ by some 20 ppm, 0.008 bins a
-/// laser cycle. Different rates may differ by any amount, here 1 %.
+/// Another LiDAR. Clocks of the same rate differ by some 20 ppm, 0.008 bins a laser cycle. Different rates may
+/// differ by any amount, here 1 %.
 fn others() -> Vec<Case> {
-    let photons = 2.0 * SIGNAL;
-    let dither = "a random time from pulse to pulse: see the row with one";
-    vec![
-        Case::new("another LiDAR, clock 20 ppm off")
-            .with_stray(StrayLight::Laser {
-                photons,
-                step: 0.008,
-            })
-            .advised(dither)
-            .silent_as("The histogram is that of a target where the other pulse stays"),
-        Case::new("another LiDAR, rate 1 % off")
-            .with_stray(StrayLight::Laser { photons, step: 4.0 }),
-        Case::new("another LiDAR, own pulses at random times")
-            .with_stray(StrayLight::Dithered { photons }),
-    ]
+    let advice = "a random time from pulse to pulse: see the row with dither";
+    let silent = "The histogram is that of a target where the other pulse stays";
+    let mut cases = Vec::new();
+    for (clock, step, strengths) in [
+        ("of the same clock", 0.0, &[2.0][..]),
+        ("clock 20 ppm off", 0.008, &[0.5, 1.0, 2.0, 4.0]),
+        ("rate 1 % off", 4.0, &[2.0]),
+    ] {
+        for &strength in strengths {
+            for has_target in [true, false] {
+                for dither in [0, DITHER] {
+                    let target = if has_target { "" } else { ", no target" };
+                    let dithered = match dither {
+                        0 => String::new(),
+                        range => format!(", dither of {range}"),
+                    };
+                    let name = format!(
+                        "another LiDAR, {clock}, {strength} × the signal{target}{dithered}"
+                    );
+                    let case = Case::new(name).with_stray(StrayLight::Laser {
+                        photons: strength * SIGNAL,
+                        step,
+                        dither,
+                    });
+                    let case = if has_target {
+                        case
+                    } else {
+                        case.without_target()
+                    };
+                    cases.push(match dither {
+                        0 => case.advised(advice).silent_as(silent),
+                        _ => case,
+                    });
+                }
+            }
+        }
+    }
+    cases
 }
 
 /// Scenes with pile-up: photons that hide later ones. Pixels are set to the dead time of the TDC where the

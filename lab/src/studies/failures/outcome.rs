@@ -79,6 +79,8 @@ impl Warning {
 pub struct Outcome {
     /// The rule and the depth estimator.
     pub method: Method,
+    /// Whether the case has a target.
+    pub has_target: bool,
     /// Number of events.
     pub events: u64,
     /// False alarms per event, `None` without events; without a target, false alarms per exposure.
@@ -163,6 +165,7 @@ fn outcome(case: &Case, point: &PointTally, plain: &PointTally, method: Method) 
     };
     Outcome {
         method,
+        has_target,
         events,
         false_share,
         without,

@@ -2,6 +2,8 @@
 
 use super::{BINS, PERIOD, SIGMA};
 use anyhow::Result;
+use dtof_sensors::dither::{Added, Dither};
+use rand_core::Rng;
 use rand_distr::{Distribution, Exp, Normal, Poisson, Uniform};
 use rand_pcg::Pcg64;
 
@@ -32,11 +34,8 @@ pub enum StrayLight {
         photons: f64,
         /// Bins by which its pulse comes later in each laser cycle.
         step: f64,
-    },
-    /// The same with random times of the own laser pulses: a random position in each laser cycle.
-    Dithered {
-        /// Photons of a pulse.
-        photons: f64,
+        /// The range of the own laser's dither in bins, 0 for none.
+        dither: u16,
     },
 }
 
@@ -46,13 +45,25 @@ pub struct StrayPhotons {
     rng: Pcg64,
     /// The position of the other laser's next pulse, in bins.
     place: f64,
+    /// By how many bins the own laser cycles are longer than the shortest.
+    added: Added,
 }
 
 impl StrayPhotons {
     /// At the start of an exposure.
     pub fn new(stray: StrayLight, mut rng: Pcg64) -> Result<Self> {
         let place = Uniform::new(0.0, PERIOD)?.sample(&mut rng);
-        Ok(Self { stray, rng, place })
+        let range = match stray {
+            StrayLight::Laser { dither, .. } => dither,
+            _ => 0,
+        };
+        let added = Dither::new(range, rng.next_u64())?.added();
+        Ok(Self {
+            stray,
+            rng,
+            place,
+            added,
+        })
     }
 
     /// Calls `photon` with the TDC codes of the next laser cycle.
@@ -78,13 +89,14 @@ impl StrayPhotons {
                 let place = |rng: &mut Pcg64| width.sample(rng) + depth.sample(rng);
                 draw(photons, place, rng, photon)?;
             }
-            StrayLight::Laser { photons, step } => {
+            StrayLight::Laser {
+                photons,
+                step,
+                dither,
+            } => {
                 pulse(photons, self.place, rng, photon)?;
-                self.place = (self.place + step).rem_euclid(PERIOD);
-            }
-            StrayLight::Dithered { photons } => {
-                let place = Uniform::new(0.0, PERIOD)?.sample(rng);
-                pulse(photons, place, rng, photon)?;
+                let added = f64::from(self.added.next().unwrap_or(0)) - f64::from(dither) / 2.0;
+                self.place = (self.place + step - added).rem_euclid(PERIOD);
             }
         }
         Ok(())

@@ -1,0 +1,112 @@
+//! Another LiDAR, and the dither against it.
+
+use std::fmt::Write as _;
+
+use anyhow::{Result, ensure};
+
+use crate::studies::beyond::dither::{
+    Counted, DEFAULT, MOST_FALSE, MOST_WRONG, Outcome, RANGES, STRENGTHS, Scene, least_range,
+    outcome, undisturbed,
+};
+use crate::sweep::Part;
+use crate::sweep::values::Values;
+
+/// The section on the study of the dither.
+pub(super) fn section(values: &mut Values, part: &Part) -> Result<()> {
+    values.set("lidar.table", table(part)?);
+    values.set(
+        "lidar.without",
+        cell(|scene| undisturbed(part, scene, Counted::All))?,
+    );
+    values.set("lidar.default", DEFAULT);
+    values.set("lidar.most wrong", 100.0 * MOST_WRONG);
+    values.set("lidar.most false", 100.0 * MOST_FALSE);
+    let at = |scene, counted, strength| outcome(part, scene, counted, strength, DEFAULT);
+    for (name, scene, counted, strength) in [
+        ("equal", Scene::Empty, Counted::All, 1.0),
+        ("twice", Scene::Empty, Counted::All, 2.0),
+        ("twice once", Scene::Empty, Counted::OncePerBin, 2.0),
+        ("dark", Scene::Dark, Counted::All, 2.0),
+        ("very dark", Scene::VeryDark, Counted::All, 2.0),
+        ("dark once", Scene::Dark, Counted::OncePerBin, 2.0),
+        ("first wrong", Scene::FirstPhoton, Counted::First, 2.0),
+    ] {
+        let outcome = at(scene, counted, strength)?;
+        values.set(format!("lidar.{name}"), percent(outcome, 1));
+    }
+    for (name, scene, counted) in [
+        ("time", Scene::Target, Counted::All),
+        ("first time", Scene::FirstPhoton, Counted::First),
+    ] {
+        let without = undisturbed(part, scene, counted)?.cycles.value;
+        let ratio = at(scene, counted, 2.0)?.cycles.value / without;
+        values.set(format!("lidar.{name}"), format!("{ratio:.2}"));
+    }
+    let without = undisturbed(part, Scene::Empty, Counted::All)?.wrong;
+    let [equal, twice] = [1.0, 2.0].map(|strength| at(Scene::Empty, Counted::All, strength));
+    let (equal, twice) = (equal?.wrong, twice?.wrong);
+    ensure!(
+        equal.contains(without.value)
+            && twice.interval.0 > without.interval.1
+            && least_range(part, Scene::Empty, Counted::All, 1.0)? == Some(DEFAULT),
+        "the data no longer show which LiDAR the default suits"
+    );
+    Ok(())
+}
+
+fn percent(outcome: Outcome, digits: usize) -> String {
+    format!("{:.digits$}", 100.0 * outcome.wrong.value)
+}
+
+/// With a target, without one, and without one in the dark.
+fn cell(of: impl Fn(Scene) -> Result<Outcome>) -> Result<String> {
+    let [target, empty, dark] = [Scene::Target, Scene::Empty, Scene::Dark].map(of);
+    Ok(format!(
+        "{} · {} · {}",
+        percent(target?, 2),
+        percent(empty?, 1),
+        percent(dark?, 1)
+    ))
+}
+
+/// A row for each range, and the smallest that suffices.
+fn table(part: &Part) -> Result<String> {
+    let mut table = "| S |".to_owned();
+    for strength in STRENGTHS {
+        write!(table, " {strength} × |")?;
+    }
+    writeln!(table, "\n|---|{}", "---|".repeat(STRENGTHS.len()))?;
+    let all = RANGES.map(|range| (range.to_string(), Counted::All, range));
+    let once = (
+        format!("{DEFAULT}, once per bin"),
+        Counted::OncePerBin,
+        DEFAULT,
+    );
+    for (name, counted, range) in all.into_iter().chain([once]) {
+        write!(table, "| {name} |")?;
+        for strength in STRENGTHS {
+            let cell = cell(|scene| outcome(part, scene, counted, strength, range))?;
+            write!(table, " {cell} |")?;
+        }
+        writeln!(table)?;
+    }
+    for (name, empty, counted) in [
+        ("least S", Scene::Empty, Counted::All),
+        ("least S in the dark", Scene::Dark, Counted::All),
+        (
+            "least S in the dark, once per bin",
+            Scene::Dark,
+            Counted::OncePerBin,
+        ),
+    ] {
+        write!(table, "| {name} |")?;
+        for strength in STRENGTHS {
+            match least_range(part, empty, counted, strength)? {
+                Some(range) => write!(table, " {range} |")?,
+                None => write!(table, " none |")?,
+            }
+        }
+        writeln!(table)?;
+    }
+    Ok(table)
+}

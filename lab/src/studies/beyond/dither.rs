@@ -1,0 +1,449 @@
+//! Another LiDAR whose clock is nearly the same, and the dither of the own laser against it.
+
+use crate::studies::failures::case::{BACKGROUND, Case, SIGNAL};
+use crate::studies::failures::stray::StrayLight;
+use crate::studies::failures::{BINS, FALSE, Method, Rule};
+use crate::studies::scenes::one_pixel::in_parts;
+use crate::sweep::mean::{Measured, add, add_value};
+use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, Point, Study, Tally, point, whole};
+use anyhow::Result;
+use dtof_core::{LaserCycle, Look, OncePerBin, Statistics};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::{Pen, REFERENCE, STEPS};
+use dtof_options::rows::grouped;
+use rand_pcg::Pcg64;
+use std::fmt::Write as _;
+
+/// Ranges of the dither in bins; 0 is none.
+pub const RANGES: [f64; 6] = [0.0, 16.0, 32.0, 64.0, DEFAULT, 254.0];
+/// The default of a device.
+pub const DEFAULT: f64 = 128.0;
+/// Photons of the other LiDAR's pulse, over those of the target's.
+pub const STRENGTHS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
+/// No other LiDAR. A TDC code counts from the own pulse on, so the dither then changes no photon.
+const ABSENT: f64 = 0.0;
+/// Bins by which the other's pulse comes later in each laser cycle: 20 ppm of 400 bins.
+const STEP: f64 = 0.008;
+/// The most wrong events with a target if a dither suffices.
+pub const MOST_WRONG: f64 = 0.002;
+/// The most exposures with an event without a target if a dither suffices.
+pub const MOST_FALSE: f64 = 0.015;
+/// The false alarms that z is for.
+const REQUESTED: f64 = 0.01;
+
+/// The photons that a pixel counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Counted {
+    /// All.
+    All,
+    /// Those of one laser cycle in one bin once.
+    OncePerBin,
+    /// The first of a laser cycle; the pixel is set to the dead time of such a TDC.
+    First,
+}
+
+impl Counted {
+    /// Its name in tables and tallies.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::OncePerBin => "once per bin",
+            Self::First => "first",
+        }
+    }
+}
+
+/// A scene, beside the other LiDAR.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scene {
+    /// The target of the plain scene.
+    Target,
+    /// No target.
+    Empty,
+    /// No target, and a tenth of the background.
+    Dark,
+    /// No target, and a hundredth of the background.
+    VeryDark,
+    /// The target in half of the background, seen by a TDC that takes the first photon only.
+    FirstPhoton,
+}
+
+impl Scene {
+    const ALL: [Self; 5] = [
+        Self::Target,
+        Self::Empty,
+        Self::Dark,
+        Self::VeryDark,
+        Self::FirstPhoton,
+    ];
+
+    const fn name(self) -> &'static str {
+        match self {
+            Self::Target => "target",
+            Self::Empty => "no target",
+            Self::Dark => "no target, a tenth of the background",
+            Self::VeryDark => "no target, a hundredth of the background",
+            Self::FirstPhoton => "target, first photon only",
+        }
+    }
+
+    /// Its place in [`Self::ALL`].
+    fn number(self) -> f64 {
+        f64::from(self as u8)
+    }
+
+    const fn has_target(self) -> bool {
+        matches!(self, Self::Target | Self::FirstPhoton)
+    }
+
+    fn background(self) -> f64 {
+        match self {
+            Self::Target | Self::Empty => BACKGROUND,
+            Self::Dark => BACKGROUND / 10.0,
+            Self::VeryDark => BACKGROUND / 100.0,
+            Self::FirstPhoton => BACKGROUND / 2.0,
+        }
+    }
+
+    /// The pixels, which see the same photons.
+    const fn counted(self) -> &'static [Counted] {
+        match self {
+            Self::FirstPhoton => &[Counted::First],
+            _ => &[Counted::All, Counted::OncePerBin],
+        }
+    }
+
+    /// Exposures of a trial. Without a target they are long.
+    const fn exposures(self) -> u64 {
+        if self.has_target() { 200 } else { 60 }
+    }
+
+    fn case(self, strength: f64, range: u16) -> Case {
+        let case = Case::new(self.name()).with_background(self.background());
+        let case = if self.has_target() {
+            case
+        } else {
+            case.without_target()
+        };
+        if strength == ABSENT {
+            return case;
+        }
+        case.with_stray(StrayLight::Laser {
+            photons: strength * SIGNAL,
+            step: STEP,
+            dither: range,
+        })
+    }
+}
+
+/// Another LiDAR over the range of the dither.
+pub const STUDY: Study = Study {
+    name: "dither",
+    about: "wrong events and false alarms next to another LiDAR, over the range of the dither",
+    revision: 1,
+    few_seeds: 4,
+    all_seeds: 200,
+    points,
+    trial,
+    results,
+};
+
+fn points() -> Vec<Point> {
+    let mut points = Vec::new();
+    for scene in Scene::ALL {
+        let at = |strength, range| {
+            point([
+                ("scene", scene.number()),
+                ("strength", strength),
+                ("range", range),
+            ])
+        };
+        points.push(at(ABSENT, 0.0));
+        points.extend(
+            STRENGTHS
+                .into_iter()
+                .flat_map(|strength| RANGES.map(|range| at(strength, range))),
+        );
+    }
+    points
+}
+
+fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    let scene = Scene::ALL[usize::from(whole(point, "scene"))];
+    let case = scene.case(point["strength"], whole(point, "range"));
+    let mut tally = Tally::from([("exposures".to_owned(), scene.exposures())]);
+    for _ in 0..scene.exposures() {
+        exposure(&case, scene.counted(), rng, &mut tally)?;
+    }
+    Ok(tally)
+}
+
+/// One exposure of the same photons for all pixels; each ends it on its own.
+fn exposure(case: &Case, counted: &[Counted], rng: &mut Pcg64, tally: &mut Tally) -> Result<()> {
+    let mut photons = case.pixel(rng)?;
+    let method = Method {
+        rule: Rule::Window,
+        is_centred: true,
+    };
+    let pixel = |&counted: &Counted| {
+        let mut case = case.clone();
+        if counted == Counted::First {
+            case.dead_time = u16::try_from(BINS)?;
+        }
+        let (config, pixel) = method.pixel(&case)?;
+        Ok((counted, config, pixel))
+    };
+    let mut waiting = counted.iter().map(pixel).collect::<Result<Vec<_>>>()?;
+    let mut codes = Vec::new();
+    let mut cycle = 0;
+    while !waiting.is_empty() {
+        cycle += 1;
+        codes.clear();
+        photons.next_cycle(cycle, |code| codes.push(code))?;
+        waiting.retain_mut(|(counted, config, pixel)| {
+            let statistics = &mut Statistics::new();
+            match counted {
+                Counted::All => pixel.count_batch(config, &codes),
+                Counted::OncePerBin => {
+                    let bins = &mut OncePerBin::<{ BINS / 32 }>::new();
+                    pixel.count_once_per_bin(config, statistics, bins, &codes);
+                }
+                Counted::First => pixel.count_batch(config, codes.iter().copied().min().as_slice()),
+            }
+            let now = LaserCycle::new(cycle.into());
+            let look = pixel.end_laser_cycle(config, statistics, now);
+            if let Some(event) = pixel.take_event() {
+                let position = i64::from(event.position().raw());
+                let is_far = |surface| (position - in_parts(surface)).abs() > FALSE;
+                let is_wrong = case.surfaces(cycle).all(is_far);
+                add_value(tally, counted.name(), cycle.into());
+                add(tally, counted.name(), "wrong", is_wrong.into());
+            }
+            !matches!(look, Look::Event | Look::Expired)
+        });
+    }
+    Ok(())
+}
+
+/// The events of a pixel in a scene.
+#[derive(Clone, Copy, Debug)]
+pub struct Outcome {
+    /// With a target the share of wrong events. Without one every event is wrong: the share of exposures that
+    /// end with an event.
+    pub wrong: Measured,
+    /// Mean laser cycles to an event; NaN without events.
+    pub cycles: Measured,
+    exposures: u64,
+}
+
+/// The outcome next to a LiDAR of this strength, with a dither of this range.
+///
+/// # Errors
+/// Fails if `part` has no such point.
+pub fn outcome(
+    part: &Part,
+    scene: Scene,
+    counted: Counted,
+    strength: f64,
+    range: f64,
+) -> Result<Outcome> {
+    let point = part.one([
+        ("scene", scene.number()),
+        ("strength", strength),
+        ("range", range),
+    ])?;
+    let name = counted.name();
+    let trials = if scene.has_target() {
+        format!("{name} values")
+    } else {
+        "exposures".to_owned()
+    };
+    Ok(Outcome {
+        wrong: point.share(&format!("{name} wrong"), &trials),
+        cycles: Measured::mean(point, name),
+        exposures: point.count("exposures"),
+    })
+}
+
+/// The outcome without another LiDAR.
+///
+/// # Errors
+/// As [`outcome`].
+pub fn undisturbed(part: &Part, scene: Scene, counted: Counted) -> Result<Outcome> {
+    outcome(part, scene, counted, ABSENT, 0.0)
+}
+
+/// The smallest range with surely at most [`MOST_WRONG`] next to a target and at most [`MOST_FALSE`] in the scene
+/// `empty` without one: the intervals end there. `None` if no range is large enough.
+///
+/// # Errors
+/// As [`outcome`].
+pub fn least_range(
+    part: &Part,
+    empty: Scene,
+    counted: Counted,
+    strength: f64,
+) -> Result<Option<f64>> {
+    for range in RANGES {
+        let wrong = |scene| {
+            anyhow::Ok(
+                outcome(part, scene, counted, strength, range)?
+                    .wrong
+                    .interval
+                    .1,
+            )
+        };
+        if wrong(Scene::Target)? <= MOST_WRONG && wrong(empty)? <= MOST_FALSE {
+            return Ok(Some(range));
+        }
+    }
+    Ok(None)
+}
+
+/// Panels, row by row.
+const PANELS: [(Scene, Counted, &str); 4] = [
+    (Scene::Target, Counted::All, "target: wrong events"),
+    (Scene::Empty, Counted::All, "no target: false alarms"),
+    (Scene::Dark, Counted::All, "the same, background / 10"),
+    (Scene::Dark, Counted::OncePerBin, "… and once per bin"),
+];
+const PENS: [Pen; 4] = [STEPS[0], STEPS[1], STEPS[2], STEPS[3]];
+
+fn results(part: &Part) -> Result<Results> {
+    let mut panels = Vec::new();
+    for (scene, counted, title) in PANELS {
+        let ends = [0.0, 254.0].map(|range| Dot::exact(range, REQUESTED));
+        let mut series = vec![Series::unnamed(REFERENCE, Style::Dashed, ends.into())];
+        for (strength, pen) in STRENGTHS.into_iter().zip(PENS) {
+            let dot = |range| {
+                let outcome = outcome(part, scene, counted, strength, range)?;
+                anyhow::Ok(outcome.wrong.at(range))
+            };
+            let dots = RANGES.into_iter().map(dot).collect::<Result<_>>()?;
+            series.push(Series::unnamed(pen, Style::JoinedDots, dots));
+        }
+        panels.push(Panel {
+            title: title.to_owned(),
+            series,
+        });
+    }
+    let as_bright = |scene| {
+        let outcome = outcome(part, scene, Counted::All, 1.0, DEFAULT)?;
+        anyhow::Ok(outcome.wrong.interval)
+    };
+    let mut key: Vec<Key> = STRENGTHS
+        .into_iter()
+        .zip(PENS)
+        .map(|(strength, pen)| Key::new(pen, Style::JoinedDots, format!("{strength} ×")))
+        .collect();
+    key.push(Key::new(REFERENCE, Style::Dashed, "1 %, as requested"));
+    let chart = Chart {
+        finding: format!("A dither of {DEFAULT} bins hides an equal LiDAR"),
+        holds: as_bright(Scene::Target)?.1 <= MOST_WRONG
+            && as_bright(Scene::Empty)?.1 <= MOST_FALSE
+            && as_bright(Scene::Dark)?.0 > MOST_FALSE,
+        note: format!(
+            "Key: photons of the other LiDAR's pulse over the target's {SIGNAL}. Its clock is 20 ppm off. Bars hold \
+             99 %. Background {BACKGROUND} a bin and laser cycle."
+        ),
+        x: Axis::linear("range of the dither, bins"),
+        y: Axis::logarithmic("events or exposures, %")
+            .percent()
+            .within(2e-5, 1.0),
+        key,
+        columns: 2,
+        panels,
+    };
+    let exposures = |scene| {
+        anyhow::Ok(grouped(
+            undisturbed(part, scene, scene.counted()[0])?.exposures,
+        ))
+    };
+    Ok(Results {
+        figures: vec![Figure::new("dither", &chart)?],
+        values: [
+            ("exposures", exposures(Scene::Target)?),
+            ("empty exposures", exposures(Scene::Empty)?),
+        ]
+        .into(),
+        tables: vec![("results/data/dither.csv", csv(part)?)],
+        ..Results::default()
+    })
+}
+
+fn csv(part: &Part) -> Result<String> {
+    let mut csv = "scene,counted,strength,range,exposures,wrong,wrong_low,wrong_high,cycles,cycles_low,cycles_high\n"
+        .to_owned();
+    for scene in Scene::ALL {
+        for &counted in scene.counted() {
+            let mut row = |strength, range| {
+                let outcome = outcome(part, scene, counted, strength, range)?;
+                writeln!(
+                    csv,
+                    "\"{}\",{},{strength},{range},{},{},{}",
+                    scene.name(),
+                    counted.name(),
+                    outcome.exposures,
+                    outcome.wrong.cells(5),
+                    outcome.cycles.cells(2),
+                )?;
+                anyhow::Ok(())
+            };
+            row(ABSENT, 0.0)?;
+            for strength in STRENGTHS {
+                for range in RANGES {
+                    row(strength, range)?;
+                }
+            }
+        }
+    }
+    Ok(csv)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sweep::run_seeds;
+    use rand_core::SeedableRng;
+
+    /// Of 200 events, 29 % are wrong without a dither and 0.03 % with the default.
+    #[test]
+    fn a_pulse_that_stays_is_a_target_and_one_that_wanders_is_not() {
+        let wrong = |range| {
+            let scene = Scene::Target.number();
+            let point = point([("scene", scene), ("strength", 2.0), ("range", range)]);
+            trial(&point, &mut Pcg64::seed_from_u64(1)).unwrap()["all wrong"]
+        };
+        assert!((30..90).contains(&wrong(0.0)), "{}", wrong(0.0));
+        assert!(wrong(DEFAULT) <= 2, "{}", wrong(DEFAULT));
+    }
+
+    /// Of 10,000, at most 20 with a target and 150 without one, less 2.6 standard deviations.
+    #[test]
+    fn the_least_range_has_surely_few_wrong_events_in_both_scenes() {
+        fn made_up(point: &Point, _: &mut Pcg64) -> Result<Tally> {
+            let wrong = match (whole(point, "scene"), whole(point, "range")) {
+                (0, ..=16) => 15,
+                (0, _) => 8,
+                (1, ..=32) => 130,
+                (1, _) => 110,
+                _ => 130,
+            };
+            Ok(Tally::from([
+                ("exposures".to_owned(), 10_000),
+                ("all values".to_owned(), 10_000),
+                ("all wrong".to_owned(), wrong),
+            ]))
+        }
+        let study = Study {
+            trial: made_up,
+            ..STUDY
+        };
+        let part = run_seeds(&study, 0..1).unwrap();
+        let least = |empty| least_range(&part, empty, Counted::All, 1.0).unwrap();
+        assert_eq!(least(Scene::Empty), Some(64.0));
+        assert_eq!(least(Scene::Dark), None);
+    }
+}
