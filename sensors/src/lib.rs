@@ -122,7 +122,7 @@ pub struct SensorInfo {
     /// unknown. See
     /// [`PixelConfigBuilder::dead_time`](dtof_core::PixelConfigBuilder::dead_time).
     pub dead_time: u16,
-    /// The largest range of [dither](dither), in its bins; 0 if it cannot.
+    /// The largest range of [dither], in its bins; 0 if it cannot.
     pub most_dither: u8,
 }
 
