@@ -70,6 +70,7 @@ impl Calibration {
             run: before.run,
             file: before.file,
             dead_time_of_sensor: None,
+            dither_of_laser: None,
         };
         Ok(found.without_recording())
     }

@@ -60,10 +60,10 @@ impl Task<'_> {
         );
         let last_bin = u16::try_from(settings.bins)?.checked_sub(1);
         let last_bin = last_bin.context("the settings have no bins")?;
-        // A laser that is not the device's is not its to dither.
-        let dither_bins = match source {
-            Source::Link => 0,
-            Source::Sensor => settings.dither_bins,
+        // A laser that is not the device's is not its to dither. Without a dither the seed means nothing.
+        let (dither_bins, dither_seed) = match (source, settings.dither_bins) {
+            (Source::Link, _) | (_, 0) => (0, 0),
+            (Source::Sensor, bins) => (bins, settings.dither_seed),
         };
         Ok(Configuration {
             rule: settings.rule,
@@ -75,7 +75,7 @@ impl Task<'_> {
             dead_time: Some(settings.dead_time),
             once_per_bin: settings.once_per_bin,
             dither_bins,
-            dither_seed: settings.dither_seed,
+            dither_seed,
             pixels: self.pixels,
             columns: u16::try_from(self.columns)?,
             binning: settings.binning,

@@ -11,15 +11,11 @@ use dtof_link::{DynamicDepth, SensorRecord};
 use super::monitor::array;
 use super::{Client, HostTimeout, Stopped, Task};
 use dtof_engine::settings::Settings;
-use dtof_engine::settings::{SensorSettings, SettingsFile};
+use dtof_engine::settings::{DITHER_BINS, SensorSettings, SettingsFile};
 use dtof_events::aer_file::Header;
 use dtof_events::clock::LaserClock;
 use dtof_options::Refused;
 use dtof_photons::masked;
-
-/// The range of the dither of a sensor that can. With 128 another LiDAR as bright as the target makes no more false
-/// alarms than its absence would, except in the dark: see `docs/results/methods.md`.
-const DITHER_BINS: u16 = 128;
 
 /// How a device operates.
 #[derive(Clone, Debug)]
@@ -80,16 +76,21 @@ impl Setup {
         check_dither(requested.sensor.dither_bins, sensor.most_dither.into())?;
         let began = SystemTime::now();
         let micros = began.duration_since(UNIX_EPOCH).unwrap_or_default();
+        let asked = &requested.sensor;
+        let range = asked.dither_bins.unwrap_or_else(|| {
+            // An odd range cannot be.
+            DITHER_BINS.min(sensor.most_dither.into()) & !1
+        });
+        // Two devices of one kind have different lengths.
+        let seed = asked.dither_seed.or(u64::try_from(micros.as_micros()).ok());
         let mut effective = requested.clone().or(SettingsFile {
             sensor: SensorSettings {
                 bin_width_ps: sensor.bin_width,
                 offset_mm: Some(sensor.offset),
-                dither_bins: Some(DITHER_BINS.min(sensor.most_dither.into())),
-                // Two devices of one kind have different lengths.
-                dither_seed: u64::try_from(micros.as_micros()).ok(),
                 ..SensorSettings::default()
             },
             dead_time_of_sensor: Some(sensor.dead_time),
+            dither_of_laser: Some((range, seed.unwrap_or(0))),
             ..SettingsFile::default()
         });
         effective.check_bins(bins)?;
@@ -218,14 +219,48 @@ mod tests {
         let bins = |text, most| ranges(text, most).map(|ranges| ranges.map(|(bins, _)| bins));
         assert_eq!(bins("", 254), Ok([128, 0]));
         assert_eq!(bins("", 40), Ok([40, 0]));
+        assert_eq!(bins("", 41), Ok([40, 0]));
+        assert_eq!(bins("", 1), Ok([0, 0]));
         assert_eq!(bins("", 0), Ok([0, 0]));
         assert_eq!(bins("[sensor]\ndither_bins = 0", 254), Ok([0, 0]));
         assert_ne!(ranges("", 254).unwrap()[0].1, 0, "the clock's seed");
         let given = "[sensor]\ndither_bins = 64\ndither_seed = 9";
-        assert_eq!(ranges(given, 64).unwrap()[0], (64, 9));
+        assert_eq!(ranges(given, 64), Ok([(64, 9), (0, 0)]));
+        assert_eq!(ranges("", 0), Ok([(0, 0); 2]), "no seed without a dither");
         let refused = |most| ranges(given, most).unwrap_err();
         assert!(refused(62).contains("at most 62 bins"), "{}", refused(62));
         assert!(refused(0).contains("cannot dither"), "{}", refused(0));
+    }
+
+    #[test]
+    fn the_dither_of_this_device_is_not_written_into_the_settings_for_any() {
+        for text in ["", "dither_bins = 2\n", "dither_seed = 9\n"] {
+            for most_dither in [0, 41, 254] {
+                if text.contains("bins") && most_dither == 0 {
+                    continue;
+                }
+                let sensor = SensorRecord {
+                    pixels: 1,
+                    bin_width: None,
+                    offset: I24F8::ZERO,
+                    laser_millihertz: 0,
+                    bins: 128,
+                    dead_time: 0,
+                    most_dither,
+                };
+                let requested = SettingsFile::parse(&format!("[sensor]\n{text}")).unwrap();
+                let setup = Setup::new(sensor, 128, requested, 1).unwrap();
+                let written = setup.effective.with_settings(&setup.settings);
+                assert_eq!(
+                    written.sensor.dither_bins,
+                    setup.requested.sensor.dither_bins
+                );
+                assert_eq!(
+                    written.sensor.dither_seed,
+                    setup.requested.sensor.dither_seed
+                );
+            }
+        }
     }
 
     #[test]

@@ -15,4 +15,4 @@ mod sections;
 pub use detection::{DetectionSettings, EstimatorName, RuleName, share};
 pub use engine::{AdaptiveBinning, Settings};
 pub use file::{MARK, SettingsFile};
-pub use sections::{RaySettings, RunSettings, SensorSettings};
+pub use sections::{DITHER_BINS, RaySettings, RunSettings, SensorSettings};

@@ -176,8 +176,6 @@ pub fn settings_of_scene(requested: SettingsFile, scene: &Scene) -> Result<Setti
             bin_width_ps: Some(width),
             // The ranges of simulated photons need no offset.
             offset_mm: None,
-            dither_bins: Some(scene.dither_bins),
-            dither_seed: Some(requested.run.seed.unwrap_or(1)),
             ..requested.sensor
         },
         rays: RaySettings {
@@ -195,6 +193,7 @@ pub fn settings_of_scene(requested: SettingsFile, scene: &Scene) -> Result<Setti
             ..requested.run
         },
         dead_time_of_sensor: Some(scene.effects.tdc_dead_time()),
+        dither_of_laser: Some((scene.dither_bins, requested.run.seed.unwrap_or(1))),
         ..requested
     })
 }

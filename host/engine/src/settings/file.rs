@@ -57,6 +57,10 @@ pub struct SettingsFile {
     /// The dead time that sensor or scene say, in bins, for settings without one.
     #[serde(skip)]
     pub dead_time_of_sensor: Option<u16>,
+    /// Range in bins and seed of the dither that the laser of a device or scene has; otherwise it is the one that
+    /// [`Self::sensor`] asks for. It is not written: another laser may have another.
+    #[serde(skip)]
+    pub dither_of_laser: Option<(u16, u64)>,
     /// The file that set some of them.
     #[serde(skip)]
     pub file: Option<KeysOfFile>,
@@ -257,6 +261,7 @@ impl SettingsFile {
             rays: self.rays.or(other.rays),
             run: self.run.or(other.run),
             dead_time_of_sensor: self.dead_time_of_sensor.or(other.dead_time_of_sensor),
+            dither_of_laser: self.dither_of_laser.or(other.dither_of_laser),
             file: self.file,
         };
         // The file still sets the keys that no option sets or drops.
@@ -412,6 +417,34 @@ rebin = 2
         assert_eq!(again.settings(64).unwrap(), settings);
         assert_eq!(again.detection.alpha, file.detection.alpha);
         assert_eq!((again.sensor.bins, again.run.seed), (Some(64), Some(1)));
+    }
+
+    #[test]
+    fn the_dither_of_a_laser_is_used_and_only_what_was_asked_for_is_written() {
+        for (text, of_laser, used) in [
+            ("", None, (0, 0)),
+            ("", Some((128, 77)), (128, 77)),
+            ("dither_bins = 64", None, (64, 0)),
+            ("dither_bins = 64\ndither_seed = 9", None, (64, 9)),
+            // Those of a scene are not the ones of the file.
+            ("dither_bins = 64\ndither_seed = 9", Some((0, 1)), (0, 1)),
+        ] {
+            let mut file = SettingsFile::parse(&format!("[sensor]\n{text}")).unwrap();
+            file.dither_of_laser = of_laser;
+            let file = file.clone().or(SettingsFile {
+                dither_of_laser: Some((2, 2)).filter(|_| of_laser.is_some()),
+                ..SettingsFile::default()
+            });
+            let settings = file.settings(128).unwrap();
+            assert_eq!((settings.dither_bins, settings.dither_seed), used, "{text}");
+            let written = file.with_settings(&settings);
+            assert_eq!(written.dither_of_laser, of_laser);
+            assert_eq!(written.settings(128).unwrap(), settings);
+            let written = written.to_toml().unwrap();
+            for key in ["dither_bins", "dither_seed"] {
+                assert_eq!(written.contains(key), text.contains(key), "{written}");
+            }
+        }
     }
 
     #[test]

@@ -51,6 +51,10 @@ impl SettingsFile {
         };
         let (echoes, echo_wait) = detection.several()?;
         let dead_time = self.dead_time(bins)?;
+        let asked = (sensor.dither_bins, sensor.dither_seed);
+        let (dither_bins, dither_seed) = self
+            .dither_of_laser
+            .unwrap_or((asked.0.unwrap_or(0), asked.1.unwrap_or(0)));
         let has_window = sensor.sigma_bins.is_some() || detection.half_widths.is_some();
         ensure!(
             detection.estimator != Some(EstimatorName::Window) || has_window,
@@ -81,8 +85,8 @@ impl SettingsFile {
             dead_time,
             is_dead_time_of_sensor: dead_time > 0 && sensor.dead_time.is_none(),
             once_per_bin: detection.once_per_bin.unwrap_or(false),
-            dither_bins: sensor.dither_bins.unwrap_or(0),
-            dither_seed: sensor.dither_seed.unwrap_or(0),
+            dither_bins,
+            dither_seed,
             frame: self.run.frame,
             seed: self.run.seed.unwrap_or(1),
         })
@@ -115,6 +119,7 @@ impl SettingsFile {
                 ..self.run.clone()
             },
             dead_time_of_sensor: self.dead_time_of_sensor,
+            dither_of_laser: self.dither_of_laser,
             file: self.file.clone(),
         }
     }

@@ -143,6 +143,11 @@ impl SensorSettings {
     }
 }
 
+/// The range of the dither of a laser that can, in bins, unless an option says otherwise. Another LiDAR as bright as
+/// the target then makes no more false alarms than there are without it, except in the dark: see
+/// `docs/results/methods.md`.
+pub const DITHER_BINS: u16 = 128;
+
 /// Reads the range of a dither.
 fn dither(text: &str) -> Result<u16, String> {
     let range = integer(0..=Dither::MOST.into())(text)?;

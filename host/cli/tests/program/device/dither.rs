@@ -4,6 +4,7 @@ use std::sync::mpsc::{self, Receiver};
 use std::time::Duration;
 
 use dtof_core::fixed::types::U16F16;
+use dtof_engine::settings::SettingsFile;
 use dtof_firmware::sidecar::Sidecar;
 use dtof_sensors::dither::Dither;
 use dtof_sensors::simulated::Simulated;
@@ -13,7 +14,7 @@ use crate::common::Scratch;
 use crate::common::port::{self, listen, serve};
 use crate::view::Live;
 use crate::view::device::feed;
-use crate::view::http::Stream;
+use crate::view::http::{Stream, post};
 
 /// The largest range of its dither.
 const MOST: u8 = 40;
@@ -114,5 +115,26 @@ fn the_live_page_says_the_dither() {
         let mut page = Stream::open(live.port, 5);
         page.until("dither", |frame| frame["source"]["ditherBins"] == range);
         assert_eq!(started.recv().unwrap().range(), u16::from(range));
+    }
+}
+
+#[test]
+fn saved_settings_have_the_dither_that_was_asked_for_and_not_that_of_this_device() {
+    for (settings, bins, seed) in [
+        ("", None, None),
+        ("[sensor]\ndither_bins = 8", Some(8), None),
+        ("[sensor]\ndither_seed = 5", None, Some(5)),
+    ] {
+        let scratch = Scratch::new();
+        let (name, started) = device();
+        let live = Live::of(feed(&name, settings), Some(&scratch.path("out")));
+        let mut page = Stream::open(live.port, 0);
+        page.until("a device", |frame| frame["connection"]["state"] == "live");
+        assert_eq!(started.recv().unwrap().range(), bins.unwrap_or(MOST.into()));
+        let answer = post(live.port, "/save", "{}");
+        assert!(answer.body.contains("dtof.toml"), "{answer:?}");
+        let saved = SettingsFile::read(&scratch.path("out/dtof.toml")).unwrap();
+        let saved = (saved.sensor.dither_bins, saved.sensor.dither_seed);
+        assert_eq!(saved, (bins, seed), "{settings}");
     }
 }
