@@ -6,12 +6,15 @@
 //! pulse on.
 //!
 //! A laser cycle of a mean of `P` bins takes `P - S/2 + s`, where `s` is uniform from 0 to `S`, the range.
-//! The place of the other's pulse is a random walk: after `n` laser cycles it has moved by about `S · √(n / 12)`
-//! bins. A random place *around a fixed beat*, `s` bins after every `P`-th, would keep the pulse within `S` bins
-//! for ever.
+//! The place of the other's pulse is a random walk: after `n` laser cycles, up to 512, it has moved by about
+//! `S · √(n / 12)` bins. A random place *around a fixed beat*, `s` bins after every `P`-th, would keep the pulse
+//! within `S` bins for ever.
 //!
 //! The lengths repeat after [`Dither::LENGTHS`] laser cycles. The second half of them is the first with the
-//! signs of its deviations changed, so that the mean length is exactly `P`.
+//! signs of its deviations changed, so that the mean length is exactly `P`. So the walk comes back to where it
+//! began. If both clocks are exactly equal, it takes the same way again and again, and in long exposures the other's
+//! photons make a fixed pattern. A difference between the clocks moves the pattern on: 20 ppm of 1,250 bins are
+//! 25 bins each time.
 //!
 //! ```
 //! use dtof_sensors::dither::Dither;
@@ -29,7 +32,7 @@ use core::fmt;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
-/// The stream of random numbers; any will do.
+/// The stream of random numbers, as `docs/link-format.md` says.
 const STREAM: u64 = 0x6469_7468;
 
 /// The random lengths of laser cycles. Off by default.

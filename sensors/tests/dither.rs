@@ -62,8 +62,48 @@ fn a_length_says_nothing_of_the_next() {
 #[test]
 fn one_seed_gives_one_sequence_which_repeats() {
     let dither = Dither::new(64, 5).unwrap();
-    assert_eq!(lengths(64, 5), lengths(64, 5));
     assert_ne!(lengths(64, 5), lengths(64, 6));
     let second = dither.added().skip(Dither::LENGTHS).take(Dither::LENGTHS);
     assert!(second.eq(lengths(64, 5)));
+}
+
+/// Computed with another program from the link's format.
+#[test]
+fn lengths_are_those_of_the_link_format() {
+    let document = include_str!("../../docs/link-format.md");
+    for (range, seed, first) in [
+        (64, 5, [36, 13, 30, 33, 28, 2, 31, 18]),
+        (128, 7, [105, 37, 128, 16, 25, 40, 21, 19]),
+    ] {
+        let lengths = lengths(range, seed);
+        assert_eq!(lengths[..8], first, "{range}, {seed}");
+        let mirrored = first.map(|bins| u8::try_from(range).unwrap() - bins);
+        assert_eq!(lengths[512..520], mirrored, "{range}, {seed}");
+        let row = |numbers: [u8; 8]| numbers.map(|number| number.to_string()).join(" ");
+        let row = format!("| {range} | {seed} | {} | {} |", row(first), row(mirrored));
+        assert!(document.contains(&row), "{row}");
+    }
+}
+
+/// As the module says of an equal clock.
+#[test]
+fn the_other_pulse_wanders_for_512_laser_cycles_and_comes_back_in_as_many() {
+    let squares = |cycles: usize| {
+        let moved = |seed| {
+            let of_cycle = |added: u8| i64::from(added) - 64;
+            lengths(128, seed)[..cycles]
+                .iter()
+                .copied()
+                .map(of_cycle)
+                .sum::<i64>()
+        };
+        (0..400).map(|seed| moved(seed).pow(2) as f64).sum::<f64>() / 400.0
+    };
+    for cycles in [16, 128, 512] {
+        // 129 whole numbers; a mean square of 400 is off by 7 %.
+        let expected = cycles as f64 * (129.0f64.powi(2) - 1.0) / 12.0;
+        let off = squares(cycles) / expected - 1.0;
+        assert!(off.abs() < 0.3, "{cycles}: {off}");
+    }
+    assert_eq!(squares(Dither::LENGTHS), 0.0);
 }
