@@ -115,6 +115,10 @@ static dtof_status_t configure(const dtof_message_t *message)
         && requested.bin_width_ps_q16 != BIN_WIDTH_PS_Q16) {
         status = DTOF_ERROR_BIN_WIDTH;
     }
+    /* As `dtof_sensor_write` says below, this laser cannot dither. */
+    if (status == DTOF_OK && requested.dither_bins > 0) {
+        status = DTOF_ERROR_DITHER;
+    }
     /* 0 would switch the timeout off. */
     if (status == DTOF_OK && requested.host_timeout_ms == 0) {
         status = DTOF_ERROR_HOST_TIMEOUT;

@@ -653,11 +653,11 @@ typedef struct dtof_device_config_t {
     // dtof_pixel_count_once_per_bin. If your sensor gives histograms, refuse it with
     // DTOF_ERROR_ONCE_PER_BIN.
     uint8_t once_per_bin;
-    // The range of the laser's dither in bins, 0 for none: each laser cycle lasts as long as the mean, less half
-    // of it, and a random number of bins from 0 to it. Refuse it with DTOF_ERROR_DITHER if it is more than your
-    // laser can.
+    // The range S of the laser's dither, an even number of bins up to 254; 0 for none. Each laser cycle lasts
+    // P - S/2 + s bins, where P is the mean and s a random number from 0 to S. Refuse it with DTOF_ERROR_DITHER
+    // if it is more than your laser can.
     uint16_t dither_bins;
-    // The seed of these random numbers.
+    // The seed of the random numbers s. docs/link-format.md says how they are made, and has the first ones.
     uint64_t dither_seed;
 } dtof_device_config_t;
 
@@ -1045,6 +1045,7 @@ dtof_status_t dtof_link_set_stop_reason(struct dtof_link_t *link,
 // leaves the dead time to the sensor and the rule can use it.
 //
 // Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_BLOCKS,
+// DTOF_ERROR_DITHER if its range is odd, above 254 bins, or not 0 for photons of the link,
 // DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
 // DTOF_ERROR_DEAD_TIME, DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT,
 // DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.

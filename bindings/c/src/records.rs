@@ -13,7 +13,7 @@ use crate::link::dtof_link_t;
 use crate::memory::{array_mut, data_ref, data_slice, object_ref, put, status};
 use crate::statistics::dtof_statistics_t;
 use crate::status::dtof_status_t;
-use crate::status::dtof_status_t::DTOF_ERROR_BLOCKS;
+use crate::status::dtof_status_t::{DTOF_ERROR_BLOCKS, DTOF_ERROR_DITHER};
 use crate::version::DTOF_BINS;
 
 /// Bytes of the body of SENSOR.
@@ -22,6 +22,9 @@ const _: () = assert!(DTOF_SENSOR_BYTES == SensorRecord::BYTES);
 /// Bytes of the body of STATISTICS.
 pub const DTOF_REPORT_BYTES: usize = 234;
 const _: () = assert!(DTOF_REPORT_BYTES == Report::BYTES);
+
+/// The largest range of a dither in bins.
+const MOST_DITHER: u16 = 254;
 
 /// Photons come over the link.
 pub const DTOF_SOURCE_LINK: u8 = 0;
@@ -51,11 +54,11 @@ pub struct dtof_device_config_t {
     /// dtof_pixel_count_once_per_bin. If your sensor gives histograms, refuse it with
     /// DTOF_ERROR_ONCE_PER_BIN.
     pub once_per_bin: u8,
-    /// The range of the laser's dither in bins, 0 for none: each laser cycle lasts as long as the mean, less half
-    /// of it, and a random number of bins from 0 to it. Refuse it with DTOF_ERROR_DITHER if it is more than your
-    /// laser can.
+    /// The range S of the laser's dither, an even number of bins up to 254; 0 for none. Each laser cycle lasts
+    /// P - S/2 + s bins, where P is the mean and s a random number from 0 to S. Refuse it with DTOF_ERROR_DITHER
+    /// if it is more than your laser can.
     pub dither_bins: u16,
-    /// The seed of these random numbers.
+    /// The seed of the random numbers s. docs/link-format.md says how they are made, and has the first ones.
     pub dither_seed: u64,
 }
 
@@ -64,6 +67,7 @@ pub struct dtof_device_config_t {
 /// leaves the dead time to the sensor and the rule can use it.
 ///
 /// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_BLOCKS,
+/// DTOF_ERROR_DITHER if its range is odd, above 254 bins, or not 0 for photons of the link,
 /// DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
 /// DTOF_ERROR_DEAD_TIME, DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT,
 /// DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
@@ -82,6 +86,11 @@ pub unsafe extern "C" fn dtof_device_config_read(
         let requested = Configuration::from_le_bytes(body)?;
         if requested.binning.is_some() {
             return Err(DTOF_ERROR_BLOCKS);
+        }
+        let range = requested.dither_bins;
+        let is_of_sensor = requested.source == Source::Sensor;
+        if range > MOST_DITHER || !range.is_multiple_of(2) || (range > 0 && !is_of_sensor) {
+            return Err(DTOF_ERROR_DITHER);
         }
         if requested.dynamic_depth.is_some() {
             return Err(Refusal::Unknown.into());

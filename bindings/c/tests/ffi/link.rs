@@ -244,6 +244,35 @@ fn the_dead_time_is_the_hosts_or_else_the_sensors() {
 }
 
 #[test]
+fn a_dither_that_cannot_be_is_refused() {
+    let refused = Err(DTOF_ERROR_DITHER);
+    for (dither_bins, source, expected) in [
+        (0, Source::Sensor, Ok(0)),
+        (2, Source::Sensor, Ok(2)),
+        (254, Source::Sensor, Ok(254)),
+        (1, Source::Sensor, refused),
+        (253, Source::Sensor, refused),
+        (255, Source::Sensor, refused),
+        (256, Source::Sensor, refused),
+        (u16::MAX - 1, Source::Sensor, refused),
+        (0, Source::Link, Ok(0)),
+        (2, Source::Link, refused),
+    ] {
+        let requested = Configuration {
+            dither_bins,
+            source,
+            ..configuration()
+        };
+        let read = read(&requested.to_le_bytes());
+        assert_eq!(
+            read.map(|config| config.dither_bins),
+            expected,
+            "{dither_bins}"
+        );
+    }
+}
+
+#[test]
 fn the_host_says_whether_photons_count_once_per_bin() {
     let mut record = configuration().to_le_bytes();
     for (byte, expected) in [
