@@ -195,7 +195,7 @@ impl Config {
     }
 
     /// The start values of the two counters of the laser's pulse, pulse and pause, for a dither of this
-    /// range, which is at most [`Self::most_dither`]. The dither adds to the pause.
+    /// range. The dither adds to the pause.
     #[must_use]
     pub const fn laser_counters(&self, range: u16) -> [u32; 2] {
         let shortest = self.shortest(range);
@@ -211,8 +211,11 @@ impl Config {
         self.shortest(range).saturating_sub(BINS + BESIDE)
     }
 
-    /// Clocks of the shortest laser cycle.
+    /// Clocks of the shortest laser cycle. That of a range above [`Self::most_dither`] is as long as with it, so
+    /// that no two pulses come too soon after each other.
     const fn shortest(&self, range: u16) -> u32 {
+        let most = self.most_dither() as u16;
+        let range = if range < most { range } else { most };
         self.period.saturating_sub(range as u32 / 2)
     }
 }
@@ -274,6 +277,20 @@ mod tests {
                         [config.period() + half; 2]
                     );
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn no_range_makes_a_laser_cycle_shorter_than_the_laser_may_have() {
+        for (laser_hz, pulse_ns, least) in [(800_000, 16, 136), (189_394, 104, 650)] {
+            let config = limited(laser_hz, pulse_ns).unwrap();
+            if cfg!(feature = "laser-beyond-limits") && pulse_ns > 16 {
+                continue;
+            }
+            assert!(config.most_dither() < 254);
+            for range in [u16::from(config.most_dither()), 254, u16::MAX] {
+                assert_eq!(clocks(&config, range, 0), [least; 2], "{laser_hz}");
             }
         }
     }

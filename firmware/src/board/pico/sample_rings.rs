@@ -219,20 +219,25 @@ impl SampleRings {
         }
     }
 
-    /// Whether a queue was full when a shift register had a word for it.
+    /// Whether a queue was full when a shift register had a word for it, or was empty when a state machine
+    /// waited for what the dither adds. It alone is late then, and out of step with the others from then on.
     #[allow(clippy::unused_self, reason = "of these rings")]
     pub fn has_stalled(&self) -> bool {
         // SAFETY: it is only read, and reading it changes nothing.
         #[allow(unsafe_code, reason = "rp2040-hal keeps the register to itself")]
         let debug = unsafe { &*PIO0::PTR }.fdebug().read();
-        debug.rxstall().bits() != 0
+        debug.rxstall().bits() != 0 || debug.txstall().bits() != 0
     }
 }
 
+/// The state machines have not begun: only a `pull` that waits sets the flag of an empty queue (3.7, FDEBUG), and the
+/// first one comes after the samples of a laser cycle, when the DMA has long filled the queues.
 fn clear_stalls() {
     // SAFETY: this clears flags only, and nothing else reads them.
     #[allow(unsafe_code, reason = "rp2040-hal keeps the register to itself")]
     unsafe {
-        (*PIO0::PTR).fdebug().write(|w| w.rxstall().bits(0xf));
+        (*PIO0::PTR)
+            .fdebug()
+            .write(|w| w.rxstall().bits(0xf).txstall().bits(0xf));
     }
 }
