@@ -12,7 +12,7 @@ use super::effects::cover_glass::Crosstalk;
 use super::effects::dead_time::Recharge;
 use super::effects::jitter::TimingError;
 use super::effects::limits::Timing;
-use super::effects::other_lidar::OtherPulses;
+use super::effects::other_lidar::{OtherLidar, OtherPulses};
 use super::effects::second_echo::EchoDelay;
 use super::effects::tail::TailDelay;
 use super::effects::tdc::Tdc;
@@ -78,7 +78,7 @@ impl Detector {
         let gap = Background::new(gap_rate, end, timing.period, rng(Stream::Gap))?;
 
         let other = effects.other_lidar.as_ref();
-        let other_rate = other.map_or(0.0, |other| other.photons);
+        let other_rate = other.map_or(0.0, OtherLidar::photons_per_cycle);
         let rate = |part: &Option<Background>| part.as_ref().map_or(0.0, |part| part.mean);
         let glass_rate = cover_glass.map_or(0.0, |glass| glass.signal);
         Ok(Self {

@@ -1,10 +1,12 @@
 //! The pulses of another LiDAR.
 
+use dtof_engine::settings::SettingsFile;
 use dtof_sensors::dither::Dither;
+use dtof_simulate::scene::Scene;
 
 use crate::common::{Scratch, succeeded};
 
-use super::{Photons, array, near, near_count, pixel, seeded, sliced};
+use super::{Photons, array, histogram, near, near_count, pixel, seeded, sliced};
 
 /// A laser cycle of 400 bins of 250 ps.
 fn scene(keys: &str, other: &str) -> String {
@@ -173,4 +175,80 @@ fn a_dithered_run_is_the_same_on_any_number_of_threads_and_its_photons_replay_to
         lines(&one[0]),
         lines(&replayed)
     );
+}
+
+#[test]
+fn the_first_and_the_last_bin_have_as_many_of_its_photons_as_others() {
+    // Its clock is so far off that its pulses come everywhere; without a pause between the histogram and the next
+    // own pulse the late photons of the last bins are the first ones of the next laser cycle.
+    for laser in ["laser_rate_mhz = 10", "laser_rate_mhz = 31.25"] {
+        let text = format!("{laser}\nbackground = 0.0\n[other_lidar]\nphotons = 3\nppm = 3137\n");
+        let cycles = 400_000;
+        let photons = pixel(&text, cycles);
+        let bins = histogram(&photons);
+        let period = if laser.ends_with("10") { 400.0 } else { 128.0 };
+        let expected = 3.0 * cycles as f64 / 1.003_137 / period;
+        for bin in [0, 1, 2, 64, 125, 126, 127] {
+            let off = f64::from(bins[bin]) / expected - 1.0;
+            // Photons of a pulse come together: counts vary by twice Poisson's law.
+            assert!(off.abs() < 0.08, "{laser}, {bin}: {off}");
+        }
+    }
+}
+
+#[test]
+fn every_photon_of_a_pulse_near_the_end_of_a_laser_cycle_comes() {
+    // A laser cycle of 128 bins has no place where photons are not seen.
+    let text = "laser_rate_mhz = 31.25\nbackground = 0.0\n[other_lidar]\nphotons = 5\nppm = 900\n";
+    near_count("photons", pixel(text, 20_000).len(), 100_000.0 / 1.0009);
+}
+
+#[test]
+fn the_limit_of_the_photons_counts_those_of_a_faster_lidar_as_often_as_they_come() {
+    let photons = |rows, ppm| {
+        let text = format!(
+            "background = 0.0\ncolumns = 30\nrows = {rows}\n[other_lidar]\nphotons = 10000\nppm = {ppm}"
+        );
+        let photons = Scene::parse(&text).and_then(|scene| scene.photons(1, 10).map(|_| ()));
+        photons.map_err(|error| error.to_string())
+    };
+    // 6,000,000 photons a pulse, twice as often; and 14,700,000, in two of three laser cycles.
+    let refused = photons(20, -500_000).unwrap_err();
+    assert!(
+        refused.contains("12000000 photons a laser cycle"),
+        "{refused}"
+    );
+    assert_eq!(photons(20, 0), Ok(()));
+    assert_eq!(photons(49, 500_000), Ok(()));
+}
+
+#[test]
+fn a_simulation_writes_no_dither_of_its_scene_into_its_settings() {
+    let scratch = Scratch::new();
+    let sensor = |out: &str| {
+        let text = scratch.read(&format!("{out}/dtof.toml"));
+        let sensor = SettingsFile::parse(&text).unwrap().sensor;
+        (sensor.dither_bins, sensor.dither_seed)
+    };
+    for (number, range) in [0, 64].into_iter().enumerate() {
+        let surface = "[[surface]]\nposition_bins = 70\nsignal = 0.5";
+        let text = scene(
+            &format!("cycles = 2000\ndither_bins = {range}"),
+            "photons = 0.5",
+        );
+        scratch.file("scene.toml", format!("{text}{surface}"));
+        scratch.printed(&format!("simulate --scene scene.toml --out plain{number}"));
+        assert_eq!(sensor(&format!("plain{number}")), (None, None));
+        // What is asked for of a device stays, and the scene has its own.
+        scratch.file("asked.toml", "[sensor]\ndither_bins = 8\ndither_seed = 9\n");
+        let out = format!("asked{number}");
+        scratch.printed(&format!(
+            "simulate --scene scene.toml --settings asked.toml --out {out}"
+        ));
+        assert_eq!(sensor(&out), (Some(8), Some(9)));
+        let summary = scratch.read(&format!("{out}/summary.json"));
+        let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+        let used = summary["settings"]["dither_bins"].as_u64();
+        assert_eq!(used, Some(range).filter(|&range| range > 0));
+    }
 }
