@@ -5,6 +5,11 @@ import { FLASH, RAM } from './chip.js';
 
 /** SYST_CSR, the control of the processor's timer. */
 const SYST_CSR = 0xe000e010;
+/** CTRL of the DMA's channel that sends the dither to the first shift register, without a start. */
+const DITHER_CTRL = 0x50000000 + 6 * 0x40 + 0x10;
+const ENABLED = 1;
+/** Clocks for which it pauses: more than the four laser cycles for which its queue lasts. */
+const PAUSE = 7500;
 const UDF = 0xde00;
 const BRANCH_TO_ITSELF = 0xe7fe;
 /** `push` of two registers or more, the last of which is LR: a function begins. */
@@ -51,6 +56,21 @@ export const FAULTS = {
     const isPlanted = FAULTS.overflow(machine);
     machine.chip.ignoresStackingFaults = isPlanted;
     return isPlanted;
+  },
+  /** A state machine gets no dither for some laser cycles, and waits for it. */
+  starve: (machine) => {
+    const { rp2040, clocks } = machine;
+    const control = rp2040.readUint32(DITHER_CTRL);
+    if (machine.starvedFrom === undefined) {
+      rp2040.writeUint32(DITHER_CTRL, control & ~ENABLED);
+      machine.starvedFrom = clocks;
+    }
+    const isOver = clocks >= machine.starvedFrom + PAUSE;
+    // The image may have set the channel up again.
+    if (isOver && !(control & ENABLED)) {
+      rp2040.writeUint32(DITHER_CTRL, control | ENABLED);
+    }
+    return isOver;
   },
   /** The image calls a function of core::panicking. */
   panic: (machine) => {

@@ -131,6 +131,18 @@ test('a forced reset says so', () => {
   assert.equal(machine.rp2040.readUint32(WATCHDOG + 0x08), 2);
 });
 
+test('a change of how the queues of a state machine join empties them', () => {
+  const { rp2040 } = lit();
+  const [machine] = rp2040.pio[0].machines;
+  const shift = PIO0 + 0xd0;
+  const fill = () => [1, 2].forEach((word) => rp2040.writeUint32(PIO0 + 0x10, word));
+  fill();
+  rp2040.writeUint32(shift, rp2040.readUint32(shift));
+  assert.equal(machine.txFIFO.itemCount, 2);
+  rp2040.writeUint32(shift, (rp2040.readUint32(shift) ^ (1 << 31)) >>> 0);
+  assert.equal(machine.txFIFO.itemCount, 0);
+});
+
 test('a reset of the core lets the laser fire on', () => {
   const machine = lit();
   machine.run(350);

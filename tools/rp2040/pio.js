@@ -13,6 +13,18 @@ const IN_PINS_1 = 0x4001;
 const AUTOPUSH_RIGHT = (1 << 16) | (1 << 18);
 /** Registers of a state machine begin here. */
 const STATE_MACHINES = 0x0c8;
+const BYTES_OF_ONE = 0x18;
+/** SHIFTCTRL within them; a change of its two uppermost bits, FJOIN, empties both queues (3.7, SM0_SHIFTCTRL). */
+const SHIFTCTRL = 0x08;
+const JOINS = 30;
+
+/** Empties the queues, which rp2040js leaves as they are. */
+function empty(machine) {
+  machine.rxFIFO.reset();
+  machine.txFIFO.reset();
+  machine.updateDMARx();
+  machine.updateDMATx();
+}
 
 export class PioClock {
   /** `now` gives the clock up to which all has happened. `changed` is called when a pin may have. */
@@ -46,6 +58,11 @@ export class PioClock {
     };
     pio.writeUint32 = (offset, value) => {
       this.settle(this.now());
+      const machine = pio.machines[Math.floor((offset - STATE_MACHINES) / BYTES_OF_ONE)];
+      const isShift = (offset - STATE_MACHINES) % BYTES_OF_ONE === SHIFTCTRL;
+      if (machine && isShift && (machine.shiftCtrl ^ value) >>> JOINS !== 0) {
+        empty(machine);
+      }
       writeUint32.call(pio, offset, value);
       this.plan();
     };

@@ -294,6 +294,39 @@ fn pico_dithers_its_laser_and_decides_as_this_computer() -> Result<()> {
     Ok(())
 }
 
+/// One state machine waits for its dither: it would sample at wrong times from then on.
+#[test]
+fn pico_starts_its_timer_again_when_a_state_machine_was_late() -> Result<()> {
+    let Some(_alone) = enabled("the Pico's late dither in rp2040js", &[NODE, NPM]) else {
+        return Ok(());
+    };
+    install()?;
+    let image = image(&["photon-timer"], None)?;
+    let mut board = Rp2040::start_with_fault(&image, "starve", 5.0, 1)?;
+    let mut client = Client::new(board.connect()?)?;
+    let settings = Settings {
+        dither_bins: 128,
+        dither_seed: 7,
+        ..gathers()
+    };
+    let task = Task {
+        settings: &settings,
+        pixels: 1,
+        columns: 1,
+        dynamic_depth: None,
+        host_timeout: HostTimeout::default(),
+    };
+    client.configure(&task.configuration(Source::Sensor)?)?;
+    let mut timer = Timer { board, client };
+    let report = timer.wait(1500)?;
+    ensure!(report.sensor_errors == 1, "{report:?}");
+    drop(timer.client);
+    let done = timer.board.stop()?;
+    ensure!(done.planted_ms.is_some(), "no state machine was late");
+    println!("late once, started again, {} pulses", done.laser.pulses);
+    Ok(())
+}
+
 /// The times from pulse to pulse are uniform: none is shorter or longer than the range allows, their mean is
 /// that without dither, and no length is rare or frequent.
 fn check_intervals(laser: &Laser, period_ns: u64, dither: Dither) -> Result<()> {
