@@ -107,6 +107,14 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     check(&steps, |of| surely_false(of) < 0.02);
     // A pulse that stays looks like a target, and no flag distinguishes it; the same holds for a
     // veil. With dither the other laser's pulse wanders.
+    for name in [
+        "2 × the signal, no target",
+        "4 × the signal, no target",
+        "4 × the signal",
+    ] {
+        let name = format!("another LiDAR, clock 20 ppm off, {name}, dither of 128, once per bin");
+        check(&[&name], |of| of.verdict != Verdict::Fails);
+    }
     for clock in ["of the same clock", "clock 20 ppm off"] {
         let twice = format!("another LiDAR, {clock}, 2 × the signal");
         let without_target = format!("{twice}, no target");
@@ -157,4 +165,14 @@ fn the_page_has_a_row_for_every_case() {
         assert!(is_explained, "{}", case.name);
     }
     assert!(!text.contains("not known"));
+    // What every method survives needs no advice.
+    let advice = values.fill("{advice}").unwrap();
+    for (case, outcomes) in outcomes(&part).unwrap() {
+        let is_well = |outcome: &Outcome| {
+            outcome.verdict == Verdict::Survives && outcome.warning == Warning::NotNeeded
+        };
+        let is_advised = case.advice.is_some() && !outcomes.iter().all(is_well);
+        let row = format!("| {} | ", case.name);
+        assert_eq!(advice.contains(&row), is_advised, "{}", case.name);
+    }
 }

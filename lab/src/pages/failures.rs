@@ -36,7 +36,11 @@ pub fn tables(part: &Part) -> Result<Values> {
             let why = case.silence.unwrap_or("not known");
             writeln!(silent, "| {} | {} | {why} |", case.name, methods.join("; "))?;
         }
-        if let Some(text) = case.advice {
+        // What no method fails at needs none.
+        let is_needed = |outcome: &Outcome| {
+            outcome.verdict != Verdict::Survives || outcome.warning != Warning::NotNeeded
+        };
+        if let Some(text) = case.advice.filter(|_| outcomes.iter().any(is_needed)) {
             writeln!(advice, "| {} | {text} |", case.name)?;
         }
     }

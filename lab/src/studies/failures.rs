@@ -45,7 +45,7 @@ pub(super) const FALSE: i64 = 3 * PER_BIN;
 pub const STUDY: Study = Study {
     name: "failures",
     about: "false alarms, missing and wrong events in scenes that are not plain, and their flags",
-    revision: 8,
+    revision: 9,
     few_seeds: 30,
     all_seeds: 200,
     points,

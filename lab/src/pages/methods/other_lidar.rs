@@ -29,20 +29,23 @@ pub(super) fn section(values: &mut Values, part: &Part) -> Result<()> {
         ("dark", Scene::Dark, Counted::All, 2.0),
         ("very dark", Scene::VeryDark, Counted::All, 2.0),
         ("dark once", Scene::Dark, Counted::OncePerBin, 2.0),
-        ("first wrong", Scene::FirstPhoton, Counted::First, 2.0),
+        ("clock equal", Scene::EqualClock, Counted::All, 1.0),
+        ("clock twice", Scene::EqualClock, Counted::All, 2.0),
     ] {
         let outcome = at(scene, counted, strength)?;
         values.set(format!("lidar.{name}"), percent(outcome, 1));
     }
-    for (name, scene, counted) in [
-        ("time", Scene::Target, Counted::All),
-        ("first time", Scene::FirstPhoton, Counted::First),
-    ] {
-        let without = undisturbed(part, scene, counted)?.cycles.value;
-        let ratio = at(scene, counted, 2.0)?.cycles.value / without;
-        values.set(format!("lidar.{name}"), format!("{ratio:.2}"));
-    }
-    let without = undisturbed(part, Scene::Empty, Counted::All)?.wrong;
+    let alone = undisturbed(part, Scene::Target, Counted::All)?.cycles.value;
+    let ratio = at(Scene::Target, Counted::All, 2.0)?.cycles.value / alone;
+    values.set("lidar.time", format!("{ratio:.2}"));
+    values.set(
+        "lidar.first without",
+        first_cell(|scene| undisturbed(part, scene, Counted::First))?,
+    );
+    values.set("lidar.first table", first_table(part)?);
+    let without = undisturbed(part, Scene::Empty, Counted::All)?;
+    values.set("lidar.alone", percent(without, 1));
+    let without = without.wrong;
     let [equal, twice] = [1.0, 2.0].map(|strength| at(Scene::Empty, Counted::All, strength));
     let (equal, twice) = (equal?.wrong, twice?.wrong);
     ensure!(
@@ -69,13 +72,41 @@ fn cell(of: impl Fn(Scene) -> Result<Outcome>) -> Result<String> {
     ))
 }
 
+/// Of a TDC of the first photon: laser cycles to an event, wrong events and, without a target, false alarms.
+fn first_cell(of: impl Fn(Scene) -> Result<Outcome>) -> Result<String> {
+    let target = of(Scene::FirstPhoton)?;
+    Ok(format!(
+        "{:.0} · {} · {}",
+        target.cycles.value,
+        percent(target, 2),
+        percent(of(Scene::FirstPhotonEmpty)?, 1)
+    ))
+}
+
+/// A row without dither and one with the default.
+fn first_table(part: &Part) -> Result<String> {
+    let mut table = heading();
+    for range in [0.0, DEFAULT] {
+        write!(table, "| {range} |")?;
+        for strength in STRENGTHS {
+            let cell = first_cell(|scene| outcome(part, scene, Counted::First, strength, range))?;
+            write!(table, " {cell} |")?;
+        }
+        writeln!(table)?;
+    }
+    Ok(table)
+}
+
+/// The names of the strengths.
+fn heading() -> String {
+    let strengths = STRENGTHS.map(|strength| format!(" {strength} × |"));
+    let below = "---|".repeat(STRENGTHS.len());
+    format!("| S |{}\n|---|{below}\n", strengths.concat())
+}
+
 /// A row for each range, and the smallest that suffices.
 fn table(part: &Part) -> Result<String> {
-    let mut table = "| S |".to_owned();
-    for strength in STRENGTHS {
-        write!(table, " {strength} × |")?;
-    }
-    writeln!(table, "\n|---|{}", "---|".repeat(STRENGTHS.len()))?;
+    let mut table = heading();
     let all = RANGES.map(|range| (range.to_string(), Counted::All, range));
     let once = (
         format!("{DEFAULT}, once per bin"),

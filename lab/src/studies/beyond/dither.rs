@@ -11,6 +11,7 @@ use anyhow::Result;
 use dtof_core::{LaserCycle, Look, OncePerBin, Statistics};
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{Pen, REFERENCE, STEPS};
+use dtof_engine::settings::DITHER_BINS;
 use dtof_options::rows::grouped;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
@@ -18,7 +19,7 @@ use std::fmt::Write as _;
 /// Ranges of the dither in bins; 0 is none.
 pub const RANGES: [f64; 6] = [0.0, 16.0, 32.0, 64.0, DEFAULT, 254.0];
 /// The default of a device.
-pub const DEFAULT: f64 = 128.0;
+pub const DEFAULT: f64 = DITHER_BINS as f64;
 /// Photons of the other LiDAR's pulse, over those of the target's.
 pub const STRENGTHS: [f64; 4] = [0.5, 1.0, 2.0, 4.0];
 /// No other LiDAR. A TDC code counts from the own pulse on, so the dither then changes no photon.
@@ -68,15 +69,21 @@ pub enum Scene {
     VeryDark,
     /// The target in half of the background, seen by a TDC that takes the first photon only.
     FirstPhoton,
+    /// The same without the target.
+    FirstPhotonEmpty,
+    /// No target, and the other's clock is exactly the same.
+    EqualClock,
 }
 
 impl Scene {
-    const ALL: [Self; 5] = [
+    const ALL: [Self; 7] = [
         Self::Target,
         Self::Empty,
         Self::Dark,
         Self::VeryDark,
         Self::FirstPhoton,
+        Self::FirstPhotonEmpty,
+        Self::EqualClock,
     ];
 
     const fn name(self) -> &'static str {
@@ -86,6 +93,8 @@ impl Scene {
             Self::Dark => "no target, a tenth of the background",
             Self::VeryDark => "no target, a hundredth of the background",
             Self::FirstPhoton => "target, first photon only",
+            Self::FirstPhotonEmpty => "no target, first photon only",
+            Self::EqualClock => "no target, exactly the same clock",
         }
     }
 
@@ -100,17 +109,17 @@ impl Scene {
 
     fn background(self) -> f64 {
         match self {
-            Self::Target | Self::Empty => BACKGROUND,
+            Self::Target | Self::Empty | Self::EqualClock => BACKGROUND,
             Self::Dark => BACKGROUND / 10.0,
             Self::VeryDark => BACKGROUND / 100.0,
-            Self::FirstPhoton => BACKGROUND / 2.0,
+            Self::FirstPhoton | Self::FirstPhotonEmpty => BACKGROUND / 2.0,
         }
     }
 
     /// The pixels, which see the same photons.
     const fn counted(self) -> &'static [Counted] {
         match self {
-            Self::FirstPhoton => &[Counted::First],
+            Self::FirstPhoton | Self::FirstPhotonEmpty => &[Counted::First],
             _ => &[Counted::All, Counted::OncePerBin],
         }
     }
@@ -132,7 +141,7 @@ impl Scene {
         }
         case.with_stray(StrayLight::Laser {
             photons: strength * SIGNAL,
-            step: STEP,
+            step: if self == Self::EqualClock { 0.0 } else { STEP },
             dither: range,
         })
     }
@@ -142,7 +151,7 @@ impl Scene {
 pub const STUDY: Study = Study {
     name: "dither",
     about: "wrong events and false alarms next to another LiDAR, over the range of the dither",
-    revision: 1,
+    revision: 2,
     few_seeds: 4,
     all_seeds: 200,
     points,
@@ -303,11 +312,26 @@ pub fn least_range(
 }
 
 /// Panels, row by row.
-const PANELS: [(Scene, Counted, &str); 4] = [
+const PANELS: [(Scene, Counted, &str); 6] = [
     (Scene::Target, Counted::All, "target: wrong events"),
     (Scene::Empty, Counted::All, "no target: false alarms"),
     (Scene::Dark, Counted::All, "the same, background / 10"),
     (Scene::Dark, Counted::OncePerBin, "… and once per bin"),
+    (
+        Scene::FirstPhoton,
+        Counted::First,
+        "first photon only, target",
+    ),
+    (
+        Scene::FirstPhotonEmpty,
+        Counted::First,
+        "first photon only, no target",
+    ),
+];
+/// Panels of the laser cycles to an event.
+const TIMES: [(Scene, Counted, &str); 2] = [
+    (Scene::Target, Counted::All, "all photons"),
+    (Scene::FirstPhoton, Counted::First, "first photon only"),
 ];
 const PENS: [Pen; 4] = [STEPS[0], STEPS[1], STEPS[2], STEPS[3]];
 
@@ -340,13 +364,13 @@ fn results(part: &Part) -> Result<Results> {
         .collect();
     key.push(Key::new(REFERENCE, Style::Dashed, "1 %, as requested"));
     let chart = Chart {
-        finding: format!("A dither of {DEFAULT} bins hides an equal LiDAR"),
+        finding: format!("{DEFAULT} bins hide an equal LiDAR, not in the dark"),
         holds: as_bright(Scene::Target)?.1 <= MOST_WRONG
             && as_bright(Scene::Empty)?.1 <= MOST_FALSE
             && as_bright(Scene::Dark)?.0 > MOST_FALSE,
         note: format!(
             "Key: photons of the other LiDAR's pulse over the target's {SIGNAL}. Its clock is 20 ppm off. Bars hold \
-             99 %. Background {BACKGROUND} a bin and laser cycle."
+             99 %. Background {BACKGROUND} a bin and laser cycle; half of it for the first photon only."
         ),
         x: Axis::linear("range of the dither, bins"),
         y: Axis::logarithmic("events or exposures, %")
@@ -362,7 +386,7 @@ fn results(part: &Part) -> Result<Results> {
         ))
     };
     Ok(Results {
-        figures: vec![Figure::new("dither", &chart)?],
+        figures: vec![Figure::new("dither", &chart)?, times(part)?],
         values: [
             ("exposures", exposures(Scene::Target)?),
             ("empty exposures", exposures(Scene::Empty)?),
@@ -371,6 +395,52 @@ fn results(part: &Part) -> Result<Results> {
         tables: vec![("results/data/dither.csv", csv(part)?)],
         ..Results::default()
     })
+}
+
+/// The laser cycles to an event.
+fn times(part: &Part) -> Result<Figure> {
+    let mut panels = Vec::new();
+    for (scene, counted, title) in TIMES {
+        let alone = undisturbed(part, scene, counted)?.cycles.value;
+        let ends = [0.0, 254.0].map(|range| Dot::exact(range, alone));
+        let mut series = vec![Series::unnamed(REFERENCE, Style::Dashed, ends.into())];
+        for (strength, pen) in STRENGTHS.into_iter().zip(PENS) {
+            let dot = |range| {
+                let cycles = outcome(part, scene, counted, strength, range)?.cycles;
+                anyhow::Ok(cycles.at(range))
+            };
+            let dots = RANGES.into_iter().map(dot).collect::<Result<_>>()?;
+            series.push(Series::unnamed(pen, Style::JoinedDots, dots));
+        }
+        panels.push(Panel {
+            title: title.to_owned(),
+            series,
+        });
+    }
+    let slower = |scene, counted| {
+        let cycles = outcome(part, scene, counted, 2.0, DEFAULT)?.cycles.value;
+        anyhow::Ok(cycles / undisturbed(part, scene, counted)?.cycles.value)
+    };
+    let mut key: Vec<Key> = STRENGTHS
+        .into_iter()
+        .zip(PENS)
+        .map(|(strength, pen)| Key::new(pen, Style::JoinedDots, format!("{strength} ×")))
+        .collect();
+    key.push(Key::new(REFERENCE, Style::Dashed, "without the other"));
+    let chart = Chart {
+        finding: "A TDC of the first photon loses more time".to_owned(),
+        holds: slower(Scene::FirstPhoton, Counted::First)? > slower(Scene::Target, Counted::All)?,
+        note: format!(
+            "Key: photons of the other LiDAR's pulse over the target's {SIGNAL}. Its clock is 20 ppm off. Bars hold \
+             99 %. Background {BACKGROUND} a bin and laser cycle; half of it for the first photon only."
+        ),
+        x: Axis::linear("range of the dither, bins"),
+        y: Axis::linear("laser cycles an event"),
+        key,
+        columns: 2,
+        panels,
+    };
+    Figure::new("dither-time", &chart)
 }
 
 fn csv(part: &Part) -> Result<String> {

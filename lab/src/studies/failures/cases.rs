@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use dtof_core::RangeGate;
+use dtof_engine::settings::DITHER_BINS;
 
 use super::L1;
 use super::case::{BACKGROUND, Case, PLACE, SIGNAL};
@@ -22,8 +23,6 @@ const RAIN_ENDS: f64 = 24.0;
 const RAIN_GATE: u16 = 28;
 /// A cover glass: signal and position.
 const GLASS: (f64, f64) = (10.0 * SIGNAL, 3.5);
-/// The range of a dither, in bins.
-const DITHER: u16 = 128;
 /// Background counts a bin after L1 laser cycles.
 pub const BACKGROUNDS: [f64; 5] = [0.05, 0.5, 5.0, 50.0, 500.0];
 
@@ -212,44 +211,61 @@ fn weather() -> Result<Vec<Case>> {
 /// Another LiDAR. Clocks of the same rate differ by some 20 ppm, 0.008 bins a laser cycle. Different rates may
 /// differ by any amount, here 1 %.
 fn others() -> Vec<Case> {
-    let advice = "a random time from pulse to pulse: see the row with dither";
-    let silent = "The histogram is that of a target where the other pulse stays";
     let mut cases = Vec::new();
-    for (clock, step, strengths) in [
-        ("of the same clock", 0.0, &[2.0][..]),
-        ("clock 20 ppm off", 0.008, &[0.5, 1.0, 2.0, 4.0]),
-        ("rate 1 % off", 4.0, &[2.0]),
+    for (clock, step) in [
+        ("of the same clock", 0.0),
+        ("clock 20 ppm off", 0.008),
+        ("rate 1 % off", 4.0),
     ] {
-        for &strength in strengths {
+        for strength in [0.5, 1.0, 2.0, 4.0] {
             for has_target in [true, false] {
-                for dither in [0, DITHER] {
-                    let target = if has_target { "" } else { ", no target" };
-                    let dithered = match dither {
-                        0 => String::new(),
-                        range => format!(", dither of {range}"),
-                    };
-                    let name = format!(
-                        "another LiDAR, {clock}, {strength} × the signal{target}{dithered}"
-                    );
-                    let case = Case::new(name).with_stray(StrayLight::Laser {
-                        photons: strength * SIGNAL,
-                        step,
-                        dither,
-                    });
-                    let case = if has_target {
-                        case
-                    } else {
-                        case.without_target()
-                    };
-                    cases.push(match dither {
-                        0 => case.advised(advice).silent_as(silent),
-                        _ => case,
-                    });
+                for dither in [0, DITHER_BINS] {
+                    cases.push(other((clock, step), strength, has_target, dither));
                 }
             }
         }
     }
+    // The remedy for what dither leaves.
+    for strength in [2.0, 4.0] {
+        for has_target in [true, false] {
+            let clock = ("clock 20 ppm off", 0.008);
+            let mut case = other(clock, strength, has_target, DITHER_BINS).counting_once_per_bin();
+            case.name += ", once per bin";
+            cases.push(case);
+        }
+    }
     cases
+}
+
+/// Another LiDAR of a clock, which brings its pulse by so many bins later in each laser cycle.
+fn other((clock, step): (&str, f64), strength: f64, has_target: bool, dither: u16) -> Case {
+    let stays = "The histogram is that of a target where the other pulse stays";
+    let random = "a random time from pulse to pulse: see the row with dither";
+    let together = "All photons of one pulse of the other come in the same one to three bins. The histogram does not tell that \
+                    they came in one laser cycle";
+    let once = "photons that count once a bin and laser cycle: see the rows with once per bin";
+    let target = if has_target { "" } else { ", no target" };
+    let dithered = match dither {
+        0 => String::new(),
+        range => format!(", dither of {range}"),
+    };
+    let name = format!("another LiDAR, {clock}, {strength} × the signal{target}{dithered}");
+    let case = Case::new(name).with_stray(StrayLight::Laser {
+        photons: strength * SIGNAL,
+        step,
+        dither,
+    });
+    let case = if has_target {
+        case
+    } else {
+        case.without_target()
+    };
+    // At another rate the pulse never stays, with or without dither.
+    if dither > 0 || step > 1.0 {
+        case.advised(once).silent_as(together)
+    } else {
+        case.advised(random).silent_as(stays)
+    }
 }
 
 /// Scenes with pile-up: photons that hide later ones. Pixels are set to the dead time of the TDC where the

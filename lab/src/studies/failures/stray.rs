@@ -39,11 +39,15 @@ pub enum StrayLight {
     },
 }
 
+/// Bins by which a photon is surely nearer to the place of its pulse.
+const REACH: f64 = 8.0 * SIGMA;
+
 /// The stray photons of an exposure.
 pub struct StrayPhotons {
     stray: StrayLight,
     rng: Pcg64,
-    /// The position of the other laser's next pulse, in bins.
+    /// The position of the other laser's next pulse, in bins. It may lie before the own pulse: its late photons
+    /// come after it.
     place: f64,
     /// By how many bins the own laser cycles are longer than the shortest.
     added: Added,
@@ -52,7 +56,7 @@ pub struct StrayPhotons {
 impl StrayPhotons {
     /// At the start of an exposure.
     pub fn new(stray: StrayLight, mut rng: Pcg64) -> Result<Self> {
-        let place = Uniform::new(0.0, PERIOD)?.sample(&mut rng);
+        let place = Uniform::new(-REACH, PERIOD - REACH)?.sample(&mut rng);
         let range = match stray {
             StrayLight::Laser { dither, .. } => dither,
             _ => 0,
@@ -96,7 +100,8 @@ impl StrayPhotons {
             } => {
                 pulse(photons, self.place, rng, photon)?;
                 let added = f64::from(self.added.next().unwrap_or(0)) - f64::from(dither) / 2.0;
-                self.place = (self.place + step - added).rem_euclid(PERIOD);
+                let next = self.place + step - added;
+                self.place = (next + REACH).rem_euclid(PERIOD) - REACH;
             }
         }
         Ok(())
@@ -129,4 +134,34 @@ fn draw(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_core::SeedableRng;
+
+    /// Half of the photons of bin 0 are late ones of a pulse before the own pulse.
+    #[test]
+    fn another_laser_sends_as_many_photons_into_the_first_and_last_bins_as_into_others() {
+        let stray = StrayLight::Laser {
+            photons: 20.0,
+            step: 0.37,
+            dither: 128,
+        };
+        let mut photons = StrayPhotons::new(stray, Pcg64::seed_from_u64(3)).unwrap();
+        let mut counts = [0u32; BINS];
+        let cycles = 100_000;
+        for _ in 0..cycles {
+            photons
+                .next_cycle(|code| counts[usize::from(code)] += 1)
+                .unwrap();
+        }
+        // Photons of a pulse come together, so that counts vary more than by Poisson's law.
+        let expected = 20.0 * f64::from(cycles) / PERIOD;
+        for bin in [0, 1, 2, 64, 125, 126, 127] {
+            let off = f64::from(counts[bin]) / expected - 1.0;
+            assert!(off.abs() < 0.2, "{bin}: {off}");
+        }
+    }
 }
