@@ -50,7 +50,7 @@ pub trait Sampler {
     fn completed(&mut self) -> u32;
     /// The samples of a laser cycle; anything once they are overwritten.
     fn samples(&self, cycle: u32) -> Samples;
-    /// Whether the memory took samples too slowly, so that they came late.
+    /// Whether the memory took samples or gave the dither too slowly, so that samples came late.
     fn has_stalled(&self) -> bool;
 }
 
