@@ -76,13 +76,15 @@ impl Setup {
         check_dither(requested.sensor.dither_bins, sensor.most_dither.into())?;
         let began = SystemTime::now();
         let micros = began.duration_since(UNIX_EPOCH).unwrap_or_default();
-        let asked = &requested.sensor;
-        let range = asked.dither_bins.unwrap_or_else(|| {
+        let range = requested.sensor.dither_bins.unwrap_or_else(|| {
             // An odd range cannot be.
             DITHER_BINS.min(sensor.most_dither.into()) & !1
         });
         // Two devices of one kind have different lengths.
-        let seed = asked.dither_seed.or(u64::try_from(micros.as_micros()).ok());
+        let seed = requested
+            .sensor
+            .dither_seed
+            .or(u64::try_from(micros.as_micros()).ok());
         let mut effective = requested.clone().or(SettingsFile {
             sensor: SensorSettings {
                 bin_width_ps: sensor.bin_width,

@@ -146,6 +146,8 @@ pub fn settings_of_file(metadata: &Metadata, array: Array) -> SettingsFile {
             gate: metadata.gate,
             ..SensorSettings::default()
         },
+        // Its times count from the own pulses on, whatever the dither of the laser was.
+        dither_of_laser: Some((0, 0)),
         ..SettingsFile::default()
     }
 }

@@ -51,10 +51,10 @@ impl SettingsFile {
         };
         let (echoes, echo_wait) = detection.several()?;
         let dead_time = self.dead_time(bins)?;
-        let asked = (sensor.dither_bins, sensor.dither_seed);
+        let requested = (sensor.dither_bins, sensor.dither_seed);
         let (dither_bins, dither_seed) = self
             .dither_of_laser
-            .unwrap_or((asked.0.unwrap_or(0), asked.1.unwrap_or(0)));
+            .unwrap_or((requested.0.unwrap_or(0), requested.1.unwrap_or(0)));
         let has_window = sensor.sigma_bins.is_some() || detection.half_widths.is_some();
         ensure!(
             detection.estimator != Some(EstimatorName::Window) || has_window,

@@ -138,7 +138,7 @@ impl SceneFile {
         within("background", self.background, 0.0..=100.0)?;
         within("pulse_sigma_bins", self.pulse_sigma_bins, 0.0..=1000.0)?;
         Dither::new(self.dither_bins, 0)
-            .map_err(|error| Refused::value("dither_bins", self.dither_bins, error.to_string()))?;
+            .map_err(|error| anyhow!("dither_bins {}: {error}", self.dither_bins))?;
         within("signal_at_one_metre", self.signal_at_one_metre, 0.0..=1e6)?;
         let mm_per_bin = self.bin_width_ps * MM_PER_PS;
         let surfaces = (1..).zip(self.surface).map(|(number, entry)| {

@@ -86,6 +86,20 @@ fn a_damaged_aer_file_is_named_with_its_offset() {
     }
 }
 
+/// Its times count from the own pulses on. The settings go on for a device.
+#[test]
+fn a_recording_has_no_dither_but_keeps_that_of_its_settings() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", steady(0, 60, 100));
+    scratch.file("own.toml", "[sensor]\ndither_bins = 64\ndither_seed = 9\n");
+    let summary = scratch.replayed(&input, "--settings own.toml");
+    assert_eq!(summary["settings"].get("dither_bins"), None);
+    let written = scratch.read("out/dtof.toml");
+    for line in ["dither_bins = 64", "dither_seed = 9"] {
+        assert_contains(&written, line);
+    }
+}
+
 #[test]
 fn only_the_first_cycles_are_replayed_and_the_rest_is_counted() {
     let scratch = Scratch::new();

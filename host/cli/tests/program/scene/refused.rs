@@ -57,6 +57,10 @@ fn numbers_that_cannot_be_are_named_by_key() {
         background = inf | background inf
         background = 100\ncolumns = 50\nrows = 50 | photons a laser cycle: more than 10000000
         pulse_sigma_bins = -1 | pulse_sigma_bins -1
+        dither_bins = 127 | : dither_bins 127: the range of the dither must be an even number of bins
+        dither_bins = 256 | : dither_bins 256: the range of the dither must be
+        [other_lidar]\nphotons = -1 | [other_lidar]: photons -1
+        [other_lidar]\nphotons = 1\nppm = 600_000 | [other_lidar]: ppm 600000
         field_of_view_degrees = [60, 180] | field_of_view_degrees: must be HORIZONTALxVERTICAL in degrees
         signal_at_one_metre = -1 | signal_at_one_metre -1
         [tail]\nshare = 1.5\ndecay_bins = 5 | [tail]: share 1.5: must be from 0 to 1
