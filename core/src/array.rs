@@ -109,7 +109,83 @@ impl Array {
         rows.flat_map(move |row| (0..across).map(move |right| address(row, right)))
     }
 
+    /// The neighbours of a pixel of the array that exist: of a corner 2 of four or 3 of eight. None of a pixel
+    /// outside it.
+    #[inline]
+    pub fn neighbours(
+        &self,
+        pixel: PixelAddress,
+        neighbours: Neighbours,
+    ) -> impl Iterator<Item = PixelAddress> + Clone + use<> {
+        let Self { columns, rows } = *self;
+        let row = u32::from(pixel.raw()).checked_div(columns).unwrap_or(0);
+        let column = u32::from(pixel.raw()).wrapping_sub(row * columns);
+        let steps = neighbours.steps().iter();
+        steps.filter_map(move |&(down, right)| {
+            let row = row
+                .checked_add_signed(down.into())
+                .filter(|&row| row < rows)?;
+            let column = column
+                .checked_add_signed(right.into())
+                .filter(|&column| column < columns)?;
+            u16::try_from(row * columns + column)
+                .ok()
+                .map(PixelAddress::new)
+        })
+    }
+
     const fn blocks_in_a_row(&self, level: BlockLevel) -> u32 {
         self.columns.div_ceil(1 << level.raw())
+    }
+}
+
+/// The pixels around a pixel.
+///
+/// Exhaustive, because the link and the C header number them.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Neighbours {
+    /// Those that share a side.
+    Four,
+    /// Those that share a corner, too.
+    Eight,
+}
+
+impl Neighbours {
+    /// From their number; `None` unless it is 4 or 8.
+    #[must_use]
+    pub const fn new(number: u8) -> Option<Self> {
+        match number {
+            4 => Some(Self::Four),
+            8 => Some(Self::Eight),
+            _ => None,
+        }
+    }
+
+    /// Their number: 4 or 8.
+    #[must_use]
+    pub const fn raw(self) -> u8 {
+        match self {
+            Self::Four => 4,
+            Self::Eight => 8,
+        }
+    }
+
+    /// Rows and columns to them.
+    const fn steps(self) -> &'static [(i8, i8)] {
+        const EIGHT: &[(i8, i8); 8] = &[
+            (-1, 0),
+            (0, -1),
+            (0, 1),
+            (1, 0),
+            (-1, -1),
+            (-1, 1),
+            (1, -1),
+            (1, 1),
+        ];
+        match self {
+            Self::Four => EIGHT.split_at(4).0,
+            Self::Eight => EIGHT,
+        }
     }
 }

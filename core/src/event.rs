@@ -41,7 +41,8 @@ pub struct DepthEvent {
     pub peak_bin: BinIndex,
     /// Where the pulse lies, from the start of the peak bin.
     pub offset: SubBinOffset,
-    /// Photons in the highest bin, background included.
+    /// Photons in the highest bin, background included. Of an event that neighbours
+    /// [confirmed](Flags::CONFIRMED): the pixel's own photons in the window of the rule.
     pub peak_count: Count,
     /// The background a bin, as the detection rule estimates it.
     pub background: Count,

@@ -1,10 +1,9 @@
-//! Flags: every known error of an event is marked.
+//! Flags: every known error of an event is marked, and what neighbours confirmed.
 
 use core::fmt;
 use core::ops::{BitOr, BitOrAssign};
 
-/// What is known to be wrong with an event. Five bits. A sixth, for "confirmed by
-/// neighbouring pixels", is reserved: no event has it.
+/// What is known to be wrong with an event, and whether neighbours confirmed it. Six bits.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Flags(u8);
@@ -36,10 +35,14 @@ impl Flags {
     /// exposure, and may be a part of it.
     pub const TAIL: Self = Self(1 << 4);
 
-    /// From bits, or `None` above five bits.
+    /// Bit 5: the pixel's own photons were not enough, and its [neighbours](crate::neighbours) confirmed
+    /// them. The depth is that of their photons together.
+    pub const CONFIRMED: Self = Self(1 << 5);
+
+    /// From bits, or `None` above six bits.
     #[must_use]
     pub const fn from_bits(bits: u8) -> Option<Self> {
-        if bits < 32 { Some(Self(bits)) } else { None }
+        if bits < 64 { Some(Self(bits)) } else { None }
     }
 
     /// The bits.

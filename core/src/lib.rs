@@ -26,6 +26,7 @@
 //! | `detect` | detection rules, thresholds, one decision |
 //! | `config`, `statistics`, `pixel` | one configuration and one statistics, many pixels |
 //! | [`binning`] | blocks of pixels that decide together |
+//! | [`neighbours`] | pixels of an array that confirm each other |
 //! | [`events`] | results from events: running mean, dynamic depth, reflectivity |
 //! | `aer` | events as words |
 //! | [`pixel_processor`] | registers and words of a pixel in programmable logic |
@@ -114,6 +115,7 @@ mod event;
 pub mod events;
 mod flags;
 mod histogram;
+pub mod neighbours;
 pub mod paper;
 mod pixel;
 pub mod pixel_processor;
@@ -125,7 +127,7 @@ mod units;
 pub use fixed;
 
 pub use aer::{AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord};
-pub use array::Array;
+pub use array::{Array, Neighbours};
 pub use config::{PixelConfig, PixelConfigBuilder, PixelConfigError};
 pub use depth::{CentredWindow, DepthEstimate, DepthEstimator, RangeScale, RangeScaleError};
 pub use detect::{

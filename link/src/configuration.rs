@@ -5,7 +5,7 @@ use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::paper::Threshold;
 use dtof_core::{
     AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, DetectionRule,
-    EchoNumber, PaperRule, WindowRule,
+    EchoNumber, Neighbours, PaperRule, WindowRule,
 };
 
 use crate::adaptive_binning::AdaptiveBinning;
@@ -59,6 +59,9 @@ pub struct Configuration {
     pub columns: u16,
     /// Blocks of pixels that decide together.
     pub binning: Option<AdaptiveBinning>,
+    /// The pixels around a pixel that confirm it, if any; with a window rule, and without blocks, a dead time
+    /// that is weighed, or whole histograms.
+    pub neighbours: Option<Neighbours>,
     /// Whether pixels expect their next event where the last was; with a window rule.
     pub tracking: bool,
     /// The last echo that a pixel reports in an exposure.
@@ -98,6 +101,7 @@ const DEAD_TIME_OF_SENSOR: u8 = 0;
 const DEAD_TIME_GIVEN: u8 = 1;
 const EVERY_PHOTON: u8 = 0;
 const ONCE_PER_BIN: u8 = 1;
+const NO_NEIGHBOURS: u8 = 0;
 const NOT_TRACKING: u8 = 0;
 const TRACKING: u8 = 1;
 
@@ -202,8 +206,9 @@ impl Configuration {
             .chain(dead_time.to_le_bytes())
             .chain([once_per_bin])
             .chain(self.dither_bins.to_le_bytes())
-            // The bytes after it are reserved.
-            .chain(self.dither_seed.to_le_bytes());
+            .chain(self.dither_seed.to_le_bytes())
+            // The byte after it is reserved.
+            .chain([self.neighbours.map_or(NO_NEIGHBOURS, Neighbours::raw)]);
         let mut bytes = [0; Self::BYTES];
         for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
@@ -267,6 +272,7 @@ impl Configuration {
         let [once_per_bin] = fields.next()?;
         let dither_bins = u16::from_le_bytes(fields.next()?);
         let dither_seed = u64::from_le_bytes(fields.next()?);
+        let [neighbours] = fields.next()?;
         let Fields(reserved) = fields;
 
         let changes = |reference| DynamicDepth {
@@ -319,6 +325,11 @@ impl Configuration {
                 BlockLevel::PIXEL => None,
                 _ if patience == 0 => return Err(Refusal::Patience),
                 levels => Some(AdaptiveBinning { levels, patience }),
+            },
+            neighbours: match (Neighbours::new(neighbours), neighbours) {
+                (None, NO_NEIGHBOURS) => None,
+                (None, _) => return Err(Refusal::Unknown),
+                (neighbours, _) => neighbours,
             },
             tracking: match tracking {
                 NOT_TRACKING => false,

@@ -57,6 +57,9 @@ numbered! {
         OncePerBin = 22: "the sensor gives histograms, where photons cannot count once per bin",
         /// A dither that is odd, more than the sensor can, or with photons from the link.
         Dither = 23: "the sensor cannot dither its laser by so many bins",
+        /// Neighbours with another rule than the window rule, with blocks, with a dead time that is weighed,
+        /// or with a sensor that gives histograms.
+        Neighbours = 24: "neighbours need the window rule and photons, without blocks and without a dead time",
     }
 }
 

@@ -23,6 +23,7 @@ fn configuration(rule: AnyRule) -> Configuration {
         pixels: 64,
         columns: 8,
         binning: None,
+        neighbours: None,
         tracking: false,
         echoes: EchoNumber::FIRST,
         echo_guard_bins: 0,

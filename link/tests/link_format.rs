@@ -4,8 +4,8 @@
 use dtof_core::events::Reference;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::{
-    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule,
-    WindowRule,
+    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, Neighbours,
+    PaperRule, WindowRule,
 };
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, FrameError, PAYLOAD_BYTES, WIRE_BYTES, encode};
@@ -95,6 +95,7 @@ fn a_host_configures_with_the_golden_frame() {
             levels: BlockLevel::saturating(2),
             patience: 100,
         }),
+        neighbours: Some(Neighbours::Eight),
         tracking: true,
         echoes: EchoNumber::new(2).unwrap(),
         echo_guard_bins: 4,
@@ -179,7 +180,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
         source,
         prop::option::of(binning),
         echoes,
-        any::<(Option<u16>, [bool; 2], [u8; 2])>(),
+        any::<(Option<u16>, [bool; 2], [u8; 2], u8)>(),
         any::<[u16; 7]>(),
         (
             any::<u32>(),
@@ -201,7 +202,8 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                 wide_numbers,
             )| {
                 let [x, l1, l2, first, last, pixels, columns] = numbers;
-                let (dead_time, [once_per_bin, tracking], [echo_guard_bins, echo_wait]) = more;
+                let (dead_time, [once_per_bin, tracking], [echo_guard_bins, echo_wait], neighbours) = more;
+                let neighbours = Neighbours::new(4 * (neighbours % 3));
                 let (width, offset, host_timeout_ms, (dither_bins, dither_seed)) = wide_numbers;
                 Configuration {
                     rule,
@@ -217,6 +219,7 @@ fn configuration() -> impl Strategy<Value = Configuration> {
                     pixels,
                     columns,
                     binning,
+                    neighbours,
                     tracking,
                     echoes,
                     echo_guard_bins,
@@ -268,7 +271,8 @@ proptest! {
         choices in prop::array::uniform7(0u8..3), rule in 0u8..4, width in 0u8..9,
         before in 200u16..1100, after in 200u16..1100, levels in 0u8..5, patience in 0u16..9, echoes in 0u8..6,
         host_timeout in prop_oneof![Just(0u16), 190u16..210, 59_990u16..60_010, any::<u16>()],
-        reserved in prop::option::of((65usize..67, 1u8..)),
+        neighbours in 0u8..12,
+        reserved in prop::option::of(1u8..),
     ) {
         let mut bytes = numbers;
         bytes[2..4].copy_from_slice(&minimum_count.to_le_bytes());
@@ -284,15 +288,13 @@ proptest! {
         bytes[32..34].copy_from_slice(&after.to_le_bytes());
         bytes[44..46].copy_from_slice(&patience.to_le_bytes());
         bytes[50..52].copy_from_slice(&host_timeout.to_le_bytes());
-        bytes[65..].fill(0);
-        if let Some((at, value)) = reserved {
-            bytes[at] = value;
-        }
+        bytes[65] = neighbours;
+        bytes[66] = reserved.unwrap_or(0);
         let found = Configuration::from_le_bytes(&bytes);
         let is_off_limits = host_timeout != 0 && !(200..=60_000).contains(&host_timeout);
         let unknown = source == 2 || rule == 3 || estimator == 2 || dynamic_depth == 2 || dead_time == 2
             || once_per_bin == 2 || (dynamic_depth == 1 && reference == 2)
-            || levels == 4 || tracking == 2 || !(1..=4).contains(&echoes);
+            || ![0, 4, 8].contains(&neighbours) || levels == 4 || tracking == 2 || !(1..=4).contains(&echoes);
         prop_assert_eq!(
             found.is_err(),
             unknown || (rule == 1 && !(1..=7).contains(&width))

@@ -89,6 +89,9 @@
 // The peak lies on the tail of an echo that was reported before.
 #define DTOF_FLAG_TAIL 16
 
+// Neighbouring pixels confirmed what was not enough by itself.
+#define DTOF_FLAG_CONFIRMED 32
+
 // Bytes of a dtof_statistics_t.
 #define DTOF_STATISTICS_SIZE 104
 
@@ -138,7 +141,7 @@
 #define DTOF_ECHOES 4
 
 // The version of the word format, which a file header contains.
-#define DTOF_AER_VERSION 4
+#define DTOF_AER_VERSION 5
 
 // Bytes of a word.
 #define DTOF_WORD_BYTES 16
@@ -388,6 +391,8 @@ enum dtof_status_t
     DTOF_ERROR_ONCE_PER_BIN = 79,
     // The laser cannot be dithered by so many bins.
     DTOF_ERROR_DITHER = 80,
+    // Neighbours confirm nothing here.
+    DTOF_ERROR_NEIGHBOURS = 81,
 };
 #ifndef __cplusplus
 #if __STDC_VERSION__ >= 202311L
@@ -549,7 +554,7 @@ typedef struct dtof_event_t {
     uint8_t level;
     // The number of the echo in its exposure: 1 to 4.
     uint8_t echo;
-    // DTOF_FLAG_..., added up: below 32.
+    // DTOF_FLAG_..., added up: below 64.
     uint8_t flags;
 } dtof_event_t;
 
@@ -1040,11 +1045,11 @@ dtof_status_t dtof_link_silent_ms(const struct dtof_link_t *link,
 dtof_status_t dtof_link_set_stop_reason(struct dtof_link_t *link,
                                         uint8_t reason);
 
-// Reads the body of CONFIGURE. Blocks of pixels and dynamic depth are refused, as this library
-// has neither. `sensor_dead_time` is that of dtof_sensor_write. The settings get it if the host
+// Reads the body of CONFIGURE. Blocks of pixels, neighbours and dynamic depth are refused, as this library
+// has none of them. `sensor_dead_time` is that of dtof_sensor_write. The settings get it if the host
 // leaves the dead time to the sensor and the rule can use it.
 //
-// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_BLOCKS,
+// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_BLOCKS, DTOF_ERROR_NEIGHBOURS,
 // DTOF_ERROR_DITHER if its range is odd, above 254 bins, or not 0 for photons of the link,
 // DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
 // DTOF_ERROR_DEAD_TIME, DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT,

@@ -13,7 +13,7 @@ use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::DTOF_ERROR_AER_KIND;
 
 /// The version of the word format, which a file header contains.
-pub const DTOF_AER_VERSION: u16 = 4;
+pub const DTOF_AER_VERSION: u16 = 5;
 const _: () = assert!(DTOF_AER_VERSION == AER_VERSION);
 
 /// Bytes of a word.

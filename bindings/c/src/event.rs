@@ -20,6 +20,8 @@ pub const DTOF_FLAG_DEFERRED: u8 = 4;
 pub const DTOF_FLAG_PILE_UP: u8 = 8;
 /// The peak lies on the tail of an echo that was reported before.
 pub const DTOF_FLAG_TAIL: u8 = 16;
+/// Neighbouring pixels confirmed what was not enough by itself.
+pub const DTOF_FLAG_CONFIRMED: u8 = 32;
 
 /// A depth event: a peak exceeded the threshold.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -46,7 +48,7 @@ pub struct dtof_event_t {
     pub level: u8,
     /// The number of the echo in its exposure: 1 to 4.
     pub echo: u8,
-    /// DTOF_FLAG_..., added up: below 32.
+    /// DTOF_FLAG_..., added up: below 64.
     pub flags: u8,
 }
 

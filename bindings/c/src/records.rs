@@ -13,7 +13,7 @@ use crate::link::dtof_link_t;
 use crate::memory::{array_mut, data_ref, data_slice, object_ref, put, status};
 use crate::statistics::dtof_statistics_t;
 use crate::status::dtof_status_t;
-use crate::status::dtof_status_t::{DTOF_ERROR_BLOCKS, DTOF_ERROR_DITHER};
+use crate::status::dtof_status_t::{DTOF_ERROR_BLOCKS, DTOF_ERROR_DITHER, DTOF_ERROR_NEIGHBOURS};
 use crate::version::DTOF_BINS;
 
 /// Bytes of the body of SENSOR.
@@ -62,11 +62,11 @@ pub struct dtof_device_config_t {
     pub dither_seed: u64,
 }
 
-/// Reads the body of CONFIGURE. Blocks of pixels and dynamic depth are refused, as this library
-/// has neither. `sensor_dead_time` is that of dtof_sensor_write. The settings get it if the host
+/// Reads the body of CONFIGURE. Blocks of pixels, neighbours and dynamic depth are refused, as this library
+/// has none of them. `sensor_dead_time` is that of dtof_sensor_write. The settings get it if the host
 /// leaves the dead time to the sensor and the rule can use it.
 ///
-/// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_BLOCKS,
+/// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_BLOCKS, DTOF_ERROR_NEIGHBOURS,
 /// DTOF_ERROR_DITHER if its range is odd, above 254 bins, or not 0 for photons of the link,
 /// DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
 /// DTOF_ERROR_DEAD_TIME, DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT,
@@ -86,6 +86,9 @@ pub unsafe extern "C" fn dtof_device_config_read(
         let requested = Configuration::from_le_bytes(body)?;
         if requested.binning.is_some() {
             return Err(DTOF_ERROR_BLOCKS);
+        }
+        if requested.neighbours.is_some() {
+            return Err(DTOF_ERROR_NEIGHBOURS);
         }
         let range = requested.dither_bins;
         let is_of_sensor = requested.source == Source::Sensor;

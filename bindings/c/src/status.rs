@@ -108,6 +108,8 @@ pub enum dtof_status_t {
     DTOF_ERROR_ONCE_PER_BIN = 79,
     /// The laser cannot be dithered by so many bins.
     DTOF_ERROR_DITHER = 80,
+    /// Neighbours confirm nothing here.
+    DTOF_ERROR_NEIGHBOURS = 81,
 }
 
 use dtof_status_t::*;
@@ -164,7 +166,7 @@ impl From<AerError> for dtof_status_t {
 }
 
 /// Each refusal of the link with its errors.
-const REFUSALS: [(Refusal, dtof_status_t); 24] = [
+const REFUSALS: [(Refusal, dtof_status_t); 25] = [
     (Refusal::Unknown, DTOF_ERROR_CONFIGURATION),
     (Refusal::ZeroX, DTOF_ERROR_ZERO_X),
     (Refusal::XAboveL1, DTOF_ERROR_X_ABOVE_L1),
@@ -189,6 +191,7 @@ const REFUSALS: [(Refusal, dtof_status_t); 24] = [
     (Refusal::DeadTime, DTOF_ERROR_DEAD_TIME),
     (Refusal::OncePerBin, DTOF_ERROR_ONCE_PER_BIN),
     (Refusal::Dither, DTOF_ERROR_DITHER),
+    (Refusal::Neighbours, DTOF_ERROR_NEIGHBOURS),
 ];
 
 impl From<Refusal> for dtof_status_t {
@@ -221,7 +224,7 @@ pub extern "C" fn dtof_status_text(status: u8) -> *const c_char {
 }
 
 /// The text of every status. A test compares it with the enum.
-const TEXTS: [(dtof_status_t, &CStr); 46] = [
+const TEXTS: [(dtof_status_t, &CStr); 47] = [
     (DTOF_OK, c"done"),
     (DTOF_ERROR_NULL, c"a pointer is null"),
     (DTOF_ERROR_ALIGNMENT, c"a pointer is not aligned"),
@@ -330,5 +333,9 @@ const TEXTS: [(dtof_status_t, &CStr); 46] = [
     (
         DTOF_ERROR_DITHER,
         c"the sensor cannot dither its laser by so many bins",
+    ),
+    (
+        DTOF_ERROR_NEIGHBOURS,
+        c"neighbours need the window rule and photons, without blocks and without a dead time",
     ),
 ];

@@ -53,12 +53,10 @@ pub const PEAK_COUNT: Field = field(0, 24);
 pub const BACKGROUND_LOW: Field = field(24, 8);
 pub const BACKGROUND_HIGH: Field = field(0, 16);
 pub const OFFSET: Field = field(16, 10);
-pub const FLAGS: Field = field(26, 5);
-/// The place of a sixth flag.
-pub const RESERVED_FLAG: Field = field(31, 1);
+pub const FLAGS: Field = field(26, 6);
 // The second part of a dynamic depth event; its pixel, cycle and level are where those of a
 // depth event are. The third is the position, the fourth the change.
-pub const CHANGE_FLAGS: Field = field(20, 5);
+pub const CHANGE_FLAGS: Field = field(20, 6);
 // The second part of a control word. The first of the last word is the checksum.
 pub const CONTROL: Field = field(20, 10);
 

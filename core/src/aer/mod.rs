@@ -41,7 +41,7 @@ use core::fmt;
 use self::field::{
     BACKGROUND_HIGH, BACKGROUND_LOW, CHANGE_FLAGS, CONTROL, CONTROL_END, CONTROL_TIME, CYCLE_LOW,
     ECHO, EXPOSURE, FLAGS, KIND, KIND_CONTROL, KIND_DEPTH_EVENT, KIND_DYNAMIC_DEPTH, LEVEL, OFFSET,
-    PEAK_BIN, PEAK_COUNT, PIXEL, RESERVED_FLAG,
+    PEAK_BIN, PEAK_COUNT, PIXEL,
 };
 use crate::event::DepthEvent;
 use crate::events::DynamicDepthEvent;
@@ -51,7 +51,7 @@ use crate::units::{
 };
 
 /// The version of the word layout, which file headers and links announce.
-pub const AER_VERSION: u16 = 4;
+pub const AER_VERSION: u16 = 5;
 
 /// One packed word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -287,9 +287,6 @@ impl AerDecoder {
         match KIND.get(word.parts[1]) {
             KIND_DEPTH_EVENT => {
                 let high = self.cycle_high.ok_or(AerError::MissingTime)?;
-                if RESERVED_FLAG.get(word.parts[3]) != 0 {
-                    return Err(AerError::ReservedBits);
-                }
                 Ok(AerRecord::Event(unpack(word, high)))
             }
             KIND_DYNAMIC_DEPTH => {

@@ -212,6 +212,6 @@ pub(crate) fn detection_in<const BINS: usize, W: CounterWidth>(
 
 /// To the nearest whole count, halves up.
 #[inline]
-fn rounded(background: U24F8) -> Count {
+pub(super) fn rounded(background: U24F8) -> Count {
     Count::saturating((background.to_bits() >> 8) + (background.to_bits() >> 7 & 1))
 }

@@ -8,6 +8,7 @@
 //! | `window`, `window_z` | the window rule, a CFAR test over all photons of the pulse, and its z |
 //! | `live` | how often each bin was live, for a TDC with a dead time |
 //! | `tracking` | the window rule with a lower threshold where the last event was |
+//! | `confirm` | neighbouring pixels confirm what is promising |
 //! | `any_rule` | a rule that is chosen at run time |
 //! | `decision` | one decision on one histogram |
 //! | `comparator_tree` | the paper's search for the peak, as a model of its hardware |
@@ -16,6 +17,7 @@ mod any_rule;
 mod average;
 mod background;
 mod comparator_tree;
+mod confirm;
 mod decision;
 mod live;
 mod quadrant;
@@ -30,6 +32,7 @@ pub use any_rule::AnyRule;
 pub use average::AverageRule;
 pub use background::quadrant_background;
 pub use comparator_tree::ComparatorTree;
+pub use confirm::NeighbourRule;
 pub use decision::{Detection, detect};
 pub(crate) use decision::{detect_at, detection_in};
 pub use live::{LiveCounts, LiveDecision, LiveWindow};

@@ -40,6 +40,8 @@
 //! # Ok::<(), dtof_core::WindowWidthError>(())
 //! ```
 
+use core::ops::RangeInclusive;
+
 use fixed::types::{U4F12, U8F8, U24F8};
 
 use super::live::{LiveCounts, LiveDecision};
@@ -135,14 +137,22 @@ impl WindowRule {
         self.minimum_count
     }
 
+    /// The same rule with another z.
+    pub(super) const fn with_z(self, z: U4F12) -> Self {
+        Self { z, ..self }
+    }
+
     /// The rules of a pixel that tracks. Together they have the false alarms of this rule. z
     /// is limited to the range of [`z_for`](crate::z_for). It is never higher than this
     /// rule's near the last event, and never lower elsewhere.
     #[must_use]
     pub fn tracking<const BINS: usize>(&self, gate: &RangeGate<BINS>) -> Tracking<Self> {
         let [near, far] = tracking_z(self.z, gate);
-        let near = Self { z: near, ..*self };
-        Tracking::new(near, Self { z: far, ..*self }, u16::from(self.width) - 1)
+        Tracking::new(
+            self.with_z(near),
+            self.with_z(far),
+            u16::from(self.width) - 1,
+        )
     }
 
     /// The rule for blocks of pixels with this rule; its z is not lower. The blocks of all
@@ -150,10 +160,7 @@ impl WindowRule {
     /// [`z_for_levels`](crate::rule::z_for_levels).
     #[must_use]
     pub fn of_blocks(&self, levels: BlockLevel) -> Self {
-        Self {
-            z: block_z(self.z, levels),
-            ..*self
-        }
+        self.with_z(block_z(self.z, levels))
     }
 
     /// The most photons in a gated window that contains the peak bin: at most 7 · 2²⁴.
@@ -164,27 +171,101 @@ impl WindowRule {
         gate: &RangeGate<BINS>,
         peak: Peak,
     ) -> u32 {
-        let width = u16::from(self.width);
-        let (bin, last) = (peak.bin.raw(), gate.last());
-        let first_start = (bin + 1).saturating_sub(width).max(gate.first());
-        let last_start = bin.min((last + 1).saturating_sub(width));
-        // From the first bin of the first window to the last of the last.
-        let bins = usize::from(first_start)..usize::from(last_start + width);
-        let bins = histogram.counts().get(bins).unwrap_or_default();
-        let windows = bins.split_at_checked(width.into());
-        let (first, entering) = windows.unwrap_or_default();
-        let mut sum = first
-            .iter()
-            .fold(0, |sum: u32, &count| sum.wrapping_add(count.into()));
-        let mut highest = sum;
-        for (&leaving, &entering) in bins.iter().zip(entering) {
-            sum = sum
-                .wrapping_add(entering.into())
-                .wrapping_sub(leaving.into());
-            highest = highest.max(sum);
-        }
-        highest
+        highest_sum(histogram, self.starts_about(gate, peak.bin), self.width)
     }
+
+    /// Where the gated windows that contain a bin begin.
+    #[inline(always)]
+    pub(super) fn starts_about<const BINS: usize>(
+        &self,
+        gate: &RangeGate<BINS>,
+        bin: BinIndex,
+    ) -> RangeInclusive<u16> {
+        let width = u16::from(self.width);
+        let (bin, last) = (bin.raw(), gate.last());
+        let first_start = (bin + 1).saturating_sub(width).max(gate.first());
+        first_start..=bin.min((last + 1).saturating_sub(width))
+    }
+}
+
+/// The most photons in a window of those that begin at `starts`.
+#[inline(always)]
+pub(super) fn highest_sum<const BINS: usize, W: CounterWidth>(
+    histogram: &Histogram<BINS, W>,
+    starts: RangeInclusive<u16>,
+    width: u8,
+) -> u32 {
+    let width = u16::from(width);
+    // From the first bin of the first window to the last of the last.
+    let bins = usize::from(*starts.start())..usize::from(*starts.end() + width);
+    let bins = histogram.counts().get(bins).unwrap_or_default();
+    let windows = bins.split_at_checked(width.into());
+    let (first, entering) = windows.unwrap_or_default();
+    let mut sum = first
+        .iter()
+        .fold(0, |sum: u32, &count| sum.wrapping_add(count.into()));
+    let mut highest = sum;
+    for (&leaving, &entering) in bins.iter().zip(entering) {
+        sum = sum
+            .wrapping_add(entering.into())
+            .wrapping_sub(leaving.into());
+        highest = highest.max(sum);
+    }
+    highest
+}
+
+/// Whether the `inside` photons of a window of `width` of `bins` bins stand `z` (in 1/4096)
+/// standard deviations above what `total` photons in all bins have there on average. `NARROW` is for
+/// counters of up to 10 bits, of one pixel or of nine together.
+#[inline(always)]
+pub(super) fn stands_clear<const NARROW: bool>(
+    inside: u32,
+    total: u32,
+    width: u32,
+    bins: u32,
+    z: u16,
+) -> bool {
+    let bins_outside = bins - width;
+
+    // In 1/16 counts.
+    let z_squared = u32::from(z) * u32::from(z);
+    let skew = bins_outside.saturating_sub(width) * ((z_squared / 6) >> 20);
+    let (inside_times, total_times) = (bins << 4, width << 4);
+    let above = if NARROW {
+        // Of nine pixels: 14 + 16 bits, 7 + 24 bits and 20 bits.
+        let level = total_times * total + skew;
+        let Some(above) = (inside_times * inside).checked_sub(level) else {
+            return false;
+        };
+        above
+    } else {
+        let level = u64::from(total_times) * u64::from(total) + u64::from(skew);
+        let Some(above) = (u64::from(inside_times) * u64::from(inside)).checked_sub(level) else {
+            return false;
+        };
+        // Its square is then above any variance.
+        u32::try_from(above).unwrap_or(u32::MAX).min((1 << 30) - 1)
+    };
+    // At most 8 + 3 + 32 bits, or 10 + 3 + 26; in 1/16, and with z², 20 more.
+    let spread = u64::from(bins_outside * width) * u64::from(total);
+    let exceeds = |sixteenths: u64| {
+        (u64::from(above) * u64::from(above)) << 4 > sixteenths * u64::from(z_squared >> 16)
+    };
+    // 20 + 12 bits, and after the division 23.
+    let most = bins * bins * (z_squared >> 20) / (36 << 4);
+    if above == 0 || !exceeds(spread.saturating_sub(most.into()) << 4) {
+        return false;
+    }
+    // N/(N + c) of the upper 16 bits, in 1/2¹⁶.
+    let sum = spread + u64::from(most);
+    let shift = u64::BITS - (sum >> 16).leading_zeros();
+    #[allow(clippy::cast_possible_truncation, reason = "16 bits")]
+    let [sum, part] = [sum >> shift, spread >> shift].map(|value| value as u32);
+    let Some(part) = (part << 16).checked_div(sum) else {
+        return false;
+    };
+    // 43 + 16 bits, or 39 + 17.
+    exceeds((spread * u64::from(part)) >> 12)
 }
 
 impl DetectionRule for WindowRule {
@@ -200,47 +281,20 @@ impl DetectionRule for WindowRule {
         if inside < self.minimum_count.raw() {
             return None;
         }
-        let width = u32::from(self.width);
+        let (width, total) = (u32::from(self.width), histogram.total());
         let bins = excluded.bins_left(gate)?;
-        let bins_outside = bins - width;
-
-        // In 1/16 counts.
-        let z_squared = u32::from(self.z.to_bits()) * u32::from(self.z.to_bits());
-        let skew = bins_outside.saturating_sub(width) * ((z_squared / 6) >> 20);
-        let (inside_times, total_times) = (bins << 4, width << 4);
-        let above = if W::BITS <= 10 {
-            // 14 + 13 bits, 7 + 20 bits and 20 bits.
-            let level = total_times * histogram.total() + skew;
-            (inside_times * inside).checked_sub(level)?
+        let z = self.z.to_bits();
+        let stands_clear = if W::BITS <= 10 {
+            stands_clear::<true>(inside, total, width, bins, z)
         } else {
-            let level = u64::from(total_times) * u64::from(histogram.total()) + u64::from(skew);
-            let above = (u64::from(inside_times) * u64::from(inside)).checked_sub(level)?;
-            // Its square is then above any variance.
-            u32::try_from(above).unwrap_or(u32::MAX).min((1 << 30) - 1)
+            stands_clear::<false>(inside, total, width, bins, z)
         };
-        // At most 8 + 3 + 32 bits, or 10 + 3 + 26; in 1/16, and with z², 20 more.
-        let spread = u64::from(bins_outside * width) * u64::from(histogram.total());
-        let exceeds = |sixteenths: u64| {
-            (u64::from(above) * u64::from(above)) << 4 > sixteenths * u64::from(z_squared >> 16)
-        };
-        // 20 + 12 bits, and after the division 23.
-        let most = bins * bins * (z_squared >> 20) / (36 << 4);
-        if above == 0 || !exceeds(spread.saturating_sub(most.into()) << 4) {
+        if !stands_clear {
             return None;
         }
-        // N/(N + c) of the upper 16 bits, in 1/2¹⁶.
-        let sum = spread + u64::from(most);
-        let shift = u64::BITS - (sum >> 16).leading_zeros();
-        #[allow(clippy::cast_possible_truncation, reason = "16 bits")]
-        let [sum, part] = [sum >> shift, spread >> shift].map(|value| value as u32);
-        let part = (part << 16).checked_div(sum)?;
-        // 43 + 16 bits, or 39 + 17.
-        if !exceeds((spread * u64::from(part)) >> 12) {
-            return None;
-        }
-        let outside = histogram.total().wrapping_sub(inside);
-        mean(outside, bins_outside)
+        mean(total.wrapping_sub(inside), bins - width)
     }
+
     #[inline(always)]
     fn weighs_dead_time(&self) -> bool {
         true

@@ -87,7 +87,7 @@ pub fn z_for_levels<const BINS: usize>(
 }
 
 /// 1 in the unit of [`log2`].
-const ONE: u32 = 256;
+pub(super) const ONE: u32 = 256;
 
 /// The z for so many trials, as a binary logarithm in 1/256.
 #[allow(clippy::cast_possible_truncation, reason = "the highest z is 16 bits")]
@@ -103,7 +103,7 @@ fn z_of(trials: u32) -> U4F12 {
 
 /// The trials for a z, as a binary logarithm in 1/256: the inverse of [`z_of`], limited to
 /// its range.
-fn trials_of(z: U4F12) -> u32 {
+pub(super) fn trials_of(z: U4F12) -> u32 {
     let z = z.to_bits();
     let mut trials = 6 * ONE;
     for (&low, &high) in Z.iter().zip(Z.iter().skip(1)) {
@@ -112,6 +112,11 @@ fn trials_of(z: U4F12) -> u32 {
         trials += part.min(2 * ONE);
     }
     trials
+}
+
+/// The z with half of the false alarms.
+pub(super) fn twice_the_trials(z: U4F12) -> U4F12 {
+    z_of(trials_of(z) + ONE).max(z)
 }
 
 /// The z near the last event, and elsewhere, each with half of the false alarms of `z`. The

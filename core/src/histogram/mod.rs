@@ -35,7 +35,7 @@ pub mod counter;
 pub mod excluded;
 pub mod gate;
 
-use core::ops::RangeInclusive;
+use core::ops::{Range, RangeInclusive};
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use fixed::types::U24F8;
@@ -367,6 +367,35 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
             let count = (*counter).into().saturating_add(photons.into());
             *counter = W::counter(count.min(W::MAX));
         }
+    }
+
+    /// The photons of some bins, wrapping.
+    #[inline(never)]
+    pub(crate) fn photons_of(&self, bins: Range<u16>) -> u32 {
+        let bins = usize::from(bins.start)..usize::from(bins.end);
+        let bins = self.counts.get(bins).unwrap_or_default();
+        bins.iter()
+            .fold(0, |sum, &count| sum.wrapping_add(count.into()))
+    }
+
+    /// Adds some bins of another histogram, and its total. Counters saturate. The peak is not kept.
+    #[inline(never)]
+    pub(crate) fn add_bins<V: CounterWidth>(
+        &mut self,
+        other: &Histogram<BINS, V>,
+        bins: Range<u16>,
+    ) {
+        let bins = usize::from(bins.start)..usize::from(bins.end);
+        let (counters, photons) = (self.counts.get_mut(bins.clone()), other.counts.get(bins));
+        for (counter, &photons) in counters
+            .unwrap_or_default()
+            .iter_mut()
+            .zip(photons.unwrap_or_default())
+        {
+            let count = (*counter).into().saturating_add(photons.into());
+            *counter = W::counter(count.min(W::MAX));
+        }
+        self.total = self.total.saturating_add(other.total);
     }
 
     /// Leaves photons out of the total.

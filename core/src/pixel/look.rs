@@ -39,6 +39,11 @@ impl State {
     /// The exposure before this one had an event, and the pixel tracks.
     pub(super) const EXPECTING: Self = Self(1 << 3);
 
+    /// A look has begun in steps, and decides.
+    pub(super) const DECIDES: Self = Self(1 << 4);
+    /// The event in the slot is to be reported at the end of this look.
+    pub(super) const DETECTED: Self = Self(1 << 5);
+
     pub(super) const fn contains(self, other: Self) -> bool {
         self.0 & other.0 != 0
     }

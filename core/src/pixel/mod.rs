@@ -41,6 +41,7 @@ mod count;
 mod input;
 mod look;
 mod once_per_bin;
+mod steps;
 
 pub use self::input::DecisionInput;
 pub use self::look::Look;
@@ -141,7 +142,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         last: LaserCycle,
         cycles: u16,
     ) -> Look {
-        self.end_laser_cycles_with(config, statistics, last, cycles, |_| ())
+        self.end_laser_cycles_with(config, statistics, last, cycles, unobserved)
     }
 
     /// The same with an observer. It is called right before an event is reported, with what the
@@ -236,8 +237,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         if self.state.contains(State::HAS_ECHO) {
             // Photons that have come since the last look.
             self.leave_out_excluded::<R, LIVE>(config, statistics);
-            // The slot has the last echo, even if that was taken.
-            longest = config.end_after_echo(self.event.exposure);
+            longest = self.longest_after_echo(config);
         }
         if self.exposure >= longest {
             return self.end(config, statistics);
@@ -247,8 +247,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             self.state.set(State::DEFERRED);
             return Look::Deferred;
         }
-        let expected = self.state.contains(State::EXPECTING);
-        let expected = expected.then_some(self.expected);
+        let expected = self.expected();
         let (histogram, excluded) = (&self.histogram, &self.excluded);
         let detection = if LIVE {
             let Some(counts) = config.live_counts(histogram, self.exposure.into(), excluded) else {
@@ -284,15 +283,45 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         cycle: LaserCycle,
         detection: &Detection,
     ) -> Look {
+        self.put(cycle, detection);
+        self.report_slot(config, statistics)
+    }
+
+    /// The length at which this exposure ends, which has had an echo.
+    #[inline(always)]
+    const fn longest_after_echo<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> u16 {
+        // The slot has the last echo, even if that was taken.
+        config.end_after_echo(self.event.exposure)
+    }
+
+    /// Where a pixel that tracks expects its event.
+    #[inline(always)]
+    fn expected(&self) -> Option<BinIndex> {
+        let expects = self.state.contains(State::EXPECTING);
+        expects.then_some(self.expected)
+    }
+
+    /// Puts the event of `detection` into the slot.
+    #[inline(always)]
+    fn put(&mut self, cycle: LaserCycle, detection: &Detection) {
         let DepthEvent { pixel, level, .. } = self.event;
         self.event = detection.event(pixel, cycle, self.exposure);
         self.event.level = level;
+    }
+
+    /// Reports the event in the slot. The exposure ends, or goes on for the next echo.
+    #[inline(always)]
+    fn report_slot<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+    ) -> Look {
         if self.state.contains(State::DEFERRED) {
             self.event.flags |= Flags::DEFERRED;
         }
         if config.is_first_photon_only()
             && !self.weighs_dead_time(config)
-            && 2 * self.photons() > u64::from(self.exposure) * level.pixels()
+            && 2 * self.photons() > u64::from(self.exposure) * self.event.level.pixels()
         {
             self.event.flags |= Flags::PILE_UP;
         }
@@ -458,4 +487,8 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         self.histogram.clear();
         self.exposure = 0;
     }
+}
+
+/// No observer. One function for all, so that looks are compiled once.
+pub(crate) const fn unobserved<const BINS: usize, W: CounterWidth>(_: &DecisionInput<'_, BINS, W>) {
 }

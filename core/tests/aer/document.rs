@@ -187,7 +187,7 @@ pub fn event(numbers: [u64; 10]) -> DepthEvent {
         offset: SubBinOffset::new((next() % 1024) as i16 - 512).unwrap(),
         peak_count: Count::new(next() as u32 % (1 << 24)).unwrap(),
         background: Count::new(next() as u32 % (1 << 24)).unwrap(),
-        flags: Flags::from_bits(next() as u8 % 32).unwrap(),
+        flags: Flags::from_bits(next() as u8 % 64).unwrap(),
     }
 }
 

@@ -1,6 +1,7 @@
 //! Applies a configuration.
 
 use dtof_core::binning::{Binning, BlockLink};
+use dtof_core::neighbours::NeighbourConfig;
 use dtof_core::{AnyRule, Array, PixelAddress, PixelConfig, RangeGate, RangeScale};
 use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source, StopReason};
 use dtof_sensors::dither::Dither;
@@ -59,7 +60,14 @@ impl Sidecar<'_> {
                 .echo_wait(requested.echo_wait);
             Ok(config.build()?)
         };
-        let config = config_of(requested.rule)?;
+        let neighbours = self.neighbours_of(&requested)?;
+        let own = neighbours.map_or(requested.rule, |neighbours| {
+            (*neighbours.rule().own()).into()
+        });
+        let config = config_of(own)?;
+        if neighbours.is_some() && config.weighs_dead_time() {
+            return Err(Refusal::Neighbours);
+        }
         let binning = match requested.binning {
             None => None,
             Some(binning) => Some((
@@ -86,6 +94,7 @@ impl Sidecar<'_> {
         }
         self.config = Some(config);
         self.binning = binning.map(|(_, config, patience)| (config, patience));
+        self.neighbours = neighbours;
         self.dynamic_depth = dynamic_depth;
         self.bin_width = requested.bin_width_ps;
         self.dither = dither;
@@ -105,12 +114,7 @@ impl Sidecar<'_> {
         requested: &Configuration,
         binning: AdaptiveBinning,
     ) -> Result<Binning, Refusal> {
-        let columns = requested.columns.into();
-        let rows = u32::from(requested.pixels).checked_div(columns);
-        let rows = rows.ok_or(Refusal::Blocks)?;
-        // The last row may not be full.
-        let rows = rows + u32::from(rows * columns < u32::from(requested.pixels));
-        let array = Array::new(columns, rows).ok_or(Refusal::Blocks)?;
+        let array = array_of(requested).ok_or(Refusal::Blocks)?;
         let blocks = Binning::new(array, binning.levels).ok_or(Refusal::Blocks)?;
         let room = u32::try_from(self.blocks.capacity()).unwrap_or(u32::MAX);
         if blocks.number_of_blocks() > room {
@@ -118,4 +122,29 @@ impl Sidecar<'_> {
         }
         Ok(blocks)
     }
+
+    /// The requested neighbours.
+    fn neighbours_of(&self, requested: &Configuration) -> Result<Option<NeighbourConfig>, Refusal> {
+        let Some(neighbours) = requested.neighbours else {
+            return Ok(None);
+        };
+        let of_sensor = requested.source == Source::Sensor;
+        let gives_histograms = self.sensor.is_some_and(|sensor| sensor.gives_histograms);
+        let array = array_of(requested).ok_or(Refusal::Neighbours)?;
+        match &requested.rule {
+            AnyRule::Window(rule)
+                if requested.binning.is_none() && !(of_sensor && gives_histograms) =>
+            {
+                Ok(Some(NeighbourConfig::new(array, neighbours, rule)))
+            }
+            _ => Err(Refusal::Neighbours),
+        }
+    }
+}
+
+/// The array of the requested pixels; `None` without columns. Its last row may not be full.
+fn array_of(requested: &Configuration) -> Option<Array> {
+    let (pixels, columns) = (u32::from(requested.pixels), requested.columns.into());
+    let rows = pixels.checked_div(columns)?;
+    Array::new(columns, rows + u32::from(rows * columns < pixels))
 }

@@ -26,8 +26,10 @@ mod sensor;
 use dtof_core::binning::{BlockLink, BlockPlace};
 use dtof_core::events::{DynamicDepthConfig, DynamicDepthPixel};
 use dtof_core::fixed::types::U16F16;
+use dtof_core::neighbours::{ArrayPixel, NeighbourConfig};
 use dtof_core::{
-    AerEncoder, AerWord, AnyRule, AsyncPixel, DepthEvent, PixelAddress, PixelConfig, Statistics,
+    AerEncoder, AerWord, AnyRule, AsyncPixel, Count10, DepthEvent, PixelAddress, PixelConfig,
+    Statistics,
 };
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
@@ -68,6 +70,16 @@ impl Pixel {
             feed,
             dynamic_depth: DynamicDepthPixel::new(),
         }
+    }
+}
+
+impl ArrayPixel<BINS, Count10> for Pixel {
+    fn pixel(&self) -> Option<&AsyncPixel<BINS>> {
+        Some(&self.detector)
+    }
+
+    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS>> {
+        Some(&mut self.detector)
     }
 }
 
@@ -116,6 +128,8 @@ pub struct Sidecar<'a> {
     config: Option<PixelConfig<BINS, AnyRule>>,
     /// That of the blocks, and laser cycles between ticks.
     binning: Option<(PixelConfig<BINS, AnyRule>, u16)>,
+    /// Of the configuration in force, if neighbours confirm.
+    neighbours: Option<NeighbourConfig>,
     /// Of the configuration in force: changes of depth are sent, not depth events.
     dynamic_depth: Option<DynamicDepthConfig>,
     /// Of the configuration in force, for sensors that measure times.
@@ -194,6 +208,7 @@ impl<'a> Sidecar<'a> {
             blocks,
             config: None,
             binning: None,
+            neighbours: None,
             dynamic_depth: None,
             bin_width: U16F16::ZERO,
             dither: Dither::OFF,

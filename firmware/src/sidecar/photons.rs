@@ -1,6 +1,7 @@
 //! Photons into pixels, and photons messages of the link.
 
 use dtof_core::binning::{count_in_blocks, end_laser_cycles_of_blocks};
+use dtof_core::neighbours::end_laser_cycles_of_array;
 use dtof_core::{LaserCycle, Look, OncePerBin};
 use heapless::vec::Vec;
 
@@ -124,11 +125,16 @@ impl Sidecar<'_> {
             bins.end_laser_cycle();
         }
         let mut fired = false;
-        for pixel in self.pixels.iter_mut() {
-            let (detector, statistics) = (&mut pixel.detector, &mut self.statistics);
-            if detector.end_laser_cycles(config, statistics, last, ended) == Look::Event {
-                pixel.feed.reported();
-                fired = true;
+        if let Some(neighbours) = &self.neighbours {
+            let (pixels, statistics) = (&mut self.pixels[..], &mut self.statistics);
+            fired = end_laser_cycles_of_array(pixels, config, neighbours, statistics, last, ended);
+        } else {
+            for pixel in self.pixels.iter_mut() {
+                let (detector, statistics) = (&mut pixel.detector, &mut self.statistics);
+                if detector.end_laser_cycles(config, statistics, last, ended) == Look::Event {
+                    pixel.feed.reported();
+                    fired = true;
+                }
             }
         }
         if let Some((config, patience)) = &self.binning {

@@ -31,6 +31,7 @@ pub const CONFIGURATION: Configuration = Configuration {
     pixels: 8,
     columns: 8,
     binning: None,
+    neighbours: None,
     tracking: false,
     echoes: EchoNumber::FIRST,
     echo_guard_bins: 0,

@@ -220,6 +220,7 @@ impl Method {
         let settings = Settings {
             centroid: self.centroid,
             binning: None,
+            neighbours: None,
             tracking: false,
             frame: None,
             dead_time: if self.weighs() { like.dead_time } else { 0 },

@@ -79,6 +79,7 @@ impl Task<'_> {
             pixels: self.pixels,
             columns: u16::try_from(self.columns)?,
             binning: settings.binning,
+            neighbours: settings.neighbours,
             tracking: settings.tracking,
             echoes: settings.echoes,
             echo_guard_bins: settings.echo_guard_bins(),

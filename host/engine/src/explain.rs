@@ -4,7 +4,7 @@ use dtof_core::fixed::types::U24F8;
 use dtof_core::rule::{ExcludedBins, LiveCounts, LiveWindow};
 use dtof_core::{
     AnyRule, BinIndex, BlockLevel, Count, Count10, Count16, Count24, CounterWidth, DetectionRule,
-    EchoNumber, Histogram, Peak, PixelConfig, RangeGate,
+    EchoNumber, Flags, Histogram, Peak, PixelConfig, RangeGate,
 };
 use serde::Serialize;
 
@@ -21,7 +21,8 @@ pub struct Explanation {
     /// The fewest photons in that bin with which the rule reports it, all other bins being equal;
     /// `None` if no counter holds so many.
     pub needed: Option<u32>,
-    /// The threshold depends on earlier events, as the pixel tracks or reports several echoes.
+    /// The threshold depends on earlier events, as the pixel tracks or reports several echoes, or on
+    /// neighbours that confirmed it.
     /// `needed` and `background` are `None` then.
     pub depends: bool,
     /// The background a bin according to the rule, at the photons of the peak or at `needed`,
@@ -124,6 +125,15 @@ fn all<const BINS: usize>(settings: &Settings, decisions: &[Decision]) -> Option
             return Some(input.explain::<Count10>());
         }
         let input = DecisionInput::new(config, decision, settings.frame.is_some())?;
+        if decision.event.flags.contains(Flags::CONFIRMED) {
+            // The peak is that of all pixels; its own photons were too few.
+            return Some(Explanation {
+                depends: true,
+                needed: None,
+                background: None,
+                ..input.explain::<Count10>()
+            });
+        }
         Some(match is_pixel && settings.frame.is_none() {
             true => input.explain::<Count10>(),
             false => input.explain::<Count16>(),

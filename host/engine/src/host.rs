@@ -7,7 +7,8 @@ use rayon::prelude::*;
 use super::Engine;
 use super::decisions::Decision;
 use super::frame::FrameEngine;
-use super::group::{Configs, Done, Group};
+use super::group::{Configs, Done, Group, sort};
+use super::neighbours::NeighbourEngine;
 use super::once_per_bin::OncePerBinEngine;
 use crate::settings::Settings;
 use crate::with_bins;
@@ -47,6 +48,21 @@ impl<const BINS: usize> HostEngine<BINS> {
                 settings, length, addresses,
             )?));
         }
+        let engine: Box<dyn Engine> = if let Some(neighbours) = settings.neighbours {
+            Box::new(NeighbourEngine::<BINS>::new(
+                settings, neighbours, array, addresses,
+            )?)
+        } else {
+            Box::new(Self::new(settings, array, addresses)?)
+        };
+        Ok(if settings.once_per_bin {
+            Box::new(OncePerBinEngine::new(engine, BINS))
+        } else {
+            engine
+        })
+    }
+
+    fn new(settings: &Settings, array: Array, addresses: &[PixelAddress]) -> Result<Self> {
         let groups = match settings.binning {
             Some(binning) => Group::for_array(array, binning, addresses)?,
             None => {
@@ -56,7 +72,7 @@ impl<const BINS: usize> HostEngine<BINS> {
                     .collect()
             }
         };
-        let engine = Box::new(Self {
+        Ok(Self {
             configs: Configs {
                 pixels: settings.config()?,
                 blocks: settings.block_config()?,
@@ -65,11 +81,6 @@ impl<const BINS: usize> HostEngine<BINS> {
             groups,
             pixels: Statistics::new(),
             blocks: Statistics::new(),
-        });
-        Ok(if settings.once_per_bin {
-            Box::new(OncePerBinEngine::new(engine, BINS))
-        } else {
-            engine
         })
     }
 }
@@ -111,13 +122,4 @@ impl<const BINS: usize> Engine for HostEngine<BINS> {
         all.sort_unstable_by_key(|decision| (decision.event.level, decision.event.pixel));
         all
     }
-}
-
-/// Sorts by laser cycle, level and pixel. Not generic, so that it is compiled once.
-fn sort(events: &mut [DepthEvent], first_cycle: u64) {
-    // One number compares faster than three.
-    events.sort_unstable_by_key(|event| {
-        let cycle = event.cycle.raw() - first_cycle;
-        cycle << 24 | u64::from(event.level.raw()) << 16 | u64::from(event.pixel.raw())
-    });
 }

@@ -7,6 +7,7 @@ pub mod explain;
 pub mod frame;
 pub mod group;
 pub mod host;
+mod neighbours;
 mod once_per_bin;
 pub mod settings;
 pub mod slices;

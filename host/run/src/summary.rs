@@ -129,6 +129,9 @@ fn settings<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, 
     if let Some(binning) = settings.binning {
         map.serialize_entry("patience", &binning.patience)?;
     }
+    if let Some(neighbours) = settings.neighbours {
+        map.serialize_entry("neighbours", &neighbours.raw())?;
+    }
     map.serialize_entry("tracking", &settings.tracking)?;
     map.serialize_entry("echoes", &settings.echoes.raw())?;
     map.serialize_entry("echo_wait", &settings.echo_wait)?;

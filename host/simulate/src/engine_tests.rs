@@ -1,8 +1,10 @@
 //! Tests of the engine and of sources of photons, with simulated photons.
 
 use dtof_core::fixed::types::U8F8;
+use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
 use dtof_core::{
-    AnyRule, Array, AverageRule, BlockLevel, Count, DepthEvent, EchoNumber, PaperRule, WindowRule,
+    AnyRule, Array, AsyncPixel, AverageRule, BlockLevel, Count, DepthEvent, EchoNumber, Flags,
+    LaserCycle, Neighbours, PaperRule, PixelAddress, Statistics, WindowRule,
 };
 use dtof_engine::decisions::Decision;
 use dtof_engine::explain::explain_decisions;
@@ -43,6 +45,14 @@ fn rules() -> [AnyRule; 3] {
     ]
 }
 
+fn with_neighbours(neighbours: Neighbours) -> Settings {
+    Settings {
+        rule: rules()[2],
+        neighbours: Some(neighbours),
+        ..Settings::static_scene(0)
+    }
+}
+
 /// Settings that cover everything a decision depends on.
 fn all_settings() -> Vec<Settings> {
     let plain = rules().map(|rule| Settings {
@@ -71,7 +81,14 @@ fn all_settings() -> Vec<Settings> {
         frame: Some(500),
         ..window
     };
-    let mut all = vec![tracking, both, frames, demo::settings(3).unwrap()];
+    let mut all = vec![
+        tracking,
+        both,
+        frames,
+        demo::settings(3).unwrap(),
+        with_neighbours(Neighbours::Four),
+        with_neighbours(Neighbours::Eight),
+    ];
     all.extend(plain.into_iter().chain(gated).chain(echoes));
     all
 }
@@ -137,7 +154,12 @@ fn counts_of_a_block_are_those_its_event_tells() {
 
 #[test]
 fn decisions_do_not_depend_on_slices_or_threads() {
-    for settings in [demo::settings(3).unwrap(), Settings::static_scene(0)] {
+    let neighbours = with_neighbours(Neighbours::Eight);
+    for settings in [
+        demo::settings(3).unwrap(),
+        Settings::static_scene(0),
+        neighbours,
+    ] {
         let (_, all, _) = run(&settings, 256);
         let one = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
@@ -159,6 +181,9 @@ fn an_explanation_agrees_with_the_event() {
         assert_eq!(explanations.len(), decisions.len());
         let mut exactly = 0;
         for (explained, Decision { event, counts, .. }) in explanations.iter().zip(&decisions) {
+            if event.flags.contains(Flags::CONFIRMED) {
+                continue;
+            }
             let bin = event.peak_bin.raw();
             assert_eq!(explained.peak, (bin, event.peak_count.raw()));
             assert!(!explained.depends);
@@ -218,4 +243,83 @@ fn only_masked_pixels_lose_their_photons_and_they_are_counted() {
     assert_eq!(masked.masked(), lost);
     let refused = Masked::new(photons(), &[8]).err().unwrap();
     assert_eq!(refused.to_string(), "masked 8: there are 8 pixels");
+}
+
+/// Those of the core's array, whose pixels all end each laser cycle together.
+#[test]
+fn neighbours_confirm_as_in_the_core() {
+    for neighbours in [Neighbours::Four, Neighbours::Eight] {
+        let settings = with_neighbours(neighbours);
+        let (events, _, slices) = run(&settings, 100);
+        let AnyRule::Window(rule) = &settings.rule else {
+            panic!("{settings:?}");
+        };
+        let rule = NeighbourConfig::new(ARRAY, neighbours, rule);
+        let config = settings.config::<128>().unwrap();
+        let addresses = (0..32).map(PixelAddress::new);
+        let mut pixels: Vec<AsyncPixel<128>> = addresses.map(AsyncPixel::new).collect();
+        let (mut expected, mut statistics) = (Vec::new(), Statistics::new());
+        for slice in &slices {
+            for cycle in 0..slice.pixels[0].cycles {
+                for (pixel, received) in pixels.iter_mut().zip(&slice.pixels) {
+                    let now = received
+                        .photons
+                        .iter()
+                        .filter(|photon| photon.cycle == cycle);
+                    now.for_each(|photon| pixel.count(&config, photon.code));
+                }
+                let last = LaserCycle::new(slice.first_cycle + u64::from(cycle));
+                end_laser_cycles_of_array(&mut pixels, &config, &rule, &mut statistics, last, 1);
+                expected.extend(pixels.iter_mut().filter_map(AsyncPixel::take_event));
+            }
+        }
+        assert!(events == expected);
+        let confirmed = events
+            .iter()
+            .filter(|event| event.flags.contains(Flags::CONFIRMED));
+        assert!(confirmed.count() > 10);
+    }
+}
+
+/// The threshold of such an event is not one of the pixel's own photons.
+#[test]
+fn a_confirmed_event_depends_on_neighbours() {
+    let settings = with_neighbours(Neighbours::Eight);
+    let (_, decisions, _) = run(&settings, 256);
+    let explanations = explain_decisions(&settings, &decisions);
+    let mut confirmed = 0;
+    for (decision, explanation) in decisions.iter().zip(&explanations) {
+        let is_confirmed = decision.event.flags.contains(Flags::CONFIRMED);
+        assert_eq!(explanation.depends, is_confirmed);
+        assert_eq!(explanation.needed.is_none(), is_confirmed);
+        confirmed += u32::from(is_confirmed);
+    }
+    assert!(confirmed > 0);
+}
+
+/// What it cannot be used with is refused.
+#[test]
+fn neighbours_need_the_window_rule_and_no_dead_time() {
+    let good = with_neighbours(Neighbours::Eight);
+    let refused = |settings: &Settings| {
+        let addresses = [PixelAddress::new(0)];
+        let engine = host_engine(settings, ARRAY, &addresses);
+        engine.map(|_| ()).map_err(|error| format!("{error:#}"))
+    };
+    assert_eq!(refused(&good), Ok(()));
+    let paper = Settings {
+        rule: rules()[0],
+        ..good.clone()
+    };
+    let reason = refused(&paper).unwrap_err();
+    assert!(reason.contains("is for"), "{reason}");
+    let dead = Settings {
+        dead_time: 128,
+        ..good
+    };
+    assert!(
+        refused(&dead)
+            .unwrap_err()
+            .contains("cannot be used with a dead time")
+    );
 }

@@ -117,6 +117,7 @@ fn configuration() -> Configuration {
         pixels: 9,
         columns: 3,
         binning: None,
+        neighbours: None,
         tracking: true,
         echoes: EchoNumber::LAST,
         echo_guard_bins: 6,

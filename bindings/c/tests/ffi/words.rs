@@ -106,7 +106,7 @@ fn an_event_that_does_not_fit_a_word_is_refused() {
         |event| event.offset_q8 = 512,
         |event| event.peak_count = 1 << 24,
         |event| event.background = 1 << 24,
-        |event| event.flags = 32,
+        |event| event.flags = 64,
     ];
     let good = dtof_event_t {
         echo: 1,

@@ -4,6 +4,7 @@
 
 use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::fixed::types::U4F12;
+use dtof_core::neighbours::NeighbourRule;
 use dtof_core::{
     Array, AsyncPixel, BlockLevel, Count, EchoNumber, Histogram, LaserCycle, Look, PixelAddress,
     PixelConfig, RangeGate, Statistics, WindowRule,
@@ -74,6 +75,8 @@ impl Features {
 #[derive(Clone)]
 pub struct Further {
     pub pixel: AsyncPixel<BINS>,
+    neighbour: AsyncPixel<BINS>,
+    rule: NeighbourRule,
     blocks: [Block<BINS>; 3],
     link: BlockLink,
     /// A window of 3 bins, X = 4.
@@ -87,10 +90,12 @@ pub struct Further {
 
 impl Further {
     pub fn new() -> Option<Self> {
-        let binning = Binning::new(Array::new(1, 1)?, BlockLevel::MAX)?;
+        let binning = Self::binning()?;
         let mut blocks = binning.blocks().map(Block::new);
         Some(Self {
             pixel: AsyncPixel::new(PixelAddress::new(7)),
+            neighbour: AsyncPixel::new(PixelAddress::new(8)),
+            rule: NeighbourRule::new(&Self::window_rule()?),
             blocks: [blocks.next()?, blocks.next()?, blocks.next()?],
             link: binning.link_of(PixelAddress::new(0)),
             config: Self::config(Features::NONE)?,
@@ -101,8 +106,16 @@ impl Further {
         })
     }
 
+    fn binning() -> Option<Binning> {
+        Binning::new(Array::new(1, 1)?, BlockLevel::MAX)
+    }
+
+    fn window_rule() -> Option<WindowRule> {
+        WindowRule::new(3, const { U4F12::lit("4.4") }, Count::saturating(5)).ok()
+    }
+
     fn config(features: Features) -> Option<PixelConfig<BINS, WindowRule>> {
-        let rule = WindowRule::new(3, const { U4F12::lit("4.4") }, Count::saturating(5)).ok()?;
+        let rule = Self::window_rule()?;
         let tracking = rule.tracking(&RangeGate::<BINS>::full());
         let config = PixelConfig::with_rule(rule)
             .x(X)
@@ -117,9 +130,16 @@ impl Further {
 
     /// An empty pixel and empty blocks, of which so many levels are fed.
     pub fn empty(&mut self, features: Features, levels: usize) -> Option<()> {
-        let codes = self.codes;
-        *self = Self::new()?;
-        self.codes = codes;
+        // In place: a second one would take much of the stack.
+        self.pixel = AsyncPixel::new(self.pixel.address());
+        self.neighbour = AsyncPixel::new(self.neighbour.address());
+        let binning = Self::binning()?;
+        for (block, place) in self.blocks.iter_mut().zip(binning.blocks()) {
+            *block = Block::new(place);
+        }
+        self.link = binning.link_of(PixelAddress::new(0));
+        self.statistics = Statistics::default();
+        self.histogram.clear();
         self.config = Self::config(features)?;
         self.link.tick(levels == 0);
         let feeding = self.blocks.iter_mut().take(levels.saturating_sub(1));
@@ -155,6 +175,11 @@ impl Further {
             count_in_blocks(&mut self.blocks, &self.link, &self.config, code);
         }
         self.pass(0..CYCLES - 1);
+    }
+
+    /// The photons of a neighbour.
+    pub fn neighbours(&mut self) {
+        self.neighbour.count_batch(&self.config, &self.codes);
     }
 
     /// The first look, whose event the link takes. Whether there was one.
@@ -231,6 +256,24 @@ pub extern "C" fn count(further: &mut Further, index: u32) -> u32 {
 
 pub extern "C" fn look(further: &mut Further, cycle: u32) -> u32 {
     further.end_laser_cycle(cycle) as u32
+}
+
+/// A look in steps, with the pixel that has the photons of another exposure as each of 8 neighbours.
+pub extern "C" fn look_with_neighbours(further: &mut Further, cycle: u32) -> u32 {
+    let Further {
+        pixel,
+        neighbour,
+        config,
+        rule,
+        statistics,
+        ..
+    } = further;
+    let last = LaserCycle::new(cycle.into());
+    pixel.begin_look(config, statistics, 1);
+    if let Some(detection) = pixel.decide(config, rule, core::iter::repeat_n(&*neighbour, 8)) {
+        pixel.keep_detection(last, &detection);
+    }
+    pixel.end_look(config, statistics, last, |_| ()) as u32
 }
 
 pub extern "C" fn look_of_block(further: &mut Further, cycle: u32) -> u32 {

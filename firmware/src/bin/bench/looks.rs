@@ -4,7 +4,7 @@
 use dtof_core::Look;
 
 use crate::counter::{Counter, Operation};
-use crate::further::{Features, Further, count, echoes, look, look_of_block};
+use crate::further::{Features, Further, count, echoes, look, look_of_block, look_with_neighbours};
 use crate::report;
 use crate::scene::{CYCLES, EXPOSURES, PHOTONS, State};
 
@@ -54,6 +54,19 @@ fn first<const TARGETS: u8>(
     further.photons(state, number, TARGETS);
     further.empty(features, 1)?;
     further.until_first_look();
+    Some(())
+}
+
+/// The same without a target, beside neighbours with another exposure.
+fn among_neighbours(
+    further: &mut Further,
+    state: &mut State,
+    number: u32,
+    features: Features,
+) -> Option<()> {
+    first::<0>(further, state, number, features)?;
+    further.photons(state, number + EXPOSURES, 0);
+    further.neighbours();
     Some(())
 }
 
@@ -202,7 +215,14 @@ const BOTH: Features = Features {
     ..ECHOES
 };
 
-const ROWS: [Row; 19] = [
+const fn of_neighbours(variant: &'static str, gives: Look) -> Row {
+    Row {
+        way: look_with_neighbours,
+        ..row(variant, Features::NONE, among_neighbours, gives)
+    }
+}
+
+const ROWS: [Row; 21] = [
     row(
         "look; window of 3; no event",
         PLAIN,
@@ -222,6 +242,8 @@ const ROWS: [Row; 19] = [
         after_event::<1>,
         Look::Event,
     ),
+    of_neighbours("look; 8 neighbours; no event", Look::NoPeak),
+    of_neighbours("look; 8 neighbours; confirmed", Look::Event),
     row(
         "look; two echoes; no event",
         ECHOES,

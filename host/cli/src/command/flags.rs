@@ -222,6 +222,8 @@ flags! {
         blocks, at level 1 of 2x2 pixels, at 2 of 4x4 and at 3 of 8x8 [default: 0]";
     patience Text("N") => "Adaptive binning: laser cycles without an event after which a pixel also counts \
         in its block [default: 64]";
+    neighbours Text("N") => "Window rule: the 4 or 8 pixels around a pixel confirm what is not enough by itself. \
+        For arrays, without --binning [default: 0]";
     tracking Optional("YES") => "Window rule: expect the next event of a pixel near its last, with a lower \
         threshold there and a higher one elsewhere";
     echoes Text("N") => "Most echoes of a pixel in an exposure, 1 to 4. With 2 or more the exposure goes \

@@ -8,6 +8,7 @@ mod compare;
 mod dead_time;
 mod device;
 mod export;
+mod neighbours;
 mod once_per_bin;
 mod replay;
 mod saving;

@@ -3,8 +3,8 @@
 use anyhow::{Result, bail, ensure};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
-    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, EchoNumber, PaperRule, WindowRule,
-    WindowWidthError,
+    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, EchoNumber, Neighbours, PaperRule,
+    WindowRule, WindowWidthError,
 };
 use dtof_link::AdaptiveBinning;
 use serde::Serialize;
@@ -50,6 +50,8 @@ pub struct DetectionSettings {
     pub binning: Option<u8>,
     /// Laser cycles without an event after which a pixel counts in its block, at least 1 [default: 64]
     pub patience: Option<u16>,
+    /// Window rule: neighbours of a pixel that confirm what is not enough by itself, 0, 4 or 8 [default: 0]
+    pub neighbours: Option<u8>,
     /// Window rule: a lower threshold near the last event, and a higher one elsewhere
     pub tracking: Option<bool>,
     /// Most echoes in an exposure, 1 to 4 [default: 1]
@@ -101,6 +103,7 @@ section! {
     x = integer(0..=u16::MAX), "laser cycles between looks";
     binning = integer(0..=BlockLevel::MAX.raw()), "levels of blocks";
     patience = integer(1..=u16::MAX), "laser cycles until a silent pixel counts in its block";
+    neighbours = neighbours, "pixels around a pixel that confirm it";
     tracking = boolean, "expect the next event near the last";
     echoes = integer(1..=EchoNumber::LAST.raw()), "of an exposure";
     echo_wait = integer(2..=u8::MAX - 1), "times the laser cycles of the last echo";
@@ -118,6 +121,7 @@ impl DetectionSettings {
                 window: None,
                 z: None,
                 false_alarm: None,
+                neighbours: None,
                 tracking: None,
                 ..other
             };
@@ -147,6 +151,7 @@ impl DetectionSettings {
                 ("window", self.window.is_some()),
                 ("z", self.z.is_some()),
                 ("false_alarm", self.false_alarm.is_some()),
+                ("neighbours", self.neighbours.unwrap_or(0) > 0),
                 ("tracking", self.tracking == Some(true)),
             ];
             if let Some((key, _)) = of_window.iter().find(|option| option.1) {
@@ -204,6 +209,19 @@ impl DetectionSettings {
         }))
     }
 
+    /// The neighbours that confirm, if any do.
+    ///
+    /// # Errors
+    /// Fails if there are blocks, too.
+    pub(super) fn confirming(&self) -> Result<Option<Neighbours>> {
+        let neighbours = self.neighbours.and_then(Neighbours::new);
+        ensure!(
+            neighbours.is_none() || self.levels() == BlockLevel::PIXEL,
+            Refused::new("neighbours", "cannot be used with `binning`")
+        );
+        Ok(neighbours)
+    }
+
     /// The last echo of an exposure, and how long a pixel waits for the next.
     ///
     /// # Errors
@@ -225,6 +243,13 @@ impl DetectionSettings {
 pub fn share(text: &str) -> Result<f64, String> {
     let share = real(text).filter(|&share| share > 0.0 && share <= 0.1);
     share.ok_or("must be a number above 0, at most 0.1".to_owned())
+}
+
+/// Reads a number of neighbours.
+fn neighbours(text: &str) -> Result<u8, String> {
+    let number = integer(0..=8)(text).ok();
+    let number = number.filter(|&number| number == 0 || Neighbours::new(number).is_some());
+    number.ok_or("must be 0, 4 or 8".to_owned())
 }
 
 /// Reads `BEFORE,AFTER`: the half widths of the depth window.

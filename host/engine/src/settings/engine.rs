@@ -2,9 +2,10 @@
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
+use dtof_core::neighbours::NeighbourRule;
 use dtof_core::{
     AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, DetectionRule, EchoNumber,
-    GateError, PaperRule, PixelConfig, PixelConfigError, RangeGate, RangeScale,
+    GateError, Neighbours, PaperRule, PixelConfig, PixelConfigError, RangeGate, RangeScale,
 };
 pub use dtof_link::AdaptiveBinning;
 
@@ -43,6 +44,9 @@ pub struct Settings {
     pub x: u16,
     /// Blocks of pixels that decide together.
     pub binning: Option<AdaptiveBinning>,
+    /// The pixels around a pixel that confirm what is not enough by itself, if any. Needs the window rule;
+    /// not used with [`Self::frame`].
+    pub neighbours: Option<Neighbours>,
     /// Whether pixels expect their next event where the last was.
     pub tracking: bool,
     /// The last echo that a pixel reports in an exposure.
@@ -87,6 +91,7 @@ impl Settings {
             l2: DEFAULT_L2,
             x: 10,
             binning: None,
+            neighbours: None,
             tracking: false,
             echoes: EchoNumber::FIRST,
             echo_wait: None,
@@ -105,7 +110,16 @@ impl Settings {
     /// # Errors
     /// Fails if the settings break a constraint.
     pub fn config<const BINS: usize>(&self) -> Result<PixelConfig<BINS, AnyRule>> {
-        self.config_of(self.rule)
+        self.config_of(self.own_rule())
+    }
+
+    /// The rule by which a pixel alone decides. With neighbours it has half of the false alarms.
+    #[must_use]
+    pub fn own_rule(&self) -> AnyRule {
+        match (self.neighbours, self.rule) {
+            (Some(_), AnyRule::Window(rule)) => (*NeighbourRule::new(&rule).own()).into(),
+            (_, rule) => rule,
+        }
     }
 
     /// The configuration of blocks of pixels.

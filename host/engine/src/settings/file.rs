@@ -389,7 +389,13 @@ rebin = 2
         assert_eq!(SettingsFile::parse(&text).unwrap(), file, "{text}");
         assert!(text.contains("sigma_bins = 0.8 "), "{text}");
         // Each key is written with its comment, except those of other rules and choices.
-        let others = ["alpha", "false_alarm", "calibration", "photons_per_cycle"];
+        let others = [
+            "alpha",
+            "false_alarm",
+            "neighbours",
+            "calibration",
+            "photons_per_cycle",
+        ];
         for (_, keys, comments) in SECTIONS {
             for (key, comment) in keys.iter().zip(comments) {
                 let line = text

@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::paper::Threshold;
 use dtof_core::rule::{HIGHEST_Z, z_for_levels};
-use dtof_core::{AnyRule, EchoNumber, RangeGate};
+use dtof_core::{AnyRule, EchoNumber, Neighbours, RangeGate};
 use dtof_theory::tune::window::one_in;
 
 use super::engine::{DEFAULT_L2, Settings, no_gate};
@@ -51,6 +51,17 @@ impl SettingsFile {
         };
         let (echoes, echo_wait) = detection.several()?;
         let dead_time = self.dead_time(bins)?;
+        let neighbours = detection.confirming()?;
+        let is_frame = self.run.frame.is_some();
+        if neighbours.is_some() && dead_time > 0 && !is_frame {
+            let reason = match sensor.dead_time {
+                Some(_) => "cannot be used with `dead_time`",
+                None => {
+                    "cannot be used with the dead time of the sensor; `dead_time` 0 leaves it out"
+                }
+            };
+            return Err(Refused::new("neighbours", reason).into());
+        }
         let requested = (sensor.dither_bins, sensor.dither_seed);
         let (dither_bins, dither_seed) = self
             .dither_of_laser
@@ -79,6 +90,7 @@ impl SettingsFile {
             l2,
             x,
             binning: detection.blocks()?,
+            neighbours,
             tracking: detection.tracking.unwrap_or(false),
             echoes,
             echo_wait,
@@ -200,6 +212,7 @@ impl DetectionSettings {
             x: Some(settings.x),
             binning: binning.map(|binning| binning.levels.raw()),
             patience: binning.map(|binning| binning.patience),
+            neighbours: settings.neighbours.map(Neighbours::raw),
             tracking: settings.tracking.then_some(true),
             echoes: several.then(|| settings.echoes.raw()),
             echo_wait: settings.echo_wait.filter(|_| several),

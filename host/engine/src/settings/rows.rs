@@ -90,7 +90,7 @@ impl Settings {
         self.frame.map_or((l1 / x + 1) * x, u64::from)
     }
 
-    /// Rule, or frame, estimator, and dead time if there is one.
+    /// Rule, or frame, estimator, and neighbours and dead time if there are any.
     #[must_use]
     pub fn detection_rows(&self) -> Vec<Row> {
         let decision = match self.frame {
@@ -112,6 +112,10 @@ impl Settings {
             }
         };
         let mut rows = vec![decision, ("depth".to_owned(), depth)];
+        if let Some(neighbours) = self.neighbours.filter(|_| self.frame.is_none()) {
+            let text = format!("{} confirm what one pixel is not sure of", neighbours.raw());
+            rows.push(("neighbours".to_owned(), text));
+        }
         if self.dead_time > 0 && self.frame.is_none() {
             let bins = self.dead_time;
             let text = match usize::from(bins) >= self.bins {

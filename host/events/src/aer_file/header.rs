@@ -8,6 +8,8 @@ use super::Event;
 
 /// The first bytes of an AER file.
 pub const MAGIC: &str = "DTOF-AER";
+/// The version whose words lack the flag of confirmed events.
+const WITHOUT_CONFIRMED: u16 = 4;
 /// The header without the settings that may follow.
 pub(super) const HEADER_BYTES: u16 = 64;
 
@@ -56,8 +58,8 @@ impl Header {
         ensure!(bytes[..8] == *MAGIC.as_bytes(), "not an AER file");
         let version = u16_at(8);
         ensure!(
-            version == AER_VERSION,
-            "AER version {version}; this program reads {AER_VERSION}"
+            (WITHOUT_CONFIRMED..=AER_VERSION).contains(&version),
+            "AER version {version}; this program reads {WITHOUT_CONFIRMED} to {AER_VERSION}"
         );
         ensure!(
             header_length(bytes).is_some() && bytes[48..].iter().all(|&byte| byte == 0),
@@ -107,4 +109,27 @@ impl Header {
 pub(super) fn header_length(bytes: &[u8; HEADER_BYTES as usize]) -> Option<u16> {
     let length = u16::from_le_bytes([bytes[10], bytes[11]]);
     (length >= HEADER_BYTES && length.is_multiple_of(16)).then_some(length)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_header_of_version_4_reads_as_one_of_version_5() {
+        let header = Header {
+            bins: 128,
+            array: Array::new(64, 32).unwrap(),
+            bin_width_ps: U16F16::lit("250"),
+            offset_mm: I24F8::lit("-12.5"),
+            laser_millihertz: 7,
+            start_us: 9,
+        };
+        for version in 0..=u8::MAX {
+            let mut bytes = header.to_bytes();
+            bytes[8] = version;
+            let read = Header::from_bytes(&bytes).ok();
+            assert_eq!(read, [4, 5].contains(&version).then_some(header));
+        }
+    }
 }

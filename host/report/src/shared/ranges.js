@@ -1,6 +1,6 @@
 // The events of a pixel: their ranges over time, and a table of them.
 
-const FLAGS = ["saturated", "clipped", "deferred", "pile-up", "tail"];
+const FLAGS = ["saturated", "clipped", "deferred", "pile-up", "tail", "confirmed"];
 
 /** The lowest and the highest range of events, with some room. */
 function spanOfRanges(events) {

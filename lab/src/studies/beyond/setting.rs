@@ -89,6 +89,7 @@ impl Setting {
                 levels: self.levels,
                 patience: self.patience,
             }),
+            neighbours: None,
             tracking: self.tracking,
             echoes: EchoNumber::FIRST,
             echo_wait: None,

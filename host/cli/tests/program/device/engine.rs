@@ -9,7 +9,9 @@ use std::time::Duration;
 use crate::common::assert_contains;
 use crate::device::{client, listen, serve};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{Array, BlockLevel, Count, DepthEvent, EchoNumber, PixelAddress, WindowRule};
+use dtof_core::{
+    Array, BlockLevel, Count, DepthEvent, EchoNumber, Flags, Neighbours, PixelAddress, WindowRule,
+};
 use dtof_device::{Client, DeviceEngine};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
@@ -180,6 +182,24 @@ fn dead_times_and_photons_once_per_bin_are_the_same_on_a_device() {
     };
     let once = same_events(&once, 1_000, Duration::ZERO, 100_000);
     assert!(every != once);
+}
+
+#[test]
+fn neighbours_confirm_alike_on_a_device() {
+    let all = Settings {
+        binning: None,
+        ..with_all()
+    };
+    let alone = same_events(&all, 1_000, Duration::ZERO, 100_000);
+    for neighbours in [Neighbours::Four, Neighbours::Eight] {
+        let settings = Settings {
+            neighbours: Some(neighbours),
+            ..all.clone()
+        };
+        let events = same_events(&settings, 1_000, Duration::ZERO, 100_000);
+        let is_confirmed = |event: &DepthEvent| event.flags.contains(Flags::CONFIRMED);
+        assert!(events.iter().any(is_confirmed) && !alone.iter().any(is_confirmed));
+    }
 }
 
 #[test]

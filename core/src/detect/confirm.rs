@@ -1,0 +1,269 @@
+//! Neighbouring pixels confirm a window that is promising, but not enough by itself.
+//!
+//! Most surfaces are larger than a pixel. So a pixel whose best window is only promising adds up the
+//! same window of its neighbours. Let the pixels together have `T` photons, `S` of them in that window. Under a
+//! flat background each photon lies in the window with the same probability, whatever the pixel and however long its
+//! exposure. So `S` and `T` are compared as those of one pixel by the [`WindowRule`]: the neighbours'
+//! backgrounds and exposures may differ.
+//!
+//! | step | condition |
+//! |---|---|
+//! | the pixel alone | a detection of the window rule with `z₁` |
+//! | promising | its window with the most photons has at least two and exceeds the background by 2 standard deviations |
+//! | confirmed | the window of all pixels together has the minimum of photons, and exceeds `z₂` |
+//!
+//! `z₁` and `z₂` each have half of the false alarms of the rule's `z`. For `z₁` that is twice as many
+//! trials. The sum contains the photons that made the pixel promising, so `z₂` depends on their share. With
+//! `r² = T₁/T`, the share of the pixel's own photons, both excesses are normally distributed
+//! with the correlation `r`, and
+//!
+//! ```text
+//! P(z₁ > 2 and z > z₂) = ∫ φ(x) Q((z₂ - r·x) / √(1 - r²)) dx   from 2 on
+//! ```
+//!
+//! is one in so many trials. With a share of half or more the neighbours hardly say anything, and `z₂` is `z₁`.
+//! Only one window is tried in a look, so that confirmed false alarms are fewer than their half:
+//! `core/tests/neighbours/false_alarms.rs` has the rates.
+//!
+//! The depth is that of the photons of all these pixels.
+
+use core::ops::RangeInclusive;
+
+use fixed::types::U4F12;
+
+use super::decision::{Detection, detection_at, rounded};
+use super::window::{WindowRule, highest_sum, stands_clear};
+use super::window_z::{ONE, trials_of, twice_the_trials};
+use crate::depth::DepthEstimator;
+use crate::flags::Flags;
+use crate::histogram::counter::{Count16, CounterWidth};
+use crate::histogram::excluded::ExcludedBins;
+use crate::histogram::gate::RangeGate;
+use crate::histogram::{Histogram, Peak, mean};
+use crate::units::{BinIndex, Count};
+
+/// The window rule for a pixel and its neighbours.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct NeighbourRule {
+    own: WindowRule,
+    /// z₂ in 1/4096, for own shares of the photons of 1/16, 2/16, … 8/16.
+    z: [u16; SHARES],
+}
+
+/// The most photons in a window of a pixel.
+struct Promising {
+    /// Where the windows begin that were looked at.
+    starts: RangeInclusive<u16>,
+    photons: u32,
+    /// Bins that are not excluded.
+    bins: u32,
+}
+
+/// What a neighbour contributes.
+pub(crate) type Neighbour<'a, const BINS: usize, W> = (&'a Histogram<BINS, W>, &'a ExcludedBins);
+
+const SHARES: usize = 8;
+/// 2 standard deviations, in 1/4096.
+const PROMISING: u16 = 2 << 12;
+/// If the highest bin has at most so many photons, it often has them by chance, and all windows are looked
+/// at; otherwise those that contain it.
+const FEW: u32 = 3;
+/// The bins of as many windows in a row as have a bin in common, of the widest.
+const MOST_BINS: usize = 2 * WindowRule::MAX_WIDTH as usize - 1;
+/// The bins to either side of a peak that its depth may need.
+const BESIDE: u16 = 6;
+
+/// z₂ in 1/4096, at least 2, for 2⁶, 2⁸, … trials and own shares of 1/16 to 8/16.
+const Z: [[u16; SHARES]; 15] = [
+    [8192, 8192, 8192, 8192, 8192, 8192, 8192, 8192],
+    [8192, 8192, 8192, 8283, 8731, 9119, 9460, 9760],
+    [9270, 10075, 10642, 11081, 11436, 11728, 11971, 12172],
+    [11589, 12329, 12830, 13203, 13492, 13718, 13896, 14032],
+    [13519, 14206, 14654, 14975, 15213, 15390, 15519, 15611],
+    [15204, 15846, 16249, 16527, 16723, 16861, 16955, 17016],
+    [16716, 17318, 17683, 17924, 18086, 18193, 18261, 18300],
+    [18099, 18665, 18996, 19206, 19339, 19422, 19470, 19494],
+    [19381, 19914, 20214, 20397, 20507, 20570, 20603, 20618],
+    [20579, 21083, 21356, 21514, 21604, 21652, 21675, 21684],
+    [21710, 22185, 22434, 22571, 22645, 22680, 22696, 22701],
+    [22782, 23232, 23458, 23577, 23636, 23663, 23673, 23676],
+    [23803, 24230, 24436, 24538, 24586, 24606, 24612, 24614],
+    [24782, 25185, 25373, 25461, 25500, 25514, 25518, 25519],
+    [25721, 26104, 26274, 26350, 26381, 26391, 26394, 26394],
+];
+
+impl NeighbourRule {
+    /// The rule for pixels and their neighbours that together have the false alarms of `rule`.
+    #[must_use]
+    pub fn new(rule: &WindowRule) -> Self {
+        let own = rule.with_z(twice_the_trials(rule.z()));
+        let above = trials_of(own.z()).saturating_sub(6 * ONE);
+        let (index, part) = ((above >> 9) as usize, above & 511);
+        let z = match Z.get(index..) {
+            Some(&[low, high, ..]) => {
+                let mut z = low;
+                for (z, high) in z.iter_mut().zip(high) {
+                    let rise = (u32::from(high - *z) * part) >> 9;
+                    *z = z.saturating_add(u16::try_from(rise).unwrap_or(0));
+                }
+                z
+            }
+            _ => Z.last().copied().unwrap_or([u16::MAX; SHARES]),
+        };
+        Self { own, z }
+    }
+
+    /// The rule of a pixel's own decisions, for its configuration.
+    #[must_use]
+    pub const fn own(&self) -> &WindowRule {
+        &self.own
+    }
+
+    /// z₂ if the pixel has `own` of `all` photons.
+    #[must_use]
+    pub fn z(&self, own: u32, all: u32) -> U4F12 {
+        let sixteenths = (16 * u64::from(own)).div_ceil(u64::from(all.max(1)));
+        let index = usize::try_from(sixteenths)
+            .unwrap_or(usize::MAX)
+            .saturating_sub(1);
+        self.z
+            .get(index)
+            .map_or(self.own.z(), |&z| U4F12::from_bits(z))
+    }
+
+    /// The pixel's window with the most photons, if it is promising.
+    #[inline(always)]
+    fn promising<const BINS: usize, W: CounterWidth>(
+        &self,
+        histogram: &Histogram<BINS, W>,
+        gate: &RangeGate<BINS>,
+        excluded: &ExcludedBins,
+    ) -> Option<Promising> {
+        let peak = histogram.peak();
+        if !gate.contains(peak.bin.raw()) {
+            return None;
+        }
+        let width = self.own.width();
+        let starts = if peak.count.raw() <= FEW {
+            gate.first()..=gate.last() + 1 - u16::from(width)
+        } else {
+            self.own.starts_about(gate, peak.bin)
+        };
+        let photons = highest_sum(histogram, starts.clone(), width);
+        if photons < 2 {
+            return None;
+        }
+        let bins = excluded.bins_left(gate)?;
+        let is_promising = exceeds::<W>(photons, histogram.total(), width, bins, PROMISING);
+        is_promising.then_some(Promising {
+            starts,
+            photons,
+            bins,
+        })
+    }
+
+    /// The detection in a promising window that the neighbours confirm.
+    #[inline(always)]
+    pub(crate) fn confirm<'a, const BINS: usize, W: CounterWidth + 'a>(
+        &self,
+        own: Neighbour<'a, BINS, W>,
+        gate: &RangeGate<BINS>,
+        estimator: &DepthEstimator,
+        neighbours: impl Iterator<Item = Neighbour<'a, BINS, W>> + Clone,
+    ) -> Option<Detection> {
+        let (histogram, excluded) = own;
+        let promising = self.promising(histogram, gate, excluded)?;
+        self.sum_up(own, promising, gate, estimator, neighbours)
+    }
+
+    /// The sum of a promising window.
+    #[inline(never)]
+    fn sum_up<'a, const BINS: usize, W: CounterWidth + 'a>(
+        &self,
+        own: Neighbour<'a, BINS, W>,
+        Promising {
+            starts,
+            photons: promising,
+            bins: own_bins,
+        }: Promising,
+        gate: &RangeGate<BINS>,
+        estimator: &DepthEstimator,
+        neighbours: impl Iterator<Item = Neighbour<'a, BINS, W>> + Clone,
+    ) -> Option<Detection> {
+        let (histogram, excluded) = own;
+        let width = u16::from(self.own.width());
+        let gated_starts = gate.first()..=gate.last() + 1 - width;
+        // With few photons, several windows in a row often have as many. The neighbours choose.
+        let has_as_many = |first: &u16| {
+            gated_starts.contains(first) && histogram.photons_of(*first..first + width) == promising
+        };
+        let first = starts.clone().find(has_as_many)?;
+        let others = (first + 1..first + width).take_while(has_as_many).count();
+        let end = first + width + u16::try_from(others).unwrap_or(0);
+        // Those with some of these bins left out, because their echo was reported, do not know.
+        let neighbours = neighbours.filter_map(|(other, excluded)| {
+            let knows = !(first..end).any(|bin| excluded.contains(bin));
+            Some((other, excluded.bins_left(gate).filter(|_| knows)?))
+        });
+        let (mut total, mut bins) = (0u32, own_bins);
+        let mut sums = [0u32; MOST_BINS];
+        let all = core::iter::once((histogram, own_bins)).chain(neighbours.clone());
+        for (one, left) in all.clone() {
+            total = total.saturating_add(one.total());
+            // The fewest bins expect the most photons.
+            bins = bins.min(left);
+            let counts = one.counts().get(first.into()..end.into());
+            for (sum, &count) in sums.iter_mut().zip(counts.unwrap_or_default()) {
+                *sum = sum.saturating_add(count.into());
+            }
+        }
+        let (mut start, mut photons) = (first, 0);
+        for place in first..=end - width {
+            let from = usize::from(place - first);
+            let window = sums.iter().skip(from).take(width.into());
+            let sum = window.fold(0u32, |sum, &count| sum.saturating_add(count));
+            if sum > photons {
+                (start, photons) = (place, sum);
+            }
+        }
+        let z = self.z(histogram.total(), total).to_bits();
+        if photons < self.own.minimum_count().raw()
+            || !exceeds::<W>(photons, total, self.own.width(), bins, z)
+        {
+            return None;
+        }
+        let end = start + width;
+        let near =
+            start.saturating_sub(BESIDE).max(gate.first())..(end + BESIDE).min(gate.last() + 1);
+        let mut sum = Histogram::<BINS, Count16>::new();
+        all.for_each(|(one, _)| sum.add_bins(one, near.clone()));
+        let mut peak = Peak::default();
+        for bin in start..end {
+            let count = Count::saturating(sum.count(bin.into()).unwrap_or(0));
+            if count > peak.count {
+                peak = Peak {
+                    bin: BinIndex::saturating(bin),
+                    count,
+                };
+            }
+        }
+        let outside = mean(total.saturating_sub(photons), bins - u32::from(width))?;
+        let mut detection = detection_at(&sum, gate, peak, outside, estimator, excluded);
+        detection.depth.flags |= Flags::CONFIRMED;
+        detection.peak.count = Count::saturating(promising);
+        let outside = histogram.total().wrapping_sub(promising);
+        detection.background = rounded(mean(outside, own_bins - u32::from(width))?);
+        Some(detection)
+    }
+}
+
+/// [`stands_clear`] for the photons of up to nine pixels.
+#[inline(never)]
+fn exceeds<W: CounterWidth>(inside: u32, total: u32, width: u8, bins: u32, z: u16) -> bool {
+    if W::BITS <= 10 {
+        stands_clear::<true>(inside, total, width.into(), bins, z)
+    } else {
+        stands_clear::<false>(inside, total, width.into(), bins, z)
+    }
+}

@@ -1,0 +1,147 @@
+//! Neighbouring pixels confirm what one pixel alone is not sure of.
+//!
+//! A dim pixel takes long to gather enough photons. Most of its neighbours see the same surface. So a
+//! pixel whose own photons are only promising adds up the same bins of its 4 or 8 neighbours,
+//! and reports if the sum stands clear of the background. The event is the pixel's own, at its place, with
+//! [`Flags::CONFIRMED`](crate::Flags::CONFIRMED). Photons cost nothing more, and there is no more memory.
+//! [`NeighbourRule`] says what is promising and what is enough.
+//!
+//! All pixels of an array look at the same time, and decide on the same photons: none clears its histogram
+//! before all have decided. A look has three steps, each for all pixels: [`AsyncPixel::begin_look`],
+//! [`AsyncPixel::decide`] and [`AsyncPixel::end_look`]. [`end_laser_cycles_of_array`] does them one after another;
+//! a program may run the pixels of a step on several threads.
+//!
+//! ```
+//! use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
+//! use dtof_core::fixed::types::U4F12;
+//! use dtof_core::{
+//!     Array, AsyncPixel, Count, Flags, LaserCycle, Neighbours, PixelAddress, PixelConfig, Statistics,
+//!     WindowRule,
+//! };
+//!
+//! let rule = WindowRule::new(3, const { U4F12::lit("4.47") }, Count::saturating(5))?;
+//! let neighbours = NeighbourConfig::new(Array::new(3, 3).unwrap(), Neighbours::Eight, &rule);
+//! let config = PixelConfig::<128, WindowRule>::with_rule(*neighbours.rule().own()).build()?;
+//! let mut pixels: Vec<AsyncPixel<128>> = (0..9).map(|pixel| AsyncPixel::new(PixelAddress::new(pixel))).collect();
+//! let mut statistics = Statistics::default();
+//!
+//! // Two photons a pixel of the same surface, and some background.
+//! for (pixel, background) in pixels.iter_mut().zip([3, 20, 35, 77, 90, 100, 101, 110, 120]) {
+//!     pixel.count_batch(&config, &[60, 61, background, 127 - background]);
+//! }
+//! for cycle in 0..44 {
+//!     let last = LaserCycle::new(cycle);
+//!     end_laser_cycles_of_array(&mut pixels, &config, &neighbours, &mut statistics, last, 1);
+//! }
+//! let event = pixels[4].take_event().unwrap();
+//! assert_eq!((event.pixel.raw(), event.peak_count.raw(), event.flags), (4, 2, Flags::CONFIRMED));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! What all pixels have in common is confirmed, too: crosstalk of a cover glass, a slope of pile-up, bins of different
+//! widths. Its significance triples with eight neighbours. Leave it out by a [gate](crate::RangeGate).
+//! Where the rule weighs a [dead time](crate::PixelConfigBuilder::dead_time) neighbours are not asked, and each pixel
+//! decides alone.
+//!
+//! Whole histograms and [blocks](crate::binning) do not ask neighbours.
+
+use crate::array::{Array, Neighbours};
+use crate::config::PixelConfig;
+pub use crate::detect::NeighbourRule;
+use crate::detect::{Detection, DetectionRule, WindowRule};
+use crate::histogram::counter::CounterWidth;
+use crate::pixel::{AsyncPixel, Look, unobserved};
+use crate::statistics::Statistics;
+use crate::units::{LaserCycle, PixelAddress};
+
+/// A place of an array: a pixel, or something with one, or without one because it is left out.
+pub trait ArrayPixel<const BINS: usize, W: CounterWidth> {
+    /// The pixel.
+    fn pixel(&self) -> Option<&AsyncPixel<BINS, W>>;
+    /// The pixel.
+    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS, W>>;
+}
+
+impl<const BINS: usize, W: CounterWidth> ArrayPixel<BINS, W> for AsyncPixel<BINS, W> {
+    fn pixel(&self) -> Option<&Self> {
+        Some(self)
+    }
+
+    fn pixel_mut(&mut self) -> Option<&mut Self> {
+        Some(self)
+    }
+}
+
+/// Which neighbours confirm, and by which rule.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub struct NeighbourConfig {
+    array: Array,
+    neighbours: Neighbours,
+    rule: NeighbourRule,
+}
+
+impl NeighbourConfig {
+    /// The pixels of `array` and their neighbours together have the false alarms of `rule`.
+    #[must_use]
+    pub fn new(array: Array, neighbours: Neighbours, rule: &WindowRule) -> Self {
+        Self {
+            array,
+            neighbours,
+            rule: NeighbourRule::new(rule),
+        }
+    }
+
+    /// The rule.
+    #[must_use]
+    pub const fn rule(&self) -> &NeighbourRule {
+        &self.rule
+    }
+
+    /// The second step of pixel `number` of `pixels`: see [`AsyncPixel::decide`].
+    #[inline]
+    #[must_use]
+    pub fn decide<const BINS: usize, W: CounterWidth, R: DetectionRule>(
+        &self,
+        pixels: &[impl ArrayPixel<BINS, W>],
+        number: usize,
+        config: &PixelConfig<BINS, R>,
+    ) -> Option<Detection> {
+        let pixel = pixels.get(number)?.pixel()?;
+        let address = PixelAddress::new(u16::try_from(number).ok()?);
+        let around = self.array.neighbours(address, self.neighbours);
+        let around = around.filter_map(|address| pixels.get(usize::from(address.raw()))?.pixel());
+        pixel.decide(config, &self.rule, around)
+    }
+}
+
+/// Ends `cycles` laser cycles at once for all pixels of an array, the last of which is `last`, as
+/// [`AsyncPixel::end_laser_cycles`] does for one. `pixels` are in the order of their addresses; `config`
+/// has the rule [`NeighbourRule::own`]. Returns whether one of them has a new event.
+pub fn end_laser_cycles_of_array<const BINS: usize, W: CounterWidth, R: DetectionRule>(
+    pixels: &mut [impl ArrayPixel<BINS, W>],
+    config: &PixelConfig<BINS, R>,
+    neighbours: &NeighbourConfig,
+    statistics: &mut Statistics,
+    last: LaserCycle,
+    cycles: u16,
+) -> bool {
+    let (mut decides, mut fired) = (false, false);
+    for pixel in pixels.iter_mut().filter_map(ArrayPixel::pixel_mut) {
+        decides |= pixel.begin_look(config, statistics, cycles);
+    }
+    if !decides {
+        return false;
+    }
+    for number in 0..pixels.len() {
+        let detection = neighbours.decide(pixels, number, config);
+        let pixel = pixels.get_mut(number).and_then(ArrayPixel::pixel_mut);
+        if let (Some(pixel), Some(detection)) = (pixel, detection) {
+            pixel.keep_detection(last, &detection);
+        }
+    }
+    for pixel in pixels.iter_mut().filter_map(ArrayPixel::pixel_mut) {
+        fired |= pixel.end_look(config, statistics, last, unobserved) == Look::Event;
+    }
+    fired
+}

@@ -1,0 +1,132 @@
+//! A look in three steps, so that all pixels of an array decide before one of them clears its
+//! histogram: [`crate::neighbours`].
+
+use super::AsyncPixel;
+use super::input::DecisionInput;
+use super::look::{Look, State};
+use crate::config::PixelConfig;
+use crate::detect::{Detection, DetectionRule, NeighbourRule};
+use crate::histogram::counter::CounterWidth;
+use crate::statistics::Statistics;
+use crate::units::LaserCycle;
+
+impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
+    /// The first step: ends `cycles` laser cycles. Returns whether this is a look that decides, after
+    /// X laser cycles or more and past L1.
+    #[inline]
+    pub fn begin_look<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        cycles: u16,
+    ) -> bool {
+        self.exposure = self.exposure.saturating_add(cycles);
+        self.since_look = self.since_look.saturating_add(cycles);
+        if self.since_look < config.x() {
+            return false;
+        }
+        self.since_look = 0;
+        if self.exposure <= config.l1() {
+            return false;
+        }
+        if self.state.contains(State::HAS_ECHO) && !self.weighs_dead_time(config) {
+            self.leave_out_excluded::<R, false>(config, statistics);
+        }
+        self.state.set(State::DECIDES);
+        true
+    }
+
+    /// The second step, once all neighbours have done the first: the detection, by the pixel's own photons or with
+    /// those of its `neighbours`. `None` if the first step was no look that decides, or the rule weighs a dead time.
+    #[must_use]
+    pub fn decide<'a, R: DetectionRule>(
+        &'a self,
+        config: &PixelConfig<BINS, R>,
+        rule: &NeighbourRule,
+        neighbours: impl Iterator<Item = &'a Self> + Clone,
+    ) -> Option<Detection>
+    where
+        W: 'a,
+    {
+        let (decides, waits) = (State::DECIDES, State::REQUESTING);
+        if !self.state.contains(decides)
+            || self.state.contains(waits)
+            || self.is_longest(config)
+            || self.weighs_dead_time(config)
+        {
+            return None;
+        }
+        let (histogram, excluded) = (&self.histogram, &self.excluded);
+        let alone = config.detect_further(histogram, self.expected(), excluded);
+        alone.or_else(|| {
+            let neighbours = neighbours.map(|other| (&other.histogram, &other.excluded));
+            let (gate, estimator) = (config.gate(), config.estimator());
+            rule.confirm((histogram, excluded), gate, estimator, neighbours)
+        })
+    }
+
+    /// Keeps what the second step gave in the slot, until the third. Does nothing where the second step gives
+    /// nothing: an event that waits is not lost.
+    #[inline]
+    pub fn keep_detection(&mut self, cycle: LaserCycle, detection: &Detection) {
+        let waits = self.state.contains(State::REQUESTING);
+        if self.state.contains(State::DECIDES) && !waits {
+            self.put(cycle, detection);
+            self.state.set(State::DETECTED);
+        }
+    }
+
+    /// The third step, once all neighbours have decided: reports, or does what else ends a look. Where the rule weighs
+    /// a dead time, the pixel decides here, alone. `cycle` is the last laser cycle, `observe` is as in
+    /// [`Self::end_laser_cycles_with`].
+    pub fn end_look<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        cycle: LaserCycle,
+        observe: impl FnOnce(&DecisionInput<'_, BINS, W>),
+    ) -> Look {
+        if !self.state.contains(State::DECIDES) {
+            return if self.since_look == 0 {
+                Look::TooEarly
+            } else {
+                Look::NotDue
+            };
+        }
+        let is_detected = self.state.contains(State::DETECTED);
+        self.state.clear(State::DECIDES);
+        self.state.clear(State::DETECTED);
+        if self.weighs_dead_time(config) {
+            return self.look_on::<R, true>(config, statistics, cycle, observe);
+        }
+        if is_detected {
+            observe(&DecisionInput {
+                histogram: &self.histogram,
+                expected: self.expected(),
+                excluded: self.excluded,
+                cycles: self.exposure.into(),
+            });
+            return self.report_slot(config, statistics);
+        }
+        if self.is_longest(config) {
+            return self.end(config, statistics);
+        }
+        if self.state.contains(State::REQUESTING) {
+            statistics.deferred += 1;
+            self.state.set(State::DEFERRED);
+            return Look::Deferred;
+        }
+        Look::NoPeak
+    }
+
+    /// Whether the exposure ends now without an event.
+    fn is_longest<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> bool {
+        let has_echo = self.state.contains(State::HAS_ECHO);
+        let longest = if has_echo {
+            self.longest_after_echo(config)
+        } else {
+            config.l2()
+        };
+        self.exposure >= longest
+    }
+}

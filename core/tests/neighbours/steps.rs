@@ -1,0 +1,309 @@
+//! What a look of an array does: edges, pixels that are left out, order, losses.
+
+use dtof_core::fixed::types::U4F12;
+use dtof_core::neighbours::{ArrayPixel, NeighbourConfig, end_laser_cycles_of_array};
+use dtof_core::{
+    Array, AsyncPixel, Count, Count10, DepthEvent, EchoNumber, Flags, LaserCycle, Look, Neighbours,
+    PixelAddress, PixelConfig, RangeGate, Statistics, WindowRule,
+};
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg64Mcg;
+
+type Config = PixelConfig<64, WindowRule>;
+
+fn rule() -> WindowRule {
+    WindowRule::new(3, U4F12::lit("4.2"), Count::saturating(4)).unwrap()
+}
+
+fn neighbours(columns: u32, rows: u32, number: Neighbours) -> NeighbourConfig {
+    NeighbourConfig::new(Array::new(columns, rows).unwrap(), number, &rule())
+}
+
+fn config(neighbours: &NeighbourConfig) -> Config {
+    PixelConfig::with_rule(*neighbours.rule().own())
+        .l1(8)
+        .l2(400)
+        .build()
+        .unwrap()
+}
+
+fn pixels(number: u16) -> Vec<AsyncPixel<64>> {
+    (0..number)
+        .map(|pixel| AsyncPixel::new(PixelAddress::new(pixel)))
+        .collect()
+}
+
+/// Ends 12 laser cycles, and returns the events.
+fn end(
+    pixels: &mut [impl ArrayPixel<64, Count10>],
+    config: &Config,
+    neighbours: &NeighbourConfig,
+    statistics: &mut Statistics,
+) -> Vec<DepthEvent> {
+    let last = LaserCycle::new(99);
+    let fired = end_laser_cycles_of_array(pixels, config, neighbours, statistics, last, 12);
+    let pixels = pixels.iter_mut().filter_map(ArrayPixel::pixel_mut);
+    let events: Vec<_> = pixels.filter_map(AsyncPixel::take_event).collect();
+    assert_eq!(fired, !events.is_empty());
+    events
+}
+
+/// A pixel with two photons in bin 30, and background in others.
+fn dim(pixel: &mut AsyncPixel<64>, config: &Config) {
+    pixel.count_batch(config, &[30, 30, 5, 50]);
+}
+
+/// Those of the neighbours that exist are asked, and no others.
+#[test]
+fn pixels_ask_the_neighbours_that_exist() {
+    for number in [Neighbours::Four, Neighbours::Eight] {
+        let rule = neighbours(5, 4, number);
+        let config = config(&rule);
+        for asking in 0..20u16 {
+            let (row, column) = (asking / 5, asking % 5);
+            for other in 0..20u16 {
+                let apart = [(other / 5).abs_diff(row), (other % 5).abs_diff(column)];
+                let is_neighbour = match number {
+                    Neighbours::Four => apart[0] + apart[1] == 1,
+                    Neighbours::Eight => apart[0].max(apart[1]) == 1,
+                };
+                let mut pixels = pixels(20);
+                dim(&mut pixels[usize::from(asking)], &config);
+                if other != asking {
+                    // Too few photons to ask, but enough to confirm.
+                    pixels[usize::from(other)]
+                        .count_batch(&config, &[30, 31, 30, 29, 30, 2, 60, 40, 13, 33, 44, 55]);
+                    pixels[usize::from(other)].begin_look(&config, &mut Statistics::default(), 0);
+                }
+                let mut statistics = Statistics::default();
+                let alone = config
+                    .detect(pixels[usize::from(other)].histogram())
+                    .is_some();
+                let events = end(&mut pixels, &config, &rule, &mut statistics);
+                let mine = events.iter().find(|event| event.pixel.raw() == asking);
+                assert_eq!(
+                    mine.is_some(),
+                    is_neighbour,
+                    "{number:?} {asking} {other} {alone}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn an_event_that_neighbours_confirm_is_the_pixels_own() {
+    let rule = neighbours(3, 3, Neighbours::Eight);
+    let config = config(&rule);
+    let mut pixels = pixels(9);
+    for pixel in &mut pixels {
+        dim(pixel, &config);
+    }
+    let mut statistics = Statistics::default();
+    let events = end(&mut pixels, &config, &rule, &mut statistics);
+    assert_eq!(events.len(), 9);
+    for (event, pixel) in events.iter().zip(0..) {
+        assert_eq!(event.pixel.raw(), pixel);
+        assert_eq!((event.exposure, event.cycle.raw()), (12, 99));
+        assert_eq!((event.peak_bin.raw(), event.offset.raw()), (30, 128));
+        // Two of four photons, so 2 in the 61 bins outside.
+        assert_eq!((event.peak_count.raw(), event.background.raw()), (2, 0));
+        assert_eq!(event.flags, Flags::CONFIRMED);
+    }
+    // Each pixel has started over.
+    assert!(pixels.iter().all(|pixel| pixel.histogram().total() == 0));
+    assert_eq!((statistics.events, statistics.photons()), (9, 36));
+    // One pixel alone is not enough.
+    let rule = neighbours(1, 1, Neighbours::Eight);
+    let mut pixels = self::pixels(1);
+    dim(&mut pixels[0], &config);
+    assert_eq!(end(&mut pixels, &config, &rule, &mut statistics), []);
+}
+
+/// The depth is that of all photons.
+#[test]
+fn the_depth_is_that_of_all_photons() {
+    let rule = neighbours(3, 1, Neighbours::Four);
+    let config = config(&rule);
+    let mut pixels = pixels(3);
+    pixels[1].count_batch(&config, &[30, 30, 5, 50]);
+    pixels[0].count_batch(&config, &[31, 31, 30, 7, 40]);
+    pixels[2].count_batch(&config, &[31, 31, 32, 9, 60]);
+    let events = end(&mut pixels, &config, &rule, &mut Statistics::default());
+    let event = events.iter().find(|event| event.pixel.raw() == 1).unwrap();
+    // Bins 30, 31 and 32 have 3, 4 and 1 photons.
+    assert_eq!((event.peak_bin.raw(), event.peak_count.raw()), (31, 2));
+    let middle = event.position().raw();
+    assert!((31 * 256..31 * 256 + 128).contains(&middle), "{middle}");
+}
+
+struct LeftOut(Option<AsyncPixel<64>>);
+
+impl ArrayPixel<64, Count10> for LeftOut {
+    fn pixel(&self) -> Option<&AsyncPixel<64>> {
+        self.0.as_ref()
+    }
+
+    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<64>> {
+        self.0.as_mut()
+    }
+}
+
+#[test]
+fn a_place_without_a_pixel_confirms_nothing() {
+    let rule = neighbours(3, 1, Neighbours::Eight);
+    let config = config(&rule);
+    for left_out in [None, Some(0)] {
+        let mut pixels: Vec<_> = pixels(3)
+            .into_iter()
+            .map(|pixel| LeftOut(Some(pixel)))
+            .collect();
+        for pixel in pixels.iter_mut().filter_map(ArrayPixel::pixel_mut) {
+            dim(pixel, &config);
+        }
+        if let Some(number) = left_out {
+            pixels[number] = LeftOut(None);
+        }
+        let events = end(&mut pixels, &config, &rule, &mut Statistics::default());
+        let confirmed: Vec<u16> = events.iter().map(|event| event.pixel.raw()).collect();
+        assert_eq!(confirmed, if left_out.is_some() { vec![] } else { vec![1] });
+    }
+}
+
+/// With a dead time that the rule weighs, each pixel decides alone, as it does without an array.
+#[test]
+fn a_dead_time_is_decided_alone() {
+    let rule = neighbours(3, 3, Neighbours::Eight);
+    let plain = config(&rule);
+    let config = plain.with_dead_time(5);
+    let mut pixels = pixels(9);
+    for pixel in &mut pixels {
+        dim(pixel, &config);
+    }
+    assert_eq!(
+        end(&mut pixels, &config, &rule, &mut Statistics::default()),
+        []
+    );
+    pixels[4].count_batch(&config, &[30; 6]);
+    let mut alone = pixels[4].clone();
+    let mut statistics = Statistics::default();
+    let look = alone.end_laser_cycles(&config, &mut statistics, LaserCycle::new(99), 12);
+    assert_eq!(look, Look::Event);
+    let events = end(&mut pixels, &config, &rule, &mut Statistics::default());
+    assert_eq!(events, [alone.take_event().unwrap()]);
+}
+
+/// Random photons: whatever order the pixels of a step come in, the events, pixels and counts are the same; every photon
+/// is counted; nothing is decided twice.
+#[test]
+fn order_does_not_matter_and_nothing_is_lost() {
+    let mut rng = Pcg64Mcg::seed_from_u64(7);
+    let (mut confirmed, mut deferred) = (0, 0);
+    for trial in 0..30 {
+        let number = [Neighbours::Four, Neighbours::Eight][trial % 2];
+        let rule = neighbours(6, 5, number);
+        let gate = RangeGate::new(trial as u16 % 7, 63 - trial as u16 % 5).unwrap();
+        let echoes = EchoNumber::new(1 + trial as u8 % 3).unwrap();
+        let config = PixelConfig::with_rule(*rule.rule().own())
+            .l1(8)
+            .l2(120)
+            .gate(gate)
+            .echoes(echoes, 3)
+            .tracking((trial % 4 == 3).then(|| rule.rule().own().tracking(&gate)))
+            .build()
+            .unwrap();
+        let (mut together, mut apart) = (pixels(30), pixels(30));
+        let (mut counts, mut others) = (Statistics::default(), Statistics::default());
+        let mut sent = 0;
+        for cycle in 0..600u64 {
+            for number in 0..30 {
+                let codes: Vec<u16> = (0..rng.next_u32() % 3)
+                    .map(|_| {
+                        let code = rng.next_u32();
+                        if code.is_multiple_of(9) {
+                            40 + (code >> 8) as u16 % 2
+                        } else {
+                            (code >> 8) as u16 % 66
+                        }
+                    })
+                    .collect();
+                sent += codes.len() as u64;
+                together[number].count_batch(&config, &codes);
+                apart[number].count_batch(&config, &codes);
+            }
+            let last = LaserCycle::new(cycle);
+            end_laser_cycles_of_array(&mut together, &config, &rule, &mut counts, last, 1);
+            for pixel in apart.iter_mut().rev() {
+                pixel.begin_look(&config, &mut others, 1);
+            }
+            let decide = |number: usize| rule.decide(&apart, number, &config);
+            let mut detections: Vec<_> = (0..30)
+                .rev()
+                .map(|number| (number, decide(number)))
+                .collect();
+            detections.rotate_left(11);
+            for (number, detection) in detections {
+                if let Some(detection) = detection {
+                    apart[number].keep_detection(last, &detection);
+                }
+                apart[number].end_look(&config, &mut others, last, |_| ());
+            }
+            // Some links are slow.
+            for number in 0..30 {
+                if !(number + cycle as usize / 40).is_multiple_of(3) {
+                    let event = together[number].take_event();
+                    assert_eq!(event, apart[number].take_event());
+                    confirmed += u32::from(
+                        event.is_some_and(|event| event.flags.contains(Flags::CONFIRMED)),
+                    );
+                }
+            }
+            assert_eq!(counts, others);
+        }
+        deferred += counts.deferred;
+        for pixel in &together {
+            pixel.add_photons_to(&mut counts);
+        }
+        assert_eq!(counts.photons(), sent);
+    }
+    assert!(confirmed > 500 && deferred > 500, "{confirmed} {deferred}");
+}
+
+/// A detection that is kept at the wrong time is no event, and none is lost by it.
+#[test]
+fn a_detection_is_kept_only_while_a_look_decides() {
+    let rule = neighbours(1, 1, Neighbours::Four);
+    let config = config(&rule);
+    let mut statistics = Statistics::default();
+    let mut pixel = AsyncPixel::<64>::new(PixelAddress::new(3));
+    pixel.count_batch(&config, &[20; 9]);
+    let detection = config.detect(pixel.histogram()).unwrap();
+    let (now, late) = (LaserCycle::new(5), LaserCycle::new(6));
+    pixel.keep_detection(now, &detection);
+    assert_eq!(
+        pixel.end_look(&config, &mut statistics, now, |_| ()),
+        Look::TooEarly
+    );
+    assert!(!pixel.begin_look(&config, &mut statistics, 3));
+    assert_eq!(
+        pixel.end_look(&config, &mut statistics, now, |_| ()),
+        Look::NotDue
+    );
+    assert!(pixel.begin_look(&config, &mut statistics, 9));
+    pixel.keep_detection(now, &detection);
+    assert_eq!(
+        pixel.end_look(&config, &mut statistics, now, |_| ()),
+        Look::Event
+    );
+    // It waits. The next one does not take its place.
+    pixel.count_batch(&config, &[40; 9]);
+    assert!(pixel.begin_look(&config, &mut statistics, 12));
+    let next = config.detect(pixel.histogram()).unwrap();
+    pixel.keep_detection(late, &next);
+    assert_eq!(
+        pixel.end_look(&config, &mut statistics, late, |_| ()),
+        Look::Deferred
+    );
+    let event = pixel.take_event().unwrap();
+    assert_eq!((event.cycle, event.peak_bin.raw()), (now, 20));
+}

@@ -1,0 +1,229 @@
+//! An array whose pixels confirm each other: [`dtof_core::neighbours`], on all threads.
+//!
+//! All pixels look at the same time. Each step of a look runs on all threads, and ends before the next begins, so that
+//! order and threads do not matter.
+
+use anyhow::{Result, ensure};
+use dtof_core::neighbours::{ArrayPixel, NeighbourConfig};
+use dtof_core::rule::DecisionInput;
+use dtof_core::{
+    AnyRule, Array, AsyncPixel, Count10, DepthEvent, Detection, LaserCycle, Neighbours,
+    PixelAddress, PixelConfig, Statistics,
+};
+use rayon::prelude::*;
+
+use super::Engine;
+use super::decisions::{Decision, LastDecision};
+use super::group::sort;
+use crate::settings::Settings;
+use dtof_options::Refused;
+use dtof_photons::source::{PixelPhotons, Slice};
+
+/// Pixels that are worth a thread.
+const PIXELS: usize = 256;
+
+/// A place of the array, without a pixel if it is left out.
+#[derive(Debug)]
+struct Place<const BINS: usize>(Option<Member<BINS>>);
+
+#[derive(Debug)]
+struct Member<const BINS: usize> {
+    /// Its index among the pixels of the source.
+    number: usize,
+    pixel: AsyncPixel<BINS>,
+    /// The next photon of the slice.
+    next: usize,
+    /// The last decision, if it is kept.
+    last: Option<Box<LastDecision<BINS>>>,
+}
+
+impl<const BINS: usize> ArrayPixel<BINS, Count10> for Place<BINS> {
+    fn pixel(&self) -> Option<&AsyncPixel<BINS>> {
+        self.0.as_ref().map(|member| &member.pixel)
+    }
+
+    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS>> {
+        self.0.as_mut().map(|member| &mut member.pixel)
+    }
+}
+
+/// The engine.
+#[derive(Debug)]
+pub struct NeighbourEngine<const BINS: usize> {
+    config: PixelConfig<BINS, AnyRule>,
+    neighbours: NeighbourConfig,
+    /// In the order of their addresses.
+    places: Vec<Place<BINS>>,
+    since_look: u16,
+    statistics: Statistics,
+}
+
+impl<const BINS: usize> NeighbourEngine<BINS> {
+    /// An engine for the pixels `addresses` of an array, ascending.
+    ///
+    /// # Errors
+    /// Fails if the settings break a constraint.
+    pub fn new(
+        settings: &Settings,
+        neighbours: Neighbours,
+        array: Array,
+        addresses: &[PixelAddress],
+    ) -> Result<Self> {
+        let AnyRule::Window(rule) = &settings.rule else {
+            return Err(Refused::new("neighbours", "is for `rule` window").into());
+        };
+        ensure!(
+            !settings.weighs_dead_time(),
+            Refused::new("neighbours", "cannot be used with a dead time")
+        );
+        let place = |address| {
+            let number = addresses.binary_search(&address).ok();
+            Place(number.map(|number| Member {
+                number,
+                pixel: AsyncPixel::new(address),
+                next: 0,
+                last: None,
+            }))
+        };
+        let pixels = usize::try_from(array.pixels())?;
+        Ok(Self {
+            config: settings.config()?,
+            neighbours: NeighbourConfig::new(array, neighbours, rule),
+            places: (0..=u16::MAX)
+                .take(pixels)
+                .map(|address| place(PixelAddress::new(address)))
+                .collect(),
+            since_look: 0,
+            statistics: Statistics::new(),
+        })
+    }
+
+    /// The first step of all pixels: their photons from laser cycle `from` to before `to` of the slice.
+    /// Returns whether one of them decides.
+    fn count(&mut self, photons: &[PixelPhotons], from: u16, to: u16) -> bool {
+        let config = &self.config;
+        let count = |places: &mut [Place<BINS>]| {
+            let (mut statistics, mut decides) = (Statistics::new(), false);
+            for Member {
+                number,
+                pixel,
+                next,
+                ..
+            } in places.iter_mut().flat_map(|place| &mut place.0)
+            {
+                let received = &photons[*number];
+                while let Some(photon) = received.photons.get(*next)
+                    && photon.cycle < to
+                {
+                    pixel.count(config, photon.code);
+                    *next += 1;
+                }
+                let cycles = to.min(received.cycles).saturating_sub(from);
+                if cycles > 0 {
+                    decides |= pixel.begin_look(config, &mut statistics, cycles);
+                }
+            }
+            (statistics, decides)
+        };
+        let parts: Vec<_> = self.places.par_chunks_mut(PIXELS).map(count).collect();
+        let mut any = false;
+        for (statistics, decides) in parts {
+            self.statistics += statistics;
+            any |= decides;
+        }
+        any
+    }
+
+    /// The second and third step of all pixels, at the end of laser cycle `last`. Adds the events.
+    fn look(&mut self, last: LaserCycle, events: &mut Vec<DepthEvent>) {
+        let (config, neighbours) = (&self.config, &self.neighbours);
+        let places = &self.places;
+        let detections: Vec<Option<Detection>> = (0..places.len())
+            .into_par_iter()
+            .with_min_len(PIXELS)
+            .map(|number| neighbours.decide(places, number, config))
+            .collect();
+        let end = |(places, detections): (&mut [Place<BINS>], &[Option<Detection>])| {
+            let (mut statistics, mut events) = (Statistics::new(), Vec::new());
+            for (Place(member), detection) in places.iter_mut().zip(detections) {
+                let Some(Member {
+                    pixel, last: kept, ..
+                }) = member
+                else {
+                    continue;
+                };
+                if let Some(detection) = detection {
+                    pixel.keep_detection(last, detection);
+                }
+                pixel.end_look(
+                    config,
+                    &mut statistics,
+                    last,
+                    |input: &DecisionInput<'_, BINS, _>| {
+                        if let Some(kept) = kept {
+                            kept.record_input(input);
+                        }
+                    },
+                );
+                if let Some(event) = pixel.take_event() {
+                    if let Some(kept) = kept {
+                        kept.record_event(event);
+                    }
+                    events.push(event);
+                }
+            }
+            (statistics, events)
+        };
+        let places = self.places.par_chunks_mut(PIXELS);
+        let parts: Vec<_> = places.zip(detections.par_chunks(PIXELS)).map(end).collect();
+        for (statistics, more) in parts {
+            self.statistics += statistics;
+            events.extend(more);
+        }
+    }
+}
+
+impl<const BINS: usize> Engine for NeighbourEngine<BINS> {
+    fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
+        let cycles = slice.pixels.iter().map(|pixel| pixel.cycles);
+        let cycles = cycles.max().unwrap_or(0);
+        for member in self.places.iter_mut().flat_map(|place| &mut place.0) {
+            member.next = 0;
+        }
+        let (mut events, mut done) = (Vec::new(), 0);
+        while done < cycles {
+            let x = self.config.x();
+            let to = done + (x - self.since_look).min(cycles - done);
+            let decides = self.count(&slice.pixels, done, to);
+            self.since_look = (self.since_look + (to - done)) % x;
+            done = to;
+            if decides {
+                let last = LaserCycle::new(slice.first_cycle + u64::from(to) - 1);
+                self.look(last, &mut events);
+            }
+        }
+        sort(&mut events, slice.first_cycle);
+        Ok(events)
+    }
+
+    fn statistics(&self) -> [Statistics; 2] {
+        let mut pixels = self.statistics;
+        for pixel in self.places.iter().filter_map(ArrayPixel::pixel) {
+            pixel.add_photons_to(&mut pixels);
+        }
+        [pixels, Statistics::new()]
+    }
+
+    fn keep_decisions(&mut self, is_kept: &dyn Fn(PixelAddress) -> bool) {
+        for member in self.places.iter_mut().flat_map(|place| &mut place.0) {
+            member.last = LastDecision::allocate(is_kept(member.pixel.address()));
+        }
+    }
+
+    fn decisions(&self) -> Vec<Decision> {
+        let members = self.places.iter().filter_map(|place| place.0.as_ref());
+        members
+            .filter_map(|member| member.last.as_ref()?.decision())
+            .collect()
+    }
+}
