@@ -287,6 +287,9 @@ pub fn end_laser_cycles_of_blocks_with<const BINS: usize, R: DetectionRule>(
         if look == Look::Event {
             block.link.reported();
             fired = true;
+        } else if look == Look::Ended {
+            // It has waited for another echo, after a report.
+            block.link.reported();
         }
     }
     fired

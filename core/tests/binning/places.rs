@@ -1,7 +1,9 @@
 //! Where blocks lie, and who feeds them.
 
 use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
-use dtof_core::{Array, BlockLevel, Flags, LaserCycle, PixelAddress, PixelConfig, Statistics};
+use dtof_core::{
+    Array, BlockLevel, EchoNumber, Flags, LaserCycle, PixelAddress, PixelConfig, Statistics,
+};
 
 use crate::level;
 
@@ -162,5 +164,38 @@ fn a_block_piles_up_when_its_pixels_do() {
                 "{number} {more}"
             );
         }
+    }
+}
+
+/// A block that had an echo and has waited for another is not silent at the tick after that exposure.
+#[test]
+fn an_exposure_that_ends_after_its_wait_is_a_report() {
+    let binning = Binning::new(Array::new(4, 4).unwrap(), level(2)).unwrap();
+    let echoes = EchoNumber::new(2).unwrap();
+    let config = PixelConfig::<32>::paper().l1(8).l2(60).echoes(echoes, 2);
+    let config = config.build().unwrap();
+    let mut link = binning.link_of(PixelAddress::new(0));
+    link.tick(false);
+    let mut blocks: Vec<Block<32>> = binning.blocks().map(Block::new).collect();
+    let mut statistics = Statistics::default();
+    let photons = |blocks: &[Block<32>]| blocks.last().unwrap().pixel().histogram().total();
+    for cycle in 0..64 {
+        count_in_blocks(&mut blocks, &link, &config, 9);
+        let now = LaserCycle::new(cycle);
+        end_laser_cycles_of_blocks(&mut blocks, &config, &mut statistics, now, 1);
+        let event = blocks[0].take_event();
+        assert_eq!(event.is_some(), cycle == 11);
+        if cycle == 20 {
+            // The tick during the exposure with the echo.
+            blocks.iter_mut().for_each(Block::tick);
+        }
+    }
+    assert_eq!(blocks[0].pixel().exposure(), 4);
+    assert_eq!(photons(&blocks), 0);
+    // The tick after it: still no photon goes on to the next level. After one without a report it does.
+    for goes_on in [false, true] {
+        blocks.iter_mut().for_each(Block::tick);
+        count_in_blocks(&mut blocks, &link, &config, 9);
+        assert_eq!(photons(&blocks) > 0, goes_on);
     }
 }

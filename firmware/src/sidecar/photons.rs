@@ -125,16 +125,18 @@ impl Sidecar<'_> {
             bins.end_laser_cycle();
         }
         let mut fired = false;
-        if let Some(neighbours) = &self.neighbours {
+if let Some(neighbours) = &self.neighbours {
             let (pixels, statistics) = (&mut self.pixels[..], &mut self.statistics);
             fired = end_laser_cycles_of_array(pixels, config, neighbours, statistics, last, ended);
         } else {
             for pixel in self.pixels.iter_mut() {
                 let (detector, statistics) = (&mut pixel.detector, &mut self.statistics);
-                if detector.end_laser_cycles(config, statistics, last, ended) == Look::Event {
+                let look = detector.end_laser_cycles(config, statistics, last, ended);
+                // A pixel that has waited for another echo has reported, too.
+                if matches!(look, Look::Event | Look::Ended) {
                     pixel.feed.reported();
-                    fired = true;
                 }
+                fired |= look == Look::Event;
             }
         }
         if let Some((config, patience)) = &self.binning {

@@ -66,8 +66,10 @@ impl<W: dtof_core::CounterWidth> Cell<W> {
         let look = self.pixel.end_laser_cycle(config, statistics, cycle);
         let event = self.pixel.take_event();
         assert_eq!(look == Look::Event, event.is_some());
-        self.has_reported |= event.is_some();
-        self.feeds &= event.is_none();
+        // An exposure with an echo has ended: the pixel is not silent.
+        let has_reported = matches!(look, Look::Event | Look::Ended);
+        self.has_reported |= has_reported;
+        self.feeds &= !has_reported;
         event
     }
 

@@ -7,7 +7,7 @@ use dtof_core::binning::{
 };
 use dtof_core::rule::DecisionInput;
 use dtof_core::{
-    AnyRule, Array, AsyncPixel, BlockLevel, Count16, DepthEvent, LaserCycle, PixelAddress,
+    AnyRule, Array, AsyncPixel, BlockLevel, Count16, DepthEvent, LaserCycle, Look, PixelAddress,
     PixelConfig, Statistics,
 };
 use dtof_link::AdaptiveBinning;
@@ -82,8 +82,8 @@ impl<const BINS: usize> Member<BINS> {
         }
     }
 
-    /// Ends `cycles` laser cycles, up to `last`. Takes the event at once, and returns whether there
-    /// was one.
+    /// Ends `cycles` laser cycles, up to `last`. Takes the event at once. Returns whether there was one, or
+    /// the exposure of one has ended: its pixel is not silent.
     fn end_laser_cycles(
         &mut self,
         config: &PixelConfig<BINS, AnyRule>,
@@ -97,10 +97,11 @@ impl<const BINS: usize> Member<BINS> {
                 kept.record_input(input);
             }
         };
-        self.pixel
-            .end_laser_cycles_with(config, &mut done.pixels, last, cycles, observe);
+        let look =
+            self.pixel
+                .end_laser_cycles_with(config, &mut done.pixels, last, cycles, observe);
         let Some(event) = self.pixel.take_event() else {
-            return false;
+            return look == Look::Ended;
         };
         if let Some(kept) = &mut self.last {
             kept.record_event(event);
