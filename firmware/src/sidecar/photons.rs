@@ -125,7 +125,7 @@ impl Sidecar<'_> {
             bins.end_laser_cycle();
         }
         let mut fired = false;
-if let Some(neighbours) = &self.neighbours {
+        if let Some(neighbours) = &self.neighbours {
             let (pixels, statistics) = (&mut self.pixels[..], &mut self.statistics);
             fired = end_laser_cycles_of_array(pixels, config, neighbours, statistics, last, ended);
         } else {
