@@ -120,7 +120,8 @@ impl Array {
         let Self { columns, rows } = *self;
         let row = u32::from(pixel.raw()).checked_div(columns).unwrap_or(0);
         let column = u32::from(pixel.raw()).wrapping_sub(row * columns);
-        let steps = neighbours.steps().iter();
+        let steps: &[_] = if row < rows { neighbours.steps() } else { &[] };
+        let steps = steps.iter();
         steps.filter_map(move |&(down, right)| {
             let row = row
                 .checked_add_signed(down.into())

@@ -10,7 +10,7 @@
 //! |---|---|
 //! | the pixel alone | a detection of the window rule with `z₁` |
 //! | promising | its window with the most photons has at least two and exceeds the background by 2 standard deviations |
-//! | confirmed | the window of all pixels together has the minimum of photons, and exceeds `z₂` |
+//! | confirmed | a neighbour has photons in the window, all pixels together have the minimum there, and exceed `z₂` |
 //!
 //! `z₁` and `z₂` each have half of the false alarms of the rule's `z`. For `z₁` that is twice as many
 //! trials. The sum contains the photons that made the pixel promising, so `z₂` depends on their share. With
@@ -21,11 +21,16 @@
 //! P(z₁ > 2 and z > z₂) = ∫ φ(x) Q((z₂ - r·x) / √(1 - r²)) dx   from 2 on
 //! ```
 //!
-//! is one in so many trials. With a share of half or more the neighbours hardly say anything, and `z₂` is `z₁`.
+//! is one in so many trials. With a share of more than half the neighbours hardly say anything, and `z₂` is `z₁`; so it is
+//! where `z₁` exceeds [`HIGHEST_Z`](crate::rule::HIGHEST_Z), the end of the table.
 //! Only one window is tried in a look, so that confirmed false alarms are fewer than their half:
 //! `core/tests/neighbours/false_alarms.rs` has the rates.
 //!
-//! The depth is that of the photons of all these pixels.
+//! Bins that the pixel has left out, because their echo was reported, count in no neighbour. A neighbour that has left
+//! out bins at the window is not asked.
+//!
+//! The depth is that of the photons of all these pixels. The peak count is that of the pixel's own photons in the window,
+//! the background what is expected of them there.
 
 use core::ops::RangeInclusive;
 
@@ -33,7 +38,7 @@ use fixed::types::U4F12;
 
 use super::decision::{Detection, detection_at, rounded};
 use super::window::{WindowRule, highest_sum, stands_clear};
-use super::window_z::{ONE, trials_of, twice_the_trials};
+use super::window_z::{HIGHEST_Z, ONE, trials_of, twice_the_trials};
 use crate::depth::DepthEstimator;
 use crate::flags::Flags;
 use crate::histogram::counter::{Count16, CounterWidth};
@@ -98,6 +103,12 @@ impl NeighbourRule {
     #[must_use]
     pub fn new(rule: &WindowRule) -> Self {
         let own = rule.with_z(twice_the_trials(rule.z()));
+        if own.z() > HIGHEST_Z {
+            return Self {
+                own,
+                z: [own.z().to_bits(); SHARES],
+            };
+        }
         let above = trials_of(own.z()).saturating_sub(6 * ONE);
         let (index, part) = ((above >> 9) as usize, above & 511);
         let z = match Z.get(index..) {
@@ -201,16 +212,19 @@ impl NeighbourRule {
         let first = starts.clone().find(has_as_many)?;
         let others = (first + 1..first + width).take_while(has_as_many).count();
         let end = first + width + u16::try_from(others).unwrap_or(0);
-        // Those with some of these bins left out, because their echo was reported, do not know.
-        let neighbours = neighbours.filter_map(|(other, excluded)| {
-            let knows = !(first..end).any(|bin| excluded.contains(bin));
-            Some((other, excluded.bins_left(gate).filter(|_| knows)?))
+        // Those that have left out bins here, because their echo was reported, do not know.
+        let reach = estimator.reach();
+        let neighbours = neighbours.filter_map(|(other, left_out)| {
+            let knows = !(first..end).any(|bin| left_out.touches(bin, reach));
+            let (photons, bins) = counted(other, left_out, gate, excluded)?;
+            knows.then_some((other, photons, bins))
         });
         let (mut total, mut bins) = (0u32, own_bins);
         let mut sums = [0u32; MOST_BINS];
-        let all = core::iter::once((histogram, own_bins)).chain(neighbours.clone());
-        for (one, left) in all.clone() {
-            total = total.saturating_add(one.total());
+        let own = (histogram, histogram.total(), own_bins);
+        let all = core::iter::once(own).chain(neighbours);
+        for (one, photons, left) in all.clone() {
+            total = total.saturating_add(photons);
             // The fewest bins expect the most photons.
             bins = bins.min(left);
             let counts = one.counts().get(first.into()..end.into());
@@ -218,7 +232,12 @@ impl NeighbourRule {
                 *sum = sum.saturating_add(count.into());
             }
         }
-        let (mut start, mut photons) = (first, 0);
+        for (bin, sum) in (first..end).zip(&mut sums) {
+            if excluded.contains(bin) {
+                *sum = 0;
+            }
+        }
+        let (mut start, mut photons) = (first, promising);
         for place in first..=end - width {
             let from = usize::from(place - first);
             let window = sums.iter().skip(from).take(width.into());
@@ -228,7 +247,8 @@ impl NeighbourRule {
             }
         }
         let z = self.z(histogram.total(), total).to_bits();
-        if photons < self.own.minimum_count().raw()
+        if photons == promising
+            || photons < self.own.minimum_count().raw()
             || !exceeds::<W>(photons, total, self.own.width(), bins, z)
         {
             return None;
@@ -237,7 +257,10 @@ impl NeighbourRule {
         let near =
             start.saturating_sub(BESIDE).max(gate.first())..(end + BESIDE).min(gate.last() + 1);
         let mut sum = Histogram::<BINS, Count16>::new();
-        all.for_each(|(one, _)| sum.add_bins(one, near.clone()));
+        all.clone()
+            .for_each(|(one, ..)| sum.add_bins(one, near.clone()));
+        excluded.empty(&mut sum);
+        sum.leave_out(sum.total().saturating_sub(total));
         let mut peak = Peak::default();
         for bin in start..end {
             let count = Count::saturating(sum.count(bin.into()).unwrap_or(0));
@@ -251,11 +274,43 @@ impl NeighbourRule {
         let outside = mean(total.saturating_sub(photons), bins - u32::from(width))?;
         let mut detection = detection_at(&sum, gate, peak, outside, estimator, excluded);
         detection.depth.flags |= Flags::CONFIRMED;
+        let is_full = |(one, ..): (&Histogram<BINS, W>, u32, u32)| {
+            one.count(peak.bin.raw().into()) == Some(W::MAX)
+        };
+        if all.clone().any(is_full) {
+            detection.depth.flags |= Flags::SATURATED;
+        }
+        // The pixel's own, of the window.
         detection.peak.count = Count::saturating(promising);
-        let outside = histogram.total().wrapping_sub(promising);
-        detection.background = rounded(mean(outside, own_bins - u32::from(width))?);
+        let outside = histogram.total().saturating_sub(promising);
+        let background = mean(
+            outside.saturating_mul(width.into()),
+            own_bins - u32::from(width),
+        )?;
+        detection.background = rounded(background);
         Some(detection)
     }
+}
+
+/// The photons of a neighbour in the bins that neither it nor the pixel has `excluded`, and the
+/// number of these bins; `None` if they are too few.
+#[inline(always)]
+fn counted<const BINS: usize, W: CounterWidth>(
+    histogram: &Histogram<BINS, W>,
+    left_out: &ExcludedBins,
+    gate: &RangeGate<BINS>,
+    excluded: &ExcludedBins,
+) -> Option<(u32, u32)> {
+    if excluded.echoes() == 0 {
+        return Some((histogram.total(), left_out.bins_left(gate)?));
+    }
+    let is_left = |bin: &u16| !excluded.contains(*bin) && !left_out.contains(*bin);
+    let (mut photons, mut bins) = (0u32, 0);
+    for bin in (gate.first()..=gate.last()).filter(is_left) {
+        photons = photons.saturating_add(histogram.count(bin.into()).unwrap_or(0));
+        bins += 1;
+    }
+    (bins >= u32::from(RangeGate::<BINS>::MIN_BINS)).then_some((photons, bins))
 }
 
 /// [`stands_clear`] for the photons of up to nine pixels.

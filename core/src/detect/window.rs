@@ -232,7 +232,7 @@ pub(super) fn stands_clear<const NARROW: bool>(
     let skew = bins_outside.saturating_sub(width) * ((z_squared / 6) >> 20);
     let (inside_times, total_times) = (bins << 4, width << 4);
     let above = if NARROW {
-        // Of nine pixels: 14 + 16 bits, 7 + 24 bits and 20 bits.
+        // Of nine pixels: 14 + 16 bits, 7 + 24 bits and 20 bits. The square of 30 bits fits 4 times over.
         let level = total_times * total + skew;
         let Some(above) = (inside_times * inside).checked_sub(level) else {
             return false;

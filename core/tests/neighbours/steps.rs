@@ -73,19 +73,11 @@ fn pixels_ask_the_neighbours_that_exist() {
                     // Too few photons to ask, but enough to confirm.
                     pixels[usize::from(other)]
                         .count_batch(&config, &[30, 31, 30, 29, 30, 2, 60, 40, 13, 33, 44, 55]);
-                    pixels[usize::from(other)].begin_look(&config, &mut Statistics::default(), 0);
                 }
                 let mut statistics = Statistics::default();
-                let alone = config
-                    .detect(pixels[usize::from(other)].histogram())
-                    .is_some();
                 let events = end(&mut pixels, &config, &rule, &mut statistics);
                 let mine = events.iter().find(|event| event.pixel.raw() == asking);
-                assert_eq!(
-                    mine.is_some(),
-                    is_neighbour,
-                    "{number:?} {asking} {other} {alone}"
-                );
+                assert_eq!(mine.is_some(), is_neighbour, "{number:?} {asking} {other}");
             }
         }
     }
@@ -306,4 +298,94 @@ fn a_detection_is_kept_only_while_a_look_decides() {
     );
     let event = pixel.take_event().unwrap();
     assert_eq!((event.cycle, event.peak_bin.raw()), (now, 20));
+}
+
+/// Every address outside the array has none.
+#[test]
+fn a_pixel_outside_the_array_has_no_neighbours() {
+    for (columns, rows) in [(1, 1), (5, 4), (1, 7), (300, 2), (65_536, 1), (256, 256)] {
+        let array = Array::new(columns, rows).unwrap();
+        for pixel in 0..=u16::MAX {
+            let neighbours = array.neighbours(PixelAddress::new(pixel), Neighbours::Eight);
+            let is_inside = u32::from(pixel) < array.pixels();
+            assert_eq!(neighbours.count() > 0, is_inside && array.pixels() > 1);
+        }
+    }
+}
+
+/// A pixel without neighbours decides as it does without an array: events, ends and counts.
+#[test]
+fn a_pixel_without_neighbours_is_one_without_an_array() {
+    let mut rng = Pcg64Mcg::seed_from_u64(17);
+    let mut counts = Statistics::default();
+    for trial in 0..40u8 {
+        let rule = neighbours(1, 1, Neighbours::Eight);
+        let gate = RangeGate::new(2, 60).unwrap();
+        let config = PixelConfig::with_rule(*rule.rule().own())
+            .x(1 + u16::from(trial) % 5)
+            .l1(8)
+            .l2(60 + u16::from(trial))
+            .gate(gate)
+            .echoes(EchoNumber::new(1 + trial % 3).unwrap(), 3)
+            .tracking((trial % 4 == 3).then(|| rule.rule().own().tracking(&gate)))
+            .build()
+            .unwrap();
+        let (mut array, mut alone) = (pixels(1), pixels(1).remove(0));
+        let (mut statistics, mut others) = (Statistics::default(), Statistics::default());
+        for look in 0..2000u64 {
+            let codes: Vec<u16> = (0..rng.next_u32() % 4)
+                .map(|_| match rng.next_u32() {
+                    code if code % 12 == 0 => 40 + (code >> 8) as u16 % 2,
+                    code => (code >> 8) as u16 % 66,
+                })
+                .collect();
+            array[0].count_batch(&config, &codes);
+            alone.count_batch(&config, &codes);
+            let (last, cycles) = (LaserCycle::new(look), 1 + trial as u16 % 2);
+            end_laser_cycles_of_array(&mut array, &config, &rule, &mut statistics, last, cycles);
+            alone.end_laser_cycles(&config, &mut others, last, cycles);
+            if look % 64 < 48 {
+                assert_eq!(array[0].take_event(), alone.take_event());
+            }
+            assert_eq!(statistics, others);
+        }
+        counts += statistics;
+    }
+    assert!(
+        counts.events > 100 && counts.expired > 100 && counts.deferred > 100,
+        "{counts:?}"
+    );
+}
+
+/// The fullest counters, of the most bins and the widest window, in all neighbours.
+#[test]
+fn full_counters_do_not_overflow() {
+    let rule = WindowRule::new(7, U4F12::MAX, Count::saturating(5)).unwrap();
+    let array = Array::new(3, 3).unwrap();
+    let rule = NeighbourConfig::new(array, Neighbours::Eight, &rule);
+    let config = PixelConfig::<1024, _>::with_rule(*rule.rule().own())
+        .build()
+        .unwrap();
+    let decide = |bins: core::ops::Range<u16>| {
+        let mut pixels: Vec<AsyncPixel<1024>> = (0..9)
+            .map(|pixel| AsyncPixel::new(PixelAddress::new(pixel)))
+            .collect();
+        for (pixel, number) in pixels.iter_mut().zip(0..) {
+            let codes: Vec<u16> = bins.clone().collect();
+            let times = if number == 4 { 0 } else { 1023 };
+            (0..times).for_each(|_| pixel.count_batch(&config, &codes));
+        }
+        pixels[4].count_batch(&config, &[503, 503]);
+        for pixel in &mut pixels {
+            pixel.begin_look(&config, &mut Statistics::default(), 44);
+        }
+        rule.decide(&pixels, 4, &config)
+    };
+    let detection = decide(500..507).unwrap();
+    let full = Flags::CONFIRMED | Flags::SATURATED;
+    assert_eq!(
+        (detection.peak.count.raw(), detection.depth.flags),
+        (2, full)
+    );
+    assert_eq!(decide(0..1024), None);
 }

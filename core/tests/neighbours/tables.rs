@@ -95,6 +95,9 @@ fn a_larger_share_never_has_a_lower_threshold() {
         assert_eq!(before, rule.own().z());
         assert_eq!(rule.z(81, 160), rule.own().z());
     }
+    // Beyond the end of the table.
+    let beyond = rule(15.9);
+    assert_eq!(beyond.z(1, 160), beyond.own().z());
     // No photons, and more than 2³².
     assert!(rule(4.47).z(0, 0) > U4F12::lit("2"));
     assert_eq!(rule(4.47).z(u32::MAX, u32::MAX), rule(4.47).own().z());
