@@ -44,7 +44,8 @@ pub struct DepthEvent {
     /// Photons in the highest bin, background included. Of an event that neighbours
     /// [confirmed](Flags::CONFIRMED): the pixel's own photons in the window of the rule.
     pub peak_count: Count,
-    /// The background a bin, as the detection rule estimates it.
+    /// The background a bin, as the detection rule estimates it. Of an event that neighbours
+    /// confirmed, what is expected of the pixel in the window of the rule.
     pub background: Count,
     /// What is known to be wrong with it.
     pub flags: Flags,

@@ -178,6 +178,7 @@ impl Pixel {
             let settings = requested.settings(bins)?;
             let of_arrays = [
                 ("binning", settings.binning.is_some()),
+                ("neighbours", settings.neighbours.is_some()),
                 ("frame", settings.frame.is_some()),
                 ("masked", !settings.masked.is_empty()),
             ];

@@ -227,7 +227,7 @@ def test_invalid_steps():
     for cycles in (0, -1, 65_536, 1.5, None, True):
         refused(lambda: pixel.end_laser_cycles(cycles))
     for options in ({"bins": 12}, {"bins": 0}, {"bins": 2048}, {"address": 70_000}, {"bins": "x"},
-                    {"binning": 1}, {"mask": [3]}, {"l1": 9, "l2": 3}, {"frame": 3}):
+                    {"binning": 1}, {"rule": "window", "window": 3, "neighbours": 8}, {"mask": [3]}, {"l1": 9, "l2": 3}, {"frame": 3}):
         refused(lambda: dtof.Pixel(**options))
     assert pixel.statistics["photons"] == 0
     pixel.count(1023)

@@ -20,6 +20,8 @@
 //!   photons, an eighth for 0.5 and almost nothing for 2. With a window rule it does not
 //!   (`core/tests/events/reflectivity.rs`).
 //! - Exposures without an event do not count, so pixels with many of them read high.
+//! - Of an event that neighbours confirmed the photons are those of the window of the rule, which holds more of the
+//!   pulse than its peak bin.
 //! - Of a TDC with a dead time, [`Reflectivity::of_signal`] reads low behind early light: the peak
 //!   was live in fewer laser cycles than the exposure has.
 //!

@@ -395,6 +395,7 @@ impl<'a> Sidecar<'a> {
         self.blocks.clear();
         self.config = None;
         self.binning = None;
+        self.neighbours = None;
         self.dynamic_depth = None;
         self.once_per_bin = None;
         self.source = Source::Link;

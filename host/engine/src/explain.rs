@@ -58,8 +58,11 @@ pub fn explain(
         }
     };
     let explanation = explanation.ok()??;
-    // Complete histograms are not tracked, and their first echo does not depend on others.
-    let depends = !is_whole && (settings.tracking || settings.echoes != EchoNumber::FIRST);
+    // Complete histograms are not tracked or confirmed, and their first echo does not depend on others.
+    let depends = !is_whole
+        && (settings.tracking
+            || settings.neighbours.is_some()
+            || settings.echoes != EchoNumber::FIRST);
     Some(match depends {
         false => explanation,
         true => Explanation {

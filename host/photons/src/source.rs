@@ -111,7 +111,14 @@ pub trait PhotonSource {
 /// no block spans two captures.
 #[must_use]
 pub fn has_only_neighbours(source: &dyn PhotonSource, level: BlockLevel) -> bool {
-    let (rows, side) = (source.capture_rows(), 1 << level.raw());
-    source.axis_names()[0] == "column"
-        && (rows == source.array().rows() || rows.is_multiple_of(side))
+    let side = 1 << level.raw();
+    is_one_capture(source)
+        || (source.axis_names()[0] == "column" && source.capture_rows().is_multiple_of(side))
+}
+
+/// Whether all pixels next to each other are neighbours: columns and rows are adjacent, and there are
+/// no further captures below the first.
+#[must_use]
+pub fn is_one_capture(source: &dyn PhotonSource) -> bool {
+    source.axis_names()[0] == "column" && source.capture_rows() == source.array().rows()
 }

@@ -14,7 +14,7 @@ use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
 use dtof_photons::open::{Metadata, ReadOptions, open};
 use dtof_photons::recorded::Layout;
-use dtof_photons::source::{PhotonSource, has_only_neighbours};
+use dtof_photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
 
 /// The options of a replay.
 #[derive(Clone, Debug, Default)]
@@ -122,10 +122,33 @@ impl Options {
             .or(settings_of_file(&metadata, photons.array()));
         let settings = requested.settings(metadata.bins)?;
         let refused = |refused: Refused| anyhow::Error::from(refused).context(input.to_string());
-        ensure!(
-            metadata.has_shape || settings.binning.is_none(),
-            refused(Refused::new("binning", "needs the array: give `columns`"))
-        );
+        let of_arrays = [
+            ("binning", settings.binning.is_some()),
+            ("neighbours", settings.neighbours.is_some()),
+        ];
+        for (key, is_used) in of_arrays {
+            ensure!(
+                metadata.has_shape || !is_used,
+                refused(Refused::new(key, "needs the array: give `columns`"))
+            );
+        }
+        if settings.neighbours.is_some() && settings.frame.is_none() {
+            let [column, row] = photons.axis_names();
+            ensure!(
+                is_one_capture(photons.as_ref()),
+                refused(Refused::new(
+                    "neighbours",
+                    format!("needs one array of columns and rows; here each row is a {row}, each column a {column}")
+                ))
+            );
+            ensure!(
+                options.layout.is_none(),
+                refused(Refused::new(
+                    "neighbours",
+                    "would be missing at the edges of parts: replay the recording as a whole"
+                ))
+            );
+        }
         ensure!(
             metadata.is_list || options.length.is_some() || !settings.weighs_dead_time(),
             Refused::value(
