@@ -138,6 +138,8 @@ def test_invalid_recordings_in_parts(client, tmp_path):
     refused(lambda: replay(client, array), "ndarray", "must be a dask array")
     refused(lambda: replay(client, chunked(4, 3, -1)), "chunks split the columns", ".rechunk({1: -1})")
     refused(lambda: replay(client, chunked(4, -1, 50)), "chunks split the bins", ".rechunk({2: -1})")
+    window = {"rule": "window", "window": 3, "neighbours": 8}
+    refused(lambda: replay(client, chunked(4, -1, -1), **window), "neighbours", "as a whole")
     refused(lambda: replay(client, chunked(3, -1, -1), binning=1), "cut blocks of 2x2 pixels", "multiples of 2 rows")
     refused(lambda: replay(client, chunked(4, -1, -1), binning=3), "multiples of 8 rows")
     four = array.reshape(2, 4, 6, 100)

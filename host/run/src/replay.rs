@@ -133,12 +133,11 @@ impl Options {
             );
         }
         if settings.neighbours.is_some() && settings.frame.is_none() {
-            let [column, row] = photons.axis_names();
             ensure!(
                 is_one_capture(photons.as_ref()),
                 refused(Refused::new(
                     "neighbours",
-                    format!("needs one array of columns and rows; here each row is a {row}, each column a {column}")
+                    "needs one capture of columns and rows: pixels of different captures are not neighbours"
                 ))
             );
             ensure!(

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use crate::device::monitor::{LONG, device, reference, watch_with};
 use crate::device::{client, settings};
-use dtof_core::BlockLevel;
+use dtof_core::{BlockLevel, Neighbours};
 use dtof_engine::settings::{AdaptiveBinning, Settings};
 
 #[test]
@@ -40,9 +40,19 @@ fn events_of_masked_pixels_are_left_out_and_counted() {
             levels: BlockLevel::saturating(1),
             patience: 64,
         }),
+        ..masked.clone()
+    };
+    // Neighbours would ask them.
+    let neighbours = Settings {
+        neighbours: Some(Neighbours::Eight),
         ..masked
     };
-    let outputs: [&mut dyn Write; 2] = [&mut Vec::new(), &mut Vec::new()];
-    let refused = watch_with(&blocks, &mut client, None, length, outputs).unwrap_err();
-    assert!(refused.to_string().contains("leave out masked or binning"));
+    for (settings, reason) in [
+        (blocks, "leave out masked or binning"),
+        (neighbours, "leave out masked or neighbours"),
+    ] {
+        let outputs: [&mut dyn Write; 2] = [&mut Vec::new(), &mut Vec::new()];
+        let refused = watch_with(&settings, &mut client, None, length, outputs).unwrap_err();
+        assert!(refused.to_string().contains(reason), "{refused}");
+    }
 }

@@ -216,7 +216,7 @@ fn arrays_that_hold_no_counts_are_refused() {
             list.npy --binning 1 | list.npy: --binning needs the array: give --columns
             list.csv --binning 1 | list.csv: --binning needs the array: give --columns
             list.npy --rule window --window 3 --neighbours 8 | list.npy: --neighbours needs the array: give --columns
-            plain.npy --axes captures,rows,columns,bins --rule window --window 3 --neighbours 8 | --neighbours needs one array of columns and rows; here each row is a
+            plain.npy --axes captures,rows,columns,bins --rule window --window 3 --neighbours 8 | --neighbours needs one capture of columns and rows
             wide.npy | 5000 bins: must be at most 4096
             long.npy | 1500 bins are more than 1024: add up neighbours with --rebin 2
             plain.npy --rebin 400 | makes 0 whole bins of 8
