@@ -32,12 +32,12 @@
 //! The depth is that of the photons of all these pixels. The peak count is that of the pixel's own photons in the window,
 //! the background what is expected of them there.
 
-use core::ops::RangeInclusive;
+use core::ops::{Range, RangeInclusive};
 
 use fixed::types::U4F12;
 
 use super::decision::{Detection, detection_at, rounded};
-use super::window::{WindowRule, highest_sum, stands_clear};
+use super::window::{WindowRule, stands_clear};
 use super::window_z::{HIGHEST_Z, ONE, trials_of, twice_the_trials};
 use crate::depth::DepthEstimator;
 use crate::flags::Flags;
@@ -58,8 +58,8 @@ pub struct NeighbourRule {
 
 /// The most photons in a window of a pixel.
 struct Promising {
-    /// Where the windows begin that were looked at.
-    starts: RangeInclusive<u16>,
+    /// Where the first of them begins.
+    first: u16,
     photons: u32,
     /// Bins that are not excluded.
     bins: u32,
@@ -69,6 +69,7 @@ struct Promising {
 pub(crate) type Neighbour<'a, const BINS: usize, W> = (&'a Histogram<BINS, W>, &'a ExcludedBins);
 
 const SHARES: usize = 8;
+const MOST_NEIGHBOURS: usize = 8;
 /// 2 standard deviations, in 1/4096.
 const PROMISING: u16 = 2 << 12;
 /// If the highest bin has at most so many photons, it often has them by chance, and all windows are looked
@@ -134,13 +135,10 @@ impl NeighbourRule {
     /// z₂ if the pixel has `own` of `all` photons.
     #[must_use]
     pub fn z(&self, own: u32, all: u32) -> U4F12 {
-        let sixteenths = (16 * u64::from(own)).div_ceil(u64::from(all.max(1)));
-        let index = usize::try_from(sixteenths)
-            .unwrap_or(usize::MAX)
-            .saturating_sub(1);
-        self.z
-            .get(index)
-            .map_or(self.own.z(), |&z| U4F12::from_bits(z))
+        let (own, all) = (u64::from(own), u64::from(all));
+        let is_share = |&(_, sixteenths): &(&u16, u64)| 16 * own <= sixteenths * all;
+        let share = self.z.iter().zip(1..).find(is_share);
+        share.map_or(self.own.z(), |(&z, _)| U4F12::from_bits(z))
     }
 
     /// The pixel's window with the most photons, if it is promising.
@@ -161,14 +159,14 @@ impl NeighbourRule {
         } else {
             self.own.starts_about(gate, peak.bin)
         };
-        let photons = highest_sum(histogram, starts.clone(), width);
+        let (first, photons) = first_highest(histogram, starts, width);
         if photons < 2 {
             return None;
         }
         let bins = excluded.bins_left(gate)?;
         let is_promising = exceeds::<W>(photons, histogram.total(), width, bins, PROMISING);
         is_promising.then_some(Promising {
-            starts,
+            first,
             photons,
             bins,
         })
@@ -181,7 +179,7 @@ impl NeighbourRule {
         own: Neighbour<'a, BINS, W>,
         gate: &RangeGate<BINS>,
         estimator: &DepthEstimator,
-        neighbours: impl Iterator<Item = Neighbour<'a, BINS, W>> + Clone,
+        neighbours: impl Iterator<Item = Neighbour<'a, BINS, W>>,
     ) -> Option<Detection> {
         let (histogram, excluded) = own;
         let promising = self.promising(histogram, gate, excluded)?;
@@ -194,47 +192,57 @@ impl NeighbourRule {
         &self,
         own: Neighbour<'a, BINS, W>,
         Promising {
-            starts,
+            first,
             photons: promising,
             bins: own_bins,
         }: Promising,
         gate: &RangeGate<BINS>,
         estimator: &DepthEstimator,
-        neighbours: impl Iterator<Item = Neighbour<'a, BINS, W>> + Clone,
+        neighbours: impl Iterator<Item = Neighbour<'a, BINS, W>>,
     ) -> Option<Detection> {
         let (histogram, excluded) = own;
         let width = u16::from(self.own.width());
-        let gated_starts = gate.first()..=gate.last() + 1 - width;
         // With few photons, several windows in a row often have as many. The neighbours choose.
-        let has_as_many = |first: &u16| {
-            gated_starts.contains(first) && histogram.photons_of(*first..first + width) == promising
-        };
-        let first = starts.clone().find(has_as_many)?;
-        let others = (first + 1..first + width).take_while(has_as_many).count();
-        let end = first + width + u16::try_from(others).unwrap_or(0);
-        // Those that have left out bins here, because their echo was reported, do not know.
-        let reach = estimator.reach();
-        let neighbours = neighbours.filter_map(|(other, left_out)| {
-            let knows = !(first..end).any(|bin| left_out.touches(bin, reach));
-            let (photons, bins) = counted(other, left_out, gate, excluded)?;
-            knows.then_some((other, photons, bins))
-        });
-        let (mut total, mut bins) = (0u32, own_bins);
+        let mut end = first + width;
+        let mut same = promising;
+        for leaving in first..first + width - 1 {
+            let [leaving, entering] = [leaving, end].map(|bin| histogram.count(bin.into()));
+            same = same
+                .wrapping_add(entering.unwrap_or(0))
+                .wrapping_sub(leaving.unwrap_or(0));
+            if same != promising || end > gate.last() {
+                break;
+            }
+            end += 1;
+        }
+        let mut asked = [None::<&Histogram<BINS, W>>; MOST_NEIGHBOURS];
+        let mut places = asked.iter_mut();
+        let (mut total, mut bins) = (histogram.total(), own_bins);
         let mut sums = [0u32; MOST_BINS];
-        let own = (histogram, histogram.total(), own_bins);
-        let all = core::iter::once(own).chain(neighbours);
-        for (one, photons, left) in all.clone() {
+        add_window(&mut sums, histogram, first..end);
+        let reach = estimator.reach();
+        for (other, left_out) in neighbours {
+            // Those that have left out bins here, because their echo was reported, do not know.
+            if left_out.echoes() > 0 && (first..end).any(|bin| left_out.touches(bin, reach)) {
+                continue;
+            }
+            let Some((photons, left)) = counted(other, left_out, gate, excluded) else {
+                continue;
+            };
+            let Some(place) = places.next() else {
+                break;
+            };
+            *place = Some(other);
             total = total.saturating_add(photons);
             // The fewest bins expect the most photons.
             bins = bins.min(left);
-            let counts = one.counts().get(first.into()..end.into());
-            for (sum, &count) in sums.iter_mut().zip(counts.unwrap_or_default()) {
-                *sum = sum.saturating_add(count.into());
-            }
+            add_window(&mut sums, other, first..end);
         }
-        for (bin, sum) in (first..end).zip(&mut sums) {
-            if excluded.contains(bin) {
-                *sum = 0;
+        if excluded.echoes() > 0 {
+            for (bin, sum) in (first..end).zip(&mut sums) {
+                if excluded.contains(bin) {
+                    *sum = 0;
+                }
             }
         }
         let (mut start, mut photons) = (first, promising);
@@ -257,8 +265,8 @@ impl NeighbourRule {
         let near =
             start.saturating_sub(BESIDE).max(gate.first())..(end + BESIDE).min(gate.last() + 1);
         let mut sum = Histogram::<BINS, Count16>::new();
-        all.clone()
-            .for_each(|(one, ..)| sum.add_bins(one, near.clone()));
+        let all = asked.into_iter().flatten().chain([histogram]);
+        all.clone().for_each(|one| sum.add_bins(one, near.clone()));
         excluded.empty(&mut sum);
         sum.leave_out(sum.total().saturating_sub(total));
         let mut peak = Peak::default();
@@ -274,9 +282,7 @@ impl NeighbourRule {
         let outside = mean(total.saturating_sub(photons), bins - u32::from(width))?;
         let mut detection = detection_at(&sum, gate, peak, outside, estimator, excluded);
         detection.depth.flags |= Flags::CONFIRMED;
-        let is_full = |(one, ..): (&Histogram<BINS, W>, u32, u32)| {
-            one.count(peak.bin.raw().into()) == Some(W::MAX)
-        };
+        let is_full = |one: &Histogram<BINS, W>| one.count(peak.bin.raw().into()) == Some(W::MAX);
         if all.clone().any(is_full) {
             detection.depth.flags |= Flags::SATURATED;
         }
@@ -289,6 +295,44 @@ impl NeighbourRule {
         )?;
         detection.background = rounded(background);
         Some(detection)
+    }
+}
+
+/// Where the first window with the most photons begins, of those that begin at `starts`, and its photons.
+#[inline(always)]
+fn first_highest<const BINS: usize, W: CounterWidth>(
+    histogram: &Histogram<BINS, W>,
+    starts: RangeInclusive<u16>,
+    width: u8,
+) -> (u16, u32) {
+    let bins = usize::from(*starts.start())..usize::from(*starts.end()) + usize::from(width);
+    let bins = histogram.counts().get(bins).unwrap_or_default();
+    let (window, entering) = bins.split_at_checked(width.into()).unwrap_or_default();
+    let mut sum = window
+        .iter()
+        .fold(0u32, |sum, &count| sum.wrapping_add(count.into()));
+    let (mut first, mut highest) = (*starts.start(), sum);
+    for ((&leaving, &entering), start) in bins.iter().zip(entering).zip(starts.skip(1)) {
+        sum = sum
+            .wrapping_add(entering.into())
+            .wrapping_sub(leaving.into());
+        if sum > highest {
+            (first, highest) = (start, sum);
+        }
+    }
+    (first, highest)
+}
+
+/// Adds some bins of a histogram to `sums`.
+#[inline(always)]
+fn add_window<const BINS: usize, W: CounterWidth>(
+    sums: &mut [u32; MOST_BINS],
+    histogram: &Histogram<BINS, W>,
+    bins: Range<u16>,
+) {
+    let counts = histogram.counts().get(bins.start.into()..bins.end.into());
+    for (sum, &count) in sums.iter_mut().zip(counts.unwrap_or_default()) {
+        *sum = sum.saturating_add(count.into());
     }
 }
 

@@ -190,7 +190,7 @@ impl WindowRule {
 
 /// The most photons in a window of those that begin at `starts`.
 #[inline(always)]
-pub(super) fn highest_sum<const BINS: usize, W: CounterWidth>(
+fn highest_sum<const BINS: usize, W: CounterWidth>(
     histogram: &Histogram<BINS, W>,
     starts: RangeInclusive<u16>,
     width: u8,

@@ -369,15 +369,6 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         }
     }
 
-    /// The photons of some bins, wrapping.
-    #[inline(never)]
-    pub(crate) fn photons_of(&self, bins: Range<u16>) -> u32 {
-        let bins = usize::from(bins.start)..usize::from(bins.end);
-        let bins = self.counts.get(bins).unwrap_or_default();
-        bins.iter()
-            .fold(0, |sum, &count| sum.wrapping_add(count.into()))
-    }
-
     /// Adds some bins of another histogram, and its total. Counters saturate. The peak is not kept.
     #[inline(never)]
     pub(crate) fn add_bins<V: CounterWidth>(
