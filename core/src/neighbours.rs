@@ -25,16 +25,16 @@
 //! let mut pixels: Vec<AsyncPixel<128>> = (0..9).map(|pixel| AsyncPixel::new(PixelAddress::new(pixel))).collect();
 //! let mut statistics = Statistics::default();
 //!
-//! // Two photons a pixel of the same surface, and some background.
+//! // Three photons a pixel of the same surface, and some background.
 //! for (pixel, background) in pixels.iter_mut().zip([3, 20, 35, 77, 90, 100, 101, 110, 120]) {
-//!     pixel.count_batch(&config, &[60, 61, background, 127 - background]);
+//!     pixel.count_batch(&config, &[60, 60, 61, background, 127 - background]);
 //! }
 //! for cycle in 0..44 {
 //!     let last = LaserCycle::new(cycle);
 //!     end_laser_cycles_of_array(&mut pixels, &config, &neighbours, &mut statistics, last, 1);
 //! }
 //! let event = pixels[4].take_event().unwrap();
-//! assert_eq!((event.pixel.raw(), event.peak_count.raw(), event.flags), (4, 2, Flags::CONFIRMED));
+//! assert_eq!((event.pixel.raw(), event.peak_count.raw(), event.flags), (4, 3, Flags::CONFIRMED));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!

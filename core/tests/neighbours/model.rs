@@ -132,6 +132,10 @@ fn confirms(
     let is_confirmed = highest > most
         && highest >= rule.rule().own().minimum_count().raw()
         && surely(highest, total, width, bins, z)?;
+    // Neighbours that are sure without the pixel.
+    let (left, others) = (own_left.len(), highest - most);
+    let is_at_edge = surely(others, total - own_total, width, bins, 3.5)?
+        && !surely(most, own_total, width, left, 3.0)?;
     let window = Confirmed {
         start,
         own: most,
@@ -140,7 +144,7 @@ fn confirms(
         bins,
         asked,
     };
-    Some(is_confirmed.then_some(window))
+    Some((is_confirmed && !is_at_edge).then_some(window))
 }
 
 /// Checks the detection of `own` in the window that the model found.

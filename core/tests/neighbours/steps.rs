@@ -48,9 +48,9 @@ fn end(
     events
 }
 
-/// A pixel with two photons in bin 30, and background in others.
+/// A pixel with three photons in bin 30, and background in others.
 fn dim(pixel: &mut AsyncPixel<64>, config: &Config) {
-    pixel.count_batch(config, &[30, 30, 5, 50]);
+    pixel.count_batch(config, &[30, 30, 30, 5, 50]);
 }
 
 /// Those of the neighbours that exist are asked, and no others.
@@ -98,13 +98,13 @@ fn an_event_that_neighbours_confirm_is_the_pixels_own() {
         assert_eq!(event.pixel.raw(), pixel);
         assert_eq!((event.exposure, event.cycle.raw()), (12, 99));
         assert_eq!((event.peak_bin.raw(), event.offset.raw()), (30, 128));
-        // Two of four photons, so 2 in the 61 bins outside.
-        assert_eq!((event.peak_count.raw(), event.background.raw()), (2, 0));
+        // Three of five photons, so 2 in the 61 bins outside.
+        assert_eq!((event.peak_count.raw(), event.background.raw()), (3, 0));
         assert_eq!(event.flags, Flags::CONFIRMED);
     }
     // Each pixel has started over.
     assert!(pixels.iter().all(|pixel| pixel.histogram().total() == 0));
-    assert_eq!((statistics.events, statistics.photons()), (9, 36));
+    assert_eq!((statistics.events, statistics.photons()), (9, 45));
     // One pixel alone is not enough.
     let rule = neighbours(1, 1, Neighbours::Eight);
     let mut pixels = self::pixels(1);
@@ -118,13 +118,13 @@ fn the_depth_is_that_of_all_photons() {
     let rule = neighbours(3, 1, Neighbours::Four);
     let config = config(&rule);
     let mut pixels = pixels(3);
-    pixels[1].count_batch(&config, &[30, 30, 5, 50]);
+    pixels[1].count_batch(&config, &[30, 30, 31, 5, 50]);
     pixels[0].count_batch(&config, &[31, 31, 30, 7, 40]);
     pixels[2].count_batch(&config, &[31, 31, 32, 9, 60]);
     let events = end(&mut pixels, &config, &rule, &mut Statistics::default());
     let event = events.iter().find(|event| event.pixel.raw() == 1).unwrap();
-    // Bins 30, 31 and 32 have 3, 4 and 1 photons.
-    assert_eq!((event.peak_bin.raw(), event.peak_count.raw()), (31, 2));
+    // Bins 30, 31 and 32 have 3, 5 and 1 photons.
+    assert_eq!((event.peak_bin.raw(), event.peak_count.raw()), (31, 3));
     let middle = event.position().raw();
     assert!((31 * 256..31 * 256 + 128).contains(&middle), "{middle}");
 }
@@ -152,6 +152,10 @@ fn a_place_without_a_pixel_confirms_nothing() {
             .collect();
         for pixel in pixels.iter_mut().filter_map(ArrayPixel::pixel_mut) {
             dim(pixel, &config);
+            if pixel.address().raw() != 1 {
+                // One of these is not enough for another pixel.
+                pixel.count_batch(&config, &[2, 7, 11, 16, 20, 38, 43, 57, 61]);
+            }
         }
         if let Some(number) = left_out {
             pixels[number] = LeftOut(None);
