@@ -235,7 +235,7 @@ fn every_pixel_of_the_demo_reports_alone_or_in_a_block() {
     let report = read("report.html");
     assert!(report.contains("</html>") && report.matches("<svg").count() == 4);
     // As documented: the report stays small enough to send.
-    assert!(report.len() < 5_000_000 && report.contains("All 33,180 events are shown."));
+    assert!(report.len() < 5_000_000 && report.contains("All 30,552 events are shown."));
     for picture in ["depth-mean", "reflectivity-events", "reflectivity-signal"] {
         assert!(read(&format!("{picture}.svg")).ends_with("</svg>\n"));
     }
