@@ -68,6 +68,8 @@ pub struct Answer {
     /// Settings of the method to take.
     toml: Option<String>,
     settings: Option<String>,
+    /// Settings of the fastest method, if that is another.
+    fastest_toml: Option<String>,
     rows: Vec<Row>,
     able: Vec<Row>,
     /// The content of `methods.csv`, `stress.csv` and `compare.svg`.
@@ -115,10 +117,12 @@ pub fn compare(
         let CompareResult {
             comparison,
             settings,
+            fastest,
         } = options.compare(input, &requested, &callbacks)?;
-        let toml = settings.as_ref().map(SettingsFile::to_toml).transpose()?;
+        let toml = |of: &Option<SettingsFile>| of.as_ref().map(SettingsFile::to_toml).transpose();
         Ok(Answer {
-            toml,
+            toml: toml(&settings)?,
+            fastest_toml: toml(&fastest)?,
             settings: settings.map(|of| serde_json::to_string(&of)).transpose()?,
             rows: comparison.rows(),
             able: comparison.candidate_rows(),

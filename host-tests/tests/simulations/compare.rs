@@ -61,6 +61,12 @@ fn costs_are_the_counted_instructions() {
             cost::FIRST_PHOTON,
             counted("look; dead time; first photon only; no event"),
         ),
+        (cost::NEIGHBOURS, counted("look; 8 neighbours; no event")),
+        (cost::LOOK, counted("look; window of 3; no event")),
+        (
+            cost::CONFIRMED,
+            counted("look; 8 neighbours; confirmed") + counted("encode and to_le_bytes"),
+        ),
         (cost::EXPIRY, counted("look at L2")),
         (
             cost::EVENT,
@@ -215,7 +221,7 @@ fn the_slowest_pixels_of_the_answer_lie_between_those_of_its_trials() {
         for (outcome, slow) in outcomes.iter_mut().zip(slow) {
             outcome.figures.slow_cycles = slow;
         }
-        let methods = Method::all(U8F8::ONE, 2, &Settings::static_scene(1));
+        let methods = Method::all(U8F8::ONE, 2, true, &Settings::static_scene(1));
         answer(&methods, &outcomes, 10.0).candidates[0].slow_cycles
     };
     assert!((slowest([200.0, 800.0]) - 400.0).abs() < 1e-3);
@@ -238,6 +244,7 @@ fn outcome(method: usize, effort: u16, cycles: f64, error_mm: f64, instructions:
             reports: 1_000_000_000_000,
             wrong: 0.0,
             stray: 0,
+            of_blocks: 0.0,
         },
         instructions,
     }
@@ -245,7 +252,7 @@ fn outcome(method: usize, effort: u16, cycles: f64, error_mm: f64, instructions:
 
 #[test]
 fn the_cheapest_of_the_nearly_fastest_is_taken() {
-    let methods = Method::all(U8F8::ONE, 2, &Settings::static_scene(1));
+    let methods = Method::all(U8F8::ONE, 2, true, &Settings::static_scene(1));
     let frames = methods.len() - 1;
     assert_eq!(methods[frames].kind, Kind::Frames);
     let all = [
@@ -279,4 +286,36 @@ fn the_cheapest_of_the_nearly_fastest_is_taken() {
     wrong[5].figures.wrong = 0.03;
     assert_eq!(answer(&methods, &wrong, 10.0).best.unwrap().method, 0);
     assert_eq!(answer(&methods, &all, 1.0).best, None);
+}
+
+#[test]
+fn blocks_are_an_answer_of_their_own() {
+    let methods = Method::all(U8F8::ONE, 2, true, &Settings::static_scene(1));
+    let number = |name: &str| {
+        methods
+            .iter()
+            .position(|method| method.name == name)
+            .unwrap()
+    };
+    let (window, eight, blocks) = (
+        number("window of 3"),
+        number("8 neighbours"),
+        number("blocks of 4×4"),
+    );
+    let mut all = vec![
+        outcome(window, 5, 300.0, 9.0, 50.0),
+        outcome(eight, 5, 100.0, 9.0, 80.0),
+        outcome(blocks, 5, 50.0, 9.0, 60.0),
+    ];
+    let taken = |all: &[Outcome]| {
+        let found = answer(&methods, all, 10.0);
+        [found.best, found.fastest].map(|choice| choice.map(|choice| choice.method))
+    };
+    assert_eq!(taken(&all), [Some(eight), Some(blocks)]);
+    // Only blocks are exact enough.
+    assert_eq!(taken(&all[2..]), [None, Some(blocks)]);
+    // Nearly as fast, but dearer.
+    all[2].figures.cycles = 95.0;
+    all[2].instructions = 90.0;
+    assert_eq!(taken(&all), [Some(eight), None]);
 }

@@ -1,4 +1,5 @@
-//! The method to take: the cheapest of those that are exact enough and nearly as fast as the fastest.
+//! The method to take: the cheapest of those that are exact enough and nearly as fast as the fastest. One answer
+//! keeps every pixel; if blocks are faster, they are another.
 
 use super::measure::Outcome;
 use super::method::Method;
@@ -27,6 +28,8 @@ pub struct Choice {
     pub error_mm: f64,
     /// Instructions a laser cycle and pixel.
     pub instructions: f64,
+    /// The share of the reports that are of blocks.
+    pub of_blocks: f64,
     /// Relative standard deviation of the time.
     uncertainty: f64,
 }
@@ -38,8 +41,10 @@ pub struct Answer {
     pub within_mm: f64,
     /// All methods that become exact enough, the fastest first.
     pub candidates: Vec<Choice>,
-    /// The method to take: one of the candidates, if there are any.
+    /// The method to take at full resolution, if one is exact enough.
     pub best: Option<Choice>,
+    /// The method to take where time matters more than resolution, if that is another.
+    pub fastest: Option<Choice>,
 }
 
 /// The error in millimetres and the share of wrong reports of the longest frame, that of L2.
@@ -67,20 +72,34 @@ pub fn answer(methods: &[Method], outcomes: &[Outcome], within_mm: f64) -> Answe
     });
     let mut candidates: Vec<Choice> = candidates.collect();
     candidates.sort_unstable_by(|one, other| one.cycles.total_cmp(&other.cycles));
-    let least = candidates.first().map_or(0.0, |choice| choice.cycles);
-    // The uncertainty counts against a method, unless it is the fastest.
-    let near = candidates.iter().enumerate().filter(|(place, choice)| {
-        *place == 0 || choice.cycles * (1.0 + choice.uncertainty) <= NEARLY * least
-    });
-    let best = near
-        .map(|(_, choice)| choice)
-        .min_by(|one, other| one.instructions.total_cmp(&other.instructions))
-        .copied();
+    let has_full_resolution = |choice: &Choice| methods[choice.method].has_full_resolution();
+    let of_all = nearly_fastest(candidates.iter());
+    let (best, fastest) = if of_all.is_some_and(|choice| has_full_resolution(&choice)) {
+        (of_all, None)
+    } else {
+        let full = candidates
+            .iter()
+            .filter(|choice| has_full_resolution(choice));
+        (nearly_fastest(full), of_all)
+    };
     Answer {
         within_mm,
         candidates,
         best,
+        fastest,
     }
+}
+
+/// The cheapest of `candidates` that are nearly as fast as the first, which is the fastest.
+fn nearly_fastest<'a>(candidates: impl Iterator<Item = &'a Choice> + Clone) -> Option<Choice> {
+    let least = candidates.clone().next()?.cycles;
+    // The uncertainty counts against a method, unless it is the fastest.
+    let near = candidates.enumerate().filter(|(place, choice)| {
+        *place == 0 || choice.cycles * (1.0 + choice.uncertainty) <= NEARLY * least
+    });
+    near.map(|(_, choice)| choice)
+        .min_by(|one, other| one.instructions.total_cmp(&other.instructions))
+        .copied()
 }
 
 /// Interpolates geometrically between the last trial that is not exact enough and the first that is.
@@ -124,6 +143,7 @@ fn where_exact(trials: &[&Outcome], within_mm: f64, wrong_allowed: f64) -> Optio
         slow_cycles,
         error_mm: between(|outcome| outcome.figures.error_mm),
         instructions: between(|outcome| outcome.instructions),
+        of_blocks: exact.figures.of_blocks,
         uncertainty: uncertainty(exact),
     })
 }

@@ -5,7 +5,7 @@ use dtof_draw::chart::{Axis, Chart, Panel, Point, Series, Style, chart};
 use dtof_draw::palette;
 
 use super::Comparison;
-use super::method::Kind;
+use super::method::Method;
 
 impl Comparison {
     /// A number of laser cycles in the unit of the chart.
@@ -26,26 +26,24 @@ impl Comparison {
     /// # Errors
     /// Fails if there is nothing to draw.
     pub fn chart(&self) -> Result<String> {
-        let panel = |title: &str, single: bool| {
-            let numbers = 0..self.methods.len();
-            let mut series: Vec<Series> = numbers
-                .filter(|&number| {
-                    let method = &self.methods[number];
-                    method.kind == Kind::Frames || method.is_single() == single
-                })
-                .filter_map(|number| self.series(number))
-                .collect();
-            series.extend(self.bound_series());
-            Panel {
+        let frames = self.methods.len() - 1;
+        let panel = |title: &str, is_in: &dyn Fn(&Method) -> bool| {
+            let numbers = (0..frames).filter(|&number| is_in(&self.methods[number]));
+            let series: Vec<Series> = numbers.filter_map(|number| self.series(number)).collect();
+            let others = self.series(frames).into_iter().chain(self.bound_series());
+            (!series.is_empty()).then(|| Panel {
                 title: title.to_owned(),
-                series,
-            }
+                series: series.into_iter().chain(others).collect(),
+            })
         };
-        let mut panels = vec![panel("each pixel and exposure by itself", true)];
-        let has_more = self.methods.iter().any(|method| !method.is_single());
-        if has_more {
-            panels.push(panel("with blocks, and with tracking", false));
-        }
+        let has_more = |method: &Method| method.has_full_resolution() && !method.is_single();
+        let panels = [
+            panel("each pixel and exposure by itself", &Method::is_single),
+            panel("every pixel, with neighbours or tracking", &has_more),
+            panel("blocks: fewer places", &|method| {
+                !method.has_full_resolution()
+            }),
+        ];
         let (finding, holds) = self.finding();
         chart(&Chart {
             finding,
@@ -55,7 +53,7 @@ impl Comparison {
             y: Axis::logarithmic("error of a report, mm"),
             key: Vec::new(),
             columns: 1,
-            panels,
+            panels: panels.into_iter().flatten().collect(),
         })
     }
 

@@ -4,7 +4,7 @@
 
 use dtof_core::{DepthEstimator, Statistics};
 
-use super::method::{Kind, Method, Rule};
+use super::method::{Method, Rule};
 use dtof_engine::settings::Settings;
 
 /// Counting a photon (`AsyncPixel::count_batch`).
@@ -22,6 +22,10 @@ pub const PAPER: f64 = 90.68;
 pub const AVERAGE: f64 = 32.0;
 /// The same with tracking (`look; tracking; no event`).
 pub const TRACKING: f64 = 410.23;
+/// The same with 8 neighbours, whether it asks them or not (`look; 8 neighbours; no event`).
+pub const NEIGHBOURS: f64 = 1269.67;
+/// A look of one step without neighbours (`look; window of 3; no event`).
+pub const LOOK: f64 = 196.97;
 /// The same with a dead time (`look; dead time of 20 bins; no event`).
 pub const DEAD_TIME: f64 = 6975.64;
 /// The same with a dead time of all bins (`look; dead time; first photon only; no event`).
@@ -33,6 +37,8 @@ pub const EXPIRY: f64 = 108.0;
 /// An event with its peak and the depth from three bins (`kept peak; event and depth`), and its word
 /// (`encode and to_le_bytes`).
 pub const EVENT: f64 = 517.0 + 46.0;
+/// The same event if 8 neighbours confirm it (`look; 8 neighbours; confirmed`), and its word.
+pub const CONFIRMED: f64 = 4760.0 + 46.0;
 /// The depth from a centred window instead (`centred window, σ 1`, less `centroid`).
 pub const CENTRED: f64 = 135.84 - 68.0;
 
@@ -50,18 +56,19 @@ pub const fn window(bins: u8) -> f64 {
 
 /// A look without an event.
 fn look(method: &Method, settings: &Settings) -> f64 {
-    match method.kind {
-        Kind::Frames => 0.0,
-        Kind::Events { weighs: true, .. } if usize::from(settings.dead_time) >= settings.bins => {
-            FIRST_PHOTON
-        }
-        Kind::Events { weighs: true, .. } => DEAD_TIME,
-        Kind::Events { tracking: true, .. } => TRACKING,
-        Kind::Events { rule, .. } => match rule {
-            Rule::Paper => PAPER,
-            Rule::Average => AVERAGE,
-            Rule::Window(width) => window(width),
-        },
+    let Some(events) = method.decides() else {
+        return 0.0;
+    };
+    match events.rule {
+        _ if events.weighs && usize::from(settings.dead_time) >= settings.bins => FIRST_PHOTON,
+        _ if events.weighs => DEAD_TIME,
+        _ if events.tracking => TRACKING,
+        Rule::Paper => PAPER,
+        Rule::Average => AVERAGE,
+        // Neighbours take as much each.
+        Rule::Window(width) => events.neighbours.map_or(window(width), |neighbours| {
+            LOOK + f64::from(neighbours.raw()) / 8.0 * (NEIGHBOURS - LOOK)
+        }),
     }
 }
 
@@ -76,9 +83,10 @@ pub fn instructions(
     pixel_cycles: u64,
 ) -> f64 {
     let all = pixel_cycles as f64;
-    let looks = match method.kind {
-        Kind::Events { .. } => all / f64::from(settings.x.max(1)),
-        Kind::Frames => 0.0,
+    let looks = if method.is_frames() {
+        0.0
+    } else {
+        all / f64::from(settings.x.max(1))
     };
     let has_blocks = settings.binning.is_some();
     let of_blocks: f64 = if has_blocks {
@@ -95,6 +103,10 @@ pub fn instructions(
         DepthEstimator::CentredWindow(_) => CENTRED,
     };
     let events = pixels.events + blocks.events;
+    // At most: not all events need neighbours.
+    let event = method.neighbours().map_or(EVENT, |neighbours| {
+        EVENT + f64::from(neighbours.raw()) / 8.0 * (CONFIRMED - EVENT)
+    });
     let photon = if settings.once_per_bin {
         ONCE_PER_BIN
     } else {
@@ -102,7 +114,7 @@ pub fn instructions(
     };
     let sum = photon * pixels.photons() as f64
         + look(method, settings) * looks
-        + (EVENT + depth) * events as f64
+        + (event + depth) * events as f64
         + EXPIRY * pixels.expired as f64
         + of_blocks;
     sum / all

@@ -26,7 +26,7 @@ pub mod truth;
 use anyhow::{Result, ensure};
 use dtof_core::{Array, BlockLevel, PixelAddress};
 
-use answer::{Answer, answer, longest_frame};
+use answer::{Answer, Choice, answer, longest_frame};
 use bound::Bound;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
@@ -54,7 +54,7 @@ const MIN_COUNTS: [u16; 16] = [
 /// The fewest reports of a trial; a trial with fewer is left out.
 const MIN_REPORTS: u64 = 100;
 
-/// If no method is as exact as frames of L2, the allowed error grows by this factor until one is, but not
+/// If no method with full resolution is as exact as frames of L2, the allowed error grows by this factor until one is, but not
 /// beyond that of a wrong report.
 const RELAXATION: f64 = std::f64::consts::SQRT_2;
 
@@ -95,15 +95,19 @@ pub struct Comparison {
     pub stressed: Vec<(Stress, Vec<Outcome>)>,
     /// The error of frames of L2, in millimetres.
     pub frame_mm: Option<f64>,
-    /// The method to take.
+    /// The methods to take.
     pub answer: Answer,
-    /// The settings of the method to take.
+    /// The settings of the method to take at full resolution.
     pub settings: Option<Settings>,
+    /// The settings of the fastest method, if that is another.
+    pub fastest: Option<Settings>,
     /// The light of the median pixel.
     pub light: Light,
     /// The true ranges.
     pub truth: Truth,
-    /// Pixels.
+    /// Columns and rows of the sensor.
+    pub sensor: [u32; 2],
+    /// Pixels that were compared.
     pub pixels: usize,
     /// Laser cycles.
     pub cycles: u64,
@@ -120,17 +124,21 @@ struct Methods<'a> {
 
 impl<'a> Methods<'a> {
     /// All methods for the pulse of `light`, each with the threshold for the same rate of false alarms.
-    fn new(task: &Task<'a>, light: &Light, most_levels: u8) -> Result<Self> {
+    fn new(task: &Task<'a>, light: &Light, most_levels: u8, has_neighbours: bool) -> Result<Self> {
         let settings = task.settings;
         let pulse = dtof_core::fixed::types::U8F8::saturating_from_num(light.sigma);
-        let methods = Method::all(pulse, most_levels, settings);
+        let methods = Method::all(pulse, most_levels, has_neighbours, settings);
         let mut rules: Vec<Rule> = methods.iter().filter_map(Method::rule).collect();
         rules.dedup();
         let simulated = Thresholds::simulate(&rules, settings, light.background, settings.seed)?;
         let thresholds = methods.iter().map(|method| {
             // Blocks have a quarter of the false alarms.
-            let alone = method.levels() == BlockLevel::PIXEL;
-            let share = task.false_alarm * if alone { 1.0 } else { 0.75 };
+            let pixels = if method.has_full_resolution() {
+                1.0
+            } else {
+                0.75
+            };
+            let share = task.false_alarm * pixels;
             method
                 .rule()
                 .map(|rule| simulated.of(rule, share))
@@ -168,7 +176,7 @@ impl<'a> Methods<'a> {
         let methods = self.all.iter().enumerate();
         let trials = methods.map(|(number, method)| match method.kind {
             Kind::Frames => self.trial(number, self.settings.l2),
-            Kind::Events { .. } => self.trial(number, MIN_COUNT),
+            Kind::Events(_) => self.trial(number, MIN_COUNT),
         });
         trials.collect()
     }
@@ -188,7 +196,11 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     (task.progress)("surveys the photons")?;
     let mut source = photons(task, 0, PHOTONS)?;
     let (array, laser_hz) = (source.array(), source.laser_hz());
-    let most_levels = most_levels(source.as_ref());
+    let (most_levels, has_neighbours) = (
+        most_levels(source.as_ref()),
+        has_neighbours(source.as_ref()),
+    );
+    let sensor = [array.columns(), source.capture_rows()];
     let surveyed = survey(source.as_mut(), settings, sigma)?;
     let truth = known_ranges(task.truth.clone(), &surveyed, settings, array)?;
     let has_target = |pixel| truth.has_target(pixel, 0);
@@ -199,7 +211,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     let light = light(&surveyed, sigma, has_target);
 
     (task.progress)("finds thresholds of equal false alarms")?;
-    let methods = Methods::new(task, &light, most_levels)?;
+    let methods = Methods::new(task, &light, most_levels, has_neighbours)?;
     let bound = Bound::new(&light, settings, task.false_alarm, settings.seed)?;
 
     (task.progress)("tries all methods")?;
@@ -217,12 +229,14 @@ pub fn compare(task: &Task) -> Result<Comparison> {
 
     let frame_mm = longest_frame(&methods.all, &outcomes).map(|frame| frame.0);
     let answer = choose(task, &methods.all, &outcomes, frame_mm)?;
-    let best = answer.best.as_ref();
-    let best = best.map(|best| methods.trial(best.method, best.effort));
-    let best = best.transpose()?;
-    // The method to take is tried under stress with the minimum count that it is taken with.
+    let trial = |choice: Option<Choice>| {
+        let trial = choice.map(|choice| methods.trial(choice.method, choice.effort));
+        trial.transpose()
+    };
+    let (best, fastest) = (trial(answer.best)?, trial(answer.fastest)?);
+    // The methods to take are tried under stress with the minimum count that they are taken with.
     let mut trials = methods.fastest()?;
-    trials.extend(best.clone());
+    trials.extend(best.iter().chain(&fastest).cloned());
     let mut stresses = Stress::all(&light, settings.gate.map_or(0, |gate| gate.0));
     // A stress that makes every pixel hot leaves none to compare.
     let is_hot = |stress: &Stress, pixel| stress.is_hot(pixel, array.columns());
@@ -235,6 +249,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
         frame_mm,
         answer,
         settings: best.map(|best| best.settings),
+        fastest: fastest.map(|fastest| fastest.settings),
         methods: methods.all,
         thresholds: methods.thresholds,
         outcomes,
@@ -242,6 +257,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
         stressed,
         light,
         truth,
+        sensor,
         pixels,
         cycles,
         laser_hz,
@@ -254,7 +270,7 @@ fn photons(task: &Task, nth_seed: u64, most: f64) -> Result<Box<dyn PhotonSource
     limited((task.photons)(seed + nth_seed)?, most, l2)
 }
 
-/// The method to take. Its error is at most the one given, or else that of frames of L2, `frame_mm`.
+/// The methods to take. Their error is at most the one given, or else that of frames of L2, `frame_mm`.
 fn choose(
     task: &Task,
     methods: &[Method],
@@ -270,12 +286,17 @@ fn choose(
              laser cycles"
         ))
     })?;
-    let mut found = answer(methods, outcomes, frame_mm);
+    let first = answer(methods, outcomes, frame_mm);
     let widest = WRONG_BEYOND_BINS * mm_per_bin(task.settings);
-    while found.best.is_none() && found.within_mm < widest {
-        found = answer(methods, outcomes, RELAXATION * found.within_mm);
-    }
-    Ok(found)
+    let wider = |last: &Answer| {
+        let within_mm = RELAXATION * last.within_mm;
+        (last.within_mm < widest).then(|| answer(methods, outcomes, within_mm))
+    };
+    let mut all: Vec<Answer> = std::iter::successors(Some(first), wider).collect();
+    // Only blocks may be exact enough.
+    let has_full = all.iter().position(|found| found.best.is_some());
+    let has_any = all.iter().position(|found| found.fastest.is_some());
+    Ok(all.swap_remove(has_full.or(has_any).unwrap_or(all.len() - 1)))
 }
 
 /// The outcomes of `trials` under `stress`, on photons of another seed.
@@ -340,6 +361,14 @@ fn most_levels(source: &dyn PhotonSource) -> u8 {
     [2, 1].into_iter().find(fits).unwrap_or(0)
 }
 
+/// Whether the pixels of `source` have neighbours on all sides, and those of one capture only.
+fn has_neighbours(source: &dyn PhotonSource) -> bool {
+    let array = source.array();
+    array.columns().min(array.rows()) > 1
+        && source.capture_rows() == array.rows()
+        && source.axis_names()[0] == "column"
+}
+
 /// Limits `source` to about `most` photons: first to fewer laser cycles, at least three exposures, then to
 /// fewer pixels.
 #[allow(
@@ -366,9 +395,11 @@ fn efforts(method: &Method, l2: u16, light: &Light) -> Vec<u16> {
             lengths.push(l2);
             lengths
         }
-        Kind::Events { .. } => {
+        Kind::Events(_) => {
             let all = (light.signal + light.background) * f64::from(l2);
-            let reachable = MIN_COUNTS.into_iter();
+            // Neighbours take three times as long to try.
+            let step = if method.neighbours().is_some() { 2 } else { 1 };
+            let reachable = MIN_COUNTS.into_iter().step_by(step);
             reachable
                 .filter(|&count| count == MIN_COUNT || f64::from(count) <= 2.0 * all)
                 .collect()

@@ -1,7 +1,7 @@
 //! The methods that are compared: rule, depth estimator and name.
 
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{AnyRule, AverageRule, BlockLevel, Count, PaperRule, WindowRule};
+use dtof_core::{AnyRule, AverageRule, BlockLevel, Count, Neighbours, PaperRule, WindowRule};
 use dtof_draw::palette::{self, Pen};
 use dtof_link::AdaptiveBinning;
 
@@ -50,21 +50,47 @@ impl Rule {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// Events, as soon as a peak stands clear.
-    Events {
-        /// The rule.
-        rule: Rule,
-        /// The number of levels of blocks.
-        levels: u8,
-        /// Whether half of the false alarms are spent near the last event.
-        tracking: bool,
-        /// Whether the rule weighs bins by the dead time of the TDC.
-        weighs: bool,
-        /// Whether photons of one laser cycle in one bin count once.
-        once_per_bin: bool,
-    },
+    Events(Events),
     /// Readings of frames.
     Frames,
 }
+
+/// What decides about an event.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Events {
+    /// The rule.
+    pub rule: Rule,
+    /// The number of levels of blocks.
+    pub levels: u8,
+    /// Laser cycles until a silent pixel counts in its block, if not those of the settings.
+    pub patience: Option<u16>,
+    /// The pixels around a pixel that confirm it.
+    pub neighbours: Option<Neighbours>,
+    /// Whether half of the false alarms are spent near the last event.
+    pub tracking: bool,
+    /// Whether the rule weighs bins by the dead time of the TDC.
+    pub weighs: bool,
+    /// Whether photons of one laser cycle in one bin count once.
+    pub once_per_bin: bool,
+}
+
+impl Events {
+    /// Each pixel and each exposure decides by itself.
+    const fn alone(rule: Rule) -> Self {
+        Self {
+            rule,
+            levels: 0,
+            patience: None,
+            neighbours: None,
+            tracking: false,
+            weighs: false,
+            once_per_bin: false,
+        }
+    }
+}
+
+/// Blocks are also tried with so many laser cycles until a silent pixel counts in its block.
+const SHORT_PATIENCE: u16 = 8;
 
 /// A method.
 #[derive(Clone, Debug, PartialEq)]
@@ -80,83 +106,83 @@ pub struct Method {
 }
 
 impl Method {
-    fn events(name: impl Into<String>, rule: Rule, pen: Pen) -> Self {
+    fn events(name: impl Into<String>, events: Events, pen: Pen) -> Self {
         Self {
             name: name.into(),
-            kind: Kind::Events {
-                rule,
-                levels: 0,
-                tracking: false,
-                weighs: false,
-                once_per_bin: false,
-            },
+            kind: Kind::Events(events),
             centroid: false,
             pen,
         }
     }
 
     /// All methods for a pulse of standard deviation `sigma` bins, in an array that has blocks of up to
-    /// `most_levels` levels. With a dead time in `like`, or photons that count once per bin, the window is
-    /// tried with it and without. Frames are the last.
+    /// `most_levels` levels, and `has_neighbours`. With a dead time in `like`, or photons that count once per
+    /// bin, the window is tried with it and without. Frames are the last.
     #[must_use]
-    pub fn all(sigma: U8F8, most_levels: u8, like: &Settings) -> Vec<Self> {
+    pub fn all(sigma: U8F8, most_levels: u8, has_neighbours: bool, like: &Settings) -> Vec<Self> {
         let width = WindowRule::width_for_pulse(sigma);
-        let window = Rule::Window(width);
+        let window = Events::alone(Rule::Window(width));
         let name = format!("window of {width}");
+        let paper = Events::alone(Rule::Paper);
+        let average = Events::alone(Rule::Average);
         let mut methods = vec![
             Self {
                 centroid: true,
-                ..Self::events("paper's rule, centroid", Rule::Paper, palette::PAPER)
+                ..Self::events("paper's rule, centroid", paper, palette::PAPER)
             },
-            Self::events("paper's rule", Rule::Paper, palette::alpha(2)),
-            Self::events("average of all bins", Rule::Average, palette::AVERAGE),
+            Self::events("paper's rule", paper, palette::alpha(2)),
+            Self::events("average of all bins", average, palette::AVERAGE),
             Self {
                 centroid: true,
                 ..Self::events(format!("{name}, centroid"), window, palette::window(2))
             },
             Self::events(name.clone(), window, palette::window(3)),
         ];
-        let more = |name: &str, levels, tracking, pen| Self {
-            kind: Kind::Events {
-                rule: window,
-                levels,
-                tracking,
-                weighs: false,
-                once_per_bin: false,
-            },
-            ..Self::events(name, window, pen)
-        };
+        let mut add = |name: &str, events, pen| methods.push(Self::events(name, events, pen));
         if like.dead_time > 0 {
-            methods.push(Self {
-                kind: Kind::Events {
-                    rule: window,
-                    levels: 0,
-                    tracking: false,
-                    weighs: true,
-                    once_per_bin: false,
-                },
-                ..Self::events(format!("{name}, dead time"), window, palette::window(4))
-            });
+            let weighs = Events {
+                weighs: true,
+                ..window
+            };
+            add(&format!("{name}, dead time"), weighs, palette::window(4));
         }
         if like.once_per_bin {
-            methods.push(Self {
-                kind: Kind::Events {
-                    rule: window,
-                    levels: 0,
-                    tracking: false,
-                    weighs: false,
-                    once_per_bin: true,
-                },
-                ..Self::events(format!("{name}, once per bin"), window, palette::window(6))
-            });
+            let once_per_bin = Events {
+                once_per_bin: true,
+                ..window
+            };
+            let name = format!("{name}, once per bin");
+            add(&name, once_per_bin, palette::window(6));
         }
-        methods.push(more("tracking", 0, true, palette::window(5)));
+        let tracking = Events {
+            tracking: true,
+            ..window
+        };
+        add("tracking", tracking, palette::window(5));
+        if has_neighbours {
+            let neighbours = |neighbours| Events {
+                neighbours: Some(neighbours),
+                ..window
+            };
+            let (four, eight) = (neighbours(Neighbours::Four), neighbours(Neighbours::Eight));
+            add("4 neighbours", four, palette::window(2));
+            add("8 neighbours", eight, palette::window(3));
+        }
+        let blocks = |levels| Events { levels, ..window };
         if most_levels > 0 {
-            methods.push(more("blocks of 2×2", 1, false, palette::window(7)));
+            add("blocks of 2×2", blocks(1), palette::window(7));
         }
         if most_levels > 1 {
-            methods.push(more("blocks of 4×4", 2, false, palette::alpha(8)));
-            methods.push(more("tracking, blocks of 4×4", 2, true, palette::window(1)));
+            add("blocks of 4×4", blocks(2), palette::alpha(8));
+        }
+        if most_levels > 0 && patience_of(like) != SHORT_PATIENCE {
+            let side = 1 << most_levels;
+            let name = format!("blocks of {side}×{side}, patience {SHORT_PATIENCE}");
+            let short = Events {
+                patience: Some(SHORT_PATIENCE),
+                ..blocks(most_levels)
+            };
+            add(&name, short, palette::window(1));
         }
         methods.push(Self {
             name: "frames".to_owned(),
@@ -173,37 +199,45 @@ impl Method {
         self.kind == Kind::Frames
     }
 
-    /// The rule, if it reports events.
+    /// How it decides about events, if it reports events.
     #[must_use]
-    pub const fn rule(&self) -> Option<Rule> {
-        match self.kind {
-            Kind::Events { rule, .. } => Some(rule),
+    pub const fn decides(&self) -> Option<&Events> {
+        match &self.kind {
+            Kind::Events(events) => Some(events),
             Kind::Frames => None,
         }
+    }
+
+    /// The rule, if it reports events.
+    #[must_use]
+    pub fn rule(&self) -> Option<Rule> {
+        self.decides().map(|events| events.rule)
     }
 
     /// The highest level of its blocks.
     #[must_use]
     pub fn levels(&self) -> BlockLevel {
-        match self.kind {
-            Kind::Events { levels, .. } => BlockLevel::saturating(levels),
-            Kind::Frames => BlockLevel::PIXEL,
-        }
+        let levels = self.decides().map_or(0, |events| events.levels);
+        BlockLevel::saturating(levels)
+    }
+
+    /// Whether every report is of one pixel.
+    #[must_use]
+    pub fn has_full_resolution(&self) -> bool {
+        self.levels() == BlockLevel::PIXEL
+    }
+
+    /// The pixels around a pixel that confirm it.
+    #[must_use]
+    pub fn neighbours(&self) -> Option<Neighbours> {
+        self.decides()?.neighbours
     }
 
     /// Whether each pixel and each exposure decides alone, so that the bound applies.
     #[must_use]
-    pub const fn is_single(&self) -> bool {
-        !matches!(
-            self.kind,
-            Kind::Events { levels: 1.., .. } | Kind::Events { tracking: true, .. }
-        )
-    }
-
-    /// Whether it weighs bins by the dead time of the TDC.
-    #[must_use]
-    pub const fn weighs(&self) -> bool {
-        matches!(self.kind, Kind::Events { weighs: true, .. })
+    pub fn is_single(&self) -> bool {
+        let is_single = |events: &Events| !events.tracking && events.neighbours.is_none();
+        self.has_full_resolution() && self.decides().is_none_or(is_single)
     }
 
     /// The settings `like`, with this method. `effort` is the minimum count of a peak, or the laser cycles
@@ -223,14 +257,8 @@ impl Method {
             neighbours: None,
             tracking: false,
             frame: None,
-            dead_time: if self.weighs() { like.dead_time } else { 0 },
-            once_per_bin: matches!(
-                self.kind,
-                Kind::Events {
-                    once_per_bin: true,
-                    ..
-                }
-            ),
+            dead_time: 0,
+            once_per_bin: false,
             ..like.clone()
         };
         Ok(match self.kind {
@@ -238,17 +266,24 @@ impl Method {
                 frame: Some(effort),
                 ..settings
             },
-            Kind::Events { rule, tracking, .. } => Settings {
-                rule: rule.with(threshold, effort)?,
-                binning: (self.levels() != BlockLevel::PIXEL).then(|| AdaptiveBinning {
+            Kind::Events(events) => Settings {
+                rule: events.rule.with(threshold, effort)?,
+                binning: (!self.has_full_resolution()).then(|| AdaptiveBinning {
                     levels: self.levels(),
-                    patience: like
-                        .binning
-                        .map_or(AdaptiveBinning::PATIENCE, |binning| binning.patience),
+                    patience: events.patience.unwrap_or_else(|| patience_of(like)),
                 }),
-                tracking,
+                neighbours: events.neighbours,
+                tracking: events.tracking,
+                dead_time: if events.weighs { like.dead_time } else { 0 },
+                once_per_bin: events.once_per_bin,
                 ..settings
             },
         })
     }
+}
+
+/// The patience of blocks in `settings`, or the default.
+fn patience_of(settings: &Settings) -> u16 {
+    let binning = settings.binning;
+    binning.map_or(AdaptiveBinning::PATIENCE, |binning| binning.patience)
 }

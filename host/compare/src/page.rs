@@ -14,8 +14,9 @@ use dtof_options::files::{MarkedFile, may_replace, write_marked};
 use dtof_report::{Figure, Section, still};
 
 /// The files of a comparison, and the mark near the start of each. The last one makes a folder complete.
-pub const FILES: [(&str, &str); 5] = [
+pub const FILES: [(&str, &str); 6] = [
     ("dtof.toml", settings::MARK),
+    ("dtof-fastest.toml", settings::MARK),
     ("compare.svg", svg::MARK),
     ("methods.csv", TABLE_HEAD),
     ("stress.csv", STRESS_HEAD),
@@ -96,8 +97,8 @@ pub fn may_write(folder: &Path, inputs: &[&Path]) -> Result<()> {
         .try_for_each(|(name, mark)| may_replace(&folder.join(name), mark, inputs))
 }
 
-/// Writes the results for the input `name` into `folder`: chart, tables, page, and the settings of the
-/// method to take, if there is one.
+/// Writes the results for the input `name` into `folder`: chart, tables, page, and `settings`: those of the
+/// method to take at full resolution, and of the fastest if that is another.
 ///
 /// # Errors
 /// Fails if the folder cannot be written.
@@ -105,7 +106,7 @@ pub fn write(
     comparison: &Comparison,
     folder: &Path,
     name: &Path,
-    settings: Option<&SettingsFile>,
+    settings: [Option<&SettingsFile>; 2],
     inputs: &[&Path],
 ) -> Result<()> {
     fs::create_dir_all(folder)
@@ -128,9 +129,10 @@ pub fn write(
     let caption = "methods.csv has every dot, stress.csv the harder conditions.";
     let figure = Figure { svg: &svg, caption };
     let page = still(&title, &lead, &sections, &[figure]);
-    let toml = settings.map(SettingsFile::to_toml).transpose()?;
+    let [best, fastest] = settings.map(|one| one.map(SettingsFile::to_toml).transpose());
     let texts = [
-        toml,
+        best?,
+        fastest?,
         Some(svg.clone()),
         Some(comparison.table()),
         Some(comparison.stress_table()),
@@ -145,10 +147,11 @@ pub fn write(
         })
         .collect();
     write_marked(&files, inputs)?;
-    let [old, ..] = &places;
-    if settings.is_none() && old.exists() {
-        // Settings of an earlier comparison would look like the answer of this one.
-        fs::remove_file(old).with_context(|| old.display().to_string())?;
+    for (old, text) in places.iter().zip(&texts) {
+        if text.is_none() && old.exists() {
+            // Settings of an earlier comparison would look like the answer of this one.
+            fs::remove_file(old).with_context(|| old.display().to_string())?;
+        }
     }
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! The reports of one method: how often they come, and their errors.
 
 use anyhow::{Result, ensure};
-use dtof_core::{Array, DepthEvent, PixelAddress, RangeScale};
+use dtof_core::{Array, BlockLevel, DepthEvent, PixelAddress, RangeScale};
 
 use super::stress::Stress;
 use super::truth::Truth;
@@ -45,11 +45,14 @@ pub struct Tally<'a> {
     scale: RangeScale,
     mm_per_bin: f64,
     cycles: u64,
+    has_neighbours: bool,
     /// The most errors that are kept of a pixel.
     most: usize,
     pixels: Vec<Reports>,
     /// Reports of pixels without a target.
     stray: u64,
+    /// Reports of pixels with a target that are of their blocks.
+    of_blocks: u64,
 }
 
 /// The reports of a pixel.
@@ -57,6 +60,8 @@ pub struct Tally<'a> {
 struct Reports {
     right: u32,
     wrong: u32,
+    /// Laser cycles until the first right report.
+    first: Option<u64>,
     /// Errors in millimetres: every `2^stride`-th.
     kept: Vec<f32>,
     stride: u32,
@@ -89,7 +94,8 @@ impl Reports {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
     /// Laser cycles of a pixel from one right report to the next: the mean of the middle half of the pixels
-    /// with a target. Infinite if they have no right report.
+    /// with a target. Infinite if they have no right report. With neighbours it is at least the time of the
+    /// first report: later ones may use photons that a neighbour has kept.
     pub cycles: f64,
     /// The same for the pixel at the 90th percentile.
     pub slow_cycles: f64,
@@ -102,6 +108,8 @@ pub struct Figures {
     pub wrong: f64,
     /// Reports of pixels without a target.
     pub stray: u64,
+    /// The share of the reports of pixels with a target that are of their blocks.
+    pub of_blocks: f64,
 }
 
 impl<'a> Tally<'a> {
@@ -124,9 +132,11 @@ impl<'a> Tally<'a> {
             scale: settings.range_scale()?,
             mm_per_bin: mm_per_bin(settings),
             cycles,
+            has_neighbours: settings.neighbours.is_some(),
             most: (MAX_KEPT / pixels.max(1)).clamp(8, 1024),
             pixels: vec![Reports::default(); pixels],
             stray: 0,
+            of_blocks: 0,
         })
     }
 
@@ -162,8 +172,10 @@ impl<'a> Tally<'a> {
             reports.wrong += 1;
         } else {
             reports.right += 1;
+            reports.first.get_or_insert(cycle + 1);
         }
         reports.keep(error, self.most);
+        self.of_blocks += u64::from(event.level != BlockLevel::PIXEL);
     }
 
     /// The figures. `watched` are the laser cycles in which each pixel had a target.
@@ -187,7 +199,11 @@ impl<'a> Tally<'a> {
             if cycles == 0 || is_hot {
                 continue;
             }
-            times.push((cycles as f64, f64::from(reports.right)));
+            let (mut cycles, mut right) = (cycles as f64, f64::from(reports.right));
+            if let Some(first) = reports.first.filter(|_| self.has_neighbours) {
+                (cycles, right) = ((cycles / right).max(first as f64), 1.0);
+            }
+            times.push((cycles, right));
             figures.reports += u64::from(reports.right + reports.wrong);
             wrong += u64::from(reports.wrong);
             let weight = 1.0 / reports.kept.len().max(1) as f64;
@@ -211,6 +227,7 @@ impl<'a> Tally<'a> {
         let slow = (0.9 * times.len() as f64) as usize;
         figures.slow_cycles = times.get(slow).map_or(f64::INFINITY, time);
         figures.wrong = wrong as f64 / figures.reports.max(1) as f64;
+        figures.of_blocks = self.of_blocks as f64 / figures.reports.max(1) as f64;
         figures.error_mm = weighted_quantile(&mut errors, 0.68);
         figures
     }

@@ -1,7 +1,7 @@
 //! The answer of a comparison as text.
 
 use super::Comparison;
-use super::answer::Choice;
+use super::answer::{Answer, Choice};
 use super::measure::Outcome;
 use dtof_options::rows::{Row, grouped, significant};
 use dtof_report::capitalised;
@@ -17,18 +17,25 @@ const SAME_TIME: f64 = 0.2;
 impl Comparison {
     /// The finding of the chart, and whether there is a method to take.
     pub(super) fn finding(&self) -> (String, bool) {
-        match &self.answer.best {
-            None => ("A method is exact enough".to_owned(), false),
-            Some(best) => {
-                let name = capitalised(&self.methods[best.method].name);
-                let time = self.time_text(best.cycles);
-                let times = self.speed_up(best).map_or(String::new(), |times| {
-                    format!(", {times:.1} times as fast as frames")
-                });
-                let error = short(best.error_mm);
-                (format!("{name}: {error} mm after {time}{times}"), true)
-            }
-        }
+        let Answer { best, fastest, .. } = &self.answer;
+        let Some(first) = best.as_ref().or(fastest.as_ref()) else {
+            return ("A method is exact enough".to_owned(), false);
+        };
+        let name = capitalised(&self.methods[first.method].name);
+        let time = self.time_text(first.cycles);
+        let times = self.speed_up(first).map_or(String::new(), |times| {
+            format!(", {times:.1} times as fast as frames")
+        });
+        let error = short(first.error_mm);
+        let second = fastest.as_ref().filter(|_| best.is_some());
+        let second = second.map_or(String::new(), |second| {
+            let name = &self.methods[second.method].name;
+            format!("; {name} after {}", self.time_text(second.cycles))
+        });
+        (
+            format!("{name}: {error} mm after {time}{times}{second}"),
+            true,
+        )
     }
 
     /// The time of the shortest frame that is exact enough, relative to that of `best`.
@@ -82,65 +89,102 @@ impl Comparison {
             row("truth", self.truth.description().to_owned()),
             row("wanted", self.allowed_error()),
         ];
-        let Some(best) = &self.answer.best else {
-            let all = self.outcomes.iter().filter(|outcome| {
-                !self.methods[outcome.trial.method].is_frames()
-                    && outcome.figures.cycles.is_finite()
-            });
-            let closest =
-                all.min_by(|one, other| one.figures.error_mm.total_cmp(&other.figures.error_mm));
-            rows.push(row("take", "no method is exact enough here".to_owned()));
-            if let Some(closest) = closest {
-                rows.push(row(
-                    "most exact",
-                    format!(
-                        "{}: {} mm; a larger --within allows it",
-                        self.methods[closest.trial.method].name,
-                        short(closest.figures.error_mm)
-                    ),
-                ));
-                if closest.figures.wrong > 0.5 {
-                    let text = "most reports are wrong: a cover glass? `calibrate` finds the gate";
-                    rows.push(row("hint", text.to_owned()));
-                }
+        let Answer { best, fastest, .. } = &self.answer;
+        match best {
+            Some(best) => {
+                let also = match fastest {
+                    None => ", the fastest too",
+                    Some(_) => "",
+                };
+                let name = format!("{}{also}", self.methods[best.method].name);
+                rows.push(row("take", name));
+                rows.extend(self.choice_rows(best, ""));
             }
-            return rows;
-        };
-        rows.extend([
-            row("take", self.methods[best.method].name.clone()),
-            row("photons of a peak", format!("at least {}", best.effort)),
-            row("time to a report", self.time_text(best.cycles)),
-            row("slowest tenth", self.slowest_tenth(best)),
-            row("error", format!("{} mm", short(best.error_mm))),
+            None if fastest.is_some() => {
+                let text = "no method that keeps every pixel is exact enough here";
+                rows.push(row("take", text.to_owned()));
+            }
+            None => rows.extend(self.rows_without_answer()),
+        }
+        if let Some(fastest) = fastest {
+            rows.push(row("fastest", self.methods[fastest.method].name.clone()));
+            rows.extend(self.choice_rows(fastest, "its "));
+        }
+        rows
+    }
+
+    /// Why there is no method to take.
+    fn rows_without_answer(&self) -> Vec<Row> {
+        let row = |name: &str, value: String| (name.to_owned(), value);
+        let mut rows = vec![row("take", "no method is exact enough here".to_owned())];
+        let all = self.outcomes.iter().filter(|outcome| {
+            !self.methods[outcome.trial.method].is_frames() && outcome.figures.cycles.is_finite()
+        });
+        let closest =
+            all.min_by(|one, other| one.figures.error_mm.total_cmp(&other.figures.error_mm));
+        if let Some(closest) = closest {
+            rows.push(row(
+                "most exact",
+                format!(
+                    "{}: {} mm; a larger --within allows it",
+                    self.methods[closest.trial.method].name,
+                    short(closest.figures.error_mm)
+                ),
+            ));
+            if closest.figures.wrong > 0.5 {
+                let text = "most reports are wrong: a cover glass? `calibrate` finds the gate";
+                rows.push(row("hint", text.to_owned()));
+            }
+        }
+        rows
+    }
+
+    /// What a method does; each row begins with `whose`.
+    fn choice_rows(&self, choice: &Choice, whose: &str) -> Vec<Row> {
+        let row = |name: &str, value: String| (format!("{whose}{name}"), value);
+        let mut rows = vec![
+            row("resolution", self.resolution(choice)),
+            row("photons of a peak", format!("at least {}", choice.effort)),
+            row("time to a report", self.time_text(choice.cycles)),
+            row("slowest tenth", self.slowest_tenth(choice)),
+            row("error", format!("{} mm", short(choice.error_mm))),
             row(
                 "cost",
                 format!(
                     "{:.0} instructions a laser cycle and pixel",
-                    best.instructions
+                    choice.instructions
                 ),
             ),
-        ]);
-        if let Some(fastest) = self
-            .answer
-            .candidates
-            .first()
-            .filter(|first| *first != best)
-        {
-            rows.push(row(
-                "fastest",
-                format!(
-                    "{}: {}, {:.0} instructions",
-                    self.methods[fastest.method].name,
-                    self.time_text(fastest.cycles),
-                    fastest.instructions
-                ),
-            ));
-        }
-        let broken: Vec<&str> = self.failing(best).collect();
+        ];
+        let broken: Vec<&str> = self.failing(choice).collect();
         if !broken.is_empty() {
-            rows.push(row("does not hold with", broken.join("; ")));
+            rows.push(row("weak points", broken.join("; ")));
         }
         rows
+    }
+
+    /// How many places the reports of a method have.
+    fn resolution(&self, choice: &Choice) -> String {
+        let method = &self.methods[choice.method];
+        let [columns, rows] = self.sensor;
+        let all = format!("{columns}×{rows}");
+        let side = 1 << method.levels().raw();
+        if side > 1 {
+            return format!(
+                "blocks of {side}×{side}: a sensor of {all} pixels keeps {}×{} places where only they \
+                 report; {:.0} % of the reports are of blocks",
+                columns.div_ceil(side),
+                rows.div_ceil(side),
+                100.0 * choice.of_blocks
+            );
+        }
+        let shared = method.neighbours().map_or(String::new(), |neighbours| {
+            format!(
+                "; a depth may have photons of {} neighbours",
+                neighbours.raw()
+            )
+        });
+        format!("full: each of {all} pixels reports{shared}")
     }
 
     /// The time of the slowest tenth of the pixels.

@@ -13,7 +13,7 @@ use super::simulate::settings_of_scene;
 use dtof_calibrate::CalibrationOptions;
 use dtof_compare::truth::Truth;
 use dtof_compare::{Comparison, Task, compare};
-use dtof_engine::settings::{RuleName, SettingsFile, share};
+use dtof_engine::settings::{RuleName, Settings, SettingsFile, share};
 use dtof_options::numbers::{MAX_INTEGER, integer, positive};
 use dtof_options::{Refused, plain};
 use dtof_photons::input::Input;
@@ -76,8 +76,10 @@ pub struct Callbacks<'a> {
 pub struct CompareResult {
     /// All methods.
     pub comparison: Comparison,
-    /// The settings of the method to take, if there is one.
+    /// The settings of the method to take at full resolution, if there is one.
     pub settings: Option<SettingsFile>,
+    /// The settings of the fastest method, if that is another.
+    pub fastest: Option<SettingsFile>,
 }
 
 /// A recording or a scene that can be compared.
@@ -194,10 +196,13 @@ impl Options {
             progress: callbacks.step,
         });
         let comparison = comparison.context(name)?;
-        let settings = comparison.settings.as_ref();
+        let file = |settings: &Option<Settings>| {
+            let settings = settings.as_ref();
+            settings.map(|settings| requested.with_settings(settings).without_recording())
+        };
         Ok(CompareResult {
-            settings: settings
-                .map(|settings| requested.with_settings(settings).without_recording()),
+            settings: file(&comparison.settings),
+            fastest: file(&comparison.fastest),
             comparison,
         })
     }

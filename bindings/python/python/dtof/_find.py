@@ -52,13 +52,15 @@ class Comparison(_Settings):
     """All methods on the same photons.
 
     ``answer`` recommends a method, in rows; ``able`` lists the methods that are exact enough.
-    ``settings`` and ``toml`` are those of the recommended method, None if there is none.
+    ``settings`` and ``toml`` are those of the recommended method, which keeps every pixel; None if
+    there is none. ``fastest_toml`` are the settings of the fastest method, None if it is the same.
     ``methods`` and ``stress`` are the rows of ``methods.csv`` and ``stress.csv``, ``chart`` is an
     SVG document.
     """
 
     settings: Optional[dict[str, Any]]
     toml: Optional[str]
+    fastest_toml: Optional[str]
     answer: dict[str, str]
     able: dict[str, str]
     methods: list[dict[str, str]]
@@ -111,6 +113,7 @@ def compare(
     return Comparison(
         settings=found["settings"] and json.loads(found["settings"]),
         toml=found["toml"],
+        fastest_toml=found["fastest_toml"],
         answer=dict(found["rows"]),
         able=dict(found["able"]),
         methods=_table(found["table"]),

@@ -1,4 +1,4 @@
-//! `dtof compare`: all methods on the same photons, and the best of them.
+//! `dtof compare`: all methods on the same photons, the best that keeps every pixel, and the fastest.
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -67,24 +67,28 @@ impl Compare {
         let CompareResult {
             comparison,
             settings,
+            fastest,
         } = compared?;
         page::write(
             &comparison,
             &self.out,
             name,
-            settings.as_ref(),
+            [settings.as_ref(), fastest.as_ref()],
             &self.inputs(),
         )?;
         if !self.quiet {
             let mut out = io::stdout().lock();
             let report = self.out.join("report.html");
             write!(out, "{}", aligned(&comparison.rows()))?;
-            if settings.is_some() {
-                writeln!(
-                    out,
-                    "\n{} has these settings.",
-                    self.out.join(FILES[0].0).display()
-                )?;
+            if settings.is_some() || fastest.is_some() {
+                writeln!(out)?;
+            }
+            let whose = ["the method to take", "the fastest"];
+            for ((settings, (file, _)), whose) in [settings, fastest].iter().zip(FILES).zip(whose) {
+                if settings.is_some() {
+                    let file = self.out.join(file);
+                    writeln!(out, "{} has the settings of {whose}.", file.display())?;
+                }
             }
             writeln!(out, "Open {} in a browser.", report.display())?;
             out.flush()?;

@@ -7,8 +7,10 @@ use crate::common::{Scratch, assert_contains, names, npy};
 
 const SCENE: &str = "columns = 8\nrows = 4\ncycles = 6000\nbackground = 0.02\nlaser_rate_mhz = 2\n\
      [[surface]]\nrange_mm = 2000\nsignal = 0.5\n";
-const FILES: [&str; 5] = [
+/// The files if the fastest method is another.
+const FILES: [&str; 6] = [
     "compare.svg",
+    "dtof-fastest.toml",
     "dtof.toml",
     "methods.csv",
     "report.html",
@@ -50,7 +52,7 @@ fn a_scene_has_an_answer_that_simulate_takes() {
         "0.0200 background photons",
         "errors of at most 12.0 mm",
         "instructions a laser cycle and pixel",
-        "out/dtof.toml has these settings.",
+        "out/dtof.toml has the settings of the method to take.",
     ] {
         assert_contains(&printed, part);
     }
@@ -89,6 +91,66 @@ fn a_scene_has_an_answer_that_simulate_takes() {
     assert!((9.0..15.0).contains(&rms), "{rms}");
 }
 
+/// A dim wall: blocks are faster than any method that keeps every pixel.
+const DIM: &str = "columns = 8\nrows = 6\ncycles = 8000\nbackground = 0.005\nlaser_rate_mhz = 1\n\
+     [[surface]]\nrange_mm = 2000\nsignal = 0.06\n";
+
+#[test]
+fn the_fastest_method_says_what_resolution_it_leaves() {
+    let scratch = Scratch::new();
+    scratch.file("dim.toml", DIM);
+    let printed = scratch.printed("compare --scene dim.toml --within 30 --out out");
+    for part in [
+        "take                   8 neighbours\n",
+        "resolution             full: each of 8×6 pixels reports; a depth may have photons of 8 neighbours\n",
+        "fastest                blocks of 4×4, patience 8\n",
+        "its resolution         blocks of 4×4: a sensor of 8×6 pixels keeps 2×2 places where only they report; 9",
+        "out/dtof.toml has the settings of the method to take.",
+        "out/dtof-fastest.toml has the settings of the fastest.",
+    ] {
+        assert_contains(&printed, part);
+    }
+    let page = scratch.read("out/report.html");
+    for part in ["keeps 2×2 places", "blocks of 4×4, patience 8 after"] {
+        assert_contains(&page, part);
+    }
+    assert_contains(&scratch.read("out/dtof.toml"), "neighbours = 8");
+    let fastest = scratch.read("out/dtof-fastest.toml");
+    assert_contains(&fastest, "binning = 2");
+    assert_contains(&fastest, "patience = 8");
+    // Both are settings that a run takes.
+    let events = |settings: &str| {
+        let line = format!("simulate --scene dim.toml --settings out/{settings} --out {settings}");
+        scratch.printed(&line);
+        let summary = scratch.read(&format!("{settings}/summary.json"));
+        let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+        summary["events_of_blocks"].as_u64()
+    };
+    assert_eq!(events("dtof.toml"), Some(0));
+    assert!(events("dtof-fastest.toml") > Some(0));
+
+    // An array of one row has neither: one answer, and the settings of the second are gone.
+    scratch.file(
+        "row.toml",
+        DIM.replace("rows = 6", "rows = 1").replace("8\n", "48\n"),
+    );
+    let printed = scratch.printed("compare --scene row.toml --within 30 --out out");
+    assert_contains(&printed, ", the fastest too\n");
+    assert_contains(&printed, "full: each of 48×1 pixels reports\n");
+    assert!(
+        !printed.contains("its resolution") && !printed.contains("dtof-fastest"),
+        "{printed}"
+    );
+    let one_answer = FILES.into_iter().filter(|name| !name.contains("fastest"));
+    let one_answer: Vec<&str> = one_answer.collect();
+    assert_eq!(names(&scratch.path("out")), one_answer);
+    let table = scratch.read("out/methods.csv");
+    assert!(
+        !table.contains("neighbours\"") && !table.contains("blocks"),
+        "{table}"
+    );
+}
+
 #[test]
 fn a_recording_without_truth_is_held_against_itself() {
     let scratch = Scratch::new();
@@ -96,7 +158,7 @@ fn a_recording_without_truth_is_held_against_itself() {
     let line = "compare --input photons.csv --columns 2 --sigma-bins 0.7 --within 9 --out out";
     let printed = scratch.printed(line);
     assert_contains(&printed, "take ");
-    assert_contains(&printed, "slowest tenth       of the pixels: ");
+    assert_contains(&printed, "slowest tenth      of the pixels: ");
     assert_contains(&scratch.read("out/compare.svg"), "laser cycles");
     let own = "errors are against the range of all photons of the pixel";
     assert_contains(&scratch.read("out/report.html"), own);
