@@ -11,7 +11,7 @@ use anyhow::{Context, Result};
 use self::analysis::{false_events, gaussian_error, hit_rate, roc};
 use self::beyond::{
     binning_edges, binning_rate, binning_reports, binning_scenes, dither, echo_wait, echoes,
-    tracking,
+    neighbours, tracking,
 };
 use self::methods::{depth_error, event_depth, false_rate, time_to_detect};
 use self::scenes::{
@@ -40,6 +40,7 @@ pub const ALL: &[Study] = &[
     binning_reports::STUDY,
     binning_edges::STUDY,
     binning_scenes::STUDY,
+    neighbours::STUDY,
     tracking::STUDY,
     echoes::STUDY,
     echo_wait::STUDY,

@@ -1,4 +1,4 @@
-//! Beyond one pixel, one exposure and one peak: adaptive binning, tracking, echoes.
+//! Beyond one pixel, one exposure and one peak: adaptive binning, neighbours, tracking, echoes.
 
 pub mod binning_edges;
 pub mod binning_rate;
@@ -8,6 +8,7 @@ pub mod dither;
 pub mod echo_wait;
 pub mod echoes;
 mod light;
+pub mod neighbours;
 mod setting;
 mod simulated_array;
 pub mod tracking;

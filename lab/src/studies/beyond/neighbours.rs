@@ -1,0 +1,390 @@
+//! Dim pixels of an array: by themselves, confirmed by neighbours, or together in blocks.
+
+use super::setting::{BINS, ONE_IN, Setting, X};
+use super::simulated_array::is_right;
+use crate::sweep::mean::{Measured, add_error};
+use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
+use anyhow::{Context, Result, ensure};
+use dtof_core::binning::{Block, BlockLink};
+use dtof_core::rule::z_for_levels;
+use dtof_core::{AsyncPixel, Neighbours, RangeGate};
+use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
+use dtof_draw::palette::{Pen, STEPS};
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::Settings;
+use dtof_options::rows::significant;
+use dtof_photons::source::PhotonSource;
+use dtof_simulate::scene::Scene;
+use rand_core::Rng;
+use rand_distr::{Distribution, Uniform};
+use rand_pcg::Pcg64;
+use std::fmt::Write as _;
+use std::mem::size_of;
+
+/// A file of `scenes/`, and a factor for its light.
+struct File {
+    name: &'static str,
+    text: &'static str,
+    light: f64,
+}
+
+const STATIC: &str = include_str!("../../../../scenes/static.toml");
+const TILTED: &str = include_str!("../../../../scenes/tilted-wall.toml");
+
+/// By number: all files with an array, and dim ones.
+const SCENES: [File; 7] = [
+    File {
+        name: "fan",
+        text: include_str!("../../../../scenes/fan.toml"),
+        light: 1.0,
+    },
+    File {
+        name: "radial",
+        text: include_str!("../../../../scenes/radial.toml"),
+        light: 1.0,
+    },
+    File {
+        name: "static",
+        text: STATIC,
+        light: 1.0,
+    },
+    File {
+        name: "tilted-wall",
+        text: TILTED,
+        light: 1.0,
+    },
+    File {
+        name: "demo",
+        text: include_str!("../../../../host/simulate/src/demo.toml"),
+        light: 1.0,
+    },
+    File {
+        name: "dim static",
+        text: STATIC,
+        light: 0.2,
+    },
+    File {
+        name: "dim tilted-wall",
+        text: TILTED,
+        light: 0.1,
+    },
+];
+const DIM_WALL: usize = 6;
+
+/// A way in which the pixels of an array work together.
+struct Way {
+    name: &'static str,
+    neighbours: Option<Neighbours>,
+    /// Levels of blocks, and their patience.
+    blocks: Option<(u8, u16)>,
+    pen: Pen,
+    /// Its operations in the table of instructions.
+    look: &'static str,
+    photon: &'static str,
+}
+
+const PHOTON: &str = "AsyncPixel::count";
+const PHOTON_OF_BLOCKS: &str = "count and count_in_blocks; 2 levels";
+const LOOK: &str = "look; window of 3; no event";
+
+const WAYS: [Way; 5] = [
+    Way {
+        name: "neither",
+        neighbours: None,
+        blocks: None,
+        pen: STEPS[6],
+        look: LOOK,
+        photon: PHOTON,
+    },
+    Way {
+        name: "4 neighbours",
+        neighbours: Some(Neighbours::Four),
+        blocks: None,
+        pen: STEPS[1],
+        look: "",
+        photon: PHOTON,
+    },
+    Way {
+        name: "8 neighbours",
+        neighbours: Some(Neighbours::Eight),
+        blocks: None,
+        pen: STEPS[2],
+        look: "look; 8 neighbours; no event",
+        photon: PHOTON,
+    },
+    Way {
+        name: "blocks",
+        neighbours: None,
+        blocks: Some((2, 64)),
+        pen: STEPS[5],
+        look: LOOK,
+        photon: PHOTON_OF_BLOCKS,
+    },
+    Way {
+        name: "blocks, patience 8",
+        neighbours: None,
+        blocks: Some((2, 8)),
+        pen: STEPS[0],
+        look: LOOK,
+        photon: PHOTON_OF_BLOCKS,
+    },
+];
+const ALONE: usize = 0;
+const EIGHT: usize = 2;
+const BLOCKS: usize = 3;
+
+/// A pixel may decide from its second look on.
+const L1: u16 = X;
+/// The longest exposure, and the laser cycles of a trial.
+const L2: u16 = 2000;
+const SLICE: u16 = 200;
+/// Times are counted to this part of a factor of two.
+const OCTAVE: f64 = 32.0;
+/// The shares of the pixels that are waited for.
+const SHARES: [f64; 4] = [0.5, 0.8, 0.9, 0.95];
+
+/// The counted instructions of a Cortex-M4F.
+const INSTRUCTIONS: &str = include_str!("../../../../docs/results/bench/instructions.csv");
+
+/// Neighbours and blocks.
+pub const STUDY: Study = Study {
+    name: "neighbours",
+    about: "time until most pixels are right: by themselves, with neighbours that confirm, and in blocks",
+    revision: 1,
+    few_seeds: 1,
+    all_seeds: 8,
+    points,
+    trial,
+    results,
+};
+
+fn points() -> Vec<Point> {
+    let scenes: Vec<f64> = (0u8..).take(SCENES.len()).map(f64::from).collect();
+    // All ways decide on the same photons, so they are one trial.
+    grid([("scene", &scenes)])
+}
+
+impl Way {
+    fn settings(&self) -> Result<Settings> {
+        let (levels, patience) = self.blocks.unwrap_or_default();
+        let setting = Setting {
+            patience,
+            l2: L2,
+            ..Setting::ALONE.with_levels(levels.into())?
+        };
+        let gate = RangeGate::<BINS>::full();
+        let z = z_for_levels(ONE_IN, &gate, X, L1, L2, setting.levels);
+        Ok(Settings {
+            neighbours: self.neighbours,
+            l1: L1,
+            ..setting.settings(z)?
+        })
+    }
+
+    /// The bytes of a pixel and its part of the blocks.
+    fn bytes(&self) -> f64 {
+        let pixel = size_of::<AsyncPixel<BINS>>() as f64;
+        let (levels, _) = self.blocks.unwrap_or_default();
+        if levels == 0 {
+            return pixel;
+        }
+        let blocks: f64 = (1..=i32::from(levels))
+            .map(|level| 0.25f64.powi(level))
+            .sum();
+        pixel + size_of::<BlockLink>() as f64 + blocks * size_of::<Block<BINS>>() as f64
+    }
+}
+
+/// What has happened to the pixels in one way.
+struct Run {
+    /// The laser cycles of the first right event of each pixel.
+    first: Vec<Option<u64>>,
+    right: u64,
+    wrong: u64,
+}
+
+fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
+    let file = &SCENES[usize::from(whole(point, "scene"))];
+    let mut scene = Scene::parse(file.text)?;
+    ensure!(usize::from(scene.bins) == BINS, "{} bins", scene.bins);
+    scene.signal_at_one_metre *= file.light;
+    // A random part of a bin farther away.
+    let shift_mm = Uniform::new(0.0, scene.mm_per_bin())?.sample(rng);
+    for surface in &mut scene.surfaces {
+        surface.range_mm += shift_mm;
+        surface.range_right_mm += shift_mm;
+    }
+    let mut photons = scene.photons(rng.next_u64(), L2.into())?;
+    let (array, addresses) = (photons.array(), photons.addresses());
+    let runs = WAYS.iter().map(|way| {
+        let run = Run {
+            first: vec![None; addresses.len()],
+            right: 0,
+            wrong: 0,
+        };
+        Ok((host_engine(&way.settings()?, array, &addresses)?, run))
+    });
+    let mut runs: Vec<_> = runs.collect::<Result<_>>()?;
+    let mut tally = Tally::new();
+    for _ in 0..L2 / SLICE {
+        let slice = photons.next_slice(SLICE)?;
+        for (way, (engine, run)) in WAYS.iter().zip(&mut runs) {
+            for event in engine.run(&slice)? {
+                for pixel in array.pixels_of(event.pixel, event.level) {
+                    // A surface behind another one counts as right. A pixel without a surface cannot be right.
+                    let views = scene.hits(pixel, event.cycle.raw()).into_iter().flatten();
+                    let positions = views.map(|view| view.range_mm / scene.mm_per_bin());
+                    let right = positions
+                        .clone()
+                        .find(|position| is_right(&event, *position));
+                    let Some(position) = right else {
+                        run.wrong += 1;
+                        continue;
+                    };
+                    run.right += 1;
+                    let first = &mut run.first[usize::from(pixel.raw())];
+                    first.get_or_insert(event.cycle.raw() + 1);
+                    // In 1/256 bins.
+                    let error = f64::from(event.position().raw()) - 256.0 * position;
+                    #[allow(clippy::cast_possible_truncation, reason = "within 3 bins")]
+                    add_error(&mut tally, way.name, error.round() as i64);
+                }
+            }
+        }
+    }
+    for (way, (_, run)) in WAYS.iter().zip(runs) {
+        for first in run.first.into_iter().flatten() {
+            let place = (OCTAVE * (first as f64).log2()).round();
+            *tally
+                .entry(format!("{} first {place}", way.name))
+                .or_default() += 1;
+        }
+        tally.insert(format!("{} right", way.name), run.right);
+        tally.insert(format!("{} wrong", way.name), run.wrong);
+    }
+    tally.insert("pixels".to_owned(), addresses.len() as u64);
+    Ok(tally)
+}
+
+/// The laser cycles until this share of the pixels has been right, if it is reached.
+fn time(point: &PointTally, way: &Way, share: f64) -> Option<f64> {
+    let wanted = share * point.count("pixels") as f64;
+    let mut right = 0;
+    let last = (OCTAVE * f64::from(L2).log2()).ceil();
+    for place in (0u16..).map(f64::from).take_while(|&place| place <= last) {
+        right += point.count(&format!("{} first {place}", way.name));
+        if right as f64 >= wanted {
+            return Some((place / OCTAVE).exp2());
+        }
+    }
+    None
+}
+
+/// Counted instructions.
+fn counted(operation: &str) -> Result<f64> {
+    let mut rows = INSTRUCTIONS.lines();
+    let row = rows.find(|row| row.contains(&format!(",{operation},3,")));
+    let row = row.with_context(|| format!("no {operation} among the instructions"))?;
+    Ok(row.rsplit(',').next().unwrap_or_default().parse()?)
+}
+
+fn costs() -> Result<String> {
+    let mut table = String::new();
+    for way in &WAYS {
+        let look = match way.look {
+            "" => "not counted".to_owned(),
+            look => {
+                let levels = way.blocks.map_or(0.0, |_| 0.25 + 0.0625);
+                let blocks = levels * counted("look; block; no event")?;
+                format!("{:.0}", counted(look)? + blocks)
+            }
+        };
+        writeln!(
+            table,
+            "| {} | {:.0} | {look} | {:.0} |",
+            way.name,
+            counted(way.photon)?,
+            way.bytes()
+        )?;
+    }
+    Ok(table)
+}
+
+fn results(part: &Part) -> Result<Results> {
+    let mut csv = "scene,way,pixels,cycles 50 %,80 %,90 %,95 %,right,wrong,rms mm\n".to_owned();
+    let mut table = String::new();
+    let mut panels = Vec::new();
+    for (file, point) in SCENES.iter().zip(part.points()) {
+        let mm = Scene::parse(file.text)?.mm_per_bin() / 256.0;
+        let mut series = Vec::new();
+        for way in &WAYS {
+            let times = SHARES.map(|share| time(point, way, share));
+            let [right, wrong] =
+                ["right", "wrong"].map(|what| point.count(&format!("{} {what}", way.name)));
+            let rms = Measured::root_mean_square(point, way.name).value * mm;
+            let cells = times.map(|time| time.map_or("-".to_owned(), |time| format!("{time:.0}")));
+            writeln!(
+                table,
+                "| {} | {} | {} | {:.2} % | {} |",
+                file.name,
+                way.name,
+                cells.join(" | "),
+                100.0 * Measured::share(wrong, right + wrong).value,
+                significant(rms, 3)
+            )?;
+            writeln!(
+                csv,
+                "{},\"{}\",{},{},{right},{wrong},{rms:.3}",
+                file.name,
+                way.name,
+                point.count("pixels"),
+                cells.join(",").replace('-', "")
+            )?;
+            let dots = SHARES.iter().zip(times);
+            let dots = dots.filter_map(|(share, time)| Some(Dot::exact(time?, 100.0 * share)));
+            let dots: Vec<Dot> = dots.collect();
+            if !dots.is_empty() {
+                series.push(Series::unnamed(way.pen, Style::JoinedDots, dots));
+            }
+        }
+        panels.push(Panel {
+            title: file.name.to_owned(),
+            series,
+        });
+    }
+    let dim = part.points().get(DIM_WALL).context("no such scene")?;
+    let of = |way: usize, share| time(dim, &WAYS[way], share);
+    let alone = of(ALONE, 0.9);
+    let times = |way| {
+        alone
+            .zip(of(way, 0.9))
+            .map_or(0.0, |(alone, other)| alone / other)
+    };
+    let [eight, blocks] = [EIGHT, BLOCKS].map(times);
+    let chart = Chart {
+        finding: "On a dim wall 8 neighbours nearly halve the time".to_owned(),
+        holds: (1.7..2.1).contains(&eight),
+        note: format!(
+            "A dot is the time until 50, 80, 90 or 95 % of the pixels have had a right event, their own or that of \
+             their block. A curve ends where fewer have had one in 2,000 laser cycles. On the dim tilted wall blocks are \
+             {blocks:.1} times as fast as pixels alone."
+        ),
+        x: Axis::logarithmic("laser cycles"),
+        y: Axis::linear("pixels that are right, %").within(50.0, 100.0),
+        key: WAYS
+            .iter()
+            .map(|way| Key::new(way.pen, Style::JoinedDots, way.name))
+            .collect(),
+        columns: 2,
+        panels,
+    };
+    let pixel = size_of::<AsyncPixel<BINS>>();
+    ensure!(pixel == 328, "a pixel takes {pixel} bytes here");
+    Ok(Results {
+        figures: vec![Figure::new("neighbours", &chart)?],
+        values: [("table", table), ("costs", costs()?)].into(),
+        tables: vec![("results/data/neighbours.csv", csv)],
+        ..Results::default()
+    })
+}
