@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             // Whole: the linker looks for the `memory.x` that cortex-m-rt's
             // `link.x` includes in the folder it is started in before all others,
             // and cargo starts it where the other board's is.
-            Some(&"MPS2_AN386") => link(image, &format!("-T{here}/memory/mps2-an386.x")),
+            Some(&"MPS2_AN386") => link(image, &format!("-T{}", mps2_an386(&here)?)),
             Some(&"PICO") => link(image, &format!("-T{here}/memory/pico.x")),
             Some(&"STM32F405") => {
                 link(image, &format!("-L{here}/.."));
@@ -57,6 +57,31 @@ fn main() -> Result<(), Box<dyn Error>> {
         link(image, "--nmagic");
     }
     Ok(())
+}
+
+/// The linker script of the board. If pixels have counters of 8 bits it takes 192 KiB, of which the
+/// stack needs at most 15.
+fn mps2_an386(here: &str) -> Result<String, Box<dyn Error>> {
+    let path = format!("{here}/memory/mps2-an386.x");
+    if env::var_os("CARGO_FEATURE_COUNT8").is_none() {
+        return Ok(path);
+    }
+    let mut script = fs::read_to_string(path)?;
+    for (whole, small) in [
+        ("LENGTH = 19K", "LENGTH = 16K"),
+        (
+            "LENGTH = 4M - LENGTH(STACK)",
+            "LENGTH = 192K - LENGTH(STACK)",
+        ),
+    ] {
+        if !script.contains(whole) {
+            return Err(format!("the linker script has no `{whole}`").into());
+        }
+        script = script.replace(whole, small);
+    }
+    let small = format!("{}/mps2-an386.x", env::var("OUT_DIR")?);
+    fs::write(&small, script)?;
+    Ok(small)
 }
 
 /// Puts the vendor's image of a sensor where the sidecar includes it from. `TMF882X_IMAGE` and the

@@ -16,7 +16,7 @@
 //! # Ok::<(), PixelConfigError>(())
 //! ```
 //!
-//! Cost: 32 bytes.
+//! Cost: 28 bytes.
 
 use crate::flags::Flags;
 use crate::units::{

@@ -57,8 +57,9 @@ pub struct Statistics {
     pub expired: u64,
     /// Of these, exposures with a deferred decision: they might have had an event.
     pub expired_deferred: u64,
-    /// Exposures that ended because a counter was full, so that it was unknown how often the bins
-    /// behind it were live. Those without an event are in `expired`, too. Only with a dead time.
+    /// Exposures that ended because a counter was full. Those without an event are in `expired`, too. With a
+    /// dead time it was unknown how often the bins behind it were live. [`Count8`](crate::Count8) had
+    /// lost a photon. Other counters never end one.
     pub ended_full: u64,
     /// Decisions in which a gated bin was blind or had a photon in nearly all laser cycles, as
     /// [`Flags::PILE_UP`](crate::Flags::PILE_UP) says; or in more laser cycles than there were, so

@@ -131,8 +131,15 @@ macro_rules! unbounded {
     ($(#[$doc:meta])* $name:ident($raw:ty)) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-        #[cfg_attr(feature = "defmt", derive(defmt::Format))]
         pub struct $name($raw);
+
+        // Not derived: that borrows the integer, which a packed one does not allow.
+        #[cfg(feature = "defmt")]
+        impl defmt::Format for $name {
+            fn format(&self, f: defmt::Formatter<'_>) {
+                defmt::write!(f, "{=str}({})", stringify!($name), self.raw());
+            }
+        }
 
         impl $name {
             /// The quantity.
@@ -159,6 +166,8 @@ unbounded! {
 
 unbounded! {
     /// When: laser cycles since the sensor was started, the first being 0.
+    // Aligned as 32-bit words are, so that an event has no padding.
+    #[repr(Rust, packed(4))]
     LaserCycle(u64)
 }
 

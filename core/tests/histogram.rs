@@ -2,7 +2,7 @@
 
 #![allow(clippy::cast_possible_truncation, reason = "small numbers")]
 
-use dtof_core::{Count10, Count16, Count24, CounterWidth, Histogram, RangeGate};
+use dtof_core::{Count8, Count10, Count16, Count24, CounterWidth, Histogram, RangeGate};
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -100,7 +100,8 @@ fn fill_one_bin<W: CounterWidth>(full: u32, past: u32) {
 }
 
 #[test]
-fn counters_of_10_16_and_24_bits_stop_when_they_are_full() {
+fn counters_of_8_10_16_and_24_bits_stop_when_they_are_full() {
+    fill_one_bin::<Count8>(255, 100);
     fill_one_bin::<Count10>(1023, 100);
     fill_one_bin::<Count16>(65_535, 100);
     fill_one_bin::<Count24>(16_777_215, 100);
@@ -237,6 +238,7 @@ fn full_counters_of_24_bits_stay_full() {
 #[test]
 fn it_takes_the_memory_it_says() {
     assert_eq!(size_of::<Histogram<128>>(), 128 * 2 + 16);
+    assert_eq!(size_of::<Histogram<128, Count8>>(), 128 + 16);
     assert_eq!(size_of::<Histogram<128, Count16>>(), 128 * 2 + 16);
     assert_eq!(size_of::<Histogram<128, Count24>>(), 128 * 4 + 16);
 }

@@ -104,7 +104,8 @@ fn a_host_learns_how_much_dither_a_sensor_can_have() {
         let (mut device, _) = configured_with::<8>(sensor_with(most), &CONFIGURATION);
         let mut host = Host::new(2, 0);
         let body = host.answer(&mut device, 0, message::SENSOR_REQUEST, &[]);
-        let record = SensorRecord::from_le_bytes(&body).unwrap().unwrap();
+        let (record, _) = SensorRecord::from_le_bytes(&body).unwrap();
+        let record = record.unwrap();
         assert_eq!(record.most_dither, most);
     }
 }

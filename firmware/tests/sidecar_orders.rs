@@ -127,11 +127,14 @@ fn the_host_is_told_what_the_sensor_is() {
     ]
     .concat();
     assert_eq!(body, expected);
-    assert_eq!(SensorRecord::from_le_bytes(&body), Some(Some(told_record)));
+    assert_eq!(
+        SensorRecord::from_le_bytes(&body),
+        Some((Some(told_record), 10))
+    );
 
     let mut host = Host::new(1, 0);
     let mut bare = device::<8>(None);
     let body = host.answer(&mut bare, 0, message::SENSOR_REQUEST, &[]);
-    assert_eq!(SensorRecord::from_le_bytes(&body), Some(None));
+    assert_eq!(SensorRecord::from_le_bytes(&body), Some((None, 10)));
     assert_eq!(SensorRecord::from_le_bytes(&body[1..]), None);
 }

@@ -29,43 +29,45 @@ impl SensorRecord {
     /// Bytes of the record.
     pub const BYTES: usize = 24;
 
-    /// The record as bytes. A device without a sensor sends one without pixels.
+    /// The record as bytes, with the width of the counters of the device's pixels. A device without a
+    /// sensor sends one without pixels.
     #[must_use]
-    pub fn to_le_bytes(sensor: Option<&Self>) -> [u8; Self::BYTES] {
+    pub fn to_le_bytes(sensor: Option<&Self>, counter_bits: u8) -> [u8; Self::BYTES] {
+        // Devices of 10 bits have always sent 0.
+        let counter_bits = if counter_bits == 10 { 0 } else { counter_bits };
+        let mut bytes = [0; Self::BYTES];
         let Some(sensor) = sensor else {
-            return [0; Self::BYTES];
+            bytes[Self::BYTES - 2] = counter_bits;
+            return bytes;
         };
         let [a, b] = sensor.pixels.to_le_bytes();
         let [c, d, e, f] = sensor.bin_width.unwrap_or_default().to_le_bytes();
         let [g, h, i, j] = sensor.offset.to_le_bytes();
-        let mut bytes = [0; Self::BYTES];
         let rate = sensor.laser_millihertz.to_le_bytes();
         let fields = [a, b, c, d, e, f, g, h, i, j].into_iter().chain(rate);
         let fields = fields.chain(sensor.bins.to_le_bytes());
         let fields = fields.chain(sensor.dead_time.to_le_bytes());
-        // One byte is reserved.
-        let fields = fields.chain([0, sensor.most_dither]);
+        let fields = fields.chain([counter_bits, sensor.most_dither]);
         for (place, byte) in bytes.iter_mut().zip(fields) {
             *place = byte;
         }
         bytes
     }
 
-    /// Reads the record: `Some(None)` if the device has no sensor, `None` if the length is
-    /// wrong or the reserved byte is not 0.
+    /// Reads the record, and the width of the counters: no record if the device has no sensor, `None`
+    /// if the length is wrong.
     #[must_use]
-    pub fn from_le_bytes(bytes: &[u8]) -> Option<Option<Self>> {
+    pub fn from_le_bytes(bytes: &[u8]) -> Option<(Option<Self>, u8)> {
         let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
         let (&[a, b, c, d, e, f, g, h, i, j], rest) = bytes.split_first_chunk()?;
         let (&rate, rest) = rest.split_first_chunk()?;
         let (&bins, rest) = rest.split_first_chunk()?;
         let (&dead_time, rest) = rest.split_first_chunk()?;
-        let &[0, most_dither] = rest else {
-            return None;
-        };
+        let &[counter_bits, most_dither] = rest.as_array()?;
+        let counter_bits = if counter_bits == 0 { 10 } else { counter_bits };
         let pixels = u16::from_le_bytes([a, b]);
         let bin_width = U16F16::from_le_bytes([c, d, e, f]);
-        Some((pixels > 0).then_some(Self {
+        let sensor = (pixels > 0).then_some(Self {
             pixels,
             bin_width: (bin_width > 0).then_some(bin_width),
             offset: I24F8::from_le_bytes([g, h, i, j]),
@@ -73,7 +75,8 @@ impl SensorRecord {
             bins: u16::from_le_bytes(bins),
             dead_time: u16::from_le_bytes(dead_time),
             most_dither,
-        }))
+        });
+        Some((sensor, counter_bits))
     }
 }
 

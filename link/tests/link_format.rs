@@ -323,7 +323,7 @@ proptest! {
     #[test]
     fn sensors_come_back(
         pixels: u16, width: u32, offset: i32, laser_millihertz: u64, bins: u16, dead_time: u16,
-        most_dither: u8,
+        most_dither: u8, counter_bits in prop_oneof![Just(8u8), Just(10), 1u8..=255],
     ) {
         let sensor = SensorRecord {
             pixels,
@@ -334,13 +334,13 @@ proptest! {
             dead_time,
             most_dither,
         };
-        let bytes = SensorRecord::to_le_bytes(Some(&sensor));
+        let bytes = SensorRecord::to_le_bytes(Some(&sensor), counter_bits);
         let expected = (pixels > 0).then_some(sensor);
-        prop_assert_eq!(SensorRecord::from_le_bytes(&bytes), Some(expected));
+        prop_assert_eq!(SensorRecord::from_le_bytes(&bytes), Some((expected, counter_bits)));
         prop_assert_eq!(SensorRecord::from_le_bytes(&bytes[1..]), None);
-        let mut reserved = bytes;
-        reserved[22] = 1;
-        prop_assert_eq!(SensorRecord::from_le_bytes(&reserved), None);
+        prop_assert_eq!(bytes[22], if counter_bits == 10 { 0 } else { counter_bits });
+        let bytes = SensorRecord::to_le_bytes(None, counter_bits);
+        prop_assert_eq!(SensorRecord::from_le_bytes(&bytes), Some((None, counter_bits)));
     }
 
     #[test]

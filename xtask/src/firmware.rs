@@ -57,22 +57,27 @@ impl Board {
 
     /// Builds an image for the board. An image for a TMF8820/21/28 or TMF8829 contains the sensor's
     /// own program, the file in `TMF882X_IMAGE` or `TMF8829_IMAGE`.
-    pub fn build(self, root: &Path, what: Build, risks: &[Risk]) -> Result<PathBuf> {
+    pub fn build(self, root: &Path, what: Build, choices: &[Choice]) -> Result<PathBuf> {
         let program = match what {
             Build::With(sensor) => sensor.program()?,
             _ => None,
         };
-        self.link(root, what, &features(what, risks)?, program.as_ref())
+        self.link(root, what, &features(what, choices)?, program.as_ref())
     }
 
-    /// Builds an image without the sensor's own program, and without risks.
+    /// Builds an image without the sensor's own program, and without choices.
     pub fn build_bare(self, root: &Path, what: Build) -> Result<PathBuf> {
         self.link(root, what, &[], None)
     }
 
     /// Builds an image for QEMU, whose `stm32f405` has no PLL.
-    pub fn build_for_emulator(self, root: &Path, what: Build, risks: &[Risk]) -> Result<PathBuf> {
-        let mut features = features(what, risks)?;
+    pub fn build_for_emulator(
+        self,
+        root: &Path,
+        what: Build,
+        choices: &[Choice],
+    ) -> Result<PathBuf> {
+        let mut features = features(what, choices)?;
         if self == Self::Stm32F405 {
             features.push("pll-off");
         }
@@ -112,46 +117,52 @@ impl Board {
     }
 }
 
-/// An option that lets the laser be on for longer.
+/// An option of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Risk {
+pub enum Choice {
     /// The photon timer may have pulses over 1 µs and over 2 % of the time.
     LaserBeyondLimits,
     /// A host may switch its timeout off.
     LaserOnWithoutHost,
+    /// Counters of 8 bits, and more pixels.
+    Count8,
 }
 
-impl Risk {
+impl Choice {
     /// The name of the option of `cargo xtask image` and `flash`, and of the feature.
     pub fn name(self) -> &'static str {
         match self {
             Self::LaserBeyondLimits => "laser-beyond-limits",
             Self::LaserOnWithoutHost => "laser-on-without-host",
+            Self::Count8 => "count8",
         }
     }
 
-    fn warning(self) -> &'static str {
-        match self {
+    fn warning(self) -> Option<&'static str> {
+        Some(match self {
             Self::LaserBeyondLimits => {
                 "the laser may have pulses over 1 us and be on for more than 2 % of the time"
             }
             Self::LaserOnWithoutHost => "a host may let the laser go on after it falls silent",
-        }
+            Self::Count8 => return None,
+        })
     }
 }
 
-/// The features of `risks` for an image. Warns of each.
-fn features(what: Build, risks: &[Risk]) -> Result<Vec<&'static str>> {
-    for &risk in risks {
-        let applies = match risk {
-            Risk::LaserBeyondLimits => what == Build::With(Sensor::PhotonTimer),
-            Risk::LaserOnWithoutHost => what != Build::SelfTest,
+/// The features of `choices` for an image. Warns of each.
+fn features(what: Build, choices: &[Choice]) -> Result<Vec<&'static str>> {
+    for &choice in choices {
+        let applies = match choice {
+            Choice::LaserBeyondLimits => what == Build::With(Sensor::PhotonTimer),
+            Choice::LaserOnWithoutHost | Choice::Count8 => what != Build::SelfTest,
         };
-        let name = risk.name();
+        let name = choice.name();
         ensure!(applies, "--{name} does not apply to this image");
-        eprintln!("warning: --{name}: {}", risk.warning());
+        if let Some(warning) = choice.warning() {
+            eprintln!("warning: --{name}: {warning}");
+        }
     }
-    Ok(risks.iter().map(|risk| risk.name()).collect())
+    Ok(choices.iter().map(|choice| choice.name()).collect())
 }
 
 /// The images of a board.
@@ -362,14 +373,14 @@ pub fn image(
     board: &str,
     what: Option<&str>,
     emulator: bool,
-    risks: &[Risk],
+    choices: &[Choice],
 ) -> Result<()> {
     let board = Board::named(board)?;
     let what = Build::named(board, what)?;
     let path = if emulator {
-        board.build_for_emulator(root, what, risks)?
+        board.build_for_emulator(root, what, choices)?
     } else {
-        board.build(root, what, risks)?
+        board.build(root, what, choices)?
     };
     println!("{}", path.display());
     Ok(())
@@ -381,20 +392,20 @@ mod tests {
 
     #[test]
     fn a_risk_is_the_feature_of_its_name_and_for_images_that_it_concerns() {
-        let risks = [Risk::LaserBeyondLimits, Risk::LaserOnWithoutHost];
-        let names = risks.map(Risk::name);
+        let choices = [Choice::LaserBeyondLimits, Choice::LaserOnWithoutHost];
+        let names = choices.map(Choice::name);
         let manifest = include_str!("../../firmware/Cargo.toml");
         for name in names {
             assert!(manifest.contains(&format!("\n{name} = []\n")), "{name}");
         }
         let timer = Build::With(Sensor::PhotonTimer);
-        assert_eq!(features(timer, &risks).unwrap(), names);
+        assert_eq!(features(timer, &choices).unwrap(), names);
         assert_eq!(features(timer, &[]).unwrap(), [""; 0]);
         for what in [Build::Sidecar, Build::With(Sensor::Tdc7200)] {
-            assert!(features(what, &[Risk::LaserOnWithoutHost]).is_ok());
-            assert!(features(what, &[Risk::LaserBeyondLimits]).is_err());
+            assert!(features(what, &[Choice::LaserOnWithoutHost]).is_ok());
+            assert!(features(what, &[Choice::LaserBeyondLimits]).is_err());
         }
-        assert!(features(Build::SelfTest, &[Risk::LaserOnWithoutHost]).is_err());
+        assert!(features(Build::SelfTest, &[Choice::LaserOnWithoutHost]).is_err());
     }
 
     #[test]

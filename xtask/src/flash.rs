@@ -5,7 +5,7 @@ use std::process::{Command, Stdio};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::firmware::{Board, Build, Risk};
+use crate::firmware::{Board, Build, Choice};
 use crate::tools::PROBE_RS;
 
 /// The probe-rs name of a board's controller: that of the Discovery.
@@ -23,12 +23,12 @@ pub fn flash(
     board: Board,
     named: Option<&str>,
     what: Build,
-    risks: &[Risk],
+    choices: &[Choice],
 ) -> Result<()> {
     // Before the build.
     PROBE_RS.require()?;
     let chip = named.map_or_else(|| chip(board), Ok)?;
-    let image = board.build(root, what, risks)?;
+    let image = board.build(root, what, choices)?;
     let status = Command::new(PROBE_RS.program)
         .args(["run", "--non-interactive", "--chip", chip])
         .arg(&image)

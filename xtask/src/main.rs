@@ -25,7 +25,7 @@ use anyhow::{Context, Result, bail, ensure};
 use lexopt::prelude::{Long, Short, Value};
 use lexopt::{Parser, ValueExt};
 
-use firmware::{Board, Build, Risk};
+use firmware::{Board, Build, Choice};
 
 const HELP: &str = "\
 cargo xtask <command>
@@ -33,16 +33,17 @@ cargo xtask <command>
   setup         install the missing parts of rust-toolchain.toml, and the other tools
                 (emulators, Verilator, compilers); prints the command for those that
                 need an administrator, and fails if a tool is still missing
-  image BOARD [SENSOR | self-test] [--emulator] [LASER]
+  image BOARD [SENSOR | self-test] [--emulator] [--count8] [LASER]
                 build an image and print its path: the sidecar or the self-test.
                 BOARD is mps2-an386, pico or stm32f405. SENSOR is tdc7200, tmf8829,
                 tmf882x or tmf8828-8x8 on stm32f405, photon-timer on pico. For pico it also
                 writes a .uf2, to copy onto the board without a probe. --emulator builds for
-                QEMU, with its slower clock and without the sensor's own program. LASER is
+                QEMU, with its slower clock and without the sensor's own program. --count8 gives
+                pixels counters of 8 bits, and the board room for more. LASER is
                 --laser-beyond-limits (the photon timer may have pulses over 1 us and a duty
                 cycle over 2 %) or --laser-on-without-host (a host may let the laser stay on
                 after it falls silent)
-  flash [--chip CHIP] [BOARD] [SENSOR | self-test] [LASER]
+  flash [--chip CHIP] [BOARD] [SENSOR | self-test] [--count8] [LASER]
                 write an image onto a board (stm32f405) with a debug probe, and show its
                 log. CHIP is the probe-rs name, by default that of the Discovery
   hil --device DEVICE [--chip CHIP] [--out DIR] [BOARD]
@@ -94,7 +95,7 @@ struct Options {
     out: Option<String>,
     emulator: bool,
     port: Option<u16>,
-    risks: Vec<Risk>,
+    choices: Vec<Choice>,
 }
 
 fn run() -> Result<()> {
@@ -117,11 +118,12 @@ fn run() -> Result<()> {
             ("flash" | "hil", Long("chip")) => options.chip = Some(parser.value()?.string()?),
             ("image", Long("emulator")) => options.emulator = true,
             ("image" | "flash", Long("laser-beyond-limits")) => {
-                options.risks.push(Risk::LaserBeyondLimits);
+                options.choices.push(Choice::LaserBeyondLimits);
             }
             ("image" | "flash", Long("laser-on-without-host")) => {
-                options.risks.push(Risk::LaserOnWithoutHost);
+                options.choices.push(Choice::LaserOnWithoutHost);
             }
+            ("image" | "flash", Long("count8")) => options.choices.push(Choice::Count8),
             ("emulate", Long("port")) => {
                 let number = parser.value()?.string()?;
                 let port = number.parse();
@@ -153,14 +155,14 @@ fn run() -> Result<()> {
                 board,
                 what.first().copied(),
                 options.emulator,
-                &options.risks,
+                &options.choices,
             )?;
         }
         ("flash", words) => {
             let (board, what) = Board::chosen(words, Board::Stm32F405);
             ensure!(what.len() < 2, "flash: one image at a time");
             let what = Build::named(board, what.first().copied())?;
-            flash::flash(root, board, options.chip.as_deref(), what, &options.risks)?;
+            flash::flash(root, board, options.chip.as_deref(), what, &options.choices)?;
         }
         ("hil", words) => {
             let (board, []) = Board::chosen(words, Board::Stm32F405) else {

@@ -48,6 +48,12 @@
 #define DTOF_BINS 128
 #endif
 
+// Bits of a pixel's counters: 10 or 8, the same as in the library. CMake's DTOF_COUNTER_BITS sets
+// both.
+#ifndef DTOF_COUNTER_BITS
+#define DTOF_COUNTER_BITS 10
+#endif
+
 // The paper's rule: the highest bin against the background and its square root.
 #define DTOF_RULE_PAPER 0
 
@@ -111,13 +117,13 @@
 #define DTOF_SCALE_ALIGN 4
 
 // Bytes of a dtof_pixel_t.
-#define DTOF_PIXEL_SIZE (80 + (2 * DTOF_BINS))
+#define DTOF_PIXEL_SIZE (68 + (((DTOF_COUNTER_BITS + 7) / 8) * DTOF_BINS))
 
-// The same in words of 64 bits.
-#define DTOF_PIXEL_WORDS (DTOF_PIXEL_SIZE / 8)
+// The same in words.
+#define DTOF_PIXEL_WORDS (DTOF_PIXEL_SIZE / 4)
 
 // Its alignment.
-#define DTOF_PIXEL_ALIGN 8
+#define DTOF_PIXEL_ALIGN 4
 
 // Bytes of a dtof_once_per_bin_t.
 #define DTOF_ONCE_PER_BIN_SIZE (4 + (4 * ((DTOF_BINS + 31) / 32)))
@@ -418,7 +424,8 @@ enum dtof_look_t
     DTOF_LOOK_DEFERRED = 3,
     // An event is in the slot.
     DTOF_LOOK_EVENT = 4,
-    // The exposure reached L2 without an event: a new one begins.
+    // The exposure reached L2 without an event, or a counter is full, with a dead time or of 8 bits: a
+    // new one begins.
     DTOF_LOOK_EXPIRED = 5,
     // The wait for another echo is over: a new exposure begins.
     DTOF_LOOK_ENDED = 6,
@@ -510,7 +517,8 @@ typedef struct dtof_counts_t {
     uint64_t expired;
     // Of these, exposures with a deferred decision.
     uint64_t expired_deferred;
-    // Exposures that ended because a counter was full, so that a dead time could not be weighed.
+    // Exposures that ended because a counter was full, so that a dead time could not be weighed, or as
+    // one of 8 bits had lost a photon.
     uint64_t ended_full;
     // Decisions that left bins out, because the TDC was hardly ever live there, or all bins,
     // because the counts contradict its dead time or a counter of a dtof_histogram_t is full.
@@ -523,12 +531,12 @@ typedef struct dtof_scale_t {
     uint32_t opaque[DTOF_SCALE_WORDS];
 } dtof_scale_t;
 
-// A macropixel: a histogram of DTOF_BINS counters of 10 bits, its exposure, and a slot for one
+// A macropixel: a histogram of DTOF_BINS counters of DTOF_COUNTER_BITS bits, its exposure, and a slot for one
 // event. dtof_pixel_init makes it.
 //
 // One thread or interrupt at a time may use a pixel. Different pixels are independent.
 typedef struct dtof_pixel_t {
-    uint64_t opaque[DTOF_PIXEL_WORDS];
+    uint32_t opaque[DTOF_PIXEL_WORDS];
 } dtof_pixel_t;
 
 // A depth event: a peak exceeded the threshold.
@@ -701,6 +709,12 @@ const char *dtof_version(void);
 //
 // Threads: any.
 uint16_t dtof_bins(void);
+
+// The bits of a pixel's counters that the library was built for. They must equal the
+// DTOF_COUNTER_BITS of this header.
+//
+// Threads: any.
+uint8_t dtof_counter_bits(void);
 
 // The body of DTOF_MESSAGE_REFUSED for a configuration that was refused with the error `status`:
 // 1 to 22. Errors without a number of their own give 1, "not known".
@@ -1061,7 +1075,7 @@ dtof_status_t dtof_device_config_read(const uint8_t *body,
                                       uint16_t sensor_dead_time,
                                       struct dtof_device_config_t *config);
 
-// Writes the body of SENSOR, DTOF_SENSOR_BYTES:
+// Writes the body of SENSOR, DTOF_SENSOR_BYTES, which also has DTOF_COUNTER_BITS:
 // - `pixels`: pixels of the sensor, 0 without a sensor
 // - `bins`: bins that the sensor measures, up to DTOF_BINS
 // - `dead_time`: bins for which its TDC is blind after a photon; 65,535 if it takes only the first

@@ -12,25 +12,25 @@ use crate::memory::{
 use crate::statistics::dtof_statistics_t;
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{DTOF_ERROR_LENGTH, DTOF_ERROR_NO_EVENT};
-use crate::version::DTOF_BINS;
+use crate::version::{DTOF_BINS, DTOF_COUNTER_BITS, PixelCounters};
 
 /// Bytes of a dtof_pixel_t.
-pub const DTOF_PIXEL_SIZE: usize = 80 + 2 * DTOF_BINS;
-/// The same in words of 64 bits.
-pub const DTOF_PIXEL_WORDS: usize = DTOF_PIXEL_SIZE / 8;
+pub const DTOF_PIXEL_SIZE: usize = 68 + ((DTOF_COUNTER_BITS + 7) / 8) * DTOF_BINS;
+/// The same in words.
+pub const DTOF_PIXEL_WORDS: usize = DTOF_PIXEL_SIZE / 4;
 /// Its alignment.
-pub const DTOF_PIXEL_ALIGN: usize = 8;
+pub const DTOF_PIXEL_ALIGN: usize = 4;
 
-/// A macropixel: a histogram of DTOF_BINS counters of 10 bits, its exposure, and a slot for one
+/// A macropixel: a histogram of DTOF_BINS counters of DTOF_COUNTER_BITS bits, its exposure, and a slot for one
 /// event. dtof_pixel_init makes it.
 ///
 /// One thread or interrupt at a time may use a pixel. Different pixels are independent.
 #[repr(C)]
 pub struct dtof_pixel_t {
-    opaque: [MaybeUninit<u64>; DTOF_PIXEL_WORDS],
+    opaque: [MaybeUninit<u32>; DTOF_PIXEL_WORDS],
 }
 
-type Pixel = AsyncPixel<DTOF_BINS>;
+type Pixel = AsyncPixel<DTOF_BINS, PixelCounters>;
 
 object!(dtof_pixel_t, Pixel, tag 0xd8,
     size DTOF_PIXEL_SIZE, align DTOF_PIXEL_ALIGN, unused_below 1);
@@ -49,7 +49,8 @@ pub enum dtof_look_t {
     DTOF_LOOK_DEFERRED = 3,
     /// An event is in the slot.
     DTOF_LOOK_EVENT = 4,
-    /// The exposure reached L2 without an event: a new one begins.
+    /// The exposure reached L2 without an event, or a counter is full, with a dead time or of 8 bits: a
+    /// new one begins.
     DTOF_LOOK_EXPIRED = 5,
     /// The wait for another echo is over: a new exposure begins.
     DTOF_LOOK_ENDED = 6,

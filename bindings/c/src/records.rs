@@ -14,7 +14,7 @@ use crate::memory::{array_mut, data_ref, data_slice, object_ref, put, status};
 use crate::statistics::dtof_statistics_t;
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{DTOF_ERROR_BLOCKS, DTOF_ERROR_DITHER, DTOF_ERROR_NEIGHBOURS};
-use crate::version::DTOF_BINS;
+use crate::version::{DTOF_BINS, dtof_counter_bits};
 
 /// Bytes of the body of SENSOR.
 pub const DTOF_SENSOR_BYTES: usize = 24;
@@ -158,7 +158,7 @@ fn settings_of(requested: &Configuration, dead_time: u16) -> dtof_config_t {
     settings
 }
 
-/// Writes the body of SENSOR, DTOF_SENSOR_BYTES:
+/// Writes the body of SENSOR, DTOF_SENSOR_BYTES, which also has DTOF_COUNTER_BITS:
 /// - `pixels`: pixels of the sensor, 0 without a sensor
 /// - `bins`: bins that the sensor measures, up to DTOF_BINS
 /// - `dead_time`: bins for which its TDC is blind after a photon; 65,535 if it takes only the first
@@ -193,7 +193,8 @@ pub unsafe extern "C" fn dtof_sensor_write(
             dead_time,
             most_dither,
         };
-        *body = SensorRecord::to_le_bytes((pixels > 0).then_some(&sensor));
+        let sensor = (pixels > 0).then_some(&sensor);
+        *body = SensorRecord::to_le_bytes(sensor, dtof_counter_bits());
         Ok(())
     })
 }

@@ -48,7 +48,8 @@ pub struct dtof_counts_t {
     pub expired: u64,
     /// Of these, exposures with a deferred decision.
     pub expired_deferred: u64,
-    /// Exposures that ended because a counter was full, so that a dead time could not be weighed.
+    /// Exposures that ended because a counter was full, so that a dead time could not be weighed, or as
+    /// one of 8 bits had lost a photon.
     pub ended_full: u64,
     /// Decisions that left bins out, because the TDC was hardly ever live there, or all bins,
     /// because the counts contradict its dead time or a counter of a dtof_histogram_t is full.

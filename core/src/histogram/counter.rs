@@ -40,6 +40,10 @@ pub trait CounterWidth: sealed::Sealed {
     fn counter(count: u32) -> Self::Counter;
 }
 
+/// 8-bit counters (0..=255): half the memory. A pixel decides on no counts that have lost photons:
+/// [`Statistics::ended_full`](crate::Statistics::ended_full).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count8 {}
 /// 10-bit counters (0..=1023), those of the paper's FPGA and the default.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Count10 {}
@@ -65,6 +69,7 @@ macro_rules! counter_width {
         }
     };
 }
+counter_width!(Count8, u8, 8);
 counter_width!(Count10, u16, 10);
 counter_width!(Count16, u16, 16);
 counter_width!(Count24, u32, 24);

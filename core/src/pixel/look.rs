@@ -17,8 +17,8 @@ pub enum Look {
     Deferred,
     /// The peak stands clear: the event is in the slot, a new exposure begins.
     Event,
-    /// N reached L2 without an event, or with a dead time a counter is full: a new exposure
-    /// begins.
+    /// N reached L2 without an event, or a counter is full, with a dead time or of 8 bits: a new
+    /// exposure begins.
     Expired,
     /// The wait for another echo is over: a new exposure begins.
     Ended,

@@ -53,12 +53,14 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             || self.state.contains(waits)
             || self.is_longest(config)
             || self.weighs_dead_time(config)
+            || self.is_full()
         {
             return None;
         }
         let (histogram, excluded) = (&self.histogram, &self.excluded);
         let alone = config.detect_further(histogram, self.expected(), excluded);
         alone.or_else(|| {
+            let neighbours = neighbours.filter(|other| !other.is_full());
             let neighbours = neighbours.map(|other| (&other.histogram, &other.excluded));
             let (gate, estimator) = (config.gate(), config.estimator());
             rule.confirm((histogram, excluded), gate, estimator, neighbours)
@@ -115,6 +117,10 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             statistics.deferred += 1;
             self.state.set(State::DEFERRED);
             return Look::Deferred;
+        }
+        if self.is_full() {
+            statistics.ended_full += 1;
+            return self.end(config, statistics);
         }
         Look::NoPeak
     }

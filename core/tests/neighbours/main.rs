@@ -8,5 +8,6 @@
 
 mod false_alarms;
 mod model;
+mod narrow;
 mod steps;
 mod tables;

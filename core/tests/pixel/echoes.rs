@@ -71,7 +71,7 @@ fn compare<const BINS: usize>(settings: Settings, cycles: &[Cycle], seen: &mut S
     seen.held += model.now.statistics.excluded;
 }
 
-fn random_settings(rng: &mut Pcg32, bins: usize) -> Settings {
+pub fn random_settings(rng: &mut Pcg32, bins: usize) -> Settings {
     let x = 1 + (rng.next_u32() % 8) as u16;
     let l1 = x + (rng.next_u32() % 40) as u16;
     let alpha = (rng.next_u32() % (5 * 256)) as u16;
@@ -131,7 +131,7 @@ fn random_pixels_are_as_described() {
 }
 
 /// Settings of which a look exists; 32 bins.
-fn settings() -> impl Strategy<Value = Settings> {
+pub fn settings() -> impl Strategy<Value = Settings> {
     let exposures = (1u16..=6, 0u16..10, 1u16..60);
     let gate = (0usize..=8, 8usize..=32);
     let rule = prop_oneof![

@@ -12,6 +12,7 @@ mod dead_time;
 mod echoes;
 mod flow_chart;
 mod model;
+mod narrow;
 mod once_per_bin;
 mod pile_up;
 mod whole;

@@ -28,8 +28,8 @@ use dtof_core::events::{DynamicDepthConfig, DynamicDepthPixel};
 use dtof_core::fixed::types::U16F16;
 use dtof_core::neighbours::{ArrayPixel, NeighbourConfig};
 use dtof_core::{
-    AerEncoder, AerWord, AnyRule, AsyncPixel, Count10, DepthEvent, PixelAddress, PixelConfig,
-    Statistics,
+    AerEncoder, AerWord, AnyRule, AsyncPixel, Count10, CounterWidth, DepthEvent, PixelAddress,
+    PixelConfig, Statistics,
 };
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
@@ -57,13 +57,13 @@ type Answer = (u8, Vec<u8, BODY_BYTES>);
 /// A macropixel, and what its dynamic depth is compared with: room for one, which the
 /// caller of [`Sidecar::new`] provides.
 #[derive(Debug)]
-pub struct Pixel {
-    detector: AsyncPixel<BINS>,
+pub struct Pixel<W: CounterWidth = Count10> {
+    detector: AsyncPixel<BINS, W>,
     feed: BlockLink,
     dynamic_depth: DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>,
 }
 
-impl Pixel {
+impl<W: CounterWidth> Pixel<W> {
     const fn new(address: PixelAddress, feed: BlockLink) -> Self {
         Self {
             detector: AsyncPixel::new(address),
@@ -73,12 +73,12 @@ impl Pixel {
     }
 }
 
-impl ArrayPixel<BINS, Count10> for Pixel {
-    fn pixel(&self) -> Option<&AsyncPixel<BINS>> {
+impl<W: CounterWidth> ArrayPixel<BINS, W> for Pixel<W> {
+    fn pixel(&self) -> Option<&AsyncPixel<BINS, W>> {
         Some(&self.detector)
     }
 
-    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS>> {
+    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS, W>> {
         Some(&mut self.detector)
     }
 }
@@ -114,15 +114,15 @@ impl AsMut<dtof_core::binning::Block<BINS>> for Block {
     }
 }
 
-/// Macropixels of 128 bins that are served over a link.
-pub struct Sidecar<'a> {
+/// Macropixels of 128 bins, with counters of the width `W`, that are served over a link.
+pub struct Sidecar<'a, W: CounterWidth = Count10> {
     endpoint: Endpoint,
     deframer: Deframer,
     /// A frame on its way, and how much of it has gone.
     wire: [u8; WIRE_BYTES],
     wire_length: usize,
     wire_sent: usize,
-    pixels: &'a mut VecView<Pixel>,
+    pixels: &'a mut VecView<Pixel<W>>,
     /// None without adaptive binning.
     blocks: &'a mut VecView<Block>,
     config: Option<PixelConfig<BINS, AnyRule>>,
@@ -184,12 +184,15 @@ pub struct Sidecar<'a> {
     sensor_fault: Option<SensorFault>,
 }
 
-impl<'a> Sidecar<'a> {
+impl<'a, W: CounterWidth> Sidecar<'a, W> {
+    #[allow(clippy::cast_possible_truncation, reason = "at most 24")]
+    const COUNTER_BITS: u8 = W::BITS as u8;
+
     /// Waits for a host. `pixels` and `blocks` provide the room for them; `sensor` describes the
     /// sensor if photons may come from one.
     #[must_use]
     pub fn new(
-        pixels: &'a mut VecView<Pixel>,
+        pixels: &'a mut VecView<Pixel<W>>,
         blocks: &'a mut VecView<Block>,
         sensor: Option<SensorInfo>,
     ) -> Self {
@@ -371,7 +374,7 @@ impl<'a> Sidecar<'a> {
             message::SYNCHRONISE => Some((message::SYNCHRONISED, message.body)),
             message::SENSOR_REQUEST => {
                 let sensor = self.sensor.as_ref().map(records::sensor);
-                let sensor = SensorRecord::to_le_bytes(sensor.as_ref());
+                let sensor = SensorRecord::to_le_bytes(sensor.as_ref(), Self::COUNTER_BITS);
                 Some((message::SENSOR, sensor.into_iter().collect()))
             }
             message::STATISTICS_REQUEST => {

@@ -1,6 +1,8 @@
 //! Photons and histograms of a sensor, which cannot wait.
 
-use dtof_core::{AnyRule, Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig};
+use dtof_core::{
+    AnyRule, Count24, CounterWidth, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig,
+};
 use dtof_link::frame::Deframer;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
@@ -18,7 +20,7 @@ const POLLS: usize = 4;
 /// simulated sensor without a clock.
 const UNPACED: u16 = 4096;
 
-impl Sidecar<'_> {
+impl<W: CounterWidth> Sidecar<'_, W> {
     /// [`Self::poll`], and polls `sensor` while a configuration takes photons from it.
     /// The report counts its errors and names the last.
     ///
@@ -200,7 +202,7 @@ impl Sidecar<'_> {
 }
 
 /// Counts while a configuration takes photons from the sensor, else does nothing.
-impl PhotonSink for Sidecar<'_> {
+impl<W: CounterWidth> PhotonSink for Sidecar<'_, W> {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
         if self.takes_sensor() {
             self.count(pixel.raw().into(), code);

@@ -152,6 +152,18 @@ impl Client {
     /// # Errors
     /// Fails if the device is gone.
     pub fn sensor(&mut self) -> Result<Option<SensorRecord>> {
+        Ok(self.sensor_and_counters()?.0)
+    }
+
+    /// The width of the counters of the device's pixels.
+    ///
+    /// # Errors
+    /// Fails if the device is gone.
+    pub fn counter_bits(&mut self) -> Result<u8> {
+        Ok(self.sensor_and_counters()?.1)
+    }
+
+    fn sensor_and_counters(&mut self) -> Result<(Option<SensorRecord>, u8)> {
         let answer = self.request(message::SENSOR_REQUEST, message::SENSOR)?;
         SensorRecord::from_le_bytes(&answer.body)
             .context("the device sends an invalid description of its sensor")

@@ -20,7 +20,7 @@ const BUILDS: [(&str, &str, &str, u32); 4] = [
     (BOARDS, "firmware-small", "firmware-small", 1024),
     (PICO, "firmware-small", "firmware-small", 1024),
 ];
-const PIXEL: u32 = 328;
+const PIXEL: u32 = 320;
 /// Bytes of the arrays of `pixel_array`: 64 and 256 pixels.
 const ARRAYS: u32 = (64 + 256) * PIXEL;
 /// Bytes of the array of `pixel_array_moved`.

@@ -356,7 +356,8 @@ fn records_are_those_of_the_link() {
         dead_time: 20,
         most_dither: 40,
     };
-    assert_eq!(SensorRecord::from_le_bytes(&sensor), Some(Some(expected)));
+    let expected = Some((Some(expected), DTOF_COUNTER_BITS as u8));
+    assert_eq!(SensorRecord::from_le_bytes(&sensor), expected);
     let read = Report::from_le_bytes(&body).unwrap();
     assert_eq!(
         (read.cycles, read.unaddressed, read.overrun),

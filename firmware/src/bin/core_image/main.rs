@@ -33,8 +33,8 @@ use dtof_core::paper::{ComparatorTree, Threshold, centroid, isqrt, quadrant_back
 use dtof_core::rule::{ExcludedBins, detect, z_for_levels};
 use dtof_core::{
     AerDecoder, AerEncoder, AerWord, AnyRule, Array, AsyncPixel, BinIndex, BinPosition, BlockLevel,
-    Count, Count10, Count16, Count24, CounterWidth, DetectionRule, EchoNumber, Flags, Histogram,
-    Peak, RangeGate, Statistics, SubBinOffset, z_for,
+    Count, Count8, Count10, Count16, Count24, CounterWidth, DetectionRule, EchoNumber, Flags,
+    Histogram, Peak, RangeGate, Statistics, SubBinOffset, z_for,
 };
 
 use values::{
@@ -62,6 +62,7 @@ fn for_bins<const BINS: usize>() {
     gates::<BINS>();
     trees::<BINS>();
     blocks::<BINS>();
+    for_width::<BINS, Count8>();
     for_width::<BINS, Count10>();
     for_width::<BINS, Count16>();
     for_width::<BINS, Count24>();

@@ -111,7 +111,7 @@ impl Fake {
                             dead_time: 0,
                             most_dither: 0,
                         };
-                        let sensor = SensorRecord::to_le_bytes(Some(&sensor));
+                        let sensor = SensorRecord::to_le_bytes(Some(&sensor), 10);
                         (message::SENSOR, sensor.to_vec())
                     }
                     message::STATISTICS_REQUEST => {

@@ -88,7 +88,7 @@ impl Fast {
                 };
                 (
                     message::SENSOR,
-                    SensorRecord::to_le_bytes(Some(&record)).to_vec(),
+                    SensorRecord::to_le_bytes(Some(&record), 10).to_vec(),
                 )
             }
             message::STATISTICS_REQUEST => {
