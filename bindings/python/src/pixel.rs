@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::{
-    AnyRule, AsyncPixel, DepthEvent, LaserCycle, OncePerBin, PixelAddress, PixelConfig, RangeScale,
-    Statistics,
+    AnyRule, AsyncPixel, Count8, Count10, CounterWidth, DepthEvent, LaserCycle, OncePerBin,
+    PixelAddress, PixelConfig, RangeScale, Statistics,
 };
 use dtof_engine::settings::Settings;
 use dtof_engine::with_bins;
@@ -27,15 +27,15 @@ trait AnyPixel: Send + Sync {
 /// Those of the widest histogram.
 type Bins = OncePerBin<{ OncePerBin::words(1024) }>;
 
-struct PixelOf<const BINS: usize> {
+struct PixelOf<const BINS: usize, W: CounterWidth> {
     config: PixelConfig<BINS, AnyRule>,
-    pixel: AsyncPixel<BINS>,
+    pixel: AsyncPixel<BINS, W>,
     /// If photons count once per bin.
     bins: Option<Bins>,
     statistics: Statistics,
 }
 
-impl<const BINS: usize> PixelOf<BINS> {
+impl<const BINS: usize, W: CounterWidth> PixelOf<BINS, W> {
     fn boxed(settings: &Settings, address: PixelAddress) -> Result<Box<dyn AnyPixel>> {
         Ok(Box::new(Self {
             config: settings.config()?,
@@ -46,7 +46,7 @@ impl<const BINS: usize> PixelOf<BINS> {
     }
 }
 
-impl<const BINS: usize> AnyPixel for PixelOf<BINS> {
+impl<const BINS: usize, W: CounterWidth> AnyPixel for PixelOf<BINS, W> {
     fn count(&mut self, bins: &[u16]) {
         let Some(seen) = &mut self.bins else {
             self.pixel.count_batch(&self.config, bins);
@@ -186,8 +186,10 @@ impl Pixel {
                 ensure!(!is_given, Refused::new(key, "is for arrays of pixels"));
             }
             let address = PixelAddress::new(address);
-            let pixel =
-                with_bins!(settings.bins, BINS => PixelOf::<BINS>::boxed(&settings, address))??;
+            let pixel = with_bins!(settings.bins, BINS => match settings.counter_bits {
+                8 => PixelOf::<BINS, Count8>::boxed(&settings, address),
+                _ => PixelOf::<BINS, Count10>::boxed(&settings, address),
+            })??;
             Ok((pixel, settings))
         };
         let (pixel, settings) = create().map_err(|error| requested.add_file_name(error))?;

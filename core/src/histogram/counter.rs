@@ -26,9 +26,9 @@ mod sealed {
 ///
 /// The decision is the same for all widths. Only the square root needs more iterations
 /// for wider counts.
-pub trait CounterWidth: sealed::Sealed {
+pub trait CounterWidth: sealed::Sealed + Copy + core::fmt::Debug + Send + Sync + 'static {
     /// The integer that holds one counter.
-    type Counter: PhotonCount + Ord + core::fmt::Debug;
+    type Counter: PhotonCount + Ord + core::fmt::Debug + Send + Sync;
     /// An empty counter.
     const ZERO: Self::Counter;
     /// Bits a counter uses; it saturates at `2^BITS - 1`.

@@ -64,6 +64,11 @@ pub fn collect(
     host_timeout: HostTimeout,
     mut done: impl FnMut(&SoFar) -> bool,
 ) -> Result<Collected> {
+    let counter_bits = client.counter_bits()?;
+    ensure!(
+        counter_bits == 10,
+        "the pixels of this device have counters of {counter_bits} bits: histograms to calibrate with need 10"
+    );
     let mut exposures = Exposures::new(pixels, client.bins());
     let mut work = Collecting {
         client,

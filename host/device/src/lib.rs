@@ -125,6 +125,7 @@ impl DeviceEngine {
             client.bins(),
             settings.bins
         );
+        setup::check_counter_bits(settings.counter_bits, client.counter_bits()?)?;
         let pixels = u16::try_from(addresses.len()).ok();
         let task = Task {
             settings,

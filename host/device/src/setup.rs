@@ -37,6 +37,7 @@ pub struct Setup {
     /// When its laser cycles began.
     pub began: SystemTime,
     sensor: SensorRecord,
+    counter_bits: u8,
     bins: u16,
 }
 
@@ -46,6 +47,7 @@ impl Setup {
     /// # Errors
     /// Fails if the device is gone or `requested` does not suit it.
     pub fn of(client: &mut Client, requested: SettingsFile, pixels: Option<u16>) -> Result<Self> {
+        let counter_bits = client.counter_bits()?;
         // A device without a sensor refuses its configuration later.
         let sensor = client.sensor()?.unwrap_or(SensorRecord {
             pixels: client.pixels(),
@@ -58,7 +60,7 @@ impl Setup {
         });
         let report = client.report()?;
         let pixels = pixels.unwrap_or(sensor.pixels.min(client.pixels()));
-        let mut setup = Self::new(sensor, client.bins(), requested, pixels)?;
+        let mut setup = Self::new(sensor, counter_bits, client.bins(), requested, pixels)?;
         setup.warnings.extend(Stopped::warning(&report));
         Ok(setup)
     }
@@ -68,12 +70,26 @@ impl Setup {
     /// # Errors
     /// Fails if `requested` does not suit the device.
     pub fn with_requested(&self, requested: SettingsFile) -> Result<Self> {
-        Self::new(self.sensor, self.bins, requested, self.pixels)
+        Self::new(
+            self.sensor,
+            self.counter_bits,
+            self.bins,
+            requested,
+            self.pixels,
+        )
     }
 
-    fn new(sensor: SensorRecord, bins: u16, requested: SettingsFile, pixels: u16) -> Result<Self> {
+    fn new(
+        sensor: SensorRecord,
+        counter_bits: u8,
+        bins: u16,
+        requested: SettingsFile,
+        pixels: u16,
+    ) -> Result<Self> {
         ensure!(pixels > 0, "the device has no pixels");
         check_dither(requested.sensor.dither_bins, sensor.most_dither.into())?;
+        let bits = requested.detection.counter_bits.unwrap_or(counter_bits);
+        check_counter_bits(bits, counter_bits)?;
         let began = SystemTime::now();
         let micros = began.duration_since(UNIX_EPOCH).unwrap_or_default();
         let range = requested.sensor.dither_bins.unwrap_or_else(|| {
@@ -95,6 +111,7 @@ impl Setup {
             dither_of_laser: Some((range, seed.unwrap_or(0))),
             ..SettingsFile::default()
         });
+        effective.detection.counter_bits = Some(counter_bits);
         effective.check_bins(bins)?;
         // A sensor may be slower than its settings promise.
         let own = LaserClock::from_millihertz(sensor.laser_millihertz);
@@ -125,6 +142,7 @@ impl Setup {
             warnings: warning.into_iter().collect(),
             began,
             sensor,
+            counter_bits,
             bins,
         })
     }
@@ -158,6 +176,15 @@ impl Setup {
 }
 
 /// Refuses more dither than the sensor can have.
+/// Fails if the pixels of a device have counters of another width.
+pub(super) fn check_counter_bits(requested: u8, of_device: u8) -> Result<(), Refused> {
+    if requested == of_device {
+        return Ok(());
+    }
+    let reason = format!("the pixels of this device have counters of {of_device} bits");
+    Err(Refused::value("counter_bits", requested, reason))
+}
+
 fn check_dither(requested: Option<u16>, most: u16) -> Result<(), Refused> {
     let reason = match most {
         0 => "this device cannot dither its laser".to_owned(),
@@ -187,7 +214,7 @@ mod tests {
             };
             let mut settings = SettingsFile::default();
             settings.sensor.gate = requested;
-            let setup = Setup::new(sensor, 128, settings, 4).unwrap();
+            let setup = Setup::new(sensor, 10, 128, settings, 4).unwrap();
             (setup.requested.sensor.gate, setup.settings.gate)
         };
         assert_eq!(gate(None, 128), (None, None));
@@ -210,7 +237,8 @@ mod tests {
                 most_dither,
             };
             let requested = SettingsFile::parse(text).unwrap();
-            let setup = Setup::new(sensor, 128, requested, 1).map_err(|error| error.to_string())?;
+            let setup =
+                Setup::new(sensor, 10, 128, requested, 1).map_err(|error| error.to_string())?;
             let task = setup.task(None, HostTimeout::default());
             let sources = [dtof_link::Source::Sensor, dtof_link::Source::Link];
             Ok::<_, String>(sources.map(|source| {
@@ -251,7 +279,7 @@ mod tests {
                     most_dither,
                 };
                 let requested = SettingsFile::parse(&format!("[sensor]\n{text}")).unwrap();
-                let setup = Setup::new(sensor, 128, requested, 1).unwrap();
+                let setup = Setup::new(sensor, 10, 128, requested, 1).unwrap();
                 let written = setup.effective.with_settings(&setup.settings);
                 assert_eq!(
                     written.sensor.dither_bins,
@@ -277,7 +305,7 @@ mod tests {
                 dead_time: of_sensor,
                 most_dither: 0,
             };
-            Setup::new(sensor, 128, SettingsFile::parse(text).unwrap(), 4).unwrap()
+            Setup::new(sensor, 10, 128, SettingsFile::parse(text).unwrap(), 4).unwrap()
         };
         let window = "[detection]\nrule = 'window'\nwindow = 3\n";
         for (text, of_sensor, used) in [

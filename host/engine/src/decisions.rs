@@ -45,11 +45,9 @@ impl<const BINS: usize> LastDecision<BINS> {
 
     /// Records the input of a decision.
     #[inline]
-    pub fn record_input<W: CounterWidth<Counter = u16>>(
-        &mut self,
-        input: &DecisionInput<'_, BINS, W>,
-    ) {
-        self.counts = *input.histogram.counts();
+    pub fn record_input<W: CounterWidth>(&mut self, input: &DecisionInput<'_, BINS, W>) {
+        let counts = input.histogram.counts().map(Into::into);
+        self.counts = counts.map(|count| u16::try_from(count).unwrap_or(u16::MAX));
         self.expected = input.expected;
         self.excluded = input.excluded;
     }

@@ -3,8 +3,8 @@
 use dtof_core::fixed::types::U24F8;
 use dtof_core::rule::{ExcludedBins, LiveCounts, LiveWindow};
 use dtof_core::{
-    AnyRule, BinIndex, BlockLevel, Count, Count10, Count16, Count24, CounterWidth, DetectionRule,
-    EchoNumber, Flags, Histogram, Peak, PixelConfig, RangeGate,
+    AnyRule, BinIndex, BlockLevel, Count, Count8, Count10, Count16, Count24, CounterWidth,
+    DetectionRule, EchoNumber, Flags, Histogram, Peak, PixelConfig, RangeGate,
 };
 use serde::Serialize;
 
@@ -50,7 +50,10 @@ pub fn explain(
 ) -> Option<Explanation> {
     let bins = counts.len();
     let explanation = match is_whole {
-        false => with_bins!(bins, BINS => explain_bins::<BINS, Count10>(settings, counts, cycles)),
+        false => with_bins!(bins, BINS => match settings.counter_bits {
+            8 => explain_bins::<BINS, Count8>(settings, counts, cycles),
+            _ => explain_bins::<BINS, Count10>(settings, counts, cycles),
+        }),
         // The sum of all counters must fit into 32 bits.
         true => {
             with_bins!(bins, of 8 16 32 64 128 256, BINS => explain_bins::<BINS, Count24>(settings, counts, cycles))
@@ -108,11 +111,17 @@ fn explain_bins<const BINS: usize, W: CounterWidth>(
 /// the peak.
 #[must_use]
 pub fn explain_decisions(settings: &Settings, decisions: &[Decision]) -> Vec<Explanation> {
-    let explanations = with_bins!(settings.bins, BINS => all::<BINS>(settings, decisions));
+    let explanations = with_bins!(settings.bins, BINS => match settings.counter_bits {
+        8 => all::<BINS, Count8>(settings, decisions),
+        _ => all::<BINS, Count10>(settings, decisions),
+    });
     explanations.ok().flatten().unwrap_or_default()
 }
 
-fn all<const BINS: usize>(settings: &Settings, decisions: &[Decision]) -> Option<Vec<Explanation>> {
+fn all<const BINS: usize, W: CounterWidth>(
+    settings: &Settings,
+    decisions: &[Decision],
+) -> Option<Vec<Explanation>> {
     let (pixels, blocks) = (settings.config().ok()?, settings.block_config().ok()?);
     let explanations = decisions.iter().map(|decision| {
         let is_pixel = decision.event.level == BlockLevel::PIXEL;
@@ -125,7 +134,7 @@ fn all<const BINS: usize>(settings: &Settings, decisions: &[Decision]) -> Option
                 expected: decision.expected,
                 cycles: decision.event.exposure.into(),
             };
-            return Some(input.explain::<Count10>());
+            return Some(input.explain::<W>());
         }
         let input = DecisionInput::new(config, decision, settings.frame.is_some())?;
         if decision.event.flags.contains(Flags::CONFIRMED) {
@@ -134,11 +143,11 @@ fn all<const BINS: usize>(settings: &Settings, decisions: &[Decision]) -> Option
                 depends: true,
                 needed: None,
                 background: None,
-                ..input.explain::<Count10>()
+                ..input.explain::<W>()
             });
         }
         Some(match is_pixel && settings.frame.is_none() {
-            true => input.explain::<Count10>(),
+            true => input.explain::<W>(),
             false => input.explain::<Count16>(),
         })
     });

@@ -7,8 +7,8 @@ use dtof_core::binning::{
 };
 use dtof_core::rule::DecisionInput;
 use dtof_core::{
-    AnyRule, Array, AsyncPixel, BlockLevel, Count16, DepthEvent, LaserCycle, Look, PixelAddress,
-    PixelConfig, Statistics,
+    AnyRule, Array, AsyncPixel, BlockLevel, Count16, CounterWidth, DepthEvent, LaserCycle, Look,
+    PixelAddress, PixelConfig, Statistics,
 };
 use dtof_link::AdaptiveBinning;
 
@@ -28,16 +28,16 @@ pub struct Configs<const BINS: usize> {
 
 /// A pixel of a group.
 #[derive(Clone, Debug)]
-struct Member<const BINS: usize> {
+struct Member<const BINS: usize, W: CounterWidth> {
     /// Its index among the pixels of the source.
     number: usize,
-    pixel: AsyncPixel<BINS>,
+    pixel: AsyncPixel<BINS, W>,
     link: Option<BlockLink>,
     /// The last decision, if it is kept.
     last: Option<Box<LastDecision<BINS>>>,
 }
 
-impl<const BINS: usize> Member<BINS> {
+impl<const BINS: usize, W: CounterWidth> Member<BINS, W> {
     /// Runs a single pixel, `since_look` laser cycles after its last look. Looks before L1 decide
     /// nothing, so the photons up to the first look after it are counted at once.
     fn run(
@@ -119,8 +119,8 @@ fn after(since_look: u16, cycles: u16, x: u16) -> u16 {
 
 /// Pixels and blocks in the order in which they report.
 #[derive(Clone, Debug)]
-pub struct Group<const BINS: usize> {
-    members: Vec<Member<BINS>>,
+pub struct Group<const BINS: usize, W: CounterWidth> {
+    members: Vec<Member<BINS, W>>,
     blocks: Vec<Block<BINS>>,
     /// The last decision of each block, if it is kept.
     block_decisions: Vec<Option<Box<LastDecision<BINS>>>>,
@@ -140,7 +140,7 @@ pub struct Done {
     pub blocks: Statistics,
 }
 
-impl<const BINS: usize> Group<BINS> {
+impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
     /// A single pixel with its index among the pixels of the source.
     #[must_use]
     pub fn single(number: usize, address: PixelAddress) -> Self {
@@ -227,7 +227,7 @@ impl<const BINS: usize> Group<BINS> {
             member.run(configs, first, photons, &mut self.since_look, &mut done);
             return done;
         }
-        let photons_of = |member: &Member<BINS>| &photons[member.number];
+        let photons_of = |member: &Member<BINS, W>| &photons[member.number];
         let cycles = self.members.iter().map(|member| photons_of(member).cycles);
         let cycles = cycles.max().unwrap_or(0);
         let mut next = vec![0; self.members.len()];

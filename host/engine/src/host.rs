@@ -1,7 +1,7 @@
 //! `dtof-core` on this computer.
 
 use anyhow::Result;
-use dtof_core::{Array, DepthEvent, PixelAddress, Statistics};
+use dtof_core::{Array, Count8, Count10, CounterWidth, DepthEvent, PixelAddress, Statistics};
 use rayon::prelude::*;
 
 use super::Engine;
@@ -16,9 +16,9 @@ use dtof_photons::source::Slice;
 
 /// Runs groups of pixels on all threads.
 #[derive(Debug)]
-struct HostEngine<const BINS: usize> {
+struct HostEngine<const BINS: usize, W: CounterWidth> {
     configs: Configs<BINS>,
-    groups: Vec<Group<BINS>>,
+    groups: Vec<Group<BINS, W>>,
     /// The counts of all pixels, without the current exposures.
     pixels: Statistics,
     /// The counts of all blocks.
@@ -34,10 +34,13 @@ pub fn host_engine(
     array: Array,
     addresses: &[PixelAddress],
 ) -> Result<Box<dyn Engine>> {
-    with_bins!(settings.bins, BINS => HostEngine::<BINS>::boxed(settings, array, addresses))?
+    with_bins!(settings.bins, BINS => match settings.counter_bits {
+        8 => HostEngine::<BINS, Count8>::boxed(settings, array, addresses),
+        _ => HostEngine::<BINS, Count10>::boxed(settings, array, addresses),
+    })?
 }
 
-impl<const BINS: usize> HostEngine<BINS> {
+impl<const BINS: usize, W: CounterWidth> HostEngine<BINS, W> {
     fn boxed(
         settings: &Settings,
         array: Array,
@@ -49,7 +52,7 @@ impl<const BINS: usize> HostEngine<BINS> {
             )?));
         }
         let engine: Box<dyn Engine> = if let Some(neighbours) = settings.neighbours {
-            Box::new(NeighbourEngine::<BINS>::new(
+            Box::new(NeighbourEngine::<BINS, W>::new(
                 settings, neighbours, array, addresses,
             )?)
         } else {
@@ -85,7 +88,7 @@ impl<const BINS: usize> HostEngine<BINS> {
     }
 }
 
-impl<const BINS: usize> Engine for HostEngine<BINS> {
+impl<const BINS: usize, W: CounterWidth> Engine for HostEngine<BINS, W> {
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
         let configs = &self.configs;
         let of_groups: Vec<Done> = self

@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 use dtof_core::neighbours::{ArrayPixel, NeighbourConfig};
 use dtof_core::rule::DecisionInput;
 use dtof_core::{
-    AnyRule, Array, AsyncPixel, Count10, DepthEvent, Detection, LaserCycle, Neighbours,
+    AnyRule, Array, AsyncPixel, CounterWidth, DepthEvent, Detection, LaserCycle, Neighbours,
     PixelAddress, PixelConfig, Statistics,
 };
 use rayon::prelude::*;
@@ -24,41 +24,41 @@ const PIXELS: usize = 256;
 
 /// A place of the array, without a pixel if it is left out.
 #[derive(Debug)]
-struct Place<const BINS: usize>(Option<Member<BINS>>);
+struct Place<const BINS: usize, W: CounterWidth>(Option<Member<BINS, W>>);
 
 #[derive(Debug)]
-struct Member<const BINS: usize> {
+struct Member<const BINS: usize, W: CounterWidth> {
     /// Its index among the pixels of the source.
     number: usize,
-    pixel: AsyncPixel<BINS>,
+    pixel: AsyncPixel<BINS, W>,
     /// The next photon of the slice.
     next: usize,
     /// The last decision, if it is kept.
     last: Option<Box<LastDecision<BINS>>>,
 }
 
-impl<const BINS: usize> ArrayPixel<BINS, Count10> for Place<BINS> {
-    fn pixel(&self) -> Option<&AsyncPixel<BINS>> {
+impl<const BINS: usize, W: CounterWidth> ArrayPixel<BINS, W> for Place<BINS, W> {
+    fn pixel(&self) -> Option<&AsyncPixel<BINS, W>> {
         self.0.as_ref().map(|member| &member.pixel)
     }
 
-    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS>> {
+    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS, W>> {
         self.0.as_mut().map(|member| &mut member.pixel)
     }
 }
 
 /// The engine.
 #[derive(Debug)]
-pub struct NeighbourEngine<const BINS: usize> {
+pub struct NeighbourEngine<const BINS: usize, W: CounterWidth> {
     config: PixelConfig<BINS, AnyRule>,
     neighbours: NeighbourConfig,
     /// In the order of their addresses.
-    places: Vec<Place<BINS>>,
+    places: Vec<Place<BINS, W>>,
     since_look: u16,
     statistics: Statistics,
 }
 
-impl<const BINS: usize> NeighbourEngine<BINS> {
+impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
     /// An engine for the pixels `addresses` of an array, ascending.
     ///
     /// # Errors
@@ -102,7 +102,7 @@ impl<const BINS: usize> NeighbourEngine<BINS> {
     /// Returns whether one of them decides.
     fn count(&mut self, photons: &[PixelPhotons], from: u16, to: u16) -> bool {
         let config = &self.config;
-        let count = |places: &mut [Place<BINS>]| {
+        let count = |places: &mut [Place<BINS, W>]| {
             let (mut statistics, mut decides) = (Statistics::new(), false);
             for Member {
                 number,
@@ -143,7 +143,7 @@ impl<const BINS: usize> NeighbourEngine<BINS> {
             .with_min_len(PIXELS)
             .map(|number| neighbours.decide(places, number, config))
             .collect();
-        let end = |(places, detections): (&mut [Place<BINS>], &[Option<Detection>])| {
+        let end = |(places, detections): (&mut [Place<BINS, W>], &[Option<Detection>])| {
             let (mut statistics, mut events) = (Statistics::new(), Vec::new());
             for (Place(member), detection) in places.iter_mut().zip(detections) {
                 let Some(Member {
@@ -183,7 +183,7 @@ impl<const BINS: usize> NeighbourEngine<BINS> {
     }
 }
 
-impl<const BINS: usize> Engine for NeighbourEngine<BINS> {
+impl<const BINS: usize, W: CounterWidth> Engine for NeighbourEngine<BINS, W> {
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
         let cycles = slice.pixels.iter().map(|pixel| pixel.cycles);
         let cycles = cycles.max().unwrap_or(0);

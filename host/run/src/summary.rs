@@ -144,6 +144,7 @@ fn settings<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, 
         map.serialize_entry("dead_time_from", source)?;
     }
     map.serialize_entry("once_per_bin", &settings.once_per_bin)?;
+    map.serialize_entry("counter_bits", &settings.counter_bits)?;
     if settings.dither_bins > 0 {
         map.serialize_entry("dither_bins", &settings.dither_bins)?;
         map.serialize_entry("dither_seed", &settings.dither_seed)?;

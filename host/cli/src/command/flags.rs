@@ -232,6 +232,8 @@ flags! {
         the last echo [default: it ends at L2]";
     once_per_bin Optional("YES") => "Photons of one laser cycle in one bin count once, so that raindrops are \
         no targets. For photons, not for histograms";
+    counter_bits Text("N") => "Bits of a pixel's counters, 8 or 10. With 8 an exposure ends without an event \
+        once a counter passes 255. A device has one of both [default: 10]";
 }
 
 flags! {

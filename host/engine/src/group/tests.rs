@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count, EchoNumber, PaperRule, RangeGate};
+use dtof_core::{Count, Count10, EchoNumber, PaperRule, RangeGate};
 use dtof_photons::source::Photon;
 
 /// The pixel laser cycle by laser cycle, as hardware would.
@@ -50,7 +50,7 @@ proptest! {
         let (events, statistics) = one_by_one(&config, first, &all);
 
         let configs = Configs { pixels: config, blocks: config, patience: 0 };
-        let mut group = Group::<16>::single(0, PixelAddress::new(3));
+        let mut group = Group::<16, Count10>::single(0, PixelAddress::new(3));
         let (mut found, mut counted) = (Vec::new(), Statistics::new());
         let mut begin = 0;
         for length in slices.into_iter().chain([600]) {

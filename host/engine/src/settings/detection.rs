@@ -60,6 +60,8 @@ pub struct DetectionSettings {
     pub echo_wait: Option<u8>,
     /// Photons of one laser cycle in one bin count once
     pub once_per_bin: Option<bool>,
+    /// Bits of a pixel's counters, 8 or 10 [default: 10]
+    pub counter_bits: Option<u8>,
 }
 
 named_values! {
@@ -108,6 +110,7 @@ section! {
     echoes = integer(1..=EchoNumber::LAST.raw()), "of an exposure";
     echo_wait = integer(2..=u8::MAX - 1), "times the laser cycles of the last echo";
     once_per_bin = boolean, "photons of one laser cycle in one bin count once";
+    counter_bits = counter_bits, "of a pixel's counters";
 }
 
 impl DetectionSettings {
@@ -250,6 +253,13 @@ fn neighbours(text: &str) -> Result<u8, String> {
     let number = integer(0..=8)(text).ok();
     let number = number.filter(|&number| number == 0 || Neighbours::new(number).is_some());
     number.ok_or("must be 0, 4 or 8".to_owned())
+}
+
+/// Reads the width of counters.
+fn counter_bits(text: &str) -> Result<u8, String> {
+    let bits = integer(0..=u8::MAX)(text).ok();
+    let bits = bits.filter(|bits| [8, 10].contains(bits));
+    bits.ok_or("must be 8 or 10".to_owned())
 }
 
 /// Reads `BEFORE,AFTER`: the half widths of the depth window.

@@ -61,6 +61,8 @@ pub struct Settings {
     pub is_dead_time_of_sensor: bool,
     /// Whether photons of one laser cycle in one bin count once. Not used with [`Self::frame`].
     pub once_per_bin: bool,
+    /// Bits of a pixel's counters, 8 or 10. Blocks and [`Self::frame`] have 16.
+    pub counter_bits: u8,
     /// The range of the laser's dither in bins: by how much its longest cycle is longer than its shortest.
     /// Decisions do not depend on it.
     pub dither_bins: u16,
@@ -98,6 +100,7 @@ impl Settings {
             dead_time: 0,
             is_dead_time_of_sensor: false,
             once_per_bin: false,
+            counter_bits: 10,
             dither_bins: 0,
             dither_seed: 0,
             frame: None,

@@ -370,6 +370,7 @@ tracking = true
 echoes = 2
 echo_wait = 4
 once_per_bin = true
+counter_bits = 8
 [rays]
 field_of_view_degrees = [60.0, 40.0]
 [run]

@@ -97,6 +97,7 @@ impl SettingsFile {
             dead_time,
             is_dead_time_of_sensor: dead_time > 0 && sensor.dead_time.is_none(),
             once_per_bin: detection.once_per_bin.unwrap_or(false),
+            counter_bits: detection.counter_bits.unwrap_or(10),
             dither_bins,
             dither_seed,
             frame: self.run.frame,
@@ -217,6 +218,7 @@ impl DetectionSettings {
             echoes: several.then(|| settings.echoes.raw()),
             echo_wait: settings.echo_wait.filter(|_| several),
             once_per_bin: settings.once_per_bin.then_some(true),
+            counter_bits: Some(settings.counter_bits).filter(|&bits| bits != 10),
             ..rule
         }
     }

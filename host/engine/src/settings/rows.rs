@@ -132,6 +132,10 @@ impl Settings {
             let text = "those of one laser cycle in one bin count once";
             rows.push(("photons".to_owned(), text.to_owned()));
         }
+        if self.counter_bits != 10 && self.frame.is_none() {
+            let text = format!("{} bits; a full one ends an exposure", self.counter_bits);
+            rows.push(("counters".to_owned(), text));
+        }
         rows
     }
 }
