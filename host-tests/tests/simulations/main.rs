@@ -14,6 +14,7 @@ mod calibration;
 mod capture_log;
 mod compare;
 mod compare_scenes;
+mod counters;
 mod dead_time;
 mod depth_map;
 mod engine;

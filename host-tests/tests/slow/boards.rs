@@ -13,7 +13,9 @@ use std::{fs, thread};
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{Array, BlockLevel, Count, EchoNumber, PaperRule, WindowRule};
+use dtof_core::{
+    Array, BlockLevel, Count, EchoNumber, Neighbours, PaperRule, PixelAddress, WindowRule,
+};
 use dtof_device::{Client, DeviceEngine, HostTimeout, Task, monitor};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
@@ -80,6 +82,42 @@ fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     used.push(senses(board, &image)?);
     stack::check(&image, &used)?;
     tests_itself(board)
+}
+
+/// 800 macropixels in 192 KiB.
+#[test]
+fn mps2_an386_with_counters_of_8_bits_decides_as_this_computer() -> Result<()> {
+    let Some(_alone) = enabled("counters of 8 bits on mps2-an386", &[QEMU]) else {
+        return Ok(());
+    };
+    let board = Board::Mps2An386;
+    let image = board.image(&["--count8"])?;
+    let settings = Settings {
+        counter_bits: 8,
+        ..settings()
+    };
+    let with_neighbours = Settings {
+        neighbours: Neighbours::new(8),
+        counter_bits: 8,
+        ..with_windows()
+    };
+    let array = Array::new(40, 20).unwrap();
+    for settings in [settings, with_neighbours] {
+        agrees(board, &image, &settings, array, 500, Duration::ZERO)?;
+    }
+    // This computer refuses what the image does not have.
+    let mut emulator = Emulator::start(board, &image, &[])?;
+    let client = Client::new(emulator.connect()?)?;
+    let wide = Settings {
+        counter_bits: 10,
+        ..with_windows()
+    };
+    let addresses = [PixelAddress::new(0)];
+    let engine = DeviceEngine::new(client, &wide, Array::new(1, 1).unwrap(), &addresses);
+    let refused = engine.err().context("10 bits are not refused")?;
+    let expected = "counter_bits 10: the pixels of this device have counters of 8 bits";
+    ensure!(refused.to_string() == expected, "{refused}");
+    Ok(())
 }
 
 #[test]
