@@ -63,7 +63,9 @@ impl SensorRecord {
         let (&rate, rest) = rest.split_first_chunk()?;
         let (&bins, rest) = rest.split_first_chunk()?;
         let (&dead_time, rest) = rest.split_first_chunk()?;
-        let &[counter_bits, most_dither] = rest.as_array()?;
+        let &[counter_bits, most_dither] = rest else {
+            return None;
+        };
         let counter_bits = if counter_bits == 0 { 10 } else { counter_bits };
         let pixels = u16::from_le_bytes([a, b]);
         let bin_width = U16F16::from_le_bytes([c, d, e, f]);

@@ -21,7 +21,7 @@
 //! ```
 //!
 //! Cost: 5 bytes a pixel. On a Cortex-M4, 128 bins and with a window of 3 bins a look at a
-//! pixel after an echo takes 606 instructions, any other 197.
+//! pixel after an echo takes 546 instructions, any other 197.
 
 use core::ops::RangeInclusive;
 
@@ -148,6 +148,7 @@ impl ExcludedBins {
         u32::from_le_bytes(self.peaks)
     }
 
+    #[allow(clippy::cast_possible_truncation)] // 10 bits
     fn peaks(&self) -> impl Iterator<Item = u16> + use<> {
         let packed = self.packed();
         (0..self.echoes()).map(move |echo| (packed >> (10 * echo)) as u16 & BinIndex::MAX.raw())

@@ -32,7 +32,7 @@
 //! [tracking](crate::PixelConfigBuilder::tracking) it expects an event where the last was.
 //!
 //! Cost: 64 bytes beside the counters (a compile-time check). On a Cortex-M4 and 128
-//! bins 10 instructions a photon in a batch, 133 a look, 110 to clear.
+//! bins 10 instructions a photon in a batch, 128 a look, 110 to clear.
 //!
 //! Source: the flow chart of the paper's section II-B. The slot is its REQ (section IV-A).
 //! ACK and the behaviour while the link is busy are ours.

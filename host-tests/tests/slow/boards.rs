@@ -103,7 +103,9 @@ fn mps2_an386_with_counters_of_8_bits_decides_as_this_computer() -> Result<()> {
     };
     let array = Array::new(40, 20).unwrap();
     for settings in [settings, with_neighbours] {
-        agrees(board, &image, &settings, array, 500, Duration::ZERO)?;
+        let used = agrees(board, &image, &settings, array, 200, Duration::ZERO)?;
+        // Of 16 KiB; a panic's report takes up to 7.
+        ensure!(used <= 9 * 1024, "{used} bytes of stack");
     }
     // This computer refuses what the image does not have.
     let mut emulator = Emulator::start(board, &image, &[])?;

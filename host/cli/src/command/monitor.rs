@@ -52,15 +52,16 @@ impl Monitor {
                 "draws on standard error, which is not a terminal here"
             )
         );
-        let [has_blocks, has_neighbours] = [
-            requested.detection.binning,
-            requested.detection.neighbours,
-        ]
-        .map(|number| number.is_some_and(|number| number > 0));
+        let [has_blocks, has_neighbours] =
+            [requested.detection.binning, requested.detection.neighbours]
+                .map(|number| number.is_some_and(|number| number > 0));
         let needs_array = self.map || self.record.is_some() || has_blocks || has_neighbours;
         ensure!(
             self.options.columns.is_none() || needs_array,
-            Refused::new("columns", "needs `map`, `record`, `binning` or `neighbours`")
+            Refused::new(
+                "columns",
+                "needs `map`, `record`, `binning` or `neighbours`"
+            )
         );
         let image = self.options.image.as_deref();
         let name = || self.device.clone();

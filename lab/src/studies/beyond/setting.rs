@@ -96,6 +96,7 @@ impl Setting {
             dead_time: 0,
             is_dead_time_of_sensor: false,
             once_per_bin: false,
+            counter_bits: 10,
             dither_bins: 0,
             dither_seed: 0,
             frame: None,

@@ -2,7 +2,7 @@
 
 use super::setting::{BINS, X};
 use anyhow::Result;
-use dtof_core::{Array, DepthEvent, PixelAddress};
+use dtof_core::{Array, Count10, DepthEvent, PixelAddress};
 use dtof_engine::group::{Configs, Group};
 use dtof_engine::settings::Settings;
 use dtof_events::last_events::LastEvents;
@@ -71,7 +71,7 @@ impl Law {
 pub struct SimulatedArray {
     laws: Vec<Law>,
     configs: Configs<BINS>,
-    groups: Vec<Group<BINS>>,
+    groups: Vec<Group<BINS, Count10>>,
     cycle: u64,
 }
 
