@@ -71,7 +71,7 @@ fn arrays_of_eight_bits_decide_as_those_of_ten_until_a_counter_overflows() {
 /// anew.
 #[test]
 fn a_pixel_that_has_lost_photons_confirms_nothing() {
-    let rule = WindowRule::new(3, U4F12::lit("4.2"), Count::saturating(4)).unwrap();
+    let rule = WindowRule::new(3, U4F12::lit("4.2"), Count::saturating(5)).unwrap();
     let array = Array::new(3, 1).unwrap();
     let neighbours = NeighbourConfig::new(array, Neighbours::Four, &rule);
     let config = PixelConfig::<32, _>::with_rule(*neighbours.rule().own())
@@ -80,7 +80,7 @@ fn a_pixel_that_has_lost_photons_confirms_nothing() {
         .unwrap();
     for (photons, is_confirmed) in [(255, true), (256, false)] {
         let mut pixels: Vec<_> = pixels::<Count8>().into_iter().take(3).collect();
-        pixels[1].count_batch(&config, &[12, 13, 5, 29]);
+        pixels[1].count_batch(&config, &[12, 12, 13, 13, 5, 29]);
         let mut bright = vec![12; photons];
         bright.extend([2; 200]);
         pixels[2].count_batch(&config, &bright);
