@@ -15,6 +15,7 @@ use crate::status::dtof_status_t::{DTOF_ERROR_LENGTH, DTOF_ERROR_NO_EVENT};
 use crate::version::{DTOF_BINS, DTOF_COUNTER_BITS, PixelCounters};
 
 /// Bytes of a dtof_pixel_t.
+#[allow(clippy::manual_div_ceil, reason = "an expression of C")]
 pub const DTOF_PIXEL_SIZE: usize = 68 + ((DTOF_COUNTER_BITS + 7) / 8) * DTOF_BINS;
 /// The same in words.
 pub const DTOF_PIXEL_WORDS: usize = DTOF_PIXEL_SIZE / 4;

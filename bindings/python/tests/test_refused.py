@@ -239,7 +239,7 @@ ANY = of.one_of(
     of.lists(of.integers(-3, 70_000), max_size=4), of.tuples(of.floats(), of.floats()),
 )
 NAMES = ["rule", "alpha", "window", "z", "false_alarm", "estimator", "half_widths", "min_count", "l1",
-         "l2", "x", "binning", "patience", "neighbours", "tracking", "once_per_bin", "echoes", "echo_wait", "gate", "mask",
+         "l2", "x", "binning", "patience", "neighbours", "tracking", "once_per_bin", "counter_bits", "echoes", "echo_wait", "gate", "mask",
          "sigma_bins", "frame", "axes", "array", "columns", "rebin", "bins", "bin_width_ps",
          "offset_mm", "photons_per_cycle", "recorded_cycles", "laser_hz", "seed"]
 

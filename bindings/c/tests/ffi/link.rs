@@ -356,7 +356,7 @@ fn records_are_those_of_the_link() {
         dead_time: 20,
         most_dither: 40,
     };
-    let expected = Some((Some(expected), DTOF_COUNTER_BITS as u8));
+    let expected = Some((Some(expected), dtof_counter_bits()));
     assert_eq!(SensorRecord::from_le_bytes(&sensor), expected);
     let read = Report::from_le_bytes(&body).unwrap();
     assert_eq!(

@@ -301,7 +301,7 @@ fn replay_takes_the_stated_defaults_and_keeps_quiet() {
     let summary = scratch.summary();
     let settings = serde_json::json!({
         "bins": 128, "bin_width_ps": 250.0, "offset_mm": 0.0, "gate": null, "rule": "paper", "alpha": 4.0, "estimator": "centroid",
-        "min_count": 5, "l1": 40, "l2": 2000, "x": 4, "binning": 0, "tracking": false, "echoes": 1, "echo_wait": null, "dead_time": 0, "once_per_bin": false, "seed": 1
+        "min_count": 5, "l1": 40, "l2": 2000, "x": 4, "binning": 0, "tracking": false, "echoes": 1, "echo_wait": null, "dead_time": 0, "once_per_bin": false, "counter_bits": 10, "seed": 1
     });
     assert_eq!(summary["settings"], settings);
     let histogram = npy("<u4", "(8,)", &10_000u32.to_le_bytes().repeat(8));
