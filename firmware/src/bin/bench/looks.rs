@@ -57,8 +57,8 @@ fn first<const TARGETS: u8>(
     Some(())
 }
 
-/// The same without a target, beside neighbours with another exposure.
-fn among_neighbours(
+/// The same without a target, or with `TARGETS` a dim one, beside neighbours with another exposure.
+fn among_neighbours<const TARGETS: u8>(
     further: &mut Further,
     state: &mut State,
     number: u32,
@@ -67,6 +67,9 @@ fn among_neighbours(
     first::<0>(further, state, number, features)?;
     further.photons(state, number + EXPOSURES, 0);
     further.neighbours();
+    if TARGETS > 0 {
+        further.dim_target();
+    }
     Some(())
 }
 
@@ -215,12 +218,15 @@ const BOTH: Features = Features {
     ..ECHOES
 };
 
-const fn of_neighbours(variant: &'static str, gives: Look) -> Row {
-    Row {
-        way: look_with_neighbours,
-        ..row(variant, Features::NONE, among_neighbours, gives)
-    }
-}
+const AMONG: Row = Row {
+    way: look_with_neighbours,
+    ..row(
+        "look; 8 neighbours; no event",
+        Features::NONE,
+        among_neighbours::<0>,
+        Look::NoPeak,
+    )
+};
 
 const ROWS: [Row; 21] = [
     row(
@@ -242,8 +248,13 @@ const ROWS: [Row; 21] = [
         after_event::<1>,
         Look::Event,
     ),
-    of_neighbours("look; 8 neighbours; no event", Look::NoPeak),
-    of_neighbours("look; 8 neighbours; confirmed", Look::Event),
+    AMONG,
+    Row {
+        variant: "look; 8 neighbours; confirmed",
+        prepare: among_neighbours::<1>,
+        gives: Look::Event as u32,
+        ..AMONG
+    },
     row(
         "look; two echoes; no event",
         ECHOES,
