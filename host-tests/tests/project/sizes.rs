@@ -19,8 +19,8 @@ fn a_macropixel_takes_what_the_documentation_says() {
     let statement = "macropixel of 128 bins takes 320 bytes, with 8-bit counters 192.";
     assert!(include_str!("../../../README.md").contains(statement));
     assert!(include_str!("../../../core/README.md").contains(statement));
-    // A block: 8 bytes more.
-    assert_eq!(size_of::<Block<128>>(), 128 * 2 + 64 + 8);
+    // A block: 4 bytes more.
+    assert_eq!(size_of::<Block<128>>(), 128 * 2 + 64 + 4);
     assert_eq!(size_of::<DepthEvent>(), 28);
     // Histogram: 2 bytes a bin (1 for 8 bits, 4 for 24) and 16 bytes more.
     assert_eq!(size_of::<Histogram<128>>(), 128 * 2 + 16);
