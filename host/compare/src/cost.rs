@@ -8,37 +8,37 @@ use super::method::{Method, Rule};
 use dtof_engine::settings::Settings;
 
 /// Counting a photon (`AsyncPixel::count_batch`).
-pub const PHOTON: f64 = 10.22;
+pub const PHOTON: f64 = 10.21;
 /// Counting it if it is the first of its bin in a laser cycle (`AsyncPixel::count_once_per_bin`).
 pub const ONCE_PER_BIN: f64 = 28.57;
 /// Asking whether it also counts in blocks (`count and count_in_blocks; feeds none`, less
 /// `AsyncPixel::count`).
 pub const FEED: f64 = 32.56 - 28.56;
 /// Counting it in a block (`count and count_in_blocks; 1 level`, less `feeds none`).
-pub const BLOCK_PHOTON: f64 = 59.99 - 32.56;
+pub const BLOCK_PHOTON: f64 = 58.99 - 32.56;
 /// A look without an event with the paper's rule (`kept peak; no event`).
 pub const PAPER: f64 = 90.68;
 /// The same with the average of all bins (`average; no event`).
 pub const AVERAGE: f64 = 32.0;
 /// The same with tracking (`look; tracking; no event`).
-pub const TRACKING: f64 = 410.23;
+pub const TRACKING: f64 = 416.50;
 /// The same with 8 neighbours, whether it asks them or not (`look; 8 neighbours; no event`).
-pub const NEIGHBOURS: f64 = 1269.67;
+pub const NEIGHBOURS: f64 = 1109.98;
 /// A look of one step without neighbours (`look; window of 3; no event`).
-pub const LOOK: f64 = 196.97;
+pub const LOOK: f64 = 196.72;
 /// The same with a dead time (`look; dead time of 20 bins; no event`).
-pub const DEAD_TIME: f64 = 6975.64;
+pub const DEAD_TIME: f64 = 6970.64;
 /// The same with a dead time of all bins (`look; dead time; first photon only; no event`).
-pub const FIRST_PHOTON: f64 = 4170.06;
+pub const FIRST_PHOTON: f64 = 4165.06;
 /// The same for a block (`look; block; no event`).
-pub const BLOCK_LOOK: f64 = 247.88;
+pub const BLOCK_LOOK: f64 = 243.97;
 /// An exposure that L2 ends (`look at L2`).
 pub const EXPIRY: f64 = 108.0;
 /// An event with its peak and the depth from three bins (`kept peak; event and depth`), and its word
 /// (`encode and to_le_bytes`).
 pub const EVENT: f64 = 517.0 + 46.0;
 /// The same event if 8 neighbours confirm it (`look; 8 neighbours; confirmed`), and its word.
-pub const CONFIRMED: f64 = 4760.0 + 46.0;
+pub const CONFIRMED: f64 = 3390.0 + 46.0;
 /// The depth from a centred window instead (`centred window, σ 1`, less `centroid`).
 pub const CENTRED: f64 = 135.84 - 68.0;
 
@@ -46,11 +46,11 @@ pub const CENTRED: f64 = 135.84 - 68.0;
 #[must_use]
 pub const fn window(bins: u8) -> f64 {
     match bins {
-        0 | 1 => 110.88,
-        2 => 134.78,
-        3 => 141.81,
-        4 | 5 => 197.88,
-        _ => 219.97,
+        0 | 1 => 109.88,
+        2 => 133.78,
+        3 => 140.81,
+        4 | 5 => 196.88,
+        _ => 218.97,
     }
 }
 

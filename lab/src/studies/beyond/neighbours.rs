@@ -380,7 +380,7 @@ fn results(part: &Part) -> Result<Results> {
         panels,
     };
     let pixel = size_of::<AsyncPixel<BINS>>();
-    ensure!(pixel == 328, "a pixel takes {pixel} bytes here");
+    ensure!(pixel == 320, "a pixel takes {pixel} bytes here");
     Ok(Results {
         figures: vec![Figure::new("neighbours", &chart)?],
         values: [("table", table), ("costs", costs()?)].into(),
