@@ -21,7 +21,7 @@
 //! ```
 //!
 //! Cost: 5 bytes a pixel. On a Cortex-M4, 128 bins and with a window of 3 bins a look at a
-//! pixel after an echo takes 546 instructions, any other 197.
+//! pixel after an echo takes 617 instructions, any other 197.
 
 use core::ops::RangeInclusive;
 
@@ -78,6 +78,7 @@ impl ExcludedBins {
     }
 
     /// Whether one of the bins up to `beside` from `bin` is excluded.
+    #[inline(never)]
     #[must_use]
     pub fn touches(&self, bin: u16, beside: u16) -> bool {
         let reach = u16::from(self.reach).saturating_add(beside);
@@ -86,6 +87,7 @@ impl ExcludedBins {
 
     /// Whether `bin` is one of the `reach` bins right behind one of these ranges: a peak there
     /// may be the tail of the echo.
+    #[inline(never)]
     #[must_use]
     pub fn is_tail(&self, bin: BinIndex) -> bool {
         let reach = u16::from(self.reach);

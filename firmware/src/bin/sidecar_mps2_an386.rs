@@ -9,7 +9,7 @@ compile_error!("an image for a board: cargo xtask image mps2-an386");
 use core::panic::PanicInfo;
 
 use cortex_m_rt::entry;
-use dtof_firmware::board::{Counters, mps2_an386::Mps2An386, on_panic, serve, turn};
+use dtof_firmware::board::{mps2_an386::Mps2An386, on_panic, serve, turn};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_sensors::Sensor;
 use dtof_sensors::simulated;
@@ -19,8 +19,7 @@ use static_cell::ConstStaticCell;
 /// As many macropixels as the memory of the STM32F405 has room for; with counters of 8 bits as 192 KiB have
 /// without blocks.
 const MOST_PIXELS: usize = if cfg!(feature = "count8") { 800 } else { 256 };
-static PIXELS: ConstStaticCell<Vec<Pixel<Counters>, MOST_PIXELS>> =
-    ConstStaticCell::new(Vec::new());
+static PIXELS: ConstStaticCell<Vec<Pixel, MOST_PIXELS>> = ConstStaticCell::new(Vec::new());
 /// The blocks of 16 x 8 macropixels in three levels.
 const MOST_BLOCKS: usize = if cfg!(feature = "count8") { 0 } else { 42 };
 static BLOCKS: ConstStaticCell<Vec<Block, MOST_BLOCKS>> = ConstStaticCell::new(Vec::new());

@@ -11,7 +11,7 @@ use core::panic::PanicInfo;
 use cortex_m_rt::entry;
 #[cfg(feature = "sensor-photon-timer")]
 use dtof_core::checked;
-use dtof_firmware::board::{Counters, on_panic, pico::Pico, run};
+use dtof_firmware::board::{on_panic, pico::Pico, run};
 #[cfg(feature = "sensor-photon-timer")]
 use dtof_firmware::photon_timer::{Config, Settings};
 use dtof_firmware::sidecar::{Block, Pixel};
@@ -22,8 +22,7 @@ use static_cell::ConstStaticCell;
 
 /// As many macropixels as leave room for blocks and the stack.
 const MOST_PIXELS: usize = if cfg!(feature = "count8") { 800 } else { 512 };
-static PIXELS: ConstStaticCell<Vec<Pixel<Counters>, MOST_PIXELS>> =
-    ConstStaticCell::new(Vec::new());
+static PIXELS: ConstStaticCell<Vec<Pixel, MOST_PIXELS>> = ConstStaticCell::new(Vec::new());
 /// The blocks of 16 x 16 macropixels in three levels.
 static BLOCKS: ConstStaticCell<Vec<Block, 84>> = ConstStaticCell::new(Vec::new());
 

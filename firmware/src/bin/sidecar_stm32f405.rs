@@ -9,7 +9,7 @@ compile_error!("an image for a board: cargo xtask image stm32f405");
 use core::panic::PanicInfo;
 
 use cortex_m_rt::entry;
-use dtof_firmware::board::{Counters, on_panic, run, stm32f405::Stm32F405};
+use dtof_firmware::board::{on_panic, run, stm32f405::Stm32F405};
 use dtof_firmware::sidecar::{Block, Pixel};
 #[cfg(not(any(
     feature = "sensor-tdc7200",
@@ -22,8 +22,7 @@ use static_cell::ConstStaticCell;
 
 /// As many macropixels as the memory of the STM32F405 has room for.
 const MOST_PIXELS: usize = if cfg!(feature = "count8") { 400 } else { 256 };
-static PIXELS: ConstStaticCell<Vec<Pixel<Counters>, MOST_PIXELS>> =
-    ConstStaticCell::new(Vec::new());
+static PIXELS: ConstStaticCell<Vec<Pixel, MOST_PIXELS>> = ConstStaticCell::new(Vec::new());
 /// The blocks of 16 x 8 macropixels in three levels.
 static BLOCKS: ConstStaticCell<Vec<Block, 42>> = ConstStaticCell::new(Vec::new());
 

@@ -48,20 +48,12 @@ use self::pico as chip;
 use self::stm32f405 as chip;
 pub use self::transmit::{Transmitter, transmit};
 
-use dtof_core::CounterWidth;
 use dtof_sensors::Sensor;
 use heapless::VecView;
 
 use self::reset_reason::ResetReason;
 use crate::serial::Serial;
 use crate::sidecar::{Block, Pixel, Sidecar};
-
-/// The counters of an image's pixels.
-#[cfg(feature = "count8")]
-pub type Counters = dtof_core::Count8;
-/// The counters of an image's pixels.
-#[cfg(not(feature = "count8"))]
-pub type Counters = dtof_core::Count10;
 
 /// Whether the image drives a real sensor, and with it a laser. The watchdog then runs on while a
 /// debugger halts the processor: otherwise the laser would stay on.
@@ -113,7 +105,7 @@ pub fn turn<B: Board>(
 
 /// The work of a turn: the sidecar serves the host and polls the sensor.
 pub fn serve(
-    sidecar: &mut Sidecar<'_, impl CounterWidth>,
+    sidecar: &mut Sidecar<'_>,
     sensor: &mut impl Sensor,
     serial: &mut Serial<'_>,
     now_ms: u32,
@@ -133,7 +125,7 @@ pub fn run<B: Board>(
     mut serial: Serial<'_>,
     reason: ResetReason,
     mut sensor: impl Sensor,
-    pixels: &mut VecView<Pixel<impl CounterWidth>>,
+    pixels: &mut VecView<Pixel>,
     blocks: &mut VecView<Block>,
 ) -> ! {
     let mut sidecar = Sidecar::new(pixels, blocks, Some(sensor.info()));

@@ -2,14 +2,14 @@
 
 use dtof_core::binning::{Binning, BlockLink};
 use dtof_core::neighbours::NeighbourConfig;
-use dtof_core::{AnyRule, Array, CounterWidth, PixelAddress, PixelConfig, RangeGate, RangeScale};
+use dtof_core::{AnyRule, Array, PixelAddress, PixelConfig, RangeGate, RangeScale};
 use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source, StopReason};
 use dtof_sensors::dither::Dither;
 
 use super::photons::BinsOfPixel;
 use super::{BINS, Block, Pixel, Sidecar};
 
-impl<W: CounterWidth> Sidecar<'_, W> {
+impl Sidecar<'_> {
     /// Applies the configuration in `body`: all pixels begin an exposure. The last configuration
     /// stays in force if the device does not support the new one.
     pub(super) fn configure(&mut self, body: &[u8]) -> Result<(), Refusal> {

@@ -1,6 +1,6 @@
 //! Events on their way from the pixels' slots into messages.
 
-use dtof_core::{AerWord, BlockLevel, CounterWidth, DepthEvent, EchoNumber};
+use dtof_core::{AerWord, BlockLevel, DepthEvent, EchoNumber};
 use dtof_link::Source;
 use dtof_link::endpoint::BODY_BYTES;
 use dtof_link::message;
@@ -12,7 +12,7 @@ use super::{QUEUE, Sidecar};
 /// Words in one message.
 const WORDS: usize = BODY_BYTES / AerWord::BYTES;
 
-impl<W: CounterWidth> Sidecar<'_, W> {
+impl Sidecar<'_> {
     /// The next message if it is a request. Histograms come after all events and do not change the
     /// order or time of events.
     pub(super) fn question(&self) -> Option<u8> {

@@ -1,12 +1,12 @@
 //! Histograms on request of the host. Events have priority: a histogram is sent only while no event
 //! waits, and if there is room left for the next events. Only one request waits at a time.
 
-use dtof_core::{CounterWidth, LaserCycle, PixelAddress};
+use dtof_core::{LaserCycle, PixelAddress};
 use dtof_link::{HistogramHead, NoHistogram, Source, message};
 
 use super::{BINS, Sidecar};
 
-impl<W: CounterWidth> Sidecar<'_, W> {
+impl Sidecar<'_> {
     /// Accepts a request, or answers at once why there is no histogram.
     #[inline(never)]
     pub(super) fn accept_request(&mut self, body: &[u8]) {

@@ -28,8 +28,8 @@ use dtof_core::events::{DynamicDepthConfig, DynamicDepthPixel};
 use dtof_core::fixed::types::U16F16;
 use dtof_core::neighbours::{ArrayPixel, NeighbourConfig};
 use dtof_core::{
-    AerEncoder, AerWord, AnyRule, AsyncPixel, Count10, CounterWidth, DepthEvent, PixelAddress,
-    PixelConfig, Statistics,
+    AerEncoder, AerWord, AnyRule, AsyncPixel, CounterWidth, DepthEvent, PixelAddress, PixelConfig,
+    Statistics,
 };
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
@@ -54,16 +54,23 @@ const LOOKS: u16 = 64;
 /// The kind and the body of a message.
 type Answer = (u8, Vec<u8, BODY_BYTES>);
 
+/// The counters of an image's pixels.
+#[cfg(feature = "count8")]
+pub type Counters = dtof_core::Count8;
+/// The counters of an image's pixels.
+#[cfg(not(feature = "count8"))]
+pub type Counters = dtof_core::Count10;
+
 /// A macropixel, and what its dynamic depth is compared with: room for one, which the
 /// caller of [`Sidecar::new`] provides.
 #[derive(Debug)]
-pub struct Pixel<W: CounterWidth = Count10> {
-    detector: AsyncPixel<BINS, W>,
+pub struct Pixel {
+    detector: AsyncPixel<BINS, Counters>,
     feed: BlockLink,
     dynamic_depth: DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>,
 }
 
-impl<W: CounterWidth> Pixel<W> {
+impl Pixel {
     const fn new(address: PixelAddress, feed: BlockLink) -> Self {
         Self {
             detector: AsyncPixel::new(address),
@@ -73,12 +80,12 @@ impl<W: CounterWidth> Pixel<W> {
     }
 }
 
-impl<W: CounterWidth> ArrayPixel<BINS, W> for Pixel<W> {
-    fn pixel(&self) -> Option<&AsyncPixel<BINS, W>> {
+impl ArrayPixel<BINS, Counters> for Pixel {
+    fn pixel(&self) -> Option<&AsyncPixel<BINS, Counters>> {
         Some(&self.detector)
     }
 
-    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS, W>> {
+    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS, Counters>> {
         Some(&mut self.detector)
     }
 }
@@ -114,15 +121,15 @@ impl AsMut<dtof_core::binning::Block<BINS>> for Block {
     }
 }
 
-/// Macropixels of 128 bins, with counters of the width `W`, that are served over a link.
-pub struct Sidecar<'a, W: CounterWidth = Count10> {
+/// Macropixels of 128 bins that are served over a link.
+pub struct Sidecar<'a> {
     endpoint: Endpoint,
     deframer: Deframer,
     /// A frame on its way, and how much of it has gone.
     wire: [u8; WIRE_BYTES],
     wire_length: usize,
     wire_sent: usize,
-    pixels: &'a mut VecView<Pixel<W>>,
+    pixels: &'a mut VecView<Pixel>,
     /// None without adaptive binning.
     blocks: &'a mut VecView<Block>,
     config: Option<PixelConfig<BINS, AnyRule>>,
@@ -184,15 +191,15 @@ pub struct Sidecar<'a, W: CounterWidth = Count10> {
     sensor_fault: Option<SensorFault>,
 }
 
-impl<'a, W: CounterWidth> Sidecar<'a, W> {
+impl<'a> Sidecar<'a> {
     #[allow(clippy::cast_possible_truncation, reason = "at most 24")]
-    const COUNTER_BITS: u8 = W::BITS as u8;
+    const COUNTER_BITS: u8 = Counters::BITS as u8;
 
     /// Waits for a host. `pixels` and `blocks` provide the room for them; `sensor` describes the
     /// sensor if photons may come from one.
     #[must_use]
     pub fn new(
-        pixels: &'a mut VecView<Pixel<W>>,
+        pixels: &'a mut VecView<Pixel>,
         blocks: &'a mut VecView<Block>,
         sensor: Option<SensorInfo>,
     ) -> Self {

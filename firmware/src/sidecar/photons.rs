@@ -2,7 +2,7 @@
 
 use dtof_core::binning::{count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::neighbours::end_laser_cycles_of_array;
-use dtof_core::{CounterWidth, LaserCycle, Look, OncePerBin};
+use dtof_core::{LaserCycle, Look, OncePerBin};
 use heapless::vec::Vec;
 
 use super::{BINS, Sidecar};
@@ -54,7 +54,7 @@ impl BinsOfPixel {
     }
 }
 
-impl<W: CounterWidth> Sidecar<'_, W> {
+impl Sidecar<'_> {
     /// Works through a photons message until it is done, an event cannot leave its
     /// slot, or the pixels have looked `looks` times, which it counts down.
     pub(super) fn work_through(&mut self, looks: &mut u16) {

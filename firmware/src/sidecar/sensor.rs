@@ -1,8 +1,6 @@
 //! Photons and histograms of a sensor, which cannot wait.
 
-use dtof_core::{
-    AnyRule, Count24, CounterWidth, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig,
-};
+use dtof_core::{AnyRule, Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig};
 use dtof_link::frame::Deframer;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 
@@ -20,7 +18,7 @@ const POLLS: usize = 4;
 /// simulated sensor without a clock.
 const UNPACED: u16 = 4096;
 
-impl<W: CounterWidth> Sidecar<'_, W> {
+impl Sidecar<'_> {
     /// [`Self::poll`], and polls `sensor` while a configuration takes photons from it.
     /// The report counts its errors and names the last.
     ///
@@ -202,7 +200,7 @@ impl<W: CounterWidth> Sidecar<'_, W> {
 }
 
 /// Counts while a configuration takes photons from the sensor, else does nothing.
-impl<W: CounterWidth> PhotonSink for Sidecar<'_, W> {
+impl PhotonSink for Sidecar<'_> {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
         if self.takes_sensor() {
             self.count(pixel.raw().into(), code);
