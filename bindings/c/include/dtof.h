@@ -545,7 +545,7 @@ typedef struct dtof_event_t {
     uint64_t cycle;
     // Photons in the highest bin, background included: up to 16,777,215.
     uint32_t peak_count;
-    // The background per bin, in photons: up to 16,777,215.
+    // The background per bin, in photons: up to 16,777,215. Of a confirmed event that of the window.
     uint32_t background;
     // The position of the pulse from the start of bin 0, in 1/256 bin: -512 to 262,399.
     // dtof_range converts it to millimetres. dtof_aer_encode ignores it.

@@ -31,7 +31,7 @@ pub struct dtof_event_t {
     pub cycle: u64,
     /// Photons in the highest bin, background included: up to 16,777,215.
     pub peak_count: u32,
-    /// The background per bin, in photons: up to 16,777,215.
+    /// The background per bin, in photons: up to 16,777,215. Of a confirmed event that of the window.
     pub background: u32,
     /// The position of the pulse from the start of bin 0, in 1/256 bin: -512 to 262,399.
     /// dtof_range converts it to millimetres. dtof_aer_encode ignores it.

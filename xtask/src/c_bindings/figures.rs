@@ -13,7 +13,7 @@ const HEADER: &str = "| | C | Rust |\n|---|---|---|\n";
 /// A figure may differ from the page by one part in so many, as compilers of C differ.
 const TOLERANCE: u64 = 20;
 /// C may take one part in so many more than Rust: it checks the tag of each object.
-const MORE: u64 = 16;
+const MORE: u64 = 10;
 /// Rows that are mostly calls of the library, and how many. Each call checks pointers and passes
 /// in memory what Rust has in registers.
 const CALLS: [(&str, u64); 4] = [
@@ -203,11 +203,11 @@ mod tests {
     }
 
     #[test]
-    fn c_may_take_a_sixteenth_more_and_a_call_some_instructions() {
+    fn c_may_take_a_tenth_more_and_a_call_some_instructions() {
         let rust = figures(&[("flash", 10_000), ("one photon", 3000)], "7");
-        let good = figures(&[("flash", 10_625), ("one photon", 7500)], "7");
+        let good = figures(&[("flash", 11_000), ("one photon", 7500)], "7");
         assert_eq!(problems(&good, &rust), [""; 0]);
-        let bad = figures(&[("flash", 10_626), ("one photon", 7501)], "8");
+        let bad = figures(&[("flash", 11_001), ("one photon", 7501)], "8");
         assert_eq!(problems(&bad, &rust).len(), 3);
     }
 
