@@ -5,6 +5,7 @@ mod common;
 mod arguments;
 mod calibrate;
 mod compare;
+mod counter_bits;
 mod dead_time;
 mod device;
 mod export;
