@@ -55,7 +55,7 @@ impl SensorRecord {
     }
 
     /// Reads the record, and the width of the counters: no record if the device has no sensor, `None`
-    /// if the length is wrong.
+    /// if the length is wrong or the width unknown.
     #[must_use]
     pub fn from_le_bytes(bytes: &[u8]) -> Option<(Option<Self>, u8)> {
         let bytes: &[u8; Self::BYTES] = bytes.try_into().ok()?;
@@ -66,7 +66,11 @@ impl SensorRecord {
         let &[counter_bits, most_dither] = rest else {
             return None;
         };
-        let counter_bits = if counter_bits == 0 { 10 } else { counter_bits };
+        let counter_bits = match counter_bits {
+            0 | 10 => 10,
+            8 => 8,
+            _ => return None,
+        };
         let pixels = u16::from_le_bytes([a, b]);
         let bin_width = U16F16::from_le_bytes([c, d, e, f]);
         let sensor = (pixels > 0).then_some(Self {

@@ -116,7 +116,7 @@
 // Its alignment.
 #define DTOF_SCALE_ALIGN 4
 
-// Bytes of a dtof_pixel_t.
+// Bytes of a dtof_pixel_t. That of twice the bins of 8 bits is the same: no size tells them apart.
 #define DTOF_PIXEL_SIZE (68 + (((DTOF_COUNTER_BITS + 7) / 8) * DTOF_BINS))
 
 // The same in words.
@@ -543,7 +543,8 @@ typedef struct dtof_pixel_t {
 typedef struct dtof_event_t {
     // The laser cycle at whose end the event was decided.
     uint64_t cycle;
-    // Photons in the highest bin, background included: up to 16,777,215.
+    // Photons in the highest bin, background included: up to 16,777,215. Of a confirmed event those of the pixel
+    // in the window of the rule.
     uint32_t peak_count;
     // The background per bin, in photons: up to 16,777,215. Of a confirmed event that of the window.
     uint32_t background;

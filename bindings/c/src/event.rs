@@ -29,7 +29,8 @@ pub const DTOF_FLAG_CONFIRMED: u8 = 32;
 pub struct dtof_event_t {
     /// The laser cycle at whose end the event was decided.
     pub cycle: u64,
-    /// Photons in the highest bin, background included: up to 16,777,215.
+    /// Photons in the highest bin, background included: up to 16,777,215. Of a confirmed event those of the pixel
+    /// in the window of the rule.
     pub peak_count: u32,
     /// The background per bin, in photons: up to 16,777,215. Of a confirmed event that of the window.
     pub background: u32,

@@ -14,7 +14,7 @@ use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{DTOF_ERROR_LENGTH, DTOF_ERROR_NO_EVENT};
 use crate::version::{DTOF_BINS, DTOF_COUNTER_BITS, PixelCounters};
 
-/// Bytes of a dtof_pixel_t.
+/// Bytes of a dtof_pixel_t. That of twice the bins of 8 bits is the same: no size tells them apart.
 #[allow(clippy::manual_div_ceil, reason = "an expression of C")]
 pub const DTOF_PIXEL_SIZE: usize = 68 + ((DTOF_COUNTER_BITS + 7) / 8) * DTOF_BINS;
 /// The same in words.

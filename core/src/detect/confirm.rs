@@ -31,9 +31,8 @@
 //! out bins at the window is not asked.
 //!
 //! The last condition is for pixels beside a surface that ends. Its pixels are sure, and would confirm any chance
-//! peak at their place: without it up to 25 % of the exposures of a pixel without a target, of 1,000 laser cycles, give an event
-//! where 1 % is asked; with it 1 to 6 %. It costs 14 to 18 % of the time until 90 % of the pixels of a dim wall have had an event
-//! (`core/tests/neighbours/false_alarms.rs`).
+//! peak at their place. With it a pixel beside a straight edge has up to 3 times the false alarms of the rule if its neighbours see up
+//! to half a photon a laser cycle, and up to 6 times if they see two (`core/tests/neighbours/false_alarms.rs`).
 //!
 //! The depth is that of the photons of all these pixels. The peak count is that of the pixel's own photons in the window,
 //! the background what is expected of them there.

@@ -152,21 +152,21 @@ fn they_are_at_most_those_of_the_rule() {
         let found = run(&light, &|_| true, exposures, 3);
         let all = sum(&found, |_| true);
         println!("{background} photons a bin and look: {}", all.text());
-        let allowed = |found: &Found| {
-            // Three standard deviations of a Poisson variable, of the corners four.
+        // Three standard deviations of a Poisson variable; of the few at corners and beside the hot pixel one event more.
+        let allowed = |found: &Found, more: f64| {
             let expected = 0.013 * found.exposures as f64;
-            (expected + 4.0 * expected.sqrt() + 1.0) as u32
+            (expected + 3.0 * expected.sqrt() + more) as u32
         };
         assert!(all.alone > 0);
-        for (name, found) in [
-            ("all", all),
-            ("corners", sum(&found, is_corner)),
-            ("beside a hot pixel", sum(&found, is_beside_hot)),
+        for (name, found, more) in [
+            ("all", all, 0.0),
+            ("corners", sum(&found, is_corner), 1.0),
+            ("beside a hot pixel", sum(&found, is_beside_hot), 1.0),
         ] {
             println!("  {name}: {}", found.text());
-            assert!(found.alone + found.confirmed <= allowed(&found));
+            assert!(found.alone + found.confirmed <= allowed(&found, more));
         }
-        assert!(2 * all.confirmed <= allowed(&all));
+        assert!(2 * all.confirmed <= allowed(&all, 0.0));
     }
 }
 

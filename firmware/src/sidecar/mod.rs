@@ -50,6 +50,8 @@ pub const BINS: usize = 128;
 const QUEUE: usize = 64;
 /// The most looks of all pixels in one turn of the main loop.
 const LOOKS: u16 = 64;
+/// The same with neighbours or a dead time, whose looks take up to 70 times as long.
+const LONG_LOOKS: u16 = 2;
 
 /// The kind and the body of a message.
 type Answer = (u8, Vec<u8, BODY_BYTES>);
@@ -325,7 +327,12 @@ impl<'a> Sidecar<'a> {
     /// more than some, so that it does not take long. `overrun` is what the serial
     /// port has lost so far.
     pub fn work(&mut self, overrun: u32) {
-        let mut looks = LOOKS;
+        let is_long = self.neighbours.is_some()
+            || self
+                .config
+                .as_ref()
+                .is_some_and(|config| config.dead_time() > 0);
+        let mut looks = if is_long { LONG_LOOKS } else { LOOKS };
         loop {
             if let Some((kind, body)) = &self.answer {
                 if self.endpoint.offer(*kind, body).is_err() {

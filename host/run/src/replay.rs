@@ -124,7 +124,10 @@ impl Options {
         let refused = |refused: Refused| anyhow::Error::from(refused).context(input.to_string());
         let of_arrays = [
             ("binning", settings.binning.is_some()),
-            ("neighbours", settings.neighbours.is_some()),
+            (
+                "neighbours",
+                settings.neighbours.is_some() && settings.frame.is_none(),
+            ),
         ];
         for (key, is_used) in of_arrays {
             ensure!(
