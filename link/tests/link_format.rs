@@ -323,7 +323,7 @@ proptest! {
     #[test]
     fn sensors_come_back(
         pixels: u16, width: u32, offset: i32, laser_millihertz: u64, bins: u16, dead_time: u16,
-        most_dither: u8, counter_bits in prop_oneof![Just(8u8), Just(10), 1u8..=255],
+        most_dither: u8, counter_bits in prop_oneof![Just(8u8), Just(10)], unknown: u8,
     ) {
         let sensor = SensorRecord {
             pixels,
@@ -339,6 +339,10 @@ proptest! {
         prop_assert_eq!(SensorRecord::from_le_bytes(&bytes), Some((expected, counter_bits)));
         prop_assert_eq!(SensorRecord::from_le_bytes(&bytes[1..]), None);
         prop_assert_eq!(bytes[22], if counter_bits == 10 { 0 } else { counter_bits });
+        let mut other = bytes;
+        other[22] = unknown;
+        let is_known = [0, 8, 10].contains(&unknown);
+        prop_assert_eq!(SensorRecord::from_le_bytes(&other).is_some(), is_known);
         let bytes = SensorRecord::to_le_bytes(None, counter_bits);
         prop_assert_eq!(SensorRecord::from_le_bytes(&bytes), Some((None, counter_bits)));
     }

@@ -106,11 +106,16 @@ impl BinnedArray {
                 level: member.level,
                 first,
             };
+            let had_reported = member.pixel.has_reported();
             let echo = member
                 .pixel
                 .end_laser_cycle(|window| stands_clear(reporter, window));
             if let Some(echo) = echo {
                 events.push((reporter, echo));
+                member.feeds = false;
+                member.has_reported = true;
+            } else if had_reported && !member.pixel.has_reported() {
+                // An exposure that ended after an echo was not silent.
                 member.feeds = false;
                 member.has_reported = true;
             }
