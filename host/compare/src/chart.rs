@@ -27,20 +27,24 @@ impl Comparison {
     /// Fails if there is nothing to draw.
     pub fn chart(&self) -> Result<String> {
         let frames = self.methods.len() - 1;
-        let panel = |title: &str, is_in: &dyn Fn(&Method) -> bool| {
+        let panel = |title: &str, is_first: bool, is_in: &dyn Fn(&Method) -> bool| {
             let numbers = (0..frames).filter(|&number| is_in(&self.methods[number]));
             let series: Vec<Series> = numbers.filter_map(|number| self.series(number)).collect();
             let others = self.series(frames).into_iter().chain(self.bound_series());
-            (!series.is_empty()).then(|| Panel {
+            (is_first || !series.is_empty()).then(|| Panel {
                 title: title.to_owned(),
                 series: series.into_iter().chain(others).collect(),
             })
         };
         let has_more = |method: &Method| method.has_full_resolution() && !method.is_single();
         let panels = [
-            panel("each pixel and exposure by itself", &Method::is_single),
-            panel("every pixel, with neighbours or tracking", &has_more),
-            panel("blocks: fewer places", &|method| {
+            panel(
+                "each pixel and exposure by itself",
+                true,
+                &Method::is_single,
+            ),
+            panel("every pixel, with neighbours or tracking", false, &has_more),
+            panel("blocks: fewer places", false, &|method| {
                 !method.has_full_resolution()
             }),
         ];
