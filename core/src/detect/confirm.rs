@@ -263,23 +263,16 @@ impl NeighbourRule {
                 (start, photons) = (place, sum);
             }
         }
-        let z = self.z(histogram.total(), total).to_bits();
-        if photons == promising
-            || photons < self.own.minimum_count().raw()
-            || !exceeds::<W>(photons, total, self.own.width(), bins, z)
-        {
+        if photons == promising || photons < self.own.minimum_count().raw() {
             return None;
         }
-        let others = (photons - promising, total.saturating_sub(histogram.total()));
-        if exceeds::<W>(others.0, others.1, self.own.width(), bins, SURE)
-            && !exceeds::<W>(
-                promising,
-                histogram.total(),
-                self.own.width(),
-                own_bins,
-                BESIDE_SURE,
-            )
-        {
+        let (own_total, wide) = (histogram.total(), self.own.width());
+        let z = self.z(own_total, total).to_bits();
+        let others = total.saturating_sub(own_total);
+        let is_confirmed = exceeds::<W>(photons, total, wide, bins, z)
+            && (!exceeds::<W>(photons - promising, others, wide, bins, SURE)
+                || exceeds::<W>(promising, own_total, wide, own_bins, BESIDE_SURE));
+        if !is_confirmed {
             return None;
         }
         let end = start + width;
@@ -319,7 +312,8 @@ impl NeighbourRule {
     }
 }
 
-/// Where the first window with the most photons begins, of those that begin at `starts`, and its photons.
+/// Where the first window with the most photons begins, of those that begin at `starts`, and its photons. Its
+/// twin without the place, `highest_sum`, saves 20 to 130 instructions at each look.
 #[inline(always)]
 fn first_highest<const BINS: usize, W: CounterWidth>(
     histogram: &Histogram<BINS, W>,

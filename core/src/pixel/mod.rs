@@ -243,17 +243,8 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             self.leave_out_excluded::<R, LIVE>(config, statistics);
             longest = self.longest_after_echo(config);
         }
-        if self.exposure >= longest {
-            return self.end(config, statistics);
-        }
-        if self.state.contains(State::REQUESTING) {
-            statistics.deferred += 1;
-            self.state.set(State::DEFERRED);
-            return Look::Deferred;
-        }
-        if self.is_full() {
-            statistics.ended_full += 1;
-            return self.end(config, statistics);
+        if let Some(look) = self.undecided(config, statistics, longest) {
+            return look;
         }
         let expected = self.expected();
         let (histogram, excluded) = (&self.histogram, &self.excluded);
@@ -278,6 +269,30 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             cycles: self.exposure.into(),
         });
         self.report(config, statistics, cycle, &detection)
+    }
+
+    /// What a look is that makes no decision: the exposure has reached the `longest`, an event waits, or a counter
+    /// is full.
+    #[inline(always)]
+    fn undecided<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        longest: u16,
+    ) -> Option<Look> {
+        if self.exposure >= longest {
+            return Some(self.end(config, statistics));
+        }
+        if self.state.contains(State::REQUESTING) {
+            statistics.deferred += 1;
+            self.state.set(State::DEFERRED);
+            return Some(Look::Deferred);
+        }
+        if self.is_full() {
+            statistics.ended_full += 1;
+            return Some(self.end(config, statistics));
+        }
+        None
     }
 
     /// Puts the event of `detection` into the slot. The exposure ends, or goes on for the

@@ -51,7 +51,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         let (decides, waits) = (State::DECIDES, State::REQUESTING);
         if !self.state.contains(decides)
             || self.state.contains(waits)
-            || self.is_longest(config)
+            || self.exposure >= self.longest(config)
             || self.weighs_dead_time(config)
             || self.is_full()
         {
@@ -110,29 +110,17 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             });
             return self.report_slot(config, statistics);
         }
-        if self.is_longest(config) {
-            return self.end(config, statistics);
-        }
-        if self.state.contains(State::REQUESTING) {
-            statistics.deferred += 1;
-            self.state.set(State::DEFERRED);
-            return Look::Deferred;
-        }
-        if self.is_full() {
-            statistics.ended_full += 1;
-            return self.end(config, statistics);
-        }
-        Look::NoPeak
+        let longest = self.longest(config);
+        self.undecided(config, statistics, longest)
+            .unwrap_or(Look::NoPeak)
     }
 
-    /// Whether the exposure ends now without an event.
-    fn is_longest<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> bool {
-        let has_echo = self.state.contains(State::HAS_ECHO);
-        let longest = if has_echo {
+    /// The length at which this exposure ends without an event.
+    fn longest<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> u16 {
+        if self.state.contains(State::HAS_ECHO) {
             self.longest_after_echo(config)
         } else {
             config.l2()
-        };
-        self.exposure >= longest
+        }
     }
 }

@@ -122,12 +122,10 @@ impl Options {
             .or(settings_of_file(&metadata, photons.array()));
         let settings = requested.settings(metadata.bins)?;
         let refused = |refused: Refused| anyhow::Error::from(refused).context(input.to_string());
+        let asks_neighbours = settings.neighbours.is_some() && settings.frame.is_none();
         let of_arrays = [
             ("binning", settings.binning.is_some()),
-            (
-                "neighbours",
-                settings.neighbours.is_some() && settings.frame.is_none(),
-            ),
+            ("neighbours", asks_neighbours),
         ];
         for (key, is_used) in of_arrays {
             ensure!(
@@ -135,7 +133,7 @@ impl Options {
                 refused(Refused::new(key, "needs the array: give `columns`"))
             );
         }
-        if settings.neighbours.is_some() && settings.frame.is_none() {
+        if asks_neighbours {
             ensure!(
                 is_one_capture(photons.as_ref()),
                 refused(Refused::new(
