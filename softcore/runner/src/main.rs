@@ -196,6 +196,7 @@ fn run(options: &Options) -> Result<()> {
         Figures::read(root)?.only(selected).check(&measured)?;
     } else if options.cores.is_empty() {
         measured.write(root)?;
+        place::write_page(root)?;
     }
     Ok(())
 }

@@ -99,6 +99,14 @@ pub fn run(parser: lexopt::Parser) -> Result<()> {
     Ok(())
 }
 
+/// Writes the page again from its file: it compares with cycles that `cargo softcore` measures.
+pub fn write_page(root: &Path) -> Result<()> {
+    let page = page::text(&files::lines(root)?, cycles(root)?);
+    fs::write(root.join(page::DOCUMENT), page).context(page::DOCUMENT)?;
+    println!("{}: written", page::DOCUMENT);
+    Ok(())
+}
+
 /// Places all designs, some at a time: a run takes a core and a gigabyte.
 fn place(flow: &Flow<'_>, kinds: &[Kind]) -> Result<Vec<Placements>> {
     let workers = thread::available_parallelism()?.get().div_ceil(2);
