@@ -345,7 +345,8 @@ impl Host {
                 assert!(self.events <= events, "events that none has decided");
                 let of = &report.statistics;
                 let kept = of.counted + of.excluded;
-                let lost = of.saturated + of.rejected + of.gated_out + report.unaddressed;
+                let lost =
+                    of.saturated + of.rejected + of.gated_out + of.repeated + report.unaddressed;
                 assert_eq!(self.photons.unwrap_or(0), kept + lost, "photons");
             }
             _ => {}
