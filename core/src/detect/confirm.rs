@@ -9,9 +9,9 @@
 //! | step | condition |
 //! |---|---|
 //! | the pixel alone | a detection of the window rule with `z₁` |
-//! | promising | its window with the most photons has at least two and exceeds the background by 2 standard deviations |
+//! | promising | its window with the most photons has at least two and exceeds the background by 2.5 standard deviations |
+//! | which neighbours | all but those that are more than twice as bright there: with two photons or more, and more than twice the pixel's photons above the background a laser cycle |
 //! | confirmed | a neighbour has photons in the window, all pixels together have the minimum there, and exceed `z₂` |
-//! | at an edge | the neighbours without the pixel do not exceed 3.5 standard deviations, or the pixel alone exceeds 3 |
 //!
 //! `z₁` and `z₂` each have half of the false alarms of the rule's `z`. For `z₁` that is twice as many
 //! trials. The sum contains the photons that made the pixel promising, so `z₂` depends on their share. With
@@ -19,7 +19,7 @@
 //! with the correlation `r`, and
 //!
 //! ```text
-//! P(z₁ > 2 and z > z₂) = ∫ φ(x) Q((z₂ - r·x) / √(1 - r²)) dx   from 2 on
+//! P(z₁ > 2.5 and z > z₂) = ∫ φ(x) Q((z₂ - r·x) / √(1 - r²)) dx   from 2.5 on
 //! ```
 //!
 //! is one in so many trials. With a share of more than half the neighbours hardly say anything, and `z₂` is `z₁`; so it is
@@ -30,9 +30,9 @@
 //! Bins that the pixel has left out, because their echo was reported, count in no neighbour. A neighbour that has left
 //! out bins at the window is not asked.
 //!
-//! The last condition is for pixels beside a surface that ends. Its pixels are sure, and would confirm any chance
-//! peak at their place. With it a pixel beside a straight edge has up to 3 times the false alarms of the rule if its neighbours see up
-//! to half a photon a laser cycle, and up to 6 times if they see two (`core/tests/neighbours/false_alarms.rs`).
+//! Brighter neighbours are left out because of surfaces that end. Their pixels would confirm any chance peak beside them.
+//! `core/tests/neighbours/false_alarms.rs` has the false alarms there, and those of a single pixel whose
+//! neighbours all see a surface.
 //!
 //! The depth is that of the photons of all these pixels. The peak count is that of the pixel's own photons in the window,
 //! the background what is expected of them there.
@@ -70,42 +70,76 @@ struct Promising {
     bins: u32,
 }
 
-/// What a neighbour contributes.
-pub(crate) type Neighbour<'a, const BINS: usize, W> = (&'a Histogram<BINS, W>, &'a ExcludedBins);
+/// What a pixel knows of its exposure.
+#[derive(Clone, Copy)]
+pub(crate) struct Exposed<'a, const BINS: usize, W: CounterWidth> {
+    pub histogram: &'a Histogram<BINS, W>,
+    pub excluded: &'a ExcludedBins,
+    pub cycles: u16,
+}
+
+/// Photons above the background a laser cycle, as a fraction.
+#[derive(Clone, Copy)]
+struct Brightness {
+    /// Times the number of bins.
+    above: u32,
+    /// Laser cycles times the number of bins.
+    cycles: u32,
+}
+
+impl Brightness {
+    /// Of `inside` photons in `width` of `bins` bins, which have `total` photons.
+    #[inline(always)]
+    fn new(inside: u32, width: u32, total: u32, bins: u32, cycles: u16) -> Self {
+        // 30 bits, of counters of 16.
+        let inside = bins.saturating_mul(inside);
+        Self {
+            above: inside.saturating_sub(width.saturating_mul(total)),
+            cycles: u32::from(cycles) * bins,
+        }
+    }
+
+    /// Whether it is more than twice another one.
+    #[inline(always)]
+    fn exceeds_twice(self, other: Self) -> bool {
+        let [this, other] = [(self.above, other.cycles), (other.above, self.cycles)]
+            .map(|(above, cycles)| u64::from(above) * u64::from(cycles));
+        // 32 and 28 bits.
+        this > 2 * other
+    }
+}
 
 const SHARES: usize = 8;
 const MOST_NEIGHBOURS: usize = 8;
-/// 2 standard deviations, in 1/4096.
-const PROMISING: u16 = 2 << 12;
-/// The neighbours' excess at which they are sure without the pixel: 3.5 standard deviations.
-const SURE: u16 = 7 << 11;
-/// What the pixel then needs by itself: 3 standard deviations.
-const BESIDE_SURE: u16 = 3 << 12;
+/// A pixel and its neighbours.
+const PIXELS: u32 = 9;
+/// 2.5 standard deviations, in 1/4096.
+const PROMISING: u16 = 5 << 11;
+/// Of fewer photons a neighbour's brightness is not known.
+const FEWEST: u32 = 2;
 /// If the highest bin has at most so many photons, it often has them by chance, and all windows are looked
 /// at; otherwise those that contain it.
-const FEW: u32 = 3;
-/// The bins of as many windows in a row as have a bin in common, of the widest.
-const MOST_BINS: usize = 2 * WindowRule::MAX_WIDTH as usize - 1;
+const FEW: u32 = 2;
 /// The bins to either side of a peak that its depth may need.
 const BESIDE: u16 = 6;
 
 /// z₂ in 1/4096, at least 2, for 2⁶, 2⁸, … trials and own shares of 1/16 to 8/16.
 const Z: [[u16; SHARES]; 15] = [
     [8192, 8192, 8192, 8192, 8192, 8192, 8192, 8192],
-    [8192, 8192, 8192, 8283, 8731, 9119, 9460, 9760],
-    [9270, 10075, 10642, 11081, 11436, 11728, 11971, 12172],
-    [11589, 12329, 12830, 13203, 13492, 13718, 13896, 14032],
-    [13519, 14206, 14654, 14975, 15213, 15390, 15519, 15611],
-    [15204, 15846, 16249, 16527, 16723, 16861, 16955, 17016],
-    [16716, 17318, 17683, 17924, 18086, 18193, 18261, 18300],
-    [18099, 18665, 18996, 19206, 19339, 19422, 19470, 19494],
-    [19381, 19914, 20214, 20397, 20507, 20570, 20603, 20618],
-    [20579, 21083, 21356, 21514, 21604, 21652, 21675, 21684],
-    [21710, 22185, 22434, 22571, 22645, 22680, 22696, 22701],
-    [22782, 23232, 23458, 23577, 23636, 23663, 23673, 23676],
-    [23803, 24230, 24436, 24538, 24586, 24606, 24612, 24614],
-    [24782, 25185, 25373, 25461, 25500, 25514, 25518, 25519],
-    [25721, 26104, 26274, 26350, 26381, 26391, 26394, 26394],
+    [8192, 8192, 8192, 8192, 8192, 8192, 8192, 8192],
+    [8192, 8192, 8757, 9400, 9946, 10420, 10839, 11210],
+    [9887, 10872, 11572, 12121, 12570, 12946, 13262, 13529],
+    [12172, 13089, 13721, 14201, 14580, 14885, 15130, 15324],
+    [14082, 14944, 15520, 15944, 16267, 16516, 16706, 16848],
+    [15752, 16566, 17095, 17471, 17748, 17952, 18100, 18202],
+    [17253, 18025, 18512, 18848, 19085, 19252, 19365, 19437],
+    [18627, 19361, 19810, 20110, 20313, 20449, 20535, 20585],
+    [19901, 20599, 21015, 21283, 21457, 21567, 21632, 21666],
+    [21093, 21759, 22144, 22383, 22532, 22620, 22668, 22691],
+    [22218, 22854, 23210, 23424, 23551, 23621, 23656, 23671],
+    [23285, 23893, 24223, 24414, 24521, 24577, 24602, 24611],
+    [24302, 24883, 25190, 25360, 25450, 25494, 25512, 25518],
+    [25276, 25832, 26116, 26267, 26343, 26377, 26390, 26394],
 ];
 
 impl NeighbourRule {
@@ -185,13 +219,12 @@ impl NeighbourRule {
     #[inline(always)]
     pub(crate) fn confirm<'a, const BINS: usize, W: CounterWidth + 'a>(
         &self,
-        own: Neighbour<'a, BINS, W>,
+        own: Exposed<'a, BINS, W>,
         gate: &RangeGate<BINS>,
         estimator: &DepthEstimator,
-        neighbours: impl Iterator<Item = Neighbour<'a, BINS, W>>,
+        neighbours: impl Iterator<Item = Exposed<'a, BINS, W>>,
     ) -> Option<Detection> {
-        let (histogram, excluded) = own;
-        let promising = self.promising(histogram, gate, excluded)?;
+        let promising = self.promising(own.histogram, gate, own.excluded)?;
         self.sum_up(own, promising, gate, estimator, neighbours)
     }
 
@@ -199,7 +232,7 @@ impl NeighbourRule {
     #[inline(never)]
     fn sum_up<'a, const BINS: usize, W: CounterWidth + 'a>(
         &self,
-        own: Neighbour<'a, BINS, W>,
+        own: Exposed<'a, BINS, W>,
         Promising {
             first,
             photons: promising,
@@ -207,79 +240,88 @@ impl NeighbourRule {
         }: Promising,
         gate: &RangeGate<BINS>,
         estimator: &DepthEstimator,
-        neighbours: impl Iterator<Item = Neighbour<'a, BINS, W>>,
+        neighbours: impl Iterator<Item = Exposed<'a, BINS, W>>,
     ) -> Option<Detection> {
-        let (histogram, excluded) = own;
+        let Exposed {
+            histogram,
+            excluded,
+            cycles,
+        } = own;
         let width = u16::from(self.own.width());
         // With few photons, several windows in a row often have as many. The neighbours choose.
         let mut end = first + width;
         let mut same = promising;
-        for leaving in first..first + width - 1 {
-            let [leaving, entering] = [leaving, end].map(|bin| histogram.count(bin.into()));
+        let counts = histogram.counts().get(first.into()..=gate.last().into());
+        let (counts, entering) = (counts.unwrap_or_default(), usize::from(width));
+        let pairs = counts
+            .iter()
+            .zip(counts.get(entering..).unwrap_or_default());
+        for (&leaving, &entering) in pairs.take(entering - 1) {
             same = same
-                .wrapping_add(entering.unwrap_or(0))
-                .wrapping_sub(leaving.unwrap_or(0));
-            if same != promising || end > gate.last() {
+                .wrapping_add(entering.into())
+                .wrapping_sub(leaving.into());
+            if same != promising {
                 break;
             }
             end += 1;
         }
+        let windows = Windows::new(first..end, excluded);
         let mut asked = [None::<&Histogram<BINS, W>>; MOST_NEIGHBOURS];
         let mut places = asked.iter_mut();
-        let (mut total, mut bins) = (histogram.total(), own_bins);
-        let mut sums = [0u32; MOST_BINS];
-        add_window(&mut sums, histogram, first..end);
+        let own_total = histogram.total();
+        let (mut total, mut bins) = (own_total, own_bins);
+        let mut in_windows = windows.photons(histogram);
+        let own_brightness = windows.brightness(in_windows, own_total, own_bins, cycles);
         let reach = estimator.reach();
-        for (other, left_out) in neighbours {
+        for other in neighbours {
             // Those that have left out bins here, because their echo was reported, do not know.
+            let left_out = other.excluded;
             if left_out.echoes() > 0 && (first..end).any(|bin| left_out.touches(bin, reach)) {
                 continue;
             }
-            let Some((photons, left)) = counted(other, left_out, gate, excluded) else {
+            let Some((photons, left)) = counted(other.histogram, left_out, gate, excluded) else {
                 continue;
             };
+            let inside = windows.photons(other.histogram);
+            let brightness = windows.brightness(inside, photons, left, other.cycles);
+            if inside >= FEWEST && brightness.exceeds_twice(own_brightness) {
+                continue;
+            }
             let Some(place) = places.next() else {
                 break;
             };
-            *place = Some(other);
+            *place = Some(other.histogram);
             total = total.saturating_add(photons);
+            in_windows = in_windows.saturating_add(inside);
             // The fewest bins expect the most photons.
             bins = bins.min(left);
-            add_window(&mut sums, other, first..end);
         }
-        if excluded.echoes() > 0 {
-            for (bin, sum) in (first..end).zip(&mut sums) {
-                if excluded.contains(bin) {
-                    *sum = 0;
-                }
-            }
+        let (z, wide) = (self.z(own_total, total).to_bits(), self.own.width());
+        // Most looks end here: no window has more photons than all of them, or than full counters.
+        let full = W::MAX.saturating_mul(PIXELS).saturating_mul(wide.into());
+        if !exceeds::<W>(in_windows.min(full), total, wide, bins, z) {
+            return None;
         }
+        let all = asked.into_iter().flatten().chain([histogram]);
         let (mut start, mut photons) = (first, promising);
         for place in first..=end - width {
-            let from = usize::from(place - first);
-            let window = sums.iter().skip(from).take(width.into());
-            let sum = window.fold(0u32, |sum, &count| sum.saturating_add(count));
+            let window = Windows::new(place..place + width, excluded);
+            let counts = all.clone().map(|one| window.photons(one));
+            let sum = counts.fold(0u32, u32::saturating_add);
             if sum > photons {
                 (start, photons) = (place, sum);
             }
         }
-        if photons == promising || photons < self.own.minimum_count().raw() {
-            return None;
-        }
-        let (own_total, wide) = (histogram.total(), self.own.width());
-        let z = self.z(own_total, total).to_bits();
-        let others = total.saturating_sub(own_total);
-        let is_confirmed = exceeds::<W>(photons, total, wide, bins, z)
-            && (!exceeds::<W>(photons - promising, others, wide, bins, SURE)
-                || exceeds::<W>(promising, own_total, wide, own_bins, BESIDE_SURE));
-        if !is_confirmed {
+        if photons == promising
+            || photons < self.own.minimum_count().raw()
+            || !exceeds::<W>(photons, total, wide, bins, z)
+        {
             return None;
         }
         let end = start + width;
         let near =
             start.saturating_sub(BESIDE).max(gate.first())..(end + BESIDE).min(gate.last() + 1);
         let mut sum = Histogram::<BINS, Count16>::new();
-        let all = asked.into_iter().flatten().chain([histogram]);
         all.clone().for_each(|one| sum.add_bins(one, near.clone()));
         excluded.empty(&mut sum);
         sum.leave_out(sum.total().saturating_sub(total));
@@ -338,16 +380,50 @@ fn first_highest<const BINS: usize, W: CounterWidth>(
     (first, highest)
 }
 
-/// Adds some bins of a histogram to `sums`.
-#[inline(always)]
-fn add_window<const BINS: usize, W: CounterWidth>(
-    sums: &mut [u32; MOST_BINS],
-    histogram: &Histogram<BINS, W>,
+/// The bins of windows in a row.
+struct Windows<'a> {
     bins: Range<u16>,
-) {
-    let counts = histogram.counts().get(bins.start.into()..bins.end.into());
-    for (sum, &count) in sums.iter_mut().zip(counts.unwrap_or_default()) {
-        *sum = sum.saturating_add(count.into());
+    excluded: &'a ExcludedBins,
+    /// Bins that are not excluded.
+    left: u32,
+}
+
+impl<'a> Windows<'a> {
+    #[inline(always)]
+    fn new(bins: Range<u16>, excluded: &'a ExcludedBins) -> Self {
+        let mut left = u32::from(bins.end - bins.start);
+        if excluded.echoes() > 0 {
+            left = bins
+                .clone()
+                .map(|bin| u32::from(!excluded.contains(bin)))
+                .sum();
+        }
+        Self {
+            bins,
+            excluded,
+            left,
+        }
+    }
+
+    /// The photons of a histogram in these bins.
+    #[inline(always)]
+    fn photons<const BINS: usize, W: CounterWidth>(&self, histogram: &Histogram<BINS, W>) -> u32 {
+        let bins = usize::from(self.bins.start)..usize::from(self.bins.end);
+        let counts = histogram.counts().get(bins).unwrap_or_default();
+        let counts = counts.iter().map(|&count| -> u32 { count.into() });
+        // At most 13 bins of counters of 24 bits.
+        if self.excluded.echoes() == 0 {
+            return counts.fold(0, u32::wrapping_add);
+        }
+        let is_left = |&(bin, _): &(u16, u32)| !self.excluded.contains(bin);
+        let counts = self.bins.clone().zip(counts).filter(is_left);
+        counts.fold(0, |sum, (_, count)| sum.wrapping_add(count))
+    }
+
+    /// The brightness of a pixel with `inside` photons in these bins and `total` in `bins`.
+    #[inline(always)]
+    fn brightness(&self, inside: u32, total: u32, bins: u32, cycles: u16) -> Brightness {
+        Brightness::new(inside, self.left, total, bins, cycles)
     }
 }
 

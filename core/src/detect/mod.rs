@@ -32,6 +32,7 @@ pub use any_rule::AnyRule;
 pub use average::AverageRule;
 pub use background::quadrant_background;
 pub use comparator_tree::ComparatorTree;
+pub(crate) use confirm::Exposed;
 pub use confirm::NeighbourRule;
 pub use decision::{Detection, detect};
 pub(crate) use decision::{detect_at, detection_in};

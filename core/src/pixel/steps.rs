@@ -5,7 +5,7 @@ use super::AsyncPixel;
 use super::input::DecisionInput;
 use super::look::{Look, State};
 use crate::config::PixelConfig;
-use crate::detect::{Detection, DetectionRule, NeighbourRule};
+use crate::detect::{Detection, DetectionRule, Exposed, NeighbourRule};
 use crate::histogram::counter::CounterWidth;
 use crate::statistics::Statistics;
 use crate::units::LaserCycle;
@@ -61,10 +61,24 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         let alone = config.detect_further(histogram, self.expected(), excluded);
         alone.or_else(|| {
             let neighbours = neighbours.filter(|other| !other.is_full());
-            let neighbours = neighbours.map(|other| (&other.histogram, &other.excluded));
             let (gate, estimator) = (config.gate(), config.estimator());
-            rule.confirm((histogram, excluded), gate, estimator, neighbours)
+            rule.confirm(
+                self.exposed(),
+                gate,
+                estimator,
+                neighbours.map(Self::exposed),
+            )
         })
+    }
+
+    /// What it and its neighbours are asked for.
+    #[inline(always)]
+    const fn exposed(&self) -> Exposed<'_, BINS, W> {
+        Exposed {
+            histogram: &self.histogram,
+            excluded: &self.excluded,
+            cycles: self.exposure,
+        }
     }
 
     /// Keeps what the second step gave in the slot, until the third. Does nothing where the second step gives

@@ -9,11 +9,11 @@ fn upper_tail(z: f64) -> f64 {
     libm::erfc(z / std::f64::consts::SQRT_2) / 2.0
 }
 
-/// The probability that the own excess is above 2 and that of all above `z`, by Simpson's rule.
+/// The probability that the own excess is above 2.5 and that of all above `z`, by Simpson's rule.
 fn both(z: f64, share: f64) -> f64 {
     let density = |x: f64| (-x * x / 2.0).exp() / (2.0 * std::f64::consts::PI).sqrt();
     let given = |x: f64| upper_tail((z - share.sqrt() * x) / (1.0 - share).sqrt());
-    let (from, steps) = (2.0, 4000);
+    let (from, steps) = (2.5, 4000);
     let step = 10.0 / f64::from(steps);
     let value = |number: i32| {
         let x = from + step * f64::from(number);

@@ -180,6 +180,8 @@ impl Further {
     /// The photons of a neighbour.
     pub fn neighbours(&mut self) {
         self.neighbour.count_batch(&self.config, &self.codes);
+        let (neighbour, statistics) = (&mut self.neighbour, &mut self.statistics);
+        neighbour.begin_look(&self.config, statistics, CYCLES);
     }
 
     /// A target that the pixel alone is not sure of: 9 more photons of 256, and 2 in each neighbour.
