@@ -102,10 +102,10 @@ impl Brightness {
     /// Whether it is more than twice another one.
     #[inline(always)]
     fn exceeds_twice(self, other: Self) -> bool {
-        let [this, other] = [(self.above, other.cycles), (other.above, self.cycles)]
-            .map(|(above, cycles)| u64::from(above) * u64::from(cycles));
         // 32 and 28 bits.
-        this > 2 * other
+        let this = u64::from(self.above) * u64::from(other.cycles);
+        let twice = 2 * u64::from(other.above) * u64::from(self.cycles);
+        this > twice
     }
 }
 

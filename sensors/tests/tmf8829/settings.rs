@@ -124,6 +124,16 @@ fn settings_that_cannot_be_are_refused() {
     assert!(Config::new(settings(Zones::Z48x32)).is_ok());
     assert_eq!(refused(|bad| bad.address = 0x07), ConfigError::Address);
     assert_eq!(refused(|bad| bad.address = 0x78), ConfigError::Address);
+    for address in [0x08, 0x77] {
+        let settings = settings(Zones::Z48x32);
+        assert!(
+            Config::new(Settings {
+                address,
+                ..settings
+            })
+            .is_ok()
+        );
+    }
     let zero = refused(|bad| bad.kilo_iterations = 0);
     assert_eq!(zero, ConfigError::ZeroIterations);
     let pixels = refused(|bad| bad.first_pixel = PixelAddress::new(u16::MAX - 1534));
