@@ -175,10 +175,10 @@ fn they_are_at_most_those_of_the_rule() {
     }
 }
 
-/// Pixels without a target beside a wall that ends, and single ones amid a wall. Some of their chance peaks at the
-/// wall's place are confirmed by the pixels that see it: beside it up to 3 times as many as asked, amid it up to 12 times.
+/// Pixels without a target beside a wall that ends have no more than elsewhere. Single ones amid a wall have up to six
+/// times as many as asked, where it is as dim as their chance peaks.
 #[test]
-fn beside_a_wall_that_ends_there_are_more() {
+fn beside_a_wall_that_ends_there_are_no_more() {
     let few = [
         (0.01, 0.5),
         (0.01, 2.0),
@@ -203,9 +203,9 @@ fn beside_a_wall_that_ends_there_are_more() {
         };
         let (end, amid) = (seen(&is_right, &is_beside), seen(&is_amid, &is_amid));
         for (name, found, times) in [
-            ("beside the wall", sum(&end, is_beside), 3.0),
+            ("beside the wall", sum(&end, is_beside), 1.3),
             ("beyond", sum(&end, is_beyond), 1.3),
-            ("amid a wall", sum(&amid, is_amid), 12.0),
+            ("amid a wall", sum(&amid, is_amid), 6.0),
         ] {
             println!("  {name}: {}", found.text());
             let expected = 0.01 * times * found.exposures as f64;
