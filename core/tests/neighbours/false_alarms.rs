@@ -217,3 +217,15 @@ fn beside_a_wall_that_ends_there_are_no_more() {
         }
     }
 }
+
+/// Three bins that have a tenth more light in all pixels, as wide ones of a TDC do, are a surface to eight neighbours: some 22 % of the
+/// exposures end with an event, at half a photon a bin and look. 1 % is asked.
+#[test]
+fn what_all_pixels_have_in_common_is_confirmed() {
+    let found = run(&|_| (0.5, 0.15), &|_| true, times() * 2_000, 7);
+    let all = sum(&found, |_| true);
+    println!("three bins a tenth brighter: {}", all.text());
+    assert!((0.19..0.25).contains(&all.share()), "{all:?}");
+    // By themselves pixels hardly notice: half of 1 %, and a third more.
+    assert!(f64::from(all.alone) < 0.01 * all.exposures as f64);
+}
