@@ -2,7 +2,8 @@
 //!
 //! A dim pixel takes long to gather enough photons. Most of its neighbours see the same surface. So a
 //! pixel whose own photons are only promising adds up the same bins of its 4 or 8 neighbours,
-//! and reports if the sum stands clear of the background. The event is the pixel's own, at its place, with
+//! and reports if the sum stands clear of the background. Neighbours that are much brighter see something else,
+//! and are left out. The event is the pixel's own, at its place, with
 //! [`Flags::CONFIRMED`](crate::Flags::CONFIRMED). Photons cost nothing more, and there is no more memory.
 //! [`NeighbourRule`] says what is promising and what is enough.
 //!

@@ -10,7 +10,7 @@
 //! |---|---|
 //! | the pixel alone | a detection of the window rule with `z₁` |
 //! | promising | its window with the most photons has at least two and exceeds the background by 2.5 standard deviations |
-//! | which neighbours | all but those that are more than twice as bright there: with two photons or more, and more than twice the pixel's photons above the background a laser cycle |
+//! | which neighbours | all but those more than twice as bright as the pixel in the window, or in all windows in a row that have as many of its photons; with fewer than two photons there a neighbour is not too bright |
 //! | confirmed | a neighbour has photons in the window, all pixels together have the minimum there, and exceed `z₂` |
 //!
 //! `z₁` and `z₂` each have half of the false alarms of the rule's `z`. For `z₁` that is twice as many
@@ -30,7 +30,8 @@
 //! Bins that the pixel has left out, because their echo was reported, count in no neighbour. A neighbour that has left
 //! out bins at the window is not asked.
 //!
-//! Brighter neighbours are left out because of surfaces that end. Their pixels would confirm any chance peak beside them.
+//! Brightness is photons above the background a laser cycle. Brighter neighbours are left out because of surfaces that end.
+//! Their pixels would confirm any chance peak beside them. To leave out those with many photons only lowers the sum, so that `z₂` holds.
 //! `core/tests/neighbours/false_alarms.rs` has the false alarms there, and those of a single pixel whose
 //! neighbours all see a surface.
 //!
@@ -70,7 +71,7 @@ struct Promising {
     bins: u32,
 }
 
-/// What a pixel knows of its exposure.
+/// What a pixel has counted, and for how long.
 #[derive(Clone, Copy)]
 pub(crate) struct Exposed<'a, const BINS: usize, W: CounterWidth> {
     pub histogram: &'a Histogram<BINS, W>,
@@ -91,7 +92,7 @@ impl Brightness {
     /// Of `inside` photons in `width` of `bins` bins, which have `total` photons.
     #[inline(always)]
     fn new(inside: u32, width: u32, total: u32, bins: u32, cycles: u16) -> Self {
-        // 30 bits, of counters of 16.
+        // 30 bits, of counters of 16. Those of 24 saturate at counts that no exposure has.
         let inside = bins.saturating_mul(inside);
         Self {
             above: inside.saturating_sub(width.saturating_mul(total)),
@@ -102,7 +103,7 @@ impl Brightness {
     /// Whether it is more than twice another one.
     #[inline(always)]
     fn exceeds_twice(self, other: Self) -> bool {
-        // 32 and 28 bits.
+        // At most 32 + 26 bits, and one more for twice.
         let this = u64::from(self.above) * u64::from(other.cycles);
         let twice = 2 * u64::from(other.above) * u64::from(self.cycles);
         this > twice
@@ -112,7 +113,8 @@ impl Brightness {
 const SHARES: usize = 8;
 const MOST_NEIGHBOURS: usize = 8;
 /// A pixel and its neighbours.
-const PIXELS: u32 = 9;
+#[allow(clippy::cast_possible_truncation, reason = "a small number")]
+const PIXELS: u32 = 1 + MOST_NEIGHBOURS as u32;
 /// 2.5 standard deviations, in 1/4096.
 const PROMISING: u16 = 5 << 11;
 /// Of fewer photons a neighbour's brightness is not known.
@@ -265,13 +267,17 @@ impl NeighbourRule {
             }
             end += 1;
         }
-        let windows = Windows::new(first..end, excluded);
+        let windows = Windows {
+            bins: first..end,
+            excluded,
+        };
         let mut asked = [None::<&Histogram<BINS, W>>; MOST_NEIGHBOURS];
         let mut places = asked.iter_mut();
         let own_total = histogram.total();
         let (mut total, mut bins) = (own_total, own_bins);
         let mut in_windows = windows.photons(histogram);
-        let own_brightness = windows.brightness(in_windows, own_total, own_bins, cycles);
+        let wide = windows.left();
+        let own_brightness = Brightness::new(in_windows, wide, own_total, own_bins, cycles);
         let reach = estimator.reach();
         for other in neighbours {
             // Those that have left out bins here, because their echo was reported, do not know.
@@ -283,7 +289,7 @@ impl NeighbourRule {
                 continue;
             };
             let inside = windows.photons(other.histogram);
-            let brightness = windows.brightness(inside, photons, left, other.cycles);
+            let brightness = Brightness::new(inside, wide, photons, left, other.cycles);
             if inside >= FEWEST && brightness.exceeds_twice(own_brightness) {
                 continue;
             }
@@ -305,7 +311,10 @@ impl NeighbourRule {
         let all = asked.into_iter().flatten().chain([histogram]);
         let (mut start, mut photons) = (first, promising);
         for place in first..=end - width {
-            let window = Windows::new(place..place + width, excluded);
+            let window = Windows {
+                bins: place..place + width,
+                excluded,
+            };
             let counts = all.clone().map(|one| window.photons(one));
             let sum = counts.fold(0u32, u32::saturating_add);
             if sum > photons {
@@ -384,25 +393,14 @@ fn first_highest<const BINS: usize, W: CounterWidth>(
 struct Windows<'a> {
     bins: Range<u16>,
     excluded: &'a ExcludedBins,
-    /// Bins that are not excluded.
-    left: u32,
 }
 
-impl<'a> Windows<'a> {
-    #[inline(always)]
-    fn new(bins: Range<u16>, excluded: &'a ExcludedBins) -> Self {
-        let mut left = u32::from(bins.end - bins.start);
-        if excluded.echoes() > 0 {
-            left = bins
-                .clone()
-                .map(|bin| u32::from(!excluded.contains(bin)))
-                .sum();
-        }
-        Self {
-            bins,
-            excluded,
-            left,
-        }
+impl Windows<'_> {
+    /// The number of bins that are not excluded.
+    fn left(&self) -> u32 {
+        let is_left = |&bin: &u16| !self.excluded.contains(bin);
+        let left = self.bins.clone().filter(is_left).map(|_| 1);
+        left.sum()
     }
 
     /// The photons of a histogram in these bins.
@@ -418,12 +416,6 @@ impl<'a> Windows<'a> {
         let is_left = |&(bin, _): &(u16, u32)| !self.excluded.contains(bin);
         let counts = self.bins.clone().zip(counts).filter(is_left);
         counts.fold(0, |sum, (_, count)| sum.wrapping_add(count))
-    }
-
-    /// The brightness of a pixel with `inside` photons in these bins and `total` in `bins`.
-    #[inline(always)]
-    fn brightness(&self, inside: u32, total: u32, bins: u32, cycles: u16) -> Brightness {
-        Brightness::new(inside, self.left, total, bins, cycles)
     }
 }
 

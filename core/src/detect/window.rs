@@ -237,6 +237,7 @@ pub(super) fn stands_clear<const NARROW: bool>(
         let Some(above) = (inside_times * inside).checked_sub(level) else {
             return false;
         };
+        debug_assert!(above < 1 << 30);
         above
     } else {
         let level = u64::from(total_times) * u64::from(total) + u64::from(skew);

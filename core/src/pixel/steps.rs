@@ -71,7 +71,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         })
     }
 
-    /// What it and its neighbours are asked for.
+    /// What the decision needs of it.
     #[inline(always)]
     const fn exposed(&self) -> Exposed<'_, BINS, W> {
         Exposed {

@@ -44,7 +44,7 @@ impl Found {
     }
 }
 
-/// What pixels see in a laser cycle X: background a bin, and photons in bins 60 to 62.
+/// What pixels see between two looks, X laser cycles: background a bin, and photons in bins 60 to 62.
 type Light<'a> = dyn Fn(u16) -> (f64, f64) + 'a;
 
 /// An array of pixels that see `light`: what each pixel found, once those that are counted have had so many
@@ -175,8 +175,9 @@ fn they_are_at_most_those_of_the_rule() {
     }
 }
 
-/// Pixels without a target beside a wall that ends have no more than elsewhere. Single ones amid a wall have up to six
-/// times as many as asked, where it is as dim as their chance peaks.
+/// Pixels without a target beside a wall that ends have no more than elsewhere. Single ones amid a wall have up to seven
+/// times as many as asked, where it is as dim as their chance peaks. A few exposures show whether brighter neighbours are left out at all;
+/// the model of the decision knows from which brightness on.
 #[test]
 fn beside_a_wall_that_ends_there_are_no_more() {
     let few = [
@@ -186,9 +187,12 @@ fn beside_a_wall_that_ends_there_are_no_more() {
         (0.2, 2.0),
         (2.0, 8.0),
     ];
+    // Where pixels amid a wall have the most.
+    let worst = [(0.5, 0.4), (2.0, 1.0)];
     let cases = [0.01, 0.05, 0.2, 2.0]
         .into_iter()
         .flat_map(|background| [0.1, 0.5, 2.0, 8.0].map(|signal| (background, signal)))
+        .chain(worst)
         .filter(|case| times() > 1 || few.contains(case));
     // The left half sees a wall; and all but every fourth pixel in both directions.
     let is_right = |address: u16| address % SIDE >= SIDE / 2;
@@ -205,7 +209,7 @@ fn beside_a_wall_that_ends_there_are_no_more() {
         for (name, found, times) in [
             ("beside the wall", sum(&end, is_beside), 1.3),
             ("beyond", sum(&end, is_beyond), 1.3),
-            ("amid a wall", sum(&amid, is_amid), 6.0),
+            ("amid a wall", sum(&amid, is_amid), 7.0),
         ] {
             println!("  {name}: {}", found.text());
             let expected = 0.01 * times * found.exposures as f64;
@@ -226,6 +230,6 @@ fn what_all_pixels_have_in_common_is_confirmed() {
     let all = sum(&found, |_| true);
     println!("three bins a tenth brighter: {}", all.text());
     assert!((0.19..0.25).contains(&all.share()), "{all:?}");
-    // By themselves pixels hardly notice: half of 1 %, and a third more.
+    // By themselves pixels hardly notice.
     assert!(f64::from(all.alone) < 0.01 * all.exposures as f64);
 }

@@ -110,32 +110,27 @@ fn confirms(
     let end = run.last()? + width;
     let mut asked = Vec::new();
     let (mut bins, mut total, mut brighter) = (own_left.len(), own_total, 0);
-    // Photons above the background in the bins of these windows, a laser cycle.
-    let bright = |counts: &[u32; BINS], left: &[usize], cycles| {
+    // Photons above the background in the bins of these windows, times the bins left; and laser cycles times those.
+    let bright = |counts: &[u32; BINS], left: &[usize], cycles: u16| {
         let there = (first..end).filter(|&bin| !own.leaves_out(bin, 0));
         let (inside, wide) = (
             there.clone().map(|bin| counts[bin]).sum::<u32>(),
             there.count(),
         );
         let all = left.iter().map(|&bin| counts[bin]).sum::<u32>();
-        let background = f64::from(all) * wide as f64 / left.len() as f64;
-        (
-            inside,
-            (f64::from(inside) - background).max(0.0) / f64::from(cycles),
-        )
+        let above =
+            (i128::from(inside) * left.len() as i128 - i128::from(all) * wide as i128).max(0);
+        (inside, above, i128::from(cycles) * left.len() as i128)
     };
-    let (_, own_bright) = bright(&own.counts, &own_left, own.cycles);
+    let (_, own_above, own_cycles) = bright(&own.counts, &own_left, own.cycles);
     for other in others {
         let knows = !(first..end).any(|bin| other.leaves_out(bin, reach));
         let both = left(&[own, other]);
         if !knows || both.len() < 8 {
             continue;
         }
-        let (inside, light) = bright(&other.counts, &both, other.cycles);
-        if inside >= 2 && (light - 2.0 * own_bright).abs() < 1e-9 {
-            return None;
-        }
-        if inside >= 2 && light > 2.0 * own_bright {
+        let (inside, above, cycles) = bright(&other.counts, &both, other.cycles);
+        if inside >= 2 && above * own_cycles > 2 * own_above * cycles {
             brighter += 1;
             continue;
         }

@@ -3,8 +3,9 @@
 use dtof_core::fixed::types::U4F12;
 use dtof_core::neighbours::{ArrayPixel, NeighbourConfig, end_laser_cycles_of_array};
 use dtof_core::{
-    Array, AsyncPixel, Count, Count10, DepthEvent, EchoNumber, Flags, LaserCycle, Look, Neighbours,
-    PixelAddress, PixelConfig, RangeGate, Statistics, WindowRule,
+    Array, AsyncPixel, Count, Count8, Count10, Count16, CounterWidth, DepthEvent, EchoNumber,
+    Flags, LaserCycle, Look, Neighbours, PixelAddress, PixelConfig, RangeGate, Statistics,
+    WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
@@ -359,6 +360,64 @@ fn a_pixel_without_neighbours_is_one_without_an_array() {
         counts.events > 100 && counts.expired > 100 && counts.deferred > 100,
         "{counts:?}"
     );
+}
+
+/// Whether eight neighbours with so many photons in so many laser cycles confirm a pixel with `own` photons in 44, which are
+/// one too few.
+fn confirms<W: CounterWidth>(own: u16, [photons, cycles]: [u16; 2]) -> bool {
+    let minimum = Count::saturating(u32::from(own) + 1);
+    let rule = WindowRule::new(3, U4F12::lit("4.2"), minimum).unwrap();
+    let array = Array::new(3, 3).unwrap();
+    let rule = NeighbourConfig::new(array, Neighbours::Eight, &rule);
+    let config = PixelConfig::<1024, _>::with_rule(*rule.rule().own())
+        .build()
+        .unwrap();
+    let mut pixels: Vec<AsyncPixel<1024, W>> = (0..9)
+        .map(|pixel| AsyncPixel::new(PixelAddress::new(pixel)))
+        .collect();
+    for (pixel, number) in pixels.iter_mut().zip(0..) {
+        let (photons, cycles) = if number == 4 {
+            (own, 44)
+        } else {
+            (photons, cycles)
+        };
+        (0..photons).for_each(|_| pixel.count(&config, 503));
+        pixel.begin_look(&config, &mut Statistics::default(), cycles);
+    }
+    rule.decide(&pixels, 4, &config).is_some()
+}
+
+/// A neighbour twice as bright confirms, a brighter one does not. Of one photon the brightness is not known.
+#[test]
+fn neighbours_more_than_twice_as_bright_do_not_confirm() {
+    for (neighbours, expected) in [
+        ([24, 44], true),
+        ([25, 44], false),
+        ([24, 43], false),
+        ([48, 88], true),
+        ([49, 88], false),
+    ] {
+        assert_eq!(
+            confirms::<Count10>(12, neighbours),
+            expected,
+            "{neighbours:?}"
+        );
+        assert_eq!(
+            confirms::<Count16>(12, neighbours),
+            expected,
+            "{neighbours:?}"
+        );
+    }
+    for (neighbours, expected) in [([1, 4], true), ([2, 4], false)] {
+        assert_eq!(
+            confirms::<Count8>(4, neighbours),
+            expected,
+            "{neighbours:?}"
+        );
+    }
+    // The longest exposure of the fullest counter: 44 photons in 44 laser cycles are as bright.
+    assert!(confirms::<Count16>(22, [u16::MAX, u16::MAX]));
+    assert!(!confirms::<Count16>(21, [u16::MAX, u16::MAX]));
 }
 
 /// The fullest counters, of the most bins and the widest window, in all neighbours.
