@@ -397,10 +397,13 @@ struct Windows<'a> {
 
 impl Windows<'_> {
     /// The number of bins that are not excluded.
+    #[inline(always)]
     fn left(&self) -> u32 {
-        let is_left = |&bin: &u16| !self.excluded.contains(bin);
-        let left = self.bins.clone().filter(is_left).map(|_| 1);
-        left.sum()
+        if self.excluded.echoes() == 0 {
+            return u32::from(self.bins.end - self.bins.start);
+        }
+        let is_left = |bin| u32::from(!self.excluded.contains(bin));
+        self.bins.clone().map(is_left).sum()
     }
 
     /// The photons of a histogram in these bins.

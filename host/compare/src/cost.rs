@@ -23,7 +23,7 @@ pub const AVERAGE: f64 = 32.0;
 /// The same with tracking (`look; tracking; no event`).
 pub const TRACKING: f64 = 416.50;
 /// The same with 8 neighbours, whether it asks them or not (`look; 8 neighbours; no event`).
-pub const NEIGHBOURS: f64 = 917.61;
+pub const NEIGHBOURS: f64 = 926.15;
 /// A look of one step without neighbours (`look; window of 3; no event`).
 pub const LOOK: f64 = 196.72;
 /// The same with a dead time (`look; dead time of 20 bins; no event`).
@@ -38,7 +38,7 @@ pub const EXPIRY: f64 = 108.0;
 /// (`encode and to_le_bytes`).
 pub const EVENT: f64 = 517.0 + 46.0;
 /// The same event if 8 neighbours confirm it (`look; 8 neighbours; confirmed`), and its word.
-pub const CONFIRMED: f64 = 3894.69 + 46.0;
+pub const CONFIRMED: f64 = 3882.77 + 46.0;
 /// The depth from a centred window instead (`centred window, σ 1`, less `centroid`).
 pub const CENTRED: f64 = 135.84 - 68.0;
 
