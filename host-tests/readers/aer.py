@@ -35,7 +35,7 @@ class Dynamic(NamedTuple):
 
 def write(path, header, events):
     data = bytearray(struct.pack(
-        "<8sHHIIIIiQq", b"DTOF-AER", 4, 64, header.bins, header.columns, header.rows,
+        "<8sHHIIIIiQq", b"DTOF-AER", 5, 64, header.bins, header.columns, header.rows,
         round(header.bin_width_ps * 65536), round(header.offset_mm * 256), 0, header.start_us,
     ).ljust(64, b"\0"))
     cycle_high = None
@@ -62,7 +62,7 @@ def read(path):
     data = open(path, "rb").read()
     fields = struct.unpack_from("<8sHHIIIIiQq", data)
     magic, version, length, bins, columns, rows, width, offset, _, start_us = fields
-    assert (magic, version) == (b"DTOF-AER", 4), path
+    assert (magic, version) == (b"DTOF-AER", 5), path
     events = []
     for at in range(length, len(data) - 15, 16):
         low, high = struct.unpack_from("<QQ", data, at)

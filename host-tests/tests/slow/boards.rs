@@ -145,7 +145,7 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
         agrees(board, &image, &with_windows(), array, 200, Duration::ZERO)?,
         agrees(board, &image, &with_all(), array, 400, Duration::ZERO)?,
         agrees(board, &image, &with_dead_time(), array, 400, Duration::ZERO)?,
-        agrees(board, &image, &once_per_bin(), array, 400, Duration::ZERO)?,
+        agrees(board, &image, &once_per_bin(), array, 1200, Duration::ZERO)?,
         senses(board, &image)?,
     ];
     stack::check(&image, &used)?;
@@ -318,7 +318,7 @@ pub fn with_all() -> Settings {
     Settings {
         binning: Some(AdaptiveBinning {
             levels: BlockLevel::MAX,
-            patience: 50,
+            patience: 20,
         }),
         tracking: true,
         echoes: EchoNumber::new(2).unwrap(),
