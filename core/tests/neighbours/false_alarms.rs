@@ -175,11 +175,11 @@ fn they_are_at_most_those_of_the_rule() {
     }
 }
 
-/// Pixels without a target beside a wall that ends have no more than elsewhere. Single ones amid a wall have up to seven
+/// Pixels without a target beside a wall that ends have up to 1.7 times as many as asked, where it is dim. Single ones amid a wall have up to seven
 /// times as many as asked, where it is as dim as their chance peaks. A few exposures show whether brighter neighbours are left out at all;
 /// the model of the decision knows from which brightness on.
 #[test]
-fn beside_a_wall_that_ends_there_are_no_more() {
+fn beside_a_wall_that_ends_there_are_few_more() {
     let few = [
         (0.01, 0.5),
         (0.01, 2.0),
