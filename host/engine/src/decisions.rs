@@ -46,8 +46,9 @@ impl<const BINS: usize> LastDecision<BINS> {
     /// Records the input of a decision.
     #[inline]
     pub fn record_input<W: CounterWidth>(&mut self, input: &DecisionInput<'_, BINS, W>) {
-        let counts = input.histogram.counts().map(Into::into);
-        self.counts = counts.map(|count| u16::try_from(count).unwrap_or(u16::MAX));
+        for (kept, &count) in self.counts.iter_mut().zip(input.histogram.counts()) {
+            *kept = u16::try_from(count.into()).unwrap_or(u16::MAX);
+        }
         self.expected = input.expected;
         self.excluded = input.excluded;
     }
