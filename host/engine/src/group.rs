@@ -7,8 +7,8 @@ use dtof_core::binning::{
 };
 use dtof_core::rule::DecisionInput;
 use dtof_core::{
-    AnyRule, Array, AsyncPixel, BlockLevel, Count16, CounterWidth, DepthEvent, LaserCycle, Look,
-    PixelAddress, PixelConfig, Statistics,
+    AnyRule, Array, AsyncPixel, BlockLevel, Count16, CounterWidth, DepthEvent, EchoNumber,
+    LaserCycle, Look, PixelAddress, PixelConfig, Statistics,
 };
 use dtof_link::AdaptiveBinning;
 
@@ -39,7 +39,8 @@ struct Member<const BINS: usize, W: CounterWidth> {
 
 impl<const BINS: usize, W: CounterWidth> Member<BINS, W> {
     /// Runs a single pixel, `since_look` laser cycles after its last look. Looks before L1 decide
-    /// nothing, so the photons up to the first look after it are counted at once.
+    /// nothing, and a look without a new photon decides as the last did, so the photons up to the first
+    /// look that can decide otherwise are counted at once.
     fn run(
         &mut self,
         configs: &Configs<BINS>,
@@ -49,12 +50,22 @@ impl<const BINS: usize, W: CounterWidth> Member<BINS, W> {
         done: &mut Done,
     ) {
         let (config, x) = (&configs.pixels, configs.pixels.x());
+        // With a dead time, or after an echo, a decision depends on the laser cycles, too.
+        let by_photons = !config.weighs_dead_time() && config.echoes() == EchoNumber::FIRST;
+        let mut has_no_peak = false;
         let mut photons = &received.photons[..];
         let mut cycle = 0;
         while cycle < received.cycles {
             let left = received.cycles - cycle;
             let mut cycles = x - *since_look;
-            let early = config.l1().saturating_sub(self.pixel.exposure());
+            let exposure = self.pixel.exposure();
+            let mut early = config.l1().saturating_sub(exposure);
+            if has_no_peak && by_photons {
+                let next = photons
+                    .first()
+                    .map_or(received.cycles, |photon| photon.cycle);
+                early = (next - cycle).min(config.l2() - 1 - exposure);
+            }
             if early >= cycles {
                 cycles = cycles
                     .saturating_add((early - cycles) / x * x)
@@ -77,20 +88,23 @@ impl<const BINS: usize, W: CounterWidth> Member<BINS, W> {
                 photons = later;
             }
             let last = LaserCycle::new(first + u64::from(cycle) - 1);
-            self.end_laser_cycles(config, done, last, cycles);
-            *since_look = after(*since_look, cycles, x);
+            let look = self.end_laser_cycles(config, done, last, cycles);
+            has_no_peak = look == Look::NoPeak;
+            *since_look = match look {
+                Look::NotDue => *since_look + cycles,
+                _ => 0,
+            };
         }
     }
 
-    /// Ends `cycles` laser cycles, up to `last`. Takes the event at once. Returns whether there was one, or
-    /// the exposure of one has ended: its pixel is not silent.
+    /// Ends `cycles` laser cycles, up to `last`. Takes the event at once.
     fn end_laser_cycles(
         &mut self,
         config: &PixelConfig<BINS, AnyRule>,
         done: &mut Done,
         last: LaserCycle,
         cycles: u16,
-    ) -> bool {
+    ) -> Look {
         let kept = &mut self.last;
         let observe = |input: &DecisionInput<'_, BINS, _>| {
             if let Some(kept) = kept {
@@ -100,14 +114,13 @@ impl<const BINS: usize, W: CounterWidth> Member<BINS, W> {
         let look =
             self.pixel
                 .end_laser_cycles_with(config, &mut done.pixels, last, cycles, observe);
-        let Some(event) = self.pixel.take_event() else {
-            return look == Look::Ended;
-        };
-        if let Some(kept) = &mut self.last {
-            kept.record_event(event);
+        if let Some(event) = self.pixel.take_event() {
+            if let Some(kept) = &mut self.last {
+                kept.record_event(event);
+            }
+            done.events.push(event);
         }
-        done.events.push(event);
-        true
+        look
     }
 }
 
@@ -245,7 +258,9 @@ impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
                     }
                 }
                 if cycle < received.cycles {
-                    let has_reported = member.end_laser_cycles(&configs.pixels, &mut done, now, 1);
+                    let look = member.end_laser_cycles(&configs.pixels, &mut done, now, 1);
+                    // It is not silent: it reports, or has reported in this exposure.
+                    let has_reported = matches!(look, Look::Event | Look::Ended);
                     if let Some(link) = member.link.as_mut().filter(|_| has_reported) {
                         link.reported();
                     }

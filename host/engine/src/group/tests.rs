@@ -1,8 +1,8 @@
 use proptest::prelude::*;
 
 use super::*;
-use dtof_core::fixed::types::U8F8;
-use dtof_core::{Count, Count10, EchoNumber, PaperRule, RangeGate};
+use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::{Count, Count10, EchoNumber, PaperRule, RangeGate, WindowRule};
 use dtof_photons::source::Photon;
 
 /// The pixel laser cycle by laser cycle, as hardware would.
@@ -33,17 +33,24 @@ proptest! {
     fn a_pixel_decides_as_it_does_laser_cycle_by_laser_cycle(
         photons in prop::collection::vec((0u16..600, prop_oneof![Just(5u16), 0u16..20]), 0..900),
         (x, l1, more) in (1u16..40, 0u16..200, 1u16..200),
-        echoes in 1u8..4,
-        has_gate in any::<bool>(),
+        (echoes, echo_wait) in (1u8..4, prop_oneof![Just(255u8), 1u8..6]),
+        (has_gate, has_window, tracks) in any::<(bool, bool, bool)>(),
+        dead_time in prop_oneof![3 => Just(0u16), 1 => 1u16..20],
         slices in prop::collection::vec(1u16..200, 1..8),
         first in 0u64..1 << 40,
     ) {
         let l1 = l1.max(x);
-        let rule = PaperRule::new(U8F8::lit("1"), Count::saturating(4));
+        let rule = if has_window {
+            AnyRule::from(WindowRule::new(3, U4F12::lit("2.5"), Count::saturating(4)).unwrap())
+        } else {
+            AnyRule::from(PaperRule::new(U8F8::lit("1"), Count::saturating(4)))
+        };
         let gate = if has_gate { RangeGate::new(2, 11).unwrap() } else { RangeGate::full() };
-        let config = PixelConfig::with_rule(AnyRule::from(rule));
+        let tracking = if tracks { rule.tracking(&gate) } else { None };
+        let config = PixelConfig::with_rule(rule).tracking(tracking).dead_time(dead_time);
         let config = config.x(x).l1(l1).l2(l1 + x + more).gate(gate);
-        let config = config.echoes(EchoNumber::new(echoes).unwrap(), 1).build().unwrap();
+        let config = config.echoes(EchoNumber::new(echoes).unwrap(), 1).echo_wait(echo_wait);
+        let config = config.build().unwrap();
         let mut all = PixelPhotons { cycles: 600, photons: Vec::new() };
         all.photons = photons.iter().map(|&(cycle, code)| Photon { cycle, code }).collect();
         all.photons.sort_by_key(|photon| photon.cycle);
