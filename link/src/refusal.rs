@@ -28,7 +28,7 @@ numbered! {
         /// No pixels, or more than the device has.
         Pixels = 9: "the device does not have that many pixels",
         /// The minimum peak count is 0 or more than a counter holds.
-        MinimumCount = 10: "the minimum peak count must be from 1 to 1023",
+        MinimumCount = 10: "the minimum peak count must be from 1 to 1023, or to what a counter of 8 bits holds",
         /// The device has no sensor.
         NoSensor = 11: "the device has no sensor",
         /// The bins of the sensor have another width.

@@ -203,7 +203,7 @@ impl From<Refusal> for dtof_status_t {
 }
 
 /// The body of DTOF_MESSAGE_REFUSED for a configuration that was refused with the error `status`:
-/// 1 to 22. Errors without a number of their own give 1, "not known".
+/// 1 to 24. Errors without a number of their own give 1, "not known".
 ///
 /// Threads: any.
 #[unsafe(no_mangle)]

@@ -65,6 +65,18 @@ impl AnyRule {
         ))
     }
 
+    /// Whether counters of `W` can hold as many photons as the rule wants: a bin of them, or a window of
+    /// the window rule. If not, there is never an event.
+    #[must_use]
+    pub const fn fits<W: CounterWidth>(&self) -> bool {
+        let (minimum, bins) = match self {
+            Self::Paper(rule) => (rule.threshold().minimum_count(), 1),
+            Self::Average(rule) => (rule.threshold().minimum_count(), 1),
+            Self::Window(rule) => (rule.minimum_count(), rule.width() as u32),
+        };
+        minimum.raw() <= W::MAX.saturating_mul(bins)
+    }
+
     /// The rule for blocks of pixels with this rule. Only the window rule's differs.
     #[must_use]
     pub fn of_blocks(&self, levels: BlockLevel) -> Self {

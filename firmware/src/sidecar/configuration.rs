@@ -7,7 +7,7 @@ use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source, StopReason};
 use dtof_sensors::dither::Dither;
 
 use super::photons::BinsOfPixel;
-use super::{BINS, Block, Pixel, Sidecar};
+use super::{BINS, Block, Counters, Pixel, Sidecar};
 
 impl Sidecar<'_> {
     /// Applies the configuration in `body`: all pixels begin an exposure. The last configuration
@@ -16,6 +16,9 @@ impl Sidecar<'_> {
         let requested = Configuration::from_le_bytes(body)?;
         if requested.host_timeout_ms == 0 && !cfg!(feature = "laser-on-without-host") {
             return Err(Refusal::HostTimeout);
+        }
+        if !requested.rule.fits::<Counters>() {
+            return Err(Refusal::MinimumCount);
         }
         let (first, mut last) = requested.gate;
         let mut most_dither = 0;

@@ -318,4 +318,8 @@ fn blocks_are_an_answer_of_their_own() {
     all[2].figures.cycles = 95.0;
     all[2].instructions = 90.0;
     assert_eq!(taken(&all), [Some(eight), None]);
+    // The cheapest of those that are nearly as fast, but not faster.
+    all[2].figures.cycles = 105.0;
+    all[2].instructions = 60.0;
+    assert_eq!(taken(&all), [Some(eight), None]);
 }

@@ -43,7 +43,7 @@ pub struct Answer {
     pub candidates: Vec<Choice>,
     /// The method to take at full resolution, if one is exact enough.
     pub best: Option<Choice>,
-    /// The method to take where time matters more than resolution, if that is another.
+    /// The method of blocks to take where time matters more than resolution, if one is faster.
     pub fastest: Option<Choice>,
 }
 
@@ -73,15 +73,12 @@ pub fn answer(methods: &[Method], outcomes: &[Outcome], within_mm: f64) -> Answe
     let mut candidates: Vec<Choice> = candidates.collect();
     candidates.sort_unstable_by(|one, other| one.cycles.total_cmp(&other.cycles));
     let has_full_resolution = |choice: &Choice| methods[choice.method].has_full_resolution();
-    let of_all = nearly_fastest(candidates.iter());
-    let (best, fastest) = if of_all.is_some_and(|choice| has_full_resolution(&choice)) {
-        (of_all, None)
-    } else {
-        let full = candidates
-            .iter()
-            .filter(|choice| has_full_resolution(choice));
-        (nearly_fastest(full), of_all)
-    };
+    let full = candidates
+        .iter()
+        .filter(|choice| has_full_resolution(choice));
+    let best = nearly_fastest(full);
+    let of_blocks = nearly_fastest(candidates.iter()).filter(|all| !has_full_resolution(all));
+    let fastest = of_blocks.filter(|blocks| best.is_none_or(|best| blocks.cycles < best.cycles));
     Answer {
         within_mm,
         candidates,

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use super::cost::instructions;
 use super::method::Method;
 use super::stress::Stress;
-use super::tally::{Figures, Tally};
+use super::tally::{Figures, Tally, Watched};
 use super::truth::Truth;
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
@@ -73,7 +73,7 @@ pub fn measure(
         })
     });
     let mut running: Vec<Running> = running.collect::<Result<_>>()?;
-    let mut watched = vec![0; array.pixels() as usize];
+    let mut watched = vec![Watched::default(); array.pixels() as usize];
     let mut pixel_cycles = 0;
     each_slice(
         source,
@@ -90,7 +90,11 @@ pub fn measure(
                 pixel_cycles += here;
                 if !masked.contains(&address.raw()) && truth.has_target(*address, slice.first_cycle)
                 {
-                    watched[usize::from(address.raw())] += here;
+                    let watched = &mut watched[usize::from(address.raw())];
+                    if watched.cycles == 0 {
+                        watched.from = slice.first_cycle;
+                    }
+                    watched.cycles += here;
                 }
             }
             Ok(())

@@ -90,12 +90,21 @@ impl Reports {
     }
 }
 
+/// The laser cycles in which a pixel has a target.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Watched {
+    /// The first of them.
+    pub from: u64,
+    /// How many they are.
+    pub cycles: u64,
+}
+
 /// Times and errors of a method.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Figures {
     /// Laser cycles of a pixel from one right report to the next: the mean of the middle half of the pixels
-    /// with a target. Infinite if they have no right report. With neighbours it is at least the time of the
-    /// first report: later ones may use photons that a neighbour has kept.
+    /// with a target. Infinite if they have no right report. With neighbours that of a pixel is at least the time
+    /// from its target to its first report: later ones may use photons that a neighbour has kept.
     pub cycles: f64,
     /// The same for the pixel at the 90th percentile.
     pub slow_cycles: f64,
@@ -178,9 +187,9 @@ impl<'a> Tally<'a> {
         self.of_blocks += u64::from(event.level != BlockLevel::PIXEL);
     }
 
-    /// The figures. `watched` are the laser cycles in which each pixel had a target.
+    /// The figures. Each pixel was `watched`.
     #[must_use]
-    pub fn finish(mut self, watched: &[u64]) -> Figures {
+    pub fn finish(mut self, watched: &[Watched]) -> Figures {
         if !matches!(self.truth, Truth::Scene(_)) {
             self.subtract_offset(watched);
         }
@@ -191,7 +200,9 @@ impl<'a> Tally<'a> {
         let mut times = Vec::new();
         let mut errors = Vec::new();
         let mut wrong = 0;
-        for (pixel, (reports, &cycles)) in self.pixels.iter().zip(watched).enumerate() {
+        for (pixel, (reports, &Watched { from, cycles })) in
+            self.pixels.iter().zip(watched).enumerate()
+        {
             #[allow(clippy::cast_possible_truncation, reason = "an address")]
             let is_hot = self
                 .stress
@@ -199,9 +210,9 @@ impl<'a> Tally<'a> {
             if cycles == 0 || is_hot {
                 continue;
             }
-            let (mut cycles, mut right) = (cycles as f64, f64::from(reports.right));
+            let (cycles, mut right) = (cycles as f64, f64::from(reports.right));
             if let Some(first) = reports.first.filter(|_| self.has_neighbours) {
-                (cycles, right) = ((cycles / right).max(first as f64), 1.0);
+                right = right.min(cycles / first.saturating_sub(from).max(1) as f64);
             }
             times.push((cycles, right));
             figures.reports += u64::from(reports.right + reports.wrong);
@@ -233,13 +244,13 @@ impl<'a> Tally<'a> {
     }
 
     /// Subtracts the median error: the offset of a sensor is calibrated for its estimator.
-    fn subtract_offset(&mut self, watched: &[u64]) {
+    fn subtract_offset(&mut self, watched: &[Watched]) {
         let mut errors = Vec::new();
         for (reports, _) in self
             .pixels
             .iter()
             .zip(watched)
-            .filter(|(_, cycles)| **cycles > 0)
+            .filter(|(_, watched)| watched.cycles > 0)
         {
             let weight = 1.0 / reports.kept.len().max(1) as f64;
             errors.extend(reports.kept.iter().map(|error| (*error, weight)));
@@ -265,4 +276,44 @@ fn weighted_quantile(values: &mut [(f32, f64)], share: f64) -> f64 {
         }
     }
     f64::INFINITY
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_core::{BinIndex, BinPosition, LaserCycle, Neighbours, SubBinOffset};
+
+    /// The time of a pixel that has a target from laser cycle 5,000 to 6,000 and reports at these.
+    fn time(reports: &[u64], neighbours: Option<Neighbours>) -> f64 {
+        let array = Array::new(1, 1).unwrap();
+        let settings = Settings {
+            neighbours,
+            ..Settings::static_scene(1)
+        };
+        let event = |cycle: u64| DepthEvent {
+            cycle: LaserCycle::new(cycle),
+            ..DepthEvent::default()
+        };
+        let events: Vec<DepthEvent> = reports.iter().map(|&cycle| event(cycle - 1)).collect();
+        let range = range_mm(&events[0], &settings.range_scale().unwrap());
+        let truth = Truth::Ranges(vec![Some(range)]);
+        let mut tally = Tally::new(&truth, &Stress::NONE, array, &settings, 6000).unwrap();
+        tally.add(&events);
+        let watched = Watched {
+            from: 5000,
+            cycles: 1000,
+        };
+        tally.finish(&[watched]).cycles
+    }
+
+    #[test]
+    fn with_neighbours_the_time_is_at_least_that_from_the_target_to_the_first_report() {
+        let eight = Some(Neighbours::Eight);
+        let late = [5500, 5510, 5520, 5530];
+        assert_eq!(time(&late, None), 250.0);
+        assert_eq!(time(&late, eight), 500.0);
+        let early = [5050, 5510];
+        assert_eq!(time(&early, None), 500.0);
+        assert_eq!(time(&early, eight), 500.0);
+    }
 }

@@ -92,12 +92,7 @@ impl Comparison {
         let Answer { best, fastest, .. } = &self.answer;
         match best {
             Some(best) => {
-                let also = match fastest {
-                    None => ", the fastest too",
-                    Some(_) => "",
-                };
-                let name = format!("{}{also}", self.methods[best.method].name);
-                rows.push(row("take", name));
+                rows.push(row("take", self.methods[best.method].name.clone()));
                 rows.extend(self.choice_rows(best, ""));
             }
             None if fastest.is_some() => {
@@ -109,6 +104,12 @@ impl Comparison {
         if let Some(fastest) = fastest {
             rows.push(row("fastest", self.methods[fastest.method].name.clone()));
             rows.extend(self.choice_rows(fastest, "its "));
+        } else if best.is_some() {
+            // See `NEARLY`.
+            rows.push(row(
+                "fastest",
+                "the same, or at most 10 % faster".to_owned(),
+            ));
         }
         rows
     }

@@ -175,7 +175,6 @@ impl Setup {
     }
 }
 
-/// Refuses more dither than the sensor can have.
 /// Fails if the pixels of a device have counters of another width.
 pub(super) fn check_counter_bits(requested: u8, of_device: u8) -> Result<(), Refused> {
     if requested == of_device {
@@ -185,6 +184,7 @@ pub(super) fn check_counter_bits(requested: u8, of_device: u8) -> Result<(), Ref
     Err(Refused::value("counter_bits", requested, reason))
 }
 
+/// Refuses more dither than the sensor can have.
 fn check_dither(requested: Option<u16>, most: u16) -> Result<(), Refused> {
     let reason = match most {
         0 => "this device cannot dither its laser".to_owned(),

@@ -73,6 +73,10 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
             return Err(Refused::new("neighbours", "is for `rule` window").into());
         };
         ensure!(
+            settings.binning.is_none(),
+            Refused::new("neighbours", "cannot be used with `binning`")
+        );
+        ensure!(
             !settings.weighs_dead_time(),
             Refused::new("neighbours", "cannot be used with a dead time")
         );

@@ -4,7 +4,7 @@ use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::paper::Threshold;
 use dtof_core::rule::{HIGHEST_Z, z_for_levels};
-use dtof_core::{AnyRule, EchoNumber, Neighbours, RangeGate};
+use dtof_core::{AnyRule, Count8, EchoNumber, Neighbours, RangeGate};
 use dtof_theory::tune::window::one_in;
 
 use super::engine::{DEFAULT_L2, Settings, no_gate};
@@ -76,13 +76,19 @@ impl SettingsFile {
             !centroid || detection.half_widths.is_none(),
             Refused::new("half_widths", "is for `estimator` window")
         );
+        let rule = detection.rule(sensor.sigma_bins, z_for)?;
+        let counter_bits = detection.counter_bits.unwrap_or(10);
+        ensure!(
+            counter_bits != 8 || is_frame || rule.fits::<Count8>(),
+            Refused::new("min_count", "is more than counters of 8 bits hold")
+        );
         Ok(Settings {
             bins,
             bin_width_ps: sensor.bin_width_ps.unwrap_or(const { U16F16::lit("250") }),
             offset_mm: sensor.offset_mm.unwrap_or(I24F8::ZERO),
             gate: sensor.gate,
             masked: sensor.masked.clone().unwrap_or_default(),
-            rule: detection.rule(sensor.sigma_bins, z_for)?,
+            rule,
             sigma_bins: sensor.sigma_bins,
             half_widths: detection.half_widths,
             centroid,
@@ -97,7 +103,7 @@ impl SettingsFile {
             dead_time,
             is_dead_time_of_sensor: dead_time > 0 && sensor.dead_time.is_none(),
             once_per_bin: detection.once_per_bin.unwrap_or(false),
-            counter_bits: detection.counter_bits.unwrap_or(10),
+            counter_bits,
             dither_bins,
             dither_seed,
             frame: self.run.frame,

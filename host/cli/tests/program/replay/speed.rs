@@ -1,5 +1,5 @@
 //! How many photons a second `dtof replay` takes on one core, and how much memory. Prints the
-//! figures of the documentation:
+//! figures of the documentation, on Linux:
 //!
 //! ```sh
 //! cargo test --release --package dtof --test program photons_a_second -- --ignored --nocapture
@@ -8,7 +8,7 @@
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use crate::common::{Scratch, npy, peak_kb};
@@ -50,60 +50,93 @@ fn write_histograms(path: &Path, photons: u64) {
     std::fs::write(path, npy("<u4", "(64, 64, 128)", &counts)).unwrap();
 }
 
-/// A list of so many photons, `a_cycle` in each laser cycle.
-fn write_list(path: &Path, photons: u64, a_cycle: u64) {
+/// A list of so many photons, `a_cycle` in each laser cycle, as an `.npy` and as a `.csv` file.
+fn write_lists(npy: &Path, csv: Option<&Path>, photons: u64, a_cycle: u64) {
     let fields = "[('pixel', '<u2'), ('cycle', '<u4'), ('bin', '<u2')]";
     let header = format!("{{'descr': {fields}, 'fortran_order': False, 'shape': ({photons},), }}");
-    let mut file = BufWriter::new(File::create(path).unwrap());
-    file.write_all(b"\x93NUMPY\x01\x00\xf6\x00").unwrap();
-    writeln!(file, "{header:<245}").unwrap();
+    let mut npy = BufWriter::new(File::create(npy).unwrap());
+    npy.write_all(b"\x93NUMPY\x01\x00\xf6\x00").unwrap();
+    writeln!(npy, "{header:<245}").unwrap();
+    let mut csv = csv.map(|path| BufWriter::new(File::create(path).unwrap()));
+    if let Some(csv) = &mut csv {
+        writeln!(csv, "pixel,cycle,bin").unwrap();
+    }
     let mut numbers = Numbers(2);
     for photon in 0..photons {
         let pixel = numbers.below(PIXELS);
         let cycle = u32::try_from(photon / a_cycle).unwrap();
         let bin = numbers.bin(pixel);
-        file.write_all(&u16::try_from(pixel).unwrap().to_le_bytes())
+        npy.write_all(&u16::try_from(pixel).unwrap().to_le_bytes())
             .unwrap();
-        file.write_all(&cycle.to_le_bytes()).unwrap();
-        file.write_all(&u16::try_from(bin).unwrap().to_le_bytes())
+        npy.write_all(&cycle.to_le_bytes()).unwrap();
+        npy.write_all(&u16::try_from(bin).unwrap().to_le_bytes())
             .unwrap();
+        if let Some(csv) = &mut csv {
+            writeln!(csv, "{pixel},{cycle},{bin}").unwrap();
+        }
     }
-    file.flush().unwrap();
+    npy.flush().unwrap();
+    if let Some(csv) = &mut csv {
+        csv.flush().unwrap();
+    }
 }
 
 /// Photons a second on one core, from start to end, and the most memory in kB.
 fn replay(scratch: &Scratch, line: &str) -> (f64, u64) {
-    let mut dtof = scratch.command(&format!("replay --out out --no-csv --quiet {line}"));
-    dtof.env("RAYON_NUM_THREADS", "1").stdout(Stdio::null());
+    let dtof = scratch.command(&format!("replay --out out --no-csv --quiet {line}"));
+    // One thread that decides, and the one that reads, take turns.
+    let mut pinned = Command::new("taskset");
+    pinned.args(["--cpu-list", "0"]).arg(dtof.get_program());
+    pinned
+        .args(dtof.get_args())
+        .current_dir(dtof.get_current_dir().unwrap());
+    pinned.env("RAYON_NUM_THREADS", "1").stdout(Stdio::null());
     let began = Instant::now();
-    let peak = peak_kb(dtof.spawn().unwrap());
+    let peak = peak_kb(pinned.spawn().unwrap());
     let seconds = began.elapsed().as_secs_f64();
     let photons = scratch.summary()["photons"].as_f64().unwrap();
     (photons / seconds, peak)
 }
 
 #[test]
-#[ignore = "prints figures; a minute with --release"]
+#[ignore = "prints figures; some minutes with --release"]
 fn photons_a_second() {
-    println!("64 × 64 pixels, 128 bins, one core, without events.csv");
-    println!("photons a pixel and laser cycle  input       rule    million photons a second");
-    for (tenths, cycles) in [(5, 20_000), (10, 10_000), (20, 5000), (50, 2000)] {
+    const PAPER: &str = "";
+    const WINDOW: &str = "--rule window --sigma-bins 1";
+    const NEIGHBOURS: &str = "--rule window --sigma-bins 1 --neighbours 8";
+    println!("64 × 64 pixels, 128 bins, one core, without events.csv, in million photons a second");
+    println!("photons a pixel  histograms      list            list in a CSV   with neighbours");
+    println!("and laser cycle  paper   window  paper   window  paper   window  histograms  list");
+    for (tenths, cycles) in [
+        (1, 100_000),
+        (5, 20_000),
+        (10, 10_000),
+        (20, 5000),
+        (50, 2000),
+    ] {
         let scratch = Scratch::new();
-        write_histograms(&scratch.path("histograms.npy"), tenths * 4000);
+        write_histograms(&scratch.path("histograms.npy"), tenths * cycles / 5);
         let a_cycle = PIXELS * tenths / 10;
-        write_list(&scratch.path("list.npy"), a_cycle * cycles, a_cycle);
+        let [npy, csv] = ["list.npy", "list.csv"].map(|name| scratch.path(name));
+        write_lists(&npy, Some(&csv), a_cycle * cycles, a_cycle);
+        let histograms = format!("--input histograms.npy --recorded-cycles {}", 2 * cycles);
+        let [list, csv] = ["npy", "csv"].map(|end| format!("--input list.{end} --columns 64"));
+        print!("{:<15}", tenths as f64 / 10.0);
         for (input, options) in [
-            ("histograms", "--recorded-cycles 40000"),
-            ("list", "--columns 64"),
+            (&histograms, PAPER),
+            (&histograms, WINDOW),
+            (&list, PAPER),
+            (&list, WINDOW),
+            (&csv, PAPER),
+            (&csv, WINDOW),
+            (&histograms, NEIGHBOURS),
+            (&list, NEIGHBOURS),
         ] {
-            for (rule, chosen) in [("paper", ""), ("window", "--rule window --sigma-bins 1")] {
-                let line = format!("--input {input}.npy --cycles {cycles} {options} {chosen}");
-                let best = (0..3).map(|_| replay(&scratch, &line).0);
-                let best = best.fold(0.0, f64::max) / 1e6;
-                let rate = tenths as f64 / 10.0;
-                println!("{rate:<31}  {input:<10}  {rule:<6}  {best:.1}");
-            }
+            let line = format!("{input} --cycles {cycles} {options}");
+            let best = (0..3).map(|_| replay(&scratch, &line).0);
+            print!("  {:<6.1}", best.fold(0.0, f64::max) / 1e6);
         }
+        println!();
     }
 }
 
@@ -111,7 +144,7 @@ fn photons_a_second() {
 #[ignore = "writes a file of 8 GB; some minutes with --release"]
 fn a_billion_photons_take_little_memory() {
     let scratch = Scratch::new();
-    write_list(&scratch.path("list.npy"), 1_000_000_000, PIXELS);
+    write_lists(&scratch.path("list.npy"), None, 1_000_000_000, PIXELS);
     let line = "--input list.npy --columns 64 --cycles 1e9";
     let (rate, peak) = replay(&scratch, line);
     assert_eq!(scratch.summary()["photons"], 1_000_000_000);
