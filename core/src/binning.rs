@@ -35,7 +35,7 @@
 //!
 //! Cost: a photon of a pixel that feeds is counted once more for each level that it reaches:
 //! on a Cortex-M4 31 instructions for the first and 18 for each other. A look of a block takes
-//! 248 with a window of 3 bins, that of a pixel 197. A block takes four bytes more than a
+//! 244 with a window of 3 bins, that of a pixel 197. A block takes four bytes more than a
 //! pixel; there are a third as many.
 //!
 //! The photons of an event of a block may be those of an event of a pixel as well: the two

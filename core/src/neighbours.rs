@@ -4,8 +4,7 @@
 //! pixel whose own photons are only promising adds up the same bins of its 4 or 8 neighbours,
 //! and reports if the sum stands clear of the background. Neighbours that are much brighter see something else,
 //! and are left out. The event is the pixel's own, at its place, with
-//! [`Flags::CONFIRMED`](crate::Flags::CONFIRMED). Photons cost nothing more, and there is no more memory.
-//! [`NeighbourRule`] says what is promising and what is enough.
+//! [`Flags::CONFIRMED`](crate::Flags::CONFIRMED). [`NeighbourRule`] says what is promising and what is enough.
 //!
 //! All pixels of an array look at the same time, and decide on the same photons: none clears its histogram
 //! before all have decided. A look has three steps, each for all pixels: [`AsyncPixel::begin_look`],
@@ -45,6 +44,13 @@
 //! decides alone.
 //!
 //! Whole histograms and [blocks](crate::binning) do not ask neighbours.
+//!
+//! Cost: a photon takes no more, and a pixel no more memory. On a Cortex-M4, with eight neighbours and a window of 3
+//! bins, a look without an event takes 926 instructions on average over background, and one that neighbours confirm
+//! 3,883; alone 197 and 414. A decision that is confirmed adds the histograms up on the stack: `2·BINS + 16` bytes.
+//!
+//! Source: ours. The field knows it as spatial pooling of neighbouring pixels in two stages: a low threshold chooses the
+//! pixels, a second one tests the pooled counts.
 
 use crate::array::{Array, Neighbours};
 use crate::config::PixelConfig;
@@ -57,9 +63,9 @@ use crate::units::{LaserCycle, PixelAddress};
 
 /// A place of an array: a pixel, or something with one, or without one because it is left out.
 pub trait ArrayPixel<const BINS: usize, W: CounterWidth> {
-    /// The pixel.
+    /// The pixel, to read.
     fn pixel(&self) -> Option<&AsyncPixel<BINS, W>>;
-    /// The pixel.
+    /// The pixel, to change.
     fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS, W>>;
 }
 
@@ -99,7 +105,8 @@ impl NeighbourConfig {
         &self.rule
     }
 
-    /// The second step of pixel `number` of `pixels`: see [`AsyncPixel::decide`].
+    /// The second step of pixel `number` of `pixels`, row · columns + column: see [`AsyncPixel::decide`]. `pixels` are all
+    /// places of the array in this order, or as many as there are of its first ones.
     #[inline]
     #[must_use]
     pub fn decide<const BINS: usize, W: CounterWidth, R: DetectionRule>(
@@ -117,8 +124,9 @@ impl NeighbourConfig {
 }
 
 /// Ends `cycles` laser cycles at once for all pixels of an array, the last of which is `last`, as
-/// [`AsyncPixel::end_laser_cycles`] does for one. `pixels` are in the order of their addresses; `config`
-/// has the rule [`NeighbourRule::own`]. Returns whether one of them has a new event.
+/// [`AsyncPixel::end_laser_cycles`] does for one. `pixels` are all places of the array row by row, or as many as there are of
+/// its first ones. `config` must have the rule [`NeighbourRule::own`]: with the whole rule there may be half as many false
+/// alarms more. Returns whether one of them has a new event.
 pub fn end_laser_cycles_of_array<const BINS: usize, W: CounterWidth, R: DetectionRule>(
     pixels: &mut [impl ArrayPixel<BINS, W>],
     config: &PixelConfig<BINS, R>,

@@ -9,7 +9,7 @@ use dtof_core::{
 };
 
 #[test]
-fn flags_have_five_bits_and_read_as_their_number() {
+fn flags_have_six_bits_and_read_as_their_number() {
     for bits in 0..=u8::MAX {
         let flags = Flags::from_bits(bits);
         assert_eq!(flags.map(Flags::bits), (bits < 64).then_some(bits));

@@ -57,7 +57,7 @@ pub struct Peak {
 /// Photon counts of one macropixel over `BINS` bins, a power of two from 8 to
 /// 1024 (checked when compiled).
 ///
-/// 2 bytes a bin for [`Count10`] and [`Count16`](crate::Count16), 4 for
+/// 1 byte a bin for [`Count8`](crate::Count8), 2 for [`Count10`] and [`Count16`](crate::Count16), 4 for
 /// [`Count24`](crate::Count24), and 16 bytes more.
 #[derive(Clone, Debug)]
 pub struct Histogram<const BINS: usize, W: CounterWidth = Count10> {

@@ -37,7 +37,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     }
 
     /// The second step, once all neighbours have done the first: the detection, by the pixel's own photons or with
-    /// those of its `neighbours`, at most 8. `None` if the first step was no look that decides, or the rule weighs a dead time.
+    /// those of its `neighbours`, at most 8. `config` must have the rule [`NeighbourRule::own`]. `None` if the first step was no look that decides, or the rule weighs a dead time.
     #[must_use]
     pub fn decide<'a, R: DetectionRule>(
         &'a self,

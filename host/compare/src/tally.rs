@@ -281,7 +281,7 @@ fn weighted_quantile(values: &mut [(f32, f64)], share: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_core::{BinIndex, BinPosition, LaserCycle, Neighbours, SubBinOffset};
+    use dtof_core::{BinIndex, Count, EchoNumber, Flags, LaserCycle, Neighbours, SubBinOffset};
 
     /// The time of a pixel that has a target from laser cycle 5,000 to 6,000 and reports at these.
     fn time(reports: &[u64], neighbours: Option<Neighbours>) -> f64 {
@@ -291,8 +291,16 @@ mod tests {
             ..Settings::static_scene(1)
         };
         let event = |cycle: u64| DepthEvent {
+            pixel: PixelAddress::new(0),
+            level: BlockLevel::PIXEL,
+            echo: EchoNumber::FIRST,
             cycle: LaserCycle::new(cycle),
-            ..DepthEvent::default()
+            exposure: 40,
+            peak_bin: BinIndex::saturating(60),
+            offset: SubBinOffset::MIN,
+            peak_count: Count::saturating(5),
+            background: Count::saturating(1),
+            flags: Flags::NONE,
         };
         let events: Vec<DepthEvent> = reports.iter().map(|&cycle| event(cycle - 1)).collect();
         let range = range_mm(&events[0], &settings.range_scale().unwrap());

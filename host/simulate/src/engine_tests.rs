@@ -245,18 +245,26 @@ fn only_masked_pixels_lose_their_photons_and_they_are_counted() {
     assert_eq!(refused.to_string(), "masked 8: there are 8 pixels");
 }
 
-/// Those of the core's array, whose pixels all end each laser cycle together.
+/// Those of the core's array, whose pixels all end each laser cycle together. With more pixels than one thread gets.
 #[test]
 fn neighbours_confirm_as_in_the_core() {
+    const LARGE: Array = Array::new(40, 20).unwrap();
     for neighbours in [Neighbours::Four, Neighbours::Eight] {
         let settings = with_neighbours(neighbours);
-        let (events, _, slices) = run(&settings, 100);
+        let mut photons = demo::photons(LARGE, 3, 1000).unwrap();
+        let addresses = photons.addresses();
+        let mut engine = host_engine(&settings, LARGE, &addresses).unwrap();
+        let slices = [100, 250, 650].map(|cycles| photons.next_slice(cycles).unwrap());
+        let events: Vec<DepthEvent> = slices
+            .iter()
+            .flat_map(|slice| engine.run(slice).unwrap())
+            .collect();
         let AnyRule::Window(rule) = &settings.rule else {
             panic!("{settings:?}");
         };
-        let rule = NeighbourConfig::new(ARRAY, neighbours, rule);
+        let rule = NeighbourConfig::new(LARGE, neighbours, rule);
         let config = settings.config::<128>().unwrap();
-        let addresses = (0..32).map(PixelAddress::new);
+        let addresses = addresses.into_iter();
         let mut pixels: Vec<AsyncPixel<128>> = addresses.map(AsyncPixel::new).collect();
         let (mut expected, mut statistics) = (Vec::new(), Statistics::new());
         for slice in &slices {
@@ -274,6 +282,10 @@ fn neighbours_confirm_as_in_the_core() {
             }
         }
         assert!(events == expected);
+        for pixel in &pixels {
+            pixel.add_photons_to(&mut statistics);
+        }
+        assert_eq!(engine.statistics(), [statistics, Statistics::new()]);
         let confirmed = events
             .iter()
             .filter(|event| event.flags.contains(Flags::CONFIRMED));
