@@ -38,7 +38,7 @@ pub const EXPIRY: f64 = 108.0;
 /// (`encode and to_le_bytes`).
 pub const EVENT: f64 = 517.0 + 46.0;
 /// The same event if 8 neighbours confirm it (`look; 8 neighbours; confirmed`), and its word.
-pub const CONFIRMED: f64 = 3882.77 + 46.0;
+pub const CONFIRMED: f64 = 5350.36 + 46.0;
 /// The depth from a centred window instead (`centred window, σ 1`, less `centroid`).
 pub const CENTRED: f64 = 135.84 - 68.0;
 

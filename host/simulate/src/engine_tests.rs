@@ -325,6 +325,12 @@ fn neighbours_need_the_window_rule_and_no_dead_time() {
     };
     let reason = refused(&paper).unwrap_err();
     assert!(reason.contains("is for"), "{reason}");
+    let blocks = Settings {
+        binning: demo::settings(3).unwrap().binning,
+        ..good.clone()
+    };
+    let reason = refused(&blocks).unwrap_err();
+    assert!(reason.contains("cannot be used with binning"), "{reason}");
     let dead = Settings {
         dead_time: 128,
         ..good

@@ -6,8 +6,8 @@ use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_c
 use dtof_core::fixed::types::U4F12;
 use dtof_core::neighbours::NeighbourRule;
 use dtof_core::{
-    Array, AsyncPixel, BlockLevel, Count, EchoNumber, Histogram, LaserCycle, Look, PixelAddress,
-    PixelConfig, RangeGate, Statistics, WindowRule,
+    Array, AsyncPixel, BlockLevel, Count, EchoNumber, Flags, Histogram, LaserCycle, Look,
+    PixelAddress, PixelConfig, RangeGate, Statistics, WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -177,11 +177,15 @@ impl Further {
         self.pass(0..CYCLES - 1);
     }
 
-    /// The photons of a neighbour.
-    pub fn neighbours(&mut self) {
+    /// The photons of a neighbour, and the rule of pixels that have some.
+    pub fn neighbours(&mut self) -> Option<()> {
+        let config = PixelConfig::with_rule(*self.rule.own()).x(X);
+        let config = config.l1(self.config.l1()).l2(self.config.l2());
+        self.config = config.build().ok()?;
         self.neighbour.count_batch(&self.config, &self.codes);
         let (neighbour, statistics) = (&mut self.neighbour, &mut self.statistics);
         neighbour.begin_look(&self.config, statistics, CYCLES);
+        Some(())
     }
 
     /// A target that the pixel alone is not sure of: 9 more photons of 256, and 2 in each neighbour.
@@ -279,7 +283,11 @@ pub extern "C" fn look_with_neighbours(further: &mut Further, cycle: u32) -> u32
     } = further;
     let last = LaserCycle::new(cycle.into());
     pixel.begin_look(config, statistics, 1);
-    if let Some(detection) = pixel.decide(config, rule, core::iter::repeat_n(&*neighbour, 8)) {
+    // An event that the pixel is sure of would not be what the row says.
+    let detection = pixel.decide(config, rule, core::iter::repeat_n(&*neighbour, 8));
+    if let Some(detection) = detection
+        && detection.depth.flags.contains(Flags::CONFIRMED)
+    {
         pixel.keep_detection(last, &detection);
     }
     pixel.end_look(config, statistics, last, |_| ()) as u32

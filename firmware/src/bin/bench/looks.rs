@@ -66,7 +66,7 @@ fn among_neighbours<const TARGETS: u8>(
 ) -> Option<()> {
     first::<0>(further, state, number, features)?;
     further.photons(state, number + EXPOSURES, 0);
-    further.neighbours();
+    further.neighbours()?;
     if TARGETS > 0 {
         further.dim_target();
     }
