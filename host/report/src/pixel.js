@@ -127,7 +127,7 @@ function rangesNote(now) {
   if (count === 0) return `The pixel has no ${data.event}${data.oneOf > 1 ? " among those shown" : ""}.`;
   const thinned = data.oneOf > 1 ? ` (1 of ${number(data.oneOf)})` : "";
   const all = `${number(count)} ${count > 1 ? data.events : data.event}${thinned}`;
-  if (now === undefined) return `Range against time: ${all}. Hollow ones have a flag.`;
+  if (now === undefined) return `Range against time: ${all}. Hollow ones have a flag other than confirmed.`;
   const last = chosen.events.findLast((event) => event.cycle < now);
   const text = last ? `${fixed(last.range, 1)} mm, reported at ${timeOf(last.cycle)}` : `no ${data.event} yet`;
   return `Range against time: ${all}. At ${timeOf(now)}: ${text}.`;

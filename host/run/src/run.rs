@@ -1,7 +1,7 @@
 //! Photons through an engine, slice by slice.
 
 use anyhow::Result;
-use dtof_core::DepthEvent;
+use dtof_core::{DepthEvent, Flags};
 
 use crate::bright::Brightness;
 use crate::glass::watch_glass;
@@ -53,6 +53,7 @@ pub fn run(
     let mut has_reported = vec![false; array.pixels() as usize];
     let has_glass = requested.sensor.glass_bins.is_some();
     let mut bins = has_glass.then(|| vec![0; settings.bins]);
+    let mut confirmed = 0;
     let addresses = source.addresses();
     let is_once_per_bin = settings.once_per_bin && settings.frame.is_none();
     let mut brightness = is_once_per_bin.then(|| Brightness::new(addresses.len(), settings.bins));
@@ -66,6 +67,7 @@ pub fn run(
         |slice| engine.run(slice),
         |slice, events, done| {
             for event in &events {
+                confirmed += u64::from(event.flags.contains(Flags::CONFIRMED));
                 for pixel in array.pixels_of(event.pixel, event.level) {
                     has_reported[usize::from(pixel.raw())] = true;
                 }
@@ -88,6 +90,7 @@ pub fn run(
     }
     let reporting = has_reported.into_iter().filter(|&has| has).count();
     let mut summary = Summary::new(engine.statistics(), source, reporting, settings);
+    summary.events_confirmed = confirmed;
     watch_glass(requested, bins.as_deref(), &mut summary);
     let warning = brightness.and_then(|brightness| brightness.warning(&addresses));
     let warnings: Vec<String> = warning.into_iter().collect();

@@ -39,6 +39,8 @@ pub struct Summary {
     pub events: u64,
     /// Of these, those of blocks of pixels.
     pub events_of_blocks: u64,
+    /// Of these, those that neighbours confirmed.
+    pub events_confirmed: u64,
     /// Pixels of the recording or scene.
     pub pixels: usize,
     /// Pixels with at least one event.
@@ -186,6 +188,7 @@ impl Summary {
             photons: statistics.photons(),
             events: statistics.events + blocks.events,
             events_of_blocks: blocks.events,
+            events_confirmed: 0,
             pixels: source.addresses().len(),
             pixels_reporting,
             held: statistics.excluded,
@@ -244,6 +247,9 @@ impl Summary {
         ]);
         if self.settings.binning.is_some() {
             rows.push(row("events of blocks", self.events_of_blocks));
+        }
+        if self.settings.neighbours.is_some() && self.settings.frame.is_none() {
+            rows.push(row("events that neighbours confirmed", self.events_confirmed));
         }
         if self.settings.frame.is_none() {
             rows.push(row("exposures without an event", self.expired));

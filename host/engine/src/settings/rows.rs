@@ -113,7 +113,10 @@ impl Settings {
         };
         let mut rows = vec![decision, ("depth".to_owned(), depth)];
         if let Some(neighbours) = self.neighbours.filter(|_| self.frame.is_none()) {
-            let text = format!("{} confirm what one pixel is not sure of", neighbours.raw());
+            let text = format!(
+                "{} confirm; half of the false alarms of z for a pixel alone, half with neighbours",
+                neighbours.raw()
+            );
             rows.push(("neighbours".to_owned(), text));
         }
         if self.dead_time > 0 && self.frame.is_none() {

@@ -1,6 +1,7 @@
 // The events of a pixel: their ranges over time, and a table of them.
 
 const FLAGS = ["saturated", "clipped", "deferred", "pile-up", "tail", "confirmed"];
+const CONFIRMED = 1 << FLAGS.indexOf("confirmed");
 
 /** The lowest and the highest range of events, with some room. */
 function spanOfRanges(events) {
@@ -54,12 +55,12 @@ function drawRanges(canvas, events, { laserHz, first, last, from, now, span, isS
     lines.fillText("range, mm", 4, 14);
   }
   for (const event of events) {
-    // What is flagged is hollow, a block or a later echo a square.
+    // What is flagged is hollow, unless neighbours confirmed it; a block or a later echo a square.
     const size = (event.level > 0 || event.echo > 1 ? 5 : 3) + (isSmall ? 0 : 1);
     lines.fillStyle = lines.strokeStyle = event.echo > 1 ? soft : ink;
     lines.globalAlpha = event.cycle >= now ? 0.25 : 1;
     const place = [x(event.cycle) - size / 2, y(event.range) - size / 2, size, size];
-    if (event.flags > 0) lines.strokeRect(...place);
+    if (event.flags & ~CONFIRMED) lines.strokeRect(...place);
     else lines.fillRect(...place);
   }
   lines.globalAlpha = 1;

@@ -15,8 +15,8 @@ Progress = Optional[Callable[[int, int], Any]]
 
 #: Counters of ``statistics`` that are summed over parts.
 COUNTERS = (
-    "photons", "events", "events_of_blocks", "pixels", "pixels_reporting", "held", "rejected",
-    "saturated", "saturated_in_blocks", "gated_out", "masked", "deferred", "expired",
+    "photons", "events", "events_of_blocks", "events_confirmed", "pixels", "pixels_reporting",
+    "held", "rejected", "saturated", "saturated_in_blocks", "gated_out", "masked", "deferred", "expired",
     "expired_deferred", "ended_full", "blind_looks", "repeated", "not_replayed", "cut_off",
 )
 
