@@ -10,8 +10,8 @@ use anyhow::{Context, Result};
 
 use self::analysis::{false_events, gaussian_error, hit_rate, roc};
 use self::beyond::{
-    binning_edges, binning_rate, binning_reports, binning_scenes, counters, dither, echo_wait,
-    echoes, neighbours, tracking,
+    binning_edges, binning_rate, binning_reports, binning_scenes, confirmed_depth, counters,
+    dither, echo_wait, echoes, neighbours, tracking,
 };
 use self::methods::{depth_error, event_depth, false_rate, time_to_detect};
 use self::scenes::{
@@ -41,6 +41,7 @@ pub const ALL: &[Study] = &[
     binning_edges::STUDY,
     binning_scenes::STUDY,
     neighbours::STUDY,
+    confirmed_depth::STUDY,
     tracking::STUDY,
     echoes::STUDY,
     echo_wait::STUDY,

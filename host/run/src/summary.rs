@@ -249,7 +249,10 @@ impl Summary {
             rows.push(row("events of blocks", self.events_of_blocks));
         }
         if self.settings.neighbours.is_some() && self.settings.frame.is_none() {
-            rows.push(row("events that neighbours confirmed", self.events_confirmed));
+            rows.push(row(
+                "events that neighbours confirmed",
+                self.events_confirmed,
+            ));
         }
         if self.settings.frame.is_none() {
             rows.push(row("exposures without an event", self.expired));

@@ -4,6 +4,7 @@ pub mod binning_edges;
 pub mod binning_rate;
 pub mod binning_reports;
 pub mod binning_scenes;
+pub mod confirmed_depth;
 pub mod counters;
 pub mod dither;
 pub mod echo_wait;

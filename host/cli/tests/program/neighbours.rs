@@ -65,7 +65,10 @@ fn dim_pixels_report_much_sooner() {
     let printed = scratch.printed(&format!(
         "simulate --scene scene.toml --out again {WINDOW} --neighbours 4"
     ));
-    assert_contains(&printed, "4 confirm; half of the false alarms of z for a pixel alone, half with neighbours");
+    assert_contains(
+        &printed,
+        "4 confirm; half of the false alarms of z for a pixel alone, half with neighbours",
+    );
 }
 
 #[test]
