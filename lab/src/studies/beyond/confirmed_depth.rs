@@ -231,7 +231,7 @@ fn results(part: &Part) -> Result<Results> {
         ["all wrong", "all values", "other events"].map(|name| far.count(name));
     let at_wall = Measured::share(wrong, wrong + right + alone);
     let chart = Chart {
-        finding: "All photons are more exact than a pixel's own, except in small things".to_owned(),
+        finding: "Pooled photons blur small things only".to_owned(),
         holds,
         note: format!(
             "Root mean square errors of confirmed events up to 3 bins off, of the middle of 3 x 3 pixels; 8 neighbours. {SIGNAL} \
