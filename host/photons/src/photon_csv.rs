@@ -45,6 +45,9 @@ impl PhotonReader for CsvReader {
             if !self.read_line()? {
                 return Ok(None);
             }
+            if let Some(photon) = plain(self.bytes()) {
+                return Ok(Some(photon));
+            }
             // Blank lines are skipped.
             if !self.text().is_ok_and(str::is_empty) {
                 return self.parse().map(Some);
@@ -67,11 +70,16 @@ impl CsvReader {
     }
 
     /// The line without its line break.
-    fn text(&self) -> Result<&str> {
+    fn bytes(&self) -> &[u8] {
         let ([line @ .., b'\r', b'\n'] | [line @ .., b'\n' | b'\r'] | line) = &*self.line;
-        str::from_utf8(line).ok().context("not text")
+        line
     }
 
+    fn text(&self) -> Result<&str> {
+        str::from_utf8(self.bytes()).ok().context("not text")
+    }
+
+    /// The photon of any row, or what is wrong with it.
     fn parse(&self) -> Result<RawPhoton> {
         let text = self.text()?;
         let mut fields = text.split(',');
@@ -90,5 +98,53 @@ impl CsvReader {
             number("cycle", cycle)?,
             number("bin", bin)?,
         ])
+    }
+}
+
+/// The photon of a row of three numbers of up to 19 digits, nothing else: most rows, in half of the time.
+fn plain(line: &[u8]) -> Option<RawPhoton> {
+    let mut photon = RawPhoton::default();
+    let mut fields = photon.iter_mut();
+    let (mut field, mut digits) = (fields.next()?, 0);
+    for &byte in line {
+        match byte {
+            b'0'..=b'9' if digits < 19 => {
+                *field = 10 * *field + u64::from(byte - b'0');
+                digits += 1;
+            }
+            b',' if digits > 0 => (field, digits) = (fields.next()?, 0),
+            _ => return None,
+        }
+    }
+    (digits > 0 && fields.next().is_none()).then_some(photon)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn reader(line: &str) -> CsvReader {
+        CsvReader {
+            input: Input::File("photons.csv".into()),
+            file: BufReader::new(Box::new(std::io::empty())),
+            line: line.into(),
+            line_number: 1,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_plain_row_is_the_photon_that_any_row_is(line in prop_oneof![
+            "[0-9]{1,20},[0-9]{1,20},[0-9]{1,20}",
+            "[0-9,. +x-]{0,12}",
+        ]) {
+            if let Some(photon) = plain(line.as_bytes()) {
+                prop_assert_eq!(reader(&line).parse().unwrap(), photon);
+            } else {
+                let is_long = line.split(',').any(|field| field.len() > 19);
+                prop_assert!(is_long || reader(&line).parse().is_err());
+            }
+        }
     }
 }
