@@ -718,7 +718,7 @@ uint16_t dtof_bins(void);
 uint8_t dtof_counter_bits(void);
 
 // The body of DTOF_MESSAGE_REFUSED for a configuration that was refused with the error `status`:
-// 1 to 22. Errors without a number of their own give 1, "not known".
+// 1 to 24. Errors without a number of their own give 1, "not known".
 //
 // Threads: any.
 uint8_t dtof_refusal_of(uint8_t status);
