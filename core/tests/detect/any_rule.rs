@@ -3,7 +3,7 @@
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::rule::{ExcludedBins, detect};
 use dtof_core::{
-    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, Count10, Count24, CounterWidth,
+    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, Count8, Count10, Count24, CounterWidth,
     DepthEstimator, Detection, DetectionRule, Histogram, PaperRule, RangeGate, WindowRule,
 };
 use proptest::prelude::*;
@@ -108,4 +108,25 @@ fn all_rules_fire_and_do_not() {
     }
     let often = |fired| (20..180).contains(fired);
     assert!(fired.iter().all(often), "{fired:?}");
+}
+
+/// All minimum counts: a bin holds 255 or 1023 photons, a window as many times that as it has bins.
+#[test]
+fn a_minimum_count_fits_if_counters_hold_it() {
+    fn fits(rule: impl Into<AnyRule>) -> [bool; 2] {
+        let rule = rule.into();
+        [rule.fits::<Count8>(), rule.fits::<Count10>()]
+    }
+    let alpha = U8F8::lit("4");
+    for minimum in 1..=2000 {
+        let least = Count::saturating(minimum);
+        let of_a_bin = [minimum <= 255, minimum <= 1023];
+        assert_eq!(fits(PaperRule::new(alpha, least)), of_a_bin);
+        assert_eq!(fits(AverageRule::new(alpha, least)), of_a_bin);
+        for width in 1..=7 {
+            let rule = WindowRule::new(width, U4F12::lit("4"), least).unwrap();
+            let bins = u32::from(width);
+            assert_eq!(fits(rule), [minimum <= 255 * bins, minimum <= 1023 * bins]);
+        }
+    }
 }
