@@ -1,4 +1,4 @@
-//! Recorded photons from a CSV file with the header `pixel,cycle,bin`.
+//! Recorded photons from a CSV file with the columns `pixel`, `cycle` and `bin`.
 
 use std::io::{BufRead, BufReader, Read};
 
@@ -7,8 +7,8 @@ use anyhow::{Context, Result, bail, ensure};
 use crate::input::Input;
 use crate::photon_list::{PhotonReader, RawPhoton};
 
-/// Rows are shorter. A longer line is not read to its end.
-const LINE_BYTES: u64 = 256;
+/// Rows are shorter. A longer line is not read to its end, and refused.
+const LINE_BYTES: u64 = 4096;
 
 /// Reads the rows of a file.
 pub struct CsvReader {
@@ -16,6 +16,41 @@ pub struct CsvReader {
     file: BufReader<Box<dyn Read>>,
     line: Vec<u8>,
     line_number: u64,
+    columns: Columns,
+}
+
+const NAMES: [&str; 3] = ["pixel", "cycle", "bin"];
+
+/// Where a row has what.
+#[derive(Clone, Copy)]
+struct Columns {
+    separator: char,
+    all: usize,
+    /// Of the [`NAMES`].
+    places: [usize; 3],
+}
+
+impl Columns {
+    /// From a header: names in any order and case, between commas, semicolons or tabs. Other columns are left out.
+    fn new(header: &str) -> Option<Self> {
+        let separator = [',', ';', '\t']
+            .into_iter()
+            .find(|&one| header.contains(one))?;
+        let names: Vec<String> = header
+            .split(separator)
+            .map(|name| name.trim().to_ascii_lowercase())
+            .collect();
+        let place = |wanted: &str| {
+            let mut found = (0..names.len()).filter(|&place| names[place] == wanted);
+            found.next().filter(|_| found.next().is_none())
+        };
+        let [pixel, cycle, bin] = NAMES.map(place);
+        Some(Self {
+            separator,
+            all: names.len(),
+            places: [pixel?, cycle?, bin?],
+        })
+    }
 }
 
 impl PhotonReader for CsvReader {
@@ -27,16 +62,23 @@ impl PhotonReader for CsvReader {
             file: BufReader::new(file),
             line: Vec::new(),
             line_number: 0,
+            columns: Columns {
+                separator: ',',
+                all: 3,
+                places: [0, 1, 2],
+            },
         };
         let is_there = rows.read_line().with_context(|| rows.place())?;
         ensure!(is_there, "{name}:1: the file is empty");
         // Some spreadsheets begin a file with a byte order mark.
         let header = rows.text().unwrap_or("bytes that are not UTF-8");
         let header = header.strip_prefix('\u{feff}').unwrap_or(header);
-        ensure!(
-            header == "pixel,cycle,bin",
-            "{name}:1: the header must be pixel,cycle,bin, not {header:?}"
-        );
+        let Some(columns) = Columns::new(header) else {
+            bail!(
+                "{name}:1: the header must have the columns pixel, cycle and bin, not {header:?}"
+            );
+        };
+        rows.columns = columns;
         Ok(rows)
     }
 
@@ -45,8 +87,10 @@ impl PhotonReader for CsvReader {
             if !self.read_line()? {
                 return Ok(None);
             }
-            if let Some(photon) = plain(self.bytes()) {
-                return Ok(Some(photon));
+            if self.columns.all == 3
+                && let Some(photon) = plain(self.bytes(), self.columns.separator)
+            {
+                return Ok(Some(self.columns.places.map(|place| photon[place])));
             }
             // Blank lines are skipped.
             if !self.text().is_ok_and(str::is_empty) {
@@ -66,7 +110,10 @@ impl CsvReader {
         self.line.clear();
         self.line_number += 1;
         let mut limited = self.file.by_ref().take(LINE_BYTES);
-        Ok(limited.read_until(b'\n', &mut self.line)? > 0)
+        let read = limited.read_until(b'\n', &mut self.line)?;
+        let is_cut = read as u64 == LINE_BYTES && !self.line.ends_with(b"\n");
+        ensure!(!is_cut, "a line of more than {LINE_BYTES} bytes");
+        Ok(read > 0)
     }
 
     /// The line without its line break.
@@ -81,30 +128,34 @@ impl CsvReader {
 
     /// The photon of any row, or what is wrong with it.
     fn parse(&self) -> Result<RawPhoton> {
-        let text = self.text()?;
-        let mut fields = text.split(',');
-        let (Some(pixel), Some(cycle), Some(bin), None) =
-            (fields.next(), fields.next(), fields.next(), fields.next())
-        else {
-            bail!("{} fields, not 3", text.split(',').count());
-        };
-        let number = |name: &str, text: &str| {
-            let digits = text.bytes().all(|byte| byte.is_ascii_digit());
-            let number = text.parse::<u64>().ok().filter(|_| digits);
-            number.with_context(|| format!("{name} {text:?} is not a whole number from 0"))
-        };
-        Ok([
-            number("pixel", pixel)?,
-            number("cycle", cycle)?,
-            number("bin", bin)?,
-        ])
+        let Columns {
+            separator,
+            all,
+            places,
+        } = self.columns;
+        let mut photon = RawPhoton::default();
+        let mut fields = 0;
+        for (place, text) in self.text()?.split(separator).enumerate() {
+            fields += 1;
+            let Some(which) = places.iter().position(|&one| one == place) else {
+                continue;
+            };
+            let digits = text.trim();
+            let is_number = digits.bytes().all(|byte| byte.is_ascii_digit());
+            let number = digits.parse().ok().filter(|_| is_number);
+            photon[which] = number.with_context(|| {
+                format!("{} {text:?} is not a whole number from 0", NAMES[which])
+            })?;
+        }
+        ensure!(fields == all, "{fields} fields, not {all}");
+        Ok(photon)
     }
 }
 
-/// The photon of a row of three numbers of up to 19 digits, nothing else: most rows, in half of the time.
-fn plain(line: &[u8]) -> Option<RawPhoton> {
-    let mut photon = RawPhoton::default();
-    let mut fields = photon.iter_mut();
+/// The numbers of a row of three of up to 19 digits, and nothing else: most rows, in half of the time.
+fn plain(line: &[u8], separator: char) -> Option<[u64; 3]> {
+    let mut numbers = [0u64; 3];
+    let mut fields = numbers.iter_mut();
     let (mut field, mut digits) = (fields.next()?, 0);
     for &byte in line {
         match byte {
@@ -112,11 +163,13 @@ fn plain(line: &[u8]) -> Option<RawPhoton> {
                 *field = 10 * *field + u64::from(byte - b'0');
                 digits += 1;
             }
-            b',' if digits > 0 => (field, digits) = (fields.next()?, 0),
+            _ if char::from(byte) == separator && digits > 0 => {
+                (field, digits) = (fields.next()?, 0)
+            }
             _ => return None,
         }
     }
-    (digits > 0 && fields.next().is_none()).then_some(photon)
+    (digits > 0 && fields.next().is_none()).then_some(numbers)
 }
 
 #[cfg(test)]
@@ -130,6 +183,7 @@ mod tests {
             file: BufReader::new(Box::new(std::io::empty())),
             line: line.into(),
             line_number: 1,
+            columns: Columns::new("pixel,cycle,bin").unwrap(),
         }
     }
 
@@ -139,7 +193,7 @@ mod tests {
             "[0-9]{1,20},[0-9]{1,20},[0-9]{1,20}",
             "[0-9,. +x-]{0,12}",
         ]) {
-            if let Some(photon) = plain(line.as_bytes()) {
+            if let Some(photon) = plain(line.as_bytes(), ',') {
                 prop_assert_eq!(reader(&line).parse().unwrap(), photon);
             } else {
                 let is_long = line.split(',').any(|field| field.len() > 19);

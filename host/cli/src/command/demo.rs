@@ -62,7 +62,7 @@ impl Demo {
             scene.size[0], scene.size[1]
         );
         let results = ResultOptions {
-            out: self.out.clone(),
+            out: Some(self.out.clone()),
             dynamic_depth: DynamicDepthOptions::default(),
             echo: None,
             no_csv: false,

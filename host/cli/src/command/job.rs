@@ -20,9 +20,9 @@ use super::flags::name;
 /// The folder of the results, and what goes into it.
 #[derive(Args)]
 pub struct ResultOptions {
-    /// Folder of the results
+    /// Folder of the results [default: out/NAME of the file]
     #[arg(long, value_name = "DIR", value_parser = path())]
-    pub out: PathBuf,
+    pub out: Option<PathBuf>,
     #[command(flatten)]
     pub dynamic_depth: DynamicDepthOptions,
     /// Echo of each exposure that maps and report show; the files of events hold all
@@ -38,6 +38,21 @@ pub struct ResultOptions {
 }
 
 impl ResultOptions {
+    /// The folder for a job that reads `input`.
+    #[must_use]
+    pub fn folder(&self, input: Option<&Path>) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| {
+            let name = input.and_then(Path::file_stem).unwrap_or_default();
+            // That of `log.json.gz` is `log`.
+            let name = Path::new(name);
+            let name = match name.extension() {
+                Some(end) if end == "json" => name.with_extension(""),
+                _ => name.to_owned(),
+            };
+            Path::new("out").join(name)
+        })
+    }
+
     /// Prepares the folder for a job that reads `input` and a settings file.
     ///
     /// # Errors
@@ -50,11 +65,13 @@ impl ResultOptions {
         effective: SettingsFile,
         settings_file: Option<&Path>,
     ) -> Result<Output> {
-        Ok(Output::create(&self.out, settings, photons, input)?
-            .with_settings(effective, settings_file)?
-            .with_changes(self.dynamic_depth.get()?.as_ref())?
-            .with_echo(self.echo, settings)
-            .without_csv(self.no_csv))
+        Ok(
+            Output::create(&self.folder(input), settings, photons, input)?
+                .with_settings(effective, settings_file)?
+                .with_changes(self.dynamic_depth.get()?.as_ref())?
+                .with_echo(self.echo, settings)
+                .without_csv(self.no_csv),
+        )
     }
 }
 

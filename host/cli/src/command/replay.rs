@@ -7,6 +7,7 @@ use clap::Args;
 use dtof::path;
 use dtof::progress::Bar;
 use dtof_engine::settings::SettingsFile;
+use dtof_options::Refused;
 use dtof_photons::input::Input;
 use dtof_run::RunResult;
 use dtof_run::recording::warnings;
@@ -19,9 +20,12 @@ use super::{print_summary, warn};
 #[derive(Args)]
 pub struct Replay {
     /// Histograms (.npy, .npz, or the log of a TMF8820 or TMF8829, .json or .json.gz), or photons
-    /// (.csv with the header pixel,cycle,bin, or .npy with these fields)
-    #[arg(long, value_name = "FILE", value_parser = path())]
-    input: PathBuf,
+    /// (.csv with columns pixel, cycle and bin, or .npy with these fields)
+    #[arg(value_name = "FILE", value_parser = path(), required_unless_present = "input")]
+    file: Option<PathBuf>,
+    /// The same file
+    #[arg(long, value_name = "FILE", value_parser = path(), conflicts_with = "file")]
+    input: Option<PathBuf>,
     #[command(flatten)]
     results: ResultOptions,
     #[command(flatten)]
@@ -38,22 +42,24 @@ impl Replay {
     fn replay(&self, requested: &SettingsFile) -> Result<()> {
         // Wrong options are refused before anything is read.
         self.results.dynamic_depth.get()?;
-        let input = Input::from(&self.input);
+        let file = self.file.as_deref().or(self.input.as_deref());
+        let file = file.ok_or_else(|| Refused::new("input", "is needed"))?;
+        let input = Input::from(file);
         let mut replay = self.options.0.open(&input, requested)?;
         let mut output = self.results.output(
             &replay.settings,
             &replay.photons,
-            Some(&self.input),
+            Some(file),
             replay.requested.with_settings(&replay.settings),
             self.options.0.given.file.as_deref(),
         )?;
         let quiet = self.results.quiet;
-        warn(&self.input, warnings(&replay.metadata), quiet);
+        warn(file, warnings(&replay.metadata), quiet);
         let RunResult { summary, .. } = replay.run(&input, &mut output, &mut Bar::new(quiet))?;
         let lead = format!("Recorded photons of {input}.");
         output.finish(&summary, replay.settings.title(), &lead, &[])?;
         if !quiet {
-            print_summary(&summary, &[], &self.results.out)?;
+            print_summary(&summary, &[], &self.results.folder(Some(file)))?;
         }
         Ok(())
     }

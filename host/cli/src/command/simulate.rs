@@ -106,7 +106,7 @@ impl Job<'_> {
         }];
         output.finish(&summary, summary.settings.title(), self.lead, &sections)?;
         if !self.results.quiet {
-            print_summary(&summary, &rows, &self.results.out)?;
+            print_summary(&summary, &rows, &self.results.folder(self.input))?;
         }
         Ok(())
     }

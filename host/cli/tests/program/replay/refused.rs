@@ -45,6 +45,8 @@ fn csv_rows_that_are_not_photons_are_named_by_line() {
         csv_refused(&row[0], &row[1..]);
     }
     csv_refused(&"0,".repeat(1000), &["photons.csv:2:", "fields, not 3"]);
+    let long = ["photons.csv:2:", "a line of more than 4096 bytes"];
+    csv_refused(&"0,".repeat(3000), &long);
     csv_refused("", &["photons.csv:2:", "no photons"]);
 }
 
@@ -62,9 +64,14 @@ fn csv_files_that_are_not_photon_lists_are_refused() {
     for (bytes, part) in [
         (&b""[..], "photons.csv:1: the file is empty"),
         (
-            b"cycle,pixel,bin\n0,1,2\n",
-            "photons.csv:1: the header must be pixel,cycle,bin, not \"cycle,pixel,bin\"",
+            b"cycle,pixels,bin\n0,1,2\n",
+            "photons.csv:1: the header must have the columns pixel, cycle and bin, not \"cycle,pixels,bin\"",
         ),
+        (
+            b"pixel,cycle,bin,Pixel\n0,1,2,0\n",
+            "the header must have the columns",
+        ),
+        (b"0,1,2\n", "the header must have the columns"),
         (b"pixel,cycle,bin\n0,\xff,2\n", "photons.csv:2: not text"),
     ] {
         refused("photons.csv", bytes, &[part]);
@@ -244,7 +251,7 @@ fn files_that_are_not_there_or_not_known_are_refused() {
             folder.csv | folder.csv
         ",
     );
-    scratch.refused(&scratch.run("replay"), &["--input"]);
+    scratch.refused(&scratch.run("replay"), &["<FILE>"]);
 }
 
 #[test]
