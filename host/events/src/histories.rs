@@ -14,11 +14,18 @@ use dtof_photons::source::Slice;
 /// How many events the mean range averages (the paper's depth map of ten events).
 pub const MEAN_OF: usize = 10;
 
+/// Events that are up to so many bins apart are of one surface.
+const SURFACE_BINS: i32 = 3;
+
 /// The ranges of one pixel.
 #[derive(Clone, Debug, Default)]
 pub struct PixelHistory {
-    /// Millimetres of the last [`MEAN_OF`] events, or fewer, oldest first.
+    /// Millimetres of the last [`MEAN_OF`] events of `level`, or fewer, oldest first.
     recent: VecDeque<f64>,
+    /// The finest level that has stood for the pixel.
+    level: BlockLevel,
+    /// How far apart events of one surface are at most, in millimetres.
+    surface_mm: f64,
     /// The brightness of the surface, from the pixel's own events.
     reflectivity: Reflectivity,
     /// The number of events, including those of blocks that stand for the pixel.
@@ -30,7 +37,17 @@ pub struct PixelHistory {
 }
 
 impl PixelHistory {
-    fn push(&mut self, range_mm: f64) {
+    /// Events of blocks never take the place of finer ones: those are of the pixel's own place.
+    fn push(&mut self, level: BlockLevel, range_mm: f64) {
+        if level < self.level {
+            self.recent.clear();
+        }
+        if self.recent.is_empty() {
+            self.level = level;
+        }
+        if level > self.level {
+            return;
+        }
         if self.recent.len() == MEAN_OF {
             self.recent.pop_front();
         }
@@ -43,11 +60,18 @@ impl PixelHistory {
         self.recent.back().copied()
     }
 
-    /// The mean range of up to [`MEAN_OF`] last events.
+    /// The mean range of one surface: that on which most of up to [`MEAN_OF`] last events lie, of two with as
+    /// many the newer. Events lie on a surface with one that is up to 3 bins away.
     #[must_use]
     pub fn mean_mm(&self) -> Option<f64> {
-        let count = self.recent.len();
-        (count > 0).then(|| self.recent.iter().sum::<f64>() / count as f64)
+        let on_surface_of = |place: f64| {
+            let all = self.recent.iter().copied();
+            all.filter(move |range| (range - place).abs() <= self.surface_mm)
+        };
+        let places = self.recent.iter().copied();
+        let place = places.max_by_key(|&place| on_surface_of(place).count())?;
+        let count = on_surface_of(place).count();
+        Some(on_surface_of(place).sum::<f64>() / count as f64)
     }
 
     /// Events of blocks say nothing about the brightness of a pixel.
@@ -97,11 +121,13 @@ impl PixelHistories {
     pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
         let range_mm = range_mm(event, scale);
         let exposure = event.exposure.into();
+        let surface_mm = scale.distance(SURFACE_BINS << 8).to_num();
         for address in self.array.pixels_of(event.pixel, event.level) {
             let pixel = &mut self.pixels[usize::from(address.raw())];
             let stands_for_pixel = pixel.last_events.record(event.level, event.cycle, exposure);
             if stands_for_pixel {
-                pixel.push(range_mm);
+                pixel.surface_mm = surface_mm;
+                pixel.push(event.level, range_mm);
                 pixel.events += 1;
             }
             if event.level == BlockLevel::PIXEL {
@@ -168,11 +194,34 @@ mod tests {
     fn the_last_range_is_the_newest_and_the_mean_that_of_the_last_ten() {
         let mut pixel = PixelHistory::default();
         assert_eq!((pixel.last_mm(), pixel.mean_mm()), (None, None));
+        pixel.surface_mm = 20.0;
         for range in 1..=12u32 {
-            pixel.push(range.into());
+            pixel.push(BlockLevel::PIXEL, range.into());
         }
         assert_eq!(pixel.last_mm(), Some(12.0));
         assert_eq!(pixel.mean_mm(), Some(7.5)); // of 3 to 12
+    }
+
+    #[test]
+    fn the_mean_is_of_one_surface() {
+        let mut pixel = PixelHistory {
+            surface_mm: 100.0,
+            ..PixelHistory::default()
+        };
+        let mut mean_after = |range: f64| {
+            pixel.push(BlockLevel::PIXEL, range);
+            pixel.mean_mm().unwrap()
+        };
+        assert_eq!(mean_after(1600.0), 1600.0);
+        // Of two with as many the newer.
+        assert_eq!(mean_after(4000.0), 4000.0);
+        assert_eq!(mean_after(1620.0), 1610.0);
+        assert_eq!(mean_after(4010.0), 4005.0);
+        // Ten later a surface is forgotten.
+        for _ in 0..7 {
+            mean_after(2000.0);
+        }
+        assert_eq!(mean_after(2010.0), 2001.25);
     }
 
     #[test]

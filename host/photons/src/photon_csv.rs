@@ -164,7 +164,7 @@ fn plain(line: &[u8], separator: char) -> Option<[u64; 3]> {
                 digits += 1;
             }
             _ if char::from(byte) == separator && digits > 0 => {
-                (field, digits) = (fields.next()?, 0)
+                (field, digits) = (fields.next()?, 0);
             }
             _ => return None,
         }

@@ -1,10 +1,11 @@
-//! The output folder: `events.csv`, `events.aer`, `summary.json`, the maps as
+//! The output folder: `events.csv`, `events.aer`, `summary.json`, the depth as `depth.npy` and `depth.csv`, the maps as
 //! SVG, `report.html` that shows them, and `dtof.toml` with the settings.
 //!
 //! Every file is written beside its place. When all are whole they are moved
 //! there, the summary last: a folder with a summary is complete.
 
 mod changes;
+mod depth;
 mod pictures;
 
 use std::fs;
@@ -242,10 +243,10 @@ impl Output {
         let report = dtof_report::html(title, lead, &all, &figures, cloud);
 
         let name = |file: &str| self.folder.join(file).display().to_string();
-        let written = |text: &str, file: &'static str| -> Result<_> {
+        let written = |content: &[u8], file: &'static str| -> Result<_> {
             let mut aside = BufWriter::new(temporary_file(&self.folder, UNFINISHED)?);
-            let text = aside.write_all(text.as_bytes()).map_err(Error::from);
-            let whole = text.and_then(|()| flush_to_disk(aside));
+            let content = aside.write_all(content).map_err(Error::from);
+            let whole = content.and_then(|()| flush_to_disk(aside));
             Ok((whole.with_context(|| name(file))?, file))
         };
         // All files are written before the first is moved to its place.
@@ -263,12 +264,14 @@ impl Output {
             None => removed.push(CSV),
         }
         for picture in &pictures {
-            files.push(written(&picture.svg, picture.name)?);
+            files.push(written(picture.svg.as_bytes(), picture.name)?);
         }
-        files.push(written(&report, REPORT)?);
-        files.push(written(&self.settings.to_toml()?, SETTINGS)?);
+        files.push(written(&depth::array(&self.maps), depth::ARRAY)?);
+        files.push(written(depth::table(&self.maps).as_bytes(), depth::TABLE)?);
+        files.push(written(report.as_bytes(), REPORT)?);
+        files.push(written(self.settings.to_toml()?.as_bytes(), SETTINGS)?);
         let summary = serde_json::to_string_pretty(summary)? + "\n";
-        files.push(written(&summary, SUMMARY)?);
+        files.push(written(summary.as_bytes(), SUMMARY)?);
 
         // Files may have appeared there during the run.
         may_hold_results(&self.folder, &self.inputs)?;
@@ -360,6 +363,8 @@ fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
     pictures.into_iter().chain([
         (CSV, events_csv::HEADER),
         (AER, aer_file::MAGIC),
+        (depth::ARRAY, depth::MARK),
+        (depth::TABLE, depth::HEADER),
         (REPORT, dtof_report::MARK),
         (SETTINGS, settings::MARK),
         (SUMMARY, summary::MARK),

@@ -16,8 +16,8 @@ def depth_map(
 ) -> numpy.ndarray:
     """The range of the last event of each pixel in millimetres, rows by columns; NaN without one.
 
-    With ``mean`` it is the mean of the last ten. An event of a block counts for all of its pixels
-    that have not reported since. ``echo`` selects the echo of each exposure: ``"first"``,
+    With ``mean`` it is the mean of those of the last ten on one surface, on which most of them lie. An event of a
+    block counts for all of its pixels that have never reported themselves, or in a smaller block. ``echo`` selects the echo of each exposure: ``"first"``,
     ``"last"``, ``"strongest"`` or ``"all"``.
     """
     maps = _native.maps(records_of(events), array, arguments({"echo": echo}))

@@ -22,7 +22,8 @@ FORMATS = ("aer", "npy")
 #: Further files that the program writes.
 _OF_THE_PROGRAM = (
     "events.csv", "report.html", "depth-last.svg", "depth-mean.svg", "event-counts.svg",
-    "reflectivity-events.svg", "reflectivity-signal.svg", "photon-counts.svg",
+    "reflectivity-events.svg", "reflectivity-signal.svg", "photon-counts.svg", "depth.npy",
+    "depth.csv",
 )
 
 

@@ -1,0 +1,72 @@
+//! The depth map as numbers: an array for NumPy, and a table. Millimetres of each pixel, the mean of the surface
+//! that most of its last events lie on.
+
+use std::fmt::Write as _;
+
+use dtof_events::histories::PixelHistories;
+
+/// 64-bit floats, rows by columns; not a number without an event.
+pub const ARRAY: &str = "depth.npy";
+/// One line a pixel; the depth is empty without an event.
+pub const TABLE: &str = "depth.csv";
+/// The first line of the table.
+pub const HEADER: &str = "pixel,column,row,depth_mm";
+/// What marks the array as a result: its header ends with so many spaces. NumPy pads its own with fewer than 64.
+pub const MARK: &str = match str::from_utf8(&[b' '; 128]) {
+    Ok(mark) => mark,
+    Err(_) => panic!("spaces are text"),
+};
+
+/// The header's length is 246 = 0xf6, so that it ends at byte 256.
+const NPY_1_0: &[u8] = b"\x93NUMPY\x01\x00\xf6\x00";
+
+/// The array.
+pub fn array(maps: &PixelHistories) -> Vec<u8> {
+    let (rows, columns) = (maps.array.rows(), maps.array.columns());
+    let header =
+        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
+    let mut bytes = NPY_1_0.to_vec();
+    bytes.extend(format!("{header:<245}\n").bytes());
+    for pixel in &maps.pixels {
+        let depth = pixel.mean_mm().unwrap_or(f64::NAN);
+        bytes.extend(depth.to_le_bytes());
+    }
+    bytes
+}
+
+/// The table.
+pub fn table(maps: &PixelHistories) -> String {
+    let columns = maps.array.columns() as usize;
+    let mut table = format!("{HEADER}\n");
+    for (number, pixel) in maps.pixels.iter().enumerate() {
+        let (column, row) = (number % columns, number / columns);
+        let depth = pixel.mean_mm().map(|depth| format!("{depth:.3}"));
+        // Writing to a string does not fail.
+        let _ = writeln!(
+            table,
+            "{number},{column},{row},{}",
+            depth.unwrap_or_default()
+        );
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_core::Array;
+
+    #[test]
+    fn the_array_has_the_mark_and_as_many_numbers_as_pixels() {
+        let maps = PixelHistories::new(Array::new(256, 256).unwrap());
+        let bytes = array(&maps);
+        assert_eq!(bytes.len(), 256 + 8 * 65_536);
+        assert!(
+            bytes[..256]
+                .windows(128)
+                .any(|part| part == MARK.as_bytes())
+        );
+        assert_eq!(bytes[255], b'\n');
+        assert!(table(&maps).ends_with("\n65535,255,255,\n"));
+    }
+}
