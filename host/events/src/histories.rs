@@ -20,6 +20,8 @@ const SURFACE_BINS: i32 = 3;
 /// The ranges of one pixel.
 #[derive(Clone, Debug, Default)]
 pub struct PixelHistory {
+    /// Millimetres of the last event.
+    last: Option<f64>,
     /// Millimetres of the last [`MEAN_OF`] events of `level`, or fewer, oldest first.
     recent: VecDeque<f64>,
     /// The finest level that has stood for the pixel.
@@ -37,8 +39,9 @@ pub struct PixelHistory {
 }
 
 impl PixelHistory {
-    /// Events of blocks never take the place of finer ones: those are of the pixel's own place.
+    /// In the mean events of blocks never take the place of finer ones: those are of the pixel's own place.
     fn push(&mut self, level: BlockLevel, range_mm: f64) {
+        self.last = Some(range_mm);
         if level < self.level {
             self.recent.clear();
         }
@@ -56,8 +59,8 @@ impl PixelHistory {
 
     /// The range of the last event.
     #[must_use]
-    pub fn last_mm(&self) -> Option<f64> {
-        self.recent.back().copied()
+    pub const fn last_mm(&self) -> Option<f64> {
+        self.last
     }
 
     /// The mean range of one surface: that on which most of up to [`MEAN_OF`] last events lie, of two with as
@@ -242,6 +245,12 @@ mod tests {
             (range / 37.474 - 0.5).round()
         });
         assert!(last.eq([50.0, 50.0, 40.0, 50.0, 50.0, 40.0, 40.0, 40.0, 40.0]));
+        // Pixels 1 and 4 have reported by themselves, and two others in a small block twice.
+        let mean = histories.pixels.iter().map(|pixel| {
+            let range = pixel.mean_mm().unwrap();
+            (range / 37.474 - 0.5).round()
+        });
+        assert!(mean.eq([50.0, 30.0, 40.0, 50.0, 10.0, 40.0, 40.0, 40.0, 40.0]));
         let events = histories.pixels.iter().map(|pixel| pixel.events);
         assert!(events.eq([3, 3, 1, 3, 4, 1, 1, 1, 1]));
         let reporting = histories.pixels.iter().filter(|pixel| pixel.events > 0);

@@ -16,8 +16,9 @@ def depth_map(
 ) -> numpy.ndarray:
     """The range of the last event of each pixel in millimetres, rows by columns; NaN without one.
 
-    With ``mean`` it is the mean of those of the last ten on one surface, on which most of them lie. An event of a
-    block counts for all of its pixels that have never reported themselves, or in a smaller block. ``echo`` selects the echo of each exposure: ``"first"``,
+    An event of a block counts for all of its pixels that have not reported since. With ``mean`` it
+    is the mean of those of the last ten that lie on one surface, where most of them lie; an event of
+    a block then counts for pixels that have never reported by themselves or in a smaller block. ``echo`` selects the echo of each exposure: ``"first"``,
     ``"last"``, ``"strongest"`` or ``"all"``.
     """
     maps = _native.maps(records_of(events), array, arguments({"echo": echo}))
