@@ -31,12 +31,20 @@ fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {
     }
 }
 
-/// Prints the summary of a run, with `more` rows.
+/// The heading of what was found in a recording.
+const FOUND: &str = "Found in the recording";
+
+/// Prints the summary of a run, with `more` rows, after what was found in the recording.
 fn print_summary(summary: &Summary, more: &[Row], folder: &Path) -> io::Result<()> {
     let detection = summary.settings.detection_rows();
     let rows = [&summary.rows()[..], more, &detection].concat();
     let report = folder.join("report.html");
     let mut out = io::stdout().lock();
+    if !summary.found.is_empty() {
+        let settings = folder.join("dtof.toml").display().to_string();
+        let rows = [&summary.found[..], &[("settings".to_owned(), settings)]].concat();
+        writeln!(out, "{FOUND}:\n{}", aligned(&rows))?;
+    }
     write!(
         out,
         "{}\nOpen {} in a browser.\n",

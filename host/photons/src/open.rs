@@ -1,5 +1,6 @@
 //! Opens recordings of all formats.
 
+use std::borrow::Cow;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
@@ -135,6 +136,8 @@ pub struct Metadata {
     /// Picoseconds a bin of the run: from the options or the file, else [`BIN_WIDTH_PS`], times
     /// [`ReadOptions::rebin`].
     pub bin_width_ps: U16F16,
+    /// Whether neither options nor file give a bin width.
+    pub is_width_assumed: bool,
     /// Millimetres to be added to every range, if the format has an offset.
     pub offset_mm: Option<I24F8>,
     /// The first and the last bin that were recorded in full, if not all were.
@@ -155,6 +158,54 @@ enum Content {
     Photons(Box<dyn CountedSource>, Metadata),
 }
 
+/// A recording that has been checked, before its length and masked pixels are settled.
+pub struct CheckedRecording {
+    input: Input,
+    content: Content,
+}
+
+impl CheckedRecording {
+    /// Its metadata.
+    #[must_use]
+    pub const fn metadata(&self) -> &Metadata {
+        match &self.content {
+            Content::Histograms(counts) => &counts.metadata,
+            Content::Photons(_, metadata) => metadata,
+        }
+    }
+
+    /// Its histograms. Photon lists are summed over the laser cycles that were requested.
+    ///
+    /// # Errors
+    /// Fails if the file has changed since it was checked.
+    pub fn counts(&mut self) -> Result<Cow<'_, Counts>> {
+        match &mut self.content {
+            Content::Histograms(counts) => Ok(Cow::Borrowed(counts)),
+            Content::Photons(photons, metadata) => {
+                Ok(Cow::Owned(counts_of(photons.as_mut(), metadata.clone())?))
+            }
+        }
+    }
+
+    /// Its photons. Of `options` only those count that settle the length of histograms: `length`, `cycles`,
+    /// `seed`, `layout`, `masked` and `dead_time`.
+    ///
+    /// # Errors
+    /// Those of [`Counts::photons`], after the name of the recording.
+    pub fn photons(self, options: &ReadOptions) -> Result<Recording> {
+        match self.content {
+            Content::Photons(photons, metadata) => Ok(Recording { photons, metadata }),
+            Content::Histograms(counts) => {
+                let photons = counts.photons(options);
+                Ok(Recording {
+                    photons: Box::new(photons.with_context(|| self.input.to_string())?),
+                    metadata: counts.metadata,
+                })
+            }
+        }
+    }
+}
+
 /// The kinds of files, told by their names.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Kind {
@@ -164,22 +215,22 @@ enum Kind {
     Csv,
 }
 
+/// Reads a recording and checks all of it.
+///
+/// # Errors
+/// Returns what is wrong with the recording or its options, after its name.
+pub fn check(input: impl Into<Input>, options: &ReadOptions) -> Result<CheckedRecording> {
+    let input = input.into();
+    let content = read(&input, options)?;
+    Ok(CheckedRecording { input, content })
+}
+
 /// Opens a recording as photons and checks all of it.
 ///
 /// # Errors
 /// Returns what is wrong with the recording or its options, after its name.
 pub fn open(input: impl Into<Input>, options: &ReadOptions) -> Result<Recording> {
-    let input = input.into();
-    match read(&input, options)? {
-        Content::Photons(photons, metadata) => Ok(Recording { photons, metadata }),
-        Content::Histograms(counts) => {
-            let photons = counts.photons(options);
-            Ok(Recording {
-                photons: Box::new(photons.with_context(|| input.to_string())?),
-                metadata: counts.metadata,
-            })
-        }
-    }
+    check(input, options)?.photons(options)
 }
 
 /// Reads a recording as histograms. Photon lists are summed over their laser cycles.
@@ -187,10 +238,13 @@ pub fn open(input: impl Into<Input>, options: &ReadOptions) -> Result<Recording>
 /// # Errors
 /// Returns what is wrong with the recording or its options, after its name.
 pub fn counts(input: impl Into<Input>, options: &ReadOptions) -> Result<Counts> {
-    let (mut photons, metadata) = match read(&input.into(), options)? {
-        Content::Histograms(counts) => return Ok(counts),
-        Content::Photons(photons, metadata) => (photons, metadata),
-    };
+    match read(&input.into(), options)? {
+        Content::Histograms(counts) => Ok(counts),
+        Content::Photons(mut photons, metadata) => counts_of(photons.as_mut(), metadata),
+    }
+}
+
+fn counts_of(photons: &mut dyn CountedSource, metadata: Metadata) -> Result<Counts> {
     Ok(Counts {
         array: photons.array(),
         axis_names: photons.axis_names(),
@@ -395,7 +449,8 @@ fn fit_bins(
 
 /// The metadata of a run with so many bins. `width_ps` is the bin width in the file, if it has one.
 fn metadata(bins: usize, width_ps: Option<U16F16>, options: &ReadOptions) -> Result<Metadata> {
-    let requested = options.bin_width_ps.or(width_ps).unwrap_or(BIN_WIDTH_PS);
+    let known = options.bin_width_ps.or(width_ps);
+    let requested = known.unwrap_or(BIN_WIDTH_PS);
     let width = requested.checked_mul_int(options.rebin.max(1).into());
     Ok(Metadata {
         bins,
@@ -403,6 +458,7 @@ fn metadata(bins: usize, width_ps: Option<U16F16>, options: &ReadOptions) -> Res
             let reason = format!("makes bins of {requested} ps too wide");
             Refused::value("rebin", options.rebin, reason)
         })?,
+        is_width_assumed: known.is_none(),
         offset_mm: None,
         gate: None,
         is_list: false,

@@ -1,7 +1,7 @@
 //! Recorded photons one by one, in non-decreasing laser cycle.
 //!
 //! A file is read twice. The first pass checks every photon and finds the pixels and the end of the
-//! recording. The second replays it and holds only one slice at a time.
+//! recording. The second replays it and holds only one slice at a time. Histograms take a pass of their own.
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{Array, PixelAddress};
@@ -36,7 +36,8 @@ const SPAN: u64 = 256;
 
 /// A source that can also give histograms.
 pub trait CountedSource: PhotonSource {
-    /// The photons of all laser cycles to replay: one histogram a pixel of the array.
+    /// The photons of all laser cycles to replay: one histogram a pixel of the array. The replay still begins
+    /// at the first photon.
     ///
     /// # Errors
     /// Fails if the file has changed since it was checked.
@@ -230,6 +231,7 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
             };
             *count += 1;
         }
+        self.rows = Validator::open(&self.input, self.rows.shape)?;
         Ok(counts)
     }
 }

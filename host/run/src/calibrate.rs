@@ -86,7 +86,7 @@ impl Options {
         self.given.suits(input, &counts.metadata)?;
         let found = calibrate_counts(&requested, &counts, &self.calibration);
         let found = found.with_context(|| input.to_string())?;
-        let width = bin_width_warning(&counts.metadata, &requested);
+        let width = bin_width_warning(&counts.metadata);
         let warnings = warnings(&counts.metadata).chain(width).collect();
         let before = requested.or(settings_of_file(&counts.metadata, counts.array));
         Ok(CalibrateResult {

@@ -224,7 +224,7 @@ impl Options {
         self.given.suits(&input, &counts.metadata)?;
         let is_once_per_bin = requested.detection.once_per_bin == Some(true);
         check_once_per_bin(is_once_per_bin, counts.metadata.is_list)?;
-        let width = bin_width_warning(&counts.metadata, &requested);
+        let width = bin_width_warning(&counts.metadata);
         warnings(&counts.metadata)
             .chain(width)
             .for_each(callbacks.warning);

@@ -162,9 +162,8 @@ pub fn warnings(metadata: &Metadata) -> impl Iterator<Item = String> + '_ {
 
 /// Warns that the bin width was assumed, if it was.
 #[must_use]
-pub fn bin_width_warning(metadata: &Metadata, requested: &SettingsFile) -> Option<String> {
-    let is_known = requested.sensor.bin_width_ps.is_some() || metadata.bin_width_ps != BIN_WIDTH_PS;
-    (!is_known).then(|| {
+pub fn bin_width_warning(metadata: &Metadata) -> Option<String> {
+    metadata.is_width_assumed.then(|| {
         format!("bins are taken to be {BIN_WIDTH_PS} ps wide; --bin-width-ps changes that")
     })
 }

@@ -1,20 +1,30 @@
 //! `replay`: recorded photons or histograms through the engine.
+//!
+//! Settings that nobody has chosen are found in the recording first, as `calibrate` finds them.
 
 use anyhow::{Context, Result, ensure};
 
+use super::calibrate::calibrate_counts;
 use super::given::{FRAME, Given, SENSOR, TDC, of_given};
 use super::recording::{RECORDING, check_once_per_bin, read_options, settings_of_file};
 use super::run::{RunResult, Sink, run};
+use dtof_calibrate::CalibrationOptions;
+use dtof_calibrate::report::rows;
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{DetectionSettings, Settings, SettingsFile};
 use dtof_options::Refused;
 use dtof_options::progress::Progress;
+use dtof_options::rows::Row;
 use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
-use dtof_photons::open::{Metadata, ReadOptions, open};
+use dtof_photons::open::{CheckedRecording, Metadata, ReadOptions, Recording, check};
 use dtof_photons::recorded::Layout;
 use dtof_photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
+
+/// The options that settle which photons are replayed. All others, but for those of the recording, choose
+/// how pixels decide.
+const RUN: &[&str] = &["cycles", "seed"];
 
 /// The options of a replay.
 #[derive(Clone, Debug, Default)]
@@ -24,14 +34,8 @@ pub struct Options {
 }
 
 impl dtof_options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] = &[
-        RECORDING,
-        SENSOR,
-        TDC,
-        DetectionSettings::KEYS,
-        FRAME,
-        &["cycles", "seed"],
-    ];
+    const KEYS: &'static [&'static [&'static str]] =
+        &[RECORDING, SENSOR, TDC, DetectionSettings::KEYS, FRAME, RUN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         self.given.set(key, text)
@@ -52,6 +56,8 @@ pub struct Replay {
     pub requested: SettingsFile,
     /// Metadata of the recording.
     pub metadata: Metadata,
+    /// What was found in the recording, one a row, if its settings come from there.
+    pub found: Vec<Row>,
 }
 
 impl Replay {
@@ -71,6 +77,7 @@ impl Replay {
         result.summary.input = Some(input.to_string());
         result.summary.cut_off = self.metadata.cut_off;
         result.summary.recording.clone_from(&self.metadata.rows);
+        result.summary.found.clone_from(&self.found);
         let warnings = self.metadata.warnings.iter().cloned();
         result.summary.warnings.extend(warnings);
         Ok(result)
@@ -90,7 +97,7 @@ impl Options {
     ///
     /// # Errors
     /// Fails if the recording cannot be read or a setting does not suit it; the error begins with the name
-    /// of the recording.
+    /// of the recording. If no settings can be found in it, the defaults hold, and the metadata has a warning.
     pub fn open(&self, input: &Input, requested: &SettingsFile) -> Result<Replay> {
         self.open_part(input, requested, None)
     }
@@ -99,7 +106,7 @@ impl Options {
     ///
     /// # Errors
     /// As [`Self::open`]. Also fails if `input` does not fit the layout, cuts blocks of pixels, or holds
-    /// photons.
+    /// photons, or if nothing chooses how pixels decide: a part does not show the settings of the whole.
     pub fn open_part(
         &self,
         input: &Input,
@@ -110,16 +117,38 @@ impl Options {
             layout,
             ..read_options(requested)
         };
-        let recording = open(input, &options)?;
-        let (photons, metadata) = (recording.photons, recording.metadata);
-        self.given.suits(input, &metadata)?;
         ensure!(
-            options.layout.is_none() || !metadata.is_list,
+            options.layout.is_none() || self.chooses_settings(),
+            Refused::new(
+                "settings",
+                "is needed for a recording in parts, or an option of detection: `dtof.calibrate` finds settings"
+            )
+        );
+        let mut recording = check(input, &options)?;
+        self.given.suits(input, recording.metadata())?;
+        ensure!(
+            options.layout.is_none() || !recording.metadata().is_list,
             "{input} holds photons: only histograms are replayed in parts"
         );
-        let requested = requested
-            .clone()
-            .or(settings_of_file(&metadata, photons.array()));
+        let mut requested = requested.clone();
+        let found = match self.chooses_settings() {
+            true => Ok(Vec::new()),
+            false => find(&mut requested, &mut recording),
+        };
+        let options = ReadOptions {
+            layout: options.layout,
+            ..read_options(&requested)
+        };
+        let Recording {
+            photons,
+            mut metadata,
+        } = recording.photons(&options)?;
+        let found = found.unwrap_or_else(|reason| {
+            let warning = format!("no settings were found: {reason:#}; the defaults are used");
+            metadata.warnings.push(warning);
+            Vec::new()
+        });
+        let requested = requested.or(settings_of_file(&metadata, photons.array()));
         let settings = requested.settings(metadata.bins)?;
         let refused = |refused: Refused| anyhow::Error::from(refused).context(input.to_string());
         let asks_neighbours = settings.neighbours.is_some() && settings.frame.is_none();
@@ -187,6 +216,45 @@ impl Options {
             settings,
             requested,
             metadata,
+            found,
         })
     }
+
+    /// Whether the user has chosen how pixels decide, by a settings file or by an option. Options that describe
+    /// the recording do not.
+    fn chooses_settings(&self) -> bool {
+        let describes = |key: &str| RECORDING.contains(&key) || RUN.contains(&key);
+        let keys = self.given.options.keys().unwrap_or_default();
+        self.given.file.is_some() || !keys.iter().all(|key| describes(key))
+    }
+}
+
+/// Finds the settings of the sensor in a recording, and puts them under those that were requested. Of a
+/// photon list it reads the laser cycles that are replayed. Gives what was found, one a row.
+fn find(requested: &mut SettingsFile, recording: &mut CheckedRecording) -> Result<Vec<Row>> {
+    let counts = recording.counts()?;
+    let all_counts = || counts.captures.iter().flatten().flatten();
+    if all_counts().all(|&count| count == 0) {
+        return Ok(Vec::new()); // A warning says so already.
+    }
+    let metadata = &counts.metadata;
+    let source = match requested.sensor.bin_width_ps {
+        Some(_) => "as given",
+        None if metadata.is_width_assumed => "assumed: --bin-width-ps gives another",
+        None => "that of the sensor",
+    };
+    let width = format!("{} ps, {source}", metadata.bin_width_ps);
+    let found = calibrate_counts(requested, &counts, &CalibrationOptions::default())?;
+    let settings = found.settings(
+        requested
+            .clone()
+            .or(settings_of_file(metadata, counts.array)),
+    )?;
+    *requested = requested.clone().or(settings);
+    let mut rows = rows(&found);
+    // A width that fits true distances better comes with the offset.
+    if !rows.iter().any(|(name, _)| name == "bin width") {
+        rows.insert(1, ("bin width".to_owned(), width));
+    }
+    Ok(rows)
 }

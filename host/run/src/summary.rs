@@ -82,6 +82,9 @@ pub struct Summary {
     /// How the recording was preprocessed.
     #[serde(serialize_with = "named")]
     pub recording: Vec<Row>,
+    /// What was found in the recording, if its settings come from there.
+    #[serde(serialize_with = "named")]
+    pub found: Vec<Row>,
     /// Warnings about the recording.
     pub warnings: Vec<String>,
     /// How the events of a simulated scene compare with it.
@@ -207,6 +210,7 @@ impl Summary {
             cover_glass: None,
             cut_off: 0,
             recording: Vec::new(),
+            found: Vec::new(),
             warnings: Vec::new(),
             against_truth: None,
             settings: settings.clone(),

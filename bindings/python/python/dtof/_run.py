@@ -65,6 +65,7 @@ def replay(
     histograms were recorded. ``cycles`` (10,000) laser cycles are replayed with random ``seed`` (1).
     Other options of ``dtof replay`` are keywords, with ``_`` instead of ``-``: ``rule="window",
     sigma_bins=0.8, gate=(12, 119), mask=[3, 70]``. An empty ``mask`` is the same as none.
+    Without ``settings`` and without an option of detection, the settings are those of :func:`calibrate`.
     ``settings`` is the name of a settings file. Options of reports and files are not available:
     ``echo``, ``dynamic_depth``, ``threshold_mm``, ``reference`` and ``no_csv``.
 

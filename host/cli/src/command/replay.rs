@@ -9,13 +9,14 @@ use dtof::progress::Bar;
 use dtof_engine::settings::SettingsFile;
 use dtof_options::Refused;
 use dtof_photons::input::Input;
+use dtof_report::Section;
 use dtof_run::RunResult;
 use dtof_run::recording::warnings;
 use dtof_run::replay::Options;
 
 use super::flags::Flags;
 use super::job::ResultOptions;
-use super::{print_summary, warn};
+use super::{FOUND, print_summary, warn};
 
 #[derive(Args)]
 pub struct Replay {
@@ -57,7 +58,15 @@ impl Replay {
         warn(file, warnings(&replay.metadata), quiet);
         let RunResult { summary, .. } = replay.run(&input, &mut output, &mut Bar::new(quiet))?;
         let lead = format!("Recorded photons of {input}.");
-        output.finish(&summary, replay.settings.title(), &lead, &[])?;
+        let found = Section {
+            heading: FOUND,
+            rows: &summary.found,
+        };
+        let sections = match summary.found.is_empty() {
+            true => &[][..],
+            false => &[found],
+        };
+        output.finish(&summary, replay.settings.title(), &lead, sections)?;
         if !quiet {
             print_summary(&summary, &[], &self.results.folder(Some(file)))?;
         }

@@ -1,7 +1,10 @@
 //! `dtof calibrate`, end to end: what it finds in a recording makes runs with a cover glass right,
 //! and tells when the glass has become brighter.
 
-use crate::common::{Scratch, assert_contains, npy};
+use std::path::Path;
+
+use crate::common::{Scratch, assert_contains, npy, succeeded};
+use dtof_core::PixelAddress;
 use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 
@@ -111,4 +114,148 @@ fn a_hot_pixel_changes_nothing_for_the_others() {
         clean > 1000.0 && (hot / clean - 1.0).abs() < 0.05,
         "{hot} {clean}"
     );
+}
+
+/// The photons of a scene, in the order of their laser cycles.
+fn photons(text: &str) -> String {
+    let scene = Scene::parse(text).unwrap();
+    let mut photons = scene.photons(5, scene.cycles).unwrap();
+    let mut all = Vec::new();
+    for slice in 0..32 {
+        for (pixel, photons) in photons.next_slice(250).unwrap().pixels.iter().enumerate() {
+            let photons = photons.photons.iter();
+            all.extend(photons.map(|one| (250 * slice + u32::from(one.cycle), pixel, one.code)));
+        }
+    }
+    all.sort_by_key(|&(cycle, ..)| cycle);
+    let rows = all.iter();
+    let rows = rows.map(|(cycle, pixel, bin)| format!("{pixel},{cycle},{bin}\n"));
+    "pixel,cycle,bin\n".to_owned() + &rows.collect::<String>()
+}
+
+/// Without settings a replay is a calibration, and a replay with what that has found.
+#[test]
+fn a_recording_alone_is_calibrated_first() {
+    let scratch = Scratch::new();
+    let text = scene(0.02, 5.0);
+    scratch.file("hot.npy", with_hot(&text, Some((3, 400))));
+    scratch.file("list.csv", photons(&text));
+    let read = |folder: &str| scratch.read(&format!("{folder}/events.csv"));
+    for (recording, run) in [
+        ("hot.npy", ""),
+        (
+            "hot.npy --bin-width-ps 373.6 --recorded-cycles 8000",
+            "--seed 4",
+        ),
+        ("list.csv --columns 16 --rebin 2 --bin-width-ps 125", ""),
+    ] {
+        for threads in ["1", "2"] {
+            let mut dtof =
+                scratch.command(&format!("replay {recording} {run} --out out-{threads}"));
+            let printed = succeeded(dtof.env("RAYON_NUM_THREADS", threads).output().unwrap());
+            assert_contains(&printed, "Found in the recording:\n");
+            assert_contains(&printed, "\n  cover glass ");
+        }
+        assert!(read("out-1").lines().count() > 1000);
+        assert_eq!(read("out-2"), read("out-1"), "{recording}");
+        assert_contains(&scratch.read("out-1/report.html"), "Found in the recording");
+
+        scratch.printed(&format!("calibrate --input {recording} --out found.toml"));
+        scratch.printed(&format!(
+            "replay {recording} {run} --settings found.toml --out by-hand"
+        ));
+        assert_eq!(read("by-hand"), read("out-1"), "{recording}");
+        // The settings that it writes need no option.
+        let settings = scratch.read("out-1/dtof.toml");
+        scratch.file("settings.toml", settings);
+        let file = recording.split(' ').next().unwrap();
+        scratch.printed(&format!(
+            "replay {file} --settings settings.toml --out again"
+        ));
+        assert_eq!(read("again"), read("out-1"), "{recording}");
+    }
+}
+
+/// An option of detection, or any settings, keep the defaults for the rest.
+#[test]
+fn an_option_of_detection_calibrates_nothing() {
+    let scratch = Scratch::new();
+    scratch.file("glass.npy", recording(&scene(0.02, 5.0)));
+    scratch.file("empty.toml", "");
+    let run = |options: &str| {
+        let printed = scratch.printed(&format!("replay glass.npy --out out {options}"));
+        assert!(!printed.contains("Found"), "{printed}");
+        scratch.read("out/events.csv")
+    };
+    let defaults = run("--settings empty.toml");
+    for options in [
+        "--rule paper",
+        "--alpha 4",
+        "--l1 40",
+        "--gate 0..127",
+        "--echoes 1",
+    ] {
+        assert_eq!(run(options), defaults, "{options}");
+    }
+    assert_eq!(scratch.summary()["found"], serde_json::json!({}));
+}
+
+/// It reads no laser cycle that it does not replay.
+#[test]
+fn a_list_is_calibrated_from_what_is_replayed() {
+    let scratch = Scratch::new();
+    let text = photons(&scene(0.02, 5.0));
+    scratch.file("all.csv", &text);
+    let is_early = |row: &&str| {
+        row.split(',')
+            .nth(1)
+            .unwrap()
+            .parse()
+            .is_ok_and(|c: u32| c < 900)
+    };
+    let early: Vec<&str> = text.lines().skip(1).filter(is_early).collect();
+    scratch.file(
+        "early.csv",
+        format!("pixel,cycle,bin\n{}\n", early.join("\n")),
+    );
+    let run = |line: &str| {
+        scratch.printed(&format!("replay {line} --columns 16 --out out"));
+        scratch.read("out/events.csv")
+    };
+    assert_eq!(run("all.csv --cycles 900"), run("early.csv"));
+}
+
+/// What cannot be calibrated is replayed with the defaults, and that is said.
+#[test]
+fn without_findings_the_defaults_hold() {
+    let scratch = Scratch::new();
+    let list = scratch.file("few.csv", "pixel,cycle,bin\n0,1,3\n0,70,9\n");
+    let short = scratch.file("short.npy", npy("|u1", "(2, 8)", &[50; 16]));
+    let summary = scratch.replayed(&short, "");
+    let warning =
+        "no settings were found: 8 bins are too few to calibrate by; the defaults are used";
+    assert_eq!(summary["warnings"][0], warning);
+    let settings = &summary["settings"];
+    assert_eq!(settings["rule"], "paper");
+    let summary = scratch.replayed(&list, "");
+    assert_eq!(&summary["settings"]["rule"], "paper");
+    assert_eq!(summary["found"]["pulse"], "no peak is bright enough");
+}
+
+/// The recording that the README replays: nearly all pixels are right without an option.
+#[test]
+fn the_sample_recording_becomes_a_depth_map() {
+    let scratch = Scratch::new();
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
+    let scene = Scene::parse(&std::fs::read_to_string(scenes.join("room.toml")).unwrap()).unwrap();
+    scratch.replayed(&scenes.join("room.npy"), "");
+    let depth = std::fs::read(scratch.path("out/depth.npy")).unwrap();
+    let (depth, _) = depth[256..].as_chunks::<8>();
+    let is_right = |(pixel, depth): &(u16, &[u8; 8])| {
+        let truth = scene.truth(PixelAddress::new(*pixel), 0).unwrap();
+        (f64::from_le_bytes(**depth) - truth.range_mm).abs() < 30.0
+    };
+    let right = (0..).zip(depth).filter(is_right).count();
+    // One is hot, and a few have too few photons.
+    assert!(right >= 755 && depth.len() == 768, "{right}");
 }

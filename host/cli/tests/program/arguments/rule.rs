@@ -28,8 +28,8 @@ fn replayed(options: &str) -> (Value, String) {
 }
 
 #[test]
-fn without_an_option_it_is_the_papers_rule_and_centroid() {
-    let (settings, events) = replayed("");
+fn an_option_of_detection_takes_the_papers_rule_and_centroid_for_the_rest() {
+    let (settings, events) = replayed("--min-count 5");
     assert_eq!(settings["rule"], "paper");
     assert_eq!(settings["estimator"], "centroid");
     assert_eq!(settings["alpha"], 4.0);
@@ -64,7 +64,10 @@ fn half_widths_move_the_depth() {
     // The file's own pulse changes nothing, another has windows of its own.
     assert_eq!(with("--sigma-bins 1"), skew);
     assert_eq!(with("--sigma-bins 0.9"), replayed("--sigma-bins 0.9").1);
-    assert_eq!(with("--estimator centroid"), replayed("").1);
+    assert_eq!(
+        with("--estimator centroid"),
+        replayed("--estimator centroid").1
+    );
 }
 
 /// The peak has 44 of the 59 photons of 44 laser cycles in two bins: the average of 128 is

@@ -24,7 +24,7 @@ fn every_order_and_type_gives_the_same_events() {
         ("one.npz", "--axes captures,rows,columns,bins"),
         ("two.npz", "--axes captures,rows,columns,bins --array lit"),
     ] {
-        let options = format!("{options} --recorded-cycles 100");
+        let options = format!("{options} --recorded-cycles 100 --rule paper");
         let summary = scratch.replayed(&array(name), &options);
         assert_eq!(
             [&summary["pixels"], &summary["photons"]],
@@ -164,12 +164,16 @@ fn what_is_surely_wrong_is_said() {
     let dark = scratch.file("dark.npy", npy("|u1", "(2, 8)", &[0; 16]));
     warned(&dark, "", "no photons: all 2 histograms are empty");
     let plain = array("plain.npy");
-    warned(&plain, "--bin-width-ps 0.25", "0.250 ns are 250");
+    warned(
+        &plain,
+        "--rule paper --bin-width-ps 0.25",
+        "0.250 ns are 250",
+    );
     // 16 bins, the pulse in bin 9, before 4 rows of 8 columns.
     let mut counts = vec![10u8; 16 * 32];
     counts[9 * 32..10 * 32].fill(200);
     let turned = scratch.file("turned.npy", npy("|u1", "(16, 4, 8)", &counts));
-    warned(&turned, "", "the first axis looks like the bins");
+    warned(&turned, "--rule paper", "the first axis looks like the bins");
     let summary = scratch.replayed(&turned, "--axes bins,rows,columns");
     assert_eq!(summary["warnings"], serde_json::json!([]));
 }

@@ -273,13 +273,13 @@ fn dynamic_depth_is_shown_over_time_where_it_is_asked_for() {
     let far = steady(0, 60, 1000);
     let near = (1000..2000).map(|cycle| format!("0,{cycle},40\n"));
     let input = scratch.file("photons.csv", far + &near.collect::<String>());
-    scratch.replayed(&input, "");
+    scratch.replayed(&input, "--rule paper");
     let (plain, events) = (
         scratch.read("out/report.html"),
         scratch.read("out/events.csv"),
     );
     assert!(!plain.contains("Dynamic depth"));
-    scratch.replayed(&input, "--dynamic-depth");
+    scratch.replayed(&input, "--rule paper --dynamic-depth");
     let shown = scratch.read("out/report.html");
     assert!(shown.contains("<figcaption>Dynamic depth: 3 changes in place of 45 events."));
     let figures = |report: &str| report.matches("<svg").count();
@@ -287,7 +287,7 @@ fn dynamic_depth_is_shown_over_time_where_it_is_asked_for() {
     assert_eq!(scratch.read("out/events.csv"), events);
     // More than a third of 20 bins; a wall has no changes.
     for options in ["--threshold-mm 300", "--cycles 1000"] {
-        scratch.replayed(&input, &format!("--dynamic-depth {options}"));
+        scratch.replayed(&input, &format!("--rule paper --dynamic-depth {options}"));
         assert_eq!(figures(&scratch.read("out/report.html")), figures(&plain));
     }
 }
@@ -296,7 +296,7 @@ fn dynamic_depth_is_shown_over_time_where_it_is_asked_for() {
 fn replay_takes_the_stated_defaults_and_keeps_quiet() {
     let scratch = Scratch::new();
     let input = scratch.file("photons.csv", steady(0, 60, 100));
-    let output = scratch.replay(&input, "--quiet");
+    let output = scratch.replay(&input, "--alpha 4 --quiet");
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
     let summary = scratch.summary();
     let settings = serde_json::json!({
