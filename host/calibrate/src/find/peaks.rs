@@ -59,7 +59,8 @@ impl Peak {
 }
 
 /// For each bin whether it holds significantly more than the background, alone or with both neighbours.
-/// In a group of three, only the bins above the background by a standard deviation count.
+/// In a group of three, only the bins above the background by a standard deviation count, and one between
+/// them: a photon two bins beside a bright bin is no peak of its own.
 fn standing(counts: &[f64], background: f64) -> Vec<bool> {
     let mut stands: Vec<bool> = counts
         .iter()
@@ -67,9 +68,10 @@ fn standing(counts: &[f64], background: f64) -> Vec<bool> {
         .collect();
     for (first, three) in counts.windows(3).enumerate() {
         if is_surely_more(three.iter().sum(), 3.0 * background, ONE_IN) {
-            for (bin, &count) in (first..).zip(three) {
-                stands[bin] |= count > background + background.sqrt();
-            }
+            let counts = |at: usize| three[at] > background + background.sqrt();
+            stands[first] |= counts(0);
+            stands[first + 1] |= counts(1) || (counts(0) && counts(2));
+            stands[first + 2] |= counts(2);
         }
     }
     stands
@@ -134,6 +136,15 @@ mod tests {
         assert_eq!(tops, [30, 36, 100]);
         assert!((peaks[0].photons / 5000.0 - 1.0).abs() < 0.01);
         assert!(peaks[0].last < peaks[1].first);
+    }
+
+    #[test]
+    fn a_photon_two_bins_beside_a_peak_belongs_to_it() {
+        let mut counts = vec![0.0; 64];
+        (counts[20], counts[22]) = (50.0, 1.0);
+        let peaks = Peak::all(&counts, 0.2);
+        assert_eq!(peaks.len(), 1, "{peaks:?}");
+        assert_eq!([peaks[0].first, peaks[0].top, peaks[0].last], [20, 20, 22]);
     }
 
     #[test]

@@ -173,7 +173,11 @@ fn what_is_surely_wrong_is_said() {
     let mut counts = vec![10u8; 16 * 32];
     counts[9 * 32..10 * 32].fill(200);
     let turned = scratch.file("turned.npy", npy("|u1", "(16, 4, 8)", &counts));
-    warned(&turned, "--rule paper", "the first axis looks like the bins");
+    warned(
+        &turned,
+        "--rule paper",
+        "the first axis looks like the bins",
+    );
     let summary = scratch.replayed(&turned, "--axes bins,rows,columns");
     assert_eq!(summary["warnings"], serde_json::json!([]));
 }
