@@ -1,6 +1,6 @@
 //! The settings of a job: options, and the settings file that they override.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
@@ -21,6 +21,8 @@ pub const FRAME: &[&str] = &["frame"];
 pub struct Given {
     /// The settings file.
     pub file: Option<PathBuf>,
+    /// The text of a settings file, in place of [`Self::file`]. Errors call it "settings".
+    pub text: Option<String>,
     /// The options.
     pub options: SettingsFile,
 }
@@ -81,8 +83,11 @@ impl Given {
 
     /// The file, without `frame` if options are for pixels with events.
     pub(super) fn read(&self) -> Result<SettingsFile> {
-        let file = self.file.as_deref().map(SettingsFile::read);
-        let mut file = file.transpose()?.unwrap_or_default();
+        let mut file = match (&self.text, &self.file) {
+            (Some(text), _) => SettingsFile::parse_as(Path::new("settings"), text)?,
+            (None, Some(file)) => SettingsFile::read(file)?,
+            (None, None) => SettingsFile::default(),
+        };
         if self.given_event_option().is_some() {
             file.run.frame = None;
         }

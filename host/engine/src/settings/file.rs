@@ -72,9 +72,17 @@ impl SettingsFile {
     /// # Errors
     /// Returns one line with the name of the file, and the line or the key that is wrong.
     pub fn read(path: &Path) -> Result<Self> {
+        let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
+        Self::parse_as(path, &text)
+    }
+
+    /// Parses the text of a file, which errors call `path`.
+    ///
+    /// # Errors
+    /// Those of [`Self::read`].
+    pub fn parse_as(path: &Path, text: &str) -> Result<Self> {
         let name = || path.display().to_string();
-        let text = fs::read_to_string(path).with_context(name)?;
-        let mut file = Self::parse(&text).map_err(|error| match error.downcast_ref() {
+        let mut file = Self::parse(text).map_err(|error| match error.downcast_ref() {
             Some(Refused { key: Some(key), .. }) => {
                 let sections = SECTIONS.iter().map(|(section, ..)| *section);
                 let keys = SECTIONS
