@@ -4,15 +4,19 @@ use std::fs::File;
 use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, bail};
+use anyhow::{Context, Result, bail, ensure};
 use dtof_core::RangeScale;
+use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::{Event, Reader, Writer};
+use dtof_export::{Format, ProjectionOptions};
 use dtof_options::files::{destination, temporary_file};
 use dtof_options::progress::Progress;
+use dtof_options::{Refused, named};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyByteArray;
 
+use crate::error::{Keywords, checked, options};
 use crate::events::{Array, events, push};
 use crate::work::{Control, work};
 
@@ -35,7 +39,14 @@ fn read(path: &Path, mut control: &Control) -> Result<(Vec<u8>, Array)> {
     let (mut records, mut read) = (Vec::new(), 0usize);
     while let Some(event) = reader.next_event()? {
         match event {
-            Event::Depth(event) => push(&mut records, &event, &scale),
+            Event::Depth(event) => {
+                let cycle = event.cycle.raw();
+                ensure!(
+                    i64::try_from(cycle).is_ok(),
+                    "cycle {cycle}: must be below 2^63 here"
+                );
+                push(&mut records, &event, &scale);
+            }
             Event::DynamicDepth(_) => {
                 bail!("holds dynamic depth events; dtof export --format csv makes a table of them")
             }
@@ -58,6 +69,35 @@ pub fn write_events(
 ) -> PyResult<()> {
     work(py, None, move |_| {
         write(&path, &records, &array).with_context(|| path.display().to_string())
+    })
+}
+
+/// Writes events in `format`, as the program does from an AER file. Returns a warning about the laser rate, if
+/// it was assumed.
+#[pyfunction]
+pub fn export(
+    py: Python,
+    path: PathBuf,
+    format: &str,
+    records: PyBackedBytes,
+    array: Array,
+    keywords: Keywords,
+) -> PyResult<Option<String>> {
+    let options: ProjectionOptions = options(keywords)?;
+    let format: Format = checked(|| {
+        named(format).map_err(|reason| Refused::value("format", format, reason).into())
+    })?;
+    work(py, None, move |mut control| {
+        let place = destination(&path, &[])?;
+        let aer = temporary_file(&place.folder, ".dtof-")?.into_temp_path();
+        write(&aer, &records, &array)?;
+        let options = options.options(SettingsFile::default())?;
+        let done = dtof_export::export(&aer, &path, format, &options, &mut control)?;
+        ensure!(
+            done.late == 0,
+            "events are not in the order of their laser cycles"
+        );
+        Ok(done.warning)
     })
 }
 

@@ -3,8 +3,11 @@
 use std::any::Any;
 use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::Path;
 
+use dtof_engine::settings::SettingsFile;
 use dtof_options::{Options, option_name};
+use dtof_run::given::Given;
 use pyo3::exceptions::PyValueError;
 use pyo3::{PyErr, PyResult};
 
@@ -31,6 +34,47 @@ pub fn catch_panics<T>(job: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Resul
 /// The options of a job, from keywords and their values as texts.
 pub fn options<O: Options>(keywords: Keywords) -> PyResult<O> {
     checked(|| Ok(dtof_options::read(keywords)?))
+}
+
+/// Jobs whose options override a settings file.
+pub trait OverSettings: Options {
+    /// Their settings.
+    fn given(&mut self) -> &mut Given;
+}
+
+macro_rules! over_settings {
+    ($($options:ty),+) => {
+        $(impl OverSettings for $options {
+            fn given(&mut self) -> &mut Given {
+                &mut self.given
+            }
+        })+
+    };
+}
+over_settings!(
+    dtof_run::replay::Options,
+    dtof_run::simulate::Options,
+    dtof_run::compare::Options,
+    dtof_run::given::Operation
+);
+
+/// The same for a job with settings: the name of a file, or a text of several lines.
+pub fn options_over<O: OverSettings>(mut keywords: Keywords) -> PyResult<O> {
+    let is_text = |(key, value): &mut (String, OsString)| {
+        key == "settings" && value.to_str().is_some_and(|text| text.contains('\n'))
+    };
+    let text = keywords.extract_if(.., is_text).last();
+    let mut options: O = options(keywords)?;
+    options.given().text = text.and_then(|(_, text)| text.into_string().ok());
+    Ok(options)
+}
+
+/// Settings from the name of a file, or from a text of several lines.
+pub fn settings(given: &str) -> anyhow::Result<SettingsFile> {
+    match given.contains('\n') {
+        true => SettingsFile::parse_as(Path::new("settings"), given),
+        false => SettingsFile::read(Path::new(given)),
+    }
 }
 
 /// Keywords and their values as texts.

@@ -137,6 +137,11 @@ fn event(record: &[u8; RECORD]) -> Result<DepthEvent> {
     let [flags, level, echo] = [record[40], record[41], record[42]];
     let cycle =
         u64::from(u32::from_le_bytes(four(0))) | u64::from(u32::from_le_bytes(four(4))) << 32;
+    ensure!(
+        i64::try_from(cycle).is_ok(),
+        "cycle {}: must be at least 0",
+        cycle.cast_signed()
+    );
     Ok(DepthEvent {
         pixel: PixelAddress::new(two(8)),
         level: BlockLevel::new(level)

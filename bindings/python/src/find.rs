@@ -1,7 +1,5 @@
 //! Settings for a recording, a scene or a rate of false alarms.
 
-use std::path::PathBuf;
-
 use dtof_calibrate::{remarks, report};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::rows::Row;
@@ -12,7 +10,7 @@ use dtof_run::tune::Options as TuneOptions;
 use pyo3::prelude::*;
 use std::sync::Mutex;
 
-use crate::error::{Keywords, options};
+use crate::error::{Keywords, options, options_over, settings};
 use crate::input::PyInput;
 use crate::run::SceneInput;
 use crate::work::work;
@@ -35,13 +33,13 @@ pub struct Found {
 pub fn calibrate(
     py: Python,
     input: PyInput,
-    older: Option<PathBuf>,
+    older: Option<String>,
     keywords: Keywords,
 ) -> PyResult<Found> {
     let options: CalibrateOptions = options(keywords)?;
     let input = Input::from(input);
     work(py, None, move |_| {
-        let older = older.as_deref().map(SettingsFile::read).transpose()?;
+        let older = older.as_deref().map(settings).transpose()?;
         let requested = options.requested(older.as_ref())?;
         let calibrated = options.calibrate(&input, requested.clone());
         let CalibrateResult {
@@ -95,7 +93,7 @@ pub fn compare(
     keywords: Keywords,
     progress: Option<Bound<PyAny>>,
 ) -> PyResult<Answer> {
-    let options: CompareOptions = options(keywords)?;
+    let options: CompareOptions = options_over(keywords)?;
     work(py, progress, move |control| {
         let requested = options.requested(photons.scene.is_some())?;
         let input = match (photons.recording, &photons.scene) {

@@ -12,6 +12,7 @@ mod load;
 mod maps;
 mod part;
 mod pixel;
+mod pixels;
 mod run;
 mod work;
 
@@ -22,6 +23,7 @@ fn _native(module: &Bound<PyModule>) -> PyResult<()> {
     module.add("Error", module.py().get_type::<error::Error>())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;
     module.add_class::<pixel::Pixel>()?;
+    module.add_class::<pixels::Pixels>()?;
     module.add_function(wrap_pyfunction!(run::replay, module)?)?;
     module.add_function(wrap_pyfunction!(run::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(load::load, module)?)?;
@@ -33,6 +35,7 @@ fn _native(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(work::use_threads, module)?)?;
     module.add_function(wrap_pyfunction!(aer::read_events, module)?)?;
     module.add_function(wrap_pyfunction!(aer::write_events, module)?)?;
+    module.add_function(wrap_pyfunction!(aer::export, module)?)?;
     module.add_function(wrap_pyfunction!(maps::maps, module)?)?;
     module.add_function(wrap_pyfunction!(maps::points, module)?)?;
     Ok(())

@@ -8,7 +8,7 @@ use dtof_run::replay::Options;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
-use crate::error::{Keywords, checked, options};
+use crate::error::{Keywords, checked, options_over};
 use crate::input::PyInput;
 use crate::work::work;
 
@@ -32,7 +32,7 @@ pub struct Loaded<'py> {
 /// Reads a recording as counts. Photon lists are summed over their laser cycles.
 #[pyfunction]
 pub fn load<'py>(py: Python<'py>, input: PyInput, keywords: Keywords) -> PyResult<Loaded<'py>> {
-    let options: Options = options(keywords)?;
+    let options: Options = options_over(keywords)?;
     let input = Input::from(input);
     let counts = work(py, None, move |_| {
         let requested = options.requested()?;

@@ -11,7 +11,7 @@ use dtof_run::replay::Options;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 
-use crate::error::{Keywords, checked, options};
+use crate::error::{Keywords, checked, options_over};
 
 /// The layout of a recording that is replayed in parts: rows and columns of all captures together, the
 /// number of captures, the photons of each pixel as numbers of 8 bytes, photons in bins that were cut off,
@@ -46,7 +46,7 @@ impl PyLayout {
 /// Checks the options of a replay.
 #[pyfunction]
 pub fn check_options(keywords: Keywords) -> PyResult<()> {
-    options::<Options>(keywords).map(drop)
+    options_over::<Options>(keywords).map(drop)
 }
 
 /// How many times as bright crosstalk of the cover glass is as in `settings`, and at least, if it is

@@ -12,7 +12,7 @@ use dtof_run::given::Operation;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
-use crate::error::{Keywords, checked};
+use crate::error::{Keywords, checked, options_over};
 use crate::events::push;
 
 /// A pixel of any number of bins.
@@ -103,7 +103,8 @@ pub struct Pixel {
 impl Pixel {
     #[new]
     fn new(bins: usize, address: u16, keywords: Keywords) -> PyResult<Self> {
-        checked(|| Self::create(bins, address, keywords))
+        let options: Operation = options_over(keywords)?;
+        checked(|| Self::create(bins, address, &options))
     }
 
     /// Counts photons by their bins.
@@ -171,8 +172,7 @@ impl Pixel {
 }
 
 impl Pixel {
-    fn create(bins: usize, address: u16, keywords: Keywords) -> Result<Self> {
-        let options: Operation = dtof_options::read(keywords)?;
+    fn create(bins: usize, address: u16, options: &Operation) -> Result<Self> {
         let requested = options.given.merged()?;
         let create = || {
             let settings = requested.settings(bins)?;

@@ -18,7 +18,7 @@ use dtof_simulate::scene::Scene;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
-use crate::error::{Keywords, checked, options};
+use crate::error::{Keywords, checked, options_over};
 use crate::events::{Array, RECORD, push};
 use crate::input::PyInput;
 use crate::part::PyLayout;
@@ -60,7 +60,7 @@ pub fn replay<'py>(
     layout: Option<PyLayout>,
     cycles: Option<u64>,
 ) -> PyResult<PyRunResult<'py>> {
-    let options: Options = options(keywords)?;
+    let options: Options = options_over(keywords)?;
     let input = Input::from(input);
     let finished = work(py, progress, move |control| {
         let mut requested = options.requested()?;
@@ -101,7 +101,7 @@ pub fn simulate<'py>(
     keywords: Keywords,
     progress: Option<Bound<'py, PyAny>>,
 ) -> PyResult<PyRunResult<'py>> {
-    let options: SimulateOptions = options(keywords)?;
+    let options: SimulateOptions = options_over(keywords)?;
     let finished = work(py, progress, move |control| {
         let requested = options.requested()?;
         let finished = run_simulation(&options, &scene, requested.clone(), control);

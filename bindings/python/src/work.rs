@@ -145,7 +145,7 @@ pub fn use_threads(threads: usize) {
 }
 
 /// The threads of this process. A forked process has none of the threads of its parent.
-fn pool() -> Result<Arc<ThreadPool>> {
+pub fn pool() -> Result<Arc<ThreadPool>> {
     static POOL: Mutex<Option<Pool>> = Mutex::new(None);
     let mut current = locked(&POOL);
     let (process, requested) = (process::id(), THREADS.load(Ordering::Relaxed));

@@ -140,7 +140,7 @@ def test_a_pixel_decides_as_a_replay_and_counts_what_it_cannot_see():
     ({"dead_time": 1, **WINDOW, "binning": 1}, ["dead_time 1: cannot be used with binning"]),
     ({"dead_time": -1}, ["dead_time -1: must be a whole number from 0 to 65535"]),
     ({"dead_time": 2.5}, ["dead_time 2.5: must be a whole number"]),
-    ({"dead_time": "many"}, ["dead_time many: must be a whole number"]),
+    ({"dead_time": "many"}, ["dead_time 'many': is a text; must be: whole number, 0 to 65535"]),
 ])
 def test_what_cannot_be_used_is_refused(options, words):
     for call in (

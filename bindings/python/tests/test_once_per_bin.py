@@ -175,7 +175,7 @@ def test_histograms_and_other_values_are_refused():
         lambda: dtof.replay(counts, once_per_bin="maybe"),
         lambda: dtof.Pixel(once_per_bin="maybe"),
     ):
-        with pytest.raises(dtof.Error, match="^once_per_bin maybe: must be true or false"):
+        with pytest.raises(dtof.Error, match="^once_per_bin .maybe.: is a text; must be: True or False"):
             call()
 
 

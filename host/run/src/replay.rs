@@ -225,7 +225,8 @@ impl Options {
     fn chooses_settings(&self) -> bool {
         let describes = |key: &str| RECORDING.contains(&key) || RUN.contains(&key);
         let keys = self.given.options.keys().unwrap_or_default();
-        self.given.file.is_some() || !keys.iter().all(|key| describes(key))
+        let has_file = self.given.file.is_some() || self.given.text.is_some();
+        has_file || !keys.iter().all(|key| describes(key))
     }
 }
 

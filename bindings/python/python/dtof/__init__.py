@@ -13,11 +13,12 @@ True
 """
 
 from ._arrays import EVENT, POINT, Array
-from ._files import Recording, load, read_events, write_events
+from ._files import Recording, export, load, read_events, write_events
 from ._find import Calibration, Comparison, calibrate, compare, tune
 from ._maps import depth_map, points, reflectivity
 from ._native import Error, __version__
 from ._pixel import Pixel
+from ._pixels import Pixels
 from ._run import Replay, photons, replay, simulate
 
 __all__ = [
@@ -28,12 +29,14 @@ __all__ = [
     "Comparison",
     "Error",
     "Pixel",
+    "Pixels",
     "Recording",
     "Replay",
     "__version__",
     "calibrate",
     "compare",
     "depth_map",
+    "export",
     "load",
     "photons",
     "points",

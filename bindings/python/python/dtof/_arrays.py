@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import os
-from typing import Any, NamedTuple, Union
+from typing import Any, NamedTuple, Optional, Union
 
 import numpy
 
@@ -17,7 +17,7 @@ EVENT = numpy.dtype(
             "cycle", "pixel", "exposure", "peak_bin", "depth_bins", "range_mm", "peak_count",
             "background", "flags", "level", "echo",
         ],
-        "formats": ["<u8", "<u2", "<u2", "<u2", "<f4", "<f8", "<u4", "<u4", "u1", "u1", "u1"],
+        "formats": ["<i8", "<u2", "<u2", "<u2", "<f4", "<f8", "<u4", "<u4", "u1", "u1", "u1"],
         "offsets": [0, 8, 10, 12, 16, 24, 32, 36, 40, 41, 42],
         "itemsize": 48,
     }
@@ -36,6 +36,17 @@ POINT = numpy.dtype(
         ("t_ns", "<f8"),
     ]
 )
+
+#: The fields of a photon.
+PHOTON = ("pixel", "cycle", "bin")
+
+#: The names of dimensions, and the axes that they are.
+_AXES = {
+    "capture": "captures", "captures": "captures", "frame": "captures", "frames": "captures", "time": "captures",
+    "row": "rows", "rows": "rows", "y": "rows",
+    "column": "columns", "columns": "columns", "col": "columns", "x": "columns",
+    "bin": "bins", "bins": "bins",
+}
 
 #: A file name, or the name, the .npy header and the data of an array.
 Input = Union[str, "tuple[str, bytes, bytes]"]
@@ -68,6 +79,7 @@ def native_input(value: Any, name: str) -> Input:
     """A file or an array for the native extension. Errors call it ``name``."""
     if isinstance(value, (str, os.PathLike)):
         return os.fspath(value)
+    value = _array_of(value, name)
     if isinstance(value, numpy.ma.MaskedArray):
         raise Error(f"{name}: a masked array; fill it first, as with .filled(0)")
     try:
@@ -87,6 +99,45 @@ def native_input(value: Any, name: str) -> Input:
         raise Error(f"{name}: {_line(error)}") from error
     data = array.tobytes("F") if described["fortran_order"] else array.tobytes("C")
     return name, header.getvalue(), data
+
+
+def _array_of(value: Any, name: str) -> Any:
+    """The array of a table of photons or a sparse matrix; anything else as it is."""
+    if is_table(value):
+        missing = [column for column in PHOTON if column not in value.columns]
+        if missing:
+            raise Error(
+                f"{name}: a table without a column {missing[0]}: photons have pixel, cycle and bin; "
+                "histograms are arrays, as from .to_numpy()"
+            )
+        return photon_list(*(value[column] for column in PHOTON))
+    if hasattr(value, "toarray") and hasattr(value, "nnz"):
+        if len(value.shape) != 2 or value.shape[0] > 65_536 or value.shape[1] > 4096:
+            raise Error(f"{name}: a sparse array of {value.shape}: must have at most 65536 pixels and 4096 bins")
+        return value.toarray()
+    return value
+
+
+def is_table(value: Any) -> bool:
+    """Whether ``value`` is a data frame, as of pandas."""
+    return hasattr(type(value), "columns") and hasattr(value, "to_numpy")
+
+
+def named_axes(value: Any, name: str) -> Optional[str]:
+    """The axes of an array whose dimensions have names, as of xarray; None of other arrays."""
+    if not (hasattr(value, "dims") and hasattr(value, "to_numpy")):
+        return None
+    axes = [_AXES.get(str(dim).lower()) for dim in value.dims]
+    names = [axis for axis in axes if axis is not None]
+    if len(names) < len(axes) or len(set(names)) < len(names) or "bins" not in names:
+        dims = ", ".join(map(str, value.dims))
+        raise Error(
+            f"{name}: the dimensions {dims}: must be some of captures, rows, columns and bins; rename them "
+            "with .rename, or give axes"
+        )
+    # One axis of pixels is rows.
+    return ",".join("rows" if axis == "columns" and "rows" not in names and "captures" not in names else axis
+                    for axis in names)
 
 
 def photon_list(pixel: Any, cycle: Any, bin: Any) -> numpy.ndarray:

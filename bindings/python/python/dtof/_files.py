@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from typing import Any, Optional
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy
 
 from . import _native
-from ._arrays import Array, events_of, records_of, native_input
+from ._arrays import Array, events_of, named_axes, native_input, records_of
+from ._keywords import LoadOptions, PointsOptions, takes
 from ._options import arguments
-from ._run import warn
+from ._warn import warn
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """Histograms of a recording.
 
@@ -35,15 +39,22 @@ class Recording:
     cut_off: int
     notes: dict[str, str]
 
+    def __repr__(self) -> str:
+        captures, rows, columns, bins = self.counts.shape
+        several = f"{captures} captures of " if captures > 1 else ""
+        return f"<dtof.Recording: {several}{rows}x{columns} pixels, {bins} bins of {self.bin_width_ps:g} ps>"
 
-def load(path: Any, **options: Any) -> Recording:
+
+@takes(LoadOptions)
+def load(path: Any, **options: Unpack[LoadOptions]) -> Recording:
     """Reads a recording of any format that ``dtof replay`` reads; photon lists become histograms.
 
-    ``axes``, ``array``, ``columns``, ``rebin``, ``bins`` and ``bin_width_ps`` are those of
-    :func:`replay`. Without ``cycles`` the whole photon list is read. The number of bins is that of
+    Without ``cycles`` the whole photon list is read. The number of bins is that of
     a run: a power of two from 8 to 1024.
     """
-    loaded = _native.load(native_input(path, "the array"), arguments(options))
+    if options.get("axes") is None:
+        options["axes"] = named_axes(path, "the array")
+    loaded = _native.load(native_input(path, "the array"), arguments(LoadOptions, options))
     warn(loaded["warnings"])
     shape = loaded["shape"]
     truth = loaded["truth_mm"]
@@ -77,3 +88,18 @@ def write_events(path: Any, events: Any, array: Array) -> None:
     :class:`dtof.Error` if an event is impossible for ``array``.
     """
     _native.write_events(os.fspath(path), records_of(events), array)
+
+
+@takes(PointsOptions)
+def export(
+    path: Any, events: Any, array: Array, format: Optional[str] = None, **options: Unpack[PointsOptions]
+) -> None:
+    """Writes events as ``dtof export`` does, completely or not at all.
+
+    ``format`` is csv, pcd, ply, mcap, ros2 or evt2, by default the extension of ``path``. Events are in the
+    order of their laser cycles.
+    """
+    name = os.fspath(path)
+    format = os.path.splitext(name)[1][1:].lower() if format is None else format
+    warning = _native.export(name, format, records_of(events), array, arguments(PointsOptions, options))
+    warn([] if warning is None else [warning])

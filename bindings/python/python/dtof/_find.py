@@ -6,13 +6,20 @@ import csv
 import io
 import json
 import os
-from dataclasses import dataclass, field
-from typing import Any, Callable, Optional
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Callable, Optional
+
+import numpy
 
 from . import _native
-from ._arrays import native_input
-from ._options import arguments, settings_file
-from ._run import scene_of, warn
+from ._arrays import named_axes, native_input
+from ._keywords import CalibrateOptions, CompareOptions, Settings, TuneOptions, takes
+from ._options import arguments, settings_text
+from ._run import scene_of
+from ._warn import warn
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 class _Settings:
@@ -31,7 +38,7 @@ class _Settings:
             raise _native.Error(f"{os.fspath(path)}: {error.strerror}") from error
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Calibration(_Settings):
     """The properties of a sensor, from a recording.
 
@@ -44,10 +51,13 @@ class Calibration(_Settings):
     found: dict[str, str]
     remarks: list[tuple[str, str]]
     changes: dict[str, str]
-    report: str = field(repr=False)
+    report: str
+
+    def __repr__(self) -> str:
+        return f"<dtof.Calibration: {len(self.found)} findings, {len(self.remarks)} remarks>"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Comparison(_Settings):
     """All methods on the same photons.
 
@@ -65,18 +75,25 @@ class Comparison(_Settings):
     able: dict[str, str]
     methods: list[dict[str, str]]
     stress: list[dict[str, str]]
-    chart: str = field(repr=False)
+    chart: str
+
+    def __repr__(self) -> str:
+        return f"<dtof.Comparison: {len(self.methods)} methods, {len(self.able)} exact enough>"
 
 
-def calibrate(recorded: Any, *, settings: Any = None, **options: Any) -> Calibration:
+@takes(CalibrateOptions)
+def calibrate(recorded: Any, *, settings: Settings = None, **options: Unpack[CalibrateOptions]) -> Calibration:
     """Finds background, pulse, cover glass, hot pixels and thresholds in histograms.
 
     ``recorded`` is a recording as for :func:`replay`. ``target_mm`` is the distance of a flat target
-    in millimetres. ``glass`` says whether the nearest surface is a cover glass. ``settings`` is a
-    file of older settings. Further options are those of ``dtof calibrate``.
+    in millimetres. ``glass`` says whether the nearest surface is a cover glass. ``settings`` are
+    older settings, as for :func:`replay`.
     """
-    older = None if settings is None else settings_file(settings)
-    found = _native.calibrate(native_input(recorded, "the array"), older, arguments(options))
+    older = None if settings is None else settings_text(settings)
+    if options.get("axes") is None:
+        options["axes"] = named_axes(recorded, "the array")
+    keywords = arguments(CalibrateOptions, options)
+    found = _native.calibrate(native_input(recorded, "the array"), older, keywords)
     warn(found["warnings"])
     return Calibration(
         settings=json.loads(found["settings"]),
@@ -88,27 +105,30 @@ def calibrate(recorded: Any, *, settings: Any = None, **options: Any) -> Calibra
     )
 
 
+@takes(CompareOptions)
 def compare(
     recorded: Any = None,
     *,
     scene: Any = None,
     truth: Any = None,
     progress: Optional[Callable[[str], Any]] = None,
-    **options: Any,
+    **options: Unpack[CompareOptions],
 ) -> Comparison:
     """Compares all methods on a recording or a scene, and recommends one.
 
     Takes ``recorded``, a recording as for :func:`replay`, or ``scene``, as for :func:`simulate`.
     ``truth`` is the true range of each pixel in millimetres, an array or a file; 0 means none.
     ``within`` is the largest error of 68 % of the reports, in millimetres. ``progress(step)`` is
-    called with each step. Further options are those of ``dtof compare``.
+    called with each step.
     """
+    if options.get("axes") is None:
+        options["axes"] = named_axes(recorded, "the array")
     compared = _CompareInput(
         recording=None if recorded is None else native_input(recorded, "the array"),
-        truth=None if truth is None else native_input(truth, "truth"),
+        truth=None if truth is None else native_input(_in_c_order(truth), "truth"),
         scene=None if scene is None else scene_of(scene),
     )
-    found = _native.compare(compared, arguments(options), progress)
+    found = _native.compare(compared, arguments(CompareOptions, options), progress)
     warn(found["warnings"])
     return Comparison(
         settings=found["settings"] and json.loads(found["settings"]),
@@ -122,15 +142,15 @@ def compare(
     )
 
 
-def tune(**options: Any) -> dict[str, Any]:
+@takes(TuneOptions)
+def tune(**options: Unpack[TuneOptions]) -> dict[str, Any]:
     """Finds α or z and L1 for a required rate of false alarms, and the performance to expect.
 
     ``background`` is in photons per bin and laser cycle, ``signal`` in photons per laser cycle,
-    ``sigma_bins`` is the standard deviation of the pulse. Further options are those of ``dtof
-    tune``. Each result has ``value``, ``unit`` and ``source``; ``"options"`` has the flags for the
+    ``sigma_bins`` is the standard deviation of the pulse. Each result has ``value``, ``unit`` and ``source``; ``"options"`` has the flags for the
     command line.
     """
-    found, flags = _native.tune(arguments(options))
+    found, flags = _native.tune(arguments(TuneOptions, options))
     return {**json.loads(found), "options": flags}
 
 
@@ -141,6 +161,10 @@ class _CompareInput:
     recording: Any
     truth: Any
     scene: Any
+
+
+def _in_c_order(truth: Any) -> Any:
+    return numpy.ascontiguousarray(truth) if isinstance(truth, numpy.ndarray) else truth
 
 
 def _table(text: str) -> list[dict[str, str]]:

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy
 
 from . import _native
 from ._arrays import POINT, Array, records_of
+from ._keywords import Echo, PointsOptions, takes
 from ._options import arguments
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 def depth_map(
-    events: Any, array: Array, *, mean: bool = False, echo: str = "strongest"
+    events: Any, array: Array, *, mean: bool = False, echo: Echo = "strongest"
 ) -> numpy.ndarray:
     """The range of the last event of each pixel in millimetres, rows by columns; NaN without one.
 
@@ -21,12 +25,12 @@ def depth_map(
     a block then counts for pixels that have never reported by themselves or in a smaller block. ``echo`` selects the echo of each exposure: ``"first"``,
     ``"last"``, ``"strongest"`` or ``"all"``.
     """
-    maps = _native.maps(records_of(events), array, arguments({"echo": echo}))
+    maps = _native.maps(records_of(events), array, arguments(PointsOptions, {"echo": echo}))
     return numpy.array(maps["mean_mm" if mean else "last_mm"]).reshape(array.shape)
 
 
 def reflectivity(
-    events: Any, array: Array, *, of: str = "signal", echo: str = "strongest"
+    events: Any, array: Array, *, of: str = "signal", echo: Echo = "strongest"
 ) -> numpy.ndarray:
     """The relative reflectivity of surfaces, rows by columns; NaN without an event.
 
@@ -35,11 +39,12 @@ def reflectivity(
     """
     if of not in ("signal", "events"):
         raise _native.Error(f'of {of!r}: must be "signal" or "events"')
-    maps = _native.maps(records_of(events), array, arguments({"echo": echo}))
+    maps = _native.maps(records_of(events), array, arguments(PointsOptions, {"echo": echo}))
     return numpy.array(maps[f"reflectivity_of_{of}"]).reshape(array.shape)
 
 
-def points(events: Any, array: Array, **options: Any) -> numpy.ndarray:
+@takes(PointsOptions)
+def points(events: Any, array: Array, **options: Unpack[PointsOptions]) -> numpy.ndarray:
     """Events as points: an array of :data:`dtof.POINT`, x, y and z in metres, t_ns in nanoseconds.
 
     The records are those of ``dtof export --format pcd``. ``fov=(horizontal, vertical)`` is in
@@ -47,5 +52,5 @@ def points(events: Any, array: Array, **options: Any) -> numpy.ndarray:
     pixel, ``laser_hz`` the laser rate in hertz (default that of ``array``, or 10 MHz), ``echo``
     selects the echo of each exposure (default ``"all"``).
     """
-    keywords = arguments(options)
+    keywords = arguments(PointsOptions, options)
     return numpy.frombuffer(_native.points(records_of(events), array, keywords), dtype=POINT)

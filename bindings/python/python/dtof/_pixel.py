@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import json
-from typing import Any, Optional
+from typing import TYPE_CHECKING, Any, Optional
 
 import numpy
 
 from . import _native
 from ._arrays import events_of
+from ._keywords import PixelOptions, takes
 from ._options import arguments
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 
 class Pixel:
     """One pixel as in the firmware, for inspection while it decides.
 
-    Options are the settings of pixels: ``rule``, ``alpha``, ``sigma_bins``, ``l1``,
-    ``l2``, ``x``, ``gate``, ``dead_time``, ``once_per_bin``, ``bin_width_ps``, ``offset_mm`` and so on.
+    Options are the settings of pixels.
     With ``once_per_bin=True``, photons of one laser cycle in one bin count once.
 
     >>> pixel = Pixel(l1=40, l2=2000, x=4)
@@ -27,10 +30,11 @@ class Pixel:
     (60.5, 0)
     """
 
-    def __init__(self, *, bins: int = 128, address: int = 0, **options: Any) -> None:
+    @takes(PixelOptions)
+    def __init__(self, *, bins: int = 128, address: int = 0, **options: Unpack[PixelOptions]) -> None:
         for name, value, most in (("bins", bins, 1024), ("address", address, 65535)):
-            _whole(name, value, most)
-        self._native = _native.Pixel(int(bins), int(address), arguments(options))
+            whole(name, value, most)
+        self._native = _native.Pixel(int(bins), int(address), arguments(PixelOptions, options))
 
     def count(self, bin: Any) -> None:
         """Counts a photon in ``bin``, or one in each of several bins. Bins past the last are rejected.
@@ -50,7 +54,7 @@ class Pixel:
 
         With ``once_per_bin=True``, all photons since the last call are of one laser cycle, even if
         ``cycles`` is more than 1."""
-        record = self._native.end_laser_cycles(_whole("cycles", cycles, 65535))
+        record = self._native.end_laser_cycles(whole("cycles", cycles, 65535))
         return None if record is None else events_of(record)[0]
 
     @property
@@ -83,7 +87,7 @@ class Pixel:
         return settings
 
 
-def _whole(name: str, value: Any, most: int) -> int:
+def whole(name: str, value: Any, most: int) -> int:
     is_whole = isinstance(value, (int, numpy.integer)) and not isinstance(value, bool)
     if not is_whole or not 0 <= value <= most:
         raise _native.Error(f"{name} {value!r}: must be a whole number from 0 to {most}")

@@ -4,27 +4,34 @@ from __future__ import annotations
 
 import json
 import os
-import warnings
 from dataclasses import dataclass
-from typing import Any, Callable, Optional
+from typing import TYPE_CHECKING, Any, Callable, Optional
 
 import numpy
 
 from . import _native
-from ._arrays import Array, events_of, photon_list, native_input
+from ._arrays import PHOTON, Array, events_of, is_table, named_axes, native_input, photon_list
+from ._files import export, write_events
+from ._html import depth_image
+from ._keywords import Echo, PointsOptions, ReplayOptions, SimulateOptions, takes
 from ._maps import depth_map, points, reflectivity
 from ._options import arguments
+from ._warn import warn
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
 
 Progress = Optional[Callable[[int, int], Any]]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Replay:
     """The results of a run.
 
     ``events`` is an array of :data:`dtof.EVENT`, sorted by laser cycle, level and pixel.
     ``statistics`` has the contents of ``summary.json``; every loss is counted there. ``settings``
-    are those of the run, ``toml`` is the same as the text of a settings file.
+    are those of the run, ``toml`` is the same as the text of a settings file. Two runs are never equal:
+    compare their events.
     """
 
     events: numpy.ndarray
@@ -37,36 +44,57 @@ class Replay:
         photons, (rows, columns) = self.statistics["photons"], self.array.shape
         return f"<dtof.Replay: {self.events.size} events of {photons} photons, {rows}x{columns} pixels>"
 
-    def depth_map(self, **options: Any) -> numpy.ndarray:
+    def _repr_html_(self) -> str:
+        depth = self.depth_map()
+        reporting = f"{self.statistics['pixels_reporting']:,} of {self.statistics['pixels']:,}"
+        totals = [
+            ("depth events", f"{self.events.size:,}"), ("photons", f"{self.statistics['photons']:,}"),
+            ("laser cycles", f"{self.statistics['cycles']:,}"), ("pixels reporting", reporting),
+        ]
+        rows = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in totals)
+        return f"<table>{rows}</table>{depth_image(depth)}"
+
+    def depth_map(self, *, mean: bool = False, echo: Echo = "strongest") -> numpy.ndarray:
         """See :func:`dtof.depth_map`."""
-        return depth_map(self.events, self.array, **options)
+        return depth_map(self.events, self.array, mean=mean, echo=echo)
 
-    def reflectivity(self, **options: Any) -> numpy.ndarray:
+    def reflectivity(self, *, of: str = "signal", echo: Echo = "strongest") -> numpy.ndarray:
         """See :func:`dtof.reflectivity`."""
-        return reflectivity(self.events, self.array, **options)
+        return reflectivity(self.events, self.array, of=of, echo=echo)
 
-    def points(self, **options: Any) -> numpy.ndarray:
+    @takes(PointsOptions)
+    def points(self, **options: Unpack[PointsOptions]) -> numpy.ndarray:
         """See :func:`dtof.points`."""
         return points(self.events, self.array, **options)
 
+    def write_events(self, path: Any) -> None:
+        """Writes the events as an AER file; see :func:`dtof.write_events`."""
+        write_events(path, self.events, self.array)
 
+    @takes(PointsOptions)
+    def export(self, path: Any, format: Optional[str] = None, **options: Unpack[PointsOptions]) -> None:
+        """See :func:`dtof.export`."""
+        export(path, self.events, self.array, format, **options)
+
+
+@takes(ReplayOptions)
 def replay(
-    recorded: Any, *, axis: int = -1, progress: Progress = None, **options: Any
+    recorded: Any, *, axis: int = -1, progress: Progress = None, **options: Unpack[ReplayOptions]
 ) -> Replay:
     """Turns a recording into depth events.
 
     ``recorded`` is the name of a file (``.npy``, ``.npz``, ``.csv``, or the ``.json`` log of a
     TMF8820 or TMF8829), an array of histograms, or an array of photons with the fields ``pixel``,
-    ``cycle`` and ``bin``. Counts are whole numbers from 0, of any type. The bins of an array are
+    ``cycle`` and ``bin``. A data frame with these columns, a sparse matrix of pixels and bins, and an
+    xarray with dimensions row, column, bin and capture (or y, x, time) are read, too. Counts are whole numbers from 0, of any type. The bins of an array are
     its axis ``axis``; the one before it are columns and all others rows. ``axes`` names all of
     them instead: ``axes="captures,rows,columns,bins"``. At most 65,536 pixels and 4096 bins.
 
     ``photons_per_cycle`` (1.0, in the brightest pixel) or ``recorded_cycles`` determine how long
     histograms were recorded. ``cycles`` (10,000) laser cycles are replayed with random ``seed`` (1).
-    Other options of ``dtof replay`` are keywords, with ``_`` instead of ``-``: ``rule="window",
-    sigma_bins=0.8, gate=(12, 119), mask=[3, 70]``. An empty ``mask`` is the same as none.
-    Without ``settings`` and without an option of detection, the settings are those of :func:`calibrate`.
-    ``settings`` is the name of a settings file. Options of reports and files are not available:
+    ``settings`` is the name or the text of a settings file, a dict of its sections, or a calibration, a
+    comparison or a run. Without ``settings`` and without an option of detection, the settings are those of
+    :func:`calibrate`. Options of reports and files are not available:
     ``echo``, ``dynamic_depth``, ``threshold_mm``, ``reference`` and ``no_csv``.
 
     ``progress(done, total)`` is called about 20 times a second with laser cycles. An exception in it
@@ -76,31 +104,36 @@ def replay(
     """
     if axis != -1:
         recorded = _bins_last(recorded, axis, options)
+    elif options.get("axes") is None:
+        options["axes"] = named_axes(recorded, "the array")
     source = native_input(recorded, "the array")
-    return result(_native.replay(source, arguments(options), progress, None))
+    return result(_native.replay(source, arguments(ReplayOptions, options), progress, None))
 
 
+@takes(ReplayOptions)
 def photons(
-    pixel: Any, cycle: Any, bin: Any, *, progress: Progress = None, **options: Any
+    pixel: Any, cycle: Any = None, bin: Any = None, *, progress: Progress = None, **options: Unpack[ReplayOptions]
 ) -> Replay:
     """Turns single photons into depth events.
 
     ``pixel``, ``cycle`` and ``bin`` are integers from 0, one per photon, or one number for all
-    photons. Laser cycles must not decrease. ``columns`` is the width of the array (default: one
+    photons. ``photons(array)`` takes all of them in one: an N×3 array of integers with the columns pixel,
+    cycle and bin, or an array or a data frame with these fields. Laser cycles must not decrease. ``columns`` is the width of the array (default: one
     row), ``bins`` the number of bins (128). All laser cycles up to the last photon are replayed,
     or as many as ``cycles`` or a settings file requests. Further options are those of
     :func:`replay`. The photons are copied twice; if they do not fit into memory, save them with
     ``numpy.save`` and replay the file, with ``cycles``.
     """
-    listed = photon_list(pixel, cycle, bin)
+    listed = photon_list(*_columns(pixel) if cycle is None and bin is None else (pixel, cycle, bin))
     # Laser cycles do not decrease. Invalid values are refused later.
     last = int(listed["cycle"][-1]) if listed.size else 0
     cycles = min(max(last, 0) + 1, 2**63 - 1)
     source = native_input(listed, "photons")
-    return result(_native.replay(source, arguments(options), progress, None, cycles))
+    return result(_native.replay(source, arguments(ReplayOptions, options), progress, None, cycles))
 
 
-def simulate(scene: Any, *, progress: Progress = None, **options: Any) -> Replay:
+@takes(SimulateOptions)
+def simulate(scene: Any, *, progress: Progress = None, **options: Unpack[SimulateOptions]) -> Replay:
     """Simulates a scene.
 
     ``scene`` is the name of a scene file, or the text of one (several lines).
@@ -108,7 +141,7 @@ def simulate(scene: Any, *, progress: Progress = None, **options: Any) -> Replay
     simulate``, further options those of :func:`replay`. ``statistics["against_truth"]`` compares
     the events with the scene.
     """
-    return result(_native.simulate(scene_of(scene), arguments(options), progress))
+    return result(_native.simulate(scene_of(scene), arguments(SimulateOptions, options), progress))
 
 
 def scene_of(scene: Any) -> Any:
@@ -135,16 +168,24 @@ def quiet_result(done: dict[str, Any]) -> Replay:
     )
 
 
-def warn(lines: list[str], callers: int = 2) -> None:
-    """Issues warnings about a recording.
+def _columns(photons: Any) -> tuple[Any, ...]:
+    """Pixel, cycle and bin of a list of photons."""
+    names = getattr(getattr(photons, "dtype", None), "names", None)
+    if is_table(photons) or names is not None:
+        missing = [name for name in PHOTON if name not in (photons.columns if names is None else names)]
+        if missing:
+            raise _native.Error(f"photons: {missing[0]} is missing: must be pixel, cycle and bin")
+        return tuple(photons[name] for name in PHOTON)
+    try:
+        array = numpy.asarray(photons)
+    except (TypeError, ValueError) as error:
+        raise _native.Error("photons: not an array: must be pixel, cycle and bin") from error
+    if array.ndim != 2 or array.shape[1] != 3:
+        raise _native.Error(f"photons: an array of {array.shape}: give pixel, cycle and bin, or an array of N×3")
+    return tuple(array.T)
 
-    They name the line ``callers`` levels up: 2 if the user called the caller of this function.
-    """
-    for line in lines:
-        warnings.warn(line, UserWarning, stacklevel=callers + 1)
 
-
-def _bins_last(recorded: Any, axis: int, options: dict[str, Any]) -> numpy.ndarray:
+def _bins_last(recorded: Any, axis: int, options: Any) -> numpy.ndarray:
     if options.get("axes") is not None:
         raise _native.Error("axis and axes: give one of them")
     if isinstance(recorded, (str, os.PathLike)):

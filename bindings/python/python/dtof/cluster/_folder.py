@@ -37,7 +37,7 @@ class Folder:
         self._folder = folder
         self._events = f"events.{events}"
         self._request = _request(file, keywords)
-        self._inputs = [file, *_settings(keywords)]
+        self._inputs = [file, *(name for name in _settings(keywords) if "\n" not in name)]
 
     def kept_statistics(self) -> Optional[dict[str, Any]]:
         """The statistics of an earlier run with the same request, if its files are unchanged."""
@@ -139,6 +139,9 @@ def _request(file: str, keywords: Keywords) -> dict[str, Any]:
 
 
 def _hash(name: str) -> str:
+    """The hash of a file, or of a text of several lines."""
+    if "\n" in name:
+        return hashlib.sha256(name.encode()).hexdigest()
     try:
         digest = hashlib.sha256()
         with open(name, "rb") as file:

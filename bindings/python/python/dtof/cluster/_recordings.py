@@ -11,8 +11,10 @@ from typing import Any, Optional, Union
 from distributed import Client
 
 from .. import _native
-from .._options import arguments
-from .._run import Replay, warn
+from .._keywords import ReplayOptions
+from .._options import absolute, arguments
+from .._run import Replay
+from .._warn import warn
 from ._client import Progress, line, check_workers, totals, wait_for
 from ._folder import FORMATS
 from ._recording import Task, run_task
@@ -92,9 +94,8 @@ def recordings(
     ``progress(done, all)`` is called after each recording.
     """
     given = _files(files)
-    if options.get("settings") is not None:
-        options["settings"] = os.path.abspath(options["settings"])
-    keywords = arguments(options)
+    options["settings"] = absolute(options.get("settings"))
+    keywords = arguments(ReplayOptions, options)
     _native.check_options(keywords)
     if events not in FORMATS:
         raise _native.Error(f"events {events!r}: must be one of {', '.join(FORMATS)}")

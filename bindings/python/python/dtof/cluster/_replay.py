@@ -11,8 +11,10 @@ from distributed import Client
 
 from .. import _native
 from .._arrays import EVENT, Array, native_input
-from .._options import Keywords, arguments
-from .._run import Replay, quiet_result, warn
+from .._keywords import ReplayOptions
+from .._options import Keywords, absolute, arguments
+from .._run import Replay, quiet_result
+from .._warn import warn
 from ._client import Progress, check_workers, totals, wait_for
 from ._split import Split, blocks_of_file, split
 from ._worker import begin
@@ -53,9 +55,8 @@ def replay(
     after each part, twice for each.
     """
     check_workers(client)
-    if options.get("settings") is not None:
-        options["settings"] = os.path.abspath(options["settings"])
-    keywords = arguments(options)
+    options["settings"] = absolute(options.get("settings"))
+    keywords = arguments(ReplayOptions, options)
     _native.check_options(keywords)
     version, axes = _native.__version__, options.get("axes")
     if isinstance(recorded, (str, os.PathLike)):

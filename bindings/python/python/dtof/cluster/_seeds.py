@@ -14,7 +14,8 @@ from typing import Any, Optional
 from distributed import Client
 
 from .. import _native
-from .._options import Keywords, arguments, flags
+from .._keywords import SimulateOptions
+from .._options import Keywords, absolute, arguments, flags
 from .._run import quiet_result
 from ._client import Progress, check_workers, totals, wait_for
 from ._worker import begin
@@ -99,8 +100,7 @@ def seeds(
     check_workers(client)
     if "seed" in options:
         raise _native.Error("seed: give seeds instead")
-    if options.get("settings") is not None:
-        options["settings"] = os.path.abspath(options["settings"])
+    options["settings"] = absolute(options.get("settings"))
     try:
         given = [int(seed.__index__()) for seed in seeds]
     except (TypeError, AttributeError) as error:
@@ -109,7 +109,7 @@ def seeds(
     if not given or len(ordered) != len(given):
         twice = next((seed for seed in ordered if given.count(seed) > 1), None)
         raise _native.Error("seeds: there are none" if twice is None else f"seed {twice}: is given twice")
-    keywords = arguments(options)
+    keywords = arguments(SimulateOptions, options)
     text = _text(scene)
     parts = [ordered[at : at + _PART] for at in range(0, len(ordered), _PART)]
     version = _native.__version__
