@@ -31,6 +31,7 @@ fn _native(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(find::compare, module)?)?;
     module.add_function(wrap_pyfunction!(find::tune, module)?)?;
     module.add_function(wrap_pyfunction!(part::check_options, module)?)?;
+    module.add_function(wrap_pyfunction!(part::check_part_options, module)?)?;
     module.add_function(wrap_pyfunction!(part::cover_glass, module)?)?;
     module.add_function(wrap_pyfunction!(work::use_threads, module)?)?;
     module.add_function(wrap_pyfunction!(aer::read_events, module)?)?;

@@ -49,6 +49,13 @@ pub fn check_options(keywords: Keywords) -> PyResult<()> {
     options_over::<Options>(keywords).map(drop)
 }
 
+/// Checks the options of a replay in parts.
+#[pyfunction]
+pub fn check_part_options(keywords: Keywords) -> PyResult<()> {
+    let options: Options = options_over(keywords)?;
+    checked(|| Ok(options.check_for_parts()?))
+}
+
 /// How many times as bright crosstalk of the cover glass is as in `settings`, and at least, if it is
 /// significantly brighter. `bins` are all photons of `pixels` pixels in `cycles` laser cycles.
 #[pyfunction]

@@ -122,7 +122,7 @@ def test_workers_without_dtof_or_of_another_version(client, tmp_path):
 
     calls = [
         lambda: cluster.recordings(client, [file]),
-        lambda: cluster.replay(client, file),
+        lambda: cluster.replay(client, file, rule="paper"),
         lambda: cluster.seeds(client, SCENE, [1], **SMALL),
     ]
     try:
@@ -180,5 +180,7 @@ def test_pages_run_unchanged(namespace, page):
             exec(block, namespace)
     assert len(namespace["many"].results) == 3 and not namespace["many"].failed
     assert Path("results/2/events.aer").exists()
-    are_equal(namespace["run"], dtof.replay(Path("large.npy").absolute(), bin_width_ps=250), page == PAGE)
+    large = Path("large.npy").absolute()
+    expected = dtof.replay(large, settings=dtof.calibrate(large, bin_width_ps=250))
+    are_equal(namespace["run"], expected, page == PAGE)
     assert namespace["trials"].totals["events"] > 500

@@ -8,7 +8,7 @@ import pytest
 import dtof
 
 @pytest.mark.parametrize("options", [
-    {}, {"rule": "window", "sigma_bins": 0.6, "l1": 8, "tracking": True},
+    {"rule": "paper"}, {"rule": "window", "sigma_bins": 0.6, "l1": 8, "tracking": True},
     {"gate": (10, 100), "echoes": 3, "bin_width_ps": 100, "offset_mm": -20.5},
 ])
 def test_a_pixel_reports_as_in_a_replay(options):

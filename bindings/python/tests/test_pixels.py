@@ -23,7 +23,7 @@ def photons(seed, cycles=600, rows=8, columns=8, bins=64):
 
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("options", [
-    {}, {"rule": "average", "alpha": 3.5}, WINDOW, {**WINDOW, "tracking": True}, {**WINDOW, "neighbours": 8},
+    {"rule": "paper"}, {"rule": "average", "alpha": 3.5}, WINDOW, {**WINDOW, "tracking": True}, {**WINDOW, "neighbours": 8},
     {**WINDOW, "binning": 2, "patience": 30}, {"echoes": 3}, {"once_per_bin": True}, {"mask": [3, 40], "gate": (5, 50)},
     {**WINDOW, "dead_time": 5},
 ])

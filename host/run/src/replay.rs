@@ -105,8 +105,8 @@ impl Options {
     /// The same for a part of a recording with this `layout`, if there is one.
     ///
     /// # Errors
-    /// As [`Self::open`]. Also fails if `input` does not fit the layout, cuts blocks of pixels, or holds
-    /// photons, or if nothing chooses how pixels decide: a part does not show the settings of the whole.
+    /// As [`Self::open`] and [`Self::check_for_parts`]. Also fails if `input` does not fit the layout, cuts blocks
+    /// of pixels, or holds photons.
     pub fn open_part(
         &self,
         input: &Input,
@@ -117,13 +117,9 @@ impl Options {
             layout,
             ..read_options(requested)
         };
-        ensure!(
-            options.layout.is_none() || self.chooses_settings(),
-            Refused::new(
-                "settings",
-                "is needed for a recording in parts, or an option of detection: `dtof.calibrate` finds settings"
-            )
-        );
+        if options.layout.is_some() {
+            self.check_for_parts()?;
+        }
         let mut recording = check(input, &options)?;
         self.given.suits(input, recording.metadata())?;
         ensure!(
@@ -218,6 +214,18 @@ impl Options {
             metadata,
             found,
         })
+    }
+
+    /// Checks that these options suit a part of a recording.
+    ///
+    /// # Errors
+    /// Fails if nothing chooses how pixels decide: a part does not show the settings of the whole.
+    pub fn check_for_parts(&self) -> Result<(), Refused> {
+        let reason = "is needed for a recording in parts, or an option of detection: calibrate finds settings";
+        match self.chooses_settings() {
+            true => Ok(()),
+            false => Err(Refused::new("settings", reason)),
+        }
     }
 
     /// Whether the user has chosen how pixels decide, by a settings file or by an option. Options that describe

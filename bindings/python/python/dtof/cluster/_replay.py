@@ -43,6 +43,9 @@ def replay(
     worker holds more than a few parts at a time; the events are returned and have to fit into
     memory.
 
+    A part does not show the settings of the whole, so ``settings`` or an option of detection is needed:
+    ``settings=dtof.calibrate("large.npy")``, for example.
+
     ``recorded`` is a dask array, or the name of an ``.npy`` file that every worker can read. Its
     axes are those of :func:`dtof.replay`: named by ``axes``; by default the last axis is the bins,
     the one before columns, and all others rows. A chunk of a dask array is a part: it must have all
@@ -67,6 +70,7 @@ def replay(
     else:
         name, blocks = "the array", recorded
     layout = split(blocks, axes, name)
+    _native.check_part_options(keywords)
 
     counted = _on_all(client, _count, layout, version, keywords, [()] * len(layout.parts), progress, 0)
     counts = numpy.concatenate([pixels for pixels, _ in counted])
