@@ -23,7 +23,7 @@ use dtof_options::{Refused, option_name};
 pub fn run<C: Parser>(run: impl FnOnce(C) -> Result<()>) -> ExitCode {
     let done = match C::try_parse() {
         Ok(cli) => run(cli),
-        Err(error) => return refuse(&error),
+        Err(error) => return refuse(&error, &flags_of(&C::command())),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
@@ -37,13 +37,13 @@ pub fn run<C: Parser>(run: impl FnOnce(C) -> Result<()>) -> ExitCode {
 }
 
 /// Prints help, or an error with its hints in one line.
-fn refuse(error: &clap::Error) -> ExitCode {
+fn refuse(error: &clap::Error, flags: &[String]) -> ExitCode {
     if !error.use_stderr() {
         return error
             .print()
             .map_or(ExitCode::FAILURE, |()| ExitCode::SUCCESS);
     }
-    complain(&format!("error: {}", reason(error)));
+    complain(&format!("error: {}", reason(error, flags)));
     ExitCode::from(2)
 }
 
@@ -56,9 +56,18 @@ pub fn flag(key: &str) -> String {
     format!("--{}", option_name(key).replace('_', "-"))
 }
 
+/// The names of the flags of the command that the command line begins with.
+fn flags_of(command: &clap::Command) -> Vec<String> {
+    let name = std::env::args_os().nth(1).unwrap_or_default();
+    let command = command.find_subcommand(name).unwrap_or(command);
+    let flags = command.get_arguments().filter(|arg| !arg.is_hide_set());
+    let names = flags.filter_map(clap::Arg::get_long);
+    names.map(|name| name.replace('-', "_")).collect()
+}
+
 /// The reason of an error in one line.
-fn reason(error: &clap::Error) -> String {
-    if let Some(refused) = refused(error) {
+fn reason(error: &clap::Error, flags: &[String]) -> String {
+    if let Some(refused) = refused(error, flags) {
         return refused.line(&flag);
     }
     let text = error.to_string();
@@ -73,7 +82,7 @@ fn reason(error: &clap::Error) -> String {
 }
 
 /// The error in the form that settings files and Python keywords use.
-fn refused(error: &clap::Error) -> Option<Refused> {
+fn refused(error: &clap::Error, flags: &[String]) -> Option<Refused> {
     let all = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => vec![key(text)],
         Some(ContextValue::Strings(texts)) => texts.iter().map(|text| key(text)).collect(),
@@ -105,8 +114,7 @@ fn refused(error: &clap::Error) -> Option<Refused> {
             let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidArg) else {
                 return None;
             };
-            let similar = all(ContextKind::SuggestedArg);
-            Refused::unknown(name, similar.iter().map(String::as_str))
+            Refused::unknown(name, flags.iter().map(String::as_str))
         }
         ErrorKind::ArgumentConflict => {
             let others = all(ContextKind::PriorArg);

@@ -91,12 +91,10 @@ impl Refused {
         }
     }
 
-    /// No option is called `name`, as the user wrote it. Suggests the most similar of `keys`.
+    /// No option is called `name`, as the user wrote it. Suggests the most similar of `keys`, if one is.
     #[must_use]
     pub fn unknown<'a>(name: &str, keys: impl IntoIterator<Item = &'a str>) -> Self {
-        let likeness = |key: &&str| strsim::jaro(key, name.trim_start_matches('-'));
-        let similar = keys.into_iter().filter(|key| likeness(key) > 0.75);
-        let nearest = similar.max_by(|one, other| likeness(one).total_cmp(&likeness(other)));
+        let nearest = most_similar(name, keys);
         let hint = nearest.map_or(String::new(), |key| format!("; is it `{key}`?"));
         Self {
             is_unknown: true,
@@ -144,6 +142,28 @@ impl Display for Refused {
 }
 
 impl Error for Refused {}
+
+/// The key that `name` probably stands for: one that `name` begins, or that begins with it, or else the one with the
+/// fewest typing errors, at most two in five letters. Dashes, underscores and case make no difference.
+fn most_similar<'a>(name: &str, keys: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let plain = |text: &str| text.to_ascii_lowercase().replace(['-', '_'], "");
+    let name = plain(name);
+    let distance = |key: &str| {
+        let key = plain(key);
+        let shorter = name.len().min(key.len());
+        if shorter >= 2 && (key.starts_with(&name) || name.starts_with(&key)) {
+            // Nearer than a typing error, and the nearer the less is missing.
+            let missing = name.len().abs_diff(key.len());
+            return Some((0, missing));
+        }
+        let errors = strsim::damerau_levenshtein(&name, &key);
+        (5 * errors <= 2 * name.chars().count().max(key.len())).then_some((errors, 0))
+    };
+    let similar = keys
+        .into_iter()
+        .filter_map(|key| Some((distance(key)?, key)));
+    similar.min().map(|(_, key)| key)
+}
 
 /// Long lists are cut off.
 fn shortened(value: &str) -> String {
@@ -347,6 +367,35 @@ mod tests {
         ] {
             let refused = Refused::value("bin_width_ps", value, reason);
             assert_eq!(refused.reason, format!("{reason}{hint}"), "{value}");
+        }
+    }
+
+    #[test]
+    fn only_what_is_probably_meant_is_suggested() {
+        let keys = "input,bins,binning,bin_width_ps,columns,alpha,sigma_bins,l1,l2,x,z,mask,rule,min_count,gate,seed,\
+                    neighbours,cycles,recorded_cycles,out,capture";
+        for (name, expected) in [
+            ("--in", Some("input")),
+            ("--bin", Some("bins")),
+            ("--alfa", Some("alpha")),
+            ("colums", Some("columns")),
+            ("Sigma-Bins", Some("sigma_bins")),
+            ("sigma", Some("sigma_bins")),
+            ("masked", Some("mask")),
+            ("rules", Some("rule")),
+            ("binwidthps", Some("bin_width_ps")),
+            ("neighbors", Some("neighbours")),
+            ("otu", Some("out")),
+            ("l3", None),
+            ("q", None),
+            ("at", None),
+            ("age", None),
+            ("verbose", None),
+            ("temperature", None),
+            ("käse", None),
+            ("", None),
+        ] {
+            assert_eq!(most_similar(name, keys.split(',')), expected, "{name}");
         }
     }
 
