@@ -114,7 +114,8 @@ section! {
 }
 
 impl DetectionSettings {
-    /// These settings, and those of `other` that they lack, except numbers of another rule.
+    /// These settings, and those of `other` that they lack, except numbers of another rule and of what is
+    /// switched off.
     #[must_use]
     pub fn or(self, mut other: Self) -> Self {
         let decided = self.rule.or(other.rule);
@@ -131,6 +132,13 @@ impl DetectionSettings {
         }
         if self.estimator == Some(EstimatorName::Centroid) {
             other.half_widths = None;
+        }
+        // What is switched off has no numbers.
+        if self.binning == Some(0) {
+            other.patience = None;
+        }
+        if self.echoes == Some(1) {
+            other.echo_wait = None;
         }
         if self.z.is_some() || self.false_alarm.is_some() {
             (other.z, other.false_alarm) = (None, None);

@@ -57,7 +57,7 @@ impl SettingsFile {
             let reason = match sensor.dead_time {
                 Some(_) => "cannot be used with `dead_time`",
                 None => {
-                    "cannot be used with the dead time of the sensor; `dead_time` 0 leaves it out"
+                    "cannot be used with the dead time of the sensor or scene; `dead_time` 0 leaves it out"
                 }
             };
             return Err(Refused::new("neighbours", reason).into());

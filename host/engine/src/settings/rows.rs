@@ -126,7 +126,7 @@ impl Settings {
                 false => format!("{bins} bins after each photon"),
             };
             let source = match self.is_dead_time_of_sensor {
-                true => "the sensor",
+                true => "the sensor or scene",
                 false => "the settings",
             };
             rows.push(("dead time".to_owned(), format!("{text}, from {source}")));

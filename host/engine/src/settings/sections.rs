@@ -13,7 +13,7 @@ use serde::ser::{Error as _, Serializer};
 
 use dtof_options::NO_OPTION;
 use dtof_options::numbers::{
-    MAX_INTEGER, bins, fixed, integer, laser_hz, list, positive, shortest, within,
+    MAX_INTEGER, bins, fixed, integer, laser_hz, list, positive, real, shortest, within,
 };
 use dtof_photons::axes::Axes;
 use dtof_photons::geometry::{FieldOfView, Rays, angles};
@@ -179,11 +179,14 @@ fn masked(text: &str) -> Result<Vec<u16>, String> {
 /// Reads the standard deviation of a pulse in bins.
 fn pulse(text: &str) -> Result<U8F8, String> {
     const WIDEST: U8F8 = CentredWindow::WIDEST_PULSE;
-    let sigma = fixed(text)?;
-    if sigma == U8F8::ZERO || sigma > WIDEST {
-        return Err(format!("must be above 0 and at most {WIDEST}"));
+    let range = format!("must be a number above 0, at most {WIDEST}");
+    match real(text) {
+        Some(sigma) if sigma > f64::from(WIDEST) => Err(format!(
+            "{range}; `rebin` 2 halves the pulse in bins, as does a TDC with wider bins"
+        )),
+        Some(sigma) if sigma > 0.0 => fixed(text),
+        _ => Err(range),
     }
-    Ok(sigma)
 }
 
 /// Reads photons a laser cycle.

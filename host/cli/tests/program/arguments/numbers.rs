@@ -47,9 +47,10 @@ fn numbers_that_cannot_be_are_refused_in_one_line() {
             --l2 1e5 | --l2 | from 0 to 65535
             --bins 1e2 | --bins | must be a power of two from 8 to 1024
             --gate 1..x | --gate | FIRST..LAST
-            --sigma-bins 0 | --sigma-bins | must be above 0 and at most 1.75
-            --sigma-bins 1.76 | --sigma-bins | must be above 0 and at most 1.75
-            --sigma-bins 255 | --sigma-bins | must be above 0 and at most 1.75
+            --sigma-bins 0 | --sigma-bins | must be a number above 0, at most 1.75
+            --sigma-bins 1.76 | --sigma-bins | must be a number above 0, at most 1.75; --rebin 2 halves
+            --sigma-bins 300 | --sigma-bins | must be a number above 0, at most 1.75; --rebin 2
+            --sigma-bins=-1 | --sigma-bins -1 | must be a number above 0, at most 1.75
         ",
     );
     let tune = "tune --rule window --background 0.1 --signal 1 --sigma-bins 2";

@@ -144,6 +144,9 @@ fn what_contradicts_the_file_is_refused() {
             --settings width.toml --bin-width-ps 0 | error: --bin-width-ps 0: with --offset-mm 0:
             --l1 4 --l1 5 | error: --l1 is given twice
             --masked 3 | error: --masked is unknown; is it --mask?
+            --in photons.csv | error: --in is unknown; is it --input?
+            --bin 8 | error: --bin is unknown; is it --bins?
+            --verbose | error: --verbose is unknown\n
             --mask 1,2,x,4 | error: --mask 1,2,x,4: x must be a whole number from 0 to 65535
             --rule= | error: --rule needs a value
             --alpha -x | error: --alpha -x: must be a number from 0 to 255.996
@@ -155,6 +158,54 @@ fn what_contradicts_the_file_is_refused() {
         "compare --scene scene.toml --out out --cycles 100",
         "--settings gate.toml | error: scene.toml: gate.toml: gate 100..200: with 128 bins",
     );
+}
+
+#[test]
+fn an_option_switches_off_what_a_file_has_with_its_numbers() {
+    let scratch = Scratch::new();
+    photons(&scratch);
+    let text = "[detection]\nbinning = 2\npatience = 32\nechoes = 2\necho_wait = 4\n[sensor]\ncolumns = 2\n";
+    scratch.file("on.toml", text);
+    let replay = "replay photons.csv --out out --settings on.toml";
+    scratch.printed(&format!("{replay} --binning 0 --echoes 1"));
+    let settings = &scratch.summary()["settings"];
+    assert_eq!(
+        (&settings["binning"], &settings["echoes"]),
+        (&0.into(), &1.into())
+    );
+    let refused = scratch.run(&format!("{replay} --binning 0 --patience 8"));
+    assert!(
+        String::from_utf8(refused.stderr)
+            .unwrap()
+            .contains("--patience is for --binning")
+    );
+}
+
+#[test]
+fn every_key_of_a_whole_number_says_its_range() {
+    use dtof_engine::settings::{DetectionSettings, RunSettings, SensorSettings, SettingsFile};
+    let mut checked = 0;
+    for (section, keys) in [
+        ("sensor", SensorSettings::KEYS),
+        ("detection", DetectionSettings::KEYS),
+        ("run", RunSettings::KEYS),
+    ] {
+        for key in keys {
+            let error = |value| SettingsFile::parse(&format!("[{section}]\n{key} = {value}\n"));
+            // The keys that take 8 or 16, but not 8.5, nor a list.
+            let is_integer = [error("8"), error("4"), error("2")]
+                .iter()
+                .any(Result::is_ok)
+                && error("3.5").is_err();
+            if is_integer {
+                let text = error("3.5").unwrap_err().to_string();
+                assert!(text.starts_with(&format!("{key} 3.5: must be ")), "{text}");
+                assert!(text.contains("from") || text.contains("or"), "{text}");
+                checked += 1;
+            }
+        }
+    }
+    assert!(checked > 15, "{checked}");
 }
 
 /// A bin width from an option is that of the recording's bins, one from a file that of rebinned bins.
