@@ -31,6 +31,17 @@ fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {
     }
 }
 
+/// Says where the settings are that were in the output folder, unless `quiet`.
+fn say_kept(kept: Option<&Path>, quiet: bool) -> io::Result<()> {
+    match kept.filter(|_| !quiet) {
+        None => Ok(()),
+        Some(kept) => {
+            let line = format!("{} has the settings that were here", kept.display());
+            writeln!(io::stdout(), "{}", printable(&line))
+        }
+    }
+}
+
 /// The heading of what was found in a recording.
 const FOUND: &str = "Found in the recording";
 

@@ -22,14 +22,16 @@ use changes::Changes;
 use dtof_draw::svg;
 use dtof_engine::Engine;
 use dtof_engine::decisions::{Decision, KeptPixels};
-use dtof_engine::settings::{self, Settings, SettingsFile};
+use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_events::aer_file;
 use dtof_events::echoes::{Echo, EchoSelection};
 use dtof_events::events_csv::{self, range_mm};
 use dtof_events::histories::PixelHistories;
 use dtof_events::sample::Sample;
 use dtof_link::DynamicDepth;
-use dtof_options::files::{PARTIAL, flush_to_disk, is_same_file, may_replace, temporary_file};
+use dtof_options::files::{
+    PARTIAL, destination, flush_to_disk, is_same_file, may_replace, temporary_file,
+};
 use dtof_options::rows::Row;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_report::{Cloud, Decisions, Figure, Section};
@@ -184,7 +186,8 @@ impl Output {
         several.then(|| ("echoes shown".to_owned(), text.to_owned()))
     }
 
-    /// Draws the maps and moves every file to its place. The report has `sections` beside the totals.
+    /// Draws the maps and moves every file to its place. The report has `sections` beside the totals. Other settings
+    /// that were in the folder are kept; returns where.
     ///
     /// # Errors
     /// Fails if the folder cannot be written.
@@ -194,7 +197,7 @@ impl Output {
         title: &str,
         lead: &str,
         sections: &[Section],
-    ) -> Result<()> {
+    ) -> Result<Option<PathBuf>> {
         let nouns = summary.settings.reports();
         let pictures = pictures(&self.maps, self.axis_names, nouns)?;
         let changes = self.changes.as_ref();
@@ -269,12 +272,14 @@ impl Output {
         files.push(written(&depth::array(&self.maps), depth::ARRAY)?);
         files.push(written(depth::table(&self.maps).as_bytes(), depth::TABLE)?);
         files.push(written(report.as_bytes(), REPORT)?);
-        files.push(written(self.settings.to_toml()?.as_bytes(), SETTINGS)?);
+        let settings_text = self.settings.to_toml()?;
+        files.push(written(settings_text.as_bytes(), SETTINGS)?);
         let summary = serde_json::to_string_pretty(summary)? + "\n";
         files.push(written(summary.as_bytes(), SUMMARY)?);
 
         // Files may have appeared there during the run.
         may_hold_results(&self.folder, &self.inputs)?;
+        let kept = keep_edited(&self.folder.join(SETTINGS), &settings_text)?;
         for name in removed {
             let old = self.folder.join(name);
             match fs::remove_file(&old) {
@@ -289,7 +294,7 @@ impl Output {
             let moved = file.persist(&place).map_err(|error| error.error);
             moved.with_context(|| place.display().to_string())?;
         }
-        Ok(())
+        Ok(kept)
     }
 }
 
@@ -366,7 +371,6 @@ fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
         (depth::ARRAY, depth::MARK),
         (depth::TABLE, depth::HEADER),
         (REPORT, dtof_report::MARK),
-        (SETTINGS, settings::MARK),
         (SUMMARY, summary::MARK),
     ])
 }
@@ -374,7 +378,39 @@ fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
 /// Checks that no result would replace one of `inputs`, or a file that no run has written.
 fn may_hold_results(folder: &Path, inputs: &[PathBuf]) -> Result<()> {
     let inputs: Vec<&Path> = inputs.iter().map(PathBuf::as_path).collect();
+    // Settings that were there are kept, whoever wrote them.
+    destination(&folder.join(SETTINGS), &inputs)?;
     results().try_for_each(|(name, mark)| may_replace(&folder.join(name), mark, &inputs))
+}
+
+/// Renames the settings in `place`, if they are not `text`: somebody may have edited them. Returns the new name, which
+/// ends in `~1`, or in the first number that is free.
+fn keep_edited(place: &Path, text: &str) -> Result<Option<PathBuf>> {
+    let name = || place.display().to_string();
+    let there = match fs::read(place) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(error).with_context(name),
+        Ok(there) if there == text.as_bytes() => return Ok(None),
+        Ok(there) => there,
+    };
+    for number in 1u64.. {
+        let kept = place.with_file_name(format!("{SETTINGS}~{number}"));
+        if fs::read(&kept).is_ok_and(|other| other == there) {
+            return Ok(Some(kept));
+        }
+        // Fails if the name is taken, so that nothing is replaced.
+        match fs::hard_link(place, &kept) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            // Not every file system has links.
+            Err(_) if !kept.exists() => {
+                fs::rename(place, &kept).with_context(name)?;
+                return Ok(Some(kept));
+            }
+            Err(error) => return Err(error).with_context(name),
+            Ok(()) => return Ok(Some(kept)),
+        }
+    }
+    Ok(None)
 }
 
 /// Removes files that a killed run has left. Those of an export or a recording stay: it may still run.

@@ -1,7 +1,7 @@
 //! Photons through an engine, slice by slice.
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, Flags};
+use dtof_core::{DepthEvent, Flags, PixelAddress};
 
 use crate::bright::Brightness;
 use crate::glass::watch_glass;
@@ -57,6 +57,13 @@ pub fn run(
     let addresses = source.addresses();
     let is_once_per_bin = settings.once_per_bin && settings.frame.is_none();
     let mut brightness = is_once_per_bin.then(|| Brightness::new(addresses.len(), settings.bins));
+    // Laser cycles of each pixel that is left out. Its exposures all end without an event, as it has no photons.
+    let is_masked = |pixel: &PixelAddress| settings.masked.contains(&pixel.raw());
+    let masked = addresses
+        .iter()
+        .enumerate()
+        .filter(|(_, pixel)| is_masked(pixel));
+    let mut masked: Vec<(usize, u64)> = masked.map(|(place, _)| (place, 0)).collect();
     for sink in &mut *sinks {
         sink.begin(source, engine);
     }
@@ -71,6 +78,9 @@ pub fn run(
                 for pixel in array.pixels_of(event.pixel, event.level) {
                     has_reported[usize::from(pixel.raw())] = true;
                 }
+            }
+            for (place, cycles) in &mut masked {
+                *cycles += u64::from(slice.pixels[*place].cycles);
             }
             if let Some(bins) = &mut bins {
                 add_photons(slice, bins);
@@ -88,9 +98,16 @@ pub fn run(
     for sink in &mut *sinks {
         sink.end(engine);
     }
+    let x = settings.x.max(1);
+    let longest = match settings.frame {
+        Some(frame) => u64::from(frame.max(1)),
+        None => u64::from(settings.l2.div_ceil(x)) * u64::from(x),
+    };
+    let expired_masked: u64 = masked.iter().map(|(_, cycles)| cycles / longest).sum();
     let reporting = has_reported.into_iter().filter(|&has| has).count();
     let mut summary = Summary::new(engine.statistics(), source, reporting, settings);
     summary.events_confirmed = confirmed;
+    summary.expired = summary.expired.saturating_sub(expired_masked);
     watch_glass(requested, bins.as_deref(), &mut summary);
     let warning = brightness.and_then(|brightness| brightness.warning(&addresses));
     let warnings: Vec<String> = warning.into_iter().collect();

@@ -16,7 +16,7 @@ use dtof_run::replay::Options;
 
 use super::flags::Flags;
 use super::job::ResultOptions;
-use super::{FOUND, print_summary, warn};
+use super::{FOUND, print_summary, say_kept, warn};
 
 #[derive(Args)]
 pub struct Replay {
@@ -66,7 +66,8 @@ impl Replay {
             true => &[][..],
             false => &[found],
         };
-        output.finish(&summary, replay.settings.title(), &lead, sections)?;
+        let kept = output.finish(&summary, replay.settings.title(), &lead, sections)?;
+        say_kept(kept.as_deref(), quiet)?;
         if !quiet {
             print_summary(&summary, &[], &self.results.folder(Some(file)))?;
         }

@@ -15,8 +15,8 @@ use dtof_simulate::scene::Scene;
 
 use super::flags::Flags;
 use super::job::{EngineOptions, ResultOptions};
-use super::print_summary;
 use super::scene_options::SceneOptions;
+use super::{print_summary, say_kept};
 
 #[derive(Args)]
 pub struct Simulate {
@@ -104,7 +104,8 @@ impl Job<'_> {
             heading: "Surfaces",
             rows: &rows,
         }];
-        output.finish(&summary, summary.settings.title(), self.lead, &sections)?;
+        let kept = output.finish(&summary, summary.settings.title(), self.lead, &sections)?;
+        say_kept(kept.as_deref(), self.results.quiet)?;
         if !self.results.quiet {
             print_summary(&summary, &rows, &self.results.folder(self.input))?;
         }

@@ -103,7 +103,8 @@ fn settings_in_the_output_folder_are_kept() {
 
 #[test]
 fn a_file_of_somebody_else_is_kept() {
-    for name in RESULTS {
+    // Settings are kept beside those of the run.
+    for name in RESULTS.into_iter().filter(|name| *name != "dtof.toml") {
         // Of the same kind, and empty.
         for text in ["{}\n", "<svg></svg>\n", "<!DOCTYPE html>\n", PHOTONS, ""] {
             let scratch = Scratch::new();
@@ -118,6 +119,33 @@ fn a_file_of_somebody_else_is_kept() {
     scratch.file("out/demo/report.html", "mine\n");
     let name = "out/demo/report.html";
     kept(&scratch, "demo --cycles 200", name, "was not written");
+}
+
+#[test]
+fn settings_that_a_run_would_replace_are_kept_under_another_name() {
+    let scratch = Scratch::new();
+    scratch.file("photons.csv", PHOTONS);
+    scratch.printed(REPLAY);
+    let first = scratch.read("out/dtof.toml");
+    // Nothing is kept of what is the same.
+    scratch.printed(REPLAY);
+    assert!(!scratch.path("out/dtof.toml~1").exists());
+    for (number, text) in [(1, format!("{first}# mine\n")), (2, "mine\n".to_owned())] {
+        scratch.file("out/dtof.toml", &text);
+        let kept = format!("out/dtof.toml~{number}");
+        let printed = scratch.printed(REPLAY);
+        assert_contains(
+            &printed,
+            &format!("{kept} has the settings that were here\n"),
+        );
+        assert_eq!(scratch.read(&kept), text);
+        assert_eq!(scratch.read("out/dtof.toml"), first);
+    }
+    // The same text is not kept twice.
+    scratch.file("out/dtof.toml", "mine\n");
+    scratch.printed(&format!("{REPLAY} --quiet"));
+    assert!(!scratch.path("out/dtof.toml~3").exists());
+    assert_eq!(scratch.read("out/dtof.toml"), first);
 }
 
 /// This also holds after a run that was ended between any two of its files.
