@@ -52,7 +52,7 @@ pub fn calibrate(
             toml: settings.to_toml()?,
             settings: serde_json::to_string(&settings)?,
             rows: report::rows(&found),
-            remarks: remarks(&found),
+            remarks: remarks(&found, &settings),
             report: report::page(&found, &settings, &changes, &input.to_string())?,
             changes,
             warnings,

@@ -1,11 +1,13 @@
 //! Remarks: what a recording does not show, and the option that would help.
 
 use super::{Calibration, Length, Nearest, Tdc};
+use dtof_engine::settings::SettingsFile;
+use dtof_options::numbers::shortest;
 use dtof_options::rows::Row;
 
-/// Remarks on the settings, each a topic and a sentence or two.
+/// Remarks on the `settings`, each a topic and a sentence or two.
 #[must_use]
-pub fn remarks(found: &Calibration) -> Vec<Row> {
+pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
     let mut remarks = Vec::new();
     let mut remark = |topic: &str, text: String| remarks.push((topic.to_owned(), text));
     match found.length {
@@ -139,13 +141,23 @@ pub fn remarks(found: &Calibration) -> Vec<Row> {
                 "--target-mm {distance} was not used: no more than half of the pixels see a surface at \
                  one range. Put a flat target in front of more of them."
             ),
+            None if settings.sensor.offset_mm.is_some() => String::new(),
             None => {
                 "The range offset is not known: put a flat target at a known distance in front of more \
                      than half of the pixels, and pass --target-mm D."
                     .to_owned()
             }
         };
-        remark("offset", what);
+        let kept = settings.sensor.offset_mm.map(|offset| {
+            let offset = shortest(offset);
+            format!(
+                "{offset} mm are kept, from the settings or the log's sensor: this recording does not give another \
+                 range offset."
+            )
+        });
+        let texts = [what, kept.unwrap_or_default()];
+        let texts: Vec<String> = texts.into_iter().filter(|text| !text.is_empty()).collect();
+        remark("offset", texts.join(" "));
     }
     remarks
 }

@@ -88,7 +88,7 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
     );
     row(
         "offset",
-        found.offset.map_or("not known".to_owned(), |offset| {
+        found.offset.map_or("not found".to_owned(), |offset| {
             let error = 1.96 * offset.error_mm;
             format!("{:.1} mm (± {error:.1})", offset.mm)
         }),
@@ -180,7 +180,7 @@ pub fn page(
 ) -> Result<String> {
     let svg = histogram(found)?;
     let rows = rows(found);
-    let remarks = remarks(found);
+    let remarks = remarks(found, settings);
     let file: Vec<Row> = settings
         .to_toml()?
         .lines()

@@ -2,7 +2,7 @@
 
 use super::background::Level;
 use super::observed::Trace;
-use super::significance::{is_surely_more, median, quantile};
+use super::significance::{is_surely_less, is_surely_more, median, quantile};
 
 /// A hot pixel has more than this many times the background of the median pixel.
 const HOT: f64 = 10.0;
@@ -20,7 +20,8 @@ pub struct Pixels {
     pub spread: (f64, f64),
     /// Hot pixels: with many times the background of the others.
     pub hot: Vec<usize>,
-    /// Dead pixels: without a photon where others have enough for a decision.
+    /// Dead pixels: without a photon, where even the darkest of the others have so many that chance does not
+    /// explain it.
     pub dead: Vec<usize>,
 }
 
@@ -35,7 +36,12 @@ impl Pixels {
         // Most of the pixels may be dead: the median is that of pixels with photons.
         let with_photons = of.iter().filter(|pixel| pixel.total > 0.0);
         let usual = median(with_photons.map(|pixel| pixel.total));
-        let is_dead = |pixel: &Sum| pixel.total == 0.0 && usual > ONE_IN.ln();
+        // A pixel without a photon may be dark rather than dead. If some are surely darker than the median, it
+        // may be as dark as the darkest of them.
+        let darker = of.iter().map(|pixel| pixel.total);
+        let darker = darker.filter(|&total| total > 0.0 && is_surely_less(total, usual, ONE_IN));
+        let expected = darker.fold(usual, f64::min);
+        let is_dead = |pixel: &Sum| pixel.total == 0.0 && expected > ONE_IN.ln();
         let alive = of.iter().filter(|pixel| !is_dead(pixel));
         let rate = median(alive.map(Sum::rate));
         // One photon more, as the median may be 0.

@@ -102,7 +102,7 @@ impl Calibrate {
             if !changes.is_empty() {
                 write!(out, "\nSince the older settings:\n{}", aligned(&changes))?;
             }
-            for (topic, remark) in remarks(&found) {
+            for (topic, remark) in remarks(&found, &settings) {
                 write!(out, "\n{topic}: {remark}\n")?;
             }
             writeln!(out, "\nOpen {} in a browser.", place.display())?;

@@ -258,4 +258,52 @@ fn the_sample_recording_becomes_a_depth_map() {
     let right = (0..).zip(depth).filter(is_right).count();
     // One is hot, and a few have too few photons.
     assert!(right >= 755 && depth.len() == 768, "{right}");
+
+/// 8 × 8 histograms of 32 bins with so many photons a bin, pixel by pixel.
+fn even(photons: impl Fn(usize) -> [u8; 32]) -> Vec<u8> {
+    let data: Vec<u8> = (0..64).flat_map(photons).collect();
+    crate::common::npy("|u1", "(8, 8, 32)", &data)
+}
+
+#[test]
+fn a_pixel_is_dead_only_if_the_darkest_of_the_others_are_not_dark() {
+    let scratch = Scratch::new();
+    scratch.file(
+        "even.npy",
+        even(|pixel| [if pixel == 9 { 0 } else { 4 }; 32]),
+    );
+    let dark = |pixel| match pixel {
+        9 => [0; 32],
+        10..14 => {
+            let mut bins = [0; 32];
+            bins[3 + pixel] = 3;
+            bins
+        }
+        _ => [4; 32],
+    };
+    scratch.file("dark.npy", even(dark));
+    for (name, dead) in [("even", " 9"), ("dark", " none")] {
+        let printed = scratch.printed(&format!(
+            "calibrate --input {name}.npy --recorded-cycles 1000 --out {name}.toml"
+        ));
+        let row = printed
+            .lines()
+            .find(|line| line.contains("dead pixels"))
+            .unwrap();
+        assert!(row.trim_end().ends_with(dead), "{row}");
+    }
+}
+
+#[test]
+fn an_offset_of_the_older_settings_that_is_kept_is_said() {
+    let scratch = Scratch::new();
+    scratch.file("even.npy", even(|_| [4; 32]));
+    let calibrate = "calibrate --input even.npy --out new.toml";
+    let printed = scratch.printed(calibrate);
+    assert_contains(&printed, "The range offset is not known");
+    scratch.file("old.toml", "[sensor]\noffset_mm = 12.5\n");
+    let printed = scratch.printed(&format!("{calibrate} --settings old.toml"));
+    assert_contains(&printed, "offset: 12.5 mm are kept");
+    assert!(!printed.contains("not known: put"), "{printed}");
+    assert_contains(&scratch.read("new.toml"), "offset_mm = 12.5");
 }
