@@ -52,7 +52,7 @@ impl Emulator {
             image.is_file(),
             Refused::input(format!(
                 "no image at {}: run `cargo xtask image mps2-an386` in a clone of dtof; `image` takes \
-                 the path that it prints",
+                 the path that it prints, which ends in target/{IMAGE}",
                 plain(image.display())
             ))
         );
@@ -101,11 +101,17 @@ impl Emulator {
     }
 }
 
-/// Path of the image that xtask builds, found from the path of this program.
+/// Path of the image that xtask builds, in the folder where cargo has built this program, or else where it would build
+/// it in the current folder: an installed program lies elsewhere.
 fn built() -> Result<PathBuf> {
     let program = env::current_exe()?;
     let folder = program.ancestors().nth(2);
-    Ok(folder.context("a program in no folder")?.join(IMAGE))
+    let beside = folder.context("a program in no folder")?.join(IMAGE);
+    let here = PathBuf::from("target").join(IMAGE);
+    Ok(match !beside.is_file() && here.is_file() {
+        true => here,
+        false => beside,
+    })
 }
 
 /// QEMU, with the serial port of the image connected to a TCP port of this computer.

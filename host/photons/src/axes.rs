@@ -73,6 +73,9 @@ pub struct AxisLayout {
     pub array: Array,
     /// The names of columns and rows.
     pub axis_names: [&'static str; 2],
+    /// Whether the axes of pixels are surely columns and rows of one capture or of several: they have names, or there
+    /// is nothing else that they could be.
+    pub is_shape_known: bool,
 }
 
 impl AxisLayout {
@@ -94,6 +97,7 @@ impl AxisLayout {
         let last = default.0.iter_mut().rev();
         last.zip([Axis::Bins, Axis::Columns])
             .for_each(|(axis, meaning)| *axis = meaning);
+        let is_named = axes.is_some();
         let axes = axes.unwrap_or(&default);
         ensure!(
             axes.0.len() == strides.len(),
@@ -115,7 +119,10 @@ impl AxisLayout {
         let by_capture = of(Axis::Captures).count() > of(Axis::Rows).count();
         let pixels: Vec<_> = named.iter().map(|(_, stride)| *stride).collect();
         let all = pixels_of(&pixels)?;
+        // Two axes of pixels are rows and columns. More may be captures, and one may be an array that was flattened.
+        let is_shape_known = is_named || all == 1 || shape.len() == 3;
         Ok(Self {
+            is_shape_known,
             array: array(length(Axis::Columns), all / length(Axis::Captures))?,
             axis_names: ["column", if by_capture { "capture" } else { "row" }],
             pixels,

@@ -142,7 +142,8 @@ pub struct Metadata {
     pub offset_mm: Option<I24F8>,
     /// The first and the last bin that were recorded in full, if not all were.
     pub gate: Option<(u16, u16)>,
-    /// Whether rows and columns are known. A list without columns is taken for one row.
+    /// Whether rows and columns are known. A list without columns is taken for one row, and so are histograms in two axes
+    /// without names; the first of more than three axes without names may be captures.
     pub has_shape: bool,
     /// Photons in bins that were cut off.
     pub cut_off: u64,
@@ -296,6 +297,11 @@ fn read(input: &Input, options: &ReadOptions) -> Result<Content> {
 }
 
 fn kind(path: &Path) -> Result<Kind> {
+    ensure!(
+        !path.is_dir(),
+        "{}: is a folder; name a file in it",
+        path.display()
+    );
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.to_ascii_lowercase();
     let kinds = [
@@ -373,6 +379,7 @@ fn array(input: &Input, options: &ReadOptions, read: Histograms) -> Result<Conte
     let counts = fit_bins(layout.array, captures, [bins, bins], None, options);
     let mut counts = counts.with_context(|| input.to_string())?;
     counts.axis_names = layout.axis_names;
+    counts.metadata.has_shape = layout.is_shape_known;
     counts.metadata.warnings.extend(axes);
     Ok(Content::Histograms(counts))
 }

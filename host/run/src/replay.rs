@@ -155,7 +155,14 @@ impl Options {
         for (key, is_used) in of_arrays {
             ensure!(
                 metadata.has_shape || !is_used,
-                refused(Refused::new(key, "needs the array: give `columns`"))
+                refused(Refused::new(
+                    key,
+                    match metadata.is_list {
+                        true => "needs the array: give `columns`",
+                        false =>
+                            "needs the array: say with `axes` which axes are captures, rows and columns",
+                    }
+                ))
             );
         }
         if asks_neighbours {

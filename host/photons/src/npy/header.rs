@@ -124,10 +124,10 @@ impl Element {
         is_integer.then_some((size, self.kind == 'i'))
     }
 
-    /// The bytes of a float type of 32 or 64 bits.
+    /// The bytes of a float type of 16, 32 or 64 bits.
     #[must_use]
     pub fn float(&self) -> Option<u64> {
-        matches!((self.kind, self.size), ('f', 4 | 8)).then_some(self.size)
+        matches!((self.kind, self.size), ('f', 2 | 4 | 8)).then_some(self.size)
     }
 
     /// Whether the highest byte comes first.
@@ -152,9 +152,22 @@ impl Element {
                 Number::Integer(((value << bits).cast_signed() >> bits).into())
             }
             (None, Some(8)) => Number::Float(f64::from_bits(value)),
+            (None, Some(2)) => Number::Float(half(u16::try_from(value).ok()?)),
             (None, Some(_)) => Number::Float(f32::from_bits(u32::try_from(value).ok()?).into()),
             (None, None) => return None,
         })
+    }
+}
+
+/// The value of a float of 16 bits (IEEE 754 binary16).
+fn half(bits: u16) -> f64 {
+    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
+    let (exponent, fraction) = (bits >> 10 & 0x1f, f64::from(bits & 0x3ff) / 1024.0);
+    sign * match exponent {
+        0 => fraction * 2f64.powi(-14),
+        0x1f if fraction == 0.0 => f64::INFINITY,
+        0x1f => f64::NAN,
+        _ => (1.0 + fraction) * 2f64.powi(i32::from(exponent) - 15),
     }
 }
 

@@ -30,7 +30,7 @@ pub enum ElementKind {
 /// The most elements of a picture: 4096 by 4096 in three colours.
 const MOST_NUMBERS: u64 = 3 << 24;
 
-/// Reads a picture of floats of 32 or 64 bits, or of integers, little- or big-endian.
+/// Reads a picture of floats of 16, 32 or 64 bits, or of integers, little- or big-endian.
 ///
 /// # Errors
 /// Returns what is wrong with the file, after its name.

@@ -327,3 +327,77 @@ fn blocks_do_not_reach_across_captures() {
     let four = scratch.file("four.npy", npy("|u1", "(2, 4, 4, 8)", &[1; 256]));
     scratch.replayed(&four, options);
 }
+
+#[test]
+fn floats_of_16_bits_are_read() {
+    let scratch = Scratch::new();
+    // 0, 1, 1.5, 2048, infinity and not a number.
+    let halves = |last: u16| {
+        let mut all = [0u16; 16];
+        (all[3], all[9]) = (0x3c00, 0x6800);
+        all[15] = last;
+        all.iter()
+            .flat_map(|half| half.to_le_bytes())
+            .collect::<Vec<u8>>()
+    };
+    let path = scratch.file("a.npy", npy("<f2", "(1, 2, 8)", &halves(0)));
+    assert_eq!(scratch.replayed(&path, "--cycles 1e6")["photons"], 2049);
+    for (last, reason) in [
+        (0x3e00, "is 1.5"),
+        (0x7c00, "is inf"),
+        (0x7e00, "is NaN"),
+        (0xbc00, "negative"),
+    ] {
+        let path = scratch.file("b.npy", npy("<f2", "(1, 2, 8)", &halves(last)));
+        let error = String::from_utf8(scratch.replay(&path, "").stderr).unwrap();
+        assert!(
+            error.contains(reason) && error.contains("[0, 1, 7]"),
+            "{error}"
+        );
+    }
+}
+
+/// Four axes without names may have captures first; two may be an array that was flattened.
+#[test]
+fn neighbours_and_blocks_need_to_know_the_axes() {
+    let scratch = Scratch::new();
+    let counts = [1; 2 * 4 * 4 * 8];
+    let needs = "needs the array: say with --axes which axes are captures, rows and columns";
+    for (shape, names) in [
+        ("(2, 4, 4, 8)", "captures,rows,columns,bins"),
+        ("(32, 8)", "columns,bins"),
+    ] {
+        let path = scratch.file("a.npy", npy("|u1", shape, &counts));
+        for options in ["--binning 1", "--rule window --window 3 --neighbours 4"] {
+            let error = String::from_utf8(scratch.replay(&path, options).stderr).unwrap();
+            assert!(error.contains(needs), "{error}");
+        }
+        // As the axes are named, blocks are possible: each in one capture.
+        scratch.replayed(&path, &format!("--binning 1 --axes {names}"));
+        scratch.replayed(&path, "");
+    }
+    let path = scratch.file("a.npy", npy("|u1", "(8, 4, 8)", &counts));
+    scratch.replayed(&path, "--binning 1");
+}
+
+#[test]
+fn exposures_of_masked_pixels_are_not_counted() {
+    let scratch = Scratch::new();
+    let path = scratch.file("a.npy", npy("|u1", "(2, 2, 8)", &[0; 32]));
+    for (options, each) in [("", 5), ("--x 7 --l2 1999", 4), ("--frame 300", 33)] {
+        for (mask, pixels) in [("", 4), ("--mask 1", 3), ("--mask 0,1,2,3", 0)] {
+            let summary = scratch.replayed(&path, &format!("{options} {mask}"));
+            assert_eq!(summary["expired"], each * pixels, "{options} {mask}");
+        }
+    }
+}
+
+#[test]
+fn a_folder_is_no_recording() {
+    let scratch = Scratch::new();
+    std::fs::create_dir(scratch.path("a.npy")).unwrap();
+    scratch.refused(
+        &scratch.run("replay a.npy --out out"),
+        &["a.npy: is a folder; name a file in it"],
+    );
+}

@@ -106,7 +106,6 @@ fn npy_files_that_are_not_integer_histograms_are_refused() {
     let zeros = [0; 128];
     for row in table(
         "
-            <f2 | False | (8, 8) | <f2 | must be integers
             |b1 | False | (2, 64) | must be integers
             <c8 | False | (2, 8) | must be integers
             <u1 | False | (32, 4) | 4 bins | from 8 to 4096

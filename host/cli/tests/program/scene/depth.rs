@@ -269,7 +269,7 @@ fn what_is_no_depth_map_is_refused_in_a_line() {
         ("near.npy", floats("(1, 2)", &[0.0005, 1.0])),
         ("bright.npy", floats("(1, 2)", &[0.01, 1.0])),
         ("bool.npy", npy("|b1", "(1, 2)", &[1, 1])),
-        ("half.npy", npy("<f2", "(1, 2)", &[0, 60, 0, 60])),
+        ("complex.npy", npy("<c8", "(1, 2)", &[0; 16])),
         ("complex.npy", npy("<c8", "(1, 2)", &[0; 16])),
         ("short.npy", npy("<f4", "(2, 2)", &[0; 12])),
         ("text.npy", b"1.0, 2.0\n".to_vec()),
@@ -298,7 +298,7 @@ fn what_is_no_depth_map_is_refused_in_a_line() {
             --depth near.npy | near.npy | as near as 0.5 mm
             --depth bright.npy | bright.npy | 40000 signal photons a laser cycle from 10.0 mm
             --depth bool.npy | bool.npy | |b1 | must be integers, or floats
-            --depth half.npy | half.npy | <f2 | numpy.float32
+            --depth complex.npy | complex.npy | <c8 | numpy.float32
             --depth complex.npy | complex.npy | <c8
             --depth short.npy | short.npy | 12 bytes
             --depth text.npy | text.npy | not an .npy file
