@@ -258,6 +258,7 @@ fn the_sample_recording_becomes_a_depth_map() {
     let right = (0..).zip(depth).filter(is_right).count();
     // One is hot, and a few have too few photons.
     assert!(right >= 755 && depth.len() == 768, "{right}");
+}
 
 /// 8 × 8 histograms of 32 bins with so many photons a bin, pixel by pixel.
 fn even(photons: impl Fn(usize) -> [u8; 32]) -> Vec<u8> {
