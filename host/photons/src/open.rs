@@ -259,7 +259,8 @@ fn counts_of(photons: &mut dyn CountedSource, metadata: Metadata) -> Result<Coun
 fn read(input: &Input, options: &ReadOptions) -> Result<Content> {
     let kind = input.file().map_or(Ok(Kind::Array), kind)?;
     let has_records = match kind {
-        Kind::Array => records::other_fields(input)?,
+        // Three columns that `axes` names are pixels.
+        Kind::Array => records::other_fields(input, options.axes.is_some())?,
         _ => None,
     };
     let is_list = kind == Kind::Csv || has_records.is_some();
@@ -354,6 +355,13 @@ fn list<R: PhotonReader + 'static>(input: &Input, options: &ReadOptions) -> Resu
         metadata(shape.bins.into(), None, options).with_context(|| input.to_string())?;
     let photons = PhotonList::<R>::open(input, shape, options.cycles)?;
     metadata.is_list = true;
+    metadata.warnings.extend(warnings::late_photons(
+        photons.first_cycle(),
+        options.cycles,
+    ));
+    metadata
+        .warnings
+        .extend(warnings::list_shape(photons.pixels(), shape.columns));
     metadata.has_shape = shape.columns.is_some() || photons.array().pixels() == 1;
     if shape.rebin > 1 {
         let sums = format!("{} sums of {}", shape.bins, shape.rebin);

@@ -145,6 +145,8 @@ pub struct PhotonList<R> {
     places: Vec<Option<u16>>,
     array: Array,
     cycles: u64,
+    /// The laser cycle of the first photon.
+    first_cycle: u64,
     photons_per_cycle: f64,
     not_replayed: u64,
     next_cycle: u64,
@@ -168,10 +170,14 @@ impl<R: PhotonReader> PhotonList<R> {
         let mut rows = Validator::<R>::open(input, shape)?;
         let mut is_there = vec![false; Array::MOST_PIXELS as usize];
         let (mut photons, mut not_replayed, mut recorded) = (0u64, 0, 0u64);
+        let mut first_cycle = 0;
         // The span of the last photon, its photons so far, and the most photons of any span.
         let (mut span, mut of_span, mut most) = (0, 0u64, 0);
         while let Some(row) = rows.next()? {
             is_there[row.pixel()] = true;
+            if photons == 0 {
+                first_cycle = row.cycle;
+            }
             photons += 1;
             recorded = row.cycle.saturating_add(1);
             if row.cycle >= cycles {
@@ -207,12 +213,27 @@ impl<R: PhotonReader> PhotonList<R> {
             addresses,
             places,
             cycles: cycles.min(recorded),
+            first_cycle,
             photons_per_cycle: most as f64 / SPAN.min(recorded) as f64,
             not_replayed,
             next_cycle: 0,
             ahead: None,
             rows,
         })
+    }
+}
+
+impl<R> PhotonList<R> {
+    /// The laser cycle of the first photon.
+    pub fn first_cycle(&self) -> u64 {
+        self.first_cycle
+    }
+
+    /// Pixels up to the last with a photon.
+    pub fn pixels(&self) -> usize {
+        self.addresses
+            .last()
+            .map_or(0, |last| usize::from(last.raw()) + 1)
     }
 }
 

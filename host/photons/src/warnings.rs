@@ -2,6 +2,8 @@
 
 use dtof_core::fixed::types::U16F16;
 
+use dtof_options::rows::grouped;
+
 /// No SPAD resolves a picosecond, so a narrower bin was probably given in nanoseconds.
 #[must_use]
 pub fn narrow_bins(width_ps: U16F16) -> Option<String> {
@@ -22,6 +24,37 @@ pub fn empty_histograms(is_empty: impl Iterator<Item = bool>) -> Option<String> 
         empty += u32::from(is_empty);
     }
     (empty == all).then(|| format!("no photons: all {all} histograms are empty"))
+}
+
+/// Warns if the first photon of a list comes after the `cycles` laser cycles that are read.
+#[must_use]
+pub fn late_photons(first_cycle: u64, cycles: u64) -> Option<String> {
+    (first_cycle >= cycles).then(|| {
+        let (first, cycles) = (grouped(first_cycle), grouped(cycles));
+        let times = match first_cycle {
+            1_000_000_000.. => "; if these are times, turn them into laser cycles counted from 0",
+            _ => "; --cycles takes more, or count laser cycles from 0",
+        };
+        format!("no photon in the first {cycles} laser cycles: the first comes in laser cycle {first}{times}")
+    })
+}
+
+/// Warns if `columns` do not divide the `pixels` of a list, or if they are missing and the pixels would make a square.
+#[must_use]
+pub fn list_shape(pixels: usize, columns: Option<u32>) -> Option<String> {
+    let side = pixels.isqrt();
+    let square = (side >= 4 && side * side == pixels).then_some(side);
+    match (columns, square) {
+        (None, Some(side)) => Some(format!(
+            "{pixels} pixels are taken as one row; --columns {side} makes {side}x{side}"
+        )),
+        (Some(columns), _) if columns > 0 && !pixels.is_multiple_of(columns as usize) => {
+            Some(format!(
+                "{pixels} pixels do not fill rows of {columns} columns, or the last pixels have no photon"
+            ))
+        }
+        _ => None,
+    }
 }
 
 /// How much more often two photons of a line fall into one place than if they were spread evenly. 1

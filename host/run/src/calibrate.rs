@@ -43,6 +43,16 @@ impl dtof_options::Options for Options {
     }
 }
 
+/// No flat target is nearer than 20 mm, so such a distance was probably given in metres.
+fn in_metres(target_mm: f64) -> Option<String> {
+    (target_mm > 0.0 && target_mm < 20.0).then(|| {
+        let mm = target_mm * 1000.0;
+        format!(
+            "a target at {target_mm} mm: --target-mm takes millimetres; {target_mm} m are {mm:.0}"
+        )
+    })
+}
+
 fn yes_or_no(text: &str) -> Result<bool, String> {
     match text {
         "yes" => Ok(true),
@@ -87,7 +97,9 @@ impl Options {
         let found = calibrate_counts(&requested, &counts, &self.calibration);
         let found = found.with_context(|| input.to_string())?;
         let width = bin_width_warning(&counts.metadata);
-        let warnings = warnings(&counts.metadata).chain(width).collect();
+        let metres = self.calibration.target_mm.and_then(in_metres);
+        let warnings = warnings(&counts.metadata);
+        let warnings = warnings.chain(width).chain(metres).collect();
         let before = requested.or(settings_of_file(&counts.metadata, counts.array));
         Ok(CalibrateResult {
             settings: found.settings(before)?,

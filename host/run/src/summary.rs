@@ -268,6 +268,14 @@ impl Summary {
                 format!("the first decision comes after {first_decision} laser cycles"),
             ));
         }
+        if self.events == 0 && self.photons > 0 && self.gated_out == self.photons {
+            let why = "all photons are outside the range gate".to_owned();
+            rows.push(("no event".to_owned(), why));
+        }
+        if self.events == 0 && self.photons == 0 && self.masked > 0 {
+            let why = "all photons are of pixels left out".to_owned();
+            rows.push(("no event".to_owned(), why));
+        }
         // Only losses that have occurred.
         let losses = [
             ("photons outside the range gate", self.gated_out),
@@ -285,7 +293,6 @@ impl Summary {
                 "decisions where bins were hardly ever live",
                 self.blind_looks,
             ),
-            ("recorded photons not replayed", self.not_replayed),
             ("recorded photons in bins cut off", self.cut_off),
         ];
         rows.extend(
@@ -294,6 +301,15 @@ impl Summary {
                 .filter(|loss| loss.1 > 0)
                 .map(|&(name, value)| row(name, value)),
         );
+        if self.not_replayed > 0 {
+            let all = self.photons + self.masked + self.not_replayed;
+            let text = format!(
+                "{} of {}: --cycles N takes more",
+                grouped(self.not_replayed),
+                grouped(all)
+            );
+            rows.push(("recorded photons not replayed".to_owned(), text));
+        }
         if let Some([times, least]) = self.cover_glass {
             let text = format!(
                 "{times:.1} times as bright as when it was calibrated, at least {least:.1}: clean it"

@@ -63,7 +63,7 @@ fn events(dtof: &Path, host: &Path, folder: &Path) -> Result<()> {
     replay
         .arg("--out")
         .arg(&rust)
-        .args(["--bin-width-ps", "250", "--quiet"]);
+        .args(["--rule", "paper", "--bin-width-ps", "250", "--quiet"]);
     succeed(&mut replay)?;
     let found = printed(Command::new(dtof).arg("decode").arg(&c))?;
     let expected = fs::read_to_string(rust.join("events.csv"))?;

@@ -308,3 +308,15 @@ fn an_offset_of_the_older_settings_that_is_kept_is_said() {
     assert!(!printed.contains("not known: put"), "{printed}");
     assert_contains(&scratch.read("new.toml"), "offset_mm = 12.5");
 }
+
+#[test]
+fn a_distance_in_metres_is_warned_of() {
+    let scratch = Scratch::new();
+    scratch.file("even.npy", even(|_| [4; 32]));
+    let warned = |distance| {
+        let line = format!("calibrate --input even.npy --out new.toml --target-mm {distance}");
+        let error = String::from_utf8(scratch.run(&line).stderr).unwrap();
+        error.contains("--target-mm takes millimetres; 1.383 m are 1383")
+    };
+    assert!(warned("1.383") && !warned("1383"));
+}

@@ -1,11 +1,12 @@
 //! Recorded photons from a structured `.npy` array with the fields `pixel`, `cycle` and `bin`,
-//! integers of any type in any order. Other fields are ignored.
+//! integers of any type in any order. Other fields are ignored. An array of integers with three columns is the
+//! same: pixel, cycle and bin.
 
 use std::io::{BufReader, Read};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use super::header::{Elements, Field, Header};
+use super::header::{Element, Elements, Field, Header};
 use crate::input::Input;
 use crate::photon_list::{PhotonReader, RawPhoton};
 
@@ -71,18 +72,20 @@ pub struct RecordReader {
     after: u64,
 }
 
-/// The fields that are ignored, if the elements are records.
+/// The fields that are ignored, if the elements are photons. Those of an array whose axes have names are not,
+/// unless they have fields.
 ///
 /// # Errors
 /// Fails if it is not an `.npy` file; names it first.
-pub fn other_fields(input: &Input) -> Result<Option<Vec<String>>> {
+pub fn other_fields(input: &Input, has_axes: bool) -> Result<Option<Vec<String>>> {
     let header = || {
         let (file, length) = input.open()?;
         Header::read(&mut BufReader::new(file), length)
     };
     let header = header().with_context(|| input.to_string())?;
+    let is_triples = is_triples(&header) && !has_axes;
     let Elements::Records(fields) = header.elements else {
-        return Ok(None);
+        return Ok(is_triples.then(Vec::new));
     };
     let names = fields.into_iter().map(|field| field.name);
     // Padding has no name.
@@ -90,16 +93,44 @@ pub fn other_fields(input: &Input) -> Result<Option<Vec<String>>> {
     Ok(Some(others.collect()))
 }
 
+/// Whether it is an array of photons, a row each: the integers pixel, cycle and bin. No histogram has three bins.
+fn is_triples(header: &Header) -> bool {
+    let Elements::Plain(element) = &header.elements else {
+        return false;
+    };
+    matches!(header.shape[..], [_, 3]) && element.integer().is_some()
+}
+
+/// The fields of the rows of [`is_triples`].
+fn fields_of_triple(element: &Element) -> Vec<Field> {
+    let bytes = element.integer().map_or(0, |(bytes, _)| bytes.into());
+    let field = |name: &str| Field {
+        name: name.to_owned(),
+        text: element.to_string(),
+        bytes,
+        element: Some(element.clone()),
+    };
+    NAMES.map(field).into()
+}
+
 impl RecordReader {
     fn open_input(input: &Input) -> Result<Self> {
         let (file, length) = input.open()?;
         let mut file = BufReader::with_capacity(1 << 16, file);
         let header = Header::read(&mut file, length)?;
-        let &[records] = &header.shape[..] else {
-            bail!("a list of photons has one axis, not {:?}", header.shape);
-        };
-        let Elements::Records(fields) = header.elements else {
-            bail!("the elements are not records");
+        let (records, fields) = match (&header.elements, &header.shape[..]) {
+            (Elements::Records(fields), &[records]) => (records, fields.clone()),
+            (Elements::Records(_), shape) => {
+                bail!("a list of photons has one axis, not {shape:?}")
+            }
+            (Elements::Plain(element), &[records, _]) if is_triples(&header) => {
+                ensure!(
+                    !header.fortran || records <= 1,
+                    "the photons are in Fortran order; save numpy.ascontiguousarray of them"
+                );
+                (records, fields_of_triple(element))
+            }
+            (Elements::Plain(_), _) => bail!("the elements are not records"),
         };
         let record = size(&fields)?;
         Ok(Self {
@@ -188,7 +219,6 @@ fn numbers(fields: &[Field]) -> Result<[IntegerField; 3]> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::header::Element;
     use super::*;
 
     #[test]

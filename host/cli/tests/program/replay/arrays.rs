@@ -401,3 +401,95 @@ fn a_folder_is_no_recording() {
         &["a.npy: is a folder; name a file in it"],
     );
 }
+
+#[test]
+fn three_columns_of_integers_are_photons() {
+    let scratch = Scratch::new();
+    let photons: Vec<[u16; 3]> = (0..300).map(|at| [at % 3, at / 3, 60]).collect();
+    let data: Vec<u8> = photons
+        .iter()
+        .flatten()
+        .flat_map(|number| number.to_le_bytes())
+        .collect();
+    let path = scratch.file("a.npy", npy("<u2", "(300, 3)", &data));
+    let summary = scratch.replayed(&path, "--columns 3");
+    assert_eq!(
+        (&summary["photons"], &summary["pixels"]),
+        (&300.into(), &3.into())
+    );
+    assert_eq!(summary["cycles"], 100);
+    let text: String = photons
+        .iter()
+        .map(|[pixel, cycle, bin]| format!("{pixel},{cycle},{bin}\n"))
+        .collect();
+    let events = scratch.events();
+    let csv = scratch.file("a.csv", format!("pixel,cycle,bin\n{text}"));
+    scratch.replayed(&csv, "--columns 3");
+    assert_eq!(scratch.events(), events);
+    // Three pixels, as the axes say.
+    let summary = scratch.replayed(&path, "--axes bins,columns --cycles 1000000");
+    assert_eq!(summary["pixels"], 3);
+    let mut fortran = npy("<u2", "(300, 3)", &data);
+    let is_false = |part: &[u8]| part == b"False";
+    let at = fortran.windows(5).position(is_false).unwrap();
+    fortran[at..at + 5].copy_from_slice(b"True ");
+    let path = scratch.file("b.npy", fortran);
+    let error = String::from_utf8(scratch.replay(&path, "").stderr).unwrap();
+    assert_contains(&error, "b.npy: the photons are in Fortran order");
+}
+
+#[test]
+fn what_a_photon_list_leaves_open_is_said() {
+    let scratch = Scratch::new();
+    let list = |pixels: u64, first: u64| {
+        let rows =
+            (0..10 * pixels).map(|at| format!("{},{},60\n", at % pixels, first + at / pixels));
+        scratch.file(
+            "p.csv",
+            format!("pixel,cycle,bin\n{}", rows.collect::<String>()),
+        )
+    };
+    for (pixels, first, options, warning) in [
+        (
+            16,
+            0,
+            "",
+            "16 pixels are taken as one row; --columns 4 makes 4x4",
+        ),
+        (16, 0, "--columns 16", ""),
+        (16, 0, "--columns 4", ""),
+        (15, 0, "", ""),
+        (
+            15,
+            0,
+            "--columns 4",
+            "15 pixels do not fill rows of 4 columns",
+        ),
+        (3, 9999, "", ""),
+        (
+            3,
+            10_000,
+            "",
+            "--cycles takes more, or count laser cycles from 0",
+        ),
+        (
+            3,
+            1_700_000_000,
+            "",
+            "if these are times, turn them into laser cycles",
+        ),
+    ] {
+        let output = scratch.replay(&list(pixels, first), options);
+        let error = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            output.status.success() && error.is_empty() == warning.is_empty(),
+            "{error}"
+        );
+        assert_contains(&error, warning);
+    }
+    let printed = scratch.printed("replay p.csv --out out");
+    assert_contains(&printed, "30 of 30: --cycles N takes more");
+    list(3, 0);
+    let printed = scratch.printed("replay p.csv --out out --gate 100..120");
+    assert_contains(&printed, "all photons are outside the range gate");
+}
