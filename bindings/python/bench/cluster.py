@@ -38,7 +38,7 @@ def recordings(folder, photons):
 
 def speeds(workers, files, one, folder):
     """Photons a second."""
-    options = {"cycles": 10_000_000, "photons_per_cycle": 1}
+    options = {"rule": "paper", "cycles": 10_000_000, "photons_per_cycle": 1}
     found = []
 
     def many():

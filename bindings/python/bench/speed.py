@@ -49,7 +49,7 @@ def photon_list(photons):
 def main():
     program = sys.argv[1]
     photons = int(float(sys.argv[2])) if len(sys.argv) > 2 else 100_000_000
-    options = {"cycles": 10_000_000, "columns": 64}
+    options = {"rule": "paper", "cycles": 10_000_000, "columns": 64}
     with tempfile.TemporaryDirectory() as folder:
         failed = False
         for name, make in [("histograms", histograms), ("photon list", photon_list)]:
