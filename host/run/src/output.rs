@@ -67,6 +67,8 @@ pub struct Output {
     /// of the report unless it shows all.
     echo: Option<Echo>,
     selection: Option<EchoSelection>,
+    /// If pixels report several.
+    layers: Vec<depth::Layer>,
     /// If they are requested.
     changes: Option<Changes>,
     /// The pixels of the photons.
@@ -117,6 +119,7 @@ impl Output {
             decisions: None,
             echo: None,
             selection: selection(None, settings),
+            layers: depth::Layer::all(settings, array),
             changes: None,
             pixels: source.addresses(),
         })
@@ -259,9 +262,12 @@ impl Output {
             .map_err(Error::from)
             .and_then(flush_to_disk);
         let mut files = vec![(aer.with_context(|| name(AER))?, AER)];
-        // Without a summary the folder does not look complete. A table that this run does not write would
-        // be that of another run.
+        // Without a summary the folder does not look complete. A file that this run does not write would be
+        // that of another run.
         let mut removed = vec![SUMMARY];
+        if self.layers.is_empty() {
+            removed.extend(depth::LAYERS.iter().flat_map(|layer| [layer.1, layer.2]));
+        }
         match self.csv {
             Some(csv) => files.push((flush_to_disk(csv).with_context(|| name(CSV))?, CSV)),
             None => removed.push(CSV),
@@ -271,6 +277,11 @@ impl Output {
         }
         files.push(written(&depth::array(&self.maps), depth::ARRAY)?);
         files.push(written(depth::table(&self.maps).as_bytes(), depth::TABLE)?);
+        for layer in &self.layers {
+            let [array, table] = layer.names;
+            files.push(written(&depth::array(&layer.maps), array)?);
+            files.push(written(depth::table(&layer.maps).as_bytes(), table)?);
+        }
         files.push(written(report.as_bytes(), REPORT)?);
         let settings_text = self.settings.to_toml()?;
         files.push(written(settings_text.as_bytes(), SETTINGS)?);
@@ -319,6 +330,9 @@ impl Sink for Output {
             if self.echo.is_none() {
                 self.sample.add(event, range_mm(event, &self.scale));
             }
+            for layer in &mut self.layers {
+                layer.add(event, &self.scale);
+            }
             match &mut self.selection {
                 Some(selection) => selection.push(*event),
                 None => self.show(event),
@@ -330,6 +344,9 @@ impl Sink for Output {
 
     /// Shows the events that still waited for another echo of their exposure.
     fn end(&mut self, engine: &dyn Engine) {
+        for layer in &mut self.layers {
+            layer.end(&self.scale);
+        }
         if let Some(selection) = &mut self.selection {
             selection.finish();
         }
@@ -365,7 +382,10 @@ fn selection(echo: Option<Echo>, settings: &Settings) -> Option<EchoSelection> {
 /// Names of results, and the mark near the start of each.
 fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
     let pictures = pictures::NAMES.map(|name| (name, svg::MARK));
-    pictures.into_iter().chain([
+    let layers = depth::LAYERS.into_iter();
+    let layers =
+        layers.flat_map(|(_, array, table)| [(array, depth::MARK), (table, depth::HEADER)]);
+    pictures.into_iter().chain(layers).chain([
         (CSV, events_csv::HEADER),
         (AER, aer_file::MAGIC),
         (depth::ARRAY, depth::MARK),

@@ -1,14 +1,23 @@
 //! The depth map as numbers: an array for NumPy, and a table. Millimetres of each pixel, the mean of the surface
-//! that most of its last events lie on.
+//! that most of its last events lie on. If pixels report several echoes, also the depth of the nearest and of the
+//! farthest echo of each exposure.
 
 use std::fmt::Write as _;
 
+use dtof_core::{Array, DepthEvent, EchoNumber, RangeScale};
+use dtof_engine::settings::Settings;
+use dtof_events::echoes::{Echo, EchoSelection};
 use dtof_events::histories::PixelHistories;
 
 /// 64-bit floats, rows by columns; not a number without an event.
 pub const ARRAY: &str = "depth.npy";
 /// One line a pixel; the depth is empty without an event.
 pub const TABLE: &str = "depth.csv";
+/// The same of one echo of each exposure: the array and the table.
+pub const LAYERS: [(Echo, &str, &str); 2] = [
+    (Echo::First, "depth-nearest.npy", "depth-nearest.csv"),
+    (Echo::Last, "depth-farthest.npy", "depth-farthest.csv"),
+];
 /// The first line of the table.
 pub const HEADER: &str = "pixel,column,row,depth_mm";
 /// What marks the array as a result: its header ends with so many spaces. NumPy pads its own with fewer than 64.
@@ -19,6 +28,48 @@ pub const MARK: &str = match str::from_utf8(&[b' '; 128]) {
 
 /// The header's length is 246 = 0xf6, so that it ends at byte 256.
 const NPY_1_0: &[u8] = b"\x93NUMPY\x01\x00\xf6\x00";
+
+/// The depth of one echo of each exposure.
+pub struct Layer {
+    /// The names of its files.
+    pub names: [&'static str; 2],
+    selection: EchoSelection,
+    /// Its depth.
+    pub maps: PixelHistories,
+}
+
+impl Layer {
+    /// The nearest and the farthest, if the pixels of `array` report several echoes.
+    pub fn all(settings: &Settings, array: Array) -> Vec<Self> {
+        if settings.echoes == EchoNumber::FIRST || settings.frame.is_some() {
+            return Vec::new();
+        }
+        let layers = LAYERS.map(|(echo, array_name, table_name)| Self {
+            names: [array_name, table_name],
+            selection: EchoSelection::new(echo, settings.echoes, settings.l2),
+            maps: PixelHistories::new(array),
+        });
+        layers.into()
+    }
+
+    /// Takes an event.
+    pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
+        self.selection.push(*event);
+        self.take_selected(scale);
+    }
+
+    /// Takes the events that still waited for another echo of their exposure.
+    pub fn end(&mut self, scale: &RangeScale) {
+        self.selection.finish();
+        self.take_selected(scale);
+    }
+
+    fn take_selected(&mut self, scale: &RangeScale) {
+        for event in &mut self.selection {
+            self.maps.add(&event, scale);
+        }
+    }
+}
 
 /// The array.
 pub fn array(maps: &PixelHistories) -> Vec<u8> {

@@ -113,3 +113,44 @@ fn blocks_are_compared_with_what_their_pixels_see() {
     assert!(truth["bias_mm"].as_f64().unwrap().abs() < 12.0, "{truth}");
     assert_eq!(truth["surfaces"][0]["pixels"], 64);
 }
+
+/// A pane before a wall on the left, the wall alone on the right: a map of each surface, and none between.
+#[test]
+fn two_surfaces_have_two_maps() {
+    let scratch = Scratch::new();
+    let scene = scratch.file(
+        "scene.toml",
+        "columns = 8\nrows = 4\nbackground = 0.01\ncycles = 8000\n\
+         [[surface]]\nrange_mm = 3000\nsignal = 0.4\n\
+         [[surface]]\nrange_mm = 1000\nsignal = 0.4\ntransmittance = 0.8\n\
+         rectangle = { columns = [0, 4], rows = [0, 4] }\n",
+    );
+    let depths = |name: &str| -> Vec<f64> {
+        let array = std::fs::read(scratch.path(&format!("out/{name}.npy"))).unwrap();
+        let table = scratch.read(&format!("out/{name}.csv"));
+        let (depths, _) = array[256..].as_chunks();
+        let depths: Vec<f64> = depths
+            .iter()
+            .map(|bytes| f64::from_le_bytes(*bytes))
+            .collect();
+        let rows = table.lines().skip(1);
+        for (row, depth) in rows.zip(&depths) {
+            assert!(row.ends_with(&format!(",{depth:.3}")), "{row} {depth}");
+        }
+        depths
+    };
+    let are = |depths: &[f64], left: f64, right: f64| {
+        for (pixel, depth) in depths.iter().enumerate() {
+            let truth = if pixel % 8 < 4 { left } else { right };
+            assert!((depth - truth).abs() < 30.0, "{pixel}: {depth} mm");
+        }
+    };
+    scratch.simulated(&scene, &format!("{RUN} --echo-wait 4"));
+    are(&depths("depth-nearest"), 1000.0, 3000.0);
+    are(&depths("depth-farthest"), 3000.0, 3000.0);
+    // Without several echoes there is one map, and none of an earlier run.
+    scratch.simulated(&scene, "--rule window --sigma-bins 1");
+    are(&depths("depth"), 1000.0, 3000.0);
+    assert!(!scratch.path("out/depth-nearest.npy").exists());
+    assert!(!scratch.path("out/depth-farthest.csv").exists());
+}
