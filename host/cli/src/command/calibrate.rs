@@ -17,13 +17,13 @@ use dtof_run::calibrate::Options;
 
 use self::from_device::{DeviceArgs, FromDevice};
 use super::flags::Flags;
+use super::job::Recorded;
 use super::warn;
 
 #[derive(Args)]
 pub struct Calibrate {
-    /// Recording in any format that `replay` reads
-    #[arg(long, value_name = "FILE", value_parser = path(), conflicts_with = "device")]
-    input: Option<PathBuf>,
+    #[command(flatten)]
+    recorded: Recorded,
     #[command(flatten)]
     from_device: DeviceArgs,
     /// Settings file to write
@@ -52,9 +52,10 @@ impl Calibrate {
     }
 
     fn calibrate(&self, requested: &SettingsFile, older: Option<SettingsFile>) -> Result<()> {
-        let name = self.input.as_ref().map(|input| input.display().to_string());
+        let input = self.recorded.file();
+        let name = input.map(|input| input.display().to_string());
         let name = name.or(self.from_device.device.clone()).unwrap_or_default();
-        let (found, settings, collected) = match &self.input {
+        let (found, settings, collected) = match input {
             Some(input) => {
                 self.from_device.check_unused()?;
                 let calibrated = self.options.0.calibrate(&input.into(), requested.clone())?;
@@ -85,7 +86,7 @@ impl Calibrate {
             "{}: settings and report need two names",
             place.display()
         );
-        let inputs = [self.input.as_deref(), self.settings.as_deref()];
+        let inputs = [input, self.settings.as_deref()];
         let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
         // Settings are written last: if they exist, so does the report.
         let text = settings.to_toml()?;

@@ -15,15 +15,15 @@ use dtof_run::compare::{Callbacks, CompareInput, CompareResult, Options};
 use dtof_simulate::scene::Scene;
 
 use super::flags::Flags;
+use super::job::Recorded;
 use super::warn;
 
 #[derive(Args)]
 pub struct Compare {
-    /// Recording in any format that `replay` reads
-    #[arg(long, value_name = "FILE", value_parser = path(), required_unless_present = "scene")]
-    input: Option<PathBuf>,
+    #[command(flatten)]
+    recorded: Recorded,
     /// Scene instead of a recording, a TOML file; docs/scenes.md lists its keys
-    #[arg(long, value_name = "FILE", value_parser = path(), conflicts_with = "input")]
+    #[arg(long, value_name = "FILE", value_parser = path(), conflicts_with_all = ["file", "input"])]
     scene: Option<PathBuf>,
     /// True range of each pixel in millimetres, an .npy array with a number a pixel; 0 for unknown
     /// [default: the file's, if it has one]
@@ -41,7 +41,7 @@ pub struct Compare {
 
 impl Compare {
     pub fn run(&self) -> Result<()> {
-        let name = self.input.as_deref().or(self.scene.as_deref());
+        let name = self.recorded.file().or(self.scene.as_deref());
         let name = name.ok_or_else(|| Refused::new("input", "is needed, or `scene`"))?;
         page::may_write(&self.out, &self.inputs())?;
         let requested = self.options.0.requested(self.scene.is_some())?;
@@ -98,12 +98,8 @@ impl Compare {
 
     /// The input files.
     fn inputs(&self) -> Vec<&Path> {
-        let files = [
-            &self.input,
-            &self.scene,
-            &self.truth,
-            &self.options.0.given.file,
-        ];
-        files.into_iter().flatten().map(PathBuf::as_path).collect()
+        let files = [&self.scene, &self.truth, &self.options.0.given.file];
+        let files = files.into_iter().map(Option::as_deref);
+        files.chain([self.recorded.file()]).flatten().collect()
     }
 }

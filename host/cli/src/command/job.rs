@@ -17,6 +17,26 @@ use dtof_run::output::Output;
 use super::dynamic_depth::DynamicDepthOptions;
 use super::flags::name;
 
+/// The recording that a command reads.
+#[derive(Args)]
+pub struct Recorded {
+    /// Histograms (.npy, .npz, or the log of a TMF8820 or TMF8829, .json or .json.gz), or photons
+    /// (.csv with columns pixel, cycle and bin, or .npy with these fields or three columns)
+    #[arg(value_name = "FILE", value_parser = path())]
+    file: Option<PathBuf>,
+    /// The same file
+    #[arg(long, value_name = "FILE", value_parser = path(), conflicts_with = "file")]
+    input: Option<PathBuf>,
+}
+
+impl Recorded {
+    /// The file, if one is named.
+    #[must_use]
+    pub fn file(&self) -> Option<&Path> {
+        self.file.as_deref().or(self.input.as_deref())
+    }
+}
+
 /// The folder of the results, and what goes into it.
 #[derive(Args)]
 pub struct ResultOptions {

@@ -1,10 +1,7 @@
 //! `dtof replay`: recorded photons or histograms through the engine.
 
-use std::path::PathBuf;
-
 use anyhow::Result;
 use clap::Args;
-use dtof::path;
 use dtof::progress::Bar;
 use dtof_engine::settings::SettingsFile;
 use dtof_options::Refused;
@@ -15,18 +12,13 @@ use dtof_run::recording::warnings;
 use dtof_run::replay::Options;
 
 use super::flags::Flags;
-use super::job::ResultOptions;
+use super::job::{Recorded, ResultOptions};
 use super::{FOUND, print_summary, say_kept, warn};
 
 #[derive(Args)]
 pub struct Replay {
-    /// Histograms (.npy, .npz, or the log of a TMF8820 or TMF8829, .json or .json.gz), or photons
-    /// (.csv with columns pixel, cycle and bin, or .npy with these fields)
-    #[arg(value_name = "FILE", value_parser = path(), required_unless_present = "input")]
-    file: Option<PathBuf>,
-    /// The same file
-    #[arg(long, value_name = "FILE", value_parser = path(), conflicts_with = "file")]
-    input: Option<PathBuf>,
+    #[command(flatten)]
+    recorded: Recorded,
     #[command(flatten)]
     results: ResultOptions,
     #[command(flatten)]
@@ -43,7 +35,7 @@ impl Replay {
     fn replay(&self, requested: &SettingsFile) -> Result<()> {
         // Wrong options are refused before anything is read.
         self.results.dynamic_depth.get()?;
-        let file = self.file.as_deref().or(self.input.as_deref());
+        let file = self.recorded.file();
         let file = file.ok_or_else(|| Refused::new("input", "is needed"))?;
         let input = Input::from(file);
         let mut replay = self.options.0.open(&input, requested)?;

@@ -160,7 +160,7 @@ fn a_recording_alone_is_calibrated_first() {
         assert_eq!(read("out-2"), read("out-1"), "{recording}");
         assert_contains(&scratch.read("out-1/report.html"), "Found in the recording");
 
-        scratch.printed(&format!("calibrate --input {recording} --out found.toml"));
+        scratch.printed(&format!("calibrate {recording} --out found.toml"));
         scratch.printed(&format!(
             "replay {recording} {run} --settings found.toml --out by-hand"
         ));

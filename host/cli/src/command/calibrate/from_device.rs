@@ -29,7 +29,7 @@ const SECONDS: u32 = 10;
 pub struct DeviceArgs {
     /// Device whose sensor is calibrated: tcp:HOST:PORT, a serial port, or `qemu`, which starts an
     /// emulated device
-    #[arg(long, value_name = "DEVICE")]
+    #[arg(long, value_name = "DEVICE", conflicts_with_all = ["file", "input"])]
     pub device: Option<String>,
     /// Image for `--device qemu` [default: the one built by `cargo xtask image mps2-an386`]
     #[arg(long, value_name = "FILE")]

@@ -129,3 +129,22 @@ fn a_calibration_of_nothing_says_what_it_takes() {
     let output = scratch.run("calibrate --out dtof.toml");
     scratch.refused(&output, &["error: --input is needed, or --device\n"]);
 }
+
+#[test]
+fn a_recording_is_named_once() {
+    let scratch = Scratch::new();
+    for (line, other) in [
+        ("replay a.npy --input b.npy", "--input"),
+        ("calibrate a.npy --out dtof.toml --input b.npy", "--input"),
+        ("calibrate a.npy --out dtof.toml --device qemu", "--device"),
+        (
+            "calibrate --input a.npy --out dtof.toml --device qemu",
+            "--device",
+        ),
+        ("compare a.npy --out out --input b.npy", "--input"),
+        ("compare a.npy --out out --scene b.toml", "--scene"),
+        ("compare --input a.npy --out out --scene b.toml", "--scene"),
+    ] {
+        scratch.refused(&scratch.run(line), &["cannot be used with", other]);
+    }
+}
