@@ -590,7 +590,10 @@ rebin = 2
                 "[sensor]\nsigma_bins = 0.001",
                 "sigma_bins 0.001: is less than half",
             ),
-            ("[sensor]\nsigma_bins = 2", "sigma_bins 2: must be above 0"),
+            (
+                "[sensor]\nsigma_bins = 2",
+                "sigma_bins 2: must be a number above 0",
+            ),
             (
                 "[sensor]\nlaser_hz = 0",
                 "laser_hz 0: must be a whole number from 1 to 1000000000000",
