@@ -36,7 +36,7 @@ impl Replay {
         // Wrong options are refused before anything is read.
         self.results.dynamic_depth.get()?;
         let file = self.recorded.file();
-        let file = file.ok_or_else(|| Refused::new("input", "is needed"))?;
+        let file = file.ok_or_else(|| Refused::new("<FILE>", "is needed"))?;
         let input = Input::from(file);
         let mut replay = self.options.0.open(&input, requested)?;
         let mut output = self.results.output(
