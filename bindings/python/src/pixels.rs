@@ -3,16 +3,16 @@
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, ensure};
-use dtof_core::{BlockLevel, EchoNumber, Flags, LaserCycle, PixelAddress, RangeScale};
+use dtof_core::{BlockLevel, EchoNumber, LaserCycle, PixelAddress, RangeScale};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_options::Refused;
 use dtof_photons::masked::check;
 use dtof_photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
+use dtof_run::Reported;
 use dtof_run::given::Operation;
 use dtof_run::output::header;
-use dtof_run::summary::Summary;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyByteArray;
@@ -93,8 +93,7 @@ impl PhotonSource for Received {
 struct State {
     engine: Box<dyn Engine>,
     received: Received,
-    has_reported: Vec<bool>,
-    confirmed: u64,
+    reported: Reported,
 }
 
 /// An array of pixels.
@@ -191,12 +190,10 @@ impl Pixels {
     fn summary(&self) -> PyResult<String> {
         checked(|| {
             let summary = self.with(|state| {
-                let reporting = state.has_reported.iter().filter(|&&has| has).count();
-                let statistics = state.engine.statistics();
-                let mut summary =
-                    Summary::new(statistics, &state.received, reporting, &self.settings);
-                summary.events_confirmed = state.confirmed;
-                summary
+                let engine = state.engine.as_ref();
+                state
+                    .reported
+                    .summary(engine, &state.received, &self.settings)
             });
             Ok(serde_json::to_string(&summary)?)
         })
@@ -251,9 +248,8 @@ impl Pixels {
             array: Array::of(&header(&settings, &received)?),
             state: Mutex::new(State {
                 engine,
-                has_reported: vec![false; received.pixels.len()],
+                reported: Reported::new(received.array),
                 received,
-                confirmed: 0,
             }),
             settings,
             keeps_histograms,
@@ -270,10 +266,7 @@ impl Pixels {
             let slice = state.received.next_slice(cycles)?;
             let mut records = Vec::new();
             for event in state.engine.run(&slice)? {
-                state.confirmed += u64::from(event.flags.contains(Flags::CONFIRMED));
-                for pixel in state.received.array.pixels_of(event.pixel, event.level) {
-                    state.has_reported[usize::from(pixel.raw())] = true;
-                }
+                state.reported.add(&event);
                 push(&mut records, &event, &self.scale);
             }
             Ok(records)

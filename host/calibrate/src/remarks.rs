@@ -136,18 +136,12 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
         );
     }
     if found.offset.is_none() {
-        let what = match found.target_mm {
-            Some(distance) => format!(
+        let unused = found.target_mm.map(|distance| {
+            format!(
                 "--target-mm {distance} was not used: no more than half of the pixels see a surface at \
                  one range. Put a flat target in front of more of them."
-            ),
-            None if settings.sensor.offset_mm.is_some() => String::new(),
-            None => {
-                "The range offset is not known: put a flat target at a known distance in front of more \
-                     than half of the pixels, and pass --target-mm D."
-                    .to_owned()
-            }
-        };
+            )
+        });
         let kept = settings.sensor.offset_mm.map(|offset| {
             let offset = shortest(offset);
             format!(
@@ -155,8 +149,14 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
                  range offset."
             )
         });
-        let texts = [what, kept.unwrap_or_default()];
-        let texts: Vec<String> = texts.into_iter().filter(|text| !text.is_empty()).collect();
+        let mut texts: Vec<String> = unused.into_iter().chain(kept).collect();
+        if texts.is_empty() {
+            texts.push(
+                "The range offset is not known: put a flat target at a known distance in front of more \
+                 than half of the pixels, and pass --target-mm D."
+                    .to_owned(),
+            );
+        }
         remark("offset", texts.join(" "));
     }
     remarks

@@ -15,4 +15,4 @@ pub mod summary;
 pub mod truth;
 pub mod tune;
 
-pub use run::{RunResult, Sink, run};
+pub use run::{Reported, RunResult, Sink, run};

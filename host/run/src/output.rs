@@ -275,12 +275,10 @@ impl Output {
         for picture in &pictures {
             files.push(written(picture.svg.as_bytes(), picture.name)?);
         }
-        files.push(written(&depth::array(&self.maps), depth::ARRAY)?);
-        files.push(written(depth::table(&self.maps).as_bytes(), depth::TABLE)?);
-        for layer in &self.layers {
-            let [array, table] = layer.names;
-            files.push(written(&depth::array(&layer.maps), array)?);
-            files.push(written(depth::table(&layer.maps).as_bytes(), table)?);
+        let layers = self.layers.iter().map(|layer| (&layer.maps, layer.names));
+        for (maps, [array, table]) in layers.chain([(&self.maps, [depth::ARRAY, depth::TABLE])]) {
+            files.push(written(&depth::array(maps), array)?);
+            files.push(written(depth::table(maps).as_bytes(), table)?);
         }
         files.push(written(report.as_bytes(), REPORT)?);
         let settings_text = self.settings.to_toml()?;

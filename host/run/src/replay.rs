@@ -1,6 +1,6 @@
 //! `replay`: recorded photons or histograms through the engine.
 //!
-//! Settings that nobody has chosen are found in the recording first, as `calibrate` finds them.
+//! Without chosen settings it finds them in the recording first, as `calibrate` does.
 
 use anyhow::{Context, Result, ensure};
 

@@ -1,7 +1,7 @@
 //! Photons through an engine, slice by slice.
 
 use anyhow::Result;
-use dtof_core::{DepthEvent, Flags, PixelAddress};
+use dtof_core::{Array, DepthEvent, Flags, PixelAddress};
 
 use crate::bright::Brightness;
 use crate::glass::watch_glass;
@@ -27,6 +27,48 @@ pub trait Sink {
     fn end(&mut self, _engine: &dyn Engine) {}
 }
 
+/// The pixels that have reported, and how many events neighbours confirmed.
+#[derive(Clone, Debug)]
+pub struct Reported {
+    array: Array,
+    has_reported: Vec<bool>,
+    confirmed: u64,
+}
+
+impl Reported {
+    /// No pixel of `array` has reported.
+    #[must_use]
+    pub fn new(array: Array) -> Self {
+        Self {
+            array,
+            has_reported: vec![false; array.pixels() as usize],
+            confirmed: 0,
+        }
+    }
+
+    /// Takes an event. That of a block is one of all its pixels.
+    pub fn add(&mut self, event: &DepthEvent) {
+        self.confirmed += u64::from(event.flags.contains(Flags::CONFIRMED));
+        for pixel in self.array.pixels_of(event.pixel, event.level) {
+            self.has_reported[usize::from(pixel.raw())] = true;
+        }
+    }
+
+    /// The summary of the photons of `source` through `engine`, whose events these are.
+    #[must_use]
+    pub fn summary(
+        &self,
+        engine: &dyn Engine,
+        source: &dyn PhotonSource,
+        settings: &Settings,
+    ) -> Summary {
+        let reporting = self.has_reported.iter().filter(|&&has| has).count();
+        let mut summary = Summary::new(engine.statistics(), source, reporting, settings);
+        summary.events_confirmed = self.confirmed;
+        summary
+    }
+}
+
 /// The result of a run.
 #[derive(Clone, Debug)]
 pub struct RunResult {
@@ -49,11 +91,9 @@ pub fn run(
     sinks: &mut [&mut dyn Sink],
     progress: &mut dyn Progress,
 ) -> Result<RunResult> {
-    let array = source.array();
-    let mut has_reported = vec![false; array.pixels() as usize];
+    let mut reported = Reported::new(source.array());
     let has_glass = requested.sensor.glass_bins.is_some();
     let mut bins = has_glass.then(|| vec![0; settings.bins]);
-    let mut confirmed = 0;
     let addresses = source.addresses();
     let is_once_per_bin = settings.once_per_bin && settings.frame.is_none();
     let mut brightness = is_once_per_bin.then(|| Brightness::new(addresses.len(), settings.bins));
@@ -74,10 +114,7 @@ pub fn run(
         |slice| engine.run(slice),
         |slice, events, done| {
             for event in &events {
-                confirmed += u64::from(event.flags.contains(Flags::CONFIRMED));
-                for pixel in array.pixels_of(event.pixel, event.level) {
-                    has_reported[usize::from(pixel.raw())] = true;
-                }
+                reported.add(event);
             }
             for (place, cycles) in &mut masked {
                 *cycles += u64::from(slice.pixels[*place].cycles);
@@ -104,9 +141,7 @@ pub fn run(
         None => u64::from(settings.l2.div_ceil(x)) * u64::from(x),
     };
     let expired_masked: u64 = masked.iter().map(|(_, cycles)| cycles / longest).sum();
-    let reporting = has_reported.into_iter().filter(|&has| has).count();
-    let mut summary = Summary::new(engine.statistics(), source, reporting, settings);
-    summary.events_confirmed = confirmed;
+    let mut summary = reported.summary(engine, source, settings);
     summary.expired = summary.expired.saturating_sub(expired_masked);
     watch_glass(requested, bins.as_deref(), &mut summary);
     let warning = brightness.and_then(|brightness| brightness.warning(&addresses));

@@ -101,6 +101,13 @@ def native_input(value: Any, name: str) -> Input:
     return name, header.getvalue(), data
 
 
+def recording_input(recorded: Any, options: Any) -> Input:
+    """A recording for the native extension. Sets ``axes`` in ``options``, if its dimensions have names."""
+    if options.get("axes") is None:
+        options["axes"] = named_axes(recorded, "the array")
+    return native_input(recorded, "the array")
+
+
 def _array_of(value: Any, name: str) -> Any:
     """The array of a table of photons or a sparse matrix; anything else as it is."""
     if is_table(value):

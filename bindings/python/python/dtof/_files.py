@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Optional
 import numpy
 
 from . import _native
-from ._arrays import Array, events_of, named_axes, native_input, records_of
+from ._arrays import Array, events_of, recording_input, records_of
 from ._keywords import LoadOptions, PointsOptions, takes
 from ._options import arguments
 from ._warn import warn
@@ -52,9 +52,8 @@ def load(path: Any, **options: Unpack[LoadOptions]) -> Recording:
     Without ``cycles`` the whole photon list is read. The number of bins is that of
     a run: a power of two from 8 to 1024.
     """
-    if options.get("axes") is None:
-        options["axes"] = named_axes(path, "the array")
-    loaded = _native.load(native_input(path, "the array"), arguments(LoadOptions, options))
+    source = recording_input(path, options)
+    loaded = _native.load(source, arguments(LoadOptions, options))
     warn(loaded["warnings"])
     shape = loaded["shape"]
     truth = loaded["truth_mm"]

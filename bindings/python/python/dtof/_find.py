@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Callable, Optional
 import numpy
 
 from . import _native
-from ._arrays import named_axes, native_input
+from ._arrays import native_input, recording_input
 from ._keywords import CalibrateOptions, CompareOptions, Settings, TuneOptions, takes
 from ._options import arguments, settings_text
 from ._run import scene_of
@@ -90,10 +90,8 @@ def calibrate(recorded: Any, *, settings: Settings = None, **options: Unpack[Cal
     older settings, as for :func:`replay`.
     """
     older = None if settings is None else settings_text(settings)
-    if options.get("axes") is None:
-        options["axes"] = named_axes(recorded, "the array")
-    keywords = arguments(CalibrateOptions, options)
-    found = _native.calibrate(native_input(recorded, "the array"), older, keywords)
+    source = recording_input(recorded, options)
+    found = _native.calibrate(source, older, arguments(CalibrateOptions, options))
     warn(found["warnings"])
     return Calibration(
         settings=json.loads(found["settings"]),
@@ -121,10 +119,8 @@ def compare(
     ``within`` is the largest error of 68 % of the reports, in millimetres. ``progress(step)`` is
     called with each step.
     """
-    if options.get("axes") is None:
-        options["axes"] = named_axes(recorded, "the array")
     compared = _CompareInput(
-        recording=None if recorded is None else native_input(recorded, "the array"),
+        recording=None if recorded is None else recording_input(recorded, options),
         truth=None if truth is None else native_input(_in_c_order(truth), "truth"),
         scene=None if scene is None else scene_of(scene),
     )

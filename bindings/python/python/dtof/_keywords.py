@@ -38,6 +38,35 @@ Rule = Optional[Literal["paper", "average", "window"]]
 Estimator = Optional[Literal["centroid", "window"]]
 Echo = Optional[Literal["first", "last", "strongest", "all"]]
 
+#: Keywords of several functions.
+BinWidth = Annotated[
+    Number,
+    "number, 0 to 65535.99998, picoseconds",
+    "Width of a bin of the file in picoseconds, rounded to 1/65536 [default: 250; for logs the "
+    "sensor's]",
+]
+Offset = Annotated[
+    Number,
+    "number, -8388608 to 8388607.996, millimetres",
+    "Millimetres added to every range, rounded to 1/256 [default: 0; for logs the sensor's]",
+]
+CyclesToReplay = Annotated[
+    Integer,
+    "whole number, 1 to 9223372036854775807",
+    "Laser cycles to replay at most [default: 10000]",
+]
+Frame = Annotated[
+    Integer,
+    "whole number, 1 to 65535",
+    "Simulate a frame-based sensor for comparison: every N laser cycles each pixel reports its "
+    "highest bin, if that is above the background",
+]
+FalseAlarm = Annotated[
+    Number,
+    "number above 0",
+    "Share of exposures without a target that end with an event, at most 0.1 [default: 0.01]",
+]
+
 
 class HasSettings(Protocol):
     """A calibration, a comparison or a run."""
@@ -71,17 +100,8 @@ class RecordingOptions(TypedDict, total=False):
         "Number of bins after rebin, a power of two from 8 to 1024. Longer histograms lose their last "
         "bins [default: the file's, or the next power of two; 128 for photon lists]",
     ]
-    bin_width_ps: Annotated[
-        Number,
-        "number, 0 to 65535.99998, picoseconds",
-        "Width of a bin of the file in picoseconds, rounded to 1/65536 [default: 250; for logs the "
-        "sensor's]",
-    ]
-    offset_mm: Annotated[
-        Number,
-        "number, -8388608 to 8388607.996, millimetres",
-        "Millimetres added to every range, rounded to 1/256 [default: 0; for logs the sensor's]",
-    ]
+    bin_width_ps: BinWidth
+    offset_mm: Offset
     photons_per_cycle: Annotated[
         Number,
         "number above 0",
@@ -247,27 +267,14 @@ class LoadOptions(RecordingOptions, total=False):
         "Settings file in TOML, such as every run writes; options override it. docs/settings.md lists its "
         "keys",
     ]
-    cycles: Annotated[
-        Integer,
-        "whole number, 1 to 9223372036854775807",
-        "Laser cycles to replay at most [default: 10000]",
-    ]
+    cycles: CyclesToReplay
 
 
 class ReplayOptions(RecordingOptions, SensorOptions, DetectionOptions, total=False):
     """Of ``replay`` and ``photons``."""
 
-    frame: Annotated[
-        Integer,
-        "whole number, 1 to 65535",
-        "Simulate a frame-based sensor for comparison: every N laser cycles each pixel reports its "
-        "highest bin, if that is above the background",
-    ]
-    cycles: Annotated[
-        Integer,
-        "whole number, 1 to 9223372036854775807",
-        "Laser cycles to replay at most [default: 10000]",
-    ]
+    frame: Frame
+    cycles: CyclesToReplay
     seed: Annotated[
         Integer,
         "whole number, 0 to 9223372036854775807",
@@ -284,12 +291,7 @@ class SimulateOptions(SensorOptions, DetectionOptions, total=False):
         "True or False",
         "Simulate without signal: photon-counts.svg is then a passive image",
     ]
-    frame: Annotated[
-        Integer,
-        "whole number, 1 to 65535",
-        "Simulate a frame-based sensor for comparison: every N laser cycles each pixel reports its "
-        "highest bin, if that is above the background",
-    ]
+    frame: Frame
     cycles: Annotated[
         Integer,
         "whole number, 1 to 9223372036854775807",
@@ -315,11 +317,7 @@ class CalibrateOptions(RecordingOptions, total=False):
         "True or False",
         "Whether the nearest surface is a cover glass, if all pixels have it at the same bin",
     ]
-    false_alarm: Annotated[
-        Number,
-        "number above 0",
-        "Share of exposures without a target that end with an event, at most 0.1 [default: 0.01]",
-    ]
+    false_alarm: FalseAlarm
     seed: Annotated[Integer, "whole number, 0 to 9223372036854775807", "Seed of the simulation [default: 1]"]
 
 
@@ -331,11 +329,7 @@ class CompareOptions(RecordingOptions, SensorOptions, total=False):
         "number above 0, millimetres",
         "Largest error of 68 % of the reports in millimetres [default: that of frames of L2]",
     ]
-    false_alarm: Annotated[
-        Number,
-        "number above 0",
-        "Share of exposures without a target that end with an event, at most 0.1 [default: 0.01]",
-    ]
+    false_alarm: FalseAlarm
     once_per_bin: Annotated[
         Switch,
         "True or False",
@@ -420,17 +414,8 @@ class TuneOptions(TypedDict, total=False):
 class PixelOptions(SensorOptions, DetectionOptions, total=False):
     """Of ``Pixel`` and ``Pixels``."""
 
-    bin_width_ps: Annotated[
-        Number,
-        "number, 0 to 65535.99998, picoseconds",
-        "Width of a bin of the file in picoseconds, rounded to 1/65536 [default: 250; for logs the "
-        "sensor's]",
-    ]
-    offset_mm: Annotated[
-        Number,
-        "number, -8388608 to 8388607.996, millimetres",
-        "Millimetres added to every range, rounded to 1/256 [default: 0; for logs the sensor's]",
-    ]
+    bin_width_ps: BinWidth
+    offset_mm: Offset
 
 
 class PointsOptions(TypedDict, total=False):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Callable, Optional
 import numpy
 
 from . import _native
-from ._arrays import PHOTON, Array, events_of, is_table, named_axes, native_input, photon_list
+from ._arrays import PHOTON, Array, events_of, is_table, native_input, photon_list, recording_input
 from ._files import export, write_events
 from ._html import depth_image
 from ._keywords import Echo, PointsOptions, ReplayOptions, SimulateOptions, takes
@@ -104,9 +104,7 @@ def replay(
     """
     if axis != -1:
         recorded = _bins_last(recorded, axis, options)
-    elif options.get("axes") is None:
-        options["axes"] = named_axes(recorded, "the array")
-    source = native_input(recorded, "the array")
+    source = recording_input(recorded, options)
     return result(_native.replay(source, arguments(ReplayOptions, options), progress, None))
 
 

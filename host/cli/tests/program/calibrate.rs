@@ -24,18 +24,25 @@ fn recording(text: &str) -> Vec<u8> {
     with_hot(text, None)
 }
 
-/// The same, so many photons more in each bin of a pixel.
-fn with_hot(text: &str, hot: Option<(usize, u32)>) -> Vec<u8> {
+/// The photons of a scene: laser cycle, pixel and bin.
+fn photons(text: &str) -> Vec<(u32, usize, u16)> {
     let scene = Scene::parse(text).unwrap();
     let mut photons = scene.photons(5, scene.cycles).unwrap();
-    let mut counts = vec![0u32; 128 * 128];
-    for _ in 0..32 {
-        let slice = photons.next_slice(250).unwrap();
-        for (pixel, photons) in slice.pixels.iter().enumerate() {
-            for photon in &photons.photons {
-                counts[128 * pixel + usize::from(photon.code)] += 1;
-            }
+    let mut all = Vec::new();
+    for slice in 0..32 {
+        for (pixel, photons) in photons.next_slice(250).unwrap().pixels.iter().enumerate() {
+            let photons = photons.photons.iter();
+            all.extend(photons.map(|one| (250 * slice + u32::from(one.cycle), pixel, one.code)));
         }
+    }
+    all
+}
+
+/// The same, so many photons more in each bin of a pixel.
+fn with_hot(text: &str, hot: Option<(usize, u32)>) -> Vec<u8> {
+    let mut counts = vec![0u32; 128 * 128];
+    for (_, pixel, bin) in photons(text) {
+        counts[128 * pixel + usize::from(bin)] += 1;
     }
     if let Some((pixel, photons)) = hot {
         let bins = &mut counts[128 * pixel..128 * (pixel + 1)];
@@ -116,17 +123,9 @@ fn a_hot_pixel_changes_nothing_for_the_others() {
     );
 }
 
-/// The photons of a scene, in the order of their laser cycles.
-fn photons(text: &str) -> String {
-    let scene = Scene::parse(text).unwrap();
-    let mut photons = scene.photons(5, scene.cycles).unwrap();
-    let mut all = Vec::new();
-    for slice in 0..32 {
-        for (pixel, photons) in photons.next_slice(250).unwrap().pixels.iter().enumerate() {
-            let photons = photons.photons.iter();
-            all.extend(photons.map(|one| (250 * slice + u32::from(one.cycle), pixel, one.code)));
-        }
-    }
+/// The list of the photons of a scene, in the order of their laser cycles.
+fn list(text: &str) -> String {
+    let mut all = photons(text);
     all.sort_by_key(|&(cycle, ..)| cycle);
     let rows = all.iter();
     let rows = rows.map(|(cycle, pixel, bin)| format!("{pixel},{cycle},{bin}\n"));
@@ -139,7 +138,7 @@ fn a_recording_alone_is_calibrated_first() {
     let scratch = Scratch::new();
     let text = scene(0.02, 5.0);
     scratch.file("hot.npy", with_hot(&text, Some((3, 400))));
-    scratch.file("list.csv", photons(&text));
+    scratch.file("list.csv", list(&text));
     let read = |folder: &str| scratch.read(&format!("{folder}/events.csv"));
     for (recording, run) in [
         ("hot.npy", ""),
@@ -204,7 +203,7 @@ fn an_option_of_detection_calibrates_nothing() {
 #[test]
 fn a_list_is_calibrated_from_what_is_replayed() {
     let scratch = Scratch::new();
-    let text = photons(&scene(0.02, 5.0));
+    let text = list(&scene(0.02, 5.0));
     scratch.file("all.csv", &text);
     let is_early = |row: &&str| {
         row.split(',')
@@ -225,7 +224,7 @@ fn a_list_is_calibrated_from_what_is_replayed() {
     assert_eq!(run("all.csv --cycles 900"), run("early.csv"));
 }
 
-/// What cannot be calibrated is replayed with the defaults, and that is said.
+/// If no settings can be found, the defaults hold, and a warning names the reason.
 #[test]
 fn without_findings_the_defaults_hold() {
     let scratch = Scratch::new();
@@ -263,7 +262,7 @@ fn the_sample_recording_becomes_a_depth_map() {
 /// 8 × 8 histograms of 32 bins with so many photons a bin, pixel by pixel.
 fn even(photons: impl Fn(usize) -> [u8; 32]) -> Vec<u8> {
     let data: Vec<u8> = (0..64).flat_map(photons).collect();
-    crate::common::npy("|u1", "(8, 8, 32)", &data)
+    npy("|u1", "(8, 8, 32)", &data)
 }
 
 #[test]

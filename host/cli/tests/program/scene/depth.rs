@@ -270,7 +270,6 @@ fn what_is_no_depth_map_is_refused_in_a_line() {
         ("bright.npy", floats("(1, 2)", &[0.01, 1.0])),
         ("bool.npy", npy("|b1", "(1, 2)", &[1, 1])),
         ("complex.npy", npy("<c8", "(1, 2)", &[0; 16])),
-        ("complex.npy", npy("<c8", "(1, 2)", &[0; 16])),
         ("short.npy", npy("<f4", "(2, 2)", &[0; 12])),
         ("text.npy", b"1.0, 2.0\n".to_vec()),
         (
@@ -299,7 +298,6 @@ fn what_is_no_depth_map_is_refused_in_a_line() {
             --depth bright.npy | bright.npy | 40000 signal photons a laser cycle from 10.0 mm
             --depth bool.npy | bool.npy | |b1 | must be integers, or floats
             --depth complex.npy | complex.npy | <c8 | numpy.float32
-            --depth complex.npy | complex.npy | <c8
             --depth short.npy | short.npy | 12 bytes
             --depth text.npy | text.npy | not an .npy file
             --depth large.npy | large.npy | 65537 pixels: more than 65,536
