@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use dtof_core::{DepthEvent, RangeScale};
+use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_photons::input::Input;
@@ -38,6 +39,8 @@ pub struct PyRunResult<'py> {
     warnings: Vec<String>,
     /// Photons bin by bin, if the settings have crosstalk of the cover glass.
     bins: Option<Vec<u64>>,
+    /// How clear the peak of each pixel stands, if pixels decide once.
+    confidence: Option<Vec<f64>>,
 }
 
 /// The same before the conversion.
@@ -165,6 +168,7 @@ struct Records {
     array: Array,
     /// One vector for each slice.
     events: Vec<Vec<u8>>,
+    confidence: Option<Vec<f64>>,
 }
 
 impl Records {
@@ -173,6 +177,7 @@ impl Records {
             scale: settings.range_scale()?,
             array: Array::of(&header(settings, source)?),
             events: Vec::new(),
+            confidence: None,
         })
     }
 }
@@ -185,6 +190,10 @@ impl Sink for Records {
         }
         self.events.push(records);
         Ok(())
+    }
+
+    fn end(&mut self, engine: &dyn Engine) {
+        self.confidence = engine.confidence().map(<[f64]>::to_vec);
     }
 }
 
@@ -215,6 +224,7 @@ impl Finished {
             array: self.records.array,
             warnings: self.warnings,
             bins: self.result.bins,
+            confidence: self.records.confidence,
         })
     }
 }

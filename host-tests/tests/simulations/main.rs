@@ -16,6 +16,7 @@ mod compare;
 mod compare_scenes;
 mod counters;
 mod dead_time;
+mod decide_once;
 mod depth_map;
 mod engine;
 mod motion;

@@ -13,7 +13,9 @@ pub struct Decision {
     pub event: DepthEvent,
     /// The histogram of its exposure. The bins around earlier echoes are empty, except with a dead
     /// time, which has the photons before the gate, too.
-    pub counts: Vec<u16>,
+    pub counts: Vec<u32>,
+    /// Laser cycles of the exposure. The event has no more than 16 bits for them.
+    pub cycles: u32,
     /// The bin where a pixel that tracks expected its event.
     pub expected: Option<BinIndex>,
     /// The bins around earlier echoes of the exposure.
@@ -24,7 +26,8 @@ pub struct Decision {
 #[derive(Clone, Debug)]
 pub struct LastDecision<const BINS: usize> {
     event: Option<DepthEvent>,
-    counts: [u16; BINS],
+    counts: [u32; BINS],
+    cycles: u32,
     expected: Option<BinIndex>,
     excluded: ExcludedBins,
 }
@@ -37,6 +40,7 @@ impl<const BINS: usize> LastDecision<BINS> {
             Box::new(Self {
                 event: None,
                 counts: [0; BINS],
+                cycles: 0,
                 expected: None,
                 excluded: ExcludedBins::NONE,
             })
@@ -47,8 +51,9 @@ impl<const BINS: usize> LastDecision<BINS> {
     #[inline]
     pub fn record_input<W: CounterWidth>(&mut self, input: &DecisionInput<'_, BINS, W>) {
         for (kept, &count) in self.counts.iter_mut().zip(input.histogram.counts()) {
-            *kept = u16::try_from(count.into()).unwrap_or(u16::MAX);
+            *kept = count.into();
         }
+        self.cycles = input.cycles;
         self.expected = input.expected;
         self.excluded = input.excluded;
     }
@@ -65,6 +70,7 @@ impl<const BINS: usize> LastDecision<BINS> {
         Some(Decision {
             event: self.event?,
             counts: self.counts.to_vec(),
+            cycles: self.cycles,
             expected: self.expected,
             excluded: self.excluded,
         })

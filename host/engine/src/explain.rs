@@ -3,15 +3,15 @@
 use dtof_core::fixed::types::U24F8;
 use dtof_core::rule::{ExcludedBins, LiveCounts, LiveWindow};
 use dtof_core::{
-    AnyRule, BinIndex, BlockLevel, Count, Count8, Count10, Count16, Count24, CounterWidth,
-    DetectionRule, EchoNumber, Flags, Histogram, Peak, PixelConfig, RangeGate,
+    AnyRule, BinIndex, BlockLevel, Count, Count8, Count10, Count16, CounterWidth, DetectionRule,
+    EchoNumber, Flags, Histogram, Peak, PixelConfig, RangeGate,
 };
 use serde::Serialize;
 
 use super::decisions::Decision;
 use super::frame;
 use super::settings::Settings;
-use crate::with_bins;
+use crate::{with_bins, with_widest};
 
 /// The peak of a histogram and what the rule needs to report it.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -54,10 +54,8 @@ pub fn explain(
             8 => explain_bins::<BINS, Count8>(settings, counts, cycles),
             _ => explain_bins::<BINS, Count10>(settings, counts, cycles),
         }),
-        // The sum of all counters must fit into 32 bits.
         true => {
-            with_bins!(bins, of 8 16 32 64 128 256, BINS => explain_bins::<BINS, Count24>(settings, counts, cycles))
-                .or_else(|_| with_bins!(bins, BINS => explain_bins::<BINS, Count16>(settings, counts, cycles)))
+            with_widest!(bins, BINS, W => explain_bins::<BINS, W>(settings, counts, cycles))
         }
     };
     let explanation = explanation.ok()??;
@@ -111,10 +109,13 @@ fn explain_bins<const BINS: usize, W: CounterWidth>(
 /// the peak.
 #[must_use]
 pub fn explain_decisions(settings: &Settings, decisions: &[Decision]) -> Vec<Explanation> {
-    let explanations = with_bins!(settings.bins, BINS => match settings.counter_bits {
-        8 => all::<BINS, Count8>(settings, decisions),
-        _ => all::<BINS, Count10>(settings, decisions),
-    });
+    let explanations = match settings.decide_once {
+        false => with_bins!(settings.bins, BINS => match settings.counter_bits {
+            8 => all::<BINS, Count8>(settings, decisions),
+            _ => all::<BINS, Count10>(settings, decisions),
+        }),
+        true => with_widest!(settings.bins, BINS, W => all::<BINS, W>(settings, decisions)),
+    };
     explanations.ok().flatten().unwrap_or_default()
 }
 
@@ -132,7 +133,7 @@ fn all<const BINS: usize, W: CounterWidth>(
                 counts: counts_of(decision),
                 excluded: decision.excluded,
                 expected: decision.expected,
-                cycles: decision.event.exposure.into(),
+                cycles: decision.cycles,
             };
             return Some(input.explain::<W>());
         }
@@ -166,7 +167,7 @@ fn histogram<const BINS: usize, W: CounterWidth>(
 fn counts_of<const BINS: usize>(decision: &Decision) -> [u32; BINS] {
     let mut counts = [0; BINS];
     for (count, &kept) in counts.iter_mut().zip(&decision.counts) {
-        *count = kept.into();
+        *count = kept;
     }
     counts
 }

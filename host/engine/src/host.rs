@@ -9,9 +9,10 @@ use super::decisions::Decision;
 use super::frame::FrameEngine;
 use super::group::{Configs, Done, Group, sort};
 use super::neighbours::NeighbourEngine;
+use super::once::OnceEngine;
 use super::once_per_bin::OncePerBinEngine;
 use crate::settings::Settings;
-use crate::with_bins;
+use crate::{with_bins, with_widest};
 use dtof_photons::source::Slice;
 
 /// Runs groups of pixels on all threads.
@@ -34,10 +35,20 @@ pub fn host_engine(
     array: Array,
     addresses: &[PixelAddress],
 ) -> Result<Box<dyn Engine>> {
-    with_bins!(settings.bins, BINS => match settings.counter_bits {
-        8 => HostEngine::<BINS, Count8>::boxed(settings, array, addresses),
-        _ => HostEngine::<BINS, Count10>::boxed(settings, array, addresses),
-    })?
+    let engine = if settings.decide_once {
+        with_widest!(settings.bins, BINS, W => {
+            OnceEngine::<BINS, W>::new(settings, array, addresses).map(|engine| Box::new(engine) as _)
+        })?
+    } else {
+        with_bins!(settings.bins, BINS => match settings.counter_bits {
+            8 => HostEngine::<BINS, Count8>::boxed(settings, array, addresses),
+            _ => HostEngine::<BINS, Count10>::boxed(settings, array, addresses),
+        })?
+    }?;
+    Ok(match settings.once_per_bin && settings.frame.is_none() {
+        true => Box::new(OncePerBinEngine::new(engine, settings.bins)),
+        false => engine,
+    })
 }
 
 impl<const BINS: usize, W: CounterWidth> HostEngine<BINS, W> {
@@ -51,17 +62,11 @@ impl<const BINS: usize, W: CounterWidth> HostEngine<BINS, W> {
                 settings, length, addresses,
             )?));
         }
-        let engine: Box<dyn Engine> = if let Some(neighbours) = settings.neighbours {
-            Box::new(NeighbourEngine::<BINS, W>::new(
+        Ok(match settings.neighbours {
+            Some(neighbours) => Box::new(NeighbourEngine::<BINS, W>::new(
                 settings, neighbours, array, addresses,
-            )?)
-        } else {
-            Box::new(Self::new(settings, array, addresses)?)
-        };
-        Ok(if settings.once_per_bin {
-            Box::new(OncePerBinEngine::new(engine, BINS))
-        } else {
-            engine
+            )?),
+            None => Box::new(Self::new(settings, array, addresses)?),
         })
     }
 

@@ -8,6 +8,7 @@ pub mod frame;
 pub mod group;
 pub mod host;
 mod neighbours;
+mod once;
 mod once_per_bin;
 pub mod settings;
 pub mod slices;
@@ -25,6 +26,17 @@ pub trait Engine: Send {
     /// # Errors
     /// Fails if the engine cannot be reached.
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>>;
+
+    /// The recording has ended. Returns the events of engines that decide then.
+    fn finish(&mut self) -> Vec<DepthEvent> {
+        Vec::new()
+    }
+
+    /// After [`Self::finish`], if the engine decides then: how many standard deviations the peak of each place of the
+    /// array stands above the background; not a number where there is no pixel, or one that is left out.
+    fn confidence(&self) -> Option<&[f64]> {
+        None
+    }
 
     /// The counts of all pixels so far, and of all blocks.
     fn statistics(&self) -> [Statistics; 2];

@@ -8,7 +8,7 @@ use dtof_core::neighbours::{ArrayPixel, NeighbourConfig};
 use dtof_core::rule::DecisionInput;
 use dtof_core::{
     AnyRule, Array, AsyncPixel, CounterWidth, DepthEvent, Detection, LaserCycle, Neighbours,
-    PixelAddress, PixelConfig, Statistics,
+    PixelAddress, PixelConfig, Statistics, WindowRule,
 };
 use rayon::prelude::*;
 
@@ -58,6 +58,25 @@ pub struct NeighbourEngine<const BINS: usize, W: CounterWidth> {
     statistics: Statistics,
 }
 
+/// The rule for neighbours.
+///
+/// # Errors
+/// Fails if neighbours cannot be used with the other settings.
+pub fn check(settings: &Settings) -> Result<&WindowRule> {
+    let AnyRule::Window(rule) = &settings.rule else {
+        return Err(Refused::new("neighbours", "is for `rule` window").into());
+    };
+    ensure!(
+        settings.binning.is_none(),
+        Refused::new("neighbours", "cannot be used with `binning`")
+    );
+    ensure!(
+        !settings.weighs_dead_time(),
+        Refused::new("neighbours", "cannot be used with a dead time")
+    );
+    Ok(rule)
+}
+
 impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
     /// An engine for the pixels `addresses` of an array, ascending.
     ///
@@ -69,17 +88,7 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
         array: Array,
         addresses: &[PixelAddress],
     ) -> Result<Self> {
-        let AnyRule::Window(rule) = &settings.rule else {
-            return Err(Refused::new("neighbours", "is for `rule` window").into());
-        };
-        ensure!(
-            settings.binning.is_none(),
-            Refused::new("neighbours", "cannot be used with `binning`")
-        );
-        ensure!(
-            !settings.weighs_dead_time(),
-            Refused::new("neighbours", "cannot be used with a dead time")
-        );
+        let rule = check(settings)?;
         let place = |address| {
             let number = addresses.binary_search(&address).ok();
             Place(number.map(|number| Member {

@@ -61,6 +61,14 @@ impl Engine for OncePerBinEngine {
         })
     }
 
+    fn finish(&mut self) -> Vec<DepthEvent> {
+        self.engine.finish()
+    }
+
+    fn confidence(&self) -> Option<&[f64]> {
+        self.engine.confidence()
+    }
+
     fn statistics(&self) -> [Statistics; 2] {
         let [mut pixels, blocks] = self.engine.statistics();
         pixels.repeated += self.repeated;

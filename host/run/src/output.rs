@@ -69,6 +69,8 @@ pub struct Output {
     selection: Option<EchoSelection>,
     /// If pixels report several.
     layers: Vec<depth::Layer>,
+    /// How clear the peak of each pixel stands, if pixels decide once.
+    confidence: Option<Vec<f64>>,
     /// If they are requested.
     changes: Option<Changes>,
     /// The pixels of the photons.
@@ -120,6 +122,7 @@ impl Output {
             echo: None,
             selection: selection(None, settings),
             layers: depth::Layer::all(settings, array),
+            confidence: None,
             changes: None,
             pixels: source.addresses(),
         })
@@ -268,6 +271,13 @@ impl Output {
         if self.layers.is_empty() {
             removed.extend(depth::LAYERS.iter().flat_map(|layer| [layer.1, layer.2]));
         }
+        match &self.confidence {
+            Some(confidence) => {
+                let array = depth::array(self.maps.array, confidence.iter().copied());
+                files.push(written(&array, depth::CONFIDENCE)?);
+            }
+            None => removed.push(depth::CONFIDENCE),
+        }
         match self.csv {
             Some(csv) => files.push((flush_to_disk(csv).with_context(|| name(CSV))?, CSV)),
             None => removed.push(CSV),
@@ -277,8 +287,11 @@ impl Output {
         }
         let layers = self.layers.iter().map(|layer| (&layer.maps, layer.names));
         for (maps, [array, table]) in layers.chain([(&self.maps, [depth::ARRAY, depth::TABLE])]) {
-            files.push(written(&depth::array(maps), array)?);
-            files.push(written(depth::table(maps).as_bytes(), table)?);
+            let depths = maps.pixels.iter().map(|pixel| pixel.mean_mm());
+            let depths = depths.map(|depth| depth.unwrap_or(f64::NAN));
+            files.push(written(&depth::array(maps.array, depths), array)?);
+            let text = depth::table(maps, self.confidence.as_deref());
+            files.push(written(text.as_bytes(), table)?);
         }
         files.push(written(report.as_bytes(), REPORT)?);
         let settings_text = self.settings.to_toml()?;
@@ -352,6 +365,7 @@ impl Sink for Output {
         if let Some((_, decisions)) = &mut self.decisions {
             *decisions = engine.decisions();
         }
+        self.confidence = engine.confidence().map(<[f64]>::to_vec);
     }
 }
 
@@ -374,7 +388,7 @@ pub fn header(settings: &Settings, source: &dyn PhotonSource) -> Result<aer_file
 fn selection(echo: Option<Echo>, settings: &Settings) -> Option<EchoSelection> {
     let echo = echo.unwrap_or(Echo::Strongest);
     let several = settings.echoes > EchoNumber::FIRST && echo != Echo::All;
-    several.then(|| EchoSelection::new(echo, settings.echoes, settings.l2))
+    several.then(|| EchoSelection::new(echo, settings.echoes, settings.longest_exposure()))
 }
 
 /// Names of results, and the mark near the start of each.
@@ -387,6 +401,7 @@ fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
         (CSV, events_csv::HEADER),
         (AER, aer_file::MAGIC),
         (depth::ARRAY, depth::MARK),
+        (depth::CONFIDENCE, depth::MARK),
         (depth::TABLE, depth::HEADER),
         (REPORT, dtof_report::MARK),
         (SUMMARY, summary::MARK),

@@ -112,6 +112,7 @@ pub fn read_options(requested: &SettingsFile) -> ReadOptions {
         axes,
         array,
         rebin,
+        decide_once,
         ..
     } = requested.run.clone();
     let recorded = recorded_cycles.map(RecordingLength::Cycles);
@@ -126,7 +127,10 @@ pub fn read_options(requested: &SettingsFile) -> ReadOptions {
         array,
         bin_width_ps: width.map(|width| width / U16F16::from_num(rebin.max(1))),
         length: recorded.or(rate),
-        cycles: cycles.unwrap_or(10_000),
+        cycles: cycles.unwrap_or(match decide_once {
+            Some(true) => u64::MAX,
+            _ => 10_000,
+        }),
         seed: seed.unwrap_or(1),
         layout: None,
         masked: requested.sensor.masked.clone().unwrap_or_default(),

@@ -22,9 +22,9 @@ use dtof_photons::open::{CheckedRecording, Metadata, ReadOptions, Recording, che
 use dtof_photons::recorded::Layout;
 use dtof_photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
 
-/// The options that settle which photons are replayed. All others, but for those of the recording, choose
-/// how pixels decide.
-const RUN: &[&str] = &["cycles", "seed"];
+/// The options that settle which photons are replayed, and whether pixels decide once. All others, but for those of the
+/// recording, choose how pixels decide.
+const RUN: &[&str] = &["cycles", "seed", "decide_once"];
 
 /// The options of a replay.
 #[derive(Clone, Debug, Default)]
@@ -261,11 +261,16 @@ fn find(requested: &mut SettingsFile, recording: &mut CheckedRecording) -> Resul
     };
     let width = format!("{} ps, {source}", metadata.bin_width_ps);
     let found = calibrate_counts(requested, &counts, &CalibrationOptions::default())?;
-    let settings = found.settings(
+    let mut settings = found.settings(
         requested
             .clone()
             .or(settings_of_file(metadata, counts.array)),
     )?;
+    if requested.run.decide_once == Some(true) && settings.detection.z.is_some() {
+        // That z is for exposures of many looks.
+        settings.detection.z = None;
+        settings.detection.false_alarm = Some(CalibrationOptions::default().false_alarm);
+    }
     *requested = requested.clone().or(settings);
     let mut rows = rows(&found);
     // A width that fits true distances better comes with the offset.

@@ -10,7 +10,7 @@ use dtof_engine::Engine;
 use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_engine::slices::each_slice;
 use dtof_options::progress::Progress;
-use dtof_photons::source::{PhotonSource, Slice};
+use dtof_photons::source::{PhotonSource, PixelPhotons, Slice};
 
 /// Where the photons and the events of a run go.
 pub trait Sink {
@@ -131,12 +131,26 @@ pub fn run(
             progress.at(done)
         },
     )?;
+    let decided = engine.finish();
+    for event in &decided {
+        reported.add(event);
+    }
+    if !decided.is_empty() {
+        let slice = Slice {
+            first_cycle: source.cycles(),
+            pixels: vec![PixelPhotons::default(); addresses.len()],
+        };
+        for sink in &mut *sinks {
+            sink.take(&slice, &decided)?;
+        }
+    }
     progress.end();
     for sink in &mut *sinks {
         sink.end(engine);
     }
     let x = settings.x.max(1);
     let longest = match settings.frame {
+        _ if settings.decide_once => u64::MAX, // They are not counted.
         Some(frame) => u64::from(frame.max(1)),
         None => u64::from(settings.l2.div_ceil(x)) * u64::from(x),
     };

@@ -35,7 +35,7 @@ impl dtof_options::Options for Options {
         TDC,
         DetectionSettings::KEYS,
         FRAME,
-        &["cycles", "seed"],
+        &["cycles", "seed", "decide_once"],
     ];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {

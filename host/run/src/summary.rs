@@ -61,7 +61,7 @@ pub struct Summary {
     pub masked: u64,
     /// Decisions put off because the event before was not taken yet.
     pub deferred: u64,
-    /// Exposures that reached L2 without an event.
+    /// Exposures that reached L2 without an event; if pixels decide once, pixels without an event.
     pub expired: u64,
     /// Of these, exposures with a decision put off.
     pub expired_deferred: u64,
@@ -156,6 +156,9 @@ fn settings<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, 
     }
     if let Some(frame) = settings.frame {
         map.serialize_entry("frame", &frame)?;
+    }
+    if settings.decide_once {
+        map.serialize_entry("decide_once", &true)?;
     }
     map.serialize_entry("seed", &settings.seed)?;
     let estimator = match settings.estimator() {
@@ -258,7 +261,9 @@ impl Summary {
                 self.events_confirmed,
             ));
         }
-        if self.settings.frame.is_none() {
+        if self.settings.decide_once {
+            rows.push(row("pixels without an event", self.expired));
+        } else if self.settings.frame.is_none() {
             rows.push(row("exposures without an event", self.expired));
         }
         let first_decision = self.settings.first_decision();
@@ -288,7 +293,13 @@ impl Summary {
             ),
             ("photons with a code past the last bin", self.rejected),
             ("decisions put off", self.deferred),
-            ("exposures ended by a full counter", self.ended_full),
+            (
+                match self.settings.decide_once {
+                    true => "pixels with a full counter; --cycles N takes fewer photons",
+                    false => "exposures ended by a full counter",
+                },
+                self.ended_full,
+            ),
             (
                 "decisions where bins were hardly ever live",
                 self.blind_looks,

@@ -61,6 +61,12 @@ Frame = Annotated[
     "Simulate a frame-based sensor for comparison: every N laser cycles each pixel reports its "
     "highest bin, if that is above the background",
 ]
+DecideOnce = Annotated[
+    Switch,
+    "True or False",
+    "Decide once for each pixel, on all of its photons, and write how clear its peak stands: "
+    "confidence.npy. Takes all laser cycles unless cycles says less",
+]
 FalseAlarm = Annotated[
     Number,
     "number above 0",
@@ -274,6 +280,7 @@ class ReplayOptions(RecordingOptions, SensorOptions, DetectionOptions, total=Fal
     """Of ``replay`` and ``photons``."""
 
     frame: Frame
+    decide_once: DecideOnce
     cycles: CyclesToReplay
     seed: Annotated[
         Integer,
@@ -292,6 +299,7 @@ class SimulateOptions(SensorOptions, DetectionOptions, total=False):
         "Simulate without signal: photon-counts.svg is then a passive image",
     ]
     frame: Frame
+    decide_once: DecideOnce
     cycles: Annotated[
         Integer,
         "whole number, 1 to 9223372036854775807",

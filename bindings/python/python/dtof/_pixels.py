@@ -62,7 +62,7 @@ class Pixels:
     def histogram(self, event: Any) -> numpy.ndarray:
         """The photons of each bin from which ``event`` was decided, if it is the last of its pixel or block."""
         pixel, level, cycle, echo = (int(event[name]) for name in ("pixel", "level", "cycle", "echo"))
-        return numpy.frombuffer(self._native.histogram(pixel, level, cycle, echo), dtype="<u2")
+        return numpy.frombuffer(self._native.histogram(pixel, level, cycle, echo), dtype="<u4")
 
     @property
     def cycles(self) -> int:

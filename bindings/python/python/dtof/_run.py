@@ -30,8 +30,10 @@ class Replay:
 
     ``events`` is an array of :data:`dtof.EVENT`, sorted by laser cycle, level and pixel.
     ``statistics`` has the contents of ``summary.json``; every loss is counted there. ``settings``
-    are those of the run, ``toml`` is the same as the text of a settings file. Two runs are never equal:
-    compare their events.
+    are those of the run, ``toml`` is the same as the text of a settings file. With ``decide_once``,
+    ``confidence`` has how many standard deviations the peak of each pixel stands above its background
+    (rows by columns, NaN for pixels left out); else it is None. Two runs are never equal: compare their
+    events.
     """
 
     events: numpy.ndarray
@@ -39,6 +41,7 @@ class Replay:
     statistics: dict[str, Any]
     settings: dict[str, Any]
     toml: str
+    confidence: Optional[numpy.ndarray] = None
 
     def __repr__(self) -> str:
         photons, (rows, columns) = self.statistics["photons"], self.array.shape
@@ -92,6 +95,7 @@ def replay(
 
     ``photons_per_cycle`` (1.0, in the brightest pixel) or ``recorded_cycles`` determine how long
     histograms were recorded. ``cycles`` (10,000) laser cycles are replayed with random ``seed`` (1).
+    ``decide_once`` takes all photons for one decision a pixel: see :attr:`Replay.confidence`.
     ``settings`` is the name or the text of a settings file, a dict of its sections, or a calibration, a
     comparison or a run. Without ``settings`` and without an option of detection, the settings are those of
     :func:`calibrate`. Options of reports and files are not available:
@@ -157,12 +161,14 @@ def result(done: dict[str, Any]) -> Replay:
 
 def quiet_result(done: dict[str, Any]) -> Replay:
     """The result of a native run, without its warnings."""
+    array, confidence = Array(**done["array"]), done["confidence"]
     return Replay(
         events=events_of(done["events"]),
-        array=Array(**done["array"]),
+        array=array,
         statistics=json.loads(done["summary"]),
         settings=json.loads(done["settings"]),
         toml=done["toml"],
+        confidence=None if confidence is None else numpy.array(confidence).reshape(array.shape),
     )
 
 

@@ -240,11 +240,13 @@ flags! {
     FRAME:
     frame Text("N") => "Simulate a frame-based sensor for comparison: every N laser cycles each pixel \
         reports its highest bin, if that is above the background";
+    decide_once Optional("YES") => "Decide once for each pixel, on all of its photons, and write how clear its peak \
+        stands: confidence.npy. Takes all laser cycles unless --cycles says less";
 }
 
 flags! {
     REPLAY:
-    cycles Text("N") => "Laser cycles to replay at most [default: 10000]";
+    cycles Text("N") => "Laser cycles to replay at most [default: 10000; all with --decide-once]";
     seed Text("N") => "Seed of the laser cycles that recorded photons get [default: 1]";
 }
 

@@ -7,6 +7,7 @@ mod calibrate;
 mod compare;
 mod counter_bits;
 mod dead_time;
+mod decide_once;
 mod device;
 mod export;
 mod neighbours;

@@ -71,6 +71,8 @@ pub struct Settings {
     /// A frame-based sensor instead: all pixels read their highest bin every so many laser cycles.
     /// Rule, minimum, L1, L2 and X are not used.
     pub frame: Option<u16>,
+    /// Pixels decide once, on all photons of the recording. L1, L2, X, tracking and counters are not used.
+    pub decide_once: bool,
     /// Seed of every random number.
     pub seed: u64,
 }
@@ -104,6 +106,7 @@ impl Settings {
             dither_bins: 0,
             dither_seed: 0,
             frame: None,
+            decide_once: false,
             seed,
         }
     }

@@ -404,6 +404,7 @@ rebin = 2
             "neighbours",
             "calibration",
             "photons_per_cycle",
+            "decide_once",
         ];
         for (_, keys, comments) in SECTIONS {
             for (key, comment) in keys.iter().zip(comments) {
@@ -432,6 +433,38 @@ rebin = 2
         assert_eq!(again.settings(64).unwrap(), settings);
         assert_eq!(again.detection.alpha, file.detection.alpha);
         assert_eq!((again.sensor.bins, again.run.seed), (Some(64), Some(1)));
+    }
+
+    #[test]
+    fn a_single_decision_has_the_z_of_a_single_look() {
+        let of = |text: &str| {
+            SettingsFile::parse(&format!("{text}[detection]\nrule = 'window'\nwindow = 3"))
+        };
+        let file = of("[run]\ndecide_once = true\n").unwrap();
+        let once = file.settings(128).unwrap();
+        assert!(once.decide_once);
+        assert_eq!(file.with_settings(&once).run.decide_once, Some(true));
+        let z = |settings: &super::super::Settings| match settings.rule {
+            dtof_core::AnyRule::Window(rule) => rule.z(),
+            _ => panic!("another rule"),
+        };
+        let looks = of("").unwrap().settings(128).unwrap();
+        assert!(z(&once) < z(&looks));
+        // One in 100 of 128 bins: 12,800 trials.
+        assert!(
+            (z(&once).to_num::<f64>() - 3.78).abs() < 0.02,
+            "{}",
+            z(&once)
+        );
+        let refused = of("[run]\ndecide_once = true\nframe = 9\n")
+            .unwrap()
+            .settings(128);
+        assert!(
+            refused
+                .unwrap_err()
+                .to_string()
+                .contains("cannot be used with")
+        );
     }
 
     #[test]

@@ -30,6 +30,16 @@ impl SettingsFile {
         let x = detection.x.unwrap_or(4);
         let l1 = detection.l1.unwrap_or(40);
         let l2 = detection.l2.unwrap_or(DEFAULT_L2);
+        let decide_once = self.run.decide_once.unwrap_or(false);
+        ensure!(
+            !decide_once || self.run.frame.is_none(),
+            Refused::new("decide_once", "cannot be used with `frame`")
+        );
+        // A single decision is a single look.
+        let looks = match decide_once {
+            true => (1, 0, 2),
+            false => (x, l1, l2),
+        };
         let z_for = |share| {
             // Only the number of bins within the gate matters here. The engine refuses an invalid
             // number of bins.
@@ -38,6 +48,7 @@ impl SettingsFile {
             let (first, last) = sensor.gate.unwrap_or((0, last_bin));
             let gate = RangeGate::<1024>::new(first, last)
                 .map_err(|error| no_gate((first, last), bins, &error))?;
+            let (x, l1, l2) = looks;
             let z = z_for_levels(one_in(share), &gate, x, l1, l2, detection.levels());
             ensure!(
                 z < HIGHEST_Z,
@@ -107,6 +118,7 @@ impl SettingsFile {
             dither_bins,
             dither_seed,
             frame: self.run.frame,
+            decide_once,
             seed: self.run.seed.unwrap_or(1),
         })
     }
@@ -135,6 +147,7 @@ impl SettingsFile {
             run: RunSettings {
                 seed: Some(settings.seed),
                 frame: settings.frame,
+                decide_once: settings.decide_once.then_some(true),
                 ..self.run.clone()
             },
             dead_time_of_sensor: self.dead_time_of_sensor,

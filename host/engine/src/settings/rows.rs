@@ -39,20 +39,24 @@ impl Settings {
                 ),
             ));
         }
-        if self.tracking {
+        if self.tracking && !self.decide_once {
             let text = "half of the false alarms near the last event of a pixel";
             rows.push(row("tracking", text.to_owned()));
         }
         if self.echoes > EchoNumber::FIRST {
             let reach = self.echo_guard_bins();
             let (most, wait) = (self.echoes, self.echo_wait);
+            let wait = wait.filter(|_| !self.decide_once);
             let ends = wait.map_or(String::new(), |times| {
                 format!(", which ends after {times} times the laser cycles of the last")
             });
             let text = format!("up to {most} an exposure{ends}; ±{reach} bins left out");
             rows.push(row("echoes", text));
         }
-        if self.frame.is_none() {
+        if self.decide_once {
+            let text = "one a pixel, on all of its photons".to_owned();
+            rows.push(row("decisions", text));
+        } else if self.frame.is_none() {
             rows.push(row(
                 "decisions",
                 format!(
@@ -69,6 +73,7 @@ impl Settings {
     #[must_use]
     pub fn title(&self) -> &'static str {
         match self.frame {
+            None if self.decide_once => "Depth, decided once on all photons",
             None => "Asynchronous depth events",
             Some(_) => "Frames, as a frame-based sensor reads them",
         }
@@ -86,8 +91,20 @@ impl Settings {
     /// Laser cycles until the first decision.
     #[must_use]
     pub fn first_decision(&self) -> u64 {
+        if self.decide_once {
+            return 1;
+        }
         let (x, l1) = (u64::from(self.x), u64::from(self.l1));
         self.frame.map_or((l1 / x + 1) * x, u64::from)
+    }
+
+    /// The most laser cycles of an exposure.
+    #[must_use]
+    pub fn longest_exposure(&self) -> u16 {
+        match self.decide_once {
+            true => u16::MAX,
+            false => self.l2,
+        }
     }
 
     /// Rule, or frame, estimator, and neighbours and dead time if there are any.
@@ -135,7 +152,7 @@ impl Settings {
             let text = "those of one laser cycle in one bin count once";
             rows.push(("photons".to_owned(), text.to_owned()));
         }
-        if self.counter_bits != 10 && self.frame.is_none() {
+        if self.counter_bits != 10 && self.frame.is_none() && !self.decide_once {
             let text = format!("{} bits; a full one ends an exposure", self.counter_bits);
             rows.push(("counters".to_owned(), text));
         }

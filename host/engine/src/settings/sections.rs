@@ -13,7 +13,7 @@ use serde::ser::{Error as _, Serializer};
 
 use dtof_options::NO_OPTION;
 use dtof_options::numbers::{
-    MAX_INTEGER, bins, fixed, integer, laser_hz, list, positive, real, shortest, within,
+    MAX_INTEGER, bins, boolean, fixed, integer, laser_hz, list, positive, real, shortest, within,
 };
 use dtof_photons::axes::Axes;
 use dtof_photons::geometry::{FieldOfView, Rays, angles};
@@ -108,6 +108,8 @@ pub struct RunSettings {
     pub recorded_cycles: Option<u64>,
     /// Laser cycles of a frame, if it is a frame-based sensor.
     pub frame: Option<u16>,
+    /// Whether pixels decide once, on all photons.
+    pub decide_once: Option<bool>,
     /// Recorded arrays: the meaning of each axis.
     #[serde(serialize_with = "as_text")]
     pub axes: Option<Axes>,
@@ -248,6 +250,7 @@ section! {
     photons_per_cycle = positive, "in the brightest pixel of a recording";
     recorded_cycles = integer(1..=MAX_INTEGER), "laser cycles of a recording";
     frame = integer(1..=u16::MAX), "laser cycles, of a frame-based sensor";
+    decide_once = boolean, "on all photons of a pixel";
     axes = str::parse, "of a recorded array";
     array = name, "of an archive";
     rebin = integer(1..=512), "neighbouring bins that are added up";

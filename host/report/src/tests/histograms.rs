@@ -123,12 +123,13 @@ fn histograms_are_thinned_until_there_is_room() {
 fn a_large_array_of_bright_pixels_stays_below_the_documented_size() {
     let array = Array::new(64, 64).unwrap();
     let settings = Settings::static_scene(0);
-    let counts: Vec<u16> = (0..128)
+    let counts: Vec<u32> = (0..128)
         .map(|bin| if bin == 10 { 1023 } else { 800 + bin })
         .collect();
     let decision = |pixel| Decision {
         event: event(pixel, 1 << 40, 10),
         counts: counts.clone(),
+        cycles: 10,
         expected: Some(BinIndex::saturating(3)),
         excluded: ExcludedBins::NONE,
     };

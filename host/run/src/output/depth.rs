@@ -1,6 +1,6 @@
 //! The depth map as numbers: an array for NumPy, and a table. Millimetres of each pixel, the mean of the surface
 //! that most of its last events lie on. If pixels report several echoes, also the depth of the nearest and of the
-//! farthest echo of each exposure.
+//! farthest echo of each exposure, and if they decide once how clear the peak of each pixel stands.
 
 use std::fmt::Write as _;
 
@@ -18,7 +18,10 @@ pub const LAYERS: [(Echo, &str, &str); 2] = [
     (Echo::First, "depth-nearest.npy", "depth-nearest.csv"),
     (Echo::Last, "depth-farthest.npy", "depth-farthest.csv"),
 ];
-/// The first line of the table.
+/// How clear the peak of each pixel stands, in standard deviations, as the array of depths; not a number for pixels
+/// that are left out.
+pub const CONFIDENCE: &str = "confidence.npy";
+/// The first line of the table, or its beginning: a column `confidence` may follow.
 pub const HEADER: &str = "pixel,column,row,depth_mm";
 /// What marks the array as a result: its header ends with so many spaces. NumPy pads its own with fewer than 64.
 pub const MARK: &str = match str::from_utf8(&[b' '; 128]) {
@@ -46,7 +49,7 @@ impl Layer {
         }
         let layers = LAYERS.map(|(echo, array_name, table_name)| Self {
             names: [array_name, table_name],
-            selection: EchoSelection::new(echo, settings.echoes, settings.l2),
+            selection: EchoSelection::new(echo, settings.echoes, settings.longest_exposure()),
             maps: PixelHistories::new(array),
         });
         layers.into()
@@ -71,33 +74,39 @@ impl Layer {
     }
 }
 
-/// The array.
-pub fn array(maps: &PixelHistories) -> Vec<u8> {
-    let (rows, columns) = (maps.array.rows(), maps.array.columns());
+/// An array with a value for each pixel.
+pub fn array(array: Array, values: impl Iterator<Item = f64>) -> Vec<u8> {
+    let (rows, columns) = (array.rows(), array.columns());
     let header =
         format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
     let mut bytes = NPY_1_0.to_vec();
     bytes.extend(format!("{header:<245}\n").bytes());
-    for pixel in &maps.pixels {
-        let depth = pixel.mean_mm().unwrap_or(f64::NAN);
-        bytes.extend(depth.to_le_bytes());
-    }
+    bytes.extend(values.flat_map(f64::to_le_bytes));
     bytes
 }
 
-/// The table.
-pub fn table(maps: &PixelHistories) -> String {
+/// The table, with the confidence if there is one for each pixel.
+pub fn table(maps: &PixelHistories, confidence: Option<&[f64]>) -> String {
     let columns = maps.array.columns() as usize;
-    let mut table = format!("{HEADER}\n");
+    let more = confidence.map_or("", |_| ",confidence");
+    let mut table = format!("{HEADER}{more}\n");
     for (number, pixel) in maps.pixels.iter().enumerate() {
         let (column, row) = (number % columns, number / columns);
         let depth = pixel.mean_mm().map(|depth| format!("{depth:.3}"));
         // Writing to a string does not fail.
-        let _ = writeln!(
+        let _ = write!(
             table,
             "{number},{column},{row},{}",
             depth.unwrap_or_default()
         );
+        if let Some(confidence) = confidence.and_then(|all| all.get(number)) {
+            let text = match confidence.is_nan() {
+                true => String::new(),
+                false => format!("{confidence:.3}"),
+            };
+            let _ = write!(table, ",{text}");
+        }
+        table.push('\n');
     }
     table
 }
@@ -110,7 +119,7 @@ mod tests {
     #[test]
     fn the_array_has_the_mark_and_as_many_numbers_as_pixels() {
         let maps = PixelHistories::new(Array::new(256, 256).unwrap());
-        let bytes = array(&maps);
+        let bytes = array(maps.array, std::iter::repeat_n(f64::NAN, 65_536));
         assert_eq!(bytes.len(), 256 + 8 * 65_536);
         assert!(
             bytes[..256]
@@ -118,6 +127,6 @@ mod tests {
                 .any(|part| part == MARK.as_bytes())
         );
         assert_eq!(bytes[255], b'\n');
-        assert!(table(&maps).ends_with("\n65535,255,255,\n"));
+        assert!(table(&maps, None).ends_with("\n65535,255,255,\n"));
     }
 }

@@ -100,6 +100,7 @@ impl Setting {
             dither_bins: 0,
             dither_seed: 0,
             frame: None,
+            decide_once: false,
             seed: 0,
         })
     }

@@ -23,7 +23,7 @@ FORMATS = ("aer", "npy")
 _OF_THE_PROGRAM = (
     "events.csv", "report.html", "depth-last.svg", "depth-mean.svg", "event-counts.svg",
     "reflectivity-events.svg", "reflectivity-signal.svg", "photon-counts.svg", "depth.npy",
-    "depth.csv", "depth-nearest.npy", "depth-nearest.csv", "depth-farthest.npy", "depth-farthest.csv",
+    "depth.csv", "confidence.npy", "depth-nearest.npy", "depth-nearest.csv", "depth-farthest.npy", "depth-farthest.csv",
 )
 
 

@@ -150,4 +150,6 @@ def _joined(done: list[Done], name: str) -> Replay:
         statistics["cover_glass"] = _native.cover_glass(
             first.toml, photons, statistics["cycles"], max(pixels, 0)
         )
-    return Replay(events, Array(*first.array), statistics, first.settings, first.toml)
+    known = [run.confidence for run in runs if run.confidence is not None]
+    confidence = numpy.fmax.reduce(known) if known else None
+    return Replay(events, Array(*first.array), statistics, first.settings, first.toml, confidence)

@@ -1,0 +1,271 @@
+use dtof_core::{Count24, WindowRule};
+use dtof_photons::source::{Photon, PixelPhotons};
+use proptest::prelude::*;
+
+use super::*;
+use crate::host::host_engine;
+
+fn settings(bins: usize) -> Settings {
+    let rule = WindowRule::new(3, "4".parse().unwrap(), Count::saturating(5)).unwrap();
+    Settings {
+        bins,
+        rule: rule.into(),
+        sigma_bins: Some("1".parse().unwrap()),
+        decide_once: true,
+        ..Settings::static_scene(0)
+    }
+}
+
+/// Each photon of `counts` in the laser cycle of its number, modulo `cycles`.
+fn photons(counts: &[u32], cycles: u16) -> Vec<Photon> {
+    let codes = (0..).zip(counts);
+    let codes = codes.flat_map(|(code, &count)| (0..count).map(move |_| code));
+    let mut photons: Vec<Photon> = (0..)
+        .zip(codes)
+        .map(|(number, code): (u32, u16)| Photon {
+            cycle: u16::try_from(number % u32::from(cycles)).unwrap(),
+            code,
+        })
+        .collect();
+    photons.sort_by_key(|photon| photon.cycle);
+    photons
+}
+
+/// One slice of as many laser cycles for all pixels.
+fn slice(histograms: &[Vec<u32>], cycles: u16) -> Slice {
+    let pixels = histograms.iter().map(|counts| PixelPhotons {
+        cycles,
+        photons: photons(counts, cycles),
+    });
+    Slice {
+        first_cycle: 0,
+        pixels: pixels.collect(),
+    }
+}
+
+fn addresses(pixels: usize) -> Vec<PixelAddress> {
+    (0..=u16::MAX).take(pixels).map(PixelAddress::new).collect()
+}
+
+/// The events of histograms of 100 laser cycles, and the engine.
+fn decided(
+    settings: &Settings,
+    array: Array,
+    histograms: &[Vec<u32>],
+) -> (Vec<DepthEvent>, Box<dyn Engine>) {
+    let addresses = addresses(histograms.len());
+    let mut engine = host_engine(settings, array, &addresses).unwrap();
+    engine.keep_decisions(&|_| true);
+    engine.run(&slice(histograms, 100)).unwrap();
+    (engine.finish(), engine)
+}
+
+fn line(pixels: usize) -> Array {
+    Array::new(u32::try_from(pixels).unwrap(), 1).unwrap()
+}
+
+/// 20 photons a bin, and a pulse of 5, 30 and 10 photons.
+fn wall(at: usize) -> Vec<u32> {
+    let mut counts = vec![20; 128];
+    counts[at - 1] += 5;
+    counts[at] += 30;
+    counts[at + 1] += 10;
+    counts
+}
+
+fn counts() -> impl Strategy<Value = Vec<u32>> {
+    let counts = prop::collection::vec(0..30_u32, 128);
+    (counts, 4..124_usize, 0..90_u32).prop_map(|(mut counts, bin, more)| {
+        counts[bin] += more;
+        counts
+    })
+}
+
+proptest! {
+    /// An event is what the core finds in the whole histogram. Every photon is accounted for, however many slices they
+    /// come in.
+    #[test]
+    fn a_pixel_decides_as_the_core_on_its_histogram(
+        counts in counts(), first in 0..60_u16, past in 0..5_u32, cut in 1..100_u16, echoes in 1..=3_u8
+    ) {
+        let settings = Settings {
+            gate: Some((first, 127)),
+            echoes: EchoNumber::new(echoes).unwrap(),
+            ..settings(128)
+        };
+        let config = settings.config::<128>().unwrap();
+        let mut histogram = Histogram::<128, Count24>::new();
+        let all: [u32; 128] = counts.clone().try_into().unwrap();
+        let gated_out = config.add_frame(&mut histogram, &all);
+        let mut expected = Vec::new();
+        config.detect_echoes(&mut histogram.clone(), 100, |echo, detection| {
+            let event = detection.event(PixelAddress::new(0), LaserCycle::new(99), 100);
+            expected.push(DepthEvent { echo, ..event });
+        });
+
+        let mut with_past = counts.clone();
+        with_past.push(past);
+        let [whole] = slice(&[with_past], 100).pixels.try_into().unwrap();
+        let (before, after): (Vec<Photon>, Vec<Photon>) = whole.photons.iter().partition(|photon| photon.cycle < cut);
+        let after = after.iter().map(|photon| Photon { cycle: photon.cycle - cut, ..*photon });
+        let mut engine = host_engine(&settings, line(1), &addresses(1)).unwrap();
+        for (first_cycle, cycles, photons) in [(0, cut, before), (cut.into(), 100 - cut, after.collect())] {
+            let slice = Slice { first_cycle, pixels: vec![PixelPhotons { cycles, photons }] };
+            prop_assert!(engine.run(&slice).unwrap().is_empty());
+        }
+        prop_assert_eq!(engine.finish(), expected.clone());
+
+        let [statistics, _] = engine.statistics();
+        prop_assert_eq!(statistics.photons(), u64::from(counts.iter().sum::<u32>() + past));
+        prop_assert_eq!((statistics.rejected, statistics.gated_out), (past.into(), gated_out.into()));
+        prop_assert_eq!((statistics.events, statistics.expired), (expected.len() as u64, expected.is_empty().into()));
+    }
+
+    /// With many photons the rule asks for a confidence of z, and a little more for the skew of Poisson numbers.
+    #[test]
+    fn the_confidence_is_in_units_of_z(counts in counts()) {
+        let counts: Vec<u32> = counts.iter().map(|count| count + 100).collect();
+        let (events, engine) = decided(&settings(128), line(1), &[counts]);
+        let confidence = engine.confidence().unwrap()[0];
+        if confidence < 4.0 {
+            prop_assert!(events.is_empty(), "{}", confidence);
+        }
+        // The best window may lie beside the highest bin.
+        if !events.is_empty() {
+            prop_assert!(confidence > 4.0, "{}", confidence);
+        }
+    }
+}
+
+#[test]
+fn the_confidence_is_that_of_the_formula() {
+    let mut counts = vec![10; 128];
+    counts[40] = 40;
+    // 30 more than 10 a bin: in 3 of 128 bins.
+    let (_, engine) = decided(&settings(128), line(1), &[counts]);
+    let confidence = engine.confidence().unwrap()[0];
+    let (total, share) = (1310.0, 3.0 / 128.0);
+    let expected: f64 = (60.0 - share * total) / f64::sqrt(share * (1.0 - share) * total);
+    assert!(
+        (confidence - expected).abs() < 1e-9,
+        "{confidence} {expected}"
+    );
+}
+
+#[test]
+fn without_photons_the_confidence_is_0_and_of_pixels_left_out_unknown() {
+    let settings = Settings {
+        masked: vec![1],
+        ..settings(128)
+    };
+    let (events, engine) = decided(&settings, line(3), &[vec![0; 128], vec![0; 128], wall(50)]);
+    assert_eq!(events.len(), 1);
+    let confidence = engine.confidence().unwrap();
+    assert_eq!(confidence[0], 0.0);
+    assert!(confidence[1].is_nan() && confidence[2] > 4.0);
+    let [statistics, _] = engine.statistics();
+    assert_eq!(statistics.expired, 1);
+    // The histogram of the event, for the report.
+    let [decision] = engine.decisions().try_into().unwrap();
+    assert_eq!((decision.counts, decision.cycles), (wall(50), 100));
+}
+
+#[test]
+fn a_full_counter_is_no_event() {
+    // 1024 bins have counters of 16 bits.
+    let mut counts = vec![20; 1024];
+    counts[40] = 65_535;
+    let (events, _) = decided(&settings(1024), line(1), &[counts.clone()]);
+    assert_eq!(events.len(), 1);
+    counts[40] += 3;
+    let (events, engine) = decided(&settings(1024), line(1), &[counts]);
+    assert!(events.is_empty());
+    let [statistics, _] = engine.statistics();
+    assert_eq!((statistics.ended_full, statistics.saturated), (1, 3));
+}
+
+#[test]
+fn a_recording_that_ends_early_decides_at_its_end() {
+    let mut engine = host_engine(&settings(128), line(2), &addresses(2)).unwrap();
+    let mut slice = slice(&[wall(50), wall(60)], 100);
+    slice.pixels[0].cycles = 150;
+    engine.run(&slice).unwrap();
+    let events = engine.finish();
+    let of: Vec<_> = events
+        .iter()
+        .map(|event| (event.pixel.raw(), event.cycle.raw(), event.exposure))
+        .collect();
+    assert_eq!(of, [(1, 99, 100), (0, 149, 150)]);
+}
+
+/// Pixels of a wall that are too dim by themselves, around `middle`.
+fn around(middle: Vec<u32>) -> Vec<Vec<u32>> {
+    let mut dim = vec![20; 128];
+    (dim[49], dim[50], dim[51]) = (24, 38, 26);
+    let mut all = vec![dim; 9];
+    all[4] = middle;
+    all
+}
+
+#[test]
+fn neighbours_confirm_a_surface_that_the_pixel_sees() {
+    let with = Settings {
+        neighbours: Neighbours::new(8),
+        ..settings(128)
+    };
+    let array = Array::new(3, 3).unwrap();
+    let of_middle = |settings: &Settings, middle: Vec<u32>| {
+        let (events, _) = decided(settings, array, &around(middle));
+        events
+            .into_iter()
+            .find(|event| event.pixel == PixelAddress::new(4))
+    };
+    // As dim as the others.
+    let dim = around(Vec::new()).remove(0);
+    assert_eq!(of_middle(&settings(128), dim.clone()), None);
+    let event = of_middle(&with, dim).unwrap();
+    assert!(event.flags.contains(Flags::CONFIRMED));
+    assert_eq!(event.peak_bin.raw(), 50);
+    // Its own photons.
+    assert_eq!((event.peak_count.raw(), event.background.raw()), (38, 20));
+    // It sees nothing.
+    assert_eq!(of_middle(&with, vec![20; 128]), None);
+    // It sees something else, by itself.
+    let event = of_middle(&with, wall(90)).unwrap();
+    assert!(!event.flags.contains(Flags::CONFIRMED));
+    let (alone, _) = decided(&settings(128), line(1), &[wall(90)]);
+    assert_eq!(
+        (event.peak_bin, event.offset, event.peak_count),
+        (alone[0].peak_bin, alone[0].offset, alone[0].peak_count)
+    );
+    // It sees the same, half a bin off by chance: the depth is that of all.
+    let mut off = wall(50);
+    off.swap(49, 51);
+    let event = of_middle(&with, off.clone()).unwrap();
+    let (alone, _) = decided(&settings(128), line(1), &[off]);
+    assert!(event.offset > alone[0].offset && !event.flags.contains(Flags::CONFIRMED));
+    // A pixel that is left out has no say.
+    let without: Vec<u16> = (0..9).filter(|&pixel| pixel != 4).collect();
+    let masked = Settings {
+        masked: without,
+        ..with
+    };
+    assert_eq!(of_middle(&masked, around(Vec::new()).remove(0)), None);
+}
+
+#[test]
+fn what_needs_looks_is_refused() {
+    let with = |change: fn(&mut Settings)| {
+        let mut settings = settings(128);
+        change(&mut settings);
+        let refused = host_engine(&settings, line(1), &addresses(1));
+        refused.err().unwrap().to_string()
+    };
+    let blocks = with(|settings| {
+        settings.binning = Some(crate::settings::AdaptiveBinning {
+            levels: dtof_core::BlockLevel::new(1).unwrap(),
+            patience: 64,
+        });
+    });
+    assert_eq!(blocks, "decide_once cannot be used with binning");
+}
