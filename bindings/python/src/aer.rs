@@ -5,7 +5,6 @@ use std::io::{BufReader, BufWriter};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
-use dtof_core::RangeScale;
 use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::{Event, Reader, Writer};
 use dtof_export::{Format, ProjectionOptions};
@@ -34,8 +33,8 @@ pub fn read_events(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyByteA
 
 fn read(path: &Path, mut control: &Control) -> Result<(Vec<u8>, Array)> {
     let mut reader = Reader::new(BufReader::new(File::open(path)?))?;
-    let header = *reader.header();
-    let scale = RangeScale::new(header.bin_width_ps, header.offset_mm)?;
+    let header = reader.header().clone();
+    let ranges = header.ranges()?;
     let (mut records, mut read) = (Vec::new(), 0usize);
     while let Some(event) = reader.next_event()? {
         match event {
@@ -45,7 +44,7 @@ fn read(path: &Path, mut control: &Control) -> Result<(Vec<u8>, Array)> {
                     i64::try_from(cycle).is_ok(),
                     "cycle {cycle}: must be below 2^63 here"
                 );
-                push(&mut records, &event, &scale);
+                push(&mut records, &event, &ranges);
             }
             Event::DynamicDepth(_) => {
                 bail!("holds dynamic depth events; dtof export --format csv makes a table of them")

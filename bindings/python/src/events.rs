@@ -5,18 +5,19 @@ use dtof_core::fixed::traits::Fixed;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
     BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
-    RangeScale, SubBinOffset,
+    SubBinOffset,
 };
 use dtof_events::aer_file::{Event, Header};
 use dtof_events::events_csv::range_mm;
 use dtof_options::numbers::bins_of;
+use dtof_photons::ranges::{Ranges, RangesError};
 use pyo3::prelude::*;
 
 /// Bytes of a record of `dtof.EVENT`: little-endian, with padding.
 pub const RECORD: usize = 48;
 
 /// Appends the record of `event`.
-pub fn push(records: &mut Vec<u8>, event: &DepthEvent, scale: &RangeScale) {
+pub fn push(records: &mut Vec<u8>, event: &DepthEvent, ranges: &Ranges) {
     let mut record = [0; RECORD];
     let mut put = |at: usize, bytes: &[u8]| record[at..at + bytes.len()].copy_from_slice(bytes);
     // 18 bits, a multiple of 1/256: exact as f32.
@@ -27,7 +28,7 @@ pub fn push(records: &mut Vec<u8>, event: &DepthEvent, scale: &RangeScale) {
     put(10, &event.exposure.to_le_bytes());
     put(12, &event.peak_bin.raw().to_le_bytes());
     put(16, &depth_bins.to_le_bytes());
-    put(24, &range_mm(event, scale).to_le_bytes());
+    put(24, &range_mm(event, ranges).to_le_bytes());
     put(32, &event.peak_count.raw().to_le_bytes());
     put(36, &event.background.raw().to_le_bytes());
     put(
@@ -38,7 +39,7 @@ pub fn push(records: &mut Vec<u8>, event: &DepthEvent, scale: &RangeScale) {
 }
 
 /// The array of events, as Python has it.
-#[derive(FromPyObject, IntoPyObject, Clone, Copy, Debug)]
+#[derive(FromPyObject, IntoPyObject, Clone, Debug)]
 pub struct Array {
     pub bins: u32,
     pub rows: u32,
@@ -47,6 +48,8 @@ pub struct Array {
     pub offset_mm: f64,
     pub laser_millihertz: u64,
     pub start_us: i64,
+    /// Of each pixel, `None` if it is left out; none if they are 0.
+    pub offsets_mm: Option<Vec<Option<f64>>>,
 }
 
 impl Array {
@@ -59,6 +62,11 @@ impl Array {
             offset_mm: header.offset_mm.to_num(),
             laser_millihertz: header.laser_millihertz,
             start_us: header.start_us,
+            offsets_mm: (!header.offsets_mm.is_empty()).then(|| {
+                let offsets = header.offsets_mm.iter();
+                let offsets = offsets.map(|offset| offset.map(|offset| offset.to_num()));
+                offsets.collect()
+            }),
         }
     }
 
@@ -84,10 +92,25 @@ impl Array {
                 .with_context(|| format!("offset_mm {offset}: must be a multiple of 1/256"))?,
             laser_millihertz: self.laser_millihertz,
             start_us: self.start_us,
+            offsets_mm: self.pixel_offsets()?,
         };
-        RangeScale::new(header.bin_width_ps, header.offset_mm)
-            .with_context(|| format!("bin_width_ps {width}, offset_mm {offset}"))?;
+        header.ranges().with_context(|| match header.ranges() {
+            Err(RangesError::Scale(_)) => format!("bin_width_ps {width}, offset_mm {offset}"),
+            _ => "offsets_mm".to_owned(),
+        })?;
         Ok(header)
+    }
+
+    fn pixel_offsets(&self) -> Result<Vec<Option<I24F8>>> {
+        let offsets = self.offsets_mm.iter().flatten().map(|&offset| {
+            let Some(offset) = offset else {
+                return Ok(None);
+            };
+            let exact = exact::<I24F8>(offset);
+            let reason = || format!("offsets_mm {offset}: must be a multiple of 1/256");
+            exact.map(Some).with_context(reason)
+        });
+        offsets.collect()
     }
 }
 

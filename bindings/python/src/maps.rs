@@ -1,6 +1,6 @@
 //! Maps of pixels from events, and events as points.
 
-use dtof_core::{EchoNumber, RangeScale};
+use dtof_core::EchoNumber;
 use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::Event;
 use dtof_events::echoes::{Echo, EchoSelection};
@@ -35,11 +35,11 @@ pub fn maps(
     let options: ProjectionOptions = options(keywords)?;
     work(py, None, move |_| {
         let header = array.header()?;
-        let scale = RangeScale::new(header.bin_width_ps, header.offset_mm)?;
+        let ranges = header.ranges()?;
         let mut maps = PixelHistories::new(header.array);
         for event in select(events(&records, &header)?, options.echo) {
             if let Event::Depth(event) = event {
-                maps.add(&event, &scale);
+                maps.add(&event, &ranges);
             }
         }
         let all = |value: fn(&PixelHistory) -> Option<f64>| {

@@ -2,12 +2,13 @@
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::{
-    AnyRule, AsyncPixel, Count8, Count10, CounterWidth, DepthEvent, LaserCycle, OncePerBin,
-    PixelAddress, PixelConfig, RangeScale, Statistics,
+    AnyRule, Array, AsyncPixel, Count8, Count10, CounterWidth, DepthEvent, LaserCycle, OncePerBin,
+    PixelAddress, PixelConfig, Statistics,
 };
 use dtof_engine::settings::Settings;
 use dtof_engine::with_bins;
 use dtof_options::Refused;
+use dtof_photons::ranges::Ranges;
 use dtof_run::given::Operation;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
@@ -92,7 +93,7 @@ impl<const BINS: usize, W: CounterWidth> AnyPixel for PixelOf<BINS, W> {
 #[pyclass(module = "dtof._native")]
 pub struct Pixel {
     pixel: Box<dyn AnyPixel>,
-    scale: RangeScale,
+    ranges: Ranges,
     settings: String,
     /// Laser cycles that have ended.
     #[pyo3(get)]
@@ -130,7 +131,7 @@ impl Pixel {
         })?;
         Ok(event.map(|event| {
             let mut record = Vec::new();
-            push(&mut record, &event, &self.scale);
+            push(&mut record, &event, &self.ranges);
             PyByteArray::new(py, &record)
         }))
     }
@@ -181,6 +182,7 @@ impl Pixel {
                 ("neighbours", settings.neighbours.is_some()),
                 ("frame", settings.frame.is_some()),
                 ("masked", !settings.masked.is_empty()),
+                ("offsets_mm", !settings.offsets_mm.is_empty()),
             ];
             for (key, is_given) in of_arrays {
                 ensure!(!is_given, Refused::new(key, "is for arrays of pixels"));
@@ -190,12 +192,14 @@ impl Pixel {
                 8 => PixelOf::<BINS, Count8>::boxed(&settings, address),
                 _ => PixelOf::<BINS, Count10>::boxed(&settings, address),
             })??;
-            Ok((pixel, settings))
+            let array = Array::new(1, 1).context("one pixel")?;
+            let ranges = settings.ranges(array)?;
+            Ok((pixel, settings, ranges))
         };
-        let (pixel, settings) = create().map_err(|error| requested.add_file_name(error))?;
+        let (pixel, settings, ranges) = create().map_err(|error| requested.add_file_name(error))?;
         Ok(Self {
             pixel,
-            scale: settings.range_scale()?,
+            ranges,
             settings: serde_json::to_string(&requested.with_settings(&settings))?,
             cycle: 0,
         })

@@ -3,12 +3,13 @@
 use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, ensure};
-use dtof_core::{BlockLevel, EchoNumber, LaserCycle, PixelAddress, RangeScale};
+use dtof_core::{BlockLevel, EchoNumber, LaserCycle, PixelAddress};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_options::Refused;
 use dtof_photons::masked::check;
+use dtof_photons::ranges::Ranges;
 use dtof_photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_run::Reported;
 use dtof_run::given::Operation;
@@ -100,7 +101,7 @@ struct State {
 #[pyclass(module = "dtof._native")]
 pub struct Pixels {
     state: Mutex<State>,
-    scale: RangeScale,
+    ranges: Ranges,
     settings: Settings,
     /// The settings as JSON, and as a settings file.
     #[pyo3(get)]
@@ -201,7 +202,7 @@ impl Pixels {
 
     #[getter]
     fn array(&self) -> Array {
-        self.array
+        self.array.clone()
     }
 }
 
@@ -236,13 +237,14 @@ impl Pixels {
             if keeps_histograms {
                 engine.keep_decisions(&|_| true);
             }
-            Ok((engine, received, settings))
+            let ranges = settings.ranges(array)?;
+            Ok((engine, received, settings, ranges))
         };
-        let (engine, received, settings) =
+        let (engine, received, settings, ranges) =
             create().map_err(|error| requested.add_file_name(error))?;
         let used = requested.with_settings(&settings);
         Ok(Self {
-            scale: settings.range_scale()?,
+            ranges,
             settings_json: serde_json::to_string(&used)?,
             toml: used.to_toml()?,
             array: Array::of(&header(&settings, &received)?),
@@ -267,7 +269,7 @@ impl Pixels {
             let mut records = Vec::new();
             for event in state.engine.run(&slice)? {
                 state.reported.add(&event);
-                push(&mut records, &event, &self.scale);
+                push(&mut records, &event, &self.ranges);
             }
             Ok(records)
         })

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use anyhow::{Context, Result};
-use dtof_core::{DepthEvent, RangeScale};
+use dtof_core::DepthEvent;
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_photons::input::Input;
+use dtof_photons::ranges::Ranges;
 use dtof_photons::recorded::Layout;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_run::output::header;
@@ -164,7 +165,7 @@ impl SceneInput {
 
 /// Events as records, in memory.
 struct Records {
-    scale: RangeScale,
+    ranges: Ranges,
     array: Array,
     /// One vector for each slice.
     events: Vec<Vec<u8>>,
@@ -174,7 +175,7 @@ struct Records {
 impl Records {
     fn of(settings: &Settings, source: &dyn PhotonSource) -> Result<Self> {
         Ok(Self {
-            scale: settings.range_scale()?,
+            ranges: settings.ranges(source.array())?,
             array: Array::of(&header(settings, source)?),
             events: Vec::new(),
             confidence: None,
@@ -186,7 +187,7 @@ impl Sink for Records {
     fn take(&mut self, _slice: &Slice, events: &[DepthEvent]) -> Result<()> {
         let mut records = Vec::with_capacity(events.len() * RECORD);
         for event in events {
-            push(&mut records, event, &self.scale);
+            push(&mut records, event, &self.ranges);
         }
         self.events.push(records);
         Ok(())

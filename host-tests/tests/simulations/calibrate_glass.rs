@@ -33,6 +33,7 @@ fn found(scene: &Scene, cycles: u64, seed: u64) -> Calibration {
         cycles: None,
         bin_width_ps: 250.0,
         truth_mm: None,
+        slant: None,
     };
     calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }

@@ -25,6 +25,7 @@ fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibra
         cycles: None,
         bin_width_ps: 250.0,
         truth_mm: None,
+        slant: None,
     };
     calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }
@@ -121,6 +122,7 @@ fn tdc_of(capture: Vec<Vec<u64>>, cycles: u64) -> Option<Tdc> {
         cycles: None,
         bin_width_ps: 250.0,
         truth_mm: None,
+        slant: None,
     };
     calibrate(&observed, &CalibrationOptions::default())
         .unwrap()

@@ -108,6 +108,7 @@ fn a_recording_with_distances_calibrates_itself() {
         cycles: None,
         bin_width_ps: counts.metadata.bin_width_ps.to_num(),
         truth_mm: counts.truth_mm.as_deref(),
+        slant: None,
     };
     let found = calibrate(&observed, &CalibrationOptions::default()).unwrap();
     let pulse = found.pulse.as_ref().unwrap();

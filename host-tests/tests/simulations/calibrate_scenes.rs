@@ -17,6 +17,7 @@ fn judge(number: u64) -> (Vec<String>, String) {
         cycles: None,
         bin_width_ps: drawn.scene.bin_width_ps,
         truth_mm: None,
+        slant: None,
     };
     let options = CalibrationOptions {
         // A wall alone may be a cover glass: the user decides.
@@ -143,6 +144,7 @@ fn a_wall_alone_may_be_a_cover_glass() {
         cycles: None,
         bin_width_ps: drawn.scene.bin_width_ps,
         truth_mm: None,
+        slant: None,
     };
     let with = |glass| {
         let options = CalibrationOptions {

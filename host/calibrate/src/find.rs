@@ -8,6 +8,7 @@ pub mod observed;
 pub mod offset;
 pub mod peaks;
 pub mod pile_up;
+pub mod pixel_offsets;
 pub mod pixels;
 pub mod pulse;
 pub mod shape;

@@ -19,14 +19,19 @@ mod settle;
 mod watch;
 mod written;
 
+use std::collections::BTreeSet;
+
 use anyhow::Result;
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
+use dtof_photons::MM_PER_PS;
+use rayon::prelude::*;
 
 pub use find::glass::{Glass, Nearest};
 pub use find::observed::{Length, Observed};
 pub use find::offset::Offset;
 pub use find::pile_up::Tdc;
+pub use find::pixel_offsets::PixelOffsets;
 pub use find::pixels::Pixels;
 pub use find::pulse::Pulse;
 pub use photon_budget::PhotonBudget;
@@ -36,6 +41,7 @@ pub use watch::{Change, RunPhotons, glass_change};
 use find::background::Level;
 use find::good_histograms::GoodHistograms;
 use find::observed::Trace;
+use find::pixel_offsets::{LARGEST_MM, Measured, pixel_offsets};
 use find::shape::Window;
 use find::significance::{is_surely_less, median};
 use find::{glass, offset, peaks, pile_up, pulse};
@@ -113,6 +119,8 @@ pub struct Calibration {
     pub target_mm: Option<f64>,
     /// The range offset, if a distance is known.
     pub offset: Option<Offset>,
+    /// By how much the pixels differ, if a distance is known to more than one.
+    pub pixel_offsets: Option<PixelOffsets>,
     /// First and last bin of the range gate.
     pub gate: (u16, u16),
     /// Settings of the window rule, if the pulse is known.
@@ -125,6 +133,8 @@ pub struct Calibration {
     pub captures: usize,
     /// Pixels of a capture.
     pub array_pixels: usize,
+    /// Columns of its array.
+    pub columns: usize,
 }
 
 /// All histograms of a recording, corrected for pile-up, and the properties of their pixels.
@@ -191,7 +201,12 @@ pub fn calibrate(observed: &Observed, options: &CalibrationOptions) -> Result<Ca
     let bins = observed.bins();
     let gate = settle::gate(last_bin, glass.map_or(0, |glass| glass.end))?;
     let pulse = pulse::pulse(&windows(&good, gate.0, glass), options.seed);
-    let mut offset = offset_of(&good, gate, depth_window(pulse.as_ref()), observed, options);
+    let found = offset_of(&good, gate, depth_window(pulse.as_ref()), observed, options);
+    let (mut offset, pixel_offsets) = found.unzip();
+    let pixel_offsets = pixel_offsets.flatten();
+    if let (Some(offset), Some(pixels)) = (&mut offset, &pixel_offsets) {
+        offset.mm += pixels.median_mm;
+    }
     let (counts, _) = good.pooled();
     let cycles = good.cycles();
     let findings = pulse.as_ref().map(|pulse| settle::Findings {
@@ -213,7 +228,9 @@ pub fn calibrate(observed: &Observed, options: &CalibrationOptions) -> Result<Ca
         .unwrap_or(observed.bin_width_ps);
     if let (Some(before), Some(offset)) = (&found, &mut offset) {
         let scale = (gate, bin_width_ps, offset.mm);
-        if let Some(replay) = Replay::new(observed, before, &pixels.hot, scale, options.seed)? {
+        let own = pixel_offsets.as_ref().map_or(&[][..], |pixels| &pixels.mm);
+        let replay = Replay::new(observed, before, &pixels.hot, (scale, own), options.seed)?;
+        if let Some(replay) = replay {
             photon_budget = replay.best()?;
         }
         if let Some(budget) = photon_budget {
@@ -230,12 +247,14 @@ pub fn calibrate(observed: &Observed, options: &CalibrationOptions) -> Result<Ca
         pulse,
         target_mm: options.target_mm,
         offset,
+        pixel_offsets,
         gate,
         detection: found,
         photon_budget,
         mean: counts.iter().map(|count| count / cycles).collect(),
         captures: observed.captures.len(),
         array_pixels: observed.array.pixels() as usize,
+        columns: observed.array.columns() as usize,
         pixels,
     })
 }
@@ -303,26 +322,74 @@ fn depth_window(pulse: Option<&Pulse>) -> CentredWindow {
     )
 }
 
-/// The range offset from the distance of the target, else from true distances.
+/// The range offset from the distance of the target, else from true distances. With it comes by how much the pixels
+/// differ.
 fn offset_of(
     good: &GoodHistograms,
     gate: (u16, u16),
     window: CentredWindow,
     observed: &Observed,
     options: &CalibrationOptions,
-) -> Option<Offset> {
+) -> Option<(Offset, Option<PixelOffsets>)> {
     let first = usize::from(gate.0);
     let has_peak = |peaks: &[peaks::Peak]| peaks.iter().any(|peak| peak.top >= first);
     let all = good.traces.iter().zip(&good.peaks);
     let with_peak = all.filter(|(_, peaks)| has_peak(peaks));
     let placed = with_peak.filter_map(|(trace, _)| {
         let position = offset::position(trace, observed.bins(), gate, window)?;
-        Some((position, trace.truth_mm))
+        Some((trace, position))
     });
-    if let Some(distance) = options.target_mm {
-        let positions: Vec<f64> = placed.map(|(position, _)| position).collect();
-        return offset::from_target(&positions, distance, observed.bin_width_ps);
+    let mut placed: Vec<(&Trace, f64, Option<f64>)> = placed
+        .map(|(trace, position)| (trace, position, trace.truth_mm))
+        .collect();
+    let mm_per_bin = observed.bin_width_ps * MM_PER_PS;
+    let offset = if let Some(distance) = options.target_mm {
+        let slant = |trace: &Trace| observed.slant.map_or(1.0, |slant| slant[trace.pixel]);
+        let usual = median(placed.iter().map(|(trace, ..)| slant(trace)));
+        for (trace, _, truth) in &mut placed {
+            *truth = Some(distance * slant(trace) / usual);
+        }
+        // As if all pixels saw the target as far away as the median pixel.
+        let straight = placed.iter().map(|(_, position, truth)| {
+            position - (truth.unwrap_or(distance) - distance) / mm_per_bin
+        });
+        let straight: Vec<f64> = straight.collect();
+        // Pixels may differ only if it is known how far the target is in each.
+        let reach = observed
+            .slant
+            .map_or(0.0, |_| 2.0 * LARGEST_MM / mm_per_bin);
+        offset::from_target(&straight, distance, observed.bin_width_ps, reach)?
+    } else {
+        placed.retain(|(.., truth)| truth.is_some());
+        let pairs = placed
+            .iter()
+            .filter_map(|(_, position, truth)| Some((*position, (*truth)?)));
+        offset::from_distances(&pairs.collect::<Vec<_>>(), observed.bin_width_ps)?
+    };
+    if options.target_mm.is_none() && observed.captures.len() < 2 {
+        // Its surfaces may differ from their true distances, and not the pixels.
+        return Some((offset, None));
     }
-    let pairs = placed.filter_map(|(position, truth)| Some((position, truth?)));
-    offset::from_distances(&pairs.collect::<Vec<_>>(), observed.bin_width_ps)
+    let mm_per_bin = offset.bin_width_ps.map_or(mm_per_bin, |ps| ps * MM_PER_PS);
+    let measured = placed.par_iter().filter_map(|(trace, position, truth)| {
+        Some(Measured {
+            pixel: trace.pixel,
+            error_mm: (*truth)? - mm_per_bin * position - offset.mm,
+            noise_mm: mm_per_bin * offset::noise((trace, *position), observed.bins(), gate, window),
+        })
+    });
+    let measured: Vec<Measured> = measured.collect();
+    let has_traces = good
+        .traces
+        .iter()
+        .map(|trace| trace.pixel)
+        .collect::<BTreeSet<_>>();
+    let pixels = observed.array.pixels() as usize;
+    let is_good = |pixel: usize| has_traces.contains(&pixel);
+    let found = pixel_offsets(&measured, pixels, is_good, mm_per_bin);
+    let found = found.map(|found| match options.target_mm {
+        Some(_) if observed.slant.is_none() => found.without_field_of_view(),
+        _ => found,
+    });
+    Some((offset, found))
 }

@@ -55,6 +55,7 @@ impl PhotonBudget {
 pub struct Replay<'a> {
     settings: Settings,
     slice: Slice,
+    /// True ranges, without the offset of each pixel.
     truth: Vec<f64>,
     detection: &'a WindowDetection,
 }
@@ -68,7 +69,7 @@ impl<'a> Replay<'a> {
         observed: &Observed,
         detection: &'a WindowDetection,
         hot: &[usize],
-        (gate, bin_width_ps, offset_mm): ((u16, u16), f64, f64),
+        ((gate, bin_width_ps, offset_mm), offsets_mm): (((u16, u16), f64, f64), &[f64]),
         seed: u64,
     ) -> Result<Option<Self>> {
         let Some(truth) = observed.truth_mm else {
@@ -95,7 +96,13 @@ impl<'a> Replay<'a> {
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let slice = photons.next_slice(cycles.clamp(1.0, MAX_CYCLES.into()) as u16)?;
         let with_truth = slice.pixels.into_iter().zip(truth);
-        let with_truth = with_truth.filter_map(|(pixel, truth)| Some((pixel, (*truth)?)));
+        let own = |place: usize| offsets_mm.get(place % pixels as usize).copied();
+        // The range without the offset of the pixel.
+        let with_truth = with_truth
+            .enumerate()
+            .filter_map(|(place, (pixel, truth))| {
+                Some((pixel, (*truth)? - own(place).unwrap_or(0.0)))
+            });
         let (pixels, truth): (Vec<_>, Vec<f64>) = with_truth.unzip();
         let settings = Settings {
             gate: Some(gate),
@@ -195,11 +202,11 @@ impl<'a> Replay<'a> {
         if events.len() < MIN_EVENTS {
             return Ok(None);
         }
-        let scale = settings.range_scale()?;
+        let ranges = settings.ranges(array)?;
         let errors = || {
             events.iter().map(|event| {
-                let range: f64 = scale.range(event.position()).to_num();
-                range - self.truth[usize::from(event.pixel.raw())]
+                let range = ranges.of(event.pixel, event.level, event.position());
+                range.to_num::<f64>() - self.truth[usize::from(event.pixel.raw())]
             })
         };
         let off = median(errors());

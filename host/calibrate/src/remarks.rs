@@ -135,6 +135,18 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
             ),
         );
     }
+    if let Some(pixels) = &found.pixel_offsets
+        && pixels.needs_field_of_view
+    {
+        remark(
+            "offset",
+            format!(
+                "Beyond their noise the pixels differ by {:.1} mm. A flat target is farther away at the edges of the \
+                 array: --fov HxV says by how much, and the rest is written as an offset for each pixel.",
+                pixels.spread_mm
+            ),
+        );
+    }
     if found.offset.is_none() {
         let unused = found.target_mm.map(|distance| {
             format!(

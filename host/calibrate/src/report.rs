@@ -3,14 +3,18 @@
 use anyhow::Result;
 use dtof_draw::chart::{Axis, Chart, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{AVERAGE, EVENTS, PAPER, REFERENCE};
+use dtof_draw::picture::{Map, heat_map};
 
-use super::{Calibration, Length, Nearest, remarks};
+use super::{Calibration, Length, Nearest, PixelOffsets, remarks};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::rows::{Row, grouped, significant};
 use dtof_report::{Figure, Section, still};
 
 /// Marks near the start of every settings file and of every report: such files may be replaced.
 pub const MARKS: [&str; 2] = [dtof_engine::settings::MARK, dtof_report::MARK];
+
+/// The most columns and rows of an array whose offsets are listed.
+const WIDEST: usize = 8;
 
 /// The findings, one a row, with 95 % intervals.
 #[must_use]
@@ -93,6 +97,29 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
             format!("{:.1} mm (± {error:.1})", offset.mm)
         }),
     );
+    if let Some(pixels) = &found.pixel_offsets {
+        let lowest = pixels.mm.iter().copied().fold(0.0, f64::min);
+        let highest = pixels.mm.iter().copied().fold(0.0, f64::max);
+        let text = match (pixels.mm.is_empty(), pixels.needs_field_of_view) {
+            (true, false) => "none: pixels differ by no more than their noise".to_owned(),
+            (true, true) => "not found: the field of view is not known".to_owned(),
+            (false, _) => format!(
+                "{lowest:.1} to {highest:.1} mm; without noise their standard deviation is {:.1} mm",
+                pixels.spread_mm
+            ),
+        };
+        row("offsets of pixels", text);
+        if found.columns <= WIDEST && found.array_pixels / found.columns <= WIDEST {
+            for (number, numbers) in pixels.mm.chunks(found.columns).enumerate() {
+                let numbers = numbers.iter().map(|mm| format!("{mm:6.1}"));
+                let numbers: Vec<String> = numbers.collect();
+                row(&format!("row {number}, mm"), numbers.join(" "));
+            }
+        }
+        if !pixels.without.is_empty() {
+            row("without a target", listed(&pixels.without));
+        }
+    }
     if let Some(width) = found.offset.and_then(|offset| offset.bin_width_ps) {
         row("bin width", format!("{width:.2} ps, from the distances"));
     }
@@ -160,6 +187,15 @@ pub fn changes(now: &SettingsFile, before: &SettingsFile) -> Vec<Row> {
         mm.map_or("not known".to_owned(), |mm| format!("{mm:.1} mm"))
     };
     named("offset", mm(before.offset_mm), mm(now.offset_mm));
+    let most = |offsets: &Option<Vec<dtof_core::fixed::types::I24F8>>| {
+        let most = offsets.iter().flatten().map(|mm| mm.abs()).max();
+        most.map_or("none".to_owned(), |most| format!("up to {most:.1} mm"))
+    };
+    named(
+        "offsets of pixels",
+        most(&before.offsets_mm),
+        most(&now.offsets_mm),
+    );
     let masked = |masked: &Option<Vec<u16>>| {
         let of = masked.iter().flatten().map(|&pixel| pixel.into());
         listed(&of.collect::<Vec<usize>>())
@@ -215,8 +251,20 @@ pub fn page(
         svg: &svg,
         caption: "The mean histogram of all good pixels and captures, with the findings.",
     };
+    let mut figures = vec![figure];
+    let map = found
+        .pixel_offsets
+        .as_ref()
+        .map(|pixels| offsets(found, pixels));
+    let map = map.transpose()?.flatten();
+    if let Some(svg) = &map {
+        figures.push(Figure {
+            svg,
+            caption: "The offset of each pixel, which is added to the range offset. Without a target it is 0.",
+        });
+    }
     let lead = format!("From the histograms of {name}. Intervals are 95 % intervals.");
-    Ok(still("Calibration", &lead, &sections, &[figure]))
+    Ok(still("Calibration", &lead, &sections, &figures))
 }
 
 /// The chart of the mean histogram, with the findings.
@@ -288,6 +336,28 @@ fn histogram(found: &Calibration) -> Result<String> {
         columns: 1,
         panels: vec![Panel::only(series)],
     })
+}
+
+/// The map of the offsets, if there are any.
+fn offsets(found: &Calibration, pixels: &PixelOffsets) -> Result<Option<String>> {
+    let is_without = |pixel: &usize| pixels.without.contains(pixel);
+    let all = pixels.mm.iter().enumerate();
+    let values: Vec<Option<f64>> = all
+        .map(|(pixel, mm)| (!is_without(&pixel)).then_some(*mm))
+        .collect();
+    if values.is_empty() {
+        return Ok(None);
+    }
+    let map = Map {
+        title: "Offsets of the pixels",
+        unit: "mm",
+        axis_names: ["column", "row"],
+        missing: "target",
+        columns: found.columns,
+        rows: found.array_pixels / found.columns,
+        values: &values,
+    };
+    heat_map(&map).map(Some)
 }
 
 /// The title of the chart.

@@ -19,6 +19,15 @@ impl Calibration {
             let mm = I24F8::checked_from_num(offset.mm);
             mm.with_context(|| format!("an offset of {:.0} mm is too large", offset.mm))
         });
+        // Their median is 0, so that older ones suit a new offset.
+        let offsets = match (&self.offset, &self.pixel_offsets) {
+            (Some(_), Some(pixels)) if !pixels.needs_field_of_view => {
+                let tenths = pixels.mm.iter().map(|mm| (mm * 10.0).round() / 10.0);
+                let offsets: Vec<I24F8> = tenths.map(I24F8::saturating_from_num).collect();
+                Some(offsets).filter(|offsets| !offsets.is_empty())
+            }
+            _ => before.sensor.offsets_mm,
+        };
         let width = U16F16::checked_from_num(self.bin_width_ps);
         let glass = self.glass().filter(|_| self.gate.0 > 0);
         let sensor = SensorSettings {
@@ -29,6 +38,7 @@ impl Calibration {
             bins: u16::try_from(self.bins).ok(),
             bin_width_ps: Some(width.context("the bin width is too large")?),
             offset_mm: offset.transpose()?.or(before.sensor.offset_mm),
+            offsets_mm: offsets,
             gate: self.written_gate(),
             masked: Some(self.masked()?).filter(|masked| !masked.is_empty()),
             sigma_bins: match &self.detection {

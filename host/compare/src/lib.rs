@@ -331,20 +331,24 @@ fn known_ranges(
 ) -> Result<Truth> {
     let mm_per_bin = mm_per_bin(settings);
     let offset = settings.offset_mm.to_num::<f64>();
-    let range = |pixel: &PixelLight| Some(pixel.position? * mm_per_bin + offset);
+    let range = |address: PixelAddress, pixel: &PixelLight| {
+        let own = settings.offsets_mm.get(usize::from(address.raw()));
+        let own: f64 = own.map_or(0.0, |own| own.to_num());
+        Some(pixel.position? * mm_per_bin + offset + own)
+    };
     Ok(match truth {
         Some(Truth::Scene(scene)) => Truth::Scene(scene),
         Some(given) => {
-            let errors = surveyed
-                .iter()
-                .filter_map(|(address, pixel)| Some(range(pixel)? - given.ranges(*address, 0)[0]?));
+            let errors = surveyed.iter().filter_map(|(address, pixel)| {
+                Some(range(*address, pixel)? - given.ranges(*address, 0)[0]?)
+            });
             let offset = median(errors.collect());
             given.moved(offset)
         }
         None => {
             let mut ranges = vec![None; array.pixels() as usize];
             for (address, pixel) in surveyed {
-                ranges[usize::from(address.raw())] = range(pixel);
+                ranges[usize::from(address.raw())] = range(*address, pixel);
             }
             Truth::OfAllPhotons(ranges)
         }

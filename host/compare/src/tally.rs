@@ -1,13 +1,14 @@
 //! The reports of one method: how often they come, and their errors.
 
 use anyhow::{Result, ensure};
-use dtof_core::{Array, BlockLevel, DepthEvent, PixelAddress, RangeScale};
+use dtof_core::{Array, BlockLevel, DepthEvent, PixelAddress};
 
 use super::stress::Stress;
 use super::truth::Truth;
 use dtof_engine::settings::Settings;
 use dtof_events::events_csv::range_mm;
 use dtof_photons::MM_PER_PS;
+use dtof_photons::ranges::Ranges;
 
 /// A report with an error of more than so many bins is wrong.
 pub const WRONG_BEYOND_BINS: f64 = 3.0;
@@ -42,7 +43,7 @@ pub struct Tally<'a> {
     truth: &'a Truth,
     stress: &'a Stress,
     array: Array,
-    scale: RangeScale,
+    ranges: Ranges,
     mm_per_bin: f64,
     cycles: u64,
     has_neighbours: bool,
@@ -138,7 +139,7 @@ impl<'a> Tally<'a> {
             truth,
             stress,
             array,
-            scale: settings.range_scale()?,
+            ranges: settings.ranges(array)?,
             mm_per_bin: mm_per_bin(settings),
             cycles,
             has_neighbours: settings.neighbours.is_some(),
@@ -171,7 +172,7 @@ impl<'a> Tally<'a> {
         // Without the drift, at the middle of the exposure.
         let middle = cycle.saturating_sub(u64::from(event.exposure) / 2);
         let moved = self.stress.moved(middle, self.cycles) * self.mm_per_bin;
-        let range = range_mm(event, &self.scale) - moved;
+        let range = range_mm(event, &self.ranges) - moved;
         let errors = ranges.into_iter().flatten().map(|truth| range - truth);
         let error = errors.min_by(|one, other| one.abs().total_cmp(&other.abs()));
         let limit = WRONG_BEYOND_BINS * self.mm_per_bin;
@@ -303,7 +304,7 @@ mod tests {
             flags: Flags::NONE,
         };
         let events: Vec<DepthEvent> = reports.iter().map(|&cycle| event(cycle - 1)).collect();
-        let range = range_mm(&events[0], &settings.range_scale().unwrap());
+        let range = range_mm(&events[0], &settings.ranges(array).unwrap());
         let truth = Truth::Ranges(vec![Some(range)]);
         let mut tally = Tally::new(&truth, &Stress::NONE, array, &settings, 6000).unwrap();
         tally.add(&events);

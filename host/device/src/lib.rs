@@ -30,6 +30,7 @@ use dtof_engine::Engine;
 use dtof_engine::settings::Settings;
 use dtof_events::aer_file::Event;
 use dtof_options::Refused;
+use dtof_photons::ranges::Ranges;
 use dtof_photons::source::Slice;
 
 /// How the pixels of a device operate.
@@ -48,6 +49,16 @@ pub struct Task<'a> {
 }
 
 impl Task<'_> {
+    /// From its events to millimetres.
+    ///
+    /// # Errors
+    /// Fails if the settings break a constraint, or if there is not one offset for each pixel.
+    pub fn ranges(&self) -> Result<Ranges> {
+        let array = monitor::array(self.pixels, Some(self.columns));
+        self.settings
+            .ranges(array.context("the device has no pixels")?)
+    }
+
     /// The configuration of a device that takes photons from `source`.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, ensure};
-use dtof_core::{Array, RangeScale};
+use dtof_core::Array;
 use dtof_link::endpoint::LinkCounters;
 use dtof_link::{Report, Source};
 
@@ -17,6 +17,7 @@ use dtof_engine::settings::Settings;
 use dtof_events::aer_file::Event;
 use dtof_events::events_csv;
 use dtof_options::Refused;
+use dtof_photons::ranges::Ranges;
 pub use event_file::EventFile;
 use losses::{Losses, since};
 use map::LiveMap;
@@ -100,22 +101,21 @@ impl Outputs<'_> {
     fn write(
         &mut self,
         mut events: Vec<Event>,
-        settings: &Settings,
+        (task, ranges): (&Task, &Ranges),
         readers: &mut Readers,
     ) -> Result<()> {
-        let scale = &settings.range_scale()?;
-        self.masked += leave_out_masked(&mut events, settings);
+        self.masked += leave_out_masked(&mut events, task.settings);
         let events = &events[..];
         if let Some(recording) = &mut self.recording {
             recording.write(events)?;
         }
         if readers.events {
-            readers.events = still_open(write(self.events, events, scale))?;
+            readers.events = still_open(write(self.events, events, ranges))?;
         }
         if let Some(map) = &mut self.map
             && readers.statistics
         {
-            map.add(events, scale);
+            map.add(events, ranges);
             readers.statistics = still_open(map.draw_when_due())?;
         }
         Ok(())
@@ -162,15 +162,16 @@ pub fn monitor(
         events: true,
         statistics: true,
     };
-    let watched = watch(client, task, done, outputs, &mut readers);
-    let written = outputs.write(client.take_events(), task.settings, &mut readers);
+    let ranges = &task.ranges()?;
+    let watched = watch(client, (task, ranges), done, outputs, &mut readers);
+    let written = outputs.write(client.take_events(), (task, ranges), &mut readers);
     watched.and(written).and(outputs.finish(&readers))
 }
 
 /// [`monitor`] except for the events that have arrived and are not written yet.
 fn watch(
     client: &mut Client,
-    task: &Task,
+    (task, ranges): (&Task, &Ranges),
     done: impl Fn(Duration) -> bool,
     outputs: &mut Outputs,
     readers: &mut Readers,
@@ -205,7 +206,7 @@ fn watch(
             break;
         }
         let report = client.poll_report()?;
-        outputs.write(client.take_events(), task.settings, readers)?;
+        outputs.write(client.take_events(), (task, ranges), readers)?;
         if let Some(report) = report {
             let line = rates.line(client, &report, outputs.masked);
             outputs.show(line, readers)?;
@@ -225,9 +226,9 @@ fn write_header(out: &mut dyn Write, columns: &str) -> io::Result<()> {
     out.flush()
 }
 
-fn write(out: &mut dyn Write, events: &[Event], scale: &RangeScale) -> io::Result<()> {
+fn write(out: &mut dyn Write, events: &[Event], ranges: &Ranges) -> io::Result<()> {
     for event in events {
-        events_csv::write_event(&mut *out, event, scale)?;
+        events_csv::write_event(&mut *out, event, ranges)?;
     }
     out.flush()
 }

@@ -122,7 +122,7 @@ impl Setup {
             let measured = (0, sensor.bins - 1);
             effective.sensor.gate = effective.sensor.gate.or(Some(measured));
         }
-        let settings = effective.settings(bins.into())?;
+        let mut settings = effective.settings(bins.into())?;
         masked::check(&settings.masked, pixels.into())?;
         let columns = effective.sensor.columns;
         let refused = |reason| Refused::value("columns", columns.unwrap_or_default(), reason);
@@ -132,6 +132,12 @@ impl Setup {
         );
         let array = array(pixels, columns)
             .ok_or_else(|| refused(format!("with {pixels} pixels it makes more than 65,536")))?;
+        // The last row may have more places than pixels.
+        if settings.offsets_mm.len() == usize::from(pixels) {
+            let places = array.pixels() as usize;
+            settings.offsets_mm.resize(places, I24F8::ZERO);
+        }
+        settings.ranges(array)?;
         Ok(Self {
             settings,
             requested,
@@ -169,6 +175,7 @@ impl Setup {
             array: self.array,
             bin_width_ps: self.settings.bin_width_ps,
             offset_mm: self.settings.offset_mm,
+            offsets_mm: self.settings.pixel_offsets(),
             laser_millihertz: self.laser_millihertz,
             start_us: i64::try_from(start.as_micros()).unwrap_or(0),
         }

@@ -15,7 +15,7 @@ use dtof_core::{
 
 pub use header::Header;
 pub use header::MAGIC;
-use header::{HEADER_BYTES, header_length};
+use header::{HEADER_BYTES, header_length, offset_bytes, offsets_from_bytes, offsets_to_bytes};
 
 use dtof_options::named_values;
 
@@ -120,8 +120,13 @@ impl<W: Write> Writer<W> {
     /// Begins a file.
     ///
     /// # Errors
-    /// Fails if the writer fails.
+    /// Fails if the writer fails, or if `header` has offsets for another number of pixels.
     pub fn new(out: W, header: &Header) -> io::Result<Self> {
+        let (offsets, pixels) = (header.offsets_mm.len(), header.array.pixels());
+        if offsets > 0 && offsets != pixels as usize {
+            let text = format!("{offsets} offsets for {pixels} pixels");
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, text));
+        }
         let mut writer = Self {
             out,
             digest: CRC_32.digest(),
@@ -129,6 +134,7 @@ impl<W: Write> Writer<W> {
             events: 0,
         };
         writer.put(&header.to_bytes())?;
+        writer.put(&offsets_to_bytes(&header.offsets_mm))?;
         Ok(writer)
     }
 
@@ -198,20 +204,23 @@ impl<R: Read> Reader<R> {
             })?;
         let mut digest = CRC_32.digest();
         digest.update(&bytes);
-        let header = Header::from_bytes(&bytes)?;
+        let mut header = Header::from_bytes(&bytes)?;
         // The settings of the run are skipped.
         let length = header_length(&bytes).unwrap_or(HEADER_BYTES);
-        let mut settings = vec![0; usize::from(length - HEADER_BYTES)];
+        let settings = usize::from(length - HEADER_BYTES);
+        let offsets = offset_bytes(&bytes, header.array);
+        let mut rest = vec![0; settings + offsets];
         input
-            .read_exact(&mut settings)
+            .read_exact(&mut rest)
             .context("the file ends inside its header")?;
-        digest.update(&settings);
+        digest.update(&rest);
+        header.offsets_mm = offsets_from_bytes(&rest[settings..], header.array.pixels())?;
         Ok(Self {
             input,
             digest,
             decoder: AerDecoder::new(),
             header,
-            offset: length.into(),
+            offset: u64::from(length) + offsets as u64,
             events: 0,
             ended: false,
         })

@@ -2,10 +2,11 @@
 
 use std::io::{self, Write};
 
+use dtof_core::DepthEvent;
 use dtof_core::events::{DynamicDepthEvent, Polarity};
-use dtof_core::{DepthEvent, RangeScale};
 
 use crate::aer_file::{Event, EventKind};
+use dtof_photons::ranges::Ranges;
 
 /// The columns of depth events.
 ///
@@ -37,18 +38,19 @@ pub fn header(kind: EventKind) -> &'static str {
 pub fn write_event(
     out: &mut (impl Write + ?Sized),
     event: &Event,
-    scale: &RangeScale,
+    ranges: &Ranges,
 ) -> io::Result<()> {
     match event {
-        Event::Depth(event) => write(out, event, scale),
-        Event::DynamicDepth(event) => write_dynamic_depth(out, event, scale),
+        Event::Depth(event) => write(out, event, ranges),
+        Event::DynamicDepth(event) => write_dynamic_depth(out, event, ranges),
     }
 }
 
 /// The range of an event in millimetres, exact: a multiple of 1/256 mm.
 #[must_use]
-pub fn range_mm(event: &DepthEvent, scale: &RangeScale) -> f64 {
-    scale.range(event.position()).to_num()
+pub fn range_mm(event: &DepthEvent, ranges: &Ranges) -> f64 {
+    let range = ranges.of(event.pixel, event.level, event.position());
+    range.to_num()
 }
 
 /// Writes one event.
@@ -58,7 +60,7 @@ pub fn range_mm(event: &DepthEvent, scale: &RangeScale) -> f64 {
 pub fn write(
     out: &mut (impl Write + ?Sized),
     event: &DepthEvent,
-    scale: &RangeScale,
+    ranges: &Ranges,
 ) -> io::Result<()> {
     let depth_bins = f64::from(event.position().raw()) / 256.0;
     writeln!(
@@ -68,7 +70,7 @@ pub fn write(
         event.pixel.raw(),
         event.exposure,
         event.peak_bin,
-        range_mm(event, scale),
+        range_mm(event, ranges),
         event.peak_count,
         event.background,
         event.flags,
@@ -84,7 +86,7 @@ pub fn write(
 pub fn write_dynamic_depth(
     out: &mut (impl Write + ?Sized),
     event: &DynamicDepthEvent,
-    scale: &RangeScale,
+    ranges: &Ranges,
 ) -> io::Result<()> {
     let polarity = match event.polarity() {
         Polarity::Nearer => -1,
@@ -95,8 +97,10 @@ pub fn write_dynamic_depth(
         "{},{},{polarity},{:.3},{:.3},{},{}",
         event.cycle.raw(),
         event.pixel.raw(),
-        scale.range(event.position).to_num::<f64>(),
-        scale.distance(event.change()).to_num::<f64>(),
+        ranges
+            .of(event.pixel, event.level, event.position)
+            .to_num::<f64>(),
+        ranges.scale().distance(event.change()).to_num::<f64>(),
         event.flags,
         event.level,
     )

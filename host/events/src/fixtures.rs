@@ -1,10 +1,11 @@
-//! An event and a scale for tests of several modules.
+//! An event and ranges for tests of several modules.
 
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
-    BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
-    RangeScale, SubBinOffset,
+    Array, BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
+    SubBinOffset,
 };
+use dtof_photons::ranges::Ranges;
 
 /// An event in the middle of a bin.
 #[must_use]
@@ -23,11 +24,12 @@ pub fn event(pixel: u16, cycle: u64, bin: u16) -> DepthEvent {
     }
 }
 
-/// Bins of 250 ps.
+/// Of bins of 250 ps, without an offset.
 ///
 /// # Panics
 /// Never panics: the numbers are valid.
 #[must_use]
-pub fn scale() -> RangeScale {
-    RangeScale::new(U16F16::lit("250"), I24F8::ZERO).unwrap()
+pub fn ranges() -> Ranges {
+    let array = Array::new(1, 1).unwrap();
+    Ranges::new(array, U16F16::lit("250"), I24F8::ZERO, Vec::new()).unwrap()
 }

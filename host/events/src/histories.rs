@@ -4,11 +4,12 @@ use std::collections::VecDeque;
 
 use dtof_core::events::Reflectivity;
 use dtof_core::fixed::types::I24F8;
-use dtof_core::{Array, BlockLevel, DepthEvent, PixelAddress, RangeScale};
+use dtof_core::{Array, BlockLevel, DepthEvent, PixelAddress};
 
 use crate::events_csv::range_mm;
 use crate::last_events::LastEvents;
 use dtof_options::rows::{Row, grouped};
+use dtof_photons::ranges::Ranges;
 use dtof_photons::source::Slice;
 
 /// How many events the mean range averages (the paper's depth map of ten events).
@@ -121,10 +122,10 @@ impl PixelHistories {
 
     /// Adds an event. That of a block counts for the pixels for which it stands (see
     /// [`LastEvents`]).
-    pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
-        let range_mm = range_mm(event, scale);
+    pub fn add(&mut self, event: &DepthEvent, ranges: &Ranges) {
+        let range_mm = range_mm(event, ranges);
         let exposure = event.exposure.into();
-        let surface_mm = scale.distance(SURFACE_BINS << 8).to_num();
+        let surface_mm = ranges.scale().distance(SURFACE_BINS << 8).to_num();
         for address in self.array.pixels_of(event.pixel, event.level) {
             let pixel = &mut self.pixels[usize::from(address.raw())];
             let stands_for_pixel = pixel.last_events.record(event.level, event.cycle, exposure);
@@ -230,16 +231,16 @@ mod tests {
     #[test]
     fn a_block_stands_for_its_pixels_that_have_not_reported_since() {
         let mut histories = PixelHistories::new(Array::new(3, 3).unwrap());
-        let scale = fixtures::scale();
+        let ranges = fixtures::ranges();
         let of_block = |pixel, cycle, bin, level| DepthEvent {
             level: BlockLevel::new(level).unwrap(),
             ..fixtures::event(pixel, cycle, bin) // over 40 laser cycles
         };
-        histories.add(&of_block(4, 100, 10, 0), &scale);
-        histories.add(&of_block(0, 140, 20, 1), &scale); // from 101 on
-        histories.add(&of_block(1, 150, 30, 0), &scale);
-        histories.add(&of_block(0, 189, 40, 2), &scale); // from 150 on
-        histories.add(&of_block(0, 190, 50, 1), &scale); // from 151 on
+        histories.add(&of_block(4, 100, 10, 0), &ranges);
+        histories.add(&of_block(0, 140, 20, 1), &ranges); // from 101 on
+        histories.add(&of_block(1, 150, 30, 0), &ranges);
+        histories.add(&of_block(0, 189, 40, 2), &ranges); // from 150 on
+        histories.add(&of_block(0, 190, 50, 1), &ranges); // from 151 on
         let last = histories.pixels.iter().map(|pixel| {
             let range = pixel.last_mm().unwrap();
             (range / 37.474 - 0.5).round()
@@ -281,7 +282,7 @@ mod tests {
         let mut histories = PixelHistories::new(Array::new(2, 2).unwrap());
         let at = |pixel, cycle, bin| fixtures::event(pixel, cycle, bin);
         for event in [at(3, 50, 10), at(3, 99, 12), at(0, 120, 10)] {
-            histories.add(&event, &fixtures::scale());
+            histories.add(&event, &fixtures::ranges());
         }
         histories.pixels[3].photons = 12_345;
         let rows = histories.rows(["zone", "capture"], ["event", "events"]);

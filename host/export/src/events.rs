@@ -58,7 +58,7 @@ impl Survey {
         let file = path.metadata()?;
         ensure!(file.is_file(), "not a file that can be read twice");
         let mut reader = open(path)?;
-        let header = *reader.header();
+        let header = reader.header().clone();
         let (clock, warning) = LaserClock::for_file(clock, &header);
         let mut survey = Self {
             header,

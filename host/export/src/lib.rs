@@ -24,7 +24,6 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
-use dtof_core::RangeScale;
 use dtof_link::DynamicDepth;
 use tempfile::NamedTempFile;
 
@@ -194,19 +193,19 @@ pub fn export(
         kind == EventKind::Depth || options.echo == Echo::All,
         Refused::new("echo", "is only for depth events")
     );
-    let (header, clock) = (survey.header, survey.clock);
+    let (header, clock) = (&survey.header, survey.clock);
     let array = header.array;
     let (rays, assumed_rays) = options.rays.rays(array)?;
     let projection = Projection {
         rays,
-        scale: RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?,
+        ranges: header.ranges().with_context(name)?,
         clock,
     };
     let mut assumptions = match format {
         Format::Evt2 => clock.to_string(),
         _ => format!("{assumed_rays}, {clock}"),
     };
-    let span = Span::new(format, &clock, &header, survey.latest).with_context(name)?;
+    let span = Span::new(format, &clock, header, survey.latest).with_context(name)?;
     let slice_ns = options
         .slice_ns
         .unwrap_or_else(|| mcap::slice_of(span.end_ns));
@@ -229,7 +228,7 @@ pub fn export(
         }
         Format::Evt2 => {
             let changes = &options.dynamic_depth;
-            let config = changes.config(&projection.scale).map_err(|error| {
+            let config = changes.config(projection.ranges.scale()).map_err(|error| {
                 Refused::value("threshold_mm", changes.threshold_mm, error.to_string())
             })?;
             evt2::Evt2::new(file, array, clock, config, options.echo).map(boxed)
@@ -287,7 +286,7 @@ pub fn points<'a>(
     let (clock, _) = LaserClock::for_file(options.clock, header);
     let projection = Projection {
         rays: options.rays.rays(header.array)?.0,
-        scale: RangeScale::new(header.bin_width_ps, header.offset_mm)?,
+        ranges: header.ranges()?,
         clock,
     };
     let mut records = Vec::new();

@@ -97,7 +97,7 @@ pub fn record(event: &Event, projection: &Projection) -> Result<[u8; BYTES]> {
     let value = match event {
         Event::Depth(event) => event.peak_count.raw() as f32,
         Event::DynamicDepth(event) => {
-            let millimetres: f64 = projection.scale.distance(event.change()).to_num();
+            let millimetres: f64 = projection.ranges.scale().distance(event.change()).to_num();
             (millimetres / 1000.0) as f32
         }
     };

@@ -1,18 +1,18 @@
 //! Events in metres and nanoseconds.
 
 use anyhow::{Context, Result};
-use dtof_core::RangeScale;
 
 use dtof_events::aer_file::Event;
 use dtof_events::clock::LaserClock;
 use dtof_photons::geometry::Rays;
+use dtof_photons::ranges::Ranges;
 
 /// Turns an event into a point in space and time.
 pub struct Projection {
     /// The rays of the pixels.
     pub rays: Rays,
     /// Bins to millimetres.
-    pub scale: RangeScale,
+    pub ranges: Ranges,
     /// Laser cycles to nanoseconds.
     pub clock: LaserClock,
 }
@@ -27,8 +27,9 @@ impl Projection {
         reason = "rounded to the nearest f32"
     )]
     pub fn point(&self, event: &Event) -> Result<[f32; 3]> {
-        let range_mm = self.scale.range(event.position()).to_num();
-        let point = self.rays.point(event.pixel(), event.level(), range_mm);
+        let (pixel, level) = (event.pixel(), event.level());
+        let range_mm = self.ranges.of(pixel, level, event.position()).to_num();
+        let point = self.rays.point(pixel, level, range_mm);
         let point = point.with_context(|| format!("pixel {} has no ray", event.pixel().raw()))?;
         // No negative zeros.
         Ok(point.map(|side| side as f32 + 0.0))

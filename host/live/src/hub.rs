@@ -14,12 +14,12 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use dtof_core::RangeScale;
 use dtof_device::{HistogramAnswer, Setup};
 use dtof_engine::explain::explain;
 use dtof_engine::settings::Settings;
 use dtof_engine::settings::SettingsFile;
 use dtof_events::aer_file::{Event, Header};
+use dtof_photons::ranges::Ranges;
 
 use super::outputs::RecordingStatus;
 pub use frame::MOST_PIXELS;
@@ -86,7 +86,7 @@ struct State {
     settings: Option<(SettingsFile, Settings)>,
     /// The options, shown until settings are applied.
     requested: SettingsFile,
-    scale: Option<RangeScale>,
+    ranges: Option<Ranges>,
     connection: Connection,
     pixels: Pixels,
     pages: Pages,
@@ -126,7 +126,7 @@ impl Hub {
             header: None,
             settings: None,
             requested: SettingsFile::default(),
-            scale: None,
+            ranges: None,
             connection: Connection {
                 state: "opening",
                 reason: String::new(),
@@ -193,11 +193,12 @@ impl Hub {
         let mut state = self.state();
         let state = &mut *state;
         state.events += events.len() as u64;
-        let (Some(header), Some(scale)) = (&state.header, &state.scale) else {
+        let (Some(header), Some(ranges)) = (&state.header, &state.ranges) else {
             return;
         };
         for event in events {
-            let range_mm: f64 = scale.range(event.position()).to_num();
+            let range = ranges.of(event.pixel(), event.level(), event.position());
+            let range_mm: f64 = range.to_num();
             #[allow(clippy::cast_possible_truncation, reason = "24 bits for a picture")]
             let range_mm = range_mm as f32;
             state.pixels.add(event, range_mm, header.array);
@@ -315,8 +316,8 @@ impl State {
         if let Some(slice) = &mut self.slice {
             slice.restart(self.pixels.len());
         }
+        self.ranges = header.ranges().ok();
         self.header = Some(header);
-        self.scale = RangeScale::new(header.bin_width_ps, header.offset_mm).ok();
         self.losses = Losses::default();
         self.seconds = 0.0;
         self.histograms.clear();

@@ -159,6 +159,14 @@ impl Rays {
         Ok(Self { array, rays })
     }
 
+    /// For each pixel how many times as far a plane before the lens is along its ray as straight ahead, at most a
+    /// hundred times.
+    #[must_use]
+    pub fn slants(&self) -> Vec<f64> {
+        let forward = self.rays.iter().map(|ray| ray.direction[2]);
+        forward.map(|forward| 1.0 / forward.max(0.01)).collect()
+    }
+
     /// The point that a pixel sees at a range, in metres; `None` if there is no such pixel. The
     /// point of a block, whose first pixel is `pixel`, is on the mean of its rays.
     #[must_use]

@@ -12,6 +12,7 @@ pub mod open;
 mod photon_csv;
 mod photon_list;
 pub mod range;
+pub mod ranges;
 pub mod recorded;
 pub mod source;
 pub mod tmf8820;

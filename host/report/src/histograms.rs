@@ -10,6 +10,7 @@ use dtof_engine::decisions::{Decision, KeptPixels};
 use dtof_engine::explain::{Explanation, explain_decisions};
 use dtof_engine::settings::Settings;
 use dtof_events::events_csv::range_mm;
+use dtof_photons::ranges::Ranges;
 
 /// The last decisions of a run.
 #[derive(Clone, Copy, Debug)]
@@ -30,13 +31,14 @@ impl Decisions<'_> {
     pub(super) fn data(&self, room: usize) -> (serde_json::Value, usize) {
         let all = self.last();
         let looks = explain_decisions(self.settings, &all);
+        let ranges = self.settings.ranges(self.array).ok();
         let mut kept = self.kept;
         let (packed, count) = loop {
             let pairs = all.iter().zip(&looks);
             let pairs = pairs.filter(|(decision, _)| kept.contains(decision.event.pixel));
             let (mut packed, mut count) = (Packed::default(), 0);
             for (decision, look) in pairs {
-                self.push(&mut packed, decision, look);
+                self.push(&mut packed, decision, look, ranges.as_ref());
                 count += 1;
             }
             if packed.len() <= room || count == 0 {
@@ -87,14 +89,19 @@ impl Decisions<'_> {
     }
 
     /// Packs event, look, excluded bins and counts.
-    fn push(&self, packed: &mut Packed, decision: &Decision, look: &Explanation) {
+    fn push(
+        &self,
+        packed: &mut Packed,
+        decision: &Decision,
+        look: &Explanation,
+        ranges: Option<&Ranges>,
+    ) {
         let Decision { event, counts, .. } = decision;
         packed.push(event.pixel.raw());
         packed.push(super::events::kind(event.level, event.echo, event.flags));
         packed.push(event.cycle.raw());
         packed.push(event.exposure);
-        let scale = self.settings.range_scale().ok();
-        packed.push_range(scale.map_or(0.0, |scale| range_mm(event, &scale)));
+        packed.push_range(ranges.map_or(0.0, |ranges| range_mm(event, ranges)));
         packed.push(event.peak_bin.raw());
         // The number plus 1, or 0 for none.
         packed.push(look.needed.map_or(0, |needed| u64::from(needed) + 1));

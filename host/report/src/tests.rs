@@ -15,7 +15,7 @@ fn sample(limit: usize, count: u32) -> Sample {
     for cycle in 0..count {
         let pixel = u16::try_from(cycle % 4).unwrap();
         let event = event(pixel, cycle.into(), 10 + pixel);
-        sample.add(&event, range_mm(&event, &scale()));
+        sample.add(&event, range_mm(&event, &ranges()));
     }
     sample
 }
@@ -170,7 +170,7 @@ fn every_event_is_in_the_data() {
             echo: 1,
             flags: 0,
             exposure: given.exposure.into(),
-            range: range_mm(&given, &scale()),
+            range: range_mm(&given, &ranges()),
             peak: given.peak_count.raw().into(),
         };
         assert_eq!(read, expected);

@@ -15,6 +15,9 @@ use dtof_photons::recorded::RecordingLength;
 /// Options of this job; keys of settings files with these names mean something else.
 const OWN: &[&str] = &["target_mm", "glass", "false_alarm", "seed"];
 
+/// Where the pixels look.
+const RAYS: &[&str] = &["field_of_view_degrees", "calibration"];
+
 /// The options of a calibration.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
@@ -25,7 +28,7 @@ pub struct Options {
 }
 
 impl dtof_options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] = &[RECORDING, OWN];
+    const KEYS: &'static [&'static [&'static str]] = &[RECORDING, RAYS, OWN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
@@ -123,6 +126,7 @@ pub(super) fn calibrate_counts(
         (None, Some(RecordingLength::PhotonsPerCycle(rate))) => Length::PhotonsPerCycle(rate),
         (None, None) => Length::Unknown,
     };
+    let slants = requested.rays.slants(counts.array)?;
     let observed = Observed {
         array: counts.array,
         captures: &counts.captures,
@@ -130,6 +134,7 @@ pub(super) fn calibrate_counts(
         cycles: None,
         bin_width_ps: counts.metadata.bin_width_ps.to_num(),
         truth_mm: counts.truth_mm.as_deref(),
+        slant: slants.as_deref(),
     };
     calibrate(&observed, options)
 }

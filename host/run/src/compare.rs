@@ -170,7 +170,8 @@ impl Options {
             );
             Refused::new("sigma_bins", reason)
         })?;
-        let settings = requested.settings(requested.sensor.bins.unwrap_or(128).into())?;
+        let mut settings = requested.settings(requested.sensor.bins.unwrap_or(128).into())?;
+        let masked = settings.masked.clone();
         let photons = |seed: u64| -> Result<Box<dyn PhotonSource>> {
             let options = ReadOptions {
                 seed,
@@ -183,9 +184,12 @@ impl Options {
                 Photons::Histograms(counts) => Box::new(counts.photons(&options)?),
                 Photons::List(input) => open(input, &options)?.photons,
             };
-            let photons = Masked::new(photons, &settings.masked)?;
+            let photons = Masked::new(photons, &masked)?;
             Ok(Box::new(photons.with_laser_hz(requested.sensor.laser_hz)))
         };
+        if !settings.offsets_mm.is_empty() {
+            settings = settings.for_source(photons(1)?.as_ref())?;
+        }
         let comparison = compare(&Task {
             photons: &photons,
             truth,

@@ -118,7 +118,7 @@ pub struct Operation {
 
 impl Options for Operation {
     const KEYS: &'static [&'static [&'static str]] = &[
-        &["bin_width_ps", "offset_mm"],
+        &["bin_width_ps", "offset_mm", "offsets_mm"],
         SENSOR,
         TDC,
         DITHER,

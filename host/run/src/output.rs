@@ -13,7 +13,7 @@ use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Error, Result, ensure};
-use dtof_core::{DepthEvent, EchoNumber, PixelAddress, RangeScale};
+use dtof_core::{DepthEvent, EchoNumber, PixelAddress};
 use tempfile::NamedTempFile;
 
 use crate::Sink;
@@ -33,6 +33,7 @@ use dtof_options::files::{
     PARTIAL, destination, flush_to_disk, is_same_file, may_replace, temporary_file,
 };
 use dtof_options::rows::Row;
+use dtof_photons::ranges::Ranges;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_report::{Cloud, Decisions, Figure, Section};
 use pictures::{Picture, pictures};
@@ -57,7 +58,7 @@ pub struct Output {
     /// None with [`Self::without_csv`].
     csv: Option<BufWriter<NamedTempFile>>,
     aer: aer_file::Writer<BufWriter<NamedTempFile>>,
-    scale: RangeScale,
+    ranges: Ranges,
     maps: PixelHistories,
     axis_names: [&'static str; 2],
     sample: Sample,
@@ -89,7 +90,7 @@ impl Output {
         source: &dyn PhotonSource,
         input: Option<&Path>,
     ) -> Result<Self> {
-        let scale = settings.range_scale()?;
+        let ranges = settings.ranges(source.array())?;
         ensure!(
             !folder.join("methods.csv").exists(),
             "{}: holds the results of a comparison; take another folder",
@@ -114,7 +115,7 @@ impl Output {
             bins: settings.bins,
             csv: Some(csv),
             aer,
-            scale,
+            ranges,
             maps: PixelHistories::new(array),
             axis_names: source.axis_names(),
             sample: Sample::new(Sample::LIMIT),
@@ -144,7 +145,7 @@ impl Output {
     /// # Errors
     /// Fails if the threshold is too low.
     pub fn with_changes(mut self, options: Option<&DynamicDepth>) -> Result<Self> {
-        let changes = options.map(|options| Changes::new(options, self.scale));
+        let changes = options.map(|options| Changes::new(options, self.ranges.clone()));
         self.changes = changes.transpose()?;
         Ok(self)
     }
@@ -173,9 +174,9 @@ impl Output {
 
     /// Adds a selected event to maps and report.
     fn show(&mut self, event: &DepthEvent) {
-        self.maps.add(event, &self.scale);
+        self.maps.add(event, &self.ranges);
         if self.echo.is_some() {
-            self.sample.add(event, range_mm(event, &self.scale));
+            self.sample.add(event, range_mm(event, &self.ranges));
         }
     }
 
@@ -332,17 +333,17 @@ impl Sink for Output {
         self.maps.count(&self.pixels, slice);
         for event in events {
             let csv = self.csv.as_mut();
-            csv.map_or(Ok(()), |csv| events_csv::write(csv, event, &self.scale))
+            csv.map_or(Ok(()), |csv| events_csv::write(csv, event, &self.ranges))
                 .and_then(|()| self.aer.write(&aer_file::Event::Depth(*event)))
                 .with_context(|| self.folder.display().to_string())?;
             if let Some(changes) = &mut self.changes {
                 changes.add(event);
             }
             if self.echo.is_none() {
-                self.sample.add(event, range_mm(event, &self.scale));
+                self.sample.add(event, range_mm(event, &self.ranges));
             }
             for layer in &mut self.layers {
-                layer.add(event, &self.scale);
+                layer.add(event, &self.ranges);
             }
             match &mut self.selection {
                 Some(selection) => selection.push(*event),
@@ -356,7 +357,7 @@ impl Sink for Output {
     /// Shows the events that still waited for another echo of their exposure.
     fn end(&mut self, engine: &dyn Engine) {
         for layer in &mut self.layers {
-            layer.end(&self.scale);
+            layer.end(&self.ranges);
         }
         if let Some(selection) = &mut self.selection {
             selection.finish();
@@ -379,6 +380,7 @@ pub fn header(settings: &Settings, source: &dyn PhotonSource) -> Result<aer_file
         array: source.array(),
         bin_width_ps: settings.bin_width_ps,
         offset_mm: settings.offset_mm,
+        offsets_mm: settings.pixel_offsets(),
         laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),
         start_us: 0,
     })

@@ -21,6 +21,7 @@ pub const RECORDING: &[&str] = &[
     "bins",
     "bin_width_ps",
     "offset_mm",
+    "offsets_mm",
     "photons_per_cycle",
     "recorded_cycles",
     "laser_hz",

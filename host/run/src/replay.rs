@@ -146,6 +146,8 @@ impl Options {
         });
         let requested = requested.or(settings_of_file(&metadata, photons.array()));
         let settings = requested.settings(metadata.bins)?;
+        let settings = settings.for_source(photons.as_ref());
+        let settings = settings.map_err(|error| requested.add_file_name(error))?;
         let refused = |refused: Refused| anyhow::Error::from(refused).context(input.to_string());
         let asks_neighbours = settings.neighbours.is_some() && settings.frame.is_none();
         let of_arrays = [

@@ -176,6 +176,7 @@ pub fn settings_of_scene(requested: SettingsFile, scene: &Scene) -> Result<Setti
             bin_width_ps: Some(width),
             // The ranges of simulated photons need no offset.
             offset_mm: None,
+            offsets_mm: None,
             ..requested.sensor
         },
         rays: RaySettings {

@@ -100,6 +100,10 @@ fn settings<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, 
     map.serialize_entry("bins", &settings.bins)?;
     map.serialize_entry("bin_width_ps", &settings.bin_width_ps.to_num::<f64>())?;
     map.serialize_entry("offset_mm", &settings.offset_mm.to_num::<f64>())?;
+    if !settings.offsets_mm.is_empty() {
+        let offsets: Vec<f64> = settings.offsets_mm.iter().map(|mm| mm.to_num()).collect();
+        map.serialize_entry("offsets_mm", &offsets)?;
+    }
     map.serialize_entry("gate", &settings.gate)?;
     if !settings.masked.is_empty() {
         map.serialize_entry("masked", &settings.masked)?;

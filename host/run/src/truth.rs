@@ -4,12 +4,13 @@
 use std::ops::AddAssign;
 
 use anyhow::Result;
-use dtof_core::{Array, DepthEvent, EchoNumber, RangeScale};
+use dtof_core::{Array, DepthEvent, EchoNumber};
 use serde::Serialize;
 
 use dtof_engine::settings::Settings;
 use dtof_events::events_csv::range_mm;
 use dtof_options::rows::{Row, grouped};
+use dtof_photons::ranges::Ranges;
 use dtof_simulate::scene::{Hit, Scene};
 
 /// An event is a false alarm if its range lies farther from the truth than this many bins.
@@ -188,7 +189,7 @@ fn percent(share: f64) -> String {
 pub struct SceneComparison<'a> {
     scene: &'a Scene,
     array: Array,
-    scale: RangeScale,
+    ranges: Ranges,
     /// Laser cycles of the run.
     cycles: u64,
     /// Distance from the first echo to the second, if pixels report several.
@@ -228,7 +229,7 @@ impl<'a> SceneComparison<'a> {
         Ok(Self {
             scene,
             array,
-            scale: settings.range_scale()?,
+            ranges: settings.ranges(array)?,
             cycles,
             behind_mm: behind_mm.filter(|_| settings.echoes > EchoNumber::FIRST),
             first_bin: settings.gate.map_or(0, |(first, _)| first.into()),
@@ -262,7 +263,7 @@ impl<'a> SceneComparison<'a> {
     /// The surface of an event and its error, if that is at most `limit_mm`. The error of a block is the
     /// mean over its pixels that see a surface there.
     fn found(&mut self, event: &DepthEvent, limit_mm: f64) -> Option<(usize, f64)> {
-        let range_mm = range_mm(event, &self.scale);
+        let range_mm = range_mm(event, &self.ranges);
         let (mut surface, mut sum, mut pixels) = (None, 0.0, 0.0);
         for pixel in self.array.pixels_of(event.pixel, event.level) {
             let [nearest, behind] = self.scene.hits(pixel, event.cycle.raw());

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Sequence
 from typing import Any, NamedTuple, Optional, Union
 
 import numpy
@@ -58,7 +59,8 @@ class Array(NamedTuple):
     ``bin_width_ps`` is in picoseconds, a multiple of 1/65536. ``offset_mm`` is in millimetres, a
     multiple of 1/256, and added to every range. ``laser_millihertz`` is the number of laser
     cycles in 1000 seconds. ``start_us`` is the time of laser cycle 0, in microseconds since
-    1970-01-01 UTC. Both are 0 if unknown.
+    1970-01-01 UTC. Both are 0 if unknown. ``offsets_mm`` are added to ``offset_mm`` for each pixel, None for one
+    that is left out; as a whole None if they are 0.
     """
 
     bins: int
@@ -68,6 +70,7 @@ class Array(NamedTuple):
     offset_mm: float
     laser_millihertz: int = 0
     start_us: int = 0
+    offsets_mm: Optional[Sequence[Optional[float]]] = None
 
     @property
     def shape(self) -> tuple[int, int]:

@@ -50,6 +50,12 @@ Offset = Annotated[
     "number, -8388608 to 8388607.996, millimetres",
     "Millimetres added to every range, rounded to 1/256 [default: 0; for logs the sensor's]",
 ]
+Offsets = Annotated[
+    Numbers,
+    "numbers, one a pixel, millimetres",
+    "Millimetres added to offset_mm for each pixel, in the order of the addresses, rounded to 1/256 "
+    "[default: 0]",
+]
 CyclesToReplay = Annotated[
     Integer,
     "whole number, 1 to 9223372036854775807",
@@ -108,6 +114,7 @@ class RecordingOptions(TypedDict, total=False):
     ]
     bin_width_ps: BinWidth
     offset_mm: Offset
+    offsets_mm: Offsets
     photons_per_cycle: Annotated[
         Number,
         "number above 0",
@@ -315,6 +322,17 @@ class SimulateOptions(SensorOptions, DetectionOptions, total=False):
 class CalibrateOptions(RecordingOptions, total=False):
     """Of ``calibrate``."""
 
+    fov: Annotated[
+        Numbers,
+        "two numbers, (60, 40), degrees",
+        "Field of view in degrees from edge to edge, so that a flat target gives the offset of each pixel "
+        "[default: unknown]",
+    ]
+    calibration: Annotated[
+        Path,
+        "file",
+        "Instead of fov: TOML file with a direction for each pixel; docs/export.md lists its keys",
+    ]
     target_mm: Annotated[
         Number,
         "number, 0 to 1000000, millimetres",
@@ -424,6 +442,7 @@ class PixelOptions(SensorOptions, DetectionOptions, total=False):
 
     bin_width_ps: BinWidth
     offset_mm: Offset
+    offsets_mm: Offsets
 
 
 class PointsOptions(TypedDict, total=False):

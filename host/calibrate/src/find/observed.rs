@@ -52,6 +52,9 @@ pub struct Observed<'a> {
     /// The true distance in millimetres of each pixel of each capture, in the same order, where it
     /// is known.
     pub truth_mm: Option<&'a [Option<f64>]>,
+    /// For each pixel of the array how many times as far as straight ahead a flat target is, along its ray. `None` if
+    /// the field of view is not known.
+    pub slant: Option<&'a [f64]>,
 }
 
 /// One histogram.

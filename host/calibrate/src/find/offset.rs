@@ -16,6 +16,8 @@ use dtof_photons::MM_PER_PS;
 const MOST: usize = 400;
 /// A bin width is fitted if distances span so many bins.
 const LEAST_BINS: f64 = 20.0;
+/// Photons farther from a peak do not move it.
+const NOISE_BINS: f64 = 8.0;
 /// Positions on one flat target differ by at most so many bins.
 const ONE_TARGET: f64 = 1.5;
 
@@ -62,26 +64,35 @@ pub fn from_distances(pairs: &[(f64, f64)], bin_width_ps: f64) -> Option<Offset>
     })
 }
 
-/// From one target at `distance_mm`. Only positions near the most common one are used; `None` if they
-/// are not more than half.
+/// From one target at `distance_mm`. Only positions near the most common one are used, within 1.5 bins or else
+/// within `reach_bins`; `None` if they are not more than half.
 #[must_use]
-pub fn from_target(positions: &[f64], distance_mm: f64, bin_width_ps: f64) -> Option<Offset> {
+pub fn from_target(
+    positions: &[f64],
+    distance_mm: f64,
+    bin_width_ps: f64,
+    reach_bins: f64,
+) -> Option<Offset> {
+    let near = most_common(positions, ONE_TARGET);
+    let near = near.or_else(|| most_common(positions, reach_bins))?;
+    let pairs: Vec<(f64, f64)> = near.into_iter().map(|at| (at, distance_mm)).collect();
+    from_distances(&pairs, bin_width_ps)
+}
+
+/// The most positions within `reach` bins, if they are more than half.
+fn most_common(positions: &[f64], reach: f64) -> Option<Vec<f64>> {
     let mut sorted = positions.to_vec();
     sorted.sort_by(f64::total_cmp);
     let near = |at: f64| {
         let first = sorted.partition_point(|&position| position < at);
-        let end = sorted.partition_point(|&position| position <= at + ONE_TARGET);
+        let end = sorted.partition_point(|&position| position <= at + reach);
         &sorted[first..end]
     };
     let most = sorted
         .iter()
         .map(|&at| near(at))
         .max_by_key(|near| near.len())?;
-    if 2 * most.len() <= positions.len() {
-        return None;
-    }
-    let pairs: Vec<(f64, f64)> = most.iter().map(|&at| (at, distance_mm)).collect();
-    from_distances(&pairs, bin_width_ps)
+    (2 * most.len() > positions.len()).then(|| most.to_vec())
 }
 
 /// Where the core places the highest peak of a histogram of `bins` bins within `gate`, in bins.
@@ -97,6 +108,28 @@ pub fn position(
         gate.map(|gate| place(&trace.counts, &gate, window))
     })
     .ok()?
+}
+
+/// The standard deviation of that position by the noise of the photons, in bins: each bin near it in turn has one
+/// standard deviation more.
+#[must_use]
+pub fn noise(
+    (trace, position): (&Trace, f64),
+    bins: usize,
+    gate: (u16, u16),
+    window: CentredWindow,
+) -> f64 {
+    let mut moved = trace.clone();
+    let mut variance = 0.0;
+    let is_near = |bin: &usize| (*bin as f64 + 0.5 - position).abs() < NOISE_BINS;
+    for bin in (0..trace.counts.len()).filter(is_near) {
+        let count = trace.counts[bin];
+        moved.counts[bin] = count + count.max(0.0).sqrt();
+        let place = self::position(&moved, bins, gate, window);
+        variance += place.map_or(0.0, |place| (place - position).powi(2));
+        moved.counts[bin] = count;
+    }
+    variance.sqrt()
 }
 
 /// The same for counts of any size.
@@ -151,13 +184,16 @@ mod tests {
     fn the_target_is_what_most_pixels_see() {
         let mut positions = vec![40.3; 10];
         positions.extend([60.0, 61.0, 62.0, 63.0, 64.0, 65.0, 66.0, 40.4, 40.2]);
-        let found = from_target(&positions, 1000.0, 100.0).unwrap();
+        let found = from_target(&positions, 1000.0, 100.0, 1.5).unwrap();
         assert_eq!(found.histograms, 12);
         assert!((found.mm - (1000.0 - 40.3 * 100.0 * MM_PER_PS)).abs() < 1e-9);
-        assert_eq!(from_target(&[], 1000.0, 100.0), None);
+        assert_eq!(from_target(&[], 1000.0, 100.0, 1.5), None);
         // No surface is that of most.
         positions.truncate(17);
         positions.extend([20.0; 4]);
-        assert_eq!(from_target(&positions, 1000.0, 100.0), None);
+        assert_eq!(from_target(&positions, 1000.0, 100.0, 1.5), None);
+        // Unless its pixels may differ that much.
+        let found = from_target(&positions, 1000.0, 100.0, 25.0).unwrap();
+        assert_eq!(found.histograms, 17);
     }
 }

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof_core::RangeScale;
 use dtof_events::{aer_file, events_csv};
 
 #[derive(Args)]
@@ -36,8 +35,7 @@ impl Decode {
             Box::new(File::open(&self.file).with_context(name)?)
         };
         let mut reader = aer_file::Reader::new(BufReader::new(input)).with_context(name)?;
-        let header = *reader.header();
-        let scale = RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?;
+        let ranges = reader.header().ranges().with_context(name)?;
         let first = reader.next_event();
         // The first event decides on the columns.
         let header = match &first {
@@ -52,7 +50,7 @@ impl Decode {
                 "{}: depth events and dynamic depth events in one file have no columns in common",
                 name()
             );
-            events_csv::write_event(out, &event, &scale)?;
+            events_csv::write_event(out, &event, &ranges)?;
             next = reader.next_event().with_context(name)?;
         }
         Ok(())

@@ -168,6 +168,8 @@ flags! {
         250; for logs the sensor's]";
     offset_mm Signed("MM") => "Millimetres added to every range, rounded to 1/256 [default: 0; for logs the \
         sensor's]";
+    offsets_mm Signed("MM,MM,...") => "Millimetres added to --offset-mm for each pixel, in the order of the \
+        addresses, rounded to 1/256 [default: 0]";
     photons_per_cycle Text("R") => "Histograms: photons a laser cycle in the brightest unmasked pixel of \
         each capture [default: 1]";
     recorded_cycles Text("N") => "Histograms: laser cycles of each capture";
@@ -272,6 +274,14 @@ flags! {
 }
 
 flags! {
+    RAYS:
+    field_of_view_degrees Signed("HxV") => "Field of view in degrees from edge to edge, so that a flat target \
+        gives the offset of each pixel [default: unknown]";
+    calibration Text("FILE") => "Instead of --fov: TOML file with a direction for each pixel; docs/export.md \
+        lists its keys";
+}
+
+flags! {
     ACCURACY:
     within Text("MM") => "Largest error of 68 % of the reports in millimetres [default: that of frames \
         of L2]";
@@ -316,6 +326,8 @@ flags! {
     bin_width_ps Signed("PS") => "Width of a bin in picoseconds, rounded to 1/65536 [default: the device's, \
         or 250 if it has none]";
     offset_mm Signed("MM") => "Millimetres added to every range, rounded to 1/256 [default: the device's]";
+    offsets_mm Signed("MM,MM,...") => "Millimetres added to --offset-mm for each pixel, in the order of the \
+        addresses, rounded to 1/256 [default: 0]";
 }
 
 flags! {
@@ -345,7 +357,7 @@ has_flags! {
     Operation: DEVICE SENSOR TDC DITHER DETECTION;
     replay::Options: RECORDING SENSOR TDC DETECTION FRAME REPLAY;
     simulate::Options: ARRAY SENSOR TDC DETECTION FRAME SIMULATE;
-    calibrate::Options: RECORDING CALIBRATE;
+    calibrate::Options: RECORDING RAYS CALIBRATE;
     compare::Options: ACCURACY RECORDING SENSOR TDC COMPARE;
     tune::Options: TUNE;
 }

@@ -130,6 +130,7 @@ mod tests {
         array: Array::new(2, 2).unwrap(),
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::ZERO,
+        offsets_mm: Vec::new(),
         laser_millihertz: 0,
         start_us: 0,
     };

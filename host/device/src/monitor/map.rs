@@ -5,11 +5,12 @@ mod picture;
 use std::io::{self, Write};
 use std::time::{Duration, Instant};
 
-use dtof_core::{Array, EchoNumber, RangeScale};
+use dtof_core::{Array, EchoNumber};
 
 use dtof_draw::picture::span;
 use dtof_events::aer_file::Event;
 use dtof_events::last_events::LastEvents;
+use dtof_photons::ranges::Ranges;
 use picture::{PLAIN, block, picture};
 
 /// Shortest interval between two drawings of [`LiveMap::draw_when_due`].
@@ -60,12 +61,13 @@ impl LiveMap {
 
     /// Adds events. An event of a block fills those of its pixels whose own event is not newer; see
     /// [`LastEvents`]. The first of several echoes is shown.
-    pub fn add(&mut self, events: &[Event], scale: &RangeScale) {
+    pub fn add(&mut self, events: &[Event], ranges: &Ranges) {
         for event in events {
             if event.echo() > EchoNumber::FIRST {
                 continue;
             }
-            let range_mm = scale.range(event.position()).to_num();
+            let range = ranges.of(event.pixel(), event.level(), event.position());
+            let range_mm = range.to_num();
             for pixel in self.array.pixels_of(event.pixel(), event.level()) {
                 let pixel = usize::from(pixel.raw());
                 let (Some(range), Some(last_events)) =

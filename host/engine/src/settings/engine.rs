@@ -4,12 +4,14 @@ use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::neighbours::NeighbourRule;
 use dtof_core::{
-    AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, DetectionRule, EchoNumber,
-    GateError, Neighbours, PaperRule, PixelConfig, PixelConfigError, RangeGate, RangeScale,
+    AnyRule, Array, BlockLevel, CentredWindow, Count, DepthEstimator, DetectionRule, EchoNumber,
+    GateError, Neighbours, PaperRule, PixelConfig, PixelConfigError, RangeGate,
 };
 pub use dtof_link::AdaptiveBinning;
 
 use dtof_options::Refused;
+use dtof_photons::ranges::{Ranges, RangesError};
+use dtof_photons::source::PhotonSource;
 
 /// The default of L2 in laser cycles.
 pub(crate) const DEFAULT_L2: u16 = 2000;
@@ -23,6 +25,8 @@ pub struct Settings {
     pub bin_width_ps: U16F16,
     /// Millimetres added to every range.
     pub offset_mm: I24F8,
+    /// Millimetres added to that, for each pixel in the order of the addresses; empty if they are 0.
+    pub offsets_mm: Vec<I24F8>,
     /// First and last bin that may hold the peak, both inclusive.
     pub gate: Option<(u16, u16)>,
     /// Addresses of pixels that are left out: hot and dead ones.
@@ -85,6 +89,7 @@ impl Settings {
             bins: 128,
             bin_width_ps: U16F16::lit("250"),
             offset_mm: I24F8::ZERO,
+            offsets_mm: Vec::new(),
             gate: None,
             masked: Vec::new(),
             rule: PaperRule::new(U8F8::lit("8"), Count::saturating(5)).into(),
@@ -228,15 +233,49 @@ impl Settings {
         })
     }
 
-    /// The scale from bins to millimetres.
+    /// From the events of `array` to millimetres.
     ///
     /// # Errors
-    /// Fails if the settings break a constraint.
-    pub fn range_scale(&self) -> Result<RangeScale> {
-        RangeScale::new(self.bin_width_ps, self.offset_mm).map_err(|error| {
-            let reason = format!("with `offset_mm` {}: {error}", self.offset_mm);
-            Refused::value("bin_width_ps", self.bin_width_ps, reason).into()
+    /// Fails if the settings break a constraint, or if there is not one offset for each pixel.
+    pub fn ranges(&self, array: Array) -> Result<Ranges> {
+        let ranges = Ranges::new(
+            array,
+            self.bin_width_ps,
+            self.offset_mm,
+            self.pixel_offsets(),
+        );
+        ranges.map_err(|error| match error {
+            RangesError::Scale(_) => {
+                let reason = format!("with `offset_mm` {}: {error}", self.offset_mm);
+                Refused::value("bin_width_ps", self.bin_width_ps, reason).into()
+            }
+            _ => Refused::new("offsets_mm", error.to_string()).into(),
         })
+    }
+
+    /// The offset of each pixel, `None` for those that are left out; empty if they are 0.
+    #[must_use]
+    pub fn pixel_offsets(&self) -> Vec<Option<I24F8>> {
+        let mut offsets: Vec<_> = self.offsets_mm.iter().copied().map(Some).collect();
+        for &pixel in &self.masked {
+            if let Some(offset) = offsets.get_mut(usize::from(pixel)) {
+                *offset = None;
+            }
+        }
+        offsets
+    }
+
+    /// These settings with one offset for each pixel of `source`: those of one capture hold for each.
+    ///
+    /// # Errors
+    /// Fails as [`Self::ranges`] does.
+    pub fn for_source(mut self, source: &dyn PhotonSource) -> Result<Self> {
+        let (array, rows) = (source.array(), source.capture_rows());
+        if self.offsets_mm.len() == (array.columns() * rows) as usize {
+            self.offsets_mm = self.offsets_mm.repeat((array.rows() / rows) as usize);
+        }
+        self.ranges(array)?;
+        Ok(self)
     }
 }
 

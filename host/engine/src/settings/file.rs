@@ -29,8 +29,9 @@ const SECTIONS: [(&str, &[&str], &[&str]); 4] = [
 ];
 
 /// The keys whose values are lists.
-const LISTS: [&str; 5] = [
+const LISTS: [&str; 6] = [
     "gate",
+    "offsets_mm",
     "masked",
     "glass_bins",
     "half_widths",
@@ -137,7 +138,7 @@ impl SettingsFile {
                 }
                 let is_empty = value.as_array().is_some_and(Vec::is_empty);
                 // An empty list sets nothing.
-                if !(is_empty && matches!(&**key, "masked" | "glass_bins")) {
+                if !(is_empty && matches!(&**key, "masked" | "glass_bins" | "offsets_mm")) {
                     file.set_value(key, value)?;
                 }
             }
@@ -353,6 +354,7 @@ columns = 16
 bins = 128
 bin_width_ps = 92.1
 offset_mm = -179.5
+offsets_mm = [1.5, -78.0, 0.0]
 gate = [12, 127]
 masked = [3, 70]
 sigma_bins = 0.8

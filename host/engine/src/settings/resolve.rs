@@ -97,6 +97,7 @@ impl SettingsFile {
             bins,
             bin_width_ps: sensor.bin_width_ps.unwrap_or(const { U16F16::lit("250") }),
             offset_mm: sensor.offset_mm.unwrap_or(I24F8::ZERO),
+            offsets_mm: sensor.offsets_mm.clone().unwrap_or_default(),
             gate: sensor.gate,
             masked: sensor.masked.clone().unwrap_or_default(),
             rule,
@@ -126,12 +127,13 @@ impl SettingsFile {
     /// A file with `settings`, and the rest of this one.
     #[must_use]
     pub fn with_settings(&self, settings: &Settings) -> Self {
-        let masked = &settings.masked;
+        let (masked, offsets_mm) = (&settings.masked, &settings.offsets_mm);
         Self {
             sensor: SensorSettings {
                 bins: u16::try_from(settings.bins).ok(),
                 bin_width_ps: Some(settings.bin_width_ps),
                 offset_mm: Some(settings.offset_mm),
+                offsets_mm: (!offsets_mm.is_empty()).then(|| offsets_mm.clone()),
                 gate: settings.gate,
                 masked: (!masked.is_empty()).then(|| masked.clone()),
                 sigma_bins: settings.sigma_bins,

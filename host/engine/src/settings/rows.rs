@@ -19,6 +19,12 @@ impl Settings {
             row("range offset", format!("{} mm", self.offset_mm)),
             row("range gate", gate),
         ];
+        if let (Some(low), Some(high)) =
+            (self.offsets_mm.iter().min(), self.offsets_mm.iter().max())
+        {
+            let text = format!("from {low:.1} to {high:.1} mm, added to the range offset");
+            rows.insert(2, row("offsets of pixels", text));
+        }
         if !self.masked.is_empty() {
             let pixels: Vec<String> = self.masked.iter().map(u16::to_string).collect();
             rows.push(row("pixels left out", pixels.join(", ")));

@@ -64,6 +64,9 @@ pub struct SensorSettings {
     /// Millimetres added to every range.
     #[serde(serialize_with = "decimal")]
     pub offset_mm: Option<I24F8>,
+    /// For each pixel, in the order of the addresses: millimetres added to that.
+    #[serde(serialize_with = "decimals")]
+    pub offsets_mm: Option<Vec<I24F8>>,
     /// First and last bin that may hold the peak, both inclusive.
     pub gate: Option<(u16, u16)>,
     /// Addresses of hot and dead pixels. They neither decide nor count in a block.
@@ -126,6 +129,7 @@ section! {
     bins = bins, "of a histogram";
     bin_width_ps = fixed, "picoseconds a bin";
     offset_mm = fixed, "added to every range";
+    offsets_mm = offsets, "added to that, one for each pixel";
     gate = gate, "first and last bin that may hold a peak";
     masked = masked, "addresses of pixels that are left out";
     sigma_bins = pulse, "standard deviation of the pulse";
@@ -171,6 +175,11 @@ fn gate(text: &str) -> Result<(u16, u16), String> {
         return Err("the first bin must come before the last".to_owned());
     }
     Ok((first, last))
+}
+
+/// Reads the offset of each pixel.
+fn offsets(text: &str) -> Result<Vec<I24F8>, String> {
+    list(text, &[','], fixed)
 }
 
 /// Reads addresses.
@@ -227,6 +236,16 @@ impl RaySettings {
         self.first_of(other)
     }
 
+    /// [`Rays::slants`], if the rays are known.
+    ///
+    /// # Errors
+    /// Fails as [`Self::rays`] does.
+    pub fn slants(&self, array: Array) -> anyhow::Result<Option<Vec<f64>>> {
+        let is_known = *self != Self::default();
+        let slants = is_known.then(|| self.rays(array).map(|(rays, _)| rays.slants()));
+        slants.transpose()
+    }
+
     /// The rays of an array, and where they come from: "60x32.2 degrees", or the calibration file.
     ///
     /// # Errors
@@ -277,6 +296,19 @@ fn as_text<T: Display, S: Serializer>(value: &Option<T>, serializer: S) -> Resul
         None => serializer.serialize_none(),
         Some(value) => serializer.collect_str(value),
     }
+}
+
+/// Fixed-point numbers as decimal ones with the fewest digits.
+fn decimals<T: Fixed + FromStr, S: Serializer>(
+    numbers: &Option<Vec<T>>,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    let Some(numbers) = numbers else {
+        return serializer.serialize_none();
+    };
+    let shortest = numbers.iter().map(|number| shortest(*number).parse());
+    let shortest: Result<Vec<f64>, _> = shortest.collect();
+    serializer.collect_seq(shortest.map_err(S::Error::custom)?)
 }
 
 /// A fixed-point number as a decimal one with the fewest digits.

@@ -6,7 +6,6 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, anyhow};
-use dtof_core::RangeScale;
 
 use super::{Command, FeedContext, PageRequest, reply};
 use dtof_events::aer_file::{Event, Header, Reader};
@@ -43,8 +42,8 @@ impl Playback {
     /// Fails if the file cannot be read, or if neither it nor `laser_hz` gives the laser rate.
     pub fn new(file: PathBuf, laser_hz: Option<u64>, speed: f64) -> Result<Self> {
         let name = || file.display().to_string();
-        let header = *open(&file).with_context(name)?.reader.header();
-        RangeScale::new(header.bin_width_ps, header.offset_mm).with_context(name)?;
+        let header = open(&file).with_context(name)?.reader.header().clone();
+        header.ranges().with_context(name)?;
         let requested = laser_hz.map(LaserClock::new).transpose()?;
         let (clock, warning) =
             LaserClock::prefer(requested, LaserClock::from_header(&header), "the file");
@@ -77,7 +76,7 @@ impl Playback {
     fn header(&self, at: &Position) -> Header {
         Header {
             laser_millihertz: self.clock.millihertz(),
-            ..*at.reader.header()
+            ..at.reader.header().clone()
         }
     }
 

@@ -7,7 +7,6 @@ mod log;
 mod timing;
 
 use anyhow::Result;
-use dtof_core::RangeScale;
 
 use super::topics::{LossesMessage, Topic, named};
 use crate::hub::{Hub, Snapshot};
@@ -15,6 +14,7 @@ use dtof_events::aer_file::{Event, EventKind};
 use dtof_export::foxglove::{Time, cloud};
 use dtof_export::points::record;
 use dtof_export::projection::Projection;
+use dtof_photons::ranges::Ranges;
 use images::Images;
 use log::StatusLog;
 use timing::Timing;
@@ -99,15 +99,15 @@ impl Frames {
         let array = header.map(|header| header.array);
         self.images = Images::of(array);
         let rays = array.map(|array| snapshot.rays.rays(array)).transpose();
-        let projection = |scale: RangeScale| {
+        let projection = |ranges: &Ranges| {
             let (rays, _) = rays.as_ref().ok()?.as_ref()?;
             Some(Projection {
                 rays: rays.clone(),
-                scale,
+                ranges: ranges.clone(),
                 clock: self.timing.clock(),
             })
         };
-        self.projection = snapshot.scale.and_then(projection);
+        self.projection = snapshot.ranges.as_ref().and_then(projection);
         self.log.no_points = rays.err().map(|error| format!("no points: {error:#}"));
     }
 

@@ -1,13 +1,12 @@
 //! A snapshot of the state, for messages to Foxglove.
 
-use dtof_core::RangeScale;
-
 use super::pixels::Pixel;
 use super::slice::Slice;
 use super::{Connection, Hub, Losses};
 use dtof_engine::settings::RaySettings;
 use dtof_events::aer_file::{Event, Header};
 use dtof_export::foxglove::Statistics;
+use dtof_photons::ranges::Ranges;
 
 /// The current state.
 pub struct Snapshot {
@@ -16,7 +15,7 @@ pub struct Snapshot {
     pub name: String,
     /// `None` before laser cycles begin.
     pub header: Option<Header>,
-    pub scale: Option<RangeScale>,
+    pub ranges: Option<Ranges>,
     pub rays: RaySettings,
     pub connection: Connection,
     pub losses: Losses,
@@ -59,8 +58,8 @@ impl Hub {
         Snapshot {
             version: state.version,
             name: state.name.clone(),
-            header: state.header,
-            scale: state.scale,
+            header: state.header.clone(),
+            ranges: state.ranges.clone(),
             rays: file.rays.clone(),
             connection: state.connection.clone(),
             losses: state.losses.clone(),

@@ -20,6 +20,7 @@ fn hub() -> Hub {
         array: Array::new(100, 100).unwrap(),
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::ZERO,
+        offsets_mm: Vec::new(),
         laser_millihertz: 0,
         start_us: 0,
     });
@@ -202,6 +203,7 @@ fn the_newest_events_wait_for_subscribers_and_all_are_counted() {
         array: Array::new(2, 1).unwrap(),
         bin_width_ps: U16F16::lit("250"),
         offset_mm: I24F8::ZERO,
+        offsets_mm: Vec::new(),
         laser_millihertz: 0,
         start_us: 0,
     });

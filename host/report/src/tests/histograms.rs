@@ -62,7 +62,7 @@ fn the_histogram_of_the_last_event_of_each_pixel_is_in_the_data() {
         );
         assert_eq!(
             reader.range(),
-            range_mm(event, &settings.range_scale().unwrap())
+            range_mm(event, &settings.ranges(array).unwrap())
         );
         assert_eq!(reader.number(), u64::from(event.peak_bin.raw()));
         assert_eq!(reader.number(), u64::from(explanation.needed.unwrap()) + 1);

@@ -4,8 +4,8 @@
 //! the paper) are drawn over time, as in its Fig. 17 and 18.
 
 use anyhow::Result;
+use dtof_core::DepthEvent;
 use dtof_core::events::Polarity;
-use dtof_core::{DepthEvent, RangeScale};
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{Colour, Mark, Pen};
 use dtof_link::DynamicDepth;
@@ -15,6 +15,7 @@ use dtof_events::echoes::Echo;
 use dtof_events::sample::Sample;
 use dtof_options::Refused;
 use dtof_options::rows::grouped;
+use dtof_photons::ranges::Ranges;
 
 /// The most changes of one direction that are drawn.
 const MAX_DRAWN: usize = 4096;
@@ -32,7 +33,7 @@ const fn pen(colour: Colour, mark: Mark) -> Pen {
 #[derive(Clone, Debug)]
 pub struct Changes {
     found: DepthChanges,
-    scale: RangeScale,
+    ranges: Ranges,
     /// Depth events.
     events: u64,
     /// Of each direction, in the order of [`DIRECTIONS`].
@@ -44,14 +45,14 @@ impl Changes {
     ///
     /// # Errors
     /// Fails if the threshold is too low.
-    pub fn new(options: &DynamicDepth, scale: RangeScale) -> Result<Self> {
-        let config = options.config(&scale);
+    pub fn new(options: &DynamicDepth, ranges: Ranges) -> Result<Self> {
+        let config = options.config(ranges.scale());
         let config = config.map_err(|error| {
             Refused::value("threshold_mm", options.threshold_mm, error.to_string())
         })?;
         Ok(Self {
             found: DepthChanges::new(config, Echo::All),
-            scale,
+            ranges,
             events: 0,
             directions: [Sample::new(MAX_DRAWN), Sample::new(MAX_DRAWN)],
         })
@@ -68,7 +69,8 @@ impl Changes {
             Polarity::Nearer => nearer,
             Polarity::Farther => farther,
         };
-        direction.add(event, self.scale.range(change.position).to_num());
+        let range = self.ranges.of(change.pixel, change.level, change.position);
+        direction.add(event, range.to_num());
     }
 
     /// The number of changes.
@@ -134,12 +136,12 @@ fn thousands(cycles: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_events::fixtures::{event, scale};
+    use dtof_events::fixtures::{event, ranges};
 
     /// A pixel that sees bin 40, then bin 10 from laser cycle 1000 on, then 40 again; one that
     /// stays.
     fn stepped(cycles: u64) -> Changes {
-        let mut changes = Changes::new(&DynamicDepth::default(), scale()).unwrap();
+        let mut changes = Changes::new(&DynamicDepth::default(), ranges()).unwrap();
         for cycle in (0..cycles).step_by(50) {
             let bin = if (cycle / 1000).is_multiple_of(2) {
                 40

@@ -4,10 +4,11 @@
 
 use std::fmt::Write as _;
 
-use dtof_core::{Array, DepthEvent, EchoNumber, RangeScale};
+use dtof_core::{Array, DepthEvent, EchoNumber};
 use dtof_engine::settings::Settings;
 use dtof_events::echoes::{Echo, EchoSelection};
 use dtof_events::histories::PixelHistories;
+use dtof_photons::ranges::Ranges;
 
 /// 64-bit floats, rows by columns; not a number without an event.
 pub const ARRAY: &str = "depth.npy";
@@ -56,20 +57,20 @@ impl Layer {
     }
 
     /// Takes an event.
-    pub fn add(&mut self, event: &DepthEvent, scale: &RangeScale) {
+    pub fn add(&mut self, event: &DepthEvent, ranges: &Ranges) {
         self.selection.push(*event);
-        self.take_selected(scale);
+        self.take_selected(ranges);
     }
 
     /// Takes the events that still waited for another echo of their exposure.
-    pub fn end(&mut self, scale: &RangeScale) {
+    pub fn end(&mut self, ranges: &Ranges) {
         self.selection.finish();
-        self.take_selected(scale);
+        self.take_selected(ranges);
     }
 
-    fn take_selected(&mut self, scale: &RangeScale) {
+    fn take_selected(&mut self, ranges: &Ranges) {
         for event in &mut self.selection {
-            self.maps.add(&event, scale);
+            self.maps.add(&event, ranges);
         }
     }
 }

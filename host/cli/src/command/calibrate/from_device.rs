@@ -146,6 +146,7 @@ impl DeviceArgs {
         let mut cycles = collected.cycles.clone();
         cycles.sort_unstable();
         let median = cycles.get(cycles.len() / 2).copied().unwrap_or(0);
+        let slants = requested.rays.slants(array)?;
         let captures = [collected.histograms];
         let observed = Observed {
             array,
@@ -154,6 +155,7 @@ impl DeviceArgs {
             cycles: Some(&collected.cycles),
             bin_width_ps: settings.bin_width_ps.to_num(),
             truth_mm: None,
+            slant: slants.as_deref(),
         };
         let found = calibrate(&observed, options)?;
         ensure!(

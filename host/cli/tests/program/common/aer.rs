@@ -17,6 +17,7 @@ pub const HEADER: Header = Header {
     array: Array::new(64, 32).unwrap(),
     bin_width_ps: U16F16::lit("250"),
     offset_mm: I24F8::lit("-12.5"),
+    offsets_mm: Vec::new(),
     laser_millihertz: 0,
     start_us: 0,
 };
