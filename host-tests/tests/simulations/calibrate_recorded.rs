@@ -44,11 +44,13 @@ fn judged(
         pixels,
     };
     let events = engine.run(&slice).unwrap();
-    let scale = settings.range_scale().unwrap();
+    let ranges = settings.ranges(array).unwrap();
     let mut errors = vec![Vec::new(); truth.len()];
     for event in &events {
         let pixel = usize::from(event.pixel.raw());
-        let range: f64 = scale.range(event.position()).to_num();
+        let range: f64 = ranges
+            .of(event.pixel, event.level, event.position())
+            .to_num();
         errors[pixel].push(range - truth[pixel]);
     }
     let median = |values: &mut Vec<f64>| {

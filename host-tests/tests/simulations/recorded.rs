@@ -42,7 +42,7 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
         RecordedHistograms::new(recorded.array, &recorded.captures, length, 10_000, 1).unwrap();
     let mut engine = host_engine(&settings, photons.array(), &photons.addresses()).unwrap();
     let events = engine.run(&photons.next_slice(10_000).unwrap()).unwrap();
-    let scale = settings.range_scale().unwrap();
+    let ranges = settings.ranges(photons.array()).unwrap();
 
     std::array::from_fn(|zone| {
         // The capture and the error of the range, for every event of this zone.
@@ -51,7 +51,7 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
             .map(|event| {
                 (
                     usize::from(event.pixel.raw()),
-                    scale.range(event.position()),
+                    ranges.of(event.pixel, event.level, event.position()),
                 )
             })
             .map(|(pixel, range)| (pixel % ZONES, pixel / ZONES, range.to_num::<f64>()))

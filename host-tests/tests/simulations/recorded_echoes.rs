@@ -60,7 +60,7 @@ fn near_captures(log: &PathBuf, sigma: &str) -> Vec<(f64, Found)> {
     let truth = ground_truth(log);
     let recorded = counts(log, &ReadOptions::default()).unwrap();
     let length = RecordingLength::PhotonsPerCycle(4.0);
-    let scale = settings.range_scale().unwrap();
+    let ranges = settings.ranges(Array::new(1, 1).unwrap()).unwrap();
     let captures = truth.into_iter().zip(&recorded.captures);
     let near = captures.filter(|(mm, _)| *mm < NEAR_MM);
     near.map(|(mm, capture)| {
@@ -70,7 +70,9 @@ fn near_captures(log: &PathBuf, sigma: &str) -> Vec<(f64, Found)> {
         let mut engine = host_engine(&settings, one, &photons.addresses()).unwrap();
         let mut found = Found::default();
         for event in engine.run(&photons.next_slice(CYCLES).unwrap()).unwrap() {
-            let range = scale.range(event.position()).to_num();
+            let range = ranges
+                .of(event.pixel, event.level, event.position())
+                .to_num();
             if event.echo == EchoNumber::FIRST {
                 found.firsts.push(range);
             } else {

@@ -393,3 +393,78 @@ fn offset_of(
     });
     Some((offset, found))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_core::{Array, PixelAddress};
+    use rand_distr::{Distribution, Poisson};
+
+    /// What is found in one capture of a target at 1,200 mm, of 8x8 pixels of 56 mm a bin and these offsets, with
+    /// so many photons of the target and so many a bin of the background.
+    fn differences(
+        offsets: &[f64; 64],
+        (signal, background, sigma): (f64, f64, f64),
+        seed: u64,
+    ) -> PixelOffsets {
+        let bin_width_ps = 373.6;
+        let histogram = |pixel: usize| -> Vec<u64> {
+            let address = PixelAddress::new(u16::try_from(pixel).unwrap());
+            let mut rng = dtof_theory::random::pixel_rng(seed, address);
+            // Ranges differ by half a bin, as those of a plane.
+            let mm = 1200.0 * slant(pixel) - offsets[pixel];
+            let position = mm / (bin_width_ps * MM_PER_PS);
+            let bins = (0..128).map(|bin| {
+                let mean =
+                    background + signal * dtof_theory::rates::bin_share(bin, position, sigma);
+                #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+                let count = Poisson::new(mean).unwrap().sample(&mut rng) as u64;
+                count
+            });
+            bins.collect()
+        };
+        let captures = [(0..64).map(histogram).collect::<Vec<_>>()];
+        let slants: Vec<f64> = (0..64).map(slant).collect();
+        let observed = Observed {
+            array: Array::new(8, 8).unwrap(),
+            captures: &captures,
+            length: Length::Cycles(10_000),
+            cycles: None,
+            bin_width_ps,
+            truth_mm: None,
+            slant: Some(&slants),
+        };
+        let all = AllHistograms::new(&observed, &[]).unwrap();
+        let rate = all.pixels.background;
+        let good = GoodHistograms::new(observed.array, rate, all.traces, all.levels);
+        let options = CalibrationOptions {
+            target_mm: Some(1200.0),
+            ..CalibrationOptions::default()
+        };
+        let window = CentredWindow::for_pulse(settle::sigma(sigma));
+        let found = offset_of(&good, (0, 127), window, &observed, &options);
+        found.unwrap().1.unwrap()
+    }
+
+    fn slant(pixel: usize) -> f64 {
+        1.0 + 0.03 * (pixel % 8) as f64 / 7.0 - 0.02 * (pixel / 8) as f64 / 7.0
+    }
+
+    #[test]
+    fn of_a_thousand_recordings_of_equal_pixels_few_have_offsets() {
+        for light in [
+            (200.0, 2.0, 0.8),
+            (1000.0, 20.0, 1.4),
+            (1000.0, 20.0, 0.5),
+            (100_000.0, 200.0, 0.8),
+        ] {
+            let found: Vec<PixelOffsets> = (0..1000)
+                .into_par_iter()
+                .map(|seed| differences(&[0.0; 64], light, seed))
+                .collect();
+            let wrong = found.iter().filter(|found| !found.mm.is_empty()).count();
+            println!("{light:?}: {wrong} of 1000");
+            assert!(wrong <= 5, "{light:?}: {wrong} of 1000");
+        }
+    }
+}

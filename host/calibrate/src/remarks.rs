@@ -151,7 +151,8 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
         let unused = found.target_mm.map(|distance| {
             format!(
                 "--target-mm {distance} was not used: no more than half of the pixels see a surface at \
-                 one range. Put a flat target in front of more of them."
+                 one range. Put a flat target in front of more of them; with --fov HxV, too, their ranges may differ \
+                 by up to 240 mm."
             )
         });
         let kept = settings.sensor.offset_mm.map(|offset| {

@@ -20,8 +20,8 @@ fn replay(file: &Path) -> Result<usize> {
         l1: 40,
         ..Settings::static_scene(1)
     };
-    let scale = settings.range_scale()?;
     let photons = recording.photons.as_mut();
+    let ranges = settings.ranges(photons.array())?;
     let mut engine = host_engine(&settings, photons.array(), &photons.addresses())?;
     let mut events = 0;
     each_slice(
@@ -29,7 +29,7 @@ fn replay(file: &Path) -> Result<usize> {
         |slice| engine.run(slice),
         |_, found, _| {
             for event in &found {
-                let range = scale.range(event.position());
+                let range = ranges.of(event.pixel, event.level, event.position());
                 println!(
                     "cycle {} pixel {}: {range} mm",
                     event.cycle.raw(),

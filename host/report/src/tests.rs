@@ -6,7 +6,7 @@ use dtof_core::{Array, BlockLevel, DepthEvent, EchoNumber, Flags, PixelAddress};
 
 use super::packed::tests::Reader;
 use dtof_events::events_csv::range_mm;
-use dtof_events::fixtures::{event, scale};
+use dtof_events::fixtures::{event, ranges};
 use dtof_events::sample::Sample;
 
 /// `count` events, one a laser cycle, of four pixels in turn.

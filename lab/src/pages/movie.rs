@@ -8,7 +8,7 @@
 use std::collections::{BTreeMap, HashMap};
 
 use anyhow::Result;
-use dtof_core::{Array, EchoNumber, PixelAddress, RangeScale};
+use dtof_core::{Array, EchoNumber, PixelAddress};
 
 use dtof_draw::palette;
 use dtof_draw::picture::{levels, span};
@@ -63,8 +63,8 @@ pub fn demo() -> Result<String> {
     let mut engine = host_engine(&settings, photons.array(), &photons.addresses())?;
     let slice = photons.next_slice(CYCLES)?;
     let events = engine.run(&slice)?;
-    let scale: RangeScale = settings.range_scale()?;
     let array = photons.array();
+    let ranges = settings.ranges(array)?;
     let mut firsts = vec![u64::MAX; array.pixels() as usize];
     let mut last_events = vec![LastEvents::default(); array.pixels() as usize];
     let mut flashes = Vec::new();
@@ -73,7 +73,7 @@ pub fn demo() -> Result<String> {
         let flash = |pixel, side| Flash {
             moment: moment(event.cycle.raw()),
             square: square(pixel, side, event.echo, array),
-            range_mm: range_mm(event, &scale),
+            range_mm: range_mm(event, &ranges),
         };
         flashes.push(flash(event.pixel, 1 << event.level.raw()));
         for pixel in array.pixels_of(event.pixel, event.level) {

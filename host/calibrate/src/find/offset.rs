@@ -194,6 +194,6 @@ mod tests {
         assert_eq!(from_target(&positions, 1000.0, 100.0, 1.5), None);
         // Unless its pixels may differ that much.
         let found = from_target(&positions, 1000.0, 100.0, 25.0).unwrap();
-        assert_eq!(found.histograms, 17);
+        assert_eq!(found.histograms, 16);
     }
 }

@@ -91,11 +91,13 @@ pub fn pixel_offsets(
     let statistic = with
         .iter()
         .map(|&pixel| (mean(pixel) - centre).powi(2) / variance(pixel));
-    let differ = statistic.sum::<f64>() > limit_of_chi_square((with.len() - 1) as f64);
+    let (statistic, freedom) = (statistic.sum::<f64>(), (with.len() - 1) as f64);
+    let differ = statistic > limit_of_chi_square(freedom);
+    // The variance of the differences (DerSimonian and Laird).
+    let squares = with.iter().map(|&pixel| variance(pixel).powi(-2));
+    let spread = (statistic - freedom) / (weight - squares.sum::<f64>() / weight);
+    let spread = spread.max(0.0);
     let median_mm = median(with.iter().map(|&pixel| mean(pixel)));
-    let squares = with.iter().map(|&pixel| (mean(pixel) - centre).powi(2));
-    let noise = with.iter().map(|&pixel| variance(pixel)).sum::<f64>() / with.len() as f64;
-    let spread = (squares.sum::<f64>() / (with.len() - 1) as f64 - noise).max(0.0);
     let mut mm = Vec::new();
     if differ {
         mm = vec![0.0; pixels];
@@ -190,7 +192,8 @@ mod tests {
         for one in &mut all {
             one.noise_mm = 2.0;
         }
-        assert_eq!(pixel_offsets(&all, 64, |_| true, 50.0).unwrap().mm, []);
+        let found = pixel_offsets(&all, 64, |_| true, 50.0).unwrap();
+        assert!(found.mm.is_empty(), "{found:?}");
         let truth: Vec<f64> = (0..64).map(|pixel| f64::from(pixel % 2) * 80.0).collect();
         let mut all = measured(&truth, 20.0, 4, 2);
         for one in &mut all {

@@ -70,7 +70,7 @@ fn the_state_is_cleared_when_laser_cycles_begin_again() {
     hub.add_events(&[event(7, 9)]);
     let mut old = hub.join(0).unwrap();
     assert_eq!(frame(&hub, &mut old).0, [(7, 1)]);
-    let header = hub.state().header.unwrap();
+    let header = hub.state().header.clone().unwrap();
     hub.begin_recording(header);
     let mut new = hub.join(0).unwrap();
     for page in [&mut old, &mut new] {
@@ -106,7 +106,7 @@ fn the_newest_events_of_a_pixel_wait_and_the_others_are_counted() {
     assert!(cycles.eq(1001 - MOST_EVENTS as u64..=1000));
     // Events that wait are dropped when laser cycles begin again.
     hub.add_events(&all);
-    let header = hub.state().header.unwrap();
+    let header = hub.state().header.clone().unwrap();
     hub.begin_recording(header);
     assert_eq!(frame(&hub, &mut page).2["pixel"]["drawn"], 0);
     hub.leave(&page);

@@ -76,6 +76,7 @@ impl Setting {
             bins: BINS,
             bin_width_ps: const { U16F16::lit("250") },
             offset_mm: I24F8::ZERO,
+            offsets_mm: Vec::new(),
             gate: None,
             masked: Vec::new(),
             rule: WindowRule::new(3, z, Count::saturating(5))?.into(),

@@ -110,10 +110,10 @@ fn reference_events() -> Vec<DepthEvent> {
 /// The same as CSV.
 pub fn reference() -> String {
     let mut csv = Vec::new();
-    let scale = settings().range_scale().unwrap();
+    let ranges = settings().ranges(Array::new(4, 1).unwrap()).unwrap();
     writeln!(csv, "{}", events_csv::HEADER).unwrap();
     for event in &reference_events() {
-        events_csv::write(&mut csv, event, &scale).unwrap();
+        events_csv::write(&mut csv, event, &ranges).unwrap();
     }
     String::from_utf8(csv).unwrap()
 }
@@ -252,14 +252,14 @@ fn changes_of_depth_are_those_of_the_events() {
         Duration::from_secs(2),
     );
     ended.unwrap();
-    let scale = settings().range_scale().unwrap();
-    let config = dynamic_depth.config(&scale).unwrap();
+    let ranges = settings().ranges(Array::new(4, 1).unwrap()).unwrap();
+    let config = dynamic_depth.config(ranges.scale()).unwrap();
     let mut pixels = [const { DynamicDepthPixel::<{ DynamicDepth::MEAN_OF }>::new() }; 4];
     let mut csv = Vec::new();
     writeln!(csv, "{}", events_csv::DYNAMIC_DEPTH_HEADER).unwrap();
     for event in reference_events() {
         if let Some(change) = pixels[usize::from(event.pixel.raw())].observe(&config, &event) {
-            events_csv::write_dynamic_depth(&mut csv, &change, &scale).unwrap();
+            events_csv::write_dynamic_depth(&mut csv, &change, &ranges).unwrap();
         }
     }
     assert!(events.lines().count() > 5);

@@ -183,17 +183,17 @@ fn what_export_takes_for_damage_decode_does_too() {
     narrow.array = Array::new(8, 2).unwrap();
     let scratch = Scratch::new();
     for (header, event, part) in [
-        (beyond, depth(0, 2, 32), "bin 32 of 32"),
-        (beyond, dynamic(0, 2, 33, 1), "bin 33 of 32"),
-        (narrow, depth(16, 2, 5), "pixel 16 of 16"),
-        (narrow, dynamic(16, 2, 5, 1), "pixel 16 of 16"),
+        (&beyond, depth(0, 2, 32), "bin 32 of 32"),
+        (&beyond, dynamic(0, 2, 33, 1), "bin 33 of 32"),
+        (&narrow, depth(16, 2, 5), "pixel 16 of 16"),
+        (&narrow, dynamic(16, 2, 5, 1), "pixel 16 of 16"),
     ] {
         let first = match event {
             Event::Depth(_) => depth(15, 1, 31),
             // The mean of positions that lie in the bin after the peak.
             Event::DynamicDepth(_) => dynamic(15, 1, 32, 1),
         };
-        scratch.file("events.aer", file(&header, &[first, event]));
+        scratch.file("events.aer", file(header, &[first, event]));
         let part = format!("events.aer: byte 96: {part}");
         for line in ["export --format csv --out x.csv", "decode"] {
             let output = scratch.run(&format!("{line} events.aer"));

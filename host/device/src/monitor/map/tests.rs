@@ -6,7 +6,7 @@ use dtof_draw::palette;
 use proptest::prelude::*;
 
 use super::*;
-use dtof_events::fixtures::{self, event, scale};
+use dtof_events::fixtures::{self, event, ranges};
 
 fn array(columns: u32, rows: u32) -> Array {
     Array::new(columns, rows).unwrap()
@@ -144,7 +144,7 @@ fn it_is_drawn_in_place_and_gives_the_cursor_back() {
     assert_eq!(first.matches('\n').count(), 21);
 
     let [known, foreign] = [3, 4].map(|pixel| Event::Depth(event(pixel, 9, 40)));
-    map.add(&[known, foreign], &scale());
+    map.add(&[known, foreign], &ranges());
     map.set_line("events/s 12, and so much more than fits here".to_owned());
     map.draw_when_due().unwrap();
     assert_eq!(screen.taken(), "", "not so soon");
@@ -182,11 +182,11 @@ fn a_block_fills_its_pixels_that_have_not_reported_since() {
     };
     map.add(
         &[block_event(6, 0, 100, 10), block_event(0, 1, 139, 20)],
-        &scale(),
+        &ranges(),
     );
     // The pixel's event lies in the block's exposure, laser cycles 100 to 139.
     assert_eq!(shown(&map), [20, 20, 0, 0, 0, 20, 10, 0, 0, 0, 0, 0, 0]);
-    map.add(&[block_event(0, 1, 141, 21)], &scale());
+    map.add(&[block_event(0, 1, 141, 21)], &ranges());
     assert_eq!(shown(&map), [21, 21, 0, 0, 0, 21, 21, 0, 0, 0, 0, 0, 0]);
     // At the edges, blocks fill only existing pixels.
     map.add(
@@ -195,7 +195,7 @@ fn a_block_fills_its_pixels_that_have_not_reported_since() {
             block_event(4, 3, 200, 40),
             block_event(14, 1, 200, 50),
         ],
-        &scale(),
+        &ranges(),
     );
     let second = Event::Depth(DepthEvent {
         echo: EchoNumber::new(2).unwrap(),
@@ -207,7 +207,7 @@ fn a_block_fills_its_pixels_that_have_not_reported_since() {
             block_event(10, 1, 300, 70),
             block_event(3, 0, 300, 9),
         ],
-        &scale(),
+        &ranges(),
     );
     assert_eq!(
         shown(&map),

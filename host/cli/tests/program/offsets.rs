@@ -1,0 +1,171 @@
+//! The offset of each pixel, end to end: `calibrate` finds those of a simulated TMF8828, whose zones differ in
+//! patches, and everything that shows millimetres applies them.
+
+use std::collections::BTreeMap;
+
+use crate::common::{Scratch, assert_contains, npy, succeeded};
+use dtof_core::{Array, PixelAddress};
+use dtof_photons::MM_PER_PS;
+use dtof_photons::geometry::{FieldOfView, Rays};
+use rand_distr::{Distribution, Poisson};
+
+const PIXELS: usize = 64;
+const BINS: u32 = 128;
+const MM_PER_BIN: f64 = 373.6 * MM_PER_PS;
+const CYCLES: f64 = 20_000.0;
+const FOV: [f64; 2] = [41.0, 52.0];
+const SENSOR: &str = "--bin-width-ps 373.6 --recorded-cycles 20000";
+/// Millimetres that zones see everything too near: patches of 2 columns and 4 rows.
+const PATCHES: [f64; 8] = [-78.0, 31.0, 12.0, -55.0, 78.0, -23.0, 47.0, 5.0];
+
+fn zones() -> Vec<f64> {
+    let patch = |pixel: usize| pixel % 8 / 2 + 4 * (pixel / 32);
+    (0..PIXELS).map(|pixel| PATCHES[patch(pixel)]).collect()
+}
+
+/// How much farther away a flat target is in each pixel.
+fn slants() -> Vec<f64> {
+    let view = FieldOfView::new(FOV).unwrap();
+    Rays::pinhole(Array::new(8, 8).unwrap(), view).slants()
+}
+
+/// The ranges of a flat target that the median pixel sees at `mm`.
+fn target(mm: f64) -> Vec<f64> {
+    let slants = slants();
+    let mut sorted = slants.clone();
+    sorted.sort_by(f64::total_cmp);
+    slants.iter().map(|slant| mm * slant / sorted[31]).collect()
+}
+
+/// The ranges of a scene: a floor that comes nearer, and a box before a wall.
+fn scene() -> Vec<f64> {
+    let range = |pixel: usize| match (pixel % 8, pixel / 8) {
+        (_, row @ 5..) => 1700.0 - 130.0 * (row as f64 - 5.0),
+        (2..=4, 2..) => 910.0,
+        (column, row) => 2400.0 + 37.0 * column as f64 - 19.0 * row as f64,
+    };
+    (0..PIXELS).map(range).collect()
+}
+
+/// A recording of surfaces at these ranges by zones that see them `too_near`.
+fn recording(ranges: &[f64], too_near: &[f64], seed: u64) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    for (pixel, (range, too_near)) in (0..).zip(ranges.iter().zip(too_near)) {
+        let mut rng = dtof_theory::random::pixel_rng(seed, PixelAddress::new(pixel));
+        let position = (range - too_near) / MM_PER_BIN;
+        for bin in 0..BINS {
+            let signal = 0.05 * dtof_theory::rates::bin_share(bin, position, 0.9);
+            let photons = Poisson::new(CYCLES * (0.002 + signal)).unwrap();
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let count = photons.sample(&mut rng) as u32;
+            bytes.extend(count.to_le_bytes());
+        }
+    }
+    npy("<u4", "(8, 8, 128)", &bytes)
+}
+
+/// The mean absolute error of `depth.npy` in millimetres.
+fn error_mm(scratch: &Scratch, folder: &str, truth: &[f64]) -> f64 {
+    let bytes = std::fs::read(scratch.path(&format!("{folder}/depth.npy"))).unwrap();
+    let numbers = bytes[256..].chunks_exact(8);
+    let depths = numbers.map(|bytes| f64::from_le_bytes(bytes.try_into().unwrap()));
+    let errors: Vec<f64> = depths
+        .zip(truth)
+        .map(|(depth, truth)| (depth - truth).abs())
+        .collect();
+    assert_eq!(errors.len(), truth.len());
+    errors.iter().sum::<f64>() / errors.len() as f64
+}
+
+/// The number in the column of this name, of each event in lines of CSV.
+fn ranges(csv: &str) -> Vec<(String, f64)> {
+    let rows = csv.lines().skip(1).map(|line| {
+        let cells: Vec<&str> = line.split(',').collect();
+        (cells[1].to_owned(), cells[5].parse().unwrap())
+    });
+    rows.collect()
+}
+
+#[test]
+fn a_flat_target_gives_the_offset_of_each_zone_and_another_scene_gets_right() {
+    let scratch = Scratch::new();
+    let zones = zones();
+    scratch.file("target.npy", recording(&target(1200.0), &zones, 1));
+    scratch.file("scene.npy", recording(&scene(), &zones, 2));
+    let [horizontal, vertical] = FOV;
+    let calibrate = format!("calibrate target.npy {SENSOR} --target-mm 1200");
+    // Without the field of view a flat target does not tell the pixels apart: it is said.
+    let plain = scratch.run(&format!("{calibrate} --out plain.toml"));
+    assert_contains(&succeeded(plain), "--fov");
+    assert!(!scratch.read("plain.toml").contains("offsets_mm"));
+    let printed = scratch.printed(&format!(
+        "{calibrate} --fov {horizontal}x{vertical} --out own.toml"
+    ));
+    assert_contains(&printed, "offsets of pixels");
+    assert_contains(&printed, "row 7, mm");
+    assert_contains(&scratch.read("own.html"), "Offsets of the pixels");
+    assert_contains(&scratch.read("own.toml"), "offsets_mm = [");
+
+    // Before: one offset for all.
+    let own = scratch.read("own.toml");
+    let one: String = own
+        .lines()
+        .filter(|line| !line.starts_with("offsets_mm"))
+        .map(|line| format!("{line}\n"))
+        .collect();
+    scratch.file("one.toml", one);
+    for settings in ["one", "own"] {
+        scratch.printed(&format!(
+            "replay scene.npy {SENSOR} --cycles 20000 --settings {settings}.toml --out {settings}"
+        ));
+    }
+    let [before, after] = ["one", "own"].map(|folder| error_mm(&scratch, folder, &scene()));
+    println!("mean absolute error: {before:.1} mm before, {after:.1} mm after");
+    assert!(before > 30.0 && after < 8.0, "{before} {after}");
+
+    // One range of an event, wherever it is shown.
+    let events = scratch.read("own/events.csv");
+    assert_eq!(scratch.printed("decode own/events.aer"), events);
+    scratch.printed("export own/events.aer --format csv --out points.csv");
+    let points = scratch.read("points.csv");
+    let header: Vec<&str> = points.lines().next().unwrap().split(',').collect();
+    let column = header.iter().position(|name| *name == "range_mm").unwrap();
+    let exported = points
+        .lines()
+        .skip(1)
+        .map(|line| line.split(',').nth(column).unwrap());
+    assert!(
+        exported.eq(events
+            .lines()
+            .skip(1)
+            .map(|line| line.split(',').nth(5).unwrap()))
+    );
+
+    // The same bins, with and without the offset of the pixel.
+    let [plain, own] =
+        ["one", "own"].map(|folder| ranges(&scratch.read(&format!("{folder}/events.csv"))));
+    let mut differences = BTreeMap::<String, f64>::new();
+    for ((pixel, before), (same, after)) in plain.iter().zip(&own) {
+        assert_eq!(pixel, same);
+        let difference = after - before;
+        let first = *differences.entry(pixel.clone()).or_insert(difference);
+        assert!((first - difference).abs() < 0.002, "{pixel}");
+    }
+    assert_eq!(differences.len(), PIXELS);
+}
+
+#[test]
+fn pixels_that_do_not_differ_get_no_offsets() {
+    let scratch = Scratch::new();
+    for seed in 0..4 {
+        scratch.file(
+            "target.npy",
+            recording(&target(1200.0), &[0.0; PIXELS], seed),
+        );
+        let printed = scratch.printed(&format!(
+            "calibrate target.npy {SENSOR} --target-mm 1200 --fov 41x52 --out dtof.toml"
+        ));
+        assert!(!scratch.read("dtof.toml").contains("offsets_mm"), "{seed}");
+        assert_contains(&printed, "none: pixels differ by no more than their noise");
+    }
+}
