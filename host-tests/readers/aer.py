@@ -12,6 +12,7 @@ class Header(NamedTuple):
     bin_width_ps: float
     offset_mm: float
     start_us: int = 0
+    offsets_mm: tuple = ()  # of each pixel, None if it is left out
 
 
 class Depth(NamedTuple):
@@ -35,9 +36,12 @@ class Dynamic(NamedTuple):
 
 def write(path, header, events):
     data = bytearray(struct.pack(
-        "<8sHHIIIIiQq", b"DTOF-AER", 5, 64, header.bins, header.columns, header.rows,
+        "<8sHHIIIIiQq", b"DTOF-AER", 6 if header.offsets_mm else 5, 64, header.bins, header.columns, header.rows,
         round(header.bin_width_ps * 65536), round(header.offset_mm * 256), 0, header.start_us,
     ).ljust(64, b"\0"))
+    for offset in header.offsets_mm:
+        data += struct.pack("<i", -2**31 if offset is None else round(offset * 256))
+    data += bytes(-len(data) % 16)
     cycle_high = None
     for event in events:
         if event.cycle >> 16 != cycle_high:
@@ -62,7 +66,12 @@ def read(path):
     data = open(path, "rb").read()
     fields = struct.unpack_from("<8sHHIIIIiQq", data)
     magic, version, length, bins, columns, rows, width, offset, _, start_us = fields
-    assert (magic, version) == (b"DTOF-AER", 5), path
+    assert magic == b"DTOF-AER" and version in (5, 6), path
+    offsets = ()
+    if version == 6:
+        offsets = struct.unpack_from(f"<{columns * rows}i", data, length)
+        offsets = tuple(None if offset == -2**31 else offset / 256 for offset in offsets)
+        length += -(-columns * rows // 4) * 16
     events = []
     for at in range(length, len(data) - 15, 16):
         low, high = struct.unpack_from("<QQ", data, at)
@@ -80,4 +89,4 @@ def read(path):
             time = high << 16
         else:
             break
-    return Header(bins, columns, rows, width / 65536, offset / 256, start_us), events
+    return Header(bins, columns, rows, width / 65536, offset / 256, start_us, offsets), events

@@ -257,9 +257,12 @@ def main():
 
     array = aer.Header(bins=128, columns=1280, rows=51, bin_width_ps=250.0, offset_mm=-12.5,
                        start_us=1_790_000_000_123_457)
+    offsets = tuple(None if pixel % 5 == 3 else (pixel % 157 - 78) / 4 for pixel in range(1280 * 51))
     for name, dynamic in (("late", False), ("late-changes", True)):
         aer.write(f"{name}.aer", array, late_events(dynamic))
         check(dtof, name)
+    aer.write("offsets.aer", array._replace(offsets_mm=offsets), late_events(False))
+    check(dtof, "offsets")
     aer.write("too-late.aer", array, [aer.Depth(2**34 * 10, 0, 256)])
     done = subprocess.run(
         [dtof, "export", "too-late.aer", "--format", "evt2", "--out", "too-late.raw"],

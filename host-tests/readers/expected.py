@@ -54,7 +54,10 @@ def microseconds(event, laser_hz):
 
 def range_mm(header, event):
     """Within 0.01 mm, as the core works with fixed-point numbers."""
-    return event.position / 256 * header.bin_width_ps * MM_PER_PS + header.offset_mm
+    own = [header.offsets_mm[pixel] for pixel in block(header, event)] if header.offsets_mm else []
+    own = [offset for offset in own if offset is not None]
+    mean = sum(own) / len(own) if own else 0.0
+    return event.position / 256 * header.bin_width_ps * MM_PER_PS + header.offset_mm + mean
 
 
 def records(header, events, laser_hz):

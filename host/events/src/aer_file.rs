@@ -311,3 +311,68 @@ impl<R: Read> Reader<R> {
         self.offset += AerWord::BYTES as u64;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use dtof_core::Array;
+    use dtof_core::fixed::types::{I24F8, U16F16};
+
+    fn file(offsets_mm: Vec<Option<I24F8>>) -> (Header, Vec<u8>) {
+        let header = Header {
+            bins: 128,
+            array: Array::new(3, 1).unwrap(),
+            bin_width_ps: U16F16::lit("250"),
+            offset_mm: I24F8::lit("-12.5"),
+            offsets_mm,
+            laser_millihertz: 7,
+            start_us: 9,
+        };
+        let mut writer = Writer::new(Vec::new(), &header).unwrap();
+        let event = Event::Depth(crate::fixtures::event(2, 100, 60));
+        writer.write(&event).unwrap();
+        (header, writer.finish().unwrap())
+    }
+
+    #[test]
+    fn offsets_of_pixels_are_read_as_they_were_written() {
+        let offsets = [Some("-78.25"), None, Some("0.00390625")];
+        let offsets = offsets.map(|mm| mm.map(|mm| mm.parse().unwrap()));
+        let (header, bytes) = file(offsets.to_vec());
+        assert_eq!((bytes[8], bytes.len()), (6, 64 + 16 + 3 * 16));
+        let mut reader = Reader::new(&bytes[..]).unwrap();
+        assert_eq!((reader.header(), reader.offset()), (&header, 80));
+        assert!(reader.next_event().unwrap().is_some());
+        assert!(reader.next_event().unwrap().is_none());
+        // Any byte of them is under the checksum, and the padding is 0.
+        for at in 64..80 {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 1;
+            let read = Reader::new(&damaged[..]).and_then(|mut reader| {
+                reader.next_event()?;
+                reader.next_event()
+            });
+            let error = format!("{:#}", read.unwrap_err());
+            let part = if at < 76 { "checksum" } else { "damaged" };
+            assert!(error.contains(part), "{at}: {error}");
+        }
+        for length in [64, 70, 79] {
+            let error = Reader::new(&bytes[..length]).map(|_| ()).unwrap_err();
+            assert_eq!(error.to_string(), "the file ends inside its header");
+        }
+    }
+
+    #[test]
+    fn a_file_without_offsets_is_of_version_5_as_before() {
+        let (header, bytes) = file(Vec::new());
+        assert_eq!((bytes[8], bytes.len()), (5, 64 + 3 * 16));
+        assert_eq!(Reader::new(&bytes[..]).unwrap().header(), &header);
+        // Offsets of other pixels cannot be written.
+        let offsets_mm = vec![None; 2];
+        let header = Header {
+            offsets_mm,
+            ..header
+        };
+        assert!(Writer::new(Vec::new(), &header).is_err());
+    }
+}

@@ -78,6 +78,12 @@ class Array(NamedTuple):
         return self.rows, self.columns
 
 
+def array_of(fields: dict[str, Any]) -> Array:
+    """The array of pixels that the native extension gives."""
+    offsets = fields.pop("offsets_mm")
+    return Array(**fields, offsets_mm=None if offsets is None else tuple(offsets))
+
+
 def native_input(value: Any, name: str) -> Input:
     """A file or an array for the native extension. Errors call it ``name``."""
     if isinstance(value, (str, os.PathLike)):

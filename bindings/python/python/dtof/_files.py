@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Optional
 import numpy
 
 from . import _native
-from ._arrays import Array, events_of, recording_input, records_of
+from ._arrays import Array, array_of, events_of, recording_input, records_of
 from ._keywords import LoadOptions, PointsOptions, takes
 from ._options import arguments
 from ._warn import warn
@@ -77,7 +77,7 @@ def read_events(path: Any) -> tuple[numpy.ndarray, Array]:
     Raises :class:`dtof.Error` with the position of the byte if the file is damaged.
     """
     records, array = _native.read_events(os.fspath(path))
-    return events_of(records), Array(**array)
+    return events_of(records), array_of(array)
 
 
 def write_events(path: Any, events: Any, array: Array) -> None:

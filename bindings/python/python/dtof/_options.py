@@ -17,9 +17,9 @@ Keywords = list[tuple[str, str]]
 
 
 def arguments(kinds: Any, options: Mapping[str, Any]) -> Keywords:
-    """Options of :mod:`dtof._keywords` as text, without ``None`` values and an empty mask."""
+    """Options of :mod:`dtof._keywords` as text, without ``None`` values and empty lists of pixels."""
     texts = [(key, _text(kinds, key, value)) for key, value in options.items() if value is not None]
-    return [(key, text) for key, text in texts if text or key not in ("mask", "laser_off")]
+    return [(key, text) for key, text in texts if text or key not in ("mask", "offsets_mm", "laser_off")]
 
 
 def flags(keywords: Keywords) -> list[str]:

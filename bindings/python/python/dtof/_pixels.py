@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy
 
 from . import _native
-from ._arrays import Array, events_of
+from ._arrays import Array, array_of, events_of
 from ._keywords import PixelOptions, takes
 from ._options import arguments
 from ._pixel import whole
@@ -72,7 +72,7 @@ class Pixels:
     @property
     def array(self) -> Array:
         """The array, for :func:`dtof.depth_map` and files."""
-        return Array(**self._native.array)
+        return array_of(self._native.array)
 
     @property
     def statistics(self) -> dict[str, Any]:

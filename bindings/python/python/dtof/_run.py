@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Callable, Optional
 import numpy
 
 from . import _native
-from ._arrays import PHOTON, Array, events_of, is_table, native_input, photon_list, recording_input
+from ._arrays import PHOTON, Array, array_of, events_of, is_table, native_input, photon_list, recording_input
 from ._files import export, write_events
 from ._html import depth_image
 from ._keywords import Echo, PointsOptions, ReplayOptions, SimulateOptions, takes
@@ -161,7 +161,7 @@ def result(done: dict[str, Any]) -> Replay:
 
 def quiet_result(done: dict[str, Any]) -> Replay:
     """The result of a native run, without its warnings."""
-    array, confidence = Array(**done["array"]), done["confidence"]
+    array, confidence = array_of(done["array"]), done["confidence"]
     return Replay(
         events=events_of(done["events"]),
         array=array,

@@ -169,3 +169,112 @@ fn pixels_that_do_not_differ_get_no_offsets() {
         assert_contains(&printed, "none: pixels differ by no more than their noise");
     }
 }
+
+/// The bytes of a block of the format's document.
+fn document(fence: &str) -> Vec<u8> {
+    let text = include_str!("../../../../docs/aer-format.md");
+    let (_, block) = text.split_once(&format!("```{fence}\n")).unwrap();
+    let (block, _) = block.split_once("```").unwrap();
+    let bytes = block.split_whitespace();
+    bytes
+        .map(|byte| u8::from_str_radix(byte, 16).unwrap())
+        .collect()
+}
+
+#[test]
+fn the_file_of_the_document_is_decoded_as_it_says() {
+    let scratch = Scratch::new();
+    scratch.file("offsets.aer", document("offsets"));
+    let csv = scratch.printed("decode offsets.aer");
+    let expected = [("1".to_owned(), 2176.43), ("2".to_owned(), 2285.43)];
+    assert_eq!(ranges(&csv), expected, "{csv}");
+    // The same words after a header of version 5: files as they were before offsets.
+    let mut old = document("offsets");
+    old[8] = 5;
+    old.drain(64..96);
+    let words = old.len() - 16;
+    let checksum = crc32(&old[..words]);
+    old[words..words + 4].copy_from_slice(&checksum.to_le_bytes());
+    scratch.file("old.aer", old);
+    let csv = scratch.printed("decode old.aer");
+    let expected = [("1".to_owned(), 2254.68), ("2".to_owned(), 2254.68)];
+    assert_eq!(ranges(&csv), expected, "{csv}");
+}
+
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(u32::MAX, |crc, byte| {
+        let shift = |crc: u32, _| crc >> 1 ^ (crc & 1) * 0xedb8_8320;
+        (0..8).fold(crc ^ u32::from(*byte), shift)
+    })
+}
+
+#[test]
+fn a_list_of_another_length_is_refused() {
+    let scratch = Scratch::new();
+    let file = scratch.file("target.npy", recording(&target(1200.0), &[0.0; PIXELS], 1));
+    let many = "1,".repeat(62);
+    for (options, part) in [
+        (
+            "--offsets-mm=1,2,3".to_owned(),
+            "offsets-mm has 3 numbers, but there are 64 pixels",
+        ),
+        (format!("--offsets-mm={many}1"), "has 63 numbers"),
+        (format!("--offsets-mm={many}1,8388607"), "that of pixel 63"),
+        ("--offsets-mm=a".to_owned(), "must be a number"),
+    ] {
+        let output = scratch.replay(&file, &format!("--l1 40 {options}"));
+        scratch.refused(&output, &[part]);
+    }
+    scratch.file("own.toml", "[sensor]\noffsets_mm = [1, 2.5]\n");
+    let output = scratch.replay(&file, "--settings own.toml");
+    scratch.refused(&output, &["own.toml: offsets_mm has 2 numbers"]);
+    scratch.file("own.toml", "[sensor]\noffsets_mm = 1\n");
+    let output = scratch.replay(&file, "--settings own.toml");
+    scratch.refused(&output, &["own.toml: offsets_mm 1: must be a list"]);
+}
+
+/// Blocks have the mean offset of their pixels that are not left out.
+#[test]
+fn events_of_blocks_and_captures_have_the_offsets_of_their_pixels() {
+    let scratch = Scratch::new();
+    let one = recording(&target(1200.0), &[0.0; PIXELS], 1);
+    let file = scratch.file("one.npy", &one);
+    let offsets: Vec<String> = (0..PIXELS).map(|pixel| pixel.to_string()).collect();
+    let offsets = format!("--offsets-mm={}", offsets.join(","));
+    let options = "--rule paper --alpha 30 --binning 1 --patience 8 --mask 1,8,9";
+    scratch.replayed(&file, options);
+    let before = scratch.events();
+    scratch.replayed(&file, &format!("{options} {offsets}"));
+    let after = scratch.events();
+    let mut blocks = 0;
+    for (before, after) in before.iter().zip(&after) {
+        let number = |row: &[String], column: usize| row[column].parse::<f64>().unwrap();
+        let (pixel, level) = (number(after, 1), number(after, 9));
+        let first = f64::from(u8::from(pixel == 0.0 && level == 1.0));
+        let mean = match level {
+            0.0 => pixel,
+            // Of the first block only pixel 0 counts, of others the mean of +0, +1, +8 and +9.
+            _ => pixel + 4.5 * (1.0 - first),
+        };
+        let difference = number(after, 5) - number(before, 5);
+        assert!((difference - mean).abs() < 0.002, "{after:?}");
+        blocks += usize::from(level > 0.0);
+    }
+    assert!(before.len() == after.len() && blocks > 10, "{blocks}");
+
+    // Those of one capture hold for each.
+    let two = [&one[128..], &one[128..]].concat();
+    let file = scratch.file("two.npy", npy("<u4", "(2, 8, 8, 128)", &two));
+    let options = "--axes captures,rows,columns,bins --l1 40";
+    scratch.replayed(&file, options);
+    let before = scratch.events();
+    scratch.replayed(&file, &format!("{options} {offsets}"));
+    for (before, after) in before.iter().zip(&scratch.events()) {
+        let number = |row: &[String], column: usize| row[column].parse::<f64>().unwrap();
+        let difference = number(after, 5) - number(before, 5);
+        assert!(
+            (difference - number(after, 1) % 64.0).abs() < 0.002,
+            "{after:?}"
+        );
+    }
+}
