@@ -774,7 +774,8 @@ dtof_status_t dtof_statistics_read(const struct dtof_statistics_t *statistics,
                                    struct dtof_counts_t *counts);
 
 // Initialises a scale. `bin_width_ps_q16` is the width of a bin, `offset_mm_q8` is added to every
-// range. The millimetres per bin are rounded to the nearest 1/65536 mm.
+// range. The millimetres per bin are rounded to the nearest 1/65536 mm. If pixels have offsets of
+// their own, each takes a scale whose `offset_mm_q8` is the sum of both.
 //
 // Errors: DTOF_ERROR_ZERO_BIN_WIDTH, DTOF_ERROR_RANGE, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
 // Threads: no other thread uses `scale` during the call.

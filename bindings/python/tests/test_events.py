@@ -14,6 +14,7 @@ OPTIONS = {
     "blocks": {"binning": 2, "patience": 16, "alpha": 8, "min_count": 7},
     "frame": {"frame": 500},
     "sensor": {"bin_width_ps": 92.1, "offset_mm": -179.5, "gate": (2, 90), "mask": [0, 5]},
+    "offsets": {"offsets_mm": [-78.0, 12.5, *range(22)], "mask": [2], "binning": 1, "patience": 16, "alpha": 8},
     "run": {"photons_per_cycle": 0.3, "seed": 9, "cycles": 3001, "laser_hz": 5_000_000},
     "bins": {"rebin": 3, "bins": 32},
 }

@@ -43,6 +43,25 @@ def test_calibrate(program, tmp_path, counts):
     assert "pulse" in again.changes and not found.changes
 
 
+def test_a_flat_target_gives_the_offset_of_each_pixel():
+    random = numpy.random.default_rng(12)
+    position = numpy.where(numpy.arange(16) % 4 < 2, 30.2, 30.8).reshape(4, 4, 1)  # 0.6 bins are 18 mm
+    pulse = numpy.exp(-0.5 * ((numpy.arange(64) + 0.5 - position) / 0.8) ** 2)
+    counts = random.poisson(10 + 2000 * pulse)
+    found = dtof.calibrate(counts, target_mm=900, fov=(2, 2), **OPTIONS)
+    offsets = numpy.reshape(found.settings["sensor"]["offsets_mm"], (4, 4))
+    assert offsets[:, :2].mean() - offsets[:, 2:].mean() == pytest.approx(18, abs=1.5)
+    assert "offsets of pixels" in found.found
+    # The same as settings, as a list and as an array.
+    run = dtof.replay(counts, settings=found, min_count=200)
+    assert run.array.offsets_mm == pytest.approx(offsets.ravel(), abs=1 / 256)
+    assert numpy.nanmean(abs(dtof.depth_map(run.events, run.array) - 900)) < 6
+    for given in (offsets, offsets.ravel().tolist()):
+        again = dtof.replay(counts, settings=found, min_count=200, offsets_mm=given)
+        assert (again.events == run.events).all()
+    assert dtof.replay(counts, offsets_mm=[]).array.offsets_mm is None
+
+
 def test_compare(program, tmp_path, counts):
     numpy.save(tmp_path / "counts.npy", counts)
     truth = numpy.repeat((20.8 + 3 * numpy.arange(8)) * 200 * 0.149896, 8).reshape(8, 8)

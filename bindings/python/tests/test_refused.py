@@ -209,6 +209,8 @@ def test_invalid_events(tmp_path):
                   run.array._replace(bin_width_ps=65535.9), run.array._replace(offset_mm=0.1),
                   # Multiples, with which no range is found.
                   run.array._replace(bin_width_ps=2.0**-16), run.array._replace(bin_width_ps=65535.0),
+                  run.array._replace(offsets_mm=[0.0] * 3), run.array._replace(offsets_mm=[0.1] * 4),
+                  run.array._replace(offsets_mm=[0.0, 0.0, 0.0, 8e6]),
                   run.array._replace(bins=0), run.array._replace(bins=24),
                   run.array._replace(bins=2048), run.array._replace(bins=4_000_000_000)]:
         refused(lambda: dtof.write_events(path, run.events, array))
@@ -244,7 +246,7 @@ ANY = of.one_of(
 NAMES = ["rule", "alpha", "window", "z", "false_alarm", "estimator", "half_widths", "min_count", "l1",
          "l2", "x", "binning", "patience", "neighbours", "tracking", "once_per_bin", "counter_bits", "echoes", "echo_wait", "gate", "mask",
          "sigma_bins", "frame", "axes", "array", "columns", "rebin", "bins", "bin_width_ps",
-         "offset_mm", "photons_per_cycle", "recorded_cycles", "laser_hz", "seed"]
+         "offset_mm", "offsets_mm", "photons_per_cycle", "recorded_cycles", "laser_hz", "seed"]
 
 
 @settings(deadline=None, max_examples=150)

@@ -86,8 +86,9 @@ def calibrate(recorded: Any, *, settings: Settings = None, **options: Unpack[Cal
     """Finds background, pulse, cover glass, hot pixels and thresholds in histograms.
 
     ``recorded`` is a recording as for :func:`replay`. ``target_mm`` is the distance of a flat target
-    in millimetres. ``glass`` says whether the nearest surface is a cover glass. ``settings`` are
-    older settings, as for :func:`replay`.
+    in millimetres; with ``fov`` the ``settings`` also have an offset for each pixel
+    (``settings["sensor"]["offsets_mm"]``) if pixels differ. ``glass`` says whether the nearest surface
+    is a cover glass. ``settings`` are older settings, as for :func:`replay`.
     """
     older = None if settings is None else settings_text(settings)
     source = recording_input(recorded, options)
