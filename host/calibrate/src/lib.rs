@@ -227,9 +227,16 @@ pub fn calibrate(observed: &Observed, options: &CalibrationOptions) -> Result<Ca
         .and_then(|offset| offset.bin_width_ps)
         .unwrap_or(observed.bin_width_ps);
     if let (Some(before), Some(offset)) = (&found, &mut offset) {
-        let scale = (gate, bin_width_ps, offset.mm);
+        let scale = (gate, bin_width_ps);
         let own = pixel_offsets.as_ref().map_or(&[][..], |pixels| &pixels.mm);
-        let replay = Replay::new(observed, before, &pixels.hot, (scale, own), options.seed)?;
+        let replay = Replay::new(
+            observed,
+            before,
+            &pixels.hot,
+            scale,
+            (offset.mm, own),
+            options.seed,
+        )?;
         if let Some(replay) = replay {
             photon_budget = replay.best()?;
         }
@@ -452,19 +459,18 @@ mod tests {
 
     #[test]
     fn equal_pixels_have_no_offsets_but_for_few_of_a_thousand_recordings() {
-        for (draws, light) in [
-            (1000, (200.0, 2.0, 0.8)),
-            (200, (1000.0, 20.0, 1.4)),
-            (200, (1000.0, 20.0, 0.5)),
-            (200, (100_000.0, 200.0, 0.8)),
+        for (draws, most, light) in [
+            (1000, 2, (200.0, 2.0, 0.8)),
+            (200, 0, (1000.0, 20.0, 1.4)),
+            (200, 0, (1000.0, 20.0, 0.5)),
+            (200, 0, (100_000.0, 200.0, 0.8)),
         ] {
             let found: Vec<PixelOffsets> = (0..draws)
                 .into_par_iter()
                 .map(|seed| differences(&[0.0; 64], light, seed))
                 .collect();
             let wrong = found.iter().filter(|found| !found.mm.is_empty()).count();
-            println!("{light:?}: {wrong} of {draws}");
-            assert!(wrong <= 5, "{light:?}: {wrong} of {draws}");
+            assert!(wrong <= most, "{light:?}: {wrong} of {draws}");
         }
     }
 }

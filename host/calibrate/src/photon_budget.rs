@@ -69,7 +69,8 @@ impl<'a> Replay<'a> {
         observed: &Observed,
         detection: &'a WindowDetection,
         hot: &[usize],
-        ((gate, bin_width_ps, offset_mm), offsets_mm): (((u16, u16), f64, f64), &[f64]),
+        (gate, bin_width_ps): ((u16, u16), f64),
+        (offset_mm, offsets_mm): (f64, &[f64]),
         seed: u64,
     ) -> Result<Option<Self>> {
         let Some(truth) = observed.truth_mm else {

@@ -203,7 +203,7 @@ fn the_file_of_the_document_is_decoded_as_it_says() {
 
 fn crc32(bytes: &[u8]) -> u32 {
     !bytes.iter().fold(u32::MAX, |crc, byte| {
-        let shift = |crc: u32, _| crc >> 1 ^ (crc & 1) * 0xedb8_8320;
+        let shift = |crc: u32, _| (crc >> 1) ^ ((crc & 1) * 0xedb8_8320);
         (0..8).fold(crc ^ u32::from(*byte), shift)
     })
 }

@@ -121,7 +121,7 @@ fn what_is_no_aer_file_leaves_the_output_as_it_was() {
         (&[0; 200], "not an AER file"),
         (b"cycle,pixel\n", "not an AER file"),
         (&with(8..9, 3), "AER version 3; this program reads 4 to 6"),
-        (&with(8..9, 6), "AER version 6"),
+        (&with(8..9, 7), "AER version 7"),
         (&with(16..17, 0), "0x32 pixels"),
         (&with(16..24, 0xff), "4294967295x4294967295 pixels"),
         (&with(24..28, 0), "bin width is zero"),
