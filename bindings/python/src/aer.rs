@@ -1,12 +1,11 @@
 //! AER files.
 
-use std::fs::File;
-use std::io::{BufReader, BufWriter};
+use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_engine::settings::SettingsFile;
-use dtof_events::aer_file::{Event, Reader, Writer};
+use dtof_events::aer_file::{self, Event, Writer};
 use dtof_export::{Format, ProjectionOptions};
 use dtof_options::files::{destination, temporary_file};
 use dtof_options::progress::Progress;
@@ -32,7 +31,7 @@ pub fn read_events(py: Python<'_>, path: PathBuf) -> PyResult<(Bound<'_, PyByteA
 }
 
 fn read(path: &Path, mut control: &Control) -> Result<(Vec<u8>, Array)> {
-    let mut reader = Reader::new(BufReader::new(File::open(path)?))?;
+    let mut reader = aer_file::open(path)?;
     let header = reader.header().clone();
     let ranges = header.ranges()?;
     let (mut records, mut read) = (Vec::new(), 0usize);

@@ -3,7 +3,9 @@
 
 mod header;
 
-use std::io::{self, Read, Write};
+use std::fs::File;
+use std::io::{self, BufReader, Read, Write};
+use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use crc::{CRC_32_ISO_HDLC, Crc, Digest, Table};
@@ -17,6 +19,7 @@ pub use header::Header;
 pub use header::MAGIC;
 use header::{HEADER_BYTES, header_length, offset_bytes, offsets_from_bytes, offsets_to_bytes};
 
+use dtof_options::files::is_file;
 use dtof_options::named_values;
 
 /// Processes 16 bytes at a time, the size of a word.
@@ -176,6 +179,15 @@ impl<W: Write> Writer<W> {
         self.digest.update(bytes);
         self.out.write_all(bytes)
     }
+}
+
+/// Opens the file at `path`.
+///
+/// # Errors
+/// Fails if it is no file, such as a pipe, and like [`Reader::new`].
+pub fn open(path: &Path) -> Result<Reader<BufReader<File>>> {
+    is_file(path)?;
+    Reader::new(BufReader::new(File::open(path)?))
 }
 
 /// Reads a file, event by event.

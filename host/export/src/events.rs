@@ -1,23 +1,16 @@
 //! The events of an AER file, up to its end or to where it is damaged.
 
-use std::fs::File;
-use std::io::BufReader;
 use std::path::Path;
 
 use anyhow::{Result, bail, ensure};
 use dtof_core::EchoNumber;
 
 use super::Format;
-use dtof_events::aer_file::{Event, EventKind, Header, Reader};
+use dtof_events::aer_file::{self, Event, EventKind, Header};
 use dtof_events::clock::LaserClock;
 use dtof_events::echoes::{Echo, EchoSelection};
 use dtof_options::Refused;
 use dtof_options::progress::Progress;
-
-/// Opens a file.
-pub fn open(path: &Path) -> Result<Reader<BufReader<File>>> {
-    Reader::new(BufReader::new(File::open(path)?))
-}
 
 /// Selects `echo` of each exposure. A file does not give the length of exposures or the number of
 /// echoes, so the limits are the largest.
@@ -55,9 +48,7 @@ impl Survey {
         echo: Echo,
         progress: &mut dyn Progress,
     ) -> Result<Self> {
-        let file = path.metadata()?;
-        ensure!(file.is_file(), "not a file that can be read twice");
-        let mut reader = open(path)?;
+        let mut reader = aer_file::open(path)?;
         let header = reader.header().clone();
         let (clock, warning) = LaserClock::for_file(clock, &header);
         let mut survey = Self {
@@ -69,7 +60,7 @@ impl Survey {
             latest: 0,
             damage: None,
         };
-        progress.begin(file.len(), "bytes counted");
+        progress.begin(path.metadata()?.len(), "bytes counted");
         let mut selection = selection(echo);
         let mut beyond = None;
         loop {

@@ -28,7 +28,7 @@ use dtof_link::DynamicDepth;
 use tempfile::NamedTempFile;
 
 use dtof_engine::settings::{RaySettings, SettingsFile};
-use dtof_events::aer_file::{Event, EventKind, Header};
+use dtof_events::aer_file::{self, Event, EventKind, Header};
 use dtof_events::clock::LaserClock;
 use dtof_events::echoes::Echo;
 use dtof_options::files::{destination, flush_to_disk, temporary_file};
@@ -237,7 +237,7 @@ pub fn export(
     let mut sink = sink.with_context(to)?;
 
     progress.begin(survey.all(), "events");
-    let mut events = events::open(input).with_context(name)?;
+    let mut events = aer_file::open(input).with_context(name)?;
     let mut selection = events::selection(options.echo);
     for done in 1..=survey.all() {
         let event = events.next_event().with_context(name)?;

@@ -109,6 +109,20 @@ pub fn is_same_file(one: &Path, other: &Path) -> bool {
     matches!((fs::canonicalize(one), fs::canonicalize(other)), (Ok(one), Ok(other)) if one == other)
 }
 
+/// Checks that a recording is a file. A pipe or a device may never end, and cannot be read twice.
+///
+/// # Errors
+/// Fails if nothing is at `path`, or something else.
+pub fn is_file(path: &Path) -> Result<()> {
+    let there = fs::metadata(path)?;
+    ensure!(!there.is_dir(), "is a folder; name a file in it");
+    ensure!(
+        there.is_file(),
+        "is a pipe or a device; save it as a file first"
+    );
+    Ok(())
+}
+
 /// Creates a file in `folder` that is deleted unless it is persisted. Its name begins with
 /// `prefix`.
 ///

@@ -36,6 +36,11 @@ pub fn read(path: &Path) -> Result<CaptureLog> {
 
 fn parse(name: &str, mut text: impl BufRead) -> Result<CaptureLog> {
     let start = text.fill_buf().with_context(|| name.to_owned())?;
+    // Some editors begin a file with a byte order mark.
+    if start.starts_with(b"\xef\xbb\xbf") {
+        text.consume(3);
+    }
+    let start = text.fill_buf().with_context(|| name.to_owned())?;
     let first = start.iter().find(|byte| !byte.is_ascii_whitespace());
     let is_object = first == Some(&b'{');
     Ok(if is_object {

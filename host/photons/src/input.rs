@@ -71,17 +71,6 @@ impl Input {
         }
     }
 
-    /// Returns whether a second read gives the same data.
-    ///
-    /// # Errors
-    /// Fails if there is no such file.
-    pub fn can_be_read_twice(&self) -> io::Result<bool> {
-        match self {
-            Self::File(path) => Ok(path.metadata()?.is_file()),
-            Self::Array(_) => Ok(true),
-        }
-    }
-
     /// The path, if it is a file.
     #[must_use]
     pub fn file(&self) -> Option<&Path> {
@@ -139,6 +128,6 @@ mod tests {
             assert_eq!(length, 14);
         }
         assert_eq!(input.to_string(), "counts");
-        assert!(input.can_be_read_twice().unwrap() && input.file().is_none());
+        assert!(input.file().is_none());
     }
 }

@@ -19,6 +19,7 @@ use crate::photon_list::{CountedSource, ListOptions, PhotonList, PhotonReader};
 use crate::recorded::{Capture, Layout, RecordedHistograms, RecordingLength};
 use crate::source::PhotonSource;
 use crate::{tmf8820, tmf8829, warnings};
+use dtof_options::files::is_file;
 use dtof_options::rows::Row;
 use dtof_options::{Refused, plain};
 
@@ -257,6 +258,9 @@ fn counts_of(photons: &mut dyn CountedSource, metadata: Metadata) -> Result<Coun
 }
 
 fn read(input: &Input, options: &ReadOptions) -> Result<Content> {
+    if let Some(path) = input.file() {
+        is_file(path).with_context(|| input.to_string())?;
+    }
     let kind = input.file().map_or(Ok(Kind::Array), kind)?;
     let has_records = match kind {
         // Three columns that `axes` names are pixels.
@@ -298,11 +302,6 @@ fn read(input: &Input, options: &ReadOptions) -> Result<Content> {
 }
 
 fn kind(path: &Path) -> Result<Kind> {
-    ensure!(
-        !path.is_dir(),
-        "{}: is a folder; name a file in it",
-        path.display()
-    );
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.to_ascii_lowercase();
     let kinds = [

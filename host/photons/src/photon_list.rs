@@ -162,11 +162,6 @@ impl<R: PhotonReader> PhotonList<R> {
     /// # Errors
     /// Returns what is wrong with the file, after its name and the place.
     pub fn open(input: &Input, shape: ListOptions, cycles: u64) -> Result<Self> {
-        let can_be = input.can_be_read_twice();
-        ensure!(
-            can_be.with_context(|| input.to_string())?,
-            "{input}: not a file that can be read twice"
-        );
         let mut rows = Validator::<R>::open(input, shape)?;
         let mut is_there = vec![false; Array::MOST_PIXELS as usize];
         let (mut photons, mut not_replayed, mut recorded) = (0u64, 0, 0u64);

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, anyhow};
 
 use super::{Command, FeedContext, PageRequest, reply};
-use dtof_events::aer_file::{Event, Header, Reader};
+use dtof_events::aer_file::{self, Event, Header, Reader};
 use dtof_events::clock::LaserClock;
 use dtof_options::Refused;
 
@@ -164,7 +164,7 @@ impl Playback {
 
 /// A file at its start.
 fn open(file: &PathBuf) -> Result<Position> {
-    let mut reader = Reader::new(BufReader::new(File::open(file)?))?;
+    let mut reader = aer_file::open(file)?;
     Ok(Position {
         next: reader.next_event()?,
         reader,

@@ -31,7 +31,7 @@ fn options_that_cannot_be_are_refused_in_one_line() {
             events.aer --out x | --format
             events.aer --format las --out x | las
             none.aer --format csv --out x | none.aer: No such file
-            folder --format csv --out x | folder: not a file
+            folder --format csv --out x | folder: is a folder
             events.aer --format csv --out folder | folder: exists and is not a file
             events.aer --format csv --out /dev/null | is not a file
             events.aer --format csv --out ./events.aer | is an input file

@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 
 use crate::common::{Scratch, assert_contains, npy};
 
@@ -399,6 +400,32 @@ fn a_folder_is_no_recording() {
     scratch.refused(
         &scratch.run("replay a.npy --out out"),
         &["a.npy: is a folder; name a file in it"],
+    );
+}
+
+/// A pipe that nobody writes into is refused at once: a program that opens one waits for ever.
+#[cfg(unix)]
+#[test]
+fn a_pipe_is_no_recording() {
+    let scratch = Scratch::new();
+    for name in ["pipe", "a.npy", "a.npz", "a.json", "a.csv", "a.aer"] {
+        let made = Command::new("mkfifo").arg(scratch.path(name)).status();
+        assert!(made.unwrap().success());
+    }
+    scratch.all_refused(
+        "",
+        "
+            replay pipe --out out | pipe: is a pipe or a device; save it as a file first
+            replay a.npy --out out | a.npy: is a pipe
+            replay a.npz --out out | a.npz: is a pipe
+            replay a.json --out out | a.json: is a pipe
+            replay a.csv --out out | a.csv: is a pipe
+            replay /dev/zero --out out | /dev/zero: is a pipe or a device
+            calibrate a.json --out out.toml | a.json: is a pipe
+            compare a.npy --out out | a.npy: is a pipe
+            export a.aer --format csv --out x | a.aer: is a pipe
+            view a.aer | a.aer: is a pipe
+        ",
     );
 }
 

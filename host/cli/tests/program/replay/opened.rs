@@ -88,6 +88,9 @@ fn a_tmf8829_log_is_told_by_its_content_and_read_packed_or_not() {
     assert_eq!(plain.metadata.gate, Some((0, 53)));
     assert_eq!(plain.metadata.bin_width_ps, 4 * U16F16::lit("203.8"));
     assert_eq!(plain.metadata.offset_mm, Some(tmf8829::OFFSET_MM));
+    // As some editors save it.
+    let marked = counts_of("a.json", &format!("\u{feff}{log}"));
+    assert_eq!(marked.captures, plain.captures);
     let scratch = Scratch::new();
     // The name does not reveal the format.
     for name in ["b.json.gz", "b.json"] {

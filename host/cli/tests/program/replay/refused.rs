@@ -240,6 +240,7 @@ fn settings_that_cannot_be_are_refused() {
 fn files_that_are_not_there_or_not_known_are_refused() {
     let scratch = Scratch::new();
     std::fs::create_dir(scratch.path("folder.csv")).unwrap();
+    scratch.file("a.txt", "");
     scratch.all_refused(
         "replay --out out --input",
         "
