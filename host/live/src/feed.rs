@@ -42,6 +42,10 @@ pub enum Command {
     Record(bool),
     /// Play a recording, or pause it.
     Play(bool),
+    /// Go to a place of a recording, in seconds from its start.
+    Seek(f64),
+    /// Play a recording so many times as fast.
+    Speed(f64),
 }
 
 /// A device and its options.

@@ -125,6 +125,7 @@ impl App {
     }
 
     fn subscribe(&self, topic: Topic) {
+        self.hub.set_visited();
         self.subscribers[topic.index()].fetch_add(1, Ordering::Relaxed);
         self.has_new_subscriber.store(true, Ordering::Relaxed);
     }

@@ -68,6 +68,21 @@ pub struct Losses {
     pub last_fault: Option<String>,
 }
 
+/// Where the playback of a recording is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Playhead {
+    /// Seconds of the recording that have been played.
+    pub seconds: f64,
+    /// Seconds to its last event.
+    pub length: f64,
+    /// Times as fast as it was recorded.
+    pub speed: f64,
+    /// Events that have been played.
+    pub events: u64,
+    /// Events of the recording.
+    pub all: u64,
+}
+
 /// The last histogram of a pixel that a page shows.
 #[derive(Debug)]
 struct LastHistogram {
@@ -101,8 +116,9 @@ struct State {
     histograms: Vec<LastHistogram>,
     /// Histograms so far.
     histogram_number: u64,
-    /// Playback time of a recording.
-    seconds: f64,
+    playhead: Playhead,
+    /// A page or a client of Foxglove has come.
+    is_visited: bool,
 }
 
 /// Events a second, over about a second.
@@ -146,7 +162,8 @@ impl Hub {
             recording: RecordingStatus::default(),
             histograms: Vec::new(),
             histogram_number: 0,
-            seconds: 0.0,
+            playhead: Playhead::default(),
+            is_visited: false,
         }))
     }
 
@@ -209,9 +226,25 @@ impl Hub {
         }
     }
 
-    /// Sets the playback time of a recording.
-    pub(super) fn set_seconds(&self, seconds: f64) {
-        self.state().seconds = seconds;
+    /// Sets where playback is.
+    pub(super) fn set_playhead(&self, playhead: Playhead) {
+        self.state().playhead = playhead;
+    }
+
+    /// Counts events a second anew from now on.
+    pub(super) fn restart_rate(&self) {
+        let mut state = self.state();
+        (state.rate.since, state.rate.events) = (Instant::now(), state.events);
+    }
+
+    /// Returns whether a page or a client of Foxglove has come.
+    pub(super) fn is_visited(&self) -> bool {
+        self.state().is_visited
+    }
+
+    /// A page or a client of Foxglove has come.
+    pub(super) fn set_visited(&self) {
+        self.state().is_visited = true;
     }
 
     /// Sets losses and rates.
@@ -265,6 +298,7 @@ impl Hub {
     /// Opens a page that shows a pixel; `None` if [`MOST_PAGES`] are open.
     #[must_use]
     pub fn join(&self, pixel: u16) -> Option<Page> {
+        self.set_visited();
         self.state().pages.join(pixel)
     }
 
@@ -319,7 +353,6 @@ impl State {
         self.ranges = header.ranges().ok();
         self.header = Some(header);
         self.losses = Losses::default();
-        self.seconds = 0.0;
         self.histograms.clear();
     }
 

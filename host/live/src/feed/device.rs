@@ -8,6 +8,8 @@ use anyhow::{Result, anyhow};
 use super::session::{Session, with_restart_hint};
 use super::{Command, Device, FeedContext, PageRequest, reply};
 use dtof_device::{Client, Stopped};
+use dtof_link::Refusal;
+use dtof_options::Refused;
 
 /// Interval of attempts to reach a device that is gone.
 const AGAIN: Duration = Duration::from_secs(1);
@@ -32,8 +34,9 @@ impl Device {
     pub(super) fn run(mut self, context: &mut FeedContext) -> Result<()> {
         context.hub.set_requested(&self.requested);
         let mut sessions = Sessions::default();
-        let mut printed = String::new();
+        let (mut printed, mut reason) = (String::new(), String::new());
         while !context.is_stopped() {
+            let was_there = sessions.any;
             let ended = self.session(context, &mut sessions);
             let recorded = context.recorder.end_file();
             context.show_recording();
@@ -48,6 +51,11 @@ impl Device {
             }
             if let Some(request) = sessions.pending.take() {
                 reply(request.answer, Err(anyhow!("{ended:#}")));
+                // Wrong settings change nothing, and are told to no other page.
+                if was_there && (ended.is::<Refused>() || ended.is::<Refusal>()) {
+                    sessions.pending = self.wait(context, &reason, true);
+                    continue;
+                }
             }
             let state = if stopped.is_some() { "stopped" } else { "gone" };
             let text = |mut reason: String| {
@@ -60,7 +68,7 @@ impl Device {
                 }
             };
             // The page shows keys, the terminal flags.
-            let reason = text(format!("{ended:#}"));
+            reason = text(format!("{ended:#}"));
             let on_terminal = text(dtof_options::line(&ended, &context.terminal.name));
             context.hub.set_connection(state, &reason);
             if printed != on_terminal {
@@ -107,12 +115,15 @@ impl Device {
                 Ok(request) => request,
             };
             match request.command {
-                Command::Settings(_) => return Some(request),
+                Command::Settings(ref text) => match Session::changed(&self.requested, text) {
+                    Ok(_) => return Some(request),
+                    Err(error) => reply(request.answer, Err(error)),
+                },
                 Command::Record(on) => {
                     let done = context.record(on, None);
                     context.reply(request.answer, done);
                 }
-                Command::Save | Command::Play(_) => {
+                Command::Save | Command::Play(_) | Command::Seek(_) | Command::Speed(_) => {
                     let error = if is_off {
                         anyhow!("{reason}")
                     } else {

@@ -5,9 +5,10 @@ use std::io::BufReader;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, ensure};
 
-use super::{Command, FeedContext, PageRequest, reply};
+use super::{Command, FeedContext, reply};
+use crate::hub::Playhead;
 use dtof_events::aer_file::{self, Event, Header, Reader};
 use dtof_events::clock::LaserClock;
 use dtof_options::Refused;
@@ -26,13 +27,26 @@ pub struct Playback {
     speed: f64,
 }
 
-/// The state of playback.
-struct Position {
+/// What playback does.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Mode {
+    /// Waits for the first page.
+    Waiting,
+    Playing,
+    Paused,
+    Ended,
+    /// Has met damage, or the file is gone.
+    Failed,
+}
+
+/// A recording that is played.
+struct Player<'a> {
+    playback: &'a Playback,
+    mode: Mode,
     reader: Reader<BufReader<File>>,
     /// The next event, which is not due yet.
     next: Option<Event>,
-    /// Seconds of the recording that have been played.
-    seconds: f64,
+    playhead: Playhead,
 }
 
 impl Playback {
@@ -42,7 +56,7 @@ impl Playback {
     /// Fails if the file cannot be read, or if neither it nor `laser_hz` gives the laser rate.
     pub fn new(file: PathBuf, laser_hz: Option<u64>, speed: f64) -> Result<Self> {
         let name = || file.display().to_string();
-        let header = open(&file).with_context(name)?.reader.header().clone();
+        let header = aer_file::open(&file).with_context(name)?.header().clone();
         header.ranges().with_context(name)?;
         let requested = laser_hz.map(LaserClock::new).transpose()?;
         let (clock, warning) =
@@ -72,102 +86,170 @@ impl Playback {
         }
     }
 
-    /// The header of the file, with the laser rate of playback.
-    fn header(&self, at: &Position) -> Header {
-        Header {
-            laser_millihertz: self.clock.millihertz(),
-            ..at.reader.header().clone()
-        }
-    }
-
-    fn play(&self, context: &mut FeedContext) -> Result<()> {
-        let mut at = open(&self.file)?;
-        context.hub.begin_recording(self.header(&at));
-        context.hub.set_connection("playing", "");
-        let (mut plays, mut turn) = (true, Instant::now());
+    fn play(&self, context: &FeedContext) -> Result<()> {
+        let mut player = Player::new(self, context)?;
+        let mut turn = Instant::now();
         while !context.is_stopped() {
             while let Ok(request) = context.requests.try_recv() {
-                self.execute(request, &mut plays, &mut at, context)?;
+                reply(request.answer, player.execute(request.command, context));
+                turn = Instant::now();
             }
             let elapsed = turn.elapsed();
             turn = Instant::now();
-            if plays {
-                if at.next.is_some() {
-                    at.seconds += elapsed.as_secs_f64() * self.speed;
-                    self.send_due(&mut at, context)?;
-                }
-                if at.next.is_none() {
-                    plays = false;
-                    context.hub.set_connection("ended", "");
-                }
+            if player.mode == Mode::Waiting && context.hub.is_visited() {
+                player.set_mode(Mode::Playing, "", context);
+            }
+            if player.mode == Mode::Playing {
+                player.playhead.seconds += elapsed.as_secs_f64() * player.playhead.speed;
+                player.send_due(context);
             }
             std::thread::sleep(EVERY);
         }
         Ok(())
     }
+}
 
-    /// Sends the events that are due.
-    fn send_due(&self, at: &mut Position, context: &FeedContext) -> Result<()> {
-        let mut batch = Vec::new();
-        while let Some(event) = at.next {
-            let seconds = self.clock.nanoseconds(event.cycle().raw()) as f64 / 1e9;
-            if seconds > at.seconds {
-                break;
-            }
-            batch.push(event);
-            at.next = match at.reader.next_event() {
-                Ok(next) => next,
-                Err(error) => {
-                    // Events before the damage are good.
-                    context.hub.add_events(&batch);
-                    return Err(error);
-                }
-            };
-            if batch.len() == BATCH {
-                // Reading is too slow for this speed, so playback time waits for it.
-                at.seconds = seconds;
+impl<'a> Player<'a> {
+    /// Reads all of the file once for its length, up to its end or to where it is damaged.
+    fn new(playback: &'a Playback, context: &FeedContext) -> Result<Self> {
+        let mut reader = aer_file::open(&playback.file)?;
+        let (mut last, mut all) = (0, 0);
+        while let Ok(Some(event)) = reader.next_event() {
+            last = event.cycle().raw();
+            all += 1;
+            if context.is_stopped() {
                 break;
             }
         }
-        context.hub.add_events(&batch);
-        context.hub.set_seconds(at.seconds);
+        let mut player = Self {
+            playback,
+            mode: Mode::Waiting,
+            reader,
+            next: None,
+            playhead: Playhead {
+                length: playback.clock.nanoseconds(last) as f64 / 1e9,
+                all,
+                speed: playback.speed,
+                ..Playhead::default()
+            },
+        };
+        player.rewind(context)?;
+        Ok(player)
+    }
+
+    /// Goes to the start of the file.
+    fn rewind(&mut self, context: &FeedContext) -> Result<()> {
+        self.reader = aer_file::open(&self.playback.file)?;
+        self.next = self.reader.next_event()?;
+        (self.playhead.seconds, self.playhead.events) = (0.0, 0);
+        context.hub.begin_recording(Header {
+            laser_millihertz: self.playback.clock.millihertz(),
+            ..*self.reader.header()
+        });
+        context.hub.set_playhead(self.playhead);
         Ok(())
     }
 
-    fn execute(
-        &self,
-        request: PageRequest,
-        plays: &mut bool,
-        at: &mut Position,
-        context: &FeedContext,
-    ) -> Result<()> {
-        let done = match request.command {
-            Command::Play(on) => {
-                if on && at.next.is_none() {
-                    *at = open(&self.file)?;
-                    context.hub.begin_recording(self.header(at));
-                }
-                *plays = on;
-                let state = if on { "playing" } else { "paused" };
-                context.hub.set_connection(state, "");
-                Ok(format!("The recording is {state}."))
+    fn set_mode(&mut self, mode: Mode, reason: &str, context: &FeedContext) {
+        self.mode = mode;
+        let state = match mode {
+            Mode::Waiting => "opening",
+            Mode::Playing => "playing",
+            Mode::Paused => "paused",
+            Mode::Ended => "ended",
+            Mode::Failed => "failed",
+        };
+        context.hub.set_connection(state, reason);
+    }
+
+    fn fail(&mut self, error: &anyhow::Error, context: &FeedContext) {
+        let reason = format!("{}: {error:#}", self.playback.name());
+        self.set_mode(Mode::Failed, &reason, context);
+    }
+
+    /// Sends the events that are due. Ends after the last, or where the file is damaged.
+    fn send_due(&mut self, context: &FeedContext) {
+        let (mut batch, mut damage) = (Vec::new(), None);
+        while let Some(event) = self.next {
+            let seconds = self.playback.clock.nanoseconds(event.cycle().raw()) as f64 / 1e9;
+            if seconds > self.playhead.seconds {
+                break;
+            }
+            batch.push(event);
+            self.next = self.reader.next_event().unwrap_or_else(|error| {
+                damage = Some(error);
+                None
+            });
+            if batch.len() == BATCH {
+                // Reading is too slow for this speed, so playback time waits for it.
+                self.playhead.seconds = seconds;
+                break;
+            }
+        }
+        if self.next.is_none() {
+            self.playhead.seconds = self.playhead.length;
+        }
+        self.playhead.events += batch.len() as u64;
+        context.hub.add_events(&batch);
+        context.hub.set_playhead(self.playhead);
+        match damage {
+            Some(error) => self.fail(&error, context),
+            None if self.next.is_none() => self.set_mode(Mode::Ended, "", context),
+            None => {}
+        }
+    }
+
+    /// Goes to a place in seconds: all events from the start to there are sent at once. A recording
+    /// that was at its end plays from there.
+    fn seek(&mut self, seconds: f64, context: &FeedContext) -> Result<()> {
+        let mode = match self.mode {
+            Mode::Ended | Mode::Failed => Mode::Playing,
+            mode => mode,
+        };
+        if let Err(error) = self.rewind(context) {
+            self.fail(&error, context);
+            return Err(error);
+        }
+        self.set_mode(mode, "", context);
+        while self.mode == mode && self.playhead.seconds < seconds && !context.is_stopped() {
+            self.playhead.seconds = seconds;
+            self.send_due(context);
+        }
+        context.hub.restart_rate();
+        Ok(())
+    }
+
+    fn execute(&mut self, command: Command, context: &FeedContext) -> Result<String> {
+        match command {
+            Command::Play(true) if matches!(self.mode, Mode::Ended | Mode::Failed) => {
+                self.seek(0.0, context)?;
+                Ok("The recording is playing.".to_owned())
+            }
+            Command::Play(true) => {
+                self.set_mode(Mode::Playing, "", context);
+                Ok("The recording is playing.".to_owned())
+            }
+            Command::Play(false) => {
+                self.set_mode(Mode::Paused, "", context);
+                Ok("The recording is paused.".to_owned())
+            }
+            Command::Seek(seconds) => {
+                self.seek(seconds, context)?;
+                Ok(format!(
+                    "The recording is at {:.3} s.",
+                    self.playhead.seconds
+                ))
+            }
+            Command::Speed(speed) => {
+                ensure!(speed > 0.0, "the speed must be above 0");
+                self.playhead.speed = speed;
+                context.hub.set_playhead(self.playhead);
+                Ok(format!("The recording plays {speed} times as fast."))
             }
             Command::Record(_) => Err(anyhow!("this is a recording already")),
             Command::Settings(_) | Command::Save => {
                 Err(anyhow!("a recording has no settings to change"))
             }
-        };
-        reply(request.answer, done);
-        Ok(())
+        }
     }
-}
-
-/// A file at its start.
-fn open(file: &PathBuf) -> Result<Position> {
-    let mut reader = aer_file::open(file)?;
-    Ok(Position {
-        next: reader.next_event()?,
-        reader,
-        seconds: 0.0,
-    })
 }

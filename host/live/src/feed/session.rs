@@ -215,7 +215,9 @@ impl<'a> Session<'a> {
                 context.show_recording();
                 done
             }
-            Command::Play(_) => Err(anyhow!("a device cannot be paused")),
+            Command::Play(_) | Command::Seek(_) | Command::Speed(_) => {
+                Err(anyhow!("a device cannot be paused"))
+            }
         };
         context.reply(request.answer, done);
         Ok(())

@@ -41,7 +41,7 @@ impl State {
             "rate": rate,
             "losses": self.losses,
             "recorded": self.recording,
-            "seconds": self.seconds,
+            "playhead": self.playhead,
         });
         if page.version != self.version {
             page.version = self.version;

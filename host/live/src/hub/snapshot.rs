@@ -64,7 +64,7 @@ impl Hub {
             connection: state.connection.clone(),
             losses: state.losses.clone(),
             recording_error: state.recording.error.clone(),
-            seconds: state.seconds,
+            seconds: state.playhead.seconds,
             arrived: state.events,
             masked: state.masked,
             events,

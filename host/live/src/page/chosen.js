@@ -49,7 +49,9 @@ function histogramNote(histogram) {
 }
 
 function rangesNote() {
-  if (chosen.arrived === 0) return "No event yet.";
+  if (chosen.arrived === 0) {
+    return Number.isNaN(pixels.range[chosen.pixel]) ? "No event yet." : "No event since this pixel was chosen.";
+  }
   const { drawn, arrived } = chosen;
   const of = drawn < arrived ? ` ${number(drawn)} of ${number(arrived)} events drawn.` : "";
   return `Range in millimetres: the last ${number(chosen.events.length)} events.${of}`;

@@ -39,6 +39,12 @@ document.addEventListener("keydown", (event) => {
 
 element("record").addEventListener("click", () => press("record"));
 element("play").addEventListener("click", () => press("play"));
+element("position").addEventListener("input", () => { isMoving = true; });
+element("position").addEventListener("change", async (event) => {
+  await send("/seek", { seconds: Number(event.target.value) });
+  isMoving = false;
+});
+element("speed").addEventListener("change", (event) => send("/speed", { speed: Number(event.target.value) }));
 element("pause").addEventListener("click", pause);
 element("help").addEventListener("click", () => element("keys").showModal());
 element("light-quantity").addEventListener("input", redraw);

@@ -18,16 +18,18 @@ function showState({ state, reason, returned }) {
   badge.className = `badge ${kind}`;
   const again = returned > 0 ? `came back ${number(returned)} ${returned > 1 ? "times" : "time"}` : "";
   put(element("reason"), reason || again);
-  put(element("play"), state === "playing" ? "Pause recording" : state === "ended" ? "Play again" : "Play");
+  const isOver = state === "ended" || state === "failed";
+  put(element("play"), state === "playing" ? "Pause recording" : isOver ? "Play again" : "Play");
   element("play").dataset.on = state !== "playing";
 }
 
 function showTotals(frame, framesPerSecond) {
   const { losses, recorded } = frame;
-  const rows = [["events", number(frame.events)], ["events a second", number(frame.rate)]];
-  if (source?.kind === "recording") {
-    rows.push(["seconds", number(frame.seconds, 1)]);
-  } else {
+  const isRecording = source?.kind === "recording";
+  const { events: played, all } = frame.playhead;
+  const total = isRecording ? `${number(played)} of ${number(all)}` : number(frame.events);
+  const rows = [["events", total], ["events a second", number(frame.rate)]];
+  if (!isRecording) {
     rows.push(["photons a second", number(losses.photon_rate)], ["laser cycles", number(losses.cycles)]);
   }
   const [deadTime, isOfSensor] = source?.deadTime ?? [0];
@@ -51,6 +53,31 @@ function showTotals(frame, framesPerSecond) {
   button.classList.toggle("recording-now", recorded.on);
   button.dataset.on = !recorded.on;
 }
+
+/** The position is moved and not sent yet, so frames leave it alone. */
+let isMoving = false;
+
+/** A place in a recording, in seconds. */
+function placeText(seconds, length) {
+  const digits = length < 10 ? 3 : 1;
+  return `${fixed(seconds, digits)} of ${fixed(length, digits)} s`;
+}
+
+/** Shows where playback is, and how fast. */
+function showPlayhead({ seconds, length, speed }) {
+  const [position, speeds] = [element("position"), element("speed")];
+  position.max = length;
+  if (!isMoving) position.value = seconds;
+  const text = placeText(Number(position.value), length);
+  put(element("place"), text);
+  position.setAttribute("aria-valuetext", text);
+  if (speed === shownSpeed) return;
+  shownSpeed = speed;
+  const all = [...new Set([...SPEEDS, speed])].sort((one, other) => one - other);
+  speeds.replaceChildren(...all.map((one) => new Option(`${one}×`, one, false, one === speed)));
+}
+const SPEEDS = [0.001, 0.01, 0.1, 0.25, 0.5, 1, 2, 4, 10, 100];
+let shownSpeed = 0;
 
 function showLosses({ counts, last_fault: fault }) {
   const body = element("losses");
@@ -93,6 +120,12 @@ async function post(path, body, kind = "application/json") {
   } catch {
     return { done: false, text: "the program does not answer" };
   }
+}
+
+/** Posts a command whose effect the page shows; says only why it was not done. */
+async function send(path, body) {
+  const { done, text } = await post(path, JSON.stringify(body));
+  if (!done) tell(text, true);
 }
 
 async function command(path, body) {

@@ -5,6 +5,7 @@ let page = null;
 let isDrawing = false;
 let last = null;
 let times = [];
+/** A person has chosen the pixel. */
 let isChosen = false;
 let rated = performance.now();
 /** A request to show the chosen pixel is open. */
@@ -38,14 +39,14 @@ function takeFrame(frame) {
     const isDevice = source.kind === "device";
     for (const part of document.querySelectorAll(".of-device")) part.hidden = !isDevice;
     for (const part of document.querySelectorAll(".of-recording")) part.hidden = isDevice;
-    // The first choice is the middle pixel.
-    const middle = Math.floor(data.rows / 2) * data.columns + Math.floor(data.columns / 2);
-    choose(chosen.pixel < pixels.count && isChosen ? chosen.pixel : Math.min(middle, pixels.count - 1));
-    isChosen = pixels.count > 0;
-    document.body.classList.toggle("filled", isChosen);
+    if (!isChosen || chosen.pixel >= pixels.count) showPixel(middlePixel(() => true));
+    document.body.classList.toggle("filled", pixels.count > 0);
     fillSettings();
   }
   takePixels(frame.pixels);
+  // The first choice is a pixel with an event.
+  const hasEvent = (pixel) => !Number.isNaN(pixels.range[pixel]);
+  if (!isChosen && !hasEvent(chosen.pixel)) showPixel(middlePixel(hasEvent));
   if (frame.pixel.number === chosen.pixel) {
     takeEvents(frame.pixel.events);
     chosen.drawn += frame.pixel.drawn;
@@ -62,6 +63,7 @@ function takeFrame(frame) {
   showState(frame.connection);
   const seconds = Math.max(0.1, (now - times[0]) / 1000);
   showTotals(frame, times.length > 1 ? (times.length - 1) / seconds : 0);
+  if (source?.kind === "recording") showPlayhead(frame.playhead);
   showLosses(frame.losses);
   showEnd(frame.recorded);
   if (paused) return;
@@ -84,8 +86,25 @@ async function watch() {
   isWatching = false;
 }
 
-/** Chooses another pixel. */
+/** The pixel closest to the middle of those that suit, -1 without any. */
+function middlePixel(suits) {
+  const distance = (pixel) =>
+    Math.hypot((pixel % data.columns) - (data.columns >> 1), Math.floor(pixel / data.columns) - (data.rows >> 1));
+  let [closest, least] = [-1, Infinity];
+  for (let pixel = 0; pixel < pixels.count; pixel++) {
+    if (distance(pixel) < least && suits(pixel)) [closest, least] = [pixel, distance(pixel)];
+  }
+  return closest;
+}
+
+/** Shows the pixel that a person has chosen. */
 function choose(pixel) {
+  isChosen = true;
+  showPixel(pixel);
+}
+
+/** Shows another pixel. */
+function showPixel(pixel) {
   if (pixel < 0) return;
   element("pixel-name").value = `${pixel}: ${pixelName(pixel)}`;
   if (pixel === chosen.pixel) return;

@@ -39,6 +39,20 @@ struct Switch {
     on: bool,
 }
 
+/// `/seek`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Seek {
+    seconds: f64,
+}
+
+/// `/speed`.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Speed {
+    speed: f64,
+}
+
 /// `/watch`.
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -110,7 +124,7 @@ impl App {
         let path = request.uri().path().to_owned();
         let kind = match path.as_str() {
             "/settings" => "application/toml",
-            "/save" | "/record" | "/play" | "/watch" => "application/json",
+            "/save" | "/record" | "/play" | "/seek" | "/speed" | "/watch" => "application/json",
             _ => return Err((StatusCode::NOT_FOUND, "there is nothing here".to_owned())),
         };
         let refused = |(status, why): guard::Refused| (status, why.to_owned());
@@ -121,6 +135,8 @@ impl App {
             "/save" => read::<Nothing>(&text).map(|_| Command::Save)?,
             "/record" => Command::Record(read::<Switch>(&text)?.on),
             "/play" => Command::Play(read::<Switch>(&text)?.on),
+            "/seek" => Command::Seek(read::<Seek>(&text)?.seconds),
+            "/speed" => Command::Speed(read::<Speed>(&text)?.speed),
             _ => {
                 let Watch { page, pixel } = read(&text)?;
                 return match self.hub.watch(page, pixel) {

@@ -75,6 +75,16 @@ fn a_device_that_was_never_there_is_named() {
     let answer = post(live.port, "/settings", "[detection]\nl1 = 50\n");
     assert_eq!(answer.status, 422);
     assert_contains(&answer.body, "tcp:127.0.0.1:1: ");
+    // Wrong settings are named to the page that has sent them. The others still say why there is no
+    // device.
+    let answer = post(live.port, "/settings", "[detection]\nalpha = 999\n");
+    assert_eq!(answer.status, 422);
+    assert_contains(&answer.body, "alpha 999: must be a number from 0");
+    for _ in 0..15 {
+        let frame = page.frame();
+        let reason = frame["connection"]["reason"].as_str().unwrap();
+        assert!(reason.starts_with("tcp:127.0.0.1:1: "), "{reason}");
+    }
     let begun = std::time::Instant::now();
     live.end();
     assert!(begun.elapsed() < std::time::Duration::from_secs(5));

@@ -69,6 +69,8 @@ fn no_other_site_can_ask_or_say_anything() {
         "/save",
         "/record",
         "/play",
+        "/seek",
+        "/speed",
         "/watch",
         "/nothing",
     ];

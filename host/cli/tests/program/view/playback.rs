@@ -62,6 +62,72 @@ fn a_recording_is_played_at_its_rate_paused_and_played_again() {
 }
 
 #[test]
+fn a_recording_waits_for_its_first_page() {
+    let scratch = Scratch::new();
+    let path = scratch.file("events.aer", recording());
+    let feed = Feed::Playback(Playback::new(path, None, 100.0).unwrap());
+    let live = Live::of(feed, None);
+    // Ten times as long as it lasts.
+    std::thread::sleep(Duration::from_millis(100));
+    assert_eq!(live.hub.arrived(), 0);
+    let mut page = Stream::open(live.port, 0);
+    page.until("the end", |frame| frame["connection"]["state"] == "ended");
+    assert_eq!(live.hub.arrived(), 10);
+}
+
+#[test]
+fn a_recording_can_be_moved_to_a_place_and_change_its_speed() {
+    let scratch = Scratch::new();
+    let path = scratch.file("events.aer", recording());
+    let feed = Feed::Playback(Playback::new(path, None, 1e-6).unwrap());
+    let live = Live::of(feed, None);
+    let mut page = Stream::open(live.port, 5);
+    let frame = page.until("playing", |frame| frame["connection"]["state"] == "playing");
+    let playhead = &frame["playhead"];
+    assert_eq!(playhead["length"], 1.0);
+    assert_eq!(
+        (&playhead["all"], &playhead["speed"]),
+        (&10.into(), &1e-6.into())
+    );
+    // The page shows what has come until then, and nothing later.
+    for (seconds, events) in [(0.55, 5), (0.95, 9), (0.0, 0), (0.35, 3)] {
+        let body = format!("{{\"seconds\":{seconds}}}");
+        assert_eq!(post(live.port, "/seek", &body).status, 200);
+        let frame = page.until("moved", |frame| frame["playhead"]["events"] == events);
+        assert!((frame["playhead"]["seconds"].as_f64().unwrap() - seconds).abs() < 1e-3);
+        assert_eq!(frame["connection"]["state"], "playing");
+        let frame = page.until("all pixels", |frame| frame["drawn"]["left"] == 0);
+        assert_eq!(frame["playhead"]["events"], events);
+    }
+    assert_eq!(post(live.port, "/speed", "{\"speed\":1000.0}").status, 200);
+    let frame = page.until("the end", |frame| frame["connection"]["state"] == "ended");
+    assert_eq!(frame["playhead"]["speed"], 1000.0);
+    assert_eq!(
+        (&frame["playhead"]["seconds"], &frame["playhead"]["events"]),
+        (&1.0.into(), &10.into())
+    );
+    // It plays on from a place before its end. A place after its end is its end.
+    post(live.port, "/speed", "{\"speed\":0.001}");
+    post(live.port, "/seek", "{\"seconds\":0.5}");
+    page.until("playing", |frame| frame["connection"]["state"] == "playing");
+    post(live.port, "/play", "{\"on\":false}");
+    post(live.port, "/seek", "{\"seconds\":0.25}");
+    let frame = page.until("paused", |frame| frame["playhead"]["events"] == 2);
+    assert_eq!(frame["connection"]["state"], "paused");
+    post(live.port, "/seek", "{\"seconds\":1e300}");
+    page.until("the end", |frame| frame["connection"]["state"] == "ended");
+    for (path, body, status) in [
+        ("/speed", "{\"speed\":0}", 422),
+        ("/speed", "{\"speed\":-1}", 422),
+        ("/speed", "{\"speed\":1e999}", 400),
+        ("/seek", "{\"seconds\":-1}", 200),
+        ("/seek", "{\"seconds\":\"1\"}", 400),
+    ] {
+        assert_eq!(post(live.port, path, body).status, status, "{path} {body}");
+    }
+}
+
+#[test]
 fn a_recording_is_played_faster_and_a_damaged_one_is_named() {
     let scratch = Scratch::new();
     let mut bytes = recording();
@@ -84,12 +150,15 @@ fn a_recording_is_played_faster_and_a_damaged_one_is_named() {
             Feed::Playback(Playback::new(path, None, 100.0).unwrap()),
             None,
         );
-        let frame = Stream::open(live.port, 0)
-            .until("failed", |frame| frame["connection"]["state"] == "failed");
+        let mut page = Stream::open(live.port, 0);
+        let frame = page.until("failed", |frame| frame["connection"]["state"] == "failed");
         let reason = frame["connection"]["reason"].as_str().unwrap();
         assert_contains(reason, "damaged.aer: byte ");
-        // The events before the damage are shown.
+        // The events before the damage are shown, and can be shown again.
         assert_eq!(frame["events"], events);
+        assert_eq!(frame["playhead"]["all"], events);
+        post(live.port, "/seek", "{\"seconds\":0}");
+        page.until("again", |frame| frame["events"] == 2 * events);
     }
 }
 

@@ -29,10 +29,16 @@ fn stays_off_until_settings_are_put_in_force(live: &Live, page: &mut Stream, dev
     assert_eq!(device.starts.load(Ordering::Relaxed), starts);
     // Other commands do not start it, nor do settings that are refused.
     let _ = post(live.port, "/save", "{}");
-    let refused = post(live.port, "/settings", "[detection]\nl1 = 0\n");
-    assert_eq!(refused.status, 422, "{refused:?}");
+    let reason = page.frame()["connection"]["reason"].clone();
+    for settings in ["l1 = 0\n", "l1 = 60\nl2 = 3\n", "estimator = \"window\"\n"] {
+        let refused = post(live.port, "/settings", &format!("[detection]\n{settings}"));
+        assert_eq!(refused.status, 422, "{refused:?}");
+    }
     thread::sleep(Duration::from_millis(1_500));
     assert_eq!(device.starts.load(Ordering::Relaxed), starts);
+    // Only the page that has sent them was told why.
+    let other = Stream::open(live.port, 2).frame();
+    assert_eq!(other["connection"]["reason"], reason);
 
     let answer = post(live.port, "/settings", "[detection]\nl1 = 60\n");
     assert_eq!(answer.status, 200, "{answer:?}");
