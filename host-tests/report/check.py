@@ -286,6 +286,8 @@ def main(chromium, pictures, *reports):
             text = report.page.locator("#cloud-hint").inner_text()
             check("says that not all events are shown", " events shown: " in text)
             check("drawn in colours", report.colours() > 50)
+            note = report.page.locator("#histogram-note").inner_text()
+            check("it opens on a pixel with a histogram", note.startswith("Histogram of the last event"))
 
         with Report(browser, opened(large)) as report:
             note = report.page.locator("#histogram-note").inner_text

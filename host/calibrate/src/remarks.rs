@@ -3,7 +3,7 @@
 use super::{Calibration, Length, Nearest, Tdc};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::numbers::shortest;
-use dtof_options::rows::Row;
+use dtof_options::rows::{Row, bins};
 
 /// Remarks on the `settings`, each a topic and a sentence or two.
 #[must_use]
@@ -48,8 +48,9 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
             remark(
                 "cover glass",
                 format!(
-                    "The crosstalk of the cover glass has a tail. Its end, bin {low} to {high}, comes from the \
-                 photons, not from the shape of the pulse."
+                    "The crosstalk of the cover glass has a tail. Its end, {}, comes from the photons, not from \
+                     the shape of the pulse.",
+                    bins(low, high)
                 ),
             );
         }

@@ -17,6 +17,16 @@ pub fn grouped(value: u64) -> String {
     text
 }
 
+/// One bin, or bins from the first to the last: bin 21, bins 3 to 7.
+#[must_use]
+pub fn bins(first: usize, last: usize) -> String {
+    if first == last {
+        format!("bin {first}")
+    } else {
+        format!("bins {first} to {last}")
+    }
+}
+
 /// A number other than 0 with at least `digits` significant digits and at most 12 decimals.
 #[must_use]
 #[allow(
@@ -74,6 +84,11 @@ mod tests {
             printable(name),
             "a\u{fffd}[2J\u{fffd}b\u{fffd}\u{fffd}\u{fffd} é 漢 ש"
         );
+    }
+
+    #[test]
+    fn a_range_of_one_bin_is_that_bin() {
+        assert_eq!([bins(21, 21), bins(3, 7)], ["bin 21", "bins 3 to 7"]);
     }
 
     #[test]

@@ -158,7 +158,7 @@ element("time-unit").textContent = `time, ${clock.unit}`;
 addScale();
 if (data.isFew) addFew();
 else data.spikes.forEach((pixel) => addLane(pixel));
-choose(data.spikes[0]);
+choose(firstPixel(data.spikes));
 chooseWindow();
 chooseFar();
 chooseThird();

@@ -86,6 +86,16 @@ function isKept(pixel) {
   return (pixel % data.columns) % every === 0 && Math.floor(pixel / data.columns) % every === 0;
 }
 
+/** The pixel of the first look: the first of these with a histogram, or the next to them. */
+function firstPixel(preferred) {
+  const hasHistogram = (pixel) => isKept(pixel) && decisions.some(({ pixel: first, level }) => holds(first, level, pixel));
+  const [column, row] = [preferred[0] % data.columns, Math.floor(preferred[0] / data.columns)];
+  const distance = (pixel) => Math.hypot((pixel % data.columns) - column, Math.floor(pixel / data.columns) - row);
+  const kept = decisions.map(({ pixel }) => pixel).filter(isKept);
+  return preferred.find(hasHistogram) ??
+    kept.reduce((best, one) => (distance(one) < distance(best) ? one : best), kept[0] ?? preferred[0]);
+}
+
 function histogramNote() {
   if (!data.histograms) return `No histograms: these ${data.events} were decided on a device.`;
   const { every } = data.histograms;

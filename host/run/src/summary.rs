@@ -253,7 +253,13 @@ impl Summary {
             },
             (
                 "pixels reporting".to_owned(),
-                format!("{} of {}", self.pixels_reporting, self.pixels),
+                match self.settings.binning {
+                    None => format!("{} of {}", self.pixels_reporting, self.pixels),
+                    Some(_) => format!(
+                        "{} of {}, by themselves or in a block",
+                        self.pixels_reporting, self.pixels
+                    ),
+                },
             ),
         ]);
         if self.settings.binning.is_some() {

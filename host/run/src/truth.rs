@@ -9,7 +9,7 @@ use serde::Serialize;
 
 use dtof_engine::settings::Settings;
 use dtof_events::events_csv::range_mm;
-use dtof_options::rows::{Row, grouped};
+use dtof_options::rows::{Row, bins, grouped};
 use dtof_photons::ranges::Ranges;
 use dtof_simulate::scene::{Hit, Scene};
 
@@ -109,9 +109,9 @@ impl AgainstTruth {
             rows.push((
                 "like a cover glass".to_owned(),
                 format!(
-                    "{} false alarms in bins {first} to {last}, before every surface: try \
-                     --gate {from}..{to}",
-                    grouped(glass.false_alarms)
+                    "{} false alarms in {}, before every surface: try --gate {from}..{to}",
+                    grouped(glass.false_alarms),
+                    bins(first.into(), last.into())
                 ),
             ));
         }

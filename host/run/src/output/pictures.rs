@@ -45,6 +45,8 @@ pub fn pictures(
     let draw = |name, title: &str, unit, caption, values| {
         draw_without(one, name, title, unit, caption, values)
     };
+    // A pixel that has reported in blocks only has a depth, but its light was not measured.
+    let own = format!("{one} of its own");
     let all = |value: &dyn Fn(&PixelHistory) -> Option<f64>| -> Vec<Option<f64>> {
         maps.pixels.iter().map(value).collect()
     };
@@ -76,14 +78,16 @@ pub fn pictures(
             }),
             all(&|pixel| Some(pixel.events as f64)),
         )?,
-        draw(
+        draw_without(
+            &own,
             "reflectivity-events.svg",
             &format!("Reflectivity from the number of {several}"),
             "of the most",
             None,
             relative(all(&PixelHistory::reflectivity_of_events)),
         )?,
-        draw(
+        draw_without(
+            &own,
             "reflectivity-signal.svg",
             "Reflectivity from the signal",
             "of the most",
@@ -129,6 +133,10 @@ mod tests {
         let pictures = pictures(&maps, ["column", "row"], ["event", "events"]).unwrap();
         assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
         for picture in pictures {
+            // A pixel that has reported in blocks only is reported, and no light was measured.
+            let is_of_light = picture.name.starts_with("reflectivity");
+            let own = "no event of its own in any pixel";
+            assert_eq!(picture.svg.contains(own), is_of_light);
             assert!(picture.svg[..1024].contains(dtof_draw::svg::MARK));
         }
     }
