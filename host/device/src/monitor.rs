@@ -186,19 +186,19 @@ fn watch(
     readers.events = still_open(write_header(outputs.events, columns))?;
     let started = Instant::now();
     let mut rates = Rates {
-        since: started,
         here: *client.counters(),
         first: client.report()?,
-        last: [0; 2],
+        before: (started, [0; 2]),
+        last: (started, [0; 2]),
     };
     Stopped::check(&rates.first, task.host_timeout)?;
     let mut requested = false;
     loop {
         let is_read = outputs.recording.is_some() || (readers.events && readers.statistics);
         let ends = !is_read || done(started.elapsed());
-        // The last line may cover less than a second, but at least half of one.
-        let interval = if ends { EVERY / 2 } else { EVERY };
-        if !requested && is_read && rates.since.elapsed() >= interval {
+        // The last line has the losses up to the end.
+        let is_due = ends || rates.last.0.elapsed() >= EVERY;
+        if !requested && is_read && is_due {
             client.request_report()?;
             requested = true;
         }
@@ -244,28 +244,34 @@ fn still_open(written: io::Result<()>) -> io::Result<bool> {
 
 /// Makes the lines of statistics.
 struct Rates {
-    /// The time of the last line.
-    since: Instant,
     /// The host's counts at the start.
     here: LinkCounters,
     /// The device's counts at the start.
     first: Report,
-    /// Events and photons at the last line.
-    last: [u64; 2],
+    /// Time, events and photons of the line before the last.
+    before: (Instant, [u64; 2]),
+    /// Time, events and photons of the last line.
+    last: (Instant, [u64; 2]),
 }
 
 impl Rates {
     /// Rates since the last line, losses since the start, and `masked` events.
     fn line(&mut self, client: &Client, report: &Report, masked: u64) -> String {
-        let seconds = self.since.elapsed().as_secs_f64();
+        // Soon after a line, at the end, the rates are those since the line before.
+        let (began, before) = if self.last.0.elapsed() < EVERY / 2 {
+            self.before
+        } else {
+            self.last
+        };
+        let seconds = began.elapsed().as_secs_f64();
         let rate = |now: u64, before: u64| now.saturating_sub(before) as f64 / seconds;
         // Blocks count the photons of pixels again.
         let (pixels, blocks) = (&report.statistics, &report.blocks);
         let now = [pixels.events + blocks.events, pixels.photons()];
         let mut line = format!(
             "events/s {:.0}, photons/s {:.0}",
-            rate(now[0], self.last[0]),
-            rate(now[1], self.last[1]),
+            rate(now[0], before[0]),
+            rate(now[1], before[1]),
         );
         let losses = Losses {
             first: &self.first,
@@ -275,8 +281,8 @@ impl Rates {
         if masked > 0 {
             line += &format!(", events left out {masked}");
         }
-        self.since = Instant::now();
-        self.last = now;
+        self.before = self.last;
+        self.last = (Instant::now(), now);
         line
     }
 }

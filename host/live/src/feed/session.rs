@@ -26,7 +26,7 @@ pub struct Session<'a> {
     device: &'a Device,
     /// Set if the sensor has stopped. It starts again when settings are applied.
     stopped: Option<Stopped>,
-    /// The counts of device and host at the start.
+    /// The counts of device and host when the settings were applied.
     first: Report,
     here: LinkCounters,
     /// Photons in the last report, and its time.
@@ -64,7 +64,6 @@ impl<'a> Session<'a> {
             turn: 0,
         };
         session.configure(session.setup.clone(), context)?;
-        session.first = session.client.report()?;
         context.hub.set_connection("live", "");
         let first = session.first;
         session.check_running(&first, context);
@@ -118,7 +117,9 @@ impl<'a> Session<'a> {
             }
             self.exchange(context)?;
         }
-        self.drain(context)?;
+        if let Some(lost) = self.last_losses(context)? {
+            context.complain(&format!("lost at the end: {lost}"));
+        }
         let configuration = self.configuration(&self.setup, Source::Link)?;
         let stopped = self.client.configure(&configuration);
         self.take_events(context);
@@ -148,6 +149,19 @@ impl<'a> Session<'a> {
             self.exchange(context)?;
         }
         Ok(())
+    }
+
+    /// Shows the last report before the device is configured anew, which clears its counts. Returns the
+    /// losses, if there are any.
+    fn last_losses(&mut self, context: &mut FeedContext) -> Result<Option<String>> {
+        self.drain(context)?;
+        let report = self.client.report()?;
+        self.take_events(context);
+        self.show(&report, context);
+        let here = &since(self.client.counters(), &self.here);
+        let first = &self.first;
+        let line = losses::Losses { first, here }.line(&report);
+        Ok(line.strip_prefix(", ").map(str::to_owned))
     }
 
     fn request_histogram(&mut self, context: &FeedContext) -> Result<()> {
@@ -232,10 +246,17 @@ impl<'a> Session<'a> {
                 return Ok(());
             }
         };
-        self.drain(context)?;
+        let lost = match self.last_losses(context) {
+            Ok(lost) => lost,
+            Err(error) => {
+                reply(answer, Err(anyhow!("{error:#}")));
+                return Err(error);
+            }
+        };
         match self.configure(setup, context) {
             Ok(()) => {
-                reply(answer, Ok("The settings are applied.".to_owned()));
+                let lost = lost.map_or(String::new(), |lost| format!(" Lost until then: {lost}."));
+                reply(answer, Ok(format!("The settings are applied.{lost}")));
                 Ok(())
             }
             Err(error) if error.downcast_ref::<Refusal>().is_some() => {
@@ -271,6 +292,9 @@ impl<'a> Session<'a> {
         let configured = self.client.configure(&configuration);
         self.take_events(context);
         configured?;
+        // The counts of the link go on.
+        self.here = *self.client.counters();
+        self.first = self.client.report()?;
         // A histogram that came meanwhile belongs to the old setup.
         while self.client.take_histogram().is_some() {
             self.histogram = None;

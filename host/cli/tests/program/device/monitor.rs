@@ -207,6 +207,15 @@ fn a_sensor_that_does_not_answer_is_named() {
 }
 
 #[test]
+fn losses_shortly_before_the_end_are_reported() {
+    let (name, _rests) = device_of(None, true, LONG);
+    let (_, statistics, ended) = watched(&mut client(&name), None, Duration::from_millis(300));
+    ended.unwrap();
+    assert_eq!(statistics.lines().count(), 1);
+    assert_contains(&statistics, ", sensor errors ");
+}
+
+#[test]
 fn a_reader_that_has_seen_enough_ends_it() {
     for (events, statistics) in [(10, 10_000), (500, 10_000), (100_000, 10)] {
         let mut client = client(&device(true, LONG));
