@@ -75,9 +75,9 @@ fn events_lie_on_its_walls() {
     let settings = Settings::static_scene(1);
     let mut photons = scene.photons(settings.seed, 500).unwrap();
     let mut engine = host_engine(&settings, photons.array(), &photons.addresses()).unwrap();
-    let mut comparison = SceneComparison::new(&scene, &settings, 500).unwrap();
+    let mut comparison = SceneComparison::new(&scene, &settings).unwrap();
     comparison.add(&engine.run(&photons.next_slice(500).unwrap()).unwrap());
-    let truth = comparison.finish();
+    let truth = comparison.finish(500);
     let all = truth.all;
     let walls = truth
         .surfaces

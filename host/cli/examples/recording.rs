@@ -2,6 +2,7 @@
 //!
 //! Without a file it takes a list of photons that it writes first.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
@@ -37,7 +38,7 @@ fn replay(file: &Path) -> Result<usize> {
                 );
             }
             events += found.len();
-            Ok(())
+            Ok(ControlFlow::Continue(()))
         },
     )?;
     Ok(events)

@@ -19,8 +19,9 @@ pub mod view;
 use std::io::{self, Write};
 use std::path::Path;
 
+use anyhow::{Result, ensure};
 use dtof::complain;
-use dtof_options::rows::{Row, aligned, printable};
+use dtof_options::rows::{Row, aligned, grouped, printable};
 use dtof_run::summary::Summary;
 
 /// Prints warnings about `file` on standard error, a line each, unless `quiet`.
@@ -40,6 +41,18 @@ fn say_kept(kept: Option<&Path>, quiet: bool) -> io::Result<()> {
             writeln!(io::stdout(), "{}", printable(&line))
         }
     }
+}
+
+/// Fails if a run of `all` laser cycles has ended before.
+fn check_complete(summary: &Summary, all: u64, folder: &Path) -> Result<()> {
+    ensure!(
+        summary.cycles == all,
+        "ended by Ctrl-C after {} of {} laser cycles; {} has the results until then",
+        grouped(summary.cycles),
+        grouped(all),
+        folder.display()
+    );
+    Ok(())
 }
 
 /// The heading of what was found in a recording.

@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
+use crate::interrupt::is_interrupted;
 use dtof_options::progress::Progress;
 
 /// A progress bar. It appears after a second, and only on a terminal.
@@ -43,6 +44,10 @@ impl Progress for Bar {
         }
         self.bar.set_position(done);
         Ok(())
+    }
+
+    fn ends_early(&self) -> bool {
+        is_interrupted()
     }
 
     fn end(&mut self) {

@@ -1,5 +1,7 @@
 //! One pass over photons: all methods decide on the same ones.
 
+use std::ops::ControlFlow;
+
 use anyhow::{Result, ensure};
 use rayon::prelude::*;
 
@@ -97,7 +99,7 @@ pub fn measure(
                     watched.cycles += here;
                 }
             }
-            Ok(())
+            Ok(ControlFlow::Continue(()))
         },
     )?;
     let outcomes = running.into_par_iter().map(|running| {

@@ -1,5 +1,7 @@
 //! Feeds an engine slice by slice, and makes the photons of the next slice meanwhile.
 
+use std::ops::ControlFlow;
+
 use anyhow::{Context, Result};
 
 use dtof_photons::source::{PhotonSource, Slice};
@@ -13,14 +15,15 @@ const FEWEST_PHOTONS: f64 = 5e5;
 const MOST_PHOTONS: f64 = 1e7;
 
 /// Gives all of `source` to `decide`, slice by slice, and makes the photons of the next slice
-/// meanwhile. `observe` gets each slice, its result, and how many laser cycles are done.
+/// meanwhile. `observe` gets each slice, its result, and how many laser cycles are done, and may end it
+/// there.
 ///
 /// # Errors
 /// Returns the first error of the recording, of `decide` or of `observe`.
 pub fn each_slice<T: Send>(
     source: &mut dyn PhotonSource,
     mut decide: impl FnMut(&Slice) -> Result<T> + Send,
-    mut observe: impl FnMut(&Slice, T, u64) -> Result<()>,
+    mut observe: impl FnMut(&Slice, T, u64) -> Result<ControlFlow<()>>,
 ) -> Result<()> {
     let mut done = 0;
     let mut next = next_slice(source, done)?;
@@ -31,7 +34,10 @@ pub fn each_slice<T: Send>(
             scope.spawn(|_| decided = Some(decide(&slice)));
             after = next_slice(source, done);
         });
-        observe(&slice, decided.context("no slice was decided on")??, done)?;
+        let decided = decided.context("no slice was decided on")??;
+        if observe(&slice, decided, done)?.is_break() {
+            break;
+        }
         next = after?;
     }
     Ok(())

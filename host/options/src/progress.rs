@@ -13,6 +13,11 @@ pub trait Progress {
     /// Fails if the job was cancelled.
     fn at(&mut self, done: u64) -> Result<()>;
 
+    /// Whether a job that reads photons ends here, with what it has.
+    fn ends_early(&self) -> bool {
+        false
+    }
+
     /// The part has ended.
     fn end(&mut self);
 }

@@ -1,5 +1,7 @@
 //! Photons through an engine, slice by slice.
 
+use std::ops::ControlFlow;
+
 use anyhow::Result;
 use dtof_core::{Array, DepthEvent, Flags, PixelAddress};
 
@@ -10,6 +12,7 @@ use dtof_engine::Engine;
 use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_engine::slices::each_slice;
 use dtof_options::progress::Progress;
+use dtof_options::rows::grouped;
 use dtof_photons::source::{PhotonSource, PixelPhotons, Slice};
 
 /// Where the photons and the events of a run go.
@@ -107,7 +110,8 @@ pub fn run(
     for sink in &mut *sinks {
         sink.begin(source, engine);
     }
-    progress.begin(source.cycles(), "laser cycles");
+    let (all, mut cycles) = (source.cycles(), 0);
+    progress.begin(all, "laser cycles");
     progress.at(0)?;
     each_slice(
         source,
@@ -128,7 +132,12 @@ pub fn run(
             for sink in &mut *sinks {
                 sink.take(slice, &events)?;
             }
-            progress.at(done)
+            cycles = done;
+            progress.at(done)?;
+            Ok(match progress.ends_early() {
+                true => ControlFlow::Break(()),
+                false => ControlFlow::Continue(()),
+            })
         },
     )?;
     let decided = engine.finish();
@@ -137,7 +146,7 @@ pub fn run(
     }
     if !decided.is_empty() {
         let slice = Slice {
-            first_cycle: source.cycles(),
+            first_cycle: cycles,
             pixels: vec![PixelPhotons::default(); addresses.len()],
         };
         for sink in &mut *sinks {
@@ -159,7 +168,12 @@ pub fn run(
     summary.expired = summary.expired.saturating_sub(expired_masked);
     watch_glass(requested, bins.as_deref(), &mut summary);
     let warning = brightness.and_then(|brightness| brightness.warning(&addresses));
-    let warnings: Vec<String> = warning.into_iter().collect();
+    let mut warnings: Vec<String> = warning.into_iter().collect();
+    if cycles < all {
+        summary.cycles = cycles;
+        let (cycles, all) = (grouped(cycles), grouped(all));
+        warnings.push(format!("ended early, after {cycles} of {all} laser cycles"));
+    }
     summary.warnings.clone_from(&warnings);
     Ok(RunResult {
         summary,

@@ -14,7 +14,7 @@ use dtof_engine::settings::{
 use dtof_options::numbers::{boolean, integer};
 use dtof_options::progress::Progress;
 use dtof_photons::masked::Masked;
-use dtof_photons::source::{PhotonSource, Slice};
+use dtof_photons::source::Slice;
 use dtof_simulate::scene::Scene;
 
 /// The options of a simulation.
@@ -136,14 +136,13 @@ impl Simulation {
         sink: &mut dyn Sink,
         progress: &mut dyn Progress,
     ) -> Result<RunResult> {
-        let mut comparison =
-            SceneComparison::new(&self.scene, &self.settings, self.photons.cycles())?;
+        let mut comparison = SceneComparison::new(&self.scene, &self.settings)?;
         let settings = (&self.settings, &self.requested);
         let sinks: &mut [&mut dyn Sink] = &mut [sink, &mut comparison];
         let mut result = run(&mut self.photons, engine, settings, sinks, progress)?;
         result.summary.input.clone_from(&self.input);
         result.summary.field_of_view_degrees = Some(self.scene.effective_field_of_view().degrees());
-        result.summary.against_truth = Some(comparison.finish());
+        result.summary.against_truth = Some(comparison.finish(result.summary.cycles));
         Ok(result)
     }
 }

@@ -190,8 +190,6 @@ pub struct SceneComparison<'a> {
     scene: &'a Scene,
     array: Array,
     ranges: Ranges,
-    /// Laser cycles of the run.
-    cycles: u64,
     /// Distance from the first echo to the second, if pixels report several.
     behind_mm: Option<f64>,
     /// The first and the last bin that may hold the peak.
@@ -218,11 +216,11 @@ struct Tally {
 }
 
 impl<'a> SceneComparison<'a> {
-    /// Begins to compare the events of `cycles` laser cycles with `scene`.
+    /// Begins to compare events with `scene`.
     ///
     /// # Errors
     /// Fails if the range scale is invalid, or if the scene has more pixels than addresses.
-    pub fn new(scene: &'a Scene, settings: &Settings, cycles: u64) -> Result<Self> {
+    pub fn new(scene: &'a Scene, settings: &Settings) -> Result<Self> {
         let (array, bins) = (scene.array()?, usize::from(scene.bins));
         let second_echo = scene.effects.second_echo.as_ref();
         let behind_mm = second_echo.map(|echo| echo.behind_mm);
@@ -230,7 +228,6 @@ impl<'a> SceneComparison<'a> {
             scene,
             array,
             ranges: settings.ranges(array)?,
-            cycles,
             behind_mm: behind_mm.filter(|_| settings.echoes > EchoNumber::FIRST),
             first_bin: settings.gate.map_or(0, |(first, _)| first.into()),
             last_bin: settings.gate.map_or(bins - 1, |(_, last)| last.into()),
@@ -284,9 +281,9 @@ impl<'a> SceneComparison<'a> {
         Some((surface?, sum / pixels))
     }
 
-    /// The result.
+    /// The result of a run of `cycles` laser cycles.
     #[must_use]
-    pub fn finish(&self) -> AgainstTruth {
+    pub fn finish(&self, cycles: u64) -> AgainstTruth {
         let step_mm = FALSE_BEYOND_BINS * self.scene.mm_per_bin() / STEPS as f64;
         let mut all = Tally::new(0);
         let mut surfaces = Vec::new();
@@ -301,7 +298,7 @@ impl<'a> SceneComparison<'a> {
                     pixels: tally.has_sent.iter().filter(|sent| **sent).count(),
                     first_cycle: tally.first_cycle,
                     errors: tally.errors(step_mm),
-                    pixels_beyond: self.scene.pixels_beyond(index, self.cycles),
+                    pixels_beyond: self.scene.pixels_beyond(index, cycles),
                 });
             }
         }
@@ -311,7 +308,7 @@ impl<'a> SceneComparison<'a> {
             false_beyond_bins: FALSE_BEYOND_BINS,
             all: all.errors(step_mm),
             surfaces,
-            cover_glass: self.cover_glass(all.events),
+            cover_glass: self.cover_glass(all.events, cycles),
         }
     }
 
@@ -322,7 +319,7 @@ impl<'a> SceneComparison<'a> {
         clippy::cast_sign_loss,
         reason = "bins of a histogram"
     )]
-    fn cover_glass(&self, events: u64) -> Option<CoverGlass> {
+    fn cover_glass(&self, events: u64, cycles: u64) -> Option<CoverGlass> {
         let false_alarms: u64 = self.false_peaks.iter().sum();
         let reach = FALSE_BEYOND_BINS as usize;
         let most = self.false_peaks.iter().max()?;
@@ -340,7 +337,7 @@ impl<'a> SceneComparison<'a> {
         let sigma = self.scene.pulse_sigma_bins;
         let ends = middle as f64 + (GLASS_ENDS_SIGMA * sigma).ceil().max(FALSE_BEYOND_BINS);
         let surfaces = self.scene.surfaces.iter();
-        let ranges = surfaces.map(|surface| self.scene.nearest_mm(surface, self.cycles));
+        let ranges = surfaces.map(|surface| self.scene.nearest_mm(surface, cycles));
         let nearest = ranges.fold(f64::INFINITY, f64::min) / self.scene.mm_per_bin();
         let gate = (ends + 1.0).min((nearest - FALSE_BEYOND_BINS).floor());
         let has_room = gate > last as f64 && gate + MIN_GATE as f64 <= self.last_bin as f64 + 1.0;

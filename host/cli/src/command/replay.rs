@@ -2,10 +2,12 @@
 
 use anyhow::Result;
 use clap::Args;
+use dtof::interrupt;
 use dtof::progress::Bar;
 use dtof_engine::settings::SettingsFile;
 use dtof_options::Refused;
 use dtof_photons::input::Input;
+use dtof_photons::source::PhotonSource;
 use dtof_report::Section;
 use dtof_run::RunResult;
 use dtof_run::recording::warnings;
@@ -13,7 +15,7 @@ use dtof_run::replay::Options;
 
 use super::flags::Flags;
 use super::job::{Recorded, ResultOptions};
-use super::{FOUND, print_summary, say_kept, warn};
+use super::{FOUND, check_complete, print_summary, say_kept, warn};
 
 #[derive(Args)]
 pub struct Replay {
@@ -48,6 +50,7 @@ impl Replay {
         )?;
         let quiet = self.results.quiet;
         warn(file, warnings(&replay.metadata), quiet);
+        interrupt::handle_ctrl_c(|| ())?;
         let RunResult { summary, .. } = replay.run(&input, &mut output, &mut Bar::new(quiet))?;
         let lead = format!("Recorded photons of {input}.");
         let found = Section {
@@ -60,9 +63,10 @@ impl Replay {
         };
         let kept = output.finish(&summary, replay.settings.title(), &lead, sections)?;
         say_kept(kept.as_deref(), quiet)?;
+        let folder = self.results.folder(Some(file));
         if !quiet {
-            print_summary(&summary, &[], &self.results.folder(Some(file)))?;
+            print_summary(&summary, &[], &folder)?;
         }
-        Ok(())
+        check_complete(&summary, replay.photons.cycles(), &folder)
     }
 }

@@ -4,11 +4,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
+use dtof::interrupt;
 use dtof::path;
 use dtof::progress::Bar;
 use dtof_engine::settings::SettingsFile;
 use dtof_options::rows::Row;
 use dtof_photons::geometry::FieldOfView;
+use dtof_photons::source::PhotonSource;
 use dtof_report::Section;
 use dtof_run::simulate::{Options, Simulation};
 use dtof_simulate::scene::Scene;
@@ -16,7 +18,7 @@ use dtof_simulate::scene::Scene;
 use super::flags::Flags;
 use super::job::{EngineOptions, ResultOptions};
 use super::scene_options::SceneOptions;
-use super::{print_summary, say_kept};
+use super::{check_complete, print_summary, say_kept};
 
 #[derive(Args)]
 pub struct Simulate {
@@ -94,6 +96,7 @@ impl Job<'_> {
             self.results
                 .output(settings, photons, self.input, effective, self.settings_file)?;
         let progress = &mut Bar::new(self.results.quiet);
+        interrupt::handle_ctrl_c(|| ())?;
         let ran = simulation.run(engine.as_mut(), &mut output, progress)?;
         let mut summary = ran.summary;
         summary.export_with = export_with(&simulation.scene);
@@ -106,10 +109,11 @@ impl Job<'_> {
         }];
         let kept = output.finish(&summary, summary.settings.title(), self.lead, &sections)?;
         say_kept(kept.as_deref(), self.results.quiet)?;
+        let folder = self.results.folder(self.input);
         if !self.results.quiet {
-            print_summary(&summary, &rows, &self.results.folder(self.input))?;
+            print_summary(&summary, &rows, &folder)?;
         }
-        Ok(())
+        check_complete(&summary, simulation.photons.cycles(), &folder)
     }
 }
 

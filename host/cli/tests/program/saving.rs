@@ -5,6 +5,8 @@ mod elsewhere;
 #[cfg(target_os = "linux")]
 mod full;
 #[cfg(unix)]
+mod interrupted;
+#[cfg(unix)]
 mod killed;
 
 use std::collections::BTreeMap;
