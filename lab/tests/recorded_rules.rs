@@ -17,7 +17,8 @@ use dtof_lab::studies::methods::passage::{Ladder, Passage, Rule, count_false};
 use dtof_photons::open::{ReadOptions, counts};
 use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
 use dtof_photons::source::{PhotonSource, Slice};
-use dtof_photons::tmf8820::{self, BINS};
+use dtof_photons::tmf8820::BINS;
+use dtof_sensors::tmf882x;
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::random::trial_rng;
 use dtof_theory::rates::Rates;
@@ -68,7 +69,7 @@ struct Outcome {
 impl NoisyRecording<'_> {
     /// Replays the centre zone; the added photons are the same for every rule.
     fn replay(&self, config: &PixelConfig<BINS, AnyRule>) -> Outcome {
-        let scale = RangeScale::new(tmf8820::BIN_WIDTH_PS, tmf8820::OFFSET_MM).unwrap();
+        let scale = RangeScale::new(tmf882x::BIN_WIDTH_PS, tmf882x::OFFSET_MM).unwrap();
         let added = self.added;
         let number = (added > 0.0).then(|| Poisson::new(added * 128.0).unwrap());
         let bins = Uniform::new(0, 128).unwrap();

@@ -11,6 +11,7 @@ use dtof_photons::open::{ReadOptions, counts};
 use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
 use dtof_photons::source::PhotonSource;
 use dtof_photons::tmf8820;
+use dtof_sensors::tmf882x;
 
 const ZONES: usize = 9;
 const CENTRE: usize = 4;
@@ -28,8 +29,8 @@ struct Zone {
 fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES] {
     let settings = Settings {
         bins: tmf8820::BINS,
-        bin_width_ps: tmf8820::BIN_WIDTH_PS,
-        offset_mm: tmf8820::OFFSET_MM,
+        bin_width_ps: tmf882x::BIN_WIDTH_PS,
+        offset_mm: tmf882x::OFFSET_MM,
         rule: PaperRule::new(U8F8::lit("4"), Count::saturating(min_count.into())).into(),
         l1: 40,
         x: 4,

@@ -22,6 +22,7 @@ use crate::{tmf8820, tmf8829, warnings};
 use dtof_options::files::is_file;
 use dtof_options::rows::Row;
 use dtof_options::{Refused, plain};
+use dtof_sensors::tmf8829::OFFSET_MM;
 
 /// The default bin width in picoseconds, if neither the user nor the file gives one.
 pub const BIN_WIDTH_PS: U16F16 = U16F16::lit("250");
@@ -395,13 +396,13 @@ fn log(path: &Path, options: &ReadOptions) -> Result<Content> {
     let in_file = || path.display().to_string();
     let counts = match capture_log::read(path)? {
         CaptureLog::Tmf8820(log) => {
-            let width = Some(tmf8820::BIN_WIDTH_PS);
-            let (array, bins) = (tmf8820::ARRAY, [tmf8820::BINS; 2]);
-            let counts = fit_bins(array, log.captures, bins, width, options);
+            let width = Some(log.bin_width_ps);
+            let bins = [tmf8820::BINS; 2];
+            let counts = fit_bins(log.array, log.captures, bins, width, options);
             let mut counts = counts.with_context(in_file)?;
-            counts.axis_names = tmf8820::AXIS_NAMES;
+            counts.axis_names = log.axis_names;
             counts.truth_mm = log.truth_mm;
-            counts.metadata.offset_mm = Some(tmf8820::OFFSET_MM);
+            counts.metadata.offset_mm = log.offset_mm;
             counts
         }
         CaptureLog::Tmf8829(log) => {
@@ -409,7 +410,7 @@ fn log(path: &Path, options: &ReadOptions) -> Result<Content> {
             let bins = [tmf8829::BINS, log.measured_bins];
             let counts = fit_bins(log.array, log.captures, bins, width, options);
             let mut counts = counts.with_context(in_file)?;
-            counts.metadata.offset_mm = Some(tmf8829::OFFSET_MM);
+            counts.metadata.offset_mm = Some(OFFSET_MM);
             counts.metadata.rows.splice(0..0, log.rows);
             counts
         }

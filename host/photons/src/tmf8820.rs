@@ -1,36 +1,34 @@
-//! Recorded histograms from the public TMF8820 capture log: a JSON list of captures of the 3×3-zone
-//! sensor, each with nine histograms of 128 bins. Pixel address = capture × 9 + zone; zone 4 is the
-//! centre.
+//! Recorded histograms from a capture log as the public one of a TMF8820: a JSON list of captures, each
+//! with a histogram of 128 bins a zone. A TMF8820 has nine zones: pixel address = capture × 9 + zone, and
+//! zone 4 is the centre. A TMF8828 has 8×8: pixel address = capture × 64 + zone.
 
 use std::io::Read;
 
-use anyhow::{Result, anyhow, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use dtof_core::Array;
 use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_sensors::tmf882x::{BIN_WIDTH_8X8_PS, BIN_WIDTH_PS, OFFSET_MM};
 use serde::Deserialize;
 
 use crate::recorded::Capture;
 
-/// Zones of the sensor.
-pub const ZONES: u32 = 9;
-/// The array of a capture.
-pub const ARRAY: Array = Array::new(ZONES, 1).unwrap();
-/// The centre zone.
-pub const CENTRE: u32 = 4;
-/// The names of the columns and rows of a log.
-pub const AXIS_NAMES: [&str; 2] = ["zone", "capture"];
+/// The centre of nine zones.
+const CENTRE: usize = 4;
 /// Bins of its histograms.
 pub const BINS: usize = 128;
-/// The bin width. A fit of pulse positions to distances from 30 to 400 mm gives 13.80 mm a bin; the
-/// log's authors state 91 ps.
-pub const BIN_WIDTH_PS: U16F16 = U16F16::lit("92.1");
-/// Moves the ranges of the centre zone of the public log to its ground truth from 30 to 400 mm.
-pub const OFFSET_MM: I24F8 = I24F8::lit("-179.5");
 
 /// The captures of a log.
 #[derive(Clone, Debug)]
 pub struct Tmf8820Log {
-    /// Nine histograms each.
+    /// The array of a capture: 9 in a row, or 8×8.
+    pub array: Array,
+    /// The names of its columns and rows.
+    pub axis_names: [&'static str; 2],
+    /// Picoseconds a bin.
+    pub bin_width_ps: U16F16,
+    /// Moves pulses to distances; not known of 8×8 zones.
+    pub offset_mm: Option<I24F8>,
+    /// A histogram for each zone.
     pub captures: Vec<Capture>,
     /// The true distance of each zone in millimetres. The log has it for centre zones, if at all.
     pub truth_mm: Option<Vec<Option<f64>>>,
@@ -54,11 +52,26 @@ pub fn read(name: &str, text: impl Read) -> Result<Tmf8820Log> {
         anyhow!("{name}:{line}: not a TMF8820 capture log: {error}")
     })?;
     ensure!(!entries.is_empty(), "{name}: no captures");
+    let all = entries[0].hists.len();
+    let (array, axis_names, bin_width_ps, offset_mm) = match all {
+        64 => (Array::new(8, 8), ["column", "row"], BIN_WIDTH_8X8_PS, None),
+        _ => (
+            Array::new(9, 1),
+            ["zone", "capture"],
+            BIN_WIDTH_PS,
+            Some(OFFSET_MM),
+        ),
+    };
+    let array = array.context("an array")?;
     for (index, entry) in entries.iter().enumerate() {
         let zones = entry.hists.len();
         ensure!(
-            zones == ZONES as usize,
-            "{name}: capture {index} has {zones} zones, not 9"
+            zones == array.pixels() as usize,
+            "{name}: capture {index} has {zones} zones, not {}",
+            match all {
+                64 => "64 as capture 0",
+                _ => "9 or 64",
+            }
         );
         for (zone, histogram) in entry.hists.iter().enumerate() {
             let bins = histogram.len();
@@ -68,12 +81,17 @@ pub fn read(name: &str, text: impl Read) -> Result<Tmf8820Log> {
             );
         }
     }
-    let truth = entries
-        .iter()
-        .flat_map(|entry| (0..ZONES).map(|zone| entry.dist_to_plane.filter(|_| zone == CENTRE)));
+    let centre = (all == 9).then_some(CENTRE);
+    let truth = entries.iter().flat_map(|entry| {
+        (0..entry.hists.len()).map(move |zone| entry.dist_to_plane.filter(|_| centre == Some(zone)))
+    });
     let truth: Vec<Option<f64>> = truth.map(|metres| Some(metres? * 1000.0)).collect();
     let truth_mm = truth.iter().any(Option::is_some).then_some(truth);
     Ok(Tmf8820Log {
+        array,
+        axis_names,
+        bin_width_ps,
+        offset_mm,
         captures: entries.into_iter().map(|entry| entry.hists).collect(),
         truth_mm,
     })

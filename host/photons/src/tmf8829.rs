@@ -8,7 +8,8 @@ use std::io::Read;
 
 use anyhow::{Context, Result, anyhow, ensure};
 use dtof_core::Array;
-use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::fixed::types::U16F16;
+use dtof_sensors::tmf8829::FINEST_BIN_PS;
 use serde::Deserialize;
 
 use crate::recorded::Capture;
@@ -16,11 +17,6 @@ use dtof_options::rows::Row;
 
 /// Bins of its histograms.
 pub const BINS: usize = 64;
-/// The width of the sensor's own bins. A fit of the pulses to its distances from 0.26 to 2.85 m, in
-/// a log with four of them a bin, gives 122.2 mm a bin of the log.
-const OWN_BIN_WIDTH_PS: U16F16 = U16F16::lit("203.8");
-/// Moves pulses to the sensor's distances, from the same fit.
-pub const OFFSET_MM: I24F8 = I24F8::lit("-441.1");
 /// The sensor's default: four of its bins make one.
 const BIN_SHIFT: u32 = 2;
 
@@ -123,7 +119,7 @@ fn parse_log(log: Log) -> Result<Tmf8829Log> {
         .unwrap_or(BIN_SHIFT);
     let width = 1u16
         .checked_shl(shift)
-        .and_then(|own| OWN_BIN_WIDTH_PS.checked_mul_int(own.into()));
+        .and_then(|own| FINEST_BIN_PS.checked_mul_int(own.into()));
     let measured = configuration.and_then(|of| of.histogram_bins);
     let measured = measured.and_then(|bins| usize::try_from(bins.checked_shr(shift)?).ok());
     let measured = measured.filter(|bins| (1..BINS).contains(bins));

@@ -20,7 +20,7 @@ use super::flags::name;
 /// The recording that a command reads.
 #[derive(Args)]
 pub struct Recorded {
-    /// Histograms (.npy, .npz, or the log of a TMF8820 or TMF8829, .json or .json.gz), or photons
+    /// Histograms (.npy, .npz, or the log of a TMF8820, TMF8828 or TMF8829, .json or .json.gz), or photons
     /// (.csv with columns pixel, cycle and bin, or .npy with these fields or three columns)
     #[arg(value_name = "FILE", value_parser = path())]
     file: Option<PathBuf>,

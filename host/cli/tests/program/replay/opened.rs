@@ -5,10 +5,9 @@ use std::io::Write;
 use std::sync::Arc;
 
 use dtof_core::Array;
-use dtof_core::fixed::types::U16F16;
 use dtof_photons::input::{Input, NpyArray};
 use dtof_photons::open::{BIN_WIDTH_PS, Counts, ReadOptions, counts, open};
-use dtof_photons::{tmf8820, tmf8829};
+use dtof_sensors::{tmf882x, tmf8829};
 use flate2::Compression;
 use flate2::write::GzEncoder;
 
@@ -60,7 +59,38 @@ fn the_truth_of_a_log_is_that_of_its_centre_zones() {
     let truth = counts.truth_mm.unwrap();
     let expected = |address: usize| (address == 9 + 4).then_some(250.0);
     assert_eq!(truth, (0..18).map(expected).collect::<Vec<_>>());
-    assert_eq!(counts.metadata.bin_width_ps, tmf8820::BIN_WIDTH_PS);
+    assert_eq!(counts.metadata.bin_width_ps, tmf882x::BIN_WIDTH_PS);
+}
+
+#[test]
+fn a_log_of_64_zones_is_that_of_a_tmf8828() {
+    let zone = |count: usize| format!("[{}]", vec![count.to_string(); 128].join(","));
+    let capture = |zones: usize| {
+        let zones: Vec<String> = (0..zones).map(zone).collect();
+        format!(
+            "{{\"hists\": [{}], \"dist_to_plane\": 0.25}}",
+            zones.join(",")
+        )
+    };
+    let counts = counts_of("a.json", &format!("[{0}, {0}]", capture(64)));
+    assert_eq!(
+        (counts.array, counts.captures.len()),
+        (Array::new(8, 8).unwrap(), 2)
+    );
+    assert_eq!(counts.captures[1][63], [63; 128]);
+    assert_eq!(counts.metadata.bin_width_ps, tmf882x::BIN_WIDTH_8X8_PS);
+    // Neither its offset nor its centre is known.
+    assert_eq!((counts.metadata.offset_mm, counts.truth_mm), (None, None));
+    let scratch = Scratch::new();
+    scratch.file("mixed.json", format!("[{}, {}]", capture(64), capture(9)));
+    scratch.file("few.json", format!("[{}]", capture(16)));
+    scratch.all_refused(
+        "replay --out out --input",
+        "
+            mixed.json | mixed.json: capture 1 has 9 zones, not 64 as capture 0
+            few.json | few.json: capture 0 has 16 zones, not 9 or 64
+        ",
+    );
 }
 
 /// A log of two frames, two rows and two columns; `bin` gives the count of a bin in a column.
@@ -86,7 +116,7 @@ fn a_tmf8829_log_is_told_by_its_content_and_read_packed_or_not() {
     assert_eq!(plain.captures[1][3][7], 107);
     // 218 of the sensor's own bins are 54 of four, and one of two.
     assert_eq!(plain.metadata.gate, Some((0, 53)));
-    assert_eq!(plain.metadata.bin_width_ps, 4 * U16F16::lit("203.8"));
+    assert_eq!(plain.metadata.bin_width_ps, 4 * tmf8829::FINEST_BIN_PS);
     assert_eq!(plain.metadata.offset_mm, Some(tmf8829::OFFSET_MM));
     // As some editors save it.
     let marked = counts_of("a.json", &format!("\u{feff}{log}"));
