@@ -22,12 +22,13 @@ fn recorded_photons_of_a_log_are_warned_of_when_turned_and_only_then() {
     let recorded = counts(&log, &ReadOptions::default()).unwrap();
     assert_eq!(recorded.metadata.warnings, [""; 0]);
     let pixels = recorded.captures.concat();
-    assert_eq!(swapped_axes(recorded.captures.len(), &pixels), None);
+    assert_eq!(swapped_axes(&[recorded.captures.len(), 9], &pixels), None);
     for capture in &recorded.captures {
-        assert_eq!(swapped_axes(9, capture), None);
+        assert_eq!(swapped_axes(&[9], capture), None);
     }
     let (bins, turned) = bins_first(&pixels, 9);
-    assert!(swapped_axes(bins, &turned).is_some());
+    let rows = turned.len() / bins;
+    assert!(swapped_axes(&[bins, rows], &turned).is_some());
     let beside = "../../shared/data/tmf8829_log/tmf8829_log.json.gz";
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join(beside);
     if !beside.exists() {
@@ -37,7 +38,7 @@ fn recorded_photons_of_a_log_are_warned_of_when_turned_and_only_then() {
     let recorded = counts(&beside, &ReadOptions::default()).unwrap();
     assert_eq!(recorded.metadata.warnings, [""; 0]);
     let pixels = recorded.captures.concat();
-    assert_eq!(swapped_axes(26, &pixels), None);
+    assert_eq!(swapped_axes(&[26, 16], &pixels), None);
 }
 
 /// The histograms of a scene of this repository over a number of laser cycles.
@@ -75,12 +76,12 @@ fn simulated_scenes_are_not_warned_of() {
         for laser_off in [false, true] {
             let (rows, columns, pixels) = histograms(&name, laser_off);
             assert_eq!(
-                swapped_axes(rows, &pixels),
+                swapped_axes(&[rows, columns], &pixels),
                 None,
                 "{name}, laser off: {laser_off}"
             );
             let (bins, turned) = bins_first(&pixels, columns);
-            let is_warned = swapped_axes(bins, &turned).is_some();
+            let is_warned = swapped_axes(&[bins, rows], &turned).is_some();
             assert!(!(laser_off && is_warned), "{name}: a passive image");
             println!("{name}: {rows} rows, {columns} columns, turned: warned {is_warned}");
         }

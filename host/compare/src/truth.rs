@@ -41,6 +41,18 @@ impl Truth {
         Ok(Self::Ranges(ranges))
     }
 
+    /// Warns if all ranges of an array are so short that they are probably metres.
+    #[must_use]
+    pub fn in_metres(&self) -> Option<String> {
+        let Self::Ranges(ranges) = self else {
+            return None;
+        };
+        let most = ranges.iter().flatten().copied().fold(0.0, f64::max);
+        (most < 20.0).then(|| {
+            format!("no true range is more than {most} mm: --truth takes millimetres; {most} m are {:.0}", most * 1000.0)
+        })
+    }
+
     /// The true ranges of `pixel` in a laser cycle: that of the nearest surface, and that of the one
     /// behind it.
     #[must_use]
@@ -83,5 +95,18 @@ impl Truth {
             Self::Scene(_) | Self::Ranges(_) => "errors are against the true range",
             Self::OfAllPhotons(_) => "errors are against the range of all photons of the pixel",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_that_are_probably_metres_are_warned_of() {
+        let warning = |ranges: &[Option<f64>]| Truth::Ranges(ranges.to_vec()).in_metres();
+        let text = "no true range is more than 1.5 mm: --truth takes millimetres; 1.5 m are 1500";
+        assert_eq!(warning(&[Some(0.8), None, Some(1.5)]).unwrap(), text);
+        assert_eq!(warning(&[Some(0.8), Some(1500.0)]), None);
     }
 }

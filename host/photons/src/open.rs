@@ -43,6 +43,8 @@ pub struct ReadOptions {
     pub axes: Option<Axes>,
     /// `.npz`: the name of the array, which may be left out if there is only one.
     pub array: Option<String>,
+    /// Histograms: the capture to use, counted from 0; all if left out.
+    pub capture: Option<u32>,
     /// Picoseconds a bin of the recording.
     pub bin_width_ps: Option<U16F16>,
     /// Histograms: the length of the recording; by default one photon a laser cycle.
@@ -67,6 +69,7 @@ impl Default for ReadOptions {
             rebin: 1,
             axes: None,
             array: None,
+            capture: None,
             bin_width_ps: None,
             length: None,
             cycles: u64::MAX,
@@ -336,6 +339,13 @@ fn check_options(input: &Input, options: &ReadOptions, kind: Kind, is_list: bool
         )
     );
     ensure!(
+        options.capture.is_none() || !is_list,
+        Refused::new(
+            "capture",
+            format!("is for histograms; {} holds photons", plain(input))
+        )
+    );
+    ensure!(
         options.array.is_none() || kind == Kind::Archive,
         Refused::new(
             "array",
@@ -373,12 +383,12 @@ fn list<R: PhotonReader + 'static>(input: &Input, options: &ReadOptions) -> Resu
 fn array(input: &Input, options: &ReadOptions, read: Histograms) -> Result<Content> {
     let Histograms {
         layout,
-        first,
+        axes,
         pixels,
     } = read;
     // A part is too small for this check.
-    let axes = match (&options.axes, &options.layout) {
-        (None, None) => warnings::swapped_axes(first, &pixels),
+    let swapped = match (&options.axes, &options.layout) {
+        (None, None) => warnings::swapped_axes(&axes, &pixels),
         _ => None,
     };
     let bins = layout.bins();
@@ -388,7 +398,7 @@ fn array(input: &Input, options: &ReadOptions, read: Histograms) -> Result<Conte
     let mut counts = counts.with_context(|| input.to_string())?;
     counts.axis_names = layout.axis_names;
     counts.metadata.has_shape = layout.is_shape_known;
-    counts.metadata.warnings.extend(axes);
+    counts.metadata.warnings.extend(swapped);
     Ok(Content::Histograms(counts))
 }
 
@@ -401,7 +411,14 @@ fn log(path: &Path, options: &ReadOptions) -> Result<Content> {
             let counts = fit_bins(log.array, log.captures, bins, width, options);
             let mut counts = counts.with_context(in_file)?;
             counts.axis_names = log.axis_names;
-            counts.truth_mm = log.truth_mm;
+            // Of the capture that is used.
+            let first = options.capture.unwrap_or(0) * log.array.pixels();
+            let used = counts.captures.len() * log.array.pixels() as usize;
+            let truth = log.truth_mm.map(|all| {
+                let of_used = all.into_iter().skip(first as usize).take(used);
+                of_used.collect::<Vec<_>>()
+            });
+            counts.truth_mm = truth.filter(|truth| truth.iter().any(Option::is_some));
             counts.metadata.offset_mm = log.offset_mm;
             counts
         }
@@ -422,11 +439,21 @@ fn log(path: &Path, options: &ReadOptions) -> Result<Content> {
 /// measured in full.
 fn fit_bins(
     array: Array,
-    captures: Vec<Capture>,
+    mut captures: Vec<Capture>,
     [recorded, measured]: [usize; 2],
     width_ps: Option<U16F16>,
     options: &ReadOptions,
 ) -> Result<Counts> {
+    let all = captures.len();
+    if let Some(capture) = options.capture {
+        let place = usize::try_from(capture)?;
+        let reason = match all {
+            1 => "there is 1; `axes` says which axis of an array has captures".to_owned(),
+            _ => format!("there are {all}, counted from 0"),
+        };
+        ensure!(place < all, Refused::value("capture", capture, reason));
+        captures = vec![captures.swap_remove(place)];
+    }
     let fit = BinFit::new(recorded, measured, options.rebin.into(), options.bins)?;
     let mut metadata = metadata(fit.bins(), width_ps, options)?;
     let mut fit_one = |histogram| {
@@ -451,6 +478,13 @@ fn fit_bins(
     };
     metadata.gate = fit.gate();
     metadata.rows = fit.rows(metadata.cut_off);
+    if let Some(capture) = options.capture {
+        let row = (
+            "capture".to_owned(),
+            format!("{capture} of {all}, counted from 0"),
+        );
+        metadata.rows.insert(0, row);
+    }
     metadata.warnings.extend(empty);
     Ok(Counts {
         array,

@@ -87,28 +87,42 @@ impl Concentration {
     }
 }
 
-/// Warns if the first axis, of length `first`, looks like the bins although the last was read as
-/// such. Photons concentrate in a pulse along the bins, and hardly along pixels.
+/// Warns if another axis than the last looks like the bins although the last was read as such. `axes` are
+/// the lengths of the others. Photons concentrate in a pulse along the bins, and hardly along pixels.
 #[must_use]
-pub fn swapped_axes(first: usize, pixels: &[Vec<u64>]) -> Option<String> {
-    // A histogram has at least 8 bins.
-    if first < 8 || !pixels.len().is_multiple_of(first) {
-        return None;
-    }
+pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
     let mut along_last = Concentration::default();
     pixels
         .iter()
         .for_each(|bins| along_last.add(bins.iter().copied()));
-    let apart = pixels.len() / first;
-    let mut along_first = Concentration::default();
-    for start in 0..apart {
-        for bin in 0..pixels[start].len() {
-            let line = pixels[start..].iter().step_by(apart);
-            along_first.add(line.map(|bins| bins[bin]));
+    if along_last.value() >= 2.0 {
+        return None;
+    }
+    let mut apart = pixels.len();
+    let mut found = (4.0, None);
+    for (number, &length) in axes.iter().enumerate() {
+        let whole = apart;
+        apart /= length.max(1);
+        // A histogram has at least 8 bins.
+        if length < 8 || apart * length != whole {
+            continue;
+        }
+        let mut along = Concentration::default();
+        for start in (0..pixels.len()).filter(|start| start % whole < apart) {
+            for bin in 0..pixels[start].len() {
+                let line = pixels[start..].iter().step_by(apart).take(length);
+                along.add(line.map(|bins| bins[bin]));
+            }
+        }
+        if along.value() > found.0 {
+            found = (along.value(), Some(number));
         }
     }
-    (along_first.value() > 4.0 && along_last.value() < 2.0).then(|| {
-        "the first axis looks like the bins, and the last like pixels; --axes says which is which"
-            .to_owned()
-    })
+    let which = match found.1? {
+        0 => "the first axis".to_owned(),
+        number => format!("axis {} of {}", number + 1, axes.len() + 1),
+    };
+    Some(format!(
+        "{which} looks like the bins, and the last like pixels; --axes says which is which"
+    ))
 }

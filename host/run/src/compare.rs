@@ -237,6 +237,8 @@ impl Options {
             (Some(truth), _) => Some(Truth::read(truth, pixels)?),
             (None, ranges) => ranges.clone().map(Truth::Ranges),
         };
+        let metres = truth.as_ref().and_then(Truth::in_metres);
+        metres.into_iter().for_each(callbacks.warning);
         let merged = requested
             .clone()
             .or(settings_of_file(&counts.metadata, counts.array));

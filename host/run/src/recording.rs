@@ -16,6 +16,7 @@ use dtof_photons::recorded::RecordingLength;
 pub const RECORDING: &[&str] = &[
     "axes",
     "array",
+    "capture",
     "columns",
     "rebin",
     "bins",
@@ -79,7 +80,7 @@ impl Given {
     /// # Errors
     /// Returns an option that is only for recordings.
     pub fn suits_device(&self) -> Result<(), Refused> {
-        let keys = &["axes", "array", "rebin", "bins"];
+        let keys = &["axes", "array", "capture", "rebin", "bins"];
         self.refuse(keys, "is for recordings, not for a device")?;
         self.refuse(
             LENGTH,
@@ -112,6 +113,7 @@ pub fn read_options(requested: &SettingsFile) -> ReadOptions {
         recorded_cycles,
         axes,
         array,
+        capture,
         rebin,
         decide_once,
         ..
@@ -126,6 +128,7 @@ pub fn read_options(requested: &SettingsFile) -> ReadOptions {
         rebin,
         axes,
         array,
+        capture,
         bin_width_ps: width.map(|width| width / U16F16::from_num(rebin.max(1))),
         length: recorded.or(rate),
         cycles: cycles.unwrap_or(match decide_once {

@@ -13,9 +13,11 @@ use dtof_calibrate::report::rows;
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{DetectionSettings, Settings, SettingsFile};
+use dtof_events::clock::LaserClock;
 use dtof_options::Refused;
 use dtof_options::progress::Progress;
 use dtof_options::rows::Row;
+use dtof_photons::geometry::FieldOfView;
 use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
 use dtof_photons::open::{CheckedRecording, Metadata, ReadOptions, Recording, check};
@@ -78,9 +80,47 @@ impl Replay {
         result.summary.cut_off = self.metadata.cut_off;
         result.summary.recording.clone_from(&self.metadata.rows);
         result.summary.found.clone_from(&self.found);
+        result.summary.assumed = self.assumed();
         let warnings = self.metadata.warnings.iter().cloned();
         result.summary.warnings.extend(warnings);
         Ok(result)
+    }
+}
+
+impl Replay {
+    /// What neither options nor settings nor the recording give.
+    fn assumed(&self) -> Vec<Row> {
+        let array = self.photons.array();
+        let width = self.metadata.bin_width_ps;
+        let is_of_found = self.found.iter().any(|(name, _)| name == "bin width");
+        let view = FieldOfView::default_for([array.columns(), array.rows()]);
+        let rays = &self.requested.rays;
+        let rows = [
+            (
+                self.metadata.is_width_assumed && !is_of_found,
+                "bin width",
+                format!("assumed: {width} ps; --bin-width-ps gives another"),
+            ),
+            (
+                self.photons.laser_hz().is_none(),
+                "laser rate",
+                format!(
+                    "assumed for times: {}; --laser-hz gives another",
+                    LaserClock::default()
+                ),
+            ),
+            (
+                array.pixels() > 1
+                    && rays.field_of_view_degrees.is_none()
+                    && rays.calibration.is_none(),
+                "field of view",
+                format!("assumed for points: {view} degrees; export --fov gives another"),
+            ),
+        ];
+        let assumed = rows.into_iter().filter(|(is_assumed, ..)| *is_assumed);
+        assumed
+            .map(|(_, name, text)| (name.to_owned(), text))
+            .collect()
     }
 }
 
@@ -231,6 +271,10 @@ impl Options {
     /// Fails if nothing chooses how pixels decide: a part does not show the settings of the whole.
     pub fn check_for_parts(&self) -> Result<(), Refused> {
         let reason = "is needed for a recording in parts, or an option of detection: calibrate finds settings";
+        if self.given.options.run.capture.is_some() {
+            let reason = "is for a recording as a whole; leave out the other captures before it is cut into parts";
+            return Err(Refused::new("capture", reason));
+        }
         match self.chooses_settings() {
             true => Ok(()),
             false => Err(Refused::new("settings", reason)),

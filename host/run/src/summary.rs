@@ -85,6 +85,9 @@ pub struct Summary {
     /// What was found in the recording, if its settings come from there.
     #[serde(serialize_with = "named")]
     pub found: Vec<Row>,
+    /// What was assumed about the recording, one a row, for people.
+    #[serde(skip)]
+    pub assumed: Vec<Row>,
     /// Warnings about the recording.
     pub warnings: Vec<String>,
     /// How the events of a simulated scene compare with it.
@@ -218,6 +221,7 @@ impl Summary {
             cut_off: 0,
             recording: Vec::new(),
             found: Vec::new(),
+            assumed: Vec::new(),
             warnings: Vec::new(),
             against_truth: None,
             settings: settings.clone(),
@@ -233,6 +237,7 @@ impl Summary {
             rows.push(("input".to_owned(), input.clone()));
         }
         rows.extend(self.recording.iter().cloned());
+        rows.extend(self.assumed.iter().cloned());
         if let Some((shortest, longest)) = self.recorded_cycles {
             let cycles = if shortest == longest {
                 grouped(longest)

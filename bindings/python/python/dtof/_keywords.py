@@ -100,6 +100,11 @@ class RecordingOptions(TypedDict, total=False):
         "is bins, the one before columns, all others are rows]",
     ]
     array: Annotated[Text, "text", ".npz: name of the array [default: the only one]"]
+    capture: Annotated[
+        Integer,
+        "whole number, 0 to 65535",
+        "Arrays with captures, and logs: the capture or frame to use, counted from 0 [default: all]",
+    ]
     columns: Annotated[
         Integer,
         "whole number, 1 to 65536",

@@ -87,7 +87,7 @@ def replay(
     """Turns a recording into depth events.
 
     ``recorded`` is the name of a file (``.npy``, ``.npz``, ``.csv``, or the ``.json`` log of a
-    TMF8820 or TMF8829), an array of histograms, or an array of photons with the fields ``pixel``,
+    TMF8820, TMF8828 or TMF8829), an array of histograms, or an array of photons with the fields ``pixel``,
     ``cycle`` and ``bin``. A data frame with these columns, a sparse matrix of pixels and bins, and an
     xarray with dimensions row, column, bin and capture (or y, x, time) are read, too. Counts are whole numbers from 0, of any type. The bins of an array are
     its axis ``axis``; the one before it are columns and all others rows. ``axes`` names all of

@@ -159,6 +159,7 @@ flags! {
     axes Text("AXIS,AXIS,...") => "Arrays of histograms: meaning of each axis: captures, rows, columns or \
         bins [default: the last is bins, the one before columns, all others are rows]";
     array Text("NAME") => ".npz: name of the array [default: the only one]";
+    capture Text("N") => "Arrays with captures, and logs: the capture or frame to use, counted from 0 [default: all]";
     columns Text("N") => "Photon lists: columns of the array, pixel = row × columns + column [default: \
         one row]";
     rebin Text("K") => "Number of neighbouring bins to add up [default: 1]";

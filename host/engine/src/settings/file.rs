@@ -285,7 +285,8 @@ impl SettingsFile {
     /// Drops what belongs to a single recording.
     #[must_use]
     pub fn without_recording(mut self) -> Self {
-        (self.run.axes, self.run.array, self.run.cycles) = (None, None, None);
+        (self.run.axes, self.run.array) = (None, None);
+        (self.run.capture, self.run.cycles) = (None, None);
         self
     }
 

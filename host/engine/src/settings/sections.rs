@@ -118,6 +118,8 @@ pub struct RunSettings {
     pub axes: Option<Axes>,
     /// Archives: the name of the array.
     pub array: Option<String>,
+    /// Recordings: the capture to use, counted from 0.
+    pub capture: Option<u32>,
     /// Recordings: how many neighbouring bins are summed.
     pub rebin: Option<u16>,
 }
@@ -272,6 +274,7 @@ section! {
     decide_once = boolean, "on all photons of a pixel";
     axes = str::parse, "of a recorded array";
     array = name, "of an archive";
+    capture = integer(0..=u16::MAX.into()), "to use of a recording, from 0";
     rebin = integer(1..=512), "neighbouring bins that are added up";
 }
 

@@ -15,8 +15,8 @@ use dtof_options::Refused;
 pub struct Histograms {
     /// The layout in the file.
     pub layout: AxisLayout,
-    /// Length of the first axis.
-    pub first: usize,
+    /// Lengths of the axes but the last.
+    pub axes: Vec<usize>,
     /// One histogram a pixel, in the order of addresses.
     pub pixels: Vec<Vec<u64>>,
 }
@@ -56,7 +56,10 @@ pub(super) fn read_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Resul
         count.map_err(|why| anyhow!("element {} is {why}", index_of(place, &shape, fortran)))
     })?;
     Ok(Histograms {
-        first: usize::try_from(shape[0])?,
+        axes: shape[..shape.len() - 1]
+            .iter()
+            .map(|&length| usize::try_from(length))
+            .collect::<Result<_, _>>()?,
         pixels: layout.histograms(&counts).collect(),
         layout,
     })

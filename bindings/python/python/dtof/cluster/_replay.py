@@ -39,7 +39,7 @@ def replay(
     """Replays one recording of histograms, its rows spread over the workers of ``client``.
 
     The result is that of :func:`dtof.replay` on the whole recording, its events byte for byte. One
-    warning is missing: that the first axis looks like the bins, which a part cannot detect. No
+    warning is missing: that another axis looks like the bins, which a part cannot detect. No
     worker holds more than a few parts at a time; the events are returned and have to fit into
     memory.
 

@@ -179,6 +179,16 @@ fn what_is_surely_wrong_is_said() {
         "--rule paper",
         "the first axis looks like the bins",
     );
+    // The same with the bins in the middle.
+    let mut counts = vec![10u8; 16 * 32];
+    for row in 0..4 {
+        let first = (row * 16 + 9) * 8;
+        counts[first..first + 8].fill(200);
+    }
+    let middle = scratch.file("middle.npy", npy("|u1", "(4, 16, 8)", &counts));
+    warned(&middle, "--rule paper", "axis 2 of 3 looks like the bins");
+    let summary = scratch.replayed(&middle, "--axes rows,bins,columns");
+    assert_eq!(summary["warnings"], serde_json::json!([]));
     let summary = scratch.replayed(&turned, "--axes bins,rows,columns");
     assert_eq!(summary["warnings"], serde_json::json!([]));
 }
@@ -391,6 +401,25 @@ fn exposures_of_masked_pixels_are_not_counted() {
             assert_eq!(summary["expired"], each * pixels, "{options} {mask}");
         }
     }
+}
+
+#[test]
+fn what_was_assumed_stands_in_the_rows() {
+    let scratch = Scratch::new();
+    scratch.file("a.npy", npy("|u1", "(2, 4, 8)", &[9; 64]));
+    let line = "replay a.npy --out out --alpha 4";
+    let printed = scratch.printed(line);
+    for row in [
+        "bin width                   assumed: 250 ps; --bin-width-ps gives another",
+        "laser rate                  assumed for times: 10 MHz; --laser-hz gives another",
+        "field of view               assumed for points: 60x32.2 degrees; export --fov gives another",
+    ] {
+        assert_contains(&printed, row);
+    }
+    scratch.file("rays.toml", "[rays]\nfield_of_view_degrees = [60, 30]\n");
+    let given = "--bin-width-ps 250 --laser-hz 5000000 --settings rays.toml";
+    let printed = scratch.printed(&format!("{line} {given}"));
+    assert!(!printed.contains("assumed"), "{printed}");
 }
 
 #[test]

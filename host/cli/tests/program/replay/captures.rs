@@ -1,6 +1,8 @@
 //! A capture log has zones and captures, where other arrays have columns and rows.
 
-use crate::common::{Scratch, assert_contains};
+use dtof_photons::open::{ReadOptions, counts};
+
+use crate::common::{Scratch, assert_contains, npy};
 
 #[test]
 fn the_report_of_a_capture_log_calls_them_so() {
@@ -25,4 +27,72 @@ fn the_report_of_a_capture_log_calls_them_so() {
         let sides = format!("\"sides\":[\"{across}\",\"{down}\"]");
         assert_eq!(report.contains(&sides), has_events);
     }
+}
+
+/// One capture gives what a file of that capture alone gives.
+#[test]
+fn one_capture_of_several_can_be_chosen() {
+    let scratch = Scratch::new();
+    // Three captures of 2×2 pixels, each with another peak.
+    let bytes = |captures: std::ops::Range<usize>| -> Vec<u8> {
+        let bins = captures.flat_map(|capture| {
+            (0..4 * 16).map(move |at| if at % 16 == 4 + 3 * capture { 200 } else { 1 })
+        });
+        bins.collect()
+    };
+    let all = scratch.file("all.npy", npy("|u1", "(3, 2, 2, 16)", &bytes(0..3)));
+    let one = scratch.file("one.npy", npy("|u1", "(1, 2, 2, 16)", &bytes(1..2)));
+    let axes = "--axes captures,rows,columns,bins";
+    let summary = scratch.replayed(&all, &format!("{axes} --alpha 4 --capture 1"));
+    assert_eq!(summary["pixels"], 4);
+    assert_eq!(summary["recording"]["capture"], "1 of 3, counted from 0");
+    let chosen = scratch.events();
+    assert!(!chosen.is_empty());
+    scratch.replayed(&one, &format!("{axes} --alpha 4"));
+    assert_eq!(scratch.events(), chosen);
+    // Pixels of one capture are neighbours.
+    scratch.replayed(
+        &all,
+        &format!("{axes} --capture 2 --rule window --window 3 --z 5 --neighbours 4"),
+    );
+    std::fs::remove_dir_all(scratch.path("out")).unwrap();
+    for part in ["calibrate", "compare"] {
+        let line = format!(
+            "{part} all.npy --capture 3 --axes captures,rows,columns,bins --out new/x.toml"
+        );
+        scratch.refused(
+            &scratch.run(&line),
+            &["--capture 3: there are 3, counted from 0"],
+        );
+    }
+    scratch.file("list.csv", "pixel,cycle,bin\n0,0,0\n");
+    scratch.all_refused(
+        "replay --out out",
+        "
+            all.npy --capture 1 | --capture 1: there is 1; --axes says which axis of an array has captures
+            list.csv --capture 0 | --capture is for histograms; list.csv holds photons
+            all.npy --capture -1 | --capture
+        ",
+    );
+}
+
+#[test]
+fn one_capture_of_a_log_has_its_own_truth() {
+    let scratch = Scratch::new();
+    let zone = format!("[{}]", ["3"; 128].join(","));
+    let zones = format!("\"hists\": [{}]", [zone.as_str(); 9].join(","));
+    let log = format!("[{{{zones}}}, {{{zones}, \"dist_to_plane\": 0.25}}]");
+    let path = scratch.file("log.json", log);
+    let truth = |capture| {
+        let options = ReadOptions {
+            capture: Some(capture),
+            ..ReadOptions::default()
+        };
+        let counts = counts(&path, &options).unwrap();
+        assert_eq!(counts.captures.len(), 1);
+        counts.truth_mm
+    };
+    assert_eq!(truth(0), None);
+    let known = truth(1).unwrap();
+    assert_eq!((known.len(), known[4]), (9, Some(250.0)));
 }
