@@ -91,7 +91,7 @@ impl Playback {
         let mut turn = Instant::now();
         while !context.is_stopped() {
             while let Ok(request) = context.requests.try_recv() {
-                reply(request.answer, player.execute(request.command, context));
+                reply(request.answer, player.execute(&request.command, context));
                 turn = Instant::now();
             }
             let elapsed = turn.elapsed();
@@ -219,8 +219,8 @@ impl<'a> Player<'a> {
         Ok(())
     }
 
-    fn execute(&mut self, command: Command, context: &FeedContext) -> Result<String> {
-        match command {
+    fn execute(&mut self, command: &Command, context: &FeedContext) -> Result<String> {
+        match *command {
             Command::Play(true) if matches!(self.mode, Mode::Ended | Mode::Failed) => {
                 self.seek(0.0, context)?;
                 Ok("The recording is playing.".to_owned())
