@@ -3,6 +3,7 @@
 
 use dtof_core::BlockLevel;
 use dtof_theory::looks::table::Table;
+use dtof_theory::progress::NONE;
 use dtof_theory::tune::{FalseAlarmLimit, Request, tune};
 
 fn main() -> anyhow::Result<()> {
@@ -19,7 +20,7 @@ fn main() -> anyhow::Result<()> {
         levels: BlockLevel::PIXEL,
         seed: 1,
     };
-    let tuned = tune(&request, &Table::load()?)?;
+    let tuned = tune(&request, &Table::load()?, NONE)?;
     println!("α = {}, L1 = {}", tuned.alpha, tuned.l1);
     println!("false alarms an exposure: {:.4}", tuned.false_alarms);
     assert!(tuned.false_alarms <= tuned.limit);

@@ -15,6 +15,7 @@
 //! | [`bounds::cramer_rao`] | the smallest error of a pulse's position | exact |
 //! | [`counts`] | Poisson, normal and binomial laws, and what a dead time hides | exact |
 //! | [`tune`] | settings for a required false-alarm rate | all of these |
+//! | [`progress`] | how far a long calculation is | |
 //! | [`random`] | random numbers of a pixel or a trial | |
 
 #![forbid(unsafe_code)]
@@ -24,6 +25,7 @@ pub mod counts;
 pub mod gaussian;
 pub mod known_background;
 pub mod looks;
+pub mod progress;
 pub mod random;
 pub mod rates;
 pub mod tune;

@@ -15,14 +15,16 @@ use anyhow::{Context, Result, bail, ensure};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::paper::Threshold;
 use dtof_core::{BlockLevel, Count, Count10, CounterWidth, DepthEstimator, PaperRule, PixelConfig};
+use rayon::prelude::*;
 
 use self::shortest::shortest;
 use crate::counts::poisson::Poisson;
 use crate::looks::detections::{DetectionSettings, Detections};
 use crate::looks::exposure::Looks;
-use crate::looks::repeated_looks::{BINS, Bounds, MINIMUM_COUNT, RepeatedLooks, single_looks};
+use crate::looks::repeated_looks::{BINS, Bounds, MINIMUM_COUNT, RepeatedLooks};
 use crate::looks::single_look::SingleLook;
 use crate::looks::table::{MARGIN, Table};
+use crate::progress::{Part, Progress};
 
 /// The limit on false alarms of a pixel without a target, as a probability.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -117,33 +119,43 @@ const MAX_LOOKS: u16 = 5000;
 /// Finds α and L1.
 ///
 /// # Errors
-/// Fails if the request is invalid or cannot be met; the message is one line.
-pub fn tune(request: &Request, table: &Table) -> Result<Tuned> {
+/// Fails if the request is invalid or cannot be met, or if `progress` ends the calculation; the message is
+/// one line.
+pub fn tune(request: &Request, table: &Table, progress: Progress) -> Result<Tuned> {
     check(request)?;
     let mean_a_step = request.background * f64::from(request.x);
     let last = u32::from(request.l2 - 1) / u32::from(request.x);
-    let steps = single_looks(request.bins.into(), mean_a_step, last);
+    let part = Part::new(progress, last.into())?;
+    let look = |step: u32| {
+        let look = SingleLook::new(request.bins.into(), mean_a_step * f64::from(step));
+        part.next().map(|()| look)
+    };
+    let steps: Vec<SingleLook> = (1..=last)
+        .into_par_iter()
+        .map(look)
+        .collect::<Result<_>>()?;
 
     let minimum_count = Count::saturating(request.minimum_count.into());
-    let all: Vec<(DetectionSettings, Tuned)> = candidates(request)
-        .into_iter()
-        .filter_map(|l1| {
-            let looks = Looks::new(request.x, l1, request.l2);
-            let tuned = calibrated(request, table, &steps, l1, looks)?;
+    let candidates = candidates(request);
+    let part = Part::new(progress, candidates.len() as u64 * BISECTIONS)?;
+    let mut all = Vec::new();
+    for l1 in candidates {
+        let looks = Looks::new(request.x, l1, request.l2);
+        if let Some(tuned) = calibrated(request, table, &steps, (l1, looks), &part)? {
             let settings = DetectionSettings {
                 looks,
                 rule: PaperRule::new(tuned.alpha, minimum_count).into(),
                 estimator: DepthEstimator::Centroid3,
             };
-            Some((settings, tuned))
-        })
-        .collect();
+            all.push((settings, tuned));
+        }
+    }
     ensure!(
         !all.is_empty(),
         "no α keeps false alarms below the wanted rate with so little background: raise --min-count \
          or --l1"
     );
-    let (tuned, detections) = shortest(request, &all)?;
+    let (tuned, detections) = shortest(request, &all, progress)?;
     Ok(Tuned {
         detections,
         ..tuned
@@ -238,14 +250,17 @@ fn candidates(request: &Request) -> Vec<u16> {
     candidates
 }
 
+/// Halvings of the range of α, 16 bits.
+const BISECTIONS: u64 = 16;
+
 /// The smallest α that keeps false alarms within the limit; `None` if none does.
 fn calibrated(
     request: &Request,
     table: &Table,
     steps: &[SingleLook],
-    l1: u16,
-    looks: Looks,
-) -> Option<Tuned> {
+    (l1, looks): (u16, Looks),
+    part: &Part,
+) -> Result<Option<Tuned>> {
     let limit = request.limit.per_exposure(looks);
     let repeated = RepeatedLooks::new(steps, looks.first, looks.last);
     let first_mean = request.background * f64::from(looks.first * looks.x);
@@ -280,9 +295,10 @@ fn calibrated(
     let is_within_limit = |alpha: u16| probability(alpha).1 <= limit;
     let (mut low, mut high) = (0u16, u16::MAX);
     if !is_within_limit(high) {
-        return None;
+        return Ok(None);
     }
     while low < high {
+        part.next()?;
         let middle = low + (high - low) / 2;
         if is_within_limit(middle) {
             high = middle;
@@ -291,7 +307,7 @@ fn calibrated(
         }
     }
     let (false_alarms, _, source, bounds) = probability(high);
-    Some(Tuned {
+    Ok(Some(Tuned {
         alpha: U8F8::from_bits(high),
         l1,
         looks,
@@ -300,7 +316,7 @@ fn calibrated(
         source,
         bounds,
         detections: Detections::default(),
-    })
+    }))
 }
 
 #[cfg(test)]

@@ -35,13 +35,14 @@ pub fn calibrate(
     input: PyInput,
     older: Option<String>,
     keywords: Keywords,
+    progress: Option<Bound<PyAny>>,
 ) -> PyResult<Found> {
     let options: CalibrateOptions = options(keywords)?;
     let input = Input::from(input);
-    work(py, None, move |_| {
+    work(py, progress, move |mut control| {
         let older = older.as_deref().map(settings).transpose()?;
         let requested = options.requested(older.as_ref())?;
-        let calibrated = options.calibrate(&input, requested.clone());
+        let calibrated = options.calibrate(&input, requested.clone(), &mut control);
         let CalibrateResult {
             found,
             settings,
@@ -134,10 +135,14 @@ pub fn compare(
 
 /// Threshold and L1 for a rate of false alarms, as JSON, and the options for them.
 #[pyfunction]
-pub fn tune(py: Python, keywords: Keywords) -> PyResult<(String, String)> {
+pub fn tune(
+    py: Python,
+    keywords: Keywords,
+    progress: Option<Bound<PyAny>>,
+) -> PyResult<(String, String)> {
     let options: TuneOptions = options(keywords)?;
-    work(py, None, move |_| {
-        let tuned = options.tune()?;
+    work(py, progress, move |mut control| {
+        let tuned = options.tune(&mut control)?;
         Ok((tuned.json().to_string(), tuned.options().to_owned()))
     })
 }

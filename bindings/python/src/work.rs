@@ -3,7 +3,7 @@
 
 use std::mem;
 use std::process;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -23,8 +23,8 @@ const POLL_INTERVAL: Duration = Duration::from_millis(50);
 #[derive(Debug, Default)]
 pub struct Control {
     is_stopped: AtomicBool,
-    done: AtomicU64,
-    total: AtomicU64,
+    /// How many items of the part are done, and how many there are.
+    items: Mutex<(u64, u64)>,
     steps: Mutex<Vec<String>>,
 }
 
@@ -46,11 +46,11 @@ impl Control {
 
 impl Progress for &Control {
     fn begin(&mut self, total: u64, _unit: &str) {
-        self.total.store(total, Ordering::Relaxed);
+        *locked(&self.items) = (0, total);
     }
 
     fn at(&mut self, done: u64) -> Result<()> {
-        self.done.store(done, Ordering::Relaxed);
+        locked(&self.items).0 = done;
         self.check_running()
     }
 
@@ -67,7 +67,7 @@ impl Reporter<'_> {
     /// Calls it with each step as text, then with done and total if they have changed.
     fn report(&mut self, control: &Control) -> PyResult<()> {
         let steps = mem::take(&mut *locked(&control.steps));
-        let [done, total] = [&control.done, &control.total].map(|of| of.load(Ordering::Relaxed));
+        let (done, total) = *locked(&control.items);
         let Some(progress) = &self.progress else {
             return Ok(());
         };

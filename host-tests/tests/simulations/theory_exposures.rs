@@ -16,6 +16,7 @@ use dtof_theory::looks::repeated_looks::{
 };
 use dtof_theory::looks::single_look::SingleLook;
 use dtof_theory::looks::table::{self, Estimate, MARGIN, Row, Table};
+use dtof_theory::progress::NONE;
 use dtof_theory::random::{pixel_rng, trial_rng};
 use dtof_theory::rates::Rates;
 use dtof_theory::tune::{FalseAlarmLimit, Request, Tuned, tune};
@@ -323,7 +324,7 @@ fn tuned_settings_keep_their_word_in_the_engine() {
     let allowed = 0.02;
     for (background, l2, side) in [(0.02, 800, 40), (0.2, 400, 60), (1.0, 300, 24)] {
         let request = request(background, 1.0, l2, allowed);
-        let tuned = tune(&request, &table).unwrap();
+        let tuned = tune(&request, &table, NONE).unwrap();
         assert!(tuned.false_alarms <= allowed);
         let events = first_events(&request, &tuned, 0.0, side);
         let events = u32::try_from(events.len()).unwrap();
@@ -346,7 +347,7 @@ fn tuned_settings_keep_their_word_in_the_engine() {
 fn time_and_depth_error_are_those_of_the_engine() {
     let table = Table::load().unwrap();
     let request = request(0.05, 0.4, 800, 0.01);
-    let tuned = tune(&request, &table).unwrap();
+    let tuned = tune(&request, &table, NONE).unwrap();
     let events = first_events(&request, &tuned, request.signal, 40);
     let (mut cycles, mut squares) = (Vec::new(), Vec::new());
     for event in &events {

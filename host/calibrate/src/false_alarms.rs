@@ -9,6 +9,7 @@ use dtof_core::fixed::types::U4F12;
 use dtof_core::rule::detect;
 use dtof_core::{Count, DepthEstimator, Histogram, RangeGate, WindowRule};
 use dtof_theory::looks::exposure::{Exposures, Looks};
+use dtof_theory::progress::{Part, Progress};
 use dtof_theory::random::trial_rng;
 use dtof_theory::rates::Rates;
 use rayon::prelude::*;
@@ -48,9 +49,10 @@ pub struct ExposureSettings {
 /// The z that gives the share, and the number of simulated exposures.
 ///
 /// # Errors
-/// Fails if the gate or the window is invalid, or if the share is too small to simulate.
-pub fn z(settings: &ExposureSettings) -> Result<(U4F12, u64)> {
-    let highest = with_bins!(settings.bins, BINS => highest::<BINS>(settings))??;
+/// Fails if the gate or the window is invalid, if the share is too small to simulate, or if `progress` ends the
+/// calculation.
+pub fn z(settings: &ExposureSettings, progress: Progress) -> Result<(U4F12, u64)> {
+    let highest = with_bins!(settings.bins, BINS => highest::<BINS>(settings, progress))??;
     let all = highest.len() as f64;
     let above_z = settings.share * all;
     ensure!(
@@ -81,7 +83,10 @@ pub fn z(settings: &ExposureSettings) -> Result<(U4F12, u64)> {
 }
 
 /// The highest z of each exposure, in descending order.
-fn highest<const BINS: usize>(settings: &ExposureSettings) -> Result<Vec<U4F12>> {
+fn highest<const BINS: usize>(
+    settings: &ExposureSettings,
+    progress: Progress,
+) -> Result<Vec<U4F12>> {
     let (l1, l2, x) = settings.looks;
     let gate = RangeGate::<BINS>::new(settings.gate.0, settings.gate.1).context("the gate")?;
     let bins = u16::try_from(BINS)?;
@@ -91,6 +96,7 @@ fn highest<const BINS: usize>(settings: &ExposureSettings) -> Result<Vec<U4F12>>
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let count = (PHOTONS / each.max(1.0)).clamp(EXPOSURES.0, EXPOSURES.1) as usize;
     let each = count.div_ceil(usize::from(TRIALS));
+    let part = Part::new(progress, (each * usize::from(TRIALS)) as u64)?;
     let rule = |z| {
         WindowRule::new(
             settings.window,
@@ -104,7 +110,7 @@ fn highest<const BINS: usize>(settings: &ExposureSettings) -> Result<Vec<U4F12>>
         rule(z).is_ok_and(|rule| detect(histogram, &gate, &rule, &estimator).is_some())
     };
     // One type for all numbers of bins: the parallel code is compiled once.
-    let trial: &(dyn Fn(u16) -> Vec<U4F12> + Sync) = &|trial| {
+    let trial: &(dyn Fn(u16) -> Result<Vec<U4F12>> + Sync) = &|trial| {
         let mut rng = trial_rng(settings.seed, trial);
         let mut found = Vec::with_capacity(each);
         for _ in 0..each {
@@ -118,10 +124,12 @@ fn highest<const BINS: usize>(settings: &ExposureSettings) -> Result<Vec<U4F12>>
                 false
             });
             found.push(highest);
+            part.next()?;
         }
-        found
+        Ok(found)
     };
-    let mut all: Vec<U4F12> = (0..TRIALS).into_par_iter().flat_map(trial).collect();
+    let trials = (0..TRIALS).into_par_iter().map(trial);
+    let mut all = trials.collect::<Result<Vec<_>>>()?.concat();
     all.sort_unstable();
     all.reverse();
     Ok(all)

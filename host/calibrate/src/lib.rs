@@ -25,6 +25,7 @@ use anyhow::Result;
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 use dtof_photons::MM_PER_PS;
+use dtof_theory::progress::{self, Progress};
 use rayon::prelude::*;
 
 pub use find::glass::{Glass, Nearest};
@@ -177,6 +178,18 @@ impl AllHistograms {
 /// if the crosstalk of the cover glass leaves no gate, or if so few false alarms cannot be
 /// simulated.
 pub fn calibrate(observed: &Observed, options: &CalibrationOptions) -> Result<Calibration> {
+    calibrate_with(observed, options, progress::NONE)
+}
+
+/// The same with progress of the calculation.
+///
+/// # Errors
+/// As [`calibrate`]. Also fails if `progress` ends the calculation.
+pub fn calibrate_with(
+    observed: &Observed,
+    options: &CalibrationOptions,
+    progress: Progress,
+) -> Result<Calibration> {
     let mut all = AllHistograms::new(observed, &[])?;
     if !all.pixels.hot.is_empty() && !observed.length.is_known() {
         // A hot pixel is the brightest, but does not show how long the recording lasted.
@@ -218,7 +231,9 @@ pub fn calibrate(observed: &Observed, options: &CalibrationOptions) -> Result<Ca
         options,
     });
     let detection = |budget| {
-        let detection = findings.as_ref().map(|of| settle::detection(of, budget));
+        let detection = findings
+            .as_ref()
+            .map(|of| settle::detection(of, budget, progress));
         detection.transpose()
     };
     let mut found = detection(None)?;
@@ -238,7 +253,7 @@ pub fn calibrate(observed: &Observed, options: &CalibrationOptions) -> Result<Ca
             options.seed,
         )?;
         if let Some(replay) = replay {
-            photon_budget = replay.best()?;
+            photon_budget = replay.best(progress)?;
         }
         if let Some(budget) = photon_budget {
             offset.mm += budget.offset_mm;

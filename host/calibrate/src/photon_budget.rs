@@ -16,6 +16,7 @@ use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_photons::recorded::{Layout, RecordedHistograms, RecordingLength};
 use dtof_photons::source::{PhotonSource, Slice};
+use dtof_theory::progress::{Part, Progress};
 
 /// The most laser cycles that are replayed, and the most photons.
 const MAX_CYCLES: u16 = 10_000;
@@ -131,17 +132,21 @@ impl<'a> Replay<'a> {
     /// The best window, minimum count and X; `None` if there are too few events.
     ///
     /// # Errors
-    /// Fails if the settings are invalid.
-    pub fn best(&self) -> Result<Option<PhotonBudget>> {
+    /// Fails if the settings are invalid, or if `progress` ends the calculation.
+    pub fn best(&self, progress: Progress) -> Result<Option<PhotonBudget>> {
         let least = self.detection.min_count;
+        let windows = self.detection.window..=WindowRule::MAX_WIDTH;
+        let part = Part::new(progress, windows.len() as u64)?;
         let paper = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(least.into()));
         let Some(paper) = self.replay(paper.into(), (1, least, self.settings.x))? else {
             return Ok(None);
         };
         let mut best: Option<PhotonBudget> = None;
         let mut first = least;
-        for window in self.detection.window..=WindowRule::MAX_WIDTH {
-            let Some(found) = self.with_window(window, first, paper.photons)? else {
+        for window in windows {
+            let found = self.with_window(window, first, paper.photons, &part)?;
+            part.next()?;
+            let Some(found) = found else {
                 continue;
             };
             // A wider window holds more photons.
@@ -159,10 +164,17 @@ impl<'a> Replay<'a> {
 
     /// The highest minimum count from `first` on whose events take at most `budget` photons, or `first`,
     /// then the highest X; `None` if there are too few events.
-    fn with_window(&self, window: u8, first: u16, budget: f64) -> Result<Option<PhotonBudget>> {
+    fn with_window(
+        &self,
+        window: u8,
+        first: u16,
+        budget: f64,
+        part: &Part,
+    ) -> Result<Option<PhotonBudget>> {
         let mut best = None;
         let z = U4F12::saturating_from_num(self.detection.z.unwrap_or(0.0));
         let with = |minimum: u16, x: u16| {
+            part.check()?;
             let rule = WindowRule::new(window, z, Count::saturating(minimum.into()))?;
             self.replay(rule.into(), (window, minimum, x))
         };

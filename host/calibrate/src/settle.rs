@@ -3,6 +3,7 @@
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{BlockLevel, CentredWindow, WindowRule};
+use dtof_theory::progress::Progress;
 use dtof_theory::tune::{FalseAlarmLimit, Request, window};
 
 use super::false_alarms;
@@ -75,8 +76,12 @@ pub fn sigma(sigma: f64) -> U8F8 {
 /// The settings of the window rule, with window, minimum count and X of `budget` if there is one.
 ///
 /// # Errors
-/// Fails if so few false alarms cannot be simulated.
-pub fn detection(found: &Findings, budget: Option<PhotonBudget>) -> Result<WindowDetection> {
+/// Fails if so few false alarms cannot be simulated, or if `progress` ends the calculation.
+pub fn detection(
+    found: &Findings,
+    budget: Option<PhotonBudget>,
+    progress: Progress,
+) -> Result<WindowDetection> {
     let Findings {
         background,
         options,
@@ -117,11 +122,11 @@ pub fn detection(found: &Findings, budget: Option<PhotonBudget>) -> Result<Windo
         levels: BlockLevel::PIXEL,
         seed: options.seed,
     };
-    // If the signal is too weak for any L1, the default stays.
-    if let Ok(tuned) = window::tune(&request) {
+    // If the signal is too weak for any L1, the default stays. If `progress` has ended it, `z` fails at once.
+    if let Ok(tuned) = window::tune(&request, progress) {
         detection.l1 = tuned.l1;
     }
-    let (z, exposures) = false_alarms::z(&false_alarms::ExposureSettings {
+    let exposures = false_alarms::ExposureSettings {
         background,
         bins: found.bins,
         gate: found.gate,
@@ -130,7 +135,8 @@ pub fn detection(found: &Findings, budget: Option<PhotonBudget>) -> Result<Windo
         looks: (detection.l1, l2, x),
         share: options.false_alarm,
         seed: options.seed,
-    })?;
+    };
+    let (z, exposures) = false_alarms::z(&exposures, progress)?;
     detection.is_by_count = z < MIN_Z;
     detection.z = Some(z.max(MIN_Z).to_num());
     detection.exposures = exposures;

@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use crate::interrupt::is_interrupted;
 use dtof_options::progress::Progress;
 
-/// A progress bar. It appears after a second, and only on a terminal.
+/// A progress bar. It appears a second after the job begins, and only on a terminal.
 pub struct Bar {
     bar: ProgressBar,
     since: Instant,
@@ -33,7 +33,7 @@ impl Progress for Bar {
         let template = format!("{{bar:40}} {{human_pos}} of {{human_len}} {unit}, {{eta}} left");
         let style = ProgressStyle::with_template(&template);
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        (self.bar, self.since) = (bar, Instant::now());
+        self.bar = bar;
     }
 
     fn at(&mut self, done: u64) -> Result<()> {

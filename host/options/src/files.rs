@@ -7,7 +7,7 @@ use std::fs;
 use std::io::{BufWriter, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use tempfile::NamedTempFile;
 
 /// The suffix of incomplete files.
@@ -15,6 +15,31 @@ pub const PARTIAL: &str = ".partial";
 
 /// The mark of a file is searched in so many bytes at its start.
 const HEAD: u64 = 1024;
+
+/// The most bytes of a text file. None that the program reads is longer.
+const MOST_TEXT: u64 = 1 << 24;
+
+/// Reads a text file.
+///
+/// # Errors
+/// Fails if it cannot be read, is not in UTF-8 or longer than 16 MiB. The error begins with its name.
+pub fn read_text(path: &Path) -> Result<String> {
+    let name = || path.display().to_string();
+    let mut bytes = Vec::new();
+    let file = fs::File::open(path).with_context(name)?;
+    // Some files, such as `/dev/zero`, have no end.
+    let read = file.take(MOST_TEXT + 1).read_to_end(&mut bytes);
+    ensure!(
+        read.with_context(name)? as u64 <= MOST_TEXT,
+        "{}: more than {MOST_TEXT} bytes: no such file is so long",
+        name()
+    );
+    String::from_utf8(bytes).map_err(|error| {
+        let before = &error.as_bytes()[..error.utf8_error().valid_up_to()];
+        let line = before.iter().filter(|&&byte| byte == b'\n').count() + 1;
+        anyhow!("{}: line {line}: not UTF-8; save the file as UTF-8", name())
+    })
+}
 
 /// The path of an output file.
 pub struct Destination {

@@ -4,10 +4,11 @@ use anyhow::{Context, Result};
 
 use super::given::Given;
 use super::recording::{RECORDING, bin_width_warning, read_options, settings_of_file, warnings};
-use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate};
+use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate_with};
 use dtof_engine::settings::{SettingsFile, share};
 use dtof_options::Refused;
 use dtof_options::numbers::{MAX_INTEGER, integer, within};
+use dtof_options::progress::{Progress, shared};
 use dtof_photons::input::Input;
 use dtof_photons::open::{Counts, counts};
 use dtof_photons::recorded::RecordingLength;
@@ -91,13 +92,19 @@ impl Options {
     /// Calibrates the sensor that recorded `input`, with the settings from [`Self::requested`].
     ///
     /// # Errors
-    /// Fails if the recording cannot be read or calibrated; the error begins with its name.
-    pub fn calibrate(&self, input: &Input, requested: SettingsFile) -> Result<CalibrateResult> {
+    /// Fails if the recording cannot be read or calibrated, or if `progress` ends the work; the error begins with
+    /// the name of the recording.
+    pub fn calibrate(
+        &self,
+        input: &Input,
+        requested: SettingsFile,
+        progress: &mut dyn Progress,
+    ) -> Result<CalibrateResult> {
         let mut options = read_options(&requested);
         options.cycles = u64::MAX;
         let counts = counts(input, &options)?;
         self.given.suits(input, &counts.metadata)?;
-        let found = calibrate_counts(&requested, &counts, &self.calibration);
+        let found = calibrate_counts(&requested, &counts, &self.calibration, progress);
         let found = found.with_context(|| input.to_string())?;
         let width = bin_width_warning(&counts.metadata);
         let metres = self.calibration.target_mm.and_then(in_metres);
@@ -115,11 +122,12 @@ impl Options {
 /// Calibrates the sensor of a recording that has been read.
 ///
 /// # Errors
-/// Those of [`calibrate`].
+/// Those of [`calibrate_with`].
 pub(super) fn calibrate_counts(
     requested: &SettingsFile,
     counts: &Counts,
     options: &CalibrationOptions,
+    progress: &mut dyn Progress,
 ) -> Result<Calibration> {
     let length = match (counts.cycles, read_options(requested).length) {
         (Some(cycles), _) | (None, Some(RecordingLength::Cycles(cycles))) => Length::Cycles(cycles),
@@ -136,5 +144,5 @@ pub(super) fn calibrate_counts(
         truth_mm: counts.truth_mm.as_deref(),
         slant: slants.as_deref(),
     };
-    calibrate(&observed, options)
+    calibrate_with(&observed, options, &shared(progress, "steps"))
 }

@@ -249,7 +249,7 @@ impl Options {
                 false_alarm: self.false_alarm_share(&requested),
                 ..CalibrationOptions::default()
             };
-            let found = calibrate_counts(&requested, &counts, &options);
+            let found = calibrate_counts(&requested, &counts, &options, &mut ());
             let found = found.with_context(|| input.to_string())?;
             requested.or(found.settings(merged)?)
         };

@@ -306,7 +306,7 @@ fn find(requested: &mut SettingsFile, recording: &mut CheckedRecording) -> Resul
         None => "that of the sensor",
     };
     let width = format!("{} ps, {source}", metadata.bin_width_ps);
-    let found = calibrate_counts(requested, &counts, &CalibrationOptions::default())?;
+    let found = calibrate_counts(requested, &counts, &CalibrationOptions::default(), &mut ())?;
     let mut settings = found.settings(
         requested
             .clone()

@@ -9,12 +9,14 @@ use anyhow::Result;
 use dtof_core::BlockLevel;
 use dtof_engine::settings::RuleName;
 use dtof_options::numbers::{MAX_INTEGER, bins, integer, positive, shortest};
+use dtof_options::progress::{Progress, shared};
 use dtof_options::rows::significant;
 use dtof_options::{NO_OPTION, Refused, named};
 use dtof_photons::MM_PER_PS;
 use dtof_theory::gaussian;
 use dtof_theory::looks::detections::Detections;
 use dtof_theory::looks::table::Table;
+use dtof_theory::progress as theory;
 use dtof_theory::rates::{signal_for_snr, snr};
 use dtof_theory::tune::{FalseAlarmLimit, Request, Source, tune};
 use serde_json::json;
@@ -201,13 +203,15 @@ impl Options {
     /// Finds the settings.
     ///
     /// # Errors
-    /// Fails if options are missing or exclude each other, or if no threshold has so few false alarms.
-    pub fn tune(&self) -> Result<TuneResult> {
+    /// Fails if options are missing or exclude each other, if no threshold has so few false alarms, or if
+    /// `progress` ends the work.
+    pub fn tune(&self, progress: &mut dyn Progress) -> Result<TuneResult> {
         let request = self.request()?;
+        let progress = &shared(progress, "steps");
         let (lines, rule) = match self.rule {
-            RuleName::Paper => self.paper(&request)?,
-            RuleName::Average => self.average(&request)?,
-            RuleName::Window => self.window(&request)?,
+            RuleName::Paper => self.paper(&request, progress)?,
+            RuleName::Average => self.average(&request, progress)?,
+            RuleName::Window => self.window(&request, progress)?,
         };
         // Without these options, `replay` would use other bins than the settings are for.
         let histogram = if (self.bins, self.bin_width_ps) == (128, 250.0) {
@@ -274,9 +278,9 @@ impl Options {
     }
 
     /// α and L1, what to expect of them, and the options for them.
-    fn paper(&self, request: &Request) -> Result<(Vec<Line>, String)> {
+    fn paper(&self, request: &Request, progress: theory::Progress) -> Result<(Vec<Line>, String)> {
         let table = Table::load()?;
-        let tuned = tune(request, &table)?;
+        let tuned = tune(request, &table, progress)?;
         let false_alarms = match tuned.source {
             Source::Table => format!("simulation: table, {} exposures a point", table.exposures),
             Source::TableAtMost => format!(

@@ -4,6 +4,7 @@ use anyhow::Result;
 use dtof_core::{AnyRule, BinPosition, DepthEstimator};
 
 use crate::looks::exposure::{Exposures, Looks};
+use crate::progress::Part;
 use crate::random::trial_rng;
 use crate::rates::Rates;
 
@@ -41,16 +42,17 @@ impl Detections {
     /// An event farther from the target is a false alarm.
     pub const NEAR_BINS: f64 = 3.0;
 
-    /// Simulates `exposures` exposures with the random numbers of trial `trial`.
+    /// Simulates `exposures` exposures with the random numbers of trial `trial`. Each is an item of `part`.
     ///
     /// # Errors
-    /// Fails if a rate is negative or not a number.
+    /// Fails if a rate is negative or not a number, or if the part ends the calculation.
     pub fn trial<const BINS: usize>(
         seed: u64,
         trial: u16,
         rates: &Rates,
         settings: &DetectionSettings,
         exposures: u32,
+        part: &Part,
     ) -> Result<Self> {
         let DetectionSettings {
             looks,
@@ -63,6 +65,7 @@ impl Detections {
         let mut sum = Self::default();
         for _ in 0..exposures {
             let (cycles, event) = simulated.event::<BINS>(rule, estimator, &mut rng);
+            part.next()?;
             sum.exposures += 1;
             sum.cycles += u64::from(cycles);
             let Some(event) = event else { continue };
@@ -119,6 +122,7 @@ mod tests {
     use dtof_core::{Count, PaperRule};
 
     use super::*;
+    use crate::progress::NONE;
 
     fn trial(signal: f64, alpha: &str) -> Detections {
         let rates = Rates {
@@ -132,7 +136,8 @@ mod tests {
             rule: PaperRule::new(alpha.parse::<U8F8>().unwrap(), Count::saturating(2)).into(),
             estimator: DepthEstimator::Centroid3,
         };
-        Detections::trial::<128>(3, 7, &rates, &settings, 200).unwrap()
+        let part = Part::new(NONE, 200).unwrap();
+        Detections::trial::<128>(3, 7, &rates, &settings, 200, &part).unwrap()
     }
 
     #[test]

@@ -16,6 +16,7 @@ use super::{Request, candidates, check};
 use crate::counts::binomial;
 use crate::looks::detections::{DetectionSettings, Detections};
 use crate::looks::exposure::{Exposures, Looks};
+use crate::progress::{Part, Progress};
 use crate::random::trial_rng;
 use crate::rates::Rates;
 
@@ -48,15 +49,16 @@ pub struct Tuned {
 /// Finds α and L1.
 ///
 /// # Errors
-/// Fails if the request is invalid or cannot be met; the message is one line.
-pub fn tune(request: &Request) -> Result<Tuned> {
+/// Fails if the request is invalid or cannot be met, or if `progress` ends the calculation; the message is
+/// one line.
+pub fn tune(request: &Request, progress: Progress) -> Result<Tuned> {
     check(request)?;
     let l1s = candidates(request);
     let looks: Vec<Looks> = l1s
         .iter()
         .map(|&l1| Looks::new(request.x, l1, request.l2))
         .collect();
-    let highest = highest_alphas(request, &looks)?;
+    let highest = highest_alphas(request, &looks, progress)?;
     let exposures = highest.len() as u64;
     let minimum_count = Count::saturating(request.minimum_count.into());
     let mut all = Vec::new();
@@ -81,12 +83,12 @@ pub fn tune(request: &Request) -> Result<Tuned> {
          false alarms, or take --rule window",
         1.0 / rarest
     );
-    let ((settings, alpha, l1), detections) = shortest(request, &all)?;
+    let ((settings, alpha, l1), detections) = shortest(request, &all, progress)?;
     Ok(Tuned {
         alpha,
         l1,
         exposures,
-        false_alarms: false_alarms(request, &settings)?,
+        false_alarms: false_alarms(request, &settings, progress)?,
         detections,
     })
 }
@@ -108,15 +110,20 @@ fn smallest_alpha(mut highest: Vec<Option<u16>>, limit: f64) -> Option<U8F8> {
 
 /// Simulates exposures without a target. For each exposure and candidate: the highest α, in
 /// 1/256, that fires at any look; `None` if none fires.
-fn highest_alphas(request: &Request, looks: &[Looks]) -> Result<Vec<Vec<Option<u16>>>> {
+fn highest_alphas(
+    request: &Request,
+    looks: &[Looks],
+    progress: Progress,
+) -> Result<Vec<Vec<Option<u16>>>> {
     let trial = for_bins!(request.bins, trial);
     let photons = request.background * f64::from(request.bins) * f64::from(request.l2);
     let most = (PHOTONS / photons / f64::from(TRIALS)).clamp(1.0, LONGEST_TRIAL);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let exposures = most as u32;
+    let part = Part::new(progress, (u32::from(TRIALS) * exposures).into())?;
     let trials = (0..TRIALS)
         .into_par_iter()
-        .map(|number| trial(request, looks, FIRST_TRIAL + number, exposures))
+        .map(|number| trial(request, looks, FIRST_TRIAL + number, exposures, &part))
         .collect::<Result<Vec<_>>>()?;
     Ok(trials.into_iter().flatten().collect())
 }
@@ -126,6 +133,7 @@ fn trial<const BINS: usize>(
     looks: &[Looks],
     number: u16,
     exposures: u32,
+    part: &Part,
 ) -> Result<Vec<Vec<Option<u16>>>> {
     let rates = Rates::without_target(request.background);
     let minimum_count = Count::saturating(request.minimum_count.into());
@@ -145,9 +153,9 @@ fn trial<const BINS: usize>(
             }
             false
         });
-        highest
+        part.next().map(|()| highest)
     };
-    Ok((0..exposures).map(exposure).collect())
+    (0..exposures).map(exposure).collect()
 }
 
 /// The highest α in 1/256 with which the average rule fires on `histogram`: it fires if

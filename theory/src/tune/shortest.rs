@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::Request;
 use crate::looks::detections::{DetectionSettings, Detections};
+use crate::progress::{Part, Progress};
 use crate::rates::Rates;
 
 /// The function for this number of bins, which [`check`](super::check) has validated.
@@ -36,14 +37,17 @@ const PHOTONS: f64 = 1e8;
 /// The entry of `all` with the shortest mean time to an event, and its detections.
 ///
 /// # Errors
-/// Fails if the signal is too weak for all of them.
+/// Fails if the signal is too weak for all of them, or if `progress` ends the calculation.
 pub fn shortest<T: Copy>(
     request: &Request,
     all: &[(DetectionSettings, T)],
+    progress: Progress,
 ) -> Result<(T, Detections)> {
+    let exposures = u64::from(EXPOSURES.0) * all.len() as u64 + u64::from(EXPOSURES.1);
+    let part = Part::new(progress, u64::from(POSITIONS) * exposures)?;
     let mut best: Option<(&(DetectionSettings, T), f64)> = None;
     for entry in all {
-        let detections = detections(request, &entry.0, 0, EXPOSURES.0)?;
+        let detections = detections(request, &entry.0, 0, EXPOSURES.0, &part)?;
         let time = detections.cycles_to_event();
         if detections.near > 0 && best.is_none_or(|best| time < best.1) {
             best = Some((entry, time));
@@ -52,7 +56,7 @@ pub fn shortest<T: Copy>(
     let mut found = None;
     if let Some(((settings, value), _)) = best {
         // Fresh photons: those that chose it would flatter it.
-        let detections = detections(request, settings, POSITIONS, EXPOSURES.1)?;
+        let detections = detections(request, settings, POSITIONS, EXPOSURES.1, &part)?;
         found = Some((*value, detections));
     }
     found
@@ -70,8 +74,12 @@ pub fn shortest<T: Copy>(
 /// event.
 ///
 /// # Errors
-/// Fails if the background cannot be simulated.
-pub fn false_alarms(request: &Request, settings: &DetectionSettings) -> Result<(u64, u64)> {
+/// Fails if the background cannot be simulated, or if `progress` ends the calculation.
+pub fn false_alarms(
+    request: &Request,
+    settings: &DetectionSettings,
+    progress: Progress,
+) -> Result<(u64, u64)> {
     let without_target = Request {
         signal: 0.0,
         ..*request
@@ -81,7 +89,9 @@ pub fn false_alarms(request: &Request, settings: &DetectionSettings) -> Result<(
     let most = f64::from(EXPOSURES.1);
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let exposures = (PHOTONS / photons / f64::from(POSITIONS)).clamp(50.0, most) as u32;
-    let found = detections(&without_target, settings, 2 * POSITIONS, exposures)?;
+    let part = Part::new(progress, (u32::from(POSITIONS) * exposures).into())?;
+    let first = 2 * POSITIONS;
+    let found = detections(&without_target, settings, first, exposures, &part)?;
     Ok((found.exposures, found.near + found.far))
 }
 
@@ -91,6 +101,7 @@ fn detections(
     settings: &DetectionSettings,
     first_trial: u16,
     exposures: u32,
+    part: &Part,
 ) -> Result<Detections> {
     let trial = for_bins!(request.bins, Detections::trial);
     let trials: Vec<Detections> = (0..POSITIONS)
@@ -105,7 +116,7 @@ fn detections(
                 sigma: request.sigma,
             };
             let number = first_trial + index;
-            trial(request.seed, number, &rates, settings, exposures)
+            trial(request.seed, number, &rates, settings, exposures, part)
         })
         .collect::<Result<_>>()?;
     let mut sum = Detections::default();

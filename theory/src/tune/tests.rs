@@ -2,6 +2,8 @@ use dtof_core::paper::Threshold;
 use dtof_core::{BlockLevel, Count};
 
 use super::*;
+use crate::looks::repeated_looks::single_looks;
+use crate::progress::NONE;
 
 const REQUEST: Request = Request {
     background: 0.05,
@@ -121,7 +123,7 @@ fn alpha_is_the_smallest_that_keeps_false_alarms_down() {
             limit: FalseAlarmLimit::PerExposure(limit),
             ..request
         };
-        let found = tune(&request, &table).unwrap();
+        let found = tune(&request, &table, NONE).unwrap();
         assert_eq!((found.l1, found.looks, found.limit), (40, looks, limit));
 
         let repeated = RepeatedLooks::new(&steps, looks.first, looks.last);
@@ -150,14 +152,17 @@ fn alpha_is_the_smallest_that_keeps_false_alarms_down() {
 #[test]
 fn alpha_of_the_average_keeps_false_alarms_down() {
     let limit = 0.02;
-    let found = average::tune(&Request {
-        background: 0.2,
-        bins: 8,
-        l2: 200,
-        signal: 2.0,
-        limit: FalseAlarmLimit::PerExposure(limit),
-        ..REQUEST
-    })
+    let found = average::tune(
+        &Request {
+            background: 0.2,
+            bins: 8,
+            l2: 200,
+            signal: 2.0,
+            limit: FalseAlarmLimit::PerExposure(limit),
+            ..REQUEST
+        },
+        NONE,
+    )
     .unwrap();
     assert_eq!((found.l1, found.exposures), (40, 64 * 2000));
     let (exposures, events) = found.false_alarms;
@@ -177,7 +182,7 @@ fn no_other_l1_is_much_faster() {
             l1,
             ..REQUEST
         };
-        let found = window::tune(&request).unwrap();
+        let found = window::tune(&request, NONE).unwrap();
         (found.l1, found.detections.cycles_to_event())
     };
     let (chosen, best) = time(None);
@@ -195,23 +200,82 @@ fn no_other_l1_is_much_faster() {
 /// z holds from 0.4 background photons a bin at the first look on: 40 laser cycles here.
 #[test]
 fn a_bright_target_waits_until_z_holds() {
-    let found = window::tune(&Request {
-        background: 0.01,
-        signal: 3.0,
-        l1: None,
-        ..REQUEST
-    });
+    let found = window::tune(
+        &Request {
+            background: 0.01,
+            signal: 3.0,
+            l1: None,
+            ..REQUEST
+        },
+        NONE,
+    );
     assert_eq!(found.unwrap().l1, 36);
 }
 
 /// The number of exposures follows from the photons simulated in a second.
 #[test]
 fn much_background_has_fewer_exposures_without_a_target() {
-    let found = window::tune(&Request {
-        background: 0.4,
-        signal: 3.0,
-        ..REQUEST
-    });
+    let found = window::tune(
+        &Request {
+            background: 0.4,
+            signal: 3.0,
+            ..REQUEST
+        },
+        NONE,
+    );
     // An exposure of 996 laser cycles has 50,995 of the 1e8 photons.
     assert_eq!(found.unwrap().false_alarms.0, 8 * 245);
+}
+
+/// Each rule reports parts that begin with 0 and end with their totals, and stops where it is told to.
+#[test]
+fn progress_is_reported_and_ends_the_work() {
+    use std::sync::Mutex;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    let request = Request {
+        background: 0.2,
+        bins: 8,
+        l2: 200,
+        signal: 2.0,
+        ..REQUEST
+    };
+    let table = Table::load().unwrap();
+    let run = |rule: usize, progress: Progress| match rule {
+        0 => tune(&request, &table, progress).map(drop),
+        1 => average::tune(&request, progress).map(drop),
+        _ => window::tune(&request, progress).map(drop),
+    };
+    for (rule, parts) in [3, 3, 2].into_iter().enumerate() {
+        let calls = Mutex::new(Vec::new());
+        run(rule, &|done, total| {
+            calls.lock().unwrap().push((done, total));
+            Ok(())
+        })
+        .unwrap();
+        let calls = calls.into_inner().unwrap();
+        let begun: Vec<u64> = calls
+            .iter()
+            .filter(|call| call.0 == 0)
+            .map(|call| call.1)
+            .collect();
+        assert_eq!(begun.len(), parts, "{rule}");
+        let ended: Vec<u64> = calls
+            .iter()
+            .filter(|call| call.0 == call.1)
+            .map(|call| call.1)
+            .collect();
+        assert_eq!(ended, begun, "{rule}");
+        // Calls after an error are those of items that were under way.
+        for last in [0, calls.len() / 2, calls.len() - 2] {
+            let count = AtomicUsize::new(0);
+            let error = run(rule, &|_, _| {
+                anyhow::ensure!(count.fetch_add(1, Ordering::Relaxed) < last, "stopped");
+                Ok(())
+            });
+            assert_eq!(error.unwrap_err().to_string(), "stopped");
+            let extra = count.into_inner() - last;
+            assert!(extra <= 128, "{rule} {last}: {extra}");
+        }
+    }
 }

@@ -14,6 +14,7 @@ use super::shortest::{false_alarms, shortest};
 use super::{Request, candidates, check};
 use crate::looks::detections::{DetectionSettings, Detections};
 use crate::looks::exposure::Looks;
+use crate::progress::Progress;
 
 /// Background counts a bin at the first look for which [`z_for_levels`] is valid.
 const BACKGROUND: std::ops::RangeInclusive<f64> = 0.4..=200.0;
@@ -50,8 +51,9 @@ pub fn one_in(share: f64) -> u32 {
 /// Finds z and L1.
 ///
 /// # Errors
-/// Fails if the request is invalid or cannot be met; the message is one line.
-pub fn tune(request: &Request) -> Result<Tuned> {
+/// Fails if the request is invalid or cannot be met, or if `progress` ends the calculation; the message is
+/// one line.
+pub fn tune(request: &Request, progress: Progress) -> Result<Tuned> {
     check(request)?;
     let sigma = U8F8::saturating_from_num(request.sigma).max(U8F8::DELTA);
     let window = WindowRule::width_for_pulse(sigma);
@@ -89,7 +91,7 @@ pub fn tune(request: &Request) -> Result<Tuned> {
         };
         all.push((settings, (settings, l1, one_in, z)));
     }
-    let ((settings, l1, one_in, z), detections) = shortest(request, &all)?;
+    let ((settings, l1, one_in, z), detections) = shortest(request, &all, progress)?;
     Ok(Tuned {
         sigma,
         window,
@@ -97,7 +99,7 @@ pub fn tune(request: &Request) -> Result<Tuned> {
         one_in,
         l1,
         estimator,
-        false_alarms: false_alarms(request, &settings)?,
+        false_alarms: false_alarms(request, &settings, progress)?,
         detections,
     })
 }

@@ -9,13 +9,11 @@ import os
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Callable, Optional
 
-import numpy
-
 from . import _native
 from ._arrays import native_input, recording_input
 from ._keywords import CalibrateOptions, CompareOptions, Settings, TuneOptions, takes
 from ._options import arguments, settings_text
-from ._run import scene_of
+from ._run import Progress, scene_of
 from ._warn import warn
 
 if TYPE_CHECKING:
@@ -82,17 +80,21 @@ class Comparison(_Settings):
 
 
 @takes(CalibrateOptions)
-def calibrate(recorded: Any, *, settings: Settings = None, **options: Unpack[CalibrateOptions]) -> Calibration:
+def calibrate(
+    recorded: Any, *, settings: Settings = None, progress: Progress = None, **options: Unpack[CalibrateOptions]
+) -> Calibration:
     """Finds background, pulse, cover glass, hot pixels and thresholds in histograms.
 
     ``recorded`` is a recording as for :func:`replay`. ``target_mm`` is the distance of a flat target
     in millimetres; with ``fov`` the ``settings`` also have an offset for each pixel
     (``settings["sensor"]["offsets_mm"]``) if pixels differ. ``glass`` says whether the nearest surface
-    is a cover glass. ``settings`` are older settings, as for :func:`replay`.
+    is a cover glass. ``settings`` are older settings, as for :func:`replay`. ``progress(done, total)`` is
+    called about 20 times a second with steps of each part of the work. An exception in it ends the work,
+    as does Ctrl-C.
     """
     older = None if settings is None else settings_text(settings)
     source = recording_input(recorded, options)
-    found = _native.calibrate(source, older, arguments(CalibrateOptions, options))
+    found = _native.calibrate(source, older, arguments(CalibrateOptions, options), progress)
     warn(found["warnings"])
     return Calibration(
         settings=json.loads(found["settings"]),
@@ -122,7 +124,7 @@ def compare(
     """
     compared = _CompareInput(
         recording=None if recorded is None else recording_input(recorded, options),
-        truth=None if truth is None else native_input(_in_c_order(truth), "truth"),
+        truth=None if truth is None else native_input(truth, "truth"),
         scene=None if scene is None else scene_of(scene),
     )
     found = _native.compare(compared, arguments(CompareOptions, options), progress)
@@ -140,14 +142,14 @@ def compare(
 
 
 @takes(TuneOptions)
-def tune(**options: Unpack[TuneOptions]) -> dict[str, Any]:
+def tune(*, progress: Progress = None, **options: Unpack[TuneOptions]) -> dict[str, Any]:
     """Finds α or z and L1 for a required rate of false alarms, and the performance to expect.
 
     ``background`` is in photons per bin and laser cycle, ``signal`` in photons per laser cycle,
-    ``sigma_bins`` is the standard deviation of the pulse. Each result has ``value``, ``unit`` and ``source``; ``"options"`` has the flags for the
-    command line.
+    ``sigma_bins`` is the standard deviation of the pulse. Each result has ``value``, ``unit`` and ``source``;
+    ``"options"`` has the flags for the command line. ``progress`` is as for :func:`calibrate`.
     """
-    found, flags = _native.tune(arguments(TuneOptions, options))
+    found, flags = _native.tune(arguments(TuneOptions, options), progress)
     return {**json.loads(found), "options": flags}
 
 
@@ -158,10 +160,6 @@ class _CompareInput:
     recording: Any
     truth: Any
     scene: Any
-
-
-def _in_c_order(truth: Any) -> Any:
-    return numpy.ascontiguousarray(truth) if isinstance(truth, numpy.ndarray) else truth
 
 
 def _table(text: str) -> list[dict[str, str]]:

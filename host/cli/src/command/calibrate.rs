@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::path;
+use dtof::progress::Bar;
 use dtof_calibrate::remarks;
 use dtof_calibrate::report::{self, MARKS};
 use dtof_engine::settings::SettingsFile;
@@ -58,7 +59,10 @@ impl Calibrate {
         let (found, settings, collected) = match input {
             Some(input) => {
                 self.from_device.check_unused()?;
-                let calibrated = self.options.0.calibrate(&input.into(), requested.clone())?;
+                let mut bar = Bar::new(self.quiet);
+
+                let options = &self.options.0;
+                let calibrated = options.calibrate(&input.into(), requested.clone(), &mut bar)?;
                 warn(input, calibrated.warnings, self.quiet);
                 (calibrated.found, calibrated.settings, Vec::new())
             }

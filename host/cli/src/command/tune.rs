@@ -4,6 +4,7 @@ use std::io::{self, Write};
 
 use anyhow::Result;
 use clap::Args;
+use dtof::progress::Bar;
 use dtof_run::tune::Options;
 
 use super::flags::Flags;
@@ -19,7 +20,7 @@ pub struct Tune {
 
 impl Tune {
     pub fn run(&self) -> Result<()> {
-        let tuned = self.options.0.tune()?;
+        let tuned = self.options.0.tune(&mut Bar::new(false))?;
         let mut out = io::stdout().lock();
         if self.json {
             writeln!(out, "{}", serde_json::to_string_pretty(&tuned.json())?)?;

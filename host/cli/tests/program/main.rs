@@ -10,6 +10,7 @@ mod dead_time;
 mod decide_once;
 mod device;
 mod export;
+mod interrupt;
 mod neighbours;
 mod offsets;
 mod once_per_bin;

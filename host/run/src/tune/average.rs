@@ -2,14 +2,19 @@
 
 use anyhow::Result;
 use dtof_options::numbers::shortest;
+use dtof_theory::progress::Progress;
 use dtof_theory::tune::{Request, average};
 
 use super::{Line, Options};
 
 impl Options {
     /// α and L1, what to expect of them, and the options for them.
-    pub(super) fn average(&self, request: &Request) -> Result<(Vec<Line>, String)> {
-        let tuned = average::tune(request)?;
+    pub(super) fn average(
+        &self,
+        request: &Request,
+        progress: Progress,
+    ) -> Result<(Vec<Line>, String)> {
+        let tuned = average::tune(request, progress)?;
         let alpha = format!(
             "lowest for these false alarms; simulation: seed {}, {} exposures without a target",
             self.seed, tuned.exposures

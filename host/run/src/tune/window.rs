@@ -4,13 +4,18 @@ use anyhow::{Result, ensure};
 use dtof_core::{CentredWindow, DepthEstimator};
 use dtof_options::Refused;
 use dtof_options::numbers::shortest;
+use dtof_theory::progress::Progress;
 use dtof_theory::tune::{Request, window};
 
 use super::{Line, Options, number};
 
 impl Options {
     /// z and L1, what to expect of them, and the options for them.
-    pub(super) fn window(&self, request: &Request) -> Result<(Vec<Line>, String)> {
+    pub(super) fn window(
+        &self,
+        request: &Request,
+        progress: Progress,
+    ) -> Result<(Vec<Line>, String)> {
         let widest = CentredWindow::WIDEST_PULSE;
         ensure!(
             request.sigma <= widest.to_num::<f64>(),
@@ -20,7 +25,7 @@ impl Options {
                 number(request.sigma)
             ))
         );
-        let tuned = window::tune(request)?;
+        let tuned = window::tune(request, progress)?;
         let z = format!(
             "for a false alarm in {} exposures; simulation: table",
             tuned.one_in

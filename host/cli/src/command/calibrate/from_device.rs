@@ -7,14 +7,14 @@ use anyhow::{Context, Result, ensure};
 use clap::Args;
 use dtof::progress::Bar;
 use dtof::{complain, interrupt};
-use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate};
+use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate_with};
 use dtof_device::histograms::{Collected, SoFar, collect};
 use dtof_device::monitor::array;
 use dtof_device::{Client, Port, Stopped};
 use dtof_engine::settings::{SensorSettings, SettingsFile};
 use dtof_options::Refused;
 use dtof_options::numbers::{MAX_INTEGER, integer};
-use dtof_options::progress::Progress;
+use dtof_options::progress::{Progress, shared};
 use dtof_options::rows::{Row, grouped};
 use dtof_photons::open::BIN_WIDTH_PS;
 use dtof_run::given::Given;
@@ -157,7 +157,8 @@ impl DeviceArgs {
             truth_mm: None,
             slant: slants.as_deref(),
         };
-        let found = calibrate(&observed, options)?;
+        let mut bar = Bar::new(quiet);
+        let found = calibrate_with(&observed, options, &shared(&mut bar, "steps"))?;
         ensure!(
             found.pulse.is_some() || !interrupt::is_interrupted(),
             "ended too soon: no peak is bright enough to measure the pulse; nothing is written"
