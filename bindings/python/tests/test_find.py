@@ -72,6 +72,8 @@ def test_compare(program, tmp_path, counts):
     steps = []
     found = dtof.compare(counts, truth=truth, cycles=6000, progress=steps.append, **OPTIONS)
     assert found.toml == (out / "dtof.toml").read_text()
+    other_order = dtof.compare(counts, truth=numpy.asfortranarray(truth), cycles=6000, **OPTIONS)
+    assert other_order.methods == found.methods
     for rows, name in [(found.methods, "methods.csv"), (found.stress, "stress.csv")]:
         with open(out / name) as file:
             assert rows == list(csv.DictReader(file))

@@ -39,7 +39,7 @@ def test_photons_in_one_array_or_table():
     for wrong in (table.drop(columns="bin"), numpy.ones((5, 2), int), numpy.ones((5, 3)), [1, 2, 3], None):
         with pytest.raises(dtof.Error):
             dtof.photons(wrong)
-    with pytest.raises(dtof.Error, match="a table without a column bin: .*to_numpy"):
+    with pytest.raises(dtof.Error, match="bin is missing: .*to_numpy"):
         dtof.replay(table.drop(columns="bin"))
 
 

@@ -5,6 +5,7 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
+use dtof_photons::npy;
 use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 
@@ -29,7 +30,8 @@ fn record(text: &str) -> Result<Vec<u8>> {
         }
         left -= cycles;
     }
-    let shape = (scene.array()?.rows(), scene.array()?.columns(), scene.bins);
+    let array = scene.array()?;
+    let shape = [array.rows(), array.columns(), scene.bins.into()].map(u64::from);
     let counts: Vec<u16> = counts.into_iter().flatten().collect();
     // A byte each, if all fit.
     let small: Result<Vec<u8>, _> = counts.iter().map(|&count| u8::try_from(count)).collect();
@@ -40,9 +42,7 @@ fn record(text: &str) -> Result<Vec<u8>> {
             counts.into_iter().flat_map(u16::to_le_bytes).collect(),
         ),
     };
-    let header = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape:?}, }}");
-    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
-    bytes.extend(format!("{header:<117}\n").bytes());
+    let mut bytes = npy::header(kind, &shape, 128);
     bytes.extend(data);
     Ok(bytes)
 }

@@ -96,7 +96,7 @@ def native_input(value: Any, name: str) -> Input:
     except (TypeError, ValueError) as error:
         raise Error(f"{name}: not an array: {_line(error)}") from error
     if array.dtype.hasobject:
-        raise Error(f"{name}: an array of {array.dtype}: must be numbers")
+        raise Error(f"{name}: the elements are Python objects: must be numbers; convert them, as with .astype(int)")
     small = {"bool": "u1", "float16": "f4"}.get(array.dtype.name)
     if small is not None:
         array = array.astype(small)
@@ -120,18 +120,24 @@ def recording_input(recorded: Any, options: Any) -> Input:
 def _array_of(value: Any, name: str) -> Any:
     """The array of a table of photons or a sparse matrix; anything else as it is."""
     if is_table(value):
-        missing = [column for column in PHOTON if column not in value.columns]
-        if missing:
-            raise Error(
-                f"{name}: a table without a column {missing[0]}: photons have pixel, cycle and bin; "
-                "histograms are arrays, as from .to_numpy()"
-            )
-        return photon_list(*(value[column] for column in PHOTON))
+        return photon_list(*photon_columns(value, name))
     if hasattr(value, "toarray") and hasattr(value, "nnz"):
         if len(value.shape) != 2 or value.shape[0] > 65_536 or value.shape[1] > 4096:
             raise Error(f"{name}: a sparse array of {value.shape}: must have at most 65536 pixels and 4096 bins")
         return value.toarray()
     return value
+
+
+def photon_columns(photons: Any, name: str) -> list[Any]:
+    """Pixel, cycle and bin of a table, or of an array with fields."""
+    names = photons.columns if is_table(photons) else photons.dtype.names
+    missing = [column for column in PHOTON if column not in names]
+    if missing:
+        raise Error(
+            f"{name}: {missing[0]} is missing: photons have pixel, cycle and bin; "
+            "histograms are arrays, as from .to_numpy()"
+        )
+    return [photons[column] for column in PHOTON]
 
 
 def is_table(value: Any) -> bool:
@@ -159,7 +165,7 @@ def named_axes(value: Any, name: str) -> Optional[str]:
 def photon_list(pixel: Any, cycle: Any, bin: Any) -> numpy.ndarray:
     """A photon list with the smallest possible types."""
     columns = {"pixel": pixel, "cycle": cycle, "bin": bin}
-    columns = {name: _integers(name, values) for name, values in columns.items()}
+    columns = {name: integers(f"photons: {name}", values) for name, values in columns.items()}
     lengths = {values.size for values in columns.values() if values.ndim == 1}
     if len(lengths) != 1:
         shapes = ", ".join(f"{name} {values.shape}" for name, values in columns.items())
@@ -171,17 +177,18 @@ def photon_list(pixel: Any, cycle: Any, bin: Any) -> numpy.ndarray:
     return photons
 
 
-def _integers(name: str, values: Any) -> numpy.ndarray:
+def integers(name: str, values: Any) -> numpy.ndarray:
+    """One number, or an array of integers with one axis."""
     if isinstance(values, numpy.ma.MaskedArray):
-        raise Error(f"photons: {name} is a masked array; leave the masked photons out first")
+        raise Error(f"{name} is a masked array; leave the masked photons out first")
     try:
         array = numpy.asarray(values)
     except (TypeError, ValueError, OverflowError) as error:
-        raise Error(f"photons: {name} is not an array: {_line(error)}") from error
+        raise Error(f"{name} is not an array: {_line(error)}") from error
+    if array.shape == (0,):
+        return array.astype("u2")
     if array.dtype.kind not in "iu" or array.ndim > 1:
-        raise Error(
-            f"photons: {name} is {array.dtype} with {array.ndim} axes: must be integers with one"
-        )
+        raise Error(f"{name} is {array.dtype} with {array.ndim} axes: must be integers with one")
     return array
 
 

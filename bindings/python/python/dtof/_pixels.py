@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy
 
 from . import _native
-from ._arrays import Array, array_of, events_of
+from ._arrays import Array, array_of, events_of, integers
 from ._keywords import PixelOptions, takes
 from ._options import arguments
 from ._pixel import whole
@@ -97,14 +97,7 @@ class Pixels:
 
 
 def _numbers(name: str, values: Any) -> numpy.ndarray:
-    try:
-        array = numpy.atleast_1d(numpy.asarray(values))
-    except (TypeError, ValueError, OverflowError) as error:
-        raise _native.Error(f"{name}: not an array of integers") from error
-    if array.size == 0:
-        return numpy.empty(0, "<u2")
-    if array.dtype.kind not in "iu" or array.ndim > 1:
-        raise _native.Error(f"{name}: {array.dtype} with {array.ndim} axes: must be integers with one")
-    if array.min() < 0 or array.max() > 65535:
+    array = numpy.atleast_1d(integers(name, values))
+    if array.size and (array.min() < 0 or array.max() > 65535):
         raise _native.Error(f"{name}: must be from 0 to 65535")
     return array.astype("<u2")

@@ -11,6 +11,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
 use std::time::Duration;
 
+use dtof_photons::npy;
 use tempfile::TempDir;
 
 /// The cells of each row of a table, `a | b | c`. A cell may hold `\n` for a line end.
@@ -133,11 +134,10 @@ impl Scratch {
 
 /// An array as NumPy writes them.
 pub fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
-    let mut header =
-        format!("{{'descr': '{descr}', 'fortran_order': False, 'shape': {shape}, }}").into_bytes();
-    header.resize(117, b' ');
-    header.push(b'\n');
-    [b"\x93NUMPY\x01\x00\x76\x00", &header[..], data].concat()
+    let lengths = shape.trim_matches(['(', ')']).split(',');
+    let lengths = lengths.filter_map(|length| length.trim().parse().ok());
+    let lengths: Vec<u64> = lengths.collect();
+    [&npy::header(descr, &lengths, 128), data].concat()
 }
 
 /// The most memory a process had, in kB, as long as it ran.

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Error, Result, anyhow, ensure};
@@ -10,6 +9,7 @@ use serde::Serialize;
 use toml::{Table, Value};
 
 use super::{DetectionSettings, RaySettings, RunSettings, SensorSettings};
+use dtof_options::files::read_text;
 use dtof_options::numbers::boolean;
 use dtof_options::{KeysOfFile, NO_OPTION, Refused};
 
@@ -73,8 +73,7 @@ impl SettingsFile {
     /// # Errors
     /// Returns one line with the name of the file, and the line or the key that is wrong.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = fs::read_to_string(path).with_context(|| path.display().to_string())?;
-        Self::parse_as(path, &text)
+        Self::parse_as(path, &read_text(path)?)
     }
 
     /// Parses the text of a file, which errors call `path`.

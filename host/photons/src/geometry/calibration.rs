@@ -1,7 +1,5 @@
 //! Calibration files: a direction and a range bias for each pixel.
 
-use std::fs::File;
-use std::io::Read;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, ensure};
@@ -11,9 +9,7 @@ use toml::Spanned;
 
 use super::{Ray, unit};
 use crate::range::within;
-
-/// No calibration file of 65,536 pixels is longer.
-const MOST_BYTES: u64 = 1 << 24;
+use dtof_options::files::read_text;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -25,17 +21,8 @@ struct CalibrationFile {
 }
 
 pub fn read(path: &Path, array: Array) -> Result<Vec<Ray>> {
-    let name = || path.display().to_string();
-    let mut text = String::new();
-    let file = File::open(path).with_context(name)?;
-    // Some files, such as `/dev/zero`, have no end.
-    let read = file.take(MOST_BYTES + 1).read_to_string(&mut text);
-    ensure!(
-        read.with_context(name)? as u64 <= MOST_BYTES,
-        "{}: more than {MOST_BYTES} bytes: no calibration file is so long",
-        name()
-    );
-    parse(&text, array).with_context(name)
+    let text = read_text(path)?;
+    parse(&text, array).with_context(|| path.display().to_string())
 }
 
 pub(super) fn parse(text: &str, array: Array) -> Result<Vec<Ray>> {

@@ -198,20 +198,18 @@ impl Header {
         let mut before = start.len() as u64;
         if version > 1 {
             let mut high = [0; 2];
-            file.read_exact(&mut high)?;
+            let read = file.read_exact(&mut high);
+            ensure!(read.is_ok(), not_npy(CUT));
             bytes |= u64::from(u16::from_le_bytes(high)) << 16;
             before += 2;
         }
         ensure!(
-            bytes <= length.min(MOST_BYTES),
+            bytes <= MOST_BYTES,
             "the header is longer than one of numbers can be"
         );
         let mut header = Vec::new();
         file.take(bytes).read_to_end(&mut header)?;
-        ensure!(
-            header.len() as u64 == bytes,
-            not_npy("the file ends within its header")
-        );
+        ensure!(header.len() as u64 == bytes, not_npy(CUT));
         let text = match version {
             3 => String::from_utf8(header).map_err(|_| not_npy("the header is not UTF-8"))?,
             // Latin-1.
@@ -219,6 +217,11 @@ impl Header {
         };
         let dictionary = Literals::only(text.trim_end())?;
         let (header, each) = Self::from_dictionary(&dictionary)?;
+        let is_object = matches!(&header.elements, Elements::Plain(element) if element.kind == 'O');
+        ensure!(
+            !is_object,
+            "the elements are Python objects: must be numbers; convert them, as with .astype(int)"
+        );
         let data = length.saturating_sub(before + bytes);
         let shape = &header.shape;
         let mut axes = shape.iter();
@@ -273,6 +276,9 @@ impl Header {
         Ok((header, bytes))
     }
 }
+
+/// The file is shorter than its header.
+const CUT: &str = "the file ends within its header";
 
 /// The error of a file that is not in NumPy's format.
 fn not_npy(reason: impl fmt::Display) -> Error {

@@ -8,6 +8,7 @@ use dtof_core::{Array, DepthEvent, EchoNumber};
 use dtof_engine::settings::Settings;
 use dtof_events::echoes::{Echo, EchoSelection};
 use dtof_events::histories::PixelHistories;
+use dtof_photons::npy;
 use dtof_photons::ranges::Ranges;
 
 /// 64-bit floats, rows by columns; not a number without an event.
@@ -30,8 +31,8 @@ pub const MARK: &str = match str::from_utf8(&[b' '; 128]) {
     Err(_) => panic!("spaces are text"),
 };
 
-/// The header's length is 246 = 0xf6, so that it ends at byte 256.
-const NPY_1_0: &[u8] = b"\x93NUMPY\x01\x00\xf6\x00";
+/// So long that it ends with the mark.
+const HEADER_BYTES: usize = 256;
 
 /// The depth of one echo of each exposure.
 pub struct Layer {
@@ -77,11 +78,8 @@ impl Layer {
 
 /// An array with a value for each pixel.
 pub fn array(array: Array, values: impl Iterator<Item = f64>) -> Vec<u8> {
-    let (rows, columns) = (array.rows(), array.columns());
-    let header =
-        format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({rows}, {columns}), }}");
-    let mut bytes = NPY_1_0.to_vec();
-    bytes.extend(format!("{header:<245}\n").bytes());
+    let shape = [array.rows(), array.columns()].map(u64::from);
+    let mut bytes = npy::header("<f8", &shape, HEADER_BYTES);
     bytes.extend(values.flat_map(f64::to_le_bytes));
     bytes
 }

@@ -1,6 +1,5 @@
 //! Scene files. `docs/scenes.md` lists the keys.
 
-use std::fs;
 use std::path::Path;
 
 use anyhow::{Context, Result, anyhow, ensure};
@@ -19,6 +18,7 @@ use crate::effects::second_echo::SecondEcho;
 use crate::effects::tail::Tail;
 use crate::effects::tdc::Tdc;
 use dtof_options::Refused;
+use dtof_options::files::read_text;
 use dtof_options::numbers::bins_of;
 use dtof_photons::MM_PER_PS;
 use dtof_photons::geometry::FieldOfView;
@@ -108,9 +108,8 @@ impl Scene {
     /// # Errors
     /// Returns one line with the name of the file, and the line or the key that is wrong.
     pub fn read(path: &Path) -> Result<Self> {
-        let name = || path.display().to_string();
-        let text = fs::read_to_string(path).with_context(name)?;
-        Self::parse(&text).with_context(name)
+        let text = read_text(path)?;
+        Self::parse(&text).with_context(|| path.display().to_string())
     }
 
     /// Parses the text of a scene file.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use crate::common::{Scratch, assert_contains, npy};
+use dtof_photons::npy::header;
 
 fn array(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/program/replay/numpy");
@@ -256,16 +257,8 @@ fn records_that_are_not_photons_are_named_by_number() {
         .concat()
     };
     let refused = |fields: &str, records: &[Vec<u8>], parts: &[&str]| {
-        let header = format!(
-            "{{'descr': {fields}, 'fortran_order': False, 'shape': ({},), }}",
-            records.len()
-        );
-        let mut bytes = b"\x93NUMPY\x01\x00\xf6\x00".to_vec();
-        bytes.extend(header.bytes());
-        bytes.resize(255, b' ');
-        bytes.push(b'\n');
-        bytes.extend(records.concat());
-        let input = scratch.file("list.npy", bytes);
+        let header = header(fields, &[records.len() as u64], 128);
+        let input = scratch.file("list.npy", [header, records.concat()].concat());
         scratch.refused(&scratch.replay(&input, ""), parts);
     };
     let fields = "[('pixel', '<i2'), ('cycle', '<i4'), ('bin', '<i2')]";

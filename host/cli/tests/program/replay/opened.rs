@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use dtof_core::Array;
 use dtof_photons::input::{Input, NpyArray};
+use dtof_photons::npy::header;
 use dtof_photons::open::{BIN_WIDTH_PS, Counts, ReadOptions, counts, open};
 use dtof_sensors::{tmf882x, tmf8829};
 use flate2::Compression;
@@ -176,13 +177,7 @@ fn an_array_in_memory_is_read_as_its_file_is() {
     let scratch = Scratch::new();
     let descr = "[('pixel', '<u2'), ('cycle', '<u2'), ('bin', '|u1')]";
     let list = |rows: &[[u8; 5]]| {
-        let text = format!(
-            "{{'descr': {descr}, 'fortran_order': False, 'shape': ({},), }}\n",
-            rows.len()
-        );
-        let mut header = b"\x93NUMPY\x01\x00".to_vec();
-        header.extend(u16::try_from(text.len()).unwrap().to_le_bytes());
-        header.extend(text.as_bytes());
+        let header = header(descr, &[rows.len() as u64], 128);
         let path = scratch.path("list.npy");
         std::fs::write(&path, [&header[..], rows.as_flattened()].concat()).unwrap();
         let array = NpyArray {

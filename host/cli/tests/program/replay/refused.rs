@@ -317,6 +317,45 @@ fn an_npy_header_made_to_take_long_is_refused_at_once() {
 }
 
 #[test]
+fn a_file_that_ends_within_its_header_is_named() {
+    let whole = npy(&described("<u4", "False", "(2, 16)"), &[0; 128]);
+    for end in [10, 11, 60, 127] {
+        let part = "recorded.npy: not an .npy file as numpy.save writes it: the file ends within its header";
+        refused("recorded.npy", &whole[..end], &[part]);
+    }
+    for start in [
+        &b"\x93NUMPY\x02\x00\x76\x00"[..],
+        b"\x93NUMPY\x03\x00\x76\x00\x00",
+    ] {
+        refused("recorded.npy", start, &["the file ends within its header"]);
+    }
+}
+
+#[test]
+fn an_array_of_python_objects_is_refused_with_a_remedy() {
+    for descr in ["|O", "|O8"] {
+        let part =
+            "the elements are Python objects: must be numbers; convert them, as with .astype(int)";
+        npy_refused(&described(descr, "False", "(2, 16)"), &[0; 200], &[part]);
+    }
+}
+
+#[test]
+fn a_text_file_that_is_not_utf_8_is_named_with_its_line() {
+    let scratch = Scratch::new();
+    let photon = scratch.file("photons.csv", PHOTON);
+    let bytes = b"# first\n# Pr\xfcfstand\n[run]\nseed = 1\n";
+    let part = ": line 2: not UTF-8; save the file as UTF-8";
+    let file = scratch.file("latin.toml", bytes);
+    let output = scratch.replay(&photon, "--settings latin.toml");
+    scratch.refused(&output, &[&format!("latin.toml{part}")]);
+    scratch.refused(
+        &scratch.simulate(&file, ""),
+        &[&format!("latin.toml{part}")],
+    );
+}
+
+#[test]
 fn a_failed_run_leaves_the_results_of_the_one_before() {
     let scratch = Scratch::new();
     let good = scratch.file("good.csv", PHOTON);

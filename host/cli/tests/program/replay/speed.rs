@@ -11,6 +11,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
+use dtof_photons::npy::header;
+
 use crate::common::{Scratch, npy, peak_kb};
 
 const PIXELS: u64 = 64 * 64;
@@ -53,10 +55,8 @@ fn write_histograms(path: &Path, photons: u64) {
 /// A list of so many photons, `a_cycle` in each laser cycle, as an `.npy` and as a `.csv` file.
 fn write_lists(npy: &Path, csv: Option<&Path>, photons: u64, a_cycle: u64) {
     let fields = "[('pixel', '<u2'), ('cycle', '<u4'), ('bin', '<u2')]";
-    let header = format!("{{'descr': {fields}, 'fortran_order': False, 'shape': ({photons},), }}");
     let mut npy = BufWriter::new(File::create(npy).unwrap());
-    npy.write_all(b"\x93NUMPY\x01\x00\xf6\x00").unwrap();
-    writeln!(npy, "{header:<245}").unwrap();
+    npy.write_all(&header(fields, &[photons], 256)).unwrap();
     let mut csv = csv.map(|path| BufWriter::new(File::create(path).unwrap()));
     if let Some(csv) = &mut csv {
         writeln!(csv, "pixel,cycle,bin").unwrap();
