@@ -51,17 +51,6 @@ function pixelName(pixel) {
   return `${column} ${pixel % data.columns}, ${row} ${Math.floor(pixel / data.columns)}`;
 }
 
-/** Writes a text that can be read on whatever is below it. */
-function writeOver(lines, text, x, y) {
-  lines.save();
-  lines.strokeStyle = getComputedStyle(lines.canvas).getPropertyValue("--card");
-  lines.lineWidth = 4;
-  lines.lineJoin = "round";
-  lines.strokeText(text, x, y);
-  lines.restore();
-  lines.fillText(text, x, y);
-}
-
 /** The context of a canvas that has as many pixels as the screen shows of it. */
 function context(canvas) {
   const ratio = Math.min(2, window.devicePixelRatio || 1);

@@ -7,7 +7,7 @@
 function drawHistogram(canvas, shot, gate) {
   const { context: lines, width, height, ink, soft, line } = context(canvas);
   if (!shot?.counts) return;
-  const box = { left: 46, right: width - 12, top: 24, bottom: height - 36 };
+  const box = { left: 46, right: width - 12, top: 44, bottom: height - 36 };
   const bins = shot.counts.length;
   const { peak = [0, 0], needed = null, background = null, quadrants = [], dead_time: deadTime = 0 } = shot.look ?? {};
   // A threshold that no photons would reach is not to flatten the rest.
@@ -31,7 +31,7 @@ function drawHistogram(canvas, shot, gate) {
   }
   lines.fillText("bin", (box.left + box.right) / 2, height - 5);
   lines.textAlign = "left";
-  lines.fillText("photons", 4, 14);
+  lines.fillText("photons", 16, box.top - 8);
 
   // The window or the quadrants of the rule.
   if (shot.look?.window) {
@@ -65,30 +65,36 @@ function drawHistogram(canvas, shot, gate) {
     // Above all bars, its arrow over the bin.
     lines.textAlign = isLeft ? "left" : "right";
     const mirrored = `peak: ${number(peak[1])} in bin ${peak[0]} ▾`;
-    lines.fillText(isLeft ? text : mirrored, Math.max(isLeft ? 62 : 0, at + (isLeft ? -arrow : arrow)), box.top - 5);
+    lines.fillText(isLeft ? text : mirrored, Math.max(isLeft ? 74 : 0, at + (isLeft ? -arrow : arrow)), box.top - 8);
   }
-  // Names on the side away from the peak.
-  const side = isLeft ? "right" : "left";
-  if (needed !== null && needed > 0 && needed < top) mark(lines, box, y(needed), ink, `${number(needed)} needed`, [], side);
+  // Levels, and their names above the bars.
+  const levels = [];
+  const isSeen = needed !== null && needed > 0 && needed < top;
+  if (isSeen) levels.push({ name: `${number(needed)} needed`, colour: ink, dash: [], at: () => y(needed) });
   if (background > 0 && deadTime > 0) {
     const live = liveOf(shot.counts, shot.exposure, deadTime);
-    const levels = live.map((cycles) => (background * cycles) / live[peak[0]]);
-    lines.strokeStyle = lines.fillStyle = soft;
+    const at = (bin) => y((background * live[bin]) / live[peak[0]]);
+    levels.push({ name: `background ${number(background, 1)} at the peak`, colour: soft, dash: [4, 4], at });
+  } else if (background > 0) {
+    levels.push({ name: `background ${number(background, 1)}`, colour: soft, dash: [4, 4], at: () => y(background) });
+  }
+  let next = 16;
+  for (const { name, colour, dash, at } of levels) {
+    lines.strokeStyle = lines.fillStyle = colour;
     lines.lineWidth = 1.5;
-    lines.setLineDash([4, 4]);
+    lines.setLineDash(dash);
     lines.beginPath();
     for (let bin = first; bin <= last; bin++) {
-      lines.lineTo(x(bin), y(levels[bin]));
-      lines.lineTo(x(bin + 1), y(levels[bin]));
+      lines.lineTo(x(bin), at(bin));
+      lines.lineTo(x(bin + 1), at(bin));
     }
+    lines.moveTo(next, 10);
+    lines.lineTo(next + 20, 10);
     lines.stroke();
     lines.setLineDash([]);
-    lines.textAlign = side;
-    const end = y(levels[side === "right" ? last : first]);
-    writeOver(lines, `background ${number(background, 1)} at the peak`, side === "right" ? box.right - 2 : box.left + 4, end - 4);
-  } else if (background > 0) {
-    const isFree = !needed || y(background) - y(needed) > 16;
-    mark(lines, box, y(background), soft, isFree ? `background ${number(background, 1)}` : "", [4, 4], side);
+    lines.textAlign = "left";
+    lines.fillText(name, next + 26, 14);
+    next += 42 + lines.measureText(name).width;
   }
 }
 
@@ -98,20 +104,6 @@ function liveOf(counts, cycles, deadTime) {
     const before = counts.slice(Math.max(0, bin - deadTime), bin);
     return Math.max(0, cycles - before.reduce((sum, count) => sum + count, 0));
   });
-}
-
-/** A level line with its name. */
-function mark(lines, box, at, colour, text, dash, side) {
-  lines.strokeStyle = lines.fillStyle = colour;
-  lines.lineWidth = 1.5;
-  lines.setLineDash(dash);
-  lines.beginPath();
-  lines.moveTo(box.left, at);
-  lines.lineTo(box.right, at);
-  lines.stroke();
-  lines.setLineDash([]);
-  lines.textAlign = side;
-  writeOver(lines, text, side === "right" ? box.right - 2 : box.left + 4, at - 4);
 }
 
 /** The numbers of an upright axis from 0 to top. */

@@ -46,7 +46,7 @@ function camera([across, down, along], width, height) {
   const seen = (a, b) => across.length * Math.abs(a) + along.length * Math.abs(b);
   const wide = seen(cosYaw, sinYaw);
   const high = down.length * cosPitch + seen(sinYaw, cosYaw) * Math.abs(sinPitch);
-  const fit = Math.min((width - 110) / wide, (height - 90) / high);
+  const fit = Math.min((width - 130) / wide, (height - 90) / high);
   const scale = Math.max(40, fit) * zoom;
   return {
     scale,

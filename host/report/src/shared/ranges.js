@@ -52,7 +52,7 @@ function drawRanges(canvas, events, { laserHz, first, last, from, now, span, isS
     lines.textAlign = "center";
     lines.fillText(isWhole ? unit : `time, ${unit}`, (box.left + box.right) / 2, height - 5);
     lines.textAlign = "left";
-    lines.fillText("range, mm", 4, 14);
+    lines.fillText("range, mm", 16, 14);
   }
   for (const event of events) {
     // What is flagged is hollow, unless neighbours confirmed it; a block or a later echo a square.
