@@ -8,6 +8,7 @@ mod bus;
 pub mod failures;
 pub mod methods;
 mod movie;
+mod pixel;
 mod timing;
 
 use crate::studies::beyond::dither;
@@ -151,6 +152,7 @@ pub fn documents(
         documents.push((page.into(), values.fill(template)?));
     }
     documents.push(("figures/demo.svg".into(), movie::demo()?));
+    documents.push(("figures/pixel.svg".into(), pixel::pixel()?));
     documents.push(("figures/processing.svg".into(), timing::timing()));
     Ok(documents)
 }
