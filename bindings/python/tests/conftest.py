@@ -29,10 +29,11 @@ def program():
 
     def run(*arguments, check=True):
         arguments = [name, *map(os.fspath, arguments)]
-        done = subprocess.run(arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        done = subprocess.run(arguments, capture_output=True, text=True)
         assert not check or done.returncode == 0, done.stderr
         return done.stdout if check else done.stderr
 
+    run.name = name
     return run
 
 

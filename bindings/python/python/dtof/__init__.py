@@ -20,6 +20,7 @@ from ._native import Error, __version__
 from ._pixel import Pixel
 from ._pixels import Pixels
 from ._run import Replay, photons, replay, simulate
+from ._view import View, view
 
 __all__ = [
     "EVENT",
@@ -32,6 +33,7 @@ __all__ = [
     "Pixels",
     "Recording",
     "Replay",
+    "View",
     "__version__",
     "calibrate",
     "compare",
@@ -45,5 +47,6 @@ __all__ = [
     "replay",
     "simulate",
     "tune",
+    "view",
     "write_events",
 ]

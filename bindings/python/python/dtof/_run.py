@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any, Callable, Optional
 import numpy
 
 from . import _native
-from ._arrays import PHOTON, Array, array_of, events_of, is_table, native_input, photon_list, recording_input
+from ._arrays import Array, array_of, events_of, is_table, native_input, photon_columns, photon_list, recording_input
 from ._files import export, write_events
 from ._html import depth_image
 from ._keywords import Echo, PointsOptions, ReplayOptions, SimulateOptions, takes
 from ._maps import depth_map, points, reflectivity
 from ._options import arguments
+from ._view import View, view
 from ._warn import warn
 
 if TYPE_CHECKING:
@@ -73,6 +74,10 @@ class Replay:
     def write_events(self, path: Any) -> None:
         """Writes the events as an AER file; see :func:`dtof.write_events`."""
         write_events(path, self.events, self.array)
+
+    def view(self, **options: Any) -> View:
+        """See :func:`dtof.view`."""
+        return view(self, **options)
 
     @takes(PointsOptions)
     def export(self, path: Any, format: Optional[str] = None, **options: Unpack[PointsOptions]) -> None:
@@ -174,12 +179,8 @@ def quiet_result(done: dict[str, Any]) -> Replay:
 
 def _columns(photons: Any) -> tuple[Any, ...]:
     """Pixel, cycle and bin of a list of photons."""
-    names = getattr(getattr(photons, "dtype", None), "names", None)
-    if is_table(photons) or names is not None:
-        missing = [name for name in PHOTON if name not in (photons.columns if names is None else names)]
-        if missing:
-            raise _native.Error(f"photons: {missing[0]} is missing: must be pixel, cycle and bin")
-        return tuple(photons[name] for name in PHOTON)
+    if is_table(photons) or getattr(getattr(photons, "dtype", None), "names", None) is not None:
+        return tuple(photon_columns(photons, "photons"))
     try:
         array = numpy.asarray(photons)
     except (TypeError, ValueError) as error:
