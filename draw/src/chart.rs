@@ -1,9 +1,9 @@
 //! Charts as SVG documents: measured points are dots with confidence intervals, calculated
 //! values are lines.
 //!
-//! The title states the finding. Each curve has its name at its end; names that would overlap
-//! are moved apart. Axis labels never touch. Many curves are drawn as small multiples: panels
-//! with the same axes.
+//! The title states the finding. Each curve has its name at its end, or at the first place beside it
+//! where the name touches nothing; a name without a place stands in a legend below the panels. Many
+//! curves are drawn as small multiples: panels with the same axes.
 
 mod draw;
 mod names;

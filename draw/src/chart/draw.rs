@@ -3,8 +3,8 @@
 use anyhow::{Result, ensure};
 
 use super::names::Area;
-use super::panel::{self, LINE, Names};
-use super::parts::{Chart, Panel};
+use super::panel::{self, LINE, Names, TO_NAME};
+use super::parts::{Chart, Key, Panel, Style};
 use super::scale::{GAP, Scale, Tick};
 use crate::svg::{Anchor, EDGE, Svg, TEXT, TITLE, text_width, wrapped};
 
@@ -27,12 +27,13 @@ pub fn chart(chart: &Chart) -> Result<String> {
     let title = chart.title();
     let lines = wrapped(&title, TITLE.0, INNER);
     let mut y = svg.lines("ink title", (EDGE, EDGE), TITLE, Anchor::Start, &lines);
-    y = key(&mut svg, chart, y + 6.0);
+    y = key(&mut svg, &chart.key, y + 6.0);
     let soft = |svg: &mut Svg, y, text| {
         let lines = wrapped(text, TEXT, INNER);
         svg.lines("soft", (EDGE, y), (TEXT, LINE), Anchor::Start, &lines)
     };
     y = soft(&mut svg, y, &chart.y.label) + 8.0;
+    let mut left_out: Vec<Key> = Vec::new();
     let rows: Vec<&[Panel]> = chart.panels.chunks(layout.columns).collect();
     for (row, panels) in rows.iter().enumerate() {
         let title_lines = panels.iter().map(|panel| layout.title(panel).len());
@@ -40,11 +41,17 @@ pub fn chart(chart: &Chart) -> Result<String> {
         let below = rows.get(row + 1).map_or(0, |below| below.len());
         for (column, panel) in panels.iter().enumerate() {
             let area = layout.area(column, top);
-            let (at, lines) = ((area.left, y - LINE / 10.0), layout.title(panel));
+            // Clear of a dot or ring at the upper edge of the plot.
+            let (at, lines) = ((area.left, y - 7.5), layout.title(panel));
             svg.lines("ink panel", at, (TEXT, LINE), Anchor::Start, &lines);
             layout.frame(&mut svg, &area, column, column >= below);
             let scales = (&layout.x, &layout.y);
-            panel::draw(&mut svg, panel, scales, &area, &layout.names[column]);
+            let names = panel::draw(&mut svg, panel, scales, &area, &layout.names[column]);
+            for name in names {
+                if !left_out.iter().any(|other| other.text == name.text) {
+                    left_out.push(name);
+                }
+            }
         }
         y = top + layout.height + ROW_GAP;
     }
@@ -52,14 +59,15 @@ pub fn chart(chart: &Chart) -> Result<String> {
     let right = layout.area(layout.columns - 1, 0.0).right;
     let middle = (f64::midpoint(layout.left, right), y + LINE / 2.0);
     svg.text("soft", middle, TEXT, Anchor::Middle, &chart.x.label);
-    y = soft(&mut svg, y + LINE + 8.0, &chart.note);
+    y = key(&mut svg, &left_out, y + LINE + 8.0);
+    y = soft(&mut svg, y, &chart.note);
     Ok(svg.document((WIDTH, y + EDGE - 4.0), &title))
 }
 
 /// Draws the legend. Returns its bottom.
-fn key(svg: &mut Svg, chart: &Chart, mut y: f64) -> f64 {
+fn key(svg: &mut Svg, keys: &[Key], mut y: f64) -> f64 {
     let mut x = EDGE;
-    for key in &chart.key {
+    for key in keys {
         let width = 36.0 + text_width(&key.text, TEXT);
         if x > EDGE && x + width > WIDTH - EDGE {
             (x, y) = (EDGE, y + LINE);
@@ -71,16 +79,15 @@ fn key(svg: &mut Svg, chart: &Chart, mut y: f64) -> f64 {
             panel::interval(svg, (middle, y + 2.0), (middle, y + LINE - 2.0));
             panel::dot(svg, key.pen.mark, (middle, y + LINE / 2.0), 4.2, true);
         }
+        if key.style == Style::Ring {
+            panel::ring(svg, (middle, y + LINE / 2.0));
+        }
         svg.raw("</g>");
         let at = (x + 34.0, y + LINE / 2.0);
         svg.text("ink", at, TEXT, Anchor::Start, &key.text);
         x += width + 14.0;
     }
-    if chart.key.is_empty() {
-        y
-    } else {
-        y + LINE + 4.0
-    }
+    if keys.is_empty() { y } else { y + LINE + 4.0 }
 }
 
 /// The positions of the panels, and their common axes.
@@ -128,19 +135,24 @@ impl Layout {
             (_, false) => HEIGHTS[1],
             (_, true) => HEIGHTS[2],
         };
+        let max_width = if columns == 1 { 165.0 } else { 105.0 };
+        let names: Vec<Names> = (0..columns)
+            .map(|column| {
+                let panels = chart.panels.iter().skip(column).step_by(columns);
+                Names::new(panels, &x, max_width)
+            })
+            .collect();
+        // All names fit beside the plots.
+        let height = names
+            .iter()
+            .map(|names| names.height - LINE)
+            .fold(height, f64::max);
         let y_ticks = y.ticks(height, |_| TEXT);
         let widest = |ticks: &[Tick]| {
             let widths = ticks.iter().map(|tick| text_width(&tick.label, TEXT));
             widths.fold(0.0, f64::max)
         };
         let left = EDGE + widest(&y_ticks) + 8.0;
-        let max_width = if columns == 1 { 165.0 } else { 105.0 };
-        let names: Vec<Names> = (0..columns)
-            .map(|column| {
-                let panels = chart.panels.iter().skip(column).step_by(columns);
-                Names::new(panels.flat_map(|panel| &panel.series), &x, max_width)
-            })
-            .collect();
         let beside: f64 = names.iter().map(|names| names.width).sum();
         let whole = WIDTH - left - EDGE - beside;
         let plot = |gap: f64| (whole - gap * (columns as f64 - 1.0)) / columns as f64;
@@ -169,7 +181,13 @@ impl Layout {
     }
 
     fn title(&self, panel: &Panel) -> Vec<String> {
-        wrapped(&panel.title, TEXT, self.width + self.gap / 2.0)
+        let has_names = self.names.iter().any(|names| names.width > 0.0);
+        let beside = if has_names {
+            TO_NAME / 2.0
+        } else {
+            self.gap / 2.0
+        };
+        wrapped(&panel.title, TEXT, self.width + beside.min(self.gap / 2.0))
     }
 
     /// Draws grid and axes of a plot. The first column has the labels of y; `has_x_labels` asks

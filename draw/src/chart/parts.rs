@@ -140,7 +140,8 @@ impl Axis {
 /// A series of points.
 #[derive(Clone, Debug)]
 pub struct Series {
-    /// The name, drawn at the end of the curve or beside its only dot.
+    /// The name, drawn at the end of the curve or beside one of its dots; in a legend below the panels if
+    /// there is no free place.
     pub name: Option<String>,
     /// Colour and mark.
     pub pen: Pen,
@@ -185,11 +186,13 @@ pub enum Style {
     Dots,
     /// Measured: dots with their intervals, joined.
     JoinedDots,
+    /// A ring around a point that was chosen. Its name stands beside it.
+    Ring,
 }
 
 impl Style {
     pub(super) const fn has_line(self) -> bool {
-        !matches!(self, Self::Dots)
+        !matches!(self, Self::Dots | Self::Ring)
     }
 
     pub(super) const fn has_dots(self) -> bool {

@@ -1,10 +1,10 @@
 use proptest::prelude::*;
 
-use super::names::{Area, Label, beside, spread};
+use super::names::{Area, Label, Taken, beside, spread};
 use super::scale::{GAP, Scale, number};
 use super::*;
-use crate::palette::{self, EVENTS};
-use crate::svg::text_width;
+use crate::palette::{self, EVENTS, NEUTRAL};
+use crate::svg::{Anchor, text_width};
 
 /// A chart of `points`, joined, with a name.
 fn of(logarithmic: bool, points: Vec<Point>) -> Chart {
@@ -170,16 +170,53 @@ fn a_name_alone_stands_where_its_curve_ends() {
 }
 
 #[test]
-fn a_name_beside_a_dot_avoids_what_is_there() {
+fn a_name_beside_a_dot_takes_the_first_free_place() {
     let bounds = Area::around((0.0, 0.0), (200.0, 100.0), 0.0);
-    let free = beside((20.0, 50.0), (60.0, 18.0), &bounds, &[]);
-    assert_eq!(free, (29.0, 41.0));
-    let there = Area::around((25.0, 40.0), (100.0, 60.0), 0.0);
-    let (_, top) = beside((20.0, 50.0), (60.0, 18.0), &bounds, &[there]);
-    assert!(!(22.0..60.0).contains(&top), "{top}");
+    let mut taken = Taken::default();
+    let found = |dot, taken: &Taken| beside(&[dot], (60.0, 18.0), &bounds, taken);
+    let spot = found((20.0, 50.0), &taken).unwrap();
+    assert_eq!(
+        (spot.x, spot.area.top, spot.anchor),
+        (29.0, 41.0, Anchor::Start)
+    );
+    assert_eq!(spot.line, None);
     // No room to the right.
-    let (left, _) = beside((190.0, 50.0), (60.0, 18.0), &bounds, &[]);
-    assert!(left < 130.0);
+    let spot = found((190.0, 50.0), &taken).unwrap();
+    assert_eq!(
+        (spot.x, spot.area.top, spot.anchor),
+        (181.0, 41.0, Anchor::End)
+    );
+    let there = Area::around((25.0, 40.0), (100.0, 60.0), 0.0);
+    taken.dots.push(there);
+    let spot = found((20.0, 50.0), &taken).unwrap();
+    assert!(!(22.0..60.0).contains(&spot.area.top), "{spot:?}");
+    // A place that is far has a line to the dot.
+    taken
+        .dots
+        .push(Area::around((0.0, 25.0), (200.0, 75.0), 0.0));
+    assert!(found((20.0, 50.0), &taken).unwrap().line.is_some());
+    // A line across all places.
+    for y in [10.0, 30.0, 50.0, 70.0, 90.0] {
+        taken.lines.push(((-100.0, y), (300.0, y)));
+    }
+    assert!(found((20.0, 50.0), &taken).is_none());
+}
+
+#[test]
+fn a_name_without_a_place_stands_in_a_legend() {
+    // A dense zigzag leaves no room.
+    let zigzag = (0..400).map(|step| Point::exact(f64::from(step), f64::from(step % 2)));
+    let mut crowded = of(false, zigzag.collect());
+    let ring = Series::named("taken", NEUTRAL, Style::Ring, vec![Point::exact(90.0, 0.5)]);
+    crowded.panels[0].series.push(ring);
+    let svg = chart(&crowded).unwrap();
+    // One ring in the plot, one in the legend.
+    assert_eq!(svg.matches("r=\"7\"").count(), 2, "{svg}");
+    assert_eq!(svg.matches(">taken</text>").count(), 1);
+    crowded.panels[0].series.remove(0);
+    let svg = chart(&crowded).unwrap();
+    assert_eq!(svg.matches("r=\"7\"").count(), 1, "{svg}");
+    assert_eq!(svg.matches(">taken</text>").count(), 1);
 }
 
 #[test]

@@ -31,6 +31,7 @@ impl Comparison {
             let numbers = (0..frames).filter(|&number| is_in(&self.methods[number]));
             let series: Vec<Series> = numbers.filter_map(|number| self.series(number)).collect();
             let others = self.series(frames).into_iter().chain(self.bound_series());
+            let others = others.chain(self.rings(is_in));
             (is_first || !series.is_empty()).then(|| Panel {
                 title: title.to_owned(),
                 series: series.into_iter().chain(others).collect(),
@@ -64,11 +65,28 @@ impl Comparison {
     /// Explains dots and names of the chart.
     fn note(&self) -> String {
         format!(
-            "A dot is a minimum count of photons, or a length of frames. All rules have at most \
-             the same rate of false alarms. Beside a name: instructions a laser cycle and pixel on a Cortex-M4F. \
-             Times are those of the middle half of the pixels; {}, 68 % of which are smaller.",
+            "A dot is a minimum count of photons, or a length of frames. A ring is around the answer. All \
+             rules have at most the same rate of false alarms. Beside a name: instructions a laser cycle and \
+             pixel on a Cortex-M4F. Times are those of the middle half of the pixels. 68 % of the errors are \
+             smaller; {}.",
             self.truth.description()
         )
+    }
+
+    /// A ring around each point of the answer whose method `is_in` the panel.
+    fn rings(&self, is_in: &dyn Fn(&Method) -> bool) -> impl Iterator<Item = Series> {
+        let answer = [("take", self.answer.best), ("fastest", self.answer.fastest)];
+        let rings = answer.map(|(name, choice)| {
+            let choice = choice.filter(|choice| is_in(&self.methods[choice.method]))?;
+            let point = Point::exact(self.time(choice.cycles), choice.error_mm);
+            Some(Series::named(
+                name,
+                palette::NEUTRAL,
+                Style::Ring,
+                vec![point],
+            ))
+        });
+        rings.into_iter().flatten()
     }
 
     fn series(&self, number: usize) -> Option<Series> {
