@@ -24,8 +24,10 @@ const WIDTHS: [u16; 95] = [
 ];
 /// The width of any other character.
 const OTHER: u16 = 620;
-/// The factor by which other fonts, and bold letters, may be wider.
+/// The factor by which other fonts may be wider.
 const SLACK: f64 = 1.1;
+/// The factor by which bold letters are wider, also those of wide fonts.
+pub const BOLD: f64 = 1.17;
 
 /// An upper estimate of the width of `text` at a font size of `size`.
 #[must_use]

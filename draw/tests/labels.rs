@@ -5,7 +5,7 @@ use std::path::Path;
 
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::STEPS;
-use dtof_draw::svg::text_width;
+use dtof_draw::svg::{BOLD, text_width};
 use proptest::prelude::*;
 
 type Place = (f64, f64);
@@ -50,7 +50,8 @@ fn read(svg: &str) -> (Vec<Text>, Vec<Stroke>) {
                     let (name, letter) = entity.split_at(entity.len() - 1);
                     text.replace(&format!("&{name}"), letter)
                 });
-                let width = text_width(&letters, size);
+                let is_bold = ["title", "panel"].iter().any(|bold| class.ends_with(bold));
+                let width = text_width(&letters, size) * if is_bold { BOLD } else { 1.0 };
                 let left = match attribute("text-anchor") {
                     Some("middle") => x - width / 2.0,
                     Some("end") => x - width,
@@ -144,10 +145,17 @@ fn touches(text: &Text, &(from, to, half): &Stroke) -> bool {
     first <= last
 }
 
-/// What touches a text of a document.
+/// What touches a text of a document, and texts that are cut.
 fn touching(svg: &str) -> Vec<String> {
     let (texts, strokes) = read(svg);
-    let mut found = Vec::new();
+    let width = svg.split_once("width=\"").unwrap().1;
+    let width: f64 = width.split_once('"').unwrap().0.parse().unwrap();
+    let cut = texts
+        .iter()
+        .filter(|text| text.left < 0.0 || text.right > width);
+    let mut found: Vec<String> = cut
+        .map(|text| format!("{:?} is cut", text.letters))
+        .collect();
     for (index, text) in texts.iter().enumerate() {
         for other in &texts[index + 1..] {
             let apart = text.right < other.left

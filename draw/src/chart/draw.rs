@@ -6,7 +6,7 @@ use super::names::Area;
 use super::panel::{self, LINE, Names, TO_NAME};
 use super::parts::{Chart, Key, Panel, Style};
 use super::scale::{GAP, Scale, Tick};
-use crate::svg::{Anchor, EDGE, Svg, TEXT, TITLE, text_width, wrapped};
+use crate::svg::{Anchor, BOLD, EDGE, Svg, TEXT, TITLE, text_width, wrapped};
 
 /// Width of every chart. At 400 pixels the smallest letters are 10 pixels high.
 const WIDTH: f64 = 560.0;
@@ -25,7 +25,7 @@ pub fn chart(chart: &Chart) -> Result<String> {
     let layout = Layout::new(chart)?;
     let mut svg = Svg::default();
     let title = chart.title();
-    let lines = wrapped(&title, TITLE.0, INNER);
+    let lines = wrapped(&title, BOLD * TITLE.0, INNER);
     let mut y = svg.lines("ink title", (EDGE, EDGE), TITLE, Anchor::Start, &lines);
     y = key(&mut svg, &chart.key, y + 6.0);
     let soft = |svg: &mut Svg, y, text| {
@@ -187,7 +187,11 @@ impl Layout {
         } else {
             self.gap / 2.0
         };
-        wrapped(&panel.title, TEXT, self.width + beside.min(self.gap / 2.0))
+        wrapped(
+            &panel.title,
+            BOLD * TEXT,
+            self.width + beside.min(self.gap / 2.0),
+        )
     }
 
     /// Draws grid and axes of a plot. The first column has the labels of y; `has_x_labels` asks

@@ -3,7 +3,7 @@
 use super::axis::{Axis, Lines};
 use super::map::Map;
 use super::scale::{Mark, Scale};
-use crate::svg::{EDGE, TEXT, TITLE, one_line, text_width, wrapped};
+use crate::svg::{BOLD, EDGE, TEXT, TITLE, one_line, text_width, wrapped};
 
 /// The largest size of a map.
 const MAX_WIDTH: f64 = 400.0;
@@ -89,7 +89,7 @@ impl Layout {
         };
         let canvas = (left + width + right + EDGE).ceil().max(MIN_CANVAS);
 
-        let title = wrapped(&one_line(map.title), TITLE.0, canvas - 2.0 * EDGE);
+        let title = wrapped(&one_line(map.title), BOLD * TITLE.0, canvas - 2.0 * EDGE);
         // The line above the map has the name of the rows and the unit of the bar.
         let top = EDGE + TITLE.1 * title.len() as f64 + LINE + 10.0;
         let plot = Frame {

@@ -12,7 +12,7 @@ use dtof_core::{Array, EchoNumber, PixelAddress};
 
 use dtof_draw::palette;
 use dtof_draw::picture::{levels, span};
-use dtof_draw::svg::{Anchor, At, EDGE, Svg, TEXT, TITLE, wrapped};
+use dtof_draw::svg::{Anchor, At, BOLD, EDGE, Svg, TEXT, TITLE, wrapped};
 use dtof_engine::host::host_engine;
 use dtof_events::events_csv::range_mm;
 use dtof_events::last_events::LastEvents;
@@ -132,7 +132,7 @@ fn square(pixel: PixelAddress, side: u32, echo: EchoNumber, array: Array) -> Squ
 fn draw(array: Array, flashes: &[Flash], marks: &[Flash], title: &str, note: &str) -> String {
     let mut svg = Svg::default();
     svg.raw(&format!("<style>{}</style>", sheet()));
-    let lines = wrapped(title, TITLE.0, INNER);
+    let lines = wrapped(title, BOLD * TITLE.0, INNER);
     let mut y = svg.lines("ink title", (EDGE, EDGE), TITLE, Anchor::Start, &lines) + 8.0;
     let side = INNER / f64::from(array.columns());
     let (left, top) = (At(EDGE), At(y));

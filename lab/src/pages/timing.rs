@@ -3,7 +3,7 @@
 
 use crate::studies::scenes::latency::element::{PIXELS, ProcessingElement, READINGS};
 use dtof_draw::palette::Colour;
-use dtof_draw::svg::{Anchor, At, EDGE, Svg, TEXT, TITLE, wrapped};
+use dtof_draw::svg::{Anchor, At, BOLD, EDGE, Svg, TEXT, TITLE, wrapped};
 
 /// Laser cycles drawn.
 const CYCLES: u16 = 24;
@@ -52,7 +52,7 @@ pub fn timing() -> String {
     let note = "Numbers are pixels: each colour is the histogram of one of four, handed in when its turn \
                 comes. All pixels count on meanwhile.";
     let mut svg = Svg::default();
-    let lines = wrapped(title, TITLE.0, INNER);
+    let lines = wrapped(title, BOLD * TITLE.0, INNER);
     let mut y = svg.lines("ink title", (EDGE, EDGE), TITLE, Anchor::Start, &lines) + 6.0;
     for element in &READINGS[1..] {
         y = panel(&mut svg, *element, y);
