@@ -144,7 +144,7 @@ impl<'a> Player<'a> {
         (self.playhead.seconds, self.playhead.events) = (0.0, 0);
         context.hub.begin_recording(Header {
             laser_millihertz: self.playback.clock.millihertz(),
-            ..*self.reader.header()
+            ..self.reader.header().clone()
         });
         context.hub.set_playhead(self.playhead);
         Ok(())
