@@ -210,7 +210,7 @@ def test_invalid_events(tmp_path):
                   # Multiples, with which no range is found.
                   run.array._replace(bin_width_ps=2.0**-16), run.array._replace(bin_width_ps=65535.0),
                   run.array._replace(offsets_mm=[0.0] * 3), run.array._replace(offsets_mm=[0.1] * 4),
-                  run.array._replace(offsets_mm=[0.0, 0.0, 0.0, 8e6]),
+                  run.array._replace(offsets_mm=[0.0, 0.0, 0.0, 8.38e6]),
                   run.array._replace(bins=0), run.array._replace(bins=24),
                   run.array._replace(bins=2048), run.array._replace(bins=4_000_000_000)]:
         refused(lambda: dtof.write_events(path, run.events, array))
