@@ -165,6 +165,14 @@ impl Setup {
         }
     }
 
+    /// The settings as a text for a file of its events. The gate has the bins that the sensor measures.
+    ///
+    /// # Errors
+    /// Fails if they cannot be written as TOML.
+    pub fn toml(&self) -> Result<String> {
+        self.effective.with_settings(&self.settings).to_toml()
+    }
+
     /// Header of a file of its events.
     #[must_use]
     pub fn header(&self) -> Header {
@@ -222,6 +230,9 @@ mod tests {
             let mut settings = SettingsFile::default();
             settings.sensor.gate = requested;
             let setup = Setup::new(sensor, 10, 128, settings, 4).unwrap();
+            // A recording says so, too.
+            let recorded = SettingsFile::parse(&setup.toml().unwrap()).unwrap();
+            assert_eq!(recorded.sensor.gate, setup.settings.gate);
             (setup.requested.sensor.gate, setup.settings.gate)
         };
         assert_eq!(gate(None, 128), (None, None));

@@ -125,6 +125,14 @@ impl<W: Write> Writer<W> {
     /// # Errors
     /// Fails if the writer fails, or if `header` has offsets for another number of pixels.
     pub fn new(out: W, header: &Header) -> io::Result<Self> {
+        Self::with_settings(out, header, "")
+    }
+
+    /// The same with the settings in the header. Settings of more than 65,456 bytes are left out.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_settings(out: W, header: &Header, settings: &str) -> io::Result<Self> {
         let (offsets, pixels) = (header.offsets_mm.len(), header.array.pixels());
         if offsets > 0 && offsets != pixels as usize {
             let text = format!("{offsets} offsets for {pixels} pixels");
@@ -136,7 +144,13 @@ impl<W: Write> Writer<W> {
             encoder: AerEncoder::new(),
             events: 0,
         };
-        writer.put(&header.to_bytes())?;
+        let most = usize::from(u16::MAX - 15 - HEADER_BYTES);
+        let settings = Some(settings).filter(|text| text.len() <= most);
+        let mut settings = settings.unwrap_or_default().as_bytes().to_vec();
+        settings.resize(settings.len().next_multiple_of(AerWord::BYTES), b'\n');
+        let length = u16::try_from(settings.len()).unwrap_or(0);
+        writer.put(&header.to_bytes(HEADER_BYTES + length))?;
+        writer.put(&settings)?;
         writer.put(&offsets_to_bytes(&header.offsets_mm))?;
         Ok(writer)
     }
@@ -196,6 +210,7 @@ pub struct Reader<R: Read> {
     digest: Digest<'static, u32, Checksum>,
     decoder: AerDecoder,
     header: Header,
+    settings: String,
     offset: u64,
     events: u64,
     ended: bool,
@@ -217,7 +232,6 @@ impl<R: Read> Reader<R> {
         let mut digest = CRC_32.digest();
         digest.update(&bytes);
         let mut header = Header::from_bytes(&bytes)?;
-        // The settings of the run are skipped.
         let length = header_length(&bytes).unwrap_or(HEADER_BYTES);
         let settings = usize::from(length - HEADER_BYTES);
         let offsets = offset_bytes(&bytes, header.array);
@@ -232,6 +246,9 @@ impl<R: Read> Reader<R> {
             digest,
             decoder: AerDecoder::new(),
             header,
+            settings: String::from_utf8_lossy(&rest[..settings])
+                .trim_end()
+                .to_owned(),
             offset: u64::from(length) + offsets as u64,
             events: 0,
             ended: false,
@@ -241,6 +258,11 @@ impl<R: Read> Reader<R> {
     /// The header.
     pub fn header(&self) -> &Header {
         &self.header
+    }
+
+    /// The settings of the run in TOML; empty if the file has none.
+    pub fn settings(&self) -> &str {
+        &self.settings
     }
 
     /// The offset in the file of the next word.
@@ -386,5 +408,30 @@ mod tests {
             ..header
         };
         assert!(Writer::new(Vec::new(), &header).is_err());
+    }
+
+    #[test]
+    fn settings_in_a_header_are_read_back_unless_they_are_too_long() {
+        let header = Header {
+            bins: 128,
+            array: Array::new(2, 2).unwrap(),
+            bin_width_ps: U16F16::lit("250"),
+            offset_mm: I24F8::ZERO,
+            offsets_mm: Vec::new(),
+            laser_millihertz: 0,
+            start_us: 0,
+        };
+        let event = Event::Depth(crate::fixtures::event(1, 9, 3));
+        for (length, kept) in [(0, 0), (1, 1), (16, 16), (65_456, 65_456), (65_457, 0)] {
+            let settings = "x".repeat(length);
+            let mut writer = Writer::with_settings(Vec::new(), &header, &settings).unwrap();
+            writer.write(&event).unwrap();
+            let bytes = writer.finish().unwrap();
+            let mut reader = Reader::new(&bytes[..]).unwrap();
+            assert_eq!(reader.settings(), &settings[..kept]);
+            assert_eq!(reader.header(), &header);
+            assert_eq!(reader.next_event().unwrap(), Some(event));
+            assert_eq!(reader.next_event().unwrap(), None);
+        }
     }
 }

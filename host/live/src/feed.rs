@@ -17,9 +17,8 @@ pub use playback::Playback;
 use super::hub::{Hub, Kind};
 use super::outputs::{Folder, Recorder};
 use super::terminal::Terminal;
-use dtof_device::{HostTimeout, Port};
+use dtof_device::{HostTimeout, Port, Setup};
 use dtof_engine::settings::SettingsFile;
-use dtof_events::aer_file::Header;
 use dtof_options::rows::printable;
 
 /// Takes the answer: what was done, or why not, in a line.
@@ -156,8 +155,8 @@ impl FeedContext<'_> {
     }
 
     /// Switches recording on or off, and tells pages.
-    fn record(&mut self, on: bool, header: Option<&Header>) -> Result<String> {
-        let done = self.recorder.switch(on, header);
+    fn record(&mut self, on: bool, setup: Option<&Setup>) -> Result<String> {
+        let done = self.recorder.switch(on, setup);
         self.show_recording();
         done
     }

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
+use dtof_device::Setup;
 use dtof_device::monitor::EventFile;
 use dtof_engine::settings::SettingsFile;
-use dtof_events::aer_file::{Event, Header};
+use dtof_events::aer_file::Event;
 use dtof_options::Refused;
 use dtof_options::files::temporary_file;
 use dtof_options::rows::grouped;
@@ -71,9 +72,10 @@ impl Folder {
     ///
     /// # Errors
     /// Fails if there is no folder, or it cannot be written.
-    pub fn record(&self, header: &Header) -> Result<(PathBuf, EventFile)> {
+    pub fn record(&self, setup: &Setup) -> Result<(PathBuf, EventFile)> {
         let path = self.free("events", "aer")?;
-        let file = EventFile::new(&path, &[], header)?.that_replaces_nothing();
+        let file =
+            EventFile::new(&path, &[], &setup.header(), &setup.toml()?)?.that_replaces_nothing();
         Ok((path, file))
     }
 }
@@ -123,20 +125,20 @@ impl Recorder {
         &self.status
     }
 
-    /// Switches recording on or off. Without a `header`, the next session begins the file. Returns a
+    /// Switches recording on or off. Without a `setup`, the next session begins the file. Returns a
     /// line that says what was done.
     ///
     /// # Errors
     /// Fails if no file can be begun, or the disk does not take the last one.
-    pub fn switch(&mut self, on: bool, header: Option<&Header>) -> Result<String> {
+    pub fn switch(&mut self, on: bool, setup: Option<&Setup>) -> Result<String> {
         if !on {
             self.stop()?;
-        } else if let Some(header) = header {
-            self.begin_file(header)?;
+        } else if let Some(setup) = setup {
+            self.begin_file(setup)?;
         }
         self.status.on = on;
         let RecordingStatus { file, events, .. } = &self.status;
-        Ok(match (on, header) {
+        Ok(match (on, setup) {
             (true, Some(_)) => format!("Recording into {file}."),
             (true, None) => "Recording begins with the device.".to_owned(),
             (false, _) if file.is_empty() => "Nothing was recorded.".to_owned(),
@@ -168,9 +170,9 @@ impl Recorder {
     }
 
     /// Begins the file of a session, if recording is on.
-    pub fn resume(&mut self, header: &Header) {
+    pub fn resume(&mut self, setup: &Setup) {
         if self.status.on
-            && let Err(error) = self.begin_file(header)
+            && let Err(error) = self.begin_file(setup)
         {
             self.fail(&error);
         }
@@ -191,11 +193,11 @@ impl Recorder {
         }
     }
 
-    fn begin_file(&mut self, header: &Header) -> Result<()> {
+    fn begin_file(&mut self, setup: &Setup) -> Result<()> {
         if self.file.is_some() {
             return Ok(());
         }
-        let (path, file) = self.folder.record(header)?;
+        let (path, file) = self.folder.record(setup)?;
         self.file = Some(file);
         self.status = RecordingStatus {
             on: true,

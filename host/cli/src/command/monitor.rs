@@ -95,7 +95,12 @@ impl Monitor {
         };
         let mut recording = match &self.record {
             None => None,
-            Some(file) => Some(EventFile::new(file, image.as_slice(), &setup.header())?),
+            Some(file) => Some(EventFile::new(
+                file,
+                image.as_slice(),
+                &setup.header(),
+                &setup.toml()?,
+            )?),
         };
         let monitored = monitor(
             &mut client,

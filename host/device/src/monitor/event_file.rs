@@ -26,20 +26,21 @@ pub struct EventFile {
 }
 
 impl EventFile {
-    /// Begins a file that replaces none of `inputs`.
+    /// Begins a file that replaces none of `inputs`, with `settings` in its header.
     ///
     /// # Errors
     /// Fails if its folder cannot be written, or if `path` is something other than a file.
-    pub fn new(path: &Path, inputs: &[&Path], header: &Header) -> Result<Self> {
+    pub fn new(path: &Path, inputs: &[&Path], header: &Header, settings: &str) -> Result<Self> {
         let place = destination(path, inputs)?;
         let name = || path.display().to_string();
         let mut file = temporary_file(&place.folder, ".dtof-recording-").with_context(name)?;
         file.disable_cleanup(true);
         let aside = file.path().to_owned();
-        let begun = Writer::new(BufWriter::new(file), header).and_then(|mut aer| {
-            aer.flush()?;
-            Ok(aer)
-        });
+        let begun =
+            Writer::with_settings(BufWriter::new(file), header, settings).and_then(|mut aer| {
+                aer.flush()?;
+                Ok(aer)
+            });
         if begun.is_err() {
             // The file is empty. A failure to remove it matters less than `begun`.
             let _ = fs::remove_file(&aside);
@@ -143,7 +144,9 @@ mod tests {
             (folder.path(), ": exists and is not a file"),
             (&gone, ": there is no folder "),
         ] {
-            let error = EventFile::new(path, &[], &HEADER).map(|_| ()).unwrap_err();
+            let error = EventFile::new(path, &[], &HEADER, "")
+                .map(|_| ())
+                .unwrap_err();
             assert!(format!("{error:#}").contains(part), "{error:#}");
         }
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
@@ -153,7 +156,7 @@ mod tests {
     fn a_new_one_replaces_nothing_that_came_meanwhile() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("events.aer");
-        let recording = EventFile::new(&path, &[], &HEADER).unwrap();
+        let recording = EventFile::new(&path, &[], &HEADER, "").unwrap();
         let recording = recording.that_replaces_nothing();
         fs::write(&path, "older").unwrap();
         let error = format!("{:#}", recording.finish().unwrap_err());
@@ -165,7 +168,7 @@ mod tests {
     fn what_cannot_be_moved_to_its_place_stays_and_is_named() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("events.aer");
-        let recording = EventFile::new(&path, &[], &HEADER).unwrap();
+        let recording = EventFile::new(&path, &[], &HEADER, "").unwrap();
         let aside = recording.aside.clone();
         fs::create_dir(&path).unwrap();
         let error = format!("{:#}", recording.finish().unwrap_err());

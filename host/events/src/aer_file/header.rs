@@ -48,7 +48,8 @@ impl Header {
         Ranges::new(self.array, self.bin_width_ps, self.offset_mm, offsets)
     }
 
-    pub(super) fn to_bytes(&self) -> [u8; HEADER_BYTES as usize] {
+    /// `length` is that of the header with its settings.
+    pub(super) fn to_bytes(&self, length: u16) -> [u8; HEADER_BYTES as usize] {
         let mut bytes = [0; HEADER_BYTES as usize];
         let version = match self.offsets_mm.is_empty() {
             true => AER_VERSION,
@@ -57,7 +58,7 @@ impl Header {
         let fields = [
             MAGIC.as_bytes(),
             &version.to_le_bytes(),
-            &HEADER_BYTES.to_le_bytes(),
+            &length.to_le_bytes(),
             &self.bins.to_le_bytes(),
             &self.array.columns().to_le_bytes(),
             &self.array.rows().to_le_bytes(),
@@ -184,7 +185,7 @@ mod tests {
             start_us: 9,
         };
         for version in 0..=u8::MAX {
-            let mut bytes = header.to_bytes();
+            let mut bytes = header.to_bytes(HEADER_BYTES);
             bytes[8] = version;
             let read = Header::from_bytes(&bytes).ok();
             let known = [4, 5, 6].contains(&version);

@@ -221,11 +221,11 @@ impl<'a> Session<'a> {
                 saved.map(|path| format!("Saved as {}.", path.display()))
             }
             Command::Record(on) => {
-                let header = self.setup.header();
+                let setup = &self.setup;
                 let recorder = &mut context.recorder;
                 let done = self
                     .client
-                    .exchange_during(|| recorder.switch(on, Some(&header)));
+                    .exchange_during(|| recorder.switch(on, Some(setup)));
                 context.show_recording();
                 done
             }
@@ -303,7 +303,7 @@ impl<'a> Session<'a> {
         let recorder = &mut context.recorder;
         let _ = self.client.exchange_during(|| recorder.end_file());
         context.hub.begin(&setup);
-        context.recorder.resume(&setup.header());
+        context.recorder.resume(&setup);
         context.show_recording();
         self.last = (0, Instant::now());
         self.setup = setup;

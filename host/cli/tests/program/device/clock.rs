@@ -124,7 +124,7 @@ fn recorded(path: &Path, sensor: impl Sensor + Send + 'static) {
     let mut setup = Setup::of(&mut client, SettingsFile::default(), None).unwrap();
     setup.began = UNIX_EPOCH + Duration::from_micros(START_US);
     setup.settings = settings();
-    let mut recording = EventFile::new(path, &[], &setup.header()).unwrap();
+    let mut recording = EventFile::new(path, &[], &setup.header(), "").unwrap();
     // The device's clock is faster than this computer's.
     let host_timeout = HostTimeout::from_milliseconds(60_000).unwrap();
     let task = setup.task(None, host_timeout);

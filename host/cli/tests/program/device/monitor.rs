@@ -18,8 +18,8 @@ use dtof_core::{Array, DepthEvent, PixelAddress};
 use dtof_device::monitor::{Outputs, monitor};
 use dtof_device::{Client, HostTimeout, Task};
 use dtof_engine::host::host_engine;
-use dtof_engine::settings::Settings;
-use dtof_events::events_csv;
+use dtof_engine::settings::{Settings, SettingsFile};
+use dtof_events::{aer_file, events_csv};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::DynamicDepth;
 use dtof_sensors::dither::Dither;
@@ -309,6 +309,13 @@ fn what_is_recorded_is_what_is_printed_also_when_the_device_is_gone() {
         assert_eq!(output.status.success(), whole, "{output:?}");
         let decoded = scratch.printed("decode events.aer");
         assert!(decoded.as_bytes() == output.stdout && decoded.len() > 500);
+        let recorded = aer_file::open(&scratch.path("events.aer")).unwrap();
+        let settings = SettingsFile::parse(recorded.settings()).unwrap();
+        assert_eq!(
+            (settings.sensor.bins, settings.sensor.columns),
+            (Some(128), Some(2))
+        );
+        assert_eq!(settings.detection.l1, Some(40));
     }
     assert_eq!(names(&scratch.path("")), ["events.aer"]);
 }

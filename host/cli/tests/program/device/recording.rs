@@ -156,7 +156,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     let device = device([LINK_VERSION, AER_VERSION], pixel, lives);
     let sent = Arc::clone(&device.sent);
     let mut client = Client::new(Box::new(device)).unwrap();
-    let mut recording = EventFile::new(&path, &[], &header).unwrap();
+    let mut recording = EventFile::new(&path, &[], &header, "").unwrap();
     let screen = Screen::default();
     let room = Box::new(|| (24, 80));
     let mut map = LiveMap::new(Box::new(screen.clone()), room, PIXELS, array);

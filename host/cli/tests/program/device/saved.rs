@@ -106,8 +106,18 @@ fn what_was_printed_before_the_program_was_killed_is_in_the_file_it_left() {
     );
 }
 
-/// A disk that takes so many bytes of a file.
-fn full(bytes: usize) -> usize {
+/// The bytes of the header of a recording, which has the settings.
+fn header() -> usize {
+    let scratch = Scratch::new();
+    let name = device(true, LONG);
+    let line = format!("monitor --pixels 4 --columns 2 --device {name} --record events.aer");
+    scratch.printed(&format!("{line} --seconds 1"));
+    let bytes = std::fs::read(scratch.path("events.aer")).unwrap();
+    usize::from(u16::from_le_bytes([bytes[10], bytes[11]]))
+}
+
+/// A disk that takes so many bytes of a file with a header of this length.
+fn full(bytes: usize, header: usize) -> usize {
     let scratch = Scratch::new();
     scratch.file("events.aer", OLDER);
     let line = format!(
@@ -130,7 +140,7 @@ fn full(bytes: usize) -> usize {
     let error = errors.next().unwrap();
     assert_eq!(errors.next(), None, "{message}");
     assert_contains(error, "events.aer: File too large");
-    if bytes < 64 {
+    if bytes < header {
         // Without a header there is nothing to keep.
         assert_eq!(names(&scratch.path("")), ["events.aer"]);
         assert_eq!(scratch.read("events.aer"), OLDER);
@@ -144,7 +154,7 @@ fn full(bytes: usize) -> usize {
     // All that fits is there. The rest is shorter than an event with its time word.
     let saved = events(&rows);
     assert!(
-        64 + 16 * saved + 32 + 16 > bytes,
+        header + 16 * saved + 32 + 16 > bytes,
         "{bytes} bytes hold {saved} events"
     );
     saved
@@ -156,10 +166,16 @@ fn a_recording_on_a_full_disk_keeps_what_came_and_says_where() {
         skipped("a recording on a full disk", "prlimit");
         return;
     }
-    let limits = [0, 1, 63, 64, 65, 79, 80, 95, 96, 97, 200, 500, 1000, 1234];
+    let header = header();
+    assert!(header > 64);
+    let whole = [0, 1, 15, 16, 31, 32, 33, 136, 436, 936, 1170].map(|more| header + more);
+    let limits = [&[0, 1, 63, 64, header - 1], &whole[..]].concat();
     let mut saved = 0;
     thread::scope(|scope| {
-        let runs = limits.map(|bytes| scope.spawn(move || full(bytes)));
+        let runs = limits
+            .iter()
+            .map(|&bytes| scope.spawn(move || full(bytes, header)));
+        let runs: Vec<_> = runs.collect();
         saved = runs.into_iter().map(|run| run.join().unwrap()).sum();
     });
     assert!(saved > 0);
