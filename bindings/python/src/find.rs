@@ -111,7 +111,7 @@ pub fn compare(
                     warnings.push(warning);
                 }
             },
-            step: &|step| control.step(step),
+            step: &|step, share| control.step(step, share),
         };
         let CompareResult {
             comparison,

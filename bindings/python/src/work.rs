@@ -25,16 +25,16 @@ pub struct Control {
     is_stopped: AtomicBool,
     /// How many items of the part are done, and how many there are.
     items: Mutex<(u64, u64)>,
-    steps: Mutex<Vec<String>>,
+    steps: Mutex<Vec<(String, f64)>>,
 }
 
 impl Control {
-    /// Reports the next step.
+    /// Reports the current step, and the share of the whole that is done, 0 to 1.
     ///
     /// # Errors
     /// Fails if the work was cancelled.
-    pub fn step(&self, step: &str) -> Result<()> {
-        locked(&self.steps).push(step.to_owned());
+    pub fn step(&self, step: &str, share: f64) -> Result<()> {
+        locked(&self.steps).push((step.to_owned(), share));
         self.check_running()
     }
 
@@ -64,7 +64,7 @@ struct Reporter<'py> {
 }
 
 impl Reporter<'_> {
-    /// Calls it with each step as text, then with done and total if they have changed.
+    /// Calls it with each step and its share, then with done and total if they have changed.
     fn report(&mut self, control: &Control) -> PyResult<()> {
         let steps = mem::take(&mut *locked(&control.steps));
         let (done, total) = *locked(&control.items);
@@ -72,7 +72,7 @@ impl Reporter<'_> {
             return Ok(());
         };
         for step in steps {
-            progress.call1((step,))?;
+            progress.call1(step)?;
         }
         if (done, total) != self.last {
             self.last = (done, total);

@@ -70,14 +70,17 @@ def test_compare(program, tmp_path, counts):
     program("compare", "--input", tmp_path / "counts.npy", "--truth", tmp_path / "truth.npy",
             "--out", out, "--quiet", "--cycles", "6000", *TEXTS)
     steps = []
-    found = dtof.compare(counts, truth=truth, cycles=6000, progress=steps.append, **OPTIONS)
+    found = dtof.compare(counts, truth=truth, cycles=6000, progress=lambda *step: steps.append(step), **OPTIONS)
     assert found.toml == (out / "dtof.toml").read_text()
     other_order = dtof.compare(counts, truth=numpy.asfortranarray(truth), cycles=6000, **OPTIONS)
     assert other_order.methods == found.methods
     for rows, name in [(found.methods, "methods.csv"), (found.stress, "stress.csv")]:
         with open(out / name) as file:
             assert rows == list(csv.DictReader(file))
-    assert "tries all methods" in steps and found.answer["compared"]
+    names, shares = zip(*steps)
+    assert "tries all methods" in names and found.answer["compared"]
+    assert shares[0] == 0 and shares[-1] == 1 and list(shares) == sorted(shares)
+    assert numpy.diff(shares).max() < 0.2
     assert found.chart.startswith("<svg")
 
 

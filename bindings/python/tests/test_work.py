@@ -120,8 +120,8 @@ def test_progress_is_called_in_the_calling_thread_until_the_end():
     steps = []
     scene = "columns = 8\nrows = 8\nbackground = 0.02\n[[surface]]\nkind = \"plane\"\n"
     with contextlib.suppress(dtof.Error):
-        dtof.compare(scene=scene, progress=steps.append)
-    assert all(isinstance(step, str) for step in steps)
+        dtof.compare(scene=scene, progress=lambda step, share: steps.append((step, share)))
+    assert all(isinstance(step, str) and 0 <= share <= 1 for step, share in steps)
 
 
 def test_an_exception_in_progress_ends_the_work():

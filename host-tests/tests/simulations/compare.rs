@@ -97,7 +97,7 @@ fn rules_have_the_requested_false_alarms() {
     let rules = slow_or_quick(&ALL[..], &ALL[..2]);
     for &(background, l1) in slow_or_quick(&[(0.02, 40), (0.1, 4)][..], &[(0.02, 40)]) {
         let settings = settings(l1);
-        let found = Thresholds::simulate(rules, &settings, background, 1).unwrap();
+        let found = Thresholds::simulate(rules, &settings, background, 1, &|_| Ok(())).unwrap();
         let scene = format!("columns = 64\nrows = 32\ncycles = 8000\nbackground = {background}\n");
         let scene = Scene::parse(&scene).unwrap();
         for &rule in rules {
@@ -245,6 +245,7 @@ fn outcome(method: usize, effort: u16, cycles: f64, error_mm: f64, instructions:
             wrong: 0.0,
             stray: 0,
             of_blocks: 0.0,
+            silent: 0.0,
         },
         instructions,
     }

@@ -53,7 +53,8 @@ fn compared(scene: &Scene, seed: u64, within_mm: Option<f64>) -> Comparison {
         sigma: scene.pulse_sigma_bins,
         false_alarm: 0.01,
         within_mm,
-        progress: &|_| Ok(()),
+        why_l1: "",
+        progress: &|_, _| Ok(()),
     })
     .unwrap()
 }

@@ -264,7 +264,7 @@ pub fn page(
         });
     }
     let lead = format!("From the histograms of {name}. Intervals are 95 % intervals.");
-    Ok(still("Calibration", &lead, &sections, &figures))
+    Ok(still("Calibration", &lead, &sections, &[], &figures))
 }
 
 /// The chart of the mean histogram, with the findings.

@@ -55,30 +55,74 @@ impl Progress for Bar {
     }
 }
 
-/// A line with the current step of a long job.
+/// The steps of a long job, with the share that is done and the time left. On a terminal only, and at once.
 pub struct Steps {
     bar: ProgressBar,
+    since: Instant,
 }
 
 impl Steps {
-    /// A line on a terminal, unless `quiet`.
+    /// A bar on a terminal, unless `quiet`.
     #[must_use]
     pub fn new(quiet: bool) -> Self {
-        let bar = ProgressBar::new_spinner();
+        let bar = ProgressBar::new(1000);
+        let style = ProgressStyle::with_template("{bar:30} {percent:>3} %, {msg}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         if quiet {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
-        Self { bar }
+        Self {
+            bar,
+            since: Instant::now(),
+        }
     }
 
-    /// Shows the next step.
-    pub fn at(&self, step: &str) {
-        self.bar.set_message(step.to_owned());
+    /// Shows the current step, and the share of the whole that is done, 0 to 1.
+    pub fn at(&self, step: &str, share: f64) {
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "0 to 1"
+        )]
+        self.bar.set_position((share * 1000.0) as u64);
+        let left = time_left(self.since.elapsed(), share);
+        let left = left.map_or(String::new(), |left| format!("about {left} left, "));
+        self.bar.set_message(format!("{left}{step}"));
         self.bar.tick();
     }
 
-    /// Removes the line.
+    /// Hides the bar while `print` writes lines.
+    pub fn suspend(&self, print: impl FnOnce()) {
+        self.bar.suspend(print);
+    }
+
+    /// Removes the bar.
     pub fn finish(&self) {
         self.bar.finish_and_clear();
+    }
+}
+
+/// The time that is left if the rest goes on at the same speed, in seconds, or in minutes from two on. None at
+/// the very beginning.
+fn time_left(elapsed: Duration, share: f64) -> Option<String> {
+    let left = elapsed.as_secs_f64() * (1.0 - share) / share;
+    match left {
+        _ if share <= 0.0 => None,
+        ..120.0 => Some(format!("{left:.0} s")),
+        _ => Some(format!("{:.0} min", left / 60.0)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_time_left_is_that_of_the_share_that_is_left() {
+        let of = |seconds, share| time_left(Duration::from_secs(seconds), share);
+        assert_eq!(of(1, 0.0), None);
+        assert_eq!(of(1, 0.02).as_deref(), Some("49 s"));
+        assert_eq!(of(30, 0.1).as_deref(), Some("4 min"));
+        assert_eq!(of(30, 1.0).as_deref(), Some("0 s"));
     }
 }

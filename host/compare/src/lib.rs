@@ -22,6 +22,7 @@ mod tally;
 mod text;
 pub mod thresholds;
 pub mod truth;
+mod work;
 
 use anyhow::{Result, ensure};
 use dtof_core::{Array, BlockLevel, PixelAddress};
@@ -41,6 +42,7 @@ pub use tally::Figures;
 use tally::{WRONG_BEYOND_BINS, mm_per_bin};
 use thresholds::{MIN_COUNT, Thresholds};
 use truth::Truth;
+use work::Work;
 
 /// About so many photons methods are compared on, and so many under stress.
 const PHOTONS: f64 = 1.5e7;
@@ -76,8 +78,11 @@ pub struct Task<'a> {
     /// The error that is allowed, in millimetres; by default that of frames of L2, or the lowest that
     /// any method reaches.
     pub within_mm: Option<f64>,
-    /// Takes the name of the next step. An error from it ends the comparison.
-    pub progress: &'a dyn Fn(&str) -> Result<()>,
+    /// Why pixels report no sooner than after L1, for the answer.
+    pub why_l1: &'a str,
+    /// Takes the name of the current step, and the share of the whole work that is done, 0 to 1: at the start of
+    /// each step, and about every half percent. An error from it ends the comparison.
+    pub progress: &'a dyn Fn(&str, f64) -> Result<()>,
 }
 
 /// The result of a comparison.
@@ -101,6 +106,8 @@ pub struct Comparison {
     pub settings: Option<Settings>,
     /// The settings of the fastest method, if that is another.
     pub fastest: Option<Settings>,
+    /// Pixels report after so many laser cycles at the soonest, and why.
+    pub l1: (u16, String),
     /// The light of the median pixel.
     pub light: Light,
     /// The true ranges.
@@ -124,13 +131,13 @@ struct Methods<'a> {
 
 impl<'a> Methods<'a> {
     /// All methods for the pulse of `light`, each with the threshold for the same rate of false alarms.
-    fn new(task: &Task<'a>, light: &Light, most_levels: u8, has_neighbours: bool) -> Result<Self> {
-        let settings = task.settings;
-        let pulse = dtof_core::fixed::types::U8F8::saturating_from_num(light.sigma);
-        let methods = Method::all(pulse, most_levels, has_neighbours, settings);
+    fn new(task: &Task<'a>, all: Vec<Method>, light: &Light, work: &Work) -> Result<Self> {
+        let (settings, methods) = (task.settings, all);
         let mut rules: Vec<Rule> = methods.iter().filter_map(Method::rule).collect();
         rules.dedup();
-        let simulated = Thresholds::simulate(&rules, settings, light.background, settings.seed)?;
+        let progress = |part| work.at(part);
+        let simulated =
+            Thresholds::simulate(&rules, settings, light.background, settings.seed, &progress)?;
         let thresholds = methods.iter().map(|method| {
             // Blocks have a quarter of the false alarms.
             let pixels = if method.has_full_resolution() {
@@ -193,15 +200,21 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     } = *task;
     // Invalid settings are refused before any photons are drawn.
     host_engine(settings, const { Array::new(1, 1).unwrap() }, &[])?;
-    (task.progress)("surveys the photons")?;
+    let work = Work::new(task.progress);
     let mut source = photons(task, 0, PHOTONS)?;
+    let cost = Cost::new(source.as_ref());
+    work.begin(
+        "surveys the photons",
+        cost.pass(0),
+        cost.pass(0) + cost.rest(120, 14, 9),
+    )?;
     let (array, laser_hz) = (source.array(), source.laser_hz());
     let (most_levels, has_neighbours) = (
         most_levels(source.as_ref()),
         has_neighbours(source.as_ref()),
     );
     let sensor = [array.columns(), source.capture_rows()];
-    let surveyed = survey(source.as_mut(), settings, sigma)?;
+    let surveyed = survey(source.as_mut(), settings, sigma, &|part| work.at(part))?;
     let truth = known_ranges(task.truth.clone(), &surveyed, settings, array)?;
     let has_target = |pixel| truth.has_target(pixel, 0);
     ensure!(
@@ -210,11 +223,28 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     );
     let light = light(&surveyed, sigma, has_target);
 
-    (task.progress)("finds thresholds of equal false alarms")?;
-    let methods = Methods::new(task, &light, most_levels, has_neighbours)?;
+    let mut stresses = Stress::all(&light, settings.gate.map_or(0, |gate| gate.0));
+    // A stress that makes every pixel hot leaves none to compare.
+    let is_hot = |stress: &Stress, pixel| stress.is_hot(pixel, array.columns());
+    stresses.retain(|stress| surveyed.iter().any(|(pixel, _)| !is_hot(stress, *pixel)));
+
+    let pulse = dtof_core::fixed::types::U8F8::saturating_from_num(light.sigma);
+    let all = Method::all(pulse, most_levels, has_neighbours, settings);
+    let tried = all
+        .iter()
+        .map(|method| efforts(method, settings.l2, &light).len());
+    let (tried, under_stress_tried) = (tried.sum(), all.len() + 2);
+    let rest = cost.rest(tried, under_stress_tried, stresses.len());
+    let step = "finds thresholds of equal false alarms";
+    work.begin(step, Cost::THRESHOLDS, rest)?;
+    let methods = Methods::new(task, all, &light, &work)?;
     let bound = Bound::new(&light, settings, task.false_alarm, settings.seed)?;
 
-    (task.progress)("tries all methods")?;
+    work.begin(
+        "tries all methods",
+        cost.pass(tried),
+        rest - Cost::THRESHOLDS,
+    )?;
     let mut source = photons(task, 0, PHOTONS)?;
     let (pixels, cycles) = (source.addresses().len(), source.cycles());
     let trials = methods.trials(&light)?;
@@ -224,6 +254,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
         &trials,
         &truth,
         &Stress::NONE,
+        &|part| work.at(part),
     )?;
     outcomes.retain(|outcome| is_measured(outcome, cycles));
 
@@ -237,14 +268,14 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     // The methods to take are tried under stress with the minimum count that they are taken with.
     let mut trials = methods.fastest()?;
     trials.extend(best.iter().chain(&fastest).cloned());
-    let mut stresses = Stress::all(&light, settings.gate.map_or(0, |gate| gate.0));
-    // A stress that makes every pixel hot leaves none to compare.
-    let is_hot = |stress: &Stress, pixel| stress.is_hot(pixel, array.columns());
-    stresses.retain(|stress| surveyed.iter().any(|(pixel, _)| !is_hot(stress, *pixel)));
-    let stressed = stresses
-        .into_iter()
-        .map(|stress| under_stress(task, &methods.all, &trials, &truth, stress))
-        .collect::<Result<_>>()?;
+    let each = cost.under_stress(trials.len());
+    let mut stressed = Vec::new();
+    for (number, stress) in stresses.iter().enumerate() {
+        work.begin(stress.name, each, each * (stresses.len() - number) as f64)?;
+        let outcomes = under_stress(task, &methods.all, &trials, &truth, stress, &work)?;
+        stressed.push((stress.clone(), outcomes));
+    }
+    (task.progress)("is done", 1.0)?;
     Ok(Comparison {
         frame_mm,
         answer,
@@ -255,6 +286,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
         outcomes,
         bound,
         stressed,
+        l1: (settings.l1, task.why_l1.to_owned()),
         light,
         truth,
         sensor,
@@ -262,6 +294,39 @@ pub fn compare(task: &Task) -> Result<Comparison> {
         cycles,
         laser_hz,
     })
+}
+
+/// The work of each step: photons, times the trials that decide on them.
+struct Cost {
+    photons: f64,
+}
+
+impl Cost {
+    /// Photons cost as much to draw as so many trials.
+    const DRAWN: f64 = 8.0;
+    /// The work of the exposures that are simulated for thresholds.
+    const THRESHOLDS: f64 = 2e8;
+
+    fn new(source: &dyn PhotonSource) -> Self {
+        Self {
+            photons: source.photons_per_cycle() * source.cycles() as f64,
+        }
+    }
+
+    /// A pass over all photons.
+    fn pass(&self, trials: usize) -> f64 {
+        self.photons * (Self::DRAWN + trials as f64)
+    }
+
+    /// A pass under stress.
+    fn under_stress(&self, trials: usize) -> f64 {
+        self.photons.min(STRESS_PHOTONS) * (Self::DRAWN + trials as f64)
+    }
+
+    /// All after the survey.
+    fn rest(&self, trials: usize, under_stress: usize, stresses: usize) -> f64 {
+        Self::THRESHOLDS + self.pass(trials) + self.under_stress(under_stress) * stresses as f64
+    }
 }
 
 /// About `most` photons of the seed that is `nth_seed` after the first.
@@ -305,14 +370,14 @@ fn under_stress(
     methods: &[Method],
     trials: &[Trial],
     truth: &Truth,
-    stress: Stress,
-) -> Result<(Stress, Vec<Outcome>)> {
-    (task.progress)(stress.name)?;
+    stress: &Stress,
+    work: &Work,
+) -> Result<Vec<Outcome>> {
     let source = photons(task, 1, STRESS_PHOTONS)?;
     let bins = u16::try_from(task.settings.bins)?;
-    let mut source = Stressed::new(source, &stress, bins, task.sigma, task.settings.seed);
-    let outcomes = measure(&mut source, methods, trials, truth, &stress)?;
-    Ok((stress, outcomes))
+    let mut source = Stressed::new(source, stress, bins, task.sigma, task.settings.seed);
+    let progress = |part| work.at(part);
+    measure(&mut source, methods, trials, truth, stress, &progress)
 }
 
 /// Whether a trial has enough reports for its time and its error.

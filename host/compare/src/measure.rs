@@ -45,16 +45,18 @@ struct Running<'a> {
     tally: Tally<'a>,
 }
 
-/// Runs all `trials` of `methods` on the photons of `source`, which are under `stress`.
+/// Runs all `trials` of `methods` on the photons of `source`, which are under `stress`. `progress` takes the share
+/// that is done, 0 to 1.
 ///
 /// # Errors
-/// Fails if a trial is of no method, if settings are invalid, or if the photons cannot be read.
+/// Fails if `progress` fails, if a trial is of no method, if settings are invalid, or if the photons cannot be read.
 pub fn measure(
     source: &mut dyn PhotonSource,
     methods: &[Method],
     trials: &[Trial],
     truth: &Truth,
     stress: &Stress,
+    progress: &dyn Fn(f64) -> Result<()>,
 ) -> Result<Vec<Outcome>> {
     ensure!(
         trials.iter().all(|trial| trial.method < methods.len()),
@@ -86,7 +88,7 @@ pub fn measure(
                 Ok(())
             })
         },
-        |slice, (), _| {
+        |slice, (), done| {
             for (address, pixel) in addresses.iter().zip(&slice.pixels) {
                 let here = u64::from(pixel.cycles);
                 pixel_cycles += here;
@@ -99,6 +101,7 @@ pub fn measure(
                     watched.cycles += here;
                 }
             }
+            progress(done as f64 / cycles.max(1) as f64)?;
             Ok(ControlFlow::Continue(()))
         },
     )?;
@@ -140,7 +143,9 @@ mod tests {
             settings: Settings::static_scene(1),
         };
         let truth = Truth::Ranges(Vec::new());
-        let refused = measure(&mut source, &[], &[trial], &truth, &Stress::NONE);
+        let refused = measure(&mut source, &[], &[trial], &truth, &Stress::NONE, &|_| {
+            Ok(())
+        });
         let error = refused.unwrap_err().to_string();
         assert_eq!(error, "a trial of a method that does not exist");
     }

@@ -9,9 +9,10 @@ use dtof_draw::svg;
 
 use super::Comparison;
 use super::measure::Outcome;
+use super::text::{HARDER, STRESS_NOTE};
 use dtof_engine::settings::{self, SettingsFile};
-use dtof_options::files::{MarkedFile, may_replace, write_marked};
-use dtof_report::{Figure, Section, still};
+use dtof_options::files::{MarkedFile, may_replace, temporary_file, write_marked};
+use dtof_report::{Figure, Section, Table, capitalised, still};
 
 /// The files of a comparison, and the mark near the start of each. The last one makes a folder complete.
 pub const FILES: [(&str, &str); 6] = [
@@ -82,19 +83,24 @@ pub const TABLE_HEAD: &str = "method,threshold,least_photons_or_frame,cycles,cyc
 /// The columns that come first in the table under stress.
 const STRESS_HEAD: &str = "condition,holds";
 
-/// Checks that the results may be written into `folder`.
+/// Creates `folder` if it does not exist, and checks that the results can be written there.
 ///
 /// # Errors
-/// Fails if it holds a run, one of `inputs`, or a file of these names that no comparison has written.
-pub fn may_write(folder: &Path, inputs: &[&Path]) -> Result<()> {
+/// Fails if the folder cannot be written, if it holds a run, one of `inputs`, or a file of these names that no
+/// comparison has written.
+pub fn prepare(folder: &Path, inputs: &[&Path]) -> Result<()> {
     ensure!(
         !folder.join("summary.json").exists(),
         "{}: holds the results of a run; take another folder",
         folder.display()
     );
+    fs::create_dir_all(folder)
+        .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
     FILES
         .iter()
-        .try_for_each(|(name, mark)| may_replace(&folder.join(name), mark, inputs))
+        .try_for_each(|(name, mark)| may_replace(&folder.join(name), mark, inputs))?;
+    // It is deleted at once.
+    temporary_file(folder, ".dtof-").map(drop)
 }
 
 /// Writes the results for the input `name` into `folder`: chart, tables, page, and `settings`: those of the
@@ -109,26 +115,30 @@ pub fn write(
     settings: [Option<&SettingsFile>; 2],
     inputs: &[&Path],
 ) -> Result<()> {
-    fs::create_dir_all(folder)
-        .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
-    may_write(folder, inputs)?;
+    prepare(folder, inputs)?;
     let svg = comparison.chart()?;
     let section = |heading, rows| Section { heading, rows };
-    let (answer, candidates, stress) = (
-        comparison.rows(),
-        comparison.candidate_rows(),
-        comparison.stress_rows(),
-    );
+    let (answer, candidates) = (comparison.rows(), comparison.candidate_rows());
+    let head = comparison.stress_head();
+    let head: Vec<String> = head
+        .iter()
+        .map(|[group, name]| format!("{group} {name}"))
+        .collect();
+    let stress = Table {
+        heading: &capitalised(HARDER),
+        head: &head,
+        rows: &comparison.stress_rows(),
+        note: STRESS_NOTE,
+    };
     let sections = [
         section("Answer", &answer[..]),
         section("Methods that are exact enough", &candidates),
-        section("Harder conditions: time to a report, relative", &stress),
     ];
     let lead = format!("All methods on the same photons of {}.", name.display());
     let (title, _) = comparison.finding();
     let caption = "methods.csv has every dot, stress.csv the harder conditions.";
     let figure = Figure { svg: &svg, caption };
-    let page = still(&title, &lead, &sections, &[figure]);
+    let page = still(&title, &lead, &sections, &[stress], &[figure]);
     let [best, fastest] = settings.map(|one| one.map(SettingsFile::to_toml).transpose());
     let texts = [
         best?,

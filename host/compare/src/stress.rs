@@ -16,6 +16,8 @@ use dtof_theory::random::pixel_rng;
 pub struct Stress {
     /// Its name.
     pub name: &'static str,
+    /// The name above the column of a table, in two lines. Columns with the same first line stand side by side.
+    pub short: [&'static str; 2],
     /// The share of the photons that stays.
     pub keep: f64,
     /// Background photons a bin and laser cycle that are added.
@@ -47,6 +49,7 @@ impl Stress {
     /// No change.
     pub const NONE: Self = Self {
         name: "as it is",
+        short: ["as it", "is"],
         keep: 1.0,
         background: 0.0,
         hot: 0.0,
@@ -65,43 +68,51 @@ impl Stress {
             Self::NONE,
             Self {
                 name: "twice the background",
+                short: ["background", "×2"],
                 background,
                 ..Self::NONE
             },
             Self {
                 name: "four times the background",
+                short: ["background", "×4"],
                 background: 3.0 * background,
                 ..Self::NONE
             },
             Self {
                 name: "half the signal",
+                short: ["signal", "÷2"],
                 keep: 0.5,
                 background: 0.5 * background,
                 ..Self::NONE
             },
             Self {
                 name: "a quarter of the signal",
+                short: ["signal", "÷4"],
                 keep: 0.25,
                 background: 0.75 * background,
                 ..Self::NONE
             },
             Self {
                 name: "a hot pixel in each block",
+                short: ["hot", "pixel"],
                 hot: 99.0 * background,
                 ..Self::NONE
             },
             Self {
                 name: "drift of 4 bins",
+                short: ["", "drift"],
                 drift_bins: 4.0,
                 ..Self::NONE
             },
             Self {
                 name: "a glass inside the gate, ten times the signal",
+                short: ["cover", "glass"],
                 pulse: Some((10.0 * signal, glass, 0.0)),
                 ..Self::NONE
             },
             Self {
                 name: "a second LiDAR",
+                short: ["second", "LiDAR"],
                 pulse: Some((signal, 0.0, 4.37)),
                 ..Self::NONE
             },

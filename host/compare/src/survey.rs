@@ -25,13 +25,15 @@ pub struct PixelLight {
 }
 
 /// Counts all photons of `source`: the light of each pixel, corrected for the dead time of the settings.
+/// `progress` takes the share that is done.
 ///
 /// # Errors
-/// Fails if the gate is invalid or the photons cannot be read.
+/// Fails if `progress` fails, if the gate is invalid or the photons cannot be read.
 pub fn survey(
     source: &mut dyn PhotonSource,
     settings: &Settings,
     sigma: f64,
+    progress: &dyn Fn(f64) -> Result<()>,
 ) -> Result<Vec<(PixelAddress, PixelLight)>> {
     let (first, last) = first_and_last(settings)?;
     let addresses = source.addresses();
@@ -54,6 +56,7 @@ pub fn survey(
         if slice.pixels.iter().all(|pixel| pixel.cycles == 0) {
             break;
         }
+        progress(done as f64 / source.cycles() as f64)?;
     }
     let all = addresses.into_iter().zip(histograms).zip(cycles);
     let all = all.map(|((address, histogram), cycles)| {

@@ -120,6 +120,8 @@ pub struct Figures {
     pub stray: u64,
     /// The share of the reports of pixels with a target that are of their blocks.
     pub of_blocks: f64,
+    /// The share of the pixels with a target that have no right report.
+    pub silent: f64,
 }
 
 impl<'a> Tally<'a> {
@@ -224,6 +226,8 @@ impl<'a> Tally<'a> {
         // Infinite without a right report.
         let time = |(cycles, right): &(f64, f64)| cycles / right;
         times.sort_unstable_by(|one, other| time(one).total_cmp(&time(other)));
+        let silent = times.iter().filter(|pixel| pixel.1 == 0.0).count();
+        figures.silent = silent as f64 / times.len().max(1) as f64;
         let quarter = times.len() / 4;
         let middle = &times[quarter..times.len() - quarter];
         let sum = |of: fn(&(f64, f64)) -> f64| middle.iter().map(of).sum::<f64>();

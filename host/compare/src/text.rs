@@ -3,6 +3,7 @@
 use super::Comparison;
 use super::answer::{Answer, Choice};
 use super::measure::Outcome;
+use super::method::Method;
 use dtof_options::rows::{Row, grouped, significant};
 use dtof_report::capitalised;
 
@@ -11,15 +12,22 @@ use dtof_report::capitalised;
 const HOLDS_ERROR: f64 = 1.5;
 const HOLDS_WRONG: f64 = 0.05;
 
-/// A time that differs by less than this share counts as equal.
-const SAME_TIME: f64 = 0.2;
+const FAILS: &str = "fails";
+
+/// The heading of the harder conditions, and what their table has.
+pub(super) const HARDER: &str = "harder conditions";
+pub(super) const STRESS_NOTE: &str =
+    "×: time to a report over that without. fails: the error grows by half, or 5 % are wrong";
+
+/// A warning says that this share of the pixels or more does not report.
+const MANY_SILENT: f64 = 0.1;
 
 impl Comparison {
-    /// The finding of the chart, and whether there is a method to take.
+    /// The finding of the chart, and whether the data show it.
     pub(super) fn finding(&self) -> (String, bool) {
         let Answer { best, fastest, .. } = &self.answer;
         let Some(first) = best.as_ref().or(fastest.as_ref()) else {
-            return ("A method is exact enough".to_owned(), false);
+            return (capitalised(&self.none_is_exact(&|_| true)), true);
         };
         let name = capitalised(&self.methods[first.method].name);
         let time = self.time_text(first.cycles);
@@ -88,6 +96,13 @@ impl Comparison {
             ),
             row("truth", self.truth.description().to_owned()),
             row("wanted", self.allowed_error()),
+            row(
+                "first report",
+                format!(
+                    "after more than {} laser cycles (L1), {}",
+                    self.l1.0, self.l1.1
+                ),
+            ),
         ];
         let Answer { best, fastest, .. } = &self.answer;
         match best {
@@ -96,8 +111,8 @@ impl Comparison {
                 rows.extend(self.choice_rows(best, ""));
             }
             None if fastest.is_some() => {
-                let text = "no method that keeps every pixel is exact enough here";
-                rows.push(row("take", text.to_owned()));
+                let text = self.none_is_exact(&Method::has_full_resolution);
+                rows.push(row("take", text));
             }
             None => rows.extend(self.rows_without_answer()),
         }
@@ -117,27 +132,72 @@ impl Comparison {
     /// Why there is no method to take.
     fn rows_without_answer(&self) -> Vec<Row> {
         let row = |name: &str, value: String| (name.to_owned(), value);
-        let mut rows = vec![row("take", "no method is exact enough here".to_owned())];
-        let all = self.outcomes.iter().filter(|outcome| {
-            !self.methods[outcome.trial.method].is_frames() && outcome.figures.cycles.is_finite()
-        });
-        let closest =
-            all.min_by(|one, other| one.figures.error_mm.total_cmp(&other.figures.error_mm));
-        if let Some(closest) = closest {
-            rows.push(row(
-                "most exact",
-                format!(
-                    "{}: {} mm; a larger --within allows it",
-                    self.methods[closest.trial.method].name,
-                    short(closest.figures.error_mm)
-                ),
-            ));
+        let mut rows = vec![row("take", self.none_is_exact(&|_| true))];
+        if let Some(closest) = self.most_exact(&|_| true) {
             if closest.figures.wrong > 0.5 {
                 let text = "most reports are wrong: a cover glass? `calibrate` finds the gate";
                 rows.push(row("hint", text.to_owned()));
+            } else {
+                rows.push(row("hint", "a larger --within has an answer".to_owned()));
             }
         }
         rows
+    }
+
+    /// The trial with the smallest error, of the methods that are `among` those to choose from.
+    fn most_exact(&self, among: &dyn Fn(&Method) -> bool) -> Option<&Outcome> {
+        let all = self.outcomes.iter().filter(|outcome| {
+            let method = &self.methods[outcome.trial.method];
+            !method.is_frames() && among(method) && outcome.figures.cycles.is_finite()
+        });
+        all.min_by(|one, other| one.figures.error_mm.total_cmp(&other.figures.error_mm))
+    }
+
+    /// That no method is exact enough, and how exact one is.
+    fn none_is_exact(&self, among: &dyn Fn(&Method) -> bool) -> String {
+        let within = self.answer.within_mm;
+        let whose = if self.answer.fastest.is_some() {
+            "no method that keeps every pixel"
+        } else {
+            "no method"
+        };
+        let none = format!("{whose} reaches an error of {} mm", short(within));
+        let Some(closest) = self.most_exact(among) else {
+            return format!("{none}: none has enough reports");
+        };
+        let name = &self.methods[closest.trial.method].name;
+        let figures = &closest.figures;
+        let error = short(figures.error_mm);
+        if figures.error_mm > within {
+            return format!("{none}; the smallest is {error} mm, by {name}");
+        }
+        format!(
+            "{none} reliably: {name} has {error} mm, but {:.0} % of its {} reports are wrong",
+            100.0 * figures.wrong,
+            grouped(figures.reports)
+        )
+    }
+
+    /// Warnings about the methods to take: pixels that do not report.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let Answer { best, fastest, .. } = &self.answer;
+        let answers = [
+            (best, "the method to take"),
+            (fastest, "the fastest method"),
+        ];
+        let warnings = answers.into_iter().filter_map(|(choice, whose)| {
+            let choice = choice.as_ref()?;
+            let silent = self.without_stress(choice.method, choice.effort)?.figures.silent;
+            (silent >= MANY_SILENT).then(|| {
+                format!(
+                    "{whose} leaves {:.0} % of the pixels without a right report; a larger --within takes \
+                     one that reports sooner",
+                    100.0 * silent
+                )
+            })
+        });
+        warnings.collect()
     }
 
     /// What a method does; each row begins with `whose`.
@@ -225,34 +285,78 @@ impl Comparison {
         rows.collect()
     }
 
-    /// The time of each method in harder conditions relative to that without, and where it fails.
-    #[must_use]
-    pub fn stress_rows(&self) -> Vec<Row> {
-        let rows = self.methods.iter().enumerate().map(|(number, method)| {
-            let stressed = self.stressed.iter();
-            let mut outcomes = stressed.filter_map(|(stress, all)| {
-                let outcome = all.iter().find(|one| one.trial.method == number)?;
-                Some((stress.name, outcome))
+    /// The names of the harder conditions, in two lines.
+    pub(super) fn stress_head(&self) -> Vec<[&'static str; 2]> {
+        let stressed = self.stressed.iter().skip(1);
+        stressed.map(|(stress, _)| stress.short).collect()
+    }
+
+    /// A row for the methods to take, with their minimum count, and for each method, with the lowest: in each
+    /// harder condition its time over that without, or that it fails.
+    pub(super) fn stress_rows(&self) -> Vec<(String, Vec<String>)> {
+        let Answer { best, fastest, .. } = &self.answer;
+        let answers = [(best, "take"), (fastest, "fastest")];
+        let answers = answers.into_iter().filter_map(|(choice, name)| {
+            let choice = choice.as_ref()?;
+            Some((name.to_owned(), choice.method, Some(choice.effort)))
+        });
+        let methods = self.methods.iter().enumerate();
+        let methods = methods.map(|(number, method)| (method.name.clone(), number, None));
+        let rows = answers.chain(methods).map(|(name, method, effort)| {
+            let is_same = |outcome: &&Outcome| {
+                let trial = &outcome.trial;
+                trial.method == method && effort.is_none_or(|effort| trial.effort == effort)
+            };
+            let mut outcomes = self
+                .stressed
+                .iter()
+                .map(|(_, all)| all.iter().find(is_same));
+            let before = outcomes.next().flatten();
+            let before = before.map_or(f64::NAN, |outcome| outcome.figures.cycles);
+            let cells = outcomes.map(|outcome| match outcome {
+                Some(outcome) if self.holds(outcome) => {
+                    format!("×{:.1}", outcome.figures.cycles / before)
+                }
+                _ => FAILS.to_owned(),
             });
-            let before = outcomes
-                .next()
-                .map_or(f64::NAN, |(_, outcome)| outcome.figures.cycles);
-            let mut texts: Vec<String> = outcomes
-                .filter_map(|(name, outcome)| {
-                    let times = outcome.figures.cycles / before;
-                    if !self.holds(outcome) {
-                        Some(format!("{name}: fails"))
-                    } else if (times - 1.0).abs() < SAME_TIME {
-                        None
-                    } else {
-                        Some(format!("{name}: ×{times:.1}"))
-                    }
-                })
-                .collect();
-            texts.push("else as before".to_owned());
-            (method.name.clone(), texts.join("; "))
+            (name, cells.collect())
         });
         rows.collect()
+    }
+
+    /// The harder conditions as text.
+    #[must_use]
+    pub fn stress_text(&self) -> String {
+        /// Of a column.
+        const WIDTH: usize = 7;
+        let (head, rows) = (self.stress_head(), self.stress_rows());
+        let names = rows.iter().map(|(name, _)| name.chars().count());
+        let left = 2 + names.fold(HARDER.len(), usize::max);
+        let mut lines = vec![format!("{:left$}", format!("  {HARDER}")), " ".repeat(left)];
+        for (column, [group, name]) in head.iter().enumerate() {
+            let end = left + WIDTH * (column + 1);
+            let is_last = head.get(column + 1).is_none_or(|next| next[0] != *group);
+            let group = if is_last { group } else { "" };
+            for (line, text) in lines.iter_mut().zip([group, name]) {
+                let width = end - line.chars().count();
+                *line += &format!("{text:>width$}");
+            }
+        }
+        for (name, cells) in rows {
+            let cells: String = cells.iter().map(|cell| format!("{cell:>WIDTH$}")).collect();
+            lines.push(format!("  {name:width$}{cells}", width = left - 2));
+        }
+        lines.push(format!("  {STRESS_NOTE}"));
+        lines
+            .iter()
+            .map(|line| format!("{}\n", line.trim_end()))
+            .collect()
+    }
+
+    /// A method without stress, on the photons that are then changed.
+    fn without_stress(&self, method: usize, effort: u16) -> Option<&Outcome> {
+        let mut all = self.stressed.first()?.1.iter();
+        all.find(|outcome| (outcome.trial.method, outcome.trial.effort) == (method, effort))
     }
 
     /// The conditions in which the method to take fails, with its minimum count.
@@ -269,13 +373,7 @@ impl Comparison {
 
     /// Whether a method holds under stress: it reports, about as exact as without, and is rarely wrong.
     pub(super) fn holds(&self, stressed: &Outcome) -> bool {
-        let without = self.stressed.first().and_then(|(_, outcomes)| {
-            let mut all = outcomes.iter();
-            all.find(|outcome| {
-                let (one, other) = (&outcome.trial, &stressed.trial);
-                (one.method, one.effort) == (other.method, other.effort)
-            })
-        });
+        let without = self.without_stress(stressed.trial.method, stressed.trial.effort);
         let before = without.map_or(f64::INFINITY, |outcome| outcome.figures.error_mm);
         let figures = &stressed.figures;
         figures.cycles.is_finite()

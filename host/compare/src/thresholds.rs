@@ -18,6 +18,8 @@ const MAX_EXPOSURES: u32 = 20_000;
 /// The fewest exposures.
 const MIN_EXPOSURES: u32 = 1_000;
 const MAX_PHOTONS: f64 = 4e8;
+/// Progress is reported after so many exposures.
+const PART: u32 = 500;
 /// The fewest exposures with a false alarm at a threshold.
 const MIN_EVENTS: f64 = 5.0;
 
@@ -31,18 +33,19 @@ pub struct Thresholds {
 
 impl Thresholds {
     /// Simulates `rules` with `background` photons a bin and laser cycle, and gate, L1, L2 and X of
-    /// `settings`.
+    /// `settings`. `progress` takes the share that is done.
     ///
     /// # Errors
-    /// Fails if number of bins, gate, background or a window is invalid.
+    /// Fails if `progress` fails, or if number of bins, gate, background or a window is invalid.
     pub fn simulate(
         rules: &[Rule],
         settings: &Settings,
         background: f64,
         seed: u64,
+        progress: &dyn Fn(f64) -> Result<()>,
     ) -> Result<Self> {
         let exceeded = with_bins!(settings.bins, BINS => {
-            exceeded::<BINS>(rules, settings, background, seed)
+            exceeded::<BINS>(rules, settings, background, seed, progress)
         })??;
         Ok(Self {
             rules: rules.to_vec(),
@@ -90,6 +93,7 @@ fn exceeded<const BINS: usize>(
     settings: &Settings,
     background: f64,
     seed: u64,
+    progress: &dyn Fn(f64) -> Result<()>,
 ) -> Result<Vec<Vec<u32>>> {
     ensure!(
         background >= 0.0 && background.is_finite(),
@@ -153,11 +157,15 @@ fn exceeded<const BINS: usize>(
             }
         }
     };
-    let fired: Vec<Vec<usize>> = (0..exposures).into_par_iter().map(one).collect();
     let mut counts = vec![vec![0; Rule::THRESHOLDS + 1]; rules.len()];
-    for exposure in fired {
-        for (counts, fired) in counts.iter_mut().zip(exposure) {
-            counts[fired] += 1;
+    for first in (0..exposures).step_by(PART as usize) {
+        let part = first..exposures.min(first + PART);
+        progress(f64::from(first) / f64::from(exposures))?;
+        let fired: Vec<Vec<usize>> = part.into_par_iter().map(one).collect();
+        for exposure in fired {
+            for (counts, fired) in counts.iter_mut().zip(exposure) {
+                counts[fired] += 1;
+            }
         }
     }
     Ok(counts)

@@ -38,6 +38,19 @@ pub struct Section<'a> {
     pub rows: &'a [(String, String)],
 }
 
+/// A table of several columns: a name and a value for each of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a> {
+    /// The heading of the table.
+    pub heading: &'a str,
+    /// The headings of the columns of values.
+    pub head: &'a [String],
+    /// The name and the values of each row.
+    pub rows: &'a [(String, Vec<String>)],
+    /// The text below it.
+    pub note: &'a str,
+}
+
 /// The mark near the start of every page.
 pub const MARK: &str = "<meta name=\"generator\" content=\"dtof\">";
 
@@ -67,13 +80,25 @@ pub fn html(
     let script = format!("script-src 'sha256-{hash}'; ");
     let taken: usize = figures.iter().map(|figure| figure.svg.len()).sum();
     let interactive = events.html(MAX_PAGE.saturating_sub(MAX_OTHER + taken));
-    page(title, lead, (&script, &interactive), sections, figures)
+    page(
+        title,
+        lead,
+        (&script, &interactive),
+        (sections, &[]),
+        figures,
+    )
 }
 
 /// The same page without events, and so without a script.
 #[must_use]
-pub fn still(title: &str, lead: &str, sections: &[Section], figures: &[Figure]) -> String {
-    page(title, lead, ("", ""), sections, figures)
+pub fn still(
+    title: &str,
+    lead: &str,
+    sections: &[Section],
+    tables: &[Table],
+    figures: &[Figure],
+) -> String {
+    page(title, lead, ("", ""), (sections, tables), figures)
 }
 
 /// `script` is the policy of the script, `interactive` the elements that it fills.
@@ -81,7 +106,7 @@ fn page(
     title: &str,
     lead: &str,
     (script, interactive): (&str, &str),
-    sections: &[Section],
+    (sections, tables): (&[Section], &[Table]),
     figures: &[Figure],
 ) -> String {
     let title = text(title);
@@ -115,6 +140,26 @@ fn page(
             page += &format!("<tr><th scope=\"row\">{name}</th><td>{value}</td></tr>\n");
         }
         page += "</tbody>\n</table>\n</section>\n";
+    }
+    for table in tables {
+        let (heading, note) = (text(table.heading), text(table.note));
+        let head = table
+            .head
+            .iter()
+            .map(|name| format!("<th scope=\"col\">{}</th>", text(name)));
+        page += &format!(
+            "<section class=\"wide\">\n<h2>{heading}</h2>\n<div><table>\n\
+             <thead><tr><td></td>{}</tr></thead>\n<tbody>\n",
+            head.collect::<String>()
+        );
+        for (name, values) in table.rows {
+            let values = values
+                .iter()
+                .map(|value| format!("<td>{}</td>", text(value)));
+            let (name, values) = (text(name), values.collect::<String>());
+            page += &format!("<tr><th scope=\"row\">{name}</th>{values}</tr>\n");
+        }
+        page += &format!("</tbody>\n</table></div>\n<p class=\"hint\">{note}</p>\n</section>\n");
     }
     page + "</div>\n</main>\n</body>\n</html>\n"
 }

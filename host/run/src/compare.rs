@@ -68,8 +68,9 @@ pub enum CompareInput {
 pub struct Callbacks<'a> {
     /// Takes a warning about the recording.
     pub warning: &'a dyn Fn(String),
-    /// Takes the name of the next step. An error from it ends the comparison.
-    pub step: &'a dyn Fn(&str) -> Result<()>,
+    /// Takes the name of the current step, and the share of the work that is done, 0 to 1. An error from it ends
+    /// the comparison.
+    pub step: &'a dyn Fn(&str, f64) -> Result<()>,
 }
 
 /// The result of a comparison.
@@ -87,6 +88,8 @@ struct Subject {
     requested: SettingsFile,
     truth: Option<Truth>,
     photons: Photons,
+    /// Why L1 is what it is.
+    why_l1: &'static str,
 }
 
 /// Where photons come from, for each seed.
@@ -161,6 +164,7 @@ impl Options {
             requested,
             truth,
             photons,
+            why_l1,
         } = subject;
         let false_alarm = self.false_alarm_share(&requested);
         let sigma = requested.sensor.sigma_bins.ok_or_else(|| {
@@ -197,9 +201,14 @@ impl Options {
             sigma: sigma.to_num(),
             false_alarm,
             within_mm: self.within,
+            why_l1,
             progress: callbacks.step,
         });
         let comparison = comparison.context(name)?;
+        comparison
+            .warnings()
+            .into_iter()
+            .for_each(callbacks.warning);
         let file = |settings: &Option<Settings>| {
             let settings = settings.as_ref();
             settings.map(|settings| requested.with_settings(settings).without_recording())
@@ -224,6 +233,7 @@ impl Options {
         requested: SettingsFile,
         callbacks: &Callbacks,
     ) -> Result<Subject> {
+        (callbacks.step)("reads the recording", 0.0)?;
         let counts = counts(&input, &read_options(&requested))?;
         self.given.suits(&input, &counts.metadata)?;
         let is_once_per_bin = requested.detection.once_per_bin == Some(true);
@@ -242,9 +252,16 @@ impl Options {
         let merged = requested
             .clone()
             .or(settings_of_file(&counts.metadata, counts.array));
-        let requested = if requested.sensor.sigma_bins.is_some() {
+        let is_calibrated = requested.sensor.sigma_bins.is_none();
+        let why_l1 = match merged.detection.l1 {
+            Some(_) => GIVEN_L1,
+            None if is_calibrated => "which `calibrate` found for this background and signal",
+            None => SECOND_LOOK,
+        };
+        let requested = if !is_calibrated {
             merged
         } else {
+            (callbacks.step)("calibrates", 0.0)?;
             let options = CalibrationOptions {
                 false_alarm: self.false_alarm_share(&requested),
                 ..CalibrationOptions::default()
@@ -256,6 +273,7 @@ impl Options {
         Ok(Subject {
             requested: with_short_exposures(requested),
             truth,
+            why_l1,
             photons: if counts.metadata.is_list {
                 Photons::List(input)
             } else {
@@ -265,14 +283,20 @@ impl Options {
     }
 }
 
+/// Why L1 is what it is.
+const GIVEN_L1: &str = "as the settings have it";
+const SECOND_LOOK: &str = "at the second look: the thresholds allow for that";
+
 /// A scene; the width of the pulse is that of the scene unless it is given.
 fn subject_of_scene(scene: Scene, name: &str, requested: SettingsFile) -> Result<Subject> {
     let mut requested = settings_of_scene(requested, &scene).with_context(|| name.to_owned())?;
     let sigma = U8F8::checked_from_num(scene.pulse_sigma_bins);
     let sigma = sigma.filter(|sigma| *sigma <= CentredWindow::WIDEST_PULSE);
     requested.sensor.sigma_bins = requested.sensor.sigma_bins.or(sigma);
+    let is_given = requested.detection.l1.is_some();
     Ok(Subject {
         requested: with_short_exposures(requested),
+        why_l1: if is_given { GIVEN_L1 } else { SECOND_LOOK },
         truth: Some(Truth::Scene(Box::new(scene.clone()))),
         photons: Photons::Scene(Box::new(scene)),
     })

@@ -112,15 +112,15 @@ def compare(
     *,
     scene: Any = None,
     truth: Any = None,
-    progress: Optional[Callable[[str], Any]] = None,
+    progress: Optional[Callable[[str, float], Any]] = None,
     **options: Unpack[CompareOptions],
 ) -> Comparison:
     """Compares all methods on a recording or a scene, and recommends one.
 
     Takes ``recorded``, a recording as for :func:`replay`, or ``scene``, as for :func:`simulate`.
     ``truth`` is the true range of each pixel in millimetres, an array or a file; 0 means none.
-    ``within`` is the largest error of 68 % of the reports, in millimetres. ``progress(step)`` is
-    called with each step.
+    ``within`` is the largest error of 68 % of the reports, in millimetres. ``progress(step, share)``
+    is called with each step and the share of the whole work that is done, 0 to 1, some 200 times.
     """
     compared = _CompareInput(
         recording=None if recorded is None else recording_input(recorded, options),

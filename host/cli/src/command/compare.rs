@@ -1,5 +1,6 @@
 //! `dtof compare`: all methods on the same photons, the best that keeps every pixel, and the fastest.
 
+use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -43,7 +44,6 @@ impl Compare {
     pub fn run(&self) -> Result<()> {
         let name = self.recorded.file().or(self.scene.as_deref());
         let name = name.ok_or_else(|| Refused::new("input", "is needed, or `scene`"))?;
-        page::may_write(&self.out, &self.inputs())?;
         let requested = self.options.0.requested(self.scene.is_some())?;
         let input = match &self.scene {
             Some(file) => {
@@ -51,19 +51,25 @@ impl Compare {
             }
             None => CompareInput::Recording(name.into(), self.truth.as_deref().map(Input::from)),
         };
+        let is_new = !self.out.exists();
+        page::prepare(&self.out, &self.inputs())?;
         let steps = Steps::new(self.quiet);
         let compared = self.options.0.compare(
             input,
             &requested,
             &Callbacks {
-                warning: &|warning| warn(name, [warning], self.quiet),
-                step: &|step| {
-                    steps.at(step);
+                warning: &|warning| steps.suspend(|| warn(name, [warning], self.quiet)),
+                step: &|step, share| {
+                    steps.at(step, share);
                     Ok(())
                 },
             },
         );
         steps.finish();
+        if compared.is_err() && is_new {
+            // Nothing is in it. If it cannot be removed, it stays.
+            let _ = fs::remove_dir(&self.out);
+        }
         let CompareResult {
             comparison,
             settings,
@@ -80,6 +86,7 @@ impl Compare {
             let mut out = io::stdout().lock();
             let report = self.out.join("report.html");
             write!(out, "{}", aligned(&comparison.rows()))?;
+            write!(out, "\n{}", comparison.stress_text())?;
             if settings.is_some() || fastest.is_some() {
                 writeln!(out)?;
             }

@@ -52,10 +52,23 @@ fn a_scene_has_an_answer_that_simulate_takes() {
         "0.0200 background photons",
         "errors of at most 12.0 mm",
         "instructions a laser cycle and pixel",
+        "after more than 4 laser cycles (L1), at the second look",
+        "harder conditions               background     signal    hot         cover second\n",
+        "     ×2     ×4     ÷2     ÷4  pixel  drift  glass  LiDAR\n",
         "out/dtof.toml has the settings of the method to take.",
     ] {
         assert_contains(&printed, part);
     }
+    let window = printed
+        .lines()
+        .find(|line| line.starts_with("  window of 3  "));
+    let cells: Vec<&str> = window.unwrap().split_whitespace().skip(3).collect();
+    assert_eq!(cells.len(), 8, "{cells:?}");
+    assert!(
+        cells[3].starts_with('×') && cells[6] == "fails",
+        "{cells:?}"
+    );
+    assert_contains(&scratch.read("out/report.html"), "<td>fails</td>");
     assert_eq!(names(&scratch.path("out")), FILES);
     scratch.printed("compare --scene scene.toml --within 12 --out again --quiet");
     for name in FILES {
@@ -74,7 +87,9 @@ fn a_scene_has_an_answer_that_simulate_takes() {
         assert_contains(&table, part);
         assert_contains(&chart, part);
     }
-    assert_contains(&chart, "µs");
+    for part in ["µs", ">take</text>", ">fastest</text>"] {
+        assert_contains(&chart, part);
+    }
     let stress = scratch.read("out/stress.csv");
     assert_contains(
         &stress,
@@ -178,6 +193,32 @@ fn a_recording_without_truth_is_held_against_itself() {
     assert_contains(&report, "window of 3, once per bin");
 }
 
+/// The same wall behind a dim ball.
+const PARTLY_DIM: &str = "[[surface]]\nrange_mm = 1500\nsignal = 0.01\n\
+     ball = { centre = [6, 1], radius = 1.5, radius_mm = 10 }\n";
+
+#[test]
+fn a_warning_says_that_pixels_stay_silent() {
+    let scratch = Scratch::new();
+    scratch.file("scene.toml", format!("{SCENE}{PARTLY_DIM}"));
+    let output = scratch.run("compare --scene scene.toml --within 4 --out out");
+    assert!(output.status.success());
+    let warning = String::from_utf8(output.stderr).unwrap();
+    let share = "warning: scene.toml: the method to take leaves 16 % of the pixels without a right report; ";
+    assert_contains(&warning, share);
+}
+
+#[test]
+fn without_an_answer_the_smallest_error_is_named() {
+    let scratch = Scratch::new();
+    scratch.file("scene.toml", SCENE.replace("6000", "3000"));
+    let printed = scratch.printed("compare --scene scene.toml --within 0.1 --out out");
+    let none = "o method reaches an error of 0.100 mm; the smallest is ";
+    assert_contains(&printed, &format!("  take          n{none}"));
+    assert_contains(&scratch.read("out/report.html"), &format!("<h1>N{none}"));
+    assert!(!printed.contains("has the settings"), "{printed}");
+}
+
 #[test]
 fn what_cannot_be_compared_is_refused() {
     let scratch = Scratch::new();
@@ -205,6 +246,13 @@ fn what_cannot_be_compared_is_refused() {
             {recording} --truth none.npy | none.npy: no pixel has a range"
         ),
     );
+    assert!(!scratch.path("out").exists());
+    // The output folder is checked before the scene, which has no target.
+    for folder in ["dark.toml", "dark.toml/out"] {
+        let output = scratch.run(&format!("compare --scene dark.toml --out {folder}"));
+        let message = String::from_utf8(output.stderr).unwrap();
+        assert_contains(&message, &format!("{folder}: cannot be the output folder"));
+    }
     // Runs and comparisons do not replace each other's files.
     scratch.printed("simulate --scene scene.toml --out run --quiet");
     let output = scratch.run("compare --scene scene.toml --out run");
