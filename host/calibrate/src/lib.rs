@@ -473,6 +473,51 @@ mod tests {
     }
 
     #[test]
+    fn true_distances_of_several_captures_give_offsets_without_a_field_of_view() {
+        let histogram = |pixel: usize, mm: f64| -> Vec<u64> {
+            let near = if pixel.is_multiple_of(2) { 40.0 } else { 0.0 };
+            let position = (mm - near) / (250.0 * MM_PER_PS);
+            let photons = |bin| 5.0 + 800.0 * dtof_theory::rates::bin_share(bin, position, 0.9);
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let counts = (0..128).map(|bin| photons(bin).round() as u64).collect();
+            counts
+        };
+        let mm = |capture: usize, pixel: usize| 900.0 + 310.0 * capture as f64 + 7.0 * pixel as f64;
+        let found = |captures: usize| {
+            let capture = |at: usize| {
+                (0..8)
+                    .map(|pixel| histogram(pixel, mm(at, pixel)))
+                    .collect()
+            };
+            let truth: Vec<Option<f64>> = (0..captures * 8)
+                .map(|at| Some(mm(at / 8, at % 8)))
+                .collect();
+            let captures: Vec<Vec<Vec<u64>>> = (0..captures).map(capture).collect();
+            let observed = Observed {
+                array: Array::new(4, 2).unwrap(),
+                captures: &captures,
+                length: Length::Unknown,
+                cycles: None,
+                bin_width_ps: 250.0,
+                truth_mm: Some(&truth),
+                slant: None,
+            };
+            calibrate(&observed, &CalibrationOptions::default()).unwrap()
+        };
+        // One capture does not tell pixels from surfaces.
+        assert_eq!(found(1).pixel_offsets, None);
+        let found = found(3);
+        let (offset, pixels) = (found.offset.unwrap().mm, found.pixel_offsets.unwrap());
+        for (pixel, own) in pixels.mm.iter().enumerate() {
+            let expected = if pixel.is_multiple_of(2) { 40.0 } else { 0.0 };
+            assert!(
+                (offset + own - expected).abs() < 2.0,
+                "{pixel}: {offset} {own}"
+            );
+        }
+    }
+
+    #[test]
     fn equal_pixels_have_no_offsets_but_for_few_of_a_thousand_recordings() {
         for (draws, most, light) in [
             (1000, 2, (200.0, 2.0, 0.8)),

@@ -312,6 +312,38 @@ mod tests {
     }
 
     #[test]
+    fn there_is_an_offset_for_each_pixel_of_the_device() {
+        let setup = |text: &str| {
+            let sensor = SensorRecord {
+                pixels: 5,
+                bin_width: None,
+                offset: I24F8::ZERO,
+                laser_millihertz: 0,
+                bins: 128,
+                dead_time: 0,
+                most_dither: 0,
+            };
+            let requested = SettingsFile::parse(&format!("[sensor]\ncolumns = 3\n{text}")).unwrap();
+            Setup::new(sensor, 10, 128, requested, 5)
+        };
+        let setup_of_five = setup("masked = [1]\noffsets_mm = [1, 2, 3, 4, 5]").unwrap();
+        // The last place of the second row has no pixel.
+        let expected = [Some(1), None, Some(3), Some(4), Some(5), Some(0)];
+        let expected = expected.map(|mm| mm.map(I24F8::from_num::<i32>));
+        let header = setup_of_five.header();
+        assert_eq!(header.offsets_mm, expected);
+        let task = setup_of_five.task(None, HostTimeout::default());
+        assert_eq!(task.ranges().unwrap(), header.ranges().unwrap());
+        for text in [
+            "offsets_mm = [1, 2, 3, 4]",
+            "offsets_mm = [8388607, 0, 0, 0, 0]",
+        ] {
+            let error = setup(text).map(|_| ()).unwrap_err().to_string();
+            assert!(error.contains("offsets_mm"), "{error}");
+        }
+    }
+
+    #[test]
     fn the_dead_time_is_the_sensors_unless_it_is_given() {
         let setup = |text: &str, of_sensor| {
             let sensor = SensorRecord {
