@@ -63,3 +63,30 @@ fn reports_in_a_browser_are_drawn_turned_and_closed() -> Result<()> {
     ensure!(bytes < MOST_BYTES, "report.png has {bytes} bytes");
     Ok(())
 }
+
+#[test]
+fn a_recording_in_a_browser_waits_is_moved_and_slowed_down() -> Result<()> {
+    let test = "a recording in a browser";
+    let Some(_alone) = enabled(test, &["chromium", "python3"]) else {
+        return Ok(());
+    };
+    let Some(python) = python(test, "host-tests/report/requirements.txt") else {
+        return Ok(());
+    };
+    let (dtof, root) = (dtof()?, root());
+    let folder = root.join("out/check-view");
+    let mut demo = Command::new(&dtof);
+    succeed(
+        demo.current_dir(&root)
+            .args(["demo", "--quiet", "--out"])
+            .arg(&folder),
+    )?;
+    let mut check = Command::new(python);
+    check.arg(root.join("host-tests/report/view.py"));
+    check
+        .arg("chromium")
+        .arg(&folder)
+        .arg(&dtof)
+        .arg(folder.join("events.aer"));
+    succeed(&mut check)
+}

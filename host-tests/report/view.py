@@ -1,0 +1,82 @@
+"""The live page of a recording in a real browser: its position, its speed, and its first pixel."""
+
+import shutil
+import subprocess
+import sys
+import time
+
+from browser import check
+from playwright.sync_api import sync_playwright
+
+MOVE = """(share) => {
+    const position = document.getElementById("position");
+    position.value = share * position.max;
+    for (const name of ["input", "change"]) position.dispatchEvent(new Event(name));
+}"""
+
+
+def until(page, what, part, text):
+    """Waits until a part has a text. The page's policy forbids Playwright's own wait."""
+    since = time.monotonic()
+    while text not in page.inner_text(part) and time.monotonic() - since < 10:
+        time.sleep(0.02)
+    check(f"{what}: {page.inner_text(part)!r}", text in page.inner_text(part))
+
+
+def shows_a_recording(browser, address, width, scheme, picture):
+    errors = []
+    window = browser.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme)
+    page = window.new_page()
+    page.on("console", lambda message: errors.append(message.text))
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(address)
+    page.wait_for_selector("#playback:not([hidden])")
+
+    page.select_option("#speed", "0.001")
+    page.evaluate(MOVE, 0.5)
+    until(page, "it goes to half of the recording", "#place", "0.100 of 0.200 s")
+    until(page, "about half of the events have come", "#totals", "\n15,")
+    until(page, "the pixel has events", "#ranges-note", "Range in millimetres")
+    check("the speed is as chosen", page.eval_on_selector("#speed", "e => e.value") == "0.001")
+    spoken = page.get_attribute("#position", "aria-valuetext")
+    check(f"the position is said in seconds: {spoken}", " of 0.200 s" in spoken)
+    page.focus("#position")
+    page.keyboard.press("End")
+    until(page, "End goes to the end", "#state", "at its end")
+    until(page, "it can be played again", "#play", "Play again")
+    page.keyboard.press("Home")
+    until(page, "Home plays it from the start", "#state", "playing")
+    page.keyboard.press("ArrowRight")
+    until(page, "an arrow key moves it", "#place", "0.002 of")
+    wide = page.evaluate("document.documentElement.scrollWidth")
+    check(f"no scrolling sideways at {width} pixels", wide <= width)
+    page.screenshot(path=picture)
+    check(f"no errors {errors}", not errors)
+    window.close()
+
+
+def main(chromium, pictures, dtof, recording):
+    program = subprocess.Popen([dtof, "view", recording], stdout=subprocess.PIPE, text=True)
+    try:
+        address = program.stdout.readline().strip()
+        # Five times as long as the recording.
+        time.sleep(1)
+        with sync_playwright() as driver:
+            # Root, as in a container, has no sandbox.
+            browser = driver.chromium.launch(executable_path=shutil.which(chromium), args=["--no-sandbox"])
+            page = browser.new_page()
+            page.goto(address)
+            until(page, "it ends", "#state", "at its end")
+            note = page.inner_text("#ranges-note")
+            check(f"it has waited for its page: {note}", note.startswith("Range in millimetres: the last"))
+            page.close()
+            for width in [400, 1200]:
+                for scheme in ["light", "dark"]:
+                    print(f"{width} pixels, {scheme}")
+                    shows_a_recording(browser, address, width, scheme, f"{pictures}/view-{width}-{scheme}.png")
+            browser.close()
+    finally:
+        program.terminate()
+
+
+main(*sys.argv[1:])
