@@ -46,9 +46,10 @@ def speeds(workers, files, one, folder):
         with tempfile.TemporaryDirectory(dir=folder) as out:
             return cluster.recordings(client, files, out=out, **options).totals
 
-    with LocalCluster(
-        n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None
-    ) as local, Client(local) as client:
+    with (
+        LocalCluster(n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None) as local,
+        Client(local) as client,
+    ):
         for replay in (many, lambda: cluster.replay(client, one, rows=32, **options).statistics):
             seconds = []
             for _ in range(3):
@@ -67,8 +68,10 @@ def main():
     failed = False
     for (name, least), alone, both in zip(MIN_RATIO.items(), one, two):
         failed |= both / alone < least
-        print(f"{name}: one worker {alone / 1e6:.1f}, two {both / 1e6:.1f} million photons a second, "
-              f"ratio {both / alone:.2f}")
+        print(
+            f"{name}: one worker {alone / 1e6:.1f}, two {both / 1e6:.1f} million photons a second, "
+            f"ratio {both / alone:.2f}"
+        )
     sys.exit(failed)
 
 

@@ -57,8 +57,7 @@ def main():
             file = Path(folder) / "input.npy"
             numpy.save(file, array)
             texts = [f"--{key}={value}" for key, value in options.items()]
-            command = [program, "replay", "--input", file, "--out", Path(folder) / "out",
-                       "--no-csv", "--quiet", *texts]
+            command = [program, "replay", "--input", file, "--out", Path(folder) / "out", "--no-csv", "--quiet", *texts]
             theirs = fastest(lambda: subprocess.run(command, check=True))
             calls = {"array": lambda: dtof.replay(array, **options)}
             if name == "photon list":
@@ -68,8 +67,10 @@ def main():
                 ours = fastest(run)
                 ratio = theirs / ours
                 failed |= ratio < MIN_RATIO
-                print(f"{name} ({call}): program {theirs:.2f} s, package {ours:.2f} s, "
-                      f"{ratio:.2f} of its speed", flush=True)
+                print(
+                    f"{name} ({call}): program {theirs:.2f} s, package {ours:.2f} s, {ratio:.2f} of its speed",
+                    flush=True,
+                )
     sys.exit(failed)
 
 

@@ -50,10 +50,10 @@ class Cluster:
         self.client.wait_for_workers(2, timeout=60)
 
     def _start(self, command):
-        log = open(self.folder / "log.txt", "ab")
-        return subprocess.Popen(
-            command, cwd=self.folder, env=self._env, stdout=log, stderr=log, start_new_session=True
-        )
+        with open(self.folder / "log.txt", "ab") as log:
+            return subprocess.Popen(
+                command, cwd=self.folder, env=self._env, stdout=log, stderr=log, start_new_session=True
+            )
 
     def kill_one(self, busy=True):
         """Kills a worker process, by default while it has a task. Its nanny starts another."""
@@ -109,8 +109,4 @@ def are_equal(run, expected, by_another_name=False):
 def contents(folder):
     """All files, except temporary files of a killed process."""
     files = (path for path in sorted(folder.rglob("*")) if path.is_file())
-    return {
-        str(path.relative_to(folder)): path.read_bytes()
-        for path in files
-        if not path.name.endswith(".partial")
-    }
+    return {str(path.relative_to(folder)): path.read_bytes() for path in files if not path.name.endswith(".partial")}

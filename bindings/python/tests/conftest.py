@@ -15,7 +15,10 @@ def built():
     """Builds the program; returns its path."""
     done = subprocess.run(
         ["cargo", "build", "--release", "--package", "dtof", "--message-format", "json"],
-        cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True,
+        cwd=ROOT,
+        check=True,
+        stdout=subprocess.PIPE,
+        text=True,
     )
     messages = (json.loads(line) for line in done.stdout.splitlines())
     names = [message.get("executable") for message in messages]

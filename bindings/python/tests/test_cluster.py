@@ -10,12 +10,12 @@ import dtof
 
 pytest.importorskip("distributed")
 
-import dask.array  # noqa: E402
-from clusters import PAGE, README, are_equal, blocks, counts, refused, saved  # noqa: E402
-from conftest import ROOT  # noqa: E402
+import dask.array
 
-from dtof import cluster  # noqa: E402
-from dtof.cluster._worker import begin  # noqa: E402
+from clusters import PAGE, README, are_equal, blocks, counts, refused, saved
+from conftest import ROOT
+from dtof import cluster
+from dtof.cluster._worker import begin
 
 # Seeds.
 

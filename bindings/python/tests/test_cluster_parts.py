@@ -7,10 +7,10 @@ import dtof
 
 pytest.importorskip("distributed")
 
-import dask.array  # noqa: E402
-from clusters import are_equal, counts, refused, saved  # noqa: E402
+import dask.array
 
-from dtof import cluster  # noqa: E402
+from clusters import are_equal, counts, refused, saved
+from dtof import cluster
 
 GLASS = "[sensor]\ngate = [10, 127]\nglass = 0.1\nglass_bins = [0, 0, 0.05, 0.05, 0, 0, 0, 0, 0, 0]\n"
 
@@ -153,7 +153,12 @@ def test_invalid_recordings_in_parts(client, tmp_path):
     refused(lambda: replay(client, chunked(4, -1, -1)[:0]), "empty")
     bad = array.copy()
     bad[5, 2, 7] = -1
-    refused(lambda: replay(client, chunked(4, -1, -1, of=bad), rule="paper"), "the array[4:8, :, :]", "[1, 2, 7]", "negative")
+    refused(
+        lambda: replay(client, chunked(4, -1, -1, of=bad), rule="paper"),
+        "the array[4:8, :, :]",
+        "[1, 2, 7]",
+        "negative",
+    )
     refused(lambda: replay(client, chunked(4, -1, -1), alpha=300), "alpha 300: ")
     file = saved(tmp_path, "counts.npy", array)
     for rows in (0, -1, 1.5, "2", True):

@@ -11,10 +11,9 @@ import dtof
 
 pytest.importorskip("distributed")
 
-from clusters import are_equal, contents, counts, refused, saved  # noqa: E402
-
-from dtof import cluster  # noqa: E402
-from dtof.cluster._folder import Folder  # noqa: E402
+from clusters import are_equal, contents, counts, refused, saved
+from dtof import cluster
+from dtof.cluster._folder import Folder
 
 
 def test_recordings_come_in_order_and_their_totals_are_sums(client, tmp_path):
@@ -50,9 +49,9 @@ def test_a_recording_that_cannot_be_read_is_one_error(client, tmp_path):
         for one in many.failed:
             assert one.error.startswith(one.file) and "\n" not in one.error, one.error
         assert "is negative" in many.results[0].error
-        assert many.totals == {
-            key: dtof.replay(good).statistics[key] for key in many.totals
-        } and many.totals["events"] > 0
+        assert (
+            many.totals == {key: dtof.replay(good).statistics[key] for key in many.totals} and many.totals["events"] > 0
+        )
     assert "4 failed" in repr(many)
     assert not (tmp_path / "bad").exists()
 
@@ -167,8 +166,11 @@ def test_no_file_of_others_is_replaced(client, tmp_path):
     file = saved(tmp_path, "in/a.npy", counts())
     out = tmp_path / "out"
     for name, text in [
-        ("events.aer", b"mine"), ("events.npy", b"mine"), ("dtof.toml", b"a = 1\n"),
-        ("summary.json", b"{}"), ("summary.json", b"[1"),
+        ("events.aer", b"mine"),
+        ("events.npy", b"mine"),
+        ("dtof.toml", b"a = 1\n"),
+        ("summary.json", b"{}"),
+        ("summary.json", b"[1"),
     ]:
         (out / "a").mkdir(parents=True, exist_ok=True)
         (out / "a" / name).write_bytes(text)

@@ -73,11 +73,14 @@ def test_the_generator_blinds_for_the_dead_time():
     assert abs(pixel.size / 4000 - (1 - math.exp(-6.5))) < 0.005
 
 
-@pytest.mark.parametrize("background,dead_time,cycles,most", [
-    (5.5, BINS, 2_000_000, 1900),
-    (2.5, BINS, 300_000, 130),
-    (5.5, 20, 200_000, 100),
-])
+@pytest.mark.parametrize(
+    "background,dead_time,cycles,most",
+    [
+        (5.5, BINS, 2_000_000, 1900),
+        (2.5, BINS, 300_000, 130),
+        (5.5, 20, 200_000, 100),
+    ],
+)
 def test_events_are_right_under_strong_light(background, dead_time, cycles, most):
     done = run(2, background, 0.5, dead_time, cycles, l2=2000)
     error = done.events["depth_bins"] - PLACE
@@ -118,7 +121,7 @@ def test_a_pixel_decides_as_a_replay_and_counts_what_it_cannot_see():
     ends = numpy.searchsorted(cycle, numpy.arange(8001))
     events = []
     for now in range(8000):
-        pixel.count(bin[ends[now]:ends[now + 1]])
+        pixel.count(bin[ends[now] : ends[now + 1]])
         event = pixel.end_laser_cycles()
         if event is not None:
             events.append(event)
@@ -134,14 +137,17 @@ def test_a_pixel_decides_as_a_replay_and_counts_what_it_cannot_see():
     assert gated.statistics["ended_full"] == 1 and gated.statistics["events"] == 0
 
 
-@pytest.mark.parametrize("options,words", [
-    ({"dead_time": 20}, ["dead_time 20: is for rule window", "128 bins or more"]),
-    ({"dead_time": 20, "rule": "average"}, ["dead_time 20: is for rule window"]),
-    ({"dead_time": 1, **WINDOW, "binning": 1}, ["dead_time 1: cannot be used with binning"]),
-    ({"dead_time": -1}, ["dead_time -1: must be a whole number from 0 to 65535"]),
-    ({"dead_time": 2.5}, ["dead_time 2.5: must be a whole number"]),
-    ({"dead_time": "many"}, ["dead_time 'many': is a text; must be: whole number, 0 to 65535"]),
-])
+@pytest.mark.parametrize(
+    "options,words",
+    [
+        ({"dead_time": 20}, ["dead_time 20: is for rule window", "128 bins or more"]),
+        ({"dead_time": 20, "rule": "average"}, ["dead_time 20: is for rule window"]),
+        ({"dead_time": 1, **WINDOW, "binning": 1}, ["dead_time 1: cannot be used with binning"]),
+        ({"dead_time": -1}, ["dead_time -1: must be a whole number from 0 to 65535"]),
+        ({"dead_time": 2.5}, ["dead_time 2.5: must be a whole number"]),
+        ({"dead_time": "many"}, ["dead_time 'many': is a text; must be: whole number, 0 to 65535"]),
+    ],
+)
 def test_what_cannot_be_used_is_refused(options, words):
     for call in (
         lambda: dtof.photons([0], [0], [5], columns=1, **options),

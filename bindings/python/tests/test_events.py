@@ -94,8 +94,10 @@ def test_a_mask_may_be_empty(mask):
 
 def test_an_empty_mask_leaves_that_of_the_settings(tmp_path):
     (tmp_path / "hot.toml").write_text("[sensor]\nmasked = [1]\n")
-    masked = [dtof.replay(counts(), settings=tmp_path / "hot.toml", **more).statistics["masked"]
-              for more in [{}, {"mask": []}, {"mask": None}, {"mask": [0]}]]
+    masked = [
+        dtof.replay(counts(), settings=tmp_path / "hot.toml", **more).statistics["masked"]
+        for more in [{}, {"mask": []}, {"mask": None}, {"mask": [0]}]
+    ]
     assert masked[0] == masked[1] == masked[2] > 0
     assert dtof.replay(counts(), mask=[0]).statistics["masked"] == masked[3]
 
@@ -156,8 +158,10 @@ def test_photons_are_replayed_to_the_last(tmp_path):
     # Its settings repeat the run, and may request fewer cycles.
     toml = tmp_path / "dtof.toml"
     toml.write_text(run.toml)
-    numpy.save(tmp_path / "photons.npy", numpy.array(
-        list(zip(*given)), dtype=[("pixel", "u2"), ("cycle", "u4"), ("bin", "u2")]))
+    numpy.save(
+        tmp_path / "photons.npy",
+        numpy.array(list(zip(*given)), dtype=[("pixel", "u2"), ("cycle", "u4"), ("bin", "u2")]),
+    )
     again = dtof.replay(tmp_path / "photons.npy", settings=toml)
     assert again.statistics["photons"] == 3 and again.toml == run.toml
     toml.write_text("[run]\ncycles = 20_001\n")
@@ -254,9 +258,15 @@ def test_suspicious_recordings_give_a_warning():
 
 
 @pytest.mark.filterwarnings("default")
-@pytest.mark.parametrize("name,options", [
-    ("replay", {}), ("load", {}), ("calibrate", {}), ("compare", {"within": 1000, "cycles": 6000}),
-])
+@pytest.mark.parametrize(
+    "name,options",
+    [
+        ("replay", {}),
+        ("load", {}),
+        ("calibrate", {}),
+        ("compare", {"within": 1000, "cycles": 6000}),
+    ],
+)
 def test_a_warning_names_the_line_that_called(name, options):
     with pytest.warns(UserWarning, match="photons in bins that were cut off") as warned:
         getattr(dtof, name)(counts(2, 2), bins=64, **options)

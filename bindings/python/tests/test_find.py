@@ -67,8 +67,19 @@ def test_compare(program, tmp_path, counts):
     truth = numpy.repeat((20.8 + 3 * numpy.arange(8)) * 200 * 0.149896, 8).reshape(8, 8)
     numpy.save(tmp_path / "truth.npy", truth)
     out = tmp_path / "out"
-    program("compare", "--input", tmp_path / "counts.npy", "--truth", tmp_path / "truth.npy",
-            "--out", out, "--quiet", "--cycles", "6000", *TEXTS)
+    program(
+        "compare",
+        "--input",
+        tmp_path / "counts.npy",
+        "--truth",
+        tmp_path / "truth.npy",
+        "--out",
+        out,
+        "--quiet",
+        "--cycles",
+        "6000",
+        *TEXTS,
+    )
     steps = []
     found = dtof.compare(counts, truth=truth, cycles=6000, progress=lambda *step: steps.append(step), **OPTIONS)
     assert found.toml == (out / "dtof.toml").read_text()

@@ -72,7 +72,16 @@ def test_results_are_short_and_comparable():
 def test_export_is_that_of_the_program(program, tmp_path, format):
     run = dtof.replay(COUNTS)
     run.write_events(tmp_path / "events.aer")
-    program("export", tmp_path / "events.aer", "--format", format, "--out", tmp_path / f"a.{format}", "--laser-hz", "1000000")
+    program(
+        "export",
+        tmp_path / "events.aer",
+        "--format",
+        format,
+        "--out",
+        tmp_path / f"a.{format}",
+        "--laser-hz",
+        "1000000",
+    )
     run.export(tmp_path / f"b.{format}", laser_hz=1_000_000)
     assert (tmp_path / f"a.{format}").read_bytes() == (tmp_path / f"b.{format}").read_bytes()
     with pytest.raises(dtof.Error, match="format xyz: must be csv"):

@@ -15,7 +15,7 @@ from dtof import _keywords
 OTHERS = {
     "replay": "input out dynamic_depth threshold_mm reference echo no_csv quiet help",
     "simulate": "scene depth depth_along albedo fov signal_at_one_metre background pulse_sigma_bins out dynamic_depth "
-                "threshold_mm reference echo no_csv quiet device image help",
+    "threshold_mm reference echo no_csv quiet device image help",
     "calibrate": "input device image seconds photons host_timeout out report settings quiet help",
     "compare": "input scene truth out quiet help",
     "tune": "json help",
@@ -33,7 +33,9 @@ def help_of(program, job):
             options[name] = flag[2] or ""
         elif name and line.strip() and not options[name]:
             options[name] = line.strip()
-    named = {name: re.sub(r"--([a-z0-9-]+)", lambda flag: flag[1].replace("-", "_"), text) for name, text in options.items()}
+    named = {
+        name: re.sub(r"--([a-z0-9-]+)", lambda flag: flag[1].replace("-", "_"), text) for name, text in options.items()
+    }
     return {name: re.sub(r" \[possible values:.*\]$", "", text) for name, text in named.items()}
 
 
@@ -41,7 +43,9 @@ def help_of(program, job):
 def test_keywords_are_the_options_of_the_program_with_their_help(program, job):
     of_program = help_of(program, job)
     expected = {name: text for name, text in of_program.items() if name not in OTHERS[job].split()}
-    kinds = get_type_hints(getattr(_keywords, {"export": "Points"}.get(job, job.title()) + "Options"), include_extras=True)
+    kinds = get_type_hints(
+        getattr(_keywords, {"export": "Points"}.get(job, job.title()) + "Options"), include_extras=True
+    )
     assert {name: kind.__metadata__[1] for name, kind in kinds.items()} == expected
     function = getattr(dtof, job)
     assert set(expected) <= set(inspect.signature(function).parameters)

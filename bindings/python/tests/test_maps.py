@@ -61,8 +61,10 @@ def test_points_are_those_of_the_export(program, tmp_path, run):
     dtof.write_events(tmp_path / "events.aer", run.events, run.array)
     for options, texts in [
         ({}, []),
-        ({"fov": (40, 30), "echo": "first", "laser_hz": 1_000_000},
-         ["--fov", "40x30", "--echo", "first", "--laser-hz", "1000000"]),
+        (
+            {"fov": (40, 30), "echo": "first", "laser_hz": 1_000_000},
+            ["--fov", "40x30", "--echo", "first", "--laser-hz", "1000000"],
+        ),
     ]:
         out = tmp_path / f"{len(texts)}.pcd"
         program("export", tmp_path / "events.aer", "--format", "pcd", "--out", out, *texts)

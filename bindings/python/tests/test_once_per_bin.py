@@ -129,7 +129,7 @@ def test_a_pixel_decides_as_a_replay():
     events = []
     for now in range(8000):
         # In two parts: they are of one laser cycle.
-        of_cycle = bin[ends[now]:ends[now + 1]]
+        of_cycle = bin[ends[now] : ends[now + 1]]
         pixel.count(of_cycle[:4])
         pixel.count(of_cycle[4:])
         event = pixel.end_laser_cycles()

@@ -7,10 +7,15 @@ import pytest
 
 import dtof
 
-@pytest.mark.parametrize("options", [
-    {"rule": "paper"}, {"rule": "window", "sigma_bins": 0.6, "l1": 8, "tracking": True},
-    {"gate": (10, 100), "echoes": 3, "bin_width_ps": 100, "offset_mm": -20.5},
-])
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"rule": "paper"},
+        {"rule": "window", "sigma_bins": 0.6, "l1": 8, "tracking": True},
+        {"gate": (10, 100), "echoes": 3, "bin_width_ps": 100, "offset_mm": -20.5},
+    ],
+)
 def test_a_pixel_reports_as_in_a_replay(options):
     random = numpy.random.default_rng(2)
     photons = 6000

@@ -22,11 +22,21 @@ def photons(seed, cycles=600, rows=8, columns=8, bins=64):
 
 
 @pytest.mark.parametrize("seed", [1, 2])
-@pytest.mark.parametrize("options", [
-    {"rule": "paper"}, {"rule": "average", "alpha": 3.5}, WINDOW, {**WINDOW, "tracking": True}, {**WINDOW, "neighbours": 8},
-    {**WINDOW, "binning": 2, "patience": 30}, {"echoes": 3}, {"once_per_bin": True}, {"mask": [3, 40], "gate": (5, 50)},
-    {**WINDOW, "dead_time": 5},
-])
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"rule": "paper"},
+        {"rule": "average", "alpha": 3.5},
+        WINDOW,
+        {**WINDOW, "tracking": True},
+        {**WINDOW, "neighbours": 8},
+        {**WINDOW, "binning": 2, "patience": 30},
+        {"echoes": 3},
+        {"once_per_bin": True},
+        {"mask": [3, 40], "gate": (5, 50)},
+        {**WINDOW, "dead_time": 5},
+    ],
+)
 def test_the_events_are_those_of_photons(options, seed):
     pixel, cycle, bin = photons(seed)
     run = dtof.photons(pixel, cycle, bin, columns=8, bins=64, **options)
@@ -38,8 +48,20 @@ def test_the_events_are_those_of_photons(options, seed):
     events = numpy.concatenate(events)
     assert run.events.size > 5 and (events == run.events).all()
     statistics = pixels.statistics
-    for name in ("photons", "events", "events_of_blocks", "events_confirmed", "expired", "masked", "repeated",
-                 "gated_out", "rejected", "held", "pixels_reporting", "cycles"):
+    for name in (
+        "photons",
+        "events",
+        "events_of_blocks",
+        "events_confirmed",
+        "expired",
+        "masked",
+        "repeated",
+        "gated_out",
+        "rejected",
+        "held",
+        "pixels_reporting",
+        "cycles",
+    ):
         assert statistics[name] == run.statistics[name], name
     depth = dtof.depth_map(events, pixels.array)
     assert numpy.array_equal(depth, run.depth_map(), equal_nan=True)
@@ -65,8 +87,13 @@ def test_the_histogram_of_an_event():
 
 def test_what_is_wrong_is_refused():
     pixels = dtof.Pixels(2, 2, 16)
-    for given, words in [(([4], [1]), "pixel 4: there are 4 pixels"), (([-1], [1]), "pixel: must be from 0"),
-                         (([0, 1], [1]), "as long as each other"), (([0.5], [1]), "pixel: float64"), ((["a"], [1]), "pixel")]:
+    for given, words in [
+        (([4], [1]), "pixel 4: there are 4 pixels"),
+        (([-1], [1]), "pixel: must be from 0"),
+        (([0, 1], [1]), "as long as each other"),
+        (([0.5], [1]), "pixel is float64"),
+        ((["a"], [1]), "pixel"),
+    ]:
         with pytest.raises(dtof.Error, match=words):
             pixels.cycle(*given)
     for cycles in (0, 65_536, None):

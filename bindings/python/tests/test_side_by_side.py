@@ -10,12 +10,12 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "bench" / "side_by_side"))
 
-import stored
 import measure
 import methods
-import with_numpy
 import page
 import photons
+import stored
+import with_numpy
 
 import dtof
 
@@ -64,8 +64,7 @@ def test_recorded_photons_are_those_of_the_recording(recorded):
         of_bins, all_bins = seen[:, part].sum(0), expected.sum(0)
         assert (abs(of_bins - all_bins) < 6 * np.sqrt(all_bins + 1)).all()
     assert (seen[:, 0] != seen[:, 1]).any()
-    assert abs(np.bincount(scene.photons.cycle, minlength=500) - seen.sum() / 500).max() < 6 * np.sqrt(
-        seen.sum() / 500)
+    assert abs(np.bincount(scene.photons.cycle, minlength=500) - seen.sum() / 500).max() < 6 * np.sqrt(seen.sum() / 500)
 
 
 def test_the_centroid_of_known_counts():
@@ -135,18 +134,14 @@ def test_the_shortest_frames_have_no_threshold_without_a_minimum_of_photons(meth
 
 
 def test_frames_with_and_without_find_peaks_agree(bright):
-    with_scipy, with_arrays = (
-        method.reports(bright, bright.photons, 400, 5.0) for method in FRAMES
-    )
+    with_scipy, with_arrays = (method.reports(bright, bright.photons, 400, 5.0) for method in FRAMES)
     for mine, other in zip(with_scipy, with_arrays):
         assert mine == pytest.approx(other, abs=0.2)
     assert with_scipy[0].size == 48 * 5
 
 
 def test_asynchronous_numpy_reports_what_dtof_reports(bright):
-    of_numpy, of_dtof = (
-        method.reports(bright, bright.photons, 20, 5.0) for method in ASYNCHRONOUS
-    )
+    of_numpy, of_dtof = (method.reports(bright, bright.photons, 20, 5.0) for method in ASYNCHRONOUS)
     same = {*zip(of_numpy[0], of_numpy[1])} & {*zip(of_dtof[0], of_dtof[1])}
     assert len(same) > 0.99 * of_numpy[0].size > 0.99 * 48 * 20
     assert of_dtof[0].size == pytest.approx(of_numpy[0].size, rel=0.01)
@@ -179,11 +174,15 @@ def test_scores_of_known_reports(bright):
 def test_thresholds_are_the_lowest_allowed(method, bright):
     threshold = measure.lowest_threshold(method, bright, method.settings[-2])
     below = method.thresholds[max(method.thresholds.index(threshold) - 1, 0)]
-    of = lambda threshold: measure.alarms(method, bright, bright.empty, method.settings[-2], threshold)
+
+    def of(threshold):
+        return measure.alarms(method, bright, bright.empty, method.settings[-2], threshold)
+
     assert of(threshold) <= 1 < of(below) or threshold == method.thresholds[0]
 
 
 def test_lines_are_counted_without_comments_and_docstrings():
+    # fmt: off
     def function(a,
                  b):
         """Of two
@@ -193,6 +192,7 @@ def test_lines_are_counted_without_comments_and_docstrings():
         text = """one
         two"""
         return a, b, text  # but this
+    # fmt: on
 
     assert methods.lines_of(function) == 5
     names = {function.__name__ for function in methods.needed(with_numpy.frames)}

@@ -30,9 +30,7 @@ def test_ctrl_c_ends_it_within_half_a_second():
 
 def dim_tune(rule, progress=None):
     """Takes seconds or minutes unless it is interrupted."""
-    return dtof.tune(
-        background=0.01, signal=0.02, sigma_bins=1, l2=50_000, x=11, rule=rule, progress=progress
-    )
+    return dtof.tune(background=0.01, signal=0.004, sigma_bins=1, l2=50_000, x=11, rule=rule, progress=progress)
 
 
 def long_calibration(progress=None):
@@ -75,20 +73,26 @@ def test_ctrl_c_ends_every_kind_of_work(work):
 
 def working():
     """The threads of this process that work."""
-    names = {task: Path(f"/proc/self/task/{task}/comm").read_text() for task in os.listdir("/proc/self/task")}
-    return {task for task, name in names.items() if name == "dtof\n"}
+    found = set()
+    for task in Path("/proc/self/task").iterdir():
+        with contextlib.suppress(OSError):  # it has ended
+            if (task / "comm").read_text() == "dtof\n":
+                found.add(task.name)
+    return found
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="threads are counted in /proc")
 @pytest.mark.parametrize("work", sorted(set(LONG) - {"compare"}))
 def test_nothing_works_on_unseen(work):
-    before = working()
-    sent = interrupt_after(1)
+    while working():  # a comparison that was interrupted
+        time.sleep(0.1)
+    interrupt_after(0.3)
     with pytest.raises(KeyboardInterrupt):
         LONG[work]()
-    while working() - before:
-        # Half a second; longer on a busy machine.
-        assert time.monotonic() - sent[0] < 2
+    # Of the processor: other programs may keep this one waiting.
+    begun = time.process_time()
+    while working():
+        assert time.process_time() - begun < 0.5
         time.sleep(0.01)
 
 
@@ -107,7 +111,8 @@ def test_progress_comes_in_the_first_second(work):
     begun = time.monotonic()
     with pytest.raises(Enough):
         work(progress)
-    assert calls[-1][0] - begun < 1
+    # At first that nothing is done yet.
+    assert calls[0][0] - begun < 1 and calls[0][1] < calls[0][2]
 
 
 def test_progress_is_called_in_the_calling_thread_until_the_end():
@@ -118,7 +123,7 @@ def test_progress_is_called_in_the_calling_thread_until_the_end():
     assert {thread for _, thread in told} == {threading.get_ident()}
     assert ats == sorted(ats) and ats[-1][0] == ats[-1][1] > 0
     steps = []
-    scene = "columns = 8\nrows = 8\nbackground = 0.02\n[[surface]]\nkind = \"plane\"\n"
+    scene = 'columns = 8\nrows = 8\nbackground = 0.02\n[[surface]]\nkind = "plane"\n'
     with contextlib.suppress(dtof.Error):
         dtof.compare(scene=scene, progress=lambda step, share: steps.append((step, share)))
     assert all(isinstance(step, str) and 0 <= share <= 1 for step, share in steps)

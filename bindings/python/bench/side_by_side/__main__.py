@@ -15,11 +15,10 @@ import sys
 
 os.environ["RAYON_NUM_THREADS"] = "1"  # before dtof is loaded
 
+import measure
 import numpy
 import scipy
-
 import stored
-import measure
 from methods import METHODS, OWN_THRESHOLD
 from photons import scenes
 
@@ -29,8 +28,9 @@ def arguments():
     place = stored.ROOT.parent / "shared/data/tmf8820_plane_gt/distance_data.json"
     parser.add_argument("recording", nargs="?", default=place, help="the log of a TMF8820")
     parser.add_argument("--check", action="store_true", help="compare with the stored table")
-    parser.add_argument("--scenes", default="bright,outdoor,recording",
-                        help="scenes to measure or check; others stay unchanged")
+    parser.add_argument(
+        "--scenes", default="bright,outdoor,recording", help="scenes to measure or check; others stay unchanged"
+    )
     parser.add_argument("--page", action="store_true", help="write page and chart from the stored tables")
     return parser.parse_args()
 
@@ -70,9 +70,11 @@ def fast(rows):
 def speed(method, scene, rows):
     found = measure.photons_a_second(method, scene, fast(rows)) / 1e6
     print(f"    {found:.3g} million photons a second of processor time", flush=True)
-    machine = (f"{platform.machine()} with {os.cpu_count()} cores, "
-               f"Python {platform.python_version()}, numpy {numpy.__version__}, "
-               f"scipy {scipy.__version__}")
+    machine = (
+        f"{platform.machine()} with {os.cpu_count()} cores, "
+        f"Python {platform.python_version()}, numpy {numpy.__version__}, "
+        f"scipy {scipy.__version__}"
+    )
     return stored.Speed(scene.name, method.name, found, len(scene.photons), machine)
 
 

@@ -9,15 +9,20 @@ import matplotlib
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
-
 from stored import PALETTE
 
 TITLE = ("Outdoors, events come sooner than frames,", "from numpy nearly as from dtof")
 WIDTH, HEIGHT = 560, 720
 # The classes of the palette, by their colours in light mode.
 CLASSES = {
-    "#1f2328": "ink", "#59636e": "soft", "#0067b1": "c0", "#b3470b": "c1", "#0a7554": "c2",
-    "#7a3db8": "c3", "#b0307f": "c4", "#8a6100": "c5",
+    "#1f2328": "ink",
+    "#59636e": "soft",
+    "#0067b1": "c0",
+    "#b3470b": "c1",
+    "#0a7554": "c2",
+    "#7a3db8": "c3",
+    "#b0307f": "c4",
+    "#8a6100": "c5",
 }
 INK, SOFT, GRID, EDGE, PAPER = "#1f2328", "#59636e", "#e3e7eb", "#8c959f", "#ffffff"
 PENS = {  # colour and mark
@@ -29,17 +34,25 @@ PENS = {  # colour and mark
 # A panel for each scene: title, ticks, and the positions of names: index of the dot, and offset.
 PANELS = {
     "outdoor": (
-        "outdoors: bright and dim pixels", (100, 200, 500, 1000), (0.15, 0.2, 0.3, 0.4, 0.5),
+        "outdoors: bright and dim pixels",
+        (100, 200, 500, 1000),
+        (0.15, 0.2, 0.3, 0.4, 0.5),
         {
-            "frames, find_peaks": (-1, 9, -12), "frames, arrays": (-1, 9, 2),
-            "asynchronous, arrays": (0, 10, -2), "dtof": (6, -34, -12),
+            "frames, find_peaks": (-1, 9, -12),
+            "frames, arrays": (-1, 9, 2),
+            "asynchronous, arrays": (0, 10, -2),
+            "dtof": (6, -34, -12),
         },
     ),
     "bright": (
-        "a bright room: alike from 0.3 bins down", (20, 50, 100, 200, 500, 1000), (0.05, 0.1, 0.2, 0.4),
+        "a bright room: alike from 0.3 bins down",
+        (20, 50, 100, 200, 500, 1000),
+        (0.05, 0.1, 0.2, 0.4),
         {
-            "frames, find_peaks": (-1, 9, -12), "frames, arrays": (-1, 9, 4),
-            "asynchronous, arrays": (1, 14, 2), "dtof": (5, -40, -14),
+            "frames, find_peaks": (-1, 9, -12),
+            "frames, arrays": (-1, 9, 4),
+            "asynchronous, arrays": (1, 14, 2),
+            "dtof": (5, -40, -14),
         },
     ),
 }
@@ -48,8 +61,11 @@ PANELS = {
 def svg(rows) -> str:
     """The chart as an SVG document with colours as classes."""
     settings = {
-        "svg.fonttype": "none", "svg.hashsalt": "dtof", "font.size": 14.5,
-        "font.family": "sans-serif", "font.sans-serif": ["Liberation Sans", "DejaVu Sans"],
+        "svg.fonttype": "none",
+        "svg.hashsalt": "dtof",
+        "font.size": 14.5,
+        "font.family": "sans-serif",
+        "font.sans-serif": ["Liberation Sans", "DejaVu Sans"],
     }
     with matplotlib.rc_context(settings):
         figure, panels = plt.subplots(2, 1, figsize=(WIDTH / 72, HEIGHT / 72))
@@ -92,8 +108,7 @@ def draw(axes, rows, title, times, errors, places):
 
 def best(points):
     """The Pareto frontier: points without another that is both sooner and more exact."""
-    return [point for point in points
-            if not any(other[0] < point[0] and other[1] < point[1] for other in points)]
+    return [point for point in points if not any(other[0] < point[0] and other[1] < point[1] for other in points)]
 
 
 def in_classes(text: str) -> str:
@@ -122,9 +137,11 @@ def in_classes(text: str) -> str:
 
     text = re.sub(r'<(\w+(?: [^<>]*?)?) style="([^"]*)"([^<>]*>)', named, text)
     sheet = PALETTE.read_text(encoding="utf-8")
-    head = (f'<svg width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" '
-            'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
-            f'class="dtof" role="img"><title>{" ".join(TITLE)}</title><style>{sheet}</style>')
-    body = text[text.index(">", text.index("<svg")) + 1:]
+    head = (
+        f'<svg width="{WIDTH}" height="{HEIGHT}" viewBox="0 0 {WIDTH} {HEIGHT}" '
+        'xmlns="http://www.w3.org/2000/svg" xmlns:xlink="http://www.w3.org/1999/xlink" '
+        f'class="dtof" role="img"><title>{" ".join(TITLE)}</title><style>{sheet}</style>'
+    )
+    body = text[text.index(">", text.index("<svg")) + 1 :]
     lines = (line.strip() for line in body.splitlines())
     return head + "\n" + "\n".join(line for line in lines if line) + "\n"

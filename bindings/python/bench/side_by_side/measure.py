@@ -81,13 +81,19 @@ def scored(scene, reports) -> dict:
     mean = total[number > 0] / number[number > 0]
     rms = root_mean_square(error[at])
     wait = float(np.minimum(waited, scene.photons.cycles).mean())
-    return {"mean": wait, "half": float(half), "nine_of_ten": float(nine_of_ten), "error_bins": rms,
-            "error_mm": rms * scene.mm_per_bin, "wrong": float(wrong),
-            "mean_error_bins": root_mean_square(mean)}
+    return {
+        "mean": wait,
+        "half": float(half),
+        "nine_of_ten": float(nine_of_ten),
+        "error_bins": rms,
+        "error_mm": rms * scene.mm_per_bin,
+        "wrong": float(wrong),
+        "mean_error_bins": root_mean_square(mean),
+    }
 
 
 def root_mean_square(values) -> float:
-    return float(np.sqrt(np.mean(values ** 2))) if values.size else float("inf")
+    return float(np.sqrt(np.mean(values**2))) if values.size else float("inf")
 
 
 def curve(method, scene) -> list[Row]:
@@ -129,7 +135,7 @@ def times_at(rows, within) -> Optional[tuple[float, float, float]]:
     for one, other in zip(curve, curve[1:]):
         if min(one[0], other[0]) < within < max(one[0], other[0]):
             part = np.log(within / one[0]) / np.log(other[0] / one[0])
-            between = (a if a == b else a ** (1 - part) * b ** part for a, b in zip(one[1:], other[1:]))
+            between = (a if a == b else a ** (1 - part) * b**part for a, b in zip(one[1:], other[1:]))
             exact.append(tuple(map(float, between)))
     return min((times for times in exact if np.isfinite(times[2])), default=None)
 

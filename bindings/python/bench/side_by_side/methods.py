@@ -37,8 +37,10 @@ class Method:
 
     def reports(self, scene, photons, setting, threshold):
         """Pixel, laser cycle and position in bins of every report."""
-        settings = {"exposure" if self.by_exposure else "min_photons": setting,
-                    "z" if self.thresholds is Z_THRESHOLDS else "k": threshold}
+        settings = {
+            "exposure" if self.by_exposure else "min_photons": setting,
+            "z" if self.thresholds is Z_THRESHOLDS else "k": threshold,
+        }
         return self.function(photons, **self.arguments(scene), **settings)
 
     @property
@@ -67,8 +69,7 @@ def dtof_arguments(scene):
 
 
 METHODS = (
-    Method("frames, find_peaks", with_numpy.frames_with_find_peaks, find_peaks_arguments,
-           Z_THRESHOLDS, True),
+    Method("frames, find_peaks", with_numpy.frames_with_find_peaks, find_peaks_arguments, Z_THRESHOLDS, True),
     Method("frames, arrays", with_numpy.frames, frames_arguments, K_THRESHOLDS, True),
     Method("asynchronous, arrays", with_numpy.asynchronous, numpy_arguments, K_THRESHOLDS, False),
     Method("dtof", with_dtof.events, dtof_arguments, Z_THRESHOLDS, False),
@@ -86,16 +87,14 @@ def needed(function):
             found.append(function)
             of_module = vars(inspect.getmodule(function))
             named = [of_module.get(name) for name in function.__code__.co_names]
-            left += [other for other in named if inspect.isfunction(other)
-                     and other.__module__ == function.__module__]
+            left += [other for other in named if inspect.isfunction(other) and other.__module__ == function.__module__]
     return found
 
 
 def lines_of(function) -> int:
     """Lines of code, without empty lines, comments and docstrings."""
     lines, at_start = set(), True
-    nothing = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT,
-               tokenize.ENDMARKER}
+    nothing = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
     for token in tokenize.generate_tokens(io.StringIO(inspect.getsource(function)).readline):
         docstring = token.type == tokenize.STRING and at_start
         if token.type not in nothing and not docstring:

@@ -13,7 +13,7 @@ DESCRIPTIONS = {
     "a threshold for Poisson counts",
     "asynchronous, arrays": "the paper's idea: every four laser cycles, each pixel whose three best bins stand clear of the "
     "others reports and starts over",
-    "dtof": "one call of `dtof.photons` with `rule=\"window\"`",
+    "dtof": 'one call of `dtof.photons` with `rule="window"`',
 }
 SCENES = {
     "bright": "A bright room",
@@ -42,8 +42,7 @@ def methods_table() -> str:
 
 
 def figures(rows, scene) -> str:
-    head = ("error", "method", "mean time", "half of the pixels", "nine in ten", "setting", "wrong, %",
-            "false alarms")
+    head = ("error", "method", "mean time", "half of the pixels", "nine in ten", "setting", "wrong, %", "false alarms")
     lines = []
     for within in WITHIN:
         for method in METHODS:
@@ -51,22 +50,27 @@ def figures(rows, scene) -> str:
             times = times_at(of(rows, scene, method.name), within)
             mm_per_bin = row.error_mm / row.error_bins
             setting = f"{row.setting} {'laser cycles' if method.by_exposure else 'photons'}"
-            lines.append((f"{within} bins, {rounded(within * mm_per_bin)} mm", method.name,
-                          *(f"{time:.0f}" for time in times), setting, f"{100 * row.wrong:.1f}",
-                          f"{row.false_alarms:.2f}"))
+            lines.append(
+                (
+                    f"{within} bins, {rounded(within * mm_per_bin)} mm",
+                    method.name,
+                    *(f"{time:.0f}" for time in times),
+                    setting,
+                    f"{100 * row.wrong:.1f}",
+                    f"{row.false_alarms:.2f}",
+                )
+            )
     return table(head, lines)
 
 
 def speed(speeds) -> str:
-    lines = [(method.name, *(rounded(row.one_core) for row in in_scenes(speeds, method.name)))
-             for method in METHODS]
+    lines = [(method.name, *(rounded(row.one_core) for row in in_scenes(speeds, method.name))) for method in METHODS]
     return table(("method", *(title.lower() for title in SCENES.values())), lines)
 
 
 def machine(speeds) -> str:
     photons = ", ".join(f"{row.photons / 1e6:.1f}" for row in in_scenes(speeds, "dtof"))
-    return (f"The scenes have {photons} million photons. The machine: {speeds[0].machine}.\n"
-            "Other work ran beside.")
+    return f"The scenes have {photons} million photons. The machine: {speeds[0].machine}.\nOther work ran beside."
 
 
 def in_short(rows, speeds) -> str:

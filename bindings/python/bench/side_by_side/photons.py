@@ -79,8 +79,9 @@ def in_order(random, pixel, bin, cycles) -> Photons:
     return Photons(pixel[order], cycle[order], bin[order], cycles)
 
 
-def simulated(name, description, seed, range_mm, background, signal, bin_width_ps, centroid_half_width, cycles,
-              empty_cycles):
+def simulated(
+    name, description, seed, range_mm, background, signal, bin_width_ps, centroid_half_width, cycles, empty_cycles
+):
     bins, sigma = 128, 1.0
     random = np.random.default_rng(seed)
     position = range_mm / (bin_width_ps * MM_PER_PS)

@@ -78,5 +78,7 @@ def differences(measured, scenes) -> list[str]:
         return [f"{len(new)} rows, {len(old)} are stored"]
     return [
         f"{was['scene']}, {was['method']}, {was['setting']}: {name} {now[name]}, stored {was[name]}"
-        for was, now in zip(old, new) for name in was if was[name] != now[name]
+        for was, now in zip(old, new)
+        for name in was
+        if was[name] != now[name]
     ]

@@ -15,8 +15,17 @@ from ._native import Error
 EVENT = numpy.dtype(
     {
         "names": [
-            "cycle", "pixel", "exposure", "peak_bin", "depth_bins", "range_mm", "peak_count",
-            "background", "flags", "level", "echo",
+            "cycle",
+            "pixel",
+            "exposure",
+            "peak_bin",
+            "depth_bins",
+            "range_mm",
+            "peak_count",
+            "background",
+            "flags",
+            "level",
+            "echo",
         ],
         "formats": ["<i8", "<u2", "<u2", "<u2", "<f4", "<f8", "<u4", "<u4", "u1", "u1", "u1"],
         "offsets": [0, 8, 10, 12, 16, 24, 32, 36, 40, 41, 42],
@@ -43,10 +52,20 @@ PHOTON = ("pixel", "cycle", "bin")
 
 #: The names of dimensions, and the axes that they are.
 _AXES = {
-    "capture": "captures", "captures": "captures", "frame": "captures", "frames": "captures", "time": "captures",
-    "row": "rows", "rows": "rows", "y": "rows",
-    "column": "columns", "columns": "columns", "col": "columns", "x": "columns",
-    "bin": "bins", "bins": "bins",
+    "capture": "captures",
+    "captures": "captures",
+    "frame": "captures",
+    "frames": "captures",
+    "time": "captures",
+    "row": "rows",
+    "rows": "rows",
+    "y": "rows",
+    "column": "columns",
+    "columns": "columns",
+    "col": "columns",
+    "x": "columns",
+    "bin": "bins",
+    "bins": "bins",
 }
 
 #: A file name, or the name, the .npy header and the data of an array.
@@ -158,8 +177,9 @@ def named_axes(value: Any, name: str) -> Optional[str]:
             "with .rename, or give axes"
         )
     # One axis of pixels is rows.
-    return ",".join("rows" if axis == "columns" and "rows" not in names and "captures" not in names else axis
-                    for axis in names)
+    return ",".join(
+        "rows" if axis == "columns" and "rows" not in names and "captures" not in names else axis for axis in names
+    )
 
 
 def photon_list(pixel: Any, cycle: Any, bin: Any) -> numpy.ndarray:

@@ -42,8 +42,7 @@ Echo = Optional[Literal["first", "last", "strongest", "all"]]
 BinWidth = Annotated[
     Number,
     "number, 0 to 65535.99998, picoseconds",
-    "Width of a bin of the file in picoseconds, rounded to 1/65536 [default: 250; for logs the "
-    "sensor's]",
+    "Width of a bin of the file in picoseconds, rounded to 1/65536 [default: 250; for logs the sensor's]",
 ]
 Offset = Annotated[
     Number,
@@ -53,8 +52,7 @@ Offset = Annotated[
 Offsets = Annotated[
     Numbers,
     "numbers, one a pixel, millimetres",
-    "Millimetres added to offset_mm for each pixel, in the order of the addresses, rounded to 1/256 "
-    "[default: 0]",
+    "Millimetres added to offset_mm for each pixel, in the order of the addresses, rounded to 1/256 [default: 0]",
 ]
 CyclesToReplay = Annotated[
     Integer,
@@ -139,8 +137,7 @@ class SensorOptions(TypedDict, total=False):
     settings: Annotated[
         Settings,
         "file, text of several lines, dict of sections, or a result with settings",
-        "Settings file in TOML, such as every run writes; options override it. docs/settings.md lists its "
-        "keys",
+        "Settings file in TOML, such as every run writes; options override it. docs/settings.md lists its keys",
     ]
     gate: Annotated[
         Integers,
@@ -201,8 +198,7 @@ class DetectionOptions(TypedDict, total=False):
     estimator: Annotated[
         Estimator,
         "centroid or window",
-        "Estimator of the position of a peak [default: window with sigma_bins or half_widths, else "
-        "centroid]",
+        "Estimator of the position of a peak [default: window with sigma_bins or half_widths, else centroid]",
     ]
     half_widths: Annotated[
         Numbers,
@@ -235,8 +231,7 @@ class DetectionOptions(TypedDict, total=False):
     patience: Annotated[
         Integer,
         "whole number, 1 to 65535",
-        "Adaptive binning: laser cycles without an event after which a pixel also counts in its block "
-        "[default: 64]",
+        "Adaptive binning: laser cycles without an event after which a pixel also counts in its block [default: 64]",
     ]
     neighbours: Annotated[
         Integer,
@@ -259,8 +254,7 @@ class DetectionOptions(TypedDict, total=False):
     echo_wait: Annotated[
         Integer,
         "whole number, 2 to 254",
-        "Two or more echoes: an exposure ends at this multiple of its length at the last echo [default: "
-        "it ends at L2]",
+        "Two or more echoes: an exposure ends at this multiple of its length at the last echo [default: it ends at L2]",
     ]
     once_per_bin: Annotated[
         Switch,
@@ -282,8 +276,7 @@ class LoadOptions(RecordingOptions, total=False):
     settings: Annotated[
         Settings,
         "file, text of several lines, dict of sections, or a result with settings",
-        "Settings file in TOML, such as every run writes; options override it. docs/settings.md lists its "
-        "keys",
+        "Settings file in TOML, such as every run writes; options override it. docs/settings.md lists its keys",
     ]
     cycles: CyclesToReplay
 
@@ -432,8 +425,7 @@ class TuneOptions(TypedDict, total=False):
     binning: Annotated[
         Integer,
         "whole number, 0 to 3",
-        "Window rule: levels of adaptive binning, 0 to 3; pixels and blocks share the false alarms "
-        "[default: 0]",
+        "Window rule: levels of adaptive binning, 0 to 3; pixels and blocks share the false alarms [default: 0]",
     ]
     seed: Annotated[
         Integer,
@@ -456,8 +448,7 @@ class PointsOptions(TypedDict, total=False):
     fov: Annotated[
         Numbers,
         "two numbers, (60, 40), degrees",
-        "Field of view in degrees from edge to edge [default: 60 along the longer side, with square "
-        "pixels]",
+        "Field of view in degrees from edge to edge [default: 60 along the longer side, with square pixels]",
     ]
     calibration: Annotated[
         Path,
@@ -467,8 +458,7 @@ class PointsOptions(TypedDict, total=False):
     laser_hz: Annotated[
         Integer,
         "whole number, hertz",
-        "Laser cycles a second, if the file has none or is wrong [default: the file's, else 10000000 with "
-        "a warning]",
+        "Laser cycles a second, if the file has none or is wrong [default: the file's, else 10000000 with a warning]",
     ]
     echo: Annotated[
         Echo,

@@ -15,9 +15,7 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 
-def depth_map(
-    events: Any, array: Array, *, mean: bool = False, echo: Echo = "strongest"
-) -> numpy.ndarray:
+def depth_map(events: Any, array: Array, *, mean: bool = False, echo: Echo = "strongest") -> numpy.ndarray:
     """The range of the last event of each pixel in millimetres, rows by columns; NaN without one.
 
     An event of a block counts for all of its pixels that have not reported since. With ``mean`` it
@@ -29,9 +27,7 @@ def depth_map(
     return numpy.array(maps["mean_mm" if mean else "last_mm"]).reshape(array.shape)
 
 
-def reflectivity(
-    events: Any, array: Array, *, of: str = "signal", echo: Echo = "strongest"
-) -> numpy.ndarray:
+def reflectivity(events: Any, array: Array, *, of: str = "signal", echo: Echo = "strongest") -> numpy.ndarray:
     """The relative reflectivity of surfaces, rows by columns; NaN without an event.
 
     ``of="signal"`` uses the signal photons per laser cycle, ``of="events"`` the number of events as

@@ -81,7 +81,7 @@ def _toml(key: str, value: Any) -> str:
 def _text(kinds: Any, key: str, value: Any) -> str:
     if key == "settings":
         return settings_text(value)
-    if key == "mask" and getattr(value, "dtype", None) == bool:
+    if key == "mask" and isinstance(value, numpy.ndarray) and value.dtype.kind == "b":
         raise Error("mask: must be addresses of pixels, as numpy.flatnonzero gives them")
     if isinstance(value, (str, bytes)) and not is_text(kinds, key):
         raise Error(f"{key} {value!r}: is a text; must be: {kind_of(kinds, key)}")

@@ -52,8 +52,10 @@ class Replay:
         depth = self.depth_map()
         reporting = f"{self.statistics['pixels_reporting']:,} of {self.statistics['pixels']:,}"
         totals = [
-            ("depth events", f"{self.events.size:,}"), ("photons", f"{self.statistics['photons']:,}"),
-            ("laser cycles", f"{self.statistics['cycles']:,}"), ("pixels reporting", reporting),
+            ("depth events", f"{self.events.size:,}"),
+            ("photons", f"{self.statistics['photons']:,}"),
+            ("laser cycles", f"{self.statistics['cycles']:,}"),
+            ("pixels reporting", reporting),
         ]
         rows = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in totals)
         return f"<table>{rows}</table>{depth_image(depth)}"
@@ -86,9 +88,7 @@ class Replay:
 
 
 @takes(ReplayOptions)
-def replay(
-    recorded: Any, *, axis: int = -1, progress: Progress = None, **options: Unpack[ReplayOptions]
-) -> Replay:
+def replay(recorded: Any, *, axis: int = -1, progress: Progress = None, **options: Unpack[ReplayOptions]) -> Replay:
     """Turns a recording into depth events.
 
     ``recorded`` is the name of a file (``.npy``, ``.npz``, ``.csv``, or the ``.json`` log of a

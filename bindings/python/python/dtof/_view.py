@@ -27,7 +27,11 @@ class View:
         # A session of its own: Ctrl-C in Python is for Python.
         with tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as complaints:
             self._program = subprocess.Popen(
-                command, stdout=subprocess.PIPE, stderr=complaints, stdin=subprocess.DEVNULL, text=True,
+                command,
+                stdout=subprocess.PIPE,
+                stderr=complaints,
+                stdin=subprocess.DEVNULL,
+                text=True,
                 start_new_session=True,
             )
             self._folder = folder
@@ -74,9 +78,7 @@ class View:
         )
 
 
-def view(
-    run: Any, *, speed: Optional[float] = None, laser_hz: Optional[int] = None, browser: bool = True
-) -> View:
+def view(run: Any, *, speed: Optional[float] = None, laser_hz: Optional[int] = None, browser: bool = True) -> View:
     """Shows the events of a run, or of an AER file, on a page in the browser.
 
     They play at the rate of the laser, ``speed`` times as fast (1). ``laser_hz`` is that rate in hertz; by default it is

@@ -15,9 +15,26 @@ Progress = Optional[Callable[[int, int], Any]]
 
 #: Counters of ``statistics`` that are summed over parts.
 COUNTERS = (
-    "photons", "events", "events_of_blocks", "events_confirmed", "pixels", "pixels_reporting",
-    "held", "rejected", "saturated", "saturated_in_blocks", "gated_out", "masked", "deferred", "expired",
-    "expired_deferred", "ended_full", "blind_looks", "repeated", "not_replayed", "cut_off",
+    "photons",
+    "events",
+    "events_of_blocks",
+    "events_confirmed",
+    "pixels",
+    "pixels_reporting",
+    "held",
+    "rejected",
+    "saturated",
+    "saturated_in_blocks",
+    "gated_out",
+    "masked",
+    "deferred",
+    "expired",
+    "expired_deferred",
+    "ended_full",
+    "blind_looks",
+    "repeated",
+    "not_replayed",
+    "cut_off",
 )
 
 
@@ -59,9 +76,7 @@ def check_version(who: str, version: str, expected: str = __version__) -> None:
         raise Error(f"{who} has dtof {version}, not {expected}: install the same everywhere")
 
 
-def wait_for(
-    client: Client, futures: list[Future[Any]], progress: Progress, keep_errors: bool = False
-) -> list[Any]:
+def wait_for(client: Client, futures: list[Future[Any]], progress: Progress, keep_errors: bool = False) -> list[Any]:
     """The results of ``futures``, in their order.
 
     The first error cancels the others and is raised, unless ``keep_errors`` keeps errors as results.

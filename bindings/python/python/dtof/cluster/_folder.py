@@ -21,9 +21,21 @@ from .._run import Replay
 FORMATS = ("aer", "npy")
 #: Further files that the program writes.
 _OF_THE_PROGRAM = (
-    "events.csv", "report.html", "depth-last.svg", "depth-mean.svg", "event-counts.svg",
-    "reflectivity-events.svg", "reflectivity-signal.svg", "photon-counts.svg", "depth.npy",
-    "depth.csv", "confidence.npy", "depth-nearest.npy", "depth-nearest.csv", "depth-farthest.npy", "depth-farthest.csv",
+    "events.csv",
+    "report.html",
+    "depth-last.svg",
+    "depth-mean.svg",
+    "event-counts.svg",
+    "reflectivity-events.svg",
+    "reflectivity-signal.svg",
+    "photon-counts.svg",
+    "depth.npy",
+    "depth.csv",
+    "confidence.npy",
+    "depth-nearest.npy",
+    "depth-nearest.csv",
+    "depth-farthest.npy",
+    "depth-farthest.csv",
 )
 
 
@@ -81,9 +93,7 @@ class Folder:
     def _hashes(self) -> dict[str, Optional[str]]:
         """The SHA-256 of each file except the summary, None for a missing file."""
         places = {name: self._place(name) for name in (self._events, "dtof.toml")}
-        return {
-            name: _hash(place) if os.path.isfile(place) else None for name, place in places.items()
-        }
+        return {name: _hash(place) if os.path.isfile(place) else None for name, place in places.items()}
 
     def _place(self, name: str) -> str:
         return os.path.join(self._folder, name)

@@ -15,7 +15,7 @@ from .._keywords import ReplayOptions
 from .._options import absolute, arguments
 from .._run import Replay
 from .._warn import warn
-from ._client import Progress, line, check_workers, totals, wait_for
+from ._client import Progress, check_workers, line, totals, wait_for
 from ._folder import FORMATS
 from ._recording import Task, run_task
 
@@ -60,8 +60,7 @@ class Recordings:
         events, photons = self.totals["events"], self.totals["photons"]
         failed = f", {len(self.failed)} failed" if self.failed else ""
         return (
-            f"<dtof.cluster.Recordings: {events} events of {photons} photons in "
-            f"{len(self.results)} recordings{failed}>"
+            f"<dtof.cluster.Recordings: {events} events of {photons} photons in {len(self.results)} recordings{failed}>"
         )
 
 
@@ -151,9 +150,7 @@ def _names(files: list[str], names: Optional[Iterable[str]]) -> list[str]:
         # Some file systems ignore case.
         other = seen.setdefault(name.lower(), file)
         if other is not file:
-            raise _native.Error(
-                f"{file}: its folder would be {name}, which is that of {other}: give names"
-            )
+            raise _native.Error(f"{file}: its folder would be {name}, which is that of {other}: give names")
     return given
 
 

@@ -96,10 +96,7 @@ def _on_all(
 ) -> list[Any]:
     """Runs ``job`` for all parts."""
     task = delayed(job, pure=False)
-    tasks = [
-        task(version, part.name, part.block, keywords, *of_part)
-        for part, of_part in zip(layout.parts, more)
-    ]
+    tasks = [task(version, part.name, part.block, keywords, *of_part) for part, of_part in zip(layout.parts, more)]
     futures = client.compute(tasks)
     report = None
     if progress is not None:
@@ -147,9 +144,7 @@ def _joined(done: list[Done], name: str) -> Replay:
     if bins:
         pixels = statistics["pixels"] - len(statistics["settings"].get("masked", []))
         photons = [sum(of_bin) for of_bin in zip(*bins)]
-        statistics["cover_glass"] = _native.cover_glass(
-            first.toml, photons, statistics["cycles"], max(pixels, 0)
-        )
+        statistics["cover_glass"] = _native.cover_glass(first.toml, photons, statistics["cycles"], max(pixels, 0))
     known = [run.confidence for run in runs if run.confidence is not None]
     confidence = numpy.fmax.reduce(known) if known else None
     return Replay(events, Array(*first.array), statistics, first.settings, first.toml, confidence)

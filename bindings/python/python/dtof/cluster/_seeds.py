@@ -113,16 +113,12 @@ def seeds(
     text = _text(scene)
     parts = [ordered[at : at + _PART] for at in range(0, len(ordered), _PART)]
     version = _native.__version__
-    futures = client.map(
-        _simulate, *zip(*((version, text, part, keywords) for part in parts)), pure=False
-    )
+    futures = client.map(_simulate, *zip(*((version, text, part, keywords) for part in parts)), pure=False)
     statistics = [run for part in wait_for(client, futures, progress) for run in part]
     return Seeds(ordered, statistics, _hash(text[1], keywords))
 
 
-def _simulate(
-    version: str, scene: tuple[str, str], seeds: list[int], keywords: Keywords
-) -> list[dict[str, Any]]:
+def _simulate(version: str, scene: tuple[str, str], seeds: list[int], keywords: Keywords) -> list[dict[str, Any]]:
     begin(version)
     runs = (_native.simulate(scene, [*keywords, ("seed", str(seed))], None) for seed in seeds)
     return [quiet_result(run).statistics for run in runs]

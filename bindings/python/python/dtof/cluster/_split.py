@@ -79,9 +79,7 @@ def split(array: Any, axes: Any, name: str) -> Split:
     outer = _outer(names)
     for axis, axis_name in enumerate(names):
         if axis not in outer and array.numblocks[axis] > 1:
-            raise _native.Error(
-                f"{name}: chunks split the {axis_name}: .rechunk({{{axis}: -1}}) makes them whole"
-            )
+            raise _native.Error(f"{name}: chunks split the {axis_name}: .rechunk({{{axis}: -1}}) makes them whole")
     lengths = [array.shape[axis] for axis in outer]
     blocks = array.to_delayed()
     parts = []
@@ -96,8 +94,7 @@ def split(array: Any, axes: Any, name: str) -> Split:
         more = next((at for at, length in enumerate(extent) if length > 1), len(extent))
         if extent[more + 1 :] != lengths[more + 1 :]:
             raise _native.Error(
-                f"{of_part}: parts of several captures: "
-                f".rechunk({{{outer[0]}: 1}}) makes chunks of one each"
+                f"{of_part}: parts of several captures: .rechunk({{{outer[0]}: 1}}) makes chunks of one each"
             )
         row = 0
         for length, first in zip(lengths, begin):
@@ -112,9 +109,7 @@ def split(array: Any, axes: Any, name: str) -> Split:
     )
 
 
-def blocks_of_file(
-    client: Client, version: str, path: str, axes: Any, rows: Optional[int]
-) -> dask.array.Array:
+def blocks_of_file(client: Client, version: str, path: str, axes: Any, rows: Optional[int]) -> dask.array.Array:
     """An ``.npy`` file as a dask array; workers read its chunks."""
     shape, dtype = client.submit(_header, version, path, pure=False).result()
     if rows is not None and (isinstance(rows, bool) or not isinstance(rows, int) or rows < 1):
@@ -130,9 +125,7 @@ def blocks_of_file(
     chunks = tuple(rows if at == axis else length for at, length in enumerate(shape))
     chunks = dask.array.core.normalize_chunks(chunks, shape)
     empty = numpy.empty((0,) * len(shape), dtype)
-    blocks: dask.array.Array = dask.array.map_blocks(
-        _block, version, path, chunks=chunks, dtype=dtype, meta=empty
-    )
+    blocks: dask.array.Array = dask.array.map_blocks(_block, version, path, chunks=chunks, dtype=dtype, meta=empty)
     return blocks
 
 
