@@ -407,6 +407,7 @@ rebin = 2
             "calibration",
             "photons_per_cycle",
             "decide_once",
+            "capture",
         ];
         for (_, keys, comments) in SECTIONS {
             for (key, comment) in keys.iter().zip(comments) {
