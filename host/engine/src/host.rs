@@ -45,7 +45,7 @@ pub fn host_engine(
             _ => HostEngine::<BINS, Count10>::boxed(settings, array, addresses),
         })?
     }?;
-    Ok(match settings.once_per_bin && settings.frame.is_none() {
+    Ok(match settings.counts_once_per_bin() {
         true => Box::new(OncePerBinEngine::new(engine, settings.bins)),
         false => engine,
     })

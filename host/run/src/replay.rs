@@ -231,8 +231,7 @@ impl Options {
                 "needs `recorded_cycles`: histograms are weighed by them"
             )
         );
-        let is_once_per_bin = settings.once_per_bin && settings.frame.is_none();
-        check_once_per_bin(is_once_per_bin, metadata.is_list)?;
+        check_once_per_bin(settings.counts_once_per_bin(), metadata.is_list)?;
         if let Some(binning) = settings.binning {
             let ([column, row], side) = (photons.axis_names(), 1 << binning.levels.raw());
             ensure!(

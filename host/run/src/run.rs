@@ -98,7 +98,7 @@ pub fn run(
     let has_glass = requested.sensor.glass_bins.is_some();
     let mut bins = has_glass.then(|| vec![0; settings.bins]);
     let addresses = source.addresses();
-    let is_once_per_bin = settings.once_per_bin && settings.frame.is_none();
+    let is_once_per_bin = settings.counts_once_per_bin();
     let mut brightness = is_once_per_bin.then(|| Brightness::new(addresses.len(), settings.bins));
     // Laser cycles of each pixel that is left out. Its exposures all end without an event, as it has no photons.
     let is_masked = |pixel: &PixelAddress| settings.masked.contains(&pixel.raw());
@@ -117,9 +117,6 @@ pub fn run(
         source,
         |slice| engine.run(slice),
         |slice, events, done| {
-            for event in &events {
-                reported.add(event);
-            }
             for (place, cycles) in &mut masked {
                 *cycles += u64::from(slice.pixels[*place].cycles);
             }
@@ -129,9 +126,7 @@ pub fn run(
             if let Some(brightness) = &mut brightness {
                 brightness.add(slice);
             }
-            for sink in &mut *sinks {
-                sink.take(slice, &events)?;
-            }
+            deliver(slice, &events, &mut reported, sinks)?;
             cycles = done;
             progress.at(done)?;
             Ok(match progress.ends_early() {
@@ -141,17 +136,12 @@ pub fn run(
         },
     )?;
     let decided = engine.finish();
-    for event in &decided {
-        reported.add(event);
-    }
     if !decided.is_empty() {
         let slice = Slice {
             first_cycle: cycles,
             pixels: vec![PixelPhotons::default(); addresses.len()],
         };
-        for sink in &mut *sinks {
-            sink.take(&slice, &decided)?;
-        }
+        deliver(&slice, &decided, &mut reported, sinks)?;
     }
     progress.end();
     for sink in &mut *sinks {
@@ -180,6 +170,22 @@ pub fn run(
         bins,
         warnings,
     })
+}
+
+/// Gives a slice and its events to all sinks.
+fn deliver(
+    slice: &Slice,
+    events: &[DepthEvent],
+    reported: &mut Reported,
+    sinks: &mut [&mut dyn Sink],
+) -> Result<()> {
+    for event in events {
+        reported.add(event);
+    }
+    for sink in sinks {
+        sink.take(slice, events)?;
+    }
+    Ok(())
 }
 
 /// Photons past the last bin are left out; statistics count them.

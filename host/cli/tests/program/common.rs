@@ -98,6 +98,14 @@ impl Scratch {
             .collect()
     }
 
+    /// An array of the last run into `out`, such as `depth`: a number for each pixel.
+    pub fn map(&self, name: &str) -> Vec<f64> {
+        let array = std::fs::read(self.path(&format!("out/{name}.npy"))).unwrap();
+        let (values, _) = array[256..].as_chunks();
+        let values = values.iter();
+        values.map(|bytes| f64::from_le_bytes(*bytes)).collect()
+    }
+
     /// The summary of the last run into `out`.
     pub fn summary(&self) -> serde_json::Value {
         serde_json::from_str(&self.read("out/summary.json")).unwrap()

@@ -11,15 +11,6 @@ fn scenes() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes")
 }
 
-fn map(scratch: &Scratch, name: &str) -> Vec<f64> {
-    let array = std::fs::read(scratch.path(&format!("out/{name}.npy"))).unwrap();
-    let (values, _) = array[256..].as_chunks();
-    values
-        .iter()
-        .map(|bytes| f64::from_le_bytes(*bytes))
-        .collect()
-}
-
 /// How many pixels of the room are within 30 mm of the truth.
 fn right(scratch: &Scratch) -> usize {
     let scene = std::fs::read_to_string(scenes().join("room.toml")).unwrap();
@@ -28,7 +19,7 @@ fn right(scratch: &Scratch) -> usize {
         let truth = scene.truth(PixelAddress::new(*pixel), 0).unwrap();
         (depth - truth.range_mm).abs() < 30.0
     };
-    (0..).zip(map(scratch, "depth")).filter(is_right).count()
+    (0..).zip(scratch.map("depth")).filter(is_right).count()
 }
 
 #[test]
@@ -41,7 +32,7 @@ fn all_photons_decide_once_with_settings_from_the_recording() {
     assert_eq!(summary["settings"]["decide_once"], true);
     assert_eq!(summary["events"], summary["pixels_reporting"]);
     assert!(right(&scratch) >= 760, "{}", right(&scratch));
-    let (depths, confidences) = (map(&scratch, "depth"), map(&scratch, "confidence"));
+    let (depths, confidences) = (scratch.map("depth"), scratch.map("confidence"));
     let table = scratch.read("out/depth.csv");
     assert!(table.starts_with("pixel,column,row,depth_mm,confidence\n"));
     let optional = |value: f64| match value.is_nan() {
@@ -63,7 +54,7 @@ fn all_photons_decide_once_with_settings_from_the_recording() {
     let settings = scratch.file("again.toml", scratch.read("out/dtof.toml"));
     scratch.replayed(&room, &format!("--settings {}", settings.display()));
     assert_eq!(scratch.read("out/events.csv"), first);
-    assert_eq!(map(&scratch, "confidence").len(), 768);
+    assert_eq!(scratch.map("confidence").len(), 768);
 
     // With neighbours at least as many are right.
     scratch.replayed(
@@ -97,7 +88,7 @@ fn two_surfaces_are_two_maps() {
     );
     assert_eq!(scratch.summary()["events"], 64);
     for (name, truth) in [("depth-nearest", 1000.0), ("depth-farthest", 3000.0)] {
-        let depths = map(&scratch, name);
+        let depths = scratch.map(name);
         assert!(
             depths.iter().all(|depth| (depth - truth).abs() < 20.0),
             "{depths:?}"

@@ -171,6 +171,12 @@ impl Settings {
         self.dead_time > 0 && self.rule.weighs_dead_time() && self.frame.is_none()
     }
 
+    /// Whether photons of one laser cycle in one bin count once: frames count all.
+    #[must_use]
+    pub fn counts_once_per_bin(&self) -> bool {
+        self.once_per_bin && self.frame.is_none()
+    }
+
     fn refused(&self, error: PixelConfigError) -> Refused {
         let Self { x, l1, l2, .. } = self;
         match error {

@@ -154,7 +154,7 @@ impl Settings {
             };
             rows.push(("dead time".to_owned(), format!("{text}, from {source}")));
         }
-        if self.once_per_bin && self.frame.is_none() {
+        if self.counts_once_per_bin() {
             let text = "those of one laser cycle in one bin count once";
             rows.push(("photons".to_owned(), text.to_owned()));
         }

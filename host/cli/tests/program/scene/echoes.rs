@@ -126,13 +126,7 @@ fn two_surfaces_have_two_maps() {
          rectangle = { columns = [0, 4], rows = [0, 4] }\n",
     );
     let depths = |name: &str| -> Vec<f64> {
-        let array = std::fs::read(scratch.path(&format!("out/{name}.npy"))).unwrap();
-        let table = scratch.read(&format!("out/{name}.csv"));
-        let (depths, _) = array[256..].as_chunks();
-        let depths: Vec<f64> = depths
-            .iter()
-            .map(|bytes| f64::from_le_bytes(*bytes))
-            .collect();
+        let (depths, table) = (scratch.map(name), scratch.read(&format!("out/{name}.csv")));
         let rows = table.lines().skip(1);
         for (row, depth) in rows.zip(&depths) {
             assert!(row.ends_with(&format!(",{depth:.3}")), "{row} {depth}");
