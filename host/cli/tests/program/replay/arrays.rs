@@ -425,7 +425,7 @@ fn a_folder_is_no_recording() {
     );
 }
 
-/// A pipe that nobody writes into is refused at once: a program that opens one waits for ever.
+/// A pipe that nobody writes into is refused at once: a program that opens one would never go on.
 #[cfg(unix)]
 #[test]
 fn a_pipe_is_no_recording() {
