@@ -93,7 +93,7 @@ fn read(svg: &str) -> (Vec<Text>, Vec<Stroke>) {
     (texts, strokes)
 }
 
-/// The lines of a path of M, L, H, V and z.
+/// The lines of a path of M, L, H, V, their relative forms, and z.
 fn lines_of(path: &str) -> Vec<(Place, Place)> {
     let mut lines = Vec::new();
     let (mut start, mut at) = ((0.0, 0.0), (0.0, 0.0));
@@ -108,12 +108,15 @@ fn lines_of(path: &str) -> Vec<(Place, Place)> {
         rest = &rest[end..];
         let to = match (command, &numbers[..]) {
             ('M' | 'L', &[x, y]) => (x, y),
+            ('m' | 'l', &[x, y]) => (at.0 + x, at.1 + y),
             ('H', &[x]) => (x, at.1),
             ('V', &[y]) => (at.0, y),
+            ('h', &[x]) => (at.0 + x, at.1),
+            ('v', &[y]) => (at.0, at.1 + y),
             ('z', []) => start,
             _ => panic!("{path}: {command} {numbers:?}"),
         };
-        if command == 'M' {
+        if matches!(command, 'M' | 'm') {
             start = to;
         } else {
             lines.push((at, to));

@@ -85,7 +85,7 @@ fn main() {
         let range = zone.range.expect("each zone sees a clear pulse");
         let of_sensor = zone.of_sensor.expect("so does the sensor");
         print_line!("{range} mm, the sensor says {of_sensor} mm");
-        // The middle of bin 10 of 814.6 ps, less 439.3 mm.
+        // The middle of bin 10 of 814.6 ps, less 439.4 mm.
         assert_eq!(range.round(), 843);
         assert_eq!(of_sensor, 842);
     }

@@ -10,7 +10,7 @@ use dtof_core::{
     Statistics,
 };
 use dtof_draw::palette::Colour;
-use dtof_draw::svg::{Anchor, At, EDGE, Svg, TEXT, TITLE, wrapped};
+use dtof_draw::svg::{Anchor, At, BOLD, EDGE, Svg, TEXT, TITLE, wrapped};
 use dtof_options::rows::significant;
 use dtof_photons::source::{PhotonSource, PixelPhotons};
 use dtof_simulate::scene::Scene;
@@ -109,7 +109,7 @@ pub fn pixel() -> Result<String> {
     let &(first, metres) = bright.events.first().context("no event")?;
     let title = "A pixel reports the moment its peak stands clear";
     let mut svg = Svg::default();
-    let lines = wrapped(title, TITLE.0, INNER);
+    let lines = wrapped(title, BOLD * TITLE.0, INNER);
     let top = svg.lines("ink title", (EDGE, EDGE), TITLE, Anchor::Start, &lines) + 4.0;
     let mut left = EDGE;
     for (_, colour, dashes, name) in levels(0.0, 0.0) {
