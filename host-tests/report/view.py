@@ -56,11 +56,13 @@ def shows_a_recording(browser, address, width, scheme, picture):
 
 
 def main(chromium, pictures, dtof, recording):
-    program = subprocess.Popen([dtof, "view", recording], stdout=subprocess.PIPE, text=True)
+    # The recording takes two seconds, so that a busy machine has its page long before the end.
+    command = [dtof, "view", recording, "--speed", "0.1"]
+    program = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
     try:
         address = program.stdout.readline().strip()
-        # Five times as long as the recording.
-        time.sleep(1)
+        # Longer than the recording takes.
+        time.sleep(3)
         with sync_playwright() as driver:
             # Root, as in a container, has no sandbox.
             browser = driver.chromium.launch(executable_path=shutil.which(chromium), args=["--no-sandbox"])
