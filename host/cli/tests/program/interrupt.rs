@@ -8,9 +8,12 @@ use std::time::{Duration, Instant};
 use crate::common::{Scratch, npy};
 
 /// Runs `dtof` with `arguments` on a terminal of util-linux until a progress bar appears, then presses Ctrl-C. The
-/// command replaces its shell.
+/// command replaces its shell, and Ctrl-C ends it also where this test runs in the background, which ignores it.
 fn interrupted(scratch: &Scratch, arguments: &str) {
-    let command = format!("exec '{}' {arguments}", env!("CARGO_BIN_EXE_dtof"));
+    let command = format!(
+        "exec env --default-signal=INT '{}' {arguments}",
+        env!("CARGO_BIN_EXE_dtof")
+    );
     let begun = Instant::now();
     let mut terminal = Command::new("script")
         .args(["--quiet", "--return", "--flush", "--command"])
