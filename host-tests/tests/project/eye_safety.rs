@@ -1,4 +1,4 @@
-//! The figures of "Eye safety first" in `docs/boards.md`, computed from the limits on the page and the
+//! The figures of `docs/eye-safety.md`, computed from the limits on the page and the
 //! default laser of the Pico's image.
 
 use dtof_firmware::photon_timer::{BINS, CLOCK_HZ, Config, Settings};
@@ -16,7 +16,7 @@ const LONGEST: f64 = 125.0;
 const CLOCKS_A_CLOCK: f64 = 50.0;
 
 fn page() -> &'static str {
-    include_str!("../../../docs/boards.md")
+    include_str!("../../../docs/eye-safety.md")
 }
 
 /// The numbers in the only row of the page that begins with `label`.
