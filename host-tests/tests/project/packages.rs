@@ -86,6 +86,11 @@ fn lacking(package: &Value) -> Vec<&'static str> {
     let readme = readme.unwrap_or_default();
     let library = folder(package).join("src/lib.rs");
     let library = fs::read_to_string(library).unwrap_or_default();
+    let badges = format!(
+        "\nRust {} or newer. MIT or Apache-2.0.\n",
+        text(package, "rust_version")
+    );
+    let without_std = library.contains("#![no_std]") || library.contains("no_std)]");
     let least = if is_of_host(package) { 100 } else { 150 };
     let required = [
         ("description", !text(package, "description").is_empty()),
@@ -98,6 +103,11 @@ fn lacking(package: &Value) -> Vec<&'static str> {
         (
             "README of 150 to 350 words",
             (least..=350).contains(&readme.split_whitespace().count()),
+        ),
+        ("oldest Rust and licence in it", readme.ends_with(&badges)),
+        (
+            "`no_std` in it",
+            !without_std || readme.contains("`no_std`"),
         ),
         ("compiled example in it", readme.contains("\n```rust\n")),
         ("README without ways out of it", !readme.contains("](")),
