@@ -174,7 +174,7 @@ impl Pixel {
 
 impl Pixel {
     fn create(bins: usize, address: u16, options: &Operation) -> Result<Self> {
-        let requested = options.given.merged()?;
+        let requested = options.given.merged_with_looks()?;
         let create = || {
             let settings = requested.settings(bins)?;
             let of_arrays = [

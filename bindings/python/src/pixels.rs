@@ -217,7 +217,7 @@ impl Pixels {
         let array = dtof_core::Array::new(columns, rows).with_context(|| {
             format!("{rows} rows and {columns} columns: must be 1 to 65,536 pixels")
         })?;
-        let requested = options.given.merged()?;
+        let requested = options.given.merged_with_looks()?;
         let create = || {
             let settings = requested.settings(bins)?;
             check(&settings.masked, array.pixels() as usize)?;

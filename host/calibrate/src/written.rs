@@ -56,11 +56,14 @@ impl Calibration {
                 before_gate.map(|&rate| four_digits(rate)).collect()
             }),
         };
+        // The z that was found is for looks.
+        let has_looks = before.run.decide_once != Some(true);
+        let z = |found: Option<f64>| found.filter(|_| has_looks);
         let detection = self.detection.map(|detection| DetectionSettings {
             rule: Some(RuleName::Window),
             window: Some(detection.window),
-            z: detection.z.map(U4F12::saturating_from_num),
-            false_alarm: detection.z.is_none().then_some(detection.false_alarm),
+            z: z(detection.z).map(U4F12::saturating_from_num),
+            false_alarm: z(detection.z).is_none().then_some(detection.false_alarm),
             half_widths: detection.half_widths,
             min_count: Some(detection.min_count),
             l1: Some(detection.l1),

@@ -48,6 +48,24 @@ pub struct Task<'a> {
     pub host_timeout: HostTimeout,
 }
 
+/// Checks that pixels of a device can have these settings.
+///
+/// # Errors
+/// Fails if they ask for frames or for a single decision.
+pub fn check_looks(settings: &Settings) -> Result<(), Refused> {
+    let others = [
+        ("frame", settings.frame.is_some()),
+        ("decide_once", settings.decide_once),
+    ];
+    match others.iter().find(|(_, is_used)| *is_used) {
+        Some((key, _)) => Err(Refused::new(
+            *key,
+            "is not for a device, which reports events",
+        )),
+        None => Ok(()),
+    }
+}
+
 impl Task<'_> {
     /// From its events to millimetres.
     ///
@@ -62,13 +80,10 @@ impl Task<'_> {
     /// The configuration of a device that takes photons from `source`.
     ///
     /// # Errors
-    /// Fails if the settings have no bins or ask for frames, or if a number does not fit.
+    /// Fails if the settings have no bins, ask for frames or a single decision, or if a number does not fit.
     pub fn configuration(&self, source: Source) -> Result<Configuration> {
         let settings = self.settings;
-        ensure!(
-            settings.frame.is_none(),
-            Refused::new("frame", "is not for a device, which reports events")
-        );
+        check_looks(settings)?;
         let last_bin = u16::try_from(settings.bins)?.checked_sub(1);
         let last_bin = last_bin.context("the settings have no bins")?;
         // A laser that is not the device's is not its to dither. Without a dither the seed means nothing.

@@ -122,9 +122,10 @@ impl Options {
         let mut requested = if is_scene {
             let reason = "is for recordings, not for a scene";
             self.given.refuse(RECORDING, reason)?;
-            self.given.merged()?
+            self.given.merged_with_looks()?
         } else {
-            self.given.merged_for_recording()?
+            let file = self.given.read()?.with_looks();
+            self.given.for_recording_over(file)?
         };
         if self.false_alarm.is_some() {
             requested.override_key("false_alarm");

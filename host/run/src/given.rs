@@ -81,6 +81,14 @@ impl Given {
         Ok(self.options.clone().or(self.read()?))
     }
 
+    /// The same for pixels with looks, whatever the file says.
+    ///
+    /// # Errors
+    /// Fails if the file cannot be read.
+    pub fn merged_with_looks(&self) -> Result<SettingsFile> {
+        Ok(self.options.clone().or(self.read()?.with_looks()))
+    }
+
     /// The file, without `frame` if options are for pixels with events.
     pub(super) fn read(&self) -> Result<SettingsFile> {
         let mut file = match (&self.text, &self.file) {

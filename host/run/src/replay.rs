@@ -306,18 +306,17 @@ fn find(requested: &mut SettingsFile, recording: &mut CheckedRecording) -> Resul
     };
     let width = format!("{} ps, {source}", metadata.bin_width_ps);
     let found = calibrate_counts(requested, &counts, &CalibrationOptions::default(), &mut ())?;
-    let mut settings = found.settings(
+    let settings = found.settings(
         requested
             .clone()
             .or(settings_of_file(metadata, counts.array)),
     )?;
-    if requested.run.decide_once == Some(true) && settings.detection.z.is_some() {
-        // That z is for exposures of many looks.
-        settings.detection.z = None;
-        settings.detection.false_alarm = Some(CalibrationOptions::default().false_alarm);
-    }
     *requested = requested.clone().or(settings);
     let mut rows = rows(&found);
+    if requested.run.decide_once == Some(true) {
+        // Its z, L1 and L2 are for looks. The settings have the rule.
+        rows.retain(|(name, _)| name != "rule");
+    }
     // A width that fits true distances better comes with the offset.
     if !rows.iter().any(|(name, _)| name == "bin width") {
         rows.insert(1, ("bin width".to_owned(), width));

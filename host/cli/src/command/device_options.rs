@@ -67,7 +67,7 @@ impl DeviceOptions {
     pub fn requested(&self) -> Result<SettingsFile> {
         let mut given = self.operation.0.given.clone();
         given.options.sensor.columns = self.columns.map(u32::from);
-        given.merged()
+        given.merged_with_looks()
     }
 
     /// Returns whether any was given.

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use clap::Args;
 use dtof::path;
 use dtof_device::{Client, DeviceEngine};
@@ -10,7 +10,6 @@ use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_events::echoes::Echo;
-use dtof_options::Refused;
 use dtof_photons::source::PhotonSource;
 use dtof_run::output::Output;
 
@@ -122,10 +121,7 @@ impl EngineOptions {
             return host_engine(settings, array, &addresses);
         };
         // Checked before the device is opened.
-        ensure!(
-            settings.frame.is_none(),
-            Refused::new("frame", "is not for a device, which reports events")
-        );
+        dtof_device::check_looks(settings)?;
         let port = dtof_device::open(device, self.image.as_deref())?;
         let client = Client::new(port).with_context(|| device.clone())?;
         let engine = DeviceEngine::new(client, settings, array, &addresses)?;

@@ -273,3 +273,15 @@ fn what_cannot_be_compared_is_refused() {
     assert_eq!(scratch.read("out/methods.csv"), "mine\n");
     assert_eq!(names(&scratch.path("out")), ["methods.csv"]);
 }
+
+#[test]
+fn the_settings_of_a_run_that_decided_once_are_those_of_its_sensor() {
+    let scratch = Scratch::new();
+    scratch.file("scene.toml", SCENE);
+    scratch.printed(
+        "simulate --scene scene.toml --decide-once --rule window --sigma-bins 1 --out once",
+    );
+    scratch.printed("compare --scene scene.toml --settings once/dtof.toml --out out");
+    let settings = scratch.read("out/dtof.toml");
+    assert!(!settings.contains("decide_once"), "{settings}");
+}

@@ -49,6 +49,11 @@ fn all_photons_decide_once_with_settings_from_the_recording() {
     // Only the hot pixel has none.
     assert_eq!(confidences.iter().filter(|value| value.is_nan()).count(), 1);
 
+    // L1, L2 and a z for looks were not used.
+    let found = summary["found"].to_string();
+    assert_contains(&found, "pulse");
+    assert!(!found.contains("L2"), "{found}");
+
     // The settings that it writes repeat it, in any number of slices.
     let first = scratch.read("out/events.csv");
     let settings = scratch.file("again.toml", scratch.read("out/dtof.toml"));
@@ -143,4 +148,52 @@ fn what_needs_looks_is_refused() {
         );
         assert_contains(&message, reason);
     }
+}
+
+/// The z in a settings file.
+fn z(scratch: &Scratch, file: &str) -> f64 {
+    let text = scratch.read(file);
+    let line = text.lines().find_map(|line| line.strip_prefix("z = "));
+    let number = line.unwrap().split_whitespace().next();
+    number.unwrap().parse().unwrap()
+}
+
+#[test]
+fn a_z_for_looks_and_one_for_a_single_decision_do_not_replace_each_other() {
+    let scratch = Scratch::new();
+    let room = scenes().join("room.npy");
+    scratch.printed(&format!(
+        "calibrate {} --recorded-cycles 4000 --out looks.toml",
+        room.display()
+    ));
+    scratch.replayed(&room, "--decide-once --recorded-cycles 4000");
+    scratch.file("once.toml", scratch.read("out/dtof.toml"));
+    assert!(z(&scratch, "once.toml") < z(&scratch, "looks.toml") - 0.3);
+    scratch.replayed(&room, "--settings looks.toml --decide-once");
+    assert_eq!(z(&scratch, "out/dtof.toml"), z(&scratch, "once.toml"));
+    // One that is given is kept.
+    scratch.replayed(&room, "--settings looks.toml --decide-once --z 5");
+    assert_eq!(z(&scratch, "out/dtof.toml"), 5.0);
+
+    // An even background, and the settings of a single decision: 10 exposures of each of 768 pixels.
+    let scene = scratch.file(
+        "dark.toml",
+        "columns = 32\nrows = 24\nbackground = 0.5\n[[surface]]\nrange_mm = 2000\nsignal = 0.0001\n",
+    );
+    let settings = "--settings once.toml --decide-once=false --gate 0..127 --l1 40 --l2 400";
+    scratch.simulated(&scene, &format!("{settings} --cycles 4000"));
+    let summary = scratch.summary();
+    let share = summary["events"].as_f64().unwrap() / (768.0 * 10.0);
+    assert!(share < 0.02, "{share}");
+
+    // An older calibration that decided once has no z for looks in the new one.
+    scratch.printed(&format!(
+        "calibrate {} --recorded-cycles 4000 --settings once.toml --out new.toml",
+        room.display()
+    ));
+    let new = scratch.read("new.toml");
+    assert!(!new.contains("\nz = "), "{new}");
+    assert_contains(&new, "false_alarm = 0.01");
+    scratch.replayed(&room, "--settings new.toml");
+    assert_eq!(z(&scratch, "out/dtof.toml"), z(&scratch, "once.toml"));
 }

@@ -254,9 +254,23 @@ impl SettingsFile {
         dtof_options::add_file_name(error, self.file.as_ref())
     }
 
+    /// These settings for pixels with looks: without `decide_once`, and without the z of a single decision.
+    #[must_use]
+    pub fn with_looks(mut self) -> Self {
+        if self.run.decide_once.take() == Some(true) {
+            self.detection.z = None;
+        }
+        self
+    }
+
     /// These settings, and those of `other` that they lack.
     #[must_use]
     pub fn or(self, mut other: Self) -> Self {
+        // A z is for looks, or for a single decision.
+        let decides_once = self.run.decide_once.or(other.run.decide_once) == Some(true);
+        if decides_once != (other.run.decide_once == Some(true)) {
+            other.detection.z = None;
+        }
         // Half widths belong to a pulse.
         let sigma = self.sensor.sigma_bins;
         if sigma.is_some() && sigma != other.sensor.sigma_bins {
@@ -468,6 +482,36 @@ rebin = 2
                 .to_string()
                 .contains("cannot be used with")
         );
+    }
+
+    #[test]
+    fn a_z_is_for_looks_or_for_a_single_decision() {
+        let of = |once: &str, z: &str| {
+            let text = format!("[run]\n{once}\n[detection]\nrule = 'window'\nwindow = 3\n{z}");
+            SettingsFile::parse(&text).unwrap()
+        };
+        let [on, off, none] = ["decide_once = true", "decide_once = false", ""];
+        for (options, file, z) in [
+            (none, none, Some("4.5")),
+            (off, none, Some("4.5")),
+            (none, off, Some("4.5")),
+            (none, on, Some("4.5")),
+            (on, on, Some("4.5")),
+            (on, none, None),
+            (on, off, None),
+            (off, on, None),
+        ] {
+            let z = z.map(|z| z.parse().unwrap());
+            let over = |own: &str| of(options, own).or(of(file, "z = 4.5"));
+            assert_eq!(over("").detection.z, z, "{options} over {file}");
+            // One that is given comes with how it is used.
+            let own = over("z = 5").detection.z;
+            assert_eq!(own, Some("5".parse().unwrap()), "{options} over {file}");
+        }
+        let once = of(on, "z = 4.5").with_looks();
+        assert_eq!((once.detection.z, once.run.decide_once), (None, None));
+        let looks = of(none, "z = 4.5");
+        assert_eq!(looks.clone().with_looks(), looks);
     }
 
     #[test]
