@@ -20,7 +20,8 @@
 extern crate std;
 
 pub mod board;
-pub mod photon_timer;
 pub mod self_test;
 pub mod serial;
 pub mod sidecar;
+
+pub use dtof_sensors::photon_timer;

@@ -9,17 +9,24 @@
 #![no_std]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
-#![deny(
-    clippy::expect_used,
-    clippy::float_arithmetic,
-    clippy::indexing_slicing,
-    clippy::panic,
-    clippy::unwrap_used
+#![cfg_attr(
+    not(test),
+    deny(
+        clippy::expect_used,
+        clippy::float_arithmetic,
+        clippy::indexing_slicing,
+        clippy::panic,
+        clippy::unwrap_used
+    )
 )]
+
+#[cfg(test)]
+extern crate std;
 
 pub mod dither;
 mod fault;
 pub mod i2c;
+pub mod photon_timer;
 pub mod protocol;
 pub mod simulated;
 pub mod tdc7200;
@@ -34,8 +41,9 @@ use dtof_core::fixed::types::{I24F8, U16F16};
 use self::dither::Dither;
 pub use self::fault::SensorFault;
 
-/// Where a sensor's photons go.
-pub trait PhotonSink {
+/// Where a sensor's photons go. `BINS` is the number of bins of its histograms; the drivers of this
+/// crate give 128.
+pub trait PhotonSink<const BINS: usize = 128> {
     /// One photon of `pixel` in the present laser cycle. All photons of a pixel come one after another, in
     /// any order of bins.
     fn photon(&mut self, pixel: PixelAddress, code: u16);
@@ -45,7 +53,7 @@ pub trait PhotonSink {
     /// are of these cycles.
     fn begin_frame(&mut self, cycles: u32);
     /// A whole histogram of `pixel` of the frame that began last.
-    fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]);
+    fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; BINS]);
     /// A target of `pixel` that the sensor itself has found, for comparison. Only some sensors
     /// report targets.
     fn target(&mut self, _pixel: PixelAddress, _target: &Target) {}
@@ -74,7 +82,9 @@ pub struct Target {
 /// Poll on every edge of the interrupt pin and also once a millisecond: the timer brings a sensor
 /// up and notices that it is gone. Poll again at once while the answer is not [`Polled::Idle`], up
 /// to a limit: a fast sensor may always have more.
-pub trait Sensor {
+///
+/// `BINS` is the number of bins of the histograms that it gives.
+pub trait Sensor<const BINS: usize = 128> {
     /// The driver's error, which contains that of the bus. The host receives its kind.
     type Error: Into<SensorFault>;
 
@@ -95,7 +105,11 @@ pub trait Sensor {
     ///
     /// # Errors
     /// Fails if this step fails. The next polls bring the sensor up again.
-    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Self::Error>;
+    fn poll(
+        &mut self,
+        now_ms: u32,
+        sink: &mut impl PhotonSink<BINS>,
+    ) -> Result<Polled, Self::Error>;
 }
 
 /// The description of a sensor for a host.

@@ -3,7 +3,7 @@
 
 mod common;
 
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::pin::pin;
 use std::rc::Rc;
 use std::task::{Context, Poll, Waker};
@@ -14,17 +14,57 @@ use common::tmf8829::bus::{Bus, Fault};
 use common::{RecordingSink, SinkCall};
 use dtof_chips::tmf8829::varied_counts;
 use dtof_chips::{Chip as _, Tmf8829 as Chip};
-use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
+use dtof_core::{PixelAddress, RangeGate, checked};
 use dtof_sensors::dither::Dither;
+use dtof_sensors::protocol::Timing;
 use dtof_sensors::tmf882x::{self, Tmf882x};
-use dtof_sensors::tmf8829::{Config, Tmf8829, Zones};
-use dtof_sensors::{Polled, Sensor};
+use dtof_sensors::tmf8829::{self, Config, Tmf8829, Zones};
+use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, ErrorType, Operation};
+use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::i2c::I2c;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
 
-/// A bus on which each transfer takes a while.
-struct Slow<B>(B);
+/// A transfer: its register, and how many bytes are read.
+type Transfer = (u8, usize);
+
+/// A bus on which each transfer takes a while, before the chip takes it and after. `present` is the
+/// one that is not over; clones share it.
+#[derive(Clone)]
+struct Slow<B> {
+    bus: B,
+    present: Rc<Cell<Option<Transfer>>>,
+    /// After so many transfers it never ends one.
+    left: Rc<Cell<Option<u32>>>,
+}
+
+/// The future of a transfer is not ready so often.
+const WAITS: u32 = 4;
+
+impl<B> Slow<B> {
+    fn new(bus: B) -> Self {
+        Self {
+            bus,
+            present: Rc::default(),
+            left: Rc::default(),
+        }
+    }
+}
+
+/// Is not ready so often.
+async fn wait(mut times: u32) {
+    std::future::poll_fn(|context| {
+        if times == 0 {
+            return Poll::Ready(());
+        }
+        times -= 1;
+        context.waker().wake_by_ref();
+        Poll::Pending
+    })
+    .await;
+}
 
 impl<B: ErrorType<Error = ErrorKind>> ErrorType for Slow<B> {
     type Error = ErrorKind;
@@ -36,31 +76,80 @@ impl<B: embedded_hal::i2c::I2c<Error = ErrorKind>> I2c for Slow<B> {
         address: u8,
         operations: &mut [Operation<'_>],
     ) -> Result<(), ErrorKind> {
-        let mut waits = 3;
-        std::future::poll_fn(|context| {
-            if waits == 0 {
-                return Poll::Ready(());
+        let (mut register, mut read) = (0, 0);
+        for operation in &*operations {
+            match operation {
+                Operation::Write(bytes) => register = bytes[0],
+                Operation::Read(bytes) => read = bytes.len(),
             }
-            waits -= 1;
-            context.waker().wake_by_ref();
-            Poll::Pending
-        })
-        .await;
-        self.0.transaction(address, operations)
+        }
+        self.present.set(Some((register, read)));
+        match self.left.get() {
+            Some(0) => std::future::pending().await,
+            left => self.left.set(left.map(|left| left - 1)),
+        }
+        wait(WAITS / 2).await;
+        let done = self.bus.transaction(address, operations);
+        wait(WAITS / 2).await;
+        self.present.set(None);
+        done
     }
 }
 
 /// What came of a future, and how often it was not ready.
 fn run<T>(future: impl Future<Output = T>) -> (T, u32) {
+    run_at(&Cell::new(0), future)
+}
+
+/// The same; a millisecond passes whenever it is not ready.
+fn run_at<T>(clock: &Cell<u32>, future: impl Future<Output = T>) -> (T, u32) {
     let mut future = pin!(future);
     let mut context = Context::from_waker(Waker::noop());
     let mut pending = 0;
     loop {
         match future.as_mut().poll(&mut context) {
             Poll::Ready(done) => return (done, pending),
-            Poll::Pending => pending += 1,
+            Poll::Pending => {
+                pending += 1;
+                clock.set(clock.get().wrapping_add(1));
+                assert!(pending < 100_000, "it hangs");
+            }
         }
     }
+}
+
+/// Polls a future until it is ready, but at most so often, and drops it. Returns whether it was ready.
+fn drop_after<T>(future: impl Future<Output = T>, polls: u32) -> bool {
+    let mut future = pin!(future);
+    let mut context = Context::from_waker(Waker::noop());
+    (0..polls).any(|_| future.as_mut().poll(&mut context).is_ready())
+}
+
+/// A timer of the clock.
+struct Timer(Rc<Cell<u32>>);
+
+impl DelayNs for Timer {
+    async fn delay_ns(&mut self, ns: u32) {
+        let end = self.0.get().wrapping_add(ns.div_ceil(1_000_000));
+        std::future::poll_fn(|_| match end.wrapping_sub(self.0.get()) {
+            0 | 0x8000_0000.. => Poll::Ready(()),
+            _ => Poll::Pending,
+        })
+        .await;
+    }
+}
+
+/// The clock, and the timing of a driver by it.
+fn timing(bus_ms: u32) -> (Rc<Cell<u32>>, Timing<impl FnMut() -> u32, Timer>) {
+    // The milliseconds wrap in the middle of it.
+    let clock = Rc::new(Cell::new(u32::MAX - 100));
+    let now = Rc::clone(&clock);
+    let timing = Timing {
+        now_ms: move || now.get(),
+        delay: Timer(Rc::clone(&clock)),
+        bus_ms,
+    };
+    (clock, timing)
 }
 
 #[test]
@@ -72,7 +161,7 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
     let (interrupt, enable) = pins(blocking);
     let mut sensor = Tmf8829::<_, _, _>::new(blocking.clone(), interrupt, enable, &IMAGE, config);
     let (interrupt, enable) = pins(waiting);
-    let slow = Slow(waiting.clone());
+    let slow = Slow::new(waiting.clone());
     let mut awaited = Tmf8829::<_, _, _>::new(slow, interrupt, enable, &IMAGE, config);
     let mut sinks = [(); 2].map(|()| RecordingSink::default());
     let mut data = 0;
@@ -95,7 +184,7 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
         data += u32::from(polled == Ok(Polled::Data));
         let logs = [blocking, waiting].map(|bus| bus.0.borrow().log.clone());
         assert_eq!(logs[0], logs[1]);
-        assert_eq!(pending, 3 * u32::try_from(logs[1].len()).unwrap());
+        assert_eq!(pending, WAITS * u32::try_from(logs[1].len()).unwrap());
         assert_eq!(first.take(), second.take());
     }
     assert!(data > 300, "{data}");
@@ -113,31 +202,61 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
     );
 }
 
-/// Who drops a poll within a transfer loses the rest of that frame, and no count is wrong.
+/// Polls are dropped at each place where they wait. A frame of which the header or the data were on the
+/// bus is lost and counted; all others come, and what comes is right.
 #[test]
-fn a_poll_that_is_dropped_costs_its_frame() {
+fn a_poll_of_a_tmf8829_that_is_dropped_costs_at_most_its_frame() {
     let config = Config::new(settings(Zones::Z8x8)).unwrap();
     let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
-    let slow = Slow(bus.clone());
-    let mut sensor = Tmf8829::<_, _, _>::new(slow, bus.clone(), bus.clone(), &IMAGE, config);
+    let slow = Slow::new(bus.clone());
+    let present = Rc::clone(&slow.present);
+    let mut sensor = Tmf8829::<_, _, _, 252>::new(slow, bus.clone(), bus.clone(), &IMAGE, config);
     let mut sink = RecordingSink::default();
-    let mut dropped = 0;
-    for now_ms in 0..3000 {
-        if now_ms % 400 == 399 {
-            let mut poll = pin!(sensor.poll_async(now_ms, &mut sink));
-            let mut context = Context::from_waker(Waker::noop());
-            dropped += u32::from(poll.as_mut().poll(&mut context).is_pending());
-            // The chip was read, and nobody has the bytes.
-            let mut lost = [0; 100];
-            bus.0.borrow_mut().chip.read(0xFF, &mut lost);
+    // Of reasons, headers and data; and how far each poll had come.
+    let (mut reasons, mut missed, mut broken) = (0, 0, 0);
+    let mut dropped_at = std::collections::BTreeSet::new();
+    let mut rng = Pcg32::seed_from_u64(1);
+    for poll in 0..60_000 {
+        let measured = sensor.is_measuring();
+        // Two of three polls that begin a frame, and some others.
+        let begins = measured && bus.0.borrow().chip.interrupts();
+        if !rng.next_u32().is_multiple_of(if begins { 2 } else { 300 }) {
+            assert!(run(sensor.poll_async(poll, &mut sink)).0.is_ok());
             continue;
         }
-        assert!(run(sensor.poll_async(now_ms, &mut sink)).0.is_ok());
+        let polls = 1 + rng.next_u32() % (3 * WAITS);
+        if drop_after(sensor.poll_async(poll, &mut sink), polls) {
+            continue;
+        }
+        let transfer = present.take().unwrap();
+        dropped_at.insert((transfer, (polls - 1) % WAITS));
+        match transfer {
+            (0xE1, _) if measured => {
+                reasons += 1;
+                assert!(run(sensor.poll_async(poll, &mut sink)).0.is_ok());
+                assert!(sensor.is_measuring(), "it need not begin again");
+            }
+            (0xFA, _) => missed += 1,
+            (0xFF, 1..) => broken += 1,
+            _ => {}
+        }
     }
-    assert_eq!(dropped, 7);
+    assert!(
+        reasons > 20 && missed > 20 && broken > 20,
+        "{reasons} {missed} {broken}"
+    );
+    for register in [(0xE1, 0), (0xE1, 1), (0xFA, 21), (0xFF, 252)] {
+        let of = dropped_at
+            .iter()
+            .filter(|(transfer, _)| *transfer == register);
+        assert_eq!(of.count(), 4, "{register:02x?}: {dropped_at:02x?}");
+    }
     let counts = sensor.counts();
-    assert_eq!((counts.broken, counts.errors), (7, 0));
-    let measurements = bus.0.borrow().chip.sent.len() / 3 + 1;
+    assert_eq!(
+        (counts.missed, counts.broken, counts.errors),
+        (missed, broken, 0)
+    );
+    let measurements = u32::try_from(bus.0.borrow().chip.sent.len()).unwrap();
     let mut histograms = 0;
     for given in sink.take() {
         let SinkCall::Histogram(pixel, counts) = given else {
@@ -148,11 +267,145 @@ fn a_poll_that_is_dropped_costs_its_frame() {
             let scene = varied_counts()(measurement, Some((zone % 8, zone / 8)), 256);
             scene[..128] == counts
         };
-        let measurements = u32::try_from(measurements).unwrap();
         assert!((0..measurements).any(is_right), "pixel {pixel}");
         histograms += 1;
     }
     assert!(histograms > 200, "{histograms}");
+}
+
+#[test]
+fn a_poll_of_a_tmf8828_that_is_dropped_costs_at_most_its_set() {
+    let config = tmf882x::Config::new(tmf882x::Settings::of_8x8(PixelAddress::new(10))).unwrap();
+    let chip = Rc::new(RefCell::new(tmf8828::Chip::new(0)));
+    let bus = tmf8828::Bus(Rc::clone(&chip));
+    let slow = Slow::new(bus.clone());
+    let present = Rc::clone(&slow.present);
+    let mut sensor = Tmf882x::<_, _, _>::new(slow, bus.clone(), bus, &[], config);
+    let mut sink = RecordingSink::default();
+    let (mut reasons, mut broken) = (0, 0);
+    for poll in 0..20_000 {
+        if poll % 331 != 330 {
+            assert!(run(sensor.poll_async(poll, &mut sink)).0.is_ok());
+            continue;
+        }
+        let measured = sensor.is_measuring();
+        if drop_after(sensor.poll_async(poll, &mut sink), 1 + poll / 331 % 12) {
+            continue;
+        }
+        match present.take() {
+            Some((0xE1, _)) if measured => reasons += 1,
+            Some((0x20, 135)) => broken += 1,
+            _ => {}
+        }
+    }
+    assert!(reasons > 10 && broken > 10, "{reasons} {broken}");
+    assert_eq!(
+        (sensor.counts().broken, sensor.counts().errors),
+        (broken, 0)
+    );
+    let mut histograms = 0;
+    for given in sink.take() {
+        let SinkCall::Histogram(pixel, counts) = given else {
+            continue;
+        };
+        let expected = (0..128).map(|bin| tmf8828::count(Some(pixel - 10), bin));
+        assert!(counts.into_iter().eq(expected), "pixel {pixel}");
+        histograms += 1;
+    }
+    assert!(histograms > 1000, "{histograms}");
+}
+
+/// INT wakes the driver, and a timer brings it up. Each frame comes, none twice.
+#[test]
+fn next_waits_for_the_sensor() {
+    let config = Config::new(settings(Zones::Z8x8)).unwrap();
+    let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
+    let mut sensor = Tmf8829::<_, _, _, 252>::new(
+        Slow::new(bus.clone()),
+        bus.clone(),
+        bus.clone(),
+        &IMAGE,
+        config,
+    );
+    assert_eq!(sensor.info(), config.info());
+    let (clock, mut timing) = timing(100);
+    let mut sink = RecordingSink::default();
+    while sensor.counts().frames < 7 {
+        let before = sensor.counts().histograms;
+        let (given, _) = run_at(&clock, sensor.next(&mut timing, &mut sink));
+        assert_eq!(given, Ok(()));
+        assert!(sensor.counts().histograms > before);
+    }
+    assert_eq!((sensor.counts().errors, sensor.counts().missed), (0, 0));
+
+    // Nothing more comes: the driver waits for INT, and then it is an error.
+    bus.0.borrow_mut().chip.is_halted = true;
+    let began = clock.get();
+    let failed = loop {
+        let (given, _) = run_at(&clock, sensor.next(&mut timing, &mut sink));
+        if let Err(error) = given {
+            break error;
+        }
+    };
+    assert_eq!(SensorFault::from(failed), SensorFault::Timeout);
+    let waited = clock.get().wrapping_sub(began);
+    let limit = config.settings().data_timeout_ms;
+    assert!((limit..limit + 1000).contains(&waited), "{waited} ms");
+}
+
+/// A bus that never ends a transfer, at each transfer of the way up and of two frames: an error at the
+/// limit, and all is right again once the bus is.
+#[test]
+fn a_bus_that_hangs_ends_a_poll_in_time() {
+    const BUS_MS: u32 = 50;
+    let config = Config::new(settings(Zones::Z8x8)).unwrap();
+    let mut hung = std::collections::BTreeSet::new();
+    for transfers in 0..160 {
+        let bus = Bus::new(Chip::new(&[7; 100], varied_counts()));
+        let slow = Slow::new(bus.clone());
+        let (present, left) = (Rc::clone(&slow.present), Rc::clone(&slow.left));
+        let (interrupt, enable) = (bus.clone(), bus.clone());
+        let mut sensor = Tmf8829::<_, _, _, 252>::new(slow, interrupt, enable, &[7; 100], config);
+        let (clock, mut timing) = timing(BUS_MS);
+        let mut sink = RecordingSink::default();
+        left.set(Some(transfers));
+        let failed = loop {
+            clock.set(clock.get().wrapping_add(1));
+            let began = clock.get();
+            let polled = run_at(&clock, sensor.poll_within(&mut timing, &mut sink)).0;
+            if let Err(error) = polled {
+                assert_eq!(clock.get().wrapping_sub(began), BUS_MS);
+                break error;
+            }
+        };
+        assert_eq!(failed, tmf8829::Error::BusTimeout);
+        assert_eq!(sensor.counts().errors, 1);
+        assert_eq!(SensorFault::from(failed), SensorFault::Bus);
+        hung.insert(present.take().unwrap().0);
+        left.set(None);
+        let given = run_at(&clock, sensor.next(&mut timing, &mut sink)).0;
+        assert_eq!(given, Ok(()));
+    }
+    // Start, commands, configuration, interrupts, headers, data.
+    for register in [0xF8, 0xE3, 0x00, 0x08, 0x22, 0xE1, 0xFA, 0xFF] {
+        assert!(hung.contains(&register), "{register:#04x}: {hung:02x?}");
+    }
+}
+
+/// What a program needs when it is compiled: the bins of the gate, the pixels, the scale.
+#[test]
+fn a_sensor_is_described_as_a_constant() {
+    const ZONES: Config = checked!(Config::new(tmf8829::Settings::new(
+        PixelAddress::new(0),
+        Zones::Z16x16
+    )));
+    const NINE: tmf882x::Config = checked!(tmf882x::Config::new(tmf882x::Settings::new(
+        PixelAddress::new(3)
+    )));
+    const MEASURED: RangeGate<128> = checked!(RangeGate::new(0, ZONES.info().bins - 1));
+    assert_eq!(MEASURED, checked!(RangeGate::new(0, 53)));
+    const PIXELS: [u16; 2] = [ZONES.info().pixels, NINE.info().pixels];
+    assert_eq!(PIXELS, [256, 12]);
 }
 
 #[test]
@@ -163,7 +416,7 @@ fn an_awaited_tmf8828_gives_the_same() {
     let (interrupt, enable) = (one.clone(), one.clone());
     let mut sensor = Tmf882x::<_, _, _>::new(one, interrupt, enable, &[], config);
     let (interrupt, enable) = (other.clone(), other.clone());
-    let mut awaited = Tmf882x::<_, _, _>::new(Slow(other), interrupt, enable, &[], config);
+    let mut awaited = Tmf882x::<_, _, _>::new(Slow::new(other), interrupt, enable, &[], config);
     let mut sinks = [(); 2].map(|()| RecordingSink::default());
     let mut histograms = 0;
     for now_ms in 0..1000 {
@@ -175,7 +428,7 @@ fn an_awaited_tmf8828_gives_the_same() {
         let before = chips[1].borrow().transfers;
         let (later, pending) = run(awaited.poll_async(now_ms, second));
         assert_eq!(polled, later);
-        assert_eq!(pending, 3 * (chips[1].borrow().transfers - before));
+        assert_eq!(pending, WAITS * (chips[1].borrow().transfers - before));
         let given = first.take();
         assert_eq!(given, second.take());
         let is_histogram = |given: &&SinkCall| matches!(given, SinkCall::Histogram(..));

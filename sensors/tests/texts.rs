@@ -61,7 +61,7 @@ fn every_error_of_a_poll_says_what_happened() {
     let texts = [
         (
             Tmf882x::<Bus, Bus>::Bus("cut").to_string(),
-            "TMF882x: I2C: \"cut\"",
+            "TMF882x: bus: \"cut\"",
         ),
         (
             Tmf882x::<Bus, Bus>::Device(tmf882x::DeviceError::WrongMode { mode: 8 }).to_string(),

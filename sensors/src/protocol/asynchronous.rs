@@ -1,24 +1,129 @@
 //! A protocol over embedded-hal-async.
 
-use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
-use embedded_hal_async::i2c::I2c;
+use core::future::poll_fn;
+use core::pin::pin;
+use core::task::Poll;
 
-use super::{Done, Driver, Failure, Protocol, Request};
+use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
+use embedded_hal_async::delay::DelayNs;
+use embedded_hal_async::digital::Wait;
+
+use super::{AsyncBus, Done, Driver, Failure, Protocol, Request};
 use crate::{PhotonSink, Polled};
 
-impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN>
+/// Time for a driver: the clock, a timer, and how long the bus may take.
+#[derive(Clone, Debug)]
+pub struct Timing<N, D> {
+    /// Returns milliseconds, which may wrap.
+    pub now_ms: N,
+    /// A timer of the driver's own.
+    pub delay: D,
+    /// The most milliseconds that a poll may take. It has to cover the slowest poll of the sensor: a
+    /// chunk, or ten short transfers. 100 is enough at 100 kHz.
+    pub bus_ms: u32,
+}
+
+/// The output of the future that is ready first, or of the first one if both are.
+async fn race<A, B>(
+    first: impl Future<Output = A>,
+    second: impl Future<Output = B>,
+) -> Result<A, B> {
+    let (mut first, mut second) = (pin!(first), pin!(second));
+    poll_fn(|context| {
+        if let Poll::Ready(done) = first.as_mut().poll(context) {
+            return Poll::Ready(Ok(done));
+        }
+        second.as_mut().poll(context).map(Err)
+    })
+    .await
+}
+
+impl<P, BUS, INT, EN> Driver<P, BUS, INT, EN>
 where
     P: Protocol,
-    I2C: I2c,
+    BUS: AsyncBus,
     INT: InputPin,
     EN: OutputPin + PinErrorType<Error = INT::Error>,
 {
-    /// [`Sensor::poll`](crate::Sensor::poll) that awaits its transfers: the same ones, in the same
-    /// order. It awaits nothing else. After a poll that is [`Polled::Idle`] await an edge of
-    /// INT or a millisecond, whichever comes first.
+    /// Polls until the sink has been given photons or a histogram. Between polls it waits for INT to go
+    /// low or for a millisecond, whichever comes first.
     ///
-    /// The future may be dropped. If it is dropped within a transfer, the state of the sensor is
-    /// unknown, and the next poll begins to bring it up again.
+    /// The future may be dropped, as with [`Self::poll_async`]. While it waits for INT nothing is lost.
+    ///
+    /// # Errors
+    /// Fails if a poll fails, or if the bus takes longer than `bus_ms` ([`Failure::BusTimeout`]). Call it
+    /// again: the next polls bring the sensor up again.
+    pub async fn next(
+        &mut self,
+        timing: &mut Timing<impl FnMut() -> u32, impl DelayNs>,
+        sink: &mut impl PhotonSink,
+    ) -> Result<(), P::Error<BUS::Error, INT::Error>>
+    where
+        INT: Wait,
+    {
+        loop {
+            match self.poll_within(timing, sink).await? {
+                Polled::Data => return Ok(()),
+                Polled::Working => {}
+                Polled::Idle => {
+                    let waited = self.wait(&mut timing.delay).await;
+                    waited.map_err(|error| self.fail(Failure::Pin(error)))?;
+                }
+            }
+        }
+    }
+
+    /// Waits a millisecond, or until INT goes low.
+    async fn wait(&mut self, delay: &mut impl DelayNs) -> Result<(), INT::Error>
+    where
+        INT: Wait,
+    {
+        // It is low for no reason, or the sensor is not up.
+        if self.interrupt.is_low()? {
+            delay.delay_ms(1).await;
+            return Ok(());
+        }
+        let waited = race(self.interrupt.wait_for_low(), delay.delay_ms(1)).await;
+        waited.unwrap_or(Ok(()))
+    }
+
+    /// [`Self::poll_async`] that takes at most `bus_ms` milliseconds of the timer. It cannot end a
+    /// bus whose futures block.
+    ///
+    /// # Errors
+    /// Fails if the poll fails or takes longer ([`Failure::BusTimeout`]). The next polls bring the sensor
+    /// up again.
+    pub async fn poll_within(
+        &mut self,
+        timing: &mut Timing<impl FnMut() -> u32, impl DelayNs>,
+        sink: &mut impl PhotonSink,
+    ) -> Result<Polled, P::Error<BUS::Error, INT::Error>> {
+        let now_ms = (timing.now_ms)();
+        let limit = timing.delay.delay_ms(timing.bus_ms);
+        match race(self.poll_async(now_ms, sink), limit).await {
+            Ok(polled) => polled,
+            Err(()) => {
+                self.is_under_way = false;
+                Err(self.fail(Failure::BusTimeout))
+            }
+        }
+    }
+
+    fn fail(
+        &mut self,
+        failure: Failure<BUS::Error, INT::Error>,
+    ) -> P::Error<BUS::Error, INT::Error> {
+        let error = failure.into();
+        self.protocol.failed(&error);
+        error
+    }
+
+    /// [`Sensor::poll`](crate::Sensor::poll) that awaits its transfers: the same ones, in the same
+    /// order. It awaits nothing else, and as long as the bus does. [`Self::next`] calls it as often as
+    /// needed.
+    ///
+    /// The future may be dropped. If it is dropped within a transfer of a frame, the frame is lost; the next
+    /// poll counts it and begins to bring the sensor up again.
     ///
     /// # Errors
     /// Fails if this step fails. The next polls bring the sensor up again.
@@ -26,9 +131,9 @@ where
         &mut self,
         now_ms: u32,
         sink: &mut impl PhotonSink,
-    ) -> Result<Polled, P::Error<I2C::Error, INT::Error>> {
+    ) -> Result<Polled, P::Error<BUS::Error, INT::Error>> {
         if core::mem::replace(&mut self.is_under_way, true) {
-            self.protocol.restart();
+            self.protocol.dropped();
         }
         let polled = self.step_async(now_ms, sink).await;
         self.is_under_way = false;
@@ -46,14 +151,14 @@ where
         // Before the first await: a dropped future has stopped the sensor all the same.
         let _ = self.enable.set_low();
         if let Request::Write { address, bytes } = self.protocol.stop() {
-            let _ = self.i2c.write(address, bytes).await;
+            let _ = self.bus.write(address, bytes).await;
         }
     }
 
     async fn transfer_async(
         &mut self,
         now_ms: u32,
-    ) -> Result<Done, Failure<I2C::Error, INT::Error>> {
+    ) -> Result<Done, Failure<BUS::Error, INT::Error>> {
         match self.protocol.request(now_ms) {
             Request::Nothing(polled) => return Ok(Done::Over(polled)),
             Request::Interrupt => {
@@ -65,16 +170,16 @@ where
                 set.map_err(Failure::Pin)?;
             }
             Request::Write { address, bytes } => {
-                let written = self.i2c.write(address, bytes).await;
-                written.map_err(Failure::of_bus)?;
+                let written = self.bus.write(address, bytes).await;
+                written.map_err(BUS::failure)?;
             }
             Request::Read {
                 address,
                 register,
                 bytes,
             } => {
-                let read = self.i2c.write_read(address, &[register], bytes).await;
-                read.map_err(Failure::of_bus)?;
+                let read = self.bus.read(address, register, bytes).await;
+                read.map_err(BUS::failure)?;
             }
         }
         Ok(Done::Level(false))
@@ -84,7 +189,7 @@ where
         &mut self,
         now_ms: u32,
         sink: &mut impl PhotonSink,
-    ) -> Result<Polled, P::Error<I2C::Error, INT::Error>> {
+    ) -> Result<Polled, P::Error<BUS::Error, INT::Error>> {
         loop {
             match self.transfer_async(now_ms).await? {
                 Done::Over(polled) => return Ok(polled),

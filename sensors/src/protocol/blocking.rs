@@ -2,21 +2,20 @@
 
 use dtof_core::fixed::types::U16F16;
 use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
-use embedded_hal::i2c::I2c;
 
-use super::{Done, Driver, Failure, Protocol, Request};
+use super::{Bus, Done, Driver, Failure, Protocol, Request};
 use crate::dither::Dither;
 use crate::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
-impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN>
+impl<P, BUS, INT, EN> Driver<P, BUS, INT, EN>
 where
     P: Protocol,
-    I2C: I2c,
+    BUS: Bus,
     INT: InputPin,
     EN: OutputPin + PinErrorType<Error = INT::Error>,
 {
     /// Executes one request.
-    fn transfer(&mut self, now_ms: u32) -> Result<Done, Failure<I2C::Error, INT::Error>> {
+    fn transfer(&mut self, now_ms: u32) -> Result<Done, Failure<BUS::Error, INT::Error>> {
         match self.protocol.request(now_ms) {
             Request::Nothing(polled) => return Ok(Done::Over(polled)),
             Request::Interrupt => {
@@ -28,16 +27,16 @@ where
                 set.map_err(Failure::Pin)?;
             }
             Request::Write { address, bytes } => {
-                let written = self.i2c.write(address, bytes);
-                written.map_err(Failure::of_bus)?;
+                let written = self.bus.write(address, bytes);
+                written.map_err(BUS::failure)?;
             }
             Request::Read {
                 address,
                 register,
                 bytes,
             } => {
-                let read = self.i2c.write_read(address, &[register], bytes);
-                read.map_err(Failure::of_bus)?;
+                let read = self.bus.read(address, register, bytes);
+                read.map_err(BUS::failure)?;
             }
         }
         Ok(Done::Level(false))
@@ -47,7 +46,7 @@ where
         &mut self,
         now_ms: u32,
         sink: &mut impl PhotonSink,
-    ) -> Result<Polled, P::Error<I2C::Error, INT::Error>> {
+    ) -> Result<Polled, P::Error<BUS::Error, INT::Error>> {
         loop {
             match self.transfer(now_ms)? {
                 Done::Over(polled) => return Ok(polled),
@@ -61,15 +60,15 @@ where
     }
 }
 
-impl<P, I2C, INT, EN> Sensor for Driver<P, I2C, INT, EN>
+impl<P, BUS, INT, EN> Sensor for Driver<P, BUS, INT, EN>
 where
     P: Protocol,
-    P::Error<I2C::Error, INT::Error>: Into<SensorFault>,
-    I2C: I2c,
+    P::Error<BUS::Error, INT::Error>: Into<SensorFault>,
+    BUS: Bus,
     INT: InputPin,
     EN: OutputPin + PinErrorType<Error = INT::Error>,
 {
-    type Error = P::Error<I2C::Error, INT::Error>;
+    type Error = P::Error<BUS::Error, INT::Error>;
 
     fn info(&self) -> SensorInfo {
         self.protocol.info()
@@ -84,7 +83,7 @@ where
     fn stop(&mut self) {
         let _ = self.enable.set_low();
         if let Request::Write { address, bytes } = self.protocol.stop() {
-            let _ = self.i2c.write(address, bytes);
+            let _ = self.bus.write(address, bytes);
         }
     }
 

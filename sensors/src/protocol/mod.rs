@@ -3,15 +3,23 @@
 //! A [`Protocol`] is the state machine of a sensor without a bus or pins. It returns its next
 //! [`Request`] and takes the answer. [`Driver`] executes requests over embedded-hal as a
 //! [`Sensor`](crate::Sensor), which never waits, or over embedded-hal-async
-//! (`Driver::poll_async`, with the feature `async`). Both make the same transfers.
+//! (`Driver::next`, with the feature `async`). Both make the same transfers.
+//! The [`Bus`] is I²C or, for a TMF8829, SPI.
 
 #[cfg(feature = "async")]
 mod asynchronous;
 mod blocking;
+mod bus;
 
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 
 use crate::{PhotonSink, Polled, SensorInfo};
+
+#[cfg(feature = "async")]
+pub use self::asynchronous::Timing;
+#[cfg(feature = "async")]
+pub use self::bus::AsyncBus;
+pub use self::bus::Bus;
 
 /// A request of a protocol to its bus or its pins.
 #[derive(Debug)]
@@ -25,14 +33,14 @@ pub enum Request<'a> {
     Interrupt,
     /// Write to the I²C address: the register first, then its values.
     Write {
-        /// 7 bits.
+        /// 7 bits. SPI has none.
         address: u8,
         /// One transaction.
         bytes: &'a [u8],
     },
     /// Write the register to the I²C address, and fill `bytes` in the same transaction.
     Read {
-        /// 7 bits.
+        /// 7 bits. SPI has none.
         address: u8,
         /// The first register.
         register: u8,
@@ -52,11 +60,13 @@ pub enum Failure<B, P> {
     Bus(B),
     /// A pin failed.
     Pin(P),
+    /// The bus did not finish a transfer in time.
+    BusTimeout,
 }
 
 impl<B: embedded_hal::i2c::Error, P> Failure<B, P> {
     /// A device that does not acknowledge a byte has acknowledged its address, so it is there.
-    fn of_bus(error: B) -> Self {
+    fn of_i2c(error: B) -> Self {
         use NoAcknowledgeSource::{Address, Unknown};
         match error.kind() {
             ErrorKind::NoAcknowledge(Address | Unknown) => Self::Nack(error),
@@ -85,6 +95,10 @@ pub trait Protocol {
     /// Abandons the present measurement; the next requests begin again.
     fn restart(&mut self);
 
+    /// A transfer was begun and its future dropped, so that the sensor may have executed it. Begins
+    /// again, unless the transfer can be repeated. What is lost is counted.
+    fn dropped(&mut self);
+
     /// The command that stops the sensor, if it is up. Restarts the protocol.
     fn stop(&mut self) -> Request<'_>;
 
@@ -107,11 +121,13 @@ pub trait Protocol {
     fn failed<B, P>(&mut self, error: &Self::Error<B, P>);
 }
 
-/// A sensor's protocol on an I²C bus, with INT and ENABLE.
+/// A sensor's protocol on a bus, with INT and ENABLE.
+///
+/// The driver owns INT. Nothing else may wait for the same pin.
 #[derive(Debug)]
-pub struct Driver<P, I2C, INT, EN> {
+pub struct Driver<P, BUS, INT, EN> {
     protocol: P,
-    i2c: I2C,
+    bus: BUS,
     interrupt: INT,
     enable: EN,
     /// A transfer began and did not end: its future was dropped.
@@ -119,11 +135,18 @@ pub struct Driver<P, I2C, INT, EN> {
     is_under_way: bool,
 }
 
-impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN> {
-    pub(crate) const fn of(protocol: P, i2c: I2C, interrupt: INT, enable: EN) -> Self {
+impl<P: Protocol, BUS, INT, EN> Driver<P, BUS, INT, EN> {
+    /// The description for a host. The `Config` of the sensor has the same as a constant.
+    pub fn info(&self) -> SensorInfo {
+        self.protocol.info()
+    }
+}
+
+impl<P, BUS, INT, EN> Driver<P, BUS, INT, EN> {
+    pub(crate) const fn of(protocol: P, bus: BUS, interrupt: INT, enable: EN) -> Self {
         Self {
             protocol,
-            i2c,
+            bus,
             interrupt,
             enable,
             #[cfg(feature = "async")]
@@ -136,7 +159,7 @@ impl<P, I2C, INT, EN> Driver<P, I2C, INT, EN> {
     }
 
     /// Gives the bus and the pins (INT, ENABLE) back.
-    pub fn release(self) -> (I2C, INT, EN) {
-        (self.i2c, self.interrupt, self.enable)
+    pub fn release(self) -> (BUS, INT, EN) {
+        (self.bus, self.interrupt, self.enable)
     }
 }

@@ -43,6 +43,8 @@ pub enum Error<B, P, Boot, Cmd, D> {
     Bus(B),
     /// A pin failed.
     Pin(P),
+    /// An awaited bus did not finish a transfer in time.
+    BusTimeout,
     /// A step took too long.
     Timeout(Waiting<Boot, Cmd>),
     /// The register ID is that of another chip.
@@ -84,6 +86,7 @@ impl<B, P, Boot, Cmd, D> From<Failure<B, P>> for Error<B, P, Boot, Cmd, D> {
             Failure::Nack(error) => Self::Nack(error),
             Failure::Bus(error) => Self::Bus(error),
             Failure::Pin(error) => Self::Pin(error),
+            Failure::BusTimeout => Self::BusTimeout,
         }
     }
 }
@@ -106,7 +109,8 @@ where
         write!(f, "{}: ", D::SENSOR)?;
         match self {
             Self::Nack(error) => write!(f, "not acknowledged: {error:?}"),
-            Self::Bus(error) => write!(f, "I2C: {error:?}"),
+            Self::Bus(error) => write!(f, "bus: {error:?}"),
+            Self::BusTimeout => f.write_str("the bus does not finish a transfer"),
             Self::Pin(error) => write!(f, "pin: {error:?}"),
             Self::Timeout(waiting) => write!(f, "timed out: {waiting:?}"),
             Self::WrongChip { id } => write!(f, "another chip answers: ID {id:#04x}"),
@@ -138,7 +142,7 @@ impl<B, P, Boot, Cmd, D: ModelError> From<Error<B, P, Boot, Cmd, D>> for SensorF
     fn from(error: Error<B, P, Boot, Cmd, D>) -> Self {
         match error {
             Error::Nack(_) => Self::NoAnswer,
-            Error::Bus(_) => Self::Bus,
+            Error::Bus(_) | Error::BusTimeout => Self::Bus,
             Error::Pin(_) => Self::Pin,
             Error::WrongChip { .. } | Error::WrongApplication { .. } => Self::WrongChip,
             Error::Timeout(Waiting::Data) => Self::Timeout,

@@ -2,8 +2,10 @@
 
 use dtof_core::PixelAddress;
 
+use super::OFFSET_MM;
 use super::registers::DEFAULT_ADDRESS;
 use super::zones::{Preset, REFERENCES, Zones};
+use crate::SensorInfo;
 use crate::tmf::{ConfigError, check_address_and_pulses};
 
 /// The results of each zone beside its histogram.
@@ -152,12 +154,32 @@ impl Config {
         &self.0
     }
 
+    /// The description for a host, also as a constant: for the range gate of its bins, say.
+    #[must_use]
+    pub const fn info(&self) -> SensorInfo {
+        let settings = self.settings();
+        SensorInfo {
+            pixels: self.pixels(),
+            bin_width: Some(settings.preset.bin_width(settings.zones)),
+            bins: settings.preset.bins(settings.zones),
+            offset: OFFSET_MM,
+            gives_histograms: true,
+            laser_millihertz: self.laser_millihertz(),
+            dead_time: 0,
+            most_dither: 0,
+        }
+    }
+
     /// One more than the last pixel of a zone or a reference.
-    pub(super) fn pixels(&self) -> u16 {
+    const fn pixels(&self) -> u16 {
         let first = self.0.first_pixel.raw();
         let zones = first.saturating_add(self.0.zones.number());
-        let references = self.0.reference.map(PixelAddress::raw);
-        references.map_or(zones, |first| zones.max(first.saturating_add(REFERENCES)))
+        match self.0.reference {
+            Some(reference) if reference.raw() >= zones => {
+                reference.raw().saturating_add(REFERENCES)
+            }
+            _ => zones,
+        }
     }
 
     /// Laser pulses that a frame of histograms has integrated: those of its time slot.
@@ -166,7 +188,7 @@ impl Config {
     }
 
     /// Laser pulses that are counted in a thousand seconds, on average, rounded down.
-    pub(super) const fn laser_millihertz(&self) -> u64 {
+    const fn laser_millihertz(&self) -> u64 {
         let pulses = self.pulses() as u64 * self.0.zones.frames() as u64;
         match (pulses * 1_000_000).checked_div(self.0.period_ms as u64) {
             Some(rate) => rate,

@@ -120,8 +120,8 @@ const BUFFER: usize = 256;
 /// `CHUNK` is how many bytes of a frame or of the image go over the bus in one transaction, 4 to
 /// 252 in steps of 4 (checked when compiled). Another device on the bus may have to wait for that
 /// long. The header of a frame always has 21.
-pub type Tmf8829<'a, I2C, INT, EN, const CHUNK: usize = 128> =
-    Driver<Tmf8829Protocol<'a, CHUNK>, I2C, INT, EN>;
+pub type Tmf8829<'a, BUS, INT, EN, const CHUNK: usize = 128> =
+    Driver<Tmf8829Protocol<'a, CHUNK>, BUS, INT, EN>;
 
 /// The protocol of a TMF8829, with its image.
 #[derive(Debug)]
@@ -155,7 +155,7 @@ pub struct Counts {
     pub aborted: u32,
     /// Of these, frames with SPADs overloaded or the laser at its limit.
     pub limited: u32,
-    /// Missed frames, by their numbers.
+    /// Missed frames: by their numbers, or because a poll was dropped while it read the header.
     pub missed: u32,
     /// Photons in bins that a histogram does not hold.
     pub beyond: u64,
@@ -212,17 +212,17 @@ enum State {
     Reading,
 }
 
-impl<'a, I2C, INT, EN, const CHUNK: usize> Tmf8829<'a, I2C, INT, EN, CHUNK> {
+impl<'a, BUS, INT, EN, const CHUNK: usize> Tmf8829<'a, BUS, INT, EN, CHUNK> {
     /// A driver that has not accessed its device yet. `image` may be empty for a sensor that
     /// already runs the application.
     pub const fn new(
-        i2c: I2C,
+        bus: BUS,
         interrupt: INT,
         enable: EN,
         image: &'a [u8],
         config: Config,
     ) -> Self {
-        Self::of(Tmf8829Protocol::new(image, config), i2c, interrupt, enable)
+        Self::of(Tmf8829Protocol::new(image, config), bus, interrupt, enable)
     }
 
     /// Counts of the data so far.
@@ -309,23 +309,24 @@ impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
     type Error<B, P> = Error<B, P>;
 
     fn info(&self) -> SensorInfo {
-        let settings = self.config.settings();
-        SensorInfo {
-            pixels: self.config.pixels(),
-            bin_width: Some(settings.preset.bin_width(settings.zones)),
-            bins: settings.preset.bins(settings.zones),
-            offset: OFFSET_MM,
-            gives_histograms: true,
-            laser_millihertz: self.config.laser_millihertz(),
-            dead_time: 0,
-            most_dither: 0,
-        }
+        self.config.info()
     }
 
     fn restart(&mut self) {
         if !matches!(self.state, State::Off { .. }) {
             self.give_up(!self.is_measuring());
         }
+    }
+
+    fn dropped(&mut self) {
+        match self.state {
+            // Reading and clearing the reasons can be repeated.
+            State::Asking | State::Clearing { .. } => return,
+            // The sensor may have sent the header, and its number with it.
+            State::Beginning => self.counts.missed = self.counts.missed.saturating_add(1),
+            _ => {}
+        }
+        self.restart();
     }
 
     fn stop(&mut self) -> Request<'_> {

@@ -1,9 +1,12 @@
 //! How a TMF8820/21/28 measures.
 
 use dtof_core::PixelAddress;
+use dtof_core::fixed::types::I24F8;
 
 use super::frame::CHANNELS;
 use super::registers::DEFAULT_ADDRESS;
+use super::{BIN_WIDTH_8X8_PS, BIN_WIDTH_PS, OFFSET_MM};
+use crate::SensorInfo;
 use crate::tmf::{ConfigError, check_address_and_pulses};
 
 /// The vendor's maps of nine zones that are measured at once (`SPAD_MAP_ID`).
@@ -143,12 +146,33 @@ impl Config {
         &self.0
     }
 
+    /// The description for a host, also as a constant. The laser rate is the mean over a period.
+    #[must_use]
+    pub const fn info(&self) -> SensorInfo {
+        let (bin_width, offset) = match self.0.zones {
+            Zones::Nine(_) => (BIN_WIDTH_PS, OFFSET_MM),
+            Zones::SixtyFour => (BIN_WIDTH_8X8_PS, I24F8::ZERO),
+        };
+        SensorInfo {
+            pixels: self.pixels(),
+            bin_width: Some(bin_width),
+            bins: 128,
+            offset,
+            gives_histograms: true,
+            laser_millihertz: self.laser_millihertz(),
+            most_dither: 0,
+            dead_time: 0,
+        }
+    }
+
     /// One more than the last pixel of a zone or the reference.
-    pub(super) fn pixels(&self) -> u16 {
+    const fn pixels(&self) -> u16 {
         let first = self.0.first_pixel.raw();
         let zones = first.saturating_add(self.0.zones.number());
-        let reference = self.0.reference.map(PixelAddress::raw);
-        reference.map_or(zones, |pixel| zones.max(pixel.saturating_add(1)))
+        match self.0.reference {
+            Some(pixel) if pixel.raw() >= zones => pixel.raw().saturating_add(1),
+            _ => zones,
+        }
     }
 
     /// Laser pulses a measurement, or half a capture.
@@ -158,7 +182,7 @@ impl Config {
 
     /// Laser pulses that are counted in a thousand seconds, on average, rounded down. 0 with 8×8
     /// zones, for which it is not documented.
-    pub(super) const fn laser_millihertz(&self) -> u64 {
+    const fn laser_millihertz(&self) -> u64 {
         if matches!(self.0.zones, Zones::SixtyFour) {
             return 0;
         }

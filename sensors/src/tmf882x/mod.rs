@@ -122,8 +122,8 @@ const BOOT_MS: u32 = 10;
 /// `CHUNK` is how many bytes of a packet or of the image go over the bus in one
 /// transaction, 1 to 135 (checked when compiled; the
 /// bootloader takes 128 at most). Another device on the bus may have to wait for that long.
-pub type Tmf882x<'a, I2C, INT, EN, const CHUNK: usize = PACKET> =
-    Driver<Tmf882xProtocol<'a, CHUNK>, I2C, INT, EN>;
+pub type Tmf882x<'a, BUS, INT, EN, const CHUNK: usize = PACKET> =
+    Driver<Tmf882xProtocol<'a, CHUNK>, BUS, INT, EN>;
 
 /// The protocol of a TMF8820/21/28, with its image.
 #[derive(Debug)]
@@ -153,6 +153,8 @@ pub struct Counts {
     /// Packets dropped while waiting for packet 0 of a set. With 8×8 zones also histograms whose
     /// zones are unknown.
     pub left_out: u32,
+    /// Sets that broke off because a poll was dropped while it read a packet.
+    pub broken: u32,
     /// Errors.
     pub errors: u32,
 }
@@ -202,18 +204,18 @@ enum State {
     Reading { at: u8 },
 }
 
-impl<'a, I2C, INT, EN, const CHUNK: usize> Tmf882x<'a, I2C, INT, EN, CHUNK> {
+impl<'a, BUS, INT, EN, const CHUNK: usize> Tmf882x<'a, BUS, INT, EN, CHUNK> {
     /// A driver that has not accessed its device yet. `image` may be empty for a
     /// sensor that already runs the application.
     pub const fn new(
-        i2c: I2C,
+        bus: BUS,
         interrupt: INT,
         enable: EN,
         image: &'a [u8],
         config: Config,
     ) -> Self {
         let protocol = Tmf882xProtocol::new(image, config);
-        Self::of(protocol, i2c, interrupt, enable)
+        Self::of(protocol, bus, interrupt, enable)
     }
 
     /// Counts of the data so far.
@@ -256,6 +258,7 @@ impl<'a, const CHUNK: usize> Tmf882xProtocol<'a, CHUNK> {
                 histograms: 0,
                 packets: 0,
                 left_out: 0,
+                broken: 0,
                 errors: 0,
             },
         }
@@ -287,29 +290,24 @@ impl<'a, const CHUNK: usize> Tmf882xProtocol<'a, CHUNK> {
 impl<const CHUNK: usize> Protocol for Tmf882xProtocol<'_, CHUNK> {
     type Error<B, P> = Error<B, P>;
 
-    /// The laser rate is the mean over a period.
     fn info(&self) -> SensorInfo {
-        let settings = self.config.settings();
-        let (bin_width, offset) = match settings.zones {
-            Zones::Nine(_) => (BIN_WIDTH_PS, OFFSET_MM),
-            Zones::SixtyFour => (BIN_WIDTH_8X8_PS, I24F8::ZERO),
-        };
-        SensorInfo {
-            pixels: self.config.pixels(),
-            bin_width: Some(bin_width),
-            bins: 128,
-            offset,
-            gives_histograms: true,
-            laser_millihertz: self.config.laser_millihertz(),
-            most_dither: 0,
-            dead_time: 0,
-        }
+        self.config.info()
     }
 
     fn restart(&mut self) {
         if !matches!(self.state, State::Off { .. }) {
             self.give_up();
         }
+    }
+
+    fn dropped(&mut self) {
+        match self.state {
+            // Reading and clearing the reasons can be repeated.
+            State::Asking | State::Clearing { .. } => return,
+            State::Reading { .. } => count(&mut self.counts.broken),
+            _ => {}
+        }
+        self.restart();
     }
 
     fn stop(&mut self) -> Request<'_> {

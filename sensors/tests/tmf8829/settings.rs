@@ -5,7 +5,6 @@ use crate::common::tmf8829::bus::Bus;
 use dtof_chips::tmf8829::{Tmf8829 as Chip, varied_counts};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
-use dtof_sensors::Sensor;
 use dtof_sensors::tmf8829::{
     Config, ConfigError, Preset, Results, Settings, Tmf8829, Tmf8829Protocol, Zones,
 };

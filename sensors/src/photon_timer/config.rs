@@ -3,7 +3,7 @@
 use core::error::Error;
 use core::fmt;
 
-use dtof_sensors::dither::Dither;
+use crate::dither::Dither;
 
 /// Bins of a laser cycle.
 pub const BINS: u32 = 128;
@@ -29,6 +29,7 @@ const LEAST_CLOCKS_A_CLOCK: u32 = 50;
 
 /// Settings of the laser.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Settings {
     /// Laser cycles a second.
     pub laser_hz: u32,
@@ -38,6 +39,7 @@ pub struct Settings {
 
 /// Checked [`Settings`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Config {
     /// The mean.
     period: u32,
@@ -46,6 +48,7 @@ pub struct Config {
 
 /// Settings that cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum ConfigError {
     /// A laser cycle would be shorter than the bins, and 8 clocks: above 922,509 a second.
     TooFast,

@@ -1,5 +1,6 @@
 //! Against a model that has one level a bin, and a ring that is overwritten.
 
+use std::string::ToString;
 use std::vec;
 use std::vec::Vec;
 
@@ -249,6 +250,13 @@ fn samples_that_come_late_are_never_seen_and_it_begins_anew() {
         assert!(seen.ended.iter().all(Vec::is_empty), "from {late_from}");
     }
     assert_eq!(SensorFault::from(Error::Stalled), SensorFault::Data);
+    assert_eq!(
+        [Error::Stalled, Error::Lost(7)].map(|error| error.to_string()),
+        [
+            "samples came late and are dropped",
+            "7 laser cycles were overwritten before they were read"
+        ]
+    );
 }
 
 /// Memory that always takes samples too slowly.

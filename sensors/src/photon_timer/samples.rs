@@ -3,6 +3,7 @@
 /// The levels of a pin at 128 successive clocks and at the clock before. Two shift registers
 /// alternate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Samples {
     /// The top bit is the pin right before bin 0; the others are not used.
     pub before: u32,
@@ -13,6 +14,13 @@ pub struct Samples {
 }
 
 impl Samples {
+    /// The pin is low all the time.
+    pub const DARK: Self = Self {
+        before: 0,
+        even: [0; 2],
+        odd: [0; 2],
+    };
+
     /// Whether the pin was low all the time.
     #[inline]
     #[must_use]

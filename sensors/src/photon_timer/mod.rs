@@ -19,11 +19,14 @@
 mod config;
 mod samples;
 
+use core::error;
+use core::fmt;
+
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_sensors::dither::Dither;
-use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
-use heapless::Vec;
+
+use crate::dither::Dither;
+use crate::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 pub use self::config::{BINS, CLOCK_HZ, Config, ConfigError, Settings};
 pub use self::samples::Samples;
@@ -68,18 +71,34 @@ pub struct PhotonTimer<S> {
     /// The laser cycle that is read next.
     next: u32,
     lost: u32,
-    /// Samples copied from the ring.
-    batch: Vec<Samples, { BATCH as usize }>,
+    /// Samples copied from the ring: so many.
+    batch: [Samples; BATCH as usize],
+    copied: usize,
 }
 
 /// An error of a poll. The next poll goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum Error {
     /// This many laser cycles were overwritten before they were read.
     Lost(u32),
     /// Samples came late; those in memory are dropped.
     Stalled,
 }
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Lost(cycles) => write!(
+                f,
+                "{cycles} laser cycles were overwritten before they were read"
+            ),
+            Self::Stalled => f.write_str("samples came late and are dropped"),
+        }
+    }
+}
+
+impl error::Error for Error {}
 
 impl From<Error> for SensorFault {
     fn from(error: Error) -> Self {
@@ -100,7 +119,8 @@ impl<S: Sampler> PhotonTimer<S> {
             off_since: None,
             next: 0,
             lost: 0,
-            batch: Vec::new(),
+            batch: [Samples::DARK; BATCH as usize],
+            copied: 0,
         }
     }
 
@@ -119,11 +139,10 @@ impl<S: Sampler> PhotonTimer<S> {
     /// Copies the next complete laser cycles. Returns how many were lost before them, if any.
     fn copy(&mut self) -> Result<(), u32> {
         let waiting = self.sampler.completed().wrapping_sub(self.next).min(BATCH);
-        self.batch.clear();
-        for count in 0..waiting {
-            let cycle = self.next.wrapping_add(count);
-            // There is room: checked above.
-            let _ = self.batch.push(self.sampler.samples(cycle));
+        self.copied = 0;
+        for (place, count) in self.batch.iter_mut().zip(0..waiting) {
+            *place = self.sampler.samples(self.next.wrapping_add(count));
+            self.copied += 1;
         }
         // After reading: drop what was overwritten meanwhile.
         let age = self.sampler.completed().wrapping_sub(self.next);
@@ -196,9 +215,9 @@ impl<S: Sampler> Sensor for PhotonTimer<S> {
                 self.rest();
                 return Err(Error::Stalled);
             }
-            give(&self.batch, sink);
-            if !self.batch.is_full() {
-                let nothing = round == 0 && self.batch.is_empty();
+            give(self.batch.get(..self.copied).unwrap_or_default(), sink);
+            if self.copied < self.batch.len() {
+                let nothing = round == 0 && self.copied == 0;
                 return Ok(if nothing { Polled::Idle } else { Polled::Data });
             }
         }
