@@ -9,7 +9,7 @@ use std::rc::Rc;
 use std::task::{Context, Poll, Waker};
 
 use common::tmf8828;
-use common::tmf8829::bench::{IMAGE, settings};
+use common::tmf8829::bench::{IMAGE, over, settings};
 use common::tmf8829::bus::{Bus, Fault};
 use common::{RecordingSink, SinkCall};
 use dtof_chips::tmf8829::varied_counts;
@@ -19,9 +19,10 @@ use dtof_core::{PixelAddress, RangeGate, checked};
 use dtof_sensors::dither::Dither;
 use dtof_sensors::protocol::Timing;
 use dtof_sensors::tmf882x::{self, Tmf882x};
-use dtof_sensors::tmf8829::{self, Config, Tmf8829, Zones};
+use dtof_sensors::tmf8829::{self, Config, Spi, Tmf8829, Zones};
 use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, ErrorType, Operation};
+use embedded_hal::spi;
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::i2c::I2c;
 use rand_core::{Rng, SeedableRng};
@@ -93,6 +94,20 @@ impl<B: embedded_hal::i2c::I2c<Error = ErrorKind>> I2c for Slow<B> {
         wait(WAITS / 2).await;
         self.present.set(None);
         done
+    }
+}
+
+impl spi::ErrorType for Slow<Bus> {
+    type Error = spi::ErrorKind;
+}
+
+impl embedded_hal_async::spi::SpiDevice for Slow<Bus> {
+    async fn transaction(
+        &mut self,
+        operations: &mut [spi::Operation<'_, u8>],
+    ) -> Result<(), spi::ErrorKind> {
+        wait(WAITS).await;
+        embedded_hal::spi::SpiDevice::transaction(&mut self.bus, operations)
     }
 }
 
@@ -200,6 +215,41 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
         blocking.0.borrow().log.last(),
         waiting.0.borrow().log.last()
     );
+}
+
+/// Over SPI: the same transfers and the same data, faults included.
+#[test]
+fn an_awaited_tmf8829_on_spi_makes_the_same_transfers() {
+    let config = Config::new(over::<Spi<Bus>>(settings(Zones::Z16x16))).unwrap();
+    let buses = [(); 2].map(|()| Bus::new(Chip::new(&IMAGE, varied_counts())));
+    let [blocking, waiting] = &buses;
+    let pins = |bus: &Bus| (bus.clone(), bus.clone());
+    let (interrupt, enable) = pins(blocking);
+    let bus = Spi(blocking.clone());
+    let mut sensor = Tmf8829::<_, _, _>::new(bus, interrupt, enable, &IMAGE, config);
+    let (interrupt, enable) = pins(waiting);
+    let slow = Spi(Slow::new(waiting.clone()));
+    let mut awaited = Tmf8829::<_, _, _>::new(slow, interrupt, enable, &IMAGE, config);
+    let mut sinks = [(); 2].map(|()| RecordingSink::default());
+    for now_ms in 0..3000 {
+        let fault = match now_ms % 500 {
+            20 => Some(Fault::Late),
+            300 => Some(Fault::Nack),
+            _ => None,
+        };
+        for bus in &buses {
+            bus.0.borrow_mut().fault = fault;
+            bus.0.borrow_mut().log.clear();
+        }
+        let [first, second] = &mut sinks;
+        let polled = sensor.poll(now_ms, first);
+        assert_eq!(polled, run(awaited.poll_async(now_ms, second)).0);
+        let logs = [blocking, waiting].map(|bus| bus.0.borrow().log.clone());
+        assert_eq!(logs[0], logs[1]);
+        assert_eq!(first.take(), second.take());
+    }
+    assert_eq!(sensor.counts(), awaited.counts());
+    assert!(awaited.counts().errors > 5 && awaited.counts().histograms > 1000);
 }
 
 /// Polls are dropped at each place where they wait. A frame of which the header or the data were on the

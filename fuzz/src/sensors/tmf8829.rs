@@ -3,7 +3,7 @@
 use dtof_chips::Tmf8829 as Tmf;
 use dtof_chips::tmf8829::varied_counts;
 use dtof_core::PixelAddress;
-use dtof_sensors::tmf8829::{Config, Settings, Tmf8829, Zones};
+use dtof_sensors::tmf8829::{Config, Interface, Settings, Tmf8829, Zones};
 
 use super::bus::{Answer, Bus, Pin};
 use super::{Model, SinkCall, drive};
@@ -108,7 +108,9 @@ pub fn run<const CHUNK: usize>(choice: u8, input: Input<'_>) {
     let has_reference = choice & 1 != 0;
     let settings = Settings {
         reference: has_reference.then_some(PixelAddress::new(REFERENCE)),
-        address: if choice & 2 == 0 { 0x41 } else { 0x30 },
+        interface: Interface::I2c {
+            address: if choice & 2 == 0 { 0x41 } else { 0x30 },
+        },
         data_timeout_ms: 1500,
         ..Settings::new(PixelAddress::new(FIRST), Zones::Z16x16)
     };

@@ -66,7 +66,7 @@ pub fn varied_counts() -> Scene {
     })
 }
 
-/// A TMF8829 on its I²C bus.
+/// A TMF8829 on its I²C or SPI bus.
 pub struct Tmf8829 {
     registers: [u8; 256],
     /// RAM from `0x0001_0000` on, as far as it was uploaded.
@@ -99,6 +99,8 @@ pub struct Tmf8829 {
     pub is_dead: bool,
     /// The I²C address it answers at.
     pub address: u8,
+    /// The command that switched the other bus off: 0x20 SPI, 0x22 I²C.
+    pub off: Option<u8>,
 }
 
 impl Tmf8829 {
@@ -123,6 +125,7 @@ impl Tmf8829 {
             is_halted: false,
             is_dead: false,
             address: 0x41,
+            off: None,
         };
         chip.reset();
         chip
@@ -145,6 +148,18 @@ impl Tmf8829 {
     #[must_use]
     pub fn enable(&self) -> u8 {
         self.registers[0xF8]
+    }
+
+    /// One transaction on SPI: what the host sends, and room for what it reads behind it.
+    pub fn spi(&mut self, sent: &[u8], read: &mut [u8]) {
+        match sent {
+            // It does not drive MISO.
+            _ if self.off == Some(0x20) => read.fill(0xFF),
+            [0x02, bytes @ ..] if read.is_empty() => self.write(bytes),
+            // One dummy byte, and the data behind it.
+            &[0x03, register, _] => self.read(register, read),
+            other => panic!("{other:02x?} is not of this SPI"),
+        }
     }
 
     fn stop(&mut self) {
@@ -173,8 +188,10 @@ impl Tmf8829 {
 
     fn boot(&mut self, data: &[u8]) {
         self.registers[0x08] = match *data {
-            // SPI off.
-            [0x20] => 0,
+            [bus @ (0x20 | 0x22)] => {
+                self.off = Some(bus);
+                0
+            }
             [0x45, 6, 0x00, 0x00, 0x01, 0x00, low, high] => {
                 let words = usize::from(u16::from_le_bytes([low, high]));
                 assert!((1..=0x1000).contains(&words));
@@ -184,8 +201,8 @@ impl Tmf8829 {
             [0x16] => {
                 let mut image = self.image.clone();
                 image.resize(image.len().next_multiple_of(4), 0);
-                // Another program does not start.
-                if self.ram == image {
+                // Another program does not start, nor one with both buses on.
+                if self.ram == image && self.off.is_some() {
                     self.registers[0x00] = 0x01;
                 }
                 0
@@ -389,5 +406,6 @@ impl Chip for Tmf8829 {
         (self.upload, self.pending) = (0, None);
         self.stop();
         self.address = 0x41;
+        self.off = None;
     }
 }

@@ -43,7 +43,10 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
                 APPLICATION => self.go_on_in(State::Commanding(Command::Stop)),
                 BOOTLOADER if self.image.is_empty() => Err(Error::NoImage),
                 BOOTLOADER if self.image.len() > MAX_IMAGE => Err(DeviceError::LongImage.into()),
-                BOOTLOADER => self.go_on_in(State::BootCommanding(BootCommand::SpiOff)),
+                BOOTLOADER => {
+                    let off = self.config.settings().interface.other_off();
+                    self.go_on_in(State::BootCommanding(off))
+                }
                 id => Err(Error::WrongApplication { id }),
             },
             State::BootCommanding(BootCommand::Start) => self.wait_in(State::Booting, now_ms),
@@ -74,13 +77,13 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
             State::Paging => Err(Error::WrongPage { page: answer }),
             State::Configuring(LAST_BLOCK) => {
                 // The status is read at the new address.
-                self.address = self.config.settings().address;
+                self.address = self.config.settings().interface.address();
                 self.wait_in(State::Commanded(Command::WritePage), now_ms)
             }
             State::Configuring(block) => {
                 let next = block + 1;
                 // The preset has the default address, whatever the present one is.
-                let keeps = self.config.settings().address == DEFAULT_ADDRESS;
+                let keeps = self.config.settings().interface.address() == DEFAULT_ADDRESS;
                 let skipped = next == ADDRESS_BLOCK && keeps;
                 self.go_on_in(State::Configuring(next + u8::from(skipped)))
             }
@@ -135,7 +138,7 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
             return Err(DeviceError::Bootloader { command, status }.into());
         }
         self.go_on_in(match command {
-            BootCommand::SpiOff => State::BootCommanding(BootCommand::Upload),
+            BootCommand::SpiOff | BootCommand::I2cOff => State::BootCommanding(BootCommand::Upload),
             BootCommand::Upload => State::Uploading { sent: 0 },
             BootCommand::Start => State::BootCommanding(BootCommand::Start),
         })

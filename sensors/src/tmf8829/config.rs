@@ -3,7 +3,7 @@
 use dtof_core::PixelAddress;
 
 use super::OFFSET_MM;
-use super::registers::DEFAULT_ADDRESS;
+use super::registers::{BootCommand, DEFAULT_ADDRESS};
 use super::zones::{Preset, REFERENCES, Zones};
 use crate::SensorInfo;
 use crate::tmf::{ConfigError, check_address_and_pulses};
@@ -38,6 +38,38 @@ impl Results {
     }
 }
 
+/// The bus that the sensor is on. The bootloader switches the other one off: with both on, later traffic
+/// fails.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+pub enum Interface {
+    /// I²C, at most 1 MHz.
+    I2c {
+        /// The address to change to, 7 bits; 0x41 is the one after power-up.
+        address: u8,
+    },
+    /// SPI, at most 20 MHz: the driver's bus is a [`Spi`](super::Spi).
+    Spi,
+}
+
+impl Interface {
+    /// The address to change to; with SPI the one after power-up, which nobody uses.
+    pub(super) const fn address(self) -> u8 {
+        match self {
+            Self::I2c { address } => address,
+            Self::Spi => DEFAULT_ADDRESS,
+        }
+    }
+
+    /// The command that switches the other bus off.
+    pub(super) const fn other_off(self) -> BootCommand {
+        match self {
+            Self::I2c { .. } => BootCommand::SpiOff,
+            Self::Spi => BootCommand::I2cOff,
+        }
+    }
+}
+
 /// The settings. [`Config::new`] checks them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -54,8 +86,8 @@ pub struct Settings {
     pub preset: Preset,
     /// The results of each zone.
     pub results: Results,
-    /// The I²C address to change to, 7 bits; 0x41 is the one after power-up.
-    pub address: u8,
+    /// The bus. With another one than the driver's, the sensor does not come up.
+    pub interface: Interface,
     /// Milliseconds from one measurement to the next. The pulses take 50.7 ns each, with long range
     /// 91.4 ns, and have to fit.
     pub period_ms: u16,
@@ -91,12 +123,31 @@ impl Settings {
                 noise: false,
                 crosstalk: false,
             },
-            address: DEFAULT_ADDRESS,
+            interface: Interface::I2c {
+                address: DEFAULT_ADDRESS,
+            },
             period_ms,
             kilo_iterations: 586,
             command_timeout_ms: 50,
             data_timeout_ms: period_ms as u32 + 1000,
             stuck_limit: 3,
+        }
+    }
+
+    /// The same over SPI. The period is the time that a bus of 10 MHz needs, some 22 ms for each time slot:
+    /// 50 ms with 8×8 and 16×16 zones, 200 ms with 32×32, 300 ms with 48×32.
+    #[must_use]
+    pub const fn over_spi(first_pixel: PixelAddress, zones: Zones) -> Self {
+        let period_ms = match zones {
+            Zones::Z8x8 | Zones::Z16x16 => 50,
+            Zones::Z32x32Pairs | Zones::Z32x32 => 200,
+            Zones::Z48x32 => 300,
+        };
+        Self {
+            interface: Interface::Spi,
+            period_ms,
+            data_timeout_ms: period_ms as u32 + 1000,
+            ..Self::new(first_pixel, zones)
         }
     }
 }
@@ -112,7 +163,9 @@ impl Config {
     /// # Errors
     /// Returns a [`ConfigError`] if the settings cannot be used.
     pub const fn new(settings: Settings) -> Result<Self, ConfigError> {
-        if let Err(error) = check_address_and_pulses(settings.address, settings.kilo_iterations) {
+        if let Err(error) =
+            check_address_and_pulses(settings.interface.address(), settings.kilo_iterations)
+        {
             return Err(error);
         }
         // In hundredths of a picosecond.

@@ -84,8 +84,10 @@ impl Command {
 pub enum BootCommand {
     /// Start the program in RAM.
     Start = 0x16,
-    /// Switch SPI off, which this driver does not use: with both on, later traffic fails.
+    /// Switch SPI off.
     SpiOff = 0x20,
+    /// Switch I²C and I3C off. SCL has to be high.
+    I2cOff = 0x22,
     /// The program comes through the FIFO.
     Upload = 0x45,
 }

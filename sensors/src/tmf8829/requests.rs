@@ -79,7 +79,7 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
             0 => self.write(&[PERIOD, period_l, period_h, pulses_l, pulses_h]),
             1 => self.write(&[FP_MODE, settings.zones.mode()]),
             2 => self.write(&[RESULT_FORMAT, settings.results.format(), HISTOGRAMS_ON]),
-            ADDRESS_BLOCK => self.write(&[I2C_ADDRESS, settings.address << 1]),
+            ADDRESS_BLOCK => self.write(&[I2C_ADDRESS, settings.interface.address() << 1]),
             4 => self.write(&[INT_STATUS, 0xFF, FRAME_INT]),
             _ => self.write(&[CMD_STAT, Command::WritePage.code()]),
         }

@@ -7,7 +7,9 @@ use dtof_chips::Chip;
 use dtof_chips::tmf8829::frame;
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::dither::Dither;
-use dtof_sensors::tmf8829::{BootCommand, Command, DeviceError, Error, Settings, Waiting, Zones};
+use dtof_sensors::tmf8829::{
+    BootCommand, Command, DeviceError, Error, Interface, Settings, Waiting, Zones,
+};
 use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 
@@ -315,7 +317,7 @@ fn a_sensor_that_gives_no_frame_is_reset() {
 #[test]
 fn a_sensor_that_begins_again_keeps_its_address() {
     let mut bench = Bench::<128>::new(Settings {
-        address: 0x42,
+        interface: Interface::I2c { address: 0x42 },
         ..settings(Zones::Z8x8)
     });
     bench.bring_up();

@@ -3,14 +3,16 @@
 //! afterwards.
 
 use crate::common::SinkCall;
-use crate::common::tmf8829::bench::{Bench, settings};
-use crate::common::tmf8829::bus::Fault;
+use std::fmt::Debug;
+
+use crate::common::tmf8829::bench::{Bench, over, settings};
+use crate::common::tmf8829::bus::{Bus, Fault, Wired};
 use dtof_chips::Chip;
 use dtof_chips::tmf8829::{order, shape};
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::Sensor;
 use dtof_sensors::dither::Dither;
-use dtof_sensors::tmf8829::{DeviceError, Error, Zones};
+use dtof_sensors::tmf8829::{DeviceError, Error, Spi, Zones};
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
@@ -141,7 +143,7 @@ impl Oracle {
 }
 
 /// Does one fault, of the bus or of the chip.
-fn fault(bench: &Bench<CHUNK>, rng: &mut Pcg32) {
+fn fault<B>(bench: &Bench<CHUNK, B>, rng: &mut Pcg32) {
     let mut wires = bench.bus.0.borrow_mut();
     let random = rng.next_u32();
     let byte = random.to_le_bytes()[3];
@@ -171,10 +173,10 @@ fn fault(bench: &Bench<CHUNK>, rng: &mut Pcg32) {
 }
 
 /// Polls with faults, then without. How many faults, errors and frames there were.
-fn survive(zones: Zones, seed: u64) -> (u32, u32, u32) {
+fn survive<B: Wired<Error: Debug>>(zones: Zones, seed: u64) -> (u32, u32, u32) {
     let mut rng = Pcg32::seed_from_u64(seed);
     let one_in = 1 << (3 + rng.next_u32() % 7);
-    let mut bench = Bench::<CHUNK>::new(settings(zones));
+    let mut bench = Bench::<CHUNK, B>::new(over::<B>(settings(zones)));
     let mut oracle = Oracle::new([0, 2, 3, 4, 5][zones as usize]);
     let mut faults = 0;
     for polls in 0..40_000u32 {
@@ -233,16 +235,25 @@ fn survive(zones: Zones, seed: u64) -> (u32, u32, u32) {
     (faults, counts.errors, counts.frames)
 }
 
-#[test]
-fn fifty_thousand_faults() {
+fn fifty_thousand_faults<B: Wired<Error: Debug>>(bus: &str) {
     let (mut faults, mut errors, mut frames, mut seed) = (0, 0, 0, 0);
     while faults < FAULTS {
         let zones = Zones::ALL[usize::try_from(seed).unwrap() % 5];
-        let (more, with, of) = survive(zones, seed);
+        let (more, with, of) = survive::<B>(zones, seed);
         (faults, errors, frames, seed) = (faults + more, errors + with, frames + of, seed + 1);
     }
     println!(
-        "faults: TMF8829, {faults} faults: {errors} errors counted, {frames} frames, 0 panics, \
+        "faults: TMF8829 over {bus}, {faults} faults: {errors} errors counted, {frames} frames, 0 panics, \
          nothing given that was not on the bus, no frame lost and not counted, right again each time"
     );
+}
+
+#[test]
+fn fifty_thousand_faults_over_i2c() {
+    fifty_thousand_faults::<Bus>("I2C");
+}
+
+#[test]
+fn fifty_thousand_faults_over_spi() {
+    fifty_thousand_faults::<Spi<Bus>>("SPI");
 }

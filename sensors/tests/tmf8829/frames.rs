@@ -1,14 +1,16 @@
 //! Frames of every mode, and constructed ones.
 
+use std::fmt::Debug;
 use std::rc::Rc;
 
 use crate::common::SinkCall;
-use crate::common::tmf8829::bench::{Bench, PRESETS, settings};
+use crate::common::tmf8829::bench::{Bench, PRESETS, over, settings};
+use crate::common::tmf8829::bus::{Bus, Wired};
 use dtof_chips::tmf8829::{Scene, frame, order, shape, varied_counts};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_sensors::dither::Dither;
-use dtof_sensors::tmf8829::{Preset, Results, Settings, Zones, snr};
+use dtof_sensors::tmf8829::{Preset, Results, Settings, Spi, Zones, snr};
 use dtof_sensors::{Sensor, Target};
 use proptest::prelude::*;
 
@@ -33,10 +35,10 @@ fn expected(zones: Zones, slot: u8, measurement: u32, merge: usize) -> Vec<SinkC
 
 /// Every mode and preset, two measurements: all histograms as the chip has them, each zone once,
 /// and the chip's own targets behind them.
-fn round<const CHUNK: usize>(zones: Zones, preset: Preset) {
-    let mut bench = Bench::<CHUNK>::new(Settings {
+fn round<const CHUNK: usize, B: Wired<Error: Debug>>(zones: Zones, preset: Preset) {
+    let mut bench = Bench::<CHUNK, B>::new(Settings {
         preset,
-        ..settings(zones)
+        ..over::<B>(settings(zones))
     });
     bench.bring_up();
     let mode = [0, 2, 3, 4, 5][zones as usize];
@@ -92,11 +94,12 @@ fn every_mode_gives_each_zone_as_the_chip_has_it() {
             if preset == Preset::LongRange && zones != Zones::Z8x8 {
                 continue;
             }
-            round::<128>(zones, preset);
+            round::<128, Bus>(zones, preset);
+            round::<128, Spi<Bus>>(zones, preset);
         }
     }
-    round::<4>(Zones::Z16x16, Preset::Standard);
-    round::<252>(Zones::Z48x32, Preset::HighAccuracy);
+    round::<4, Bus>(Zones::Z16x16, Preset::Standard);
+    round::<252, Spi<Bus>>(Zones::Z48x32, Preset::HighAccuracy);
 }
 
 /// Zones written out by hand from the tables of x and y, beside the formula in the simulated chip:
@@ -173,6 +176,11 @@ fn vector(frame: Vec<u8>, at: &[(usize, &[u8])], crc: u32) -> Vec<u8> {
 
 #[test]
 fn constructed_frames_are_read_as_agreed() {
+    constructed_frames::<Bus>();
+    constructed_frames::<Spi<Bus>>();
+}
+
+fn constructed_frames<B: Wired<Error: Debug>>() {
     let target = |number, quarters: i32, confidence| Target {
         number,
         distance: I24F8::from_num(quarters) / 4,
@@ -183,7 +191,7 @@ fn constructed_frames_are_read_as_agreed() {
     };
     let peaks = |results: Results| Settings {
         results,
-        ..settings(Zones::Z8x8)
+        ..over::<B>(settings(Zones::Z8x8))
     };
     let mut results = Settings::new(PixelAddress::new(0), Zones::Z8x8).results;
     results.peaks = 1;
@@ -199,7 +207,7 @@ fn constructed_frames_are_read_as_agreed() {
         0x8251_A583,
     );
     assert_eq!(a.len(), 225);
-    let mut bench = Bench::<128>::new(peaks(results));
+    let mut bench = Bench::<128, B>::new(peaks(results));
     bench.bring_up();
     bench.frames(1);
     bench.sensor.start(U16F16::ZERO, Dither::OFF);
@@ -223,7 +231,7 @@ fn constructed_frames_are_read_as_agreed() {
         0x5782_B961,
     );
     assert_eq!(b.len(), 609);
-    let mut bench = Bench::<128>::new(peaks(all));
+    let mut bench = Bench::<128, B>::new(peaks(all));
     bench.bring_up();
     bench.sensor.start(U16F16::ZERO, Dither::OFF);
     bench.bring_up();
@@ -248,10 +256,10 @@ fn constructed_frames_are_read_as_agreed() {
         0x8753_5B5F,
     );
     assert_eq!(c.len(), 25_377);
-    let mut bench = Bench::<128>::new(Settings {
+    let mut bench = Bench::<128, B>::new(Settings {
         reference: Some(PixelAddress::new(100)),
         preset: Preset::HighAccuracy,
-        ..settings(Zones::Z8x8)
+        ..over::<B>(settings(Zones::Z8x8))
     });
     bench.bring_up();
     bench.sensor.start(U16F16::ZERO, Dither::OFF);

@@ -1,13 +1,14 @@
 //! Settings of the TMF8829: what reaches the chip, what is described, what is refused.
 
-use crate::common::tmf8829::bench::{Bench, IMAGE, PRESETS, settings};
-use crate::common::tmf8829::bus::Bus;
+use crate::common::tmf8829::bench::{Bench, IMAGE, PRESETS, over, settings};
+use crate::common::tmf8829::bus::{Bus, Wired};
 use dtof_chips::tmf8829::{Tmf8829 as Chip, varied_counts};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::tmf8829::{
-    Config, ConfigError, Preset, Results, Settings, Tmf8829, Tmf8829Protocol, Zones,
+    Config, ConfigError, Interface, Preset, Results, Settings, Spi, Tmf8829, Tmf8829Protocol, Zones,
 };
+use dtof_sensors::{Sensor, SensorFault};
 
 #[test]
 fn the_image_and_every_setting_reach_their_places() {
@@ -16,7 +17,7 @@ fn the_image_and_every_setting_reach_their_places() {
         preset: Preset::HighAccuracy,
         period_ms: 0x0123,
         kilo_iterations: 0x0456,
-        address: 0x42,
+        interface: Interface::I2c { address: 0x42 },
         results: Results {
             peaks: 2,
             signal: true,
@@ -121,13 +122,22 @@ fn settings_that_cannot_be_are_refused() {
         Config::new(settings).map(|_| ()).unwrap_err()
     };
     assert!(Config::new(settings(Zones::Z48x32)).is_ok());
-    assert_eq!(refused(|bad| bad.address = 0x07), ConfigError::Address);
-    assert_eq!(refused(|bad| bad.address = 0x78), ConfigError::Address);
+    let address = |address| {
+        let interface = Interface::I2c { address };
+        let settings = settings(Zones::Z48x32);
+        Config::new(Settings {
+            interface,
+            ..settings
+        })
+        .unwrap_err()
+    };
+    assert_eq!(address(0x07), ConfigError::Address);
+    assert_eq!(address(0x78), ConfigError::Address);
     for address in [0x08, 0x77] {
         let settings = settings(Zones::Z48x32);
         assert!(
             Config::new(Settings {
-                address,
+                interface: Interface::I2c { address },
                 ..settings
             })
             .is_ok()
@@ -185,39 +195,92 @@ fn settings_that_cannot_be_are_refused() {
     }
 }
 
+/// A bus of so many clocks a second, and how long a measurement takes.
+fn measure<B: Wired<Error: std::fmt::Debug>>(zones: Zones, hertz: f64) -> f64 {
+    let mut bench = Bench::<128, B>::new(over::<B>(settings(zones)));
+    bench.bring_up();
+    let frames = usize::from(zones.frames());
+    let results = if frames > 2 { 2 } else { 1 };
+    bench.bus.0.borrow_mut().clocks = 0;
+    bench.frames(frames + results);
+    bench.bus.0.borrow().clocks as f64 / hertz
+}
+
 /// What the documentation says of bus and memory.
 #[test]
 fn a_measurement_takes_the_bus_as_long_as_is_said() {
-    for (zones, seconds) in [
-        (Zones::Z8x8, 1.2),
-        (Zones::Z16x16, 1.2),
-        (Zones::Z32x32, 4.8),
-        (Zones::Z48x32, 7.2),
+    let first = PixelAddress::new(10);
+    for (zones, i2c, spi) in [
+        (Zones::Z8x8, 1.18, 0.0399),
+        (Zones::Z16x16, 1.21, 0.0408),
+        (Zones::Z32x32, 4.82, 0.1632),
+        (Zones::Z48x32, 7.23, 0.2448),
     ] {
-        let mut bench = Bench::<128>::new(settings(zones));
-        bench.bring_up();
-        let frames = usize::from(zones.frames());
-        let results = if frames > 2 { 2 } else { 1 };
-        bench.bus.0.borrow_mut().log.clear();
-        bench.frames(frames + results);
-        // Nine bits a byte, an address before each direction, at 400 kHz.
-        let wires = bench.bus.0.borrow();
-        let bytes = wires.log.iter().map(|(written, read)| {
-            let read = read.as_ref().map_or(0, Vec::len);
-            1 + written.len() + if read > 0 { 1 + read } else { 0 }
-        });
-        let bytes: usize = bytes.sum();
-        let taken = 9.0 * bytes as f64 / 400e3;
-        assert!((taken - seconds).abs() < 0.06, "{zones:?}: {taken} s");
+        let taken = measure::<Bus>(zones, 400e3);
+        assert!((taken - i2c).abs() < 0.005, "{zones:?}: {taken} s");
         // The period leaves room for that.
-        let period = f64::from(settings(zones).period_ms) / 1000.0;
+        let period = f64::from(Settings::new(first, zones).period_ms) / 1000.0;
         assert!(
             taken < period && period < 1.2 * taken,
             "{zones:?}: {taken} s"
         );
-        println!("TMF8829, {zones:?}: {taken:.2} s a measurement at 400 kHz");
+        println!("TMF8829, {zones:?}: {taken:.2} s a measurement over I2C at 400 kHz");
+        let taken = measure::<Spi<Bus>>(zones, 10.5e6);
+        assert!((taken - spi).abs() < 0.00005, "{zones:?}: {taken} s");
+        println!(
+            "TMF8829, {zones:?}: {:.1} ms over SPI at 10.5 MHz",
+            1e3 * taken
+        );
+        let taken = measure::<Spi<Bus>>(zones, 10e6);
+        let period = f64::from(Settings::over_spi(first, zones).period_ms) / 1000.0;
+        assert!(
+            taken < period && period < 1.2 * taken,
+            "{zones:?}: {taken} s"
+        );
     }
+    assert!((measure::<Bus>(Zones::Z16x16, 1e6) - 0.48).abs() < 0.005);
+    assert!((measure::<Spi<Bus>>(Zones::Z16x16, 20e6) - 0.0214).abs() < 0.00005);
     let driver = size_of::<Tmf8829Protocol<'static>>();
     println!("TMF8829: {driver} bytes of RAM");
     assert!(driver < 1024, "{driver} bytes");
+}
+
+/// Over SPI the bootloader switches I²C off, over I²C SPI.
+#[test]
+fn the_other_bus_is_switched_off() {
+    let mut bench =
+        Bench::<128, Spi<Bus>>::new(Settings::over_spi(PixelAddress::new(0), Zones::Z8x8));
+    bench.bring_up();
+    assert_eq!(bench.bus.0.borrow().chip.off, Some(0x22));
+    assert_eq!(bench.bus.0.borrow().chip.address, 0x41);
+    let mut bench = Bench::<128>::new(settings(Zones::Z8x8));
+    bench.bring_up();
+    assert_eq!(bench.bus.0.borrow().chip.off, Some(0x20));
+}
+
+/// The wrong bus in the settings, and a sensor that is not there: an error, and nothing is given.
+#[test]
+fn spi_without_a_sensor_is_an_error() {
+    fn faults(settings: Settings, is_unplugged: bool) -> Vec<SensorFault> {
+        let mut bench = Bench::<128, Spi<Bus>>::new(settings);
+        bench.bus.0.borrow_mut().is_unplugged = is_unplugged;
+        let polls = (0..2000).map(|now_ms| bench.sensor.poll(now_ms, &mut bench.sink));
+        let faults = polls
+            .filter_map(|polled| polled.err().map(SensorFault::from))
+            .collect();
+        assert_eq!(bench.sink.take(), []);
+        faults
+    }
+    let unplugged = faults(over::<Spi<Bus>>(settings(Zones::Z8x8)), true);
+    assert!(unplugged.len() > 100);
+    assert!(
+        unplugged
+            .iter()
+            .all(|fault| *fault == SensorFault::WrongChip)
+    );
+    let wrong = faults(settings(Zones::Z8x8), false);
+    assert!(
+        wrong.len() > 10 && wrong[0] == SensorFault::Rejected,
+        "{wrong:?}"
+    );
 }

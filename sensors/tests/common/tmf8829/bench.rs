@@ -1,5 +1,7 @@
 //! A driver of a TMF8829 beside its chip.
 
+use std::fmt::Debug;
+
 use dtof_chips::Tmf8829 as Chip;
 use dtof_chips::tmf8829::varied_counts;
 use dtof_core::PixelAddress;
@@ -7,7 +9,7 @@ use dtof_sensors::tmf8829::{Config, Preset, Settings, Tmf8829, Zones};
 use dtof_sensors::{Polled, Sensor};
 
 use super::super::{RecordingSink, SinkCall};
-use super::bus::Bus;
+use super::bus::{Bus, Wired};
 
 pub const IMAGE: [u8; 1234] = [0x5A; 1234];
 pub const PRESETS: [Preset; 3] = [Preset::Standard, Preset::LongRange, Preset::HighAccuracy];
@@ -16,14 +18,22 @@ pub fn settings(zones: Zones) -> Settings {
     Settings::new(PixelAddress::new(10), zones)
 }
 
-pub struct Bench<const CHUNK: usize> {
-    pub sensor: Tmf8829<'static, Bus, Bus, Bus, CHUNK>,
+/// Settings of the same over another bus.
+pub fn over<B: Wired>(settings: Settings) -> Settings {
+    Settings {
+        interface: B::INTERFACE,
+        ..settings
+    }
+}
+
+pub struct Bench<const CHUNK: usize, B = Bus> {
+    pub sensor: Tmf8829<'static, B, Bus, Bus, CHUNK>,
     pub bus: Bus,
     pub sink: RecordingSink,
     pub now_ms: u32,
 }
 
-impl<const CHUNK: usize> Bench<CHUNK> {
+impl<const CHUNK: usize, B: Wired<Error: Debug>> Bench<CHUNK, B> {
     pub fn new(settings: Settings) -> Self {
         let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
         Self {
@@ -84,11 +94,11 @@ impl<const CHUNK: usize> Bench<CHUNK> {
     }
 }
 
-fn sensor<const CHUNK: usize>(
+fn sensor<const CHUNK: usize, B: Wired>(
     bus: &Bus,
     settings: Settings,
     image: &'static [u8],
-) -> Tmf8829<'static, Bus, Bus, Bus, CHUNK> {
+) -> Tmf8829<'static, B, Bus, Bus, CHUNK> {
     let config = Config::new(settings).unwrap();
-    Tmf8829::new(bus.clone(), bus.clone(), bus.clone(), image, config)
+    Tmf8829::new(B::to(bus), bus.clone(), bus.clone(), image, config)
 }
