@@ -10,6 +10,8 @@ const DITHER_CTRL = 0x50000000 + 6 * 0x40 + 0x10;
 const ENABLED = 1;
 /** Clocks for which it pauses: more than the four laser cycles for which its queue lasts. */
 const PAUSE = 7500;
+/** Milliseconds of a reset of the bus: a hub takes 10 to 20. */
+const BUS_RESET_MS = 20;
 const UDF = 0xde00;
 const BRANCH_TO_ITSELF = 0xe7fe;
 /** `push` of two registers or more, the last of which is LR: a function begins. */
@@ -56,6 +58,11 @@ export const FAULTS = {
     const isPlanted = FAULTS.overflow(machine);
     machine.chip.ignoresStackingFaults = isPlanted;
     return isPlanted;
+  },
+  /** The host resets the bus of the USB, for longer than the laser may go on, and does no more. */
+  'bus-reset': ({ host }) => {
+    host.resetBus(BUS_RESET_MS);
+    return true;
   },
   /** A state machine gets no dither for some laser cycles, and waits for it. */
   starve: (machine) => {

@@ -5,6 +5,13 @@ import { createSetupPacket, DataDirection, SetupRecipient, SetupType, USBCDC } f
 
 const SET_CONTROL_LINE_STATE = 0x22;
 const DTR_AND_RTS = 0b11;
+/** SIE_STATUS: the bus is in reset, is connected, and its lines, both low (SE0) or idle (J). */
+const BUS_RESET = 1 << 19;
+const CONNECTED = 1 << 16;
+const LINES = 0b11 << 2;
+const IDLE = 0b01 << 2;
+/** Milliseconds of the reset of the bus that begins to set the device up. */
+const FIRST_RESET_MS = 10;
 
 export class Host {
   /**
@@ -47,7 +54,7 @@ export class Host {
     };
     usb.onUSBEnabled = () => {
       this.begin();
-      usb.resetDevice();
+      this.resetBus(FIRST_RESET_MS);
     };
     // The library forgets a read request that comes before the device is known.
     usb.onEndpointRead = (endpoint, size) => {
@@ -61,6 +68,17 @@ export class Host {
         this.ask();
       }
     };
+  }
+
+  /** Resets the bus. The chip is of version B1: it does not find the end by itself, as behind a busy hub. */
+  resetBus(ms) {
+    const { usb } = this;
+    usb.sieStatus = (usb.sieStatus & ~(LINES | CONNECTED)) | BUS_RESET;
+    usb.sieStatusUpdated();
+    const end = usb.rp2040.clock.createAlarm(() => {
+      usb.sieStatus |= IDLE;
+    });
+    end.schedule(ms * 1e6);
   }
 
   get isReady() {

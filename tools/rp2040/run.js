@@ -27,6 +27,7 @@ node run.js IMAGE [options]
                     overflow-entered
                                 the same, but the handler of the hard fault is entered
                     panic       a function that panics is called
+                    bus-reset   with --usb: the host resets the bus, and does no more
                     starve      a state machine gets no dither for some laser cycles
   --boots N       end with a failure instead of booting once more than this (10)
   --attached      end when standard input does

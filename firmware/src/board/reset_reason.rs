@@ -1,9 +1,23 @@
-//! Why a board has started: from a note of the previous image in RAM, or else from the chip.
+//! Why a board has started: from a word that the previous image has left in RAM, or else from the chip.
 
 #[cfg(all(target_os = "none", feature = "board"))]
 pub use self::word::{remember, take};
 
 use dtof_link::StopReason;
+
+/// Words that are unlikely in uninitialised RAM, for the reasons that an image leaves there.
+const WORDS: [(ResetReason, u32); 3] = [
+    (ResetReason::Panic, 0xd70f_9a21),
+    (ResetReason::Fault, 0xd70f_fa17),
+    (ResetReason::BrownOut, 0xd70f_b0f7),
+];
+
+/// The reason that a word in RAM stands for.
+#[must_use]
+pub fn of_word(word: u32) -> Option<ResetReason> {
+    let entry = WORDS.iter().find(|&&(_, of)| of == word);
+    entry.map(|&(reason, _)| reason)
+}
 
 /// Why a board has started.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -18,7 +32,7 @@ pub enum ResetReason {
     Fault,
     /// The watchdog was not fed.
     Watchdog,
-    /// The supply was too low for a while.
+    /// The supply was too low for a while, by the chip's reset or by the image's own detector.
     BrownOut,
     /// The reset pin, a debugger, or the image itself.
     Reset,
@@ -41,6 +55,13 @@ impl From<ResetReason> for Option<StopReason> {
 }
 
 impl ResetReason {
+    /// The word in RAM that stands for it; 0 if an image leaves none.
+    #[must_use]
+    pub fn word(self) -> u32 {
+        let entry = WORDS.iter().find(|&&(of, _)| of == self);
+        entry.map_or(0, |&(_, word)| word)
+    }
+
     /// From the registers of an RP2040: `REASON` of its watchdog and `CHIP_RESET` of `VREG_AND_CHIP_RESET`
     /// (RP2040 datasheet, 4.7.6 and 2.12.8). `watched` is whether the image had started the
     /// watchdog: the boot ROM ends the copying of an image by the same watchdog.
@@ -86,30 +107,19 @@ mod word {
     use core::ptr;
     use core::sync::atomic::{AtomicU32, Ordering};
 
-    use super::ResetReason;
-
-    /// Words that are unlikely in uninitialised RAM.
-    const WORDS: [(ResetReason, u32); 2] = [
-        (ResetReason::Panic, 0xd70f_9a21),
-        (ResetReason::Fault, 0xd70f_fa17),
-    ];
+    use super::{ResetReason, of_word};
 
     /// A reset leaves it as it is.
     #[unsafe(link_section = ".uninit.RESET_REASON")]
     #[allow(unsafe_code, reason = "its place is given by the section's name")]
     static WORD: AtomicU32 = AtomicU32::new(0);
 
-    /// Leaves word of a panic or a fault for the start after the reset that follows.
+    /// Leaves word of a panic, a fault or a low supply for the start after the reset that follows.
     pub fn remember(reason: ResetReason) {
         // The first: a report of a fault may panic.
-        if WORDS
-            .iter()
-            .any(|&(_, word)| word == WORD.load(Ordering::Relaxed))
-        {
-            return;
+        if of_word(WORD.load(Ordering::Relaxed)).is_none() {
+            WORD.store(reason.word(), Ordering::Relaxed);
         }
-        let entry = WORDS.iter().find(|(of, _)| *of == reason);
-        WORD.store(entry.map_or(0, |&(_, word)| word), Ordering::Relaxed);
     }
 
     /// What the image before this reset has left, once.
@@ -119,14 +129,27 @@ mod word {
         #[allow(unsafe_code, reason = "the compiler takes its value to be 0")]
         let word = unsafe { ptr::read_volatile(WORD.as_ptr()) };
         WORD.store(0, Ordering::Relaxed);
-        let entry = WORDS.iter().find(|&&(_, of)| of == word);
-        entry.map(|&(reason, _)| reason)
+        of_word(word)
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::ResetReason::{self, *};
+    use super::of_word;
+
+    #[test]
+    fn a_word_in_memory_stands_for_one_reason() {
+        for reason in [Panic, Fault, BrownOut] {
+            assert_eq!(of_word(reason.word()), Some(reason));
+        }
+        for reason in [PowerOn, Watchdog, Reset] {
+            assert_eq!(of_word(reason.word()), None);
+        }
+        for word in [0, u32::MAX, Panic.word() ^ 1] {
+            assert_eq!(of_word(word), None);
+        }
+    }
 
     #[test]
     fn rp2040() {

@@ -299,6 +299,29 @@ fn laser_goes_dark_when_its_host_ends_its_session_or_is_cut_off() -> Result<()> 
     Ok(())
 }
 
+/// The end of a reset of the bus takes 20 ms, and the chip needs help to find it.
+#[test]
+fn laser_goes_dark_when_the_usb_is_reset() -> Result<()> {
+    let Some(_alone) = enabled("the laser in a reset of the USB", &[NODE, NPM]) else {
+        return Ok(());
+    };
+    install()?;
+    let image = image(&["photon-timer"], None)?;
+    let mut board =
+        Rp2040::start_with_usb_fault(&image, "bus-reset", LIT_MS, dark_ms().ceil() as u32)?;
+    let (mut client, is_cut) = light(&mut board)?;
+    // Until the device is silent.
+    while client.report().is_ok() {}
+    is_cut.store(true, Ordering::Relaxed);
+    drop(client);
+    fired_for(
+        "reset of the USB",
+        AT_ONCE_MS,
+        |done| done.planted_ms,
+        board,
+    )
+}
+
 /// Waits until the laser has fired often enough.
 fn fires(client: &mut Client) -> Result<()> {
     let start = Instant::now();

@@ -128,6 +128,18 @@ impl Rp2040 {
         Self::spawn(ending_after(node, for_ms))
     }
 
+    /// The same with the serial port of the USB.
+    pub fn start_with_usb_fault(
+        image: &Path,
+        kind: &str,
+        fault_ms: f64,
+        for_ms: u32,
+    ) -> Result<Self> {
+        let mut node = command(image);
+        node.args(["--usb", "--plant", &format!("{kind}@{fault_ms}")]);
+        Self::spawn(ending_after(node, for_ms))
+    }
+
     /// Starts an image without a fault. Its serial port is the USB or the UART.
     pub fn start_for(image: &Path, over_usb: bool, for_ms: u32) -> Result<Self> {
         let mut node = command(image);

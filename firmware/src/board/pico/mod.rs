@@ -7,6 +7,7 @@
 //! | USB | the same link as a serial port (CDC ACM): the answer goes where the last byte came from |
 //! | GP0 | sends; pin 1, to RX of a USB adapter of 3.3 V |
 //! | GP1 | receives; pin 2, to TX of the adapter |
+//! | GP15 | leave it free: the USB of an older chip takes it for moments, see `usb.rs` |
 //! | watchdog | resets after about a second |
 //! | log | defmt over RTT, which a debug probe reads |
 //!
@@ -21,7 +22,7 @@ mod sample_rings;
 mod usb;
 
 use core::cell::RefCell;
-use core::sync::atomic::{AtomicU32, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 use cortex_m::peripheral::NVIC;
 use cortex_m::peripheral::syst::SystClkSource;
@@ -76,6 +77,8 @@ struct Port {
 static BUFFERS: ConstStaticCell<BoardBuffers> = ConstStaticCell::new(Buffers::new());
 static PORT: Mutex<RefCell<Option<Port>>> = Mutex::new(RefCell::new(None));
 static MILLISECONDS: AtomicU32 = AtomicU32::new(0);
+/// The interrupt of the USB is masked until the next millisecond.
+static USB_WAITS: AtomicBool = AtomicBool::new(false);
 
 /// The parts of the chip that a sensor takes.
 pub struct SensorPort {
@@ -269,6 +272,14 @@ fn SysTick() {
     // Nothing else writes it, and this processor has no atomic addition.
     let now = MILLISECONDS.load(Ordering::Relaxed);
     MILLISECONDS.store(now.wrapping_add(1), Ordering::Relaxed);
+    if USB_WAITS.load(Ordering::Relaxed) {
+        USB_WAITS.store(false, Ordering::Relaxed);
+        // SAFETY: it was unmasked before.
+        #[allow(unsafe_code, reason = "there is no other way to unmask")]
+        unsafe {
+            NVIC::unmask(Interrupt::USBCTRL_IRQ);
+        }
+    }
 }
 
 #[interrupt]
@@ -317,6 +328,11 @@ impl Port {
         }
         self.look_at_line();
         self.send();
+        if self.usb.is_in_reset() {
+            // It would interrupt without end, and leave the main loop no time.
+            NVIC::mask(Interrupt::USBCTRL_IRQ);
+            USB_WAITS.store(true, Ordering::Relaxed);
+        }
     }
 
     /// Tells the main loop whether the host's port is open. Only USB can tell. A close counts even

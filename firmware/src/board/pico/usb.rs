@@ -1,8 +1,12 @@
 //! The link over USB: a serial port for the host (CDC ACM), in addition to the UART.
+//!
+//! A chip of version B0 or B1 does not leave a reset of the bus behind a busy hub (RP2040-E5). rp2040-hal
+//! then takes GP15 for about a millisecond and shows the USB an idle bus there. It has to be called until
+//! the reset ends, and its interrupt stays meanwhile: see [`Usb::is_in_reset`].
 
 use heapless::Vec;
 use rp2040_hal::clocks::UsbClock;
-use rp2040_hal::pac::{RESETS, USBCTRL_DPRAM, USBCTRL_REGS};
+use rp2040_hal::pac::{self, RESETS, USBCTRL_DPRAM, USBCTRL_REGS};
 use rp2040_hal::usb::UsbBus;
 use static_cell::StaticCell;
 use usb_device::UsbError;
@@ -79,7 +83,17 @@ impl Usb {
     /// Whether a program has the port open. It raises DTR then; a host takes DTR down when the
     /// program ends, however it ends, and a cable that is pulled suspends the device.
     pub fn listens(&self) -> bool {
-        self.device.state() == UsbDeviceState::Configured && self.class.dtr()
+        !self.is_in_reset() && self.device.state() == UsbDeviceState::Configured && self.class.dtr()
+    }
+
+    /// Whether a reset of the bus goes on that [`receive`](Self::receive) could not handle yet: the
+    /// interrupt is pending until it can.
+    #[allow(clippy::unused_self, reason = "of this port")]
+    pub fn is_in_reset(&self) -> bool {
+        // SAFETY: it is only read, and reading it changes nothing.
+        #[allow(unsafe_code, reason = "rp2040-hal keeps the register to itself")]
+        let status = unsafe { &*pac::USBCTRL_REGS::PTR }.sie_status().read();
+        status.bus_reset().bit()
     }
 
     /// Hands over what there is to send, as far as the host takes it. Runs again when a packet

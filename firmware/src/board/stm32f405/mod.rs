@@ -8,6 +8,7 @@
 //! | PA2 | sends; pin 14 of P1 on the Discovery, to RX of a USB adapter of 3.3 V |
 //! | PA3 | receives; pin 13 of P1 on the Discovery, to TX of the adapter |
 //! | watchdog | the independent one, resets after about a second |
+//! | supply | below about 2.7 V the laser goes off and the board resets, until the supply is back |
 //! | log | defmt over RTT, which the debugger reads |
 //!
 //! The Discovery's debugger has a serial port of its own, but it is not
@@ -29,7 +30,7 @@ use defmt_rtt as _;
 use static_cell::ConstStaticCell;
 use stm32f4xx_hal::gpio::{Edge, PinState, Pull};
 use stm32f4xx_hal::nb;
-use stm32f4xx_hal::pac::{self, EXTI, Interrupt, USART2, interrupt};
+use stm32f4xx_hal::pac::{self, EXTI, Interrupt, PWR, RCC, USART2, interrupt};
 use stm32f4xx_hal::prelude::*;
 use stm32f4xx_hal::rcc::Config as ClockConfig;
 use stm32f4xx_hal::serial::{Config as SerialConfig, Rx, Tx};
@@ -80,6 +81,7 @@ impl Stm32F405 {
         let cause = device.RCC.csr().read().bits();
         // Otherwise the flags accumulate.
         device.RCC.csr().modify(|_, w| w.rmvf().clear());
+        wait_for_supply(&device.RCC, &device.EXTI, &device.PWR);
         let reset_reason = reset_reason::take().unwrap_or(ResetReason::of_stm32f4(cause));
         let clocks = if cfg!(feature = "pll-off") {
             ClockConfig::hsi()
@@ -99,7 +101,9 @@ impl Stm32F405 {
         let pins_b = device.GPIOB.split(&mut rcc);
         let pins_c = device.GPIOC.split(&mut rcc);
         let config = SerialConfig::default().baudrate(BAUD.bps());
-        let Ok(usart) = device.USART2.serial((pins.pa2, pins.pa3), config, &mut rcc) else {
+        // Silent while nothing is connected: a low line is a break.
+        let rx = pins.pa3.into_alternate().internal_resistor(Pull::Up);
+        let Ok(usart) = device.USART2.serial((pins.pa2, rx), config, &mut rcc) else {
             panic!("this clock does not give {BAUD} baud");
         };
         let (tx, mut rx) = usart.split();
@@ -138,6 +142,7 @@ impl Stm32F405 {
         // atomics and mutexes only, and nothing relies on their being masked.
         #[allow(unsafe_code, reason = "there is no other way to unmask")]
         unsafe {
+            NVIC::unmask(Interrupt::PVD);
             NVIC::unmask(Interrupt::USART2);
             NVIC::unmask(Interrupt::EXTI9_5);
         }
@@ -158,6 +163,19 @@ impl Stm32F405 {
     pub const fn reset_reason(&self) -> ResetReason {
         self.reset_reason
     }
+}
+
+/// Starts the voltage detector at 2.7 V and waits while the supply is lower; nothing else has been started
+/// then. From now on a fall below it is pending as an interrupt: the detector's output rises then, on line 16
+/// of EXTI (RM0090, 5.2.3, 5.4.1, 5.4.2 and 12.2.5).
+fn wait_for_supply(rcc: &RCC, exti: &EXTI, pwr: &PWR) {
+    const PLS_2V7: u8 = 0b101;
+    rcc.apb1enr().modify(|_, w| w.pwren().set_bit());
+    exti.rtsr().modify(|_, w| w.tr16().set_bit());
+    exti.imr().modify(|_, w| w.mr16().set_bit());
+    pwr.cr()
+        .modify(|_, w| w.pls().set(PLS_2V7).pvde().set_bit());
+    while pwr.csr().read().pvdo().bit_is_set() {}
 }
 
 /// Drives PC6 low, ENABLE or EN of the sensor: `BR6` of `GPIOC_BSRR` (RM0090, 8.4.7). Before
@@ -207,6 +225,14 @@ impl Board for Stm32F405 {
 #[exception]
 fn SysTick() {
     MILLISECONDS.fetch_add(1, Ordering::Relaxed);
+}
+
+/// The supply is too low. The next start waits until it is back.
+#[interrupt]
+fn PVD() {
+    laser_off();
+    reset_reason::remember(ResetReason::BrownOut);
+    end()
 }
 
 #[interrupt]
