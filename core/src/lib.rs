@@ -135,7 +135,7 @@ pub use detect::{
 };
 pub use event::DepthEvent;
 pub use flags::Flags;
-pub use histogram::counter::{Count8, Count10, Count16, Count24, CounterWidth};
+pub use histogram::counter::{Count8, Count10, Count16, Count20, Count24, CounterWidth};
 pub use histogram::gate::{GateError, RangeGate};
 pub use histogram::{Histogram, Peak};
 pub use pixel::{AsyncPixel, Look, OncePerBin};

@@ -247,7 +247,7 @@ pub(super) fn stands_clear<const NARROW: bool>(
         // Its square is then above any variance.
         u32::try_from(above).unwrap_or(u32::MAX).min((1 << 30) - 1)
     };
-    // At most 8 + 3 + 32 bits, or 10 + 3 + 26; in 1/16, and with z², 20 more.
+    // At most 8 + 3 + 32 bits, or 10 + 3 + 30; in 1/16, and with z², 20 more.
     let spread = u64::from(bins_outside * width) * u64::from(total);
     let exceeds = |sixteenths: u64| {
         (u64::from(above) * u64::from(above)) << 4 > sixteenths * u64::from(z_squared >> 16)
@@ -265,7 +265,7 @@ pub(super) fn stands_clear<const NARROW: bool>(
     let Some(part) = (part << 16).checked_div(sum) else {
         return false;
     };
-    // 43 + 16 bits, or 39 + 17.
+    // 43 + 17 bits.
     exceeds((spread * u64::from(part)) >> 12)
 }
 

@@ -50,6 +50,9 @@ pub enum Count10 {}
 /// 16-bit counters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Count16 {}
+/// 20-bit counters, the widest for 512 and 1024 bins: the sum of all bins must fit into 32 bits.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Count20 {}
 /// 24-bit counters, those of commercial sensors that send whole histograms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Count24 {}
@@ -72,6 +75,7 @@ macro_rules! counter_width {
 counter_width!(Count8, u8, 8);
 counter_width!(Count10, u16, 10);
 counter_width!(Count16, u16, 16);
+counter_width!(Count20, u32, 20);
 counter_width!(Count24, u32, 24);
 
 /// An integer that counts the photons of one bin.

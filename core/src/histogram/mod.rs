@@ -58,7 +58,7 @@ pub struct Peak {
 /// 1024 (checked when compiled).
 ///
 /// 1 byte a bin for [`Count8`](crate::Count8), 2 for [`Count10`] and [`Count16`](crate::Count16), 4 for
-/// [`Count24`](crate::Count24), and 16 bytes more.
+/// [`Count20`](crate::Count20) and [`Count24`](crate::Count24), and 16 bytes more.
 #[derive(Clone, Debug)]
 pub struct Histogram<const BINS: usize, W: CounterWidth = Count10> {
     counts: [W::Counter; BINS],

@@ -46,13 +46,13 @@ macro_rules! with_bins {
 }
 
 /// The same with the widest counters of histograms with so many bins, as the sum of all counters fits
-/// into 32 bits: of 24 bits up to 256 bins, of 16 from there on.
+/// into 32 bits: of 24 bits up to 256 bins, of 20 from there on.
 #[macro_export]
 macro_rules! with_widest {
     ($bins:expr, $name:ident, $width:ident => $value:expr) => {
         match $bins {
             bins @ (512 | 1024) => $crate::with_bins!(bins, of 512 1024, $name => {
-                type $width = dtof_core::Count16;
+                type $width = dtof_core::Count20;
                 $value
             }),
             bins => $crate::with_bins!(bins, of 8 16 32 64 128 256, $name => {

@@ -353,9 +353,10 @@ fn width<const BINS: usize>(config: &PixelConfig<BINS, AnyRule>) -> usize {
     }
 }
 
-/// How many standard deviations the photons of the best window exceed what the background has there. Let the gate have
-/// `T` photons, and a window `S` of them and the share `p` of the live laser cycles of all bins. Without a target `S` is
-/// binomial, and this is the highest `(S - p·T) / √(p·(1 - p)·T)` of all windows. 0 without photons.
+/// The highest z with which the window rule would still report, whatever its minimum count: how many standard
+/// deviations the photons of the best window exceed what the background has there, with the rule's terms for the skew of
+/// small counts. Let the gate have `T` photons, and a window `S` of them and the share `p` of the live laser cycles of all
+/// bins. Without a target `S` is binomial; see [`WindowRule`](dtof_core::WindowRule). 0 without photons.
 fn confidence<const BINS: usize, W: CounterWidth>(
     config: &PixelConfig<BINS, AnyRule>,
     histogram: &Histogram<BINS, W>,
@@ -377,13 +378,45 @@ fn confidence<const BINS: usize, W: CounterWidth>(
         bins.iter().fold([0.0; 2], add)
     };
     let [total, all_live] = sum(&each);
-    let scores = each.windows(width(config)).map(|window| {
+    // Windows that contain the highest bin, or all of them where bins are weighed.
+    let peak = usize::from(histogram.peak().bin.raw() - gate.first());
+    let width = width(config);
+    let is_tested = |start: usize| weighed.is_some() || (start..start + width).contains(&peak);
+    let mut best = 0.0;
+    for (_, window) in (0..)
+        .zip(each.windows(width))
+        .filter(|(start, _)| is_tested(*start))
+    {
         let [inside, live] = sum(window);
-        let share = live / all_live;
-        (inside - share * total) / (share * (1.0 - share) * total).sqrt()
-    });
-    // Without photons there is none, nor where a window has all of the live laser cycles.
-    scores.filter(|score| score.is_finite()).fold(0.0, f64::max)
+        best = highest_z(inside, total, live / all_live, best);
+    }
+    best
+}
+
+/// The highest z, above `z`, that `inside` of `total` photons in a window with the share `p` still exceed; else `z`.
+fn highest_z(inside: f64, total: f64, p: f64, z: f64) -> f64 {
+    const MOST: f64 = 1e6;
+    let variance = p * (1.0 - p) * total;
+    let exceeds = |z: f64| {
+        let skew = z * z / 6.0 * (1.0 - 2.0 * p).max(0.0);
+        inside - p * total > z * variance / (variance + z * z / 36.0).sqrt() + skew
+    };
+    // Also false where a window has all of the live laser cycles, or nothing does.
+    if !(variance > 0.0 && exceeds(z)) {
+        return z;
+    }
+    let (mut low, mut high) = (z, z + 1.0);
+    while high < MOST && exceeds(high) {
+        (low, high) = (high, 2.0 * high);
+    }
+    for _ in 0..60 {
+        let middle = f64::midpoint(low, high);
+        match exceeds(middle) {
+            true => low = middle,
+            false => high = middle,
+        }
+    }
+    low
 }
 
 #[cfg(test)]

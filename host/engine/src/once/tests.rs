@@ -121,35 +121,41 @@ proptest! {
         prop_assert_eq!((statistics.events, statistics.expired), (expected.len() as u64, expected.is_empty().into()));
     }
 
-    /// With many photons the rule asks for a confidence of z, and a little more for the skew of Poisson numbers.
+    /// The confidence is the highest z with an event, but for the rounding of the rule.
     #[test]
-    fn the_confidence_is_in_units_of_z(counts in counts()) {
-        let counts: Vec<u32> = counts.iter().map(|count| count + 100).collect();
-        let (events, engine) = decided(&settings(128), line(1), &[counts]);
+    fn the_confidence_agrees_with_the_decision(counts in counts(), shift in 0..8_u32, more in 0..100_u32) {
+        let counts: Vec<u32> = counts.iter().map(|count| (count + more) >> shift).collect();
+        let (events, engine) = decided(&settings(128), line(1), &[counts.clone()]);
         let confidence = engine.confidence().unwrap()[0];
-        if confidence < 4.0 {
+        if confidence < 3.9 {
             prop_assert!(events.is_empty(), "{}", confidence);
         }
-        // The best window may lie beside the highest bin.
-        if !events.is_empty() {
-            prop_assert!(confidence > 4.0, "{}", confidence);
+        let photons = counts.windows(3).map(|window| window.iter().sum::<u32>()).max().unwrap();
+        // The photons of the rule's minimum, and more.
+        if confidence > 4.1 && photons > 9 {
+            prop_assert!(!events.is_empty(), "{}", confidence);
         }
     }
 }
 
 #[test]
 fn the_confidence_is_that_of_the_formula() {
-    let mut counts = vec![10; 128];
-    counts[40] = 40;
-    // 30 more than 10 a bin: in 3 of 128 bins.
-    let (_, engine) = decided(&settings(128), line(1), &[counts]);
-    let confidence = engine.confidence().unwrap()[0];
-    let (total, share) = (1310.0, 3.0 / 128.0);
-    let expected: f64 = (60.0 - share * total) / f64::sqrt(share * (1.0 - share) * total);
-    assert!(
-        (confidence - expected).abs() < 1e-9,
-        "{confidence} {expected}"
-    );
+    // 30 more than 10 a bin, and 7 more than none: in 3 of 128 bins.
+    for (level, more, total) in [(10, 30, 1310.0), (0, 7, 7.0)] {
+        let mut counts = vec![level; 128];
+        counts[40] += more;
+        counts[100] += u32::from(level == 0);
+        let total = total + f64::from(level == 0);
+        let inside = f64::from(3 * level + more);
+        let (_, engine) = decided(&settings(128), line(1), &[counts]);
+        let z = engine.confidence().unwrap()[0];
+        let p = 3.0 / 128.0;
+        let variance = p * (1.0 - p) * total;
+        let level = total * p
+            + z * variance / f64::sqrt(variance + z * z / 36.0)
+            + z * z / 6.0 * (1.0 - 2.0 * p);
+        assert!((inside - level).abs() < 1e-9, "{z}: {inside} {level}");
+    }
 }
 
 #[test]
@@ -172,9 +178,9 @@ fn without_photons_the_confidence_is_0_and_of_pixels_left_out_unknown() {
 
 #[test]
 fn a_full_counter_is_no_event() {
-    // 1024 bins have counters of 16 bits.
+    // 1024 bins have counters of 20 bits.
     let mut counts = vec![20; 1024];
-    counts[40] = 65_535;
+    counts[40] = (1 << 20) - 1;
     let (events, _) = decided(&settings(1024), line(1), &[counts.clone()]);
     assert_eq!(events.len(), 1);
     counts[40] += 3;
@@ -251,6 +257,32 @@ fn neighbours_confirm_a_surface_that_the_pixel_sees() {
         ..with
     };
     assert_eq!(of_middle(&masked, around(Vec::new()).remove(0)), None);
+}
+
+/// The sum of nine bright pixels is more than a counter of 16 bits holds.
+#[test]
+fn bright_neighbours_confirm_with_any_number_of_bins() {
+    for bins in [128, 512, 1024] {
+        let mut dim = vec![0; bins];
+        dim[..32].fill(8000);
+        for (bin, more) in [(14, 100), (15, 200), (16, 100)] {
+            dim[bin] += more;
+        }
+        let alone = Settings {
+            gate: Some((0, 31)),
+            ..settings(bins)
+        };
+        let with = Settings {
+            neighbours: Neighbours::new(8),
+            ..alone.clone()
+        };
+        let array = Array::new(3, 3).unwrap();
+        let pixels = vec![dim; 9];
+        assert!(decided(&alone, array, &pixels).0.is_empty());
+        let (events, _) = decided(&with, array, &pixels);
+        let bins_of: Vec<u16> = events.iter().map(|event| event.peak_bin.raw()).collect();
+        assert_eq!(bins_of[4], 15, "{bins} bins: {bins_of:?}");
+    }
 }
 
 #[test]

@@ -238,14 +238,14 @@ impl RaySettings {
         self.first_of(other)
     }
 
-    /// [`Rays::slants`], if the rays are known.
+    /// [`Rays::slants`] and [`Rays::biases`], if the rays are known.
     ///
     /// # Errors
     /// Fails as [`Self::rays`] does.
-    pub fn slants(&self, array: Array) -> anyhow::Result<Option<Vec<f64>>> {
+    pub fn slants(&self, array: Array) -> anyhow::Result<Option<[Vec<f64>; 2]>> {
         let is_known = *self != Self::default();
-        let slants = is_known.then(|| self.rays(array).map(|(rays, _)| rays.slants()));
-        slants.transpose()
+        let rays = is_known.then(|| self.rays(array)).transpose()?;
+        Ok(rays.map(|(rays, _)| [rays.slants(), rays.biases()]))
     }
 
     /// The rays of an array, and where they come from: "60x32.2 degrees", or the calibration file.
