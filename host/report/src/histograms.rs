@@ -100,7 +100,7 @@ impl Decisions<'_> {
         packed.push(event.pixel.raw());
         packed.push(super::events::kind(event.level, event.echo, event.flags));
         packed.push(event.cycle.raw());
-        packed.push(event.exposure);
+        packed.push(decision.cycles);
         packed.push_range(ranges.map_or(0.0, |ranges| range_mm(event, ranges)));
         packed.push(event.peak_bin.raw());
         // The number plus 1, or 0 for none.

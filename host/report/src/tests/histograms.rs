@@ -149,3 +149,24 @@ fn a_large_array_of_bright_pixels_stays_below_the_documented_size() {
     assert!(page.len() < MAX_PAGE, "{}", page.len());
     assert_eq!(data(&page)["histograms"]["count"], 64 * 64);
 }
+
+/// Events hold at most 65,535 laser cycles of exposure.
+#[test]
+fn a_histogram_has_all_laser_cycles_of_a_long_exposure() {
+    let array = Array::new(2, 1).unwrap();
+    let (mut all, ..) = decisions_and_data(array, usize::MAX);
+    let settings = demo::settings(1).unwrap();
+    all.truncate(1);
+    all[0].cycles = 200_000;
+    all[0].event.exposure = u16::MAX;
+    let decisions = Decisions {
+        settings: &settings,
+        kept: KeptPixels::new(array, 128),
+        all: &all,
+        array,
+    };
+    let (data, _) = decisions.data(usize::MAX);
+    let mut reader = Reader::new(data["packed"].as_str().unwrap());
+    let [_, _, _, cycles] = [(); 4].map(|()| reader.number());
+    assert_eq!(cycles, 200_000);
+}
