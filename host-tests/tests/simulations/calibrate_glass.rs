@@ -34,6 +34,7 @@ fn found(scene: &Scene, cycles: u64, seed: u64) -> Calibration {
         bin_width_ps: 250.0,
         truth_mm: None,
         slant: None,
+        bias_mm: None,
     };
     calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }

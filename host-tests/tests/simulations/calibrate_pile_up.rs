@@ -26,6 +26,7 @@ fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibra
         bin_width_ps: 250.0,
         truth_mm: None,
         slant: None,
+        bias_mm: None,
     };
     calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }
@@ -123,6 +124,7 @@ fn tdc_of(capture: Vec<Vec<u64>>, cycles: u64) -> Option<Tdc> {
         bin_width_ps: 250.0,
         truth_mm: None,
         slant: None,
+        bias_mm: None,
     };
     calibrate(&observed, &CalibrationOptions::default())
         .unwrap()

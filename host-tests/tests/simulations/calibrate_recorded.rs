@@ -111,6 +111,7 @@ fn a_recording_with_distances_calibrates_itself() {
         bin_width_ps: counts.metadata.bin_width_ps.to_num(),
         truth_mm: counts.truth_mm.as_deref(),
         slant: None,
+        bias_mm: None,
     };
     let found = calibrate(&observed, &CalibrationOptions::default()).unwrap();
     let pulse = found.pulse.as_ref().unwrap();

@@ -18,6 +18,7 @@ fn judge(number: u64) -> (Vec<String>, String) {
         bin_width_ps: drawn.scene.bin_width_ps,
         truth_mm: None,
         slant: None,
+        bias_mm: None,
     };
     let options = CalibrationOptions {
         // A wall alone may be a cover glass: the user decides.
@@ -145,6 +146,7 @@ fn a_wall_alone_may_be_a_cover_glass() {
         bin_width_ps: drawn.scene.bin_width_ps,
         truth_mm: None,
         slant: None,
+        bias_mm: None,
     };
     let with = |glass| {
         let options = CalibrationOptions {

@@ -369,7 +369,7 @@ fn offset_of(
         let slant = |trace: &Trace| observed.slant.map_or(1.0, |slant| slant[trace.pixel]);
         let usual = median(placed.iter().map(|(trace, ..)| slant(trace)));
         for (trace, _, truth) in &mut placed {
-            *truth = Some(distance * slant(trace) / usual);
+            *truth = Some(distance * slant(trace) / usual + observed.bias(trace.pixel));
         }
         // As if all pixels saw the target as far away as the median pixel.
         let straight = placed.iter().map(|(_, position, truth)| {
@@ -455,6 +455,7 @@ mod tests {
             bin_width_ps,
             truth_mm: None,
             slant: Some(&slants),
+            bias_mm: None,
         };
         let all = AllHistograms::new(&observed, &[]).unwrap();
         let rate = all.pixels.background;
@@ -501,6 +502,7 @@ mod tests {
                 bin_width_ps: 250.0,
                 truth_mm: Some(&truth),
                 slant: None,
+                bias_mm: None,
             };
             calibrate(&observed, &CalibrationOptions::default()).unwrap()
         };

@@ -103,7 +103,8 @@ impl<'a> Replay<'a> {
         let with_truth = with_truth
             .enumerate()
             .filter_map(|(place, (pixel, truth))| {
-                Some((pixel, (*truth)? - own(place).unwrap_or(0.0)))
+                let bias = observed.bias(place % pixels as usize);
+                Some((pixel, (*truth)? + bias - own(place).unwrap_or(0.0)))
             });
         let (pixels, truth): (Vec<_>, Vec<f64>) = with_truth.unzip();
         let settings = Settings {

@@ -3,6 +3,7 @@
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{I24F8, U4F12, U16F16};
 
+use super::find::significance::median;
 use super::{Calibration, Glass, Length, Tdc};
 use dtof_engine::settings::{DetectionSettings, RuleName, SensorSettings, SettingsFile};
 
@@ -15,19 +16,23 @@ impl Calibration {
     pub fn settings(&self, before: SettingsFile) -> Result<SettingsFile> {
         let is_absolute = self.length != Length::Unknown;
         let whole = |value: f64| is_absolute.then(|| four_digits(value));
-        let offset = self.offset.map(|offset| {
-            let mm = I24F8::checked_from_num(offset.mm);
-            mm.with_context(|| format!("an offset of {:.0} mm is too large", offset.mm))
-        });
-        // Their median is 0, so that older ones suit a new offset.
-        let offsets = match (&self.offset, &self.pixel_offsets) {
+        // Those that were found have a median of 0. The offset that was found is for the median pixel.
+        let (offsets, median_mm) = match (&self.offset, &self.pixel_offsets) {
             (Some(_), Some(pixels)) if !pixels.needs_field_of_view => {
                 let tenths = pixels.mm.iter().map(|mm| (mm * 10.0).round() / 10.0);
                 let offsets: Vec<I24F8> = tenths.map(I24F8::saturating_from_num).collect();
-                Some(offsets).filter(|offsets| !offsets.is_empty())
+                (Some(offsets).filter(|offsets| !offsets.is_empty()), 0.0)
             }
-            _ => before.sensor.offsets_mm,
+            _ => {
+                let kept = before.sensor.offsets_mm;
+                let median = median(kept.iter().flatten().map(|mm| mm.to_num()));
+                (kept, median)
+            }
         };
+        let offset = self.offset.map(|offset| {
+            let mm = I24F8::checked_from_num(offset.mm - median_mm);
+            mm.with_context(|| format!("an offset of {:.0} mm is too large", offset.mm))
+        });
         let width = U16F16::checked_from_num(self.bin_width_ps);
         let glass = self.glass().filter(|_| self.gate.0 > 0);
         let sensor = SensorSettings {

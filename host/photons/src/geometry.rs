@@ -167,6 +167,12 @@ impl Rays {
         forward.map(|forward| 1.0 / forward.max(0.01)).collect()
     }
 
+    /// The range bias of each pixel in millimetres.
+    #[must_use]
+    pub fn biases(&self) -> Vec<f64> {
+        self.rays.iter().map(|ray| ray.bias_mm).collect()
+    }
+
     /// The point that a pixel sees at a range, in metres; `None` if there is no such pixel. The
     /// point of a block, whose first pixel is `pixel`, is on the mean of its rays.
     #[must_use]

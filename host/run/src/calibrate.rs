@@ -134,7 +134,7 @@ pub(super) fn calibrate_counts(
         (None, Some(RecordingLength::PhotonsPerCycle(rate))) => Length::PhotonsPerCycle(rate),
         (None, None) => Length::Unknown,
     };
-    let slants = requested.rays.slants(counts.array)?;
+    let rays = requested.rays.slants(counts.array)?;
     let observed = Observed {
         array: counts.array,
         captures: &counts.captures,
@@ -142,7 +142,8 @@ pub(super) fn calibrate_counts(
         cycles: None,
         bin_width_ps: counts.metadata.bin_width_ps.to_num(),
         truth_mm: counts.truth_mm.as_deref(),
-        slant: slants.as_deref(),
+        slant: rays.as_ref().map(|[slants, _]| &slants[..]),
+        bias_mm: rays.as_ref().map(|[_, biases]| &biases[..]),
     };
     calibrate_with(&observed, options, &shared(progress, "steps"))
 }

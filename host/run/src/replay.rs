@@ -305,7 +305,10 @@ fn find(requested: &mut SettingsFile, recording: &mut CheckedRecording) -> Resul
         None => "that of the sensor",
     };
     let width = format!("{} ps, {source}", metadata.bin_width_ps);
-    let found = calibrate_counts(requested, &counts, &CalibrationOptions::default(), &mut ())?;
+    let mut found = calibrate_counts(requested, &counts, &CalibrationOptions::default(), &mut ())?;
+    if requested.sensor.offsets_mm.is_some() {
+        found.pixel_offsets = None;
+    }
     let settings = found.settings(
         requested
             .clone()

@@ -55,6 +55,8 @@ pub struct Observed<'a> {
     /// For each pixel of the array how many times as far as straight ahead a flat target is, along its ray. `None` if
     /// the field of view is not known.
     pub slant: Option<&'a [f64]>,
+    /// For each pixel of the array the millimetres by which its ranges are and stay too long, as points subtract them.
+    pub bias_mm: Option<&'a [f64]>,
 }
 
 /// One histogram.
@@ -66,7 +68,7 @@ pub struct Trace {
     pub cycles: f64,
     /// Photons of each bin, corrected for pile-up where that is known.
     pub counts: Vec<f64>,
-    /// The true distance in millimetres, if it is known.
+    /// The true distance in millimetres, if it is known, with the range bias of the pixel.
     pub truth_mm: Option<f64>,
 }
 
@@ -110,6 +112,7 @@ impl Observed<'_> {
                     "capture {index}, pixel {pixel} has {found} bins, not {bins}"
                 );
                 let truth_mm = self.truth_mm.and_then(|truth| truth[traces.len()]);
+                let truth_mm = truth_mm.map(|truth| truth + self.bias(pixel));
                 traces.push(Trace {
                     pixel,
                     cycles,
@@ -119,6 +122,12 @@ impl Observed<'_> {
             }
         }
         Ok(traces)
+    }
+
+    /// The range bias of a pixel in millimetres.
+    #[must_use]
+    pub fn bias(&self, pixel: usize) -> f64 {
+        self.bias_mm.map_or(0.0, |bias| bias[pixel])
     }
 
     /// Bins of a histogram; 0 if there is none.

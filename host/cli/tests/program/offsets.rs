@@ -154,6 +154,63 @@ fn a_flat_target_gives_the_offset_of_each_zone_and_another_scene_gets_right() {
     assert_eq!(differences.len(), PIXELS);
 }
 
+/// The value of a key in a settings file.
+fn value(scratch: &Scratch, file: &str, key: &str) -> Option<f64> {
+    let text = scratch.read(file);
+    let key = format!("{key} = ");
+    let line = text.lines().find_map(|line| line.strip_prefix(&key));
+    line.map(|line| line.split_whitespace().next().unwrap().parse().unwrap())
+}
+
+#[test]
+fn nothing_is_corrected_twice() {
+    let scratch = Scratch::new();
+    let zones = zones();
+    scratch.file("target.npy", recording(&target(1200.0), &zones, 1));
+    let calibrate = format!("calibrate target.npy {SENSOR} --target-mm 1200");
+    // Points subtract the range bias of each pixel, so offsets must leave it as it is.
+    let view = FieldOfView::new(FOV).unwrap();
+    let place = |index: usize| (index as f64 + 0.5) / 8.0;
+    let rays: Vec<String> = (0..PIXELS)
+        .map(|pixel| {
+            let [x, y, z] = view.ray(place(pixel % 8), place(pixel / 8));
+            format!("[{x:?}, {y:?}, {z:?}, {:?}]", -zones[pixel])
+        })
+        .collect();
+    let rays = format!("columns = 8\nrows = 8\npixels = [{}]\n", rays.join(","));
+    scratch.file("rays.toml", rays);
+    scratch.printed(&format!(
+        "{calibrate} --calibration rays.toml --out biased.toml"
+    ));
+    let written = scratch.read("biased.toml");
+    assert!(!written.contains("offsets_mm"), "{written}");
+    let offset = value(&scratch, "biased.toml", "offset_mm").unwrap();
+    assert!(offset.abs() < 3.0, "{offset}");
+    scratch.printed(&format!(
+        "replay target.npy {SENSOR} --cycles 20000 --settings biased.toml --out out"
+    ));
+    scratch.printed("export out/events.aer --format csv --settings biased.toml --out points.csv");
+    let points = scratch.read("points.csv");
+    let names: Vec<&str> = points.lines().next().unwrap().split(',').collect();
+    let forward = names.iter().position(|name| *name == "z").unwrap();
+    let forward = points.lines().skip(1).map(|line| {
+        let number = line.split(',').nth(forward).unwrap();
+        number.parse::<f64>().unwrap()
+    });
+    let mut forward: Vec<f64> = forward.collect();
+    forward.sort_by(f64::total_cmp);
+    let spread = forward[forward.len() * 9 / 10] - forward[forward.len() / 10];
+    assert!(spread < 0.04, "{spread}");
+
+    // Offsets of pixels that are kept shift the offset of all.
+    let fifty = ["50"; PIXELS].join(",");
+    scratch.printed(&format!("{calibrate} --out plain.toml"));
+    scratch.printed(&format!("{calibrate} --offsets-mm={fifty} --out kept.toml"));
+    let [plain, kept] =
+        ["plain.toml", "kept.toml"].map(|file| value(&scratch, file, "offset_mm").unwrap());
+    assert!((plain - 50.0 - kept).abs() < 0.1, "{plain} {kept}");
+}
+
 #[test]
 fn pixels_that_do_not_differ_get_no_offsets() {
     let scratch = Scratch::new();

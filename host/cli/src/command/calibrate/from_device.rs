@@ -146,7 +146,7 @@ impl DeviceArgs {
         let mut cycles = collected.cycles.clone();
         cycles.sort_unstable();
         let median = cycles.get(cycles.len() / 2).copied().unwrap_or(0);
-        let slants = requested.rays.slants(array)?;
+        let rays = requested.rays.slants(array)?;
         let captures = [collected.histograms];
         let observed = Observed {
             array,
@@ -155,7 +155,8 @@ impl DeviceArgs {
             cycles: Some(&collected.cycles),
             bin_width_ps: settings.bin_width_ps.to_num(),
             truth_mm: None,
-            slant: slants.as_deref(),
+            slant: rays.as_ref().map(|[slants, _]| &slants[..]),
+            bias_mm: rays.as_ref().map(|[_, biases]| &biases[..]),
         };
         let mut bar = Bar::new(quiet);
         let found = calibrate_with(&observed, options, &shared(&mut bar, "steps"))?;
