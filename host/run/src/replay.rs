@@ -14,9 +14,9 @@ use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{DetectionSettings, Settings, SettingsFile};
 use dtof_events::clock::LaserClock;
-use dtof_options::Refused;
 use dtof_options::progress::Progress;
 use dtof_options::rows::Row;
+use dtof_options::{Refused, option_name};
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
@@ -24,9 +24,10 @@ use dtof_photons::open::{CheckedRecording, Metadata, ReadOptions, Recording, che
 use dtof_photons::recorded::Layout;
 use dtof_photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
 
-/// The options that settle which photons are replayed, and whether pixels decide once. All others, but for those of the
-/// recording, choose how pixels decide.
+/// The options that settle which photons are replayed, and whether pixels decide once.
 const RUN: &[&str] = &["cycles", "seed", "decide_once"];
+/// The options of detection that a search does not find. All others choose how pixels decide.
+const WANTED: &[&str] = &["masked", "neighbours", "tracking"];
 
 /// The options of a replay.
 #[derive(Clone, Debug, Default)]
@@ -60,6 +61,8 @@ pub struct Replay {
     pub metadata: Metadata,
     /// What was found in the recording, one a row, if its settings come from there.
     pub found: Vec<Row>,
+    /// The keys of the options that chose how pixels decide, so that nothing was searched for.
+    choosing: Vec<&'static str>,
 }
 
 impl Replay {
@@ -95,7 +98,17 @@ impl Replay {
         let is_of_found = self.found.iter().any(|(name, _)| name == "bin width");
         let view = FieldOfView::default_for([array.columns(), array.rows()]);
         let rays = &self.requested.rays;
+        let flag = |key: &&str| format!("--{}", option_name(key).replace('_', "-"));
+        let flags: Vec<String> = self.choosing.iter().map(flag).collect();
         let rows = [
+            (
+                !flags.is_empty(),
+                "settings",
+                format!(
+                    "not searched for in the recording because of {}; calibrate finds them",
+                    flags.join(", ")
+                ),
+            ),
             (
                 self.metadata.is_width_assumed && !is_of_found,
                 "bin width",
@@ -167,8 +180,9 @@ impl Options {
             "{input} holds photons: only histograms are replayed in parts"
         );
         let mut requested = requested.clone();
-        let found = match self.chooses_settings() {
-            true => Ok(Vec::new()),
+        let choosing = self.choosing();
+        let found = match self.has_file() || !choosing.is_empty() {
+            true => Ok((Vec::new(), None)),
             false => find(&mut requested, &mut recording),
         };
         let options = ReadOptions {
@@ -179,11 +193,11 @@ impl Options {
             photons,
             mut metadata,
         } = recording.photons(&options)?;
-        let found = found.unwrap_or_else(|reason| {
+        let (found, warning) = found.unwrap_or_else(|reason| {
             let warning = format!("no settings were found: {reason:#}; the defaults are used");
-            metadata.warnings.push(warning);
-            Vec::new()
+            (Vec::new(), Some(warning))
         });
+        metadata.warnings.extend(warning);
         let requested = requested.or(settings_of_file(&metadata, photons.array()));
         let settings = requested.settings(metadata.bins)?;
         let settings = settings.for_source(photons.as_ref());
@@ -261,6 +275,10 @@ impl Options {
             requested,
             metadata,
             found,
+            choosing: match self.has_file() {
+                true => Vec::new(),
+                false => choosing,
+            },
         })
     }
 
@@ -274,29 +292,41 @@ impl Options {
             let reason = "is for a recording as a whole; leave out the other captures before it is cut into parts";
             return Err(Refused::new("capture", reason));
         }
-        match self.chooses_settings() {
+        match self.has_file() || !self.choosing().is_empty() {
             true => Ok(()),
             false => Err(Refused::new("settings", reason)),
         }
     }
 
-    /// Whether the user has chosen how pixels decide, by a settings file or by an option. Options that describe
-    /// the recording do not.
-    fn chooses_settings(&self) -> bool {
-        let describes = |key: &str| RECORDING.contains(&key) || RUN.contains(&key);
+    /// Whether there is a settings file.
+    const fn has_file(&self) -> bool {
+        self.given.file.is_some() || self.given.text.is_some()
+    }
+
+    /// The options that choose how pixels decide. Options that describe the recording do not.
+    fn choosing(&self) -> Vec<&'static str> {
         let keys = self.given.options.keys().unwrap_or_default();
-        let has_file = self.given.file.is_some() || self.given.text.is_some();
-        has_file || !keys.iter().all(|key| describes(key))
+        let all = <Self as dtof_options::Options>::KEYS
+            .iter()
+            .copied()
+            .flatten()
+            .copied();
+        let others = all.filter(|key| ![RECORDING, RUN, WANTED].concat().contains(key));
+        others.filter(|key| keys.contains(*key)).collect()
     }
 }
 
 /// Finds the settings of the sensor in a recording, and puts them under those that were requested. Of a
-/// photon list it reads the laser cycles that are replayed. Gives what was found, one a row.
-fn find(requested: &mut SettingsFile, recording: &mut CheckedRecording) -> Result<Vec<Row>> {
+/// photon list it reads the laser cycles that are replayed. Gives what was found, one a row, and a warning
+/// about pixels that the mask should leave out.
+fn find(
+    requested: &mut SettingsFile,
+    recording: &mut CheckedRecording,
+) -> Result<(Vec<Row>, Option<String>)> {
     let counts = recording.counts()?;
     let all_counts = || counts.captures.iter().flatten().flatten();
     if all_counts().all(|&count| count == 0) {
-        return Ok(Vec::new()); // A warning says so already.
+        return Ok((Vec::new(), None)); // A warning says so already.
     }
     let metadata = &counts.metadata;
     let source = match requested.sensor.bin_width_ps {
@@ -314,6 +344,15 @@ fn find(requested: &mut SettingsFile, recording: &mut CheckedRecording) -> Resul
             .clone()
             .or(settings_of_file(metadata, counts.array)),
     )?;
+    let found_masked = settings.sensor.masked.iter().flatten();
+    let missed = requested.sensor.masked.as_ref().map(|masked| {
+        let missed = found_masked.filter(|pixel| !masked.contains(pixel));
+        missed.map(u16::to_string).collect::<Vec<_>>()
+    });
+    let warning = missed.filter(|missed| !missed.is_empty()).map(|missed| {
+        let pixels = missed.join(",");
+        format!("hot or dead pixels that --mask does not leave out: {pixels}")
+    });
     *requested = requested.clone().or(settings);
     let mut rows = rows(&found);
     if requested.run.decide_once == Some(true) {
@@ -324,5 +363,5 @@ fn find(requested: &mut SettingsFile, recording: &mut CheckedRecording) -> Resul
     if !rows.iter().any(|(name, _)| name == "bin width") {
         rows.insert(1, ("bin width".to_owned(), width));
     }
-    Ok(rows)
+    Ok((rows, warning))
 }

@@ -137,16 +137,22 @@ fn list(text: &str) -> String {
 fn a_recording_alone_is_calibrated_first() {
     let scratch = Scratch::new();
     let text = scene(0.02, 5.0);
-    scratch.file("hot.npy", with_hot(&text, Some((3, 400))));
+    scratch.file("hot.npy", with_hot(&text, Some((3, 20_000))));
     scratch.file("list.csv", list(&text));
     let read = |folder: &str| scratch.read(&format!("{folder}/events.csv"));
+    let bytes = |file: &str| std::fs::read(scratch.path(file)).unwrap();
+    let list = "list.csv --columns 16 --rebin 2 --bin-width-ps 125";
     for (recording, run) in [
         ("hot.npy", ""),
         (
             "hot.npy --bin-width-ps 373.6 --recorded-cycles 8000",
             "--seed 4",
         ),
-        ("list.csv --columns 16 --rebin 2 --bin-width-ps 125", ""),
+        (list, ""),
+        // What is wanted of the result is no rule of detection.
+        ("hot.npy", "--neighbours 8"),
+        ("hot.npy", "--mask 3,70 --tracking"),
+        (list, "--mask 7 --neighbours 8"),
     ] {
         for threads in ["1", "2"] {
             let mut dtof =
@@ -163,7 +169,13 @@ fn a_recording_alone_is_calibrated_first() {
         scratch.printed(&format!(
             "replay {recording} {run} --settings found.toml --out by-hand"
         ));
-        assert_eq!(read("by-hand"), read("out-1"), "{recording}");
+        for file in ["events.aer", "events.csv", "depth.npy", "dtof.toml"] {
+            let [by_hand, alone] = ["by-hand", "out-1"].map(|folder| format!("{folder}/{file}"));
+            assert!(
+                bytes(&by_hand) == bytes(&alone),
+                "{recording} {run}: {file}"
+            );
+        }
         // The settings that it writes need no option.
         let settings = scratch.read("out-1/dtof.toml");
         scratch.file("settings.toml", settings);
@@ -184,9 +196,13 @@ fn an_option_of_detection_calibrates_nothing() {
     let run = |options: &str| {
         let printed = scratch.printed(&format!("replay glass.npy --out out {options}"));
         assert!(!printed.contains("Found"), "{printed}");
-        scratch.read("out/events.csv")
+        let rows = printed.lines();
+        let rows = rows.filter(|row| row.contains("not searched for"));
+        let rows: Vec<&str> = rows.collect();
+        (scratch.read("out/events.csv"), rows.join("\n"))
     };
-    let defaults = run("--settings empty.toml");
+    let (defaults, row) = run("--settings empty.toml");
+    assert_eq!(row, "");
     for options in [
         "--rule paper",
         "--alpha 4",
@@ -194,9 +210,27 @@ fn an_option_of_detection_calibrates_nothing() {
         "--gate 0..127",
         "--echoes 1",
     ] {
-        assert_eq!(run(options), defaults, "{options}");
+        let (events, row) = run(options);
+        assert_eq!(events, defaults, "{options}");
+        let flag = options.split(' ').next().unwrap();
+        assert_contains(&row, &format!("because of {flag}; calibrate finds them"));
     }
+    let (_, row) = run("--l1 8 --mask 5 --rule paper --neighbours 0");
+    assert_contains(&row, "because of --rule, --l1; calibrate finds them");
     assert_eq!(scratch.summary()["found"], serde_json::json!({}));
+}
+
+/// A mask is taken as it is, so that a warning names the hot pixels that it leaves in.
+#[test]
+fn a_mask_that_leaves_hot_pixels_in_is_warned_of() {
+    let scratch = Scratch::new();
+    let hot = scratch.file("hot.npy", with_hot(&scene(0.02, 5.0), Some((3, 20_000))));
+    let summary = scratch.replayed(&hot, "--mask 5");
+    assert_eq!(summary["settings"]["masked"], serde_json::json!([5]));
+    let warning = "hot or dead pixels that --mask does not leave out: 3";
+    assert_eq!(summary["warnings"], serde_json::json!([warning]));
+    let summary = scratch.replayed(&hot, "--mask 5,3");
+    assert_eq!(summary["warnings"], serde_json::json!([]));
 }
 
 /// It reads no laser cycle that it does not replay.
