@@ -62,6 +62,18 @@ pub fn write(
     event: &DepthEvent,
     ranges: &Ranges,
 ) -> io::Result<()> {
+    write_at(out, event, range_mm(event, ranges))
+}
+
+/// Writes one event at another range.
+///
+/// # Errors
+/// Fails if the writer fails.
+pub fn write_at(
+    out: &mut (impl Write + ?Sized),
+    event: &DepthEvent,
+    range_mm: f64,
+) -> io::Result<()> {
     let depth_bins = f64::from(event.position().raw()) / 256.0;
     writeln!(
         out,
@@ -70,7 +82,7 @@ pub fn write(
         event.pixel.raw(),
         event.exposure,
         event.peak_bin,
-        range_mm(event, ranges),
+        range_mm,
         event.peak_count,
         event.background,
         event.flags,

@@ -23,8 +23,8 @@ const SURFACE_BINS: i32 = 3;
 pub struct PixelHistory {
     /// Millimetres of the last event.
     last: Option<f64>,
-    /// Millimetres of the last [`MEAN_OF`] events of `level`, or fewer, oldest first.
-    recent: VecDeque<f64>,
+    /// The last [`MEAN_OF`] events of `level`, or fewer, oldest first, and their ranges in millimetres.
+    recent: VecDeque<(f64, DepthEvent)>,
     /// The finest level that has stood for the pixel.
     level: BlockLevel,
     /// How far apart events of one surface are at most, in millimetres.
@@ -41,7 +41,8 @@ pub struct PixelHistory {
 
 impl PixelHistory {
     /// In the mean events of blocks never take the place of finer ones: those are of the pixel's own place.
-    fn push(&mut self, level: BlockLevel, range_mm: f64) {
+    fn push(&mut self, event: &DepthEvent, range_mm: f64) {
+        let level = event.level;
         self.last = Some(range_mm);
         if level < self.level {
             self.recent.clear();
@@ -55,7 +56,7 @@ impl PixelHistory {
         if self.recent.len() == MEAN_OF {
             self.recent.pop_front();
         }
-        self.recent.push_back(range_mm);
+        self.recent.push_back((range_mm, *event));
     }
 
     /// The range of the last event.
@@ -68,14 +69,21 @@ impl PixelHistory {
     /// many the newer. Events lie on a surface with one that is up to 3 bins away.
     #[must_use]
     pub fn mean_mm(&self) -> Option<f64> {
+        Some(self.surface()?.0)
+    }
+
+    /// The same, and the newest event on that surface.
+    #[must_use]
+    pub fn surface(&self) -> Option<(f64, DepthEvent)> {
         let on_surface_of = |place: f64| {
-            let all = self.recent.iter().copied();
-            all.filter(move |range| (range - place).abs() <= self.surface_mm)
+            let all = self.recent.iter();
+            all.filter(move |(range, _)| (range - place).abs() <= self.surface_mm)
         };
-        let places = self.recent.iter().copied();
+        let places = self.recent.iter().map(|(range, _)| *range);
         let place = places.max_by_key(|&place| on_surface_of(place).count())?;
-        let count = on_surface_of(place).count();
-        Some(on_surface_of(place).sum::<f64>() / count as f64)
+        let (_, newest) = on_surface_of(place).next_back()?;
+        let sum: f64 = on_surface_of(place).map(|(range, _)| range).sum();
+        Some((sum / on_surface_of(place).count() as f64, *newest))
     }
 
     /// Events of blocks say nothing about the brightness of a pixel.
@@ -131,7 +139,7 @@ impl PixelHistories {
             let stands_for_pixel = pixel.last_events.record(event.level, event.cycle, exposure);
             if stands_for_pixel {
                 pixel.surface_mm = surface_mm;
-                pixel.push(event.level, range_mm);
+                pixel.push(event, range_mm);
                 pixel.events += 1;
             }
             if event.level == BlockLevel::PIXEL {
@@ -200,10 +208,11 @@ mod tests {
         assert_eq!((pixel.last_mm(), pixel.mean_mm()), (None, None));
         pixel.surface_mm = 20.0;
         for range in 1..=12u32 {
-            pixel.push(BlockLevel::PIXEL, range.into());
+            pixel.push(&fixtures::event(0, range.into(), 0), range.into());
         }
         assert_eq!(pixel.last_mm(), Some(12.0));
         assert_eq!(pixel.mean_mm(), Some(7.5)); // of 3 to 12
+        assert_eq!(pixel.surface(), Some((7.5, fixtures::event(0, 12, 0))));
     }
 
     #[test]
@@ -213,7 +222,7 @@ mod tests {
             ..PixelHistory::default()
         };
         let mut mean_after = |range: f64| {
-            pixel.push(BlockLevel::PIXEL, range);
+            pixel.push(&fixtures::event(0, 0, 0), range);
             pixel.mean_mm().unwrap()
         };
         assert_eq!(mean_after(1600.0), 1600.0);

@@ -25,5 +25,9 @@ fn write(out: &mut Out, event: &Event, projection: &Projection) -> Result<()> {
     // Writes the fewest digits that give the same f32.
     let [x, y, z] = projection.point(event)?;
     write!(out, "{us}.{ns:03},{x},{y},{z},")?;
-    Ok(events_csv::write_event(out, event, &projection.ranges)?)
+    match event {
+        Event::Depth(depth) => events_csv::write_at(out, depth, projection.range_mm(event))?,
+        Event::DynamicDepth(_) => events_csv::write_event(out, event, &projection.ranges)?,
+    }
+    Ok(())
 }

@@ -7,6 +7,7 @@
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
 mod csv;
+mod depth_map;
 mod events;
 mod evt2;
 pub mod foxglove;
@@ -31,10 +32,13 @@ use dtof_engine::settings::{RaySettings, SettingsFile};
 use dtof_events::aer_file::{self, Event, EventKind, Header};
 use dtof_events::clock::LaserClock;
 use dtof_events::echoes::Echo;
+use dtof_events::histories::PixelHistories;
 use dtof_options::files::{destination, flush_to_disk, temporary_file};
+use dtof_options::numbers::boolean;
 use dtof_options::progress::Progress;
 use dtof_options::{Refused, named, named_values};
 
+use depth_map::{DepthMap, depth_map};
 use events::Survey;
 use mcap::Slices;
 use points::Points;
@@ -71,6 +75,8 @@ pub struct Options {
     pub kind: Option<EventKind>,
     /// Which echo of each exposure, of depth events.
     pub echo: Echo,
+    /// CSV, PCD and PLY: one point for each pixel, at the depth of its `depth.npy`.
+    pub one_per_pixel: bool,
     /// MCAP and ROS 2: nanoseconds of a slice, not 0; by default 1/100 of the run, see
     /// docs/export.md.
     pub slice_ns: Option<u64>,
@@ -87,6 +93,7 @@ impl Default for Options {
             clock: None,
             kind: None,
             echo: Echo::All,
+            one_per_pixel: false,
             slice_ns: None,
             dynamic_depth: DynamicDepth::default(),
         }
@@ -98,17 +105,25 @@ impl Default for Options {
 pub struct ProjectionOptions {
     /// Which echo of each exposure.
     pub echo: Option<Echo>,
+    /// Whether each pixel has one point, at its depth.
+    pub one_per_pixel: bool,
     /// The rays and the laser rate, which override those of a settings file.
     pub given: SettingsFile,
 }
 
 impl dtof_options::Options for ProjectionOptions {
-    const KEYS: &'static [&'static [&'static str]] =
-        &[&["field_of_view_degrees", "calibration", "laser_hz", "echo"]];
+    const KEYS: &'static [&'static [&'static str]] = &[&[
+        "field_of_view_degrees",
+        "calibration",
+        "laser_hz",
+        "echo",
+        "one_per_pixel",
+    ]];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
             "echo" => self.echo = Some(named(text)?),
+            "one_per_pixel" => self.one_per_pixel = boolean(text)?,
             _ => self.given.set(key, text)?,
         }
         Ok(())
@@ -133,7 +148,11 @@ impl ProjectionOptions {
         Ok(Options {
             rays,
             clock: sensor.laser_hz.map(LaserClock::new).transpose()?,
-            echo: self.echo.unwrap_or(Echo::All),
+            echo: self.echo.unwrap_or(match self.one_per_pixel {
+                true => Echo::Strongest, // as the maps of a run
+                false => Echo::All,
+            }),
+            one_per_pixel: self.one_per_pixel,
             ..Options::default()
         })
     }
@@ -190,16 +209,48 @@ pub fn export(
         Survey::read(input, format, options.clock, options.echo, progress).with_context(name)?;
     let kind = survey.kind(options.kind).with_context(name)?;
     ensure!(
+        kind == EventKind::Depth || !options.one_per_pixel,
+        Refused::new("one_per_pixel", "is only for depth events")
+    );
+    ensure!(
         kind == EventKind::Depth || options.echo == Echo::All,
         Refused::new("echo", "is only for depth events")
+    );
+    ensure!(
+        !options.one_per_pixel || matches!(format, Format::Csv | Format::Pcd | Format::Ply),
+        Refused::new("one_per_pixel", "is only for csv, pcd and ply")
     );
     let (header, clock) = (&survey.header, survey.clock);
     let array = header.array;
     let (rays, assumed_rays) = options.rays.rays(array)?;
+    let ranges = header.ranges().with_context(name)?;
+    let mut all = Events {
+        input,
+        survey: &survey,
+        kind,
+        echo: options.echo,
+        progress,
+    };
+    let depth_map = match options.one_per_pixel {
+        true => {
+            let mut histories = PixelHistories::new(array);
+            all.read(&mut |event| {
+                if let Event::Depth(event) = event {
+                    histories.add(event, &ranges);
+                }
+                Ok(())
+            })?;
+            Some(depth_map(&histories))
+        }
+        false => None,
+    };
     let projection = Projection {
         rays,
-        ranges: header.ranges().with_context(name)?,
+        ranges,
         clock,
+        depths_mm: depth_map
+            .as_ref()
+            .map_or(Vec::new(), |map| map.depths_mm.clone()),
     };
     let mut assumptions = match format {
         Format::Evt2 => clock.to_string(),
@@ -210,7 +261,10 @@ pub fn export(
         .slice_ns
         .unwrap_or_else(|| mcap::slice_of(span.end_ns));
     let file = BufWriter::new(temporary_file(&place.folder, ".dtof-export-")?);
-    let points = survey.chosen(kind);
+    let points = match &depth_map {
+        Some(map) => map.events.len() as u64,
+        None => survey.chosen(kind),
+    };
     let to = || out.display().to_string();
     let sink: Result<Box<dyn Sink>> = match format {
         Format::Csv => csv::begin(file, projection, kind).map(boxed),
@@ -236,29 +290,11 @@ pub fn export(
     };
     let mut sink = sink.with_context(to)?;
 
-    progress.begin(survey.all(), "events");
-    let mut events = aer_file::open(input).with_context(name)?;
-    let mut selection = events::selection(options.echo);
-    for done in 1..=survey.all() {
-        let event = events.next_event().with_context(name)?;
-        let event = event.with_context(|| format!("{} changed while it was read", name()))?;
-        match event {
-            _ if event.kind() != kind => {}
-            Event::Depth(event) => selection.push(event),
-            Event::DynamicDepth(_) => sink.write(&event).with_context(to)?,
-        }
-        for event in selection.by_ref() {
-            sink.write(&Event::Depth(event)).with_context(to)?;
-        }
-        if done.is_multiple_of(4096) {
-            progress.at(done)?;
-        }
+    let mut write = |event: &Event| sink.write(event).with_context(to);
+    match &depth_map {
+        Some(map) => map.events.iter().try_for_each(write)?,
+        None => all.read(&mut write)?,
     }
-    selection.finish();
-    for event in selection {
-        sink.write(&Event::Depth(event)).with_context(to)?;
-    }
-    progress.end();
     let finished = sink.finish().with_context(to)?;
     let moved = flush_to_disk(finished.out)
         .with_context(to)?
@@ -273,6 +309,47 @@ pub fn export(
     })
 }
 
+/// The selected events of a file.
+struct Events<'a> {
+    input: &'a Path,
+    survey: &'a Survey,
+    kind: EventKind,
+    echo: Echo,
+    progress: &'a mut dyn Progress,
+}
+
+impl Events<'_> {
+    /// Gives them to `each`, in the order of the file.
+    fn read(&mut self, each: &mut dyn FnMut(&Event) -> Result<()>) -> Result<()> {
+        let name = || self.input.display().to_string();
+        let all = self.survey.all();
+        self.progress.begin(all, "events");
+        let mut events = aer_file::open(self.input).with_context(name)?;
+        let mut selection = events::selection(self.echo);
+        for done in 1..=all {
+            let event = events.next_event().with_context(name)?;
+            let event = event.with_context(|| format!("{} changed while it was read", name()))?;
+            match event {
+                _ if event.kind() != self.kind => {}
+                Event::Depth(event) => selection.push(event),
+                Event::DynamicDepth(_) => each(&event)?,
+            }
+            for event in selection.by_ref() {
+                each(&Event::Depth(event))?;
+            }
+            if done.is_multiple_of(4096) {
+                self.progress.at(done)?;
+            }
+        }
+        selection.finish();
+        for event in selection {
+            each(&Event::Depth(event))?;
+        }
+        self.progress.end();
+        Ok(())
+    }
+}
+
 /// `events` of an array with this header as points: the records of the `pcd` format, without its
 /// header.
 ///
@@ -284,13 +361,27 @@ pub fn points<'a>(
     options: &Options,
 ) -> Result<Vec<u8>> {
     let (clock, _) = LaserClock::for_file(options.clock, header);
-    let projection = Projection {
+    let mut projection = Projection {
         rays: options.rays.rays(header.array)?.0,
         ranges: header.ranges()?,
         clock,
+        depths_mm: Vec::new(),
     };
+    let mut events: Vec<Event> = events.into_iter().copied().collect();
+    if options.one_per_pixel {
+        let mut histories = PixelHistories::new(header.array);
+        for event in &events {
+            if let Event::Depth(event) = event {
+                histories.add(event, &projection.ranges);
+            }
+        }
+        DepthMap {
+            events,
+            depths_mm: projection.depths_mm,
+        } = depth_map(&histories);
+    }
     let mut records = Vec::new();
-    for event in events {
+    for event in &events {
         records.extend(points::record(event, &projection)?);
     }
     Ok(records)

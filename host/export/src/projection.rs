@@ -15,6 +15,8 @@ pub struct Projection {
     pub ranges: Ranges,
     /// Laser cycles to nanoseconds.
     pub clock: LaserClock,
+    /// The depth of each pixel in millimetres, in place of the ranges of events; empty for these.
+    pub depths_mm: Vec<f64>,
 }
 
 impl Projection {
@@ -28,11 +30,20 @@ impl Projection {
     )]
     pub fn point(&self, event: &Event) -> Result<[f32; 3]> {
         let (pixel, level) = (event.pixel(), event.level());
-        let range_mm = self.ranges.of(pixel, level, event.position()).to_num();
+        let range_mm = self.range_mm(event);
         let point = self.rays.point(pixel, level, range_mm);
         let point = point.with_context(|| format!("pixel {} has no ray", event.pixel().raw()))?;
         // No negative zeros.
         Ok(point.map(|side| side as f32 + 0.0))
+    }
+
+    /// The range in millimetres.
+    #[must_use]
+    pub fn range_mm(&self, event: &Event) -> f64 {
+        let pixel = event.pixel();
+        let depth = self.depths_mm.get(usize::from(pixel.raw())).copied();
+        let range = || self.ranges.of(pixel, event.level(), event.position());
+        depth.unwrap_or_else(|| range().to_num())
     }
 
     /// The time in nanoseconds.

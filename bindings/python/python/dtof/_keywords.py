@@ -463,7 +463,12 @@ class PointsOptions(TypedDict, total=False):
     echo: Annotated[
         Echo,
         "first, last, strongest or all",
-        "Depth events: echo of each exposure of a pixel or block [default: all]",
+        "Depth events: echo of each exposure of a pixel or block [default: all; the strongest with one_per_pixel]",
+    ]
+    one_per_pixel: Annotated[
+        Switch,
+        "True or False",
+        "CSV, PCD and PLY: one point a pixel, at the depth of depth.npy, in place of a point an event",
     ]
 
 

@@ -66,6 +66,10 @@ impl Export {
         )?;
         let out = self.out.display();
         let written = grouped(exported.written);
+        let what = match self.projection.0.one_per_pixel {
+            true => "points, one a pixel",
+            false => "events",
+        };
         if exported.late > 0 {
             writeln!(
                 io::stderr(),
@@ -76,7 +80,7 @@ impl Export {
         }
         if let Some(damage) = exported.damage {
             bail!(
-                "{}: {damage}; {out} has the {written} events before the damage",
+                "{}: {damage}; {out} has the {written} {what} before the damage",
                 self.file.display()
             );
         }
@@ -84,7 +88,7 @@ impl Export {
         if !self.quiet {
             writeln!(
                 io::stdout(),
-                "{out}: {written} events ({})",
+                "{out}: {written} {what} ({})",
                 exported.assumptions
             )?;
         }

@@ -339,7 +339,10 @@ flags! {
         lists its keys";
     laser_hz Text("HZ") => "Laser cycles a second, if the file has none or is wrong [default: the file's, \
         else 10000000 with a warning]";
-    echo OneOf(names::<Echo>) => "Depth events: echo of each exposure of a pixel or block [default: all]";
+    echo OneOf(names::<Echo>) => "Depth events: echo of each exposure of a pixel or block [default: all; the \
+        strongest with --one-per-pixel]";
+    one_per_pixel Optional("YES") => "CSV, PCD and PLY: one point a pixel, at the depth of depth.npy, in place of \
+        a point an event";
 }
 
 /// The tables of the flags of each job, in the order of its help.

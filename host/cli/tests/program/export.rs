@@ -5,6 +5,7 @@ mod echoes;
 mod event_camera;
 #[cfg(target_os = "linux")]
 mod memory;
+mod one_per_pixel;
 mod plane;
 mod points;
 mod rates;

@@ -105,6 +105,7 @@ impl Frames {
                 rays: rays.clone(),
                 ranges: ranges.clone(),
                 clock: self.timing.clock(),
+                depths_mm: Vec::new(),
             })
         };
         self.projection = snapshot.ranges.as_ref().and_then(projection);

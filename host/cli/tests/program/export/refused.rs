@@ -1,7 +1,7 @@
 //! `dtof export`: options that cannot be.
 
 use crate::common::Scratch;
-use crate::common::aer::{HEADER, depth, events, file};
+use crate::common::aer::{HEADER, depth, dynamic, events, file};
 
 #[cfg(unix)]
 #[test]
@@ -23,6 +23,7 @@ fn options_that_cannot_be_are_refused_in_one_line() {
         "columns = 64\nrows = 32\npixels = [\n]\n",
     );
     scratch.file("late.aer", file(&HEADER, &[depth(0, 1 << 60, 5)]));
+    scratch.file("changes.aer", file(&HEADER, &[dynamic(5, 3, 40, -3)]));
     std::fs::create_dir(scratch.path("folder")).unwrap();
     scratch.all_refused(
         "export",
@@ -45,6 +46,10 @@ fn options_that_cannot_be_are_refused_in_one_line() {
             events.aer --format mcap --out x --reference reported | --reference is only for evt2
             events.aer --format evt2 --out x --fov 60x40 | --fov is only for formats with points
             events.aer --format evt2 --out x --calibration none.toml | --calibration is only for formats with points
+            events.aer --format mcap --out x --one-per-pixel | --one-per-pixel is only for csv, pcd and ply
+            events.aer --format evt2 --out x --one-per-pixel | --one-per-pixel is only for csv, pcd and ply
+            events.aer --format csv --out x --one-per-pixel=maybe | --one-per-pixel maybe: must be true or false
+            changes.aer --format csv --out x --one-per-pixel | --one-per-pixel is only for depth events
             events.aer --format csv --out x --events dynamic-depth | 12 events, none of them a dynamic depth event
             events.aer --format csv --out x --calibration none.toml | none.toml: No such file
             events.aer --format csv --out x --calibration calibration.toml | calibration.toml: line 1: 0 pixels, should be 2048
