@@ -3,7 +3,8 @@
 //!
 //! ```sh
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow report
-//! cp out/check-report/report.png docs/figures/     # updates the README's picture
+//! cp out/check-report/report.png docs/figures/     # updates the pictures of the docs
+//! cp out/check-view/live.png docs/figures/
 //! ```
 
 use std::fs;
@@ -13,7 +14,7 @@ use anyhow::{Result, ensure};
 
 use crate::{dtof, enabled, python, root, succeed};
 
-/// The most bytes of the README's picture.
+/// The most bytes of a picture of the docs.
 const MOST_BYTES: u64 = 300_000;
 
 /// The reports: a static scene, a moving one with more events than a report shows, an array whose maps
@@ -81,12 +82,18 @@ fn a_recording_in_a_browser_waits_is_moved_and_slowed_down() -> Result<()> {
             .args(["demo", "--quiet", "--out"])
             .arg(&folder),
     )?;
-    let mut check = Command::new(python);
-    check.arg(root.join("host-tests/report/view.py"));
-    check
-        .arg("chromium")
-        .arg(&folder)
-        .arg(&dtof)
-        .arg(folder.join("events.aer"));
-    succeed(&mut check)
+    let picture = folder.join("live.png");
+    for (script, output) in [("view.py", &folder), ("live.py", &picture)] {
+        let mut check = Command::new(&python);
+        check.arg(root.join("host-tests/report").join(script));
+        check
+            .arg("chromium")
+            .arg(output)
+            .arg(&dtof)
+            .arg(folder.join("events.aer"));
+        succeed(&mut check)?;
+    }
+    let bytes = fs::metadata(picture)?.len();
+    ensure!(bytes < MOST_BYTES, "live.png has {bytes} bytes");
+    Ok(())
 }
