@@ -67,7 +67,11 @@ pub fn points<'py>(
     let options: ProjectionOptions = options(keywords)?;
     let points = work(py, None, move |_| {
         let header = array.header()?;
-        let events = select(events(&records, &header)?, options.echo.or(Some(Echo::All)));
+        let echo = match options.one_per_pixel {
+            true => options.echo, // as maps
+            false => options.echo.or(Some(Echo::All)),
+        };
+        let events = select(events(&records, &header)?, echo);
         let options = options.options(SettingsFile::default())?;
         dtof_export::points(&events, &header, &options)
     })?;

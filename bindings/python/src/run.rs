@@ -7,6 +7,7 @@ use dtof_core::DepthEvent;
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
+use dtof_options::rows::grouped;
 use dtof_photons::input::Input;
 use dtof_photons::ranges::Ranges;
 use dtof_photons::recorded::Layout;
@@ -89,11 +90,31 @@ fn run_replay(
     let mut records = Records::of(&replay.settings, &replay.photons)?;
     let result = replay.run(input, &mut records, &mut { control })?;
     let of_run = result.warnings.clone();
+    let left_out = match requested.run.cycles {
+        None => not_replayed(&result),
+        Some(_) => None, // as requested
+    };
     Ok(Finished {
         records,
         result,
         requested: replay.requested.with_settings(&replay.settings),
-        warnings: warnings(&replay.metadata).chain(of_run).collect(),
+        warnings: warnings(&replay.metadata)
+            .chain(of_run)
+            .chain(left_out)
+            .collect(),
+    })
+}
+
+/// A warning about photons after the laser cycles that are replayed by default.
+fn not_replayed(result: &RunResult) -> Option<String> {
+    let summary = &result.summary;
+    let all = summary.photons + summary.masked + summary.not_replayed;
+    (summary.not_replayed > 0).then(|| {
+        format!(
+            "{} of {} recorded photons were left out: --cycles N takes more",
+            grouped(summary.not_replayed),
+            grouped(all)
+        )
     })
 }
 

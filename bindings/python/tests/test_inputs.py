@@ -1,9 +1,12 @@
 """Arrays and tables of other packages, and results in a notebook."""
 
+import warnings
+
 import numpy
 import pytest
 
 import dtof
+from dtof import _warn
 
 COUNTS = numpy.random.default_rng(5).poisson(3.0, (4, 6, 32)) + 40 * (numpy.arange(32) == 11)
 
@@ -36,6 +39,10 @@ def test_photons_in_one_array_or_table():
     assert same(dtof.photons(numpy.stack([pixel, cycle, bin], axis=1)), run)
     assert same(dtof.photons(table), run) and same(dtof.photons(table.to_records()), run)
     assert same(dtof.replay(table, cycles=int(cycle[-1]) + 1), run)
+    assert same(dtof.photons(table.rename(columns=str.upper)), run)
+    assert same(dtof.replay(table.rename(columns={"pixel": "Pixel", "bin": " BIN"})), run)
+    with pytest.raises(dtof.Error, match="photons: pixel is there 2 times: rename"):
+        dtof.photons(table.rename(columns={"pixel": "Pixel", "note": "PIXEL"}))
     for wrong in (table.drop(columns="bin"), numpy.ones((5, 2), int), numpy.ones((5, 3)), [1, 2, 3], None):
         with pytest.raises(dtof.Error):
             dtof.photons(wrong)
@@ -87,3 +94,35 @@ def test_export_is_that_of_the_program(program, tmp_path, format):
     with pytest.raises(dtof.Error, match="format xyz: must be csv"):
         run.export(tmp_path / "c.xyz")
     assert not list(tmp_path.glob(".dtof*"))
+
+
+def test_messages_name_keywords():
+    for text, expected in [
+        ("5 of 9 were left out: --cycles N takes more", "5 of 9 were left out: cycles=N takes more"),
+        ("--columns 32 makes 32x32", "columns=32 makes 32x32"),
+        ("pass --recorded-cycles N.", "pass recorded_cycles=N."),
+        ("--photons-per-cycle 0.5, an assumption", "photons_per_cycle=0.5, an assumption"),
+        ("--glass yes, --glass no; --fov HxV says", "glass=True, glass=False; fov=(H, V) says"),
+        ("--bin-width-ps takes picoseconds", "bin_width_ps takes picoseconds"),
+        ("a -- b --mask does not", "a -- b mask does not"),
+    ]:
+        assert _warn.with_keywords(text) == expected
+    with pytest.warns(UserWarning, match="bins of 0.250 ps: bin_width_ps takes picoseconds"):
+        dtof.replay(COUNTS, bin_width_ps=0.25)
+    found = dtof.calibrate(COUNTS)
+    assert found.found["offset"].startswith("not found: calibrate target_mm=D gives it")
+    texts = [*found.found.values(), *(text for _, text in found.remarks)]
+    assert not any("--" in text for text in texts) and any("recorded_cycles=N" in text for text in texts)
+
+
+def test_photons_that_are_left_out_are_warned_of():
+    with pytest.warns(
+        UserWarning, match=r"^[\d,]+ of [\d,]+ recorded photons were left out: cycles=N takes more$"
+    ) as warned:
+        run = dtof.replay(COUNTS, photons_per_cycle=0.005)
+    assert run.statistics["not_replayed"] > 0 and warned[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        dtof.replay(COUNTS, photons_per_cycle=0.005, cycles=500)  # as requested
+        dtof.replay(COUNTS, photons_per_cycle=0.005, decide_once=True)
+        dtof.photons([0, 0], [3, 20_000], [5, 5])

@@ -4,6 +4,7 @@ import numpy
 import pytest
 
 import dtof
+from test_events import flags_of
 
 
 @pytest.fixture(scope="module")
@@ -27,8 +28,8 @@ def mean_of_one_surface(ranges):
 
 def test_the_depth_map_has_the_last_range_of_each_pixel(run):
     events = run.events
-    depth = dtof.depth_map(events, run.array, echo="all")
-    mean = dtof.depth_map(events, run.array, echo="all", mean=True)
+    depth = dtof.depth_map(events, run.array, echo="all", mean=False)
+    mean = dtof.depth_map(events, run.array, echo="all")
     assert depth.shape == (6, 8)
     for pixel in range(48):
         ranges = events["range_mm"][events["pixel"] == pixel]
@@ -37,17 +38,52 @@ def test_the_depth_map_has_the_last_range_of_each_pixel(run):
             last, recent = ranges[-1], mean_of_one_surface(ranges)
         assert depth.flat[pixel] == pytest.approx(last, nan_ok=True)
         assert mean.flat[pixel] == pytest.approx(recent, nan_ok=True)
-    first = run.depth_map(echo="first")
-    assert (first <= run.depth_map(echo="last")).all()
+    first = run.depth_map(echo="first", mean=False)
+    assert (first <= run.depth_map(echo="last", mean=False)).all()
     none = dtof.depth_map(events[:0], run.array)
     assert none.shape == (6, 8) and numpy.isnan(none).all()
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {},
+        {"mask": [5], "neighbours": 8, "offsets_mm": [pixel % 5 for pixel in range(64)]},
+        {"binning": 2, "photons_per_cycle": 0.01, "patience": 8},
+        {"decide_once": True},
+        {"rule": "window", "sigma_bins": 0.5, "echoes": 2},
+        {"frame": 100},
+    ],
+)
+def test_the_depth_map_is_depth_npy_and_the_points_of_pixels(program, tmp_path, options):
+    random = numpy.random.default_rng(6)
+    counts = random.poisson(1.4, (8, 8, 64))
+    near, far = (numpy.exp(-0.5 * (numpy.arange(64) + 0.5 - place) ** 2) for place in (30.2, 50.7))
+    counts[:, :4] += random.poisson(40 * near, (8, 4, 64))
+    counts[:, 2:] += random.poisson(30 * far, (8, 6, 64))
+    numpy.save(tmp_path / "counts.npy", counts)
+    program("replay", tmp_path / "counts.npy", "--out", tmp_path / "out", *flags_of(options))
+    run = dtof.replay(counts, **options)
+    depth = run.depth_map()
+    assert numpy.array_equal(depth, numpy.load(tmp_path / "out/depth.npy"), equal_nan=True)
+    assert (~numpy.isnan(depth)).sum() > 30
+    # One point for each, at that depth.
+    points = run.points(one_per_pixel=True)
+    assert points["pixel"].tolist() == numpy.flatnonzero(~numpy.isnan(depth)).tolist()
+    distance = numpy.sqrt(sum(points[axis].astype(float) ** 2 for axis in "xyz"))
+    assert 1000 * distance == pytest.approx(depth[~numpy.isnan(depth)], abs=0.01)
+    run.export(tmp_path / "points.ply", one_per_pixel=True)
+    text = (tmp_path / "points.ply").read_bytes()
+    assert b"\nelement vertex %d\n" % points.size in text and text.endswith(points.tobytes())
+    program("export", tmp_path / "out/events.aer", "--format", "ply", "--out", tmp_path / "b.ply", "--one-per-pixel")
+    assert (tmp_path / "b.ply").read_bytes() == text
 
 
 def test_reflectivity_follows_its_formulas(run):
     events = run.events
     by_events = dtof.reflectivity(events, run.array, of="events", echo="all")
     by_signal = run.reflectivity(echo="first")
-    mean = run.depth_map(echo="all", mean=True)
+    mean = run.depth_map(echo="all")
     for pixel in range(48):
         own = events[events["pixel"] == pixel]
         expected = own.size * mean.flat[pixel] ** 2

@@ -92,10 +92,20 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
     );
     row(
         "offset",
-        found.offset.map_or("not found".to_owned(), |offset| {
-            let error = 1.96 * offset.error_mm;
-            format!("{:.1} mm (± {error:.1})", offset.mm)
-        }),
+        match (found.offset, found.target_mm) {
+            (Some(offset), _) => {
+                let error = 1.96 * offset.error_mm;
+                format!("{:.1} mm (± {error:.1})", offset.mm)
+            }
+            (None, None) => {
+                "not found: calibrate --target-mm D gives it, from a flat target at D mm; \
+                             --offset-mm sets it"
+                    .to_owned()
+            }
+            (None, Some(distance)) => {
+                format!("not found: too few pixels see a target at {distance} mm")
+            }
+        },
     );
     if let Some(pixels) = &found.pixel_offsets {
         let lowest = pixels.mm.iter().copied().fold(0.0, f64::min);

@@ -199,6 +199,16 @@ impl Options {
         });
         metadata.warnings.extend(warning);
         let requested = requested.or(settings_of_file(&metadata, photons.array()));
+        if !self.has_file() && choosing.is_empty() && requested.detection.rule.is_none() {
+            let detection = &requested.detection;
+            for (key, is_on) in [
+                ("neighbours", detection.neighbours.unwrap_or(0) > 0),
+                ("tracking", detection.tracking == Some(true)),
+            ] {
+                let reason = "needs the pulse, which was not found in the recording: give `rule` window and `sigma_bins`";
+                ensure!(!is_on, Refused::new(key, reason));
+            }
+        }
         let settings = requested.settings(metadata.bins)?;
         let settings = settings.for_source(photons.as_ref());
         let settings = settings.map_err(|error| requested.add_file_name(error))?;

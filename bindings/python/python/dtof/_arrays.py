@@ -148,15 +148,21 @@ def _array_of(value: Any, name: str) -> Any:
 
 
 def photon_columns(photons: Any, name: str) -> list[Any]:
-    """Pixel, cycle and bin of a table, or of an array with fields."""
-    names = photons.columns if is_table(photons) else photons.dtype.names
-    missing = [column for column in PHOTON if column not in names]
-    if missing:
-        raise Error(
-            f"{name}: {missing[0]} is missing: photons have pixel, cycle and bin; "
-            "histograms are arrays, as from .to_numpy()"
-        )
-    return [photons[column] for column in PHOTON]
+    """Pixel, cycle and bin of a table, or of an array with fields, in any case."""
+    names = list(photons.columns if is_table(photons) else photons.dtype.names)
+    columns = []
+    for column in PHOTON:
+        found = [one for one in names if one == column]
+        found = found or [one for one in names if str(one).strip().lower() == column]
+        if not found:
+            raise Error(
+                f"{name}: {column} is missing: photons have pixel, cycle and bin; "
+                "histograms are arrays, as from .to_numpy()"
+            )
+        if len(found) > 1:
+            raise Error(f"{name}: {column} is there {len(found)} times: rename the others")
+        columns.append(photons[found[0]])
+    return columns
 
 
 def is_table(value: Any) -> bool:

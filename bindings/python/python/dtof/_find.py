@@ -14,7 +14,7 @@ from ._arrays import native_input, recording_input
 from ._keywords import CalibrateOptions, CompareOptions, Settings, TuneOptions, takes
 from ._options import arguments, settings_text
 from ._run import Progress, scene_of
-from ._warn import warn
+from ._warn import rows_of, warn
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -99,8 +99,8 @@ def calibrate(
     return Calibration(
         settings=json.loads(found["settings"]),
         toml=found["toml"],
-        found=dict(found["rows"]),
-        remarks=found["remarks"],
+        found=dict(rows_of(found["rows"])),
+        remarks=rows_of(found["remarks"]),
         changes=dict(found["changes"]),
         report=found["report"],
     )
@@ -133,8 +133,8 @@ def compare(
         settings=found["settings"] and json.loads(found["settings"]),
         toml=found["toml"],
         fastest_toml=found["fastest_toml"],
-        answer=dict(found["rows"]),
-        able=dict(found["able"]),
+        answer=dict(rows_of(found["rows"])),
+        able=dict(rows_of(found["able"])),
         methods=_table(found["table"]),
         stress=_table(found["stress"]),
         chart=found["chart"],

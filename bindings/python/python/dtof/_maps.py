@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 
-def depth_map(events: Any, array: Array, *, mean: bool = False, echo: Echo = "strongest") -> numpy.ndarray:
-    """The range of the last event of each pixel in millimetres, rows by columns; NaN without one.
+def depth_map(events: Any, array: Array, *, mean: bool = True, echo: Echo = "strongest") -> numpy.ndarray:
+    """The depth of each pixel in millimetres, rows by columns; NaN without an event.
 
-    An event of a block counts for all of its pixels that have not reported since. With ``mean`` it
-    is the mean of those of the last ten that lie on one surface, where most of them lie; an event of
-    a block then counts for pixels that have never reported by themselves or in a smaller block. ``echo`` selects the echo of each exposure: ``"first"``,
-    ``"last"``, ``"strongest"`` or ``"all"``.
+    It is that of ``depth.npy``: the mean of those of the last ten events that lie on one surface, where most of
+    them lie. An event of a block counts for pixels that have never reported by themselves or in a smaller block.
+    With ``mean=False`` it is the range of the last event, also of a block if the pixel has not reported since.
+    ``echo`` selects the echo of each exposure: ``"first"``, ``"last"``, ``"strongest"`` or ``"all"``.
     """
     maps = _native.maps(records_of(events), array, arguments(PointsOptions, {"echo": echo}))
     return numpy.array(maps["mean_mm" if mean else "last_mm"]).reshape(array.shape)
@@ -46,7 +46,7 @@ def points(events: Any, array: Array, **options: Unpack[PointsOptions]) -> numpy
     The records are those of ``dtof export --format pcd``. ``fov=(horizontal, vertical)`` is in
     degrees (default 60 across the longer side), ``calibration`` is a file with a ray for each
     pixel, ``laser_hz`` the laser rate in hertz (default that of ``array``, or 10 MHz), ``echo``
-    selects the echo of each exposure (default ``"all"``).
+    selects the echo of each exposure (default ``"all"``), ``one_per_pixel=True`` gives the depth map.
     """
     keywords = arguments(PointsOptions, options)
     return numpy.frombuffer(_native.points(records_of(events), array, keywords), dtype=POINT)

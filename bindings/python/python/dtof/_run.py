@@ -60,7 +60,7 @@ class Replay:
         rows = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in totals)
         return f"<table>{rows}</table>{depth_image(depth)}"
 
-    def depth_map(self, *, mean: bool = False, echo: Echo = "strongest") -> numpy.ndarray:
+    def depth_map(self, *, mean: bool = True, echo: Echo = "strongest") -> numpy.ndarray:
         """See :func:`dtof.depth_map`."""
         return depth_map(self.events, self.array, mean=mean, echo=echo)
 
@@ -99,11 +99,13 @@ def replay(recorded: Any, *, axis: int = -1, progress: Progress = None, **option
     them instead: ``axes="captures,rows,columns,bins"``. At most 65,536 pixels and 4096 bins.
 
     ``photons_per_cycle`` (1.0, in the brightest pixel) or ``recorded_cycles`` determine how long
-    histograms were recorded. ``cycles`` (10,000) laser cycles are replayed with random ``seed`` (1).
+    histograms were recorded. ``cycles`` (10,000) laser cycles are replayed with random ``seed`` (1); a warning
+    counts the photons after them, unless ``cycles`` is given.
     ``decide_once`` takes all photons for one decision a pixel: see :attr:`Replay.confidence`.
     ``settings`` is the name or the text of a settings file, a dict of its sections, or a calibration, a
     comparison or a run. Without ``settings`` and without an option of detection, the settings are those of
-    :func:`calibrate`. Options of reports and files are not available:
+    :func:`calibrate`: ``statistics["found"]``. ``mask``, ``neighbours``, ``tracking`` and ``decide_once`` keep that.
+    Options of reports and files are not available:
     ``echo``, ``dynamic_depth``, ``threshold_mm``, ``reference`` and ``no_csv``.
 
     ``progress(done, total)`` is called about 20 times a second with laser cycles. An exception in it

@@ -272,6 +272,14 @@ fn without_findings_the_defaults_hold() {
     assert_eq!(settings["rule"], "paper");
     let summary = scratch.replayed(&list, "");
     assert_eq!(&summary["settings"]["rule"], "paper");
+    // What needs a pulse says so.
+    for option in ["--neighbours", "--tracking"] {
+        let value = if option == "--tracking" { "" } else { "=8" };
+        let output = scratch.run(&format!("replay short.npy --out other {option}{value}"));
+        let message = String::from_utf8(output.stderr).unwrap();
+        let reason = "needs the pulse, which was not found in the recording: give --rule window and --sigma-bins";
+        assert_contains(&message, &format!("error: {option} {reason}\n"));
+    }
     assert_eq!(summary["found"]["pulse"], "no peak is bright enough");
 }
 
