@@ -159,11 +159,7 @@ fn timing(bus_ms: u32) -> (Rc<Cell<u32>>, Timing<impl FnMut() -> u32, Timer>) {
     // The milliseconds wrap in the middle of it.
     let clock = Rc::new(Cell::new(u32::MAX - 100));
     let now = Rc::clone(&clock);
-    let timing = Timing {
-        now_ms: move || now.get(),
-        delay: Timer(Rc::clone(&clock)),
-        bus_ms,
-    };
+    let timing = Timing::new(move || now.get(), Timer(Rc::clone(&clock)), bus_ms);
     (clock, timing)
 }
 

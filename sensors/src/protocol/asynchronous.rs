@@ -14,13 +14,21 @@ use crate::{PhotonSink, Polled};
 /// Time for a driver: the clock, a timer, and how long the bus may take.
 #[derive(Clone, Debug)]
 pub struct Timing<N, D> {
-    /// Returns milliseconds, which may wrap.
-    pub now_ms: N,
-    /// A timer of the driver's own.
-    pub delay: D,
-    /// The most milliseconds that a poll may take. It has to cover the slowest poll of the sensor: a
-    /// chunk, or ten short transfers. 100 is enough at 100 kHz.
-    pub bus_ms: u32,
+    now_ms: N,
+    delay: D,
+    bus_ms: u32,
+}
+
+impl<N: FnMut() -> u32, D: DelayNs> Timing<N, D> {
+    /// `now_ms` returns milliseconds, which may wrap. `bus_ms` is the most that a poll may take. It has to
+    /// cover the longest poll of the sensor: a chunk, or ten short transfers. 100 is enough at 100 kHz.
+    pub const fn new(now_ms: N, delay: D, bus_ms: u32) -> Self {
+        Self {
+            now_ms,
+            delay,
+            bus_ms,
+        }
+    }
 }
 
 /// The output of the future that is ready first, or of the first one if both are.

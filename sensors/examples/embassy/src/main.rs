@@ -1,0 +1,38 @@
+#![doc = include_str!("../README.md")]
+#![no_std]
+#![no_main]
+
+mod depth;
+
+use defmt_rtt as _;
+use embassy_nrf::gpio::{Input, Level, Output, OutputDrive, Pull};
+use embassy_nrf::{bind_interrupts, peripherals::TWISPI0, twim};
+use embassy_time::{Delay, Instant};
+
+bind_interrupts!(struct Irqs { TWISPI0 => twim::InterruptHandler<TWISPI0>; });
+
+/// The vendor's program for the sensor.
+const PROGRAM: &[u8] = &[];
+
+#[embassy_executor::main]
+async fn main(_spawner: embassy_executor::Spawner) {
+    let p = embassy_nrf::init(Default::default());
+    let mut config = twim::Config::default();
+    config.frequency = twim::Frequency::K400;
+    let bus = twim::Twim::new(p.TWISPI0, Irqs, p.P0_26, p.P0_27, config, &mut []);
+    let int = Input::new(p.P0_28, Pull::Up);
+    let enable = Output::new(p.P0_29, Level::Low, OutputDrive::Standard);
+    let now_ms = || Instant::now().as_millis() as u32;
+    let timing = dtof_sensors::protocol::Timing::new(now_ms, Delay, 100);
+    depth::run((bus, int, enable), timing, PROGRAM, |report| match report {
+        Ok((pixel, range)) => defmt::info!("{}: {=i32} mm", pixel, range.round().to_num()),
+        Err(fault) => defmt::warn!("{}", fault),
+    })
+    .await
+}
+
+/// After a reset ENABLE is low, and with it the laser is off.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
+}
