@@ -21,6 +21,8 @@ use self::figures::Figures;
 
 const FOLDER: &str = "bindings/c";
 const HEADER: &str = "bindings/c/include/dtof.h";
+/// What the example of histograms prints.
+const MILLIMETRES: &str = "bindings/c/examples/histogram.out";
 const README: &str = "bindings/c/README.md";
 const TARGET: &str = "thumbv7em-none-eabihf";
 /// With these, an instruction takes 256 ns of the emulator's clock.
@@ -50,12 +52,18 @@ pub fn check(root: &Path, bless: bool) -> Result<()> {
     let expected = expected(root)?;
     let golden = printed(&mut Command::new(host.join("golden")))?;
     same("golden vectors here", &expected, &golden)?;
+    // A test of dtof-c compares this file with Rust.
+    let millimetres = fs::read_to_string(root.join(MILLIMETRES)).context(MILLIMETRES)?;
+    let histogram = printed(&mut Command::new(host.join("histogram")))?;
+    same("millimetres here", &millimetres, &histogram)?;
     examples::check(root, &host, &target)?;
 
     let board = build_for_board(root, &target)?;
     let golden = in_emulator(&board.join("golden"), &[])?;
     same("golden vectors in QEMU", &expected, &golden)?;
-    for image in ["golden", "count-c", "all-functions"] {
+    let histogram = in_emulator(&board.join("histogram"), &[])?;
+    same("millimetres in QEMU", &millimetres, &histogram)?;
+    for image in ["golden", "histogram", "count-c", "all-functions"] {
         no_panic(&board.join(image))?;
     }
     let [c, rust] = ["count-c", "count-rust"].map(|image| {
