@@ -112,7 +112,9 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
         let highest = pixels.mm.iter().copied().fold(0.0, f64::max);
         let text = match (pixels.mm.is_empty(), pixels.needs_field_of_view) {
             (true, false) => "none: pixels differ by no more than their noise".to_owned(),
-            (true, true) => "not found: the field of view is not known".to_owned(),
+            (true, true) => {
+                "not found: the field of view is not known; calibrate --fov HxV gives it".to_owned()
+            }
             (false, _) => format!(
                 "{lowest:.1} to {highest:.1} mm; without noise their standard deviation is {:.1} mm",
                 pixels.spread_mm

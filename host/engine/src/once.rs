@@ -379,7 +379,8 @@ fn confidence<const BINS: usize, W: CounterWidth>(
     };
     let [total, all_live] = sum(&each);
     // Windows that contain the highest bin, or all of them where bins are weighed.
-    let peak = usize::from(histogram.peak().bin.raw() - gate.first());
+    // That of an empty histogram is bin 0.
+    let peak = usize::from(histogram.peak().bin.raw().saturating_sub(gate.first()));
     let width = width(config);
     let is_tested = |start: usize| weighed.is_some() || (start..start + width).contains(&peak);
     let mut best = 0.0;

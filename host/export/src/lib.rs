@@ -69,6 +69,8 @@ named_values! {
 pub struct Options {
     /// The rays of the pixels.
     pub rays: RaySettings,
+    /// The settings file that was read, which is not replaced.
+    pub settings: Option<PathBuf>,
     /// The rate of the laser, by default that of the file, else the paper's 10 MHz.
     pub clock: Option<LaserClock>,
     /// The kind of events to export, if the file has depth events and changes of depth.
@@ -90,6 +92,7 @@ impl Default for Options {
     fn default() -> Self {
         Self {
             rays: RaySettings::default(),
+            settings: None,
             clock: None,
             kind: None,
             echo: Echo::All,
@@ -144,9 +147,12 @@ impl ProjectionOptions {
     /// # Errors
     /// Fails if the laser rate is 0.
     pub fn options(self, file: SettingsFile) -> Result<Options> {
-        let SettingsFile { sensor, rays, .. } = self.given.or(file);
+        let SettingsFile {
+            sensor, rays, file, ..
+        } = self.given.or(file);
         Ok(Options {
             rays,
+            settings: file.map(|file| file.path),
             clock: sensor.laser_hz.map(LaserClock::new).transpose()?,
             echo: self.echo.unwrap_or(match self.one_per_pixel {
                 true => Echo::Strongest, // as the maps of a run
@@ -202,8 +208,9 @@ pub fn export(
     progress: &mut dyn Progress,
 ) -> Result<ExportSummary> {
     let name = || input.display().to_string();
-    let calibration = options.rays.calibration.as_deref();
-    let inputs: Vec<&Path> = [input].into_iter().chain(calibration).collect();
+    let others = [&options.rays.calibration, &options.settings];
+    let others = others.into_iter().flatten().map(PathBuf::as_path);
+    let inputs: Vec<&Path> = [input].into_iter().chain(others).collect();
     let place = destination(out, &inputs)?;
     let survey =
         Survey::read(input, format, options.clock, options.echo, progress).with_context(name)?;

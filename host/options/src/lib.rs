@@ -339,10 +339,13 @@ pub fn named<T: Named>(text: &str) -> Result<T, String> {
 /// refused.
 ///
 /// # Errors
-/// Fails if it is `-`.
+/// Fails if it is `-` or empty.
 pub fn path(name: &OsStr) -> Result<PathBuf, String> {
     if name == "-" {
         return Err("standard input and output are not supported here; give a name".to_owned());
+    }
+    if name.is_empty() {
+        return Err("must be the name of a file or folder".to_owned());
     }
     Ok(name.into())
 }

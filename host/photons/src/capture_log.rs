@@ -2,10 +2,10 @@
 //! compressed with gzip.
 
 use std::fs::File;
-use std::io::{BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Error, Result, anyhow};
 use flate2::bufread::MultiGzDecoder;
 
 use crate::tmf8820::{self, Tmf8820Log};
@@ -28,9 +28,47 @@ pub fn read(path: &Path) -> Result<CaptureLog> {
     let mut file = BufReader::new(File::open(path).with_context(|| name.clone())?);
     let start = file.fill_buf().with_context(|| name.clone())?;
     if start.starts_with(&[0x1f, 0x8b]) {
-        parse(&name, BufReader::new(MultiGzDecoder::new(file)))
+        let unpacked = Unpacked {
+            file: MultiGzDecoder::new(file),
+            left: MOST_UNPACKED,
+        };
+        parse(&name, BufReader::new(unpacked))
     } else {
         parse(&name, file)
+    }
+}
+
+/// The most bytes of a compressed log. A small file may unpack to more than any memory holds.
+const MOST_UNPACKED: usize = 256 << 20;
+
+/// The text of a compressed log. Fails where it has more than [`MOST_UNPACKED`] bytes.
+struct Unpacked<R> {
+    file: R,
+    left: usize,
+}
+
+impl<R: Read> Read for Unpacked<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let read = self.file.read(bytes);
+        let read = read.map_err(|error| {
+            io::Error::new(
+                error.kind(),
+                format!("the compressed file is damaged: {error}"),
+            )
+        })?;
+        let left = self.left.checked_sub(read);
+        self.left = left.ok_or_else(|| {
+            io::Error::other("more than 256 MiB when unpacked; unpack it, as with gunzip")
+        })?;
+        Ok(read)
+    }
+}
+
+/// The error of a log that is not what its start looks like.
+pub(crate) fn not_a_log(name: &str, kind: &str, error: &serde_json::Error) -> Error {
+    match error.is_io() {
+        true => anyhow!("{name}: {error}"),
+        false => anyhow!("{name}:{}: not a {kind}: {error}", error.line()),
     }
 }
 

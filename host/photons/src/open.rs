@@ -180,6 +180,15 @@ impl CheckedRecording {
         }
     }
 
+    /// The array of one capture.
+    #[must_use]
+    pub fn array(&self) -> Array {
+        match &self.content {
+            Content::Histograms(counts) => counts.array,
+            Content::Photons(photons, _) => photons.array(),
+        }
+    }
+
     /// Its histograms. Photon lists are summed over the laser cycles that were requested.
     ///
     /// # Errors
@@ -428,6 +437,13 @@ fn log(path: &Path, options: &ReadOptions) -> Result<Content> {
             let counts = fit_bins(log.array, log.captures, bins, width, options);
             let mut counts = counts.with_context(in_file)?;
             counts.metadata.offset_mm = Some(OFFSET_MM);
+            if let (Some(shift), None) = (log.assumed_shift, options.bin_width_ps) {
+                let width = log.bin_width_ps;
+                counts.metadata.warnings.push(format!(
+                    "the log has no bin_shift: {shift} is taken, the sensor's default, with bins of {width:.1} ps; \
+                     --bin-width-ps gives another width"
+                ));
+            }
             counts.metadata.rows.splice(0..0, log.rows);
             counts
         }

@@ -31,6 +31,16 @@ struct Columns {
 }
 
 impl Columns {
+    /// The name of a column that a header has more than once.
+    fn twice(header: &str) -> Option<&'static str> {
+        let is = |name: &str, text: &str| text.trim().eq_ignore_ascii_case(name);
+        let number = |name: &str| {
+            let names = header.split([',', ';', '\t']);
+            names.filter(|text| is(name, text)).count()
+        };
+        NAMES.into_iter().find(|name| number(name) > 1)
+    }
+
     /// From a header: names in any order and case, between commas, semicolons or tabs. Other columns are left out.
     fn new(header: &str) -> Option<Self> {
         let separator = [',', ';', '\t']
@@ -74,6 +84,11 @@ impl PhotonReader for CsvReader {
         let header = rows.text().unwrap_or("bytes that are not UTF-8");
         let header = header.strip_prefix('\u{feff}').unwrap_or(header);
         let Some(columns) = Columns::new(header) else {
+            if let Some(twice) = Columns::twice(header) {
+                bail!(
+                    "{name}:1: the header must have the columns pixel, cycle and bin once, not {twice} twice"
+                );
+            }
             bail!(
                 "{name}:1: the header must have the columns pixel, cycle and bin, not {header:?}"
             );

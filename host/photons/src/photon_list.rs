@@ -9,6 +9,7 @@ use dtof_core::{Array, PixelAddress};
 use crate::input::Input;
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_options::Refused;
+use dtof_options::rows::grouped;
 
 /// A photon as written in a file: pixel, laser cycle and bin.
 pub type RawPhoton = [u64; 3];
@@ -137,6 +138,21 @@ impl<R: PhotonReader> Validator<R> {
     }
 }
 
+/// Refuses numbers that are times and no laser cycles: a replay would take hours for the laser cycles before the first
+/// photon. Photons come in the laser cycles from `first` to before `end`; an end before that has a warning.
+fn check_cycles(first: u64, end: u64) -> Result<(), Refused> {
+    const MANY: u64 = 10_000_000;
+    let span = end.saturating_sub(first);
+    if first < MANY || span == 0 || first <= span {
+        return Ok(());
+    }
+    let (first, span) = (grouped(first), grouped(span));
+    Err(Refused::input(format!(
+        "the first photon comes in laser cycle {first}, and all within {span}: count laser cycles from 0; times are no \
+         laser cycles"
+    )))
+}
+
 /// A checked photon list.
 pub struct PhotonList<R> {
     input: Input,
@@ -185,6 +201,7 @@ impl<R: PhotonReader> PhotonList<R> {
             most = most.max(of_span);
         }
         ensure!(photons > 0, "{}: no photons", rows.rows.place());
+        check_cycles(first_cycle, recorded.min(cycles)).with_context(|| input.to_string())?;
         let all = (0..=u16::MAX).filter(|&pixel| is_there[usize::from(pixel)]);
         let addresses: Vec<PixelAddress> = all.map(PixelAddress::new).collect();
         let mut places = vec![None; is_there.len()];

@@ -4,12 +4,13 @@
 
 use std::io::Read;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, ensure};
 use dtof_core::Array;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_sensors::tmf882x::{BIN_WIDTH_8X8_PS, BIN_WIDTH_PS, OFFSET_MM};
 use serde::Deserialize;
 
+use crate::capture_log::not_a_log;
 use crate::recorded::Capture;
 
 /// The centre of nine zones.
@@ -47,10 +48,8 @@ struct LogEntry {
 /// # Errors
 /// Returns what is wrong with the file, after its name and the line if there is one.
 pub fn read(name: &str, text: impl Read) -> Result<Tmf8820Log> {
-    let entries: Vec<LogEntry> = serde_json::from_reader(text).map_err(|error| {
-        let line = error.line();
-        anyhow!("{name}:{line}: not a TMF8820 capture log: {error}")
-    })?;
+    let entries: Vec<LogEntry> = serde_json::from_reader(text)
+        .map_err(|error| not_a_log(name, "TMF8820 capture log", &error))?;
     ensure!(!entries.is_empty(), "{name}: no captures");
     let all = entries[0].hists.len();
     let (array, axis_names, bin_width_ps, offset_mm) = match all {

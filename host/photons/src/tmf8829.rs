@@ -6,12 +6,13 @@
 
 use std::io::Read;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, ensure};
 use dtof_core::Array;
 use dtof_core::fixed::types::U16F16;
 use dtof_sensors::tmf8829::FINEST_BIN_PS;
 use serde::Deserialize;
 
+use crate::capture_log::not_a_log;
 use crate::recorded::Capture;
 use dtof_options::rows::Row;
 
@@ -31,6 +32,8 @@ pub struct Tmf8829Log {
     pub bin_width_ps: U16F16,
     /// The bins that were measured in full, from the first on: all, if the log does not say.
     pub measured_bins: usize,
+    /// The `bin_shift` that was assumed, if the log does not say.
+    pub assumed_shift: Option<u32>,
     /// What was left out.
     pub rows: Vec<Row>,
 }
@@ -66,10 +69,8 @@ struct Configuration {
 /// # Errors
 /// Returns what is wrong with the file, after its name and the line if there is one.
 pub fn read(name: &str, text: impl Read) -> Result<Tmf8829Log> {
-    let log: Log = serde_json::from_reader(text).map_err(|error| {
-        let line = error.line();
-        anyhow!("{name}:{line}: not a TMF8829 log: {error}")
-    })?;
+    let log: Log =
+        serde_json::from_reader(text).map_err(|error| not_a_log(name, "TMF8829 log", &error))?;
     parse_log(log).with_context(|| name.to_owned())
 }
 
@@ -114,9 +115,8 @@ fn parse_log(log: Log) -> Result<Tmf8829Log> {
         })
         .collect();
     let configuration = log.configuration.as_ref();
-    let shift = configuration
-        .and_then(|of| of.bin_shift)
-        .unwrap_or(BIN_SHIFT);
+    let known_shift = configuration.and_then(|of| of.bin_shift);
+    let shift = known_shift.unwrap_or(BIN_SHIFT);
     let width = 1u16
         .checked_shl(shift)
         .and_then(|own| FINEST_BIN_PS.checked_mul_int(own.into()));
@@ -133,6 +133,7 @@ fn parse_log(log: Log) -> Result<Tmf8829Log> {
         captures,
         bin_width_ps: width.with_context(|| format!("bin_shift {shift}: bins are too wide"))?,
         measured_bins: measured.unwrap_or(BINS),
+        assumed_shift: known_shift.is_none().then_some(shift),
         rows: is_copied
             .then(|| ("columns left out".to_owned(), copies))
             .into_iter()

@@ -7,7 +7,8 @@ use dtof_core::fixed::types::U8F8;
 use super::calibrate::calibrate_counts;
 use super::given::{Given, SENSOR, TDC, of_given};
 use super::recording::{
-    RECORDING, bin_width_warning, check_once_per_bin, read_options, settings_of_file, warnings,
+    RECORDING, bin_width_warning, check_once_per_bin, mask_capture, read_options, settings_of_file,
+    warnings,
 };
 use super::simulate::settings_of_scene;
 use dtof_calibrate::CalibrationOptions;
@@ -231,11 +232,12 @@ impl Options {
         &self,
         input: Input,
         truth: Option<&Input>,
-        requested: SettingsFile,
+        mut requested: SettingsFile,
         callbacks: &Callbacks,
     ) -> Result<Subject> {
         (callbacks.step)("reads the recording", 0.0)?;
         let counts = counts(&input, &read_options(&requested))?;
+        mask_capture(&mut requested, counts.array.pixels());
         self.given.suits(&input, &counts.metadata)?;
         let is_once_per_bin = requested.detection.once_per_bin == Some(true);
         check_once_per_bin(is_once_per_bin, counts.metadata.is_list)?;

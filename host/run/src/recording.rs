@@ -103,6 +103,22 @@ impl Given {
     }
 }
 
+/// Makes the pixels that are left out those of the capture that is used. They are addresses of all captures if one of
+/// them is past the `pixels` of a capture.
+pub(super) fn mask_capture(requested: &mut SettingsFile, pixels: u32) {
+    let (Some(capture), Some(masked)) = (requested.run.capture, &mut requested.sensor.masked)
+    else {
+        return;
+    };
+    if masked.iter().any(|&pixel| u32::from(pixel) >= pixels) {
+        let of_capture = |&pixel: &u16| {
+            let own = u32::from(pixel).checked_sub(capture.checked_mul(pixels)?)?;
+            u16::try_from(own).ok().filter(|_| own < pixels)
+        };
+        *masked = masked.iter().filter_map(of_capture).collect();
+    }
+}
+
 /// How to open a recording with these settings.
 #[must_use]
 pub fn read_options(requested: &SettingsFile) -> ReadOptions {

@@ -6,7 +6,9 @@ use anyhow::{Context, Result, ensure};
 
 use super::calibrate::calibrate_counts;
 use super::given::{FRAME, Given, SENSOR, TDC, of_given};
-use super::recording::{RECORDING, check_once_per_bin, read_options, settings_of_file};
+use super::recording::{
+    RECORDING, check_once_per_bin, mask_capture, read_options, settings_of_file,
+};
 use super::run::{RunResult, Sink, run};
 use dtof_calibrate::CalibrationOptions;
 use dtof_calibrate::report::rows;
@@ -180,6 +182,7 @@ impl Options {
             "{input} holds photons: only histograms are replayed in parts"
         );
         let mut requested = requested.clone();
+        mask_capture(&mut requested, recording.array().pixels());
         let choosing = self.choosing();
         let found = match self.has_file() || !choosing.is_empty() {
             true => Ok((Vec::new(), None)),

@@ -192,7 +192,7 @@ fn nothing_is_corrected_twice() {
     scratch.printed("export out/events.aer --format csv --settings biased.toml --out points.csv");
     let points = scratch.read("points.csv");
     let names: Vec<&str> = points.lines().next().unwrap().split(',').collect();
-    let forward = names.iter().position(|name| *name == "z").unwrap();
+    let forward = names.iter().position(|name| *name == "z_m").unwrap();
     let forward = points.lines().skip(1).map(|line| {
         let number = line.split(',').nth(forward).unwrap();
         number.parse::<f64>().unwrap()
@@ -200,9 +200,11 @@ fn nothing_is_corrected_twice() {
     let mut forward: Vec<f64> = forward.collect();
     forward.sort_by(f64::total_cmp);
     let spread = forward[forward.len() * 9 / 10] - forward[forward.len() / 10];
-    assert!(spread < 0.04, "{spread}");
+    // It is 0.15 with the bias twice.
+    assert!(spread < 0.06, "{spread}");
 
     // Offsets of pixels that are kept shift the offset of all.
+    scratch.file("target.npy", recording(&target(1200.0), &[0.0; PIXELS], 1));
     let fifty = ["50"; PIXELS].join(",");
     scratch.printed(&format!("{calibrate} --out plain.toml"));
     scratch.printed(&format!("{calibrate} --offsets-mm={fifty} --out kept.toml"));

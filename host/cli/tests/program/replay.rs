@@ -2,6 +2,7 @@
 
 mod arrays;
 mod captures;
+mod odd;
 mod opened;
 mod recorded;
 mod refused;

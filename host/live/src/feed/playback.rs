@@ -164,6 +164,7 @@ impl<'a> Player<'a> {
 
     fn fail(&mut self, error: &anyhow::Error, context: &FeedContext) {
         let reason = format!("{}: {error:#}", self.playback.name());
+        context.complain(&format!("{error:#}"));
         self.set_mode(Mode::Failed, &reason, context);
     }
 

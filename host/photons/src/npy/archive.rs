@@ -1,11 +1,11 @@
 //! `.npz` files: arrays by name in a zip archive.
 
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, Read};
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
-use zip::ZipArchive;
+use zip::{CompressionMethod, ZipArchive};
 
 use super::header::Array;
 use super::histograms::{Histograms, read_array};
@@ -51,10 +51,30 @@ fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histogr
     })?;
     let entry = zip.by_name(&format!("{chosen}.npy"));
     let entry = entry.with_context(|| format!("array {}", one_line(chosen)))?;
+    let method = entry.compression();
+    ensure!(
+        matches!(
+            method,
+            CompressionMethod::Stored | CompressionMethod::Deflated
+        ),
+        "array {}: its compression, {method}, is not known here; save it with numpy.savez or \
+         numpy.savez_compressed",
+        one_line(chosen)
+    );
     let length = entry.size();
-    let array = Array::read(BufReader::new(entry), length);
+    let mut entry = BufReader::new(entry);
+    let array = Array::read(&mut entry, length);
     let histograms = array.and_then(|array| read_array(array, axes));
-    histograms.with_context(|| format!("array {}", one_line(chosen)))
+    // The checksum is compared at the end of the data.
+    let checked = histograms.and_then(|histograms| {
+        let rest = entry.read(&mut [0]).context("the archive is damaged")?;
+        ensure!(
+            rest == 0,
+            "the archive is damaged: it has more data than it says"
+        );
+        Ok(histograms)
+    });
+    checked.with_context(|| format!("array {}", one_line(chosen)))
 }
 
 fn one_line(name: &str) -> String {

@@ -354,7 +354,7 @@ impl<'a> Literal<'a> {
 
     /// Lengths of axes.
     fn lengths(&self) -> Result<Vec<u64>> {
-        let wrong = || not_npy(format!("not lengths of axes: {}", self.text));
+        let wrong = || not_npy(format!("the shape {} is not lengths of axes", self.text));
         let (Value::Tuple(lengths) | Value::List(lengths)) = &self.value else {
             bail!(wrong());
         };
@@ -438,7 +438,8 @@ impl<'a> Literals<'a> {
                 Value::Dictionary(entries?.0)
             }
             _ => {
-                let is_part = |letter: char| letter.is_ascii_alphanumeric();
+                // A negative number is no length, but the error names it.
+                let is_part = |letter: char| letter.is_ascii_alphanumeric() || letter == '-';
                 let word = self.rest().split(|letter| !is_part(letter)).next();
                 let word = word.filter(|word| !word.is_empty());
                 let word = word.ok_or_else(|| not_npy("a part of its header is missing"))?;

@@ -2,7 +2,7 @@
 
 use std::io::Read;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, anyhow, bail, ensure};
 
 use super::header::{Array, Number};
 use crate::axes::{Axes, AxisLayout, index_of};
@@ -34,6 +34,11 @@ pub fn read(input: &Input, axes: Option<&Axes>) -> Result<Histograms> {
 /// Reads the elements of an array whose header has been read.
 pub(super) fn read_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Result<Histograms> {
     let (shape, fortran) = (array.shape.clone(), array.fortran);
+    if let ([_, columns @ 4..8], None) = (&shape[..], axes) {
+        bail!(Refused::input(format!(
+            "{columns} bins: must be from 8 to {MOST_BINS}; photons are rows of three: pixel, cycle and bin"
+        )));
+    }
     let layout = AxisLayout::new(&shape, fortran, axes)?;
     ensure!(
         layout.bins() <= MOST_BINS,

@@ -22,6 +22,7 @@ fn options_that_cannot_be_are_refused_in_one_line() {
         "calibration.toml",
         "columns = 64\nrows = 32\npixels = [\n]\n",
     );
+    scratch.file("own.toml", "[sensor]\nbins = 128\n");
     scratch.file("late.aer", file(&HEADER, &[depth(0, 1 << 60, 5)]));
     scratch.file("changes.aer", file(&HEADER, &[dynamic(5, 3, 40, -3)]));
     std::fs::create_dir(scratch.path("folder")).unwrap();
@@ -36,6 +37,8 @@ fn options_that_cannot_be_are_refused_in_one_line() {
             events.aer --format csv --out folder | folder: exists and is not a file
             events.aer --format csv --out /dev/null | is not a file
             events.aer --format csv --out ./events.aer | is an input file
+            events.aer --format csv --settings own.toml --out own.toml | own.toml: is an input file
+            events.aer --format csv --out= | --out
             events.aer --format csv --out x --fov 60 | HORIZONTALxVERTICAL
             events.aer --format csv --out x --fov 0x10 | HORIZONTALxVERTICAL
             events.aer --format csv --out x --laser-hz 0 | --laser-hz

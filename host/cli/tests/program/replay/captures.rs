@@ -76,6 +76,30 @@ fn one_capture_of_several_can_be_chosen() {
     );
 }
 
+/// `calibrate` masks a hot pixel in each capture.
+#[test]
+fn pixels_that_are_left_out_are_those_of_the_capture() {
+    let scratch = Scratch::new();
+    let counts: Vec<u8> = (0..3 * 4 * 16)
+        .map(|at| 1 + 99 * u8::from(at % 16 == 7))
+        .collect();
+    scratch.file("all.npy", npy("|u1", "(3, 2, 2, 16)", &counts));
+    scratch.file("mask.toml", "[sensor]\nmasked = [1, 5, 9, 10]\n");
+    let replay = "replay all.npy --axes captures,rows,columns,bins --out out";
+    for (options, masked) in [
+        ("--settings mask.toml --capture 0", "[1]"),
+        ("--settings mask.toml --capture 1", "[1]"),
+        ("--settings mask.toml --capture 2", "[1,2]"),
+        ("--settings mask.toml", "[1,5,9,10]"),
+        // As if the file had no other capture.
+        ("--capture 2 --mask 3", "[3]"),
+    ] {
+        scratch.printed(&format!("{replay} {options}"));
+        let settings = &scratch.summary()["settings"];
+        assert_eq!(settings["masked"].to_string(), masked, "{options}");
+    }
+}
+
 #[test]
 fn one_capture_of_a_log_has_its_own_truth() {
     let scratch = Scratch::new();

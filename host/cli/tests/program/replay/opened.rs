@@ -171,6 +171,45 @@ fn logs_that_are_damaged_are_refused() {
     );
 }
 
+#[test]
+fn a_log_without_a_bin_shift_is_read_with_a_warning() {
+    let log = |configuration: &str| tmf8829_log(|_, place| place, configuration);
+    let warned = counts_of("a.json", &log(""));
+    let [warning] = &warned.metadata.warnings[..] else {
+        panic!("{:?}", warned.metadata.warnings);
+    };
+    assert!(
+        warning.contains("no bin_shift: 2 is taken") && warning.contains("814.6 ps"),
+        "{warning}"
+    );
+    let known = counts_of("a.json", &log(", \"configuration\": {\"bin_shift\": 2}"));
+    assert_eq!(known.metadata.warnings, [""; 0]);
+}
+
+/// A small file may unpack to more than any memory holds.
+#[test]
+fn packed_logs_that_are_damaged_or_too_large_are_refused() {
+    let scratch = Scratch::new();
+    let packed = |name: &str, parts: usize, part: &[u8], behind: &[u8]| {
+        let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
+        for _ in 0..parts {
+            packed.write_all(part).unwrap();
+        }
+        let bytes = [packed.finish().unwrap(), behind.to_vec()].concat();
+        scratch.file(name, bytes);
+    };
+    let good = tmf8829_log(|_, place| place, "");
+    packed("behind.json.gz", 1, good.as_bytes(), b"garbage garbage");
+    packed("large.json.gz", 257, &[b' '; 1 << 20], b"");
+    scratch.all_refused(
+        "replay --out out --input",
+        "
+            behind.json.gz | behind.json.gz: the compressed file is damaged
+            large.json.gz | large.json.gz: more than 256 MiB when unpacked
+        ",
+    );
+}
+
 /// A photon list in memory gives the same photons and errors as a file.
 #[test]
 fn an_array_in_memory_is_read_as_its_file_is() {

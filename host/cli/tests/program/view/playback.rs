@@ -182,37 +182,55 @@ fn the_command_says_what_is_wrong() {
     );
 }
 
+/// The output of `dtof LINE`, which Ctrl-C ends once its page shows what `is_reached`.
 #[cfg(unix)]
-#[test]
-fn the_command_prints_its_address_and_ends_at_ctrl_c() {
+fn ended_by_ctrl_c(
+    scratch: &Scratch,
+    line: &str,
+    is_reached: fn(&serde_json::Value) -> bool,
+) -> std::process::Output {
     use std::io::{BufRead, BufReader};
     use std::process::{Command, Stdio};
 
-    let scratch = Scratch::new();
-    scratch.file("events.aer", recording());
-    let mut program = scratch
-        .command("view events.aer --speed 0.5")
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut command = scratch.command(line);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut program = command.spawn().unwrap();
     let mut line = String::new();
     let mut out = BufReader::new(program.stdout.take().unwrap());
     out.read_line(&mut line).unwrap();
-    let port = line
-        .strip_prefix("http://127.0.0.1:")
-        .unwrap()
-        .trim()
-        .trim_end_matches('/');
-    let port = port.parse().unwrap();
-    // Also while a page is open.
-    let mut page = Stream::open(port, 0);
-    page.until("playing", |frame| frame["events"].as_u64() > Some(0));
+    let port = line.trim().strip_prefix("http://127.0.0.1:").unwrap();
+    let port = port.trim_end_matches('/').parse().unwrap();
+    Stream::open(port, 0).until("reached", is_reached);
     let killed = Command::new("kill")
         .args(["-INT", &program.id().to_string()])
         .status();
     assert!(killed.unwrap().success());
-    let output = program.wait_with_output().unwrap();
+    program.wait_with_output().unwrap()
+}
+
+#[cfg(unix)]
+#[test]
+fn the_terminal_names_a_damaged_recording() {
+    let scratch = Scratch::new();
+    let whole = recording();
+    scratch.file("damaged.aer", &whole[..whole.len() - 7]);
+    let output = ended_by_ctrl_c(&scratch, "view damaged.aer --speed 100", |frame| {
+        frame["connection"]["state"] == "failed"
+    });
+    let lines = String::from_utf8(output.stderr).unwrap();
+    assert_contains(&lines, "damaged.aer: byte ");
+    assert_eq!(lines.lines().count(), 1, "{lines}");
+}
+
+#[cfg(unix)]
+#[test]
+fn the_command_prints_its_address_and_ends_at_ctrl_c() {
+    let scratch = Scratch::new();
+    scratch.file("events.aer", recording());
+    // Also while a page is open.
+    let output = ended_by_ctrl_c(&scratch, "view events.aer --speed 0.5", |frame| {
+        frame["events"].as_u64() > Some(0)
+    });
     assert!(
         output.status.success() && output.stderr.is_empty(),
         "{output:?}"
