@@ -86,14 +86,13 @@ fn run_replay(
     layout: Option<Layout>,
     control: &Control,
 ) -> Result<Finished> {
+    let is_part = layout.is_some();
     let mut replay = options.open_part(input, requested, layout)?;
     let mut records = Records::of(&replay.settings, &replay.photons)?;
     let result = replay.run(input, &mut records, &mut { control })?;
     let of_run = result.warnings.clone();
-    let left_out = match requested.run.cycles {
-        None => not_replayed(&result),
-        Some(_) => None, // as requested
-    };
+    let is_default = requested.run.cycles.is_none() && !is_part;
+    let left_out = is_default.then(|| not_replayed(&result)).flatten();
     Ok(Finished {
         records,
         result,

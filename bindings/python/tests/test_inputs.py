@@ -115,12 +115,17 @@ def test_messages_name_keywords():
     assert not any("--" in text for text in texts) and any("recorded_cycles=N" in text for text in texts)
 
 
-def test_photons_that_are_left_out_are_warned_of():
+def test_photons_that_are_left_out_are_warned_of(tmp_path):
     with pytest.warns(
         UserWarning, match=r"^[\d,]+ of [\d,]+ recorded photons were left out: cycles=N takes more$"
     ) as warned:
         run = dtof.replay(COUNTS, photons_per_cycle=0.005)
     assert run.statistics["not_replayed"] > 0 and warned[0].filename == __file__
+    # Any warning names the line of the user.
+    with pytest.warns(UserWarning, match="laser rate is not known.* laser_hz says another") as warned:
+        run.export(tmp_path / "points.csv")
+        dtof.export(tmp_path / "points.csv", run.events, run.array)
+    assert [warning.filename for warning in warned] == [__file__] * 2
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         dtof.replay(COUNTS, photons_per_cycle=0.005, cycles=500)  # as requested

@@ -58,7 +58,7 @@ def test_mistakes_are_one_line(run, installed, monkeypatch, tmp_path):
     file.write_bytes(b"nothing")
     with pytest.raises(dtof.Error, match="wrong.aer: "):
         dtof.view(file, browser=False)
-    with pytest.raises(dtof.Error, match="--speed"):
+    with pytest.raises(dtof.Error, match="^speed"):
         run.view(speed=-1, browser=False)
     with pytest.raises(dtof.Error, match="int: must be a run or the name of an AER file"):
         dtof.view(3)

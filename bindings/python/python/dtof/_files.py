@@ -96,9 +96,14 @@ def export(
     """Writes events as ``dtof export`` does, completely or not at all.
 
     ``format`` is csv, pcd, ply, mcap, ros2 or evt2, by default the extension of ``path``. Events are in the
-    order of their laser cycles.
+    order of their laser cycles. With ``one_per_pixel`` it is the depth map, a point a pixel.
     """
+    export_for(path, events, array, format, options)
+
+
+def export_for(path: Any, events: Any, array: Array, format: Optional[str], options: Any) -> None:
+    """:func:`export` for a function that the user calls. Warnings name the line that called that."""
     name = os.fspath(path)
     format = os.path.splitext(name)[1][1:].lower() if format is None else format
     warning = _native.export(name, format, records_of(events), array, arguments(PointsOptions, options))
-    warn([] if warning is None else [warning])
+    warn([] if warning is None else [warning], callers=3)

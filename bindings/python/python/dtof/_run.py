@@ -11,7 +11,7 @@ import numpy
 
 from . import _native
 from ._arrays import Array, array_of, events_of, is_table, native_input, photon_columns, photon_list, recording_input
-from ._files import export, write_events
+from ._files import export_for, write_events
 from ._html import depth_image
 from ._keywords import Echo, PointsOptions, ReplayOptions, SimulateOptions, takes
 from ._maps import depth_map, points, reflectivity
@@ -84,7 +84,7 @@ class Replay:
     @takes(PointsOptions)
     def export(self, path: Any, format: Optional[str] = None, **options: Unpack[PointsOptions]) -> None:
         """See :func:`dtof.export`."""
-        export(path, self.events, self.array, format, **options)
+        export_for(path, self.events, self.array, format, options)
 
 
 @takes(ReplayOptions)

@@ -11,7 +11,7 @@ import webbrowser
 from typing import Any, Optional
 
 from ._native import Error
-from ._warn import warn
+from ._warn import warn, with_keywords
 
 
 class View:
@@ -42,7 +42,7 @@ class View:
                 self.close()
                 complaints.seek(0)
                 lines = complaints.read().splitlines() or ["the program dtof has shown no page"]
-                raise Error(lines[-1].removeprefix("error: "))
+                raise Error(with_keywords(lines[-1].removeprefix("error: ")))
 
     def wait(self) -> None:
         """Waits until the page ends, as by Ctrl-C."""
