@@ -1,4 +1,19 @@
 #![doc = include_str!("../README.md")]
+//! ## Async
+//!
+//! With the feature `async`, `next` of a driver ([`protocol::Driver`]) waits for INT, reads, and returns once the
+//! sink has photons or a histogram. A bus that hangs ends with `BusTimeout`. What a dropped future loses
+//! is counted. In `examples/embassy` the loop is:
+//!
+//! ```text
+//! let mut timing = Timing::new(|| Instant::now().as_millis() as u32, Delay, 100); // a poll takes 100 ms at most
+//! loop {
+//!     if let Err(error) = sensor.next(&mut timing, &mut sink).await {
+//!         warn!("{}", error); // the next call starts the sensor again
+//!     }
+//! }
+//! ```
+//!
 //! ## After an error
 //!
 //! A driver keeps in its state what it waits for, and the time is an argument of
