@@ -1,4 +1,5 @@
-//! ams OSRAM TMF8829: 8×8 to 48×32 zones of raw histograms over I²C, at most 1 MHz, or SPI, at most 20 MHz.
+//! ams OSRAM TMF8829: 8×8 to 48×32 zones of raw histograms over I²C, at most 1 MHz, or SPI, at most
+//! 20 MHz.
 //!
 //! The sensor's program is the vendor's and not part of this crate. Pass the bytes of its image to
 //! the driver. It is loaded when the bootloader runs; a sensor that already runs the application
