@@ -8,14 +8,18 @@ use std::path::Path;
 
 /// The images a board runs, each with the features of the boards it is for.
 const IMAGES: [(&str, &[&str]); 5] = [
-    ("bench", &["MPS2_AN386", "PICO", "STM32F405"]),
+    ("bench", &["MPS2_AN386", "PICO", "PICO2", "STM32F405"]),
     ("sidecar-mps2-an386", &["MPS2_AN386"]),
-    ("sidecar-pico", &["PICO"]),
+    ("sidecar-pico", &["PICO", "PICO2"]),
     ("sidecar-stm32f405", &["STM32F405"]),
-    ("self-test", &["MPS2_AN386", "PICO", "STM32F405"]),
+    ("self-test", &["MPS2_AN386", "PICO", "PICO2", "STM32F405"]),
 ];
 /// The targets of boards; elsewhere the linker's own layout does.
-const TARGETS: [&str; 2] = ["thumbv6m-none-eabi", "thumbv7em-none-eabihf"];
+const TARGETS: [&str; 3] = [
+    "thumbv6m-none-eabi",
+    "thumbv7em-none-eabihf",
+    "thumbv8m.main-none-eabihf",
+];
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
@@ -45,6 +49,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             // and cargo starts it where the other board's is.
             Some(&"MPS2_AN386") => link(image, &format!("-T{}", mps2_an386(&here)?)),
             Some(&"PICO") => link(image, &format!("-T{here}/memory/pico.x")),
+            Some(&"PICO2") => link(image, &format!("-T{here}/memory/pico2.x")),
             Some(&"STM32F405") => {
                 link(image, &format!("-L{here}/.."));
                 link(image, "-Tlink.x");

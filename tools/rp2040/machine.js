@@ -80,6 +80,9 @@ export class Machine {
     this.input = [];
     this.nextInput = 0;
     this.onOutput = () => {};
+    /** The same of the UART if the serial port is that of the USB. */
+    this.uartInput = [];
+    this.onUartOutput = () => {};
     /** The device of the USB has gone from the host, which had its port open. */
     this.onGone = () => {};
     /** Clocks of events. */
@@ -128,8 +131,10 @@ export class Machine {
     });
     this.chip = chip;
     if (this.host === null) {
+      this.uartInput = this.input;
       chip.rp2040.uart[0].onByte = (byte) => this.onOutput(byte);
     } else {
+      chip.rp2040.uart[0].onByte = (byte) => this.onUartOutput(byte);
       this.host.attach(chip.rp2040.usbCtrl);
     }
     // Asked once a sample and else the sum of 30 pins.
@@ -280,7 +285,7 @@ export class Machine {
   /** Lets time pass until something happens, without instructions. */
   pass(until) {
     const from = this.clocks;
-    const toInput = this.input.length > 0 ? this.nextInput : Infinity;
+    const toInput = this.hasInput ? this.nextInput : Infinity;
     const plant = this.plantFrom > from ? this.plantFrom : Infinity;
     const next = Math.min(until, this.nextAlarm, this.chip.pio.due, this.nextChange, toInput, plant);
     this.advance(Math.max(from + 1, Math.ceil(next)));
@@ -301,9 +306,13 @@ export class Machine {
     if (pio.runs) {
       this.pioClocks += until - from;
     }
-    if (this.input.length > 0 && this.clocks >= this.nextInput) {
+    if (this.hasInput && this.clocks >= this.nextInput) {
       this.feed();
     }
+  }
+
+  get hasInput() {
+    return this.input.length > 0 || this.uartInput.length > 0;
   }
 
   advanceInSteps(until) {
@@ -326,15 +335,14 @@ export class Machine {
     }
   }
 
-  /** Gives the serial port the next byte, or of the USB the next packet, if it has room. */
+  /** Gives the UART the next byte, and the USB the next packet, if they have room. */
   feed() {
     const [uart] = this.rp2040.uart;
-    if (this.host !== null) {
-      if (this.host.send(this.input)) {
-        this.lastInput = this.clocks;
-      }
-    } else if (!uart.rxFIFO.full) {
-      uart.feedByte(this.input.shift());
+    if (this.host !== null && this.input.length > 0 && this.host.send(this.input)) {
+      this.lastInput = this.clocks;
+    }
+    if (this.uartInput.length > 0 && !uart.rxFIFO.full) {
+      uart.feedByte(this.uartInput.shift());
       this.lastInput = this.clocks;
       this.nextInput = this.clocks + CLOCKS_A_BYTE;
     }

@@ -17,6 +17,7 @@ node run.js IMAGE [options]
                   record the pulses of this pin; without it those of pin 2, the laser's
   --usb           put the serial port of the USB there, not the UART. A client that connects
                   opens it (DTR and RTS), and one that disconnects closes it
+  --uart N        with --usb: put the UART on this TCP port
   --plant KIND@MS plant a fault, so many milliseconds after the laser's first pulse. KIND is
                     fault       an undefined instruction: a hard fault
                     hang        a loop without end; interrupts go on
@@ -58,6 +59,7 @@ function main() {
       attached: { type: 'boolean' },
       count: { type: 'boolean' },
       usb: { type: 'boolean' },
+      uart: { type: 'string' },
       report: { type: 'boolean' },
       warn: { type: 'boolean' },
       help: { type: 'boolean', short: 'h' },
@@ -93,6 +95,9 @@ function main() {
   }
   if (values.attached) {
     process.stdin.on('end', () => machine.end(0)).resume();
+  }
+  if (values.uart !== undefined) {
+    serveUart(machine, whole('uart'));
   }
   serve(machine, whole('port'), whole('for') ?? null, done);
 }
@@ -169,6 +174,16 @@ function serve(machine, port, forMs, done) {
     }
   };
   server.listen(port, '127.0.0.1', turn);
+}
+
+/** Puts the UART of a machine whose serial port is the USB's on a TCP port. */
+function serveUart(machine, port) {
+  const server = createServer({ noDelay: true }, (socket) => {
+    machine.onUartOutput = (byte) => socket.write(Uint8Array.of(byte));
+    socket.on('data', (bytes) => machine.uartInput.push(...bytes));
+    socket.on('error', () => {});
+  });
+  server.listen(port, '127.0.0.1');
 }
 
 function finish(machine, report) {

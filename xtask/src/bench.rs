@@ -131,7 +131,7 @@ pub fn rows(output: &str, level: &str) -> Result<Vec<Row>> {
 pub fn beside(root: &Path, board: Board, rows: &[Row]) -> Result<String> {
     let like = match board {
         Board::Pico => Board::Pico,
-        Board::Mps2An386 | Board::Stm32F405 => Board::Mps2An386,
+        Board::Mps2An386 | Board::Pico2 | Board::Stm32F405 => Board::Mps2An386,
     };
     let of_like = PROCESSORS.iter().find(|processor| processor.board == like);
     let file = of_like.context("no figures of this board")?.file;

@@ -37,9 +37,13 @@ pub fn install_rp2040js() -> Result<()> {
 
 /// The reason to skip the emulator of `board`, if there is one.
 pub fn cannot_run(board: Board) -> Result<Option<String>> {
-    if board == Board::Pico {
-        install_rp2040js()?;
-        return Ok(None);
+    match board {
+        Board::Pico => {
+            install_rp2040js()?;
+            return Ok(None);
+        }
+        Board::Pico2 => return Ok(Some("pico2: linked and not run: it has no emulator".into())),
+        Board::Mps2An386 | Board::Stm32F405 => {}
     }
     let version = QEMU.require()?;
     let cannot = board == Board::Stm32F405 && !version.contains(KNOWN);
@@ -49,11 +53,11 @@ pub fn cannot_run(board: Board) -> Result<Option<String>> {
     }))
 }
 
-/// The command that starts an image. In QEMU, `word` is its command line.
+/// The command that starts an image. In QEMU, `word` is its command line. [`cannot_run`] must have no reason.
 pub fn command(board: Board, image: &Path, port: Option<u16>, word: Option<&str>) -> Command {
     match board {
         Board::Pico => rp2040js(image, port),
-        Board::Mps2An386 | Board::Stm32F405 => qemu(board, image, port, word),
+        Board::Mps2An386 | Board::Pico2 | Board::Stm32F405 => qemu(board, image, port, word),
     }
 }
 

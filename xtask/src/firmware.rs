@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::laser::Laser;
-use crate::{cargo, layout, target_folder, toolchain, uf2};
+use crate::{cargo, cargo_home, layout, target_folder, toolchain, uf2};
 
 const PROFILE: &str = "firmware";
 const SMALL_PROFILE: &str = "firmware-small";
@@ -19,26 +19,57 @@ const SMALL_PROFILE: &str = "firmware-small";
 pub enum Board {
     Mps2An386,
     Pico,
+    Pico2,
     Stm32F405,
 }
 
 impl Board {
-    pub const ALL: [Self; 3] = [Self::Mps2An386, Self::Pico, Self::Stm32F405];
+    pub const ALL: [Self; 4] = [Self::Mps2An386, Self::Pico, Self::Pico2, Self::Stm32F405];
 
     /// The name of the board and of its feature.
     pub fn name(self) -> &'static str {
         match self {
             Self::Mps2An386 => "mps2-an386",
             Self::Pico => "pico",
+            Self::Pico2 => "pico2",
             Self::Stm32F405 => "stm32f405",
         }
     }
 
+    /// Its name for people.
+    pub fn full_name(self) -> &'static str {
+        match self {
+            Self::Mps2An386 => "MPS2 AN386",
+            Self::Pico => "Raspberry Pi Pico",
+            Self::Pico2 => "Raspberry Pi Pico 2",
+            Self::Stm32F405 => "STM32F405, STM32F407",
+        }
+    }
+
     /// The compilation target of its processor.
-    fn target(self) -> &'static str {
+    pub fn target(self) -> &'static str {
         match self {
             Self::Mps2An386 | Self::Stm32F405 => "thumbv7em-none-eabihf",
             Self::Pico => "thumbv6m-none-eabi",
+            Self::Pico2 => "thumbv8m.main-none-eabihf",
+        }
+    }
+
+    /// The family ID of its chip, if it takes images as files.
+    pub fn uf2_family(self) -> Option<u32> {
+        match self {
+            Self::Mps2An386 | Self::Stm32F405 => None,
+            Self::Pico => Some(uf2::RP2040),
+            Self::Pico2 => Some(uf2::RP2350_ARM_S),
+        }
+    }
+
+    /// The binary of its sidecar. Both Picos have one.
+    fn sidecar(self) -> &'static str {
+        match self {
+            Self::Mps2An386 => "sidecar-mps2-an386",
+            Self::Pico | Self::Pico2 => "sidecar-pico",
+            Self::Stm32F405 => "sidecar-stm32f405",
         }
     }
 
@@ -88,7 +119,7 @@ impl Board {
     pub fn bench(self, root: &Path, small: bool) -> Result<PathBuf> {
         let profile = if small { SMALL_PROFILE } else { PROFILE };
         let features = [self.name(), "bench"];
-        link(root, self.target(), "bench", &features, None, profile)
+        link(root, self, "bench", &features, None, profile)
     }
 
     fn link(
@@ -98,20 +129,20 @@ impl Board {
         more: &[&str],
         program: Option<&Program>,
     ) -> Result<PathBuf> {
-        let sidecar = format!("sidecar-{}", self.name());
-        let (image, feature) = match what {
-            Build::Sidecar => (&*sidecar, None),
-            Build::With(sensor) => (&*sidecar, Some(sensor.feature())),
-            Build::SelfTest => ("self-test", Some("self-test")),
+        let binary = match what {
+            Build::SelfTest => "self-test",
+            _ => self.sidecar(),
         };
         let board = [self.name()].into_iter();
-        let features: Vec<&str> = board.chain(feature).chain(more.iter().copied()).collect();
-        let image = link(root, self.target(), image, &features, program, PROFILE)?;
+        let features = board.chain(what.feature()).chain(more.iter().copied());
+        let features: Vec<&str> = features.collect();
+        let image = link(root, self, binary, &features, program, PROFILE)?;
         if let Some(laser) = Laser::read(&image)? {
             eprintln!("{}", laser.text());
         }
-        if self == Self::Pico {
-            eprintln!("to copy onto the board: {}", uf2::write(&image)?.display());
+        if let Some(family) = self.uf2_family() {
+            let file = uf2::write(&image, family)?;
+            eprintln!("to copy onto the board: {}", file.display());
         }
         Ok(image)
     }
@@ -213,6 +244,15 @@ impl Build {
         }
     }
 
+    /// Its feature besides that of the board.
+    pub fn feature(self) -> Option<&'static str> {
+        match self {
+            Self::Sidecar => None,
+            Self::With(sensor) => Some(sensor.feature()),
+            Self::SelfTest => Some("self-test"),
+        }
+    }
+
     /// The names of the images of a board.
     fn names(board: Board) -> String {
         let sensors = Sensor::of(board).iter();
@@ -238,7 +278,7 @@ impl Sensor {
     pub fn of(board: Board) -> &'static [Self] {
         match board {
             Board::Mps2An386 => &[],
-            Board::Pico => &[Self::PhotonTimer],
+            Board::Pico | Board::Pico2 => &[Self::PhotonTimer],
             Board::Stm32F405 => &[Self::Tdc7200, Self::Tmf8829, Self::Tmf882x, Self::Tmf8828],
         }
     }
@@ -259,7 +299,7 @@ impl Sensor {
 
     /// The variable with the path of the sensor's own program, for `firmware/build.rs`, and the most
     /// bytes: the bootloader of a TMF8820/21/28 takes 65,536 bytes, that of a TMF8829 4,096 words.
-    fn image(self) -> Option<(&'static str, usize)> {
+    pub fn image(self) -> Option<(&'static str, usize)> {
         match self {
             Self::PhotonTimer | Self::Tdc7200 => None,
             Self::Tmf8829 => Some(("TMF8829_IMAGE", 1 << 14)),
@@ -308,18 +348,25 @@ fn check_program(bytes: &[u8], most: usize) -> Result<()> {
 /// Links one image. Returns the path of a copy that no other image replaces.
 fn link(
     root: &Path,
-    target: &str,
-    image: &str,
+    board: Board,
+    binary: &str,
     features: &[&str],
     program: Option<&Program>,
     profile: &str,
 ) -> Result<PathBuf> {
+    let target = board.target();
     toolchain::ensure_target(target)?;
     let target_folder = target_folder(root);
     let folder = target_folder.join("images");
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    let is_sidecar = binary == board.sidecar();
+    let image = if is_sidecar {
+        format!("sidecar-{}", board.name())
+    } else {
+        binary.to_owned()
+    };
     let more = features.iter().filter(|&&feature| !image.contains(feature));
-    let name: Vec<&str> = iter::once(image).chain(more.copied()).collect();
+    let name: Vec<&str> = iter::once(&*image).chain(more.copied()).collect();
     let name = name.join("+");
     if !is_kept(&folder, &name) {
         eprintln!("building {name} for the first time");
@@ -334,23 +381,45 @@ fn link(
     }
     let status = cargo
         .current_dir(root)
+        .env("CARGO_ENCODED_RUSTFLAGS", compiler_flags(root)?)
         .args(["build", "--locked", "--package", "dtof-firmware"])
         .args((!io::stderr().is_terminal()).then_some("--quiet"))
-        .args(["--bin", image, "--features", &features.join(",")])
+        .args(["--bin", binary, "--features", &features.join(",")])
         .args(["--target", target, "--profile", profile, "--target-dir"])
         .arg(&target_folder)
         .status()
         .context("cargo does not start")?;
     ensure!(status.success(), "{image} does not build, see above");
 
-    let built = target_folder.join(target).join(profile).join(image);
-    layout::check(&built, image == "bench")?;
+    let built = target_folder.join(target).join(profile).join(binary);
+    layout::check(&built, binary == "bench")?;
     let kept = folder.join(match Laser::read(&built)? {
         Some(laser) => format!("{name}+{}", laser.file_name()),
         None => name,
     });
     fs::copy(&built, &kept).with_context(|| built.display().to_string())?;
     Ok(kept)
+}
+
+/// The compiler's flags of the environment, and those that keep paths of this machine out of the image.
+fn compiler_flags(root: &Path) -> Result<String> {
+    let mut flags: Vec<String> = match env::var("CARGO_ENCODED_RUSTFLAGS") {
+        Ok(flags) => vec![flags],
+        Err(_) => {
+            let flags = env::var("RUSTFLAGS").unwrap_or_default();
+            flags.split_whitespace().map(Into::into).collect()
+        }
+    };
+    let mut remap =
+        |from: &Path, to: &str| flags.push(format!("--remap-path-prefix={}={to}", from.display()));
+    remap(&root.canonicalize()?, ".");
+    let registries = cargo_home()?.join("registry/src");
+    // None before the first download.
+    for registry in fs::read_dir(registries).into_iter().flatten() {
+        remap(&registry?.path(), "crates");
+    }
+    flags.retain(|flag| !flag.is_empty());
+    Ok(flags.join("\u{1f}"))
 }
 
 /// Whether the folder has an image of this name. The numbers of its laser may follow the name.

@@ -13,6 +13,7 @@ pub fn chip(board: Board) -> Result<&'static str> {
     match board {
         Board::Mps2An386 => bail!("{} is emulated only", board.name()),
         Board::Pico => Ok("RP2040"),
+        Board::Pico2 => Ok("RP235x"),
         Board::Stm32F405 => Ok("STM32F407VGTx"),
     }
 }

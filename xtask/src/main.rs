@@ -11,6 +11,7 @@ mod image;
 mod laser;
 mod layout;
 mod python;
+mod release;
 mod self_test;
 mod sizes;
 mod toolchain;
@@ -35,9 +36,9 @@ cargo xtask <command>
                 need an administrator, and fails if a tool is still missing
   image BOARD [SENSOR | self-test] [--emulator] [--count8] [LASER]
                 build an image and print its path: the sidecar or the self-test.
-                BOARD is mps2-an386, pico or stm32f405. SENSOR is tdc7200, tmf8829,
-                tmf882x or tmf8828-8x8 on stm32f405, photon-timer on pico. For pico it also
-                writes a .uf2, to copy onto the board without a probe. --emulator builds for
+                BOARD is mps2-an386, pico, pico2 or stm32f405. SENSOR is tdc7200, tmf8829,
+                tmf882x or tmf8828-8x8 on stm32f405, photon-timer on pico and pico2. For these
+                two it also writes a .uf2, to copy onto the board without a probe. --emulator builds for
                 QEMU, with its slower clock and without the sensor's own program. --count8 gives
                 pixels counters of 8 bits, and the board room for more. LASER is
                 --laser-beyond-limits (the photon timer may have pulses over 1 us and a duty
@@ -53,6 +54,8 @@ cargo xtask <command>
   emulate [--port PORT] [BOARD] [exit | panic | fault | overflow]
                 run the sidecar of a board (mps2-an386) in its emulator, with its serial
                 port on a TCP port (5386). The last word makes mps2-an386 end that way
+  release       write the images of boards that need no vendor's program to out/release, with
+                licences and SHA-256 sums
   sizes         print flash, RAM and stack of each image
   check-image [--all]
                 link dtof-core for every target: no panic, float or allocation.
@@ -185,6 +188,7 @@ fn run() -> Result<()> {
             };
             emulate::emulate(root, board, options.port, end)?;
         }
+        ("release", []) => release::release(root)?,
         ("sizes", []) => sizes::print(root)?,
         ("check-image", []) => image::check(root, options.all)?,
         ("self-test", []) if options.bless => self_test::bless(root)?,
@@ -215,6 +219,13 @@ fn root() -> Result<&'static Path> {
 fn target_folder(root: &Path) -> PathBuf {
     let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
     root.join(folder)
+}
+
+/// The folder of cargo's registry.
+fn cargo_home() -> Result<PathBuf> {
+    let home = || Some(env::home_dir()?.join(".cargo"));
+    let folder = env::var_os("CARGO_HOME").map(PathBuf::from).or_else(home);
+    folder.context("no CARGO_HOME")
 }
 
 /// Runs a command that must succeed. Its input is empty, so it cannot ask.

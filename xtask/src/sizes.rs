@@ -24,13 +24,15 @@ const ARRAYS: [(u64, u64); 7] = [
     (128, MOST_BLOCKS),
     (MOST_PIXELS, MOST_BLOCKS),
 ];
-/// The most that the sidecar may take of the real board: 84 KiB of flash, 20 KiB more with the
+/// The most that the sidecar may take of the STM32F405: 84 KiB of flash, 20 KiB more with the
 /// driver of a sensor, and its 128 KiB of RAM less the reserve for the stack. Decisions take most
 /// of the flash: they are compiled for the 10-bit counters of pixels, the 16-bit counters of blocks
 /// and, with a TMF8820/21/28, the 24-bit counters of its histograms.
 const MOST_FLASH: u64 = 84 * 1024;
 const MOST_FLASH_WITH_SENSOR: u64 = 104 * 1024;
 const MOST_RAM: u64 = 128 * 1024 - STACK_RESERVE;
+/// All of the 520 KiB of a Pico 2 but for the stack and 1 KiB, for its boot ROM.
+const MOST_RAM_OF_PICO2: u64 = 519 * 1024 - STACK_RESERVE;
 /// Bytes of RAM that each linker script reserves for the stack.
 const STACK_RESERVE: u64 = 19 * 1024;
 /// Bytes of the reserve that an image may need; the rest is for the report of a panic.
@@ -63,6 +65,12 @@ pub fn print(root: &Path) -> Result<()> {
                 left == STACK_RESERVE,
                 "its linker script gives the stack {left} bytes, not {STACK_RESERVE}"
             );
+            if board == Board::Pico2 {
+                ensure!(
+                    ram <= MOST_RAM_OF_PICO2,
+                    "more than {MOST_RAM_OF_PICO2} bytes of RAM"
+                );
+            }
             if board == Board::Stm32F405 {
                 // The first is the one without a sensor.
                 let most = if of_pixels.is_none() {

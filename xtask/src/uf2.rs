@@ -10,14 +10,15 @@ use object::{Endianness, elf};
 
 /// Bytes of flash per block: a flash page.
 const PAGE: u32 = 256;
-/// The family ID of the RP2040.
-const FAMILY: u32 = 0xe48b_ff56;
+/// The family ID of the RP2040, and of programs for the Arm processors of the RP2350 in secure state.
+pub const RP2040: u32 = 0xe48b_ff56;
+pub const RP2350_ARM_S: u32 = 0xe48b_ff59;
 /// Flag: the field after the sizes is the family ID.
 const HAS_FAMILY: u32 = 0x2000;
 const FLASH: std::ops::Range<u32> = 0x1000_0000..0x1100_0000;
 
-/// Writes `IMAGE.uf2` beside an image. Returns its path.
-pub fn write(image: &Path) -> Result<PathBuf> {
+/// Writes `IMAGE.uf2` beside an image, for a family of chips. Returns its path.
+pub fn write(image: &Path, family: u32) -> Result<PathBuf> {
     let name = || image.display().to_string();
     let bytes = fs::read(image).with_context(name)?;
     let file = ElfFile32::<Endianness>::parse(&*bytes).with_context(name)?;
@@ -30,7 +31,7 @@ pub fn write(image: &Path) -> Result<PathBuf> {
         }
     }
     let path = image.with_added_extension("uf2");
-    fs::write(&path, blocks(&pages)?).with_context(|| path.display().to_string())?;
+    fs::write(&path, blocks(&pages, family)?).with_context(|| path.display().to_string())?;
     Ok(path)
 }
 
@@ -45,7 +46,7 @@ fn add(pages: &mut BTreeMap<u32, [u8; PAGE as usize]>, address: u32, bytes: &[u8
 }
 
 /// A block of 512 bytes for each page.
-fn blocks(pages: &BTreeMap<u32, [u8; PAGE as usize]>) -> Result<Vec<u8>> {
+fn blocks(pages: &BTreeMap<u32, [u8; PAGE as usize]>, family: u32) -> Result<Vec<u8>> {
     let count = u32::try_from(pages.len())?;
     let mut blocks = Vec::new();
     for (number, (&address, page)) in (0u32..).zip(pages) {
@@ -57,7 +58,7 @@ fn blocks(pages: &BTreeMap<u32, [u8; PAGE as usize]>) -> Result<Vec<u8>> {
             PAGE,
             number,
             count,
-            FAMILY,
+            family,
         ];
         blocks.extend(head.iter().flat_map(|word| word.to_le_bytes()));
         blocks.extend(page);
@@ -76,13 +77,17 @@ mod tests {
         let mut pages = BTreeMap::new();
         add(&mut pages, 0x1000_0000, &[1; 256]).unwrap();
         add(&mut pages, 0x1000_01fe, &[2, 3, 4]).unwrap();
-        let blocks = blocks(&pages).unwrap();
+        for family in [RP2040, RP2350_ARM_S] {
+            let blocks = blocks(&pages, family).unwrap();
+            assert_eq!(blocks[28..32], family.to_le_bytes());
+        }
+        let blocks = blocks(&pages, 0xe48b_ff59).unwrap();
         assert_eq!(blocks.len(), 3 * 512);
         let word = |at: usize| u32::from_le_bytes(blocks[at..at + 4].try_into().unwrap());
         for (number, block) in (0..3).zip((0..).step_by(512)) {
             let head = [0, 8, 12, 16, 20, 24, 28].map(|at| word(block + at));
             let address = 0x1000_0000 + 256 * number;
-            let expected = [0x0a32_4655, 0x2000, address, 256, number, 3, 0xe48b_ff56];
+            let expected = [0x0a32_4655, 0x2000, address, 256, number, 3, 0xe48b_ff59];
             assert_eq!(head, expected);
             assert_eq!(word(block + 508), 0x0ab1_6f30);
         }

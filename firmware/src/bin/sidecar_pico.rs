@@ -1,4 +1,4 @@
-//! The sidecar on a Raspberry Pi Pico: `cargo xtask flash pico`.
+//! The sidecar on a Raspberry Pi Pico, and on a Pico 2: `cargo xtask flash pico`, `cargo xtask flash pico2`.
 
 #![no_std]
 #![no_main]
@@ -20,11 +20,17 @@ use dtof_sensors::simulated;
 use heapless::Vec;
 use static_cell::ConstStaticCell;
 
-/// As many macropixels as leave room for blocks and the stack.
-const MOST_PIXELS: usize = if cfg!(feature = "count8") { 800 } else { 512 };
+/// As many macropixels as leave room for blocks and the stack, and all blocks of 16 x 16 or 32 x 32 macropixels in
+/// three levels.
+const MOST_PIXELS: usize = match (cfg!(feature = "pico2"), cfg!(feature = "count8")) {
+    (false, false) => 512,
+    (false, true) => 800,
+    (true, false) => 1024,
+    (true, true) => 1600,
+};
+const MOST_BLOCKS: usize = if cfg!(feature = "pico2") { 336 } else { 84 };
 static PIXELS: ConstStaticCell<Vec<Pixel, MOST_PIXELS>> = ConstStaticCell::new(Vec::new());
-/// The blocks of 16 x 16 macropixels in three levels.
-static BLOCKS: ConstStaticCell<Vec<Block, 84>> = ConstStaticCell::new(Vec::new());
+static BLOCKS: ConstStaticCell<Vec<Block, MOST_BLOCKS>> = ConstStaticCell::new(Vec::new());
 
 /// 100 kHz and pulses of 100 ns, unless `LASER_HZ` and `LASER_PULSE_NS` say otherwise when
 /// the image is built.

@@ -13,7 +13,7 @@
 pub mod fault;
 #[cfg(all(target_os = "none", feature = "mps2-an386"))]
 pub mod mps2_an386;
-#[cfg(all(target_os = "none", feature = "pico"))]
+#[cfg(all(target_os = "none", feature = "pico-boards"))]
 pub mod pico;
 #[cfg(all(target_os = "none", feature = "board"))]
 mod report;
@@ -25,11 +25,14 @@ mod transmit;
 
 // Each board defines the interrupt handlers of the image.
 #[cfg(any(
-    all(feature = "mps2-an386", feature = "pico"),
+    all(feature = "mps2-an386", feature = "pico-boards"),
     all(feature = "mps2-an386", feature = "stm32f405"),
-    all(feature = "pico", feature = "stm32f405")
+    all(feature = "pico-boards", feature = "stm32f405"),
+    all(feature = "pico", feature = "pico2")
 ))]
-compile_error!("an image is for one board: choose one of mps2-an386, pico and stm32f405");
+compile_error!("an image is for one board: choose one of mps2-an386, pico, pico2 and stm32f405");
+#[cfg(all(feature = "pico-boards", not(any(feature = "pico", feature = "pico2"))))]
+compile_error!("choose pico or pico2");
 
 #[cfg(any(
     all(feature = "sensor-tdc7200", feature = "sensor-tmf8829"),
@@ -42,7 +45,7 @@ compile_error!("an image is for one sensor: choose one of the features sensor-*"
 pub use self::fault::on_panic;
 #[cfg(all(target_os = "none", feature = "mps2-an386"))]
 use self::mps2_an386 as chip;
-#[cfg(all(target_os = "none", feature = "pico"))]
+#[cfg(all(target_os = "none", feature = "pico-boards"))]
 use self::pico as chip;
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
 use self::stm32f405 as chip;
@@ -57,7 +60,10 @@ use crate::sidecar::{Block, Pixel, Sidecar};
 
 /// Whether the image drives a real sensor, and with it a laser. The watchdog then runs on while a
 /// debugger halts the processor: otherwise the laser would stay on.
-#[cfg(all(target_os = "none", any(feature = "pico", feature = "stm32f405")))]
+#[cfg(all(
+    target_os = "none",
+    any(feature = "pico-boards", feature = "stm32f405")
+))]
 const DRIVES_SENSOR: bool = cfg!(any(
     feature = "sensor-photon-timer",
     feature = "sensor-tdc7200",

@@ -67,16 +67,42 @@ impl ResetReason {
     /// watchdog: the boot ROM ends the copying of an image by the same watchdog.
     #[must_use]
     pub const fn of_rp2040(reason: u32, chip_reset: u32, watched: bool) -> Self {
-        const TIMER: u32 = 1 << 0;
-        const FORCE: u32 = 1 << 1;
         /// Power-on or brown-out.
         const HAD_POR: u32 = 1 << 8;
-        // Resets of the whole chip clear the first register and what the image has left of the
-        // watchdog; the second register outlives the others.
+        let of_chip = if chip_reset & HAD_POR != 0 {
+            Self::PowerOn
+        } else {
+            Self::Reset
+        };
+        of_chip.or_watchdog(reason, watched)
+    }
+
+    /// The same of an RP2350: `REASON` of its watchdog and `CHIP_RESET` of `POWMAN` (RP2350 datasheet,
+    /// 12.9.7 and 6.4).
+    #[must_use]
+    pub const fn of_rp2350(reason: u32, chip_reset: u32, watched: bool) -> Self {
+        const HAD_POR: u32 = 1 << 16;
+        const HAD_BOR: u32 = 1 << 17;
+        let of_chip = if chip_reset & HAD_POR != 0 {
+            Self::PowerOn
+        } else if chip_reset & HAD_BOR != 0 {
+            Self::BrownOut
+        } else {
+            Self::Reset
+        };
+        of_chip.or_watchdog(reason, watched)
+    }
+
+    /// This reason of a reset of the whole chip, unless the watchdog or the processor was reset after it.
+    const fn or_watchdog(self, reason: u32, watched: bool) -> Self {
+        const TIMER: u32 = 1 << 0;
+        const FORCE: u32 = 1 << 1;
+        // Resets of the whole chip clear `REASON` and what the image has left of the watchdog; `CHIP_RESET`
+        // outlives the others.
         if reason & TIMER != 0 && watched {
             Self::Watchdog
-        } else if reason & (TIMER | FORCE) == 0 && chip_reset & HAD_POR != 0 && !watched {
-            Self::PowerOn
+        } else if reason & (TIMER | FORCE) == 0 && !watched {
+            self
         } else {
             Self::Reset
         }
@@ -173,6 +199,33 @@ mod tests {
             (3, POR, false, Reset),
         ] {
             let found = ResetReason::of_rp2040(reason, chip_reset, watched);
+            assert_eq!(found, expected, "{reason:#x} {chip_reset:#x} {watched}");
+        }
+    }
+
+    #[test]
+    fn rp2350() {
+        const POR: u32 = 1 << 16;
+        const BOR: u32 = 1 << 17;
+        const RUN: u32 = 1 << 18;
+        const RSM: u32 = 1 << 28;
+        for (reason, chip_reset, watched, expected) in [
+            (0, POR, false, PowerOn),
+            (0, POR | BOR, false, PowerOn),
+            (0, BOR, false, BrownOut),
+            // Of the processor alone.
+            (0, POR, true, Reset),
+            (0, BOR, true, Reset),
+            (0, RUN, false, Reset),
+            (0, 0, false, Reset),
+            (1, RSM, true, Watchdog),
+            (1, POR, true, Watchdog),
+            // The boot ROM's own.
+            (1, RSM, false, Reset),
+            (2, RSM, true, Reset),
+            (2, POR, false, Reset),
+        ] {
+            let found = ResetReason::of_rp2350(reason, chip_reset, watched);
             assert_eq!(found, expected, "{reason:#x} {chip_reset:#x} {watched}");
         }
     }

@@ -38,9 +38,9 @@ const PHASES_MS: [f64; 4] = [0.0, 0.0025, 0.005, 0.0097];
 const RAM: u64 = 0x2000_0000;
 
 /// The host timeout here; the default would take a minute of emulation.
-const HOST_TIMEOUT_MS: u16 = 300;
+pub const HOST_TIMEOUT_MS: u16 = 300;
 /// The round of the main loop that stops the sensor, and the round of the keep-alive before it.
-const ROUND_MS: f64 = 2.0;
+pub const ROUND_MS: f64 = 2.0;
 
 /// A fault and its consequences.
 struct Fault {
@@ -129,8 +129,13 @@ impl Port for Cut {
 
 /// A host that has started the laser, and the switch that cuts its line.
 fn light(board: &mut Rp2040) -> Result<(Client, Arc<AtomicBool>)> {
-    let is_cut = Arc::new(AtomicBool::new(false));
     let port = board.connect()?;
+    light_over(port)
+}
+
+/// The same over a port.
+pub fn light_over(port: Box<dyn Port>) -> Result<(Client, Arc<AtomicBool>)> {
+    let is_cut = Arc::new(AtomicBool::new(false));
     let mut client = Client::new(Box::new(Cut {
         port,
         is_cut: is_cut.clone(),
@@ -149,7 +154,7 @@ fn light(board: &mut Rp2040) -> Result<(Client, Arc<AtomicBool>)> {
 
 /// The milliseconds for which the laser has fired after `from`, and for which it has been off since.
 /// Fails if a pulse had the wrong length.
-fn dark_since(from: f64, done: &Done) -> Result<(f64, f64)> {
+pub fn dark_since(from: f64, done: &Done) -> Result<(f64, f64)> {
     let laser = &done.laser;
     let last = laser.last_high_ms.context("the laser never fired")?;
     let (lit, dark) = (last - from, done.end_ms - last);
@@ -264,9 +269,9 @@ fn start(image: &Path, over_usb: bool) -> Result<Rp2040> {
 }
 
 /// From the last byte of the host, which ends a frame.
-const SILENCE_MS: RangeInclusive<f64> =
+pub const SILENCE_MS: RangeInclusive<f64> =
     HOST_TIMEOUT_MS as f64 - ROUND_MS..=HOST_TIMEOUT_MS as f64 + ROUND_MS;
-const AT_ONCE_MS: RangeInclusive<f64> = -ROUND_MS..=ROUND_MS;
+pub const AT_ONCE_MS: RangeInclusive<f64> = -ROUND_MS..=ROUND_MS;
 
 #[test]
 fn laser_goes_dark_when_its_host_ends_its_session_or_is_cut_off() -> Result<()> {
@@ -323,7 +328,7 @@ fn laser_goes_dark_when_the_usb_is_reset() -> Result<()> {
 }
 
 /// Waits until the laser has fired often enough.
-fn fires(client: &mut Client) -> Result<()> {
+pub fn fires(client: &mut Client) -> Result<()> {
     let start = Instant::now();
     while client.report()?.cycles < 1500 {
         ensure!(

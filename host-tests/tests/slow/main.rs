@@ -17,6 +17,7 @@ mod hil;
 mod histograms;
 mod laser;
 mod pico;
+mod ports;
 mod readers;
 mod report;
 mod rp2040;

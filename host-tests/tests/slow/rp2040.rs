@@ -58,6 +58,8 @@ fn folder() -> PathBuf {
 pub struct Rp2040 {
     child: Child,
     port: u16,
+    /// That of the UART, if `port` is that of the USB.
+    uart: Option<u16>,
 }
 
 /// The report of a run. Times are those of the image, in milliseconds since power-on.
@@ -147,12 +149,26 @@ impl Rp2040 {
         Self::spawn(ending_after(node, for_ms))
     }
 
+    /// Starts an image with the serial ports of the USB and of the UART.
+    pub fn start_with_both(image: &Path) -> Result<Self> {
+        let [uart, _] = free_ports()?;
+        let mut node = command(image);
+        node.args(["--usb", "--uart", &uart.to_string()]);
+        let mut board = Self::spawn(node)?;
+        board.uart = Some(uart);
+        Ok(board)
+    }
+
     fn spawn(mut node: Command) -> Result<Self> {
         let [port, _] = free_ports()?;
         node.args(["--port", &port.to_string(), "--from", "2", "--attached"]);
         let child = node.stdin(Stdio::piped()).stderr(Stdio::piped()).spawn();
         let child = child.context("node does not start")?;
-        Ok(Self { child, port })
+        Ok(Self {
+            child,
+            port,
+            uart: None,
+        })
     }
 
     /// Its serial port, as an argument for `dtof --device`.
@@ -163,6 +179,12 @@ impl Rp2040 {
     /// Connects to its serial port.
     pub fn connect(&mut self) -> Result<Box<dyn Port>> {
         let device = self.device();
+        open(&mut self.child, || dtof_device::open(&device, None))
+    }
+
+    /// Connects to its UART, if its serial port is that of the USB.
+    pub fn connect_uart(&mut self) -> Result<Box<dyn Port>> {
+        let device = format!("tcp:127.0.0.1:{}", self.uart.context("no UART")?);
         open(&mut self.child, || dtof_device::open(&device, None))
     }
 

@@ -7,7 +7,7 @@
 //! `SysTick` comes round after 2.6 million. The emulator of the Pico, told by `--count`,
 //! advances it by 1 an instruction.
 //!
-//! The STM32F405 has the counter: there it is clock cycles, as on a real Pico.
+//! The STM32F405 and the Pico 2 have the counter: there it is clock cycles, as on a real Pico.
 
 use crate::State;
 
@@ -96,7 +96,7 @@ mod hardware {
     }
 }
 
-#[cfg(feature = "stm32f405")]
+#[cfg(any(feature = "pico2", feature = "stm32f405"))]
 mod hardware {
     use cortex_m::peripheral::DWT;
 

@@ -1,4 +1,5 @@
-//! Raspberry Pi Pico: RP2040 with a flash of 2 MiB, a crystal of 12 MHz.
+//! Raspberry Pi Pico, and Pico 2: RP2040 with a flash of 2 MiB, RP2350 with one of 4 MiB. Both have a crystal
+//! of 12 MHz and the same pins. The images of the Pico 2 have never run: see `rp2350.rs`.
 //!
 //! | | |
 //! |---|---|
@@ -17,6 +18,10 @@
 
 #[cfg(feature = "sensor-photon-timer")]
 mod photon_timer;
+#[cfg(feature = "pico")]
+mod rp2040;
+#[cfg(feature = "pico2")]
+mod rp2350;
 #[cfg(feature = "sensor-photon-timer")]
 mod sample_rings;
 mod usb;
@@ -30,16 +35,20 @@ use cortex_m_rt::exception;
 use critical_section::Mutex;
 use defmt_rtt as _;
 use embedded_io::WriteReady;
-use rp2040_hal::clocks::init_clocks_and_plls;
-use rp2040_hal::fugit::{ExtU32, RateExtU32};
-use rp2040_hal::gpio::bank0::{Gpio0, Gpio1};
-use rp2040_hal::gpio::{FunctionUart, Pin, Pins, PullDown, PullUp};
-use rp2040_hal::pac::{self, Interrupt, UART0, interrupt};
-use rp2040_hal::uart::{DataBits, Reader, StopBits, UartConfig, UartPeripheral, Writer};
-use rp2040_hal::watchdog::{ScratchRegister, Watchdog};
-use rp2040_hal::{Clock, Sio};
 use static_cell::ConstStaticCell;
 
+use self::chip::hal::fugit::{ExtU32, RateExtU32};
+use self::chip::hal::gpio::bank0::{Gpio0, Gpio1};
+use self::chip::hal::gpio::{FunctionUart, Pin, Pins, PullDown, PullUp};
+use self::chip::hal::pac::{self, Interrupt, UART0, interrupt};
+use self::chip::hal::uart::{DataBits, Reader, StopBits, UartConfig, UartPeripheral, Writer};
+use self::chip::hal::watchdog::{ScratchRegister, Watchdog};
+use self::chip::hal::{Clock, Sio};
+use self::chip::init_clocks_and_plls;
+#[cfg(feature = "pico")]
+use self::rp2040 as chip;
+#[cfg(feature = "pico2")]
+use self::rp2350 as chip;
 use self::usb::Usb;
 use super::reset_reason::{self, ResetReason};
 use super::{Board, DRIVES_SENSOR, Transmitter, systick, transmit};
@@ -50,12 +59,6 @@ const CRYSTAL_HZ: u32 = 12_000_000;
 /// In a scratch register of the watchdog, which a reset by it leaves as it is: the image has
 /// started the watchdog.
 const WATCHED: u32 = 0xd70f_0d06;
-
-/// The chip's ROM loads this first: it sets the flash up for reading.
-#[unsafe(link_section = ".boot2")]
-#[used]
-#[allow(unsafe_code, reason = "the name of the section places it")]
-static BOOT2: [u8; 256] = rp2040_boot2::BOOT_LOADER_W25Q080;
 
 type UartPins = (
     Pin<Gpio0, FunctionUart, PullDown>,
@@ -112,16 +115,14 @@ impl Pico {
         else {
             panic!("the board is started twice");
         };
+        let watched = device.WATCHDOG.scratch0().read().bits() == WATCHED;
+        let reset_reason =
+            reset_reason::take().unwrap_or_else(|| chip::reset_reason(&device, watched));
         let mut resets = device.RESETS;
         // A debugger may have reset the processor alone: what an image had started goes on.
         let reset = resets.reset();
         reset.modify(|_, w| w.pio0().set_bit().dma().set_bit());
-        let cause = device.WATCHDOG.reason().read().bits();
-        let chip_reset = device.VREG_AND_CHIP_RESET.chip_reset().read().bits();
         let mut watchdog = Watchdog::new(device.WATCHDOG);
-        let watched = watchdog.read_scratch(ScratchRegister::Scratch0) == WATCHED;
-        let reset_reason =
-            reset_reason::take().unwrap_or(ResetReason::of_rp2040(cause, chip_reset, watched));
         let Ok(clocks) = init_clocks_and_plls(
             CRYSTAL_HZ,
             device.XOSC,
@@ -157,12 +158,11 @@ impl Pico {
         let (mut rx, tx) = uart.split();
         rx.enable_rx_interrupt();
         let (interrupt, serial) = BUFFERS.take().split(Self::start_sending);
-        let usb = Usb::start(
-            device.USBCTRL_REGS,
-            device.USBCTRL_DPRAM,
-            clocks.usb_clock,
-            &mut resets,
-        );
+        #[cfg(feature = "pico")]
+        let (registers, memory) = (device.USBCTRL_REGS, device.USBCTRL_DPRAM);
+        #[cfg(feature = "pico2")]
+        let (registers, memory) = (device.USB, device.USB_DPRAM);
+        let usb = Usb::start(registers, memory, clocks.usb_clock, &mut resets);
         let port = Port {
             interrupt,
             tx,
@@ -217,15 +217,15 @@ pub(super) fn laser_off() {
 
 /// Resets all of the chip: its processor can reset itself alone, and the PIO would go on.
 pub(super) fn end() -> ! {
-    rp2040_hal::reset()
+    chip::hal::reset()
 }
 
 /// Whether the watchdog waits while a debugger halts the processor. Only once it has started:
-/// rp2040-hal overwrites the register when it starts the watchdog, and its own function would stop
+/// the chip's crate overwrites the register when it starts the watchdog, and its own function would stop
 /// it.
 fn pause_watchdog_on_debug(pause: bool) {
     // SAFETY: the watchdog goes on, and nothing else writes the register meanwhile.
-    #[allow(unsafe_code, reason = "rp2040-hal keeps the register")]
+    #[allow(unsafe_code, reason = "the chip's crate keeps the register")]
     let control = unsafe { &*pac::WATCHDOG::PTR }.ctrl();
     control.modify(|_, w| {
         w.pause_dbg0().bit(pause);

@@ -15,15 +15,16 @@ use pio::{
     Instruction, InstructionOperands, JmpCondition, MovDestination, MovOperation, MovSource,
     Program,
 };
-use rp2040_hal::gpio::bank0::{Gpio2, Gpio3};
-use rp2040_hal::gpio::{FunctionPio0, OutputOverride, Pin, PullDown};
-use rp2040_hal::pac::{IO_BANK0, PIO0, RESETS};
-use rp2040_hal::pio::{
+
+use super::SensorPort;
+use super::chip::hal::gpio::bank0::{Gpio2, Gpio3};
+use super::chip::hal::gpio::{FunctionPio0, OutputOverride, Pin, PullDown};
+use super::chip::hal::pac::{IO_BANK0, PIO0, RESETS};
+use super::chip::hal::pio::{
     PIO, PIOBuilder, PIOExt, PinDir, Running, Rx, SM0, SM1, SM2, ShiftDirection, StateMachine,
     StateMachineGroup3, StateMachineIndex, Stopped, Tx, UninitStateMachine,
 };
-
-use super::SensorPort;
+use super::chip::registers::{RESET_PIO0, RESET_SET};
 use super::sample_rings::{self, Queue, SampleRings};
 use crate::photon_timer::{Config, PhotonTimer, Sampler, Samples};
 
@@ -39,7 +40,7 @@ pub type Pins = (
     Pin<Gpio3, FunctionPio0, PullDown>,
 );
 
-type Installed = rp2040_hal::pio::InstalledProgram<PIO0>;
+type Installed = super::chip::hal::pio::InstalledProgram<PIO0>;
 type Machine<SM> = (UninitStateMachine<(PIO0, SM)>, Installed);
 
 /// The stopped state machines and their programs. The samplers share one.
@@ -106,6 +107,8 @@ impl SensorPort {
     /// Never: both programs fit.
     #[must_use]
     pub fn photon_timer(mut self, config: Config) -> PhotonTimer<Hardware> {
+        // An input of RP2350 may hold a pin high against its own pull-down (RP2350-E9).
+        self.pins.0.set_input_enable(false);
         let (mut pio, laser, even, odd, _) = self.pio.split(&mut self.resets);
         let mut install = |program: Program<32>| match pio.install(&program) {
             Ok(installed) => installed,
@@ -150,14 +153,14 @@ pub fn laser_off() {
     reason = "cortex-m-rt calls it by this name, before there is memory"
 )]
 unsafe extern "C" fn __pre_init() {
-    // The alias of RESETS.RESET that sets bits, and PIO0's (RP2040 datasheet, 2.1.2 and 2.14.3).
     core::arch::naked_asm!(
-        "ldr r0, =0x4000e000",
-        "movs r1, #1",
-        "lsls r1, r1, #10",
+        "ldr r0, ={set}",
+        "ldr r1, ={pio0}",
         "str r1, [r0]",
         "bx lr",
         ".pool",
+        set = const RESET_SET,
+        pio0 = const RESET_PIO0,
     )
 }
 
@@ -280,7 +283,7 @@ impl Sampler for Hardware {
             // First: a state machine that halts within a pulse would make it longer.
             self.pins.0.set_output_override(OutputOverride::AlwaysLow);
             let (mut laser, even, odd) = steps.group.stop().free();
-            laser.set_pins([(LASER, rp2040_hal::pio::PinState::Low)]);
+            laser.set_pins([(LASER, super::chip::hal::pio::PinState::Low)]);
             self.idle = Some(Idle {
                 laser: laser.uninit(steps.laser.0, steps.laser.1),
                 even: even.uninit(steps.even.0, steps.even.1),

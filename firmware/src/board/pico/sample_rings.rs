@@ -5,7 +5,7 @@
 //! one counts down, the other waits, and is started by its end. Both write through the same
 //! ring. How far they are is read from their counters at any time, so that nothing has to be
 //! done at any time. The ring's size divides what a channel transfers, so that it begins where
-//! the other has ended. See the datasheet of RP2040, sections 2.5 and 3.5.
+//! the other has ended. See the datasheet of RP2040, sections 2.5 and 3.5; RP2350 does the same (12.6 and 11).
 //!
 //! In the same way two channels for each state machine send it what the dither adds to each laser cycle, a byte
 //! from a table. A byte comes four times in a word of the queue (section 2.1.4).
@@ -13,9 +13,12 @@
 use core::sync::atomic::{AtomicU8, AtomicU32, Ordering, compiler_fence};
 
 use dtof_sensors::dither::Dither;
-use rp2040_hal::pac::{DMA, PIO0, RESETS};
-use rp2040_hal::pio::{Rx, StateMachineIndex, Tx};
 
+use super::chip::hal::pac::{DMA, PIO0, RESETS};
+use super::chip::hal::pio::{Rx, StateMachineIndex, Tx};
+use super::chip::registers::{
+    CHAIN_TO, INCREMENT_WRITE, QUIET, REQUEST, RING_OF_WRITES, RING_SIZE,
+};
 use crate::photon_timer::Samples;
 
 /// Words of a ring, a power of two.
@@ -27,8 +30,9 @@ const WORDS_A_CYCLE: u32 = 3;
 /// Laser cycles that are certainly there: besides, one that comes, and a word on its way.
 pub const KEPT: u32 = (WORDS - 2 * WORDS_A_CYCLE) / WORDS_A_CYCLE;
 
-/// Words that a channel transfers before the other takes over: a multiple of the ring's.
-const TURN: u32 = 1 << 30;
+/// Words that a channel transfers before the other takes over: a multiple of the ring's. RP2350 counts to less
+/// than 2²⁸.
+const TURN: u32 = 1 << 27;
 
 /// Aligned to its size, as the DMA's rings are.
 #[repr(align(8192))]
@@ -98,17 +102,11 @@ const PAIRS: [u32; 2] = [0, 2];
 /// Channels that send the dither to the laser and to both shift registers.
 const DITHER_PAIRS: [u32; 3] = [4, 6, 8];
 
-// Bits of a channel's control register (2.5.7, CH0_CTRL_TRIG).
+// Bits of a channel's control register (2.5.7, CH0_CTRL_TRIG); the others are in `rp2040.rs` and `rp2350.rs`.
 const ENABLE: u32 = 1 << 0;
 const HIGH_PRIORITY: u32 = 1 << 1;
 const WORDS_OF_4_BYTES: u32 = 2 << 2;
 const INCREMENT_READ: u32 = 1 << 4;
-const INCREMENT_WRITE: u32 = 1 << 5;
-const RING_SIZE: u32 = 6;
-const RING_OF_WRITES: u32 = 1 << 10;
-const CHAIN_TO: u32 = 11;
-const REQUEST: u32 = 15;
-const QUIET: u32 = 1 << 21;
 
 impl SampleRings {
     pub const fn new(dma: DMA) -> Self {
@@ -224,7 +222,7 @@ impl SampleRings {
     #[allow(clippy::unused_self, reason = "of these rings")]
     pub fn has_stalled(&self) -> bool {
         // SAFETY: it is only read, and reading it changes nothing.
-        #[allow(unsafe_code, reason = "rp2040-hal keeps the register to itself")]
+        #[allow(unsafe_code, reason = "the chip's crate keeps the register to itself")]
         let debug = unsafe { &*PIO0::PTR }.fdebug().read();
         debug.rxstall().bits() != 0 || debug.txstall().bits() != 0
     }
@@ -234,7 +232,7 @@ impl SampleRings {
 /// first one comes after the samples of a laser cycle, when the DMA has long filled the queues.
 fn clear_stalls() {
     // SAFETY: this clears flags only, and nothing else reads them.
-    #[allow(unsafe_code, reason = "rp2040-hal keeps the register to itself")]
+    #[allow(unsafe_code, reason = "the chip's crate keeps the register to itself")]
     unsafe {
         (*PIO0::PTR)
             .fdebug()

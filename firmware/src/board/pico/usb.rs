@@ -5,9 +5,6 @@
 //! the reset ends, and its interrupt stays meanwhile: see [`Usb::is_in_reset`].
 
 use heapless::Vec;
-use rp2040_hal::clocks::UsbClock;
-use rp2040_hal::pac::{self, RESETS, USBCTRL_DPRAM, USBCTRL_REGS};
-use rp2040_hal::usb::UsbBus;
 use static_cell::StaticCell;
 use usb_device::UsbError;
 use usb_device::bus::UsbBusAllocator;
@@ -16,6 +13,10 @@ use usb_device::device::{
 };
 use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
+use super::chip::hal::clocks::UsbClock;
+use super::chip::hal::pac::RESETS;
+use super::chip::hal::usb::UsbBus;
+use super::chip::{UsbMemory, UsbRegisters};
 use crate::serial::SerialInterrupt;
 
 /// Bytes of a packet from the host.
@@ -39,8 +40,8 @@ pub struct Usb {
 impl Usb {
     /// Appears to the host.
     pub fn start(
-        registers: USBCTRL_REGS,
-        memory: USBCTRL_DPRAM,
+        registers: UsbRegisters,
+        memory: UsbMemory,
         clock: UsbClock,
         resets: &mut RESETS,
     ) -> Self {
@@ -91,8 +92,8 @@ impl Usb {
     #[allow(clippy::unused_self, reason = "of this port")]
     pub fn is_in_reset(&self) -> bool {
         // SAFETY: it is only read, and reading it changes nothing.
-        #[allow(unsafe_code, reason = "rp2040-hal keeps the register to itself")]
-        let status = unsafe { &*pac::USBCTRL_REGS::PTR }.sie_status().read();
+        #[allow(unsafe_code, reason = "the chip's crate keeps the register to itself")]
+        let status = unsafe { &*UsbRegisters::PTR }.sie_status().read();
         status.bus_reset().bit()
     }
 
