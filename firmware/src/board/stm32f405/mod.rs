@@ -165,17 +165,25 @@ impl Stm32F405 {
     }
 }
 
-/// Starts the voltage detector at 2.7 V and waits while the supply is lower; nothing else has been started
-/// then. From now on a fall below it is pending as an interrupt: the detector's output rises then, on line 16
-/// of EXTI (RM0090, 5.2.3, 5.4.1, 5.4.2 and 12.2.5).
+/// Starts the voltage detector and waits while the supply is low; nothing else has been started then. A fall
+/// from now on is pending as an interrupt: the detector's output rises then, on line 16 of EXTI (RM0090, 5.2.3,
+/// 5.4.1, 5.4.2 and 12.2.5). RM0090 names the level 2.6 V; thresholds are about 0.1 V higher.
 fn wait_for_supply(rcc: &RCC, exti: &EXTI, pwr: &PWR) {
-    const PLS_2V7: u8 = 0b101;
+    const PLS_2V6: u8 = 0b100;
     rcc.apb1enr().modify(|_, w| w.pwren().set_bit());
     exti.rtsr().modify(|_, w| w.tr16().set_bit());
-    exti.imr().modify(|_, w| w.mr16().set_bit());
     pwr.cr()
-        .modify(|_, w| w.pls().set(PLS_2V7).pvde().set_bit());
-    while pwr.csr().read().pvdo().bit_is_set() {}
+        .modify(|_, w| w.pls().set(PLS_2V6).pvde().set_bit());
+    let is_low = || pwr.csr().read().pvdo().bit_is_set();
+    loop {
+        while is_low() {}
+        // The detector's start may have been an edge; a fall after this is one again.
+        exti.pr().write(|w| w.pr16().clear_bit_by_one());
+        if !is_low() {
+            break;
+        }
+    }
+    exti.imr().modify(|_, w| w.mr16().set_bit());
 }
 
 /// Drives PC6 low, ENABLE or EN of the sensor: `BR6` of `GPIOC_BSRR` (RM0090, 8.4.7). Before
