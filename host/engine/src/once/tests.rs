@@ -125,7 +125,7 @@ proptest! {
     #[test]
     fn the_confidence_agrees_with_the_decision(counts in counts(), shift in 0..8_u32, more in 0..100_u32) {
         let counts: Vec<u32> = counts.iter().map(|count| (count + more) >> shift).collect();
-        let (events, engine) = decided(&settings(128), line(1), &[counts.clone()]);
+        let (events, engine) = decided(&settings(128), line(1), std::slice::from_ref(&counts));
         let confidence = engine.confidence().unwrap()[0];
         if confidence < 3.9 {
             prop_assert!(events.is_empty(), "{}", confidence);
