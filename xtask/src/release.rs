@@ -27,10 +27,33 @@ None has run on a real board yet. An image that drives a laser has its pulse, ra
 - Then `dtof monitor --device PORT` shows its events. `docs/boards.md` says how to connect it.
 
 The `.elf` files are also for debug probes; they decode the log. `SHA256SUMS` has the sums of all files. `licences` has the
-licences of this project and of each crate that an image may contain.
+licences of this project and of each crate that an image may contain. Crates that are published without a file of it have their
+own README and `Cargo.toml` there, with authors and the licence's name; its text is in `licences`. Rust's own libraries are under
+MIT or Apache-2.0, too.
 
 | file | board | photons |
 |---|---|---|
+";
+
+/// Some crates are published without this text.
+const BSD: &str = "\
+Redistribution and use in source and binary forms, with or without modification, are permitted provided that the following
+conditions are met:
+
+1. Redistributions of source code must retain the above copyright notice, this list of conditions and the following disclaimer.
+
+2. Redistributions in binary form must reproduce the above copyright notice, this list of conditions and the following disclaimer in
+   the documentation and/or other materials provided with the distribution.
+
+3. Neither the name of the copyright holder nor the names of its contributors may be used to endorse or promote products derived from
+   this software without specific prior written permission.
+
+THIS SOFTWARE IS PROVIDED BY THE COPYRIGHT HOLDERS AND CONTRIBUTORS \"AS IS\" AND ANY EXPRESS OR IMPLIED WARRANTIES, INCLUDING, BUT NOT
+LIMITED TO, THE IMPLIED WARRANTIES OF MERCHANTABILITY AND FITNESS FOR A PARTICULAR PURPOSE ARE DISCLAIMED. IN NO EVENT SHALL THE
+COPYRIGHT HOLDER OR CONTRIBUTORS BE LIABLE FOR ANY DIRECT, INDIRECT, INCIDENTAL, SPECIAL, EXEMPLARY, OR CONSEQUENTIAL DAMAGES
+(INCLUDING, BUT NOT LIMITED TO, PROCUREMENT OF SUBSTITUTE GOODS OR SERVICES; LOSS OF USE, DATA, OR PROFITS; OR BUSINESS INTERRUPTION)
+HOWEVER CAUSED AND ON ANY THEORY OF LIABILITY, WHETHER IN CONTRACT, STRICT LIABILITY, OR TORT (INCLUDING NEGLIGENCE OR OTHERWISE)
+ARISING IN ANY WAY OUT OF THE USE OF THIS SOFTWARE, EVEN IF ADVISED OF THE POSSIBILITY OF SUCH DAMAGE.
 ";
 
 /// The images of a release.
@@ -75,6 +98,7 @@ pub fn release(root: &Path) -> Result<()> {
     for name in ["LICENSE-APACHE", "LICENSE-MIT"] {
         copy(&root.join(name), &licences.join(name))?;
     }
+    fs::write(licences.join("BSD-3-Clause"), BSD)?;
     let mut readme = HEAD.to_owned();
     let mut crates = BTreeSet::new();
     for (board, build) in images() {
@@ -89,8 +113,8 @@ pub fn release(root: &Path) -> Result<()> {
         }
         crates.extend(dependencies(root, board, build)?);
     }
-    for (name, licence) in crates {
-        copy_licences(&name, &licence, &licences.join(&name))?;
+    for name in crates {
+        copy_licences(&name, &licences.join(&name))?;
     }
     fs::write(folder.join("README.md"), readme)?;
     let mut sums = String::new();
@@ -128,8 +152,8 @@ fn files(folder: &Path) -> Result<Vec<PathBuf>> {
     Ok(found)
 }
 
-/// The published crates that an image may contain, as `name-version`, each with its licence.
-fn dependencies(root: &Path, board: Board, build: Build) -> Result<Vec<(String, String)>> {
+/// The published crates that an image may contain, as `name-version`.
+fn dependencies(root: &Path, board: Board, build: Build) -> Result<Vec<String>> {
     let features = [Some(board.name()), build.feature()];
     let features: Vec<&str> = features.into_iter().flatten().collect();
     let output = cargo()
@@ -142,7 +166,7 @@ fn dependencies(root: &Path, board: Board, build: Build) -> Result<Vec<(String, 
             "--prefix",
             "none",
         ])
-        .args(["--edges", "normal", "--no-dedupe", "--format", "{p}|{l}"])
+        .args(["--edges", "normal", "--no-dedupe", "--format", "{p}"])
         .args([
             "--features",
             &features.join(","),
@@ -160,31 +184,35 @@ fn dependencies(root: &Path, board: Board, build: Build) -> Result<Vec<(String, 
     Ok(text.lines().filter_map(dependency).collect())
 }
 
-/// A line of `cargo tree`. Crates of this workspace have a path.
-fn dependency(line: &str) -> Option<(String, String)> {
-    let (package, licence) = line.split_once('|')?;
-    let (name, version) = package.split_once(" v")?;
+/// The crate in a line of `cargo tree`. Crates of this workspace have a path.
+fn dependency(line: &str) -> Option<String> {
+    let (name, version) = line.split_once(" v")?;
     let version = version.trim_end_matches(" (proc-macro)");
-    (!version.contains('(')).then(|| (format!("{name}-{version}"), licence.to_owned()))
+    (!version.contains('(')).then(|| format!("{name}-{version}"))
 }
 
-/// Copies the licences of a crate as it is published. A crate without such a file gets one with its licence's name.
-fn copy_licences(name: &str, licence: &str, folder: &Path) -> Result<()> {
-    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    fs::write(folder.join("LICENCE-NAME"), format!("{name}: {licence}\n"))?;
+/// Copies the licences of a crate as it is published; from a crate without them what names its authors and licence.
+fn copy_licences(name: &str, folder: &Path) -> Result<()> {
     let sources = cargo_home()?.join("registry/src");
     let registries = fs::read_dir(&sources).with_context(|| sources.display().to_string())?;
     let mut registries = registries.flatten().map(|entry| entry.path().join(name));
     let source = registries.find(|path| path.is_dir());
-    for path in files_at(&source.with_context(|| format!("no source of {name}"))?)? {
-        let file = path.file_name().unwrap_or_default().to_owned();
-        let upper = file.to_string_lossy().to_uppercase();
-        if ["LICENSE", "LICENCE", "COPYING", "NOTICE"]
-            .iter()
-            .any(|start| upper.starts_with(start))
-        {
-            copy(&path, &folder.join(file))?;
-        }
+    let source = files_at(&source.with_context(|| format!("no source of {name}"))?)?;
+    let begins = |path: &Path, starts: &[&str]| {
+        let file = path.file_name().unwrap_or_default().to_string_lossy();
+        let file = file.to_uppercase();
+        starts.iter().any(|start| file.starts_with(start))
+    };
+    let licences = ["LICENSE", "LICENCE", "COPYING", "NOTICE"];
+    let has_licences = source.iter().any(|path| begins(path, &licences));
+    let copied: &[&str] = if has_licences {
+        &licences
+    } else {
+        &["README", "CARGO.TOML"]
+    };
+    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    for path in source.iter().filter(|path| begins(path, copied)) {
+        copy(path, &folder.join(path.file_name().unwrap_or_default()))?;
     }
     Ok(())
 }
@@ -234,17 +262,13 @@ mod tests {
 
     #[test]
     fn crates_of_the_workspace_are_no_dependencies() {
-        let of = |line: &str| dependency(line).map(|(name, licence)| format!("{name}: {licence}"));
+        assert_eq!(dependency("nb v1.1.0").unwrap(), "nb-1.1.0");
         assert_eq!(
-            of("nb v1.1.0|MIT OR Apache-2.0").unwrap(),
-            "nb-1.1.0: MIT OR Apache-2.0"
+            dependency("paste v1.0.15 (proc-macro)").unwrap(),
+            "paste-1.0.15"
         );
-        assert_eq!(
-            of("paste v1.0.15 (proc-macro)|MIT").unwrap(),
-            "paste-1.0.15: MIT"
-        );
-        assert_eq!(of("dtof-core v0.2.0 (/a/core)|MIT"), None);
-        assert_eq!(of(""), None);
+        assert_eq!(dependency("dtof-core v0.2.0 (/a/core)"), None);
+        assert_eq!(dependency(""), None);
     }
 
     #[test]

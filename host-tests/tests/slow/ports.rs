@@ -106,7 +106,7 @@ fn ports_change_and_every_event_comes_on_the_one_that_spoke_last() -> Result<()>
     };
     install()?;
     let mut board = Rp2040::start_with_both(&image(&[], None)?)?;
-    let both = Both::connect(&mut board, false, 5)?;
+    let both = Both::connect(&mut board, false, 10)?;
     let client = Client::new(Box::new(both.clone()))?;
     let decided = decides_alike(client, &settings(), Array::new(8, 8).unwrap(), 200)?;
     let done = board.stop()?;
