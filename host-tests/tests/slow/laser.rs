@@ -207,8 +207,7 @@ fn goes_dark(image: &Path, fault: &Fault, fault_ms: f64) -> Result<()> {
         reset,
         reported,
     } = fault;
-    #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-    let for_ms = (lit_ms + dark_ms()).ceil() as u32;
+    let for_ms = whole(lit_ms + dark_ms());
     let mut board = Rp2040::start_with_fault(image, kind, fault_ms, for_ms)?;
     let (mut client, is_cut) = light(&mut board)?;
     // Waits until the device has restarted. A second of the watchdog may take the emulator longer than
@@ -262,10 +261,15 @@ fn fired_for(
     Ok(())
 }
 
+/// Milliseconds, rounded up.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+fn whole(ms: f64) -> u32 {
+    ms.ceil() as u32
+}
+
 fn start(image: &Path, over_usb: bool) -> Result<Rp2040> {
     let for_ms = f64::from(HOST_TIMEOUT_MS) + dark_ms() + ROUND_MS;
-    Rp2040::start_for(image, over_usb, for_ms.ceil() as u32)
+    Rp2040::start_for(image, over_usb, whole(for_ms))
 }
 
 /// From the last byte of the host, which ends a frame.
@@ -312,8 +316,7 @@ fn laser_goes_dark_when_the_usb_is_reset() -> Result<()> {
     };
     install()?;
     let image = image(&["photon-timer"], None)?;
-    let mut board =
-        Rp2040::start_with_usb_fault(&image, "bus-reset", LIT_MS, dark_ms().ceil() as u32)?;
+    let mut board = Rp2040::start_with_usb_fault(&image, "bus-reset", LIT_MS, whole(dark_ms()))?;
     let (mut client, is_cut) = light(&mut board)?;
     // Until the device is silent.
     while client.report().is_ok() {}
