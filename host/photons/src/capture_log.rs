@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
-use anyhow::{Context, Error, Result, anyhow};
+use anyhow::{Context, Result};
 use flate2::bufread::MultiGzDecoder;
 
 use crate::tmf8820::{self, Tmf8820Log};
@@ -61,14 +61,6 @@ impl<R: Read> Read for Unpacked<R> {
             io::Error::other("more than 256 MiB when unpacked; unpack it, as with gunzip")
         })?;
         Ok(read)
-    }
-}
-
-/// The error of a log that is not what its start looks like.
-pub(crate) fn not_a_log(name: &str, kind: &str, error: &serde_json::Error) -> Error {
-    match error.is_io() {
-        true => anyhow!("{name}: {error}"),
-        false => anyhow!("{name}:{}: not a {kind}: {error}", error.line()),
     }
 }
 

@@ -4,13 +4,12 @@
 
 use std::io::Read;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Error, Result, anyhow, ensure};
 use dtof_core::Array;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_sensors::tmf882x::{BIN_WIDTH_8X8_PS, BIN_WIDTH_PS, OFFSET_MM};
 use serde::Deserialize;
 
-use crate::capture_log::not_a_log;
 use crate::recorded::Capture;
 
 /// The centre of nine zones.
@@ -41,6 +40,14 @@ struct LogEntry {
     hists: Vec<Vec<u64>>,
     /// Of the centre zone, in metres.
     dist_to_plane: Option<f64>,
+}
+
+/// The error of a log that is not what its start looks like.
+pub(crate) fn not_a_log(name: &str, kind: &str, error: &serde_json::Error) -> Error {
+    match error.is_io() {
+        true => anyhow!("{name}: {error}"),
+        false => anyhow!("{name}:{}: not a {kind}: {error}", error.line()),
+    }
 }
 
 /// Reads the log from the text of the file `name`.

@@ -12,8 +12,8 @@ use dtof_core::fixed::types::U16F16;
 use dtof_sensors::tmf8829::FINEST_BIN_PS;
 use serde::Deserialize;
 
-use crate::capture_log::not_a_log;
 use crate::recorded::Capture;
+use crate::tmf8820::not_a_log;
 use dtof_options::rows::Row;
 
 /// Bins of its histograms.
