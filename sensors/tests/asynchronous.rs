@@ -2,6 +2,8 @@
 //! each transfer is awaited.
 
 mod common;
+#[path = "common/tmf8829/wait.rs"]
+mod wait;
 
 use std::cell::{Cell, RefCell};
 use std::pin::pin;

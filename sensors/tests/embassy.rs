@@ -3,6 +3,8 @@
 mod common;
 #[path = "../examples/embassy/src/depth.rs"]
 mod depth;
+#[path = "common/tmf8829/wait.rs"]
+mod wait;
 
 use std::cell::{Cell, RefCell};
 use std::pin::pin;

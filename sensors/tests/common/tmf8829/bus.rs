@@ -223,27 +223,3 @@ impl OutputPin for Bus {
         Ok(())
     }
 }
-
-/// INT goes low when the chip does: each look is one of the test's milliseconds.
-#[cfg(feature = "async")]
-impl embedded_hal_async::digital::Wait for Bus {
-    async fn wait_for_low(&mut self) -> Result<(), Broken> {
-        std::future::poll_fn(|_| match self.is_low() {
-            Ok(false) => std::task::Poll::Pending,
-            low => std::task::Poll::Ready(low.map(drop)),
-        })
-        .await
-    }
-    async fn wait_for_high(&mut self) -> Result<(), Broken> {
-        unreachable!("nothing waits for it")
-    }
-    async fn wait_for_rising_edge(&mut self) -> Result<(), Broken> {
-        unreachable!("nothing waits for it")
-    }
-    async fn wait_for_falling_edge(&mut self) -> Result<(), Broken> {
-        unreachable!("nothing waits for it")
-    }
-    async fn wait_for_any_edge(&mut self) -> Result<(), Broken> {
-        unreachable!("nothing waits for it")
-    }
-}
