@@ -18,7 +18,6 @@ use common::mocks::tmf8829::bench::{Bench, settings};
 use dtof_core::{
     Count, Count24, EchoNumber, Histogram, PixelConfig, RangeGate, RangeScale, WindowRule, z_for,
 };
-use dtof_sensors::Sensor;
 use dtof_sensors::tmf8829::Zones;
 use flate2::read::GzDecoder;
 use serde_json::Value;
