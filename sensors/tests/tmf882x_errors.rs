@@ -377,10 +377,10 @@ fn a_stop_switches_the_chip_off_whether_or_not_it_acknowledges() {
     let stop = write(0x41, &[0x08, 0xFF]);
     let not_acknowledged = stop.clone().with_error(NACK);
     for (has_failed, accesses) in [
-        (false, &[stop][..]),
+        (false, &[stop.clone()][..]),
         (false, &[not_acknowledged]),
         // After an error it may measure all the same.
-        (true, &[]),
+        (true, &[stop]),
     ] {
         let mut bench = measuring();
         if has_failed {

@@ -44,6 +44,7 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
                 BOOTLOADER if self.image.is_empty() => Err(Error::NoImage),
                 BOOTLOADER if self.image.len() > MAX_IMAGE => Err(DeviceError::LongImage.into()),
                 BOOTLOADER => {
+                    self.may_measure = false;
                     let off = self.config.settings().interface.other_off();
                     self.go_on_in(State::BootCommanding(off))
                 }
@@ -162,7 +163,10 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
             return self.wait_on(Waiting::Command(command), now_ms);
         }
         match command {
-            Command::Stop => self.load_preset(),
+            Command::Stop => {
+                self.may_measure = false;
+                self.load_preset()
+            }
             Command::LoadPreset(_) => self.go_on_in(State::Paging),
             Command::WritePage => self.go_on_in(State::Commanding(Command::Measure)),
             Command::Measure => {

@@ -150,6 +150,8 @@ pub struct Tmf8829Protocol<'a, const CHUNK: usize = 128> {
     address: u8,
     state: State,
     watch: Watch,
+    /// The command to measure was sent; the sensor has neither answered a stop nor been reset since.
+    may_measure: bool,
     /// A whole frame has come since it began to measure.
     has_given: bool,
     /// The frame that should come next, once one has come.
@@ -278,6 +280,7 @@ impl<'a, const CHUNK: usize> Tmf8829Protocol<'a, CHUNK> {
                 reset: config.settings().interface.address() != DEFAULT_ADDRESS,
             },
             watch: Watch::new(),
+            may_measure: false,
             has_given: false,
             next: None,
             buffer: [0; BUFFER],
@@ -348,9 +351,8 @@ impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
     }
 
     fn stop(&mut self) -> Request<'_> {
-        let was_measuring = self.is_measuring();
         self.restart();
-        if was_measuring {
+        if self.may_measure {
             self.stop_request()
         } else {
             Request::Nothing(Polled::Idle)

@@ -53,7 +53,11 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
             }
             State::Uploading { sent } => self.upload(usize::from(sent)),
             State::Keeping => self.write(&[ENABLE, ON_FROM_RAM]),
-            State::Commanding(command) => self.write(&[CMD_STAT, command.code()]),
+            State::Commanding(command) => {
+                // Its answer may be lost.
+                self.may_measure |= command == Command::Measure;
+                self.write(&[CMD_STAT, command.code()])
+            }
             State::Paging => self.read(PAGE, 1),
             State::Configuring(block) => self.configure(block),
             State::Measuring => Request::Interrupt,

@@ -39,10 +39,13 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
                 // It may be measuring.
                 APPLICATION => self.go_on_in(State::Commanding(Command::Stop)),
                 BOOTLOADER if self.image.is_empty() => Err(Error::NoImage),
-                BOOTLOADER => self.go_on_in(State::Loading {
-                    command: BootCommand::DownloadInit,
-                    sent: 0,
-                }),
+                BOOTLOADER => {
+                    self.may_measure = false;
+                    self.go_on_in(State::Loading {
+                        command: BootCommand::DownloadInit,
+                        sent: 0,
+                    })
+                }
                 id => Err(Error::WrongApplication { id }),
             },
             // The bootloader does not answer this command; the application does.
@@ -166,6 +169,9 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
                 return Err(Error::Refused { command, status });
             }
             return self.wait_on(0, Waiting::Command(command), now_ms);
+        }
+        if command == Command::Stop {
+            self.may_measure = false;
         }
         match command {
             // It may still be in the 8×8 mode, which its packets do not show.

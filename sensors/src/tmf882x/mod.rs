@@ -134,6 +134,8 @@ pub struct Tmf882xProtocol<'a, const CHUNK: usize = PACKET> {
     address: u8,
     state: State,
     watch: Watch,
+    /// The command to measure was sent; the sensor has neither answered a stop nor been reset since.
+    may_measure: bool,
     /// A packet has come since it began to measure.
     has_given: bool,
     buffer: [u8; PACKET],
@@ -250,6 +252,7 @@ impl<'a, const CHUNK: usize> Tmf882xProtocol<'a, CHUNK> {
                 reset: config.settings().address != DEFAULT_ADDRESS,
             },
             watch: Watch::new(),
+            may_measure: false,
             has_given: false,
             buffer: [0; PACKET],
             assembly: Assembly::new(),
@@ -311,9 +314,8 @@ impl<const CHUNK: usize> Protocol for Tmf882xProtocol<'_, CHUNK> {
     }
 
     fn stop(&mut self) -> Request<'_> {
-        let was_measuring = self.is_measuring();
         self.restart();
-        if was_measuring {
+        if self.may_measure {
             self.write(&[CMD_STAT, Command::Stop as u8])
         } else {
             Request::Nothing(Polled::Idle)

@@ -4,7 +4,7 @@ use super::bootloader::{MAX_DATA, Message, SEED};
 use super::config::Zones;
 use super::frame::PACKET;
 use super::registers::{
-    APPID, BootCommand, CMD_STAT, ENABLE, HIST_DUMP, HISTOGRAM_INT, I2C_ADDR_CHANGE,
+    APPID, BootCommand, CMD_STAT, Command, ENABLE, HIST_DUMP, HISTOGRAM_INT, I2C_ADDR_CHANGE,
     I2C_SLAVE_ADDRESS, ID, INT_ENAB, INT_STATUS, MODE, PAGE, PERIOD_MS, PON, RAW_HISTOGRAMS,
     RESULT_INT, SPAD_MAP_ID,
 };
@@ -44,7 +44,11 @@ impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
             State::Loaded { .. } => self.read(CMD_STAT, 3),
             State::Booting if self.watch.is_over(BOOT_MS, now_ms) => self.read(APPID, 1),
             State::Booting => Request::Nothing(Polled::Idle),
-            State::Commanding(command) => self.write(&[CMD_STAT, command as u8]),
+            State::Commanding(command) => {
+                // Its answer may be lost.
+                self.may_measure |= command == Command::Measure;
+                self.write(&[CMD_STAT, command as u8])
+            }
             State::Commanded(_) => self.read(CMD_STAT, 1),
             State::Switched => self.read(MODE, 1),
             State::Paging => self.read(PAGE, 1),

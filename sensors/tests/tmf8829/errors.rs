@@ -416,8 +416,39 @@ fn a_stop_stops_the_chip_and_a_start_begins_anew() {
     let wires = bench.bus.0.borrow();
     let stops = wires.log[log..].iter();
     let stops = stops.filter(|(written, _)| **written == [0x08, 0xFF]);
-    // At the end. When it came up it had been switched off, and was not measuring.
-    assert_eq!(stops.count(), 1);
+    // Both at the end: the first may be lost. When it came up it had been switched off, and was not measuring.
+    assert_eq!(stops.count(), 2);
+}
+
+/// After an error at any transfer from the command to measure on, with an ENABLE that is not wired.
+#[test]
+fn a_stop_after_an_error_sends_the_command_to_stop() {
+    let (mut before, mut later) = (0, 0);
+    for transfers in 0..120 {
+        let mut bench = bench();
+        for _ in 0..transfers {
+            bench.poll();
+        }
+        bench.bus.0.borrow_mut().fault = Some(Fault::Late);
+        error(&mut bench, 500);
+        let was_sent = {
+            let wires = bench.bus.0.borrow();
+            wires
+                .log
+                .iter()
+                .any(|(written, _)| **written == [0x08, 0x10])
+        };
+        bench.bus.0.borrow_mut().log.clear();
+        bench.sensor.stop();
+        let wires = bench.bus.0.borrow();
+        let stops = wires
+            .log
+            .iter()
+            .filter(|(written, _)| **written == [0x08, 0xFF]);
+        assert_eq!(stops.count(), usize::from(was_sent), "{transfers}");
+        *(if was_sent { &mut later } else { &mut before }) += 1;
+    }
+    assert!(before > 10 && later > 10, "{before} {later}");
 }
 
 /// Its laser is off then, whatever the bus does.
