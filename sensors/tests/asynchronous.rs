@@ -19,7 +19,7 @@ use dtof_chips::{Chip as _, Tmf8829 as Chip};
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{PixelAddress, RangeGate, checked};
 use dtof_sensors::dither::Dither;
-use dtof_sensors::protocol::Timing;
+use dtof_sensors::protocol::{self, Timing};
 use dtof_sensors::tmf882x::{self, Tmf882x};
 use dtof_sensors::tmf8829::{self, Config, Spi, Tmf8829, Zones};
 use dtof_sensors::{Polled, Sensor, SensorFault};
@@ -319,6 +319,93 @@ fn a_poll_of_a_tmf8829_that_is_dropped_costs_at_most_its_frame() {
         histograms += 1;
     }
     assert!(histograms > 200, "{histograms}");
+}
+
+/// A bus of both traits; its awaited transfers take a while.
+struct Both(Slow<Bus>);
+
+impl protocol::Bus for Both {
+    type Error = ErrorKind;
+    fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), ErrorKind> {
+        protocol::Bus::write(&mut self.0.bus, address, bytes)
+    }
+    fn read(&mut self, address: u8, register: u8, bytes: &mut [u8]) -> Result<(), ErrorKind> {
+        protocol::Bus::read(&mut self.0.bus, address, register, bytes)
+    }
+    fn failure<P>(error: ErrorKind) -> protocol::Failure<ErrorKind, P> {
+        <Bus as protocol::Bus>::failure(error)
+    }
+}
+
+impl protocol::AsyncBus for Both {
+    type Error = ErrorKind;
+    async fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), ErrorKind> {
+        protocol::AsyncBus::write(&mut self.0, address, bytes).await
+    }
+    async fn read(&mut self, address: u8, register: u8, bytes: &mut [u8]) -> Result<(), ErrorKind> {
+        protocol::AsyncBus::read(&mut self.0, address, register, bytes).await
+    }
+    fn failure<P>(error: ErrorKind) -> protocol::Failure<ErrorKind, P> {
+        <Bus as protocol::Bus>::failure(error)
+    }
+}
+
+/// An awaited poll is dropped when the FIFO has given a chunk, or the header. What is called next,
+/// blocking or not, counts the frame and gives nothing of it.
+#[test]
+fn after_a_dropped_poll_each_call_counts_the_frame() {
+    let config = Config::new(settings(Zones::Z8x8)).unwrap();
+    for (register, lost) in [(0xFF, [1, 0]), (0xFA, [0, 1])] {
+        for call in 0..5 {
+            let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
+            let slow = Slow::new(bus.clone());
+            let present = Rc::clone(&slow.present);
+            let (interrupt, enable) = (bus.clone(), bus.clone());
+            let mut sensor =
+                Tmf8829::<_, _, _, 252>::new(Both(slow), interrupt, enable, &IMAGE, config);
+            let mut sink = RecordingSink::default();
+            // The chip has answered, and the driver does not know.
+            let mut now_ms = 0;
+            while sensor.counts().histograms < 20 || present.get().is_some() {
+                now_ms += 1;
+                run(sensor.poll_async(now_ms, &mut sink)).0.unwrap();
+            }
+            loop {
+                now_ms += 1;
+                let mut poll = Box::pin(sensor.poll_async(now_ms, &mut sink));
+                let mut context = Context::from_waker(Waker::noop());
+                let mut waits = 0;
+                let was_dropped = loop {
+                    if poll.as_mut().poll(&mut context).is_ready() {
+                        break false;
+                    }
+                    let found = present
+                        .get()
+                        .is_some_and(|(at, read)| at == register && read > 0);
+                    waits = if found { waits + 1 } else { 0 };
+                    if waits == 4 {
+                        break true;
+                    }
+                };
+                drop(poll);
+                if was_dropped {
+                    break;
+                }
+            }
+            sink.take();
+            match call {
+                0 => drop(run(sensor.poll_async(now_ms, &mut sink)).0.unwrap()),
+                1 => drop(sensor.poll(now_ms, &mut sink).unwrap()),
+                2 => sensor.start(U16F16::ZERO, Dither::OFF),
+                3 => sensor.start_async(),
+                _ => sensor.stop(),
+            }
+            let counts = sensor.counts();
+            assert_eq!([counts.broken, counts.missed], lost, "{register:#x} {call}");
+            assert_eq!(sink.take(), []);
+            assert!(!sensor.is_measuring());
+        }
+    }
 }
 
 #[test]

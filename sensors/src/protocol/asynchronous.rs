@@ -140,9 +140,8 @@ where
         now_ms: u32,
         sink: &mut impl PhotonSink,
     ) -> Result<Polled, P::Error<BUS::Error, INT::Error>> {
-        if core::mem::replace(&mut self.is_under_way, true) {
-            self.protocol.dropped();
-        }
+        self.settle();
+        self.is_under_way = true;
         let polled = self.step_async(now_ms, sink).await;
         self.is_under_way = false;
         polled.inspect_err(|error| self.protocol.failed(error))
@@ -150,6 +149,7 @@ where
 
     /// Starts with a new configuration: abandons the present measurement.
     pub fn start_async(&mut self) {
+        self.settle();
         self.protocol.restart();
     }
 
@@ -158,6 +158,7 @@ where
     pub async fn stop_async(&mut self) {
         // Before the first await: a dropped future has stopped the sensor all the same.
         let _ = self.enable.set_low();
+        self.settle();
         if let Request::Write { address, bytes } = self.protocol.stop() {
             let _ = self.bus.write(address, bytes).await;
         }

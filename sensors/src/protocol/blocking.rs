@@ -75,6 +75,7 @@ where
     }
 
     fn start(&mut self, _: U16F16, _: Dither) {
+        self.settle();
         self.protocol.restart();
     }
 
@@ -82,12 +83,14 @@ where
     /// ignored.
     fn stop(&mut self) {
         let _ = self.enable.set_low();
+        self.settle();
         if let Request::Write { address, bytes } = self.protocol.stop() {
             let _ = self.bus.write(address, bytes);
         }
     }
 
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Self::Error> {
+        self.settle();
         self.step(now_ms, sink)
             .inspect_err(|error| self.protocol.failed(error))
     }

@@ -140,6 +140,14 @@ impl<P: Protocol, BUS, INT, EN> Driver<P, BUS, INT, EN> {
     pub fn info(&self) -> SensorInfo {
         self.protocol.info()
     }
+
+    /// Counts what the last poll lost if it was dropped within a transfer.
+    fn settle(&mut self) {
+        #[cfg(feature = "async")]
+        if core::mem::take(&mut self.is_under_way) {
+            self.protocol.dropped();
+        }
+    }
 }
 
 impl<P, BUS, INT, EN> Driver<P, BUS, INT, EN> {
