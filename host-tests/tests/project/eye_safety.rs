@@ -88,6 +88,23 @@ fn the_example_follows_from_the_limits() {
 }
 
 #[test]
+fn the_short_pulses_of_the_sensor_page_follow_from_the_limits() {
+    let limits = AVERAGE_W * 10f64.powf(0.002 * 205.0) / 50e3;
+    let peak_w = limits.min(PULSE_J * 10f64.powf(0.002 * 205.0) * C5) / 16e-9;
+    says(&format!(
+        "at 905 nm is {:.2} W; a diode of 75 W exceeds it {:.0} times",
+        down(peak_w, 2),
+        75.0 / peak_w
+    ));
+    let config = Config::new(Settings {
+        laser_hz: 50_000,
+        pulse_ns: 16,
+    });
+    let config = config.unwrap();
+    assert_eq!((config.pulse(), config.period()), (2, 2_500));
+}
+
+#[test]
 fn the_bare_diodes_are_of_the_classes_that_the_page_names() {
     let (pulse_s, hz) = as_it_comes();
     let energy_j = 25.0 * pulse_s;
