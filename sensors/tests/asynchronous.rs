@@ -204,7 +204,8 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
     assert_eq!(sensor.counts(), awaited.counts());
     assert!(awaited.counts().errors > 5);
 
-    run(awaited.stop_async());
+    let (clock, mut timing) = timing(100);
+    run_at(&clock, awaited.stop_async(&mut timing));
     sensor.stop();
     assert!(!waiting.0.borrow().chip.is_measuring);
     awaited.start_async();
@@ -525,6 +526,27 @@ fn a_bus_that_hangs_ends_a_poll_in_time() {
     for register in [0xF8, 0xE3, 0x00, 0x08, 0x22, 0xE1, 0xFA, 0xFF] {
         assert!(hung.contains(&register), "{register:#04x}: {hung:02x?}");
     }
+}
+
+/// The sensor is off all the same.
+#[test]
+fn a_bus_that_hangs_ends_a_stop_in_time() {
+    let config = Config::new(settings(Zones::Z8x8)).unwrap();
+    let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
+    let slow = Slow::new(bus.clone());
+    let left = Rc::clone(&slow.left);
+    let mut sensor = Tmf8829::<_, _, _>::new(slow, bus.clone(), bus.clone(), &IMAGE, config);
+    let (clock, mut timing) = timing(50);
+    let mut sink = RecordingSink::default();
+    run_at(&clock, sensor.next(&mut timing, &mut sink))
+        .0
+        .unwrap();
+    assert!(bus.0.borrow().chip.is_measuring);
+    left.set(Some(0));
+    let began = clock.get();
+    run_at(&clock, sensor.stop_async(&mut timing));
+    assert_eq!(clock.get().wrapping_sub(began), 50);
+    assert!(!bus.0.borrow().chip.is_measuring);
 }
 
 /// What a program needs when it is compiled: the bins of the gate, the pixels, the scale.

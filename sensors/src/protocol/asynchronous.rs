@@ -154,13 +154,14 @@ where
     }
 
     /// Drives ENABLE low, and also sends the command to stop, as ENABLE may not be wired. Errors are
-    /// ignored.
-    pub async fn stop_async(&mut self) {
+    /// ignored. It takes at most `bus_ms` milliseconds of the timer.
+    pub async fn stop_async(&mut self, timing: &mut Timing<impl FnMut() -> u32, impl DelayNs>) {
         // Before the first await: a dropped future has stopped the sensor all the same.
         let _ = self.enable.set_low();
         self.settle();
         if let Request::Write { address, bytes } = self.protocol.stop() {
-            let _ = self.bus.write(address, bytes).await;
+            let written = self.bus.write(address, bytes);
+            let _ = race(written, timing.delay.delay_ms(timing.bus_ms)).await;
         }
     }
 
