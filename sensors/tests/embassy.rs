@@ -94,6 +94,41 @@ fn the_example_reports_events_in_millimetres() {
     assert!(events.iter().all(|&events| events > 2), "{events:?}");
 }
 
+/// It ends, so that its board can reset the bus.
+#[test]
+fn the_example_ends_when_its_bus_hangs() {
+    struct Hangs;
+    impl ErrorType for Hangs {
+        type Error = ErrorKind;
+    }
+    impl I2c for Hangs {
+        async fn transaction(&mut self, _: u8, _: &mut [Operation<'_>]) -> Result<(), Self::Error> {
+            std::future::pending().await
+        }
+    }
+    let clock = Rc::new(Cell::new(0));
+    let timer = Timer(Rc::clone(&clock));
+    let now = Rc::clone(&clock);
+    let bus = Bus::new(Chip::new(&PROGRAM, dtof_chips::tmf8829::varied_counts()));
+    let timing = Timing::new(move || now.get(), timer, 100);
+    let mut reports = Vec::new();
+    let report = |report| reports.push(report);
+    let mut program = Box::pin(depth::run(
+        (Hangs, bus.clone(), bus),
+        timing,
+        &PROGRAM,
+        report,
+    ));
+    let mut context = Context::from_waker(Waker::noop());
+    let ended = (0..1000).any(|now_ms| {
+        clock.set(now_ms);
+        program.as_mut().poll(&mut context).is_ready()
+    });
+    drop(program);
+    assert!(ended);
+    assert_eq!(reports, [Err(SensorFault::Bus)]);
+}
+
 /// Bus, pins and timer of a board come on top.
 #[test]
 fn the_example_is_short() {

@@ -22,6 +22,9 @@ pub struct Timing<N, D> {
 impl<N: FnMut() -> u32, D: DelayNs> Timing<N, D> {
     /// `now_ms` returns milliseconds, which may wrap. `bus_ms` is the most that a poll may take. It has to
     /// cover the longest poll of the sensor: a chunk, or ten short transfers. 100 is enough at 100 kHz.
+    ///
+    /// The time also runs while the poll waits for a bus that others use, and while the executor runs
+    /// other tasks: add the longest of both.
     pub const fn new(now_ms: N, delay: D, bus_ms: u32) -> Self {
         Self {
             now_ms,
@@ -97,6 +100,11 @@ where
 
     /// [`Self::poll_async`] that takes at most `bus_ms` milliseconds of the timer. It cannot end a
     /// bus whose futures block.
+    ///
+    /// A transfer that takes too long is dropped, as it is when the caller drops a poll. The bus has to
+    /// end it then. The `Twim` of embassy-nrf does not: its DMA may write to the driver's buffer later.
+    /// With such a bus, do not move or drop the driver after a drop, and reset the bus before the
+    /// next poll, or the board.
     ///
     /// # Errors
     /// Fails if the poll fails or takes longer ([`Failure::BusTimeout`]). The next polls bring the sensor

@@ -3,7 +3,7 @@
 use dtof_core::fixed::types::I24F8;
 use dtof_core::{Count24, Histogram, PixelAddress, PixelConfig, RangeGate, RangeScale, checked};
 use dtof_sensors::protocol::{AsyncBus, Timing};
-use dtof_sensors::tmf8829::{Config, Settings, Tmf8829, Zones};
+use dtof_sensors::tmf8829::{Config, Error, Settings, Tmf8829, Zones};
 use dtof_sensors::{PhotonSink, SensorFault, SensorInfo};
 use embedded_hal::digital::{ErrorType, InputPin, OutputPin};
 use embedded_hal_async::{delay::DelayNs, digital::Wait};
@@ -33,7 +33,8 @@ impl<F: FnMut(Report)> PhotonSink for Events<F> {
     }
 }
 
-/// Reports for ever. After an error the driver starts the sensor again.
+/// Reports until the bus hangs: then it may still write to the driver, and has to be reset. After any other
+/// error the driver starts the sensor again.
 pub async fn run<INT: InputPin + Wait, EN: OutputPin + ErrorType<Error = INT::Error>>(
     (bus, int, enable): (impl AsyncBus, INT, EN),
     mut timing: Timing<impl FnMut() -> u32, impl DelayNs>,
@@ -44,7 +45,11 @@ pub async fn run<INT: InputPin + Wait, EN: OutputPin + ErrorType<Error = INT::Er
     let mut sensor = Tmf8829::<_, _, _>::new(bus, int, enable, program, SENSOR);
     loop {
         if let Err(error) = sensor.next(&mut timing, &mut events).await {
+            let hangs = matches!(error, Error::BusTimeout);
             (events.0)(Err(error.into()));
+            if hangs {
+                return;
+            }
         }
     }
 }

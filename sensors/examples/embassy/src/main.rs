@@ -4,6 +4,7 @@
 
 mod depth;
 
+use cortex_m::peripheral::SCB;
 use defmt_rtt as _;
 use embassy_nrf::gpio::{Input, Level, Output, OutputDrive, Pull};
 use embassy_nrf::{bind_interrupts, peripherals::TWISPI0, twim};
@@ -28,11 +29,12 @@ async fn main(_spawner: embassy_executor::Spawner) {
         Ok((pixel, range)) => defmt::info!("{}: {=i32} mm", pixel, range.round().to_num()),
         Err(fault) => defmt::warn!("{}", fault),
     })
-    .await
+    .await;
+    SCB::sys_reset()
 }
 
 /// After a reset ENABLE is low, and with it the laser is off.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-    cortex_m::peripheral::SCB::sys_reset()
+    SCB::sys_reset()
 }
