@@ -7,7 +7,7 @@ mod depth;
 use cortex_m::peripheral::SCB;
 use defmt_rtt as _;
 use embassy_nrf::gpio::{Input, Level, Output, OutputDrive, Pull};
-use embassy_nrf::{bind_interrupts, peripherals::TWISPI0, twim};
+use embassy_nrf::{bind_interrupts, peripherals::TWISPI0, twim, wdt};
 use embassy_time::{Delay, Instant};
 
 bind_interrupts!(struct Irqs { TWISPI0 => twim::InterruptHandler<TWISPI0>; });
@@ -23,13 +23,26 @@ async fn main(_spawner: embassy_executor::Spawner) {
     let bus = twim::Twim::new(p.TWISPI0, Irqs, p.P0_26, p.P0_27, config, &mut []);
     let int = Input::new(p.P0_28, Pull::Up);
     let enable = Output::new(p.P0_29, Level::Low, OutputDrive::Standard);
-    let now_ms = || Instant::now().as_millis() as u32;
+    // Polls ask for the time. A program that stops polling for a second is reset.
+    let watchdog = wdt::Watchdog::try_new(p.WDT, wdt::Config::default());
+    let Ok((_, [mut watchdog])) = watchdog else {
+        SCB::sys_reset()
+    };
+    let now_ms = move || {
+        watchdog.pet();
+        Instant::now().as_millis() as u32
+    };
     let timing = dtof_sensors::protocol::Timing::new(now_ms, Delay, 100);
     depth::run((bus, int, enable), timing, PROGRAM, |report| match report {
         Ok((pixel, range)) => defmt::info!("{}: {=i32} mm", pixel, range.round().to_num()),
         Err(fault) => defmt::warn!("{}", fault),
     })
     .await;
+    SCB::sys_reset()
+}
+
+#[cortex_m_rt::exception]
+unsafe fn HardFault(_: &cortex_m_rt::ExceptionFrame) -> ! {
     SCB::sys_reset()
 }
 
