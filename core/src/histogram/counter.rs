@@ -50,7 +50,7 @@ pub enum Count10 {}
 /// 16-bit counters.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Count16 {}
-/// 20-bit counters, the widest for 512 and 1024 bins: the sum of all bins must fit into 32 bits.
+/// 20-bit counters, for 512 and 1024 bins: a count and its bin have to fit into 32 bits together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Count20 {}
 /// 24-bit counters, those of commercial sensors that send whole histograms.

@@ -45,8 +45,8 @@ macro_rules! with_bins {
     };
 }
 
-/// The same with the widest counters of histograms with so many bins, as the sum of all counters fits
-/// into 32 bits: of 24 bits up to 256 bins, of 20 from there on.
+/// The same with the widest counters of histograms with so many bins, as a count and its bin fit into 32 bits
+/// together: of 24 bits up to 256 bins, of 20 from there on.
 #[macro_export]
 macro_rules! with_widest {
     ($bins:expr, $name:ident, $width:ident => $value:expr) => {

@@ -165,7 +165,7 @@ impl<const BINS: usize, W: CounterWidth> OnceEngine<BINS, W> {
             }
         }
         let all = self.decide(&sum, pixel.cycles);
-        decided.confidence = own.confidence.max(all.confidence);
+        let mut uses_sum = false;
         for (_, detection) in &mut decided.echoes {
             let deviation = self.deviation(detection, &own.histogram);
             let is_same = |(_, other): &&(EchoNumber, Detection)| {
@@ -174,6 +174,7 @@ impl<const BINS: usize, W: CounterWidth> OnceEngine<BINS, W> {
             };
             if let Some((_, other)) = all.echoes.iter().find(is_same) {
                 *detection = self.own_photons(other, &own.histogram).of_pixel(other);
+                uses_sum = true;
             }
         }
         for (echo, detection) in all.echoes.iter().filter(|_| own.echoes.is_empty()) {
@@ -189,7 +190,12 @@ impl<const BINS: usize, W: CounterWidth> OnceEngine<BINS, W> {
                 let mut detection = own.of_pixel(detection);
                 detection.depth.flags |= Flags::CONFIRMED;
                 decided.echoes.push((*echo, detection));
+                uses_sum = true;
             }
+        }
+        // Otherwise the sum saw another surface, or none.
+        if uses_sum {
+            decided.confidence = own.confidence.max(all.confidence);
         }
         decided
     }

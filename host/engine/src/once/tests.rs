@@ -216,6 +216,29 @@ fn around(middle: Vec<u32>) -> Vec<Vec<u32>> {
 }
 
 #[test]
+fn the_confidence_is_of_the_sum_only_where_the_sum_was_used() {
+    let with = Settings {
+        neighbours: Neighbours::new(8),
+        ..settings(128)
+    };
+    let array = Array::new(3, 3).unwrap();
+    let of_middle = |settings: &Settings, middle: &[u32]| {
+        let (_, engine) = decided(settings, array, &around(middle.to_vec()));
+        engine.confidence().unwrap()[4]
+    };
+    // Another surface, and nothing.
+    for middle in [wall(90), vec![20; 128]] {
+        assert_eq!(
+            of_middle(&with, &middle),
+            of_middle(&settings(128), &middle)
+        );
+    }
+    // The same surface.
+    let dim = around(Vec::new()).remove(0);
+    assert!(of_middle(&with, &dim) > of_middle(&settings(128), &dim));
+}
+
+#[test]
 fn neighbours_confirm_a_surface_that_the_pixel_sees() {
     let with = Settings {
         neighbours: Neighbours::new(8),
