@@ -134,13 +134,13 @@ impl Settings {
         }
     }
 
-    /// The same over SPI. The period is the time that a bus of 10 MHz needs, some 22 ms for each time slot:
-    /// 50 ms with 8×8 and 16×16 zones, 200 ms with 32×32, 300 ms with 48×32.
+    /// The same over SPI. The period is the time of the pulses and of a bus of 10 MHz, as the sensor waits while it is
+    /// read: 80 ms with 8×8 and 16×16 zones, 210 ms with 32×32, 300 ms with 48×32.
     #[must_use]
     pub const fn over_spi(first_pixel: PixelAddress, zones: Zones) -> Self {
         let period_ms = match zones {
-            Zones::Z8x8 | Zones::Z16x16 => 50,
-            Zones::Z32x32Pairs | Zones::Z32x32 => 200,
+            Zones::Z8x8 | Zones::Z16x16 => 80,
+            Zones::Z32x32Pairs | Zones::Z32x32 => 210,
             Zones::Z48x32 => 300,
         };
         Self {
