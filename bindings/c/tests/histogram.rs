@@ -23,5 +23,10 @@ fn the_example_of_histograms_prints_what_rust_finds() {
         writeln!(zones, "zone {zone}: {} mm", range.round()).unwrap();
     }
     let dropped = "a packet is missing, the set is dropped\n";
-    assert_eq!(PRINTED, format!("{zones}{dropped}{zones}end\n"));
+    // A set without its last packet has given the other zones.
+    let eight = &zones[..zones.find("zone 8").unwrap()];
+    assert_eq!(
+        PRINTED,
+        format!("{zones}{dropped}{zones}{eight}{dropped}{zones}{dropped}end\n")
+    );
 }
