@@ -49,6 +49,7 @@ pub struct Config {
 /// Settings that cannot be used.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum ConfigError {
     /// A laser cycle would be shorter than the bins, and 8 clocks: above 922,509 a second.
     TooFast,

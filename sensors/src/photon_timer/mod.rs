@@ -79,6 +79,7 @@ pub struct PhotonTimer<S> {
 /// An error of a poll. The next poll goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
 pub enum Error {
     /// This many laser cycles were overwritten before they were read.
     Lost(u32),

@@ -139,7 +139,8 @@ where
     /// needed.
     ///
     /// The future may be dropped. If it is dropped within a transfer of a frame, the frame is lost; the next
-    /// poll counts it and begins to bring the sensor up again.
+    /// poll counts it and begins to bring the sensor up again. A frame that the sensor has ready when it is
+    /// stopped is not given and not counted.
     ///
     /// # Errors
     /// Fails if this step fails. The next polls bring the sensor up again.
