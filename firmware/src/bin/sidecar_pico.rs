@@ -13,7 +13,7 @@ use cortex_m_rt::entry;
 use dtof_core::checked;
 use dtof_firmware::board::{on_panic, pico::Pico, run};
 #[cfg(feature = "sensor-photon-timer")]
-use dtof_firmware::photon_timer::{Config, Settings};
+use dtof_firmware::photon_timer::{Config, ConfigError, Settings};
 use dtof_firmware::sidecar::{Block, Pixel};
 #[cfg(not(feature = "sensor-photon-timer"))]
 use dtof_sensors::simulated;
@@ -35,10 +35,19 @@ static BLOCKS: ConstStaticCell<Vec<Block, MOST_BLOCKS>> = ConstStaticCell::new(V
 /// 100 kHz and pulses of 100 ns, unless `LASER_HZ` and `LASER_PULSE_NS` say otherwise when
 /// the image is built.
 #[cfg(feature = "sensor-photon-timer")]
-const LASER: Config = checked!(Config::new(Settings {
+const LASER: Config = checked!(laser(Settings {
     laser_hz: number(option_env!("LASER_HZ"), 100_000),
     pulse_ns: number(option_env!("LASER_PULSE_NS"), 100),
 }));
+
+#[cfg(feature = "sensor-photon-timer")]
+const fn laser(settings: Settings) -> Result<Config, ConfigError> {
+    if cfg!(feature = "laser-beyond-limits") {
+        Config::beyond_limits(settings)
+    } else {
+        Config::new(settings)
+    }
+}
 
 /// For `cargo xtask image`, which prints what this image does with the laser.
 #[cfg(feature = "sensor-photon-timer")]

@@ -44,6 +44,8 @@ pub struct Config {
     /// The mean.
     period: u32,
     pulse: u32,
+    /// Clocks of the shortest laser cycle that keeps the limit of the duty; 0 without the limit.
+    least_period: u32,
 }
 
 /// Settings that cannot be used.
@@ -59,9 +61,9 @@ pub enum ConfigError {
     NoPulse,
     /// The laser's pulse takes the whole laser cycle, less 5 clocks.
     LongPulse,
-    /// The laser's pulse is longer than 1 µs, without the feature `laser-beyond-limits`.
+    /// The laser's pulse is longer than 1 µs, which only [`Config::beyond_limits`] takes.
     PulseBeyondLimit,
-    /// The laser is on for more than 2 % of the time, without the feature `laser-beyond-limits`.
+    /// The laser is on for more than 2 % of the time, which only [`Config::beyond_limits`] takes.
     DutyBeyondLimit,
 }
 
@@ -75,10 +77,10 @@ impl ConfigError {
             Self::NoPulse => "the laser's pulse is 0 ns",
             Self::LongPulse => "the laser's pulse leaves no pause in its laser cycle",
             Self::PulseBeyondLimit => {
-                "the laser's pulse is longer than 1000 ns: only the feature laser-beyond-limits allows that"
+                "the laser's pulse is longer than 1000 ns: only an image with laser-beyond-limits may do that"
             }
             Self::DutyBeyondLimit => {
-                "the laser is on for more than 2 % of the time: only the feature laser-beyond-limits allows that"
+                "the laser is on for more than 2 % of the time: only an image with laser-beyond-limits may do that"
             }
         }
     }
@@ -95,34 +97,30 @@ impl Error for ConfigError {}
 impl Config {
     /// Rounds the laser cycle to the nearest clock and its pulse up, to at least 2 clocks. The
     /// rounded values must be within limits: a pulse of at most 1 µs, and at most 2 % of the time.
-    /// The limits bound the harm to an eye from a laser that is wired wrongly or too strong. The
-    /// feature `laser-beyond-limits` lifts them.
+    /// The limits bound the harm to an eye from a laser that is wired wrongly or too strong.
     ///
     /// # Errors
     /// Returns a [`ConfigError`] if the settings cannot be used.
     pub const fn new(settings: Settings) -> Result<Self, ConfigError> {
-        let config = match Self::of_hardware(settings) {
+        let mut config = match Self::beyond_limits(settings) {
             Ok(config) => config,
             Err(error) => return Err(error),
         };
-        if cfg!(feature = "laser-beyond-limits") {
-            return Ok(config);
-        }
-        config.within_limits()
-    }
-
-    const fn within_limits(self) -> Result<Self, ConfigError> {
-        if self.pulse > MOST_PULSE {
+        if config.pulse > MOST_PULSE {
             return Err(ConfigError::PulseBeyondLimit);
         }
-        if self.pulse * LEAST_CLOCKS_A_CLOCK > self.period {
+        config.least_period = config.pulse * LEAST_CLOCKS_A_CLOCK;
+        if config.least_period > config.period {
             return Err(ConfigError::DutyBeyondLimit);
         }
-        Ok(self)
+        Ok(config)
     }
 
-    /// All that the hardware can do.
-    const fn of_hardware(settings: Settings) -> Result<Self, ConfigError> {
+    /// The same without the limits, for a laser that is safe all the same: all that the hardware can do.
+    ///
+    /// # Errors
+    /// Returns a [`ConfigError`] if the hardware cannot do it.
+    pub const fn beyond_limits(settings: Settings) -> Result<Self, ConfigError> {
         let Settings { laser_hz, pulse_ns } = settings;
         if laser_hz == 0 {
             return Err(ConfigError::TooSlow);
@@ -139,7 +137,11 @@ impl Config {
         if pulse > period - SHORTEST_PAUSE {
             return Err(ConfigError::LongPulse);
         }
-        Ok(Self { period, pulse })
+        Ok(Self {
+            period,
+            pulse,
+            least_period: 0,
+        })
     }
 
     /// Clocks from one laser pulse to the next in the mean; without dither always.
@@ -154,14 +156,9 @@ impl Config {
     pub const fn most_dither(&self) -> u8 {
         let bins = BINS + BESIDE;
         let pulse = self.pulse + SHORTEST_PAUSE;
-        let duty = if cfg!(feature = "laser-beyond-limits") {
-            0
-        } else {
-            self.pulse * LEAST_CLOCKS_A_CLOCK
-        };
         let mut least = if bins > pulse { bins } else { pulse };
-        if duty > least {
-            least = duty;
+        if self.least_period > least {
+            least = self.least_period;
         }
         // Both halves of the range.
         let range = 2 * self.period.saturating_sub(least);
@@ -230,12 +227,11 @@ mod tests {
 
     /// Within the limits or not.
     fn config(laser_hz: u32, pulse_ns: u32) -> Result<Config, ConfigError> {
-        Config::of_hardware(Settings { laser_hz, pulse_ns })
+        Config::beyond_limits(Settings { laser_hz, pulse_ns })
     }
 
-    /// As an image is built without the feature `laser-beyond-limits`.
     fn limited(laser_hz: u32, pulse_ns: u32) -> Result<Config, ConfigError> {
-        config(laser_hz, pulse_ns)?.within_limits()
+        Config::new(Settings { laser_hz, pulse_ns })
     }
 
     /// The clocks of a laser cycle to which the dither adds so many: of the laser and of a shift register.
@@ -289,9 +285,6 @@ mod tests {
     fn no_range_makes_a_laser_cycle_shorter_than_the_laser_may_have() {
         for (laser_hz, pulse_ns, least) in [(800_000, 16, 136), (189_394, 104, 650)] {
             let config = limited(laser_hz, pulse_ns).unwrap();
-            if cfg!(feature = "laser-beyond-limits") && pulse_ns > 16 {
-                continue;
-            }
             assert!(config.most_dither() < 254);
             for range in [u16::from(config.most_dither()), 254, u16::MAX] {
                 assert_eq!(clocks(&config, range, 0), [least; 2], "{laser_hz}");
@@ -307,12 +300,12 @@ mod tests {
         assert_eq!(most(800_000, 16), 40);
         assert_eq!(most(922_509, 16), 0);
         // 650 clocks are 50 pulses of 13; 660 leave ten.
-        let limits = cfg!(feature = "laser-beyond-limits");
-        assert_eq!(most(192_308, 104), if limits { 254 } else { 0 });
-        assert_eq!(most(189_394, 104), if limits { 254 } else { 20 });
-        // The pulse and the shortest pause: 10 µs less 1,200 clocks.
-        let long = config(100_000, 1200 * 8).unwrap();
-        assert_eq!(long.most_dither(), if limits { 90 } else { 0 });
+        assert_eq!(most(192_308, 104), 0);
+        assert_eq!(most(189_394, 104), 20);
+        // Beyond the limits the bins alone count, or the pulse and the shortest pause: 10 µs less 1,200 clocks.
+        let beyond = |laser_hz, pulse_ns| config(laser_hz, pulse_ns).unwrap().most_dither();
+        assert_eq!(beyond(192_308, 104), 254);
+        assert_eq!(beyond(100_000, 1200 * 8), 90);
     }
 
     #[test]
@@ -328,7 +321,7 @@ mod tests {
     }
 
     #[test]
-    fn a_pulse_of_a_microsecond_passes_and_a_longer_one_takes_the_feature() {
+    fn a_pulse_of_a_microsecond_passes_and_a_longer_one_is_beyond_the_limits() {
         // Of 10,000 Hz: 2 % are 2 µs.
         assert_eq!(limited(10_000, 1000).unwrap().pulse(), 125);
         let beyond = Err(ConfigError::PulseBeyondLimit);
@@ -341,7 +334,7 @@ mod tests {
     }
 
     #[test]
-    fn two_percent_of_the_time_pass_and_more_takes_the_feature() {
+    fn two_percent_of_the_time_pass_and_more_is_beyond_the_limits() {
         let beyond = Err(ConfigError::DutyBeyondLimit);
         // 13 clocks of 650: 125 MHz / 650 = 192,307.7 Hz. Up to 192,455 Hz round to as many clocks.
         for laser_hz in [192_307, 192_308, 192_455] {
@@ -361,23 +354,6 @@ mod tests {
         assert!(limited(800_000, 16).is_ok());
         assert!(limited(922_509, 1).is_ok());
         assert_eq!(limited(800_000, 100), beyond);
-    }
-
-    #[test]
-    fn the_limits_hold_unless_the_feature_lifts_them() {
-        let settings = Settings {
-            laser_hz: 100_000,
-            pulse_ns: 9_900,
-        };
-        let lifted = cfg!(feature = "laser-beyond-limits");
-        assert_eq!(Config::new(settings).is_ok(), lifted);
-        assert_eq!(
-            Config::new(Settings {
-                pulse_ns: 0,
-                ..settings
-            }),
-            Err(ConfigError::NoPulse)
-        );
     }
 
     #[test]
