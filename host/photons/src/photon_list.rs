@@ -138,10 +138,10 @@ impl<R: PhotonReader> Validator<R> {
     }
 }
 
-/// Refuses numbers that are times and no laser cycles: a replay would take hours for the laser cycles before the first
+/// Refuses numbers that are probably times: a replay would take hours for the empty laser cycles before the first
 /// photon. Photons come in the laser cycles from `first` to before `end`; an end before that has a warning.
 fn check_cycles(first: u64, end: u64) -> Result<(), Refused> {
-    const MANY: u64 = 10_000_000;
+    const MANY: u64 = 1_000_000_000;
     let span = end.saturating_sub(first);
     if first < MANY || span == 0 || first <= span {
         return Ok(());
@@ -332,5 +332,21 @@ impl<R: PhotonReader> PhotonSource for PhotonList<R> {
             first_cycle,
             pixels,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::check_cycles;
+
+    #[test]
+    fn times_are_refused_and_excerpts_are_not() {
+        // A second of a counter at 10 MHz, after two seconds and after two minutes.
+        assert!(check_cycles(20_000_000, 30_000_000).is_ok());
+        assert!(check_cycles(1_200_000_000, 1_210_000_000).is_err());
+        // Half of the laser cycles have photons; or none that is replayed.
+        assert!(check_cycles(2_000_000_000, 4_000_000_000).is_ok());
+        assert!(check_cycles(1_700_000_000, 10_000).is_ok());
+        assert!(check_cycles(1_700_000_000, 1_700_002_000).is_err());
     }
 }
