@@ -150,6 +150,8 @@ pub struct Metadata {
     /// Whether rows and columns are known. A list without columns is taken for one row, and so are histograms in two axes
     /// without names; the first of more than three axes without names may be captures.
     pub has_shape: bool,
+    /// The captures of the file, whether one or all are used.
+    pub captures: usize,
     /// Photons in bins that were cut off.
     pub cut_off: u64,
     /// The changes made to the recording, as a table.
@@ -492,6 +494,7 @@ fn fit_bins(
             warnings::empty_histograms(layout.captures.iter().flatten().map(|&total| total == 0))
         }
     };
+    metadata.captures = all;
     metadata.gate = fit.gate();
     metadata.rows = fit.rows(metadata.cut_off);
     if let Some(capture) = options.capture {
@@ -528,6 +531,7 @@ fn metadata(bins: usize, width_ps: Option<U16F16>, options: &ReadOptions) -> Res
         gate: None,
         is_list: false,
         has_shape: true,
+        captures: 1,
         cut_off: 0,
         rows: Vec::new(),
         warnings: warnings::narrow_bins(requested).into_iter().collect(),

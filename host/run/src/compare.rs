@@ -237,7 +237,11 @@ impl Options {
     ) -> Result<Subject> {
         (callbacks.step)("reads the recording", 0.0)?;
         let counts = counts(&input, &read_options(&requested))?;
-        mask_capture(&mut requested, counts.array.pixels());
+        mask_capture(
+            &mut requested,
+            counts.array.pixels(),
+            counts.metadata.captures,
+        )?;
         self.given.suits(&input, &counts.metadata)?;
         let is_once_per_bin = requested.detection.once_per_bin == Some(true);
         check_once_per_bin(is_once_per_bin, counts.metadata.is_list)?;

@@ -9,6 +9,7 @@ use dtof_engine::settings::{RunSettings, SensorSettings, SettingsFile};
 use dtof_options::rows::grouped;
 use dtof_options::{Refused, plain};
 use dtof_photons::input::Input;
+use dtof_photons::masked;
 use dtof_photons::open::{BIN_WIDTH_PS, Metadata, ReadOptions};
 use dtof_photons::recorded::RecordingLength;
 
@@ -103,20 +104,29 @@ impl Given {
     }
 }
 
-/// Makes the pixels that are left out those of the capture that is used. They are addresses of all captures if one of
-/// them is past the `pixels` of a capture.
-pub(super) fn mask_capture(requested: &mut SettingsFile, pixels: u32) {
-    let (Some(capture), Some(masked)) = (requested.run.capture, &mut requested.sensor.masked)
-    else {
-        return;
+/// Makes the pixels that are left out those of the capture that is used. They are addresses of all `captures` if one of
+/// them is past the `pixels` of a capture. A mask of other captures only is none.
+///
+/// # Errors
+/// Fails if an address is past those of all captures.
+pub(super) fn mask_capture(
+    requested: &mut SettingsFile,
+    pixels: u32,
+    captures: usize,
+) -> Result<()> {
+    let (Some(capture), Some(addresses)) = (requested.run.capture, &requested.sensor.masked) else {
+        return Ok(());
     };
-    if masked.iter().any(|&pixel| u32::from(pixel) >= pixels) {
+    masked::check(addresses, captures * pixels as usize)?;
+    if addresses.iter().any(|&pixel| u32::from(pixel) >= pixels) {
         let of_capture = |&pixel: &u16| {
             let own = u32::from(pixel).checked_sub(capture.checked_mul(pixels)?)?;
             u16::try_from(own).ok().filter(|_| own < pixels)
         };
-        *masked = masked.iter().filter_map(of_capture).collect();
+        let own: Vec<u16> = addresses.iter().filter_map(of_capture).collect();
+        requested.sensor.masked = Some(own).filter(|own| !own.is_empty());
     }
+    Ok(())
 }
 
 /// How to open a recording with these settings.
@@ -190,4 +200,27 @@ pub fn bin_width_warning(metadata: &Metadata) -> Option<String> {
     metadata.is_width_assumed.then(|| {
         format!("bins are taken to be {BIN_WIDTH_PS} ps wide; --bin-width-ps changes that")
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mask_of_another_capture_is_none() {
+        let masked = |addresses: &[u16]| {
+            let mut requested = SettingsFile::default();
+            requested.run.capture = Some(1);
+            requested.sensor.masked = Some(addresses.to_vec());
+            mask_capture(&mut requested, 4, 3).map(|()| requested.sensor.masked)
+        };
+        assert_eq!(masked(&[1, 5, 9]).unwrap(), Some(vec![1]));
+        // As if the file had no other capture.
+        assert_eq!(masked(&[3]).unwrap(), Some(vec![3]));
+        assert_eq!(masked(&[]).unwrap(), Some(Vec::new()));
+        // Those that are found take its place.
+        assert_eq!(masked(&[8, 11]).unwrap(), None);
+        let error = masked(&[5, 12]).unwrap_err().to_string();
+        assert!(error.contains("there are 12 pixels"), "{error}");
+    }
 }

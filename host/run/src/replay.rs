@@ -182,7 +182,8 @@ impl Options {
             "{input} holds photons: only histograms are replayed in parts"
         );
         let mut requested = requested.clone();
-        mask_capture(&mut requested, recording.array().pixels());
+        let captures = recording.metadata().captures;
+        mask_capture(&mut requested, recording.array().pixels(), captures)?;
         let choosing = self.choosing();
         let found = match self.has_file() || !choosing.is_empty() {
             true => Ok((Vec::new(), None)),

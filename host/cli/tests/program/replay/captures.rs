@@ -98,6 +98,11 @@ fn pixels_that_are_left_out_are_those_of_the_capture() {
         let settings = &scratch.summary()["settings"];
         assert_eq!(settings["masked"].to_string(), masked, "{options}");
     }
+    scratch.all_refused(
+        &replay[..replay.len() - " --out out".len()],
+        "--out new --capture 0 --mask 12 | --mask 12: there are 12 pixels
+         --out new --capture 2 --mask 1,9999 | --mask 9999: there are 12 pixels",
+    );
 }
 
 #[test]
