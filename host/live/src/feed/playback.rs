@@ -77,6 +77,7 @@ impl Playback {
     pub(super) fn run(self, context: &mut FeedContext) {
         if let Err(error) = self.play(context) {
             let reason = format!("{}: {error:#}", self.name());
+            context.complain(&format!("{error:#}"));
             context.hub.set_connection("failed", &reason);
             while !context.is_stopped() {
                 if let Ok(request) = context.requests.recv_timeout(EVERY) {

@@ -6,7 +6,7 @@ use crate::common::aer::{HEADER, depth, file};
 use crate::common::{Scratch, assert_contains};
 use crate::view::Live;
 use crate::view::http::{Stream, post};
-use dtof_events::aer_file::Header;
+use dtof_events::aer_file::{Header, Reader};
 use dtof_live::{Feed, Playback};
 
 /// Ten events in a second: one laser cycle a millisecond.
@@ -200,7 +200,9 @@ fn ended_by_ctrl_c(
     out.read_line(&mut line).unwrap();
     let port = line.trim().strip_prefix("http://127.0.0.1:").unwrap();
     let port = port.trim_end_matches('/').parse().unwrap();
-    Stream::open(port, 0).until("reached", is_reached);
+    // The page stays open.
+    let mut stream = Stream::open(port, 0);
+    stream.until("reached", is_reached);
     let killed = Command::new("kill")
         .args(["-INT", &program.id().to_string()])
         .status();
@@ -213,13 +215,18 @@ fn ended_by_ctrl_c(
 fn the_terminal_names_a_damaged_recording() {
     let scratch = Scratch::new();
     let whole = recording();
-    scratch.file("damaged.aer", &whole[..whole.len() - 7]);
-    let output = ended_by_ctrl_c(&scratch, "view damaged.aer --speed 100", |frame| {
-        frame["connection"]["state"] == "failed"
-    });
-    let lines = String::from_utf8(output.stderr).unwrap();
-    assert_contains(&lines, "damaged.aer: byte ");
-    assert_eq!(lines.lines().count(), 1, "{lines}");
+    let header = Reader::new(&whole[..]).unwrap().offset();
+    let header = usize::try_from(header).unwrap();
+    // At its end, and at its first event.
+    for length in [whole.len() - 7, header + 7] {
+        scratch.file("damaged.aer", &whole[..length]);
+        let output = ended_by_ctrl_c(&scratch, "view damaged.aer --speed 100", |frame| {
+            frame["connection"]["state"] == "failed"
+        });
+        let lines = String::from_utf8(output.stderr).unwrap();
+        assert_contains(&lines, "damaged.aer: byte ");
+        assert_eq!(lines.lines().count(), 1, "{lines}");
+    }
 }
 
 #[cfg(unix)]
@@ -227,7 +234,6 @@ fn the_terminal_names_a_damaged_recording() {
 fn the_command_prints_its_address_and_ends_at_ctrl_c() {
     let scratch = Scratch::new();
     scratch.file("events.aer", recording());
-    // Also while a page is open.
     let output = ended_by_ctrl_c(&scratch, "view events.aer --speed 0.5", |frame| {
         frame["events"].as_u64() > Some(0)
     });
