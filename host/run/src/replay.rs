@@ -301,7 +301,7 @@ impl Options {
     /// # Errors
     /// Fails if nothing chooses how pixels decide: a part does not show the settings of the whole.
     pub fn check_for_parts(&self) -> Result<(), Refused> {
-        let reason = "is needed for a recording in parts, or an option of detection: calibrate finds settings";
+        let reason = "is needed for a recording in parts, or an option that chooses how pixels decide, such as `rule`: calibrate finds settings";
         if self.given.options.run.capture.is_some() {
             let reason = "is for a recording as a whole; leave out the other captures before it is cut into parts";
             return Err(Refused::new("capture", reason));

@@ -43,7 +43,7 @@ def replay(
     worker holds more than a few parts at a time; the events are returned and have to fit into
     memory.
 
-    A part does not show the settings of the whole, so ``settings`` or an option of detection is needed:
+    A part does not show the settings of the whole, so ``settings`` or an option such as ``rule`` is needed:
     ``settings=dtof.calibrate("large.npy")``, for example.
 
     ``recorded`` is a dask array, or the name of an ``.npy`` file that every worker can read. Its
