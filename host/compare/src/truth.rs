@@ -88,6 +88,18 @@ impl Truth {
         }
     }
 
+    /// The same with the range bias of each pixel of a capture added, if it is a list of ranges: reports have it as well.
+    #[must_use]
+    pub fn with_biases(self, biases: &[f64]) -> Self {
+        match self {
+            Self::Ranges(ranges) => {
+                let ranges = ranges.into_iter().zip(biases.iter().cycle());
+                Self::Ranges(ranges.map(|(range, bias)| Some(range? + bias)).collect())
+            }
+            other => other,
+        }
+    }
+
     /// What errors are relative to, as a sentence.
     #[must_use]
     pub const fn description(&self) -> &'static str {

@@ -256,6 +256,13 @@ impl Options {
         };
         let metres = truth.as_ref().and_then(Truth::in_metres);
         metres.into_iter().for_each(callbacks.warning);
+        let with_biases = |truth: Truth| -> Result<Truth> {
+            Ok(match requested.rays.slants(counts.array)? {
+                Some([_, biases]) => truth.with_biases(&biases),
+                None => truth,
+            })
+        };
+        let truth = truth.map(with_biases).transpose()?;
         let merged = requested
             .clone()
             .or(settings_of_file(&counts.metadata, counts.array));

@@ -193,6 +193,37 @@ fn a_recording_without_truth_is_held_against_itself() {
     assert_contains(&report, "window of 3, once per bin");
 }
 
+#[test]
+fn the_range_bias_of_pixels_is_no_error() {
+    let scratch = Scratch::new();
+    photons(&scratch);
+    let (ranges, biases) = ([1500.0, 1556.0, 0.0, 1668.0], [40.0, -90.0, 0.0, 160.0]);
+    let truth = |ranges: [f64; 4]| npy("<f8", "(2, 2)", &ranges.map(f64::to_le_bytes).concat());
+    scratch.file("seen.npy", truth(ranges));
+    let there: Vec<f64> = ranges
+        .iter()
+        .zip(biases)
+        .map(|(range, bias)| range - bias)
+        .collect();
+    scratch.file("there.npy", truth(there.try_into().unwrap()));
+    let pixels = biases
+        .map(|bias| format!("[0.0, 0.0, 1.0, {bias:?}]"))
+        .join(", ");
+    scratch.file(
+        "pixels.toml",
+        format!("columns = 2\nrows = 2\npixels = [{pixels}]\n"),
+    );
+    scratch.file("rays.toml", "[rays]\ncalibration = \"pixels.toml\"\n");
+    let line = "compare photons.csv --columns 2 --sigma-bins 0.7 --within 9";
+    let methods = |options: &str| {
+        scratch.printed(&format!("{line} --out out {options}"));
+        scratch.read("out/methods.csv")
+    };
+    let seen = methods("--truth seen.npy");
+    assert_eq!(methods("--truth there.npy --settings rays.toml"), seen);
+    assert_ne!(methods("--truth there.npy"), seen);
+}
+
 /// The same wall behind a dim ball.
 const PARTLY_DIM: &str = "[[surface]]\nrange_mm = 1500\nsignal = 0.01\n\
      ball = { centre = [6, 1], radius = 1.5, radius_mm = 10 }\n";
