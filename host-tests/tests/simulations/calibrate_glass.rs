@@ -35,6 +35,7 @@ fn found(scene: &Scene, cycles: u64, seed: u64) -> Calibration {
         truth_mm: None,
         slant: None,
         bias_mm: None,
+        offsets_mm: &[],
     };
     calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }

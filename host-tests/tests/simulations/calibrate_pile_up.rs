@@ -27,6 +27,7 @@ fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibra
         truth_mm: None,
         slant: None,
         bias_mm: None,
+        offsets_mm: &[],
     };
     calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }
@@ -125,6 +126,7 @@ fn tdc_of(capture: Vec<Vec<u64>>, cycles: u64) -> Option<Tdc> {
         truth_mm: None,
         slant: None,
         bias_mm: None,
+        offsets_mm: &[],
     };
     calibrate(&observed, &CalibrationOptions::default())
         .unwrap()

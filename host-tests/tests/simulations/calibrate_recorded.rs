@@ -112,6 +112,7 @@ fn a_recording_with_distances_calibrates_itself() {
         truth_mm: counts.truth_mm.as_deref(),
         slant: None,
         bias_mm: None,
+        offsets_mm: &[],
     };
     let found = calibrate(&observed, &CalibrationOptions::default()).unwrap();
     let pulse = found.pulse.as_ref().unwrap();

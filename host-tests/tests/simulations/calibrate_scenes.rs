@@ -19,6 +19,7 @@ fn judge(number: u64) -> (Vec<String>, String) {
         truth_mm: None,
         slant: None,
         bias_mm: None,
+        offsets_mm: &[],
     };
     let options = CalibrationOptions {
         // A wall alone may be a cover glass: the user decides.
@@ -147,6 +148,7 @@ fn a_wall_alone_may_be_a_cover_glass() {
         truth_mm: None,
         slant: None,
         bias_mm: None,
+        offsets_mm: &[],
     };
     let with = |glass| {
         let options = CalibrationOptions {

@@ -216,7 +216,7 @@ pub fn calibrate_with(
     let pulse = pulse::pulse(&windows(&good, gate.0, glass), options.seed);
     let found = offset_of(&good, gate, depth_window(pulse.as_ref()), observed, options);
     let (mut offset, pixel_offsets) = found.unzip();
-    let pixel_offsets = pixel_offsets.flatten();
+    let mut pixel_offsets = pixel_offsets.flatten();
     if let (Some(offset), Some(pixels)) = (&mut offset, &pixel_offsets) {
         offset.mm += pixels.median_mm;
     }
@@ -259,6 +259,11 @@ pub fn calibrate_with(
             offset.mm += budget.offset_mm;
             found = detection(Some(budget))?;
         }
+    }
+    // They were found as differences from those that the pixels have.
+    let own = pixel_offsets.iter_mut().flat_map(|pixels| &mut pixels.mm);
+    for (own, before) in own.zip(observed.offsets_mm) {
+        *own += before;
     }
     Ok(Calibration {
         length: observed.length,
@@ -456,6 +461,7 @@ mod tests {
             truth_mm: None,
             slant: Some(&slants),
             bias_mm: None,
+            offsets_mm: &[],
         };
         let all = AllHistograms::new(&observed, &[]).unwrap();
         let rate = all.pixels.background;
@@ -503,6 +509,7 @@ mod tests {
                 truth_mm: Some(&truth),
                 slant: None,
                 bias_mm: None,
+                offsets_mm: &[],
             };
             calibrate(&observed, &CalibrationOptions::default()).unwrap()
         };

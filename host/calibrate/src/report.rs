@@ -272,7 +272,7 @@ pub fn page(
     if let Some(svg) = &map {
         figures.push(Figure {
             svg,
-            caption: "The offset of each pixel, which is added to the range offset. Without a target it is 0.",
+            caption: "The offset of each pixel, which is added to the range offset. Without a target it is 0, or as it was.",
         });
     }
     let lead = format!("From the histograms of {name}. Intervals are 95 % intervals.");

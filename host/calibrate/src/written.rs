@@ -3,7 +3,6 @@
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{I24F8, U4F12, U16F16};
 
-use super::find::significance::median;
 use super::{Calibration, Glass, Length, Tdc};
 use dtof_engine::settings::{DetectionSettings, RuleName, SensorSettings, SettingsFile};
 
@@ -16,21 +15,13 @@ impl Calibration {
     pub fn settings(&self, before: SettingsFile) -> Result<SettingsFile> {
         let is_absolute = self.length != Length::Unknown;
         let whole = |value: f64| is_absolute.then(|| four_digits(value));
-        // Those that were found have a median of 0. The offset that was found is for the median pixel.
-        let (offsets, median_mm) = match (&self.offset, &self.pixel_offsets) {
-            (Some(_), Some(pixels)) if !pixels.needs_field_of_view => {
-                let tenths = pixels.mm.iter().map(|mm| (mm * 10.0).round() / 10.0);
-                let offsets: Vec<I24F8> = tenths.map(I24F8::saturating_from_num).collect();
-                (Some(offsets).filter(|offsets| !offsets.is_empty()), 0.0)
-            }
-            _ => {
-                let kept = before.sensor.offsets_mm;
-                let median = median(kept.iter().flatten().map(|mm| mm.to_num()));
-                (kept, median)
-            }
-        };
+        let offsets = self.pixel_offsets.as_ref().map(|pixels| &pixels.mm);
+        let offsets = offsets.filter(|offsets| !offsets.is_empty()).map(|mm| {
+            let tenths = mm.iter().map(|mm| (mm * 10.0).round() / 10.0);
+            tenths.map(I24F8::saturating_from_num).collect()
+        });
         let offset = self.offset.map(|offset| {
-            let mm = I24F8::checked_from_num(offset.mm - median_mm);
+            let mm = I24F8::checked_from_num(offset.mm);
             mm.with_context(|| format!("an offset of {:.0} mm is too large", offset.mm))
         });
         let width = U16F16::checked_from_num(self.bin_width_ps);
@@ -43,7 +34,7 @@ impl Calibration {
             bins: u16::try_from(self.bins).ok(),
             bin_width_ps: Some(width.context("the bin width is too large")?),
             offset_mm: offset.transpose()?.or(before.sensor.offset_mm),
-            offsets_mm: offsets,
+            offsets_mm: offsets.or(before.sensor.offsets_mm),
             gate: self.written_gate(),
             masked: Some(self.masked()?).filter(|masked| !masked.is_empty()),
             sigma_bins: match &self.detection {

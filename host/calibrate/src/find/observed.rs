@@ -3,6 +3,7 @@
 use anyhow::{Result, bail, ensure};
 use dtof_core::Array;
 
+use dtof_options::Refused;
 use dtof_photons::recorded::Capture;
 
 /// How long each capture lasted.
@@ -57,6 +58,8 @@ pub struct Observed<'a> {
     pub slant: Option<&'a [f64]>,
     /// For each pixel of the array the millimetres by which its ranges are and stay too long, as points subtract them.
     pub bias_mm: Option<&'a [f64]>,
+    /// The offset that each pixel of the array has already, in millimetres; empty if none has.
+    pub offsets_mm: &'a [f64],
 }
 
 /// One histogram.
@@ -68,7 +71,7 @@ pub struct Trace {
     pub cycles: f64,
     /// Photons of each bin, corrected for pile-up where that is known.
     pub counts: Vec<f64>,
-    /// The true distance in millimetres, if it is known, with the range bias of the pixel.
+    /// The true distance in millimetres, if it is known, with [`Observed::bias`].
     pub truth_mm: Option<f64>,
 }
 
@@ -77,7 +80,8 @@ impl Observed<'_> {
     ///
     /// # Errors
     /// Fails if there are no captures or too few bins, if captures or histograms differ in size, if a
-    /// pixel lasted no laser cycle, or if there is not one true distance for each histogram.
+    /// pixel lasted no laser cycle, or if there is not one true distance for each histogram or one offset for each
+    /// pixel.
     pub fn traces(&self, hot: &[usize]) -> Result<Vec<Trace>> {
         let pixels = self.array.pixels() as usize;
         let bins = self.bins();
@@ -88,6 +92,14 @@ impl Observed<'_> {
             let found = truth.len();
             ensure!(found == all, "{found} true distances for {all} histograms");
         }
+        let offsets = self.offsets_mm.len();
+        ensure!(
+            offsets == 0 || offsets == pixels,
+            Refused::new(
+                "offsets_mm",
+                format!("has {offsets} numbers, but a capture has {pixels} pixels")
+            )
+        );
         let mut traces = Vec::with_capacity(all);
         for (index, capture) in self.captures.iter().enumerate() {
             let found = capture.len();
@@ -124,10 +136,12 @@ impl Observed<'_> {
         Ok(traces)
     }
 
-    /// The range bias of a pixel in millimetres.
+    /// The range bias of a pixel in millimetres, less the offset that it has already: ranges without that offset are
+    /// so much too long.
     #[must_use]
     pub fn bias(&self, pixel: usize) -> f64 {
-        self.bias_mm.map_or(0.0, |bias| bias[pixel])
+        let own = self.offsets_mm.get(pixel).unwrap_or(&0.0);
+        self.bias_mm.map_or(0.0, |bias| bias[pixel]) - own
     }
 
     /// Bins of a histogram; 0 if there is none.

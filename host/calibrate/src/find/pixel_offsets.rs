@@ -28,14 +28,14 @@ pub struct Measured {
 /// By how much the pixels differ.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PixelOffsets {
-    /// Millimetres to add to the range offset, for each pixel of a capture: their median is 0. Empty if the pixels
-    /// do not differ.
+    /// Millimetres to add to the range offset, for each pixel of a capture. Empty if the pixels do not differ, except by
+    /// the offsets that they have.
     pub mm: Vec<f64>,
     /// The standard deviation of the differences without their noise.
     pub spread_mm: f64,
     /// Millimetres to add to the range offset.
     pub median_mm: f64,
-    /// Pixels that see nothing where the target is: their offset is 0.
+    /// Pixels that see nothing where the target is: their offset is 0, or as it was.
     pub without: Vec<usize>,
     /// Whether the pixels have no offsets although they differ: a flat target is farther away at the edges of the
     /// array, and the field of view is not known.

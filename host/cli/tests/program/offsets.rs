@@ -211,6 +211,64 @@ fn nothing_is_corrected_twice() {
     let [plain, kept] =
         ["plain.toml", "kept.toml"].map(|file| value(&scratch, file, "offset_mm").unwrap());
     assert!((plain - 50.0 - kept).abs() < 0.1, "{plain} {kept}");
+    // Each its own: most pixels do not see the target, and have none.
+    let ranges = target(1200.0);
+    let is_seen = |pixel: usize| pixel % 3 == 0;
+    let too_near: Vec<f64> = (0..PIXELS)
+        .map(|pixel| if is_seen(pixel) { 0.0 } else { -1e6 })
+        .collect();
+    scratch.file("target.npy", recording(&ranges, &too_near, 1));
+    let own: Vec<&str> = (0..PIXELS)
+        .map(|pixel| if is_seen(pixel) { "50" } else { "0" })
+        .collect();
+    let own = own.join(",");
+    for fov in ["", "--fov 41x52"] {
+        scratch.printed(&format!("{calibrate} {fov} --out plain.toml"));
+        scratch.printed(&format!(
+            "{calibrate} {fov} --offsets-mm={own} --out kept.toml"
+        ));
+        let [plain, kept] =
+            ["plain.toml", "kept.toml"].map(|file| value(&scratch, file, "offset_mm").unwrap());
+        assert!((plain - 50.0 - kept).abs() < 0.1, "{fov}: {plain} {kept}");
+        assert_contains(&scratch.read("kept.toml"), "offsets_mm = [");
+    }
+}
+
+/// Offsets that pixels have already are not lost; those that have changed are corrected.
+#[test]
+fn a_second_calibration_keeps_the_offsets_of_the_first() {
+    let scratch = Scratch::new();
+    let zones = zones();
+    let calibrate = format!("calibrate target.npy {SENSOR} --target-mm 1200 --fov 41x52");
+    scratch.file("target.npy", recording(&target(1200.0), &zones, 1));
+    scratch.printed(&format!("{calibrate} --out first.toml"));
+    scratch.file("target.npy", recording(&target(1200.0), &zones, 2));
+    scratch.printed(&format!(
+        "{calibrate} --settings first.toml --out second.toml"
+    ));
+    let [first, second] = ["first.toml", "second.toml"].map(|file| {
+        let text = scratch.read(file);
+        let (_, list) = text.split_once("offsets_mm = [").unwrap();
+        let own = list.split(']').next().unwrap().split(", ");
+        let all = value(&scratch, file, "offset_mm").unwrap();
+        own.map(|own| all + own.parse::<f64>().unwrap())
+            .collect::<Vec<_>>()
+    });
+    for (first, second) in first.iter().zip(&second) {
+        assert!((first - second).abs() < 10.0, "{first} {second}");
+    }
+    let mut moved = zones;
+    moved[9] += 60.0;
+    scratch.file("target.npy", recording(&target(1200.0), &moved, 3));
+    scratch.printed(&format!(
+        "{calibrate} --settings first.toml --out third.toml"
+    ));
+    scratch.file("scene.npy", recording(&scene(), &moved, 4));
+    scratch.printed(&format!(
+        "replay scene.npy {SENSOR} --cycles 20000 --settings third.toml --out out"
+    ));
+    let error = error_mm(&scratch, "out", &scene());
+    assert!(error < 8.0, "{error}");
 }
 
 #[test]
