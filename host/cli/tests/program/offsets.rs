@@ -213,7 +213,7 @@ fn nothing_is_corrected_twice() {
     assert!((plain - 50.0 - kept).abs() < 0.1, "{plain} {kept}");
     // Each its own: most pixels do not see the target, and have none.
     let ranges = target(1200.0);
-    let is_seen = |pixel: usize| pixel % 3 == 0;
+    let is_seen = |pixel: usize| pixel.is_multiple_of(3);
     let too_near: Vec<f64> = (0..PIXELS)
         .map(|pixel| if is_seen(pixel) { 0.0 } else { -1e6 })
         .collect();
