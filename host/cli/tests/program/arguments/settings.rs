@@ -113,7 +113,6 @@ fn what_contradicts_the_file_is_refused() {
         --half-widths 2 | must be BEFORE,AFTER, each 1 to 4 bins
         --half-widths 2,4.1 | must be BEFORE,AFTER, each 1 to 4 bins
         --half-widths 0.9,4 | must be BEFORE,AFTER, each 1 to 4 bins
-        --tracking | --tracking needs the pulse, which was not found in the recording: give --rule window and --sigma-bins
         --tracking --rule paper | --tracking is for --rule window",
     );
     scratch.all_refused(
