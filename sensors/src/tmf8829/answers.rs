@@ -230,7 +230,7 @@ impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
         let bytes = self.buffer.get(..length).unwrap_or_default();
         let before = self.counts.histograms;
         let counts = &mut self.counts;
-        self.stream.take(bytes, &self.config, counts, sink)?;
+        self.stream.take(bytes, &self.config, counts, sink);
         let polled = if self.counts.histograms == before {
             Polled::Working
         } else {

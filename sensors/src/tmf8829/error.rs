@@ -46,9 +46,6 @@ pub enum DeviceError {
         /// The bytes in place of the end marker.
         marker: u16,
     },
-    /// A frame has neighbouring counts of all ones: nobody drives the bus. The driver abandons the measurement.
-    /// This histogram and those behind it are not given.
-    NoData,
     /// There is a gap in the numbers of frames. The frame after it is good.
     Missed {
         /// The number of the frame that should have come.
@@ -77,7 +74,6 @@ impl fmt::Display for DeviceError {
                 "frame {id:#04x}, {part:#04x} of {payload} bytes is not of this measurement"
             ),
             Self::NoEnd { marker } => write!(f, "a frame ends with {marker:#06x}"),
-            Self::NoData => f.write_str("counts of all ones: nobody drives the bus"),
             Self::Missed { expected, found } => write!(f, "frame {found} came, not {expected}"),
             Self::Aborted { flags } => write!(f, "a frame is not valid: {flags:#04x}"),
         }
@@ -97,7 +93,6 @@ impl From<DeviceError> for SensorFault {
             DeviceError::Overrun { .. }
             | DeviceError::ForeignFrame { .. }
             | DeviceError::NoEnd { .. }
-            | DeviceError::NoData
             | DeviceError::Missed { .. }
             | DeviceError::Aborted { .. } => Self::Data,
         }

@@ -3,17 +3,14 @@
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::I24F8;
 
+use super::Counts;
 use super::config::Config;
 use super::frame::{END, Header, Kind};
 use super::zones::{FEW_BINS, REFERENCES};
-use super::{Counts, DeviceError};
 use crate::{PhotonSink, Target};
 
 /// The most bytes of a zone in a frame of results: four targets.
 const RECORD: usize = 24;
-/// A count of all ones, and the least one whose end is.
-const ALL_ONES: u32 = 0xFF_FFFF;
-const LOST: u32 = 0xFF_0000;
 
 /// A frame after its header.
 #[derive(Debug)]
@@ -26,8 +23,6 @@ pub(super) struct Stream {
     taken: u16,
     /// The present count.
     word: [u8; 3],
-    /// The count before it in its histogram.
-    before: u32,
     counts: [u32; 128],
     record: [u8; RECORD],
     pub(super) end: [u8; END as usize],
@@ -45,7 +40,6 @@ impl Stream {
             index: 0,
             taken: 0,
             word: [0; 3],
-            before: 0,
             counts: [0; 128],
             record: [0; RECORD],
             end: [0; END as usize],
@@ -55,7 +49,7 @@ impl Stream {
     /// A frame begins.
     pub(super) const fn begin(&mut self, header: Header) {
         self.header = header;
-        (self.at, self.index, self.taken, self.before) = (0, 0, 0, 0);
+        (self.at, self.index, self.taken) = (0, 0, 0);
         self.counts = [0; 128];
     }
 
@@ -71,13 +65,11 @@ impl Stream {
         config: &Config,
         counts: &mut Counts,
         sink: &mut impl PhotonSink,
-    ) -> Result<(), DeviceError> {
+    ) {
         for &byte in bytes {
             match self.at.checked_sub(self.header.data) {
                 None => match self.header.kind {
-                    Kind::Histograms { slot } => {
-                        self.count(byte, slot, config, counts, sink)?;
-                    }
+                    Kind::Histograms { slot } => self.count(byte, slot, config, counts, sink),
                     Kind::Results { is_second } => self.note(byte, is_second, config, sink),
                 },
                 Some(at) => {
@@ -88,7 +80,6 @@ impl Stream {
             }
             self.at = self.at.saturating_add(1);
         }
-        Ok(())
     }
 
     /// A byte of a histogram.
@@ -99,12 +90,12 @@ impl Stream {
         config: &Config,
         counts: &mut Counts,
         sink: &mut impl PhotonSink,
-    ) -> Result<(), DeviceError> {
+    ) {
         let [_, low, middle] = self.word;
         self.word = [low, middle, byte];
         self.taken += 1;
         if !self.taken.is_multiple_of(3) {
-            return Ok(());
+            return;
         }
         let settings = config.settings();
         let zones = settings.zones;
@@ -114,12 +105,6 @@ impl Stream {
             Some(_) => (zones.bins(), settings.preset.merge(zones)),
         };
         let count = u32::from_le_bytes([low, middle, byte, 0]);
-        // Without a sensor every bit is 1, from the middle of a count on. One count may be so, two of a histogram
-        // are more photons than its pulses can give.
-        if self.before >= LOST && count == ALL_ONES {
-            return Err(DeviceError::NoData);
-        }
-        self.before = count;
         let bin = self.taken / 3 - 1;
         match self.counts.get_mut(usize::from(bin >> merge)) {
             // Two of 24 bits at most.
@@ -127,9 +112,8 @@ impl Stream {
             None => counts.beyond = counts.beyond.saturating_add(u64::from(count)),
         }
         if bin + 1 < bins {
-            return Ok(());
+            return;
         }
-        self.before = 0;
         let (first, zone) = match zone {
             Some(zone) => (settings.first_pixel, zones.of_histogram(slot, zone)),
             None => match settings.reference {
@@ -144,7 +128,6 @@ impl Stream {
         self.counts = [0; 128];
         self.index += 1;
         self.taken = 0;
-        Ok(())
     }
 
     /// A byte of the results of a zone.

@@ -420,27 +420,6 @@ fn a_stop_stops_the_chip_and_a_start_begins_anew() {
     assert_eq!(stops.count(), 2);
 }
 
-/// A wire breaks within a chunk of a histogram: it is not given, and the frame is counted.
-#[test]
-fn counts_of_all_ones_are_not_given() {
-    let mut bench = measuring();
-    bench.frames(1);
-    while bench.bus.0.borrow().chip.fifo.len() > 20_000 {
-        let _ = poll(&mut bench);
-    }
-    let before = bench.sensor.counts();
-    let is_reading = |bench: &Bench<128>| bench.bus.0.borrow().chip.fifo.len() < 25_000;
-    while !is_reading(&bench) {
-        let _ = poll(&mut bench);
-    }
-    bench.sink.take();
-    bench.bus.0.borrow_mut().fault = Some(Fault::All(0xFF));
-    assert_eq!(error(&mut bench, 10), Error::Device(DeviceError::NoData));
-    assert_eq!(bench.sink.take(), []);
-    assert_eq!(bench.sensor.counts().broken, before.broken + 1);
-    recovers(&mut bench);
-}
-
 /// After an error at any transfer from the command to measure on, with an ENABLE that is not wired.
 #[test]
 fn a_stop_after_an_error_sends_the_command_to_stop() {

@@ -98,33 +98,11 @@ impl Oracle {
     fn histograms(&mut self, slot: usize, before: usize, data: usize) -> Vec<SinkCall> {
         let bins = if self.mode == 0 { 256 } else { 64 };
         let columns = shape(self.mode).0;
-        // Two neighbouring counts of ones: the histogram and all behind it are not given.
-        let mut at = 0;
-        let mut whole = data;
-        let lengths = [3 * 64; 4].into_iter().chain(std::iter::repeat(3 * bins));
-        for length in lengths {
-            let Some(histogram) = self
-                .bytes
-                .get(at..self.bytes.len().min(data).min(at + length))
-            else {
-                break;
-            };
-            if histogram.is_empty() {
-                break;
-            }
-            let words: Vec<_> = histogram.chunks_exact(3).collect();
-            let is_lost = |pair: &[&[u8]]| pair[0][2] == 0xFF && pair[1] == [0xFF; 3];
-            if words.windows(2).any(is_lost) {
-                whole = at;
-                break;
-            }
-            at += length;
-        }
         let mut given = Vec::new();
         for (index, (x, y)) in order(self.mode, slot).into_iter().enumerate() {
             let start = 4 * 64 * 3 + index * bins * 3;
             let end = start + bins * 3;
-            if end <= before || end > self.bytes.len().min(whole) {
+            if end <= before || end > self.bytes.len().min(data) {
                 continue;
             }
             let words = self.bytes[start..end].chunks(3).take(128);
