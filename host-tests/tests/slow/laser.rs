@@ -154,7 +154,7 @@ pub fn light_over(port: Box<dyn Port>) -> Result<(Client, Arc<AtomicBool>)> {
 
 /// The milliseconds for which the laser has fired after `from`, and for which it has been off since.
 /// Fails if a pulse had the wrong length.
-pub fn dark_since(from: f64, done: &Done) -> Result<(f64, f64)> {
+fn dark_since(from: f64, done: &Done) -> Result<(f64, f64)> {
     let laser = &done.laser;
     let last = laser.last_high_ms.context("the laser never fired")?;
     let (lit, dark) = (last - from, done.end_ms - last);
@@ -251,7 +251,17 @@ fn fired_for(
 ) -> Result<()> {
     let done = board.wait()?;
     let from = from(&done).with_context(|| format!("{what}: {done:?}"))?;
-    let (lit, dark) = dark_since(from, &done)?;
+    check_fired(what, expected, from, &done)
+}
+
+/// Checks that a laser has fired for the `expected` milliseconds after `from`, without a reset.
+pub fn check_fired(
+    what: &str,
+    expected: RangeInclusive<f64>,
+    from: f64,
+    done: &Done,
+) -> Result<()> {
+    let (lit, dark) = dark_since(from, done)?;
     println!("{what}: {lit:.3} ms of {expected:?}; off for {dark:.0} ms");
     ensure!(
         expected.contains(&lit),

@@ -6,7 +6,6 @@
 //! ```
 
 use std::io;
-use std::ops::RangeInclusive;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
 use std::sync::{Arc, Mutex};
@@ -19,7 +18,7 @@ use dtof_device::{Client, Port};
 
 use crate::boards::{decides_alike, settings};
 use crate::enabled;
-use crate::laser::{AT_ONCE_MS, SILENCE_MS, dark_since, fires, light_over};
+use crate::laser::{AT_ONCE_MS, SILENCE_MS, check_fired, fires, light_over};
 use crate::rp2040::{Done, NODE, NPM, Rp2040, image, install};
 
 /// Bytes that the UART's transmitter holds, and a packet of the USB: they may still come after a change.
@@ -160,7 +159,7 @@ fn ports_change_and_the_laser_keeps_its_rules() -> Result<()> {
     ] {
         let done = changes_lit(&image, over_usb, end).context(what)?;
         let from = from(&done).with_context(|| format!("{what}: {done:?}"))?;
-        goes_dark(what, from, expected, &done)?;
+        check_fired(what, expected, from, &done)?;
     }
     Ok(())
 }
@@ -195,15 +194,4 @@ fn changes_lit(image: &Path, over_usb: bool, end: End) -> Result<Done> {
     thread::sleep(Duration::from_secs(12));
     drop(client);
     board.stop()
-}
-
-fn goes_dark(what: &str, from: f64, expected: RangeInclusive<f64>, done: &Done) -> Result<()> {
-    let (lit, dark) = dark_since(from, done)?;
-    println!("{what}: {lit:.3} ms of {expected:?}; off for {dark:.0} ms");
-    ensure!(
-        expected.contains(&lit),
-        "{what}: {lit} ms of light: {done:?}"
-    );
-    ensure!(done.boots.len() == 1, "{what}: {done:?}");
-    Ok(())
 }

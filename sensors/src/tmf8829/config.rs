@@ -53,7 +53,7 @@ pub enum Interface {
 }
 
 impl Interface {
-    /// The address to change to; with SPI the one after power-up, which nobody uses.
+    /// The address to change to; with SPI the one after power-up, which is not used.
     pub(super) const fn address(self) -> u8 {
         match self {
             Self::I2c { address } => address,

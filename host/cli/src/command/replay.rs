@@ -41,6 +41,8 @@ impl Replay {
         let file = file.ok_or_else(|| Refused::new("<FILE>", "is needed"))?;
         let input = Input::from(file);
         let mut replay = self.options.0.open(&input, requested)?;
+        // From its first file on, the folder is finished.
+        interrupt::handle_ctrl_c(|| ())?;
         let mut output = self.results.output(
             &replay.settings,
             &replay.photons,
@@ -50,7 +52,6 @@ impl Replay {
         )?;
         let quiet = self.results.quiet;
         warn(file, warnings(&replay.metadata), quiet);
-        interrupt::handle_ctrl_c(|| ())?;
         let RunResult { summary, .. } = replay.run(&input, &mut output, &mut Bar::new(quiet))?;
         let lead = format!("Recorded photons of {input}.");
         let found = Section {

@@ -92,11 +92,12 @@ impl Job<'_> {
         let (photons, settings) = (&simulation.photons, &simulation.settings);
         let mut engine = self.engine.engine(settings, photons)?;
         let effective = simulation.requested.with_settings(settings);
+        // From its first file on, the folder is finished.
+        interrupt::handle_ctrl_c(|| ())?;
         let mut output =
             self.results
                 .output(settings, photons, self.input, effective, self.settings_file)?;
         let progress = &mut Bar::new(self.results.quiet);
-        interrupt::handle_ctrl_c(|| ())?;
         let ran = simulation.run(engine.as_mut(), &mut output, progress)?;
         let mut summary = ran.summary;
         summary.export_with = export_with(&simulation.scene);

@@ -9,6 +9,8 @@ use crate::view::until;
 
 /// Hours of work.
 const LINE: &str = "--cycles 400000000 --no-csv --quiet --out out";
+/// Bytes of a file that has events.
+const MORE_THAN_HEADER: u64 = 65_536;
 
 /// Begins a simulation, and presses Ctrl-C once it has written events.
 fn interrupted(scratch: &Scratch) -> Child {
@@ -23,7 +25,9 @@ fn interrupted(scratch: &Scratch) -> Child {
         let files = names(&out).into_iter();
         files.map(|name| out.join(name).metadata().map_or(0, |file| file.len()))
     };
-    until("begun", || out.is_dir() && bytes().any(|bytes| bytes > 0));
+    until("begun", || {
+        out.is_dir() && bytes().any(|bytes| bytes > MORE_THAN_HEADER)
+    });
     press(&child);
     child
 }
