@@ -37,6 +37,8 @@ const MOST_A_CYCLE: f64 = 5e7;
 /// The most laser cycles of a chunk, and about the photons of all pixels in a chunk.
 const CHUNK: u16 = 2048;
 const CHUNK_PHOTONS: f64 = 4e6;
+/// Laser cycles of a recording without photons, which do not show its length.
+const CYCLES_WITHOUT_PHOTONS: u64 = 10_000;
 /// How many photons of a laser cycle are written without a check.
 const AT_ONCE: usize = 4;
 
@@ -105,8 +107,7 @@ impl RecordedHistograms {
             part_totals.extend(totals(capture)?);
         }
         layout.check(&part_totals)?;
-        let (mut recorded, mut total_per_cycle) = (Vec::new(), 0.0);
-        let (mut shortest, mut longest) = (u64::MAX, 0);
+        let mut lengths = Vec::new();
         let mut pixels_before = 0;
         for totals in &layout.captures {
             let is_masked = |&(pixel, _): &(usize, &u64)| {
@@ -116,9 +117,15 @@ impl RecordedHistograms {
             let unmasked = totals.iter().enumerate().filter(|pixel| !is_masked(pixel));
             let brightest = unmasked.map(|(_, &total)| total).max().unwrap_or(0);
             pixels_before += totals.len();
-            let length_cycles = recorded_cycles(length, brightest, cycles)?;
-            shortest = shortest.min(length_cycles);
-            longest = longest.max(length_cycles);
+            lengths.push(recorded_cycles(length, brightest)?);
+        }
+        // A capture without photons does not make a replay longer.
+        let longest = lengths.iter().flatten().copied().max();
+        let longest = longest.unwrap_or_else(|| cycles.min(CYCLES_WITHOUT_PHOTONS));
+        let lengths = lengths.iter().map(|length| length.unwrap_or(longest));
+        let shortest = lengths.clone().min().unwrap_or(longest);
+        let (mut recorded, mut total_per_cycle) = (Vec::new(), 0.0);
+        for (totals, length_cycles) in layout.captures.iter().zip(lengths) {
             total_per_cycle += totals
                 .iter()
                 .map(|&total| mean(total, length_cycles))
@@ -226,19 +233,18 @@ fn chunk(photons_per_cycle: f64) -> u16 {
     (CHUNK_PHOTONS / photons_per_cycle).clamp(1.0, CHUNK.into()) as u16
 }
 
-/// Laser cycles of a capture whose brightest pixel holds `brightest` photons.
+/// Laser cycles of a capture whose brightest pixel holds `brightest` photons; `None` if only photons would show them.
 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-fn recorded_cycles(length: RecordingLength, brightest: u64, requested: u64) -> Result<u64> {
+fn recorded_cycles(length: RecordingLength, brightest: u64) -> Result<Option<u64>> {
     match length {
         RecordingLength::Cycles(cycles) => {
             ensure!(
                 cycles <= MOST,
                 Refused::value("recorded_cycles", cycles, "must be at most 2^40")
             );
-            Ok(cycles)
+            Ok(Some(cycles))
         }
-        // Without a photon the length does not matter.
-        RecordingLength::PhotonsPerCycle(_) if brightest == 0 => Ok(requested),
+        RecordingLength::PhotonsPerCycle(_) if brightest == 0 => Ok(None),
         RecordingLength::PhotonsPerCycle(rate) => {
             let cycles = (brightest as f64 / rate).round().max(1.0);
             ensure!(
@@ -249,7 +255,7 @@ fn recorded_cycles(length: RecordingLength, brightest: u64, requested: u64) -> R
                     "makes the recording longer than 2^40 laser cycles"
                 )
             );
-            Ok(cycles as u64)
+            Ok(Some(cycles as u64))
         }
     }
 }

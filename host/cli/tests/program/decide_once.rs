@@ -5,7 +5,7 @@ use std::path::Path;
 use dtof_core::PixelAddress;
 use dtof_simulate::scene::Scene;
 
-use crate::common::{Scratch, assert_contains};
+use crate::common::{Scratch, assert_contains, npy};
 
 fn scenes() -> std::path::PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes")
@@ -20,6 +20,40 @@ fn right(scratch: &Scratch) -> usize {
         (depth - truth.range_mm).abs() < 30.0
     };
     (0..).zip(scratch.map("depth")).filter(is_right).count()
+}
+
+/// Nothing shows how long a recording without photons is; it still ends.
+#[test]
+fn a_recording_without_photons_ends() {
+    let scratch = Scratch::new();
+    for (shape, bytes) in [("(2, 8)", 16), ("(2, 2, 2, 16)", 128)] {
+        let dark = scratch.file("dark.npy", npy("|u1", shape, &vec![0; bytes]));
+        let summary = scratch.replayed(&dark, "--decide-once");
+        assert_eq!(
+            (&summary["events"], &summary["cycles"]),
+            (&0.into(), &10_000.into())
+        );
+    }
+    let scratch = Scratch::new();
+    for (name, descr, shape, part) in [
+        (
+            "no_row.npy",
+            "<u2",
+            "(0, 4, 128)",
+            "the array [0, 4, 128] is empty",
+        ),
+        (
+            "no_bin.npy",
+            "<u2",
+            "(4, 4, 0)",
+            "the array [4, 4, 0] is empty",
+        ),
+        ("no_photon.npy", "<u2", "(0, 3)", "no photons"),
+    ] {
+        scratch.file(name, npy(descr, shape, &[]));
+        let output = scratch.run(&format!("replay {name} --decide-once --out out"));
+        scratch.refused(&output, &[name, part]);
+    }
 }
 
 #[test]

@@ -1,3 +1,5 @@
+use std::slice::from_ref;
+
 use super::*;
 
 /// A capture of pixels in a row.
@@ -71,6 +73,32 @@ fn equal_pixels_and_other_seeds_receive_other_photons() {
         assert_eq!(pixel.photons.len(), 800);
         assert!(all[..index].iter().all(|before| before != pixel));
     }
+}
+
+/// Nothing shows the length of a capture without photons, and no request for all laser cycles makes it endless.
+#[test]
+fn a_capture_without_photons_is_as_long_as_the_longest_other() {
+    let array = Array::new(1, 1).unwrap();
+    let length = RecordingLength::PhotonsPerCycle(0.5);
+    let cycles = |captures: &[Capture], cycles| {
+        let photons = RecordedHistograms::new(array, captures, length, cycles, 1).unwrap();
+        (photons.cycles(), photons.recorded_cycles())
+    };
+    let [dark, dim, bright] = [0, 5, 700].map(|count| vec![vec![count; 8]]);
+    let all = [dim.clone(), dark.clone(), bright];
+    assert_eq!(cycles(&all, u64::MAX), (11_200, Some((80, 11_200))));
+    assert_eq!(cycles(&all, 100), (100, Some((80, 11_200))));
+    let only_dark = [dark];
+    assert_eq!(
+        cycles(&only_dark, u64::MAX),
+        (10_000, Some((10_000, 10_000)))
+    );
+    assert_eq!(cycles(&only_dark, 300), (300, Some((300, 300))));
+    // Neither do masked pixels show it.
+    let mut layout = Layout::from_captures(array, from_ref(&dim)).unwrap();
+    layout.masked = vec![0];
+    let masked = RecordedHistograms::with_layout(&layout, from_ref(&dim), length, u64::MAX, 1);
+    assert_eq!(masked.unwrap().cycles(), 10_000);
 }
 
 #[test]
