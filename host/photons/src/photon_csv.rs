@@ -14,6 +14,8 @@ const LINE_BYTES: u64 = 4096;
 pub struct CsvReader {
     input: Input,
     file: BufReader<Box<dyn Read>>,
+    /// Bytes of the file when it was opened that have not been read.
+    left: u64,
     line: Vec<u8>,
     line_number: u64,
     columns: Columns,
@@ -66,10 +68,11 @@ impl Columns {
 impl PhotonReader for CsvReader {
     fn open(input: &Input) -> Result<Self> {
         let name = input;
-        let (file, _) = input.open().with_context(|| name.to_string())?;
+        let (file, length) = input.open().with_context(|| name.to_string())?;
         let mut rows = Self {
             input: input.clone(),
             file: BufReader::new(file),
+            left: length,
             line: Vec::new(),
             line_number: 0,
             columns: Columns {
@@ -120,7 +123,7 @@ impl PhotonReader for CsvReader {
 }
 
 impl CsvReader {
-    /// Reads the next line. Returns `false` at the end of the file.
+    /// Reads the next line. Returns `false` at the end of the file, which must not be before the end that it had.
     fn read_line(&mut self) -> Result<bool> {
         self.line.clear();
         self.line_number += 1;
@@ -128,6 +131,11 @@ impl CsvReader {
         let read = limited.read_until(b'\n', &mut self.line)?;
         let is_cut = read as u64 == LINE_BYTES && !self.line.ends_with(b"\n");
         ensure!(!is_cut, "a line of more than {LINE_BYTES} bytes");
+        self.left = self.left.saturating_sub(read as u64);
+        ensure!(
+            read > 0 || self.left == 0,
+            "the file became shorter while it was read"
+        );
         Ok(read > 0)
     }
 
@@ -196,6 +204,7 @@ mod tests {
         CsvReader {
             input: Input::File("photons.csv".into()),
             file: BufReader::new(Box::new(std::io::empty())),
+            left: 0,
             line: line.into(),
             line_number: 1,
             columns: Columns::new("pixel,cycle,bin").unwrap(),

@@ -83,34 +83,53 @@ impl ValidPhoton {
     }
 }
 
+/// So many laser cycles without a photon are a wrong number. A replay would run through all of them.
+const GAP: u64 = 1_000_000_000;
+
 /// Checks each photon of a file.
 struct Validator<R> {
     rows: R,
     shape: ListOptions,
+    /// Photons so far, and the laser cycle of the last.
+    photons: u64,
     last_cycle: u64,
+    /// A photon so many laser cycles after the last is refused: none before the first, which may come late.
+    gap: u64,
+    /// The photons of the first pass and the last laser cycle, which a second pass must have, too.
+    expected: Option<(u64, u64)>,
 }
 
 impl<R: PhotonReader> Validator<R> {
-    fn open(input: &Input, shape: ListOptions) -> Result<Self> {
+    fn open(input: &Input, shape: ListOptions, expected: Option<(u64, u64)>) -> Result<Self> {
         Ok(Self {
             rows: R::open(input)?,
             shape,
+            photons: 0,
             last_cycle: 0,
+            gap: u64::MAX,
+            expected,
         })
     }
 
     #[inline(always)]
     fn next(&mut self) -> Result<Option<ValidPhoton>> {
         let row = match self.rows.next() {
-            Ok(None) => return Ok(None),
+            Ok(None) => self.end(),
             Ok(Some([pixel, cycle, recorded])) => {
                 let bin = match self.shape.rebin {
                     1 => recorded,
                     rebin => recorded / u64::from(rebin),
                 };
                 match (u16::try_from(pixel), u16::try_from(bin)) {
-                    (Ok(pixel), Ok(bin)) if bin < self.shape.bins && cycle >= self.last_cycle => {
+                    // A laser cycle before the last wraps around to a wide gap.
+                    (Ok(pixel), Ok(bin))
+                        if bin < self.shape.bins
+                            && cycle < u64::MAX
+                            && cycle.wrapping_sub(self.last_cycle) < self.gap =>
+                    {
+                        self.photons += 1;
                         self.last_cycle = cycle;
+                        self.gap = GAP;
                         return Ok(Some(ValidPhoton::new(pixel, cycle, bin)));
                     }
                     _ => self.wrong([pixel, cycle, recorded]),
@@ -121,6 +140,21 @@ impl<R: PhotonReader> Validator<R> {
         row.with_context(|| self.rows.place())
     }
 
+    /// The file has ended. Another program may have cut it after the first pass.
+    #[cold]
+    fn end(&self) -> Result<Option<ValidPhoton>> {
+        let read = (self.photons, self.last_cycle);
+        let (photons, last_cycle) = self.expected.unwrap_or(read);
+        ensure!(
+            read == (photons, last_cycle),
+            "the file changed while it was read: it had {} photons up to cycle {last_cycle}, and now has {} up to cycle {}",
+            grouped(photons),
+            grouped(read.0),
+            read.1
+        );
+        Ok(None)
+    }
+
     /// Says why a photon is refused.
     #[cold]
     fn wrong(&self, [pixel, cycle, bin]: RawPhoton) -> Result<Option<ValidPhoton>> {
@@ -128,8 +162,23 @@ impl<R: PhotonReader> Validator<R> {
             bail!("pixel {pixel} is above 65535, the last address");
         }
         if cycle < self.last_cycle {
-            bail!("cycle {cycle} comes after cycle {}", self.last_cycle);
+            bail!(
+                "cycle {cycle} comes after cycle {}: photons must be in order of their cycles",
+                self.last_cycle
+            );
         }
+        ensure!(
+            cycle < u64::MAX,
+            "cycle {cycle} is the highest number of 64 bits: it is damaged, or stands for no cycle"
+        );
+        let gap = cycle - self.last_cycle;
+        ensure!(
+            gap < self.gap,
+            "cycle {cycle} comes {} laser cycles after the photon before it: must be less than {}; is the number damaged, \
+             or a time?",
+            grouped(gap),
+            grouped(self.gap)
+        );
         let ListOptions { bins, rebin, .. } = self.shape;
         let bins = u32::from(bins) * u32::from(rebin);
         bail!(Refused::input(format!(
@@ -178,18 +227,17 @@ impl<R: PhotonReader> PhotonList<R> {
     /// # Errors
     /// Returns what is wrong with the file, after its name and the place.
     pub fn open(input: &Input, shape: ListOptions, cycles: u64) -> Result<Self> {
-        let mut rows = Validator::<R>::open(input, shape)?;
+        let mut rows = Validator::<R>::open(input, shape, None)?;
         let mut is_there = vec![false; Array::MOST_PIXELS as usize];
-        let (mut photons, mut not_replayed, mut recorded) = (0u64, 0, 0u64);
+        let (mut not_replayed, mut recorded) = (0, 0u64);
         let mut first_cycle = 0;
         // The span of the last photon, its photons so far, and the most photons of any span.
         let (mut span, mut of_span, mut most) = (0, 0u64, 0);
         while let Some(row) = rows.next()? {
             is_there[row.pixel()] = true;
-            if photons == 0 {
+            if rows.photons == 1 {
                 first_cycle = row.cycle;
             }
-            photons += 1;
             recorded = row.cycle.saturating_add(1);
             if row.cycle >= cycles {
                 not_replayed += 1;
@@ -200,7 +248,8 @@ impl<R: PhotonReader> PhotonList<R> {
             of_span += 1;
             most = most.max(of_span);
         }
-        ensure!(photons > 0, "{}: no photons", rows.rows.place());
+        ensure!(rows.photons > 0, "{}: no photons", rows.rows.place());
+        let expected = Some((rows.photons, rows.last_cycle));
         check_cycles(first_cycle, recorded.min(cycles)).with_context(|| input.to_string())?;
         let all = (0..=u16::MAX).filter(|&pixel| is_there[usize::from(pixel)]);
         let addresses: Vec<PixelAddress> = all.map(PixelAddress::new).collect();
@@ -215,7 +264,7 @@ impl<R: PhotonReader> PhotonList<R> {
             Refused::value("columns", columns, "must be 1 or more")
         );
         let array = Array::new(columns, pixels_in_file.div_ceil(columns));
-        let rows = Validator::<R>::open(input, shape)?;
+        let rows = Validator::<R>::open(input, shape, expected)?;
         Ok(Self {
             input: input.clone(),
             array: array.ok_or_else(|| {
@@ -264,7 +313,7 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
             };
             *count += 1;
         }
-        self.rows = Validator::open(&self.input, self.rows.shape)?;
+        self.rows = Validator::open(&self.input, self.rows.shape, self.rows.expected)?;
         Ok(counts)
     }
 }

@@ -1,7 +1,7 @@
 //! The header of an array (NumPy's `NEP 1`): a Python dictionary of type, order and shape. It is
 //! checked against the length of the file before anything is allocated.
 
-use std::io::{BufReader, Read};
+use std::io::{BufReader, ErrorKind, Read};
 use std::{fmt, iter};
 
 use anyhow::{Context, Error, Result, anyhow, bail, ensure};
@@ -375,6 +375,14 @@ impl<'a> Literal<'a> {
     }
 }
 
+/// Fills `bytes`. The file had them when it was opened.
+pub(super) fn read_all(file: &mut impl Read, bytes: &mut [u8]) -> Result<()> {
+    file.read_exact(bytes).map_err(|error| match error.kind() {
+        ErrorKind::UnexpectedEof => anyhow!("the file became shorter while it was read"),
+        _ => error.into(),
+    })
+}
+
 /// A parser of literals.
 struct Literals<'a> {
     text: &'a str,
@@ -548,7 +556,7 @@ impl<R: Read> Array<R> {
         // The size in an archive may be wrong, too, so memory grows only with what is read.
         let mut all = Vec::new();
         for place in 0..count {
-            self.file.read_exact(bytes)?;
+            read_all(&mut self.file, bytes)?;
             let number = self.element.number(bytes);
             let number = number.context("the elements are not plain numbers")?;
             all.push(each(place, number)?);

@@ -6,7 +6,7 @@ use std::io::{BufReader, Read};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use super::header::{Element, Elements, Field, Header};
+use super::header::{Element, Elements, Field, Header, read_all};
 use crate::input::Input;
 use crate::photon_list::{PhotonReader, RawPhoton};
 
@@ -153,9 +153,7 @@ impl RecordReader {
         let records = usize::try_from(self.after).map_or(BLOCK, |after| after.min(BLOCK));
         self.next = 0;
         self.end = records * self.record;
-        self.file
-            .read_exact(&mut self.block[..self.end])
-            .context("the file became shorter while it was read")?;
+        read_all(&mut self.file, &mut self.block[..self.end])?;
         self.after -= records as u64;
         Ok(records > 0)
     }

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use dtof_core::Array;
 use dtof_photons::input::{Input, NpyArray};
 use dtof_photons::npy::header;
-use dtof_photons::open::{BIN_WIDTH_PS, Counts, ReadOptions, counts, open};
+use dtof_photons::open::{BIN_WIDTH_PS, Counts, ReadOptions, check, counts, open};
 use dtof_sensors::{tmf882x, tmf8829};
 use flate2::Compression;
 use flate2::write::GzEncoder;
@@ -25,10 +25,10 @@ fn photon_lists_are_summed_over_their_laser_cycles() {
     let counts = counts_of(
         "a.csv",
         // The slices are longer than that.
-        "pixel,cycle,bin\n2,0,5\n2,7,5\n0,70000000000000,127\n2,70000000000000,6\n",
+        "pixel,cycle,bin\n2,0,5\n2,7,5\n0,700000000,127\n2,700000000,6\n",
     );
     assert_eq!(counts.array, Array::new(3, 1).unwrap());
-    assert_eq!(counts.cycles, Some(70_000_000_000_001));
+    assert_eq!(counts.cycles, Some(700_000_001));
     let [pixels] = &counts.captures[..] else {
         panic!("one capture")
     };
@@ -210,6 +210,53 @@ fn packed_logs_that_are_damaged_or_too_large_are_refused() {
     );
 }
 
+/// No photon is lost silently if another program cuts a list while it is read.
+#[test]
+fn a_list_that_is_cut_while_it_is_read_is_refused() {
+    let scratch = Scratch::new();
+    let rows = |all: u64| (0..all).map(|cycle| format!("0,{cycle},60\n"));
+    let csv = |all| format!("pixel,cycle,bin\n{}", rows(all).collect::<String>());
+    let descr = "[('pixel', '<u2'), ('cycle', '<u4'), ('bin', '<u2')]";
+    let records =
+        (0..50_000u32).flat_map(|cycle| [&[0; 2], &cycle.to_le_bytes()[..], &[60, 0]].concat());
+    let npy = [header(descr, &[50_000], 128), records.collect()].concat();
+    let all = ReadOptions {
+        cycles: u64::MAX,
+        ..ReadOptions::default()
+    };
+    // More than is read ahead.
+    for (name, bytes, cut) in [
+        (
+            "list.csv",
+            csv(50_000).into_bytes(),
+            csv(40_000).len() as u64,
+        ),
+        ("list.npy", npy, 128 + 8 * 40_000),
+    ] {
+        let path = scratch.file(name, bytes);
+        let mut recording = open(&path, &all).unwrap();
+        assert_eq!(recording.photons.cycles(), 50_000);
+        let file = std::fs::OpenOptions::new().write(true).open(&path);
+        file.unwrap().set_len(cut).unwrap();
+        let slice = recording.photons.next_slice(50_000);
+        let error = format!("{:#}", slice.unwrap_err());
+        assert!(
+            error.ends_with(": the file became shorter while it was read"),
+            "{error}"
+        );
+    }
+    // Another file is in its place.
+    let path = scratch.file("list.csv", csv(500));
+    let mut checked = check(&path, &all).unwrap();
+    scratch.file("other.csv", csv(400));
+    std::fs::rename(scratch.path("other.csv"), &path).unwrap();
+    assert_eq!(checked.counts().unwrap().captures[0][0][60], 500);
+    let slice = checked.photons(&all).unwrap().photons.next_slice(500);
+    let error = format!("{:#}", slice.unwrap_err());
+    let expected = "the file changed while it was read: it had 500 photons up to cycle 499, and now has 400 up to cycle 399";
+    assert!(error.ends_with(expected), "{error}");
+}
+
 /// A photon list in memory gives the same photons and errors as a file.
 #[test]
 fn an_array_in_memory_is_read_as_its_file_is() {
@@ -240,5 +287,5 @@ fn an_array_in_memory_is_read_as_its_file_is() {
         format!("{error:#}")
     });
     assert_eq!(file, memory);
-    assert!(file.ends_with("record 1: cycle 256 comes after cycle 257"));
+    assert!(file.contains("record 1: cycle 256 comes after cycle 257: photons must be in order"));
 }

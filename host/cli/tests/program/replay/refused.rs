@@ -37,7 +37,10 @@ fn csv_rows_that_are_not_photons_are_named_by_line() {
         0,0,2.5\n | photons.csv:2: | bin "2.5"
         0,99999999999999999999,2\n | photons.csv:2: | cycle
         65536,0,2\n | photons.csv:2: | pixel 65536 | 65535
-        0,5,2\n0,4,2\n | photons.csv:3: | cycle 4 comes after cycle 5
+        0,5,2\n0,4,2\n | photons.csv:3: cycle 4 comes after cycle 5: photons must be in order of their cycles
+        0,5,2\n0,1000000005,2\n | photons.csv:3: cycle 1000000005 comes 1,000,000,000 laser cycles after | must be less than
+        0,5,2\n0,18446744073709551615,2\n | photons.csv:3: cycle 18446744073709551615 is the highest number
+        0,18446744073709551615,2\n | photons.csv:2: cycle 18446744073709551615 is the highest number
         0,5,128\n | photons.csv:2: | bin 128 | 128 bins
         0,5,65664\n | photons.csv:2: | bin 65664
     "#,
