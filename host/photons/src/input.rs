@@ -6,6 +6,10 @@ use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use anyhow::Result;
+
+use dtof_options::files::is_file;
+
 /// Data that can be read more than once.
 #[derive(Clone, Debug)]
 pub enum Input {
@@ -51,10 +55,11 @@ impl Input {
     /// All bytes from the start, and their number.
     ///
     /// # Errors
-    /// Fails if the file cannot be read.
-    pub fn open(&self) -> io::Result<(Box<dyn Read>, u64)> {
+    /// Fails if it is no file, such as a pipe, or the file cannot be read.
+    pub fn open(&self) -> Result<(Box<dyn Read>, u64)> {
         match self {
             Self::File(path) => {
+                is_file(path)?;
                 let file = File::open(path)?;
                 let length = file.metadata()?.len();
                 Ok((Box::new(file), length))

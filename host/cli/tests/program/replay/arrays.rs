@@ -430,6 +430,7 @@ fn a_folder_is_no_recording() {
 #[test]
 fn a_pipe_is_no_recording() {
     let scratch = Scratch::new();
+    scratch.file("counts.npy", npy("|u1", "(2, 8)", &[9; 16]));
     for name in ["pipe", "a.npy", "a.npz", "a.json", "a.csv", "a.aer"] {
         let made = Command::new("mkfifo").arg(scratch.path(name)).status();
         assert!(made.unwrap().success());
@@ -445,6 +446,8 @@ fn a_pipe_is_no_recording() {
             replay /dev/zero --out out | /dev/zero: is a pipe or a device
             calibrate a.json --out out.toml | a.json: is a pipe
             compare a.npy --out out | a.npy: is a pipe
+            compare counts.npy --truth a.npy --out out | a.npy: is a pipe or a device; save it as a file first
+            simulate --depth a.npy --out out | a.npy: is a pipe
             export a.aer --format csv --out x | a.aer: is a pipe
             view a.aer | a.aer: is a pipe
         ",
