@@ -296,6 +296,11 @@ impl Summary {
             let why = "all photons are of pixels left out".to_owned();
             rows.push(("no event".to_owned(), why));
         }
+        if self.photons == 0 && self.masked == 0 && self.not_replayed > 0 {
+            let why =
+                "all photons come after the laser cycles that were replayed: --cycles N takes more";
+            rows.push(("no event".to_owned(), why.to_owned()));
+        }
         // Only losses that have occurred.
         let losses = [
             ("photons outside the range gate", self.gated_out),

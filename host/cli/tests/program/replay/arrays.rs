@@ -541,6 +541,10 @@ fn what_a_photon_list_leaves_open_is_said() {
     }
     let printed = scratch.printed("replay p.csv --out out");
     assert_contains(&printed, "30 of 30: --cycles N takes more");
+    assert_contains(
+        &printed,
+        "all photons come after the laser cycles that were replayed: --cycles N takes more",
+    );
     list(3, 0);
     let printed = scratch.printed("replay p.csv --out out --gate 100..120");
     assert_contains(&printed, "all photons are outside the range gate");
