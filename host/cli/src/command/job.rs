@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
 use clap::Args;
-use dtof::path;
+use dtof::{interrupt, path};
 use dtof_device::{Client, DeviceEngine};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
@@ -72,7 +72,8 @@ impl ResultOptions {
         })
     }
 
-    /// Prepares the folder for a job that reads `input` and a settings file.
+    /// Prepares the folder for a job that reads `input` and a settings file. From now on Ctrl-C ends the photons, and
+    /// the job finishes its files.
     ///
     /// # Errors
     /// Fails if an option does not suit the others, or the folder cannot be written.
@@ -84,6 +85,8 @@ impl ResultOptions {
         effective: SettingsFile,
         settings_file: Option<&Path>,
     ) -> Result<Output> {
+        // Before the first file: nothing would remove it.
+        interrupt::handle_ctrl_c(|| ())?;
         Ok(
             Output::create(&self.folder(input), settings, photons, input)?
                 .with_settings(effective, settings_file)?

@@ -2,7 +2,6 @@
 
 use anyhow::Result;
 use clap::Args;
-use dtof::interrupt;
 use dtof::progress::Bar;
 use dtof_engine::settings::SettingsFile;
 use dtof_options::Refused;
@@ -41,8 +40,6 @@ impl Replay {
         let file = file.ok_or_else(|| Refused::new("<FILE>", "is needed"))?;
         let input = Input::from(file);
         let mut replay = self.options.0.open(&input, requested)?;
-        // From its first file on, the folder is finished.
-        interrupt::handle_ctrl_c(|| ())?;
         let mut output = self.results.output(
             &replay.settings,
             &replay.photons,

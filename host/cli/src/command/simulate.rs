@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
-use dtof::interrupt;
 use dtof::path;
 use dtof::progress::Bar;
 use dtof_engine::settings::SettingsFile;
@@ -92,8 +91,6 @@ impl Job<'_> {
         let (photons, settings) = (&simulation.photons, &simulation.settings);
         let mut engine = self.engine.engine(settings, photons)?;
         let effective = simulation.requested.with_settings(settings);
-        // From its first file on, the folder is finished.
-        interrupt::handle_ctrl_c(|| ())?;
         let mut output =
             self.results
                 .output(settings, photons, self.input, effective, self.settings_file)?;
