@@ -135,8 +135,6 @@ pub(super) fn calibrate_counts(
         (None, None) => Length::Unknown,
     };
     let rays = requested.rays.slants(counts.array)?;
-    let offsets_mm = requested.sensor.offsets_mm.iter().flatten();
-    let offsets_mm: Vec<f64> = offsets_mm.map(|mm| mm.to_num()).collect();
     let observed = Observed {
         array: counts.array,
         captures: &counts.captures,
@@ -146,7 +144,7 @@ pub(super) fn calibrate_counts(
         truth_mm: counts.truth_mm.as_deref(),
         slant: rays.as_ref().map(|[slants, _]| &slants[..]),
         bias_mm: rays.as_ref().map(|[_, biases]| &biases[..]),
-        offsets_mm: &offsets_mm,
+        offsets_mm: &requested.sensor.pixel_offsets_mm(),
     };
     calibrate_with(&observed, options, &shared(progress, "steps"))
 }

@@ -149,6 +149,13 @@ impl SensorSettings {
     pub fn or(self, other: Self) -> Self {
         self.first_of(other)
     }
+
+    /// The offset of each pixel in millimetres, if they have any.
+    #[must_use]
+    pub fn pixel_offsets_mm(&self) -> Vec<f64> {
+        let offsets = self.offsets_mm.iter().flatten();
+        offsets.map(|mm| mm.to_num()).collect()
+    }
 }
 
 /// The range of the dither of a laser that can, in bins, unless an option says otherwise. Another LiDAR as bright as

@@ -147,8 +147,6 @@ impl DeviceArgs {
         cycles.sort_unstable();
         let median = cycles.get(cycles.len() / 2).copied().unwrap_or(0);
         let rays = requested.rays.slants(array)?;
-        let offsets_mm = requested.sensor.offsets_mm.iter().flatten();
-        let offsets_mm: Vec<f64> = offsets_mm.map(|mm| mm.to_num()).collect();
         let captures = [collected.histograms];
         let observed = Observed {
             array,
@@ -159,7 +157,7 @@ impl DeviceArgs {
             truth_mm: None,
             slant: rays.as_ref().map(|[slants, _]| &slants[..]),
             bias_mm: rays.as_ref().map(|[_, biases]| &biases[..]),
-            offsets_mm: &offsets_mm,
+            offsets_mm: &requested.sensor.pixel_offsets_mm(),
         };
         let mut bar = Bar::new(quiet);
         let found = calibrate_with(&observed, options, &shared(&mut bar, "steps"))?;
