@@ -197,30 +197,26 @@ fn copy_licences(name: &str, folder: &Path) -> Result<()> {
     let registries = fs::read_dir(&sources).with_context(|| sources.display().to_string())?;
     let mut registries = registries.flatten().map(|entry| entry.path().join(name));
     let source = registries.find(|path| path.is_dir());
-    let source = files_at(&source.with_context(|| format!("no source of {name}"))?)?;
+    let source = source.with_context(|| format!("no source of {name}"))?;
+    let mut files = files(&source)?;
+    files.retain(|file| file.parent() == Some(&source));
     let begins = |path: &Path, starts: &[&str]| {
         let file = path.file_name().unwrap_or_default().to_string_lossy();
         let file = file.to_uppercase();
         starts.iter().any(|start| file.starts_with(start))
     };
     let licences = ["LICENSE", "LICENCE", "COPYING", "NOTICE"];
-    let has_licences = source.iter().any(|path| begins(path, &licences));
+    let has_licences = files.iter().any(|path| begins(path, &licences));
     let copied: &[&str] = if has_licences {
         &licences
     } else {
         &["README", "CARGO.TOML"]
     };
     fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    for path in source.iter().filter(|path| begins(path, copied)) {
+    for path in files.iter().filter(|path| begins(path, copied)) {
         copy(path, &folder.join(path.file_name().unwrap_or_default()))?;
     }
     Ok(())
-}
-
-fn files_at(folder: &Path) -> Result<Vec<PathBuf>> {
-    let entries = fs::read_dir(folder).with_context(|| folder.display().to_string())?;
-    let paths = entries.flatten().map(|entry| entry.path());
-    Ok(paths.filter(|path| path.is_file()).collect())
 }
 
 /// A path of this machine in a file.
