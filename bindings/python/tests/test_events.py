@@ -253,7 +253,7 @@ def test_every_loss_is_counted():
 def test_suspicious_recordings_give_a_warning():
     with pytest.warns(UserWarning, match="no photons: all 2 histograms are empty"):
         dtof.replay(numpy.zeros((2, 16), dtype=int))
-    with pytest.warns(UserWarning, match="bins of 0.250 ps"):
+    with pytest.warns(UserWarning, match="bins of 0.25 ps"):
         dtof.replay(counts(), bin_width_ps=0.25)
 
 

@@ -107,7 +107,7 @@ def test_messages_name_keywords():
         ("a -- b --mask does not", "a -- b mask does not"),
     ]:
         assert _warn.with_keywords(text) == expected
-    with pytest.warns(UserWarning, match="bins of 0.250 ps: bin_width_ps takes picoseconds"):
+    with pytest.warns(UserWarning, match="bins of 0.25 ps: bin_width_ps takes picoseconds"):
         dtof.replay(COUNTS, bin_width_ps=0.25)
     found = dtof.calibrate(COUNTS)
     assert found.found["offset"].startswith("not found: calibrate target_mm=D gives it")

@@ -328,6 +328,11 @@ fn kind(path: &Path) -> Result<Kind> {
     ];
     let kind = kinds.iter().find(|(end, _)| name.ends_with(end));
     let Some((_, kind)) = kind else {
+        ensure!(
+            !name.ends_with(".gz"),
+            "{}: only the log of a sensor, .json.gz, is read compressed; unpack it with gunzip",
+            path.display()
+        );
         bail!(
             "{}: the name must end in .npy, .npz, .json, .json.gz or .csv; save another format \
              from Python as an array of counts with numpy.save",

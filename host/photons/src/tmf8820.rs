@@ -2,7 +2,7 @@
 //! with a histogram of 128 bins a zone. A TMF8820 has nine zones: pixel address = capture × 9 + zone, and
 //! zone 4 is the centre. A TMF8828 has 8×8: pixel address = capture × 64 + zone.
 
-use std::io::Read;
+use std::io::{self, Read};
 
 use anyhow::{Context, Error, Result, anyhow, ensure};
 use dtof_core::Array;
@@ -43,9 +43,10 @@ struct LogEntry {
 }
 
 /// The error of a log that is not what its start looks like.
-pub(crate) fn not_a_log(name: &str, kind: &str, error: &serde_json::Error) -> Error {
+pub(crate) fn not_a_log(name: &str, kind: &str, error: serde_json::Error) -> Error {
     match error.is_io() {
-        true => anyhow!("{name}: {error}"),
+        // Without a line: it is the file that cannot be read.
+        true => anyhow!("{name}: {}", io::Error::from(error)),
         false => anyhow!("{name}:{}: not a {kind}: {error}", error.line()),
     }
 }
@@ -56,7 +57,7 @@ pub(crate) fn not_a_log(name: &str, kind: &str, error: &serde_json::Error) -> Er
 /// Returns what is wrong with the file, after its name and the line if there is one.
 pub fn read(name: &str, text: impl Read) -> Result<Tmf8820Log> {
     let entries: Vec<LogEntry> = serde_json::from_reader(text)
-        .map_err(|error| not_a_log(name, "TMF8820 capture log", &error))?;
+        .map_err(|error| not_a_log(name, "TMF8820 capture log", error))?;
     ensure!(!entries.is_empty(), "{name}: no captures");
     let all = entries[0].hists.len();
     let (array, axis_names, bin_width_ps, offset_mm) = match all {

@@ -70,7 +70,7 @@ struct Configuration {
 /// Returns what is wrong with the file, after its name and the line if there is one.
 pub fn read(name: &str, text: impl Read) -> Result<Tmf8829Log> {
     let log: Log =
-        serde_json::from_reader(text).map_err(|error| not_a_log(name, "TMF8829 log", &error))?;
+        serde_json::from_reader(text).map_err(|error| not_a_log(name, "TMF8829 log", error))?;
     parse_log(log).with_context(|| name.to_owned())
 }
 

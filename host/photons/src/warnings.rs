@@ -5,16 +5,21 @@ use std::collections::BTreeMap;
 
 use dtof_core::fixed::types::U16F16;
 
+use dtof_options::numbers::shortest;
 use dtof_options::rows::grouped;
 
 /// No SPAD resolves a picosecond, so a narrower bin was probably given in nanoseconds.
 #[must_use]
 pub fn narrow_bins(width_ps: U16F16) -> Option<String> {
     (width_ps < U16F16::ONE && width_ps > U16F16::ZERO).then(|| {
-        let (given, ns) = (width_ps.to_num::<f64>(), width_ps.to_num::<f64>() * 1000.0);
-        format!(
-            "bins of {given:.3} ps: --bin-width-ps takes picoseconds; {given:.3} ns are {ns:.0}"
-        )
+        let given = shortest(width_ps);
+        let ns = width_ps.to_num::<f64>() * 1000.0;
+        let hint = match ns >= 1.0 {
+            true => format!("{given} ns are {ns:.0}"),
+            // A nanosecond in seconds or milliseconds, perhaps.
+            false => "no TDC has such bins".to_owned(),
+        };
+        format!("bins of {given} ps: --bin-width-ps takes picoseconds; {hint}")
     })
 }
 

@@ -5,7 +5,7 @@ use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::neighbours::NeighbourRule;
 use dtof_core::{
     AnyRule, Array, BlockLevel, CentredWindow, Count, DepthEstimator, DetectionRule, EchoNumber,
-    GateError, Neighbours, PaperRule, PixelConfig, PixelConfigError, RangeGate,
+    GateError, Neighbours, PaperRule, PixelConfig, PixelConfigError, RangeGate, RangeScaleError,
 };
 pub use dtof_link::AdaptiveBinning;
 
@@ -251,6 +251,10 @@ impl Settings {
             self.pixel_offsets(),
         );
         ranges.map_err(|error| match error {
+            RangesError::Scale(RangeScaleError::ZeroBinWidth) => {
+                let reason = "too narrow: a bin would be 0 mm; give picoseconds, such as 250";
+                Refused::value("bin_width_ps", self.bin_width_ps, reason).into()
+            }
             RangesError::Scale(_) => {
                 let reason = format!("with `offset_mm` {}: {error}", self.offset_mm);
                 Refused::value("bin_width_ps", self.bin_width_ps, reason).into()

@@ -239,9 +239,12 @@ impl Header {
     /// The header of a dictionary, and the bytes of an element.
     fn from_dictionary(dictionary: &Literal) -> Result<(Self, Option<u64>)> {
         let of = |key: &str| {
-            dictionary
-                .get(key)
-                .ok_or_else(|| not_npy(format!("no {key}")))
+            ensure!(
+                dictionary.all(key).count() <= 1,
+                not_npy(format!("{key} is there twice"))
+            );
+            let found = dictionary.get(key);
+            found.ok_or_else(|| not_npy(format!("no {key}")))
         };
         let order = of("fortran_order")?;
         let fortran = match order.value {
@@ -343,13 +346,19 @@ enum Value<'a> {
 }
 
 impl<'a> Literal<'a> {
-    fn get(&self, key: &str) -> Option<&Self> {
-        let Value::Dictionary(entries) = &self.value else {
-            return None;
+    /// The values of a key.
+    fn all(&self, key: &str) -> impl Iterator<Item = &Self> {
+        let entries = match &self.value {
+            Value::Dictionary(entries) => &entries[..],
+            _ => &[],
         };
-        let is_key =
-            |entry: &&(Self, Self)| matches!(&entry.0.value, Value::Text(text) if text == key);
-        entries.iter().find(is_key).map(|(_, value)| value)
+        let is_key = move |name: &Self| matches!(&name.value, Value::Text(text) if text == key);
+        let entries = entries.iter().filter(move |(name, _)| is_key(name));
+        entries.map(|(_, value)| value)
+    }
+
+    fn get(&self, key: &str) -> Option<&Self> {
+        self.all(key).next()
     }
 
     /// Lengths of axes.
@@ -650,6 +659,8 @@ mod tests {
             "{'descr': '<u2', 'fortran_order': False, 'shape': (-3,)}",
             "{'descr': '<u2', 'fortran_order': False, 'shape': (3,)} more",
             "{'descr': '<u2', 'fortran_order': False 'shape': (3,)}",
+            "{'descr': '<u2', 'fortran_order': False, 'shape': (3,), 'shape': (3,)}",
+            "{'descr': '<u2', \"descr\": '<u2', 'fortran_order': False, 'shape': (3,)}",
             "{'descr': 'u2', 'fortran_order': False, 'shape': (3,)}",
             "{'descr': '<u', 'fortran_order': False, 'shape': (3,)}",
             "{'descr': '<u2, 'fortran_order': False, 'shape': (3,)}",

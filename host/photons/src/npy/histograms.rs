@@ -34,10 +34,16 @@ pub fn read(input: &Input, axes: Option<&Axes>) -> Result<Histograms> {
 /// Reads the elements of an array whose header has been read.
 pub(super) fn read_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Result<Histograms> {
     let (shape, fortran) = (array.shape.clone(), array.fortran);
-    if let ([_, columns @ 4..8], None) = (&shape[..], axes) {
-        bail!(Refused::input(format!(
+    match (&shape[..], axes) {
+        ([_, 3], None) if array.element.integer().is_none() => bail!(
+            "elements are {}: photons are rows of three integers: pixel, cycle and bin; convert them with \
+             .astype(numpy.int64)",
+            array.element
+        ),
+        ([_, columns @ 4..8], None) => bail!(Refused::input(format!(
             "{columns} bins: must be from 8 to {MOST_BINS}; photons are rows of three: pixel, cycle and bin"
-        )));
+        ))),
+        _ => {}
     }
     let layout = AxisLayout::new(&shape, fortran, axes)?;
     ensure!(

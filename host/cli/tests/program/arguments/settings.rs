@@ -141,7 +141,7 @@ fn what_contradicts_the_file_is_refused() {
             {window} --false-alarm 1e-9 | error: --false-alarm 0.000000001: there is no z
             --settings l2.toml --rule window --window 3 | error: l2.toml: l2 20: must be greater than --l1 40
             {window} --l1 3000 | error: --l2 2000: must be greater than --l1 3000
-            --settings width.toml --bin-width-ps 0 | error: --bin-width-ps 0: with --offset-mm 0:
+            --settings width.toml --bin-width-ps 0 | error: --bin-width-ps 0: too narrow:
             --l1 4 --l1 5 | error: --l1 is given twice
             --masked 3 | error: --masked is unknown; is it --mask?
             --in photons.csv | error: --in is unknown; is it --input?

@@ -169,7 +169,12 @@ fn what_is_surely_wrong_is_said() {
     warned(
         &plain,
         "--rule paper --bin-width-ps 0.25",
-        "0.250 ns are 250",
+        "bins of 0.25 ps: --bin-width-ps takes picoseconds; 0.25 ns are 250",
+    );
+    warned(
+        &plain,
+        "--rule paper --bin-width-ps 0.0001",
+        "bins of 0.0001 ps: --bin-width-ps takes picoseconds; no TDC has such bins",
     );
     // 16 bins, the pulse in bin 9, before 4 rows of 8 columns.
     let mut counts = vec![10u8; 16 * 32];

@@ -200,12 +200,14 @@ fn packed_logs_that_are_damaged_or_too_large_are_refused() {
     };
     let good = tmf8829_log(|_, place| place, "");
     packed("behind.json.gz", 1, good.as_bytes(), b"garbage garbage");
+    packed("a.csv.gz", 1, b"pixel,cycle,bin\n0,0,0\n", b"");
     packed("large.json.gz", 257, &[b' '; 1 << 20], b"");
     scratch.all_refused(
         "replay --out out --input",
         "
             behind.json.gz | behind.json.gz: the compressed file is damaged
-            large.json.gz | large.json.gz: more than 256 MiB when unpacked
+            large.json.gz | large.json.gz: more than 256 MiB when unpacked; unpack it, as with gunzip\n
+            a.csv.gz | a.csv.gz: only the log of a sensor, .json.gz, is read compressed; unpack it with gunzip\n
         ",
     );
 }

@@ -210,8 +210,8 @@ fn settings_that_cannot_be_are_refused() {
             --gate 20 | FIRST..LAST
             --min-count 0 | --min-count
             --min-count 1024 | --min-count
-            --bin-width-ps 0 | bin width is zero
-            --bin-width-ps 0.00003 | bin width is zero
+            --bin-width-ps 0 | --bin-width-ps 0: too narrow: a bin would be 0 mm; give picoseconds
+            --bin-width-ps 0.00003 | --bin-width-ps 0.00003: too narrow
             --bin-width-ps 65535 | 8388 m
             --bin-width-ps wide | --bin-width-ps
             --offset-mm 9e9 | --offset-mm
