@@ -137,6 +137,9 @@ pub fn list<T>(
 ) -> Result<Vec<T>, String> {
     let is_list = text.contains(separators);
     let read = |element: &str| {
+        if is_list && element.trim().is_empty() {
+            return Err("a number is missing between separators or at an end".to_owned());
+        }
         number(element.trim()).map_err(|reason| match is_list {
             true => format!("{element} {reason}"),
             false => reason,
@@ -221,6 +224,18 @@ mod tests {
         for text in ["4", "100", "2048", "many"] {
             let error = bins(text).unwrap_err();
             assert_eq!(error, "must be a power of two from 8 to 1024");
+        }
+    }
+
+    #[test]
+    fn a_list_names_the_number_that_is_wrong_or_missing() {
+        let masked = |text| list(text, &[','], integer(0..=9u16));
+        assert_eq!(masked("3, 4"), Ok(vec![3, 4]));
+        assert!(masked("3,40").unwrap_err().starts_with("40 must be"));
+        assert!(masked("x").unwrap_err().starts_with("must be"));
+        for text in ["3,", ",3", "3,,4", "3, ,4", ","] {
+            let error = masked(text).unwrap_err();
+            assert_eq!(error, "a number is missing between separators or at an end");
         }
     }
 

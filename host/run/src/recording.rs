@@ -57,9 +57,10 @@ impl Given {
     pub(super) fn for_recording_over(&self, file: SettingsFile) -> Result<SettingsFile> {
         let mut options = self.options.clone();
         let width = options.sensor.bin_width_ps.take();
+        let of_file = file.run.rebin.unwrap_or(1);
         let mut merged = options.or(file);
         ensure!(
-            self.options.run.rebin.is_none()
+            self.options.run.rebin.unwrap_or(of_file) == of_file
                 || width.is_some()
                 || merged.sensor.bin_width_ps.is_none(),
             Refused::new(

@@ -155,6 +155,9 @@ impl SettingsFile {
     /// Sets a key to a TOML value.
     fn set_value(&mut self, key: &str, value: &Value) -> Result<(), Refused> {
         let text = text_of(value);
+        if value.as_str() == Some("") {
+            return Err(Refused::new(key, "needs a value"));
+        }
         let refused = |reason| Refused::value(key, &text, reason);
         let list = value.as_array();
         let is_text = value.is_str() || list.is_some_and(|list| list.iter().any(Value::is_str));
@@ -764,6 +767,8 @@ rebin = 2
             ("[detection]\nl1 = '40'", "l1 40: must not be in quotes"),
             ("[detection]\nrule = true", "rule true: must be paper"),
             ("[run]\narray = 5", "array 5: must be in quotes"),
+            ("[run]\narray = ''", "array needs a value"),
+            ("[rays]\ncalibration = \"\"", "calibration needs a value"),
             (
                 "[run]\naxes = 'rows'",
                 "axes rows: one axis must be the bins",

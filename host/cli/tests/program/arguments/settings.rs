@@ -223,6 +223,9 @@ fn a_width_and_rebin_are_those_of_one_place_for_every_command() {
             command,
             &format!("--settings width.toml --rebin 2 | {refused}"),
         );
+        // As the file has it.
+        scratch.printed(&format!("{command} --settings width.toml --rebin 1"));
+        std::fs::remove_dir_all(scratch.path("out")).ok();
     }
     for command in [replay, calibrate] {
         scratch.printed(&format!(
