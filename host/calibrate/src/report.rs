@@ -400,6 +400,8 @@ fn listed(pixels: &[usize]) -> String {
     if pixels.is_empty() {
         return "none".to_owned();
     }
+    let all = grouped(pixels.len() as u64);
+    let noun = if pixels.len() == 1 { "pixel" } else { "pixels" };
     let shown: Vec<String> = pixels.iter().take(SHOWN).map(ToString::to_string).collect();
     let more = pixels.len().saturating_sub(SHOWN);
     let more = if more > 0 {
@@ -407,7 +409,7 @@ fn listed(pixels: &[usize]) -> String {
     } else {
         String::new()
     };
-    shown.join(", ") + &more
+    format!("{all}: {noun} {}{more}", shown.join(", "))
 }
 
 /// To three significant digits.

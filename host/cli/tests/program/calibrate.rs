@@ -323,7 +323,7 @@ fn a_pixel_is_dead_only_if_the_darkest_of_the_others_are_not_dark() {
         _ => [4; 32],
     };
     scratch.file("dark.npy", even(dark));
-    for (name, dead) in [("even", " 9"), ("dark", " none")] {
+    for (name, dead) in [("even", " 1: pixel 9"), ("dark", " none")] {
         let printed = scratch.printed(&format!(
             "calibrate --input {name}.npy --recorded-cycles 1000 --out {name}.toml"
         ));
