@@ -38,11 +38,13 @@ class View:
             atexit.register(self.close)
             assert self._program.stdout is not None
             self.address = self._program.stdout.readline().strip()
+            complaints.seek(0)
+            lines = complaints.read().splitlines()
             if not self.address:
                 self.close()
-                complaints.seek(0)
-                lines = complaints.read().splitlines() or ["the program dtof has shown no page"]
+                lines = lines or ["the program dtof has shown no page"]
                 raise Error(with_keywords(lines[-1].removeprefix("error: ")))
+            warn([line.removeprefix("warning: ") for line in lines], callers=3)
 
     def wait(self) -> None:
         """Waits until the page ends, as by Ctrl-C."""

@@ -22,7 +22,7 @@ pub struct View {
     /// File: speed of playback relative to the recording [default: 1]
     #[arg(long, value_name = "N", value_parser = positive, conflicts_with = "device")]
     speed: Option<f64>,
-    /// File: laser cycles a second, if the file has none or is wrong [default: the file's]
+    /// File: laser cycles a second, if the file has none or is wrong [default: the file's, else 10 MHz]
     #[arg(long, value_name = "HZ", value_parser = laser_hz, conflicts_with = "device")]
     laser_hz: Option<u64>,
     /// Port of the page on this computer [default: any free port]

@@ -11,7 +11,6 @@ use super::{Command, FeedContext, reply};
 use crate::hub::Playhead;
 use dtof_events::aer_file::{self, Event, Header, Reader};
 use dtof_events::clock::LaserClock;
-use dtof_options::Refused;
 
 /// Interval of batches.
 const EVERY: Duration = Duration::from_millis(20);
@@ -22,7 +21,7 @@ const BATCH: usize = 65_536;
 pub struct Playback {
     file: PathBuf,
     clock: LaserClock,
-    /// A warning if the given laser rate differs from the file's.
+    /// A warning if the laser rate is not the file's.
     pub warning: Option<String>,
     speed: f64,
 }
@@ -50,20 +49,19 @@ struct Player<'a> {
 }
 
 impl Playback {
-    /// Plays a file at `speed` times its own speed. `laser_hz` replaces the laser rate of the file.
+    /// Plays a file at `speed` times its own speed. `laser_hz` replaces the laser rate of the file. If neither gives it,
+    /// the paper's is taken, with a warning.
     ///
     /// # Errors
-    /// Fails if the file cannot be read, or if neither it nor `laser_hz` gives the laser rate.
+    /// Fails if the file cannot be read, or if `laser_hz` is 0.
     pub fn new(file: PathBuf, laser_hz: Option<u64>, speed: f64) -> Result<Self> {
         let name = || file.display().to_string();
         let header = aer_file::open(&file).with_context(name)?.header().clone();
         header.ranges().with_context(name)?;
         let requested = laser_hz.map(LaserClock::new).transpose()?;
-        let (clock, warning) =
-            LaserClock::prefer(requested, LaserClock::from_header(&header), "the file");
-        let unknown = || Refused::input("has no laser rate; give `laser_hz`");
+        let (clock, warning) = LaserClock::for_file(requested, &header);
         Ok(Self {
-            clock: clock.ok_or_else(unknown).with_context(name)?,
+            clock,
             warning,
             file,
             speed,
@@ -237,10 +235,13 @@ impl<'a> Player<'a> {
             }
             Command::Seek(seconds) => {
                 self.seek(seconds, context)?;
-                Ok(format!(
-                    "The recording is at {:.3} s.",
-                    self.playhead.seconds
-                ))
+                let Playhead {
+                    seconds, length, ..
+                } = self.playhead;
+                Ok(match length < 0.01 {
+                    true => format!("The recording is at {:.3} ms.", 1000.0 * seconds),
+                    false => format!("The recording is at {seconds:.3} s."),
+                })
             }
             Command::Speed(speed) => {
                 ensure!(speed > 0.0, "the speed must be above 0");

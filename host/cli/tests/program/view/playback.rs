@@ -162,6 +162,25 @@ fn a_recording_is_played_faster_and_a_damaged_one_is_named() {
     }
 }
 
+/// As `export` does.
+#[test]
+fn a_recording_without_a_laser_rate_is_played_at_10_mhz() {
+    let scratch = Scratch::new();
+    let path = scratch.file("slow.aer", file(&HEADER, &[depth(1, 1000, 60)]));
+    let playback = Playback::new(path.clone(), None, 1.0).unwrap();
+    let warning = playback.warning.clone().unwrap();
+    assert_contains(
+        &warning,
+        "the laser rate is not known; times are for 10 MHz",
+    );
+    let live = Live::of(Feed::Playback(playback), None);
+    let frame = Stream::open(live.port, 0).until("the end", |frame| frame["events"] == 1);
+    assert_eq!(frame["playhead"]["length"], 1e-4);
+    let told = post(live.port, "/seek", "{\"seconds\":1}");
+    assert_contains(&told.body, "The recording is at 0.100 ms.");
+    assert_eq!(Playback::new(path, Some(10), 1.0).unwrap().warning, None);
+}
+
 #[test]
 fn the_command_says_what_is_wrong() {
     let scratch = Scratch::new();
@@ -169,8 +188,7 @@ fn the_command_says_what_is_wrong() {
     scratch.file("none.aer", "no");
     scratch.all_refused(
         "view",
-        "slow.aer | slow.aer: has no laser rate; give --laser-hz
-         none.aer | none.aer: not an AER file
+        "none.aer | none.aer: not an AER file
          gone.aer | gone.aer: 
          --out x | <FILE.aer> is needed
          slow.aer --device qemu | cannot be used with
