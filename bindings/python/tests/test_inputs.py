@@ -26,6 +26,8 @@ def test_dimensions_with_names():
     with pytest.raises(dtof.Error, match="dimensions y, x, tof: must be some of .*rename"):
         dtof.replay(xarray.DataArray(COUNTS, dims=("y", "x", "tof")))
     assert same(dtof.replay(xarray.DataArray(COUNTS, dims=("y", "x", "tof")), axes="rows,columns,bins"), run)
+    with pytest.raises(dtof.Error, match="y, x, time: none is bins, as they are read as rows, columns, captures; rename"):
+        dtof.replay(xarray.DataArray(COUNTS, dims=("y", "x", "time")))
 
 
 def test_photons_in_one_array_or_table():
@@ -46,7 +48,7 @@ def test_photons_in_one_array_or_table():
     for wrong in (table.drop(columns="bin"), numpy.ones((5, 2), int), numpy.ones((5, 3)), [1, 2, 3], None):
         with pytest.raises(dtof.Error):
             dtof.photons(wrong)
-    with pytest.raises(dtof.Error, match="bin is missing: .*to_numpy"):
+    with pytest.raises(dtof.Error, match="bin is missing: .* not note, cycle, pixel; .*to_numpy"):
         dtof.replay(table.drop(columns="bin"))
 
 

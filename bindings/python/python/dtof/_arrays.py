@@ -155,8 +155,9 @@ def photon_columns(photons: Any, name: str) -> list[Any]:
         found = [one for one in names if one == column]
         found = found or [one for one in names if str(one).strip().lower() == column]
         if not found:
+            there = ", ".join(map(str, names)) or "none"
             raise Error(
-                f"{name}: {column} is missing: photons have pixel, cycle and bin; "
+                f"{name}: {column} is missing: photons have the columns pixel, cycle and bin, not {_line(there)}; "
                 "histograms are arrays, as from .to_numpy()"
             )
         if len(found) > 1:
@@ -178,10 +179,10 @@ def named_axes(value: Any, name: str) -> Optional[str]:
     names = [axis for axis in axes if axis is not None]
     if len(names) < len(axes) or len(set(names)) < len(names) or "bins" not in names:
         dims = ", ".join(map(str, value.dims))
-        raise Error(
-            f"{name}: the dimensions {dims}: must be some of captures, rows, columns and bins; rename them "
-            "with .rename, or give axes"
-        )
+        why = "must be some of captures, rows, columns and bins, each once"
+        if len(names) == len(axes) and "bins" not in names:
+            why = f"none is bins, as they are read as {', '.join(names)}"
+        raise Error(f"{name}: the dimensions {dims}: {why}; rename them with .rename, or give axes")
     # One axis of pixels is rows.
     return ",".join(
         "rows" if axis == "columns" and "rows" not in names and "captures" not in names else axis for axis in names
@@ -249,5 +250,5 @@ def records_of(events: Any) -> bytes:
     return records.tobytes()
 
 
-def _line(error: Exception) -> str:
+def _line(error: Any) -> str:
     return " ".join(str(error).split())
