@@ -2,11 +2,9 @@
 
 Arguments: the browser, the folder for the pictures, the reports of a static scene, of a moving
 one with more events than a report shows, of a large array, of a target that moves before few
-pixels, and of a single pixel. Ends with an error at the first thing that is not as it should be.
+pixels, of a single pixel, and of pixels that confirm each other. Ends with an error at the first thing that is not as it should be.
 """
 
-import base64
-import json
 import shutil
 import sys
 from pathlib import Path
@@ -17,7 +15,6 @@ from browser import Report, check
 from pixels import chooses_pixels, maps_time, opened, plays_a_move, shows_a_pixel, shows_few
 
 MOST_BYTES = 5_000_000
-SCRIPTS = Path(__file__).parent.parent.parent / "host/report/src"
 
 
 def turns(report):
@@ -136,6 +133,18 @@ def is_named(report):
     check("the focus can be seen", outline == "solid")
 
 
+def leaves_no_names(report, path):
+    """The window has no names but those of an empty page."""
+    names = "Object.getOwnPropertyNames(window)"
+    nothing = path.with_name("empty.html")
+    nothing.write_text("<!DOCTYPE html>")
+    empty = report.window.new_page()
+    empty.goto(nothing.resolve().as_uri())
+    more = set(report.run(names)) - set(empty.evaluate(names))
+    empty.close()
+    check(f"no names of the script in the window {more}", not more)
+
+
 def is_closed(report):
     """Foreign scripts do not run, and nothing is loaded."""
     report.run(
@@ -152,100 +161,13 @@ def is_closed(report):
     report.errors.clear()
 
 
-def packed(numbers):
-    """Encodes numbers for the page: digits of three bits, the lowest first, two per byte."""
-    digits = []
-    for number in numbers:
-        while number > 7:
-            digits.append(number & 7 | 8)
-            number >>= 3
-        digits.append(number)
-    digits += [0] * (len(digits) % 2)
-    pairs = zip(digits[::2], digits[1::2])
-    return base64.b64encode(bytes(low | high << 4 for low, high in pairs)).decode()
-
-
-def page_of(browser, data, events):
-    """A page with these events (since the one before, pixel, level, echo, range) and the scripts
-    that place them, and nothing else."""
-    numbers = [(since, pixel, level << 2 | echo - 1, 40, mm * 512, 9) for since, pixel, level, echo, mm in events]
-    data |= {"sides": ["column", "row"], "events": "events", "laserHz": 1000, "histograms": None}
-    data |= {"colours": "000000" * 256, "packed": packed(sum(numbers, ())), "count": len(events)}
-    page = browser.new_page()
-    page.set_content(f'<script type="application/json" id="data">{json.dumps(data)}</script>')
-    for script in ["shared/helpers.js", "events.js", "shared/projection.js"]:
-        page.add_script_tag(content=(SCRIPTS / script).read_text())
-    return page
-
-
-def places_are_true(browser):
-    """The axis is linear, also for ranges beyond the colours."""
-    ranges = [500, 1000, 2000, 9000]
-    events = [(1 if at > 0 else 0, 0, 0, 1, mm) for at, mm in enumerate(ranges)]
-    data = {"columns": 1, "rows": 1, "cycles": 4, "oneOf": 1, "low": 1000, "high": 2000}
-    page = page_of(browser, data, events)
-    found = page.evaluate(
-        """() => {
-            Object.assign(view, VIEWS.side, { third: "range" });
-            showWindow(0, 4);
-            const found = [], sides = axes();
-            eachPlace(sides, camera(sides, 800, 600), (event, x) => found.push(x));
-            return { found, low: sides[2].low, high: sides[2].high };
-        }"""
-    )
-    check("the axis spans all ranges", (found["low"], found["high"]) == (500, 9000))
-    left, *_, right = places = found["found"]
-    expected = [left + (right - left) * (mm - 500) / 8500 for mm in ranges]
-    wrong = max(abs(place - true) for place, true in zip(places, expected))
-    check("every range has its place", abs(right - left) > 100 and wrong < 0.01)
-    page.close()
-
-
-def blocks_are_as_large_as_their_pixels(browser):
-    """On 5x3 pixels: a pixel, blocks of each level, and one that the array cuts."""
-    events = [(7, 0, 1), (2, 1, 1), (0, 2, 2), (0, 3, 3), (14, 1, 4)]
-    events = [(0, *event, 1000) for event in events]
-    data = {"columns": 5, "rows": 3, "cycles": 10, "oneOf": 1, "low": 900, "high": 1100}
-    page = page_of(browser, data, events)
-    found = page.evaluate(
-        """() => {
-            Object.assign(view, VIEWS.front, { third: "range" });
-            showWindow(0, 10);
-            const places = [], sides = axes(), eye = camera(sides, 800, 600);
-            const cell = eye.scale * sides[0].length / data.columns;
-            const [left, top] = [400 - 2.5 * cell, 292 - 1.5 * cell];
-            eachPlace(sides, eye, (event, x, y, depth, wide, high) =>
-                places.push([(x - left) / cell, (y - top) / cell, wide, high]));
-            const pixels = [...Array(15).keys()];
-            const of = places.map((place, event) => pixels.filter((pixel) => isOf(event, pixel)));
-            return { places, of, names: places.map((place, event) => kindName(eventOf(event))) };
-        }"""
-    )
-    middles = [[2.5, 1.5, 1, 1], [3, 1, 2, 2], [2, 1.5, 4, 3], [2.5, 1.5, 5, 3], [4.5, 2.5, 1, 1]]
-    pairs = zip(sum(found["places"], []), sum(middles, []))
-    check("the point of a block lies in its middle", max(abs(a - b) for a, b in pairs) < 1e-6)
-    four = [0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13]
-    check("a block has its pixels", found["of"] == [[7], [2, 3, 7, 8], four, list(range(15)), [14]])
-    names = ["column 2, row 1, echo 1", "2×2 block from column 2, row 0, echo 1"]
-    names += ["4×4 block from column 0, row 0, echo 2", "8×8 block from column 0, row 0, echo 3"]
-    names += ["2×2 block from column 4, row 2, echo 4"]
-    check("it says which block and echo it is", found["names"] == names)
-    page.close()
-
-
 def main(chromium, pictures, *reports):
     pictures = Path(pictures)
-    static, moving, large, few, single = map(Path, reports)
+    static, moving, large, few, single, confirmed = map(Path, reports)
     with sync_playwright() as driver:
         # Root, as in a container, has no sandbox.
         browser = driver.chromium.launch(executable_path=shutil.which(chromium), args=["--no-sandbox"])
         print(f"browser {browser.version}")
-
-        print("ranges")
-        places_are_true(browser)
-
-        print("blocks")
-        blocks_are_as_large_as_their_pixels(browser)
 
         print("static scene")
         check("smaller than 5 MB", static.stat().st_size < MOST_BYTES)
@@ -256,6 +178,7 @@ def main(chromium, pictures, *reports):
             moves_in_time(report)
             shows_spikes(report)
             is_named(report)
+            leaves_no_names(report, static)
         with Report(browser, opened(static)) as report:
             chooses_pixels(report)
             shows_a_pixel(report, static, 64, [942, 942 - 64 * 9, 20 * 64 + 5, 31 * 64 + 63])
@@ -291,10 +214,10 @@ def main(chromium, pictures, *reports):
 
         with Report(browser, opened(large)) as report:
             note = report.page.locator("#histogram-note").inner_text
-            report.run("choose(256 * 8 + 8)")
+            report.run("$pixel.lookAt(256 * 8 + 8)")
             check("a pixel of the grid has its histogram", note().startswith("Histogram of the last event"))
-            report.run("choose(256 * 8 + 9)")
-            every = report.run("data.histograms.every")
+            report.run("$pixel.lookAt(256 * 8 + 9)")
+            every = report.run("$run.data.histograms.every")
             next = f"every {every} columns and rows. The next is that of column 8, row 8."
             check(f"another one says where the next is: {note()}", every in [2, 4, 8] and next in note())
 
@@ -308,6 +231,17 @@ def main(chromium, pictures, *reports):
         with Report(browser, few, width=390, height=740, has_touch=True) as report:
             report.width_is(390)
             report.page.screenshot(path=pictures / "few-narrow.png", full_page=True)
+
+        print("neighbours")
+        with Report(browser, opened(confirmed)) as report:
+            notes = []
+            for pixel in range(16 * 16):
+                report.run(f"$pixel.lookAt({pixel})")
+                notes.append(report.page.locator("#histogram-note").inner_text())
+            numbered = [note for note in notes if "; the rule needs " in note]
+            depends = [note for note in notes if note.endswith("depends on earlier events or on neighbours.")]
+            check(f"a number of its own: {numbered[:1]}", numbered)
+            check(f"confirmed by neighbours: {depends[:1]}", depends)
 
         print("dark")
         with Report(browser, static, color_scheme="dark") as report:

@@ -7,7 +7,8 @@ from browser import check
 
 
 def opened(path):
-    """Writes the report again with a plain script instead of a module, so that its variables are readable."""
+    """Writes the report again with a plain script instead of a module, so that the exports of its
+    modules are readable: `$run.data` is `data` of `run.js`."""
     text = path.read_text()
     policy, rest = text.split("<meta http-equiv=", 1)
     copy = path.with_name("opened.html")
@@ -41,10 +42,10 @@ def shows_a_pixel(report, path, columns, pixels):
     """The chosen pixel's numbers are those of events.csv."""
     page, rows = report.page, rows_of(path)
     for pixel in pixels:
-        report.run(f"choose({pixel})")
+        report.run(f"$pixel.lookAt({pixel})")
         report.settle()
         expected = events_of(rows, pixel, columns)
-        found = report.run("chosen.events")
+        found = report.run("$pixel.chosen.events")
         check(f"pixel {pixel} has its {len(expected)} events", len(found) == len(expected) > 0)
         names = {"cycle": "cycle", "exposure": "exposure", "flags": "flags", "level": "level"}
         names |= {"echo": "echo", "peak": "peak_count"}
@@ -53,7 +54,7 @@ def shows_a_pixel(report, path, columns, pixels):
             check(f"{there} of each is that of events.csv", same)
         off = max(abs(event["range"] - row["range_mm"]) for event, row in zip(found, expected))
         check(f"ranges are those of events.csv (off by {off})", off < 0.001)
-        shot, last = report.run("chosen.decision"), max(row["cycle"] for row in expected)
+        shot, last = report.run("$pixel.chosen.decision"), max(row["cycle"] for row in expected)
         row = next(row for row in expected if (row["cycle"], row["level"]) == (last, shot["level"]))
         check("the histogram is that of the last event", shot["cycle"] == last)
         check("of its range", abs(shot["range"] - row["range_mm"]) < 0.001)
@@ -76,12 +77,12 @@ def chooses_pixels(report):
     box = place.bounding_box()
     page.mouse.click(box["x"] + box["width"] * 0.51, box["y"] + box["height"] * 0.51)
     name = page.locator("#pixel-name").evaluate("e => e.value")
-    middle = report.run("Math.floor(data.rows / 2) * data.columns + data.columns / 2")
-    check(f"a click in the map chooses pixel {name}", report.run("chosen.pixel") == middle)
+    middle = report.run("Math.floor($run.data.rows / 2) * $run.data.columns + $run.data.columns / 2")
+    check(f"a click in the map chooses pixel {name}", report.run("$pixel.chosen.pixel") == middle)
     for key, by in [("ArrowRight", 1), ("ArrowDown", 64), ("ArrowLeft", -1), ("ArrowUp", -64)]:
-        before = report.run("chosen.pixel")
+        before = report.run("$pixel.chosen.pixel")
         page.keyboard.press(key)
-        check(f"the key {key} chooses the next", report.run("chosen.pixel") == before + by)
+        check(f"the key {key} chooses the next", report.run("$pixel.chosen.pixel") == before + by)
     report.settle()
     drawn = "document.getElementById('{}').toDataURL()"
     both = [report.run(drawn.format(id)) for id in ["histogram", "ranges"]]
@@ -111,26 +112,26 @@ def last_map(path):
 def maps_time(report, path):
     """The last map shows the last events; earlier maps show those of their time."""
     expected = last_map(path)
-    found = report.run("(mapUntil(data.cycles), [...pixels.range].map((mm) => (isNaN(mm) ? null : mm)))")
+    found = report.run("($pixel.showRangesUntil($run.data.cycles), [...$pixel.map.range].map((mm) => (isNaN(mm) ? null : mm)))")
     off = [pixel for pixel, mm in enumerate(found) if abs((mm or 0) - expected.get(pixel, 0)) > 0.01]
     check(f"the map at the end is that of events.csv {off}", not off)
-    half = report.run("(mapUntil(400), [...pixels.range].filter((mm) => !isNaN(mm)).length)")
+    half = report.run("($pixel.showRangesUntil(400), [...$pixel.map.range].filter((mm) => !isNaN(mm)).length)")
     check("early on, fewer pixels have a range", 0 < half < len(expected))
-    again = report.run("(mapUntil(data.cycles), [...pixels.range].map((mm) => (isNaN(mm) ? null : mm)))")
+    again = report.run("($pixel.showRangesUntil($run.data.cycles), [...$pixel.map.range].map((mm) => (isNaN(mm) ? null : mm)))")
     check("and at the end again the same", again == found)
 
 
 def plays_a_move(report, path, columns):
     """During playback map, plots and text show the range of that time."""
     page = report.page
-    report.run("choose(0)")
+    report.run("$pixel.lookAt(0)")
     expected = events_of(rows_of(path), 0, columns)
     page.select_option("#width", index=3)
     seen = []
     for place in [20, 100, 180]:
         page.locator("#start").fill(str(place))
         report.settle()
-        end = report.run("shown.end")
+        end = report.run("$run.shown.end")
         last = [row for row in expected if row["cycle"] < end][-1]
         note = page.locator("#ranges-note").inner_text()
         check(f"the range at the time: {note}", f": {tenths(last['range_mm'])} mm, reported at" in note)
@@ -153,9 +154,9 @@ def shows_few(report, path, columns, count):
         check("one plot is enough", not page.locator("#few").is_visible())
         return
     plots.nth(1).click()
-    check("a click chooses a pixel", report.run("chosen.pixel") == 1)
+    check("a click chooses a pixel", report.run("$pixel.chosen.pixel") == 1)
     page.keyboard.press("ArrowDown")
-    check("an arrow key the one below", report.run("chosen.pixel") == 1 + columns)
+    check("an arrow key the one below", report.run("$pixel.chosen.pixel") == 1 + columns)
     check("its plot is pressed", plots.nth(1 + columns).get_attribute("aria-pressed") == "true")
     texts = plots.all_inner_texts()
     rows = rows_of(path)

@@ -1,5 +1,6 @@
-"""The live page of a recording in a real browser: its position, its speed, and its first pixel."""
+"""The live page in a real browser: position, speed and first pixel of a recording; a device that tracks."""
 
+import json
 import shutil
 import subprocess
 import sys
@@ -55,6 +56,39 @@ def shows_a_recording(browser, address, width, scheme, picture):
     window.close()
 
 
+def draws_a_device_that_tracks(browser, address):
+    """The number that the rule needs is not known then, nor the background."""
+    look = {"peak": [1, 40], "needed": None, "depends": True, "background": None}
+    look |= {"quadrants": [0, 1, 2, 3, 4], "window": None, "dead_time": 0}
+    # Counts of 1, 40, 2 and 0 photons.
+    histogram = {"pixel": 3, "exposure": 1200, "whole": False, "counts": "AQAAACgAAAACAAAAAAAAAA==", "look": look}
+    settings = {"sensor": {}, "detection": {"rule": "window", "tracking": True}, "gate": [0, 3]}
+    frame = {
+        "frame": 1, "connection": {"state": "live", "reason": "", "returned": 0}, "events": 0, "masked": 0, "rate": 0,
+        "losses": {"photon_rate": 0, "cycles": 0, "counts": [], "last_fault": None},
+        "recorded": {"on": False, "file": "", "events": 0, "error": ""}, "playhead": {},
+        "source": {"page": 1, "name": "x", "kind": "device", "columns": 2, "rows": 2, "settings": settings},
+        "pixels": "", "drawn": {"pixels": 0, "left": 0, "events": 0},
+        "pixel": {"number": 3, "events": "", "drawn": 0, "arrived": 0}, "histogram": histogram,
+    }
+    errors = []
+    page = browser.new_page()
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    body = f"data: {json.dumps(frame)}\n\n"
+    page.route("**/stream*", lambda route: route.fulfill(content_type="text/event-stream", body=body))
+    page.route("**/watch", lambda route: route.fulfill(body=""))
+    page.goto(address)
+    until(page, "the note on the histogram", "#histogram-note", "40 photons in bin 1; the required number depends on")
+    drawn = """() => {
+        const { width, height } = document.getElementById("histogram");
+        const bytes = document.getElementById("histogram").getContext("2d").getImageData(0, 0, width, height).data;
+        return bytes.some((byte) => byte > 0);
+    }"""
+    check("the histogram is drawn", page.evaluate(drawn))
+    check(f"no errors {errors}", not errors)
+    page.close()
+
+
 def main(chromium, pictures, dtof, recording):
     # The recording takes two seconds, so that a busy machine has its page long before the end.
     command = [dtof, "view", recording, "--speed", "0.1"]
@@ -72,6 +106,8 @@ def main(chromium, pictures, dtof, recording):
             note = page.inner_text("#ranges-note")
             check(f"it has waited for its page: {note}", note.startswith("Range in millimetres: the last"))
             page.close()
+            print("tracking")
+            draws_a_device_that_tracks(browser, address)
             for width in [400, 1200]:
                 for scheme in ["light", "dark"]:
                     print(f"{width} pixels, {scheme}")

@@ -7,4 +7,5 @@ mod links;
 mod modules;
 mod packages;
 mod paper;
+mod scripts;
 mod sizes;

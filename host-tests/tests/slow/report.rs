@@ -1,5 +1,5 @@
-//! The reports of `dtof` in a real browser, which `host-tests/report/check.py` operates like a reader.
-//! Needs Chromium and Python.
+//! The scripts of the pages in Node.js, and the pages in a real browser, which `host-tests/report/check.py`
+//! operates like a reader. Needs Node.js, Chromium and Python.
 //!
 //! ```sh
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow report
@@ -12,14 +12,16 @@ use std::process::Command;
 
 use anyhow::{Result, ensure};
 
+use crate::rp2040::NODE;
 use crate::{dtof, enabled, python, root, succeed};
 
 /// The most bytes of a picture of the docs.
 const MOST_BYTES: u64 = 300_000;
 
 /// The reports: a static scene, a moving one with more events than a report shows, an array whose maps
-/// leave room for fewer, and a few pixels and a single one in front of a moving target.
-const REPORTS: [(&str, &str); 5] = [
+/// leave room for fewer, a few pixels and a single one in front of a moving target, and neighbours that
+/// confirm each other.
+const REPORTS: [(&str, &str); 6] = [
     ("static", "demo --quiet --out"),
     (
         "moving",
@@ -34,7 +36,32 @@ const REPORTS: [(&str, &str); 5] = [
         "single",
         "simulate --quiet --scene host-tests/report/approach.toml --array 1x1 --alpha 8 --out",
     ),
+    (
+        "confirmed",
+        "simulate --quiet --scene scenes/static.toml --array 16x16 --cycles 3000 --rule window --window 5 \
+         --neighbours 8 --out",
+    ),
 ];
+
+#[test]
+fn scripts_of_the_pages_pass_their_tests() -> Result<()> {
+    let Some(_alone) = enabled("scripts of the pages", &[NODE]) else {
+        return Ok(());
+    };
+    let mut node = Command::new(NODE);
+    node.arg("--test");
+    for page in ["report", "live"] {
+        let folder = root().join("host").join(page).join("tests");
+        let mut files = Vec::new();
+        for entry in fs::read_dir(&folder)? {
+            files.push(entry?.path());
+        }
+        files.retain(|path| path.to_string_lossy().ends_with(".test.js"));
+        ensure!(files.len() >= 3, "{} has no tests", folder.display());
+        node.args(files);
+    }
+    succeed(&mut node)
+}
 
 #[test]
 fn reports_in_a_browser_are_drawn_turned_and_closed() -> Result<()> {

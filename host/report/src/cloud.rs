@@ -38,15 +38,23 @@ pub struct Cloud<'a> {
     pub decisions: Option<Decisions<'a>>,
 }
 
+/// The modules of the page beside the shared ones.
+const MODULES: [shared::Module; 8] = [
+    module!("page/decisions.js"),
+    module!("page/decode.js"),
+    module!("page/events.js"),
+    module!("page/history.js"),
+    module!("page/main.js"),
+    module!("page/pixel.js"),
+    module!("page/run.js"),
+    module!("page/spikes.js"),
+];
+
 /// The only script of the page, without its tags; a module.
 pub(super) static SCRIPT: LazyLock<String> = LazyLock::new(|| {
-    let own = [
-        include_str!("spikes.js"),
-        include_str!("pixel.js"),
-        include_str!("controls.js"),
-    ];
-    let script = shared::script(include_str!("events.js"), &own);
-    format!("\n{script}")
+    let modules = [&MODULES[..], &shared::MODULES].concat();
+    let script = shared::bundle("report/src/page/main.js", &modules);
+    format!("\n{}", script.expect("modules that fit together"))
 });
 
 /// The elements that the script fills, hidden until it runs.
@@ -142,7 +150,6 @@ impl Cloud<'_> {
             "isFew": self.is_few(),
             "low": low,
             "high": high,
-            "colours": shared::colours(),
             "spikes": spikes,
             "event": self.nouns[0],
             "events": self.nouns[1],

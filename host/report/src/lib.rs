@@ -1,6 +1,14 @@
 #![doc = include_str!("../README.md")]
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
+/// A JavaScript module of this folder. Paths of modules begin at `host`.
+macro_rules! module {
+    ($path:literal) => {
+        (concat!("report/src/", $path), include_str!($path))
+    };
+}
+
+mod bundle;
 mod cloud;
 mod events;
 mod histograms;

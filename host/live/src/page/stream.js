@@ -1,9 +1,17 @@
 // The stream of frames: decoded as they come, drawn when the screen is ready.
 
+import { closest, pixelName } from "../../../report/src/shared/array.js";
+import { drawCloud } from "../../../report/src/shared/cloud.js";
+import { element, redrawing } from "../../../report/src/shared/dom.js";
+import { drawChosen, drawMaps } from "./chosen.js";
+import { post, tell } from "./command.js";
+import { showDrawn, showLosses, showPlayhead, showState, showTotals } from "./figures.js";
+import { takePixels, takeRates } from "./records.js";
+import { fillSettings } from "./settings.js";
+import { choosePixel, chosen, live, scene, takeCloud, takeEvents, takeHistogram, takeSource } from "./state.js";
+
 let paused = false;
 let page = null;
-let isDrawing = false;
-let last = null;
 let times = [];
 /** A person has chosen the pixel. */
 let isChosen = false;
@@ -14,16 +22,18 @@ let isWatching = false;
 let shownEnd = "";
 
 /** Draws everything before the next repaint. */
-function redraw() {
-  if (isDrawing) return;
-  isDrawing = true;
-  requestAnimationFrame(() => {
-    isDrawing = false;
-    takeCloud();
-    drawMaps();
-    drawCloud();
-    drawChosen();
-  });
+export const redraw = redrawing(() => {
+  takeCloud();
+  drawMaps();
+  drawCloud(element("cloud"), scene, -1);
+  drawChosen();
+});
+
+/** Stops drawing, or draws again. Returns whether it has stopped. */
+export function pause() {
+  paused = !paused;
+  redraw();
+  return paused;
 }
 
 function takeFrame(frame) {
@@ -33,37 +43,35 @@ function takeFrame(frame) {
     const isFirst = frame.frame === 1;
     if (isFirst) rated = now;
     takeSource(frame.source);
-    page = frame.source.page;
+    const { source } = live;
+    page = source.page;
     element("name").textContent = `dtof view: ${source.name}`;
     document.title = `${source.name} · dtof view`;
     const isDevice = source.kind === "device";
     for (const part of document.querySelectorAll(".of-device")) part.hidden = !isDevice;
     for (const part of document.querySelectorAll(".of-recording")) part.hidden = isDevice;
-    if (!isChosen || chosen.pixel >= pixels.count) showPixel(middlePixel(() => true));
-    document.body.classList.toggle("filled", pixels.count > 0);
+    if (!isChosen || chosen.pixel >= live.pixels.count) showPixel(middlePixel(() => true));
+    document.body.classList.toggle("filled", live.pixels.count > 0);
     fillSettings();
   }
-  takePixels(frame.pixels);
+  takePixels(live.pixels, frame.pixels);
   // The first choice is a pixel with an event.
-  const hasEvent = (pixel) => !Number.isNaN(pixels.range[pixel]);
+  const hasEvent = (pixel) => !Number.isNaN(live.pixels.range[pixel]);
   if (!isChosen && !hasEvent(chosen.pixel)) showPixel(middlePixel(hasEvent));
   if (frame.pixel.number === chosen.pixel) {
-    takeEvents(frame.pixel.events);
-    chosen.drawn += frame.pixel.drawn;
-    chosen.arrived += frame.pixel.arrived;
+    takeEvents(frame.pixel);
   } else {
     void watch();
   }
   if (frame.histogram) takeHistogram(frame.histogram);
   if (now - rated > 1000) {
-    takeRates((now - rated) / 1000);
+    takeRates(live.pixels, (now - rated) / 1000);
     rated = now;
   }
-  last = frame;
   showState(frame.connection);
   const seconds = Math.max(0.1, (now - times[0]) / 1000);
   showTotals(frame, times.length > 1 ? (times.length - 1) / seconds : 0);
-  if (source?.kind === "recording") showPlayhead(frame.playhead);
+  if (live.source?.kind === "recording") showPlayhead(frame.playhead);
   showLosses(frame.losses);
   showEnd(frame.recorded);
   if (paused) return;
@@ -88,17 +96,12 @@ async function watch() {
 
 /** The pixel closest to the middle of those that suit, -1 without any. */
 function middlePixel(suits) {
-  const distance = (pixel) =>
-    Math.hypot((pixel % data.columns) - (data.columns >> 1), Math.floor(pixel / data.columns) - (data.rows >> 1));
-  let [closest, least] = [-1, Infinity];
-  for (let pixel = 0; pixel < pixels.count; pixel++) {
-    if (distance(pixel) < least && suits(pixel)) [closest, least] = [pixel, distance(pixel)];
-  }
-  return closest;
+  return closest(scene, [scene.columns >> 1, scene.rows >> 1], suits);
 }
 
 /** Shows the pixel that a person has chosen. */
-function choose(pixel) {
+export function choose(pixel) {
+  if (pixel < 0) return;
   isChosen = true;
   showPixel(pixel);
 }
@@ -106,14 +109,14 @@ function choose(pixel) {
 /** Shows another pixel. */
 function showPixel(pixel) {
   if (pixel < 0) return;
-  element("pixel-name").value = `${pixel}: ${pixelName(pixel)}`;
+  element("pixel-name").value = `${pixel}: ${pixelName(scene, pixel)}`;
   if (pixel === chosen.pixel) return;
-  Object.assign(chosen, { pixel, events: [], drawn: 0, arrived: 0, histogram: null });
+  choosePixel(pixel);
   void watch();
   redraw();
 }
 
-function openStream() {
+export function openStream() {
   const stream = new EventSource(`/stream?pixel=${chosen.pixel}`);
   stream.addEventListener("message", (event) => takeFrame(JSON.parse(event.data)));
   stream.addEventListener("error", () => {

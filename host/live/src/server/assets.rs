@@ -9,16 +9,34 @@ const HTML: &str = include_str!("../page/index.html");
 static STYLE: LazyLock<String> =
     LazyLock::new(|| shared::STYLE.to_owned() + include_str!("../page/live.css"));
 
+/// A JavaScript module of the page. Paths of modules begin at `host`.
+macro_rules! module {
+    ($name:literal) => {
+        (
+            concat!("live/src/page/", $name),
+            include_str!(concat!("../page/", $name)),
+        )
+    };
+}
+
+const MODULES: [shared::Module; 11] = [
+    module!("chosen.js"),
+    module!("command.js"),
+    module!("figures.js"),
+    module!("form.js"),
+    module!("main.js"),
+    module!("notes.js"),
+    module!("records.js"),
+    module!("settings.js"),
+    module!("shortcuts.js"),
+    module!("state.js"),
+    module!("stream.js"),
+];
+
 static SCRIPT: LazyLock<String> = LazyLock::new(|| {
-    let own = [
-        include_str!("../page/chosen.js"),
-        include_str!("../page/figures.js"),
-        include_str!("../page/settings.js"),
-        include_str!("../page/stream.js"),
-        include_str!("../page/controls.js"),
-    ];
-    let script = shared::script(include_str!("../page/state.js"), &own);
-    format!("const HEX = \"{}\";\n{script}", shared::colours())
+    let modules = [&MODULES[..], &shared::MODULES].concat();
+    let script = shared::bundle("live/src/page/main.js", &modules);
+    script.expect("modules that fit together")
 });
 
 /// Content type and text of the file at `path`.

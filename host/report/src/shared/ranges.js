@@ -1,23 +1,16 @@
 // The events of a pixel: their ranges over time, and a table of them.
 
-const FLAGS = ["saturated", "clipped", "deferred", "pile-up", "tail", "confirmed"];
-const CONFIRMED = 1 << FLAGS.indexOf("confirmed");
-
-/** The lowest and the highest range of events, with some room. */
-function spanOfRanges(events) {
-  let [low, high] = [Infinity, -Infinity];
-  for (const { range } of events) [low, high] = [Math.min(low, range), Math.max(high, range)];
-  const room = Math.max(5, (high - low) * 0.1);
-  return [low - room, high + room];
-}
+import { contextOf } from "./dom.js";
+import { cellsOf, isDoubtful, spanOfRanges } from "./pixel-events.js";
+import { number, share, ticks, timeUnit } from "./numbers.js";
 
 /**
  * Draws ranges from the laser cycle first to last. Where `now` is given, the window of time from
  * `from` to it is marked, and events after it are faint. `span` is that of the upright axis, of
  * all its events without it; `isSmall` a plot among others.
  */
-function drawRanges(canvas, events, { laserHz, first, last, from, now, span, isSmall }) {
-  const { context: lines, width, height, soft, line, ink } = context(canvas);
+export function drawRanges(canvas, events, { laserHz, first, last, from, now, span, isSmall }) {
+  const { lines, width, height, soft, line, ink } = contextOf(canvas);
   if (events.length === 0) return;
   const [low, high] = span ?? spanOfRanges(events);
   const box = { left: isSmall ? 46 : 60, right: width - 12, top: isSmall ? 6 : 24, bottom: height - (isSmall ? 20 : 36) };
@@ -60,7 +53,7 @@ function drawRanges(canvas, events, { laserHz, first, last, from, now, span, isS
     lines.fillStyle = lines.strokeStyle = event.echo > 1 ? soft : ink;
     lines.globalAlpha = event.cycle >= now ? 0.25 : 1;
     const place = [x(event.cycle) - size / 2, y(event.range) - size / 2, size, size];
-    if (event.flags & ~CONFIRMED) lines.strokeRect(...place);
+    if (isDoubtful(event)) lines.strokeRect(...place);
     else lines.fillRect(...place);
   }
   lines.globalAlpha = 1;
@@ -86,31 +79,13 @@ function drawNow(lines, box, at, y, event, isSmall) {
   lines.fillText(`${number(event.range)} mm`, at + (isLeft ? -9 : 9), box.top - 6);
 }
 
-/** Rows of a table, newest first: what its columns ask for, of the last 30 events. */
-function fillEvents(table, events, timeOf) {
-  const measured = (value) => (Number.isNaN(value) ? "–" : number(value));
-  const cell = {
-    time: timeOf,
-    cycle: (event) => number(event.cycle),
-    range: (event) => fixed(event.range, 1),
-    peak: (event) => measured(event.peak),
-    background: (event) => measured(event.background),
-    exposure: (event) => measured(event.exposure),
-    flags: remarks,
-  };
-  const columns = [...table.tHead.rows[0].cells].map((head) => cell[head.dataset.of]);
-  const rows = events.slice(-30).reverse().map((event) => {
+/** Fills a table with the last events, newest first. Its head names the columns. */
+export function fillEvents(table, events, timeOf) {
+  const columns = [...table.tHead.rows[0].cells].map((head) => head.dataset.of);
+  const rows = cellsOf(columns, events, timeOf).map((cells) => {
     const row = document.createElement("tr");
-    for (const text of columns) row.insertCell().textContent = text(event);
+    for (const text of cells) row.insertCell().textContent = text;
     return row;
   });
   table.tBodies[0].replaceChildren(...rows);
-}
-
-/** The flags of an event, and what it is of. */
-function remarks(event) {
-  const all = FLAGS.filter((_, bit) => event.flags & (1 << bit));
-  if (event.level > 0) all.push(`${1 << event.level}×${1 << event.level} block`);
-  if (event.echo > 1) all.push(`echo ${event.echo}`);
-  return all.join(", ");
 }

@@ -1,17 +1,20 @@
 // The spikes: for some pixels a line for each event, at its laser cycle.
 
+import { pixelName } from "../shared/array.js";
+import { contextOf, element } from "../shared/dom.js";
+import { number, share, ticks } from "../shared/numbers.js";
+import { indicesOf } from "./events.js";
+import { clock, data, events, shown } from "./run.js";
+
 const lanes = element("lanes");
 const MOST_LANES = 12;
 
 /** Adds a pixel, and gives its label; the oldest one goes if there are too many. */
-function addLane(pixel, prepend = false) {
+export function addLane(pixel, prepend = false) {
   removeLane(pixel);
   const lane = document.createElement("li");
-  const spikes = [];
-  for (let event = 0; event < events.count; event++) {
-    if (isOf(event, pixel)) spikes.push(event);
-  }
-  const name = pixelName(pixel);
+  const spikes = indicesOf(events, data, pixel);
+  const name = pixelName(data, pixel);
   const label = document.createElement("span");
   const thinned = data.oneOf > 1 ? ` (1 of ${number(data.oneOf)})` : "";
   const ofBlocks = spikes.filter((event) => events.level[event] > 0).length;
@@ -43,7 +46,7 @@ function removeLane(pixel) {
 }
 
 /** The last line: laser cycles. */
-function addScale() {
+export function addScale() {
   const scale = document.createElement("li");
   scale.className = "scale";
   const canvas = document.createElement("canvas");
@@ -60,13 +63,13 @@ function addScale() {
   lanes.append(scale);
 }
 
-function drawLanes() {
+export function drawLanes() {
   for (const lane of lanes.children) lane.draw();
 }
 
 /** A line for each event of the part of the run that is shown, a shorter one for a block's. */
 function drawLane(canvas, spikes) {
-  const { context: lines, width, height, ink } = context(canvas);
+  const { lines, width, height, ink } = contextOf(canvas);
   lines.fillStyle = ink;
   for (const event of spikes) {
     if (event < shown.first || event >= shown.last) continue;
@@ -77,7 +80,7 @@ function drawLane(canvas, spikes) {
 }
 
 function drawScale(canvas) {
-  const { context: lines, width, soft } = context(canvas);
+  const { lines, width, soft } = contextOf(canvas);
   lines.fillStyle = soft;
   const { per } = clock;
   for (const time of ticks(shown.start / per, shown.end / per, width / 90)) {

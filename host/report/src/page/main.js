@@ -1,5 +1,20 @@
 // What the reader does: turn, choose the window of time, play it, choose pixels.
 
+import { neighbour, pixelAt } from "../shared/array.js";
+import { drawCloud } from "../shared/cloud.js";
+import { colours } from "../shared/colours.js";
+import { dark, element, redrawing } from "../shared/dom.js";
+import { stepOf } from "../shared/keys.js";
+import { capital, number } from "../shared/numbers.js";
+import { eventAt } from "../shared/projection.js";
+import { turnable } from "../shared/turn.js";
+import { firstPixel } from "./decisions.js";
+import { countUntil, eventOf, kindName } from "./events.js";
+import { addFew, chosen, drawPixel, drawRangeMap, lookAt } from "./pixel.js";
+import { clock, data, decisions, events, isPart, manyEchoes, scene, showWindow, shown, timeOf } from "./run.js";
+import { addLane, addScale, drawLanes } from "./spikes.js";
+
+const cloud = element("cloud");
 const start = element("start");
 const width = element("width");
 const play = element("play");
@@ -8,23 +23,25 @@ const STEPS = 200;
 /** Seconds to play the whole run in. */
 const PLAY_SECONDS = 10;
 
+/** The event that was clicked, none at first. */
+let picked = -1;
+
 /** Everything, before the next picture of the screen. */
-const redraw = (() => {
-  let asked = false;
-  return () => {
-    if (asked) return;
-    asked = true;
-    requestAnimationFrame(() => {
-      asked = false;
-      if (!data.isFew) {
-        drawCloud();
-        drawRangeMap();
-        drawLanes();
-      }
-      drawPixel();
-    });
-  };
-})();
+const redraw = redrawing(() => {
+  if (!data.isFew) {
+    drawCloud(cloud, scene, picked);
+    drawRangeMap();
+    drawLanes();
+  }
+  drawPixel();
+});
+
+/** Chooses another pixel. */
+export function choose(pixel) {
+  if (pixel < 0 || pixel === chosen.pixel) return;
+  lookAt(pixel);
+  redraw();
+}
 
 function chooseWindow() {
   const cycles = Number(width.value);
@@ -39,11 +56,7 @@ function chooseWindow() {
 /** What is shown, what was clicked, and what else there is to say. */
 function tell(news = "") {
   const span = isPart() ? `${timeOf(shown.start)} to ${timeOf(shown.end)}` : `0 to ${timeOf(data.cycles)}`;
-  let count = 0;
-  for (let event = shown.first; event < shown.last; event++) {
-    if (events.range[event] <= shown.far) count++;
-  }
-  status.value = `${number(count)} ${data.events} from ${span}. ${pickedText()} ${news}`.trim();
+  status.value = `${number(countUntil(events, shown))} ${data.events} from ${span}. ${pickedText()} ${news}`.trim();
 }
 
 /** Chooses a pixel, adds its spikes, and says so. */
@@ -54,8 +67,8 @@ function showSpikes(pixel) {
 
 function pickedText() {
   if (picked < 0) return "";
-  const event = eventOf(picked);
-  return `Chosen: ${kindName(event)}, ${number(event.range, 1)} mm at ${timeOf(event.cycle)}.`;
+  const event = eventOf(events, picked);
+  return `Chosen: ${kindName(data, event, manyEchoes)}, ${number(event.range, 1)} mm at ${timeOf(event.cycle)}.`;
 }
 
 // The window of time.
@@ -93,8 +106,8 @@ play.addEventListener("click", () => {
 });
 start.addEventListener("pointerdown", stop);
 
-turnable(cloud, redraw, (x, y) => {
-  picked = eventAt(x, y);
+turnable(cloud, scene.view, redraw, (x, y) => {
+  picked = eventAt(scene, x, y, cloud.clientWidth, cloud.clientHeight);
   tell(picked >= 0 ? showSpikes(events.pixel[picked]) : "");
 });
 
@@ -110,8 +123,8 @@ function chooseFar() {
 }
 far.addEventListener("input", chooseFar);
 function chooseThird() {
-  view.third = element("third").value;
-  const third = view.third === "range" ? "range" : "time";
+  scene.view.third = element("third").value;
+  const third = scene.view.third === "range" ? "range" : "time";
   const by = `${data.sides.join(", ")} and ${third}`;
   cloud.setAttribute("aria-label", `${capital(data.events)} by ${by}, coloured by range`);
   redraw();
@@ -119,13 +132,16 @@ function chooseThird() {
 element("third").addEventListener("input", chooseThird);
 
 // The chosen pixel.
-element("map").addEventListener("click", (event) => choose(pixelAt(event)));
+element("map").addEventListener("click", (event) => {
+  const { clientWidth, clientHeight } = event.currentTarget;
+  choose(pixelAt(data, event.offsetX, event.offsetY, clientWidth, clientHeight));
+});
 for (const id of ["map", "few", "ranges"]) {
   element(id).addEventListener("keydown", (event) => {
-    const move = STEPS_OF[event.key];
-    if (!move || event.ctrlKey || event.metaKey || event.altKey) return;
+    const move = stepOf(event);
+    if (!move) return;
     event.preventDefault();
-    step(...move);
+    choose(neighbour(data, chosen.pixel, move));
     if (id === "few") element("few").children[chosen.pixel].focus();
   });
 }
@@ -133,7 +149,7 @@ for (const id of ["map", "few", "ranges"]) {
 // Pixels by their place.
 for (const [at, id] of ["across", "down"].entries()) {
   const name = data.sides[at];
-  element(id).textContent = name[0].toUpperCase() + name.slice(1);
+  element(id).textContent = capital(name);
 }
 element("column").max = data.columns - 1;
 element("line").max = data.rows - 1;
@@ -143,8 +159,7 @@ element("add").addEventListener("submit", (event) => {
 });
 
 // The first look.
-const colourAt = (level) => colours[Math.round(level)];
-const stops = Array.from({ length: 18 }, (_, stop) => colourAt(stop * 15));
+const stops = Array.from({ length: 18 }, (_, stop) => colours[stop * 15]);
 element("bar").style.background = `linear-gradient(to right, ${stops.join(", ")})`;
 element("low").textContent = `≤ ${number(data.low)}`;
 element("high").textContent = `≥ ${number(data.high)}`;
@@ -156,9 +171,9 @@ document.querySelector(".panels").classList.toggle("is-few", data.isFew);
 element("events-thinned").value = data.oneOf > 1 ? `(1 of ${number(data.oneOf)})` : "";
 element("time-unit").textContent = `time, ${clock.unit}`;
 addScale();
-if (data.isFew) addFew();
+if (data.isFew) addFew(choose);
 else data.spikes.forEach((pixel) => addLane(pixel));
-choose(firstPixel(data.spikes));
+choose(firstPixel(data, decisions, data.spikes));
 chooseWindow();
 chooseFar();
 chooseThird();
