@@ -15,6 +15,11 @@ MOVE = """(share) => {
     for (const name of ["input", "change"]) position.dispatchEvent(new Event(name));
 }"""
 
+NAMELESS = """[...document.querySelectorAll("canvas")]
+    .filter((e) => e.checkVisibility() && e.ariaHidden !== "true")
+    .filter((e) => !e.ariaLabel && !e.hasAttribute("aria-labelledby"))
+    .map((e) => e.id)"""
+
 
 def until(page, what, part, text):
     """Waits until a part has a text. The page's policy forbids Playwright's own wait."""
@@ -49,6 +54,8 @@ def shows_a_recording(browser, address, width, scheme, picture):
     until(page, "Home plays it from the start", "#state", "playing")
     page.keyboard.press("ArrowRight")
     until(page, "an arrow key moves it", "#place", "0.002 of")
+    nameless = page.evaluate(NAMELESS)
+    check(f"every picture has a name {nameless}", not nameless)
     wide = page.evaluate("document.documentElement.scrollWidth")
     check(f"no scrolling sideways at {width} pixels", wide <= width)
     page.screenshot(path=picture)
