@@ -15,7 +15,8 @@ use dtof_core::{
 };
 use dtof_link::frame::WIRE_BYTES;
 use dtof_link::{Configuration, DynamicDepth, FaultRecord, Report, Source, message};
-use dtof_sensors::SensorInfo;
+use dtof_sensors::dither::Dither;
+use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 use rand_core::SeedableRng;
 use rand_pcg::Pcg32;
 
@@ -154,6 +155,54 @@ fn questions_are_answered_though_the_sensor_fills_the_link() {
     }
     let (least, most) = (counts.iter().min(), counts.iter().max());
     assert!(least.unwrap() * 2 > *most.unwrap(), "{counts:?}");
+}
+
+/// Gives data in each of its polls as long as it has some.
+struct Ready {
+    polls: u32,
+    left: u32,
+}
+
+impl Sensor for Ready {
+    type Error = SensorFault;
+
+    fn info(&self) -> SensorInfo {
+        SensorInfo::new(1)
+    }
+
+    fn start(&mut self, _: U16F16, _: Dither) {}
+
+    fn stop(&mut self) {}
+
+    fn poll(&mut self, _: u32, sink: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
+        self.polls += 1;
+        let Some(left) = self.left.checked_sub(1) else {
+            return Ok(Polled::Idle);
+        };
+        self.left = left;
+        sink.end_laser_cycles(1);
+        Ok(Polled::Data)
+    }
+}
+
+#[test]
+fn a_sensor_that_has_more_is_polled_on_but_not_without_end() {
+    let (mut runs, _) = configured::<8>(&CONFIGURATION);
+    let mut sensor = Ready { polls: 0, left: 10 };
+    let has_more = [0; 4].map(|now_ms| {
+        runs.poll_sensor(&mut sensor, now_ms);
+        runs.sensor_has_more()
+    });
+    assert_eq!(has_more, [true, true, false, false]);
+    // Four each, the third ends with an idle one.
+    assert_eq!(sensor.polls, 4 + 4 + 3 + 1);
+
+    // A sensor whose photons do not count keeps nobody awake.
+    let mut rests = device::<8>(Some(SensorInfo::new(1)));
+    let mut sensor = Ready { polls: 0, left: 10 };
+    rests.poll_sensor(&mut sensor, 0);
+    assert!(!rests.sensor_has_more());
+    assert_eq!(sensor.polls, 0);
 }
 
 #[test]

@@ -335,6 +335,7 @@ fn the_main_loop_does_not_sleep_while_a_byte_waits() {
                         write_all(serial, &byte);
                     }
                     run_any_steps();
+                    false
                 });
                 assert!(!SLEPT.get() || !serial.has_received(), "asleep");
             }

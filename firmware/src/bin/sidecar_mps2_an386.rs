@@ -40,12 +40,13 @@ fn main() -> ! {
     let mut is_lit = false;
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
-            serve(&mut sidecar, &mut sensor, serial, now_ms);
+            let has_more = serve(&mut sidecar, &mut sensor, serial, now_ms);
             if is_lit != sidecar.sensor_is_running() {
                 is_lit = !is_lit;
                 Mps2An386::set_laser(is_lit);
             }
             sidecar.simulate(&mut sensor, &mut left);
+            has_more
         });
     }
 }

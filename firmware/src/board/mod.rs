@@ -91,34 +91,36 @@ pub trait Board {
     fn sleep(&mut self);
 }
 
-/// One turn of the main loop: `work` gets the port and the time and does what
-/// can be done without waiting. The next turn comes when more has been received, after a
-/// millisecond at the latest.
+/// One turn of the main loop: `work` gets the port and the time, does what
+/// can be done without waiting, and returns whether there is more to do at once. The next turn comes then, or
+/// when more has been received, after a millisecond at the latest.
 pub fn turn<B: Board>(
     board: &mut B,
     serial: &mut Serial<'_>,
-    work: impl FnOnce(&mut Serial<'_>, u32),
+    work: impl FnOnce(&mut Serial<'_>, u32) -> bool,
 ) {
-    work(serial, board.now_ms());
+    let has_more = work(serial, board.now_ms());
     board.feed_watchdog();
     // No byte can come between the check and the sleep.
     board.hold_interrupts(|board| {
-        if !serial.has_received() {
+        if !has_more && !serial.has_received() {
             board.sleep();
         }
     });
 }
 
-/// The work of a turn: the sidecar serves the host and polls the sensor.
+/// The work of a turn: the sidecar serves the host and polls the sensor. Returns whether the sensor has
+/// more to do at once.
 pub fn serve(
     sidecar: &mut Sidecar<'_>,
     sensor: &mut impl Sensor,
     serial: &mut Serial<'_>,
     now_ms: u32,
-) {
+) -> bool {
     let lost = serial.lost();
     sidecar.set_listening(serial.listens());
     let Ok(()) = sidecar.poll_with(sensor, serial, lost, now_ms);
+    sidecar.sensor_has_more()
 }
 
 /// Runs a sidecar with room for these pixels and blocks without end. Its report tells the host why
@@ -138,7 +140,7 @@ pub fn run<B: Board>(
     sidecar.set_stop_reason(reason.into());
     loop {
         turn(&mut board, &mut serial, |serial, now_ms| {
-            serve(&mut sidecar, &mut sensor, serial, now_ms);
+            serve(&mut sidecar, &mut sensor, serial, now_ms)
         });
     }
 }
@@ -197,10 +199,23 @@ mod tests {
                     serial.read_exact(&mut byte).unwrap();
                     read.push((now_ms, byte[0]));
                 }
+                false
             });
         }
         assert_eq!(read, [(0, 0), (1, 1), (2, 2)]);
         assert_eq!(board.slept, [2, 3]);
+        assert_eq!(board.fed, 4);
+    }
+
+    #[test]
+    fn stays_awake_and_feeds_while_there_is_more_to_do() {
+        let mut buffers = Buffers::<8, 8>::new();
+        let (_, mut serial) = buffers.split(Mock::start_sending);
+        let mut board = Mock::default();
+        for left in (0..4).rev() {
+            turn(&mut board, &mut serial, |_, _| left > 0);
+        }
+        assert_eq!(board.slept, [3]);
         assert_eq!(board.fed, 4);
     }
 }

@@ -150,6 +150,8 @@ pub struct Sidecar<'a> {
     sensor: Option<SensorInfo>,
     /// The sensor has been started and not been stopped.
     running: bool,
+    /// It had still more when it was polled last.
+    sensor_has_more: bool,
     /// It was started for the configuration in force.
     started: bool,
     /// It stays off until another configuration.
@@ -228,6 +230,7 @@ impl<'a> Sidecar<'a> {
             once_per_bin: None,
             sensor,
             running: false,
+            sensor_has_more: false,
             started: false,
             off: false,
             stale: 0,

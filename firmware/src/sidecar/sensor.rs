@@ -46,6 +46,7 @@ impl Sidecar<'_> {
     /// It starts or stops the sensor first: see the module.
     pub fn poll_sensor(&mut self, sensor: &mut impl Sensor, now_ms: u32) {
         self.steer(sensor, now_ms);
+        self.sensor_has_more = false;
         for _ in 0..POLLS {
             if !self.takes_sensor() {
                 return;
@@ -59,6 +60,13 @@ impl Sidecar<'_> {
                 }
             }
         }
+        self.sensor_has_more = true;
+    }
+
+    /// Whether the sensor had still more when it was polled last: poll it again at once.
+    #[must_use]
+    pub const fn sensor_has_more(&self) -> bool {
+        self.sensor_has_more
     }
 
     /// Starts the sensor, or stops it.
