@@ -216,6 +216,7 @@ impl Build {
             Some("photon-timer") => Self::With(Sensor::PhotonTimer),
             Some("tmf8828-8x8") => Self::With(Sensor::Tmf8828),
             Some("tmf8829") => Self::With(Sensor::Tmf8829),
+            Some("tmf8829-spi") => Self::With(Sensor::Tmf8829Spi),
             Some("tmf882x" | "tmf8820" | "tmf8821") => Self::With(Sensor::Tmf882x),
             Some("tmf8828") => bail!("`tmf882x` for its 9 zones, or `tmf8828-8x8` for its 64?"),
             Some(name) => bail!(
@@ -268,6 +269,8 @@ pub enum Sensor {
     PhotonTimer,
     Tdc7200,
     Tmf8829,
+    /// A TMF8829 over SPI.
+    Tmf8829Spi,
     Tmf882x,
     /// A TMF8828 with 8×8 zones.
     Tmf8828,
@@ -279,7 +282,13 @@ impl Sensor {
         match board {
             Board::Mps2An386 => &[],
             Board::Pico | Board::Pico2 => &[Self::PhotonTimer],
-            Board::Stm32F405 => &[Self::Tdc7200, Self::Tmf8829, Self::Tmf882x, Self::Tmf8828],
+            Board::Stm32F405 => &[
+                Self::Tdc7200,
+                Self::Tmf8829,
+                Self::Tmf8829Spi,
+                Self::Tmf882x,
+                Self::Tmf8828,
+            ],
         }
     }
 
@@ -288,6 +297,7 @@ impl Sensor {
             Self::PhotonTimer => "sensor-photon-timer",
             Self::Tdc7200 => "sensor-tdc7200",
             Self::Tmf8829 => "sensor-tmf8829",
+            Self::Tmf8829Spi => "sensor-tmf8829-spi",
             Self::Tmf882x => "sensor-tmf882x",
             Self::Tmf8828 => "sensor-tmf8828-8x8",
         }
@@ -302,7 +312,7 @@ impl Sensor {
     pub fn image(self) -> Option<(&'static str, usize)> {
         match self {
             Self::PhotonTimer | Self::Tdc7200 => None,
-            Self::Tmf8829 => Some(("TMF8829_IMAGE", 1 << 14)),
+            Self::Tmf8829 | Self::Tmf8829Spi => Some(("TMF8829_IMAGE", 1 << 14)),
             Self::Tmf882x | Self::Tmf8828 => Some(("TMF882X_IMAGE", 1 << 16)),
         }
     }

@@ -34,7 +34,11 @@ fn main() -> ! {
     #[cfg(feature = "sensor-tdc7200")]
     let sensor = port.tdc7200();
     #[cfg(feature = "sensor-tmf8829")]
-    let sensor = port.tmf8829(include_bytes!(concat!(env!("OUT_DIR"), "/tmf8829.bin")));
+    let image = include_bytes!(concat!(env!("OUT_DIR"), "/tmf8829.bin"));
+    #[cfg(all(feature = "sensor-tmf8829", not(feature = "sensor-tmf8829-spi")))]
+    let sensor = port.tmf8829(image);
+    #[cfg(feature = "sensor-tmf8829-spi")]
+    let sensor = port.tmf8829_over_spi(image);
     #[cfg(feature = "sensor-tmf882x")]
     let sensor = port.tmf882x(include_bytes!(concat!(env!("OUT_DIR"), "/tmf882x.bin")));
     #[cfg(not(any(

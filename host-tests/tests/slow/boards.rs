@@ -150,11 +150,13 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     ];
     stack::check(&image, &used)?;
     overflows(board, &image)?;
-    // The emulated pins all read as zero: a TDC7200 that does not answer, and an I²C bus without
-    // pull-up resistors. On a real board both give "no answer".
+    // The emulated pins all read as zero: a TDC7200 that does not answer, an I²C bus without
+    // pull-up resistors, and a TMF8829 on SPI that never gets ready. On a real board the first two give
+    // "no answer", and the third reads as ones: "wrong chip or program".
     for (sensor, fault) in [
         ("tdc7200", FaultRecord::NoAnswer),
         ("tmf8829", FaultRecord::Bus),
+        ("tmf8829-spi", FaultRecord::Rejected),
         ("tmf882x", FaultRecord::Bus),
     ] {
         let image = board.image(&[sensor])?;
