@@ -32,12 +32,12 @@ const MOST_BLOCKS: usize = if cfg!(feature = "pico2") { 336 } else { 84 };
 static PIXELS: ConstStaticCell<Vec<Pixel, MOST_PIXELS>> = ConstStaticCell::new(Vec::new());
 static BLOCKS: ConstStaticCell<Vec<Block, MOST_BLOCKS>> = ConstStaticCell::new(Vec::new());
 
-/// 100 kHz and pulses of 100 ns, unless `LASER_HZ` and `LASER_PULSE_NS` say otherwise when
+/// 100 kHz and pulses of 16 ns, two bins, unless `LASER_HZ` and `LASER_PULSE_NS` say otherwise when
 /// the image is built.
 #[cfg(feature = "sensor-photon-timer")]
 const LASER: Config = checked!(laser(Settings {
     laser_hz: number(option_env!("LASER_HZ"), 100_000),
-    pulse_ns: number(option_env!("LASER_PULSE_NS"), 100),
+    pulse_ns: number(option_env!("LASER_PULSE_NS"), 16),
 }));
 
 #[cfg(feature = "sensor-photon-timer")]

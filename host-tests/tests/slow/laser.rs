@@ -26,8 +26,8 @@ use crate::pico::senses;
 use crate::rp2040::{Done, NODE, NPM, Rp2040, image, install};
 use crate::{dtof, enabled, root, stack, succeed};
 
-/// The pulse length: 100 ns in whole clocks.
-const PULSE_NS: u64 = 104;
+/// The pulse length of the image as it comes.
+const PULSE_NS: u64 = 16;
 /// The laser's period.
 const PERIOD_MS: f64 = 0.01;
 /// How long the laser fires before the fault. Faults that switch the laser off at once are planted

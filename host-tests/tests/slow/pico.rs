@@ -331,7 +331,7 @@ fn pico_starts_its_timer_again_when_a_state_machine_was_late() -> Result<()> {
 /// The times from pulse to pulse are uniform: none is shorter or longer than the range allows, their mean is
 /// that without dither, and no length is rare or frequent.
 fn check_intervals(laser: &Laser, period_ns: u64, dither: Dither) -> Result<()> {
-    ensure!(laser.longest_ns == 104, "{laser:?}");
+    ensure!(laser.longest_ns == 16, "{laser:?}");
     let half = BIN_NS * u64::from(dither.range()) / 2;
     let lengths = u64::from(dither.range()) + 1;
     let total: u64 = laser.intervals.values().sum();
