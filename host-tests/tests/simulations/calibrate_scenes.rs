@@ -85,7 +85,7 @@ fn judge(number: u64) -> (Vec<String>, String) {
             format!("{:.4}", truth.signal),
         );
     }
-    let detection = found.detection.unwrap();
+    let detection = found.detection;
     let share = false_alarms(&found, truth_of(&drawn));
     let right = (0.7..=1.3).contains(&(share / 0.01));
     check(

@@ -204,7 +204,7 @@ fn of<const BINS: usize>(found: &Calibration, background: f64) -> f64 {
     // About 200 events, or as many as do not take long.
     let exposure = background * BINS as f64 * 2000.0;
     let exposures_drawn = (6e8 / exposure).clamp(10_000.0, 20_000.0) as u32;
-    let detection = found.detection.unwrap();
+    let detection = found.detection;
     let z = U4F12::from_num(detection.z.unwrap());
     let minimum = Count::saturating(detection.min_count.into());
     let rule = WindowRule::new(detection.window, z, minimum).unwrap();

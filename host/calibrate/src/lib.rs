@@ -16,6 +16,7 @@ mod photon_budget;
 mod remarks;
 pub mod report;
 mod settle;
+mod used_pulse;
 mod watch;
 mod written;
 
@@ -24,6 +25,7 @@ use std::collections::BTreeSet;
 use anyhow::Result;
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
+use dtof_engine::settings::SettingsFile;
 use dtof_photons::MM_PER_PS;
 use dtof_theory::progress::{self, Progress};
 use rayon::prelude::*;
@@ -37,6 +39,7 @@ pub use find::pixels::Pixels;
 pub use find::pulse::Pulse;
 pub use photon_budget::PhotonBudget;
 pub use remarks::remarks;
+pub use used_pulse::{KnownPulse, PulseSource};
 pub use watch::{Change, RunPhotons, glass_change};
 
 use find::background::Level;
@@ -47,6 +50,7 @@ use find::shape::Window;
 use find::significance::{is_surely_less, median};
 use find::{glass, offset, peaks, pile_up, pulse};
 use photon_budget::Replay;
+use used_pulse::UsedPulse;
 
 /// Settings of the window rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,6 +77,8 @@ pub struct WindowDetection {
     pub sigma_bins: U8F8,
     /// Half widths of the depth estimator, where its window is asymmetric.
     pub half_widths: Option<CentredWindow>,
+    /// Where the pulse comes from.
+    pub pulse_source: PulseSource,
 }
 
 /// What the user knows beside the recording, and asks for.
@@ -84,8 +90,20 @@ pub struct CalibrationOptions {
     pub target_mm: Option<f64>,
     /// The share of exposures without a target that may end with an event.
     pub false_alarm: f64,
+    /// The pulse, if it is known.
+    pub known_pulse: KnownPulse,
     /// Seed of the simulations.
     pub seed: u64,
+}
+
+impl CalibrationOptions {
+    /// These options with the pulse of `settings`. If it `is_given` by the user, it holds whatever the recording
+    /// shows; that of older settings holds where no peak is bright enough.
+    #[must_use]
+    pub const fn with_pulse_of(mut self, settings: &SettingsFile, is_given: bool) -> Self {
+        self.known_pulse = KnownPulse::of(settings, is_given);
+        self
+    }
 }
 
 impl Default for CalibrationOptions {
@@ -94,6 +112,7 @@ impl Default for CalibrationOptions {
             glass: None,
             target_mm: None,
             false_alarm: 0.01,
+            known_pulse: KnownPulse::default(),
             seed: 1,
         }
     }
@@ -124,8 +143,8 @@ pub struct Calibration {
     pub pixel_offsets: Option<PixelOffsets>,
     /// First and last bin of the range gate.
     pub gate: (u16, u16),
-    /// Settings of the window rule, if the pulse is known.
-    pub detection: Option<WindowDetection>,
+    /// Settings of the window rule.
+    pub detection: WindowDetection,
     /// The best use of photons, where true distances are known.
     pub photon_budget: Option<PhotonBudget>,
     /// Photons a laser cycle of each bin, the mean over all good pixels and captures.
@@ -214,7 +233,8 @@ pub fn calibrate_with(
     let bins = observed.bins();
     let gate = settle::gate(last_bin, glass.map_or(0, |glass| glass.end))?;
     let pulse = pulse::pulse(&windows(&good, gate.0, glass), options.seed);
-    let found = offset_of(&good, gate, depth_window(pulse.as_ref()), observed, options);
+    let used = UsedPulse::new(pulse.as_ref(), &options.known_pulse);
+    let found = offset_of(&good, gate, used.window(), observed, options);
     let (mut offset, pixel_offsets) = found.unzip();
     let mut pixel_offsets = pixel_offsets.flatten();
     if let (Some(offset), Some(pixels)) = (&mut offset, &pixel_offsets) {
@@ -222,31 +242,26 @@ pub fn calibrate_with(
     }
     let (counts, _) = good.pooled();
     let cycles = good.cycles();
-    let findings = pulse.as_ref().map(|pulse| settle::Findings {
+    let findings = settle::Findings {
         bins,
         gate,
-        pulse,
+        measured: pulse.as_ref(),
+        pulse: used,
         background: pixels.background,
         is_absolute: observed.length != Length::Unknown,
         options,
-    });
-    let detection = |budget| {
-        let detection = findings
-            .as_ref()
-            .map(|of| settle::detection(of, budget, progress));
-        detection.transpose()
     };
-    let mut found = detection(None)?;
+    let mut detection = settle::detection(&findings, None, progress)?;
     let mut photon_budget = None;
     let bin_width_ps = offset
         .and_then(|offset| offset.bin_width_ps)
         .unwrap_or(observed.bin_width_ps);
-    if let (Some(before), Some(offset)) = (&found, &mut offset) {
+    if let Some(offset) = &mut offset {
         let scale = (gate, bin_width_ps);
         let own = pixel_offsets.as_ref().map_or(&[][..], |pixels| &pixels.mm);
         let replay = Replay::new(
             observed,
-            before,
+            &detection,
             &pixels.hot,
             scale,
             (offset.mm, own),
@@ -257,7 +272,7 @@ pub fn calibrate_with(
         }
         if let Some(budget) = photon_budget {
             offset.mm += budget.offset_mm;
-            found = detection(Some(budget))?;
+            detection = settle::detection(&findings, Some(budget), progress)?;
         }
     }
     // They were found as differences from those that the pixels have.
@@ -276,7 +291,7 @@ pub fn calibrate_with(
         offset,
         pixel_offsets,
         gate,
-        detection: found,
+        detection,
         photon_budget,
         mean: counts.iter().map(|count| count / cycles).collect(),
         captures: observed.captures.len(),
@@ -336,17 +351,6 @@ fn windows(good: &GoodHistograms, first: u16, glass: Option<&Glass>) -> Vec<Wind
     } else {
         targets
     }
-}
-
-/// The window that events will find their depth with. If the pulse is not known, that for a standard
-/// deviation of one bin.
-fn depth_window(pulse: Option<&Pulse>) -> CentredWindow {
-    let asymmetric = pulse.and_then(|pulse| pulse.asymmetric);
-    let sigma = pulse.map_or(1.0, |pulse| pulse.sigma);
-    asymmetric.map_or_else(
-        || CentredWindow::for_pulse(settle::sigma(sigma)),
-        |asymmetric| asymmetric.window,
-    )
 }
 
 /// The range offset from the distance of the target, else from true distances. With it comes by how much the pixels
@@ -470,7 +474,7 @@ mod tests {
             target_mm: Some(1200.0),
             ..CalibrationOptions::default()
         };
-        let window = CentredWindow::for_pulse(settle::sigma(sigma));
+        let window = CentredWindow::for_pulse(U8F8::from_num(sigma));
         let found = offset_of(&good, (0, 127), window, &observed, &options);
         found.unwrap().1.unwrap()
     }

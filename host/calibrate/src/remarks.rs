@@ -1,6 +1,6 @@
 //! Remarks: what a recording does not show, and the option that would help.
 
-use super::{Calibration, Length, Nearest, Tdc};
+use super::{Calibration, Length, Nearest, PulseSource, Tdc};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::numbers::shortest;
 use dtof_options::rows::{Row, bins};
@@ -56,13 +56,22 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
         }
         _ => {}
     }
+    let used = found.detection.pulse_source;
     match &found.pulse {
-        None => remark(
-            "pulse",
-            "No peak is bright enough to measure the pulse: record a target, or pass --sigma-bins \
-             to replay."
-                .to_owned(),
-        ),
+        // The user knows it.
+        _ if used == PulseSource::Given => {}
+        None => {
+            let kept = match used {
+                PulseSource::Older => "that of the older settings is kept",
+                _ => "the window is that for σ = 1 bin",
+            };
+            remark(
+                "pulse",
+                format!(
+                    "No peak is bright enough to measure the pulse, so {kept}: record a target, or pass --sigma-bins."
+                ),
+            );
+        }
         Some(pulse) if pulse.sigma > 1.75 => remark(
             "pulse",
             "The pulse is too wide for the widest window, which is for 1.75 bins: 1.75 is written. \
@@ -86,6 +95,7 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
         Some(_) => {}
     }
     let asymmetric = found.pulse.as_ref().and_then(|pulse| pulse.asymmetric);
+    let asymmetric = asymmetric.filter(|_| used == PulseSource::Measured);
     if let Some(asymmetric) = asymmetric {
         remark(
             "depth",
@@ -126,7 +136,8 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
         ),
         _ => {}
     }
-    if let Some(detection) = found.detection.filter(|detection| detection.is_by_count) {
+    let detection = &found.detection;
+    if detection.is_by_count {
         remark(
             "z",
             format!(

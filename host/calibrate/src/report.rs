@@ -5,8 +5,9 @@ use dtof_draw::chart::{Axis, Chart, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{AVERAGE, EVENTS, PAPER, REFERENCE};
 use dtof_draw::picture::{Map, heat_map};
 
-use super::{Calibration, Length, Nearest, PixelOffsets, remarks};
+use super::{Calibration, Length, Nearest, PixelOffsets, PulseSource, remarks};
 use dtof_engine::settings::SettingsFile;
+use dtof_options::numbers::shortest;
 use dtof_options::rows::{Row, grouped, significant};
 use dtof_report::{Figure, Section, still};
 
@@ -48,23 +49,7 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
     );
     row("hot pixels", listed(&of.hot));
     row("dead pixels", listed(&of.dead));
-    row(
-        "pulse",
-        match &found.pulse {
-            None => "no peak is bright enough".to_owned(),
-            Some(pulse) if pulse.is_core => format!(
-                "σ = {} bins, of its core, from {} peaks",
-                short(pulse.sigma),
-                pulse.peaks
-            ),
-            Some(pulse) => format!(
-                "σ = {} {} bins, from {} peaks",
-                short(pulse.sigma),
-                between(pulse.between),
-                pulse.peaks
-            ),
-        },
-    );
+    row("pulse", pulse(found));
     row(
         "cover glass",
         match &found.nearest {
@@ -135,25 +120,24 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
     if let Some(width) = found.offset.and_then(|offset| offset.bin_width_ps) {
         row("bin width", format!("{width:.2} ps, from the distances"));
     }
-    if let Some(of) = &found.detection {
-        let z = of.z.map_or(String::new(), |z| format!(", z {z:.3}"));
-        let counted = if of.exposures == 0 {
-            String::new()
-        } else {
-            format!(", {} simulated exposures", grouped(of.exposures))
-        };
-        row(
-            "rule",
-            format!(
-                "window of {}{z}, at least {} photons, L1 {}, L2 {}; {} % false alarms{counted}",
-                of.window,
-                of.min_count,
-                of.l1,
-                of.l2,
-                of.false_alarm * 100.0
-            ),
-        );
-    }
+    let of = &found.detection;
+    let z = of.z.map_or(String::new(), |z| format!(", z {z:.3}"));
+    let counted = if of.exposures == 0 {
+        String::new()
+    } else {
+        format!(", {} simulated exposures", grouped(of.exposures))
+    };
+    row(
+        "rule",
+        format!(
+            "window of {}{z}, at least {} photons, L1 {}, L2 {}; {} % false alarms{counted}",
+            of.window,
+            of.min_count,
+            of.l1,
+            of.l2,
+            of.false_alarm * 100.0
+        ),
+    );
     if let Some(photon_budget) = &found.photon_budget {
         row(
             "events here",
@@ -164,6 +148,33 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
         );
     }
     rows
+}
+
+/// The pulse that was measured, and that of the settings if it is another.
+fn pulse(found: &Calibration) -> String {
+    let used = shortest(found.detection.sigma_bins);
+    let used = match found.detection.pulse_source {
+        PulseSource::Measured => String::new(),
+        PulseSource::Given => format!("; σ = {used} bins are used, as given"),
+        PulseSource::Older => format!("; σ = {used} bins are kept, from the older settings"),
+        PulseSource::Assumed => format!("; the window is that for σ = {used} bin"),
+    };
+    let measured = match &found.pulse {
+        None => "no peak is bright enough".to_owned(),
+        Some(pulse) if pulse.is_core => format!(
+            "σ = {} bins, of its core, from {} peaks",
+            short(pulse.sigma),
+            pulse.peaks
+        ),
+        Some(pulse) => format!(
+            "σ = {} ({} to {}) bins, from {} peaks",
+            short(pulse.sigma),
+            short(pulse.between.0),
+            short(pulse.between.1),
+            pulse.peaks
+        ),
+    };
+    measured + &used
 }
 
 /// Changes since an older calibration, one a row.

@@ -1,14 +1,15 @@
 //! Settings from the findings: gate, window, z, L1 and L2.
 
 use anyhow::{Result, ensure};
-use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{BlockLevel, CentredWindow, WindowRule};
+use dtof_core::fixed::types::U4F12;
+use dtof_core::{BlockLevel, WindowRule};
 use dtof_theory::progress::Progress;
 use dtof_theory::tune::{FalseAlarmLimit, Request, window};
 
 use super::false_alarms;
 use super::find::pulse::Pulse;
 use super::photon_budget::PhotonBudget;
+use super::used_pulse::UsedPulse;
 use super::{CalibrationOptions, WindowDetection};
 use dtof_options::Refused;
 
@@ -31,8 +32,10 @@ pub struct Findings<'a> {
     pub bins: usize,
     /// First and last bin of the gate.
     pub gate: (u16, u16),
-    /// The pulse.
-    pub pulse: &'a Pulse,
+    /// The pulse that was measured, if a peak is bright enough.
+    pub measured: Option<&'a Pulse>,
+    /// The pulse that the settings are for.
+    pub pulse: UsedPulse,
     /// Background photons a bin and laser cycle.
     pub background: f64,
     /// Whether rates are absolute, not relative to the brightest pixel.
@@ -66,13 +69,6 @@ pub fn gate(last: usize, first: usize) -> Result<(u16, u16)> {
     Ok((first, last))
 }
 
-/// The standard deviation of a pulse in the format of settings, within its range.
-#[must_use]
-pub fn sigma(sigma: f64) -> U8F8 {
-    let sigma = U8F8::saturating_from_num(sigma);
-    sigma.clamp(U8F8::DELTA, CentredWindow::WIDEST_PULSE)
-}
-
 /// The settings of the window rule, with window, minimum count and X of `budget` if there is one.
 ///
 /// # Errors
@@ -89,8 +85,7 @@ pub fn detection(
         ..
     } = *found;
     let l2 = l2(background);
-    let sigma = sigma(pulse.sigma);
-    let width = || WindowRule::width_for_pulse(sigma);
+    let width = || WindowRule::width_for_pulse(pulse.sigma_bins);
     let x = budget.map_or(X, |budget| budget.x);
     let mut detection = WindowDetection {
         window: budget.map_or_else(width, |budget| budget.window),
@@ -102,29 +97,32 @@ pub fn detection(
         l1: L1.min(l2 / 2),
         l2,
         x,
-        sigma_bins: sigma,
-        half_widths: pulse.asymmetric.map(|asymmetric| asymmetric.window),
+        sigma_bins: pulse.sigma_bins,
+        half_widths: pulse.half_widths,
+        pulse_source: pulse.source,
     };
     if !found.is_absolute {
         return Ok(detection);
     }
     let bins = u16::try_from(found.bins)?;
-    let request = Request {
-        background: background.max(1e-6),
-        signal: pulse.signal,
-        sigma: pulse.sigma.min(f64::from(bins) / 4.0),
-        bins,
-        minimum_count: MIN_COUNT,
-        x,
-        l1: None,
-        l2,
-        limit: FalseAlarmLimit::PerExposure(options.false_alarm),
-        levels: BlockLevel::PIXEL,
-        seed: options.seed,
-    };
-    // If the signal is too weak for any L1, the default stays. If `progress` has ended it, `z` fails at once.
-    if let Ok(tuned) = window::tune(&request, progress) {
-        detection.l1 = tuned.l1;
+    if let Some(measured) = found.measured {
+        let request = Request {
+            background: background.max(1e-6),
+            signal: measured.signal,
+            sigma: measured.sigma.min(f64::from(bins) / 4.0),
+            bins,
+            minimum_count: MIN_COUNT,
+            x,
+            l1: None,
+            l2,
+            limit: FalseAlarmLimit::PerExposure(options.false_alarm),
+            levels: BlockLevel::PIXEL,
+            seed: options.seed,
+        };
+        // If the signal is too weak for any L1, the default stays. If `progress` has ended it, `z` fails at once.
+        if let Ok(tuned) = window::tune(&request, progress) {
+            detection.l1 = tuned.l1;
+        }
     }
     let exposures = false_alarms::ExposureSettings {
         background,

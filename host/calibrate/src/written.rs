@@ -37,10 +37,7 @@ impl Calibration {
             offsets_mm: offsets.or(before.sensor.offsets_mm),
             gate: self.written_gate(),
             masked: Some(self.masked()?).filter(|masked| !masked.is_empty()),
-            sigma_bins: match &self.detection {
-                Some(detection) => Some(detection.sigma_bins),
-                None => before.sensor.sigma_bins,
-            },
+            sigma_bins: Some(self.detection.sigma_bins),
             dead_time: match self.tdc {
                 Some(Tdc::DeadTime { bins, .. }) => Some(u16::try_from(bins)?),
                 _ => None,
@@ -55,26 +52,25 @@ impl Calibration {
         // The z that was found is for looks.
         let has_looks = before.run.decide_once != Some(true);
         let z = |found: Option<f64>| found.filter(|_| has_looks);
-        let detection = self.detection.map(|detection| DetectionSettings {
+        let found = &self.detection;
+        let detection = DetectionSettings {
             rule: Some(RuleName::Window),
-            window: Some(detection.window),
-            z: z(detection.z).map(U4F12::saturating_from_num),
-            false_alarm: z(detection.z).is_none().then_some(detection.false_alarm),
-            half_widths: detection.half_widths,
-            min_count: Some(detection.min_count),
-            l1: Some(detection.l1),
-            l2: Some(detection.l2),
-            x: Some(detection.x),
+            window: Some(found.window),
+            z: z(found.z).map(U4F12::saturating_from_num),
+            false_alarm: z(found.z).is_none().then_some(found.false_alarm),
+            half_widths: found.half_widths,
+            min_count: Some(found.min_count),
+            l1: Some(found.l1),
+            l2: Some(found.l2),
+            x: Some(found.x),
             ..DetectionSettings::default()
-        });
+        };
         // The offset was found with the window of this pulse.
         let mut older = before.detection;
-        if detection.is_some() {
-            (older.estimator, older.half_widths) = (None, None);
-        }
+        (older.estimator, older.half_widths) = (None, None);
         let found = SettingsFile {
             sensor,
-            detection: detection.unwrap_or_default().or(older),
+            detection: detection.or(older),
             rays: before.rays,
             run: before.run,
             file: before.file,

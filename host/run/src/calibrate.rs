@@ -89,6 +89,12 @@ impl Options {
         Ok(requested)
     }
 
+    /// The options of the calibration itself, with the pulse of the settings from [`Self::requested`].
+    #[must_use]
+    pub const fn calibration(&self, requested: &SettingsFile) -> CalibrationOptions {
+        self.calibration.with_pulse_of(requested, false)
+    }
+
     /// Calibrates the sensor that recorded `input`, with the settings from [`Self::requested`].
     ///
     /// # Errors
@@ -104,7 +110,8 @@ impl Options {
         options.cycles = u64::MAX;
         let counts = counts(input, &options)?;
         self.given.suits(input, &counts.metadata)?;
-        let found = calibrate_counts(&requested, &counts, &self.calibration, progress);
+        let options = self.calibration(&requested);
+        let found = calibrate_counts(&requested, &counts, &options, progress);
         let found = found.with_context(|| input.to_string())?;
         let width = bin_width_warning(&counts.metadata);
         let metres = self.calibration.target_mm.and_then(in_metres);

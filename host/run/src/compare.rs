@@ -172,13 +172,8 @@ impl Options {
             warnings,
         } = subject;
         let false_alarm = self.false_alarm_share(&requested);
-        let sigma = requested.sensor.sigma_bins.ok_or_else(|| {
-            let reason = format!(
-                "is needed: no peak of {} is bright enough to measure the pulse",
-                plain(&name)
-            );
-            Refused::new("sigma_bins", reason)
-        })?;
+        let sigma = requested.sensor.sigma_bins;
+        let sigma = sigma.ok_or_else(|| unknown_pulse(&name))?;
         let mut settings = requested.settings(requested.sensor.bins.unwrap_or(128).into())?;
         let masked = settings.masked.clone();
         let photons = |seed: u64| -> Result<Box<dyn PhotonSource>> {
@@ -287,6 +282,9 @@ impl Options {
             };
             let found = calibrate_counts(&requested, &counts, &options, &mut ());
             let found = found.with_context(|| input.to_string())?;
+            if found.pulse.is_none() {
+                return Err(unknown_pulse(&input.to_string()).into());
+            }
             requested.or(found.settings(merged)?)
         };
         Ok(Subject {
@@ -301,6 +299,15 @@ impl Options {
             },
         })
     }
+}
+
+/// The width of the pulse in the recording or the scene `name` is not known.
+fn unknown_pulse(name: &str) -> Refused {
+    let reason = format!(
+        "is needed: no peak of {} is bright enough to measure the pulse",
+        plain(name)
+    );
+    Refused::new("sigma_bins", reason)
 }
 
 /// Why L1 is what it is.

@@ -209,7 +209,7 @@ impl Options {
                 ("neighbours", detection.neighbours.unwrap_or(0) > 0),
                 ("tracking", detection.tracking == Some(true)),
             ] {
-                let reason = "needs the pulse, which was not found in the recording: give `rule` window and `sigma_bins`";
+                let reason = "needs the window rule, but no settings were found in the recording: give `rule` window and `sigma_bins`";
                 ensure!(!is_on, Refused::new(key, reason));
             }
         }
@@ -349,7 +349,8 @@ fn find(
         None => "that of the sensor",
     };
     let width = format!("{} ps, {source}", metadata.bin_width_ps);
-    let mut found = calibrate_counts(requested, &counts, &CalibrationOptions::default(), &mut ())?;
+    let options = CalibrationOptions::default();
+    let mut found = calibrate_counts(requested, &counts, &options, &mut ())?;
     if requested.sensor.offsets_mm.is_some() {
         found.pixel_offsets = None;
     }

@@ -68,11 +68,12 @@ impl Calibrate {
                 (calibrated.found, calibrated.settings, Vec::new())
             }
             None => {
-                let Options { given, calibration } = &self.options.0;
-                let port = self.from_device.open(given)?;
+                let options = &self.options.0;
+                let port = self.from_device.open(&options.given)?;
                 let device = &self.from_device;
+                let calibration = options.calibration(requested);
                 let calibrated =
-                    device.calibrate((&name, port), requested, calibration, self.quiet);
+                    device.calibrate((&name, port), requested, &calibration, self.quiet);
                 let FromDevice {
                     found,
                     settings,

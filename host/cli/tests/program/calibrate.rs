@@ -19,6 +19,22 @@ fn scene(background: f64, glass: f64) -> String {
     )
 }
 
+/// A wall of 24 photons a pixel and a nearer one of half as many, among 1.5 of the background a bin.
+const DIM: &str = "columns = 16\nrows = 8\ncycles = 8000\nbackground = 0.00019\n\
+                   [[surface]]\nrange_mm = 3000\nsignal = 0.003\n\
+                   [[surface]]\nrange_mm = 2000\nsignal = 0.0015\n\
+                   rectangle = { columns = [4, 12], rows = [2, 6] }\n";
+
+/// How many pixels of a depth map are within 150 mm of the scene, 4 bins.
+fn right(scratch: &Scratch, text: &str) -> usize {
+    let scene = Scene::parse(text).unwrap();
+    let is_right = |(pixel, depth): &(u16, f64)| {
+        let truth = scene.truth(PixelAddress::new(*pixel), 0).unwrap();
+        (depth - truth.range_mm).abs() < 150.0
+    };
+    (0..).zip(scratch.map("depth")).filter(is_right).count()
+}
+
 /// The histograms of a scene as NumPy writes them.
 fn recording(text: &str) -> Vec<u8> {
     with_hot(text, None)
@@ -258,6 +274,82 @@ fn a_list_is_calibrated_from_what_is_replayed() {
     assert_eq!(run("all.csv --cycles 900"), run("early.csv"));
 }
 
+/// Where no peak shows the pulse, the window rule is found all the same: few photons decide better than with the paper's.
+#[test]
+fn a_dim_recording_gets_the_window_rule() {
+    let scratch = Scratch::new();
+    let dim = scratch.file("dim.npy", recording(DIM));
+    for (length, most_before, least_after) in [("", 90, 100), ("--recorded-cycles 8000", 25, 75)] {
+        let with = |options: &str| {
+            let summary = scratch.replayed(&dim, &format!("{length} {options}"));
+            (right(&scratch, DIM), summary)
+        };
+        let (before, _) = with("--rule paper");
+        let (after, summary) = with("");
+        let (once, _) = with("--decide-once");
+        println!(
+            "{length}: of 128 pixels {before} right with the paper's rule, {after} with what is found, {once} once"
+        );
+        assert!(before <= most_before && after >= least_after, "{length}");
+        assert!(once >= 105, "{length}");
+        let pulse = "no peak is bright enough; the window is that for σ = 1 bin";
+        assert_eq!(summary["found"]["pulse"], pulse);
+        let settings = &summary["settings"];
+        assert_eq!(settings["rule"], "window");
+        assert_eq!(settings["window"], 3);
+        assert_eq!(settings["sigma_bins"], 1.0);
+    }
+}
+
+/// The pulse is the measured one, else that of older settings with its half widths.
+#[test]
+fn settings_are_for_the_pulse_that_is_known() {
+    let scratch = Scratch::new();
+    scratch.file("dim.npy", recording(DIM));
+    scratch.file("bright.npy", recording(&scene(0.02, 0.0)));
+    scratch.file(
+        "old.toml",
+        "[sensor]\nsigma_bins = 0.5\n[detection]\nrule = 'paper'\nhalf_widths = [1, 4]\n",
+    );
+    let found = |options: &str| {
+        let printed = scratch.printed(&format!("calibrate {options} --out new.toml"));
+        let written = scratch.read("new.toml");
+        let key = |key: &str| {
+            let line = written.lines().find(|line| line.starts_with(key));
+            line.map(|line| line.split(" #").next().unwrap().trim().to_owned())
+        };
+        assert_eq!(key("rule").unwrap(), "rule = \"window\"");
+        let keys = ["sigma_bins", "window", "half_widths"];
+        (keys.map(|name| key(&format!("{name} = "))), printed)
+    };
+    let keys = |sigma: &str, window: &str, half_widths: Option<&str>| {
+        let half_widths = half_widths.map(|half_widths| format!("half_widths = {half_widths}"));
+        [
+            Some(format!("sigma_bins = {sigma}")),
+            Some(format!("window = {window}")),
+            half_widths,
+        ]
+    };
+    let (old, printed) = found("dim.npy --settings old.toml");
+    assert_eq!(old, keys("0.5", "2", Some("[1.0, 4.0]")));
+    assert_contains(&printed, "σ = 0.5 bins are kept, from the older settings");
+    assert_contains(&printed, "so that of the older settings is kept");
+    let (none, printed) = found("dim.npy");
+    assert_eq!(none, keys("1.0", "3", None));
+    assert_contains(
+        &printed,
+        "so the window is that for σ = 1 bin: record a target",
+    );
+    // In a bright one older settings do not matter.
+    let (measured, printed) = found("bright.npy --settings old.toml");
+    assert_eq!(measured[1], Some("window = 3".to_owned()));
+    assert!(!printed.contains("kept, from"), "{printed}");
+    // A comparison still needs to know it.
+    let output = scratch.run("compare dim.npy --quiet --out compared");
+    let reason = "--sigma-bins is needed: no peak of dim.npy is bright enough to measure the pulse";
+    scratch.refused(&output, &[reason]);
+}
+
 /// If no settings can be found, the defaults hold, and a warning names the reason.
 #[test]
 fn without_findings_the_defaults_hold() {
@@ -270,17 +362,17 @@ fn without_findings_the_defaults_hold() {
     assert_eq!(summary["warnings"][0], warning);
     let settings = &summary["settings"];
     assert_eq!(settings["rule"], "paper");
-    let summary = scratch.replayed(&list, "");
-    assert_eq!(&summary["settings"]["rule"], "paper");
-    // What needs a pulse says so.
+    // What needs the window rule says so.
     for option in ["--neighbours", "--tracking"] {
         let value = if option == "--tracking" { "" } else { "=8" };
         let output = scratch.run(&format!("replay short.npy --out other {option}{value}"));
         let message = String::from_utf8(output.stderr).unwrap();
-        let reason = "needs the pulse, which was not found in the recording: give --rule window and --sigma-bins";
+        let reason = "needs the window rule, but no settings were found in the recording: give --rule window and --sigma-bins";
         assert_contains(&message, &format!("error: {option} {reason}\n"));
     }
-    assert_eq!(summary["found"]["pulse"], "no peak is bright enough");
+    // Two photons do not show the pulse, but are enough for settings.
+    let summary = scratch.replayed(&list, "");
+    assert_eq!(&summary["settings"]["rule"], "window");
 }
 
 /// The recording that the README replays: nearly all pixels are right without an option.

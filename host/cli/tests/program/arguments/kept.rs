@@ -39,7 +39,7 @@ fn kept(scratch: &Scratch, line: &str, name: &str, reason: &str) {
     assert_eq!(scratch.read(name), before);
 }
 
-const REPLAY: &str = "replay --input photons.csv --out out";
+const REPLAY: &str = "replay --input photons.csv --out out --rule paper";
 const READ: &str = "is an input file";
 
 #[test]
@@ -52,7 +52,7 @@ fn a_recording_in_the_output_folder_is_kept() {
         fs::hard_link(photons, scratch.path(&result)).unwrap();
         kept(
             &scratch,
-            "replay --input out/photons.csv --out out",
+            "replay --input out/photons.csv --out out --rule paper",
             &result,
             READ,
         );
