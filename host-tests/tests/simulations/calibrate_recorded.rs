@@ -142,7 +142,7 @@ fn a_recording_with_distances_calibrates_itself() {
         let settings = settings.settings(found.bins).unwrap();
         assert_eq!(settings.half_widths, Some(asymmetric.window));
         let mut even = found.clone();
-        even.detection.as_mut().unwrap().half_widths = None;
+        even.detection.half_widths = None;
         let settings = even.settings(before()).unwrap();
         let settings = settings.settings(found.bins).unwrap();
         assert_eq!((settings.half_widths, settings.centroid), (None, false));

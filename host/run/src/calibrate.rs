@@ -16,6 +16,9 @@ use dtof_photons::recorded::RecordingLength;
 /// Options of this job; keys of settings files with these names mean something else.
 const OWN: &[&str] = &["target_mm", "glass", "false_alarm", "seed"];
 
+/// The pulse, if the user knows it.
+const PULSE: &[&str] = &["sigma_bins"];
+
 /// Where the pixels look.
 const RAYS: &[&str] = &["field_of_view_degrees", "calibration"];
 
@@ -29,7 +32,7 @@ pub struct Options {
 }
 
 impl dtof_options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] = &[RECORDING, RAYS, OWN];
+    const KEYS: &'static [&'static [&'static str]] = &[RECORDING, PULSE, RAYS, OWN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
@@ -92,7 +95,8 @@ impl Options {
     /// The options of the calibration itself, with the pulse of the settings from [`Self::requested`].
     #[must_use]
     pub const fn calibration(&self, requested: &SettingsFile) -> CalibrationOptions {
-        self.calibration.with_pulse_of(requested, false)
+        let is_given = self.given.options.sensor.sigma_bins.is_some();
+        self.calibration.with_pulse_of(requested, is_given)
     }
 
     /// Calibrates the sensor that recorded `input`, with the settings from [`Self::requested`].

@@ -29,7 +29,7 @@ use dtof_photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
 /// The options that settle which photons are replayed, and whether pixels decide once.
 const RUN: &[&str] = &["cycles", "seed", "decide_once"];
 /// The options of detection that a search does not find. All others choose how pixels decide.
-const WANTED: &[&str] = &["masked", "neighbours", "tracking"];
+const WANTED: &[&str] = &["masked", "neighbours", "sigma_bins", "tracking"];
 
 /// The options of a replay.
 #[derive(Clone, Debug, Default)]
@@ -349,7 +349,8 @@ fn find(
         None => "that of the sensor",
     };
     let width = format!("{} ps, {source}", metadata.bin_width_ps);
-    let options = CalibrationOptions::default();
+    // Without a settings file the pulse is an option.
+    let options = CalibrationOptions::default().with_pulse_of(requested, true);
     let mut found = calibrate_counts(requested, &counts, &options, &mut ())?;
     if requested.sensor.offsets_mm.is_some() {
         found.pixel_offsets = None;

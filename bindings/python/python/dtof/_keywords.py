@@ -320,6 +320,12 @@ class SimulateOptions(SensorOptions, DetectionOptions, total=False):
 class CalibrateOptions(RecordingOptions, total=False):
     """Of ``calibrate``."""
 
+    sigma_bins: Annotated[
+        Number,
+        "number above 0, bins",
+        "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256 [default: measured; without "
+        "a peak that is bright enough that of settings, else 1]",
+    ]
     fov: Annotated[
         Numbers,
         "two numbers, (60, 40), degrees",

@@ -266,6 +266,12 @@ flags! {
 }
 
 flags! {
+    PULSE:
+    sigma_bins Signed("S") => "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256 [default: \
+        measured; without a peak that is bright enough that of --settings, else 1]";
+}
+
+flags! {
     CALIBRATE:
     target_mm Signed("MM") => "Distance in millimetres of a flat target that most pixels see";
     glass OneOf(yes_or_no) => "Whether the nearest surface is a cover glass, if all pixels have it at the same bin";
@@ -361,7 +367,7 @@ has_flags! {
     Operation: DEVICE SENSOR TDC DITHER DETECTION;
     replay::Options: RECORDING SENSOR TDC DETECTION FRAME REPLAY;
     simulate::Options: ARRAY SENSOR TDC DETECTION FRAME SIMULATE;
-    calibrate::Options: RECORDING RAYS CALIBRATE;
+    calibrate::Options: RECORDING PULSE RAYS CALIBRATE;
     compare::Options: ACCURACY RECORDING SENSOR TDC COMPARE;
     tune::Options: TUNE;
 }

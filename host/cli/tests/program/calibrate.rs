@@ -168,6 +168,8 @@ fn a_recording_alone_is_calibrated_first() {
         // What is wanted of the result is no rule of detection.
         ("hot.npy", "--neighbours 8"),
         ("hot.npy", "--mask 3,70 --tracking"),
+        // A pulse that is known is that of both.
+        ("hot.npy --sigma-bins 0.5", "--neighbours 4"),
         (list, "--mask 7 --neighbours 8"),
     ] {
         for threads in ["1", "2"] {
@@ -301,7 +303,7 @@ fn a_dim_recording_gets_the_window_rule() {
     }
 }
 
-/// The pulse is the measured one, else that of older settings with its half widths.
+/// The pulse is the given one, else the measured one, else that of older settings with its half widths.
 #[test]
 fn settings_are_for_the_pulse_that_is_known() {
     let scratch = Scratch::new();
@@ -334,16 +336,23 @@ fn settings_are_for_the_pulse_that_is_known() {
     assert_eq!(old, keys("0.5", "2", Some("[1.0, 4.0]")));
     assert_contains(&printed, "σ = 0.5 bins are kept, from the older settings");
     assert_contains(&printed, "so that of the older settings is kept");
+    let (given, printed) = found("dim.npy --settings old.toml --sigma-bins 1.5");
+    assert_eq!(given, keys("1.5", "5", None));
+    assert_contains(&printed, "σ = 1.5 bins are used, as given");
+    assert!(!printed.contains("No peak"), "{printed}");
     let (none, printed) = found("dim.npy");
     assert_eq!(none, keys("1.0", "3", None));
     assert_contains(
         &printed,
         "so the window is that for σ = 1 bin: record a target",
     );
-    // In a bright one older settings do not matter.
+    // In a bright one older settings do not matter, a given pulse does.
     let (measured, printed) = found("bright.npy --settings old.toml");
     assert_eq!(measured[1], Some("window = 3".to_owned()));
     assert!(!printed.contains("kept, from"), "{printed}");
+    let (given, printed) = found("bright.npy --settings old.toml --sigma-bins 1.5");
+    assert_eq!(given, keys("1.5", "5", None));
+    assert_contains(&printed, "peaks; σ = 1.5 bins are used, as given");
     // A comparison still needs to know it.
     let output = scratch.run("compare dim.npy --quiet --out compared");
     let reason = "--sigma-bins is needed: no peak of dim.npy is bright enough to measure the pulse";

@@ -46,7 +46,7 @@ fn half_widths_move_the_depth() {
     let (settings, even) = replayed("--half-widths 2.5,2.5");
     assert_eq!(settings["estimator"], "centred-window");
     assert_eq!(settings["half_widths"], serde_json::json!([2.5, 2.5]));
-    assert_eq!(even, replayed("--sigma-bins 1").1);
+    assert_eq!(even, replayed("--rule paper --sigma-bins 1").1);
     let (settings, skew) = replayed("--half-widths 1,4");
     assert_eq!(settings["half_widths"], serde_json::json!([1.0, 4.0]));
     assert_eq!(skew.lines().count(), even.lines().count());
@@ -63,7 +63,8 @@ fn half_widths_move_the_depth() {
     assert_eq!(with(""), skew);
     // The file's own pulse changes nothing, another has windows of its own.
     assert_eq!(with("--sigma-bins 1"), skew);
-    assert_eq!(with("--sigma-bins 0.9"), replayed("--sigma-bins 0.9").1);
+    let other = replayed("--rule paper --sigma-bins 0.9").1;
+    assert_eq!(with("--sigma-bins 0.9"), other);
     assert_eq!(
         with("--estimator centroid"),
         replayed("--estimator centroid").1
@@ -100,7 +101,7 @@ fn the_pulse_chooses_estimator_and_window() {
     assert_contains(&events, ",61.0000,");
 
     // The same with the paper's rule. An explicit window stays.
-    let (settings, _) = replayed("--sigma-bins 1");
+    let (settings, _) = replayed("--rule paper --sigma-bins 1");
     assert_eq!(settings["rule"], "paper");
     assert_eq!(settings["sigma_bins"], 1.0);
     let (settings, _) = replayed("--rule window --sigma-bins 1 --window 5");
