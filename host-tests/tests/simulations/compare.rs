@@ -289,6 +289,60 @@ fn the_cheapest_of_the_nearly_fastest_is_taken() {
     assert_eq!(answer(&methods, &all, 1.0).best, None);
 }
 
+/// Methods that leave a tenth of the pixels more silent than the best full-resolution trial are not taken.
+#[test]
+fn a_method_that_leaves_pixels_silent_is_not_taken() {
+    let methods = Method::all(U8F8::ONE, 2, true, &Settings::static_scene(1));
+    let blocks = methods
+        .iter()
+        .position(|method| !method.has_full_resolution());
+    let blocks = blocks.unwrap();
+    let frames = methods.len() - 1;
+    let silent = |mut outcome: Outcome, silent: f64| {
+        outcome.figures.silent = silent;
+        outcome
+    };
+    let taken = |all: &[Outcome], within_mm: f64| {
+        let choice = answer(&methods, all, within_mm).best;
+        choice.map(|choice| (choice.method, choice.effort))
+    };
+    let all = [
+        // 10 mm are reached at 10 photons, half way between the trials, with 15 % silent pixels.
+        silent(outcome(0, 5, 100.0, 14.142, 50.0), 0.05),
+        silent(outcome(0, 20, 400.0, 7.071, 50.0), 0.25),
+        silent(outcome(1, 5, 300.0, 9.0, 50.0), 0.06),
+        // Neither frames nor blocks are the best full-resolution trial.
+        silent(outcome(blocks, 5, 1000.0, 9.0, 50.0), 0.0),
+        silent(outcome(frames, 1000, 1000.0, 9.9, 1.0), 0.0),
+    ];
+    assert_eq!(taken(&all, 10.1), Some((0, 10)));
+    // A few more are too many: the slower method is taken, in which they report.
+    assert_eq!(taken(&all, 9.5), Some((1, 5)));
+    // The first trial that is exact, with nothing before it.
+    let mut first = all[1..].to_vec();
+    assert_eq!(taken(&first, 10.0), Some((1, 5)));
+    first[0].figures.cycles = 200.0;
+    assert_eq!(taken(&first, 10.0), Some((1, 5)));
+    first[0].figures.silent = 0.15;
+    assert_eq!(taken(&first, 10.0), Some((0, 20)));
+    // If only silent methods are exact, there is none to take.
+    assert_eq!(taken(&all[..2], 8.0), None);
+    // Only blocks may leave none silent.
+    let found = answer(
+        &methods,
+        &[all[0].clone(), all[1].clone(), all[3].clone()],
+        8.0,
+    );
+    assert_eq!((found.best, found.fastest), (None, None));
+    let found = answer(
+        &methods,
+        &[all[0].clone(), all[1].clone(), all[3].clone()],
+        9.5,
+    );
+    assert_eq!(found.best, None);
+    assert_eq!(found.fastest.unwrap().method, blocks);
+}
+
 #[test]
 fn blocks_are_an_answer_of_their_own() {
     let methods = Method::all(U8F8::ONE, 2, true, &Settings::static_scene(1));

@@ -354,8 +354,8 @@ fn choose(
     let first = answer(methods, outcomes, frame_mm);
     let widest = WRONG_BEYOND_BINS * mm_per_bin(task.settings);
     let wider = |last: &Answer| {
-        let within_mm = RELAXATION * last.within_mm;
-        (last.within_mm < widest).then(|| answer(methods, outcomes, within_mm))
+        let within_mm = RELAXATION * last.limits.within_mm;
+        (last.limits.within_mm < widest).then(|| answer(methods, outcomes, within_mm))
     };
     let mut all: Vec<Answer> = std::iter::successors(Some(first), wider).collect();
     // Only blocks may be exact enough.

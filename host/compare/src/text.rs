@@ -49,7 +49,8 @@ impl Comparison {
     /// The time of the shortest frame that is exact enough, relative to that of `best`.
     fn speed_up(&self, best: &Choice) -> Option<f64> {
         let frames = self.of(self.methods.len() - 1);
-        let exact = frames.filter(|outcome| outcome.figures.error_mm <= self.answer.within_mm);
+        let exact =
+            frames.filter(|outcome| outcome.figures.error_mm <= self.answer.limits.within_mm);
         let times = exact.map(|outcome| outcome.figures.cycles / best.cycles);
         times
             .min_by(f64::total_cmp)
@@ -144,18 +145,24 @@ impl Comparison {
         rows
     }
 
-    /// The trial with the smallest error, of the methods that are `among` those to choose from.
-    fn most_exact(&self, among: &dyn Fn(&Method) -> bool) -> Option<&Outcome> {
-        let all = self.outcomes.iter().filter(|outcome| {
+    /// The trials with events, of the methods that are `among` those to choose from.
+    fn events(&self, among: &dyn Fn(&Method) -> bool) -> impl Iterator<Item = &Outcome> {
+        self.outcomes.iter().filter(move |outcome| {
             let method = &self.methods[outcome.trial.method];
             !method.is_frames() && among(method) && outcome.figures.cycles.is_finite()
-        });
+        })
+    }
+
+    /// The one of them with the smallest error.
+    fn most_exact(&self, among: &dyn Fn(&Method) -> bool) -> Option<&Outcome> {
+        let all = self.events(among);
         all.min_by(|one, other| one.figures.error_mm.total_cmp(&other.figures.error_mm))
     }
 
     /// That no method is exact enough, and how exact one is.
     fn none_is_exact(&self, among: &dyn Fn(&Method) -> bool) -> String {
-        let within = self.answer.within_mm;
+        let limits = &self.answer.limits;
+        let within = limits.within_mm;
         let whose = if self.answer.fastest.is_some() {
             "no method that keeps every pixel"
         } else {
@@ -165,17 +172,40 @@ impl Comparison {
         let Some(closest) = self.most_exact(among) else {
             return format!("{none}: none has enough reports");
         };
-        let name = &self.methods[closest.trial.method].name;
+        let of = |outcome: &Outcome| {
+            let name = &self.methods[outcome.trial.method].name;
+            let error = short(outcome.figures.error_mm);
+            format!("{name} has {error} mm, but")
+        };
         let figures = &closest.figures;
-        let error = short(figures.error_mm);
         if figures.error_mm > within {
+            let name = &self.methods[closest.trial.method].name;
+            let error = short(figures.error_mm);
             return format!("{none}; the smallest is {error} mm, by {name}");
         }
-        format!(
-            "{none} reliably: {name} has {error} mm, but {:.0} % of its {} reports are wrong",
-            100.0 * figures.wrong,
-            grouped(figures.reports)
-        )
+        let exact = self.events(among).filter(|outcome| {
+            outcome.figures.error_mm <= within && outcome.figures.wrong <= limits.wrong
+        });
+        let silent = |outcome: &&Outcome| outcome.figures.silent;
+        let speaking = exact.min_by(|one, other| silent(one).total_cmp(&silent(other)));
+        match speaking {
+            Some(speaking) if silent(&speaking) > limits.silent => format!(
+                "{none} in enough pixels: {} it leaves {:.0} % of the pixels without a right report",
+                of(speaking),
+                100.0 * silent(&speaking)
+            ),
+            Some(few) => format!(
+                "{none} reliably: {} from only {} reports",
+                of(few),
+                grouped(few.figures.reports)
+            ),
+            None => format!(
+                "{none} reliably: {} {:.0} % of its {} reports are wrong",
+                of(closest),
+                100.0 * figures.wrong,
+                grouped(figures.reports)
+            ),
+        }
     }
 
     /// Warnings about the methods to take: pixels that do not report.
@@ -262,7 +292,7 @@ impl Comparison {
 
     /// The error that is allowed.
     fn allowed_error(&self) -> String {
-        let within = self.answer.within_mm;
+        let within = self.answer.limits.within_mm;
         let frame = self.frame_mm.filter(|frame| *frame < within);
         let frame = frame.map_or(String::new(), |frame| {
             format!("; frames of L2 have {} mm", short(frame))
@@ -388,4 +418,96 @@ fn short(value: f64) -> String {
         return value.to_string();
     }
     significant(value, 3)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::answer::answer;
+    use super::super::measure::Trial;
+    use super::super::stress::Light;
+    use super::super::truth::Truth;
+    use super::super::{Figures, Settings};
+    use super::*;
+    use dtof_core::fixed::types::U8F8;
+
+    /// What there is to take within 10 mm, of trials with these errors in millimetres, numbers of reports, and shares of
+    /// wrong reports and of silent pixels.
+    fn take(trials: &[(f64, u64, f64, f64)]) -> String {
+        let settings = Settings::static_scene(1);
+        let methods = Method::all(U8F8::ONE, 0, false, &settings);
+        let outcome = |(effort, &(error_mm, reports, wrong, silent))| Outcome {
+            trial: Trial {
+                method: 4,
+                effort,
+                settings: settings.clone(),
+            },
+            figures: Figures {
+                cycles: 100.0,
+                slow_cycles: 100.0,
+                error_mm,
+                reports,
+                wrong,
+                silent,
+                ..Figures::default()
+            },
+            instructions: 50.0,
+        };
+        let outcomes: Vec<Outcome> = (5..).zip(trials).map(outcome).collect();
+        let comparison = Comparison {
+            thresholds: vec![None; methods.len()],
+            answer: answer(&methods, &outcomes, 10.0),
+            outcomes,
+            methods,
+            bound: None,
+            stressed: Vec::new(),
+            frame_mm: None,
+            settings: None,
+            fastest: None,
+            l1: (4, String::new()),
+            light: Light {
+                background: 0.01,
+                signal: 0.1,
+                sigma: 1.0,
+            },
+            truth: Truth::Ranges(Vec::new()),
+            sensor: [8, 8],
+            pixels: 64,
+            cycles: 10_000,
+            laser_hz: None,
+        };
+        let mut rows = comparison.rows().into_iter();
+        rows.find(|(name, _)| name == "take").unwrap().1
+    }
+
+    #[test]
+    fn without_a_method_to_take_the_reason_is_said() {
+        let many = 1_000_000_000;
+        for (trials, text) in [
+            (&[(9.0, many, 0.01, 0.0)][..], "window of 3"),
+            (
+                &[],
+                "no method reaches an error of 10.0 mm: none has enough reports",
+            ),
+            (
+                &[(12.0, many, 0.0, 0.0)],
+                "no method reaches an error of 10.0 mm; the smallest is 12.0 mm, by window of 3",
+            ),
+            (
+                &[(14.0, many, 0.0, 0.02), (9.0, many, 0.0, 0.5)],
+                "no method reaches an error of 10.0 mm in enough pixels: window of 3 has 9.00 mm, but it leaves 50 % of the \
+                 pixels without a right report",
+            ),
+            (
+                &[(9.0, 1000, 0.2, 0.0)],
+                "no method reaches an error of 10.0 mm reliably: window of 3 has 9.00 mm, but 20 % of its 1,000 reports are \
+                 wrong",
+            ),
+            (
+                &[(9.9, 100, 0.0, 0.0)],
+                "no method reaches an error of 10.0 mm reliably: window of 3 has 9.90 mm, but from only 100 reports",
+            ),
+        ] {
+            assert_eq!(take(trials), text);
+        }
+    }
 }
