@@ -86,7 +86,8 @@ pub struct WindowDetection {
 pub struct CalibrationOptions {
     /// Whether the nearest peak that all pixels share is crosstalk of a cover glass.
     pub glass: Option<bool>,
-    /// Distance in millimetres of a flat target that most of the pixels see.
+    /// Distance in millimetres, straight ahead, of a flat target that most of the pixels see. If the rays of the pixels are
+    /// not known, the median pixel is taken to see it at this range.
     pub target_mm: Option<f64>,
     /// The share of exposures without a target that may end with an event.
     pub false_alarm: f64,
@@ -137,6 +138,8 @@ pub struct Calibration {
     pub pulse: Option<Pulse>,
     /// Distance of the target in millimetres, as the user gives it.
     pub target_mm: Option<f64>,
+    /// Whether the rays of the pixels are known.
+    pub has_rays: bool,
     /// The range offset, if a distance is known.
     pub offset: Option<Offset>,
     /// By how much the pixels differ, if a distance is known to more than one.
@@ -288,6 +291,7 @@ pub fn calibrate_with(
         nearest,
         pulse,
         target_mm: options.target_mm,
+        has_rays: observed.slant.is_some(),
         offset,
         pixel_offsets,
         gate,
@@ -375,12 +379,12 @@ fn offset_of(
         .collect();
     let mm_per_bin = observed.bin_width_ps * MM_PER_PS;
     let offset = if let Some(distance) = options.target_mm {
+        // It is farther away along a slanted ray. Without a field of view, as if all pixels looked straight ahead.
         let slant = |trace: &Trace| observed.slant.map_or(1.0, |slant| slant[trace.pixel]);
-        let usual = median(placed.iter().map(|(trace, ..)| slant(trace)));
         for (trace, _, truth) in &mut placed {
-            *truth = Some(distance * slant(trace) / usual + observed.bias(trace.pixel));
+            *truth = Some(distance * slant(trace) + observed.bias(trace.pixel));
         }
-        // As if all pixels saw the target as far away as the median pixel.
+        // As if all pixels saw the target at that distance.
         let straight = placed.iter().map(|(_, position, truth)| {
             position - (truth.unwrap_or(distance) - distance) / mm_per_bin
         });

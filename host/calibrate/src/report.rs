@@ -78,9 +78,18 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
     row(
         "offset",
         match (found.offset, found.target_mm) {
-            (Some(offset), _) => {
+            (Some(offset), target) => {
                 let error = 1.96 * offset.error_mm;
-                format!("{:.1} mm (± {error:.1})", offset.mm)
+                let target = match target {
+                    None => String::new(),
+                    Some(distance) if found.has_rays => {
+                        format!(", from a flat target {distance} mm straight ahead")
+                    }
+                    Some(distance) => {
+                        format!(", from a target that the median pixel sees at {distance} mm")
+                    }
+                };
+                format!("{:.1} mm (± {error:.1}){target}", offset.mm)
             }
             (None, None) => {
                 "not found: calibrate --target-mm D gives it, from a flat target at D mm; \

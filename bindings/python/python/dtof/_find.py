@@ -86,7 +86,7 @@ def calibrate(
     """Finds background, pulse, cover glass, hot pixels and thresholds in histograms.
 
     ``recorded`` is a recording as for :func:`replay`. ``target_mm`` is the distance of a flat target
-    in millimetres; with ``fov`` the ``settings`` also have an offset for each pixel
+    in millimetres, straight ahead; with ``fov`` the ``settings`` also have an offset for each pixel
     (``settings["sensor"]["offsets_mm"]``) if pixels differ. ``glass`` says whether the nearest surface
     is a cover glass. ``settings`` are older settings, as for :func:`replay`. ``progress(done, total)`` is
     called about 20 times a second with steps of each part of the work. An exception in it ends the work,

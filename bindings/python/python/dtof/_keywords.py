@@ -340,7 +340,8 @@ class CalibrateOptions(RecordingOptions, total=False):
     target_mm: Annotated[
         Number,
         "number, 0 to 1000000, millimetres",
-        "Distance in millimetres of a flat target that most pixels see",
+        "Distance in millimetres of a flat target that most pixels see: with fov straight ahead, as a tape "
+        "measures it, else along the ray of the median pixel",
     ]
     glass: Annotated[
         Switch,

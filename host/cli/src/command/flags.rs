@@ -273,7 +273,8 @@ flags! {
 
 flags! {
     CALIBRATE:
-    target_mm Signed("MM") => "Distance in millimetres of a flat target that most pixels see";
+    target_mm Signed("MM") => "Distance in millimetres of a flat target that most pixels see: with --fov straight \
+        ahead, as a tape measures it, else along the ray of the median pixel";
     glass OneOf(yes_or_no) => "Whether the nearest surface is a cover glass, if all pixels have it at the same bin";
     false_alarm Text("SHARE") => "Share of exposures without a target that end with an event, at most 0.1 \
         [default: 0.01]";

@@ -29,12 +29,9 @@ fn slants() -> Vec<f64> {
     Rays::pinhole(Array::new(8, 8).unwrap(), view).slants()
 }
 
-/// The ranges of a flat target that the median pixel sees at `mm`.
+/// The ranges of a flat target `mm` straight ahead.
 fn target(mm: f64) -> Vec<f64> {
-    let slants = slants();
-    let mut sorted = slants.clone();
-    sorted.sort_by(f64::total_cmp);
-    slants.iter().map(|slant| mm * slant / sorted[31]).collect()
+    slants().iter().map(|slant| mm * slant).collect()
 }
 
 /// The ranges of a scene: a floor that comes nearer, and a box before a wall.
@@ -160,6 +157,31 @@ fn value(scratch: &Scratch, file: &str, key: &str) -> Option<f64> {
     let key = format!("{key} = ");
     let line = text.lines().find_map(|line| line.strip_prefix(&key));
     line.map(|line| line.split_whitespace().next().unwrap().parse().unwrap())
+}
+
+#[test]
+fn the_distance_of_a_flat_target_is_straight_ahead() {
+    let scratch = Scratch::new();
+    scratch.file("target.npy", recording(&target(1200.0), &[25.0; PIXELS], 1));
+    let calibrate = format!("calibrate target.npy {SENSOR} --target-mm 1200");
+    let printed = scratch.printed(&format!("{calibrate} --fov 41x52 --out fov.toml"));
+    assert_contains(&printed, ", from a flat target 1200 mm straight ahead\n");
+    let offset = value(&scratch, "fov.toml", "offset_mm").unwrap();
+    assert!((offset - 25.0).abs() < 2.0, "{offset}");
+    // Without the field of view it is that of the median pixel.
+    let printed = scratch.printed(&format!("{calibrate} --out plain.toml"));
+    assert_contains(
+        &printed,
+        ", from a target that the median pixel sees at 1200 mm\n",
+    );
+    let mut ranges = target(1200.0);
+    ranges.sort_by(f64::total_cmp);
+    let offset = value(&scratch, "plain.toml", "offset_mm").unwrap();
+    // Half a pixel's step of these ranges is 3 mm; most of them lie within 1.5 bins.
+    assert!(
+        (offset - (25.0 + 1200.0 - ranges[31])).abs() < 25.0,
+        "{offset}"
+    );
 }
 
 #[test]
