@@ -7,7 +7,7 @@
 
 use std::fmt::{self, Write as _};
 
-use crate::palette::SHEET;
+use crate::palette::{Mark, SHEET};
 
 /// A string near the start of every document.
 pub const MARK: &str = "class=\"dtof\"";
@@ -132,6 +132,36 @@ impl Svg {
         self.raw(&format!(
             "<path class=\"{class}\" d=\"M{x1} {y1}L{x2} {y2}\"/>"
         ));
+    }
+
+    /// Adds a dot, filled or open.
+    pub fn dot(&mut self, mark: Mark, (x, y): (f64, f64), radius: f64, is_filled: bool) {
+        let class = if is_filled { "fill" } else { "open" };
+        let path = |places: &[(f64, f64)]| {
+            let place = |&(across, down): &(f64, f64)| {
+                format!("{} {}", At(x + across * radius), At(y + down * radius))
+            };
+            let places: Vec<String> = places.iter().map(place).collect();
+            format!("<path class=\"{class}\" d=\"M{}z\"/>", places.join("L"))
+        };
+        let element = match mark {
+            Mark::Circle => {
+                let [x, y, radius] = [x, y, radius].map(At);
+                format!("<circle class=\"{class}\" cx=\"{x}\" cy=\"{y}\" r=\"{radius}\"/>")
+            }
+            Mark::Square => path(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]),
+            Mark::Diamond => path(&[(0.0, -1.3), (1.3, 0.0), (0.0, 1.3), (-1.3, 0.0)]),
+            Mark::Up => path(&[(0.0, -1.2), (1.2, 0.9), (-1.2, 0.9)]),
+            Mark::Down => path(&[(0.0, 1.2), (1.2, -0.9), (-1.2, -0.9)]),
+            Mark::Cross => {
+                let [left, right, top, bottom] =
+                    [x - radius, x + radius, y - radius, y + radius].map(At);
+                format!(
+                    "<path class=\"stroke\" stroke-width=\"2.2\" d=\"M{left} {top}L{right} {bottom}M{left} {bottom}L{right} {top}\"/>"
+                )
+            }
+        };
+        self.raw(&element);
     }
 
     /// Adds a line of text, vertically centred on `place`.

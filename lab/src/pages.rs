@@ -14,7 +14,7 @@ mod timing;
 use crate::studies::beyond::dither;
 use crate::studies::failures::STUDY as FAILURES;
 use crate::studies::methods::{depth_error, event_depth, time_to_detect};
-use crate::sweep::results::{Claim, Figure};
+use crate::sweep::results::{Claim, Figure, Verdict};
 use crate::sweep::values::Values;
 use crate::sweep::{Part, Study};
 use crate::{studies, sweep};
@@ -25,6 +25,7 @@ use std::path::{Path, PathBuf};
 
 const FIGURES: &str = include_str!("pages/figures.md");
 const CLAIMS: &str = include_str!("pages/paper-claims.md");
+const CLAIM_DETAILS: &str = include_str!("pages/paper_claims.csv");
 
 /// Which trials run again.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -122,17 +123,21 @@ pub fn documents(
         for Claim {
             name,
             here,
+            details,
             verdict,
         } in &results.claims
         {
             values.set(format!("{}.{name}", study.name), verdict);
             values.set(format!("{}.{name}.answer", study.name), verdict.answer());
             values.set(format!("{}.{name}.here", study.name), here);
-            ensure!(
-                CLAIMS.contains(&format!("{{{}.{name}.here}}", study.name)),
-                "{}: the page has no claim {name}",
-                study.name
-            );
+            values.set(format!("{}.{name}.details", study.name), details);
+            for page in [CLAIMS, CLAIM_DETAILS] {
+                ensure!(
+                    page.contains(&format!("{{{}.{name}.here}}", study.name)),
+                    "{}: a page has no claim {name}",
+                    study.name
+                );
+            }
         }
         for Figure { name, .. } in &results.figures {
             ensure!(
@@ -141,16 +146,45 @@ pub fn documents(
             );
         }
     }
+    // Our own questions have answers instead of verdicts.
+    let is_of_paper = |study: &Study, claim: &Claim| {
+        CLAIMS.contains(&format!("**{{{}.{}}}**", study.name, claim.name))
+    };
+    let verdicts: Vec<Verdict> = all
+        .iter()
+        .flat_map(|(study, results)| results.claims.iter().map(move |claim| (study, claim)))
+        .filter(|(study, claim)| is_of_paper(study, claim))
+        .map(|(_, claim)| claim.verdict)
+        .collect();
+    values.set("claims.all", verdicts.len());
+    for (name, verdict) in [
+        ("agree", Verdict::Agrees),
+        ("differ", Verdict::Differs),
+        ("refuted", Verdict::Refuted),
+        ("open", Verdict::NotDecided),
+    ] {
+        let count = verdicts.iter().filter(|&&of| of == verdict).count();
+        values.set(format!("claims.{name}"), count);
+    }
     values.set("bus.rates", bus::rates());
     values.set("bus.waits", bus::waits());
-    values.add(FAILURES.name, &failures::tables(part(FAILURES)?)?);
+    values.add(FAILURES.name, &failures::table(part(FAILURES)?)?);
     for (page, template) in [
         ("results/failures.md", include_str!("pages/failures.md")),
         ("results/figures.md", FIGURES),
         ("results/paper-claims.md", CLAIMS),
+        ("results/data/paper_claims.csv", CLAIM_DETAILS),
     ] {
         documents.push((page.into(), values.fill(template)?));
     }
+    let failures = [
+        ("figures/failures.svg", failures::picture(part(FAILURES)?)?),
+        (
+            "results/data/failure_cases.csv",
+            failures::cases(part(FAILURES)?)?,
+        ),
+    ];
+    documents.extend(failures.map(|(path, content)| (path.into(), content)));
     documents.push(("figures/demo.svg".into(), movie::demo()?));
     documents.push(("figures/pixel.svg".into(), pixel::pixel()?));
     documents.push(("figures/processing.svg".into(), timing::timing()));

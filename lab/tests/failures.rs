@@ -1,7 +1,10 @@
 //! The results of the study of failures, on a few seeds.
 
+use dtof_lab::pages::failures;
+use dtof_lab::studies::failures::rows::{Row, SECTIONS};
 use dtof_lab::studies::failures::{Case, Outcome, Rule, STUDY, Verdict, Warning, outcomes};
-use dtof_lab::sweep;
+use dtof_lab::sweep::{self, Part};
+use std::path::Path;
 
 /// The outcomes of the case whose name starts with `name`.
 fn of<'a>(all: &'a [(Case, Vec<Outcome>)], name: &str) -> &'a [Outcome] {
@@ -145,34 +148,84 @@ fn a_few_seeds_show_what_fails_and_what_is_flagged() {
 }
 
 #[test]
-fn the_page_has_a_row_for_every_case() {
+fn every_case_is_in_a_row_of_the_page() {
     let part = sweep::run_seeds(&STUDY, 7..8).unwrap();
-    let values = dtof_lab::pages::failures::tables(&part).unwrap();
-    let text = values.fill("{table}{reports}{silent}{advice}").unwrap();
-    assert!(!text.contains("NaN"), "{text}");
+    let outcomes = outcomes(&part).unwrap();
+    let rows: Vec<Row> = SECTIONS
+        .iter()
+        .flat_map(|(_, rows)| *rows)
+        .copied()
+        .collect();
+    for (case, _) in &outcomes {
+        let of_name = rows.iter().filter(|row| row.name == case.row.name);
+        assert_eq!(of_name.count(), 1, "{}", case.name);
+    }
+    let is_of = |row: &Row| outcomes.iter().any(|(case, _)| case.row == *row);
+    assert!(rows.iter().all(is_of));
+
+    let values = failures::table(&part).unwrap();
     let table = values.fill("{table}").unwrap();
-    let rows: Vec<&str> = table.lines().collect();
-    assert_eq!(rows.len(), part.points().len() + 2);
-    assert!(rows.iter().all(|row| row.matches('|').count() == 11));
-    for row in &rows[2..] {
-        let mut cells = row.split('|').skip(2).take(8);
-        assert!(cells.all(|cell| cell.chars().count() < 40), "{row}");
-    }
-    // Where no flag helps, the page explains why.
-    for (case, outcomes) in outcomes(&part).unwrap() {
-        let is_silent = |outcome: &Outcome| outcome.warning == Warning::Silent;
-        let is_explained = case.silence.is_some() || !outcomes.iter().any(is_silent);
-        assert!(is_explained, "{}", case.name);
-    }
-    assert!(!text.contains("not known"));
-    // What every method survives needs no advice.
-    let advice = values.fill("{advice}").unwrap();
-    for (case, outcomes) in outcomes(&part).unwrap() {
+    assert!(table.lines().all(|row| row.matches('|').count() == 5));
+    let csv = failures::cases(&part).unwrap();
+    assert_eq!(csv.lines().count(), 1 + outcomes.len());
+    for (line, (case, outcomes)) in csv.lines().skip(1).zip(&outcomes) {
+        let cells = line
+            .strip_prefix('"')
+            .and_then(|line| line.strip_suffix('"'));
+        let cells: Vec<&str> = cells.unwrap().split("\",\"").collect();
+        let [name, row, fails, holds, advice, why] = cells[..] else {
+            panic!("{line}");
+        };
+        assert_eq!((name, row), (&*case.name, case.row.name));
         let is_well = |outcome: &Outcome| {
             outcome.verdict == Verdict::Survives && outcome.warning == Warning::NotNeeded
         };
-        let is_advised = case.advice.is_some() && !outcomes.iter().all(is_well);
-        let row = format!("| {} | ", case.name);
-        assert_eq!(advice.contains(&row), is_advised, "{}", case.name);
+        let is_all_well = outcomes.iter().all(is_well);
+        // What every method survives needs no advice.
+        assert_eq!(fails.is_empty(), is_all_well, "{line}");
+        assert!(advice.is_empty() || !is_all_well, "{line}");
+        assert_eq!(
+            holds == "all",
+            !outcomes.iter().any(|of| of.verdict != Verdict::Survives)
+        );
+        // Where no flag helps, the data explain why.
+        let is_silent = |outcome: &Outcome| outcome.warning == Warning::Silent;
+        assert_eq!(why.is_empty(), !outcomes.iter().any(is_silent), "{line}");
+        assert_ne!(why, "not known", "{line}");
     }
+    assert!(!(table + &csv).contains("NaN"));
+}
+
+/// Of all seeds: both estimators of a rule have one name, except where the depth matters.
+#[test]
+fn the_page_names_rules_and_estimators() {
+    let stored = |which| {
+        let path = format!("../docs/results/data/failures.{which}.json");
+        Part::load(&Path::new(env!("CARGO_MANIFEST_DIR")).join(path)).unwrap()
+    };
+    let mut part = stored("few");
+    part.add(&stored("rest")).unwrap();
+    let csv = failures::cases(&part).unwrap();
+    let of = |name: &str| {
+        let start = format!("\"{name}\"");
+        csv.lines().find(|line| line.starts_with(&start)).unwrap()
+    };
+    assert!(of("plain").ends_with(",\"\",\"all\",\"\",\"\""));
+    let bright = of("signal of 400 photons (five counters are full)");
+    assert!(
+        bright.contains("degrades, flagged: all with the centroid ("),
+        "{bright}"
+    );
+    assert!(
+        bright.contains("\"all with the centred window\""),
+        "{bright}"
+    );
+    let glass = of("cover glass 10 × the signal");
+    let fails = "\"fails silently: all (100 % false)\",\"none\",\"a gate";
+    assert!(glass.contains(fails), "{glass}");
+    let quadrants = of("a pulse in each quadrant");
+    assert!(
+        quadrants.contains("\"average, window of 3\""),
+        "{quadrants}"
+    );
 }

@@ -1,6 +1,7 @@
 //! Every study: trials are pure functions, and one seed is enough for results.
 
 use std::collections::BTreeSet;
+use std::fs;
 
 use dtof_lab::studies;
 use dtof_lab::sweep;
@@ -20,10 +21,15 @@ fn one_seed_of_every_study_gives_figures_and_claims() {
             assert_ne!(is_drawn, [false; 2], "{svg}");
         }
         for claim in &results.claims {
-            // A cell of a table.
+            // A cell of a table, and cells of a CSV table.
             let text = &claim.here;
             assert!(!text.is_empty() && !text.contains(['|', '\n']), "{text}");
-            assert!(!text.contains("NaN"), "{text}");
+            for text in [&claim.here, &claim.details] {
+                assert!(
+                    !text.contains("NaN") && !text.contains(['"', '\n']),
+                    "{text}"
+                );
+            }
         }
     }
 }
@@ -47,6 +53,20 @@ fn a_trial_depends_on_its_point_and_random_numbers_only() {
             forward
         };
         assert_ne!(trials(1), trials(2), "{}: not random", study.name);
+    }
+}
+
+/// One reader, one question; the rest is data.
+#[test]
+fn pages_of_results_are_short() {
+    for page in ["failures.md", "paper-claims.md"] {
+        let path = format!("{}/../docs/results/{page}", env!("CARGO_MANIFEST_DIR"));
+        let text = fs::read_to_string(path).unwrap();
+        let words = text.split_whitespace().count();
+        assert!(words < 2500, "{page}: {words}");
+        let cells = text.lines().flat_map(|line| line.split('|'));
+        let longest = cells.map(|cell| cell.split_whitespace().count()).max();
+        assert!(longest <= Some(40), "{page}: {longest:?}");
     }
 }
 

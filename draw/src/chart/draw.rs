@@ -77,7 +77,7 @@ fn key(svg: &mut Svg, keys: &[Key], mut y: f64) -> f64 {
         panel::line(svg, key.style, &line);
         if key.style.has_dots() {
             panel::interval(svg, (middle, y + 2.0), (middle, y + LINE - 2.0));
-            panel::dot(svg, key.pen.mark, (middle, y + LINE / 2.0), 4.2, true);
+            svg.dot(key.pen.mark, (middle, y + LINE / 2.0), 4.2, true);
         }
         if key.style == Style::Ring {
             panel::ring(svg, (middle, y + LINE / 2.0));

@@ -3,7 +3,6 @@
 use super::names::{Area, Label, Line, Place, Spot, Taken, beside, spread};
 use super::parts::{Key, Panel, Point, Series, Style};
 use super::scale::Scale;
-use crate::palette::Mark;
 use crate::svg::{Anchor, At, Svg, TEXT, text_width, wrapped};
 
 /// The height of a line.
@@ -95,36 +94,6 @@ pub(super) fn ring(svg: &mut Svg, (x, y): Place) {
     ));
 }
 
-/// Draws a dot, filled or open.
-pub(super) fn dot(svg: &mut Svg, mark: Mark, (x, y): (f64, f64), radius: f64, is_filled: bool) {
-    let class = if is_filled { "fill" } else { "open" };
-    let path = |places: &[(f64, f64)]| {
-        let place = |&(across, down): &(f64, f64)| {
-            format!("{} {}", At(x + across * radius), At(y + down * radius))
-        };
-        let places: Vec<String> = places.iter().map(place).collect();
-        format!("<path class=\"{class}\" d=\"M{}z\"/>", places.join("L"))
-    };
-    let element = match mark {
-        Mark::Circle => {
-            let [x, y, radius] = [x, y, radius].map(At);
-            format!("<circle class=\"{class}\" cx=\"{x}\" cy=\"{y}\" r=\"{radius}\"/>")
-        }
-        Mark::Square => path(&[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)]),
-        Mark::Diamond => path(&[(0.0, -1.3), (1.3, 0.0), (0.0, 1.3), (-1.3, 0.0)]),
-        Mark::Up => path(&[(0.0, -1.2), (1.2, 0.9), (-1.2, 0.9)]),
-        Mark::Down => path(&[(0.0, 1.2), (1.2, -0.9), (-1.2, -0.9)]),
-        Mark::Cross => {
-            let [left, right, top, bottom] =
-                [x - radius, x + radius, y - radius, y + radius].map(At);
-            format!(
-                "<path class=\"stroke\" stroke-width=\"2.2\" d=\"M{left} {top}L{right} {bottom}M{left} {bottom}L{right} {top}\"/>"
-            )
-        }
-    };
-    svg.raw(&element);
-}
-
 /// Draws a panel into its plot. Returns the names that have no place in or beside it.
 pub(super) fn draw(
     svg: &mut Svg,
@@ -170,14 +139,14 @@ pub(super) fn draw(
                 }
                 let at = place(point.x, point.y);
                 if has_dots {
-                    dot(svg, series.pen.mark, at, radius, true);
+                    svg.dot(series.pen.mark, at, radius, true);
                 }
                 at
             } else if let Some((_, high)) = ends.filter(|_| y.logarithmic && point.y <= 0.0) {
                 let (foot, at) = (place(point.x, y.low), place(point.x, high));
                 if has_dots {
                     interval(svg, foot, at);
-                    dot(svg, series.pen.mark, at, radius, false);
+                    svg.dot(series.pen.mark, at, radius, false);
                     taken.dots.push(Area::around(foot, at, 3.0));
                 }
                 at

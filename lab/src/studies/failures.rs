@@ -4,6 +4,7 @@
 pub(super) mod case;
 pub mod cases;
 mod outcome;
+pub mod rows;
 pub(super) mod stray;
 
 use self::cases::{BACKGROUNDS, background_name, cases};
@@ -89,7 +90,7 @@ impl Rule {
     }
 
     /// Its pen in a chart.
-    const fn pen(self) -> Pen {
+    pub(crate) const fn pen(self) -> Pen {
         match self {
             Self::Paper(4) => palette::alpha(4),
             Self::Paper(_) => palette::PAPER,
@@ -311,10 +312,15 @@ fn csv(outcomes: &[(Case, Vec<Outcome>)]) -> Result<String> {
             let share = share.unwrap_or(",,".to_owned());
             writeln!(
                 csv,
-                "\"{}\",{},{},{},{share},{:.4},{:.1},{:.3},{:.3},{:.3},{:.3},{:.3},{:.3},{},{}",
+                "\"{}\",\"{}\",{},{},{share},{:.4},{:.1},{:.3},{:.3},{:.3},{:.3},{:.3},{:.3},{},{}",
                 case.name,
                 outcome.method.rule.name(),
-                outcome.method.estimator(),
+                // The stored data call the centroid centre of mass.
+                if outcome.method.is_centred {
+                    "centred"
+                } else {
+                    "centroid"
+                },
                 outcome.events,
                 outcome.without.value,
                 outcome.cycles,

@@ -51,8 +51,10 @@ impl Figure {
 pub struct Claim {
     /// Its name in the page.
     pub name: &'static str,
-    /// The result of this study, with its interval or sample size.
+    /// The result of this study: at most 40 words.
     pub here: String,
+    /// All numbers, if `here` does not have them.
+    pub details: String,
     /// Whether the result agrees with the paper's claim.
     pub verdict: Verdict,
 }
@@ -64,8 +66,16 @@ impl Claim {
         Self {
             name,
             here: here.into(),
+            details: String::new(),
             verdict,
         }
+    }
+
+    /// The claim with all its numbers.
+    #[must_use]
+    pub fn with_details(mut self, details: impl Into<String>) -> Self {
+        self.details = details.into();
+        self
     }
 }
 
@@ -129,6 +139,19 @@ pub fn ends(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
     let ends = (f64::INFINITY, 0.0f64);
     let values = values.into_iter();
     values.fold(ends, |(low, high), value| (value.min(low), value.max(high)))
+}
+
+/// The smallest and the largest of the numbers as text, "none" without a number.
+#[must_use]
+pub fn span(values: impl IntoIterator<Item = f64>, digits: usize) -> String {
+    let mut values: Vec<f64> = values.into_iter().filter(|at| at.is_finite()).collect();
+    values.sort_by(f64::total_cmp);
+    let ends = [values.first(), values.last()].map(|end| end.map(|end| format!("{end:.digits$}")));
+    match ends {
+        [Some(low), Some(high)] if low != high => format!("{low} to {high}"),
+        [Some(low), _] => low,
+        _ => "none".to_owned(),
+    }
 }
 
 /// Shares compared with predictions.

@@ -179,9 +179,14 @@ fn claims(part: &Part) -> Vec<Claim> {
         ),
         Claim::new(
             "auc",
-            format!("AUC, highest TPR and P_hit by SNR: {}", texts.join("; ")),
+            format!(
+                "AUC, highest TPR and P_hit by SNR: {}; {}",
+                texts[0],
+                texts[texts.len() - 1]
+            ),
             Verdict::of(rising && of_snr.iter().all(limited)),
-        ),
+        )
+        .with_details(texts.join("; ")),
     ]
 }
 

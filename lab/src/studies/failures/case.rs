@@ -5,6 +5,7 @@ use dtof_core::{PixelAddress, RangeGate};
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 
+use super::rows::{self, Row};
 use super::stray::{StrayLight, StrayPhotons};
 use super::{BINS, PERIOD, SIGMA};
 use dtof_simulate::SimulatedPixel;
@@ -33,10 +34,8 @@ struct Pulse {
 pub struct Case {
     /// Its difference from the plain scene.
     pub name: String,
-    /// Advice against its failures; not measured.
-    pub advice: Option<&'static str>,
-    /// Why no flag marks the wrong events, if none does.
-    pub silence: Option<&'static str>,
+    /// Its row of the page.
+    pub row: Row,
     /// The range gate.
     pub gate: RangeGate<BINS>,
     /// Exposures of a trial.
@@ -60,8 +59,7 @@ impl Case {
     pub(in crate::studies) fn new(name: impl Into<String>) -> Self {
         Self {
             name: name.into(),
-            advice: None,
-            silence: None,
+            row: rows::PLAIN,
             gate: RangeGate::full(),
             exposures: 10,
             background: BACKGROUND,
@@ -76,13 +74,8 @@ impl Case {
         .and(SIGNAL, PLACE)
     }
 
-    pub(super) fn advised(mut self, advice: &'static str) -> Self {
-        self.advice = Some(advice);
-        self
-    }
-
-    pub(super) fn silent_as(mut self, silence: &'static str) -> Self {
-        self.silence = Some(silence);
+    pub(super) const fn in_row(mut self, row: Row) -> Self {
+        self.row = row;
         self
     }
 

@@ -6,6 +6,7 @@ use dtof_engine::settings::DITHER_BINS;
 
 use super::L1;
 use super::case::{BACKGROUND, Case, PLACE, SIGNAL};
+use super::rows::{self, Row};
 use super::stray::StrayLight;
 use dtof_simulate::effects::Effects;
 use dtof_simulate::effects::cover_glass::CoverGlass;
@@ -43,51 +44,55 @@ pub fn cases() -> Result<Vec<Case>> {
         for counts in BACKGROUNDS {
             let background = counts / f64::from(L1);
             let plain = if is_weak { WEAK } else { SIGNAL };
+            let row = match (is_weak, counts > 5.0, counts > 100.0) {
+                (false, _, false) => rows::PLAIN,
+                (false, _, true) => rows::MUCH_LIGHT,
+                (true, false, _) => rows::WEAK,
+                (true, true, false) => rows::WEAK_50,
+                (true, true, true) => rows::WEAK_500,
+            };
             let mut case = Case::new(background_name(counts, is_weak))
                 .only(plain * (background / BACKGROUND).sqrt(), PLACE)
-                .with_background(background);
+                .with_background(background)
+                .in_row(row);
             if counts > 100.0 {
                 // The background fills a counter in 82 laser cycles.
-                case = case.advised("wider counters, or a rule that fires before they are full");
                 case.exposures = 2;
             }
             cases.push(case);
         }
     }
-    let bright = "a shorter L1; leave out saturated events";
-    let ends = "leave out clipped events, or shift the histogram";
+    let shape = |name: &str| Case::new(name).in_row(rows::SHAPES);
     cases.extend([
-        Case::new("signal of 40 photons").only(40.0, PLACE),
-        Case::new("signal of 80 photons (the peak counter is full)")
-            .only(80.0, PLACE)
-            .advised(bright),
-        Case::new("signal of 400 photons (five counters are full)")
+        shape("signal of 40 photons").only(40.0, PLACE),
+        shape("signal of 80 photons (the peak counter is full)").only(80.0, PLACE),
+        shape("signal of 400 photons (five counters are full)")
             .only(400.0, PLACE)
-            .advised(bright),
-        Case::new("pulse on a bin edge").only(SIGNAL, 80.0),
-        Case::new("pulse between bins 31 and 32").only(SIGNAL, 32.0),
-        Case::new("pulse between bins 63 and 64").only(SIGNAL, 64.0),
+            .in_row(rows::FULL),
+        shape("pulse on a bin edge").only(SIGNAL, 80.0),
+        shape("pulse between bins 31 and 32").only(SIGNAL, 32.0),
+        shape("pulse between bins 63 and 64").only(SIGNAL, 64.0),
         Case::new("pulse at 0.3 bins")
             .only(SIGNAL, 0.3)
-            .advised(ends),
+            .in_row(rows::ENDS),
         Case::new("pulse at 127.7 bins")
             .only(SIGNAL, 127.7)
-            .advised(ends),
-        Case::new("second echo 0.5, same half").and(0.5 * SIGNAL, 110.3),
-        Case::new("second echo 1.5, same half").and(1.5 * SIGNAL, 110.3),
-        Case::new("second echo 0.5, other half")
+            .in_row(rows::ENDS),
+        shape("second echo 0.5, same half").and(0.5 * SIGNAL, 110.3),
+        shape("second echo 1.5, same half").and(1.5 * SIGNAL, 110.3),
+        shape("second echo 0.5, other half")
             .only(SIGNAL, 20.3)
             .and(0.5 * SIGNAL, PLACE),
-        Case::new("second echo 1.5, other half")
+        shape("second echo 1.5, other half")
             .only(SIGNAL, 20.3)
             .and(1.5 * SIGNAL, PLACE),
-        Case::new("a pulse in each half").and(SIGNAL, 48.3),
+        shape("a pulse in each half").and(SIGNAL, 48.3),
         Case::new("a pulse in each quadrant")
             .and(SIGNAL, 16.3)
             .and(SIGNAL, 48.3)
             .and(SIGNAL, 112.3)
-            .advised("a gate, if one of them is known"),
-        Case::new("pulse tail of 30 bins, 40 %").with_effects(Effects {
+            .in_row(rows::QUADRANTS),
+        shape("pulse tail of 30 bins, 40 %").with_effects(Effects {
             tail: Some(Tail {
                 share: 0.4,
                 decay_bins: 30.0,
@@ -96,41 +101,35 @@ pub fn cases() -> Result<Vec<Case>> {
         }),
     ]);
     cases.extend(pile_up()?);
-    let glass = "The histogram is that of a bright target at 3.5 bins before another one. A gate needs to know of the glass";
-    let moved = "The histogram is that of a still target, where it was on average. The event tells its exposure";
-    let smeared = "In 390 laser cycles, the window's, the target goes 2 bins. That widens the pulse from σ 1 to 1.15, and \
-                   its 47 signal photons tell the width to 10 % at best. A test of the width that flags 1 % of still targets \
-                   finds less than an eighth of such events, so none is built";
-    let hot = "The threshold lets one exposure in 100 bring a false alarm, and hardly any brings another event. That events \
-               are so rare tells, no single histogram does";
     cases.extend([
         Case::new("hot pixel, 100 × background")
             .with_background(100.0 * BACKGROUND)
-            .advised("switch the pixel off")
-            .silent_as(hot),
+            .in_row(rows::HOT),
         Case::new("cover glass 10 × the signal")
             .behind(GLASS.0, GLASS.1)
-            .advised("a gate: see the next row")
-            .silent_as(glass),
+            .in_row(rows::GLASS),
         Case::new("cover glass 10 × the signal, gate from bin 10")
             .behind(GLASS.0, GLASS.1)
-            .gated(RangeGate::new(10, 127)?),
-        Case::new("weak signal").only(WEAK, PLACE),
+            .gated(RangeGate::new(10, 127)?)
+            .in_row(rows::GATE),
+        Case::new("weak signal")
+            .only(WEAK, PLACE)
+            .in_row(rows::WEAK),
         Case::new("weak signal, background × 4 at 200")
             .only(WEAK, PLACE)
-            .changing(4.0, CHANGE),
+            .changing(4.0, CHANGE)
+            .in_row(rows::WEAK_50),
         Case::new("weak signal, background / 4 at 200")
             .only(WEAK, PLACE)
-            .changing(0.25, CHANGE),
+            .changing(0.25, CHANGE)
+            .in_row(rows::WEAK),
         Case::new("drift of 5 bins in 1000 laser cycles")
             .drifting(0.005)
-            .advised("a rule that fires sooner")
-            .silent_as(moved),
+            .in_row(rows::DRIFT),
         Case::new("weak signal, the same drift")
             .only(WEAK, PLACE)
             .drifting(0.005)
-            .advised("more light or a shorter L2, so that exposures are shorter")
-            .silent_as(smeared),
+            .in_row(rows::WEAK_DRIFT),
     ]);
     cases.extend(weather()?);
     cases.extend(others());
@@ -145,12 +144,6 @@ fn weather() -> Result<Vec<Case>> {
         photons,
         before: RAIN_ENDS,
     };
-    let gate = "photons that count once a bin and laser cycle, or a gate from where the drops end: see these rows";
-    let echoes = "several echoes: take the last";
-    let drop = "The histogram is that of a near target. It does not tell that all photons came in one laser cycle";
-    let two = "The histogram is that of two surfaces";
-    let wide =
-        "The histogram is that of a wide target before another one. No test of the width is built";
     // A net or a curtain is 20 bins in front of the surface, and smoke begins there. Neither is a
     // target: their events are false.
     let veil = PLACE - 20.0;
@@ -161,48 +154,49 @@ fn weather() -> Result<Vec<Case>> {
     };
     let gated = RangeGate::new(RAIN_GATE, 127)?;
     Ok(vec![
-        Case::new("rain, a drop of 3 photons each 20 laser cycles").with_stray(drops(20.0, 3.0)),
+        Case::new("rain, a drop of 3 photons each 20 laser cycles")
+            .with_stray(drops(20.0, 3.0))
+            .in_row(rows::SMALL_DROPS),
         Case::new("rain, a drop of 30 photons each 200 laser cycles")
             .with_stray(drops(200.0, 30.0))
-            .advised(gate)
-            .silent_as(drop),
+            .in_row(rows::RAIN),
         Case::new("rain, a drop of 3 photons each 20 laser cycles, once per bin")
             .with_stray(drops(20.0, 3.0))
-            .counting_once_per_bin(),
+            .counting_once_per_bin()
+            .in_row(rows::RAIN_ONCE),
         Case::new("rain, a drop of 30 photons each 200 laser cycles, once per bin")
             .with_stray(drops(200.0, 30.0))
-            .counting_once_per_bin(),
+            .counting_once_per_bin()
+            .in_row(rows::RAIN_ONCE),
         Case::new("heavy rain, a drop of 30 photons each 50 laser cycles")
             .with_stray(drops(50.0, 30.0))
-            .advised(gate)
-            .silent_as(drop),
+            .in_row(rows::RAIN),
         Case::new("heavy rain, a drop of 30 photons each 50 laser cycles, once per bin")
             .with_stray(drops(50.0, 30.0))
-            .counting_once_per_bin(),
+            .counting_once_per_bin()
+            .in_row(rows::RAIN_ONCE),
         Case::new("weak signal, rain of 30 photons each 200 laser cycles")
             .only(WEAK, PLACE)
             .with_stray(drops(200.0, 30.0))
-            .advised(gate)
-            .silent_as(drop),
+            .in_row(rows::RAIN),
         Case::new("weak signal, rain of 30 photons each 200 laser cycles, once per bin")
             .only(WEAK, PLACE)
             .with_stray(drops(200.0, 30.0))
-            .counting_once_per_bin(),
+            .counting_once_per_bin()
+            .in_row(rows::RAIN_ONCE),
         Case::new("the same rain, gate from bin 28")
             .with_stray(drops(200.0, 30.0))
-            .gated(gated),
+            .gated(gated)
+            .in_row(rows::GATE),
         Case::new("veil of half the signal")
             .behind(0.5 * SIGNAL, veil)
-            .advised(echoes)
-            .silent_as(two),
+            .in_row(rows::THIN),
         Case::new("veil of twice the signal")
             .behind(2.0 * SIGNAL, veil)
-            .advised(echoes)
-            .silent_as(two),
+            .in_row(rows::VEIL),
         Case::new("smoke of twice the signal")
             .with_stray(smoke)
-            .advised(echoes)
-            .silent_as(wide),
+            .in_row(rows::THIN),
         Case::new("background × 4 at 20").changing(4.0, EARLY_CHANGE),
         Case::new("background / 4 at 20").changing(0.25, EARLY_CHANGE),
     ])
@@ -229,7 +223,9 @@ fn others() -> Vec<Case> {
     for strength in [2.0, 4.0] {
         for has_target in [true, false] {
             let clock = ("clock 20 ppm off", 0.008);
-            let mut case = other(clock, strength, has_target, DITHER_BINS).counting_once_per_bin();
+            let mut case = other(clock, strength, has_target, DITHER_BINS)
+                .counting_once_per_bin()
+                .in_row(rows::DITHER_ONCE);
             case.name += ", once per bin";
             cases.push(case);
         }
@@ -239,11 +235,6 @@ fn others() -> Vec<Case> {
 
 /// Another LiDAR of a clock, which brings its pulse by so many bins later in each laser cycle.
 fn other((clock, step): (&str, f64), strength: f64, has_target: bool, dither: u16) -> Case {
-    let stays = "The histogram is that of a target where the other pulse stays";
-    let random = "a random time from pulse to pulse: see the row with dither";
-    let together = "All photons of one pulse of the other come in the same one to three bins. The histogram does not tell that \
-                    they came in one laser cycle";
-    let once = "photons that count once a bin and laser cycle: see the rows with once per bin";
     let target = if has_target { "" } else { ", no target" };
     let dithered = match dither {
         0 => String::new(),
@@ -261,11 +252,13 @@ fn other((clock, step): (&str, f64), strength: f64, has_target: bool, dither: u1
         case.without_target()
     };
     // At another rate the pulse never stays, with or without dither.
-    if dither > 0 || step > 1.0 {
-        case.advised(once).silent_as(together)
-    } else {
-        case.advised(random).silent_as(stays)
-    }
+    let is_dim = strength < 1.0 && has_target;
+    case.in_row(match (dither > 0, step > 1.0) {
+        (true, _) => rows::DITHER,
+        (_, true) => rows::OTHER_RATE,
+        _ if is_dim => rows::DIM_LIDAR,
+        _ => rows::LIDAR,
+    })
 }
 
 /// Scenes with pile-up: photons that hide later ones. Pixels are set to the dead time of the TDC where the
@@ -291,44 +284,59 @@ fn pile_up() -> Result<Vec<Case>> {
         ("dead for 5 bins".to_owned(), dead_for(5)),
     ];
     let background = |photons: f64| photons / 128.0;
-    let slope = "The histogram is that of a near target";
-    let single = "The histogram is that of a near target. The rule compares single bins with one level; the window rule \
-                  weighs them";
-    let set = "the dead time as a setting: see the next row";
     let mut cases = Vec::new();
+    let one_hit_row = |is_many| {
+        if is_many {
+            rows::ONE_HIT
+        } else {
+            rows::FEW_PHOTONS
+        }
+    };
     for photons in [0.7, 1.5, 2.0] {
         let case = Case::new(format!("one hit, {photons} photons a laser cycle"))
             .with_background(background(photons - SIGNAL))
-            .with_effects(one_hit.clone());
+            .with_effects(one_hit.clone())
+            .in_row(one_hit_row(photons > 1.5));
         cases.push(case.set_to_dead_time());
     }
     for photons in [0.7, 3.0] {
         let case = Case::new(format!("one hit, a pulse of {photons} photons alone"))
             .only(photons, PLACE)
             .with_background(0.001)
-            .with_effects(one_hit.clone());
+            .with_effects(one_hit.clone())
+            .in_row(one_hit_row(photons > 1.0));
         cases.push(case.set_to_dead_time());
     }
-    let mut both = |case: Case| {
-        cases.push(case.clone().advised(set).silent_as(slope));
-        let mut case = case.set_to_dead_time().silent_as(single);
+    // Not set to the dead time, and set.
+    let mut both = |case: Case, [row, row_if_set]: [Row; 2]| {
+        cases.push(case.clone().in_row(row));
+        let mut case = case.set_to_dead_time().in_row(row_if_set);
         case.name += ", set";
         cases.push(case);
     };
-    for (name, tdc) in &tdcs {
-        for photons in [1.0, 3.0, 6.0, 12.0] {
+    let (few, first) = ([rows::FEW_PHOTONS; 2], [rows::FIRST, rows::FIRST_SET]);
+    let (dead_20, dead_5) = ([rows::DEAD_20; 2], [rows::DEAD_5; 2]);
+    let dead_20_more = [rows::DEAD_20_MORE, rows::DEAD_20_SET];
+    let first_12 = [rows::FIRST, rows::FIRST_12_SET];
+    let by_photons = [
+        [few, first, first, first_12],
+        [dead_20, dead_20, dead_20, dead_20_more],
+        [dead_5; 4],
+    ];
+    for ((name, tdc), rows) in tdcs.iter().zip(by_photons) {
+        for (photons, rows) in [1.0, 3.0, 6.0, 12.0].into_iter().zip(rows) {
             let plural = if photons > 1.0 { "s" } else { "" };
             let name = format!("{name}, {photons} photon{plural} a laser cycle");
             let case = Case::new(name).with_background(background(photons - SIGNAL));
-            both(case.with_effects(tdc.clone()));
+            both(case.with_effects(tdc.clone()), rows);
         }
     }
-    for (name, tdc) in &tdcs {
+    for ((name, tdc), rows) in tdcs.iter().zip([first, dead_20_more, dead_5]) {
         let case = Case::new(format!("{name}, 6 photons, no target")).without_target();
         let case = case.with_background(background(6.0));
-        both(case.with_effects(tdc.clone()));
+        both(case.with_effects(tdc.clone()), rows);
     }
-    for (name, tdc) in &tdcs {
+    for ((name, tdc), rows) in tdcs.iter().zip([first, dead_20, dead_5]) {
         let name = format!("{name}, 6 photons, 2 of them crosstalk before the gate");
         let case = Case::new(name).with_background(background(4.0 - SIGNAL));
         let effects = Effects {
@@ -338,16 +346,14 @@ fn pile_up() -> Result<Vec<Case>> {
             }),
             ..tdc.clone()
         };
-        both(case.with_effects(effects).gated(RangeGate::new(8, 127)?));
+        let case = case.with_effects(effects).gated(RangeGate::new(8, 127)?);
+        both(case, rows);
     }
     Ok(cases)
 }
 
 /// A TDC that is dead for 20 bins, with crosstalk before the gate and no target, and a setting one bin off.
 fn dead_times_one_bin_off() -> Result<Vec<Case>> {
-    let slope =
-        "Rules that take each bin as live see a target where the crosstalk's dead time ends";
-    let long = "The bin where the crosstalk's dead time ends was live more often than any of the rules expects";
     let effects = Effects {
         tdc: Some(Tdc {
             hits_per_cycle: None,
@@ -364,10 +370,13 @@ fn dead_times_one_bin_off() -> Result<Vec<Case>> {
         let mut case = Case::new(format!("{name}, set to {dead_time}"));
         case.dead_time = dead_time;
         let case = case.without_target().with_background(4.0 / 128.0);
-        let reason = if dead_time > 20 { long } else { slope };
-        let case = case.with_effects(effects.clone()).silent_as(reason);
+        let row = if dead_time > 20 {
+            rows::CROSSTALK_21
+        } else {
+            rows::CROSSTALK
+        };
         let gate = RangeGate::new(8, 127)?;
-        Ok(case.gated(gate).advised("a dead time that is rounded down"))
+        Ok(case.with_effects(effects.clone()).gated(gate).in_row(row))
     });
     cases.into_iter().collect()
 }

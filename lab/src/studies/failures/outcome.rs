@@ -10,7 +10,7 @@ use crate::sweep::mean::Measured;
 use crate::sweep::{Part, PointTally};
 
 /// The verdict on a method in a case.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Verdict {
     /// False alarms significantly below 2 %, an event in most exposures, and an error of less than
     /// twice that of the plain scene. Without a target: at most one false alarm in 100 exposures.
@@ -35,7 +35,7 @@ impl Verdict {
 
 /// Whether wrong events are flagged. Wrong events are false alarms, or all events if the error is
 /// significantly at least twice that of the plain scene.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Warning {
     /// Wrong events are not significantly above one in 100 exposures, which any threshold lets
     /// through.

@@ -7,7 +7,7 @@ use super::mixed::{self, add_pair, excess, is_sharp, neither};
 use super::one_pixel::{SENSORS, in_parts, phases, watch, watch_step};
 use super::systems::{FPGA, L1, PC, PULSES, System};
 use crate::sweep::mean::{Measured, add};
-use crate::sweep::results::{Claim, Figure, Results, Verdict};
+use crate::sweep::results::{Claim, Figure, Results, Verdict, span};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, Trial, point};
 use anyhow::{Result, bail, ensure};
 use dtof_core::{AnyRule, PixelAddress, PixelConfig};
@@ -298,26 +298,29 @@ fn visible(part: &Part) -> Result<Claim> {
     Ok(Claim::new(
         "visible",
         format!(
-            "{:.2} % of events, {:.2} % of frames of 2000 are nearer to the surface seen, of two 0.8 m apart; {text}",
+            "{:.2} % of events, {:.2} % of frames of 2000 are nearer to the surface seen, of two 0.8 m apart; a tip \
+             goes {path:.5} pixels in an event's exposure",
             events.value * 100.0,
             frames.value * 100.0
         ),
         Verdict::of(events.interval.0 > VISIBLE && path < 0.1),
-    ))
+    )
+    .with_details(text))
 }
 
 /// The FPGA's.
 fn sharp(part: &Part) -> Result<Claim> {
-    let mut here = Vec::new();
+    let (mut paths, mut details) = (Vec::new(), Vec::new());
     let mut excesses = Vec::new();
     let mut is_short = true;
     for pulse in [PULSES[1], PULSES[2]] {
         let point = at(part, pulse)?;
         let (path, text) = path(point)?;
         is_short &= path < 0.1;
+        paths.push(path);
         excesses.push(excess(point, SENSORS[0]));
         let percent = |share: Measured| share.value * 100.0;
-        here.push(format!(
+        details.push(format!(
             "{}: {text}; of {} edges {:.1} % of the events over them are read as neither surface and {:.1} % without the edge, {} percentage points more (frames {}), {} expired",
             FPGA.with_pulse(pulse.1),
             grouped(point.count("events pairs")),
@@ -333,7 +336,13 @@ fn sharp(part: &Part) -> Result<Claim> {
     } else {
         Verdict::Refuted
     };
-    Ok(Claim::new("blur", here.join("; "), verdict))
+    let worst = mixed::worst(excesses.iter().copied()).map_or("none".to_owned(), mixed::points);
+    let here = format!(
+        "events over an edge are read as neither surface {worst} percentage points more often than without it; a tip \
+         goes {} pixels in an event's exposure",
+        span(paths, 5)
+    );
+    Ok(Claim::new("blur", here, verdict).with_details(details.join("; ")))
 }
 
 #[cfg(test)]

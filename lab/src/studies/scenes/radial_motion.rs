@@ -6,7 +6,7 @@
 use super::one_pixel::{PER_BIN, SENSORS, in_parts, pen, phases, watch};
 use super::systems::{FPGA, L1, PC, PULSES, System};
 use crate::sweep::mean::{Measured, add, add_value};
-use crate::sweep::results::{Claim, Figure, Results, Verdict};
+use crate::sweep::results::{Claim, Figure, Results, Verdict, span};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, Trial, grid};
 use anyhow::Result;
 use dtof_core::PixelAddress;
@@ -183,15 +183,17 @@ fn figure(part: &Part, name: &'static str, pulse: (f64, f64)) -> Result<Figure> 
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let mut here = Vec::new();
+    let (mut here, mut details) = (Vec::new(), Vec::new());
     let mut verdicts = Vec::new();
     for pulse in PULSES {
         let mut texts = Vec::new();
         let mut follows = true;
+        let mut shares = Vec::new();
         for signal in SIGNALS {
             let fast = at(part, pulse, signal, FAST)?;
             let [event, frame] = [0, 4].map(|sensor| lag(fast, SENSORS[sensor]));
             follows &= event.path_mm < event.noise_mm;
+            shares.push(100.0 * event.path_mm / event.noise_mm);
             texts.push(format!(
                 "{signal} photons {:.2} mm in an event's exposure (noise {:.1} mm, as much at {:.0} m/s), \
                  {:.1} mm in a frame of 2000 (noise {:.1} mm, as much at {:.0} m/s)",
@@ -204,11 +206,9 @@ fn results(part: &Part) -> Result<Results> {
             ));
         }
         let system = if pulse.0 > 0.0 { FPGA } else { PC };
-        here.push(format!(
-            "{}: {}",
-            system.with_pulse(pulse.1),
-            texts.join("; ")
-        ));
+        let system = system.with_pulse(pulse.1);
+        here.push(format!("{system}: {}", span(shares, 1)));
+        details.push(format!("{system}: {}", texts.join("; ")));
         verdicts.push(follows);
     }
     Ok(Results {
@@ -216,11 +216,17 @@ fn results(part: &Part) -> Result<Results> {
             figure(part, "radial-lag", PULSES[0])?,
             figure(part, "radial-lag-fpga", PULSES[2])?,
         ],
-        claims: vec![Claim::new(
-            "blur",
-            format!("at 10 m/s; {}", here.join("; ")),
-            Verdict::graded(verdicts.iter().all(|&follows| follows), verdicts[0]),
-        )],
+        claims: vec![
+            Claim::new(
+                "blur",
+                format!(
+                    "path in an event's exposure, % of its noise, at 10 m/s: {}",
+                    here.join("; ")
+                ),
+                Verdict::graded(verdicts.iter().all(|&follows| follows), verdicts[0]),
+            )
+            .with_details(format!("at 10 m/s; {}", details.join("; "))),
+        ],
         values: [("runs", grouped(u64::from(RUNS) * part.seed_count()))].into(),
         ..Results::default()
     })

@@ -5,12 +5,25 @@ use super::outcome::{Outcome, REMOVED, SCENES, at_text, by_range, holding, on_pc
 use super::{FPGA_SIGNAL, REFERENCES, SIGNALS};
 use crate::sweep::Part;
 use crate::sweep::mean::Measured;
-use crate::sweep::results::{Claim, Verdict};
-use anyhow::Result;
+use crate::sweep::results::{Claim, Verdict, span};
+use anyhow::{Context, Result};
 use dtof_options::rows::grouped;
 
 /// Changes per event below which a wall counts as silent.
 const SILENT: f64 = 1e-4;
+
+/// The spans of a number of the car and of the fan over all signals, with both backgrounds.
+fn spans(part: &Part, digits: usize, of: impl Fn(&Outcome) -> f64) -> String {
+    let texts = Background::ALL.map(|background| {
+        let scenes = SCENES.map(|(fan, scene)| {
+            let outcomes = on_pc(part, fan, background, 0);
+            let numbers = outcomes.iter().map(|(_, outcome)| of(outcome));
+            format!("{scene} {}", span(numbers, digits))
+        });
+        format!("{}, {}", background.name(), scenes.join(", "))
+    });
+    texts.join("; ")
+}
 
 /// `text` of the car and of the fan at every signal.
 fn at_signals(part: &Part, background: Background, text: impl Fn(&Outcome) -> String) -> String {
@@ -82,6 +95,7 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
         share.interval.1 < SILENT
     };
     let silent = from(is_silent);
+    let changes = |of: &Outcome| Measured::share(of.still.changes, of.still.events).value * 1000.0;
     let fpga = part.one([("fpga", 1.0)])?;
     let fpga = [0, 1].map(|way| outcome(fpga, Background::Quadrants, REFERENCES[way].1));
     let cars = [0, 1].map(|way| on_pc(part, 0.0, Background::Average, way));
@@ -90,7 +104,10 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
         let mut outcomes = cars[way].iter().map(|car| &car.1).chain([&fpga[way]]);
         outcomes.any(finds)
     });
-    let brightest = |way: usize| cars[way].last().map_or(String::new(), |car| motion(&car.1));
+    let brightest = |way: usize| {
+        let car = cars[way].last().context("no signals")?;
+        anyhow::Ok(&car.1)
+    };
     let on_the_car = cars[0]
         .iter()
         .map(|(_, of)| percent(Measured::share(of.moving.changes, of.changes)));
@@ -102,70 +119,92 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
         Claim::new(
             "removed",
             format!(
-                "over 70 % {} (quadrants: {}); {}; FPGA, car at {FPGA_SIGNAL}: {}",
+                "over 70 % {} (quadrants: {}); in %: {}; FPGA: {}",
                 at_text(&removed[0]),
                 at_text(&removed[1]),
-                with_both(part, |of| percent(of.removed)),
+                spans(part, 1, |of| of.removed.value * 100.0),
                 percent(fpga[0].removed)
             ),
             by_range(&removed[0]),
-        ),
+        )
+        .with_details(format!(
+            "{}; FPGA, car at {FPGA_SIGNAL}: {}",
+            with_both(part, |of| percent(of.removed)),
+            percent(fpga[0].removed)
+        )),
         Claim::new(
             "motion",
             format!(
+                "steps found against the mean before {}, reported last {} (car, {} photons); on the FPGA {}, {}",
+                percent(brightest(0)?.found),
+                percent(brightest(1)?.found),
+                SIGNALS[SIGNALS.len() - 1],
+                percent(fpga[0].found),
+                percent(fpga[1].found)
+            ),
+            Verdict::graded(before, reported),
+        )
+        .with_details(format!(
                 "car, average, at {} photons: against the mean before {}; against the mean reported last {}; \
                  changes that are of the car and not of the wall, at {}: {}; \
                  FPGA at {FPGA_SIGNAL}: against the mean before {}; against the mean reported last {}",
                 SIGNALS[SIGNALS.len() - 1],
-                brightest(0),
-                brightest(1),
+                motion(brightest(0)?),
+                motion(brightest(1)?),
                 signals(),
                 on_the_car.collect::<Vec<_>>().join(", "),
                 motion(&fpga[0]),
                 motion(&fpga[1])
-            ),
-            Verdict::graded(before, reported),
-        ),
+            )),
         Claim::new(
             "wall",
             format!(
-                "silent {} (quadrants: {}); changes of still pixels in a thousand of their events {}; \
-                 FPGA, car at {FPGA_SIGNAL}: {} of {} events",
+                "silent {} (quadrants: {}); changes in a thousand events of still pixels: {}; FPGA: {} of {} events",
                 at_text(&silent[0]),
                 at_text(&silent[1]),
-                with_both(part, |of| {
-                    let share = Measured::share(of.still.changes, of.still.events);
-                    format!("{:.2}", share.value * 1000.0)
-                }),
+                spans(part, 2, changes),
                 grouped(fpga[0].still.changes),
                 grouped(fpga[0].still.events)
             ),
             by_range(&silent[0]),
-        ),
+        )
+        .with_details(format!(
+            "changes of still pixels in a thousand of their events {}; FPGA, car at {FPGA_SIGNAL}: {} of {} events",
+            with_both(part, |of| format!("{:.2}", changes(of))),
+            grouped(fpga[0].still.changes),
+            grouped(fpga[0].still.events)
+        )),
         Claim::new(
             "frame-rate",
             format!(
-                "events of what moves for each of its readings in frames of 2000: more than twice as many {}; {}",
+                "more than twice the readings in frames of 2000 {}; times: {}",
                 at_text(&more[0]),
-                with_both(part, |of| times(of.moving.a_frame(of.moving.events)))
+                spans(part, 2, |of| of.moving.a_frame(of.moving.events).value)
             ),
             by_range(&more[0]),
-        ),
+        )
+        .with_details(format!(
+            "events of what moves for each of its readings in frames of 2000 {}",
+            with_both(part, |of| times(of.moving.a_frame(of.moving.events)))
+        )),
         Claim::new(
             "redundant",
             format!(
-                "of still pixels there are fewer events than readings in frames of 2000 {}; with dynamic depth {}; \
-                 events a frame {}; changes a frame {}",
+                "fewer events of still pixels than frames {}, with dynamic depth {}; changes a frame: {}",
                 at_text(&fewer_events[0]),
                 at_text(&redundant[0]),
-                with_both(part, |of| times(of.still.a_frame(of.still.events))),
-                with_both(part, |of| times(of.still.a_frame(of.still.changes)))
+                spans(part, 2, |of| of.still.a_frame(of.still.changes).value)
             ),
             // The paper itself uses dynamic depth to achieve this.
             Verdict::graded(
                 by_range(&fewer_events[0]) == Verdict::Agrees,
                 !redundant[0].is_empty(),
             ),
-        ),
+        )
+        .with_details(format!(
+            "of still pixels: events a frame {}; changes a frame {}",
+            with_both(part, |of| times(of.still.a_frame(of.still.events))),
+            with_both(part, |of| times(of.still.a_frame(of.still.changes)))
+        )),
     ])
 }

@@ -3,7 +3,7 @@
 use super::setting::{NOTHING, Setting, error, false_share};
 use super::{ALPHAS, GAUSSIAN_BACKGROUND, L1S, SNRS};
 use crate::sweep::mean::Measured;
-use crate::sweep::results::{Claim, Verdict, ends};
+use crate::sweep::results::{Claim, Verdict, ends, span};
 use crate::sweep::{Part, PointTally};
 
 /// The smallest ratio of SNRs over which a claim has to hold.
@@ -12,6 +12,11 @@ const RANGE: f64 = 5.0;
 pub fn claims(part: &Part) -> Vec<Claim> {
     let all = Setting::all(part);
     let settings = |of: &dyn Fn(Setting) -> String| all.map(|setting| setting.text(of)).join("; ");
+    // At the paper's B.
+    let papers = |of: &dyn Fn(Setting) -> String| {
+        let those = Setting::at_low_background(part, true);
+        those.map(|setting| setting.text(of)).join("; ")
+    };
     // Only settings with false alarms.
     let falls =
         |of: &dyn Fn(Setting) -> Option<Option<bool>>| in_all(all.into_iter().filter_map(of));
@@ -21,40 +26,48 @@ pub fn claims(part: &Part) -> Vec<Claim> {
         Claim::new(
             "alpha-false",
             format!(
-                "share of events that are false at α = 2, 4, 6, 8, L1 = 20, A/B = 5: {}",
-                settings(&|setting| setting.along(ALPHAS.map(|alpha| (alpha, 20))))
+                "false events at α = 2, 4, 6, 8, A/B = 5: {}",
+                papers(&|setting| setting.along(ALPHAS.map(|alpha| (alpha, 20))))
             ),
             falls(&|setting| setting.falls(ALPHAS.map(|alpha| (alpha, 20)))),
-        ),
+        )
+        .with_details(format!(
+            "share of events that are false at α = 2, 4, 6, 8, L1 = 20, A/B = 5: {}",
+            settings(&|setting| setting.along(ALPHAS.map(|alpha| (alpha, 20))))
+        )),
         Claim::new(
             "l1-false",
             format!(
-                "share of events that are false at L1 = 5, 10, 20, 40, 80, α = 4, A/B = 5: {}",
-                settings(&|setting| setting.along(L1S.map(|l1| (4, l1))))
+                "false events at L1 = 5, 20, 80, A/B = 5: {}",
+                papers(&|setting| setting.along([5, 20, 80].map(|l1| (4, l1))))
             ),
             falls(&|setting| setting.falls(L1S.map(|l1| (4, l1)))),
-        ),
+        )
+        .with_details(format!(
+            "share of events that are false at L1 = 5, 10, 20, 40, 80, α = 4, A/B = 5: {}",
+            settings(&|setting| setting.along(L1S.map(|l1| (4, l1))))
+        )),
         Claim::new(
             "error",
             format!(
-                "RMSE in bins, α = 4, L1 = 40: {}",
-                settings(&|setting| setting.list(4, 40, bins))
+                "RMSE in bins at L1 = 40 over A/B: {}",
+                settings(&|setting| {
+                    let errors = setting.shares(4, 40, error);
+                    span(errors.iter().map(|error| error.value), 3)
+                })
             ),
             verdict(|setting| setting.error_falls_with_snr()),
-        ),
+        )
+        .with_details(format!(
+            "RMSE in bins, α = 4, L1 = 40: {}",
+            settings(&|setting| setting.list(4, 40, bins))
+        )),
         alpha(part),
         Claim::new(
             "l1",
             format!(
-                "mean RMSE in bins at L1 = 10, 20, 40, 80 over the SNRs that have enough events at each, \
-                 α = 4: {}",
-                settings(&|setting| match setting.mean_errors([10, 20, 40, 80]) {
-                    None => NOTHING.to_owned(),
-                    Some((errors, snrs)) => {
-                        let errors = errors.map(|error| format!("{error:.3}"));
-                        format!("{} ({snrs} SNRs)", errors.join(", "))
-                    }
-                })
+                "mean RMSE in bins at L1 = 20, 40, 80: {}",
+                settings(&|setting| mean_errors(setting, [20, 40, 80]).0)
             ),
             match [false, true]
                 .map(|doubling| in_all(all.map(|setting| setting.gain_diminishes(doubling))))
@@ -63,27 +76,52 @@ pub fn claims(part: &Part) -> Vec<Claim> {
                 [Verdict::Agrees, _] => Verdict::Differs,
                 _ => Verdict::Refuted,
             },
-        ),
+        )
+        .with_details(format!(
+            "mean RMSE in bins at L1 = 10, 20, 40, 80 over the SNRs that have enough events at each, α = 4: {}",
+            settings(&|setting| {
+                let (errors, snrs) = mean_errors(setting, [10, 20, 40, 80]);
+                format!("{errors} ({snrs} SNRs)")
+            })
+        )),
         Claim::new(
             "rate",
             format!(
-                "events outside ±0.5 bin: {}",
-                settings(&|setting| setting.list(4, 20, percent))
+                "events outside ±0.5 bin, %, over A/B: {}",
+                settings(&|setting| {
+                    let shares = setting.shares(4, 20, false_share);
+                    span(shares.iter().map(|share| share.value * 100.0), 2)
+                })
             ),
             // At every SNR of every setting, at none of any, or at some.
             in_all(all.into_iter().flat_map(|setting| {
                 let shares = setting.shares(4, 20, false_share).into_iter();
                 shares.map(below_a_thousandth)
             })),
-        ),
+        )
+        .with_details(format!(
+            "events outside ±0.5 bin: {}",
+            settings(&|setting| setting.list(4, 20, percent))
+        )),
         gaussian(),
     ]
+}
+
+/// The mean errors of a setting at several L1, and the number of SNRs.
+fn mean_errors<const N: usize>(setting: Setting, l1s: [u16; N]) -> (String, usize) {
+    match setting.mean_errors(l1s) {
+        None => (NOTHING.to_owned(), 0),
+        Some((errors, snrs)) => {
+            let errors = errors.map(|error| format!("{error:.3}"));
+            (errors.join(", "), snrs)
+        }
+    }
 }
 
 /// Whether false alarms are independent of the SNR within a factor of 2. Agrees over all SNRs in
 /// every setting, differs over a range of [`RANGE`] with each pulse at the paper's B.
 fn snr(part: &Part) -> Claim {
-    let mut here = Vec::new();
+    let (mut here, mut details) = (Vec::new(), Vec::new());
     let (mut is_level, mut is_part) = (true, true);
     for setting in Setting::all(part) {
         let points = setting.by_snr(4, 20);
@@ -95,7 +133,8 @@ fn snr(part: &Part) -> Claim {
         is_level &= shares.first().map(|share| share.0) == Some(from)
             && shares.last().map(|share| share.0) == Some(to);
         is_part &= setting.background >= GAUSSIAN_BACKGROUND || to / from >= RANGE;
-        here.push(format!(
+        here.push(setting.text(|_| format!("{from} to {to}")));
+        details.push(format!(
             "B {}, σ {}: {}; within a factor of {factor:.1} from A/B = {from} to {to}",
             setting.background,
             setting.sigma,
@@ -114,13 +153,14 @@ fn snr(part: &Part) -> Claim {
     });
     Claim::new(
         "snr",
-        format!(
-            "share of events that are false, α = 4, L1 = 20, average: {}; with two quadrants of two bins at B = 0.05 {}",
-            here.join("; "),
-            quadrants.join(", ")
-        ),
+        format!("level to a factor of 2 over A/B of: {}", here.join("; ")),
         Verdict::graded(is_level, is_part),
     )
+    .with_details(format!(
+        "share of events that are false, α = 4, L1 = 20, average: {}; with two quadrants of two bins at B = 0.05 {}",
+        details.join("; "),
+        quadrants.join(", ")
+    ))
 }
 
 /// The widest range of x in which no two values differ by more than a factor of 2, and the factor
@@ -155,10 +195,11 @@ fn alpha(part: &Part) -> Claim {
     Claim::new(
         "alpha",
         format!(
-            "between α = 2 and 8 at one SNR, pulse and L1 (40 and 80) the RMSE differs by at most a tenth at {alike} of {all} places with B = {GAUSSIAN_BACKGROUND} (at most {most:.2} times), and at {few_alike} of {few_all} with B = 0.05 ({few_most:.2} times)"
+            "from α = 2 to 8 the RMSE changes by at most a tenth at {alike} of {all} places with B = {GAUSSIAN_BACKGROUND} (at most {most:.2} times), at {few_alike} of {few_all} with B = 0.05 ({few_most:.2} times)"
         ),
         Verdict::graded(alike == all, 2 * alike > all),
     )
+    .with_details("places: one SNR, pulse and L1 (40 and 80)")
 }
 
 /// Whether an L1 of 20 or 40 gives 30 counts a bin, by arithmetic.

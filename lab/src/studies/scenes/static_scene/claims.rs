@@ -4,7 +4,7 @@ use super::super::systems::{Background, System};
 use super::surfaces::surfaces;
 use super::{DEPTHS, ESTIMATES, MILLION};
 use crate::sweep::mean::Measured;
-use crate::sweep::results::{Claim, Verdict};
+use crate::sweep::results::{Claim, Verdict, span};
 use crate::sweep::{Part, PointTally};
 use anyhow::Result;
 use dtof_options::rows::grouped;
@@ -35,11 +35,32 @@ fn of_each(part: &Part, mut text: impl FnMut(&PointTally) -> Result<String>) -> 
     Ok(texts.join("; "))
 }
 
-/// The text on the noise of a depth relative to that of the frame, and the ratios on surfaces where
-/// at least half of the pixels have enough events.
-fn noises(part: &Part, depth: &str) -> Result<(String, Vec<Measured>)> {
-    let mut all = Vec::new();
-    let text = of_each(part, |point| {
+/// The spans of values on the PC with the average, and in the other scenes.
+fn spans(part: &Part, digits: usize, of: impl Fn(&PointTally) -> f64) -> String {
+    let points = part.points().iter();
+    let values: Vec<(bool, f64)> = points.map(|point| (is_papers(point), of(point))).collect();
+    spans_of(digits, &values)
+}
+
+/// The same of values, each with whether it is of the PC with the average.
+fn spans_of(digits: usize, values: &[(bool, f64)]) -> String {
+    let [papers, others] = [true, false].map(|is_papers| {
+        let those = values.iter().filter(|value| value.0 == is_papers);
+        span(those.map(|value| value.1), digits)
+    });
+    format!("{papers} (PC, average), {others} (quadrants, FPGA)")
+}
+
+/// The claim on the noise of a depth relative to that of the frame, with a verdict on the ratios on surfaces
+/// where at least half of the pixels have enough events.
+fn noise(
+    part: &Part,
+    name: &'static str,
+    depth: &str,
+    verdict: fn(&[Measured]) -> Verdict,
+) -> Result<Claim> {
+    let (mut papers, mut all) = (Vec::new(), Vec::new());
+    let details = of_each(part, |point| {
         let mut ratios: Vec<(Measured, String)> = Vec::new();
         let mut few = Vec::new();
         let [mut beyond, mut frames_beyond] = [0; 2];
@@ -62,8 +83,13 @@ fn noises(part: &Part, depth: &str) -> Result<(String, Vec<Measured>)> {
             };
             ratio.map_or("-".to_owned(), text)
         });
+        all.extend(
+            ratios
+                .iter()
+                .map(|(ratio, _)| (is_papers(point), ratio.value)),
+        );
         if is_papers(point) {
-            all.extend(ratios.iter().map(|(ratio, _)| *ratio));
+            papers.extend(ratios.iter().map(|(ratio, _)| *ratio));
         }
         let few = match few.join(", ") {
             few if few.is_empty() => String::new(),
@@ -73,7 +99,8 @@ fn noises(part: &Part, depth: &str) -> Result<(String, Vec<Measured>)> {
             "noise {least} to {most} that of the frame; {beyond} beyond 1.5 bins, of frames {frames_beyond}{few}"
         ))
     })?;
-    Ok((text, all))
+    let here = format!("noise over that of the frame {}", spans_of(2, &all));
+    Ok(Claim::new(name, here, verdict(&papers)).with_details(details))
 }
 
 /// Whether a depth is noisier than the frame on every surface.
@@ -117,13 +144,14 @@ fn frame_rate(part: &Part, papers: &[&PointTally]) -> Result<Claim> {
         "frame-rate",
         format!(
             "events of the brightest surface for each of its readings in frames of 2000: {}",
-            of_each(part, |point| Ok(rate(point).text(1)))?
+            spans(part, 1, |point| rate(point).value)
         ),
         Verdict::graded(
             papers.iter().all(|point| rate(point).interval.0 > 2.0),
             papers.iter().any(|point| rate(point).interval.0 > 1.0),
         ),
-    ))
+    )
+    .with_details(of_each(part, |point| Ok(rate(point).text(1)))?))
 }
 
 fn redundant(part: &Part, papers: &[&PointTally]) -> Result<Claim> {
@@ -142,27 +170,34 @@ fn redundant(part: &Part, papers: &[&PointTally]) -> Result<Claim> {
         ])
     };
     let mut less = true;
-    for point in papers {
+    let mut of_events = Vec::new();
+    for point in part.points() {
         let [events, frames] = shares(point)?;
-        less &= events.interval.1 < frames.interval.0;
+        less &= !is_papers(point) || events.interval.1 < frames.interval.0;
+        of_events.push((is_papers(point), events.value * 100.0));
     }
     Ok(Claim::new(
         "redundant",
         format!(
-            "events of the wall for each of its readings in frames of 2000, and its share of all events and of all readings: {}",
-            of_each(part, |point| {
-                let [events, frames] = shares(point)?.map(|share| share.value * 100.0);
-                Ok(format!(
-                    "{}, {events:.1} % and {frames:.1} %",
-                    rate(point).text(2)
-                ))
-            })?
+            "events of the wall for each of its readings in frames of 2000: {}; its share of all events, %: {}",
+            spans(part, 2, |point| rate(point).value),
+            spans_of(1, &of_events)
         ),
         Verdict::graded(
             papers.iter().all(|point| rate(point).interval.1 < 1.0),
             less,
         ),
-    ))
+    )
+    .with_details(format!(
+        "events of the wall for each of its readings in frames of 2000, and its share of all events and of all readings: {}",
+        of_each(part, |point| {
+            let [events, frames] = shares(point)?.map(|share| share.value * 100.0);
+            Ok(format!(
+                "{}, {events:.1} % and {frames:.1} %",
+                rate(point).text(2)
+            ))
+        })?
+    )))
 }
 
 pub fn claims(part: &Part) -> Result<Vec<Claim>> {
@@ -177,8 +212,6 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
         |point: &PointTally| Measured::mean(point, "rank correlation").times(1.0 / MILLION);
     let lowest = papers.iter().map(|point| correlation(point).interval.0);
     let lowest = lowest.fold(1.0, f64::min);
-    let (last, last_ratios) = noises(part, DEPTHS[1])?;
-    let (mean, mean_ratios) = noises(part, DEPTHS[2])?;
     let percent =
         |point: &PointTally, name: &str| Measured::mean(point, name).times(100.0 / MILLION);
     let errors = papers
@@ -204,15 +237,23 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
             "bright",
             format!(
                 "rank correlation of events with the signal {}",
-                of_each(part, |point| Ok(correlation(point).text(3)))?
+                spans(part, 3, |point| correlation(point).value)
             ),
             Verdict::graded(lowest > 0.8, lowest > 0.5),
-        ),
-        Claim::new("last", last, noisier(&last_ratios)),
-        Claim::new("mean", mean, comparable(&mean_ratios)),
+        )
+        .with_details(of_each(part, |point| Ok(correlation(point).text(3)))?),
+        noise(part, "last", DEPTHS[1], noisier)?,
+        noise(part, "mean", DEPTHS[2], comparable)?,
         Claim::new(
             "reflectivity",
             format!(
+                "rms error after one scale, %: {}; by counts and exposure {}",
+                spans(part, 1, |point| percent(point, ESTIMATES[0]).value),
+                spans(part, 1, |point| percent(point, ESTIMATES[1]).value)
+            ),
+            Verdict::graded(worst < 10.0, worst < 25.0 || ordered),
+        )
+        .with_details(format!(
                 "rms error after one scale, of pixels with an event {}",
                 of_each(part, |point| {
                     let mut without = 0;
@@ -230,9 +271,7 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
                         grouped(pixels),
                     ))
                 })?
-            ),
-            Verdict::graded(worst < 10.0, worst < 25.0 || ordered),
-        ),
+            )),
         frame_rate(part, &papers)?,
         redundant(part, &papers)?,
     ])
