@@ -401,6 +401,20 @@ fn the_sample_recording_becomes_a_depth_map() {
     assert!(right >= 755 && depth.len() == 768, "{right}");
 }
 
+#[test]
+fn the_rows_of_the_readme_are_printed() {
+    let scratch = Scratch::new();
+    let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/room.npy");
+    let printed = scratch.printed(&format!("replay {room}"));
+    let readme = include_str!("../../../../README.md");
+    let (_, rows) = readme.split_once("```text\n").unwrap();
+    let (rows, _) = rows.split_once("```").unwrap();
+    assert!(rows.lines().count() >= 5);
+    for row in rows.lines() {
+        assert!(printed.lines().any(|line| line == row), "{row}");
+    }
+}
+
 /// 8 × 8 histograms of 32 bins with so many photons a bin, pixel by pixel.
 fn even(photons: impl Fn(usize) -> [u8; 32]) -> Vec<u8> {
     let data: Vec<u8> = (0..64).flat_map(photons).collect();
