@@ -442,7 +442,6 @@ fn senses(board: Board, image: &Path) -> Result<u64> {
         &mut monitor::Outputs {
             events: &mut events,
             statistics: &mut statistics,
-            map: None,
             recording: None,
             masked: 0,
         },

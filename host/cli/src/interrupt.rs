@@ -7,15 +7,14 @@ use anyhow::Result;
 
 static INTERRUPTED: AtomicBool = AtomicBool::new(false);
 
-/// Handles Ctrl-C, which [`is_interrupted`] then reports. A second Ctrl-C calls `before_exit` and
-/// ends the program at once.
+/// Handles Ctrl-C, which [`is_interrupted`] then reports. A second Ctrl-C ends the program at
+/// once.
 ///
 /// # Errors
 /// Fails if the operating system does not support it, or if this was called before.
-pub fn handle_ctrl_c(before_exit: fn()) -> Result<()> {
+pub fn handle_ctrl_c() -> Result<()> {
     ctrlc::set_handler(move || {
         if INTERRUPTED.swap(true, Ordering::Relaxed) {
-            before_exit();
             process::exit(130);
         }
     })?;

@@ -2,7 +2,6 @@
 
 mod event_file;
 pub mod losses;
-pub mod map;
 
 use std::io::{self, ErrorKind, Write};
 use std::time::{Duration, Instant};
@@ -20,12 +19,11 @@ use dtof_options::Refused;
 use dtof_photons::ranges::Ranges;
 pub use event_file::EventFile;
 use losses::{Losses, since};
-use map::LiveMap;
 
 /// Interval of the statistics.
 const EVERY: Duration = Duration::from_secs(1);
 
-/// The array of `pixels`, for pictures and files: with `columns`, or else square or as little wider
+/// The array of `pixels`, for files: with `columns`, or else square or as little wider
 /// than high as possible. `None` if there are no pixels, or if the array has more than 65,536.
 #[must_use]
 pub fn array(pixels: u16, columns: Option<u32>) -> Option<Array> {
@@ -72,8 +70,6 @@ pub struct Outputs<'a> {
     pub events: &'a mut dyn Write,
     /// A line a second: rates, and each loss and error counted since the start.
     pub statistics: &'a mut dyn Write,
-    /// The ranges as a picture, with the line of statistics below.
-    pub map: Option<&'a mut LiveMap>,
     /// All events as an AER file.
     pub recording: Option<&'a mut EventFile>,
     /// Events of masked pixels so far, which are not written.
@@ -82,17 +78,10 @@ pub struct Outputs<'a> {
 
 impl Outputs<'_> {
     /// Writes a line of statistics.
-    fn show(&mut self, line: String, readers: &mut Readers) -> Result<()> {
-        if !readers.statistics {
-            return Ok(());
+    fn show(&mut self, line: &str, readers: &mut Readers) -> Result<()> {
+        if readers.statistics {
+            readers.statistics = still_open(writeln!(self.statistics, "{line}"))?;
         }
-        readers.statistics = still_open(match &mut self.map {
-            None => writeln!(self.statistics, "{line}"),
-            Some(map) => {
-                map.set_line(line);
-                map.draw()
-            }
-        })?;
         Ok(())
     }
 
@@ -112,22 +101,6 @@ impl Outputs<'_> {
         if readers.events {
             readers.events = still_open(write(self.events, events, ranges))?;
         }
-        if let Some(map) = &mut self.map
-            && readers.statistics
-        {
-            map.add(events, ranges);
-            readers.statistics = still_open(map.draw_when_due())?;
-        }
-        Ok(())
-    }
-
-    /// Draws the final picture.
-    fn finish(&mut self, readers: &Readers) -> Result<()> {
-        if let Some(map) = &mut self.map
-            && readers.statistics
-        {
-            still_open(map.draw())?;
-        }
         Ok(())
     }
 }
@@ -135,7 +108,6 @@ impl Outputs<'_> {
 /// Which outputs still have a reader.
 struct Readers {
     events: bool,
-    /// Of the statistics or the map.
     statistics: bool,
 }
 
@@ -165,7 +137,7 @@ pub fn monitor(
     let ranges = &task.ranges()?;
     let watched = watch(client, (task, ranges), done, outputs, &mut readers);
     let written = outputs.write(client.take_events(), (task, ranges), &mut readers);
-    watched.and(written).and(outputs.finish(&readers))
+    watched.and(written)
 }
 
 /// [`monitor`] except for the events that have arrived and are not written yet.
@@ -209,7 +181,7 @@ fn watch(
         outputs.write(client.take_events(), (task, ranges), readers)?;
         if let Some(report) = report {
             let line = rates.line(client, &report, outputs.masked);
-            outputs.show(line, readers)?;
+            outputs.show(&line, readers)?;
             Stopped::check(&report, task.host_timeout)?;
             requested = false;
             if ends {

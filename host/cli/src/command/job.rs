@@ -86,7 +86,7 @@ impl ResultOptions {
         settings_file: Option<&Path>,
     ) -> Result<Output> {
         // Before the first file: nothing would remove it.
-        interrupt::handle_ctrl_c(|| ())?;
+        interrupt::handle_ctrl_c()?;
         Ok(
             Output::create(&self.folder(input), settings, photons, input)?
                 .with_settings(effective, settings_file)?

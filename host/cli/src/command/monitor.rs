@@ -1,14 +1,12 @@
 //! `dtof monitor`: the events of a device with a sensor, as they come.
 
-use std::io::{self, BufWriter, IsTerminal, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
-use console::Term;
 use dtof::{interrupt, path};
-use dtof_device::monitor::map::{LiveMap, SHOW_CURSOR};
 use dtof_device::monitor::{EventFile, Outputs, monitor};
 use dtof_device::{Client, Setup};
 use dtof_engine::settings::SettingsFile;
@@ -25,10 +23,6 @@ pub struct Monitor {
     /// Seconds to run [default: until Ctrl-C]
     #[arg(long, value_name = "S", value_parser = integer(0..=u32::MAX))]
     seconds: Option<u32>,
-    /// Draw the ranges of all pixels on standard error, which must be a terminal. Events go to
-    /// standard output unless that is a terminal as well
-    #[arg(long)]
-    map: bool,
     /// AER file to write as well, for `dtof decode` and `dtof export`
     #[arg(long, value_name = "FILE.aer", value_parser = path())]
     record: Option<PathBuf>,
@@ -45,54 +39,23 @@ impl Monitor {
 
     fn watch(&self, requested: SettingsFile) -> Result<()> {
         let dynamic_depth = self.options.dynamic_depth()?;
-        ensure!(
-            !self.map || io::stderr().is_terminal(),
-            Refused::new(
-                "map",
-                "draws on standard error, which is not a terminal here"
-            )
-        );
         let [has_blocks, has_neighbours] =
             [requested.detection.binning, requested.detection.neighbours]
                 .map(|number| number.is_some_and(|number| number > 0));
-        let needs_array = self.map || self.record.is_some() || has_blocks || has_neighbours;
+        let needs_array = self.record.is_some() || has_blocks || has_neighbours;
         ensure!(
             self.options.columns.is_none() || needs_array,
-            Refused::new(
-                "columns",
-                "needs `map`, `record`, `binning` or `neighbours`"
-            )
+            Refused::new("columns", "needs `record`, `binning` or `neighbours`")
         );
         let image = self.options.image.as_deref();
         let name = || self.device.clone();
         let mut client = Client::new(dtof_device::open(&self.device, image)?).with_context(name)?;
-        interrupt::handle_ctrl_c(|| {
-            if io::stderr().is_terminal() {
-                let _ = write!(io::stderr(), "{SHOW_CURSOR}");
-            }
-        })?;
+        interrupt::handle_ctrl_c()?;
         let setup = Setup::of(&mut client, requested, self.options.pixels).with_context(name)?;
         super::warn(Path::new(&self.device), setup.warnings.clone(), false);
         let length = self
             .seconds
             .map(|seconds| Duration::from_secs(seconds.into()));
-        let mut map = self.map.then(|| {
-            let size = || {
-                let (lines, columns) = Term::stderr().size();
-                (lines.into(), columns.into())
-            };
-            LiveMap::new(
-                Box::new(Term::stderr()),
-                Box::new(size),
-                setup.pixels,
-                setup.array,
-            )
-        });
-        let mut events: Box<dyn Write> = if self.map && io::stdout().is_terminal() {
-            Box::new(io::sink())
-        } else {
-            Box::new(BufWriter::new(io::stdout().lock()))
-        };
         let mut recording = match &self.record {
             None => None,
             Some(file) => Some(EventFile::new(
@@ -107,9 +70,8 @@ impl Monitor {
             &setup.task(dynamic_depth, self.options.host_timeout()),
             |elapsed| interrupt::is_interrupted() || length.is_some_and(|length| elapsed >= length),
             &mut Outputs {
-                events: &mut events,
+                events: &mut BufWriter::new(io::stdout().lock()),
                 statistics: &mut io::stderr(),
-                map: map.as_mut(),
                 recording: recording.as_mut(),
                 masked: 0,
             },

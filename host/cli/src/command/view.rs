@@ -75,7 +75,7 @@ impl View {
                 Feed::Playback(playback)
             }
         };
-        interrupt::handle_ctrl_c(|| ())?;
+        interrupt::handle_ctrl_c()?;
         let foxglove = self.foxglove;
         let foxglove = foxglove.map(|port| Foxglove::bind(port, self.foxglove_origin));
         let foxglove = foxglove.transpose()?;

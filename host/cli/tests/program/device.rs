@@ -8,7 +8,6 @@ mod calibrate_refused;
 mod clock;
 mod dither;
 mod engine;
-mod map;
 mod masked;
 mod monitor;
 mod recording;

@@ -97,7 +97,7 @@ impl DeviceArgs {
         quiet: bool,
     ) -> Result<FromDevice> {
         let mut client = Client::new(port)?;
-        interrupt::handle_ctrl_c(|| ())?;
+        interrupt::handle_ctrl_c()?;
         let sensor = client.sensor()?.context("the device has no sensor")?;
         let pixels = sensor.pixels.min(client.pixels());
         ensure!(pixels > 0, "the device has no pixels");

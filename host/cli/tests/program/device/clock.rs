@@ -136,7 +136,6 @@ fn recorded(path: &Path, sensor: impl Sensor + Send + 'static) {
         &mut Outputs {
             events: &mut io::sink(),
             statistics: &mut io::sink(),
-            map: None,
             recording: Some(&mut recording),
             masked: 0,
         },

@@ -163,7 +163,6 @@ pub fn watch_with(
     let mut outputs = Outputs {
         events,
         statistics,
-        map: None,
         recording: None,
         masked: 0,
     };

@@ -1,11 +1,9 @@
 //! `dtof monitor --record` on a device that plays a part: events at awkward moments, and
 //! readers that have seen enough.
 
-use std::cell::RefCell;
 use std::collections::VecDeque;
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind};
 use std::path::Path;
-use std::rc::Rc;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -13,7 +11,6 @@ use crate::common::aer::{HEADER, depth_event};
 use crate::common::assert_contains;
 use crate::device::{Closing, settings};
 use dtof_core::{AER_VERSION, AerEncoder};
-use dtof_device::monitor::map::LiveMap;
 use dtof_device::monitor::{EventFile, Outputs, array, monitor};
 use dtof_device::{Client, HostTimeout, Port, Task};
 use dtof_events::aer_file::{Event, Header, Reader};
@@ -109,24 +106,11 @@ impl Port for Device {
     }
 }
 
-/// A terminal whose text the test can read.
-#[derive(Clone, Default)]
-struct Screen(Rc<RefCell<Vec<u8>>>);
-
-impl Write for Screen {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.0.borrow_mut().write(bytes)
-    }
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
 /// The events the device sent, the recording, and the error.
 struct Monitored {
     sent: Vec<Event>,
     recorded: Vec<Event>,
-    drawn: String,
+    statistics: String,
     error: Option<String>,
 }
 
@@ -157,9 +141,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     let sent = Arc::clone(&device.sent);
     let mut client = Client::new(Box::new(device)).unwrap();
     let mut recording = EventFile::new(&path, &[], &header, "").unwrap();
-    let screen = Screen::default();
-    let room = Box::new(|| (24, 80));
-    let mut map = LiveMap::new(Box::new(screen.clone()), room, PIXELS, array);
+    let mut statistics = Vec::new();
     let task = Task {
         settings: &settings(),
         pixels: PIXELS,
@@ -173,8 +155,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
         |elapsed| elapsed >= Duration::from_secs(seconds),
         &mut Outputs {
             events: &mut Closing(events),
-            statistics: &mut io::sink(),
-            map: Some(&mut map),
+            statistics: &mut statistics,
             recording: Some(&mut recording),
             masked: 0,
         },
@@ -183,7 +164,7 @@ fn monitored(pixel: u16, lives: u64, seconds: u64, events: usize) -> Monitored {
     Monitored {
         sent: std::mem::take(&mut sent.lock().unwrap()),
         recorded: recorded(&path),
-        drawn: String::from_utf8(screen.0.take()).unwrap(),
+        statistics: String::from_utf8(statistics).unwrap(),
         error: ended.err().map(|error| format!("{error:#}")),
     }
 }
@@ -202,9 +183,10 @@ fn what_is_sent_is_recorded_also_when_nobody_reads_and_while_the_device_stops() 
         assert_eq!(run.error, None);
         assert!(run.sent.len() >= 3, "at first, after a second, at the end");
         assert_eq!(run.recorded, run.sent);
-        // The last event, too.
-        let (_, last) = run.drawn.rsplit_once("\r").unwrap();
-        assert!(last.contains("2 of 4 pixels") && last.contains("events/s "));
+        // Each has a line of statistics, except the first, from which the others count, and the last.
+        let lines = run.statistics.lines();
+        assert!(lines.clone().all(|line| line.starts_with("events/s ")));
+        assert_eq!(lines.count(), run.sent.len() - 2, "{}", run.statistics);
     }
 }
 
@@ -236,7 +218,6 @@ fn events_before_the_first_report_have_their_header() {
         &mut Outputs {
             events: &mut printed,
             statistics: &mut io::sink(),
-            map: None,
             recording: None,
             masked: 0,
         },
