@@ -10,7 +10,6 @@ use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_options::rows::grouped;
 use dtof_photons::input::Input;
 use dtof_photons::ranges::Ranges;
-use dtof_photons::recorded::Layout;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_run::output::header;
 use dtof_run::recording::{read_options, warnings};
@@ -24,7 +23,6 @@ use pyo3::types::PyByteArray;
 use crate::error::{Keywords, checked, options_over};
 use crate::events::{Array, RECORD, push};
 use crate::input::PyInput;
-use crate::part::PyLayout;
 use crate::work::{Control, work};
 
 /// The result of a run, as Python gets it.
@@ -39,8 +37,6 @@ pub struct PyRunResult<'py> {
     settings: String,
     array: Array,
     warnings: Vec<String>,
-    /// Photons bin by bin, if the settings have crosstalk of the cover glass.
-    bins: Option<Vec<u64>>,
     /// How clear the peak of each pixel stands, if pixels decide once.
     confidence: Option<Vec<f64>>,
 }
@@ -53,16 +49,21 @@ struct Finished {
     warnings: Vec<String>,
 }
 
-/// Replays a recording, a file or an array. One with a `layout` is replayed as a part of the whole.
-/// `cycles` are the laser cycles of a recording that is replayed to its end by default.
+/// Checks the options of a replay.
 #[pyfunction]
-#[pyo3(signature = (input, keywords, progress, layout, cycles=None))]
+pub fn check_options(keywords: Keywords) -> PyResult<()> {
+    options_over::<Options>(keywords).map(drop)
+}
+
+/// Replays a recording, a file or an array. `cycles` are the laser cycles of a recording that is replayed
+/// to its end by default.
+#[pyfunction]
+#[pyo3(signature = (input, keywords, progress, cycles=None))]
 pub fn replay<'py>(
     py: Python<'py>,
     input: PyInput,
     keywords: Keywords,
     progress: Option<Bound<'py, PyAny>>,
-    layout: Option<PyLayout>,
     cycles: Option<u64>,
 ) -> PyResult<PyRunResult<'py>> {
     let options: Options = options_over(keywords)?;
@@ -72,8 +73,7 @@ pub fn replay<'py>(
         // Only more than the default replays.
         let cycles = cycles.filter(|&cycles| cycles > read_options(&requested).cycles);
         requested.run.cycles = requested.run.cycles.or(cycles);
-        let layout = layout.map(|layout| layout.read(&input)).transpose()?;
-        run_replay(&options, &input, &requested, layout, control)
+        run_replay(&options, &input, &requested, control)
             .map_err(|error| requested.add_file_name(error))
     })?;
     finished.into_python(py)
@@ -83,15 +83,13 @@ fn run_replay(
     options: &Options,
     input: &Input,
     requested: &SettingsFile,
-    layout: Option<Layout>,
     control: &Control,
 ) -> Result<Finished> {
-    let is_part = layout.is_some();
-    let mut replay = options.open_part(input, requested, layout)?;
+    let mut replay = options.open(input, requested)?;
     let mut records = Records::of(&replay.settings, &replay.photons)?;
     let result = replay.run(input, &mut records, &mut { control })?;
     let of_run = result.warnings.clone();
-    let is_default = requested.run.cycles.is_none() && !is_part;
+    let is_default = requested.run.cycles.is_none();
     let left_out = is_default.then(|| not_replayed(&result)).flatten();
     Ok(Finished {
         records,
@@ -244,7 +242,6 @@ impl Finished {
             settings,
             array: self.records.array,
             warnings: self.warnings,
-            bins: self.result.bins,
             confidence: self.records.confidence,
         })
     }

@@ -3,7 +3,7 @@
 
 use std::mem;
 use std::process;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread;
@@ -128,43 +128,30 @@ pub fn work<T: Send + 'static>(
     }
 }
 
-/// The requested number of threads, 0 for one a core.
-static THREADS: AtomicUsize = AtomicUsize::new(0);
-
 /// The threads of a process.
 struct Pool {
     process: u32,
-    requested: usize,
     threads: Arc<ThreadPool>,
 }
 
-/// Sets the number of threads of this process, 0 for one a core. Work that has begun keeps its own.
-#[pyfunction]
-pub fn use_threads(threads: usize) {
-    THREADS.store(threads, Ordering::Relaxed);
-}
-
-/// The threads of this process. A forked process has none of the threads of its parent.
+/// The threads of this process: as many as `RAYON_NUM_THREADS` says, or one a core. A forked process has none
+/// of the threads of its parent.
 pub fn pool() -> Result<Arc<ThreadPool>> {
     static POOL: Mutex<Option<Pool>> = Mutex::new(None);
     let mut current = locked(&POOL);
-    let (process, requested) = (process::id(), THREADS.load(Ordering::Relaxed));
+    let process = process::id();
     if let Some(pool) = &*current
-        && (pool.process, pool.requested) == (process, requested)
+        && pool.process == process
     {
         return Ok(Arc::clone(&pool.threads));
     }
-    let builder = ThreadPoolBuilder::new().num_threads(requested);
-    let builder = builder.thread_name(|number| format!("dtof-{number}"));
+    let builder = ThreadPoolBuilder::new().thread_name(|number| format!("dtof-{number}"));
     let threads = Arc::new(builder.build()?);
     let pool = Pool {
         process,
-        requested,
         threads: Arc::clone(&threads),
     };
-    if let Some(before) = current.replace(pool)
-        && before.process != process
-    {
+    if let Some(before) = current.replace(pool) {
         // The threads of the parent do not exist here: dropping the pool would wait for them forever.
         mem::forget(before);
     }

@@ -53,20 +53,3 @@ def recorded(capsys):
         return path
 
     return place
-
-
-@pytest.fixture(scope="session")
-def dask_cluster(tmp_path_factory):
-    """A Dask cluster."""
-    from clusters import Cluster
-
-    cluster = Cluster(tmp_path_factory.mktemp("cluster"))
-    yield cluster
-    cluster.close()
-
-
-@pytest.fixture
-def client(dask_cluster):
-    """A client of it, with all workers ready."""
-    dask_cluster.wait_for_workers()
-    return dask_cluster.client

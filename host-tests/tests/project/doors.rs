@@ -71,8 +71,7 @@ const WRITES: [&str; 13] = [
 ];
 
 /// The files that write results: below `--out`, or to a file that an option names.
-const WRITERS: [&str; 8] = [
-    "bindings/python/python/dtof/cluster/_folder.py",
+const WRITERS: [&str; 7] = [
     "bindings/python/src/aer.rs",
     "host/compare/src/page.rs",
     "host/device/src/monitor/event_file.rs",

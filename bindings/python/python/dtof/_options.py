@@ -22,12 +22,6 @@ def arguments(kinds: Any, options: Mapping[str, Any]) -> Keywords:
     return [(key, text) for key, text in texts if text or key not in ("mask", "offsets_mm", "laser_off")]
 
 
-def flags(keywords: Keywords) -> list[str]:
-    """The same as sorted flags of the command line, without the settings file."""
-    others = [(key.replace("_", "-"), text) for key, text in keywords if key != "settings"]
-    return sorted("--laser-off" if name == "laser-off" else f"--{name}={text}" for name, text in others)
-
-
 def settings_text(value: Any) -> str:
     """Settings for the native extension: the name of a file, or a text of several lines."""
     if isinstance(value, (str, os.PathLike)):
@@ -43,12 +37,6 @@ def settings_text(value: Any) -> str:
             "a calibration, a comparison or a run"
         )
     return toml
-
-
-def absolute(settings: Any) -> Any:
-    """Settings that do not depend on the folder of this process."""
-    is_name = isinstance(settings, (str, os.PathLike)) and "\n" not in os.fspath(settings)
-    return os.path.abspath(settings) if is_name else settings
 
 
 def toml_of(sections: Mapping[str, Any]) -> str:

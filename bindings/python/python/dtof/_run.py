@@ -117,7 +117,7 @@ def replay(recorded: Any, *, axis: int = -1, progress: Progress = None, **option
     if axis != -1:
         recorded = _bins_last(recorded, axis, options)
     source = recording_input(recorded, options)
-    return result(_native.replay(source, arguments(ReplayOptions, options), progress, None))
+    return result(_native.replay(source, arguments(ReplayOptions, options), progress))
 
 
 @takes(ReplayOptions)
@@ -139,7 +139,7 @@ def photons(
     last = int(listed["cycle"][-1]) if listed.size else 0
     cycles = min(max(last, 0) + 1, 2**63 - 1)
     source = native_input(listed, "photons")
-    return result(_native.replay(source, arguments(ReplayOptions, options), progress, None, cycles))
+    return result(_native.replay(source, arguments(ReplayOptions, options), progress, cycles))
 
 
 @takes(SimulateOptions)
@@ -164,11 +164,6 @@ def scene_of(scene: Any) -> Any:
 def result(done: dict[str, Any]) -> Replay:
     """The result of a native run; issues its warnings."""
     warn(done["warnings"], callers=3)
-    return quiet_result(done)
-
-
-def quiet_result(done: dict[str, Any]) -> Replay:
-    """The result of a native run, without its warnings."""
     array, confidence = array_of(done["array"]), done["confidence"]
     return Replay(
         events=events_of(done["events"]),
