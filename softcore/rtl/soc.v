@@ -9,7 +9,7 @@
 // Each processor's file states the cost of an access.
 //
 // Addresses
-//   0x0000_0000  RAM, 256 KiB. Execution starts at 0, on Ibex at 0x80.
+//   0x0000_0000  RAM, 256 KiB. Execution starts at 0.
 //   0xF000_0000  PRINT         write: the low byte is printed
 //   0xF000_0004  MARK          write: a number, logged with the clock cycle
 //   0xF000_0008  EXIT          write: the run ends, 0 is success

@@ -197,9 +197,6 @@ void clock(Vsoc &soc) {
 }
 
 void load(Vsoc &soc, const std::vector<uint8_t> &image) {
-    // The edge counts: Ibex's own clock stands still while its reset is asserted.
-    soc.reset = 0;
-    soc.eval();
     soc.reset = 1;
     soc.load_valid = 1;
     for (size_t i = 0; i < image.size(); i += 4) {

@@ -39,12 +39,12 @@ cargo softcore formal
 cargo softcore mutations [--sample N]
 
 Runs the core on RV32 processors: golden vectors in QEMU, and golden vectors, cycles and
-photon rates on the Verilog of VexRiscv, Ibex, PicoRV32 and SERV. If all of them run, it
-writes docs/results/bench/softcore*.csv and softcore.md.
+photon rates on the Verilog of VexRiscv and PicoRV32. If all of them run, it writes
+docs/results/bench/softcore*.csv and softcore.md.
 
   --qemu-only   run QEMU only: no cycles, no Verilator
   --core NAME   run this processor only; may be repeated:
-                vexriscv, ibex, picorv32, picorv32-rv32i or serv
+                vexriscv, picorv32 or picorv32-rv32i
   --check       compare with the files instead of writing them
 
 `place` is cells and clock on an FPGA: cargo softcore place --help
@@ -73,8 +73,6 @@ const MUST_FAIL: [(&str, &str); 3] = [
 fn last_words(core: &str, program: &str) -> &'static str {
     match (core, program) {
         ("picorv32" | "picorv32-rv32i", "illegal-instruction") => "the processor stops cycle",
-        // The bit-serial processor carries it out as some other, which the program tells.
-        ("serv", "illegal-instruction") => "the illegal instruction was carried out",
         (_, "illegal-instruction") => ILLEGAL,
         (_, "endless-loop") => "cycle limit",
         _ => "golden WRONG",
@@ -326,12 +324,12 @@ mod tests {
     #[test]
     fn reads_what_is_asked_for() {
         let parse = |arguments: &[&str]| Options::parse(lexopt::Parser::from_args(arguments));
-        let options = parse(&["--core", "serv", "--check", "--core=ibex"]);
+        let options = parse(&["--core", "picorv32", "--check", "--core=vexriscv"]);
         let options = options.unwrap().unwrap();
         assert!(options.check && !options.qemu_only);
         let selected = CORES.into_iter().filter(|&core| options.selects(core));
         let names: Vec<&str> = selected.map(|core| core.name).collect();
-        assert_eq!(names, ["ibex", "serv"]);
+        assert_eq!(names, ["vexriscv", "picorv32"]);
         assert!(CORES.iter().all(|&core| Options::default().selects(core)));
         assert_eq!(parse(&["--help"]).unwrap(), None);
         for wrong in [

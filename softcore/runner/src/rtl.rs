@@ -22,12 +22,10 @@ pub struct Core {
 }
 
 /// All of them.
-pub const CORES: [Core; 5] = [
+pub const CORES: [Core; 3] = [
     core("vexriscv", "rv32im", true),
-    core("ibex", "rv32imc", false),
     core("picorv32", "rv32im", false),
     core("picorv32-rv32i", "rv32i", false),
-    core("serv", "rv32i", false),
 ];
 
 const fn core(name: &'static str, isa: &'static str, caches: bool) -> Core {

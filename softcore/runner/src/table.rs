@@ -231,7 +231,12 @@ exit 0x0 cycle 250 instructions 60
 
     #[test]
     fn a_processor_without_a_cache_has_nothing_cold() {
-        let error = rows("serv,rv32i", false, &ProgramRun::success(OUTPUT, MARKS)).unwrap_err();
+        let error = rows(
+            "picorv32,rv32im",
+            false,
+            &ProgramRun::success(OUTPUT, MARKS),
+        )
+        .unwrap_err();
         assert!(error.to_string().starts_with("without a cache"));
         let same = "\
 mark 1 cycle 1 instructions 1 code 0 data 0
@@ -244,9 +249,14 @@ mark 7 cycle 9 instructions 9 code 0 data 0
 mark 8 cycle 12 instructions 12 code 0 data 0
 ";
         let output = OUTPUT.replace("1 2 call", "1 1 call");
-        let rows = rows("serv,rv32i", false, &ProgramRun::success(&output, same)).unwrap();
+        let rows = rows(
+            "picorv32,rv32im",
+            false,
+            &ProgramRun::success(&output, same),
+        )
+        .unwrap();
         let lines: Vec<String> = rows.iter().map(Row::csv).collect();
-        assert_eq!(lines, ["serv,rv32i,a: b,0.50,0.50,0.00,0.00"]);
+        assert_eq!(lines, ["picorv32,rv32im,a: b,0.50,0.50,0.00,0.00"]);
     }
 
     #[test]

@@ -79,7 +79,7 @@ mod tests {
     #[test]
     fn a_line_of_the_file_is_read_as_it_is_written() {
         let sustained = SustainedRate {
-            core: "serv,rv32i".to_owned(),
+            core: "picorv32,rv32im".to_owned(),
             rate: 12_345,
             between_looks: 98.7,
             photons: 3,
@@ -88,8 +88,11 @@ mod tests {
             fill: 9,
         };
         let line = sustained.csv();
-        assert_eq!(line, "serv,rv32i,0.12345,98.7,3,2,1,9");
+        assert_eq!(line, "picorv32,rv32im,0.12345,98.7,3,2,1,9");
         assert_eq!(SustainedRate::parse(&line), Some(sustained));
-        assert_eq!(SustainedRate::parse("serv,rv32i,0.12,98.7,3,2,1,9"), None);
+        assert_eq!(
+            SustainedRate::parse("picorv32,rv32im,0.12,98.7,3,2,1,9"),
+            None
+        );
     }
 }
