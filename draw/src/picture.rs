@@ -1,7 +1,6 @@
 //! Heat maps of one value per pixel as SVG documents.
 
 mod axis;
-mod cells;
 mod draw;
 mod layout;
 mod map;
@@ -11,4 +10,4 @@ mod tests;
 
 pub use draw::heat_map;
 pub use map::Map;
-pub use scale::{levels, span};
+pub use scale::span;

@@ -2,11 +2,10 @@
 
 use anyhow::{Result, ensure};
 
-use super::cells;
 use super::layout::{Bar, Frame, LINE, Layout};
 use super::map::Map;
 use super::scale::{Scale, levels};
-use crate::palette::{NO_EVENT, hex};
+use crate::palette::{NO_EVENT, hex, level};
 use crate::svg::{Anchor, At, EDGE, Svg, TEXT, TITLE};
 
 /// Draws `map` as a complete SVG document.
@@ -42,11 +41,43 @@ pub fn heat_map(map: &Map) -> Result<String> {
     texts(&mut svg, &layout);
     axes(&mut svg, &layout);
     let corner = layout.plot.corner;
-    cells::draw(&mut svg, &levels, layout.columns, corner, layout.cell);
+    cells(&mut svg, &levels, layout.columns, corner, layout.cell);
     if let Some(layout) = &layout.bar {
         bar(&mut svg, layout);
     }
     Ok(svg.document(layout.size, map.title))
+}
+
+/// Draws `levels`, `columns` in a line, from `corner` on as rectangles of the size `cell`. Each
+/// colour has one path; neighbours of one colour in a line share a rectangle.
+fn cells(
+    svg: &mut Svg,
+    levels: &[Option<u8>],
+    columns: usize,
+    corner: (f64, f64),
+    cell: (f64, f64),
+) {
+    let mut paths = vec![String::new(); 1 + usize::from(u8::MAX) + 1];
+    for (y, line) in levels.chunks(columns).enumerate() {
+        let mut x = 0;
+        for run in line.chunk_by(|a, b| a == b) {
+            let path = run[0].map_or(0, |level| 1 + usize::from(level));
+            let width = run.len();
+            paths[path] += &format!("M{x} {y}h{width}v1h-{width}z");
+            x += width;
+        }
+    }
+    let (x, y, (width, height)) = (At(corner.0), At(corner.1), cell);
+    svg.raw(&format!(
+        "<g transform=\"translate({x} {y})scale({width} {height})\" shape-rendering=\"crispEdges\">"
+    ));
+    let colours = std::iter::once(NO_EVENT).chain((0..=u8::MAX).map(level));
+    for (shape, colour) in paths.iter().zip(colours) {
+        if !shape.is_empty() {
+            svg.raw(&format!("<path fill=\"{}\" d=\"{shape}\"/>", hex(colour)));
+        }
+    }
+    svg.raw("</g>");
 }
 
 /// Draws title and notes.
@@ -95,7 +126,7 @@ fn bar(svg: &mut Svg, bar: &Bar) {
         size: (width, height),
     } = bar.frame;
     let cell = (width, height / bar.levels.len() as f64);
-    cells::draw(svg, &bar.levels, 1, (x, y), cell);
+    cells(svg, &bar.levels, 1, (x, y), cell);
     let right = x + width + 1.0;
     for mark in &bar.marks {
         let at = y + height * (1.0 - mark.position);

@@ -14,9 +14,9 @@ use tokio::sync::oneshot;
 
 pub use playback::Playback;
 
+use super::Terminal;
 use super::hub::{Hub, Kind};
 use super::outputs::{Folder, Recorder};
-use super::terminal::Terminal;
 use dtof_device::{HostTimeout, Port, Setup};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::rows::printable;

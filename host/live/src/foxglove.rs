@@ -23,9 +23,9 @@ use tokio::io::{AsyncRead, AsyncWrite};
 use tokio::sync::broadcast;
 use tokio::time::{MissedTickBehavior, interval};
 
+use super::Terminal;
 use super::hub::Hub;
 use super::origin::Origin;
-use super::terminal::Terminal;
 use client::Client;
 use frames::{Frame, Frames};
 use guard::Origins;

@@ -20,7 +20,6 @@ mod hub;
 mod origin;
 mod outputs;
 mod server;
-mod terminal;
 
 use std::net::{Ipv4Addr, TcpListener};
 use std::sync::Arc;
@@ -37,10 +36,18 @@ pub use foxglove::{Foxglove, MOST_CLIENTS};
 pub use hub::{Hub, MOST_EVENTS, MOST_PAGES, MOST_PIXELS};
 pub use origin::Origin;
 pub use outputs::Folder;
-pub use terminal::Terminal;
 
 /// Most commands that wait for the feed.
 const REQUESTS: usize = 16;
+
+/// The terminal of the program that serves the page: prints lines, and names options.
+#[derive(Clone, Copy)]
+pub struct Terminal {
+    /// Writes a line on standard error.
+    pub complain: fn(&str),
+    /// Gives the name of an option from its key, such as its flag.
+    pub name: fn(&str) -> String,
+}
 
 /// A page that is ready to be served. Nothing runs yet.
 pub struct Served {

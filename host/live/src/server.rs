@@ -21,12 +21,12 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Semaphore;
 use tokio_io_timeout::TimeoutStream;
 
+use super::Terminal;
 use super::feed::PageRequest;
 use super::foxglove::Foxglove;
 #[cfg(feature = "foxglove")]
 use super::foxglove::{App as Clients, MOST_CLIENTS};
 use super::hub::Hub;
-use super::terminal::Terminal;
 use routes::App;
 
 /// Most connections at a time. Others wait to be accepted.

@@ -5,7 +5,6 @@ use dtof_core::PixelAddress;
 use rand_distr::{Distribution, Poisson, StandardUniform};
 use rand_pcg::Pcg64;
 
-use super::arrival::{Arrival, code};
 use super::effects::Effects;
 use super::effects::afterpulsing::Trap;
 use super::effects::cover_glass::Crosstalk;
@@ -18,6 +17,24 @@ use super::effects::tail::TailDelay;
 use super::effects::tdc::Tdc;
 use super::stream::Stream;
 use dtof_theory::rates::Rates;
+
+/// A photon of the plain model.
+pub(super) enum Arrival {
+    /// In this bin, anywhere in it.
+    Background(u16),
+    /// At this position in bins, from the start of bin 0.
+    Signal(f64),
+}
+
+/// The bin of a position within the histogram.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "rounded down, within the bins"
+)]
+pub(super) fn code(position: f64) -> u16 {
+    position as u16
+}
 
 /// The light, SPAD and TDC of one pixel. All times are in bins from the start of the laser cycle.
 ///

@@ -22,7 +22,6 @@
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
 mod array;
-mod arrival;
 pub mod demo;
 mod detector;
 pub mod effects;

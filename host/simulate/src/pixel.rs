@@ -6,8 +6,7 @@ use dtof_theory::rates::Rates;
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, Uniform};
 use rand_pcg::Pcg64;
 
-use super::arrival::{Arrival, code};
-use super::detector::Detector;
+use super::detector::{Arrival, Detector, code};
 use super::effects::Effects;
 use super::effects::limits::Timing;
 use super::stream::Stream;

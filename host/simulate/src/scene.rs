@@ -6,7 +6,6 @@
 
 mod depth_map;
 mod file;
-mod line_of_sight;
 mod of_depth_map;
 mod surface;
 
@@ -23,7 +22,6 @@ use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 
 pub use depth_map::{DepthAlong, DepthMap};
-use line_of_sight::LineOfSight;
 pub use surface::{Ball, Brightness, Fan, Plane, Rectangle, Shape, Surface};
 
 /// The most signal photons a laser cycle of a pixel.
@@ -76,6 +74,19 @@ pub struct Hit {
     pub range_mm: f64,
     /// How much light comes back.
     pub light: Brightness,
+}
+
+/// The line of sight of a pixel.
+#[derive(Clone, Copy, Debug)]
+struct LineOfSight {
+    /// Its column and row.
+    pixel: [u32; 2],
+    /// Columns and rows of its array.
+    size: [u32; 2],
+    /// Column and row of the layout.
+    place: [f64; 2],
+    /// The unit ray through its middle.
+    ray: [f64; 3],
 }
 
 impl Scene {

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 
-use super::line_of_sight::LineOfSight;
+use super::LineOfSight;
 use dtof_options::named_values;
 use dtof_photons::npy::numbers::{self, ElementKind, Numbers};
 

@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use serde::Deserialize;
 
+use super::LineOfSight;
 use super::depth_map::DepthMap;
-use super::line_of_sight::LineOfSight;
 
 /// Larger distances are taken for infinite.
 const FARTHEST_MM: f64 = 1e9;
