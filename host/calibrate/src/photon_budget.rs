@@ -14,7 +14,7 @@ use super::find::significance::median;
 use super::{Length, Observed, WindowDetection};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_photons::recorded::{Layout, RecordedHistograms, RecordingLength};
+use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_theory::progress::{Part, Progress};
 
@@ -82,18 +82,15 @@ impl<'a> Replay<'a> {
             Length::PhotonsPerCycle(rate) => RecordingLength::PhotonsPerCycle(rate),
             Length::Unknown => return Ok(None),
         };
-        let layout = Layout::from_captures(observed.array, observed.captures)?;
-        let pixels = observed.array.pixels();
-        let hot =
-            (0..layout.array.pixels()).filter(|pixel| hot.contains(&((pixel % pixels) as usize)));
-        let hot = hot.map(u16::try_from).collect::<Result<_, _>>();
-        let layout = Layout {
-            masked: hot?,
-            ..layout
-        };
+        let (array, captures) = (observed.array, observed.captures);
+        let pixels = array.pixels();
+        let of_captures = (0..=u16::MAX).take(captures.len() * pixels as usize);
+        let hot: Vec<u16> = of_captures
+            .filter(|&pixel| hot.contains(&((u32::from(pixel) % pixels) as usize)))
+            .collect();
         let cycles = MAX_CYCLES.into();
         let mut photons =
-            RecordedHistograms::with_layout(&layout, observed.captures, length, cycles, seed)?;
+            RecordedHistograms::with_masked(array, captures, length, cycles, seed, &hot)?;
         let cycles = MAX_PHOTONS / photons.photons_per_cycle().max(1e-9);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let slice = photons.next_slice(cycles.clamp(1.0, MAX_CYCLES.into()) as u16)?;

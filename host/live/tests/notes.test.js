@@ -51,6 +51,7 @@ test("only sensor errors have the last fault", () => {
 test("a place in a recording has digits as its length suits", () => {
   assert.equal(placeText(0.1, 0.2), "0.100 of 0.200 s");
   assert.equal(placeText(0.1, 10), "0.1 of 10.0 s");
+  assert.equal(placeText(0.00005, 0.0001), "0.050 of 0.100 ms");
 });
 
 test("the current speed is among those to choose from", () => {

@@ -16,7 +16,7 @@ use crate::npy::records::{self, RecordReader};
 use crate::npy::{archive, histograms};
 use crate::photon_csv::CsvReader;
 use crate::photon_list::{CountedSource, ListOptions, PhotonList, PhotonReader};
-use crate::recorded::{Capture, Layout, RecordedHistograms, RecordingLength};
+use crate::recorded::{Capture, RecordedHistograms, RecordingLength};
 use crate::source::PhotonSource;
 use crate::{tmf8820, tmf8829, warnings};
 use dtof_options::files::is_file;
@@ -53,8 +53,6 @@ pub struct ReadOptions {
     pub cycles: u64,
     /// The seed for the random laser cycles of recorded photons.
     pub seed: u64,
-    /// Arrays of histograms: the layout of the whole recording, if these are a part of it.
-    pub layout: Option<Layout>,
     /// Pixels that do not count for the length of histograms.
     pub masked: Vec<u16>,
     /// Histograms: the bins of the run for which the TDC was blind after a photon.
@@ -74,7 +72,6 @@ impl Default for ReadOptions {
             length: None,
             cycles: u64::MAX,
             seed: 1,
-            layout: None,
             masked: Vec::new(),
             dead_time: 0,
         }
@@ -118,14 +115,10 @@ impl Counts {
         let length = options.length;
         let length = length.unwrap_or(RecordingLength::PhotonsPerCycle(1.0));
         let (cycles, seed) = (options.cycles, options.seed);
-        let mut layout = match &options.layout {
-            None => Layout::from_captures(self.array, &self.captures)?,
-            Some(layout) => layout.clone(),
-        };
-        layout.masked.clone_from(&options.masked);
-        let photons =
-            RecordedHistograms::with_layout(&layout, &self.captures, length, cycles, seed);
         let (masked, dead_time) = (&options.masked, options.dead_time);
+        let (array, captures) = (self.array, &self.captures);
+        let photons =
+            RecordedHistograms::with_masked(array, captures, length, cycles, seed, masked);
         let photons = photons?.with_dead_time(&self.captures, masked, dead_time)?;
         Ok(photons.with_axis_names(self.axis_names))
     }
@@ -205,7 +198,7 @@ impl CheckedRecording {
     }
 
     /// Its photons. Of `options` only those count that settle the length of histograms: `length`, `cycles`,
-    /// `seed`, `layout`, `masked` and `dead_time`.
+    /// `seed`, `masked` and `dead_time`.
     ///
     /// # Errors
     /// Those of [`Counts::photons`], after the name of the recording.
@@ -402,10 +395,9 @@ fn array(input: &Input, options: &ReadOptions, read: Histograms) -> Result<Conte
         axes,
         pixels,
     } = read;
-    // A part is too small for this check.
-    let swapped = match (&options.axes, &options.layout) {
-        (None, None) => warnings::swapped_axes(&axes, &pixels),
-        _ => None,
+    let swapped = match &options.axes {
+        None => warnings::swapped_axes(&axes, &pixels),
+        Some(_) => None,
     };
     let bins = layout.bins();
     let captures = pixels.chunks(layout.array.pixels() as usize);
@@ -488,17 +480,9 @@ fn fit_bins(
     let captures: Vec<Capture> = captures
         .map(|capture| capture.into_iter().map(&mut fit_one).collect())
         .collect();
-    // Uses the layout of the whole recording, if this is a part.
-    let empty = match &options.layout {
-        None => {
-            let histograms = captures.iter().flatten();
-            warnings::empty_histograms(histograms.map(|bins| bins.iter().all(|&count| count == 0)))
-        }
-        Some(layout) => {
-            metadata.cut_off = layout.cut_off;
-            warnings::empty_histograms(layout.captures.iter().flatten().map(|&total| total == 0))
-        }
-    };
+    let histograms = captures.iter().flatten();
+    let empty =
+        warnings::empty_histograms(histograms.map(|bins| bins.iter().all(|&count| count == 0)));
     metadata.captures = all;
     metadata.gate = fit.gate();
     metadata.rows = fit.rows(metadata.cut_off);

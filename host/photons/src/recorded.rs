@@ -10,7 +10,6 @@
 //! [`RecordedHistograms::with_dead_time`].
 
 mod hits;
-mod layout;
 mod remaining;
 #[cfg(test)]
 mod tests;
@@ -23,7 +22,6 @@ use rand_pcg::Pcg64;
 use rayon::prelude::*;
 
 use self::hits::Hits;
-pub use self::layout::Layout;
 use self::remaining::Remaining;
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_options::Refused;
@@ -68,8 +66,6 @@ pub struct RecordedHistograms {
     next_cycle: u64,
     /// Laser cycles of a chunk.
     chunk: u16,
-    /// The address of the first of `pixels`.
-    first: u16,
     pixels: Vec<RecordedPixel>,
 }
 
@@ -77,8 +73,8 @@ impl RecordedHistograms {
     /// Replays `captures`, each of `array`, for at most `cycles` laser cycles.
     ///
     /// # Errors
-    /// Fails if there are more pixels than addresses, or more photons than can be
-    /// counted.
+    /// Fails if there are no captures, pixels without a histogram, more pixels than addresses, or more photons
+    /// than can be counted.
     pub fn new(
         array: Array,
         captures: &[Capture],
@@ -86,83 +82,71 @@ impl RecordedHistograms {
         cycles: u64,
         seed: u64,
     ) -> Result<Self> {
-        let layout = Layout::from_captures(array, captures)?;
-        Self::with_layout(&layout, captures, length, cycles, seed)
+        Self::with_masked(array, captures, length, cycles, seed, &[])
     }
 
-    /// Replays `captures`, a part of the recording of `layout`. They yield the same photons as in a
-    /// replay of the whole recording.
+    /// The same, with pixels that do not count for the length, such as hot ones. `masked` are their addresses.
     ///
     /// # Errors
-    /// Fails if they are not a part of it, or as [`Self::new`] does.
-    pub fn with_layout(
-        layout: &Layout,
+    /// As for [`Self::new`].
+    pub fn with_masked(
+        array: Array,
         captures: &[Capture],
         length: RecordingLength,
         cycles: u64,
         seed: u64,
+        masked: &[u16],
     ) -> Result<Self> {
-        let mut part_totals = Vec::new();
+        ensure!(!captures.is_empty(), "no captures");
+        let each = array.pixels() as usize;
+        let are_complete = captures.iter().all(|capture| capture.len() == each);
+        ensure!(are_complete, "a capture does not have {each} histograms");
+        let rows = u32::try_from(captures.len())?.saturating_mul(array.rows());
+        let all = Array::new(array.columns(), rows).context("more than 65,536 pixels")?;
+        let mut addresses = 0..=u16::MAX;
+        let (mut addressed, mut lengths) = (Vec::new(), Vec::new());
         for capture in captures {
-            part_totals.extend(totals(capture)?);
-        }
-        layout.check(&part_totals)?;
-        let mut lengths = Vec::new();
-        let mut pixels_before = 0;
-        for totals in &layout.captures {
-            let is_masked = |&(pixel, _): &(usize, &u64)| {
-                u16::try_from(pixels_before + pixel)
-                    .is_ok_and(|pixel| layout.masked.contains(&pixel))
-            };
-            let unmasked = totals.iter().enumerate().filter(|pixel| !is_masked(pixel));
-            let brightest = unmasked.map(|(_, &total)| total).max().unwrap_or(0);
-            pixels_before += totals.len();
+            let pixels: Vec<(u16, u64)> = addresses.by_ref().zip(totals(capture)?).collect();
+            let unmasked = pixels
+                .iter()
+                .filter(|(address, _)| !masked.contains(address));
+            let brightest = unmasked.map(|&(_, total)| total).max().unwrap_or(0);
             lengths.push(recorded_cycles(length, brightest)?);
+            addressed.push(pixels);
         }
         // A capture without photons does not make a replay longer.
         let longest = lengths.iter().flatten().copied().max();
         let longest = longest.unwrap_or_else(|| cycles.min(CYCLES_WITHOUT_PHOTONS));
         let lengths = lengths.iter().map(|length| length.unwrap_or(longest));
         let shortest = lengths.clone().min().unwrap_or(longest);
-        let (mut recorded, mut total_per_cycle) = (Vec::new(), 0.0);
-        for (totals, length_cycles) in layout.captures.iter().zip(lengths) {
-            total_per_cycle += totals
-                .iter()
-                .map(|&total| mean(total, length_cycles))
-                .sum::<f64>();
-            recorded.extend(totals.iter().map(|_| length_cycles));
-        }
         let (mut pixels, mut photons_per_cycle) = (Vec::new(), 0.0);
-        let first = u16::try_from(layout.first).context("more than 65,536 pixels")?;
-        let recorded = recorded.into_iter().skip(layout.first);
-        let addressed = (first..=u16::MAX).zip(captures.iter().flatten());
-        for ((address, counts), recorded) in addressed.zip(recorded) {
-            let remaining = Remaining::new(counts);
-            photons_per_cycle += mean(remaining.photons(), recorded);
-            pixels.push(RecordedPixel {
-                remaining,
-                hits: None,
-                cycles_left: recorded,
-                rng: pixel_rng(seed, PixelAddress::new(address)),
-                chunk: PixelPhotons::default(),
-                replayed_cycles: 0,
-                replayed_photons: 0,
-            });
+        for ((capture, addressed), recorded) in captures.iter().zip(addressed).zip(lengths) {
+            for ((address, total), counts) in addressed.into_iter().zip(capture) {
+                photons_per_cycle += mean(total, recorded);
+                pixels.push(RecordedPixel {
+                    remaining: Remaining::new(counts),
+                    hits: None,
+                    cycles_left: recorded,
+                    rng: pixel_rng(seed, PixelAddress::new(address)),
+                    chunk: PixelPhotons::default(),
+                    replayed_cycles: 0,
+                    replayed_photons: 0,
+                });
+            }
         }
         ensure!(
             photons_per_cycle <= MOST_A_CYCLE,
             "{photons_per_cycle:.0} photons a laser cycle are more than {MOST_A_CYCLE:.0}"
         );
         Ok(Self {
-            array: layout.array,
+            array: all,
             axis_names: ["column", "row"],
-            capture_rows: layout.capture_rows()?,
+            capture_rows: array.rows(),
             photons_per_cycle,
             cycles: cycles.min(longest),
             recorded: (shortest, longest),
             next_cycle: 0,
-            chunk: chunk(total_per_cycle),
-            first,
+            chunk: chunk(photons_per_cycle),
             pixels,
         })
     }
@@ -183,7 +167,7 @@ impl RecordedHistograms {
             return Ok(self);
         }
         let pixels = self.pixels.iter_mut().zip(captures.iter().flatten());
-        for (address, (pixel, counts)) in (self.first..=u16::MAX).zip(pixels) {
+        for (address, (pixel, counts)) in (0..=u16::MAX).zip(pixels) {
             let hits = Hits::new(counts, dead_time);
             let cycles = pixel.cycles_left;
             if let Some((bin, live)) = hits.contradiction(cycles)
@@ -274,7 +258,7 @@ impl PhotonSource for RecordedHistograms {
     }
 
     fn addresses(&self) -> Vec<PixelAddress> {
-        let addresses = (self.first..=u16::MAX).take(self.pixels.len());
+        let addresses = (0..=u16::MAX).take(self.pixels.len());
         addresses.map(PixelAddress::new).collect()
     }
 

@@ -19,8 +19,7 @@ pub(crate) fn watch_glass(requested: &SettingsFile, bins: Option<&[u64]>, summar
 
 /// How many times as bright crosstalk is as in the settings, and at least, if it is significantly
 /// brighter.
-#[must_use]
-pub fn brighter(requested: &SettingsFile, run: &RunPhotons) -> Option<[f64; 2]> {
+fn brighter(requested: &SettingsFile, run: &RunPhotons) -> Option<[f64; 2]> {
     let SensorSettings {
         glass_bins, gate, ..
     } = &requested.sensor;

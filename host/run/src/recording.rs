@@ -163,7 +163,6 @@ pub fn read_options(requested: &SettingsFile) -> ReadOptions {
             _ => 10_000,
         }),
         seed: seed.unwrap_or(1),
-        layout: None,
         masked: requested.sensor.masked.clone().unwrap_or_default(),
         dead_time: requested.sensor.dead_time.unwrap_or(0),
     }

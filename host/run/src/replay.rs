@@ -2,7 +2,7 @@
 //!
 //! Without chosen settings it finds them in the recording first, as `calibrate` does.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Result, ensure};
 
 use super::calibrate::calibrate_counts;
 use super::given::{FRAME, Given, SENSOR, TDC, of_given};
@@ -22,8 +22,7 @@ use dtof_options::{Refused, option_name};
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
-use dtof_photons::open::{CheckedRecording, Metadata, ReadOptions, Recording, check};
-use dtof_photons::recorded::Layout;
+use dtof_photons::open::{CheckedRecording, Metadata, Recording, check};
 use dtof_photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
 
 /// The options that settle which photons are replayed, and whether pixels decide once.
@@ -154,33 +153,8 @@ impl Options {
     /// Fails if the recording cannot be read or a setting does not suit it; the error begins with the name
     /// of the recording. If no settings can be found in it, the defaults hold, and the metadata has a warning.
     pub fn open(&self, input: &Input, requested: &SettingsFile) -> Result<Replay> {
-        self.open_part(input, requested, None)
-    }
-
-    /// The same for a part of a recording with this `layout`, if there is one.
-    ///
-    /// # Errors
-    /// As [`Self::open`] and [`Self::check_for_parts`]. Also fails if `input` does not fit the layout, cuts blocks
-    /// of pixels, or holds photons.
-    pub fn open_part(
-        &self,
-        input: &Input,
-        requested: &SettingsFile,
-        layout: Option<Layout>,
-    ) -> Result<Replay> {
-        let options = ReadOptions {
-            layout,
-            ..read_options(requested)
-        };
-        if options.layout.is_some() {
-            self.check_for_parts()?;
-        }
-        let mut recording = check(input, &options)?;
+        let mut recording = check(input, &read_options(requested))?;
         self.given.suits(input, recording.metadata())?;
-        ensure!(
-            options.layout.is_none() || !recording.metadata().is_list,
-            "{input} holds photons: only histograms are replayed in parts"
-        );
         let mut requested = requested.clone();
         let captures = recording.metadata().captures;
         mask_capture(&mut requested, recording.array().pixels(), captures)?;
@@ -189,10 +163,7 @@ impl Options {
             true => Ok((Vec::new(), None)),
             false => find(&mut requested, &mut recording),
         };
-        let options = ReadOptions {
-            layout: options.layout,
-            ..read_options(&requested)
-        };
+        let options = read_options(&requested);
         let Recording {
             photons,
             mut metadata,
@@ -243,13 +214,6 @@ impl Options {
                     "needs one capture of columns and rows: pixels of different captures are not neighbours"
                 ))
             );
-            ensure!(
-                options.layout.is_none(),
-                refused(Refused::new(
-                    "neighbours",
-                    "would be missing at the edges of parts: replay the recording as a whole"
-                ))
-            );
         }
         ensure!(
             metadata.is_list || options.length.is_some() || !settings.weighs_dead_time(),
@@ -273,11 +237,6 @@ impl Options {
                     )
                 ))
             );
-            if let Some(layout) = &options.layout {
-                let pixels = photons.addresses().len();
-                let is_whole = layout.has_whole_blocks(pixels, side);
-                is_whole.with_context(|| input.to_string())?;
-            }
         }
         let photons = Masked::new(photons, &settings.masked)?;
         let photons = photons.with_laser_hz(requested.sensor.laser_hz);
@@ -294,22 +253,6 @@ impl Options {
                 false => choosing,
             },
         })
-    }
-
-    /// Checks that these options suit a part of a recording.
-    ///
-    /// # Errors
-    /// Fails if nothing chooses how pixels decide: a part does not show the settings of the whole.
-    pub fn check_for_parts(&self) -> Result<(), Refused> {
-        let reason = "is needed for a recording in parts, or an option that chooses how pixels decide, such as `rule`: calibrate finds settings";
-        if self.given.options.run.capture.is_some() {
-            let reason = "is for a recording as a whole; leave out the other captures before it is cut into parts";
-            return Err(Refused::new("capture", reason));
-        }
-        match self.has_file() || !self.choosing().is_empty() {
-            true => Ok(()),
-            false => Err(Refused::new("settings", reason)),
-        }
     }
 
     /// Whether there is a settings file.

@@ -77,8 +77,6 @@ impl Reported {
 pub struct RunResult {
     /// Its totals.
     pub summary: Summary,
-    /// Its photons bin by bin, if the settings have the crosstalk of the cover glass.
-    pub bins: Option<Vec<u64>>,
     /// Warnings about its photons, which are also in the summary.
     pub warnings: Vec<String>,
 }
@@ -165,11 +163,7 @@ pub fn run(
         warnings.push(format!("ended early, after {cycles} of {all} laser cycles"));
     }
     summary.warnings.clone_from(&warnings);
-    Ok(RunResult {
-        summary,
-        bins,
-        warnings,
-    })
+    Ok(RunResult { summary, warnings })
 }
 
 /// Gives a slice and its events to all sinks.

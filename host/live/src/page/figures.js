@@ -37,20 +37,8 @@ export function showTotals(frame, framesPerSecond) {
   button.dataset.on = !on;
 }
 
-<<<<<<< HEAD
-/** The position is moved and not sent yet, so frames leave it alone. */
-let isMoving = false;
-
-/** A place in a recording, in seconds, or in milliseconds if it is short. */
-function placeText(seconds, length) {
-  if (length < 0.01) return `${fixed(1000 * seconds, 3)} of ${fixed(1000 * length, 3)} ms`;
-  const digits = length < 10 ? 3 : 1;
-  return `${fixed(seconds, digits)} of ${fixed(length, digits)} s`;
-}
-=======
 /** Whether the position is moved and not sent yet, so that frames leave it alone; the speed that is shown. */
 export const playback = { isMoving: false, speed: 0 };
->>>>>>> dd56c221 (The scripts of both pages are ES modules, and their pure parts have tests)
 
 /** Shows where playback is, and how fast. */
 export function showPlayhead({ seconds, length, speed }) {

@@ -43,8 +43,9 @@ export function lossName(name, fault) {
   return fault && name === "sensor errors" ? `${name} (last: ${fault})` : name;
 }
 
-/** A place in a recording, in seconds. */
+/** A place in a recording, in seconds, or in milliseconds if it is short. */
 export function placeText(seconds, length) {
+  if (length < 0.01) return `${fixed(1000 * seconds, 3)} of ${fixed(1000 * length, 3)} ms`;
   const digits = length < 10 ? 3 : 1;
   return `${fixed(seconds, digits)} of ${fixed(length, digits)} s`;
 }

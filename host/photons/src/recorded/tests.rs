@@ -95,9 +95,8 @@ fn a_capture_without_photons_is_as_long_as_the_longest_other() {
     );
     assert_eq!(cycles(&only_dark, 300), (300, Some((300, 300))));
     // Neither do masked pixels show it.
-    let mut layout = Layout::from_captures(array, from_ref(&dim)).unwrap();
-    layout.masked = vec![0];
-    let masked = RecordedHistograms::with_layout(&layout, from_ref(&dim), length, u64::MAX, 1);
+    let dim = from_ref(&dim);
+    let masked = RecordedHistograms::with_masked(array, dim, length, u64::MAX, 1, &[0]);
     assert_eq!(masked.unwrap().cycles(), 10_000);
 }
 
@@ -123,90 +122,16 @@ fn photons_fall_evenly_over_the_laser_cycles_whatever_their_bin() {
     }
 }
 
-/// Captures of three rows of four pixels, of different brightness.
-fn bright(captures: u64) -> Vec<Capture> {
-    let counts = |pixel: u64| {
-        (0..8)
-            .map(move |bin| (pixel * 37 + bin * 11) % 90)
-            .collect()
-    };
-    let captures = (0..captures).map(|capture| (capture * 12..(capture + 1) * 12).map(counts));
-    captures.map(Iterator::collect).collect()
-}
-
-/// For any parts, and any number of photons a chunk.
 #[test]
-fn parts_hold_the_photons_that_they_hold_in_the_whole() {
-    let array = Array::new(4, 6).unwrap();
-    for length in [
-        RecordingLength::PhotonsPerCycle(0.4),
-        RecordingLength::Cycles(3000),
-    ] {
-        let captures = bright(2);
-        let all: Vec<Vec<u64>> = captures.iter().flatten().cloned().collect();
-        let totals: Vec<u64> = all.iter().map(|counts| counts.iter().sum()).collect();
-        let one = Array::new(4, 3).unwrap();
-        let mut complete = RecordedHistograms::new(one, &captures, length, 900, 5).unwrap();
-        let cycles = complete.cycles();
-        let expected = complete.next_slice(900).unwrap().pixels;
-        for (first, end) in [(0, 8), (8, 12), (12, 24), (4, 20), (0, 24)] {
-            let layout = Layout::new(array, 2, &totals, first).unwrap();
-            let histograms = [all[first..end].to_vec()];
-            let mut part =
-                RecordedHistograms::with_layout(&layout, &histograms, length, 900, 5).unwrap();
-            let addresses = part.addresses();
-            assert_eq!(usize::from(addresses[0].raw()), first);
-            assert_eq!(part.array(), array);
-            assert_eq!((part.cycles(), part.capture_rows()), (cycles, 3));
-            assert_eq!(part.recorded_cycles(), complete.recorded_cycles());
-            let photons = part.next_slice(900).unwrap().pixels;
-            assert_eq!(photons, expected[first..end]);
-        }
-    }
-}
-
-/// A dim part of a bright array has the chunks of the whole array.
-#[test]
-fn a_part_has_the_chunks_of_the_whole() {
-    let array = Array::new(1, 2).unwrap();
-    let captures = [vec![vec![4_000_000; 8], vec![900; 8]]];
-    let length = RecordingLength::Cycles(4000);
-    let mut complete = RecordedHistograms::new(array, &captures, length, 600, 5).unwrap();
-    assert!(complete.chunk < 600);
-    let layout = Layout::new(array, 1, &[32_000_000, 7200], 1).unwrap();
-    let dim = [vec![vec![900; 8]]];
-    let mut part = RecordedHistograms::with_layout(&layout, &dim, length, 600, 5).unwrap();
-    assert_eq!(part.chunk, complete.chunk);
-    assert_eq!(
-        part.next_slice(600).unwrap().pixels[0],
-        complete.next_slice(600).unwrap().pixels[1]
-    );
-}
-
-#[test]
-fn what_is_no_part_is_refused() {
-    let array = Array::new(1, 2).unwrap();
-    let layout = |first| Layout::new(array, 1, &[80, 16], first).unwrap();
-    let refused = |layout: &Layout, counts: &[u64]| {
-        let part = [counts.iter().map(|&count| vec![count; 8]).collect()];
-        let length = RecordingLength::Cycles(10);
-        let refused = RecordedHistograms::with_layout(layout, &part, length, 10, 1);
+fn captures_that_no_array_holds_are_refused() {
+    let refused = |captures: &[Capture]| {
+        let most = Array::new(256, 256).unwrap();
+        let refused = RecordedHistograms::new(most, captures, RecordingLength::Cycles(10), 10, 1);
         refused.unwrap_err().to_string()
     };
-    assert!(refused(&layout(1), &[10]).contains("pixel 1 has 80 photons, but 16"));
-    assert!(refused(&layout(1), &[2, 2]).contains("there is no pixel 2"));
-    assert!(Layout::new(array, 1, &[1], 0).is_err());
-    assert!(Layout::new(array, 0, &[1, 1], 0).is_err());
-    assert!(Layout::new(array, 3, &[1, 1], 0).is_err());
-    let most = Array::new(256, 256).unwrap();
-    let refused = |captures: &[Capture]| {
-        Layout::from_captures(most, captures)
-            .unwrap_err()
-            .to_string()
-    };
-    let layout = vec![vec![1; 8]; 65_536];
+    let capture = vec![vec![1; 8]; 65_536];
     assert_eq!(
-        refused(&[layout.clone(), layout]),
+        refused(&[capture.clone(), capture]),
         "more than 65,536 pixels"
     );
     assert_eq!(
@@ -216,23 +141,6 @@ fn what_is_no_part_is_refused() {
     assert_eq!(refused(&[]), "no captures");
 }
 
-#[test]
-fn a_part_that_cuts_a_block_is_refused() {
-    let array = Array::new(4, 10).unwrap();
-    let cuts = |row: usize, end: usize, side: usize| {
-        let layout = Layout::new(array, 1, &[0; 40], row * 4).unwrap();
-        layout.has_whole_blocks((end - row) * 4, side).is_err()
-    };
-    for row in 0..10 {
-        for end in row + 1..=10 {
-            for side in [2, 4, 8] {
-                let is_cut = row % side != 0 || (end < 10 && end % side != 0);
-                assert_eq!(cuts(row, end, side), is_cut, "{row}..{end} {side}");
-            }
-        }
-    }
-}
-
 /// A hot pixel that is masked does not count for the length. Each of two captures has its own
 /// length.
 #[test]
@@ -240,16 +148,12 @@ fn masked_pixels_do_not_set_the_length() {
     let array = Array::new(3, 1).unwrap();
     let row = |totals: [u64; 3]| totals.map(|total| vec![total; 8]).to_vec();
     let captures = [row([10, 5000, 20]), row([40, 3, 7])];
-    let length = |masked: Vec<u16>| {
-        let layout = Layout {
-            masked,
-            ..Layout::from_captures(array, &captures).unwrap()
-        };
+    let length = |masked: &[u16]| {
         let length = RecordingLength::PhotonsPerCycle(0.5);
-        let source = RecordedHistograms::with_layout(&layout, &captures, length, u64::MAX, 1);
+        let source = RecordedHistograms::with_masked(array, &captures, length, u64::MAX, 1, masked);
         source.unwrap().recorded_cycles()
     };
-    assert_eq!(length(vec![]), Some((640, 80_000)));
-    assert_eq!(length(vec![1]), Some((320, 640)));
-    assert_eq!(length(vec![1, 3]), Some((112, 320)));
+    assert_eq!(length(&[]), Some((640, 80_000)));
+    assert_eq!(length(&[1]), Some((320, 640)));
+    assert_eq!(length(&[1, 3]), Some((112, 320)));
 }
