@@ -10,4 +10,4 @@ mod tests;
 
 pub use draw::heat_map;
 pub use map::Map;
-pub use scale::span;
+pub use scale::{levels, span};

@@ -38,7 +38,8 @@ pub fn span(values: &[Option<f64>]) -> Option<(f64, f64)> {
 }
 
 /// The colour level of each value, as a map shows it.
-pub(super) fn levels(values: &[Option<f64>]) -> Vec<Option<u8>> {
+#[must_use]
+pub fn levels(values: &[Option<f64>]) -> Vec<Option<u8>> {
     let scale = Scale::new(values);
     let level = |value: &Option<f64>| Some(scale.as_ref()?.level(finite(*value)?));
     values.iter().map(level).collect()
