@@ -6,14 +6,8 @@
 //! DTOF_SLOW=1 cargo test --package dtof-host-tests --test simulations
 //! ```
 
-mod calibrate_glass;
-mod calibrate_pile_up;
 mod calibrate_recorded;
-mod calibrate_scenes;
-mod calibration;
 mod capture_log;
-mod compare;
-mod compare_scenes;
 mod counters;
 mod dead_time;
 mod decide_once;

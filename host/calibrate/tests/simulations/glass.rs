@@ -1,6 +1,6 @@
 //! Crosstalk of the cover glass: gates that exclude it, crosstalk with a tail, and crosstalk that grows.
 
-use crate::calibration::{recorded, slices};
+use crate::drawn::{recorded, slices};
 use crate::slow_or_quick;
 use dtof_calibrate::{
     Calibration, CalibrationOptions, Change, Length, Nearest, Observed, RunPhotons, calibrate,

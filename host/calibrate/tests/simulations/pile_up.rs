@@ -1,6 +1,6 @@
 //! Pile-up: which TDC a recording comes from, and rates that are corrected for it.
 
-use crate::calibration::recorded;
+use crate::drawn::recorded;
 use crate::slow_or_quick;
 use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, Tdc, calibrate};
 use dtof_core::Array;

@@ -23,7 +23,8 @@ use dtof_theory::bounds::likelihood_ratio::information;
 
 /// The instructions of an operation in a table, at opt-level 3.
 fn counted(variant: &str) -> f64 {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/results/bench/instructions.csv");
+    let path =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/results/bench/instructions.csv");
     let text = std::fs::read_to_string(path).unwrap();
     let row = text
         .lines()

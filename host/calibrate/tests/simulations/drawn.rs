@@ -1,10 +1,9 @@
 //! Random scenes for calibration, and the false alarms with the resulting settings.
 
 #![allow(
-    dead_code,
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
-    reason = "not every test needs all of it; numbers are drawn from small ranges"
+    reason = "numbers are drawn from small ranges"
 )]
 
 use std::fmt::Write as _;

@@ -1,7 +1,7 @@
 //! Compares the calibration with the truth of twenty random simulated scenes. It gets only their
 //! histograms and laser cycles.
 
-use crate::calibration::{Drawn, false_alarms};
+use crate::drawn::{Drawn, false_alarms};
 use crate::slow_or_quick;
 use dtof_calibrate::{CalibrationOptions, Length, Nearest, Observed, calibrate};
 use rayon::prelude::*;
