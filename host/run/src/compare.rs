@@ -91,8 +91,6 @@ struct Subject {
     photons: Photons,
     /// Why L1 is what it is.
     why_l1: &'static str,
-    /// Warnings about it.
-    warnings: Vec<String>,
 }
 
 /// Where photons come from, for each seed.
@@ -169,7 +167,6 @@ impl Options {
             truth,
             photons,
             why_l1,
-            warnings,
         } = subject;
         let false_alarm = self.false_alarm_share(&requested);
         let sigma = requested.sensor.sigma_bins;
@@ -194,8 +191,6 @@ impl Options {
         if !settings.offsets_mm.is_empty() {
             settings = settings.for_source(photons(1)?.as_ref())?;
         }
-        // Nothing else is wrong: an error needs no warning before it.
-        warnings.into_iter().for_each(callbacks.warning);
         let comparison = compare(&Task {
             photons: &photons,
             truth,
@@ -246,16 +241,16 @@ impl Options {
         let is_once_per_bin = requested.detection.once_per_bin == Some(true);
         check_once_per_bin(is_once_per_bin, counts.metadata.is_list)?;
         let width = bin_width_warning(&counts.metadata);
+        warnings(&counts.metadata)
+            .chain(width)
+            .for_each(callbacks.warning);
         let pixels = counts.array.pixels() as usize * counts.captures.len();
         let truth = match (truth, &counts.truth_mm) {
             (Some(truth), _) => Some(Truth::read(truth, pixels)?),
             (None, ranges) => ranges.clone().map(Truth::Ranges),
         };
         let metres = truth.as_ref().and_then(Truth::in_metres);
-        let warnings = warnings(&counts.metadata)
-            .chain(width)
-            .chain(metres)
-            .collect();
+        metres.into_iter().for_each(callbacks.warning);
         let with_biases = |truth: Truth| -> Result<Truth> {
             Ok(match requested.rays.slants(counts.array)? {
                 Some([_, biases]) => truth.with_biases(&biases),
@@ -291,7 +286,6 @@ impl Options {
             requested: with_short_exposures(requested),
             truth,
             why_l1,
-            warnings,
             photons: if counts.metadata.is_list {
                 Photons::List(input)
             } else {
@@ -325,7 +319,6 @@ fn subject_of_scene(scene: Scene, name: &str, requested: SettingsFile) -> Result
         requested: with_short_exposures(requested),
         why_l1: if is_given { GIVEN_L1 } else { SECOND_LOOK },
         truth: Some(Truth::Scene(Box::new(scene.clone()))),
-        warnings: Vec::new(),
         photons: Photons::Scene(Box::new(scene)),
     })
 }

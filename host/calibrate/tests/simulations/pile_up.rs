@@ -8,6 +8,7 @@ use dtof_simulate::scene::Scene;
 use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg32;
+use rayon::prelude::*;
 
 fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibration {
     let text = format!(
@@ -171,7 +172,7 @@ fn flat_counts_have_no_dead_time() {
         } else {
             slow_or_quick(100, 20)
         };
-        let found = (0..seeds).filter(|&seed| {
+        let found = (0u64..seeds).into_par_iter().filter(|&seed| {
             let mut rng = Pcg32::seed_from_u64(seed);
             let poisson = Poisson::new(light).unwrap();
             #[allow(

@@ -56,7 +56,6 @@ impl Calibrate {
         let input = self.recorded.file();
         let name = input.map(|input| input.display().to_string());
         let name = name.or(self.from_device.device.clone()).unwrap_or_default();
-        let mut warnings = Vec::new();
         let (found, settings, collected) = match input {
             Some(input) => {
                 self.from_device.check_unused()?;
@@ -64,7 +63,7 @@ impl Calibrate {
 
                 let options = &self.options.0;
                 let calibrated = options.calibrate(&input.into(), requested.clone(), &mut bar)?;
-                warnings = calibrated.warnings;
+                warn(input, calibrated.warnings, self.quiet);
                 (calibrated.found, calibrated.settings, Vec::new())
             }
             None => {
@@ -102,8 +101,6 @@ impl Calibrate {
             marked(&self.out, &text, MARKS[0]),
         ];
         write_marked(&files, &inputs)?;
-        // Everything is written: an error needs no warning before it.
-        warn(Path::new(&name), warnings, self.quiet);
         if !self.quiet {
             let mut out = io::stdout().lock();
             let rows = [collected, report::rows(&found)].concat();

@@ -327,18 +327,3 @@ fn the_settings_of_a_run_that_decided_once_are_those_of_its_sensor() {
     // The z of one decision is not that of looks.
     assert_eq!(settings[0], settings[1]);
 }
-
-/// The error is enough: warnings about the recording would stand before it.
-#[test]
-fn a_recording_that_is_refused_has_no_warnings() {
-    let scratch = Scratch::new();
-    scratch.file("dark.npy", npy("|u1", "(2, 16)", &[0; 32]));
-    scratch.file("x.toml", "not written by dtof");
-    scratch.all_refused(
-        "",
-        "
-            compare dark.npy --out out | --sigma-bins is needed: no peak of dark.npy
-            calibrate dark.npy --out x.toml | x.toml: was not written by this program
-        ",
-    );
-}
