@@ -113,7 +113,7 @@ fn the_bare_diodes_are_of_the_classes_that_the_page_names() {
     says(&format!("one of 75 W {:.0} mW", 3.0 * mw));
     // Class 3R ends at 5 times class 1, class 3B at 0.5 W on average.
     assert!(mw > 5.0 * 3.0 * AVERAGE_W * 1e3 && 3.0 * mw < 500.0);
-    // Pulses of 104 ns, 75 W.
+    says("with 104 ns, 75 W are class 4");
     assert!(3.0 * mw * 104e-9 / pulse_s > 500.0);
     says(&format!(
         "duty of 0.1 % only, and this one is {:.2} %",

@@ -9,7 +9,7 @@ use dtof_theory::tune::{FalseAlarmLimit, Request, window};
 use super::false_alarms;
 use super::find::pulse::Pulse;
 use super::photon_budget::PhotonBudget;
-use super::used_pulse::UsedPulse;
+use super::used_pulse::{PulseSource, UsedPulse};
 use super::{CalibrationOptions, WindowDetection};
 use dtof_options::Refused;
 
@@ -106,10 +106,14 @@ pub fn detection(
     }
     let bins = u16::try_from(found.bins)?;
     if let Some(measured) = found.measured {
+        let sigma = match pulse.source {
+            PulseSource::Given => pulse.sigma_bins.to_num(),
+            _ => measured.sigma,
+        };
         let request = Request {
             background: background.max(1e-6),
             signal: measured.signal,
-            sigma: measured.sigma.min(f64::from(bins) / 4.0),
+            sigma: sigma.min(f64::from(bins) / 4.0),
             bins,
             minimum_count: MIN_COUNT,
             x,

@@ -15,7 +15,7 @@ const WRONG_AT_MOST: f64 = 0.05;
 
 /// A method may leave this share of the pixels more without a right report than the full-resolution trial that leaves the
 /// fewest. Times are those of the middle half of the pixels, and errors those of pixels that report: neither shows pixels
-/// that have fallen silent. A tenth is more than chance: of 64 pixels the share has a standard deviation of at most 0.06.
+/// that have fallen silent. Of 64 pixels the share has a standard deviation of at most 0.063 by chance.
 const SILENT_ALLOWED: f64 = 0.1;
 
 /// A method at the point where it becomes exact enough, interpolated between two trials.
@@ -126,7 +126,7 @@ fn nearly_fastest<'a>(candidates: impl Iterator<Item = &'a Choice> + Clone) -> O
 }
 
 /// Interpolates geometrically between the last trial that is not exact enough and the first that is. `None` if too many
-/// pixels are silent there: with more photons of a peak still more are.
+/// pixels are silent there; a higher least count only silences more.
 fn where_exact(trials: &[&Outcome], limits: &Limits) -> Option<Choice> {
     let within_mm = limits.within_mm;
     // The error of few reports may be small by chance.

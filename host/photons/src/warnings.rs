@@ -1,6 +1,5 @@
 //! Warnings about recordings that can be read but look wrong.
 
-use std::cmp::Reverse;
 use std::collections::BTreeMap;
 
 use dtof_core::fixed::types::U16F16;
@@ -65,34 +64,19 @@ pub fn list_shape(pixels: usize, columns: Option<u32>) -> Option<String> {
     }
 }
 
-/// One in so many pixels may be hot.
-const HOT_ONE_IN: usize = 100;
-/// With fewer photons that would meet by chance in one place, the number that does says little.
-const FEWEST_BY_CHANCE: f64 = 5.0;
-/// From here on, the last axis looks like the bins.
-const LOOKS_LIKE_BINS: f64 = 1.5;
-/// From here on, another axis does.
-const MUST_BE_BINS: f64 = 4.0;
+/// From here on, an axis looks like the bins.
+const LOOKS_LIKE_BINS: f64 = 4.0;
+/// And if it is so many times as concentrated as the last axis.
+const MORE_THAN_LAST: f64 = 1.5;
 
-/// How much more often two photons of a line fall into one place than if they were spread evenly. 1
-/// for an even line whatever its noise, and its length if all are in one place.
-///
-/// Lines weigh as much as they have pairs of photons, but none more than the median one. So a few bright lines, such as
-/// those through a hot pixel, do not speak for all.
+/// How much more often two photons of a line fall into one place than if they were spread evenly, of all lines along an
+/// axis. 1 for an even line whatever its noise, and its length if all are in one place.
 #[derive(Clone, Default)]
 struct Concentration {
-    /// Lines by the binary logarithm of their pairs.
-    classes: BTreeMap<i32, Lines>,
-    /// Pairs of photons that would meet by chance.
-    by_chance: f64,
-}
-
-/// Sums over lines with about the same number of pairs.
-#[derive(Clone, Copy, Default)]
-struct Lines {
-    lines: f64,
-    meet: f64,
-    pairs: f64,
+    /// Lines with at least two photons, and the sum of their numbers, by a number's logarithm.
+    classes: BTreeMap<i32, (f64, f64)>,
+    /// Lines with fewer.
+    empty: f64,
 }
 
 impl Concentration {
@@ -104,59 +88,57 @@ impl Concentration {
             sum += count;
             same += count * (count - 1.0);
         }
-        let pairs: f64 = sum * (sum - 1.0) / 2.0;
-        if pairs > 0.0 {
-            #[allow(clippy::cast_possible_truncation, reason = "at most 128")]
-            let class = self.classes.entry(pairs.log2() as i32).or_default();
-            class.lines += 1.0;
-            class.meet += same * places / 2.0;
-            class.pairs += pairs;
-            self.by_chance += pairs / places;
+        if sum < 2.0 {
+            self.empty += 1.0;
+            return;
         }
+        let value: f64 = same * places / (sum * (sum - 1.0));
+        // In steps of a sixteenth of an octave. Zero is the lowest.
+        #[allow(clippy::cast_possible_truncation, reason = "saturates")]
+        let class = self.classes.entry((value.log2() * 16.0) as i32);
+        let (lines, total) = class.or_default();
+        *lines += 1.0;
+        *total += value;
     }
 
-    fn value(&self) -> f64 {
-        if self.by_chance < FEWEST_BY_CHANCE {
-            return 1.0;
+    /// The mean of the lines with photons.
+    fn mean(&self) -> f64 {
+        let lines: f64 = self.classes.values().map(|(lines, _)| lines).sum();
+        let total: f64 = self.classes.values().map(|(_, total)| total).sum();
+        if lines > 0.0 { total / lines } else { 1.0 }
+    }
+
+    /// The mean of the less concentrated half of the lines, so that hot pixels do not speak for all. A line without
+    /// photons is even.
+    fn of_lower_half(&self) -> f64 {
+        let lines: f64 = self.classes.values().map(|(lines, _)| lines).sum();
+        let half = (lines + self.empty) / 2.0;
+        let (mut taken, mut sum) = (self.empty.min(half), self.empty.min(half));
+        for (lines, total) in self.classes.values() {
+            let part = lines.min(half - taken);
+            taken += part;
+            sum += total * part / lines;
         }
-        let all: f64 = self.classes.values().map(|class| class.lines).sum();
-        let (mut lines, mut most) = (0.0, f64::INFINITY);
-        let (mut meet, mut pairs) = (0.0, 0.0);
-        for class in self.classes.values() {
-            let of_line = class.pairs / class.lines;
-            let weight = (most / of_line).min(1.0);
-            meet += weight * class.meet;
-            pairs += weight * class.pairs;
-            lines += class.lines;
-            if 2.0 * lines >= all {
-                most = most.min(of_line);
-            }
-        }
-        meet / pairs
+        if taken > 0.0 { sum / taken } else { 1.0 }
     }
 }
 
 /// Warns if another axis than the last looks like the bins although the last was read as such. `axes` are
-/// the lengths of the others. Photons concentrate in a pulse along the bins, and hardly along pixels, if hot ones are
-/// left out.
+/// the lengths of the others. Photons concentrate in a pulse along the bins: in most lines, while a hot pixel is in few.
 #[must_use]
 pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
     let mut along_last = Concentration::default();
     pixels
         .iter()
         .for_each(|bins| along_last.add(bins.iter().copied()));
-    if along_last.value() >= LOOKS_LIKE_BINS {
+    if along_last.mean() >= LOOKS_LIKE_BINS {
         return None;
     }
     let total = |bins: &[u64]| bins.iter().fold(0u64, |sum, &n| sum.saturating_add(n));
-    let mut brightest: Vec<usize> = (0..pixels.len()).collect();
-    brightest.sort_by_key(|&pixel| Reverse(total(&pixels[pixel])));
-    let mut is_left_out = vec![false; pixels.len()];
-    for &pixel in &brightest[..pixels.len().div_ceil(HOT_ONE_IN)] {
-        is_left_out[pixel] = true;
-    }
+    let brightest = (0..pixels.len()).max_by_key(|&pixel| total(&pixels[pixel]));
     let mut apart = pixels.len();
-    let mut found = (MUST_BE_BINS, None);
+    let least = LOOKS_LIKE_BINS.max(MORE_THAN_LAST * along_last.mean());
+    let mut found = (least, None);
     for (number, &length) in axes.iter().enumerate() {
         let whole = apart;
         apart /= length.max(1);
@@ -164,18 +146,20 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
         if length < 8 || apart * length != whole {
             continue;
         }
+        // If all lines pass one pixel, it may be hot, and a pulse is wider.
+        let left_out = brightest.filter(|_| length == pixels.len());
         let mut along = Concentration::default();
         for start in (0..pixels.len()).filter(|start| start % whole < apart) {
             let line = (start..).step_by(apart).take(length);
-            let line = line.filter(|&pixel| !is_left_out[pixel]);
+            let line = line.filter(|&pixel| Some(pixel) != left_out);
             let line: Vec<&[u64]> = line.map(|pixel| &pixels[pixel][..]).collect();
             let bins = line.first().map_or(0, |bins| bins.len());
             for bin in 0..bins {
                 along.add(line.iter().map(|bins| bins[bin]));
             }
         }
-        if along.value() > found.0 {
-            found = (along.value(), Some(number));
+        if along.of_lower_half() > found.0 {
+            found = (along.of_lower_half(), Some(number));
         }
     }
     let which = match found.1? {
@@ -245,5 +229,43 @@ mod tests {
         let turned = bins_first(&counts(128, 5.0, 100.0, 0.0), 16);
         let warning = swapped_axes(&[16, 8], &turned).unwrap();
         assert!(warning.starts_with("the first axis looks like the bins"));
+    }
+
+    /// Histograms of 16x16 pixels: a pulse of 60 photons at its peak, and one of the background in a bin. The wall stands at the
+    /// middle, or slopes over a quarter of the bins.
+    fn wall(bins: usize, sigma: f64, slopes: bool) -> Vec<Vec<u64>> {
+        let mut rng = Pcg64::new(2, 2);
+        let mut photons = |mean: f64| Poisson::new(mean).unwrap().sample(&mut rng);
+        let mut pixel = |number: usize| {
+            let slope = if slopes { 0.25 } else { 0.0 };
+            let centre = bins as f64 * (0.4 + slope * (number % 16) as f64 / 16.0);
+            let mut mean = |bin: usize| {
+                let away = (bin as f64 - centre) / sigma;
+                photons(1.0 + 60.0 * (-0.5 * away * away).exp())
+            };
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "numbers of photons"
+            )]
+            (0..bins).map(|bin| mean(bin) as u64).collect()
+        };
+        (0..256).map(&mut pixel).collect()
+    }
+
+    #[test]
+    fn a_narrow_pulse_in_many_bins_is_seen_along_the_right_axis() {
+        for bins in [64, 128, 256, 512] {
+            for (sigma, slopes) in [(0.5, false), (0.5, true), (1.0, false), (1.0, true)] {
+                let pixels = wall(bins, sigma, slopes);
+                let right = swapped_axes(&[16, 16], &pixels);
+                assert_eq!(right, None, "{bins} {sigma} {slopes}");
+                let flat = (0..bins).flat_map(|bin| pixels.iter().map(move |bins| bins[bin]));
+                let flat: Vec<u64> = flat.collect();
+                let turned: Vec<Vec<u64>> = flat.chunks(16).map(<[u64]>::to_vec).collect();
+                let warning = swapped_axes(&[bins, 16], &turned);
+                assert!(warning.is_some(), "{bins} {sigma} {slopes}");
+            }
+        }
     }
 }

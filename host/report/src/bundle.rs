@@ -1,7 +1,7 @@
 //! Joins the JavaScript modules of a page into one script, so that a page is one file.
 //!
-//! Each module becomes a function that is called once and returns its exports. So its names are its own, and
-//! what it does not import it does not see. Modules use the part of the syntax that [`Error`] describes.
+//! Each module becomes a function that is called once and returns its exports. So it sees only
+//! its own names and those that it imports. Modules use the part of the syntax that [`Error`] describes.
 //! Comments that fill a line and empty lines are left out.
 
 #[cfg(test)]

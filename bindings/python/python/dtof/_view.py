@@ -44,7 +44,11 @@ class View:
                 self.close()
                 lines = lines or ["the program dtof has shown no page"]
                 raise Error(with_keywords(lines[-1].removeprefix("error: ")))
-            warn([line.removeprefix("warning: ") for line in lines], callers=3)
+            try:
+                warn([line.removeprefix("warning: ") for line in lines], callers=3)
+            except Warning:
+                self.close()
+                raise
 
     def wait(self) -> None:
         """Waits until the page ends, as by Ctrl-C."""

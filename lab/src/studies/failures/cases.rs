@@ -316,11 +316,12 @@ fn pile_up() -> Result<Vec<Case>> {
     };
     let (few, first) = ([rows::FEW_PHOTONS; 2], [rows::FIRST, rows::FIRST_SET]);
     let (dead_20, dead_5) = ([rows::DEAD_20; 2], [rows::DEAD_5; 2]);
-    let dead_20_more = [rows::DEAD_20_MORE, rows::DEAD_20_SET];
+    let dead_20_12 = [rows::DEAD_20_12, rows::DEAD_20_12_SET];
+    let dead_20_empty = [rows::DEAD_20_EMPTY, rows::DEAD_20_EMPTY_SET];
     let first_12 = [rows::FIRST, rows::FIRST_12_SET];
     let by_photons = [
         [few, first, first, first_12],
-        [dead_20, dead_20, dead_20, dead_20_more],
+        [dead_20, dead_20, dead_20, dead_20_12],
         [dead_5; 4],
     ];
     for ((name, tdc), rows) in tdcs.iter().zip(by_photons) {
@@ -331,7 +332,7 @@ fn pile_up() -> Result<Vec<Case>> {
             both(case.with_effects(tdc.clone()), rows);
         }
     }
-    for ((name, tdc), rows) in tdcs.iter().zip([first, dead_20_more, dead_5]) {
+    for ((name, tdc), rows) in tdcs.iter().zip([first, dead_20_empty, dead_5]) {
         let case = Case::new(format!("{name}, 6 photons, no target")).without_target();
         let case = case.with_background(background(6.0));
         both(case.with_effects(tdc.clone()), rows);

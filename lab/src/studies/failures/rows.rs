@@ -60,7 +60,7 @@ pub(crate) const DRIFT: Row = row(
     "The histogram is that of a still target, where it was on average. The event tells its exposure",
 );
 pub(crate) const WEAK_DRIFT: Row = row(
-    "the same drift, weak signal",
+    "drift of 5 bins, weak signal",
     "not measured: more light or a shorter L2, so that exposures are shorter",
     "In 390 laser cycles, the window's, the target goes 2 bins. That widens the pulse from σ 1 to 1.15, and its 47 \
      signal photons tell the width to 10 % at best. A test of the width that flags 1 % of still targets finds less \
@@ -73,15 +73,17 @@ pub(crate) const FIRST: Row = row("first photon only, 3 to 12 photons", SET, SLO
 pub(crate) const FIRST_SET: Row = row("first photon only, 3 or 6, set", "", SINGLE);
 pub(crate) const FIRST_12_SET: Row = row("first photon only, 12, set", "", SINGLE);
 pub(crate) const DEAD_20: Row = row("dead for 20 bins, to 6 photons", "", SINGLE);
-pub(crate) const DEAD_20_MORE: Row = row("the same, 12, or 6 and no target", SET, SLOPE);
-pub(crate) const DEAD_20_SET: Row = row("the same, set", "", SINGLE);
+pub(crate) const DEAD_20_12: Row = row("dead for 20 bins, 12 photons", SET, SLOPE);
+pub(crate) const DEAD_20_12_SET: Row = row("dead for 20 bins, 12, set", "", SINGLE);
+pub(crate) const DEAD_20_EMPTY: Row = row("dead for 20 bins, no target", SET, SLOPE);
+pub(crate) const DEAD_20_EMPTY_SET: Row = row("dead for 20 bins, no target, set", "", SINGLE);
 pub(crate) const CROSSTALK: Row = row(
     "crosstalk, no target, set to 19 or 20",
     "",
     "Rules that take each bin as live see a target where the crosstalk's dead time ends",
 );
 pub(crate) const CROSSTALK_21: Row = row(
-    "the same, set to 21 of 20 bins",
+    "crosstalk, set to 21 of 20 bins",
     "round the dead time down",
     "The bin where the crosstalk's dead time ends was live more often than any of the rules expects",
 );
@@ -103,7 +105,7 @@ pub(crate) const RAIN: Row = row(
     "count photons once a bin and laser cycle, or a gate behind the drops",
     "The histogram is that of a near target. It does not tell that all photons came in one laser cycle",
 );
-pub(crate) const RAIN_ONCE: Row = row("the same, counted once per bin", "", "");
+pub(crate) const RAIN_ONCE: Row = row("rain, counted once per bin", "", "");
 pub(crate) const THIN: Row = row(
     "veil of 0.5, smoke of 2 × the signal",
     ECHOES_LAST,
@@ -151,8 +153,10 @@ pub const SECTIONS: [(&str, &[Row]); 5] = [
             FIRST_SET,
             FIRST_12_SET,
             DEAD_20,
-            DEAD_20_MORE,
-            DEAD_20_SET,
+            DEAD_20_12,
+            DEAD_20_12_SET,
+            DEAD_20_EMPTY,
+            DEAD_20_EMPTY_SET,
             CROSSTALK,
             CROSSTALK_21,
             DEAD_5,

@@ -451,7 +451,7 @@ fn a_pipe_is_no_recording() {
             replay /dev/zero --out out | /dev/zero: is a pipe or a device
             calibrate a.json --out out.toml | a.json: is a pipe
             compare a.npy --out out | a.npy: is a pipe
-            compare counts.npy --truth a.npy --out out | a.npy: is a pipe or a device; save it as a file first
+            compare counts.npy --bin-width-ps 250 --truth a.npy --out out | a.npy: is a pipe or a device; save it as a file first
             simulate --depth a.npy --out out | a.npy: is a pipe
             export a.aer --format csv --out x | a.aer: is a pipe
             view a.aer | a.aer: is a pipe
