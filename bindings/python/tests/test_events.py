@@ -149,7 +149,9 @@ def test_one_number_may_stand_for_all_photons():
 def test_photons_may_be_far_apart():
     run = dtof.photons([0] * 5, [0, 1, 2, 3, 10**9 + 2], [9] * 5, cycles=100)
     assert run.statistics["photons"] == 4 and run.statistics["not_replayed"] == 1
-    with pytest.raises(dtof.Error, match="cycle 1000000003 comes 1,000,000,000 laser cycles after the photon before it"):
+    with pytest.raises(
+        dtof.Error, match="cycle 1000000003 comes 1,000,000,000 laser cycles after the photon before it"
+    ):
         dtof.photons([0] * 5, [0, 1, 2, 3, 10**9 + 3], [9] * 5, cycles=100)
 
 

@@ -26,7 +26,9 @@ def test_dimensions_with_names():
     with pytest.raises(dtof.Error, match="dimensions y, x, tof: must be some of .*rename"):
         dtof.replay(xarray.DataArray(COUNTS, dims=("y", "x", "tof")))
     assert same(dtof.replay(xarray.DataArray(COUNTS, dims=("y", "x", "tof")), axes="rows,columns,bins"), run)
-    with pytest.raises(dtof.Error, match="y, x, time: none is bins, as they are read as rows, columns, captures; rename"):
+    with pytest.raises(
+        dtof.Error, match="y, x, time: none is bins, as they are read as rows, columns, captures; rename"
+    ):
         dtof.replay(xarray.DataArray(COUNTS, dims=("y", "x", "time")))
 
 

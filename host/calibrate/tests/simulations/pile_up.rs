@@ -166,11 +166,11 @@ fn flat_counts_have_no_dead_time() {
         (0.3, 128, 256, 100),
         (2.0, 128, 256, 300),
     ] {
-        // The largest recordings take seconds each.
+        // Each takes a second, for the z of its settings.
         let seeds = if bins > 128 {
-            slow_or_quick(10, 5)
+            slow_or_quick(10, 3)
         } else {
-            slow_or_quick(100, 20)
+            slow_or_quick(100, 8)
         };
         let found = (0u64..seeds).into_par_iter().filter(|&seed| {
             let mut rng = Pcg32::seed_from_u64(seed);
