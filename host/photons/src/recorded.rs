@@ -106,11 +106,13 @@ impl RecordedHistograms {
         let mut addresses = 0..=u16::MAX;
         let (mut addressed, mut lengths) = (Vec::new(), Vec::new());
         for capture in captures {
-            let pixels: Vec<(u16, u64)> = addresses.by_ref().zip(totals(capture)?).collect();
+            // The totals end first, so that no address is taken and lost.
+            let totals = totals(capture)?.into_iter();
+            let pixels: Vec<(u64, u16)> = totals.zip(addresses.by_ref()).collect();
             let unmasked = pixels
                 .iter()
-                .filter(|(address, _)| !masked.contains(address));
-            let brightest = unmasked.map(|&(_, total)| total).max().unwrap_or(0);
+                .filter(|(_, address)| !masked.contains(address));
+            let brightest = unmasked.map(|&(total, _)| total).max().unwrap_or(0);
             lengths.push(recorded_cycles(length, brightest)?);
             addressed.push(pixels);
         }
@@ -121,7 +123,7 @@ impl RecordedHistograms {
         let shortest = lengths.clone().min().unwrap_or(longest);
         let (mut pixels, mut photons_per_cycle) = (Vec::new(), 0.0);
         for ((capture, addressed), recorded) in captures.iter().zip(addressed).zip(lengths) {
-            for ((address, total), counts) in addressed.into_iter().zip(capture) {
+            for ((total, address), counts) in addressed.into_iter().zip(capture) {
                 photons_per_cycle += mean(total, recorded);
                 pixels.push(RecordedPixel {
                     remaining: Remaining::new(counts),

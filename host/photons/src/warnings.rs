@@ -131,13 +131,14 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
     pixels
         .iter()
         .for_each(|bins| along_last.add(bins.iter().copied()));
-    if along_last.mean() >= LOOKS_LIKE_BINS {
+    let along_last = along_last.mean();
+    if along_last >= LOOKS_LIKE_BINS {
         return None;
     }
     let total = |bins: &[u64]| bins.iter().fold(0u64, |sum, &n| sum.saturating_add(n));
     let brightest = (0..pixels.len()).max_by_key(|&pixel| total(&pixels[pixel]));
     let mut apart = pixels.len();
-    let least = LOOKS_LIKE_BINS.max(MORE_THAN_LAST * along_last.mean());
+    let least = LOOKS_LIKE_BINS.max(MORE_THAN_LAST * along_last);
     let mut found = (least, None);
     for (number, &length) in axes.iter().enumerate() {
         let whole = apart;
@@ -158,8 +159,9 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
                 along.add(line.iter().map(|bins| bins[bin]));
             }
         }
-        if along.of_lower_half() > found.0 {
-            found = (along.of_lower_half(), Some(number));
+        let value = along.of_lower_half();
+        if value > found.0 {
+            found = (value, Some(number));
         }
     }
     let which = match found.1? {

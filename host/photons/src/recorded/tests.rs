@@ -100,6 +100,24 @@ fn a_capture_without_photons_is_as_long_as_the_longest_other() {
     assert_eq!(masked.unwrap().cycles(), 10_000);
 }
 
+/// Addresses go on from capture to capture: none is left out between them.
+#[test]
+fn pixels_of_later_captures_have_the_next_addresses() {
+    let array = Array::new(2, 1).unwrap();
+    let length = RecordingLength::PhotonsPerCycle(1.0);
+    let captures = [[10, 20], [30, 40], [50, 60]].map(|pair| pair.map(|n| vec![n; 8]).to_vec());
+    let photons = |masked: &[u16]| {
+        RecordedHistograms::with_masked(array, &captures, length, u64::MAX, 1, masked).unwrap()
+    };
+    let all = photons(&[]);
+    for (address, pixel) in (0..).zip(&all.pixels) {
+        assert_eq!(pixel.rng, pixel_rng(1, PixelAddress::new(address)));
+    }
+    // The last pixel is the brightest of its capture.
+    assert_eq!(all.recorded_cycles(), Some((160, 480)));
+    assert_eq!(photons(&[5]).recorded_cycles(), Some((160, 400)));
+}
+
 #[test]
 fn what_does_not_fit_into_memory_is_refused() {
     let refused = |count: u64, cycles| recorded(vec![vec![count; 8]], cycles, 1).is_err();
