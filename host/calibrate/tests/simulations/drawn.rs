@@ -8,10 +8,10 @@
 
 use std::fmt::Write as _;
 
-use dtof_calibrate::Calibration;
+use dtof_calibrate::{Calibration, Length, Observed};
 use dtof_core::fixed::types::U4F12;
 use dtof_core::rule::detect;
-use dtof_core::{Count, DepthEstimator, Histogram, RangeGate, WindowRule};
+use dtof_core::{Array, Count, DepthEstimator, Histogram, RangeGate, WindowRule};
 use dtof_photons::recorded::Capture;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_simulate::scene::Scene;
@@ -160,6 +160,26 @@ impl Drawn {
             .rev()
             .find(matters)
             .map_or(0, |bin| bin + 1)
+    }
+}
+
+/// Captures without truth, rays or earlier offsets.
+pub fn observed(
+    array: Array,
+    captures: &[Capture],
+    length: Length,
+    bin_width_ps: f64,
+) -> Observed<'_> {
+    Observed {
+        array,
+        captures,
+        length,
+        cycles: None,
+        bin_width_ps,
+        truth_mm: None,
+        slant: None,
+        bias_mm: None,
+        offsets_mm: &[],
     }
 }
 

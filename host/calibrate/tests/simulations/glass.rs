@@ -1,10 +1,9 @@
 //! Crosstalk of the cover glass: gates that exclude it, crosstalk with a tail, and crosstalk that grows.
 
-use crate::drawn::{recorded, slices};
+use crate::drawn::{observed, recorded, slices};
 use crate::slow_or_quick;
 use dtof_calibrate::{
-    Calibration, CalibrationOptions, Change, Length, Nearest, Observed, RunPhotons, calibrate,
-    glass_change,
+    Calibration, CalibrationOptions, Change, Length, Nearest, RunPhotons, calibrate, glass_change,
 };
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::SettingsFile;
@@ -26,17 +25,12 @@ fn scene(background: f64, glass: f64, more: &str) -> Scene {
 
 fn found(scene: &Scene, cycles: u64, seed: u64) -> Calibration {
     let captures = [recorded(scene, cycles, seed)];
-    let observed = Observed {
-        array: scene.array().unwrap(),
-        captures: &captures,
-        length: Length::Cycles(cycles),
-        cycles: None,
-        bin_width_ps: 250.0,
-        truth_mm: None,
-        slant: None,
-        bias_mm: None,
-        offsets_mm: &[],
-    };
+    let observed = observed(
+        scene.array().unwrap(),
+        &captures,
+        Length::Cycles(cycles),
+        250.0,
+    );
     calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }
 

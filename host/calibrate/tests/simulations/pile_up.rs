@@ -1,8 +1,8 @@
 //! Pile-up: which TDC a recording comes from, and rates that are corrected for it.
 
-use crate::drawn::recorded;
+use crate::drawn::{observed, recorded};
 use crate::slow_or_quick;
-use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, Tdc, calibrate};
+use dtof_calibrate::{Calibration, CalibrationOptions, Length, Tdc, calibrate};
 use dtof_core::Array;
 use dtof_simulate::scene::Scene;
 use rand_core::{Rng, SeedableRng};
@@ -19,17 +19,7 @@ fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibra
     );
     let scene = Scene::parse(&text).unwrap();
     let captures = [recorded(&scene, 20_000, 4)];
-    let observed = Observed {
-        array: scene.array().unwrap(),
-        captures: &captures,
-        length: length(20_000),
-        cycles: None,
-        bin_width_ps: 250.0,
-        truth_mm: None,
-        slant: None,
-        bias_mm: None,
-        offsets_mm: &[],
-    };
+    let observed = observed(scene.array().unwrap(), &captures, length(20_000), 250.0);
     calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }
 
@@ -118,17 +108,8 @@ fn flat(
 
 fn tdc_of(capture: Vec<Vec<u64>>, cycles: u64) -> Option<Tdc> {
     let array = Array::new(u32::try_from(capture.len()).unwrap(), 1).unwrap();
-    let observed = Observed {
-        array,
-        captures: &[capture],
-        length: Length::Cycles(cycles),
-        cycles: None,
-        bin_width_ps: 250.0,
-        truth_mm: None,
-        slant: None,
-        bias_mm: None,
-        offsets_mm: &[],
-    };
+    let captures = [capture];
+    let observed = observed(array, &captures, Length::Cycles(cycles), 250.0);
     calibrate(&observed, &CalibrationOptions::default())
         .unwrap()
         .tdc

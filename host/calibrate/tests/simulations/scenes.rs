@@ -1,26 +1,21 @@
 //! Compares the calibration with the truth of twenty random simulated scenes. It gets only their
 //! histograms and laser cycles.
 
-use crate::drawn::{Drawn, false_alarms};
+use crate::drawn::{Drawn, false_alarms, observed};
 use crate::slow_or_quick;
-use dtof_calibrate::{CalibrationOptions, Length, Nearest, Observed, calibrate};
+use dtof_calibrate::{CalibrationOptions, Length, Nearest, calibrate};
 use rayon::prelude::*;
 
 /// The errors of the calibration by scene `number`, and a line about it.
 fn judge(number: u64) -> (Vec<String>, String) {
     let drawn = Drawn::new(number);
     let captures = [drawn.capture(number)];
-    let observed = Observed {
-        array: drawn.scene.array().unwrap(),
-        captures: &captures,
-        length: Length::Cycles(drawn.cycles),
-        cycles: None,
-        bin_width_ps: drawn.scene.bin_width_ps,
-        truth_mm: None,
-        slant: None,
-        bias_mm: None,
-        offsets_mm: &[],
-    };
+    let observed = observed(
+        drawn.scene.array().unwrap(),
+        &captures,
+        Length::Cycles(drawn.cycles),
+        drawn.scene.bin_width_ps,
+    );
     let options = CalibrationOptions {
         // A wall alone may be a cover glass: the user decides.
         glass: drawn.is_wall_alone().then_some(false),
@@ -139,17 +134,12 @@ fn a_wall_alone_may_be_a_cover_glass() {
     let number = (0..100).find(|&number| Drawn::new(number).is_wall_alone());
     let drawn = Drawn::new(number.unwrap());
     let captures = [drawn.capture(1)];
-    let observed = Observed {
-        array: drawn.scene.array().unwrap(),
-        captures: &captures,
-        length: Length::Cycles(drawn.cycles),
-        cycles: None,
-        bin_width_ps: drawn.scene.bin_width_ps,
-        truth_mm: None,
-        slant: None,
-        bias_mm: None,
-        offsets_mm: &[],
-    };
+    let observed = observed(
+        drawn.scene.array().unwrap(),
+        &captures,
+        Length::Cycles(drawn.cycles),
+        drawn.scene.bin_width_ps,
+    );
     let with = |glass| {
         let options = CalibrationOptions {
             glass,
