@@ -114,12 +114,10 @@ fn highest<const BINS: usize>(
         let mut rng = trial_rng(settings.seed, trial);
         let mut found = Vec::with_capacity(each);
         for _ in 0..each {
-            let mut histogram = Histogram::<BINS>::new();
             let mut highest = U4F12::ZERO;
-            exposures.frames::<BINS>(&mut rng, |_, frame| {
-                histogram.add_frame(frame, &gate);
-                if exceeds(&histogram, highest) {
-                    highest = search(highest, |z| exceeds(&histogram, z));
+            exposures.run::<BINS>(&gate, &mut rng, |_, histogram| {
+                if exceeds(histogram, highest) {
+                    highest = search(highest, |z| exceeds(histogram, z));
                 }
                 false
             });

@@ -50,6 +50,8 @@ impl Looks {
 #[derive(Clone, Debug)]
 struct Photons {
     background: Option<Poisson<f64>>,
+    /// More photons than half of the bins.
+    is_bright: bool,
     signal: Vec<(u16, Poisson<f64>)>,
 }
 
@@ -63,8 +65,10 @@ impl Photons {
             (mean > 1e-12).then(|| Ok((bin, Poisson::new(mean)?)))
         };
         let signal = (0..bins).filter_map(signal).collect::<Result<_>>();
+        let is_bright = background + rates.signal * cycles > f64::from(bins) / 2.0;
         let background = (background > 0.0).then(|| Poisson::new(background));
         Ok(Self {
+            is_bright,
             background: background.transpose().context("the background")?,
             signal: signal.context("the signal")?,
         })
@@ -95,8 +99,29 @@ impl Photons {
         }
     }
 
-    fn add_to<const BINS: usize>(&self, histogram: &mut Histogram<BINS>, rng: &mut Pcg64) {
-        self.draw::<BINS>(rng, |bin| histogram.add(bin));
+    fn frame<const BINS: usize>(&self, rng: &mut Pcg64) -> [u16; BINS] {
+        let mut frame = [0u16; BINS];
+        self.draw::<BINS>(rng, |bin| frame[usize::from(bin)] += 1);
+        frame
+    }
+
+    /// Adds the photons in the gate.
+    fn add_to<const BINS: usize>(
+        &self,
+        histogram: &mut Histogram<BINS>,
+        gate: &RangeGate<BINS>,
+        rng: &mut Pcg64,
+    ) {
+        // Both give the same histogram. A frame takes a pass over all bins, a photon alone three times as long as in one.
+        if self.is_bright {
+            histogram.add_frame(&self.frame::<BINS>(rng), gate);
+        } else {
+            self.draw::<BINS>(rng, |bin| {
+                if gate.contains(bin) {
+                    histogram.add(bin);
+                }
+            });
+        }
     }
 }
 
@@ -122,20 +147,21 @@ impl Exposures {
         })
     }
 
-    /// Calls `look` with the histogram at each look until it returns `true` or
+    /// Calls `look` with the step (of X laser cycles) and the gated histogram of each look, until it returns `true` or
     /// the exposure expires. Returns the duration in laser cycles.
-    pub(crate) fn run<const BINS: usize>(
+    pub fn run<const BINS: usize>(
         &self,
+        gate: &RangeGate<BINS>,
         rng: &mut Pcg64,
         mut look: impl FnMut(u32, &Histogram<BINS>) -> bool,
     ) -> u32 {
         let mut histogram = Histogram::new();
-        self.until_first.add_to(&mut histogram, rng);
+        self.until_first.add_to(&mut histogram, gate, rng);
         for step in self.looks.first..=self.looks.last {
             if look(step, &histogram) {
                 return step * self.looks.x;
             }
-            self.between.add_to(&mut histogram, rng);
+            self.between.add_to(&mut histogram, gate, rng);
         }
         self.looks.expiry()
     }
@@ -148,17 +174,12 @@ impl Exposures {
         rng: &mut Pcg64,
         mut look: impl FnMut(u32, &[u16; BINS]) -> bool,
     ) {
-        let frame = |photons: &Photons, rng: &mut Pcg64| {
-            let mut frame = [0u16; BINS];
-            photons.draw::<BINS>(rng, |bin| frame[usize::from(bin)] += 1);
-            frame
-        };
-        let mut photons = frame(&self.until_first, rng);
+        let mut photons = self.until_first.frame(rng);
         for step in self.looks.first..=self.looks.last {
             if look(step * self.looks.x, &photons) {
                 break;
             }
-            photons = frame(&self.between, rng);
+            photons = self.between.frame(rng);
         }
     }
 
@@ -170,8 +191,9 @@ impl Exposures {
         rng: &mut Pcg64,
     ) -> (u32, Option<Detection>) {
         let mut event = None;
-        let cycles = self.run::<BINS>(rng, |_, histogram| {
-            event = detect(histogram, &RangeGate::full(), rule, estimator);
+        let gate = RangeGate::full();
+        let cycles = self.run::<BINS>(&gate, rng, |_, histogram| {
+            event = detect(histogram, &gate, rule, estimator);
             event.is_some()
         });
         (cycles, event)
@@ -187,7 +209,7 @@ impl Exposures {
     ) -> Vec<Option<u16>> {
         let mut highest = None;
         let mut by_last = Vec::with_capacity(lasts.len());
-        self.run::<BINS>(rng, |step, histogram| {
+        self.run::<BINS>(&RangeGate::full(), rng, |step, histogram| {
             highest = highest.max(highest_alpha(histogram, minimum_count));
             if lasts.get(by_last.len()) == Some(&step) {
                 by_last.push(highest);
@@ -256,6 +278,38 @@ mod tests {
         }
     }
 
+    /// A photon alone and a frame of photons give the same histogram, also of full counters.
+    #[test]
+    fn photons_alone_and_frames_are_the_same() {
+        let rates = Rates {
+            background: 0.1,
+            signal: 2.0,
+            position: 9.5,
+            sigma: 0.7,
+        };
+        for gate in [RangeGate::full(), RangeGate::new(9, 20).unwrap()] {
+            for cycles in [1.0, 30.0, 900.0] {
+                let drawn = [false, true].map(|is_bright| {
+                    let mut photons = Photons::new(&rates, 32, cycles).unwrap();
+                    photons.is_bright = is_bright;
+                    let mut histogram = Histogram::<32>::new();
+                    let mut rng = trial_rng(2, 5);
+                    for _ in 0..3 {
+                        photons.add_to(&mut histogram, &gate, &mut rng);
+                    }
+                    assert!(histogram.total() > 0 && (cycles < 900.0 || histogram.saturated() > 0));
+                    (
+                        *histogram.counts(),
+                        histogram.peak(),
+                        histogram.total(),
+                        histogram.saturated(),
+                    )
+                });
+                assert_eq!(drawn[0], drawn[1], "{gate:?} {cycles}");
+            }
+        }
+    }
+
     #[test]
     fn the_highest_alpha_fires_and_the_next_does_not() {
         let mut rng = trial_rng(5, 0);
@@ -272,7 +326,7 @@ mod tests {
             let photons = Photons::new(&rates, 128, 1.0).unwrap();
             for _ in 0..2000 {
                 let mut histogram = Histogram::<128>::new();
-                photons.add_to(&mut histogram, &mut rng);
+                photons.add_to(&mut histogram, &RangeGate::full(), &mut rng);
                 let fires = |alpha: u16| {
                     let rule = PaperRule::new(U8F8::from_bits(alpha), minimum_count);
                     detect(&histogram, &gate, &rule, &estimator).is_some()
@@ -303,7 +357,7 @@ mod tests {
         let times = 20_000;
         for _ in 0..times {
             let mut histogram = Histogram::<64>::new();
-            photons.add_to(&mut histogram, &mut rng);
+            photons.add_to(&mut histogram, &RangeGate::full(), &mut rng);
             for (sum, &count) in sums.iter_mut().zip(histogram.counts()) {
                 *sum += u32::from(count);
             }

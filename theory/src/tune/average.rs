@@ -8,7 +8,7 @@
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{AverageRule, Count, DepthEstimator, Histogram};
+use dtof_core::{AverageRule, Count, DepthEstimator, Histogram, RangeGate};
 use rayon::prelude::*;
 
 use super::shortest::{false_alarms, for_bins, shortest};
@@ -144,7 +144,7 @@ fn trial<const BINS: usize>(
     let mut rng = trial_rng(request.seed, number);
     let exposure = |_| {
         let mut highest = vec![None; looks.len()];
-        simulated.run::<BINS>(&mut rng, |step, histogram| {
+        simulated.run::<BINS>(&RangeGate::full(), &mut rng, |step, histogram| {
             let found = highest_alpha(histogram, minimum_count);
             for (highest, looks) in highest.iter_mut().zip(looks) {
                 if step >= looks.first {

@@ -11,7 +11,7 @@ use std::fmt::Write as _;
 use dtof_calibrate::{Calibration, Length, Observed};
 use dtof_core::fixed::types::U4F12;
 use dtof_core::rule::detect;
-use dtof_core::{Array, Count, DepthEstimator, Histogram, RangeGate, WindowRule};
+use dtof_core::{Array, Count, DepthEstimator, RangeGate, WindowRule};
 use dtof_photons::recorded::Capture;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_simulate::scene::Scene;
@@ -234,10 +234,8 @@ fn of<const BINS: usize>(found: &Calibration, background: f64) -> f64 {
     let mut rng = trial_rng(0xfa15e, found.gate.0);
     let mut events = 0;
     for _ in 0..exposures_drawn {
-        let mut histogram = Histogram::<BINS>::new();
-        exposures.frames::<BINS>(&mut rng, |_, frame| {
-            histogram.add_frame(frame, &gate);
-            let event = detect(&histogram, &gate, &rule, &DepthEstimator::Centroid3).is_some();
+        exposures.run::<BINS>(&gate, &mut rng, |_, histogram| {
+            let event = detect(histogram, &gate, &rule, &DepthEstimator::Centroid3).is_some();
             events += u32::from(event);
             event
         });
