@@ -104,6 +104,24 @@ fn packages_use_what_the_table_says_and_only_what_is_above_them() {
     assert_eq!(wrong(&documented(), &built, &tested), [""; 0]);
 }
 
+/// Each crate of others that a manifest names has a row that says why.
+#[test]
+fn each_dependency_has_a_reason() {
+    let metadata = metadata();
+    let packages = metadata["packages"].as_array().unwrap();
+    let used: BTreeSet<&str> = packages
+        .iter()
+        .flat_map(|package| package["dependencies"].as_array().unwrap())
+        .filter(|dependency| dependency["path"].is_null())
+        .map(|dependency| dependency["name"].as_str().unwrap())
+        .collect();
+    let page = include_str!("../../../docs/dependencies.md");
+    let rows = page.lines().filter_map(|line| line.strip_prefix("| `"));
+    let listed: Vec<&str> = rows.filter_map(|row| row.split('`').next()).collect();
+    assert_eq!(listed.len(), used.len(), "a row twice, or none");
+    assert_eq!(BTreeSet::from_iter(listed), used);
+}
+
 #[test]
 fn an_arrow_that_is_turned_round_is_found() {
     let (built, tested) = arrows(&metadata());
