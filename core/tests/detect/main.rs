@@ -10,6 +10,8 @@ mod any_rule;
 mod average;
 mod background;
 mod common;
+#[path = "../common/light.rs"]
+mod light;
 mod live;
 #[path = "../common/parallel.rs"]
 mod parallel;

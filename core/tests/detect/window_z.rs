@@ -5,8 +5,11 @@ use dtof_core::{
     AsyncPixel, Count, LaserCycle, Look, PixelAddress, PixelConfig, RangeGate, Statistics,
     WindowRule, z_for,
 };
-use rand_core::{Rng, SeedableRng};
+use rand_core::SeedableRng;
+use rand_distr::Poisson;
 use rand_pcg::Pcg64Mcg;
+
+use crate::light;
 
 /// When a pixel looks.
 #[derive(Clone, Copy, Debug)]
@@ -14,12 +17,6 @@ struct Looks {
     x: u16,
     l1: u16,
     l2: u16,
-}
-
-/// How a Poisson process goes on: laser cycles until the next photon.
-fn gap(rng: &mut Pcg64Mcg, photons_a_cycle: f64) -> f64 {
-    let uniform = (f64::from(rng.next_u32()) + 0.5) / 4_294_967_296.0;
-    -uniform.ln() / photons_a_cycle
 }
 
 /// Exposures of `exposures` without a target that brought an event.
@@ -37,23 +34,23 @@ fn false_events<const BINS: usize>(
     let config = PixelConfig::with_rule(rule).x(x).l1(l1).l2(l2);
     let config = config.gate(gate).build().unwrap();
     let mut rng = Pcg64Mcg::seed_from_u64(u64::from(width));
-    let photons_a_cycle = background * BINS as f64;
+    let photons = Poisson::new(background * BINS as f64 * f64::from(x)).unwrap();
     let (mut events, mut statistics) = (0.0, Statistics::default());
+    let mut codes = Vec::new();
     for _ in 0..exposures {
         let mut pixel = AsyncPixel::<BINS>::new(PixelAddress::new(0));
-        let mut next = gap(&mut rng, photons_a_cycle);
-        for cycle in 0..l2 {
-            while next < f64::from(cycle) + 1.0 {
-                #[allow(clippy::cast_possible_truncation, reason = "BINS is at most 1024")]
-                let code = ((u64::from(rng.next_u32()) * BINS as u64) >> 32) as u16;
-                pixel.count(&config, code);
-                next += gap(&mut rng, photons_a_cycle);
+        let mut last = LaserCycle::new(0);
+        loop {
+            codes.clear();
+            light::draw::<BINS>(&photons, &mut rng, &mut codes);
+            pixel.count_batch(&config, &codes);
+            last = LaserCycle::new(last.raw() + u64::from(x));
+            match pixel.end_laser_cycles(&config, &mut statistics, last, x) {
+                Look::Event => events += 1.0,
+                Look::Expired => {}
+                _ => continue,
             }
-            let last = LaserCycle::new(cycle.into());
-            if pixel.end_laser_cycle(&config, &mut statistics, last) == Look::Event {
-                events += 1.0;
-                break;
-            }
+            break;
         }
     }
     events

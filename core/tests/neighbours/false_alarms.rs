@@ -6,7 +6,10 @@ use dtof_core::{
     RangeGate, Statistics, WindowRule, z_for,
 };
 use rand_core::{Rng, SeedableRng};
+use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64Mcg;
+
+use crate::light;
 
 const BINS: usize = 128;
 const SIDE: u16 = 20;
@@ -110,31 +113,30 @@ fn run(
         .map(|address| Place(pixel_at(address)))
         .collect();
     let mut found = vec![Found::default(); usize::from(pixels)];
-    let mut next: Vec<f64> = vec![0.0; usize::from(pixels)];
+    let lights = (0..pixels).map(|address| {
+        let (background, signal) = light(address);
+        // `None` without photons.
+        [background * BINS as f64, signal].map(|mean| Poisson::new(mean).ok())
+    });
+    let lights: Vec<[Option<Poisson<f64>>; 2]> = lights.collect();
+    let mut codes = Vec::new();
     let mut statistics = Statistics::default();
-    let (mut look, mut counted) = (0.0, 0);
+    let (mut look, mut counted) = (0, 0);
     while counted < exposures {
-        look += 1.0;
-        for (place, next) in array.iter_mut().zip(&mut next) {
+        look += 1;
+        for (place, [background, signal]) in array.iter_mut().zip(&lights) {
             let Some(pixel) = place.pixel_mut() else {
                 continue;
             };
-            let (background, signal) = light(pixel.address().raw());
-            let background = background * BINS as f64;
-            while *next < look {
-                let [time, kind, place] =
-                    [0; 3].map(|_| (f64::from(rng.next_u32()) + 0.5) / 4_294_967_296.0);
-                let is_signal = kind * (background + signal) < signal;
-                let code = if is_signal {
-                    60.0 + 3.0 * place
-                } else {
-                    BINS as f64 * place
-                };
-                pixel.count(&config, code as u16);
-                *next -= time.ln() / (background + signal);
+            codes.clear();
+            if let Some(photons) = background {
+                light::draw::<BINS>(photons, &mut rng, &mut codes);
             }
+            let signal = signal.map_or(0, |photons| photons.sample(&mut rng) as u32);
+            codes.extend((0..signal).map(|_| 60 + (rng.next_u32() % 3) as u16));
+            pixel.count_batch(&config, &codes);
         }
-        let last = LaserCycle::new(look as u64 * u64::from(X) - 1);
+        let last = LaserCycle::new(look * u64::from(X) - 1);
         for pixel in array.iter_mut().filter_map(ArrayPixel::pixel_mut) {
             pixel.begin_look(&config, &mut statistics, X);
         }

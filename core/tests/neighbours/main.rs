@@ -7,6 +7,8 @@
 )]
 
 mod false_alarms;
+#[path = "../common/light.rs"]
+mod light;
 mod model;
 mod narrow;
 mod steps;

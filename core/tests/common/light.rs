@@ -1,0 +1,19 @@
+//! Photons of light that is even over all bins.
+
+use rand_core::Rng;
+use rand_distr::{Distribution, Poisson};
+
+/// Appends the TDC codes of a Poisson number of photons, each in any of `BINS` bins, a power of two.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a number of photons; BINS is at most 1024"
+)]
+pub fn draw<const BINS: usize>(photons: &Poisson<f64>, rng: &mut impl Rng, codes: &mut Vec<u16>) {
+    let end = codes.len() + photons.sample(rng) as usize;
+    while codes.len() < end {
+        let random = rng.next_u64();
+        codes.extend([0, 16, 32, 48].map(|shift| (random >> shift) as u16 & (BINS as u16 - 1)));
+    }
+    codes.truncate(end);
+}
