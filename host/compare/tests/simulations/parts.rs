@@ -196,7 +196,8 @@ fn harder_conditions_have_the_photons_they_say() {
 /// A likelihood ratio gains information at a known rate, and needs that of its threshold.
 #[test]
 fn the_bound_is_that_of_the_information() {
-    for (background, signal, sigma) in [(0.05, 0.145, 1.0), (0.01, 0.3, 0.6), (0.2, 0.5, 1.5)] {
+    const ALL: [(f64, f64, f64); 3] = [(0.05, 0.145, 1.0), (0.01, 0.3, 0.6), (0.2, 0.5, 1.5)];
+    for &(background, signal, sigma) in slow_or_quick(&ALL[..], &ALL[1..2]) {
         let light = Light {
             background,
             signal,

@@ -1,6 +1,7 @@
 //! Twenty random scenes: the fastest method that a comparison recommends is mostly within a tenth of the fastest
 //! on other photons of the same scene.
 
+use dtof_compare::answer::answer;
 use dtof_compare::measure::Outcome;
 use dtof_compare::truth::Truth;
 use dtof_compare::{Comparison, Task, compare};
@@ -89,7 +90,12 @@ fn dim_pixels_are_not_left_silent() {
     // On photons of another seed; a pixel is 0.016.
     assert!(taken <= least + 0.13, "{taken} {least}");
     // With the error of frames there is none to take, for that reason.
-    let strict = compared(&scene, 1, Some(frame_mm));
+    let strict = Comparison {
+        answer: answer(&found.methods, &found.outcomes, frame_mm),
+        settings: None,
+        fastest: None,
+        ..found
+    };
     assert_eq!(strict.answer.best, None);
     let mut rows = strict.rows().into_iter();
     let (_, reason) = rows.find(|(name, _)| name == "take").unwrap();
