@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::sync::LazyLock;
 
 use serde_json::Value;
 
@@ -141,8 +142,8 @@ fn an_arrow_that_is_turned_round_is_found() {
     assert!(turned >= 15, "{turned} arrows");
 }
 
-/// Each package with the imports of its files.
-fn graphs() -> Vec<(String, crate::modules::Imports)> {
+/// Each package with the imports of its files. Tests share them: to parse all files takes longest.
+static GRAPHS: LazyLock<Vec<(String, crate::modules::Imports)>> = LazyLock::new(|| {
     let metadata = metadata();
     let of = |package: &Value| {
         let manifest = Path::new(package["manifest_path"].as_str().unwrap());
@@ -151,15 +152,14 @@ fn graphs() -> Vec<(String, crate::modules::Imports)> {
     };
     let packages = metadata["packages"].as_array().unwrap();
     packages.iter().map(of).collect()
-}
+});
 
 #[test]
 fn no_files_or_folders_of_a_package_import_each_other_in_a_circle() {
-    let graphs = graphs();
-    let files: usize = graphs.iter().map(|(_, graph)| graph.len()).sum();
+    let files: usize = GRAPHS.iter().map(|(_, graph)| graph.len()).sum();
     assert!(files > 100, "{files} files");
-    for (package, graph) in graphs {
-        assert_eq!(crate::modules::circles(&graph), [[""; 0]; 0], "{package}");
+    for (package, graph) in &*GRAPHS {
+        assert_eq!(crate::modules::circles(graph), [[""; 0]; 0], "{package}");
     }
 }
 
@@ -168,7 +168,7 @@ fn no_files_or_folders_of_a_package_import_each_other_in_a_circle() {
 #[test]
 fn a_planted_circle_of_files_or_of_folders_is_found() {
     let (mut of_files, mut of_folders) = (0, 0);
-    for (_, graph) in graphs() {
+    for (_, graph) in &*GRAPHS {
         for (from, to) in graph
             .iter()
             .flat_map(|(from, to)| to.iter().map(move |to| (from, to)))

@@ -26,7 +26,7 @@ pub trait Port: Send {
 
 impl Port for TcpStream {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        send(self, bytes)
+        send(self, bytes, STUCK)
     }
 
     fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
@@ -39,7 +39,7 @@ impl Port for TcpStream {
 
 impl Port for Box<dyn serialport::SerialPort> {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        send(self, bytes)
+        send(self, bytes, STUCK)
     }
 
     fn receive(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
@@ -47,13 +47,13 @@ impl Port for Box<dyn serialport::SerialPort> {
     }
 }
 
-/// Sends all bytes. A full buffer is an error only if it stays full for [`STUCK`].
-fn send(port: &mut impl Write, mut bytes: &[u8]) -> io::Result<()> {
+/// Sends all bytes. A full buffer is an error only if it stays full for as long as `stuck`.
+fn send(port: &mut impl Write, mut bytes: &[u8], stuck: Duration) -> io::Result<()> {
     let since = Instant::now();
     while !bytes.is_empty() {
         let sent = patient(port.write(bytes))?;
         bytes = &bytes[sent..];
-        if since.elapsed() > STUCK {
+        if since.elapsed() > stuck {
             return Err(ErrorKind::TimedOut.into());
         }
     }
@@ -104,16 +104,17 @@ mod tests {
         let listener = std::net::TcpListener::bind(("127.0.0.1", 0)).unwrap();
         let stream = TcpStream::connect(listener.local_addr().unwrap()).unwrap();
         let mut port = prompt(stream).unwrap();
+        let stuck = Duration::from_millis(300);
         let began = Instant::now();
         let bytes = [0; 1 << 16];
         let error = loop {
-            if let Err(error) = port.send(&bytes) {
+            if let Err(error) = send(&mut port, &bytes, stuck) {
                 break error;
             }
-            assert!(began.elapsed() < 12 * STUCK, "the buffers have no end");
+            assert!(began.elapsed() < 100 * stuck, "the buffers have no end");
         };
         assert_eq!(error.kind(), ErrorKind::TimedOut);
-        assert!(began.elapsed() >= STUCK);
+        assert!(began.elapsed() >= stuck);
     }
 
     /// Otherwise the program would end with success.
