@@ -4,6 +4,7 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use crate::slow_or_quick;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::rule::z_for_levels;
 use dtof_core::{BlockLevel, Count, DepthEvent, Neighbours, PixelAddress, RangeGate, WindowRule};
@@ -213,7 +214,8 @@ fn seen(scene: &Scene, neighbours: Option<Neighbours>) -> Seen {
 #[test]
 fn eight_neighbours_halve_the_time_to_its_walls() {
     let Some(folder) = vgroove() else { return };
-    let mut scene = scene_of(&folder, DepthAlong::Ray, None);
+    let size = slow_or_quick(None, Some([80, 60]));
+    let mut scene = scene_of(&folder, DepthAlong::Ray, size);
     scene.background = 0.0005;
     scene.signal_at_one_metre = 0.008;
     let [alone, together] = [None, Some(Neighbours::Eight)].map(|way| seen(&scene, way));
