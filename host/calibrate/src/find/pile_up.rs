@@ -293,3 +293,95 @@ impl<'a> Background<'a> {
         sum - photons * all.max(f64::MIN_POSITIVE).ln()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand_core::{Rng, SeedableRng};
+    use rand_distr::{Distribution, Poisson};
+    use rand_pcg::Pcg32;
+    use rayon::prelude::*;
+
+    const BINS: usize = 128;
+
+    fn trace(pixel: usize, cycles: u32, counts: Vec<f64>) -> Trace {
+        Trace {
+            pixel,
+            cycles: cycles.into(),
+            counts,
+            truth_mm: None,
+        }
+    }
+
+    /// Histograms of 64 pixels under flat light, of a TDC that is blind for `dead_time` bins.
+    fn flat(rng: &mut Pcg32, cycles: u32, light: f64, dead_time: usize) -> Vec<Trace> {
+        let pixel = |pixel| {
+            let mut counts = vec![0.0; BINS];
+            for _ in 0..cycles {
+                let mut bin = 0;
+                loop {
+                    let uniform = (f64::from(rng.next_u32()) + 0.5) / 4_294_967_296.0;
+                    #[allow(
+                        clippy::cast_possible_truncation,
+                        clippy::cast_sign_loss,
+                        reason = "empty bins"
+                    )]
+                    let empty = (-uniform.ln() / light) as usize;
+                    bin += empty;
+                    if bin >= BINS {
+                        break;
+                    }
+                    counts[bin] += 1.0;
+                    bin += 1 + dead_time;
+                }
+            }
+            trace(pixel, cycles, counts)
+        };
+        (0..64).map(pixel).collect()
+    }
+
+    /// Short dead times, too: their background has a step, and a hole behind each bright bin.
+    #[test]
+    fn a_dead_time_is_found_by_itself() {
+        let mut rng = Pcg32::seed_from_u64(1);
+        for (dead_time, light, cycles) in [
+            (128, 0.02, 400),
+            (128, 0.047, 400),
+            (20, 0.047, 2000),
+            (5, 0.05, 4000),
+        ] {
+            let traces = flat(&mut rng, cycles, light, dead_time);
+            let Tdc::DeadTime { bins, .. } = tdc(&traces) else {
+                panic!("none of {dead_time} at {light}");
+            };
+            assert!(
+                (dead_time - dead_time / 20..=dead_time).contains(&bins),
+                "{bins} of {dead_time}"
+            );
+        }
+    }
+
+    /// Flat counts of a TDC without a dead time, as sparse and as dense as they come, and with laser cycles
+    /// that would allow one. By Ville's inequality one recording in 1000 looks as if; `DTOF_SLOW=1` draws larger
+    /// and more of them.
+    #[test]
+    fn flat_counts_have_no_dead_time() {
+        let (seeds, pixels) = match std::env::var_os("DTOF_SLOW") {
+            Some(_) => (100, 1024),
+            None => (30, 256),
+        };
+        for (light, cycles) in [(0.01, 100), (0.05, 20), (0.3, 100), (2.0, 300)] {
+            let poisson = Poisson::new(light).unwrap();
+            let found = (0u64..seeds).into_par_iter().filter(|&seed| {
+                let mut rng = Pcg32::seed_from_u64(seed);
+                let mut histogram = || (0..BINS).map(|_| poisson.sample(&mut rng)).collect();
+                let traces = (0..pixels).map(|pixel| trace(pixel, cycles, histogram()));
+                let traces: Vec<Trace> = traces.collect();
+                matches!(tdc(&traces), Tdc::DeadTime { .. })
+            });
+            let found = found.count();
+            println!("{light} photons a bin, {cycles} laser cycles: {found} of {seeds}");
+            assert!(found <= 1, "{found} of {seeds} at {light}");
+        }
+    }
+}

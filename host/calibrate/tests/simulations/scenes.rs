@@ -3,7 +3,7 @@
 
 use crate::drawn::{Drawn, false_alarms, observed};
 use crate::slow_or_quick;
-use dtof_calibrate::{CalibrationOptions, Length, Nearest, calibrate};
+use dtof_calibrate::{CalibrationOptions, Length, Nearest, Tdc, calibrate};
 use rayon::prelude::*;
 
 /// The errors of the calibration by scene `number`, and a line about it.
@@ -39,6 +39,13 @@ fn judge(number: u64) -> (Vec<String>, String) {
         right,
         format!("{background:.5}"),
         format!("{truth:.5}"),
+    );
+    let right = found.tdc == Some(Tdc::SeveralHits);
+    check(
+        "TDC",
+        right,
+        format!("{:?}", found.tdc),
+        "of several hits".to_owned(),
     );
     let sigma = found.pulse.as_ref().map_or(0.0, |pulse| pulse.sigma);
     let truth = drawn.scene.pulse_sigma_bins;
