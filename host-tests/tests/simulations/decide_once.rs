@@ -258,7 +258,7 @@ fn a_dim_surface_grows_by_few_of_the_pixels_beside_it() {
     let mut most = 0.0_f64;
     for signal in [8.0, 12.0, 16.0, 24.0, 32.0, 48.0] {
         // Strips of the wall and of nothing, of four columns each.
-        let is_wall = |column: u32| column / 4 % 2 == 0;
+        let is_wall = |column: u32| (column / 4).is_multiple_of(2);
         let wall = Wall::new(
             20.0,
             |_, column| if is_wall(column) { signal } else { 0.0 },
