@@ -8,6 +8,7 @@
 //   bit 26      the link takes a word if one waits
 //   bit 27      a bus access follows in two more words: address, with bit 31 set if it is
 //               written, and data. Accesses wait for those before them.
+//   bit 28      reset
 // Standard output, six words each: what happened, the clock, and up to four words more:
 //   0 a look begins; 1 an event leaves: macropixel; 2 an AER word is taken: the word, least
 //   significant part first; 3 a register is read: address, data; 4 the end: whether a word

@@ -44,6 +44,7 @@ int main(int argc, char **argv) {
         pixels.photon_pixel = command >> 16 & 0xff;
         pixels.photon_valid = command >> 24 & 1;
         pixels.cycle_end = command >> 25 & 1;
+        pixels.reset = command >> 28 & 1;
 
         // The answer to the access that is under way.
         if (pixels.wb_ack) {

@@ -1,6 +1,7 @@
 //! `cargo softcore formal`: what is proved of the pixel processor's Verilog, for all inputs.
 //!
-//! Each proof is a module `top` of `softcore/formal` around a module of the pixel processor.
+//! Each proof is a module `top` of `softcore/formal` around a module of the pixel processor, or
+//! around one that joins others; of these the file may have stand-ins that do anything.
 //! Yosys makes both one circuit of gates, for which ABC then shows that no assertion ever
 //! fails. What no reset sets holds anything at first.
 //!
@@ -40,16 +41,16 @@ enum Engine {
     Reachability,
 }
 
-/// A proof: the file of its `top`, the modules, a fault with which it has to fail.
+/// A proof: the file of its `top`, the modules, faults with each of which it has to fail.
 struct Proof {
     name: &'static str,
     sources: &'static [&'static str],
     claim: &'static str,
     engine: Engine,
-    fault: Mutant,
+    faults: &'static [Mutant],
 }
 
-const PROOFS: [Proof; 7] = [
+const PROOFS: [Proof; 9] = [
     Proof {
         name: "bin_counter",
         sources: &[
@@ -59,44 +60,44 @@ const PROOFS: [Proof; 7] = [
         ],
         claim: "every photon counts in its bin of both histograms, a look empties the spare one, readers see that",
         engine: Engine::Induction(5),
-        fault: Mutant {
+        faults: &[Mutant {
             file: "bin_counter",
             from: "|| c_is_read && c_fresh;",
             to: ";",
-        },
+        }],
     },
     Proof {
         name: "decision",
         sources: &["rtl/pixels/decision.v"],
         claim: "background, root and comparison are the paper's formula",
         engine: Engine::Clocks(11),
-        fault: Mutant {
+        faults: &[Mutant {
             file: "decision",
             from: "{2'd0, excess} > above[STEPS + 1]",
             to: "{2'd0, excess} >= above[STEPS + 1]",
-        },
+        }],
     },
     Proof {
         name: "event_packer",
         sources: &["rtl/pixels/event_packer.v"],
         claim: "the offset is the centroid, rounded; words stay until taken; time words come when due",
         engine: Engine::Induction(3),
-        fault: Mutant {
+        faults: &[Mutant {
             file: "event_packer",
             from: "remainder <= {2'd0, distance, 9'd0} + {9'd0, sum};",
             to: "remainder <= {2'd0, distance, 9'd0};",
-        },
+        }],
     },
     Proof {
         name: "event_queue",
         sources: &["rtl/pixels/event_queue.v"],
         claim: "what is put in leaves once, in order",
         engine: Engine::Reachability,
-        fault: Mutant {
+        faults: &[Mutant {
             file: "event_queue",
             from: "if (put) next <= next + 1'b1;",
             to: "if (put && !take) next <= next + 1'b1;",
-        },
+        }],
     },
     Proof {
         name: "event_reader",
@@ -107,33 +108,118 @@ const PROOFS: [Proof; 7] = [
         ],
         claim: "the neighbours are the counts at the look, though photons came since",
         engine: Engine::Clocks(7),
-        fault: Mutant {
+        faults: &[Mutant {
             file: "event_reader",
             from: "t_ended - t_since",
             to: "t_ended",
-        },
+        }],
     },
     Proof {
         name: "look_scan",
         sources: &["rtl/pixels/look_scan.v"],
         claim: "no macropixel has a second event before its first was taken",
         engine: Engine::Reachability,
-        fault: Mutant {
+        faults: &[Mutant {
             file: "look_scan",
             from: "requesting_at_look <= requesting;",
             to: "requesting_at_look <= 0;",
-        },
+        }],
     },
     Proof {
         name: "peak_keeper",
         sources: &["rtl/pixels/peak_keeper.v"],
         claim: "a look shows the peak, the maxima and the numbers of photons as they were when it passed",
         engine: Engine::Induction(3),
-        fault: Mutant {
+        faults: &[Mutant {
             file: "peak_keeper",
             from: "f_valid && f_pixel == e_pixel ? f_next : states[e_pixel]",
             to: "states[e_pixel]",
-        },
+        }],
+    },
+    Proof {
+        name: "pixel_processor",
+        sources: &[
+            "rtl/pixels/pixel_processor.v",
+            "rtl/pixels/look_scan.v",
+            "rtl/pixels/pixel_registers.v",
+        ],
+        claim: "each photon counts once, in its laser cycle, and none while it stands still; a run leaves nothing",
+        engine: Engine::Induction(5),
+        faults: &[
+            Mutant {
+                file: "pixel_processor",
+                from: "is_stray = |(i_pixel >> PIXELS_LOG2);",
+                to: "is_stray = i_pixel[PIXELS_LOG2];",
+            },
+            Mutant {
+                file: "pixel_processor",
+                from: "is_rejected = |i_code[15:7];",
+                to: "is_rejected = i_code[7];",
+            },
+            Mutant {
+                file: "pixel_processor",
+                from: "if (running || reset) emptied <= 0;",
+                to: "if (running) emptied <= 0;",
+            },
+            Mutant {
+                file: "pixel_processor",
+                from: "a_look <= look;",
+                to: "a_look <= look_begins;",
+            },
+        ],
+    },
+    Proof {
+        name: "system",
+        sources: &["rtl/system.v", "rtl/aer_port.v"],
+        claim: "each half word leaves once, in order, whatever ACK does; photons and bus reach the pixel processor",
+        engine: Engine::Induction(4),
+        faults: &[
+            Mutant {
+                file: "aer_port",
+                from: "left != 0 && !aer_req && !ack",
+                to: "left != 0 && !aer_req",
+            },
+            Mutant {
+                file: "aer_port",
+                from: "aer_req && ack)",
+                to: "aer_req)",
+            },
+            Mutant {
+                file: "aer_port",
+                from: "assign word_taken = word_valid && left == 0 && !ack;",
+                to: "assign word_taken = word_valid && left <= 1 && !ack;",
+            },
+            Mutant {
+                file: "aer_port",
+                from: "            aer_req <= 0;\n            left <= 0;",
+                to: "            left <= 0;",
+            },
+            Mutant {
+                file: "system",
+                from: ".word_taken(port_taken && !event_valid)",
+                to: ".word_taken(port_taken)",
+            },
+            Mutant {
+                file: "system",
+                from: ".cycle_end(cycle_end)",
+                to: ".cycle_end(photon_cycle_end)",
+            },
+            Mutant {
+                file: "system",
+                from: ".photon_code({9'd0, code})",
+                to: ".photon_code({10'd0, code[5:0]})",
+            },
+            Mutant {
+                file: "system",
+                from: ".reset(in_reset),\n        .word_valid",
+                to: ".reset(1'b0),\n        .word_valid",
+            },
+            Mutant {
+                file: "system",
+                from: ".wb_adr(wb_adr),\n        .wb_dat_i",
+                to: ".wb_adr({2'd0, wb_adr[5:0]}),\n        .wb_dat_i",
+            },
+        ],
     },
 ];
 
@@ -168,11 +254,11 @@ pub fn run(mut parser: lexopt::Parser) -> Result<()> {
     Ok(())
 }
 
-/// Proves one, and that it fails with its fault.
+/// Proves one, and that it fails with each of its faults.
 fn prove(root: &Path, proof: &Proof) -> Result<String> {
     let began = Instant::now();
     let depth = |frames: u32| -> Result<()> {
-        let output = solve(root, proof, false, &format!("bmc3 -F {frames}"))?;
+        let output = solve(root, proof, None, &format!("bmc3 -F {frames}"))?;
         let expected = format!("No output asserted in {frames} frames");
         ensure!(output.contains(&expected), "an assertion fails: {output}");
         Ok(())
@@ -184,7 +270,7 @@ fn prove(root: &Path, proof: &Proof) -> Result<String> {
         }
         Engine::Induction(clocks) => {
             depth(clocks + 1)?;
-            let output = solve(root, proof, false, &format!("orpos; ind -F {clocks}"))?;
+            let output = solve(root, proof, None, &format!("orpos; ind -F {clocks}"))?;
             ensure!(
                 output.contains("Networks are equivalent"),
                 "not shown: {output}"
@@ -192,44 +278,52 @@ fn prove(root: &Path, proof: &Proof) -> Result<String> {
             format!("by induction over {clocks} clocks")
         }
         Engine::Reachability => {
-            let output = solve(root, proof, false, "scorr; orpos; pdr")?;
+            let output = solve(root, proof, None, "scorr; orpos; pdr")?;
             ensure!(output.contains("Property proved"), "not shown: {output}");
             "for every state that can be".to_owned()
         }
     };
     let seconds = began.elapsed().as_secs_f32();
-    let output = solve(root, proof, true, "orpos; bmc3 -F 60")?;
-    ensure!(
-        output.contains("was asserted in frame"),
-        "a fault is not found: {output}"
-    );
+    for fault in proof.faults {
+        let output = solve(root, proof, Some(fault), "orpos; bmc3 -F 60")?;
+        ensure!(
+            output.contains("was asserted in frame"),
+            "`{}` as `{}` is not found: {output}",
+            fault.from,
+            fault.to
+        );
+    }
     let Proof {
-        name, claim, fault, ..
+        name,
+        claim,
+        faults,
+        ..
     } = proof;
+    let number = faults.len();
+    let faults = if number == 1 { "fault" } else { "faults" };
     Ok(format!(
-        "{name}: {claim}: proved {how}, {seconds:.1} s; fails with `{}` as `{}`",
-        fault.from, fault.to
+        "{name}: {claim}: proved {how}, {seconds:.1} s; fails with {number} {faults}, each by itself"
     ))
 }
 
-/// What ABC says of the circuit, with or without the fault.
-fn solve(root: &Path, proof: &Proof, is_faulty: bool, commands: &str) -> Result<String> {
+/// What ABC says of the circuit, with or without a fault.
+fn solve(root: &Path, proof: &Proof, fault: Option<&Mutant>, commands: &str) -> Result<String> {
     let softcore = root.join("softcore");
     let folder = target_folder(root).join("softcore/formal");
     let folder = folder
         .join(proof.name)
-        .join(if is_faulty { "fault" } else { "right" });
+        .join(if fault.is_some() { "fault" } else { "right" });
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let top = format!("formal/{}.sv", proof.name);
     let (mut files, mut joins) = (Vec::new(), String::new());
     for source in proof.sources.iter().copied().chain([&*top]) {
         let path = softcore.join(source);
         let mut text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
-        if is_faulty
-            && Path::new(source).file_stem() == Some(proof.fault.file.as_ref())
+        if let Some(fault) = fault
+            && Path::new(source).file_stem() == Some(fault.file.as_ref())
             && source != top
         {
-            text = proof.fault.apply(&text)?;
+            text = fault.apply(&text)?;
         }
         joins += &connections(&text);
         // Yosys is told names without folders, which may have any letters.
@@ -290,15 +384,14 @@ mod tests {
     #[test]
     fn each_fault_has_its_place() {
         for proof in PROOFS {
-            let file = proof.fault.file;
-            let path = root()
-                .join("softcore/rtl/pixels")
-                .join(file)
-                .with_extension("v");
-            let text = fs::read_to_string(path).unwrap();
-            assert_ne!(proof.fault.apply(&text).unwrap(), text);
-            let source = format!("rtl/pixels/{file}.v");
-            assert!(proof.sources.contains(&&*source), "{file}");
+            assert!(!proof.faults.is_empty(), "{}", proof.name);
+            for fault in proof.faults {
+                let is_of =
+                    |source: &&&str| Path::new(source).file_stem() == Some(fault.file.as_ref());
+                let source = proof.sources.iter().find(is_of).unwrap();
+                let text = fs::read_to_string(root().join("softcore").join(source)).unwrap();
+                assert_ne!(fault.apply(&text).unwrap(), text);
+            }
         }
     }
 

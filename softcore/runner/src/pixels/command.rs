@@ -13,6 +13,7 @@ pub struct Command {
     pub cycle_ends: bool,
     /// The link takes a word, if one waits.
     pub link_takes: bool,
+    pub reset: bool,
     /// An access to the registers, which begins once those before it have ended.
     pub access: Option<Access>,
 }
@@ -32,6 +33,7 @@ impl Command {
             self.cycle_ends,
             self.link_takes,
             self.access.is_some(),
+            self.reset,
         ];
         let mut word = u32::from(code) | u32::from(pixel) << 16;
         for (place, bit) in (24..).zip(bits) {
@@ -102,6 +104,8 @@ pub mod register {
     /// The last two bins of the eight.
     pub const LAST_BINS: u32 = 0x34;
     pub const COUNTS: u32 = 0x40;
+    /// Registers of counts, two each.
+    pub const COUNTS_LENGTH: u32 = 24;
 }
 
 /// What the registers from `CONTROL` to `SIZE` hold: settings, run, and who packs.

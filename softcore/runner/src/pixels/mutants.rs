@@ -27,7 +27,7 @@ const fn mutant(file: &'static str, from: &'static str, to: &'static str) -> Mut
 }
 
 /// All of them.
-pub const MUTANTS: [Mutant; 69] = [
+pub const MUTANTS: [Mutant; 115] = [
     // Counting: words on their way, valid bits, full counters.
     mutant(
         "bin_counter",
@@ -351,5 +351,237 @@ pub const MUTANTS: [Mutant; 69] = [
         "pixel_registers",
         "8'h0d: wb_dat_o <= {6'd0, event_right, 6'd0, event_left};",
         "8'h0d: wb_dat_o <= {6'd0, event_left, 6'd0, event_right};",
+    ),
+    // Start and stop: what a run leaves behind.
+    mutant(
+        "pixel_processor",
+        "i_valid <= photon_valid && running;",
+        "i_valid <= photon_valid;",
+    ),
+    mutant(
+        "pixel_processor",
+        "i_end <= cycle_end && running;",
+        "i_end <= cycle_end;",
+    ),
+    mutant(
+        "pixel_processor",
+        "running <= run && (running || emptied[PIXELS_LOG2]) && !reset;",
+        "running <= run && !reset;",
+    ),
+    mutant(
+        "pixel_processor",
+        "&& (running || emptied[PIXELS_LOG2]) && !reset;",
+        "&& (running || emptied[PIXELS_LOG2]);",
+    ),
+    mutant(
+        "pixel_processor",
+        "if (running || reset) emptied <= 0;",
+        "if (reset) emptied <= 0;",
+    ),
+    mutant(
+        "pixel_processor",
+        ".reset(stopped), .live(live),\n        .a_valid",
+        ".reset(reset), .live(live),\n        .a_valid",
+    ),
+    mutant(
+        "pixel_processor",
+        ".reset(stopped), .live(live),\n        .e_valid",
+        ".reset(reset), .live(live),\n        .e_valid",
+    ),
+    mutant(
+        "pixel_processor",
+        ".reset(stopped), .emptied(",
+        ".reset(reset), .emptied(",
+    ),
+    mutant(
+        "pixel_processor",
+        ".reset(stopped),\n        .put(put),",
+        ".reset(reset),\n        .put(put),",
+    ),
+    mutant(
+        "pixel_processor",
+        ".reset(stopped), .enabled(packs)",
+        ".reset(reset), .enabled(packs)",
+    ),
+    mutant(
+        "pixel_processor",
+        ".emptied(emptied[PIXELS_LOG2-1:0])",
+        ".emptied({PIXELS_LOG2{1'b0}})",
+    ),
+    mutant(
+        "pixel_processor",
+        ".begins(begins), .x(x)",
+        ".begins(1'b0), .x(x)",
+    ),
+    // How the modules are joined: ports swapped, a clock too late or early, too narrow.
+    mutant(
+        "pixel_processor",
+        ".a_valid(a_valid), .a_counts(a_counts), .a_look(a_look)",
+        ".a_valid(a_valid), .a_counts(a_counts), .a_look(look)",
+    ),
+    mutant(
+        "pixel_processor",
+        "a_look <= look;",
+        "a_look <= look_begins;",
+    ),
+    mutant(
+        "pixel_processor",
+        ".cycle_end(i_end)",
+        ".cycle_end(cycle_end && running)",
+    ),
+    mutant(
+        "pixel_processor",
+        ".look(look), .late(late)",
+        ".look(late), .late(look)",
+    ),
+    mutant(
+        "pixel_processor",
+        ".e_count0(e_count0), .e_count1(e_count1), .e_full0(e_full0), .e_full1(e_full1),\n        .scan",
+        ".e_count0(e_count1), .e_count1(e_count0), .e_full0(e_full0), .e_full1(e_full1),\n        .scan",
+    ),
+    mutant(
+        "pixel_processor",
+        ".e_full0(e_full0), .e_full1(e_full1),\n        .scan",
+        ".e_full0(e_full1), .e_full1(e_full0),\n        .scan",
+    ),
+    mutant(
+        "pixel_processor",
+        ".scan(scan), .scan_pixel(scan_pixel),\n        .peak_count(peak_count), .peak_bin(peak_bin), .maxima",
+        ".scan(scan), .scan_pixel(found_pixel),\n        .peak_count(peak_count), .peak_bin(peak_bin), .maxima",
+    ),
+    mutant(
+        "pixel_processor",
+        ".live(live), .gate_first",
+        ".live(~live), .gate_first",
+    ),
+    mutant(
+        "pixel_processor",
+        ".alpha(alpha), .minimum(minimum), .middle",
+        ".alpha({6'd0, alpha[9:0]}), .minimum(minimum), .middle",
+    ),
+    mutant(
+        "pixel_processor",
+        ".minimum(minimum), .middle(gate_middle)",
+        ".minimum({7'd0, minimum[2:0]}), .middle(gate_middle)",
+    ),
+    mutant(
+        "pixel_processor",
+        ".middle(gate_middle),\n        .peak_count",
+        ".middle(gate_second),\n        .peak_count",
+    ),
+    mutant(
+        "pixel_processor",
+        ".x(x), .l1(l1), .l2(l2), .is_one_hit",
+        ".x({8'd0, x[7:0]}), .l1(l1), .l2(l2), .is_one_hit",
+    ),
+    mutant(
+        "pixel_processor",
+        ".l1(l1), .l2(l2), .is_one_hit(is_one_hit),\n        .cycle_end",
+        ".l1(l2), .l2(l1), .is_one_hit(is_one_hit),\n        .cycle_end",
+    ),
+    mutant(
+        "pixel_processor",
+        ".is_one_hit(is_one_hit),\n        .cycle_end",
+        ".is_one_hit(1'b0),\n        .cycle_end",
+    ),
+    mutant(
+        "pixel_processor",
+        ".photons(photons), .full(full),\n        .background",
+        ".photons({6'd0, photons[9:0]}), .full(full),\n        .background",
+    ),
+    mutant(
+        "pixel_processor",
+        ".full(full),\n        .background",
+        ".full({12'd0, full[11:0]}),\n        .background",
+    ),
+    mutant(
+        "pixel_processor",
+        ".reading(reading), .live",
+        ".reading(1'b0), .live",
+    ),
+    mutant(
+        "pixel_processor",
+        "assign taken_pixel = pixel;",
+        "reg [PIXELS_LOG2-1:0] left_pixel;\n    always @(posedge clk) left_pixel <= pixel;\n    assign taken_pixel = left_pixel;",
+    ),
+    mutant(
+        "pixel_processor",
+        "assign taken = take;",
+        "assign taken = event_leaves;",
+    ),
+    mutant(
+        "pixel_processor",
+        "assign take = register_takes || packer_takes;",
+        "assign take = packer_takes;",
+    ),
+    mutant(
+        "pixel_processor",
+        ".found_rest({found_piled_up, found_deferred,",
+        ".found_rest({found_deferred, found_piled_up,",
+    ),
+    mutant(
+        "pixel_processor",
+        "found_exposure, found_background, found_count}),",
+        "{8'd0, found_exposure[7:0]}, found_background, found_count}),",
+    ),
+    mutant(
+        "pixel_processor",
+        ".read_word0(read_word0), .read_word1(read_word1),\n        .put",
+        ".read_word0(read_word1), .read_word1(read_word0),\n        .put",
+    ),
+    mutant(
+        "pixel_processor",
+        ".put_left(put_left), .put_right(put_right)",
+        ".put_left(put_right), .put_right(put_left)",
+    ),
+    mutant(
+        "pixel_processor",
+        ".host_address(host_address), .host_taken(host_taken),\n        .host_word(host_word)\n    );\n\n    // The events",
+        ".host_address(read_address), .host_taken(host_taken),\n        .host_word(host_word)\n    );\n\n    // The events",
+    ),
+    mutant(
+        "pixel_processor",
+        ".in({scan_cycle, put_clipped,",
+        ".in({cycle, put_clipped,",
+    ),
+    mutant(
+        "pixel_processor",
+        ".left(left), .right(right),\n        .cycle_high",
+        ".left(right), .right(left),\n        .cycle_high",
+    ),
+    mutant(
+        "pixel_processor",
+        ".event_left(left), .event_right(right)",
+        ".event_left(right), .event_right(left)",
+    ),
+    mutant(
+        "pixel_processor",
+        "event_cycle[15:0], exposure,",
+        "cycle[15:0], exposure,",
+    ),
+    mutant(
+        "pixel_processor",
+        "{was_late, look_begins,",
+        "{look_begins, was_late,",
+    ),
+    mutant(
+        "pixel_processor",
+        "expired_deferred, expired, deferred, found,",
+        "expired, expired_deferred, deferred, found,",
+    ),
+    mutant(
+        "pixel_processor",
+        "strayed, gated_out, rejected, counted}",
+        "strayed, rejected, gated_out, counted}",
+    ),
+    mutant(
+        "pixel_processor",
+        ".full_ended(full_ended), .cycle(cycle)",
+        ".full_ended({16'd0, full_ended[7:0]}), .cycle(cycle)",
+    ),
+    mutant(
+        "pixel_processor",
+        ".full_ended(full_ended), .cycle(cycle)",
+        ".full_ended(full_ended), .cycle(scan_cycle)",
     ),
 ];

@@ -49,6 +49,7 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
         link: 256,
         events: Events::Link,
         reads: None,
+        restarts: Vec::new(),
         length: each,
         seed: 1,
     };
@@ -167,6 +168,28 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
     for (seed, scene) in (1..).zip(&mut scenes) {
         scene.seed = seed;
     }
+    // Some twice, where they stay as they are.
+    let restarts = vec![short, short, bright, paper, paper, every_other, dim];
+    let restarted = |name, pixels_log2, seed| Scene {
+        clocks: [1, 12],
+        bins: Bins::Target(220, 1),
+        pixels: Pixels::Strays,
+        restarts: restarts.clone(),
+        seed,
+        ..scene(name, pixels_log2, paper)
+    };
+    scenes.extend([
+        Scene {
+            link: 20,
+            length: 2 * each,
+            ..restarted("stopped and started at any time", 2, 101)
+        },
+        Scene {
+            events: Events::Registers(7),
+            ..restarted("the same, the program takes the events", 1, 102)
+        },
+        restarted("stopped and started at any time", 4, 103),
+    ]);
     Ok(scenes)
 }
 

@@ -1,5 +1,6 @@
 //! What comes to the pixel processor, clock by clock.
 
+use std::collections::VecDeque;
 use std::sync::Arc;
 
 use anyhow::Result;
@@ -31,6 +32,9 @@ pub struct Scene {
     pub events: Events,
     /// The testbench reads histograms beside, a register after so many clocks.
     pub reads: Option<u64>,
+    /// If there are any, the processor is stopped and started again at random times, and has the
+    /// next of these settings each time. Photons come meanwhile.
+    pub restarts: Vec<PixelConfig<128>>,
     /// The clocks with photons.
     pub length: u64,
     pub seed: u64,
@@ -97,7 +101,19 @@ pub fn config(
 impl Scene {
     /// What the registers of the settings hold.
     pub fn register_values(&self) -> Result<Vec<u32>> {
-        register_values(&self.config, self.events == Events::Link, self.pixels_log2)
+        self.register_values_of(&self.config)
+    }
+
+    /// The same with other settings.
+    fn register_values_of(&self, config: &PixelConfig<128>) -> Result<Vec<u32>> {
+        register_values(config, self.events == Events::Link, self.pixels_log2)
+    }
+
+    /// The settings of a run; each restart begins the next.
+    pub fn config_of(&self, run: usize) -> PixelConfig<128> {
+        let restart = run.checked_sub(1);
+        let config = restart.and_then(|restart| self.restarts.get(restart % self.restarts.len()));
+        *config.unwrap_or(&self.config)
     }
 }
 
@@ -109,6 +125,21 @@ pub struct Commands {
     cycle_ends_at: u64,
     settings: Vec<Access>,
     turn: u8,
+    /// The registers' values in each run, by its place among the restarts.
+    values: Vec<Vec<u32>>,
+    run: usize,
+    restart_at: u64,
+    /// What a restart has still to do, and when.
+    restart: VecDeque<(u64, Restart)>,
+    /// Before this clock a program takes no event: it was interrupted by a restart.
+    events_from: u64,
+}
+
+/// A step of a restart.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Restart {
+    Reset,
+    Access(Access),
 }
 
 impl Commands {
@@ -125,6 +156,13 @@ impl Commands {
             cycle_ends_at: REST,
             settings,
             turn: 0,
+            values: (0..=scene.restarts.len())
+                .map(|run| scene.register_values_of(&scene.config_of(run)))
+                .collect::<Result<_>>()?,
+            run: 0,
+            restart_at: REST + 1000,
+            restart: VecDeque::new(),
+            events_from: 0,
         })
     }
 
@@ -137,6 +175,68 @@ impl Commands {
         #[allow(clippy::cast_possible_truncation, reason = "below `end`")]
         let below = (product >> 32) as u32;
         below
+    }
+
+    /// Stops the processor in this clock and starts it again, as soon as can be or later. An access
+    /// to the registers takes two clocks.
+    fn plan_restart(&mut self, now: u64) {
+        let before = self.run;
+        self.run += 1;
+        let restarts = self.scene.restarts.len();
+        let values_of = |run: usize| match run {
+            0 => 0,
+            run => (run - 1) % restarts + 1,
+        };
+        let values = self.values[values_of(self.run)].clone();
+        let is_other = values != self.values[values_of(before)];
+        let mut at = now;
+        let mut then = |after: u64, step| {
+            at += after;
+            self.restart.push_back((at, step));
+        };
+        let is_reset = self.random.next_u32() >> 30 == 0;
+        then(
+            0,
+            if is_reset {
+                Restart::Reset
+            } else {
+                write(register::CONTROL, 0)
+            },
+        );
+        let reads_counts = !is_reset && self.random.next_u32() >> 31 == 0;
+        if reads_counts {
+            for number in 0..register::COUNTS_LENGTH {
+                let access = Access::Read(register::COUNTS + number);
+                then(if number == 0 { 8 } else { 2 }, Restart::Access(access));
+            }
+        }
+        let waits = match self.random.next_u32() >> 30 {
+            0 => 0,
+            _ => u64::from(self.random.next_u32() >> 26),
+        };
+        if waits > 0 {
+            then(2 + waits, Restart::Access(Access::Read(register::CONTROL)));
+        }
+        if is_other || is_reset {
+            for (address, &data) in (register::CONTROL..register::SIZE).zip(&values).skip(1) {
+                then(2, write(address, data));
+            }
+        }
+        then(2, write(register::CONTROL, values[0]));
+        // Whether it runs yet; that it runs.
+        then(2, Restart::Access(Access::Read(register::CONTROL)));
+        let done = at;
+        let longest = if self.random.next_u32() >> 30 == 0 {
+            6
+        } else {
+            13
+        };
+        self.restart_at = done + 2 + u64::from(self.random.next_u32() >> (32 - longest));
+        if let Events::Registers(period) = self.scene.events {
+            // Between two accesses, and then a look at the register first.
+            self.restart_at = self.restart_at.next_multiple_of(period) + period / 2;
+            self.events_from = (done + 2).next_multiple_of(9 * period);
+        }
     }
 
     #[allow(clippy::cast_possible_truncation, reason = "few macropixels and bins")]
@@ -178,6 +278,10 @@ impl Commands {
     }
 }
 
+const fn write(address: u32, data: u32) -> Restart {
+    Restart::Access(Access::Write(address, data))
+}
+
 impl Iterator for Commands {
     type Item = Command;
 
@@ -212,7 +316,7 @@ impl Iterator for Commands {
             if self.scene.events.has_registers()
                 && after >= REST
                 && (after - REST).is_multiple_of(8)
-                && after < REST + 8 * 24
+                && after < REST + 8 * u64::from(register::COUNTS_LENGTH)
             {
                 let number = u32::try_from((after - REST) / 8).ok()?;
                 command.access = Some(Access::Read(register::COUNTS + number));
@@ -232,6 +336,7 @@ impl Iterator for Commands {
             });
         }
         if let Events::Registers(period) = self.scene.events
+            && clock >= self.events_from
             && clock < end + REST * 9 / 10
         {
             // A look at the register, the seven words, and the end of it.
@@ -242,6 +347,18 @@ impl Iterator for Commands {
                     8 => Access::Write(register::WAITING, 1),
                     number => Access::Read(register::WAITING + number),
                 });
+            }
+        }
+        if !self.scene.restarts.is_empty() {
+            if clock == self.restart_at && clock < end - REST {
+                self.plan_restart(clock);
+            }
+            if self.restart.front().is_some_and(|&(at, _)| at == clock) {
+                match self.restart.pop_front() {
+                    Some((_, Restart::Access(access))) => command.access = Some(access),
+                    Some((_, Restart::Reset)) => command.reset = true,
+                    None => {}
+                }
             }
         }
         Some(command)

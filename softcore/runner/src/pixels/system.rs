@@ -60,6 +60,7 @@ pub fn measure(root: &Path) -> Result<Vec<Latency>> {
                 link: 256,
                 events: Events::System,
                 reads: None,
+                restarts: Vec::new(),
                 length: LENGTH,
                 seed: rate.into(),
             };

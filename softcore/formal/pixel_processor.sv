@@ -1,0 +1,239 @@
+// Each photon that comes while the processor runs is counted once in COUNTS: in the gate, outside,
+// past the last bin, or of a macropixel that there is not. Those of the first two kinds, and no
+// other, reach `bin_counter` two clocks later, unless it has been stopped. The end of a laser
+// cycle counts once; if a look is due there, it begins or is late, and passes with the photon of
+// that clock. What comes while it stands still counts nowhere. It runs again after every
+// macropixel has been emptied, and looks are due as from the beginning.
+//
+// Any photon, end and access to the registers in any clock; stop, start and reset at any time.
+// `look_scan` and `pixel_registers` are there; the other modules may do anything.
+module top (
+    input        clk,
+    input        reset,
+    input        photon_valid,
+    input [7:0]  photon_pixel,
+    input [15:0] photon_code,
+    input        cycle_end,
+    input        wb_cyc, wb_stb, wb_we,
+    input [7:0]  wb_adr,
+    input [31:0] wb_dat_i
+);
+    pixel_processor #(.PIXELS_LOG2(1)) dut (
+        .clk(clk), .reset(reset),
+        .photon_valid(photon_valid), .photon_pixel(photon_pixel), .photon_code(photon_code),
+        .cycle_end(cycle_end), .word_taken(1'b0),
+        .wb_cyc(wb_cyc), .wb_stb(wb_stb), .wb_we(wb_we), .wb_adr(wb_adr), .wb_dat_i(wb_dat_i)
+    );
+    wire running;               // probe dut.running
+    wire run;                   // probe dut.registers.run
+    wire was_running;           // probe dut.registers.was_running
+    wire [15:0] x;              // probe dut.registers.x
+    wire [7:0] gate_first;      // probe dut.registers.gate_first
+    wire [7:0] gate_second;     // probe dut.registers.gate_second
+    wire [7:0] gate_middle;     // probe dut.registers.gate_middle
+    wire [7:0] gate_fourth;     // probe dut.registers.gate_fourth
+    wire [7:0] gate_end;        // probe dut.registers.gate_end
+    wire [63:0] cycle;          // probe dut.registers.cycle
+    wire [47:0] count0;         // probe dut.registers.happened[0].count
+    wire [47:0] count1;         // probe dut.registers.happened[1].count
+    wire [47:0] count2;         // probe dut.registers.happened[2].count
+    wire [47:0] count3;         // probe dut.registers.happened[3].count
+    wire [47:0] count8;         // probe dut.registers.happened[8].count
+    wire [47:0] count9;         // probe dut.registers.happened[9].count
+    wire a_valid;               // probe dut.counter.a_valid
+    wire a_counts;              // probe dut.counter.a_counts
+    wire a_look;                // probe dut.counter.a_look
+    wire a_pixel;               // probe dut.counter.a_pixel
+    wire [6:0] a_bin;           // probe dut.counter.a_bin
+    wire [1:0] a_quadrant;      // probe dut.counter.a_quadrant
+    wire empties;               // probe dut.counter.reset
+    wire [1:0] emptied;         // probe dut.emptied
+    wire [15:0] exposure0;      // probe dut.scanner.exposures[0]
+    wire [15:0] exposure1;      // probe dut.scanner.exposures[1]
+    wire [15:0] until_due;      // probe dut.scanner.until_due
+    wire is_next;               // probe dut.scanner.is_next
+    wire [1:0] live;            // probe dut.scanner.live
+    wire [1:0] requesting;      // probe dut.scanner.requesting
+    wire [1:0] is_deferred;     // probe dut.scanner.is_deferred
+    wire busy;                  // probe dut.scanner.busy
+
+    // What comes.
+    wire comes = photon_valid && running;
+    wire [7:0] bin = photon_code[7:0];
+    wire strays = photon_pixel >= 8'd2;
+    wire is_rejected = photon_code >= 16'd128;
+    wire is_gated = bin >= gate_first && bin < gate_end;
+    wire [1:0] quadrant = bin < gate_second ? 2'd0 : bin < gate_middle ? 2'd1 : bin < gate_fourth ? 2'd2 : 2'd3;
+    wire is_ordered = gate_second <= gate_middle && gate_middle <= gate_fourth;
+    wire [3:0] kind = !comes ? 4'd0 : strays ? 4'd8 : is_rejected ? 4'd2 : is_gated ? 4'd1 : 4'd4;
+
+    // A clock later, and two.
+    reg is_first = 1, is_second = 0, ran = 0, was_reset = 0, ended = 0, looks = 0, is_late = 0, ended_before = 0;
+    reg [3:0] kind1 = 0, kind2 = 0;
+    reg [9:0] place1, place2;
+    reg [15:0] since;
+    reg [47:0] counts [0:3], looked, lates;
+    reg [63:0] cycles;
+    // COUNTS are of the run that began last, until a reset.
+    reg counting = 0;
+    wire begins = run && !was_running;
+    wire is_due = ended && since + 17'd1 >= x;
+    wire begins_look = running && is_due && !busy;
+    integer i;
+    always @(posedge clk) begin
+        {is_first, is_second, was_reset, ran} <= {1'b0, is_first, reset, running && !is_first};
+        kind1 <= is_first ? 4'd0 : kind;
+        kind2 <= kind1;
+        place1 <= {photon_pixel[0], bin[6:0], quadrant};
+        place2 <= place1;
+        ended <= cycle_end && running && !is_first;
+        ended_before <= ended;
+        if (ended) since <= begins_look ? 16'd0 : since + !(&since);
+        if (!running) since <= 0;
+        for (i = 0; i < 4; i = i + 1) counts[i] <= begins ? 48'd0 : counts[i] + kind2[i];
+        looked <= begins ? 48'd0 : looked + looks;
+        lates <= begins ? 48'd0 : lates + is_late;
+        looks <= begins_look;
+        is_late <= running && is_due && busy;
+        cycles <= begins ? 64'd0 : cycles + ended;
+        counting <= (counting || begins) && !reset;
+    end
+
+    always @* begin
+        if (is_first) assume (reset);
+        if (!is_first && !is_second) begin
+            assert (empties == !running);
+            assert (!running || run || !was_reset);
+            if (counting) begin
+                assert (count0 == counts[0] && count1 == counts[1]);
+                assert (count2 == counts[2] && count3 == counts[3]);
+                assert (count8 == looked && count9 == lates && cycle == cycles);
+            end
+            assert (a_valid == ((kind2[0] || kind2[2]) && ran));
+            assert (a_look == looks && (!a_look || ended_before));
+            if (a_valid && !was_reset) begin
+                assert (a_counts == kind2[0] && {a_pixel, a_bin} == place2[9:2]);
+                if (is_ordered) assert (a_quadrant == place2[1:0]);
+            end
+            // What the proof knows of the inside.
+            assert (emptied <= 2);
+            if (!running) assert ((emptied < 1 || exposure0 == 0) && (emptied < 2 || exposure1 == 0));
+            if (running) assert (is_next == (since + 17'd1 >= x));
+            if (running && !is_next) assert (until_due == x - 16'd1 - since);
+            // Nothing is left of the run before.
+            if (running && !ran) begin
+                assert (!a_valid && !a_look && kind1 == 0 && kind2 == 0);
+                assert (exposure0 == 0 && exposure1 == 0);
+                assert (live == 0 && requesting == 0 && is_deferred == 0 && !busy);
+            end
+        end
+    end
+endmodule
+
+module bin_counter #(parameter PIXELS_LOG2 = 1) (
+    input                      clk, reset,
+    input  [(1<<PIXELS_LOG2)-1:0] live,
+    input                      a_valid, a_counts, a_look,
+    input  [PIXELS_LOG2-1:0]   a_pixel,
+    input  [6:0]               a_bin,
+    input  [1:0]               a_quadrant,
+    output                     e_valid, e_counts, e_look,
+    output [PIXELS_LOG2-1:0]   e_pixel,
+    output [6:0]               e_bin,
+    output [1:0]               e_quadrant,
+    output [9:0]               e_count0, e_count1,
+    output                     e_full0, e_full1,
+    input  [PIXELS_LOG2+3:0]   read_address,
+    output [87:0]              read_word0, read_word1
+);
+    (* anyseq *) wire [PIXELS_LOG2+209:0] outputs;
+    assign {e_valid, e_counts, e_look, e_pixel, e_bin, e_quadrant, e_count0, e_count1, e_full0, e_full1,
+            read_word0, read_word1} = outputs;
+endmodule
+
+module peak_keeper #(parameter PIXELS_LOG2 = 1) (
+    input                    clk, reset,
+    input  [(1<<PIXELS_LOG2)-1:0] live,
+    input                    e_valid, e_counts, e_look,
+    input  [PIXELS_LOG2-1:0] e_pixel,
+    input  [6:0]             e_bin,
+    input  [1:0]             e_quadrant,
+    input  [9:0]             e_count0, e_count1,
+    input                    e_full0, e_full1,
+    output                   scan,
+    input  [PIXELS_LOG2-1:0] scan_pixel,
+    output [9:0]             peak_count,
+    output [6:0]             peak_bin,
+    output [39:0]            maxima,
+    output [15:0]            photons,
+    output [23:0]            full
+);
+    (* anyseq *) wire [97:0] outputs;
+    assign {scan, peak_count, peak_bin, maxima, photons, full} = outputs;
+endmodule
+
+module decision (
+    input         clk,
+    input  [15:0] alpha,
+    input  [9:0]  minimum,
+    input  [7:0]  middle,
+    input  [9:0]  peak_count,
+    input  [6:0]  peak_bin,
+    input  [39:0] maxima,
+    output [9:0]  background,
+    output        is_clear
+);
+    (* anyseq *) wire [10:0] outputs;
+    assign {background, is_clear} = outputs;
+endmodule
+
+module event_reader #(parameter PIXELS_LOG2 = 1, parameter REST = 38) (
+    input                    clk, reset,
+    input  [(1<<PIXELS_LOG2)-1:0] live,
+    input  [7:0]             gate_first, gate_end,
+    input                    found,
+    input  [PIXELS_LOG2-1:0] found_pixel,
+    input  [6:0]             found_bin,
+    input  [REST-1:0]        found_rest,
+    output                   reading,
+    output [PIXELS_LOG2+3:0] read_address,
+    input  [87:0]            read_word0, read_word1,
+    output                   put,
+    output [PIXELS_LOG2-1:0] put_pixel,
+    output [6:0]             put_bin,
+    output [REST-1:0]        put_rest,
+    output [9:0]             put_left, put_right,
+    output                   put_clipped,
+    input                    host_asks,
+    input  [PIXELS_LOG2+3:0] host_address,
+    output                   host_taken,
+    output [79:0]            host_word
+);
+    (* anyseq *) wire [2*PIXELS_LOG2+REST+114:0] outputs;
+    assign {reading, read_address, put, put_pixel, put_bin, put_rest, put_left, put_right, put_clipped,
+            host_taken, host_word} = outputs;
+endmodule
+
+module event_queue #(parameter DEPTH_LOG2 = 1, parameter WIDTH = 8) (
+    input              clk, reset, put,
+    input  [WIDTH-1:0] in,
+    input              take,
+    output [WIDTH-1:0] head,
+    output             waiting, is_last
+);
+    (* anyseq *) wire [WIDTH+1:0] outputs;
+    assign {head, waiting, is_last} = outputs;
+endmodule
+
+module event_packer (
+    input          clk, reset, enabled, waiting,
+    input  [127:0] event_word,
+    input  [9:0]   left, right,
+    input  [47:0]  cycle_high,
+    output         take, word_valid,
+    output [127:0] word,
+    input          word_taken
+);
+    (* anyseq *) wire [129:0] outputs;
+    assign {take, word_valid, word} = outputs;
+endmodule
