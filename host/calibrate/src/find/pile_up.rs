@@ -380,7 +380,6 @@ mod tests {
                 matches!(tdc(&traces), Tdc::DeadTime { .. })
             });
             let found = found.count();
-            println!("{light} photons a bin, {cycles} laser cycles: {found} of {seeds}");
             assert!(found <= 1, "{found} of {seeds} at {light}");
         }
     }
