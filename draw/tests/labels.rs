@@ -226,7 +226,9 @@ fn panels(most: usize) -> impl Strategy<Value = Vec<Panel>> {
         });
         Series::named(name, STEPS[pen], style, points.collect())
     });
-    let panel = ("[a-z ]{0,60}", prop::collection::vec(series, 1..9));
+    // A word that is wider than its panel cannot be wrapped.
+    let title = "[a-z]{0,12}( [a-z]{1,12}){0,5}";
+    let panel = (title, prop::collection::vec(series, 1..9));
     let panel = panel.prop_map(|(title, series)| Panel { title, series });
     prop::collection::vec(panel, 1..=most)
 }
