@@ -10,6 +10,7 @@ use rand_distr::{Distribution, Poisson};
     reason = "a number of photons; BINS is at most 1024"
 )]
 pub fn draw<const BINS: usize>(photons: &Poisson<f64>, rng: &mut impl Rng, codes: &mut Vec<u16>) {
+    const { assert!(BINS.is_power_of_two() && BINS <= 1024) };
     let end = codes.len() + photons.sample(rng) as usize;
     while codes.len() < end {
         let random = rng.next_u64();

@@ -116,7 +116,8 @@ fn run(
     let lights = (0..pixels).map(|address| {
         let (background, signal) = light(address);
         // `None` without photons.
-        [background * BINS as f64, signal].map(|mean| Poisson::new(mean).ok())
+        [background * BINS as f64, signal]
+            .map(|mean| (mean > 0.0).then(|| Poisson::new(mean).unwrap()))
     });
     let lights: Vec<[Option<Poisson<f64>>; 2]> = lights.collect();
     let mut codes = Vec::new();

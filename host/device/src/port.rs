@@ -49,11 +49,13 @@ impl Port for Box<dyn serialport::SerialPort> {
 
 /// Sends all bytes. A full buffer is an error only if it stays full for as long as `stuck`.
 fn send(port: &mut impl Write, mut bytes: &[u8], stuck: Duration) -> io::Result<()> {
-    let since = Instant::now();
+    let mut since = Instant::now();
     while !bytes.is_empty() {
         let sent = patient(port.write(bytes))?;
         bytes = &bytes[sent..];
-        if since.elapsed() > stuck {
+        if sent > 0 {
+            since = Instant::now();
+        } else if since.elapsed() > stuck {
             return Err(ErrorKind::TimedOut.into());
         }
     }

@@ -50,7 +50,7 @@ impl Looks {
 #[derive(Clone, Debug)]
 struct Photons {
     background: Option<Poisson<f64>>,
-    /// More photons than half of the bins.
+    /// A mean of more than half a photon a bin.
     is_bright: bool,
     signal: Vec<(u16, Poisson<f64>)>,
 }
@@ -101,7 +101,10 @@ impl Photons {
 
     fn frame<const BINS: usize>(&self, rng: &mut Pcg64) -> [u16; BINS] {
         let mut frame = [0u16; BINS];
-        self.draw::<BINS>(rng, |bin| frame[usize::from(bin)] += 1);
+        self.draw::<BINS>(rng, |bin| {
+            let count = &mut frame[usize::from(bin)];
+            *count = count.saturating_add(1);
+        });
         frame
     }
 
@@ -112,7 +115,7 @@ impl Photons {
         gate: &RangeGate<BINS>,
         rng: &mut Pcg64,
     ) {
-        // Both give the same histogram. A frame takes a pass over all bins, a photon alone three times as long as in one.
+        // Both give the same histogram. A frame takes a pass over all bins; a photon alone takes longer than one in a frame.
         if self.is_bright {
             histogram.add_frame(&self.frame::<BINS>(rng), gate);
         } else {

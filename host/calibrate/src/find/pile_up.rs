@@ -362,15 +362,16 @@ mod tests {
     }
 
     /// Flat counts of a TDC without a dead time, as sparse and as dense as they come, and with laser cycles
-    /// that would allow one. By Ville's inequality one recording in 1000 looks as if; `DTOF_SLOW=1` draws larger
-    /// and more of them.
+    /// that would allow one. At most one recording in 1000 appears to have a dead time (Ville's
+    /// inequality), so none or one in all. `DTOF_SLOW=1` draws larger and more of them.
     #[test]
     fn flat_counts_have_no_dead_time() {
         let (seeds, pixels) = match std::env::var_os("DTOF_SLOW") {
             Some(_) => (100, 1024),
             None => (30, 256),
         };
-        for (light, cycles) in [(0.01, 100), (0.05, 20), (0.3, 100), (2.0, 300)] {
+        let mut all = 0;
+        for (light, cycles) in [(0.01, 100), (0.05, 20), (0.3, 100), (2.0, 400)] {
             let poisson = Poisson::new(light).unwrap();
             let found = (0u64..seeds).into_par_iter().filter(|&seed| {
                 let mut rng = Pcg32::seed_from_u64(seed);
@@ -380,7 +381,8 @@ mod tests {
                 matches!(tdc(&traces), Tdc::DeadTime { .. })
             });
             let found = found.count();
-            assert!(found <= 1, "{found} of {seeds} at {light}");
+            all += found;
         }
+        assert!(all <= 1, "{all} of {seeds} in each");
     }
 }
