@@ -111,9 +111,16 @@ impl Scene {
 
     /// The settings of a run; each restart begins the next.
     pub fn config_of(&self, run: usize) -> PixelConfig<128> {
+        match self.place_of(run) {
+            0 => self.config,
+            place => self.restarts[place - 1],
+        }
+    }
+
+    /// Which settings a run has: 0 the first ones, then those of the restarts, over and over.
+    fn place_of(&self, run: usize) -> usize {
         let restart = run.checked_sub(1);
-        let config = restart.and_then(|restart| self.restarts.get(restart % self.restarts.len()));
-        *config.unwrap_or(&self.config)
+        restart.map_or(0, |restart| restart % self.restarts.len() + 1)
     }
 }
 
@@ -125,7 +132,7 @@ pub struct Commands {
     cycle_ends_at: u64,
     settings: Vec<Access>,
     turn: u8,
-    /// The registers' values in each run, by its place among the restarts.
+    /// The registers' values of all settings, by [`Scene::place_of`].
     values: Vec<Vec<u32>>,
     run: usize,
     restart_at: u64,
@@ -180,15 +187,10 @@ impl Commands {
     /// Stops the processor in this clock and starts it again, as soon as can be or later. An access
     /// to the registers takes two clocks.
     fn plan_restart(&mut self, now: u64) {
-        let before = self.run;
+        let before = &self.values[self.scene.place_of(self.run)];
         self.run += 1;
-        let restarts = self.scene.restarts.len();
-        let values_of = |run: usize| match run {
-            0 => 0,
-            run => (run - 1) % restarts + 1,
-        };
-        let values = self.values[values_of(self.run)].clone();
-        let is_other = values != self.values[values_of(before)];
+        let values = self.values[self.scene.place_of(self.run)].clone();
+        let is_other = values != *before;
         let mut at = now;
         let mut then = |after: u64, step| {
             at += after;
