@@ -77,6 +77,11 @@ impl<const BINS: usize> LastDecision<BINS> {
     }
 }
 
+/// Sorts by level and pixel. Not generic, so that it is compiled once.
+pub(super) fn sort(decisions: &mut [Decision]) {
+    decisions.sort_unstable_by_key(|decision| (decision.event.level, decision.event.pixel));
+}
+
 /// The pixels whose decisions are kept: all of a small array, step second column and row of a
 /// larger one, step fourth, and so on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -11,6 +11,7 @@ use dtof_core::{
 };
 
 use super::decisions::{Decision, LastDecision};
+use super::group::sort;
 use crate::Engine;
 use crate::settings::Settings;
 use dtof_options::Refused;
@@ -145,7 +146,7 @@ impl<const BINS: usize> Engine for FrameEngine<BINS> {
                 events.extend(pixel.end_laser_cycle(&self.gate, &self.estimator, now));
             }
         }
-        events.sort_unstable_by_key(|event| (event.cycle, event.pixel));
+        sort(&mut events, slice.first_cycle);
         Ok(events)
     }
 

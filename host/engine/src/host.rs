@@ -2,15 +2,15 @@
 
 use anyhow::Result;
 use dtof_core::{Array, Count8, Count10, CounterWidth, DepthEvent, PixelAddress, Statistics};
-use rayon::prelude::*;
 
 use super::Engine;
-use super::decisions::Decision;
+use super::decisions::{self, Decision};
 use super::frame::FrameEngine;
 use super::group::{Configs, Done, Group, sort};
 use super::neighbours::NeighbourEngine;
 use super::once::OnceEngine;
 use super::once_per_bin::OncePerBinEngine;
+use super::parallel::of_parts;
 use crate::settings::Settings;
 use crate::{with_bins, with_widest};
 use dtof_photons::source::Slice;
@@ -96,13 +96,14 @@ impl<const BINS: usize, W: CounterWidth> HostEngine<BINS, W> {
 impl<const BINS: usize, W: CounterWidth> Engine for HostEngine<BINS, W> {
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
         let configs = &self.configs;
-        let of_groups: Vec<Done> = self
-            .groups
-            .par_iter_mut()
-            .map(|group| group.run(configs, slice.first_cycle, &slice.pixels))
-            .collect();
+        let of_parts = of_parts(&mut self.groups, 1, |_, groups| -> Vec<Done> {
+            let groups = groups.iter_mut();
+            groups
+                .map(|group| group.run(configs, slice.first_cycle, &slice.pixels))
+                .collect()
+        });
         let mut events = Vec::new();
-        for done in of_groups {
+        for done in of_parts.into_iter().flatten() {
             events.extend(done.events);
             self.pixels += done.pixels;
             self.blocks += done.blocks;
@@ -126,8 +127,11 @@ impl<const BINS: usize, W: CounterWidth> Engine for HostEngine<BINS, W> {
     }
 
     fn decisions(&self) -> Vec<Decision> {
-        let mut all: Vec<Decision> = self.groups.iter().flat_map(Group::decisions).collect();
-        all.sort_unstable_by_key(|decision| (decision.event.level, decision.event.pixel));
+        let mut all = Vec::new();
+        for group in &self.groups {
+            all.extend(group.decisions());
+        }
+        decisions::sort(&mut all);
         all
     }
 }

@@ -10,6 +10,7 @@ pub mod host;
 mod neighbours;
 mod once;
 mod once_per_bin;
+mod parallel;
 pub mod settings;
 pub mod slices;
 

@@ -10,11 +10,11 @@ use dtof_core::{
     AnyRule, Array, AsyncPixel, CounterWidth, DepthEvent, Detection, LaserCycle, Neighbours,
     PixelAddress, PixelConfig, Statistics, WindowRule,
 };
-use rayon::prelude::*;
 
 use super::Engine;
 use super::decisions::{Decision, LastDecision};
 use super::group::sort;
+use super::parallel::of_parts;
 use crate::settings::Settings;
 use dtof_options::Refused;
 use dtof_photons::source::{PixelPhotons, Slice};
@@ -115,7 +115,7 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
     /// Returns whether one of them decides.
     fn count(&mut self, photons: &[PixelPhotons], from: u16, to: u16) -> bool {
         let config = &self.config;
-        let count = |places: &mut [Place<BINS, W>]| {
+        let count = |_, places: &mut [Place<BINS, W>]| {
             let (mut statistics, mut decides) = (Statistics::new(), false);
             for Member {
                 number,
@@ -138,9 +138,8 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
             }
             (statistics, decides)
         };
-        let parts: Vec<_> = self.places.par_chunks_mut(PIXELS).map(count).collect();
         let mut any = false;
-        for (statistics, decides) in parts {
+        for (statistics, decides) in of_parts(&mut self.places, PIXELS, count) {
             self.statistics += statistics;
             any |= decides;
         }
@@ -151,14 +150,15 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
     fn look(&mut self, last: LaserCycle, events: &mut Vec<DepthEvent>) {
         let (config, neighbours) = (&self.config, &self.neighbours);
         let places = &self.places;
-        let detections: Vec<Option<Detection>> = (0..places.len())
-            .into_par_iter()
-            .with_min_len(PIXELS)
-            .map(|number| neighbours.decide(places, number, config))
-            .collect();
-        let end = |(places, detections): (&mut [Place<BINS, W>], &[Option<Detection>])| {
+        let mut detections: Vec<Option<Detection>> = vec![None; places.len()];
+        of_parts(&mut detections, PIXELS, |first, detections| {
+            for (number, detection) in (first..).zip(detections) {
+                *detection = neighbours.decide(places, number, config);
+            }
+        });
+        let end = |first: usize, places: &mut [Place<BINS, W>]| {
             let (mut statistics, mut events) = (Statistics::new(), Vec::new());
-            for (Place(member), detection) in places.iter_mut().zip(detections) {
+            for (Place(member), detection) in places.iter_mut().zip(&detections[first..]) {
                 let Some(Member {
                     pixel, last: kept, ..
                 }) = member
@@ -187,9 +187,7 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
             }
             (statistics, events)
         };
-        let places = self.places.par_chunks_mut(PIXELS);
-        let parts: Vec<_> = places.zip(detections.par_chunks(PIXELS)).map(end).collect();
-        for (statistics, more) in parts {
+        for (statistics, more) in of_parts(&mut self.places, PIXELS, end) {
             self.statistics += statistics;
             events.extend(more);
         }

@@ -31,11 +31,11 @@ use dtof_core::{
     AnyRule, Array, Count, CounterWidth, DepthEvent, Detection, EchoNumber, Flags, Histogram,
     LaserCycle, Neighbours, PixelAddress, PixelConfig, Statistics,
 };
-use rayon::prelude::*;
 
 use super::Engine;
 use super::decisions::Decision;
 use super::neighbours::check;
+use super::parallel::{of_each, of_parts};
 use crate::settings::Settings;
 use dtof_options::Refused;
 use dtof_photons::source::Slice;
@@ -273,29 +273,29 @@ impl AroundPeak {
 
 impl<const BINS: usize, W: CounterWidth> Engine for OnceEngine<BINS, W> {
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
-        let pixels = self.pixels.par_iter_mut().zip(&slice.pixels);
-        pixels.for_each(|(pixel, received)| {
-            for photon in &received.photons {
-                match pixel.counts.get_mut(usize::from(photon.code)) {
-                    Some(count) => *count = count.saturating_add(1),
-                    None => pixel.rejected += 1,
+        of_parts(&mut self.pixels, 1, |first, pixels| {
+            for (pixel, received) in pixels.iter_mut().zip(&slice.pixels[first..]) {
+                for photon in &received.photons {
+                    match pixel.counts.get_mut(usize::from(photon.code)) {
+                        Some(count) => *count = count.saturating_add(1),
+                        None => pixel.rejected += 1,
+                    }
                 }
+                pixel.cycles += u64::from(received.cycles);
             }
-            pixel.cycles += u64::from(received.cycles);
         });
         Ok(Vec::new())
     }
 
     fn finish(&mut self) -> Vec<DepthEvent> {
-        let pixels = self.pixels.par_iter();
-        let mut decided: Vec<_> = pixels
-            .map(|pixel| self.decide(&pixel.counts, pixel.cycles))
-            .collect();
+        let mut decided = of_each(self.pixels.len(), |place| {
+            let pixel = &self.pixels[place];
+            self.decide(&pixel.counts, pixel.cycles)
+        });
         if let Some(neighbours) = self.neighbours {
-            let places = (0..decided.len()).into_par_iter();
-            decided = places
-                .map(|place| self.with_neighbours(neighbours, place, &decided))
-                .collect();
+            decided = of_each(decided.len(), |place| {
+                self.with_neighbours(neighbours, place, &decided)
+            });
         }
         let mut events = Vec::new();
         for (pixel, decided) in self.pixels.iter().zip(&decided) {
@@ -323,7 +323,7 @@ impl<const BINS: usize, W: CounterWidth> Engine for OnceEngine<BINS, W> {
             }));
         }
         self.statistics.events = events.len() as u64;
-        events.sort_by_key(|event| (event.cycle, event.pixel));
+        sort(&mut events);
         events
     }
 
@@ -349,6 +349,11 @@ impl<const BINS: usize, W: CounterWidth> Engine for OnceEngine<BINS, W> {
 fn counts<const BINS: usize, W: CounterWidth>(histogram: &Histogram<BINS, W>) -> Vec<u32> {
     let counts = histogram.counts().iter();
     counts.map(|&count| count.into()).collect()
+}
+
+/// Sorts by laser cycle and pixel, and leaves echoes in order. Not generic, so that it is compiled once.
+fn sort(events: &mut [DepthEvent]) {
+    events.sort_by_key(|event| (event.cycle, event.pixel));
 }
 
 /// Bins of the rule's window: 1 for rules that test the highest bin.

@@ -1,0 +1,77 @@
+//! Work on all threads, in the order of its items. Engines are compiled for each number of bins; what hands out their work
+//! is compiled once.
+
+use rayon::prelude::*;
+
+/// So many parts at most: a thread that is done takes another.
+const PARTS: usize = 256;
+
+/// Divides `items` into parts of at least `least` items. Calls `work` with the place of the first item and the items of
+/// each part, and returns the results in this order.
+pub fn of_parts<T: Send, R: Send>(
+    items: &mut [T],
+    least: usize,
+    work: impl Fn(usize, &mut [T]) -> R + Sync,
+) -> Vec<R> {
+    let length = items.len().div_ceil(PARTS).max(least).max(1);
+    let mut results: Vec<Option<R>> = Vec::new();
+    results.resize_with(items.len().div_ceil(length), || None);
+    let work = &work;
+    let parts = items.chunks_mut(length).zip(&mut results).enumerate();
+    let jobs = parts.map(|(number, (part, result))| -> Job<'_> {
+        Box::new(move || *result = Some(work(number * length, part)))
+    });
+    run(jobs.collect());
+    results.into_iter().flatten().collect()
+}
+
+/// Calls `work` for each number below `items`.
+pub fn of_each<R: Send>(items: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
+    let mut results: Vec<Option<R>> = Vec::new();
+    results.resize_with(items, || None);
+    of_parts(&mut results, 1, |first, part| {
+        for (number, result) in (first..).zip(part) {
+            *result = Some(work(number));
+        }
+    });
+    results.into_iter().flatten().collect()
+}
+
+type Job<'a> = Box<dyn FnOnce() + Send + 'a>;
+
+fn run(jobs: Vec<Job<'_>>) {
+    // One needs no other thread.
+    if jobs.len() <= 1 {
+        jobs.into_iter().for_each(|job| job());
+    } else {
+        jobs.into_par_iter().for_each(|job| job());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_item_is_worked_on_once_and_results_are_in_order() {
+        for items in (0..700).chain([65_536]) {
+            for least in [0, 1, 3, 256] {
+                let mut counts = vec![0_u8; items];
+                let parts = of_parts(&mut counts, least, |first, part| {
+                    part.iter_mut().for_each(|count| *count += 1);
+                    (first, part.len())
+                });
+                assert!(counts.iter().all(|&count| count == 1));
+                assert!(parts.len() <= PARTS);
+                let end = parts.iter().fold(0, |end, &(first, length)| {
+                    assert_eq!(first, end);
+                    end + length
+                });
+                assert_eq!(end, items);
+                let whole = &parts[..parts.len().saturating_sub(1)];
+                assert!(whole.iter().all(|&(_, length)| length >= least.max(1)));
+            }
+            assert_eq!(of_each(items, |number| number), Vec::from_iter(0..items));
+        }
+    }
+}
