@@ -1,7 +1,7 @@
 //! `cargo xtask image`: builds the images of boards.
 
 use std::env;
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, IsTerminal};
 use std::iter;
 use std::path::{Path, PathBuf};
@@ -381,6 +381,10 @@ fn link(
     if !is_kept(&folder, &name) {
         eprintln!("building {name} for the first time");
     }
+    // No other run replaces what is built before it is copied.
+    let lock = folder.join("lock");
+    let lock = File::create(&lock).with_context(|| lock.display().to_string())?;
+    lock.lock()?;
     let mut cargo = cargo();
     let sensors = Board::ALL.into_iter().flat_map(Sensor::of);
     for (variable, _) in sensors.filter_map(|sensor| sensor.image()) {

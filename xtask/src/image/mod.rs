@@ -20,9 +20,15 @@ use crate::{cargo, target_folder};
 
 /// For speed, and for size.
 const PROFILES: [&str; 2] = ["firmware", "firmware-small"];
-/// The target of the boards. It is checked in both profiles, the others in the small one unless
-/// `all` is set.
+/// The target of the boards.
 const BOARDS: &str = "thumbv7em-none-eabihf";
+/// Targets and the profiles of each that are checked unless `all` is set: the boards' in both, and
+/// the smallest Cortex-M and a soft-core for size.
+const FIRST: [(&str, &[&str]); 3] = [
+    (BOARDS, &PROFILES),
+    ("thumbv6m-none-eabi", &[PROFILES[1]]),
+    ("riscv32im-unknown-none-elf", &[PROFILES[1]]),
+];
 
 /// The undefined function that the panic handler of the image calls.
 const UNDEFINED: &str = "dtof_core_has_a_reachable_panic";
@@ -33,19 +39,25 @@ const PARTS: &str = "units roots ranges words products texts gates trees thresho
 /// With fewer bytes of code, something has been optimised away. About half of the smallest image.
 const MIN_TEXT: u64 = 16 * 1024;
 
-/// Builds and checks the images of every target, in `all` profiles or the most important ones.
-/// Fails if one has a problem.
+/// Builds and checks the images of `all` targets in both profiles, or the most important ones. Fails
+/// if one has a problem.
 pub fn check(root: &Path, all: bool) -> Result<()> {
     let targets = Toolchain::read(root)?.targets;
+    let images: Vec<(&str, &[&str])> = match all {
+        true => targets
+            .iter()
+            .map(|target| (&**target, &PROFILES[..]))
+            .collect(),
+        false => FIRST.to_vec(),
+    };
     let mut bad = 0;
     println!(
         "{:<28} {:<14} {:>7} {:>8} {:>11}  verdict",
         "target", "profile", ".text", ".rodata", ".data+.bss"
     );
-    for target in &targets {
+    for (target, profiles) in images {
         toolchain::ensure_target(target)?;
-        let both = all || target == BOARDS;
-        for &profile in &PROFILES[usize::from(!both)..] {
+        for profile in profiles {
             let (image, mut problems) = match build(root, target, profile, &[])? {
                 Build::Done(path) => (Image::read(&path)?, vec![]),
                 // Links it anyway, to find what can panic.
