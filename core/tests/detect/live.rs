@@ -1,7 +1,8 @@
-//! Live counts against the formulas of the module's documentation, in floating point.
+//! Live counts against the formulas of the module's documentation, in floating point. `core/tests/proofs/live.rs` has all
+//! small histograms.
 
 use dtof_core::fixed::types::U4F12;
-use dtof_core::rule::{ExcludedBins, LiveCounts, LiveDecision};
+use dtof_core::rule::{ExcludedBins, LiveCounts};
 use dtof_core::{
     BinIndex, Count, Count10, Count16, Count24, CounterWidth, DetectionRule, Histogram, RangeGate,
     WindowRule,
@@ -9,140 +10,7 @@ use dtof_core::{
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-/// A histogram and how it is looked at.
-struct Case<'a> {
-    counts: &'a [u32],
-    gate: (usize, usize),
-    excluded: &'a ExcludedBins,
-    cycles: u32,
-    dead_time: usize,
-    width: usize,
-    z: f64,
-    minimum: u32,
-    expected: Option<usize>,
-}
-
-/// A window by the formulas.
-#[derive(Clone, Copy, Debug)]
-struct Window {
-    first: usize,
-    /// `(S - E)²/E`.
-    score: f64,
-    /// How far above the threshold, in counts.
-    margin: f64,
-}
-
-impl Case<'_> {
-    /// `N - Σ counts of the D bins before b`.
-    fn live(&self, bin: usize) -> f64 {
-        let before: u32 = self.counts[bin.saturating_sub(self.dead_time)..bin]
-            .iter()
-            .sum();
-        f64::from(self.cycles) - f64::from(before)
-    }
-
-    fn is_excluded(&self, bin: usize) -> bool {
-        self.excluded.contains(bin as u16)
-    }
-
-    /// The laser cycles in which a bin was live and had no photon.
-    fn empty(&self, bin: usize) -> f64 {
-        self.live(bin) - f64::from(self.counts[bin])
-    }
-
-    /// The fewest live laser cycles of a window that is not left out.
-    fn least(&self) -> f64 {
-        let share = f64::from(self.cycles) * self.width as f64 / 1024.0;
-        share.ceil().max(self.minimum.into())
-    }
-
-    /// Whether a gated bin was blind or had a photon in nearly all laser cycles.
-    fn is_blind(&self) -> bool {
-        let mut bins = self.gate.0..=self.gate.1;
-        bins.any(|bin| self.empty(bin) * (self.width as f64) < self.least())
-    }
-
-    /// All windows above their share that are live often enough.
-    fn windows(&self) -> Vec<Window> {
-        let (first, last) = self.gate;
-        let bins = (first..=last).filter(|&bin| !self.is_excluded(bin));
-        let (photons, live) = bins.fold((0.0, 0.0), |(photons, live), bin| {
-            (photons + f64::from(self.counts[bin]), live + self.live(bin))
-        });
-        let mut windows = Vec::new();
-        for first in first..=last + 1 - self.width {
-            let mut bins = first..first + self.width;
-            if self.expected.is_some_and(|bin| !bins.contains(&bin)) {
-                continue;
-            }
-            let inside = bins.clone().map(|bin| self.counts[bin]).sum::<u32>();
-            let live_inside: f64 = bins.clone().map(|bin| self.live(bin)).sum();
-            if live_inside < self.least()
-                || inside < self.minimum
-                || bins.any(|bin| self.is_excluded(bin))
-            {
-                continue;
-            }
-            let share = live_inside / live;
-            let expected = photons * share;
-            let excess = f64::from(inside) - expected;
-            let variance = expected * (1.0 - share);
-            let skew = (self.z * self.z / 6.0 * (1.0 - 2.0 * share)).max(0.0);
-            let spread = variance * variance / (variance + self.z * self.z / 36.0);
-            if excess > 0.0 {
-                windows.push(Window {
-                    first,
-                    score: excess * excess / expected.max(1.0 / 256.0),
-                    margin: excess - skew - self.z * spread.sqrt(),
-                });
-            }
-        }
-        windows
-    }
-
-    /// Checks a decision. Returns whether it is a detection.
-    fn check(&self, decision: &LiveDecision) -> bool {
-        let (first, last) = self.gate;
-        if (first..=last).any(|bin| self.empty(bin) < 0.0) {
-            assert_eq!(decision, &LiveDecision::BLIND);
-            return false;
-        }
-        let windows = self.windows();
-        assert_eq!(decision.is_blind, self.is_blind());
-        let photons: u32 = self.counts[first..=last].iter().sum();
-        // 1/256 photon, and 1 in 4096 of what is expected.
-        let tolerance = 0.02 + f64::from(photons) / 4096.0;
-        let clear = windows.iter().filter(|one| one.margin > tolerance);
-        let highest = clear.fold(0.0, |highest: f64, one| highest.max(one.score));
-        let Some(found) = &decision.window else {
-            assert!(
-                highest == 0.0,
-                "missed one of {windows:?} {:?}",
-                self.counts
-            );
-            return false;
-        };
-        let window = windows
-            .iter()
-            .find(|one| one.first == usize::from(found.first));
-        let window = window.unwrap_or_else(|| panic!("{found:?} of {windows:?}"));
-        assert!(
-            window.score > 0.98 * highest - 0.1,
-            "{window:?} of {windows:?}"
-        );
-        assert!(window.margin > -tolerance, "{window:?}");
-        // What is outside is exact.
-        let inside = window.first..window.first + self.width;
-        let outside = (first..=last).filter(|bin| !inside.contains(bin) && !self.is_excluded(*bin));
-        let (photons, live) = outside.fold((0, 0.0), |(photons, live), bin| {
-            (photons + self.counts[bin], live + self.live(bin))
-        });
-        assert_eq!(usize::from(found.width), self.width);
-        assert_eq!(found.photons_outside, photons);
-        assert_eq!(found.live_outside, live as u64);
-        true
-    }
-}
+use crate::live_formula::Exposure;
 
 /// Decides on `counts` and checks it.
 fn check<const BINS: usize, W: CounterWidth>(
@@ -156,47 +24,16 @@ fn check<const BINS: usize, W: CounterWidth>(
 ) -> bool {
     let mut histogram = Histogram::<BINS, W>::new();
     let _ = histogram.add_frame(counts, &RangeGate::full());
-    let live = LiveCounts::new(&histogram, &gate, excluded, cycles, dead_time);
-    let decision = rule.detect_live(&live.unwrap(), expected.map(BinIndex::saturating));
-    let case = Case {
-        counts,
-        gate: (gate.first().into(), gate.last().into()),
-        excluded,
-        cycles,
-        dead_time: dead_time.into(),
-        width: rule.width().into(),
-        z: rule.z().to_num(),
-        minimum: rule.minimum_count().raw(),
-        expected: expected.map(usize::from),
-    };
-    case.check(&decision)
-}
-
-/// All histograms of 8 bins with up to 3 counts each, at all dead times.
-#[test]
-fn small_histograms_are_decided_by_the_formula() {
-    let mut fired = 0;
-    for code in 0..1u32 << 16 {
-        let counts = std::array::from_fn(|bin| code >> (2 * bin) & 3);
-        let photons: u32 = counts.iter().sum();
-        for dead_time in 1..=8 {
-            let width = 1 + (code % 3) as u8;
-            let z = [U4F12::lit("1.2"), U4F12::lit("2.5")][code as usize / 3 % 2];
-            let rule = WindowRule::new(width, z, Count::saturating(1)).unwrap();
-            let cycles = [photons, 3, 24][code as usize % 5 % 3].max(1);
-            fired += u32::from(check::<8, Count10>(
-                &counts,
-                RangeGate::full(),
-                &ExcludedBins::NONE,
-                cycles,
-                dead_time,
-                &rule,
-                None,
-            ));
-        }
+    let live = LiveCounts::new(&histogram, &gate, excluded, cycles, dead_time).unwrap();
+    let expected = expected.map(BinIndex::saturating);
+    let decision = rule.detect_live(&live, expected);
+    let bins = (gate.first().into(), gate.last().into());
+    let exposure = Exposure::new(counts, bins, excluded, cycles, dead_time.into());
+    if let Some(window) = decision.window {
+        let peak = live.brightest(window.first, window.width);
+        assert!(exposure.has_most_light(window.first, window.width, peak.bin));
     }
-    println!("{fired} detections");
-    assert!(fired > 1000);
+    exposure.check(rule, expected, &decision).fires
 }
 
 /// A slope with a target, as a TDC with this dead time counts it.

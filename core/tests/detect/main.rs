@@ -13,6 +13,8 @@ mod common;
 #[path = "../common/light.rs"]
 mod light;
 mod live;
+#[path = "../common/live.rs"]
+mod live_formula;
 #[path = "../common/parallel.rs"]
 mod parallel;
 mod peak;
@@ -21,6 +23,8 @@ mod root;
 mod shares;
 mod threshold;
 mod window;
+#[path = "../common/window.rs"]
+mod window_formula;
 mod window_z;
 mod window_z_tables;
 mod without;

@@ -10,7 +10,7 @@ use dtof_core::{
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::parallel;
+use crate::{parallel, window_formula};
 
 /// The most photons of all gated windows of `width` bins that hold the bin `peak`, the
 /// photons outside it, and how many bins these are in, of which `left_out` do not count.
@@ -65,34 +65,10 @@ pub fn as_written<const BINS: usize, W: CounterWidth>(
     let sixteenths = ((spread * part.unwrap_or(0)) >> 12).max((spread - small) << 4);
     let clear = above > 0 && 16 * above.pow(2) > z_squared * sixteenths;
 
-    let (inside_real, total) = (inside as f64, (inside + outside) as f64);
-    let share = f64::from(width) / (bins + u64::from(width)) as f64;
-    let variance = total * share * (1.0 - share);
-    let z = rule.z().to_num::<f64>();
-    let skew = (1.0 - 2.0 * share).max(0.0) * z * z / 6.0;
-    let level = |z: f64, spread: f64| total * share + skew + z * spread.max(0.0).sqrt();
-    let spread = |c: f64| {
-        let sum = variance + c;
-        if sum > 0.0 {
-            variance * variance / sum
-        } else {
-            0.0
-        }
-    };
-    // z² and its sixth, 1/36 and N²/(N + c) are rounded down, the last by 1/16 and, as the upper
-    // bits alone are divided, by variance/2¹⁵.
-    let c = z * z / 36.0;
-    let exact = level(z, spread(c));
-    let z_low = (z * z - 1.0 / 256.0).max(0.0).sqrt();
-    let unit = 1.0 / ((bins + u64::from(width)) as f64).powi(2);
-    let low = level(z_low, spread(c) - variance / 32_768.0 - unit / 16.0) - 0.0626;
-    let c_low = (c - 1.0 / (36.0 * 16.0) - unit).max(0.0);
-    let high = level(z, spread(c_low) + variance / 32_768.0);
-    if inside_real > high + 1e-6 * high {
-        assert!(clear, "{inside_real} {exact}");
-    }
-    if inside_real < low - 1e-6 * low {
-        assert!(!clear, "{inside_real} {exact}");
+    let z = rule.z().to_num();
+    let (all, width) = (inside + outside, u64::from(width));
+    if let Some(exceeds) = window_formula::exceeds(inside, all, width, bins + width, z) {
+        assert_eq!(clear, exceeds, "{inside} of {all}");
     }
     let fires = clear && inside >= u64::from(rule.minimum_count().raw());
     fires.then(|| U24F8::from_bits(((outside << 8) / bins) as u32))

@@ -7,9 +7,13 @@
 )]
 
 mod false_alarms;
+#[path = "../common/neighbours.rs"]
+mod formula;
 #[path = "../common/light.rs"]
 mod light;
 mod model;
 mod narrow;
 mod steps;
 mod tables;
+#[path = "../common/window.rs"]
+mod window_formula;
