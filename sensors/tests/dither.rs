@@ -1,6 +1,7 @@
 //! The random lengths of laser cycles.
 
 use dtof_sensors::dither::Dither;
+use dtof_sensors::photon_timer::{BINS, Config, Settings};
 
 fn lengths(range: u16, seed: u64) -> [u8; Dither::LENGTHS] {
     let mut added = Dither::new(range, seed).unwrap().added();
@@ -59,12 +60,100 @@ fn a_length_says_nothing_of_the_next() {
     assert!(sum.abs() < limit, "{sum} of {limit}");
 }
 
+/// PCG-XSH-RR 64/32 of M. O'Neill, as `docs/link-format.md` has it.
+struct Pcg {
+    state: u64,
+    increment: u64,
+}
+
+impl Pcg {
+    fn new(seed: u64, stream: u64) -> Self {
+        let increment = (stream << 1) | 1;
+        let mut pcg = Self {
+            state: seed.wrapping_add(increment),
+            increment,
+        };
+        pcg.step();
+        pcg
+    }
+
+    fn step(&mut self) {
+        let product = self.state.wrapping_mul(6_364_136_223_846_793_005);
+        self.state = product.wrapping_add(self.increment);
+    }
+
+    #[allow(clippy::cast_possible_truncation, reason = "the lower half")]
+    fn next(&mut self) -> u32 {
+        let state = self.state;
+        self.step();
+        let mixed = (((state >> 18) ^ state) >> 27) as u32;
+        mixed.rotate_right((state >> 59) as u32)
+    }
+}
+
+/// Every range, every length of the sequence and of its repetition, by the formula of the link's format.
 #[test]
-fn one_seed_gives_one_sequence_which_repeats() {
-    let dither = Dither::new(64, 5).unwrap();
-    assert_ne!(lengths(64, 5), lengths(64, 6));
-    let second = dither.added().skip(Dither::LENGTHS).take(Dither::LENGTHS);
-    assert!(second.eq(lengths(64, 5)));
+fn all_lengths_of_all_ranges_are_those_of_the_formula() {
+    let mut cases = 0u64;
+    for range in (0..=Dither::MOST).step_by(2) {
+        let mut reached = [false; 255];
+        for seed in (0..200).chain([u64::MAX, 1 << 63]) {
+            let mut pcg = Pcg::new(seed, 0x6469_7468);
+            let half: Vec<u8> = (0..512)
+                .map(|_| {
+                    let bins = (u64::from(pcg.next()) * (u64::from(range) + 1)) >> 32;
+                    u8::try_from(bins).unwrap()
+                })
+                .collect();
+            let mirrored = half.iter().map(|bins| range - bins);
+            let once: Vec<u8> = half.iter().copied().chain(mirrored).collect();
+            let added = Dither::new(range.into(), seed).unwrap().added();
+            for (found, expected) in added.zip(once.iter().chain(&once)) {
+                assert_eq!(found, *expected, "{range}, {seed}");
+                reached[usize::from(found)] = true;
+                cases += 1;
+            }
+        }
+        let values = usize::from(range) + 1;
+        assert!(reached[..values].iter().all(|&is_reached| is_reached));
+    }
+    println!("proofs: dither, lengths: {cases} cases, 0 within rounding");
+}
+
+/// Every range and every number of bins that it adds to a laser cycle of the photon timer: laser and shift registers
+/// stay in step, and all bins are sampled.
+#[test]
+fn laser_and_bins_stay_in_step_at_every_length() {
+    let mut cases = 0u64;
+    for (laser_hz, pulse_ns) in [
+        (1, 16),
+        (1000, 1000),
+        (100_000, 100),
+        (192_307, 104),
+        (800_000, 16),
+        (922_509, 16),
+    ] {
+        let config = Config::new(Settings { laser_hz, pulse_ns }).unwrap();
+        for range in (0..=u16::from(config.most_dither())).step_by(2) {
+            for added in 0..=u32::from(range) {
+                // A counter from n takes n + 1 clocks, and 1 to load. What the dither adds takes 2 to load.
+                let [pulse, pause] = config.laser_counters(range);
+                let laser = (1 + pulse + 1) + (1 + pause + 1) + (2 + added + 1);
+                // The level before, and to hand over; two clocks for each of 64 bins of one register.
+                let samples = 3 + 2 * 64;
+                let register = samples + (1 + config.sampler_counter(range) + 1) + (2 + added + 1);
+                let expected = config.period() - u32::from(range) / 2 + added;
+                assert_eq!(
+                    [laser, register],
+                    [expected; 2],
+                    "{laser_hz}, {range}, {added}"
+                );
+                assert!(expected >= BINS + 8 && 1 + pulse + 1 == config.pulse());
+                cases += 1;
+            }
+        }
+    }
+    println!("proofs: dither, laser cycles: {cases} cases, 0 within rounding");
 }
 
 /// Computed with another program from the link's format.
