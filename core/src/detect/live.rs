@@ -394,11 +394,15 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
             return None;
         }
         let excess = excess(window.photons, window.expected);
-        let level = excess.saturating_mul(excess).checked_div(window.expected)?;
         Some(if W::BITS <= 10 {
+            let level = excess.wrapping_mul(excess).checked_div(window.expected)?;
             level.min(u32::MAX.into())
         } else {
-            level
+            // Up to 35 bits. Of more than 32 the square takes the upper ones.
+            let shift = if excess >> 32 == 0 { 0 } else { 4 };
+            let upper = excess >> shift;
+            let level = upper.wrapping_mul(upper).checked_div(window.expected)?;
+            level.saturating_mul(1 << (2 * shift))
         })
     }
 

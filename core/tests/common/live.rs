@@ -187,11 +187,11 @@ impl<'a> Exposure<'a> {
                 ..Found::default()
             };
         };
-        // The one with the largest score is reported. The score so far is rounded down by up to 1/256, so that a
-        // later window with nearly the same takes its place.
+        // The one with the largest score is reported. The score so far is rounded down by up to 1/256, and of more than 2²⁴
+        // photons by 1 in 10⁸, so that a later window with nearly the same takes its place.
         let clear = windows.iter().filter(|one| one.is_clear);
         let highest = clear.fold(0.0, |highest: f64, one| highest.max(one.score[0]));
-        windows.retain(|one| one.score[1] * (1.0 + CLOSE) + UNIT >= highest);
+        windows.retain(|one| one.score[1] * (1.0 + 1e-8) + UNIT >= highest);
         let is_found = |one: &&Window| one.first == usize::from(found.first);
         let window = windows.iter().find(is_found);
         let window = window.unwrap_or_else(|| panic!("{found:?} of {windows:?} {:?}", self.counts));

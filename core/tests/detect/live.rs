@@ -139,3 +139,28 @@ fn the_brightest_bin_is_the_one_with_the_most_light() {
     assert_eq!(brightest([(51, 0), (56, 30), (57, 21)], 100), (56, 30));
     assert_eq!(brightest([(51, 0), (56, 0), (58, 0)], 100), (56, 0));
 }
+
+/// Windows of up to 7 nearly full counters of 24 bits, wherever they lie.
+#[test]
+fn of_windows_with_the_most_photons_the_brightest_is_reported() {
+    for width in 1..=7 {
+        let rule = WindowRule::new(width, U4F12::lit("4"), Count::saturating(5)).unwrap();
+        for (first, second) in [(10, 40), (40, 10)] {
+            for part in [2, 3, 10, 100, 10_000] {
+                let mut counts = [1000; 64];
+                counts[first..first + 7].fill(Count24::MAX - 1);
+                counts[second..second + 7].fill((Count24::MAX - 1) / part);
+                let fired = check::<64, Count24>(
+                    &counts,
+                    RangeGate::full(),
+                    &ExcludedBins::NONE,
+                    LiveCounts::<64, Count24>::MAX_CYCLES,
+                    1,
+                    &rule,
+                    None,
+                );
+                assert!(fired);
+            }
+        }
+    }
+}
