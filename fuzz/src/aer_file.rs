@@ -20,7 +20,7 @@ const FORMATS: [Format; 5] = [
 pub fn aer_file(data: &[u8]) {
     let mut reader = match Reader::new(Cursor::new(data)) {
         Ok(reader) => reader,
-        Err(error) => return is_one_line(&error.into()),
+        Err(error) => return is_one_line(&error),
     };
     let header = reader.header().clone();
     let mut writer = Writer::new(Vec::new(), &header).expect("memory");
@@ -34,7 +34,7 @@ pub fn aer_file(data: &[u8]) {
             }
             Ok(None) => break false,
             Err(error) => {
-                is_one_line(&error.into());
+                is_one_line(&error);
                 break true;
             }
         }

@@ -1,6 +1,11 @@
 //! What has to hold for any input, one function a target. A fuzzer calls them with inputs of its
 //! own, `tests/corpus.rs` with those that are kept.
 
+#![allow(
+    clippy::cast_possible_truncation,
+    reason = "numbers of pixels, and bytes of a pattern"
+)]
+
 mod aer;
 #[cfg(feature = "host")]
 mod aer_file;

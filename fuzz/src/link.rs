@@ -87,7 +87,7 @@ impl End {
     }
 
     /// Takes bytes off the wire, and the messages they make. Each is the next that `other` sent.
-    fn hear(&mut self, line: impl IntoIterator<Item = u8>, now: u32, other: &mut End) {
+    fn hear(&mut self, line: impl IntoIterator<Item = u8>, now: u32, other: &mut Self) {
         for byte in line {
             if let Some(frame) = self.deframer.push(byte) {
                 self.endpoint.receive(frame, now);
