@@ -411,7 +411,10 @@ fn link(
         Some(laser) => format!("{name}+{}", laser.file_name()),
         None => name,
     });
-    fs::copy(&built, &kept).with_context(|| built.display().to_string())?;
+    // Whoever has the older one open keeps it.
+    let copy = folder.join("copy");
+    fs::copy(&built, &copy).with_context(|| built.display().to_string())?;
+    fs::rename(&copy, &kept).with_context(|| kept.display().to_string())?;
     Ok(kept)
 }
 

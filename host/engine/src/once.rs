@@ -274,7 +274,8 @@ impl AroundPeak {
 impl<const BINS: usize, W: CounterWidth> Engine for OnceEngine<BINS, W> {
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
         of_parts(&mut self.pixels, 1, |first, pixels| {
-            for (pixel, received) in pixels.iter_mut().zip(&slice.pixels[first..]) {
+            let slice = slice.pixels.iter().skip(first);
+            for (pixel, received) in pixels.iter_mut().zip(slice) {
                 for photon in &received.photons {
                     match pixel.counts.get_mut(usize::from(photon.code)) {
                         Some(count) => *count = count.saturating_add(1),

@@ -1,5 +1,5 @@
-//! Work on all threads, in the order of its items. Engines are compiled for each number of bins; what hands out their work
-//! is compiled once.
+//! Work on all threads, with results in the order of its items. Engines are compiled for each number of bins; rayon, which
+//! hands out their work, is compiled once.
 
 use rayon::prelude::*;
 

@@ -1,4 +1,4 @@
-//! `cargo xtask check-image`: builds `core-image` for every target and checks the linked image.
+//! `cargo xtask check-image`: builds `core-image` for three targets or all, and checks the linked images.
 //!
 //! The linker itself refuses an image with a reachable panic. The symbols show the rest. On the
 //! targets without a floating-point unit (all but thumbv7em) every floating-point operation calls

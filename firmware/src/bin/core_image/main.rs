@@ -3,8 +3,8 @@
 //!
 //! The panic handler calls a function that exists nowhere, so one reachable
 //! panic anywhere makes the linker refuse the image. What links is then searched
-//! for floating point and allocation: `cargo xtask check-image` does both, for
-//! every target and profile.
+//! for floating point and allocation: `cargo xtask check-image` does both, with
+//! `--all` for every target and profile.
 //!
 //! Every value comes from [`values::word`], about which the optimiser knows nothing, and
 //! ends in [`values::keep`], so that nothing is worked out while compiling and nothing
