@@ -56,7 +56,7 @@ pub const PYTHON: Tool = Tool {
 };
 
 /// Every tool that [`set_up`] installs.
-const ALL: [Tool; 13] = [
+const ALL: [Tool; 14] = [
     QEMU,
     CXX,
     CMAKE,
@@ -72,6 +72,8 @@ const ALL: [Tool; 13] = [
     tool("parallel", Packages("parallel")),
     // Renders the reports.
     tool("chromium", Packages("chromium")),
+    // Makes system calls of the program fail.
+    tool("strace", Packages("strace")),
     PYTHON,
     NODE,
     NPM,

@@ -14,6 +14,9 @@ use dtof_engine::settings::{self, SettingsFile};
 use dtof_options::files::{MarkedFile, may_replace, temporary_file, write_marked};
 use dtof_report::{Figure, Section, Table, capitalised, still};
 
+/// The page, which makes a folder complete.
+const PAGE: &str = "report.html";
+
 /// The files of a comparison, and the mark near the start of each. The last one makes a folder complete.
 pub const FILES: [(&str, &str); 6] = [
     ("dtof.toml", settings::MARK),
@@ -21,7 +24,7 @@ pub const FILES: [(&str, &str); 6] = [
     ("compare.svg", svg::MARK),
     ("methods.csv", TABLE_HEAD),
     ("stress.csv", STRESS_HEAD),
-    ("report.html", dtof_report::MARK),
+    (PAGE, dtof_report::MARK),
 ];
 
 impl Comparison {
@@ -156,12 +159,10 @@ pub fn write(
             Some(MarkedFile { place, text, mark })
         })
         .collect();
-    write_marked(&files, inputs)?;
-    for (old, text) in places.iter().zip(&texts) {
-        if text.is_none() && old.exists() {
-            // Settings of an earlier comparison would look like the answer of this one.
-            fs::remove_file(old).with_context(|| old.display().to_string())?;
-        }
-    }
-    Ok(())
+    // Without its page the folder does not look complete. Settings of an earlier comparison would look like the
+    // answer of this one.
+    let old = places.iter().zip(FILES).zip(&texts);
+    let old = old.filter(|((_, (name, _)), text)| text.is_none() || *name == PAGE);
+    let removed: Vec<&Path> = old.map(|((place, _), _)| place.as_path()).collect();
+    write_marked(&files, &removed, inputs)
 }

@@ -267,12 +267,13 @@ pub fn export(
     let slice_ns = options
         .slice_ns
         .unwrap_or_else(|| mcap::slice_of(span.end_ns));
-    let file = BufWriter::new(temporary_file(&place.folder, ".dtof-export-")?);
+    let to = || out.display().to_string();
+    let file = temporary_file(&place.folder, ".dtof-export-").with_context(to)?;
+    let file = BufWriter::new(file);
     let points = match &depth_map {
         Some(map) => map.events.len() as u64,
         None => survey.chosen(kind),
     };
-    let to = || out.display().to_string();
     let sink: Result<Box<dyn Sink>> = match format {
         Format::Csv => csv::begin(file, projection, kind).map(boxed),
         Format::Pcd => Points::packed(file, projection, &pcd::header(kind, points)).map(boxed),

@@ -190,23 +190,41 @@ pub struct MarkedFile<'a> {
     pub mark: &'a str,
 }
 
-/// Writes all `files` in this order, or none. None of `inputs` is replaced.
+/// Writes all `files` in this order, or none. None of `inputs` is replaced. Once all are written, those at `removed` are
+/// removed, if they exist, before the first moves to its place.
 ///
 /// # Errors
-/// Fails if one of the files cannot be written or replaced.
-pub fn write_marked(files: &[MarkedFile], inputs: &[&Path]) -> Result<()> {
+/// Fails if one of the files cannot be written, replaced or removed.
+pub fn write_marked(files: &[MarkedFile], removed: &[&Path], inputs: &[&Path]) -> Result<()> {
     let mut written = Vec::new();
     for MarkedFile { place, text, mark } in files {
         may_replace(place, mark, inputs)?;
         let name = || place.display().to_string();
         let to = destination(place, inputs)?;
-        let mut file = BufWriter::new(temporary_file(&to.folder, ".dtof-")?);
+        let file = temporary_file(&to.folder, ".dtof-").with_context(name)?;
+        let mut file = BufWriter::new(file);
         file.write_all(text.as_bytes()).with_context(name)?;
-        written.push((flush_to_disk(file).with_context(name)?, to.file));
+        written.push((flush_to_disk(file).with_context(name)?, to.file, place));
     }
-    for (file, place) in written {
-        let name = || place.display().to_string();
-        file.persist(&place).with_context(name)?;
+    for old in removed {
+        remove(old)?;
+    }
+    for (file, to, place) in written {
+        let moved = file.persist(to).map_err(|error| error.error);
+        moved.with_context(|| place.display().to_string())?;
     }
     Ok(())
+}
+
+/// Removes a file, if it exists.
+///
+/// # Errors
+/// Fails if it cannot be removed; the error begins with its name.
+pub fn remove(file: &Path) -> Result<()> {
+    match fs::remove_file(file) {
+        Err(error) if error.kind() != ErrorKind::NotFound => {
+            Err(error).with_context(|| file.display().to_string())
+        }
+        _ => Ok(()),
+    }
 }

@@ -30,7 +30,7 @@ use dtof_events::histories::PixelHistories;
 use dtof_events::sample::Sample;
 use dtof_link::DynamicDepth;
 use dtof_options::files::{
-    PARTIAL, destination, flush_to_disk, is_same_file, may_replace, temporary_file,
+    PARTIAL, destination, flush_to_disk, is_same_file, may_replace, remove, temporary_file,
 };
 use dtof_options::rows::Row;
 use dtof_photons::ranges::Ranges;
@@ -304,13 +304,7 @@ impl Output {
         may_hold_results(&self.folder, &self.inputs)?;
         let kept = keep_edited(&self.folder.join(SETTINGS), &settings_text)?;
         for name in removed {
-            let old = self.folder.join(name);
-            match fs::remove_file(&old) {
-                Err(error) if error.kind() != ErrorKind::NotFound => {
-                    return Err(error).with_context(|| old.display().to_string());
-                }
-                _ => {}
-            }
+            remove(&self.folder.join(name))?;
         }
         for (file, name) in files {
             let place = self.folder.join(name);

@@ -100,7 +100,7 @@ impl Calibrate {
             marked(place.as_path(), page.as_str(), MARKS[1]),
             marked(&self.out, &text, MARKS[0]),
         ];
-        write_marked(&files, &inputs)?;
+        write_marked(&files, &[], &inputs)?;
         if !self.quiet {
             let mut out = io::stdout().lock();
             let rows = [collected, report::rows(&found)].concat();

@@ -5,6 +5,8 @@
 pub mod aer;
 pub mod port;
 pub mod sensed;
+#[cfg(target_os = "linux")]
+pub mod strace;
 
 use std::io::Write;
 use std::path::{Path, PathBuf};

@@ -1,13 +1,13 @@
 //! Results while the disk is full, while the program is killed, and from inputs with names that
 //! lead elsewhere: what is there is whole, and nothing else is touched.
 
+#[cfg(target_os = "linux")]
+mod any_call;
 mod elsewhere;
 #[cfg(target_os = "linux")]
 mod full;
 #[cfg(unix)]
 mod interrupted;
-#[cfg(unix)]
-mod killed;
 
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -44,8 +44,19 @@ fn times(few: u64, many: u64) -> u64 {
 /// settings.
 struct Work {
     scratch: Scratch,
-    /// Names of outputs with their commands, without the option that differs.
-    commands: Vec<(&'static str, String)>,
+    commands: Vec<Writer>,
+}
+
+/// A command that writes files.
+struct Writer {
+    /// Its output, a file or a folder.
+    out: &'static str,
+    /// The command line up to the output.
+    command: String,
+    /// The end of the command line of the earlier run, and of the new one.
+    ends: [&'static str; 2],
+    /// The file that makes the output complete, empty if the output is a file.
+    last: &'static str,
 }
 
 const SCENE: &str = "
@@ -70,42 +81,75 @@ impl Work {
             .collect();
         scratch.file("photons.csv", format!("pixel,cycle,bin\n{rows}"));
         scratch.printed("simulate --quiet --scene scene.toml --seed 9 --out source");
-        let export = |format| format!("export --quiet source/events.aer --format {format} --out");
-        let mut commands = vec![
+        let simulate = "simulate --quiet --no-csv --scene scene.toml --out";
+        let replay = "replay --quiet --input photons.csv --columns 4 --out";
+        let calibrate = "calibrate --quiet --input photons.csv --columns 4 --out";
+        let compare = "compare --quiet --input photons.csv --columns 4 --out";
+        let mut commands = Vec::new();
+        for (out, command, ends, last) in [
             // Its largest file is the report, which is written late.
+            ("simulated", simulate, ["--seed 7", ""], "summary.json"),
             (
-                "simulated",
-                "simulate --quiet --no-csv --scene scene.toml --out".to_owned(),
+                "demo",
+                "demo --quiet --array 8x8 --cycles 1200 --out",
+                ["--seed 7", ""],
+                "summary.json",
+            ),
+            ("replayed", replay, ["--alpha 5", ""], "summary.json"),
+            (
+                "calibrated",
+                calibrate,
+                ["/found.toml --bin-width-ps 200", "/found.toml"],
+                "found.toml",
             ),
             (
-                "replayed",
-                "replay --quiet --input photons.csv --columns 4 --out".to_owned(),
+                "compared",
+                compare,
+                ["--bin-width-ps 200", ""],
+                "report.html",
             ),
-        ];
-        commands.extend([
-            ("events.csv", export("csv")),
-            ("events.pcd", export("pcd")),
-            ("events.ply", export("ply")),
-            ("events.mcap", export("mcap")),
-            ("events.raw", export("evt2")),
-        ]);
+        ] {
+            let command = command.to_owned();
+            commands.push(Writer {
+                out,
+                command,
+                ends,
+                last,
+            });
+        }
+        for (out, format) in [
+            ("events.csv", "csv"),
+            ("events.pcd", "pcd"),
+            ("events.ply", "ply"),
+            ("events.mcap", "mcap"),
+            ("ros2.mcap", "ros2"),
+            ("events.raw", "evt2"),
+        ] {
+            let ends = match format {
+                // Depth noise.
+                "evt2" => ["--threshold-mm 8", "--threshold-mm 1"],
+                _ => ["--laser-hz 1000", ""],
+            };
+            let command = format!("export --quiet source/events.aer --format {format} --out");
+            commands.push(Writer {
+                out,
+                command,
+                ends,
+                last: "",
+            });
+        }
         Self { scratch, commands }
     }
 
-    /// The command line that writes `out`, as the earlier run or the new one.
+    /// The command line of a writer, as the earlier run or the new one.
     fn line(&self, out: &str, is_new: bool) -> String {
-        let command = self.commands.iter().find(|(name, _)| *name == out);
-        let (name, command) = command.unwrap();
-        let other = match (*name, is_new) {
-            // Depth noise.
-            ("events.raw", true) => "--threshold-mm 1",
-            ("events.raw", _) => "--threshold-mm 8",
-            (_, true) => "",
-            ("simulated", _) => "--seed 7",
-            ("replayed", _) => "--alpha 5",
-            _ => "--laser-hz 1000",
-        };
-        format!("{command} {name} {other}")
+        let writer = self.commands.iter().find(|writer| writer.out == out);
+        let Writer { command, ends, .. } = writer.unwrap();
+        let end = ends[usize::from(is_new)];
+        match end.starts_with('/') {
+            true => format!("{command} {out}{end}"),
+            false => format!("{command} {out} {end}"),
+        }
     }
 
     /// The files of an output, a folder or one file.
@@ -119,10 +163,29 @@ impl Work {
 
     /// Writes `out` as the earlier run did.
     fn earlier(&self, out: &str) -> Files {
-        let _ = std::fs::remove_dir_all(self.scratch.path(out));
-        let _ = std::fs::remove_file(self.scratch.path(out));
+        self.remove(out);
+        if out == "calibrated" {
+            std::fs::create_dir(self.scratch.path(out)).unwrap();
+        }
         self.scratch.printed(&self.line(out, false));
         self.written(out)
+    }
+
+    /// Writes `out` as it was.
+    fn restore(&self, out: &str, files: &Files) {
+        self.remove(out);
+        for (name, bytes) in files {
+            let path = match &name[..] {
+                "" => out.to_owned(),
+                name => format!("{out}/{name}"),
+            };
+            self.scratch.file(&path, bytes);
+        }
+    }
+
+    fn remove(&self, out: &str) {
+        let _ = std::fs::remove_dir_all(self.scratch.path(out));
+        let _ = std::fs::remove_file(self.scratch.path(out));
     }
 }
 
