@@ -115,7 +115,7 @@ impl Feed {
                 Ok(())
             }
         };
-        let recorded = context.recorder.stop();
+        let recorded = context.recorder.finish();
         ended.and(recorded)
     }
 }

@@ -85,6 +85,8 @@ pub struct Recorder {
     folder: Folder,
     file: Option<EventFile>,
     status: RecordingStatus,
+    /// The first recording that was not saved, and why.
+    failed: Option<String>,
 }
 
 /// Status of a recorder, for pages.
@@ -110,6 +112,7 @@ impl Recorder {
             folder,
             file: None,
             status: RecordingStatus::default(),
+            failed: None,
         }
     }
 
@@ -153,6 +156,18 @@ impl Recorder {
     pub fn stop(&mut self) -> Result<()> {
         self.status.on = false;
         self.end_file()
+    }
+
+    /// Ends the last file.
+    ///
+    /// # Errors
+    /// Fails if the disk did not take one of the recordings.
+    pub fn finish(&mut self) -> Result<()> {
+        let ended = self.stop();
+        match self.failed.take() {
+            Some(failed) => bail!(failed),
+            None => ended,
+        }
     }
 
     /// Ends the file. Recording stays on, and the next session begins another file.
@@ -211,5 +226,6 @@ impl Recorder {
     fn fail(&mut self, error: &anyhow::Error) {
         self.status.on = false;
         self.status.error = format!("{error:#}");
+        self.failed.get_or_insert(self.status.error.clone());
     }
 }

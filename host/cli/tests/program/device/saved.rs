@@ -1,7 +1,7 @@
 //! A recording while the disk is full, and of a program that is killed: what was printed is in the
 //! file that is not complete, and nothing else is touched.
 
-use std::io::Read;
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::thread;
@@ -12,6 +12,7 @@ use rand_pcg::Pcg32;
 
 use crate::common::{Scratch, assert_contains, names, skipped};
 use crate::device::monitor::{LONG, device, reference};
+use crate::view::http::{Stream, post};
 
 const OLDER: &str = "older";
 
@@ -183,5 +184,77 @@ fn a_recording_on_a_full_disk_keeps_what_came_and_says_where() {
         "faults: recording on {} full disks: {saved} events kept where the line says, 0 wrong, 0 earlier files \
          damaged",
         limits.len()
+    );
+}
+
+/// A recording that a page has begun, on a disk that takes so many bytes of a file. The program says at its end where
+/// the events are.
+fn full_of_the_page(bytes: usize) {
+    let scratch = Scratch::new();
+    scratch.file("events.aer", OLDER);
+    let line = format!(
+        "view --pixels 4 --columns 2 --device {} --out .",
+        device(true, LONG)
+    );
+    let program = scratch.command(&line);
+    let mut limited = Command::new("sh");
+    let shell = format!("trap '' XFSZ; exec prlimit --fsize={bytes} \"$@\"");
+    limited
+        .current_dir(scratch.path(""))
+        .args(["-c", &shell, "sh"]);
+    limited.arg(program.get_program()).args(program.get_args());
+    let limited = limited.stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = limited.spawn().unwrap();
+    let mut address = String::new();
+    let mut stdout = BufReader::new(child.stdout.take().unwrap());
+    stdout.read_line(&mut address).unwrap();
+    let port = address.trim().trim_end_matches('/').rsplit(':').next();
+    let port = port.unwrap().parse().unwrap();
+    let mut page = Stream::open(port, 0);
+    page.until("live", |frame| frame["connection"]["state"] == "live");
+    let answer = post(port, "/record", "{\"on\":true}");
+    assert_eq!(answer.status, 200, "{answer:?}");
+    let frame = page.until("ended", |frame| frame["recorded"]["error"] != "");
+    let id = child.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &id]).status();
+    assert!(sent.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let message = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{message}");
+    assert_eq!(message.lines().count(), 1, "{message}");
+
+    let names = names(&scratch.path(""));
+    assert_eq!(names.len(), 2, "{names:?}");
+    assert_eq!(scratch.read("events.aer"), OLDER);
+    let end = format!("{} has what was recorded", names[0]);
+    for said in [frame["recorded"]["error"].as_str().unwrap(), &message] {
+        assert_contains(said, "events-2.aer: cannot be written, ");
+        assert_contains(said, &end);
+    }
+    let decoded = scratch.run(&format!("decode {}", names[0]));
+    let rows = String::from_utf8(decoded.stdout).unwrap();
+    let (_, rows) = rows.split_once('\n').unwrap();
+    assert!(reference().contains(rows), "{rows}");
+}
+
+#[test]
+fn a_recording_of_the_page_on_a_full_disk_is_no_success() {
+    if !Path::new("/usr/bin/prlimit").exists() {
+        skipped("a recording of the page on a full disk", "prlimit");
+        return;
+    }
+    let header = header();
+    let more: &[usize] = match std::env::var_os("DTOF_LONG") {
+        Some(_) => &[0, 1, 15, 16, 31, 32, 33, 63, 64, 65, 136, 436],
+        None => &[0, 33, 136],
+    };
+    thread::scope(|scope| {
+        for more in more {
+            scope.spawn(move || full_of_the_page(header + more));
+        }
+    });
+    println!(
+        "faults: recording of the live page on {} full disks: each one line and an exit code, 0 earlier files damaged",
+        more.len()
     );
 }
