@@ -15,6 +15,7 @@ mod debugger;
 mod emulator;
 mod hil;
 mod histograms;
+mod large;
 mod laser;
 mod pico;
 mod ports;

@@ -6,6 +6,7 @@ use std::str::FromStr;
 use anyhow::{Context, Result, ensure};
 use dtof_core::Array;
 
+use dtof_options::rows::grouped;
 use dtof_options::{Named, Refused, named, named_values};
 
 named_values! {
@@ -190,7 +191,9 @@ fn pixels_of(axes: &[(usize, usize)]) -> Result<usize> {
     ensure!(
         pixels <= Array::MOST_PIXELS as usize,
         Refused::input(format!(
-            "{pixels} pixels; there are 65,536 addresses (see `axes` if one axis is the bins)"
+            "{} pixels are more than 65,536: cut the array into tiles, as docs/recordings.md shows (see `axes` if one \
+             axis is the bins)",
+            grouped(pixels as u64)
         ))
     );
     Ok(pixels)

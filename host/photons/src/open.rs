@@ -1,6 +1,7 @@
 //! Opens recordings of all formats.
 
 use std::borrow::Cow;
+use std::iter::repeat_with;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
@@ -400,8 +401,15 @@ fn array(input: &Input, options: &ReadOptions, read: Histograms) -> Result<Conte
         Some(_) => None,
     };
     let bins = layout.bins();
-    let captures = pixels.chunks(layout.array.pixels() as usize);
-    let captures = captures.map(<[_]>::to_vec).collect();
+    let mut pixels = pixels.into_iter();
+    let capture = || {
+        pixels
+            .by_ref()
+            .take(layout.array.pixels() as usize)
+            .collect()
+    };
+    let captures = repeat_with(capture).take_while(|capture: &Capture| !capture.is_empty());
+    let captures = captures.collect();
     let counts = fit_bins(layout.array, captures, [bins, bins], None, options);
     let mut counts = counts.with_context(|| input.to_string())?;
     counts.axis_names = layout.axis_names;

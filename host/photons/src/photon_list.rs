@@ -159,7 +159,9 @@ impl<R: PhotonReader> Validator<R> {
     #[cold]
     fn wrong(&self, [pixel, cycle, bin]: RawPhoton) -> Result<Option<ValidPhoton>> {
         if u16::try_from(pixel).is_err() {
-            bail!("pixel {pixel} is above 65535, the last address");
+            bail!(
+                "pixel {pixel} is above 65535, the last address: cut the array into tiles, as docs/recordings.md shows"
+            );
         }
         if cycle < self.last_cycle {
             bail!(

@@ -3,6 +3,9 @@
 
 use std::fs::File;
 use std::process::Stdio;
+use std::time::{Duration, Instant};
+
+use dtof_photons::npy::header;
 
 use crate::common::{Scratch, assert_contains, names, table};
 
@@ -369,4 +372,28 @@ fn a_failed_run_leaves_the_results_of_the_one_before() {
     assert_eq!(scratch.read("out/summary.json"), before);
     let names = names(&scratch.path("out"));
     assert!(names.iter().all(|name| !name.starts_with('.')), "{names:?}");
+}
+
+/// Half a terabyte, of which the disk holds the header.
+#[test]
+fn an_array_with_more_pixels_than_addresses_is_refused_before_it_is_read() {
+    let scratch = Scratch::new();
+    let header = header("<u4", &[1 << 15, 1 << 15, 128], 128);
+    let large = scratch.file("large.npy", &header);
+    let file = std::fs::OpenOptions::new().write(true).open(large).unwrap();
+    file.set_len(header.len() as u64 + (4 * 128 << 30)).unwrap();
+    let begun = Instant::now();
+    for command in [
+        "replay --input large.npy --out out",
+        "calibrate large.npy --out dtof.toml",
+    ] {
+        let line = "large.npy: 1,073,741,824 pixels are more than 65,536: cut the array into tiles, as docs/recordings.md shows";
+        scratch.refused(&scratch.run(command), &[line]);
+    }
+    assert!(begun.elapsed() < Duration::from_secs(20));
+    scratch.file("list.csv", "pixel,cycle,bin\n65536,0,1\n");
+    scratch.all_refused(
+        "replay --out out --input list.csv --columns",
+        "1024 | pixel 65536 is above 65535, the last address: cut the array into tiles",
+    );
 }

@@ -11,6 +11,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
+use dtof_options::rows::grouped;
 use dtof_photons::npy::header;
 
 use crate::common::{Scratch, npy, peak_kb};
@@ -149,8 +150,48 @@ fn a_billion_photons_take_little_memory() {
     let (rate, peak) = replay(&scratch, line);
     assert_eq!(scratch.summary()["photons"], 1_000_000_000);
     println!(
-        "10^9 photons: at most {peak} kB, {:.1} million a second",
-        rate / 1e6
+        "load: 10^9 photons: {:.1} million a second, at most {} MB",
+        rate / 1e6,
+        peak / 1000
     );
     assert!(peak < 300_000, "{peak} kB");
+}
+
+#[test]
+#[ignore = "writes a file of 67 MB; a minute with --release"]
+fn the_most_pixels_and_bins_take_known_memory() {
+    const SIDE: u64 = 256;
+    const MOST_BINS: u64 = 1024;
+    let scratch = Scratch::new();
+    let mut file = BufWriter::new(File::create(scratch.path("wide.npy")).unwrap());
+    let shape = [SIDE, SIDE, MOST_BINS];
+    file.write_all(&header("|u1", &shape, 128)).unwrap();
+    let mut numbers = Numbers(3);
+    for pixel in 0..SIDE * SIDE {
+        // Two photons a bin, and a pulse.
+        let mut counts = [0u8; MOST_BINS as usize];
+        for _ in 0..MOST_BINS {
+            counts[usize::try_from(numbers.below(MOST_BINS)).unwrap()] += 2;
+        }
+        let peak = usize::try_from(200 + pixel / SIDE * 2).unwrap();
+        counts[peak - 1..=peak + 1].copy_from_slice(&[40, 60, 40]);
+        file.write_all(&counts).unwrap();
+    }
+    file.flush().unwrap();
+    let began = Instant::now();
+    let line = "replay --quiet --no-csv --input wide.npy --recorded-cycles 2000 --out out";
+    let mut dtof = scratch.command(line);
+    let peak = peak_kb(dtof.stdout(Stdio::null()).spawn().unwrap());
+    let seconds = began.elapsed().as_secs_f64();
+    let summary = scratch.summary();
+    println!(
+        "load: 65,536 pixels of 1024 bins, {} photons: {seconds:.0} s, at most {} MB",
+        grouped(summary["photons"].as_u64().unwrap()),
+        peak / 1000
+    );
+    assert!(
+        summary["pixels_reporting"].as_u64() > Some(65_000),
+        "{summary}"
+    );
+    assert!(peak < 3_000_000, "{peak} kB");
 }
