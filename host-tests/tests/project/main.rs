@@ -1,6 +1,7 @@
 //! Tests of the project: its packages, pages, sizes and rules.
 
 mod architecture;
+mod clocks;
 mod doors;
 mod eye_safety;
 mod links;

@@ -2,6 +2,8 @@
 //! nonsense, and a device that sends 100,000 events a second.
 
 mod away;
+#[cfg(target_os = "linux")]
+mod browser;
 pub mod device;
 mod fast;
 mod foxglove;
