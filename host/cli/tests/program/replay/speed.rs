@@ -161,17 +161,16 @@ fn a_billion_photons_take_little_memory() {
 #[ignore = "writes a file of 67 MB; a minute with --release"]
 fn the_most_pixels_and_bins_take_known_memory() {
     const SIDE: u64 = 256;
-    const MOST_BINS: u64 = 1024;
     let scratch = Scratch::new();
     let mut file = BufWriter::new(File::create(scratch.path("wide.npy")).unwrap());
-    let shape = [SIDE, SIDE, MOST_BINS];
+    let shape = [SIDE, SIDE, 1024];
     file.write_all(&header("|u1", &shape, 128)).unwrap();
     let mut numbers = Numbers(3);
     for pixel in 0..SIDE * SIDE {
         // Two photons a bin, and a pulse.
-        let mut counts = [0u8; MOST_BINS as usize];
-        for _ in 0..MOST_BINS {
-            counts[usize::try_from(numbers.below(MOST_BINS)).unwrap()] += 2;
+        let mut counts = [0u8; 1024];
+        for _ in 0..counts.len() {
+            counts[usize::try_from(numbers.below(1024)).unwrap()] += 2;
         }
         let peak = usize::try_from(200 + pixel / SIDE * 2).unwrap();
         counts[peak - 1..=peak + 1].copy_from_slice(&[40, 60, 40]);

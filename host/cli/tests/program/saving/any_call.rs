@@ -54,7 +54,9 @@ fn each_file_is_the_old_or_the_new_one_whatever_call_fails_or_is_the_last() {
             new.get(writer.last) != earlier.get(writer.last),
             "{out}: the runs are the same"
         );
-        let every = calls.len().div_ceil(times(2, 100_000) as usize);
+        let every = calls
+            .len()
+            .div_ceil(usize::try_from(times(2, 100_000)).unwrap());
         for call in calls.iter().skip(number % every).step_by(every) {
             let at = format!("{out}: {call:?}");
             let all = files(&work.scratch.path(""));
