@@ -82,6 +82,15 @@ pub fn compare<const BINS: usize>(
     if let Some(expected) = alone {
         assert_eq!(is_alone, expected, "{:?}", own.counts);
     }
+    if own.echoes.is_empty() {
+        // Peak, background and depth are those without neighbours.
+        let mut histogram = Histogram::<BINS, Count16>::new();
+        histogram.add_frame(&own.counts.map(|count| count as u16), config.gate());
+        let expected = config.detect(&histogram);
+        if is_alone || expected.is_some() {
+            assert_eq!(detection, expected, "{:?}", own.counts);
+        }
+    }
     if is_alone {
         return found;
     }
