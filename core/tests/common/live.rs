@@ -187,11 +187,19 @@ impl<'a> Exposure<'a> {
                 ..Found::default()
             };
         };
-        // The one with the largest score is reported. The score so far is rounded down by up to 1/256, and of more than 2²⁴
-        // photons by 1 in 10⁸, so that a later window with nearly the same takes its place.
+        // The one with the largest score is reported. The score so far is rounded down, so that a later window with nearly the
+        // same takes its place: by up to 1/256; from 2²⁴ photons on by up to 1, because the quotient is multiplied
+        // by 256, and by 1 in 10⁸, because the excess is rounded down to 1/16.
+        let kept = |one: &Window| {
+            if one.inside >= 1 << 24 {
+                one.score[0] * (1.0 - 1e-8) - 1.0
+            } else {
+                one.score[0] * (1.0 - CLOSE) - UNIT
+            }
+        };
         let clear = windows.iter().filter(|one| one.is_clear);
-        let highest = clear.fold(0.0, |highest: f64, one| highest.max(one.score[0]));
-        windows.retain(|one| one.score[1] * (1.0 + 1e-8) + UNIT >= highest);
+        let highest = clear.fold(0.0, |highest: f64, one| highest.max(kept(one)));
+        windows.retain(|one| one.score[1] >= highest);
         let is_found = |one: &&Window| one.first == usize::from(found.first);
         let window = windows.iter().find(is_found);
         let window = window.unwrap_or_else(|| panic!("{found:?} of {windows:?} {:?}", self.counts));

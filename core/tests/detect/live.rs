@@ -144,23 +144,36 @@ fn the_brightest_bin_is_the_one_with_the_most_light() {
 #[test]
 fn of_windows_with_the_most_photons_the_brightest_is_reported() {
     for width in 1..=7 {
-        let rule = WindowRule::new(width, U4F12::lit("4"), Count::saturating(5)).unwrap();
         for (first, second) in [(10, 40), (40, 10)] {
             for part in [2, 3, 10, 100, 10_000] {
                 let mut counts = [1000; 64];
                 counts[first..first + 7].fill(Count24::MAX - 1);
                 counts[second..second + 7].fill((Count24::MAX - 1) / part);
-                let fired = check::<64, Count24>(
-                    &counts,
-                    RangeGate::full(),
-                    &ExcludedBins::NONE,
-                    LiveCounts::<64, Count24>::MAX_CYCLES,
-                    1,
-                    &rule,
-                    None,
-                );
-                assert!(fired);
+                check_wide(&counts, width);
             }
         }
     }
+}
+
+/// With 2²⁴ photons above four times as many the level is rounded down by up to 1, and a photon is half of that.
+#[test]
+fn of_windows_that_are_nearly_as_bright_one_is_reported() {
+    for more in 1..20 {
+        for less in [0, 1, 2, 3] {
+            let mut counts = [9_600_000; 64];
+            counts[10..17].fill(13_000_000);
+            counts[40..47].fill(13_000_000);
+            counts[13] += 5 * more;
+            counts[43] += 5 * more - less;
+            check_wide(&counts, 7);
+        }
+    }
+}
+
+fn check_wide(counts: &[u32; 64], width: u8) {
+    let rule = WindowRule::new(width, U4F12::lit("4"), Count::saturating(5)).unwrap();
+    let cycles = LiveCounts::<64, Count24>::MAX_CYCLES;
+    let (gate, none) = (RangeGate::full(), ExcludedBins::NONE);
+    let fired = check::<64, Count24>(counts, gate, &none, cycles, 1, &rule, None);
+    assert!(fired);
 }
