@@ -382,7 +382,7 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
     }
 
     /// The level that a better window than this one exceeds. `None` if this one has too few photons
-    /// or live laser cycles, touches an echo, or does not stand clear.
+    /// or live laser cycles, touches an echo, does not stand clear, or has a lower level than the best.
     #[cold]
     #[inline(never)]
     fn next_level(&self, window: &Candidate, width: usize, levels: &Levels) -> Option<u64> {
@@ -394,16 +394,15 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
             return None;
         }
         let excess = excess(window.photons, window.expected);
-        Some(if W::BITS <= 10 {
-            let level = excess.wrapping_mul(excess).checked_div(window.expected)?;
-            level.min(u32::MAX.into())
+        // Up to 35 bits, 21 of counters of 10 bits. Of more than 32 the square takes the upper ones.
+        let level = if W::BITS <= 10 || excess >> 32 == 0 {
+            excess.wrapping_mul(excess).checked_div(window.expected)?
         } else {
-            // Up to 35 bits. Of more than 32 the square takes the upper ones.
-            let shift = if excess >> 32 == 0 { 0 } else { 4 };
-            let upper = excess >> shift;
+            let upper = excess >> 4;
             let level = upper.wrapping_mul(upper).checked_div(window.expected)?;
-            level.saturating_mul(1 << (2 * shift))
-        })
+            level.saturating_mul(1 << 8)
+        };
+        (level >= levels.excess).then_some(level)
     }
 
     /// Where windows may start: in the gate, and so that they contain `expected`.
@@ -591,13 +590,14 @@ fn excess(photons: u32, expected: u64) -> u64 {
 }
 
 /// Whether the square of the excess is more than `level` times the `expected` photons, all in 1/256.
+/// With counters of 10 bits the lower word of `level` is compared, which is no more than all of it.
 #[inline(always)]
 fn exceeds<W: CounterWidth>(photons: u32, expected: u64, level: u64) -> bool {
     if W::BITS <= 10 {
         // A window has 13 bits of photons, and all bins have 20.
         #[allow(
             clippy::cast_possible_truncation,
-            reason = "28 bits, and a level of 32"
+            reason = "28 bits, and the lower 32 of a level"
         )]
         let (expected, level) = (expected as u32, level as u32);
         let Some(excess) = (photons << 8).checked_sub(expected) else {

@@ -177,3 +177,20 @@ fn check_wide(counts: &[u32; 64], width: u8) {
     let fired = check::<64, Count24>(counts, gate, &none, cycles, 1, &rule, None);
     assert!(fired);
 }
+
+/// Also if `(S - E)²/E` does not fit 32 bits, as of full counters where few photons are expected.
+#[test]
+fn behind_bright_bins_the_brightest_window_is_reported() {
+    let mut counts = [0; 1024];
+    counts[..70].fill(1022);
+    let rule = WindowRule::new(7, U4F12::lit("4"), Count::saturating(5)).unwrap();
+    let gate = RangeGate::new(63, 1023).unwrap();
+    // Bins 63 to 69 are live in 1149 laser cycles, and bins behind them in more.
+    let none = ExcludedBins::NONE;
+    assert!(check::<1024, Count10>(
+        &counts, gate, &none, 65_535, 63, &rule, None
+    ));
+    assert!(check::<1024, Count16>(
+        &counts, gate, &none, 65_535, 63, &rule, None
+    ));
+}
