@@ -394,8 +394,8 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
             return None;
         }
         let excess = excess(window.photons, window.expected);
-        // Up to 35 bits, 21 of counters of 10 bits. Of more than 32 the square takes the upper ones.
-        let level = if W::BITS <= 10 || excess >> 32 == 0 {
+        // Up to 35 bits. Of more than 32 the square takes the upper ones.
+        let level = if excess >> 32 == 0 {
             excess.wrapping_mul(excess).checked_div(window.expected)?
         } else {
             let upper = excess >> 4;
