@@ -81,13 +81,13 @@ const WRITERS: [&str; 7] = [
     "host/run/src/output.rs",
 ];
 
-fn root() -> PathBuf {
+pub fn root() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     root.canonicalize().unwrap()
 }
 
 /// Files below `folder` with one of these endings, by their paths from the root.
-fn files(folder: &Path, ends: &[&str], found: &mut Vec<(String, String)>) {
+pub fn files(folder: &Path, ends: &[&str], found: &mut Vec<(String, String)>) {
     for entry in fs::read_dir(folder).unwrap() {
         let path = entry.unwrap().path();
         let name = path.file_name().unwrap().to_str().unwrap();

@@ -96,14 +96,14 @@ impl<const BINS: usize, W: CounterWidth> HostEngine<BINS, W> {
 impl<const BINS: usize, W: CounterWidth> Engine for HostEngine<BINS, W> {
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
         let configs = &self.configs;
-        let of_parts = of_parts(&mut self.groups, 1, |_, groups| -> Vec<Done> {
+        let parts = of_parts(&mut self.groups, 1, |_, groups| -> Vec<Done> {
             let groups = groups.iter_mut();
             groups
                 .map(|group| group.run(configs, slice.first_cycle, &slice.pixels))
                 .collect()
         });
         let mut events = Vec::new();
-        for done in of_parts.into_iter().flatten() {
+        for done in parts.into_iter().flatten() {
             events.extend(done.events);
             self.pixels += done.pixels;
             self.blocks += done.blocks;

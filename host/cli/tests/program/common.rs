@@ -58,6 +58,18 @@ impl Scratch {
         command
     }
 
+    /// `dtof LINE` in this folder, as `shell` starts it: `exec "$@"` in it is the program.
+    pub fn in_shell(&self, shell: &str, line: &str) -> Command {
+        let program = self.command(line);
+        let mut command = Command::new("sh");
+        command
+            .current_dir(self.0.path())
+            .args(["-c", shell, "sh"])
+            .arg(program.get_program())
+            .args(program.get_args());
+        command
+    }
+
     /// The output of `dtof LINE` in this folder.
     pub fn run(&self, line: &str) -> Output {
         self.command(line).output().unwrap()

@@ -11,7 +11,6 @@ mod interrupted;
 
 use std::collections::BTreeMap;
 use std::path::Path;
-use std::process::{Command, Output};
 
 use crate::common::Scratch;
 
@@ -187,17 +186,6 @@ impl Work {
         let _ = std::fs::remove_dir_all(self.scratch.path(out));
         let _ = std::fs::remove_file(self.scratch.path(out));
     }
-}
-
-/// The program, as `shell` starts it: `exec "$@"` in it is `dtof LINE`.
-fn through(shell: &str, scratch: &Scratch, line: &str) -> Output {
-    let program = scratch.command(line);
-    let mut command = Command::new("sh");
-    command
-        .current_dir(scratch.path(""))
-        .args(["-c", shell, "sh"]);
-    command.arg(program.get_program()).args(program.get_args());
-    command.output().unwrap()
 }
 
 /// Names of incomplete files.

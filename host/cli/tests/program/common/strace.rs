@@ -82,16 +82,17 @@ pub fn calls(program: &Command, folder: &Path) -> Vec<Call> {
 /// `program` with a fault at this call.
 pub fn faulty(program: &Command, call: &Call, fault: Fault) -> Command {
     let Call { name, nth } = call;
-    let is_killed = fault == Fault::Killed;
-    let fault = match fault {
-        Fault::Full => "error=ENOSPC",
-        Fault::Killed => "signal=KILL",
+    let (fault, more) = match fault {
+        Fault::Full => ("error=ENOSPC", Some(FAST.to_owned())),
+        Fault::Killed => ("signal=KILL", None),
     };
-    let inject = format!("--inject={name}:{fault}:when={nth}");
-    let mut options = vec!["--output=/dev/null".to_owned(), format!("--trace={name}")];
-    options.push(inject);
-    if !is_killed {
-        options.push(FAST.to_owned());
-    }
-    strace(&options, program)
+    let options = [
+        "--output=/dev/null".to_owned(),
+        format!("--trace={name}"),
+        format!("--inject={name}:{fault}:when={nth}"),
+    ];
+    strace(
+        &options.into_iter().chain(more).collect::<Vec<_>>(),
+        program,
+    )
 }

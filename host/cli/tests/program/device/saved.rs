@@ -117,6 +117,12 @@ fn header() -> usize {
     usize::from(u16::from_le_bytes([bytes[10], bytes[11]]))
 }
 
+/// `dtof LINE` on a disk that takes so many bytes of a file.
+fn limited(scratch: &Scratch, line: &str, bytes: usize) -> Command {
+    let shell = format!("trap '' XFSZ; exec prlimit --fsize={bytes} \"$@\"");
+    scratch.in_shell(&shell, line)
+}
+
 /// A disk that takes so many bytes of a file with a header of this length.
 fn full(bytes: usize, header: usize) -> usize {
     let scratch = Scratch::new();
@@ -125,14 +131,7 @@ fn full(bytes: usize, header: usize) -> usize {
         "monitor --pixels 4 --columns 2 --seconds 30 --device {} --record events.aer",
         device(true, LONG)
     );
-    let program = scratch.command(&line);
-    let mut limited = Command::new("sh");
-    let shell = format!("trap '' XFSZ; exec prlimit --fsize={bytes} \"$@\"");
-    limited
-        .current_dir(scratch.path(""))
-        .args(["-c", &shell, "sh"]);
-    limited.arg(program.get_program()).args(program.get_args());
-    let output = limited.output().unwrap();
+    let output = limited(&scratch, &line, bytes).output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{bytes} bytes: {output:?}");
     let message = String::from_utf8(output.stderr).unwrap();
     let mut errors = message
@@ -196,13 +195,7 @@ fn full_of_the_page(bytes: usize) {
         "view --pixels 4 --columns 2 --device {} --out .",
         device(true, LONG)
     );
-    let program = scratch.command(&line);
-    let mut limited = Command::new("sh");
-    let shell = format!("trap '' XFSZ; exec prlimit --fsize={bytes} \"$@\"");
-    limited
-        .current_dir(scratch.path(""))
-        .args(["-c", &shell, "sh"]);
-    limited.arg(program.get_program()).args(program.get_args());
+    let mut limited = limited(&scratch, &line, bytes);
     let limited = limited.stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = limited.spawn().unwrap();
     let mut address = String::new();

@@ -3,7 +3,7 @@
 use std::path::Path;
 use std::process::Command;
 
-use super::{Work, files, through};
+use super::{Work, files};
 use crate::common::{assert_contains, npy, skipped};
 
 /// Returns whether the tools of a test are installed, and prints the missing ones.
@@ -56,7 +56,7 @@ fn a_disk_that_fills_up_changes_nothing_on_it() {
         std::fs::create_dir(&after).unwrap();
         let shell = DISK.replace("SIZE", &(taken + room).to_string());
         let shell = format!("exec unshare -rm sh -c '{shell}' sh \"$@\"");
-        let output = through(&shell, scratch, &line);
+        let output = scratch.in_shell(&shell, &line).output().unwrap();
         let left = files(&after);
         if output.status.success() {
             assert!(left.contains_key("summary.json") && left != before);
@@ -88,7 +88,11 @@ fn warnings_that_nobody_can_take_stop_nothing() {
             .unwrap()
             .contains("warning: ")
     );
-    let output = through("exec \"$@\" 2>/dev/full", &work.scratch, line);
+    let output = work
+        .scratch
+        .in_shell("exec \"$@\" 2>/dev/full", line)
+        .output()
+        .unwrap();
     assert_eq!(output.status.code(), Some(0), "{output:?}");
 }
 
@@ -100,7 +104,11 @@ fn a_table_that_nobody_can_take_is_an_error() {
     }
     let work = Work::new();
     let shell = "exec \"$@\" >/dev/full";
-    let output = through(shell, &work.scratch, "decode source/events.aer");
+    let output = work
+        .scratch
+        .in_shell(shell, "decode source/events.aer")
+        .output()
+        .unwrap();
     assert_eq!(output.status.code(), Some(1));
     let message = String::from_utf8(output.stderr).unwrap();
     assert_eq!(message.lines().count(), 1, "{message}");
