@@ -1,12 +1,6 @@
 //! Bins that are left out, against a plain set of bins; and a histogram emptied there against
 //! one that never counted those photons.
 
-#![allow(
-    clippy::cast_sign_loss,
-    clippy::cast_possible_truncation,
-    reason = "small numbers"
-)]
-
 use std::collections::BTreeSet;
 
 use dtof_core::rule::ExcludedBins;

@@ -1,7 +1,5 @@
 //! The histogram loses nothing without counting it.
 
-#![allow(clippy::cast_possible_truncation, reason = "small numbers")]
-
 use dtof_core::{Count8, Count10, Count16, Count24, CounterWidth, Histogram, RangeGate};
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};

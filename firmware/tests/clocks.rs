@@ -1,12 +1,10 @@
 //! Clocks that are off: the link with a device whose millisecond is 2 % longer or shorter than the
 //! host's, and bytes from a sender whose bits are.
 
-mod common;
-
 use std::collections::VecDeque;
 
-use common::host::{CONFIGURATION, Host, deliver, device};
-use common::script;
+use crate::common::host::{CONFIGURATION, Host, deliver, device};
+use crate::common::script;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::{Configuration, Report, Source, message};
 use rand_core::{Rng, SeedableRng};

@@ -1,8 +1,6 @@
 //! The sensor, and with it a laser, runs only while a host that is alive wants it.
 
-mod common;
-
-use common::host::{CONFIGURATION, Host, deliver, device};
+use crate::common::host::{CONFIGURATION, Host, deliver, device};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
 use dtof_firmware::serial::Buffers;

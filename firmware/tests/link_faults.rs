@@ -1,12 +1,10 @@
 //! A host and a device with a bad wire between them: over ten thousand faults,
 //! every event arrives once, in order and as it was.
 
-mod common;
-
 use std::collections::VecDeque;
 
-use common::host::{Host, deliver, device};
-use common::session::{End, Line, Outcome, Plan, Script, WHOLE, check, script, session};
+use crate::common::host::{Host, deliver, device};
+use crate::common::session::{End, Line, Outcome, Plan, Script, WHOLE, check, script, session};
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, greeting};

@@ -4,10 +4,8 @@
 //! that it broke: the host when it gives up or the device says so, the device as soon as it was
 //! restarted or has begun another session. It says so to a host of the one before.
 
-mod common;
-
-use common::host::deliver;
-use common::session::{End, Line, Outcome, Plan, Script, WHOLE, check, script, session};
+use crate::common::host::deliver;
+use crate::common::session::{End, Line, Outcome, Plan, Script, WHOLE, check, script, session};
 use dtof_link::endpoint::{Endpoint, LinkCounters, RETRANSMIT_MOST_MS};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use rand_core::Rng;

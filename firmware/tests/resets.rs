@@ -2,10 +2,8 @@
 //! host has whole events up to there, learns that the session is over, and gets every event of
 //! the next one.
 
-mod common;
-
-use common::host::{CONFIGURATION, Host, deliver, device};
-use common::script;
+use crate::common::host::{CONFIGURATION, Host, deliver, device};
+use crate::common::script;
 use dtof_core::DepthEvent;
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::frame::{Deframer, WIRE_BYTES};

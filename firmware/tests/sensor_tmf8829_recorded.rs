@@ -6,15 +6,13 @@
 //! All columns of this log are the same, and its distances are those of the first row: only 16
 //! histograms a frame are recorded. So the chip's columns are those of several frames.
 
-mod common;
-
 use std::fs::File;
 use std::io::Write;
 use std::path::PathBuf;
 use std::rc::Rc;
 
-use common::mocks::SinkCall;
-use common::mocks::tmf8829::bench::{Bench, settings};
+use crate::common::mocks::SinkCall;
+use crate::common::mocks::tmf8829::bench::{Bench, settings};
 use dtof_core::{
     Count, Count24, EchoNumber, Histogram, PixelConfig, RangeGate, RangeScale, WindowRule, z_for,
 };

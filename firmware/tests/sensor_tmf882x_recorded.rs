@@ -3,13 +3,11 @@
 //! where `TMF8820_LOG` says: as packets on a mocked bus they come out exactly as
 //! recorded, and in the sidecar give the decision of the core.
 
-mod common;
-
 use std::io::Write;
 use std::path::PathBuf;
 
-use common::host::{CONFIGURATION, configured};
-use common::mocks::tmf882x::{Bench, Counts, packet, packets, settings};
+use crate::common::host::{CONFIGURATION, configured};
+use crate::common::mocks::tmf882x::{Bench, Counts, packet, packets, settings};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::rule::detect;
 use dtof_core::{Count, Count24, DepthEstimator, DepthEvent, Histogram, PaperRule, RangeGate};

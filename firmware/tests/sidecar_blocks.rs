@@ -1,13 +1,11 @@
 //! The sidecar with adaptive binning, tracking and several echoes: the same events and counts
 //! as pixels and blocks run by hand, whatever the host does.
 
-mod common;
-
 use std::collections::{BTreeMap, VecDeque};
 
-use common::host::{CONFIGURATION, Call, Host, Scripted, device_with_blocks, scripted};
-use common::script::{messages, photons};
-use common::sharing::{Expected, configs, expected, script};
+use crate::common::host::{CONFIGURATION, Call, Host, Scripted, device_with_blocks, scripted};
+use crate::common::script::{messages, photons};
+use crate::common::sharing::{Expected, configs, expected, script};
 use dtof_core::events::{DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Reference};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::rule::{ExcludedBins, detect};

@@ -1,8 +1,8 @@
 //! The dead time of a TDC: whose it is, and what a sidecar makes of it.
 
-mod common;
-
-use common::host::{CONFIGURATION, Call, Host, configured_with, device_with_blocks, scripted};
+use crate::common::host::{
+    CONFIGURATION, Call, Host, configured_with, device_with_blocks, scripted,
+};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
     AnyRule, AsyncPixel, AverageRule, BlockLevel, Count, Count24, DepthEvent, EchoNumber, Flags,

@@ -1,8 +1,6 @@
 //! The dither that a host requests reaches the sensor, and no sensor gets one that it cannot have.
 
-mod common;
-
-use common::host::{CONFIGURATION, Host, configured_with};
+use crate::common::host::{CONFIGURATION, Host, configured_with};
 use dtof_core::fixed::types::U16F16;
 use dtof_link::{Configuration, Refusal, SensorRecord, Source, message};
 use dtof_sensors::dither::Dither;

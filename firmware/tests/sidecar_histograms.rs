@@ -1,13 +1,11 @@
 //! Histograms that a host asks for: they add up to the photons that were counted, whatever the
 //! line does and events come between, and no event is another one for them.
 
-mod common;
-
 use std::collections::BTreeMap;
 
-use common::histograms::{Answer, histograms, refused};
-use common::host::{CONFIGURATION, Call, Host, configured, deliver, device, scripted};
-use common::script;
+use crate::common::histograms::{Answer, histograms, refused};
+use crate::common::host::{CONFIGURATION, Call, Host, configured, deliver, device, scripted};
+use crate::common::script;
 use dtof_core::PixelAddress;
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::frame::{Deframer, WIRE_BYTES};

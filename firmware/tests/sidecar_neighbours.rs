@@ -1,8 +1,6 @@
 //! Pixels that confirm each other on a sidecar.
 
-mod common;
-
-use common::host::{CONFIGURATION, Call, configured, configured_with, scripted};
+use crate::common::host::{CONFIGURATION, Call, configured, configured_with, scripted};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
 use dtof_core::{

@@ -1,8 +1,6 @@
 //! Photons of one laser cycle in one bin count once on a sidecar, however they come.
 
-mod common;
-
-use common::host::{
+use crate::common::host::{
     CONFIGURATION, Call, Host, configured, configured_with, device_with_blocks, scripted,
 };
 use dtof_core::fixed::types::U4F12;

@@ -1,8 +1,6 @@
 //! What a sidecar orders its sensor to do, and what a host is told of the sensor.
 
-mod common;
-
-use common::host::{CONFIGURATION, Host, device};
+use crate::common::host::{CONFIGURATION, Host, device};
 use dtof_core::fixed::types::U16F16;
 use dtof_link::{Configuration, Refusal, SensorRecord, Source, message};
 use dtof_sensors::dither::Dither;

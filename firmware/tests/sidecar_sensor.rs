@@ -2,10 +2,8 @@
 //! pixel's, longer exposures for a host that does not read, and nothing lost
 //! that is not counted.
 
-mod common;
-
-use common::host::{CONFIGURATION, Call, Host, Scripted, configured, device, scripted};
-use common::{scene, script};
+use crate::common::host::{CONFIGURATION, Call, Host, Scripted, configured, device, scripted};
+use crate::common::{scene, script};
 use dtof_core::events::{DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Reference};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::rule::detect;

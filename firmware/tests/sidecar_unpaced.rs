@@ -1,10 +1,8 @@
 //! A simulated sensor that is not tied to a clock: however slowly the host reads, the events are those
 //! of pixels with unlimited room.
 
-mod common;
-
-use common::host::{CONFIGURATION, Call, Host, device};
-use common::script;
+use crate::common::host::{CONFIGURATION, Call, Host, device};
+use crate::common::script;
 use dtof_core::PixelAddress;
 use dtof_link::{Configuration, Source, message};
 use dtof_sensors::{PhotonSink, Sensor, simulated};

@@ -1,10 +1,8 @@
 //! Histograms of a sensor that gives whole ones, which a host asks for.
 
-mod common;
-
-use common::histograms::{histograms, refused};
-use common::host::{CONFIGURATION, Call, Host, device, scripted};
-use common::script;
+use crate::common::histograms::{histograms, refused};
+use crate::common::host::{CONFIGURATION, Call, Host, device, scripted};
+use crate::common::script;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, LaserCycle, PaperRule, PixelAddress};
 use dtof_firmware::sidecar::Sidecar;

@@ -2,12 +2,10 @@
 //! right again: a sensor that is unplugged, no host, configurations that cannot
 //! be. A host that stops reading is in `sidecar_sensor.rs`.
 
-mod common;
-
-use common::host::{CONFIGURATION, Host, configured, device_with_blocks};
-use common::mocks::Broken;
-use common::mocks::plug::{Answers, Bus, Tdc, Tmf};
-use common::{plugged, scene};
+use crate::common::host::{CONFIGURATION, Host, configured, device_with_blocks};
+use crate::common::mocks::Broken;
+use crate::common::plug::{Answers, Bus, Tdc, Tmf};
+use crate::common::{plugged, scene};
 use dtof_chips::Chip;
 use dtof_core::{DepthEvent, Statistics};
 use dtof_firmware::sidecar::Sidecar;

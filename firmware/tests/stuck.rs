@@ -5,14 +5,12 @@
 //! A handler takes no time here. Interrupts without end fill the queue whenever the main loop is
 //! about to look; if they leave it no time at all, the watchdog has to help.
 
-mod common;
-
 use std::cell::RefCell;
 use std::convert::Infallible;
 
-use common::host::{CONFIGURATION, Host, configured, device};
-use common::mocks::plug::{Answers, Bus, Tdc, Tmf};
-use common::{plugged, script};
+use crate::common::host::{CONFIGURATION, Host, configured, device};
+use crate::common::plug::{Answers, Bus, Tdc, Tmf};
+use crate::common::{plugged, script};
 use dtof_chips::Chip;
 use dtof_core::DepthEvent;
 use dtof_firmware::serial::{Buffers, Serial, SerialInterrupt};

@@ -8,8 +8,7 @@ use dtof_link::message::{HISTOGRAM, HISTOGRAM_REQUEST, greeting};
 use dtof_link::{HistogramHead, HistogramPart, NoHistogram};
 use proptest::prelude::*;
 
-mod common;
-use common::golden;
+use crate::common::golden;
 
 const HEAD: HistogramHead = HistogramHead {
     pixel: PixelAddress::new(3),
@@ -79,8 +78,8 @@ fn the_ends_send_the_golden_frames() {
     };
     let mut host = Endpoint::host(0x1234, greeting(0, 0), 0);
     let mut device = Endpoint::device(greeting(128, 64));
-    common::give(&mut device, &next(&mut host));
-    common::give(&mut host, &next(&mut device));
+    crate::common::give(&mut device, &next(&mut host));
+    crate::common::give(&mut host, &next(&mut device));
     host.offer(HISTOGRAM_REQUEST, &3u16.to_le_bytes()).unwrap();
     let [histogram] = &bodies(HEAD, &[0, 1, 2, 5, 7, 2, 1, 0])[..] else {
         panic!("more than one message");

@@ -17,8 +17,7 @@ use dtof_link::{
 };
 use proptest::prelude::*;
 
-mod common;
-use common::{give, golden};
+use crate::common::{give, golden};
 
 fn next(end: &mut Endpoint, now: u32) -> Vec<u8> {
     let mut wire = [0; WIRE_BYTES];

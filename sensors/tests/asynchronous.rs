@@ -1,19 +1,15 @@
 //! Drivers over embedded-hal-async: the same transfers and the same data as over embedded-hal, and
 //! each transfer is awaited.
 
-mod common;
-#[path = "common/tmf8829/wait.rs"]
-mod wait;
-
 use std::cell::{Cell, RefCell};
 use std::pin::pin;
 use std::rc::Rc;
 use std::task::{Context, Poll, Waker};
 
-use common::tmf8828;
-use common::tmf8829::bench::{IMAGE, over, settings};
-use common::tmf8829::bus::{Bus, Fault};
-use common::{RecordingSink, SinkCall};
+use crate::common::tmf8828;
+use crate::common::tmf8829::bench::{IMAGE, over, settings};
+use crate::common::tmf8829::bus::{Bus, Fault};
+use crate::common::{RecordingSink, SinkCall};
 use dtof_chips::tmf8829::varied_counts;
 use dtof_chips::{Chip as _, Tmf8829 as Chip};
 use dtof_core::fixed::types::U16F16;

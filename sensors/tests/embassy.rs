@@ -1,17 +1,14 @@
 //! The program of the example for embassy, against a simulated chip.
 
-mod common;
 #[path = "../examples/embassy/src/depth.rs"]
 mod depth;
-#[path = "common/tmf8829/wait.rs"]
-mod wait;
 
 use std::cell::{Cell, RefCell};
 use std::pin::pin;
 use std::rc::Rc;
 use std::task::{Context, Poll, Waker};
 
-use common::tmf8829::bus::{Bus, Fault};
+use crate::common::tmf8829::bus::{Bus, Fault};
 use dtof_chips::Tmf8829 as Chip;
 use dtof_sensors::SensorFault;
 use dtof_sensors::protocol::Timing;

@@ -2,12 +2,10 @@
 //! as often as proptest likes. Drivers never panic, a poll is as short as ever, what is marked as
 //! wrong is given to nobody, and all is right again once the sensor is.
 
-mod common;
-
 use std::cell::{Cell, RefCell, RefMut};
 use std::rc::Rc;
 
-use common::{Line, RecordingSink, SinkCall};
+use crate::common::{Line, RecordingSink, SinkCall};
 use dtof_chips::{Chip, Tdc7200 as TdcChip, Tmf882x as TmfChip};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;

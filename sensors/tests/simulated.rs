@@ -1,11 +1,9 @@
 //! The simulated sensor: exact probabilities, the rates and shapes it was given,
 //! and the same photons for the same seed however often it is asked.
 
-mod common;
-
 use std::num::NonZeroU16;
 
-use common::{RecordingSink, SinkCall};
+use crate::common::{RecordingSink, SinkCall};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{U0F32, U8F24};
 use dtof_sensors::simulated::{Pulse, RateError, Settings, Simulated, SimulatedPixel};

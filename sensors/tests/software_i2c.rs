@@ -1,13 +1,11 @@
 //! The I²C bus made by software, against a device that watches the two wires:
 //! what it sees, when, and that every wait ends.
 
-mod wires;
-
 use dtof_sensors::i2c::Error;
 use embedded_hal::i2c::{I2c, Operation};
 use proptest::prelude::*;
 
-use wires::{ADDRESS, Bus, LOOK_NS, PERIOD_NS, Phase, SCL, SDA, Seen, bus};
+use crate::common::wires::{ADDRESS, Bus, LOOK_NS, PERIOD_NS, Phase, SCL, SDA, Seen, bus};
 
 /// A transaction: what is written, or how many bytes are read.
 #[derive(Clone, Debug)]

@@ -1,15 +1,13 @@
 //! The driver of the TDC7200 on a mocked SPI bus: every register access in
 //! order, every error, and that the driver works after each.
 
-mod common;
-
 use std::cell::RefCell;
 
-use common::tdc7200::{
+use crate::common::tdc7200::{
     ARM_1, Access, Bench, CALIBRATIONS, MODE_1, configure, example, mode_1, over, read,
     read_results, write, writes,
 };
-use common::{Broken, Line, RecordingSink, SinkCall};
+use crate::common::{Broken, Line, RecordingSink, SinkCall};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_sensors::dither::Dither;

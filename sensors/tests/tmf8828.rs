@@ -1,12 +1,10 @@
 //! The 8×8 zones of a TMF8828.
 
-mod common;
-
 use std::cell::RefCell;
 use std::rc::Rc;
 
-use common::tmf8828::{Bus, Chip, MAP, count, zone};
-use common::{Broken, RecordingSink, SinkCall};
+use crate::common::tmf8828::{Bus, Chip, MAP, count, zone};
+use crate::common::{Broken, RecordingSink, SinkCall};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_sensors::dither::Dither;

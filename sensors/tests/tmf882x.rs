@@ -1,15 +1,13 @@
 //! The driver of the TMF8820/21/28 on a mocked I²C bus: every register access
 //! in order. Errors are in `tmf882x_errors.rs`.
 
-mod common;
-
 use std::cell::RefCell;
 
-use common::tmf882x::{
+use crate::common::tmf882x::{
     Bench, Counts, IMAGE, NACK, measure, measuring, packet, packets, page, read, settings,
     some_counts, write,
 };
-use common::{Line, RecordingSink};
+use crate::common::{Line, RecordingSink};
 use dtof_core::PixelAddress;
 use dtof_sensors::tmf882x::{Config, ConfigError, Error, Settings, SpadMap, Tmf882x, Zones};
 use dtof_sensors::{Polled, Sensor};

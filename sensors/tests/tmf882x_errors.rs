@@ -1,13 +1,11 @@
 //! Every error of the driver of the TMF8820/21/28 on a mocked I²C bus, and that the
 //! driver works after each.
 
-mod common;
-
-use common::tmf882x::{
+use crate::common::tmf882x::{
     Bench, IMAGE, NACK, measure, measuring, packet, packets, page, read, settings, some_counts,
     write,
 };
-use common::{Broken, SinkCall};
+use crate::common::{Broken, SinkCall};
 use dtof_sensors::tmf882x::{BootCommand, Command, DeviceError, Error, Waiting};
 use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};

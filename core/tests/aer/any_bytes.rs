@@ -10,8 +10,8 @@ use dtof_core::{
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::document::{bit_table, pack, pack_time};
-use crate::parallel;
+use super::document::{bit_table, pack, pack_time};
+use crate::common::parallel;
 
 /// Decodes any bytes as the document says, without the code.
 fn check_any_bytes(bytes: [u8; 16]) {

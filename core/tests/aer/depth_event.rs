@@ -9,8 +9,8 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::document::{Field, bit_table, event, pack, pack_event, pack_time, tables};
-use crate::parallel;
+use super::document::{Field, bit_table, event, pack, pack_event, pack_time, tables};
+use crate::common::parallel;
 
 /// There and back, from nothing, and the bytes the document wants.
 fn check_event(tables: &[Vec<Field>; 2], event: &DepthEvent) {

@@ -4,7 +4,7 @@ use dtof_core::{
     AER_VERSION, AerDecoder, AerEncoder, AerError, AerRecord, AerWord, Flags, LaserCycle,
 };
 
-use crate::document::{
+use super::document::{
     DOCUMENT, change_of, crc32, event_of, hex, named_values, rows, section, word_of,
 };
 

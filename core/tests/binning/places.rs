@@ -5,7 +5,7 @@ use dtof_core::{
     Array, BlockLevel, EchoNumber, Flags, LaserCycle, PixelAddress, PixelConfig, Statistics,
 };
 
-use crate::level;
+use super::level;
 
 /// The number of the block that a feed is into. It is on from the first tick.
 fn into(mut link: BlockLink) -> Option<usize> {

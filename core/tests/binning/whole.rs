@@ -10,7 +10,7 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::level;
+use super::level;
 
 const BINS: usize = 16;
 

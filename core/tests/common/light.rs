@@ -4,11 +4,6 @@ use rand_core::Rng;
 use rand_distr::{Distribution, Poisson};
 
 /// Appends the TDC codes of a Poisson number of photons, each in any of `BINS` bins, a power of two.
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "a number of photons; BINS is at most 1024"
-)]
 pub fn draw<const BINS: usize>(photons: &Poisson<f64>, rng: &mut impl Rng, codes: &mut Vec<u16>) {
     const { assert!(BINS.is_power_of_two() && BINS <= 1024) };
     let end = codes.len() + photons.sample(rng) as usize;

@@ -6,7 +6,7 @@ use dtof_core::{
     Count, Count16, Detection, Flags, Histogram, Peak, PixelConfig, RangeGate, WindowRule,
 };
 
-use crate::window_formula::exceeds;
+use super::window::exceeds;
 
 /// Bins to either side of an echo that are left out.
 pub const GUARD: u16 = 3;

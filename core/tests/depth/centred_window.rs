@@ -1,12 +1,6 @@
 //! The centred window against its formula in real numbers, and what must hold
 //! whatever the photons.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "small numbers"
-)]
-
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{
     CentredWindow, Count10, Count16, Count24, CounterWidth, DepthEstimate, DepthEstimator, Flags,

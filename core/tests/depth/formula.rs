@@ -1,11 +1,5 @@
 //! The centred window as its formula has it, in real numbers, and histograms to try it on.
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_possible_wrap,
-    reason = "small numbers"
-)]
-
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{
     BinIndex, CentredWindow, Count, CounterWidth, DepthEstimate, Histogram, Peak, RangeGate,

@@ -1,7 +1,5 @@
 //! The depth of a later echo: bins around the ones before it are left out of its background.
 
-#![allow(clippy::cast_possible_truncation, reason = "small numbers")]
-
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::rule::ExcludedBins;
 use dtof_core::{

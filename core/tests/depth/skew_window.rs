@@ -1,7 +1,5 @@
 //! Windows whose half widths differ: against the formula, in a mirror, and on nothing but background.
 
-#![allow(clippy::cast_possible_truncation, reason = "small numbers")]
-
 use dtof_core::fixed::types::U24F8;
 use dtof_core::{Count10, SubBinOffset};
 use proptest::prelude::*;

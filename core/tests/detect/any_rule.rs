@@ -36,7 +36,7 @@ fn check<const BINS: usize, W: CounterWidth>(
     half_width: u16,
 ) -> Result<[bool; 3], TestCaseError> {
     let mut rng = Pcg32::seed_from_u64(seed);
-    let (gate, histogram, _) = crate::common::histogram::<BINS, W>(&mut rng, round);
+    let (gate, histogram, _) = super::rules::histogram::<BINS, W>(&mut rng, round);
     let minimum = Count::saturating(minimum);
     let alpha = U8F8::from_bits(alpha);
     let paper = PaperRule::new(alpha, minimum);

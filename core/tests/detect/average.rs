@@ -45,15 +45,15 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) {
     let mut rng = Pcg32::seed_from_u64(seed);
     let mut fired = 0;
     for round in 0..rounds {
-        let (gate, histogram, most) = crate::common::histogram::<BINS, W>(&mut rng, round);
+        let (gate, histogram, most) = super::rules::histogram::<BINS, W>(&mut rng, round);
         let alpha = U8F8::from_bits(rng.next_u32() as u16 >> (rng.next_u32() % 16));
         let minimum = rng.next_u32() % (2 * most) * (round % 2);
         let rule = AverageRule::new(alpha, Count::saturating(minimum));
         let expected = as_written(&rule, &histogram, &gate, 0);
-        let fires = crate::common::gives(&rule, &histogram, &gate, expected);
+        let fires = super::rules::gives(&rule, &histogram, &gate, expected);
         fired += u32::from(fires);
     }
-    crate::common::both_often(fired, rounds);
+    super::rules::both_often(fired, rounds);
 }
 
 #[test]

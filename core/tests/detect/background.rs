@@ -8,7 +8,7 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::parallel;
+use crate::common::parallel;
 
 /// The paper's rule over all the bins given, with its example in mind: "if the
 /// peak was located in bins 64-127, the non-peak half was defined as bins 0-63".

@@ -10,7 +10,7 @@ use dtof_core::{
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::live_formula::Exposure;
+use crate::common::live::Exposure;
 
 /// Decides on `counts` and checks it.
 fn check<const BINS: usize, W: CounterWidth>(

@@ -27,7 +27,7 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) {
     let mut rng = Pcg32::seed_from_u64(seed);
     let mut fired = 0;
     for round in 0..rounds {
-        let (gate, histogram, most) = crate::common::histogram::<BINS, W>(&mut rng, round);
+        let (gate, histogram, most) = super::rules::histogram::<BINS, W>(&mut rng, round);
         let alpha = rng.next_u32() as u16 >> (rng.next_u32() % 16);
         let minimum = rng.next_u32() % (2 * most) * (round % 2);
         let rule = PaperRule::new(U8F8::from_bits(alpha), Count::saturating(minimum));
@@ -41,7 +41,7 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) {
         assert_eq!(detected, expected);
         fired += u32::from(expected.is_some());
     }
-    crate::common::both_often(fired, rounds);
+    super::rules::both_often(fired, rounds);
 }
 
 #[test]

@@ -4,7 +4,7 @@ use dtof_core::paper::isqrt;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::parallel;
+use crate::common::parallel;
 
 /// Whether `root` is the floor of the root of `value`, by the definition.
 fn is_floor(root: u32, value: u32) -> bool {

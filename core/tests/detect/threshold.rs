@@ -7,7 +7,7 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::parallel;
+use crate::common::parallel;
 
 /// In 1/256: 0, the smallest, 1/2, the paper's 4 and 8, odd ones, the largest.
 const ALPHAS: [u16; 12] = [

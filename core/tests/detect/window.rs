@@ -10,7 +10,7 @@ use dtof_core::{
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::{parallel, window_formula};
+use crate::common::{parallel, window as window_formula};
 
 /// The most photons of all gated windows of `width` bins that hold the bin `peak`, the
 /// photons outside it, and how many bins these are in, of which `left_out` do not count.
@@ -79,7 +79,7 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) {
     let mut rng = Pcg32::seed_from_u64(seed);
     let mut fired = 0;
     for round in 0..rounds {
-        let (gate, histogram, most) = crate::common::histogram::<BINS, W>(&mut rng, round);
+        let (gate, histogram, most) = super::rules::histogram::<BINS, W>(&mut rng, round);
         let z = U4F12::from_bits(rng.next_u32() as u16 >> (rng.next_u32() % 16));
         let minimum = rng.next_u32() % (2 * most) * (round % 2);
         let width = 1 + (rng.next_u32() % 7) as u8;
@@ -88,10 +88,10 @@ fn check<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) {
         let expected = (histogram.total() > 0)
             .then(|| as_written(&rule, &histogram, &gate, histogram.peak().bin, 0));
         let expected = expected.flatten();
-        let fires = crate::common::gives(&rule, &histogram, &gate, expected);
+        let fires = super::rules::gives(&rule, &histogram, &gate, expected);
         fired += u32::from(fires);
     }
-    crate::common::both_often(fired, rounds);
+    super::rules::both_often(fired, rounds);
 }
 
 #[test]

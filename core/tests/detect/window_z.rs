@@ -9,7 +9,7 @@ use rand_core::SeedableRng;
 use rand_distr::Poisson;
 use rand_pcg::Pcg64Mcg;
 
-use crate::light;
+use crate::common::light;
 
 /// When a pixel looks.
 #[derive(Clone, Copy, Debug)]

@@ -9,7 +9,7 @@ use dtof_core::{
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::{average, window};
+use super::{average, window};
 
 /// Some bins left out of a histogram that stands more or less clear.
 struct Case<const BINS: usize, W: CounterWidth> {
@@ -25,7 +25,7 @@ struct Case<const BINS: usize, W: CounterWidth> {
 
 impl<const BINS: usize, W: CounterWidth> Case<BINS, W> {
     fn random(rng: &mut Pcg32, round: u32) -> Self {
-        let (gate, mut histogram, most) = crate::common::histogram::<BINS, W>(rng, round);
+        let (gate, mut histogram, most) = super::rules::histogram::<BINS, W>(rng, round);
         let reach = rng.next_u32() % (BINS as u32 / 8).min(20);
         let peaks: Vec<u32> = (0..rng.next_u32() % 4)
             .map(|_| rng.next_u32() % BINS as u32)
@@ -99,7 +99,7 @@ fn windows<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) {
             }));
         }
     }
-    crate::common::both_often(fired[0], rounds);
+    super::rules::both_often(fired[0], rounds);
     assert!(fired[1] > 0);
 }
 
@@ -124,7 +124,7 @@ fn averages<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) {
             average::as_written(&rule, &case.histogram, &case.gate, left_out)
         }));
     }
-    crate::common::both_often(fired, rounds);
+    super::rules::both_often(fired, rounds);
 }
 
 #[test]
@@ -171,7 +171,7 @@ fn quadrants<const BINS: usize, W: CounterWidth>(rounds: u32, seed: u64) {
         assert_eq!(found, expected, "{:?} {:?}", case.excluded, case.gate);
         fired += u32::from(found.is_some());
     }
-    crate::common::both_often(fired, rounds);
+    super::rules::both_often(fired, rounds);
     assert!(of_one > rounds / 50 && of_none > 0, "{of_one} {of_none}");
 }
 

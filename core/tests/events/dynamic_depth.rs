@@ -1,7 +1,5 @@
 //! Dynamic depth against its definition, over whole sequences of events.
 
-#![allow(clippy::cast_possible_wrap, reason = "means of a few events")]
-
 use dtof_core::events::{
     DynamicDepthConfig, DynamicDepthEvent, DynamicDepthPixel, Polarity, Reference,
     ZeroThresholdError,

@@ -1,7 +1,5 @@
 //! The running mean against sums over all events.
 
-#![allow(clippy::cast_possible_wrap, reason = "means of a few events")]
-
 use dtof_core::BinPosition;
 use dtof_core::events::RunningMean;
 use proptest::prelude::*;

@@ -7,7 +7,7 @@ use dtof_core::{
     Peak, PixelConfig, PixelConfigError, RangeGate, checked,
 };
 
-use crate::model::Lone;
+use super::model::Lone;
 
 #[test]
 fn small_configurations_are_valid_if_and_only_if_there_is_a_look() {

@@ -5,8 +5,8 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::model::{Cycle, Lone, cycle, random_cycles};
-use crate::whole::{Pixel, Rule, Settings};
+use super::model::{Cycle, Lone, cycle, random_cycles};
+use super::whole::{Pixel, Rule, Settings};
 
 /// What came of some runs.
 #[derive(Debug, Default)]

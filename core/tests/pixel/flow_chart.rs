@@ -5,7 +5,7 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::model::{Lone, Model, Settings, compare, cycle, random_cycles, settings};
+use super::model::{Lone, Model, Settings, compare, cycle, random_cycles, settings};
 
 /// Section III-B.
 const PAPER: Settings = Settings {

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use rand_core::Rng;
 use rand_pcg::Pcg32;
 
-use crate::counted::Counted;
+use super::counted::Counted;
 
 /// What a pixel is set to.
 #[derive(Clone, Copy, Debug)]

@@ -9,8 +9,8 @@ use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
-use crate::echoes::{random_settings, settings};
-use crate::model::{Cycle, cycle, random_cycles};
+use super::echoes::{random_settings, settings};
+use super::model::{Cycle, cycle, random_cycles};
 
 type Config<const BINS: usize> = PixelConfig<BINS, AnyRule>;
 

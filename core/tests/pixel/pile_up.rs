@@ -2,7 +2,7 @@
 
 use dtof_core::{Flags, Look, PixelConfig, RangeGate};
 
-use crate::model::Lone;
+use super::model::Lone;
 
 /// More than half of 44 laser cycles, whatever became of the photons, and those of
 /// the exposure alone.

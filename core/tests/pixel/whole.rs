@@ -9,7 +9,7 @@ use dtof_core::{
     Look, PaperRule, PixelAddress, PixelConfig, RangeGate, SubBinOffset, WindowRule,
 };
 
-use crate::counted::Counted;
+use super::counted::Counted;
 
 /// A rule and its number: α in 1/256, or width and z in 1/4096.
 #[derive(Clone, Copy, Debug)]

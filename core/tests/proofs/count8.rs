@@ -11,7 +11,8 @@ use dtof_core::{
     Look, PaperRule, PixelAddress, PixelConfig, RangeGate, Statistics, WindowRule,
 };
 
-use crate::{HISTOGRAMS, histogram, parallel};
+use super::{HISTOGRAMS, histogram};
+use crate::common::parallel;
 
 /// More than all photons, so that they do not contradict a dead time.
 const CYCLES: u16 = 3000;

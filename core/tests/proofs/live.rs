@@ -13,8 +13,9 @@ use dtof_core::{
     WindowRule,
 };
 
-use crate::live_formula::Exposure;
-use crate::{HISTOGRAMS, histogram, parallel};
+use super::{HISTOGRAMS, histogram};
+use crate::common::live::Exposure;
+use crate::common::parallel;
 
 /// What came of some cases.
 #[derive(Clone, Copy, Debug, Default)]

@@ -10,8 +10,9 @@ use dtof_core::{
     LaserCycle, Neighbours, PixelAddress, PixelConfig, Statistics, WindowRule,
 };
 
-use crate::neighbours_formula::{GUARD, Known, compare};
-use crate::{HISTOGRAMS, histogram, parallel};
+use super::{HISTOGRAMS, histogram};
+use crate::common::neighbours::{GUARD, Known, compare};
+use crate::common::parallel;
 
 /// Of neighbours: nothing, the same surface, light over all bins, another surface, and brighter ones.
 const OTHERS: [[u32; 8]; 8] = [

@@ -8,7 +8,7 @@ use dtof_core::{
     WindowRule,
 };
 
-use crate::parallel;
+use crate::common::parallel;
 
 /// The gated bins are 4 to 11. One code lies before them, one behind, and two are of no bin: of none in the words of the
 /// bitmap, too, or of one there.

@@ -9,7 +9,7 @@ use dtof_sensors::tmf882x::Tmf882x;
 use dtof_sensors::{Sensor, tdc7200, tmf882x};
 
 use super::host::Host;
-use super::mocks::plug::{Bus, Tdc, Tmf};
+use super::plug::{Bus, Tdc, Tmf};
 
 /// A TDC7200 of one pixel.
 pub fn tdc7200(bus: &Bus<Tdc>) -> impl Sensor + use<> {

@@ -1,13 +1,11 @@
 //! What the tests of the drivers share: a sink that records its calls, and
 //! a pin whose level the test sets.
 
-#![allow(dead_code, reason = "no test uses all of it")]
-
-pub mod plug;
 pub mod tdc7200;
 pub mod tmf8828;
 pub mod tmf8829;
 pub mod tmf882x;
+pub mod wires;
 
 use std::cell::{Cell, RefCell};
 use std::rc::Rc;

@@ -1,11 +1,5 @@
 //! The asynchronous pixel against its flow chart (section II-B).
 
-#![allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "small numbers"
-)]
-
 mod config;
 mod counted;
 mod dead_time;

@@ -1,7 +1,5 @@
 //! Adaptive binning.
 
-#![allow(clippy::cast_possible_truncation, reason = "small numbers")]
-
 mod places;
 mod whole;
 

@@ -6,7 +6,7 @@ use std::rc::Rc;
 use embedded_hal::i2c::{self, I2c, NoAcknowledgeSource};
 use embedded_hal::spi::{self, SpiDevice};
 
-use super::Line;
+use super::mocks::Line;
 use dtof_chips::Chip;
 pub use dtof_chips::{Tdc7200 as Tdc, Tmf882x as Tmf};
 

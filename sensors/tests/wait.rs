@@ -1,4 +1,4 @@
-//! INT of the chip for drivers that wait for it: for tests with the feature `async`.
+//! INT of the chip for drivers that wait for it.
 
 use std::future::poll_fn;
 use std::task::Poll;

@@ -1,0 +1,18 @@
+//! One program for all tests: what they share is compiled once, and they run side by side.
+
+mod asynchronous;
+mod common;
+mod dither;
+mod embassy;
+mod many_bins;
+mod nonsense;
+mod simulated;
+mod software_i2c;
+mod tdc7200;
+mod tdc7200_time;
+mod texts;
+mod tmf8828;
+mod tmf8829;
+mod tmf882x;
+mod tmf882x_errors;
+mod wait;
