@@ -91,10 +91,22 @@ impl Evidence<'_> {
     #[must_use]
     pub fn highest(&self, cycles: u32) -> f64 {
         let cycles = f64::from(cycles);
-        let gains = &self.gains[self.scene.reach * POSITIONS..];
-        let ratios = gains.iter().zip(&self.scene.losses);
-        let ratios = ratios.map(|(gain, loss)| gain - cycles * loss);
-        ratios.fold(f64::NEG_INFINITY, f64::max)
+        let losses = &self.scene.losses;
+        let gains = &self.gains[self.scene.reach * POSITIONS..][..losses.len()];
+        let larger = |highest: f64, (gain, loss): (&f64, &f64)| {
+            let ratio = gain - cycles * loss;
+            if ratio > highest { ratio } else { highest }
+        };
+        // Each of eight lanes has a maximum of its own, and none waits for another.
+        let mut lanes = [f64::NEG_INFINITY; 8];
+        let ((gains, last_gains), (losses, last_losses)) =
+            (gains.as_chunks::<8>(), losses.as_chunks::<8>());
+        for (gains, losses) in gains.iter().zip(losses) {
+            lanes = std::array::from_fn(|lane| larger(lanes[lane], (&gains[lane], &losses[lane])));
+        }
+        let last = last_gains.iter().zip(last_losses);
+        let last = last.fold(f64::NEG_INFINITY, larger);
+        lanes.into_iter().fold(last, f64::max)
     }
 }
 
