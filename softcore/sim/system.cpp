@@ -1,7 +1,8 @@
 // The whole system with a program, clock by clock, as commands.h has it. Commands begin when
 // the program makes its first mark. What the program prints goes to standard error.
 //
-// The receiver of the AER port answers at once. A word is reported when it is complete, with the
+// The receiver of the AER port raises and lowers ACK in clocks in which the link takes words: in
+// all, or at random. A word is reported when it is complete, with the
 // clock in which REQ rose for its first half word.
 
 #include "Vsystem.h"
@@ -18,12 +19,14 @@ constexpr uint32_t PATIENCE = 1000000;
 // The receiver of the AER port.
 class Receiver {
 public:
-    void clock(Vsystem &system, uint32_t clock) {
+    void clock(Vsystem &system, uint32_t clock, bool answers) {
+        if (system.aer_req && !had_req_ && system.aer_first) {
+            first_ = clock;
+            halves_ = 0;
+        }
+        had_req_ = system.aer_req;
+        if (!answers) return;
         if (system.aer_req && !system.aer_ack) {
-            if (system.aer_first) {
-                first_ = clock;
-                halves_ = 0;
-            }
             uint32_t &part = word_[halves_ / 2 % 4];
             part = halves_ % 2 ? part | uint32_t(system.aer_data) << 16 : system.aer_data;
             if (++halves_ == 8) tell(WORD, first_, word_[0], word_[1], word_[2], word_[3]);
@@ -35,6 +38,7 @@ public:
 
 private:
     uint32_t word_[4] = {}, first_ = 0, halves_ = 0;
+    bool had_req_ = false;
 };
 
 void edge(Vsystem &system) {
@@ -71,7 +75,7 @@ int main(int argc, char **argv) {
         system.photon_valid = command >> 24 & 1;
         system.photon_cycle_end = command >> 25 & 1;
         edge(system);
-        receiver.clock(system, clock);
+        receiver.clock(system, clock, command >> 26 & 1);
         if (system.print_valid) std::fputc(system.written & 0xff, stderr);
         if (system.look_begins) tell(LOOK, clock);
         if (system.event_leaves) tell(LEAVES, clock, system.event_pixel);

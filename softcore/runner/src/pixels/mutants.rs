@@ -27,7 +27,7 @@ const fn mutant(file: &'static str, from: &'static str, to: &'static str) -> Mut
 }
 
 /// All of them.
-pub const MUTANTS: [Mutant; 113] = [
+pub const MUTANTS: [Mutant; 124] = [
     // Counting: words on their way, valid bits, full counters.
     mutant(
         "bin_counter",
@@ -390,6 +390,11 @@ pub const MUTANTS: [Mutant; 113] = [
     ),
     mutant(
         "pixel_processor",
+        ".reset(stopped), .live(live), .gate_first",
+        ".reset(reset), .live(live), .gate_first",
+    ),
+    mutant(
+        "pixel_processor",
         ".reset(stopped), .emptied(",
         ".reset(reset), .emptied(",
     ),
@@ -408,6 +413,17 @@ pub const MUTANTS: [Mutant; 113] = [
         ".emptied(emptied[PIXELS_LOG2-1:0])",
         ".emptied({PIXELS_LOG2{1'b0}})",
     ),
+    mutant("look_scan", "found <= fires && !reset;", "found <= fires;"),
+    mutant("look_scan", "            deferred <= 0;\n", ""),
+    mutant("look_scan", "            on_way <= 0;\n", ""),
+    mutant("look_scan", "            n_pixel <= 0;\n", ""),
+    mutant("event_packer", "            is_sent <= 0;\n", ""),
+    mutant(
+        "event_packer",
+        "            state <= IDLE;\n            is_sent",
+        "            is_sent",
+    ),
+    mutant("event_queue", "            next <= 0;\n", ""),
     mutant(
         "pixel_processor",
         ".begins(begins), .x(x)",
@@ -458,6 +474,21 @@ pub const MUTANTS: [Mutant; 113] = [
         "pixel_processor",
         ".alpha(alpha), .minimum(minimum), .middle",
         ".alpha({6'd0, alpha[9:0]}), .minimum(minimum), .middle",
+    ),
+    mutant(
+        "pixel_processor",
+        ".alpha(alpha), .minimum(minimum), .middle",
+        ".alpha({1'b0, alpha[14:0]}), .minimum(minimum), .middle",
+    ),
+    mutant(
+        "pixel_processor",
+        ".alpha(alpha), .minimum(minimum), .middle",
+        ".alpha(alpha), .minimum({1'b0, minimum[8:0]}), .middle",
+    ),
+    mutant(
+        "pixel_processor",
+        ".event_cycle_high(event_cycle[63:16])",
+        ".event_cycle_high(48'd0)",
     ),
     mutant(
         "pixel_processor",

@@ -33,21 +33,21 @@ const FAST_BUILD: [&str; 7] = [
 ];
 
 const HELP: &str = "\
-cargo softcore mutations [--sample N] [--file NAME]
+cargo softcore mutations [--sample N] [--only TEXT]
 
 Plants faults in copies of the pixel processor's Verilog, one at a time, and runs the scenes of
 `cargo softcore pixels`, which have to fail.
 
   --sample N   so many of them, others with each commit
-  --file NAME  those in softcore/rtl/pixels/NAME.v";
+  --only TEXT  those with TEXT in the name of their file, or in what they change";
 
 /// Runs the command.
 pub fn run(mut parser: lexopt::Parser) -> Result<()> {
-    let (mut sample, mut file) = (None, None);
+    let (mut sample, mut only) = (None, None);
     while let Some(argument) = parser.next()? {
         match argument {
             Long("sample") => sample = Some(parser.value()?.parse()?),
-            Long("file") => file = Some(parser.value()?.string()?),
+            Long("only") => only = Some(parser.value()?.string()?),
             Short('h') | Long("help") => {
                 println!("{HELP}");
                 return Ok(());
@@ -55,15 +55,18 @@ pub fn run(mut parser: lexopt::Parser) -> Result<()> {
             other => return Err(other.unexpected().into()),
         }
     }
-    prove(&crate::root().canonicalize()?, sample, file.as_deref())
+    prove(&crate::root().canonicalize()?, sample, only.as_deref())
 }
 
 /// Puts each fault into a copy of the Verilog, all of them or a sample, and fails if the
 /// scenes do not find one.
-fn prove(root: &Path, sample: Option<usize>, file: Option<&str>) -> Result<()> {
+fn prove(root: &Path, sample: Option<usize>, only: Option<&str>) -> Result<()> {
     let mut chosen =
         sample.map_or_else(|| (0..MUTANTS.len()).collect(), |many| sampled(root, many));
-    chosen.retain(|&number| file.is_none_or(|file| MUTANTS[number].file == file));
+    let is_meant = |Mutant { file, from, to }: &Mutant| {
+        only.is_none_or(|text| [file, from, to].iter().any(|of| of.contains(text)))
+    };
+    chosen.retain(|&number| is_meant(&MUTANTS[number]));
     ensure!(!chosen.is_empty(), "no faults to plant");
     let scenes = proof::scenes(root, PHOTONS)?;
     let folder = target_folder(root).join("softcore/mutants");

@@ -37,6 +37,8 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
     let dim = config([7, 60, 64], U8F8::lit("255.99"), 0, [100, 127], false)?;
     let never = config([300, 60_000, 65_535], U8F8::MAX, 0, WHOLE, false)?;
     let rare = config([300, 60_000, 65_535], U8F8::lit("0"), 1000, WHOLE, false)?;
+    let steep = config(PAPER, U8F8::lit("140"), 5, WHOLE, false)?;
+    let many = config([4, 40, 4000], U8F8::lit("2"), 700, WHOLE, false)?;
     let each = photons / 17;
     let scene = |name: &str, pixels_log2, config| Scene {
         name: name.to_owned(),
@@ -50,6 +52,7 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
         events: Events::Link,
         reads: None,
         restarts: Vec::new(),
+        longest_run: 8192,
         length: each,
         seed: 1,
     };
@@ -117,6 +120,22 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
             events: Events::Registers(3),
             bins: Bins::Target(60, 1),
             ..scene("the program takes the events", 2, paper)
+        },
+        Scene {
+            events: Events::Registers(3),
+            clocks: [1, 1],
+            length: each.max(140_000),
+            ..scene("the same, more than 2^16 laser cycles", 2, paper)
+        },
+        Scene {
+            bins: Bins::Target(230, 0),
+            length: each / 2,
+            ..scene("an α of 140", 2, steep)
+        },
+        Scene {
+            bins: Bins::Target(250, 0),
+            length: each / 2,
+            ..scene("peaks of 700 photons at least", 2, many)
         },
         Scene {
             events: Events::Registers(60),
@@ -189,6 +208,16 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
             ..restarted("the same, the program takes the events", 1, 102)
         },
         restarted("stopped and started at any time", 4, 103),
+        // A stop with events on their way, and a start before they could have arrived.
+        Scene {
+            clocks: [1, 3],
+            restarts: vec![short],
+            longest_run: 128,
+            bins: Bins::Target(256, 0),
+            pixels: Pixels::InTurn,
+            seed: 104,
+            ..scene("stopped and started at once", 1, short)
+        },
     ]);
     Ok(scenes)
 }

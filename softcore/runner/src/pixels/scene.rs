@@ -35,6 +35,8 @@ pub struct Scene {
     /// If there are any, the processor is stopped and started again at random times, and has the
     /// next of these settings each time. Photons come meanwhile.
     pub restarts: Vec<PixelConfig<128>>,
+    /// The most clocks from a start to the next stop. Every fourth time there are less than 64.
+    pub longest_run: u32,
     /// The clocks with photons.
     pub length: u64,
     pub seed: u64,
@@ -229,11 +231,11 @@ impl Commands {
         then(2, Restart::Access(Access::Read(register::CONTROL)));
         let done = at;
         let longest = if self.random.next_u32() >> 30 == 0 {
-            6
+            64
         } else {
-            13
+            self.scene.longest_run
         };
-        self.restart_at = done + 2 + u64::from(self.random.next_u32() >> (32 - longest));
+        self.restart_at = done + 2 + u64::from(self.below(longest));
         if let Events::Registers(period) = self.scene.events {
             // Between two accesses, and then a look at the register first.
             self.restart_at = self.restart_at.next_multiple_of(period) + period / 2;

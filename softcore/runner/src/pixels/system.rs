@@ -7,6 +7,7 @@ use std::process::Command;
 use anyhow::{Context, Result, ensure};
 use dtof_softcore::stream;
 
+use super::model::Outcome;
 use super::row::Latency;
 use super::scene::{Bins, Events, Pixels, Scene};
 use super::simulation::simulate;
@@ -32,6 +33,9 @@ const RATES: [u32; 6] = [4, 8, 16, 32, 64, 256];
 /// Clocks of a run.
 const LENGTH: u64 = 1_000_000;
 
+/// The chance that a slow receiver raises or lowers ACK in a clock, in 1/256.
+const SLOW: u32 = 8;
+
 /// A clock that place and route reaches for 4 and 16 macropixels in the whole system, and nearly
 /// for 64.
 pub const MEGAHERTZ: f64 = 75.0;
@@ -48,7 +52,7 @@ pub fn measure(root: &Path) -> Result<Vec<Latency>> {
     let mut all = Vec::new();
     for (program, packer) in PROGRAMS {
         let words = images.words(program);
-        for rate in RATES {
+        let run = |rate: u32, link| -> Result<(Scene, Outcome)> {
             let scene = Scene {
                 name: format!("the system, {rate}/256 photons a clock, events packed by {packer}"),
                 pixels_log2: 2,
@@ -57,16 +61,21 @@ pub fn measure(root: &Path) -> Result<Vec<Latency>> {
                 rate,
                 bins: Bins::Target(100, 1),
                 pixels: Pixels::All,
-                link: 256,
+                link,
                 events: Events::System,
                 reads: None,
                 restarts: Vec::new(),
+                longest_run: 0,
                 length: LENGTH,
                 seed: rate.into(),
             };
             let mut command = Command::new(&simulator);
             command.arg(format!("+ram={}", words.display()));
-            let mut outcome = simulate(&mut command, &scene)?;
+            let outcome = simulate(&mut command, &scene)?;
+            Ok((scene, outcome))
+        };
+        for rate in RATES {
+            let (scene, mut outcome) = run(rate, 256)?;
             outcome.latencies.sort_unstable();
             let sorted = &outcome.latencies;
             let soonest = sorted.first().copied();
@@ -97,6 +106,17 @@ pub fn measure(root: &Path) -> Result<Vec<Latency>> {
             );
             all.push(latency);
         }
+        let (scene, outcome) = run(256, SLOW)?;
+        let (events, at_once) = (outcome.latencies.len() as u64, all.last());
+        ensure!(
+            at_once.is_some_and(|at_once| (1..at_once.events).contains(&events)),
+            "{}: {events} events although ACK is slow",
+            scene.name
+        );
+        println!(
+            "{}, ACK at random: {events} events as dtof-core",
+            scene.name
+        );
     }
     Ok(all)
 }
