@@ -7,6 +7,7 @@
 //!
 //! Two kinds of comments in these files join what ports do not: `// probe PATH` behind a wire
 //! gives it what the wire at that path has, `// drive PATH WIRE` gives that path the wire.
+//! `// two clocks` has each step of the solver be any moment, in which clocks may rise or fall.
 
 use std::fs;
 use std::path::Path;
@@ -50,7 +51,7 @@ struct Proof {
     faults: &'static [Mutant],
 }
 
-const PROOFS: [Proof; 9] = [
+const PROOFS: [Proof; 10] = [
     Proof {
         name: "bin_counter",
         sources: &[
@@ -135,6 +136,59 @@ const PROOFS: [Proof; 9] = [
             from: "f_valid && f_pixel == e_pixel ? f_next : states[e_pixel]",
             to: "states[e_pixel]",
         }],
+    },
+    Proof {
+        name: "photon_crossing",
+        sources: &[
+            "rtl/photon_crossing.v",
+            "rtl/crossing_counter.v",
+            "formal/synchronizer.sv",
+        ],
+        claim: "of photons in another clock each comes out once, in order and in its laser cycle, or is counted as lost",
+        engine: Engine::Induction(3),
+        faults: &[
+            // Not Gray code: several bits change at a time.
+            Mutant {
+                file: "crossing_counter",
+                from: "gray <= then_ ^ then_ >> 1;",
+                to: "gray <= then_;",
+            },
+            Mutant {
+                file: "photon_crossing",
+                from: "wire has_room = !fill[DEPTH_LOG2];",
+                to: "wire has_room = 1;",
+            },
+            Mutant {
+                file: "photon_crossing",
+                from: "photon_valid && has_room && !owes;",
+                to: "photon_valid && has_room;",
+            },
+            Mutant {
+                file: "photon_crossing",
+                from: "photon_cycle_end && (!has_room || owes);",
+                to: "photon_cycle_end && !has_room;",
+            },
+            Mutant {
+                file: "photon_crossing",
+                from: "if (&owed) end_is_lost <= 1;",
+                to: "if (&owed) end_is_lost <= 0;",
+            },
+            Mutant {
+                file: "photon_crossing",
+                from: ".counts(photon_valid && !puts_photon)",
+                to: ".counts(photon_valid && !has_room)",
+            },
+            Mutant {
+                file: "photon_crossing",
+                from: "if (!waiting || reset) {cycle_end, valid} <= 0;",
+                to: "if (reset) {cycle_end, valid} <= 0;",
+            },
+            Mutant {
+                file: "photon_crossing",
+                from: ".clk(photon_clk), .reset(photon_reset), .counts(put)",
+                to: ".clk(photon_clk), .reset(1'b0), .counts(put)",
+            },
+        ],
     },
     Proof {
         name: "pixel_processor",
@@ -315,7 +369,7 @@ fn solve(root: &Path, proof: &Proof, fault: Option<&Mutant>, commands: &str) -> 
         .join(if fault.is_some() { "fault" } else { "right" });
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
     let top = format!("formal/{}.sv", proof.name);
-    let (mut files, mut joins) = (Vec::new(), String::new());
+    let (mut files, mut joins, mut has_two_clocks) = (Vec::new(), String::new(), false);
     for source in proof.sources.iter().copied().chain([&*top]) {
         let path = softcore.join(source);
         let mut text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
@@ -326,14 +380,20 @@ fn solve(root: &Path, proof: &Proof, fault: Option<&Mutant>, commands: &str) -> 
             text = fault.apply(&text)?;
         }
         joins += &connections(&text);
+        has_two_clocks |= text.contains("\n// two clocks\n");
         // Yosys is told names without folders, which may have any letters.
         let name = source.replace('/', "-");
         fs::write(folder.join(&name), text)?;
         files.push(name);
     }
+    let to_one_clock = if has_two_clocks {
+        "clk2fflogic"
+    } else {
+        "async2sync"
+    };
     let script = format!(
         "read_verilog -formal -sv {}\nhierarchy -top top\nproc\nflatten\nmemory_map\n{joins}\
-         opt -full\nasync2sync\nopt -full\ntechmap\nopt -fast\ndffunmap\nabc -g AND -fast\n\
+         opt -full\n{to_one_clock}\nopt -full\ntechmap\nopt -fast\ndffunmap\nabc -g AND -fast\n\
          opt_clean\nwrite_aiger -zinit circuit.aig\n",
         files.join(" ")
     );

@@ -23,7 +23,7 @@ use lexopt::prelude::{Long, Short};
 
 use crate::files;
 use crate::line::Line;
-use crate::rtl::verilate;
+use crate::rtl;
 
 pub use mutants::Mutant;
 use row::Proof;
@@ -76,6 +76,7 @@ pub fn run(parser: lexopt::Parser) -> Result<()> {
     let root = &crate::root().canonicalize()?;
     let proofs = prove(root, options.photons)?;
     let latencies = system::measure(root)?;
+    rtl::check(root, "photon_crossing")?;
     let page = page::text(&proofs, &latencies);
     println!("\n{page}");
     if options.check {
@@ -113,7 +114,13 @@ fn prove(root: &Path, photons: u64) -> Result<Vec<Proof>> {
             Entry::Vacant(place) => {
                 let name = format!("pixels-{log2}");
                 let size = format!("-GPIXELS_LOG2={log2}");
-                place.insert(verilate(root, "pixels", &name, Path::new(""), &[&size])?)
+                place.insert(rtl::verilate(
+                    root,
+                    "pixels",
+                    &name,
+                    Path::new(""),
+                    &[&size],
+                )?)
             }
         };
         let outcome = simulate(&mut Command::new(&*simulator), scene)?;
