@@ -3,7 +3,8 @@
 // other, reach `bin_counter` two clocks later, unless it has been stopped. The end of a laser
 // cycle counts once; if a look is due there, it begins or is late, and passes with the photon of
 // that clock. What comes while it stands still counts nowhere. It runs again after every
-// macropixel has been emptied, and looks are due as from the beginning.
+// macropixel has been emptied, and looks are due as from the beginning. Settings are what the bus wrote
+// while it stood still, and every bit of what one module gives another arrives there.
 //
 // Any photon, end and access to the registers in any clock; stop, start and reset at any time.
 // `look_scan` and `pixel_registers` are there; the other modules may do anything.
@@ -24,6 +25,7 @@ module top (
         .cycle_end(cycle_end), .word_taken(1'b0),
         .wb_cyc(wb_cyc), .wb_stb(wb_stb), .wb_we(wb_we), .wb_adr(wb_adr), .wb_dat_i(wb_dat_i)
     );
+    wire wb_ack;                // probe dut.registers.wb_ack
     wire running;               // probe dut.running
     wire run;                   // probe dut.registers.run
     wire was_running;           // probe dut.registers.was_running
@@ -56,6 +58,63 @@ module top (
     wire [1:0] requesting;      // probe dut.scanner.requesting
     wire [1:0] is_deferred;     // probe dut.scanner.is_deferred
     wire busy;                  // probe dut.scanner.busy
+
+    // What modules are given, and give.
+    wire [6:0] counter_in;      // probe dut.counter.inputs
+    wire [210:0] counter_out;   // probe dut.counter.outputs
+    wire [37:0] keeper_in;      // probe dut.keeper.inputs
+    wire [97:0] keeper_out;     // probe dut.keeper.outputs
+    wire [90:0] decision_in;    // probe dut.decision.inputs
+    wire [10:0] decision_out;   // probe dut.decision.outputs
+    wire [246:0] reader_in;     // probe dut.reader.inputs
+    wire [154:0] reader_out;    // probe dut.reader.outputs
+    wire [132:0] queue_in;      // probe dut.queue.inputs
+    wire [132:0] queue_out;     // probe dut.queue.outputs
+    wire [197:0] packer_in;     // probe dut.packer.inputs
+    wire [129:0] packer_out;    // probe dut.packer.outputs
+    wire keeper_empties;        // probe dut.keeper.reset
+    wire reader_empties;        // probe dut.reader.reset
+    wire queue_empties;         // probe dut.queue.reset
+    wire packer_empties;        // probe dut.packer.reset
+    wire scanner_empties;       // probe dut.scanner.reset
+    wire [15:0] scan_x;         // probe dut.scanner.x
+    wire [15:0] scan_l1;        // probe dut.scanner.l1
+    wire [15:0] scan_l2;        // probe dut.scanner.l2
+    wire is_one_hit;            // probe dut.scanner.is_one_hit
+    wire scan;                  // probe dut.scanner.scan
+    wire [9:0] peak_count;      // probe dut.scanner.peak_count
+    wire [6:0] peak_bin;        // probe dut.scanner.peak_bin
+    wire [15:0] photons;        // probe dut.scanner.photons
+    wire [23:0] full;           // probe dut.scanner.full
+    wire [9:0] background;      // probe dut.scanner.background
+    wire is_clear;              // probe dut.scanner.is_clear
+    wire taken;                 // probe dut.scanner.taken
+    wire taken_pixel;           // probe dut.scanner.taken_pixel
+    wire reading;               // probe dut.scanner.reading
+    wire [63:0] scan_cycle;     // probe dut.scanner.scan_cycle
+    wire scan_pixel;            // probe dut.scanner.scan_pixel
+    wire found;                 // probe dut.scanner.found
+    wire found_pixel;           // probe dut.scanner.found_pixel
+    wire [9:0] found_count;     // probe dut.scanner.found_count
+    wire [6:0] found_bin;       // probe dut.scanner.found_bin
+    wire [9:0] found_background;// probe dut.scanner.found_background
+    wire [15:0] found_exposure; // probe dut.scanner.found_exposure
+    wire found_deferred;        // probe dut.scanner.found_deferred
+    wire found_piled_up;        // probe dut.scanner.found_piled_up
+    wire [23:0] full_ended;     // probe dut.scanner.full_ended
+    wire [63:0] scanned;        // probe dut.scanner.cycle
+    wire event_waiting;         // probe dut.registers.event_waiting
+    wire [127:0] event_word;    // probe dut.registers.event_word
+    wire [9:0] event_left;      // probe dut.registers.event_left
+    wire [9:0] event_right;     // probe dut.registers.event_right
+    wire [47:0] event_cycle_high;// probe dut.registers.event_cycle_high
+    wire [23:0] registers_full; // probe dut.registers.full_ended
+    wire event_take;            // probe dut.registers.event_take
+    wire host_asks;             // probe dut.registers.host_asks
+    wire [4:0] host_address;    // probe dut.registers.host_address
+    wire host_taken;            // probe dut.registers.host_taken
+    wire [79:0] host_word;      // probe dut.registers.host_word
+    wire packs;                 // probe dut.registers.packs
 
     // What comes.
     wire comes = photon_valid && running;
@@ -97,6 +156,49 @@ module top (
         is_late <= running && is_due && busy;
         cycles <= begins ? 64'd0 : cycles + ended;
         counting <= (counting || begins) && !reset;
+    end
+
+    // The settings that the bus wrote.
+    reg [31:0] of_look, of_end, of_rule, of_gate, of_gate_end;
+    always @(posedge clk) begin
+        if (wb_cyc && wb_stb && wb_we && !wb_ack && !run)
+            case (wb_adr)
+                8'h01: of_look <= wb_dat_i;
+                8'h02: of_end <= wb_dat_i;
+                8'h03: of_rule <= wb_dat_i;
+                8'h04: of_gate <= wb_dat_i;
+                8'h05: of_gate_end <= wb_dat_i;
+            endcase
+        if (reset) {of_look, of_end, of_rule, of_gate, of_gate_end} <= 0;
+    end
+    always @* if (!is_first) begin
+        assert ({scan_l1, scan_x, is_one_hit, scan_l2} == {of_look, of_end[16:0]});
+        assert ({gate_fourth, gate_middle, gate_second, gate_first, gate_end} == {of_gate, of_gate_end[7:0]});
+        assert (decision_in == {of_rule[15:0], of_rule[25:16], of_gate[23:16], keeper_out[96:40]});
+    end
+
+    // Every bit of what modules give each other.
+    wire [130:0] head = queue_out[132:2];
+    wire take = event_take || packer_out[129];
+    always @* begin
+        assert ({keeper_empties, scanner_empties, reader_empties, queue_empties, packer_empties} == {5{!running}});
+        assert (counter_in == {live, reader_out[153:149]});
+        assert (keeper_in == {live, counter_out[210:176], scan_pixel});
+        assert ({scan, peak_count, peak_bin} == keeper_out[97:80] && {photons, full} == keeper_out[39:0]);
+        assert ({background, is_clear} == decision_out && reading == reader_out[154]);
+        assert ({taken, taken_pixel} == {take, head[0]});
+        assert (reader_in == {live, gate_first, gate_end, found, found_pixel, found_bin, found_piled_up, found_deferred,
+                              found_exposure, found_background, found_count, counter_out[175:0], host_asks, host_address});
+        assert (queue_in == {reader_out[148], scan_cycle, reader_out[81], reader_out[91:82], reader_out[101:92],
+                             reader_out[139:102], reader_out[146:140], reader_out[147], take});
+        assert ({host_taken, host_word} == reader_out[80:0]);
+        assert (packer_in == {packs, queue_out[1], event_word, event_left, event_right, event_cycle_high});
+        assert (event_waiting == queue_out[1] && {event_cycle_high, event_word[47:32]} == head[130:67]);
+        assert ({event_right, event_left} == head[65:46] && event_word[121:112] == 0);
+        assert (event_word[127:122] == {2'd0, head[45:44], head[66], head[17:8] == 10'd1023});
+        assert ({event_word[97:88], event_word[73:64]} == head[27:8] && event_word[31:16] == head[43:28]);
+        assert ({event_word[58:52], event_word[15:0]} == {head[7:1], 15'd0, head[0]});
+        assert (registers_full == full_ended && cycle == scanned);
     end
 
     always @* begin
@@ -146,6 +248,7 @@ module bin_counter #(parameter PIXELS_LOG2 = 1) (
     input  [PIXELS_LOG2+3:0]   read_address,
     output [87:0]              read_word0, read_word1
 );
+    wire [6:0] inputs = {live, read_address};
     (* anyseq *) wire [PIXELS_LOG2+209:0] outputs;
     assign {e_valid, e_counts, e_look, e_pixel, e_bin, e_quadrant, e_count0, e_count1, e_full0, e_full1,
             read_word0, read_word1} = outputs;
@@ -168,6 +271,8 @@ module peak_keeper #(parameter PIXELS_LOG2 = 1) (
     output [15:0]            photons,
     output [23:0]            full
 );
+    wire [37:0] inputs = {live, e_valid, e_counts, e_look, e_pixel, e_bin, e_quadrant, e_count0, e_count1, e_full0,
+                          e_full1, scan_pixel};
     (* anyseq *) wire [97:0] outputs;
     assign {scan, peak_count, peak_bin, maxima, photons, full} = outputs;
 endmodule
@@ -183,6 +288,7 @@ module decision (
     output [9:0]  background,
     output        is_clear
 );
+    wire [90:0] inputs = {alpha, minimum, middle, peak_count, peak_bin, maxima};
     (* anyseq *) wire [10:0] outputs;
     assign {background, is_clear} = outputs;
 endmodule
@@ -209,6 +315,8 @@ module event_reader #(parameter PIXELS_LOG2 = 1, parameter REST = 38) (
     output                   host_taken,
     output [79:0]            host_word
 );
+    wire [REST+208:0] inputs = {live, gate_first, gate_end, found, found_pixel, found_bin, found_rest, read_word0, read_word1,
+                                host_asks, host_address};
     (* anyseq *) wire [2*PIXELS_LOG2+REST+114:0] outputs;
     assign {reading, read_address, put, put_pixel, put_bin, put_rest, put_left, put_right, put_clipped,
             host_taken, host_word} = outputs;
@@ -221,6 +329,7 @@ module event_queue #(parameter DEPTH_LOG2 = 1, parameter WIDTH = 8) (
     output [WIDTH-1:0] head,
     output             waiting, is_last
 );
+    wire [WIDTH+1:0] inputs = {put, in, take};
     (* anyseq *) wire [WIDTH+1:0] outputs;
     assign {head, waiting, is_last} = outputs;
 endmodule
@@ -234,6 +343,7 @@ module event_packer (
     output [127:0] word,
     input          word_taken
 );
+    wire [197:0] inputs = {enabled, waiting, event_word, left, right, cycle_high};
     (* anyseq *) wire [129:0] outputs;
     assign {take, word_valid, word} = outputs;
 endmodule

@@ -197,7 +197,7 @@ const PROOFS: [Proof; 10] = [
             "rtl/pixels/look_scan.v",
             "rtl/pixels/pixel_registers.v",
         ],
-        claim: "each photon counts once, in its laser cycle, and none while it stands still; a run leaves nothing",
+        claim: "each photon counts once, in its laser cycle, and none while it stands still; a run leaves nothing; modules are joined bit for bit",
         engine: Engine::Induction(5),
         faults: &[
             Mutant {
@@ -219,6 +219,36 @@ const PROOFS: [Proof; 10] = [
                 file: "pixel_processor",
                 from: "a_look <= look;",
                 to: "a_look <= look_begins;",
+            },
+            Mutant {
+                file: "pixel_processor",
+                from: ".alpha(alpha), .minimum(minimum), .middle",
+                to: ".alpha({1'b0, alpha[14:0]}), .minimum(minimum), .middle",
+            },
+            Mutant {
+                file: "pixel_registers",
+                from: "{minimum, alpha} <= wb_dat_i[25:0];",
+                to: "{minimum, alpha} <= {1'b0, wb_dat_i[24:0]};",
+            },
+            Mutant {
+                file: "pixel_processor",
+                from: ".reset(stopped), .live(live), .gate_first",
+                to: ".reset(reset), .live(live), .gate_first",
+            },
+            Mutant {
+                file: "pixel_processor",
+                from: ".event_cycle_high(event_cycle[63:16])",
+                to: ".event_cycle_high({1'b0, event_cycle[62:16]})",
+            },
+            Mutant {
+                file: "pixel_processor",
+                from: ".full(full),\n        .background",
+                to: ".full({1'b0, full[22:0]}),\n        .background",
+            },
+            Mutant {
+                file: "pixel_processor",
+                from: ".in({scan_cycle, put_clipped,",
+                to: ".in({1'b0, scan_cycle[62:0], put_clipped,",
             },
         ],
     },
