@@ -1,10 +1,10 @@
 //! `cargo softcore mutations`: whether the scenes find faults in the Verilog.
 
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc;
+use std::sync::{Arc, mpsc};
 use std::thread;
 
 use anyhow::{Context, Result, ensure};
@@ -32,11 +32,33 @@ const FAST_BUILD: [&str; 7] = [
     "OPT_GLOBAL=-O0",
 ];
 
+/// The folder of the Verilog in `softcore`.
+const PIXELS: &str = "rtl/pixels";
+
+/// The file that joins the modules.
+const TOP: &str = "pixel_processor.v";
+
+/// After this line of it stands what holds inputs, one at a time, as one build shows all.
+const PLACE: &str = "    localparam PIXELS = 1 << PIXELS_LOG2;\n";
+const HOLDER: &str = "    localparam PIXELS = 1 << PIXELS_LOG2;
+    reg [15:0] held;
+    initial if (!$value$plusargs(\"held=%d\", held)) held = 16'hffff;
+";
+
+/// A fault: the text of a file with it, and which input is held.
+struct Fault {
+    what: String,
+    file: String,
+    text: Arc<str>,
+    held: Option<usize>,
+}
+
 const HELP: &str = "\
 cargo softcore mutations [--sample N] [--only TEXT]
 
 Plants faults in copies of the pixel processor's Verilog, one at a time, and runs the scenes of
-`cargo softcore pixels`, which have to fail.
+`cargo softcore pixels`, which have to fail. Beside a list of faults, each input of each of its
+modules is held at 0 in turn.
 
   --sample N   so many of them, others with each commit
   --only TEXT  those with TEXT in the name of their file, or in what they change";
@@ -61,15 +83,30 @@ pub fn run(mut parser: lexopt::Parser) -> Result<()> {
 /// Puts each fault into a copy of the Verilog, all of them or a sample, and fails if the
 /// scenes do not find one.
 fn prove(root: &Path, sample: Option<usize>, only: Option<&str>) -> Result<()> {
-    let mut chosen =
-        sample.map_or_else(|| (0..MUTANTS.len()).collect(), |many| sampled(root, many));
-    let is_meant = |Mutant { file, from, to }: &Mutant| {
-        only.is_none_or(|text| [file, from, to].iter().any(|of| of.contains(text)))
-    };
-    chosen.retain(|&number| is_meant(&MUTANTS[number]));
+    let faults = &faults(root)?;
+    let all = faults.len();
+    let mut chosen: Vec<usize> =
+        sample.map_or_else(|| (0..all).collect(), |many| sampled(root, many, all));
+    chosen.retain(|&number| {
+        let Fault { what, file, .. } = &faults[number];
+        only.is_none_or(|text| file.contains(text) || what.contains(text))
+    });
     ensure!(!chosen.is_empty(), "no faults to plant");
     let scenes = proof::scenes(root, PHOTONS)?;
     let folder = target_folder(root).join("softcore/mutants");
+    let mut of_chosen = chosen.iter().map(|&number| &faults[number]);
+    if let Some(held) = of_chosen.find(|fault| fault.held.is_some()) {
+        // Where none is held, all is right.
+        let none = Fault {
+            what: String::new(),
+            file: held.file.clone(),
+            text: Arc::clone(&held.text),
+            held: None,
+        };
+        let folder = folder.join("none");
+        let found = judge(root, &folder, &none, &scenes, &mut Built::default())?;
+        ensure!(found.is_none(), "with no input held: {found:?}");
+    }
     let (next, chosen) = (&AtomicUsize::new(0), &chosen);
     let (scenes, of) = (&scenes, &folder);
     let mut survivors = 0;
@@ -78,11 +115,11 @@ fn prove(root: &Path, sample: Option<usize>, only: Option<&str>) -> Result<()> {
         for worker in 0..thread::available_parallelism().map_or(1, Into::into) {
             let sender = sender.clone();
             scope.spawn(move || {
-                let folder = of.join(worker.to_string());
+                let (folder, mut built) = (of.join(worker.to_string()), Built::default());
                 while let Some(&number) = chosen.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let mutant = &MUTANTS[number];
+                    let fault = &faults[number];
                     if sender
-                        .send((mutant, judge(root, &folder, mutant, scenes)))
+                        .send((fault, judge(root, &folder, fault, scenes, &mut built)))
                         .is_err()
                     {
                         break;
@@ -91,9 +128,7 @@ fn prove(root: &Path, sample: Option<usize>, only: Option<&str>) -> Result<()> {
             });
         }
         drop(sender);
-        for (mutant, found) in results {
-            let Mutant { file, from, to } = mutant;
-            let what = format!("{file}: `{from}` as `{to}`");
+        for (Fault { what, .. }, found) in results {
             if let Some(by) = found.with_context(|| what.clone())? {
                 println!("{what}: {by}");
             } else {
@@ -109,8 +144,95 @@ fn prove(root: &Path, sample: Option<usize>, only: Option<&str>) -> Result<()> {
     Ok(())
 }
 
+/// All faults: those of the list, and each input held at 0.
+fn faults(root: &Path) -> Result<Vec<Fault>> {
+    let read = |name: &str| {
+        let path = root.join("softcore").join(PIXELS).join(name);
+        fs::read_to_string(&path).with_context(|| path.display().to_string())
+    };
+    let mut all = Vec::new();
+    for mutant in &MUTANTS {
+        let file = format!("{}.v", mutant.file);
+        let Mutant { from, to, .. } = mutant;
+        all.push(Fault {
+            what: format!("{}: `{from}` as `{to}`", mutant.file),
+            text: mutant.apply(&read(&file)?)?.into(),
+            file,
+            held: None,
+        });
+    }
+    let text = read(TOP)?;
+    let mut connections = Vec::new();
+    let mut start = 0;
+    for line in text.split_inclusive('\n') {
+        let mut words = line.split_whitespace();
+        let (module, end) = (words.next().unwrap_or_default(), start + line.len());
+        let is_instance = line.trim_end().ends_with(" (") && module != "module" && module != ")";
+        if is_instance {
+            let of_module = inputs(&read(&format!("{module}.v"))?);
+            let ports = text[end..].split("\n    );").next().unwrap_or_default();
+            for (at, _) in ports.match_indices('.') {
+                let Some((name, rest)) = ports[at + 1..].split_once('(') else {
+                    continue;
+                };
+                if name != "clk" && of_module.iter().any(|input| input == name) {
+                    let from = end + at + name.len() + 2;
+                    let given = from..from + argument(rest);
+                    connections.push((format!("{module}: its {name} is 0"), given));
+                }
+            }
+        }
+        start = end;
+    }
+    let mut with_all = text.clone();
+    for (number, (_, given)) in connections.iter().enumerate().rev() {
+        let held = format!("held == {number} ? 0 : ({})", &text[given.clone()]);
+        with_all.replace_range(given.clone(), &held);
+    }
+    ensure!(with_all.contains(PLACE), "no `{PLACE}` in {TOP}");
+    let with_all = Arc::<str>::from(with_all.replacen(PLACE, HOLDER, 1));
+    for (number, (what, _)) in connections.into_iter().enumerate() {
+        all.push(Fault {
+            what,
+            file: TOP.to_owned(),
+            text: Arc::clone(&with_all),
+            held: Some(number),
+        });
+    }
+    Ok(all)
+}
+
+/// The names of a module's inputs.
+fn inputs(text: &str) -> Vec<String> {
+    let mut all = Vec::new();
+    for line in text.lines() {
+        let Some(declared) = line.trim_start().strip_prefix("input ") else {
+            continue;
+        };
+        let code = declared.split("//").next().unwrap_or_default();
+        let names = code.rsplit(']').next().unwrap_or_default().split(',');
+        all.extend(
+            names
+                .map(str::trim)
+                .filter(|name| !name.is_empty())
+                .map(str::to_owned),
+        );
+    }
+    all
+}
+
+/// The length of what stands before the bracket that closes.
+fn argument(text: &str) -> usize {
+    let mut open = 1;
+    let end = text.find(|letter| {
+        open += i32::from(letter == '(') - i32::from(letter == ')');
+        open == 0
+    });
+    end.unwrap_or(text.len())
+}
+
 /// So many, others with each commit.
-fn sampled(root: &Path, many: usize) -> Vec<usize> {
+fn sampled(root: &Path, many: usize, all: usize) -> Vec<usize> {
     let head = Command::new("git")
         .current_dir(root)
         .args(["rev-parse", "HEAD"])
@@ -119,33 +241,51 @@ fn sampled(root: &Path, many: usize) -> Vec<usize> {
     let head = head.map(|head| head.stdout).unwrap_or_default();
     let text = String::from_utf8_lossy(&head);
     let key = usize::from_str_radix(text.get(..8).unwrap_or_default(), 16).unwrap_or_default();
-    let all = MUTANTS.len();
     (0..many.min(all))
         .map(|place| (key + place) % all)
         .collect()
 }
 
+/// What a worker has built: simulations of so many macropixels, as log2, of a text.
+#[derive(Default)]
+struct Built {
+    text: Arc<str>,
+    sizes: Vec<u32>,
+}
+
 /// What finds a fault, if anything does.
-fn judge(root: &Path, folder: &Path, mutant: &Mutant, scenes: &[Scene]) -> Result<Option<String>> {
-    let softcore = copy(root, folder)?;
-    let file = softcore
-        .join("rtl/pixels")
-        .join(mutant.file)
-        .with_extension("v");
-    let text = fs::read_to_string(&file).with_context(|| file.display().to_string())?;
-    fs::write(&file, mutant.apply(&text)?)?;
+fn judge(
+    root: &Path,
+    folder: &Path,
+    fault: &Fault,
+    scenes: &[Scene],
+    built: &mut Built,
+) -> Result<Option<String>> {
+    let softcore = folder.join("softcore");
+    if built.text != fault.text {
+        *built = Built::default();
+        copy(root, &softcore)?;
+        let file = softcore.join(PIXELS).join(&fault.file);
+        fs::write(&file, &*fault.text).with_context(|| file.display().to_string())?;
+        built.text = Arc::clone(&fault.text);
+    }
     let mut sizes: Vec<u32> = scenes.iter().map(|scene| scene.pixels_log2).collect();
     // Most scenes have four macropixels.
     sizes.sort_by_key(|&size| (size != 2, size));
     sizes.dedup();
     for size in sizes {
         let build = folder.join(format!("pixels-{size}"));
-        let parameter = format!("-GPIXELS_LOG2={size}");
-        let mut arguments = vec![&*parameter];
-        arguments.extend(FAST_BUILD);
-        let simulator = verilate_in(&softcore, "pixels", &build, Path::new(""), &arguments)?;
+        if !built.sizes.contains(&size) {
+            let parameter = format!("-GPIXELS_LOG2={size}");
+            let mut arguments = vec![&*parameter];
+            arguments.extend(FAST_BUILD);
+            verilate_in(&softcore, "pixels", &build, Path::new(""), &arguments)?;
+            built.sizes.push(size);
+        }
         for scene in scenes.iter().filter(|scene| scene.pixels_log2 == size) {
-            if let Err(error) = simulate(&mut Command::new(&simulator), scene) {
+            let mut simulator = Command::new(build.join("sim"));
+            simulator.args(fault.held.map(|held| format!("+held={held}")));
+            if let Err(error) = simulate(&mut simulator, scene) {
                 return Ok(Some(format!("{error:#}")));
             }
         }
@@ -154,9 +294,8 @@ fn judge(root: &Path, folder: &Path, mutant: &Mutant, scenes: &[Scene]) -> Resul
 }
 
 /// A copy of what the simulation is built from.
-fn copy(root: &Path, folder: &Path) -> Result<PathBuf> {
-    let softcore = folder.join("softcore");
-    for part in ["rtl/pixels", "sim"] {
+fn copy(root: &Path, softcore: &Path) -> Result<()> {
+    for part in [PIXELS, "sim"] {
         let (from, to) = (root.join("softcore").join(part), softcore.join(part));
         fs::create_dir_all(&to).with_context(|| to.display().to_string())?;
         for file in fs::read_dir(&from).with_context(|| from.display().to_string())? {
@@ -164,7 +303,7 @@ fn copy(root: &Path, folder: &Path) -> Result<PathBuf> {
             fs::copy(file.path(), to.join(file.file_name()))?;
         }
     }
-    Ok(softcore)
+    Ok(())
 }
 
 #[cfg(test)]
@@ -189,13 +328,30 @@ mod tests {
     }
 
     #[test]
+    fn each_input_is_held() {
+        let faults = faults(&crate::root()).unwrap();
+        let held = &faults[MUTANTS.len()..];
+        for what in [
+            "event_queue: its in is 0",
+            "look_scan: its reset is 0",
+            "pixel_registers: its happens is 0",
+        ] {
+            let fault = held.iter().find(|fault| fault.what == what);
+            assert!(fault.is_some(), "{what}");
+        }
+        let page = fs::read_to_string(crate::root().join("docs/softcore.md")).unwrap();
+        let told = format!("of {} inputs", held.len());
+        assert!(page.contains(&told), "{told}");
+    }
+
+    #[test]
     fn a_sample_has_no_fault_twice() {
         let root = crate::root();
-        let mut sample = sampled(&root, 9);
+        let mut sample = sampled(&root, 9, 100);
         assert_eq!(sample.len(), 9);
         sample.sort_unstable();
         sample.dedup();
         assert_eq!(sample.len(), 9);
-        assert_eq!(sampled(&root, 1000).len(), MUTANTS.len());
+        assert_eq!(sampled(&root, 1000, 100).len(), 100);
     }
 }
