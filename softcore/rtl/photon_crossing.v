@@ -1,4 +1,5 @@
-// Photons of one clock for a pixel processor in another: a queue of 2 to the DEPTH_LOG2 places.
+// Photons from one clock domain for a pixel processor in another: an asynchronous FIFO of 2 to the
+// DEPTH_LOG2 places.
 //
 // A place has what a clock of `photon_clk` brought: a photon, the end of its laser cycle, or both.
 // They come out in order, one a clock of `clk`. A photon that finds no room is lost, and `lost`
