@@ -1,9 +1,7 @@
 //! One program for all tests: what they share is compiled once, and they run side by side.
 
-mod asynchronous;
 mod common;
 mod dither;
-mod embassy;
 mod many_bins;
 mod nonsense;
 mod simulated;
@@ -15,4 +13,3 @@ mod tmf8828;
 mod tmf8829;
 mod tmf882x;
 mod tmf882x_errors;
-mod wait;

@@ -1,6 +1,6 @@
 // Of photons in one clock each comes out once in the other, as it was, after as many ends of laser
 // cycles as were before it, or is counted as lost. No end is lost unless `end_lost` says so. If
-// one of the clocks rests, the other side sees all that was done after three clocks.
+// one of the clocks stops, the other side sees all that was done after three clocks.
 //
 // Two clocks: any two, with edges at any time. Reset at any time, as long as it has to be.
 // two clocks
@@ -27,7 +27,7 @@ module top (
 
     wire valid, crossed, cycle_end, end_lost;
     wire [1:0] lost;
-    photon_crossing #(.WIDTH(1), .DEPTH_LOG2(2), .OWED_BITS(2), .LOST_BITS(2)) dut (
+    photon_crossing #(.WIDTH(1), .DEPTH_LOG2(2), .PENDING_BITS(2), .LOST_BITS(2)) dut (
         .photon_clk(photon_clk), .photon_valid(photon_valid), .photon(photon),
         .photon_cycle_end(photon_cycle_end), .clk(clk), .reset(in_reset), .valid(valid),
         .crossed(crossed), .cycle_end(cycle_end), .lost(lost), .end_lost(end_lost)
@@ -35,7 +35,7 @@ module top (
     wire photon_reset;          // probe dut.photon_reset
     wire loses;                 // probe dut.losing.counts
     wire end_is_lost;           // probe dut.end_is_lost
-    wire [1:0] owed;            // probe dut.owed
+    wire [1:0] pending;            // probe dut.pending
     wire waiting;               // probe dut.waiting
     wire [2:0] next;            // probe dut.next
     wire [2:0] next_gray;       // probe dut.putting.gray
@@ -55,11 +55,11 @@ module top (
     wire end_taken;             // probe dut.of_end_lost.taken
     wire reset_before;          // probe dut.of_reset.before
     wire reset_taken;           // probe dut.of_reset.taken
-    wire [2:0] place0;          // probe dut.places[0]
-    wire [2:0] place1;          // probe dut.places[1]
-    wire [2:0] place2;          // probe dut.places[2]
-    wire [2:0] place3;          // probe dut.places[3]
-    wire [11:0] places = {place3, place2, place1, place0};
+    wire [2:0] entry0;          // probe dut.entries[0]
+    wire [2:0] entry1;          // probe dut.entries[1]
+    wire [2:0] entry2;          // probe dut.entries[2]
+    wire [2:0] entry3;          // probe dut.entries[3]
+    wire [11:0] entries = {entry3, entry2, entry1, entry0};
 
     // What came in, and one photon of all.
     reg [3:0] photons, ends, photons_before, ends_before;
@@ -81,14 +81,15 @@ module top (
 
     // What came out.
     reg [3:0] photons_out, ends_out;
-    reg is_out, is_leaving;
+    reg is_out, is_leaving, was_waiting;
     wire is_one = is_marked && !is_out && valid && photons_out == photons_before;
     always @(posedge clk) begin
         photons_out <= photons_out + valid;
         ends_out <= ends_out + cycle_end;
         is_out <= is_out || is_one;
         is_leaving <= is_marked && !is_out && waiting && first == at;
-        if (in_reset) {photons_out, ends_out, is_out, is_leaving} <= 0;
+        was_waiting <= waiting;
+        if (in_reset) {photons_out, ends_out, is_out, is_leaving, was_waiting} <= 0;
     end
 
     // Clocks of each since the other had one.
@@ -110,35 +111,39 @@ module top (
 
     wire [2:0] ahead = at - first;
     reg [3:0] photons_there, ends_there, photons_ahead, ends_ahead;
-    integer place;
+    reg is_empty;
+    integer entry;
     always @* begin
-        {photons_there, ends_there, photons_ahead, ends_ahead} = 0;
-        for (place = 0; place < 4; place = place + 1) begin
-            if (((place - first) & 3) < fill) begin
-                photons_there = photons_there + places[3 * place + 1];
-                ends_there = ends_there + places[3 * place + 2];
+        {photons_there, ends_there, photons_ahead, ends_ahead, is_empty} = 0;
+        for (entry = 0; entry < 4; entry = entry + 1) begin
+            if (((entry - first) & 3) < fill) begin
+                photons_there = photons_there + entries[3 * entry + 1];
+                ends_there = ends_there + entries[3 * entry + 2];
+                is_empty = is_empty || !entries[3 * entry + 1] && !entries[3 * entry + 2];
             end
-            if (((place - first) & 3) < ahead) begin
-                photons_ahead = photons_ahead + places[3 * place + 1];
-                ends_ahead = ends_ahead + places[3 * place + 2];
+            if (((entry - first) & 3) < ahead) begin
+                photons_ahead = photons_ahead + entries[3 * entry + 1];
+                ends_ahead = ends_ahead + entries[3 * entry + 2];
             end
         end
     end
-    wire [2:0] place_at = places >> 3 * at[1:0];
+    wire [2:0] entry_at = entries >> 3 * at[1:0];
 
     always @* if (!in_reset) begin
         // Each is on its way until it is out.
         assert (photons - photons_out == photons_there + valid);
-        assert (end_is_lost || ends - ends_out == ends_there + owed + cycle_end);
+        assert (end_is_lost || ends - ends_out == ends_there + pending + cycle_end);
         if (is_one) assert ({cycle_end, crossed} == one && (end_is_lost || ends_out == ends_before));
         assert (losses == lost_here);
+        // What is seen to wait comes out, and nothing is lost while there is room.
+        assert (waiting == (has_0 != 0) && (valid || cycle_end) == was_waiting && !is_empty);
         if (alone == 3 && !photon_ticks)
             assert (next_out == next_gray && lost == lost_here && end_lost == end_is_lost);
         if (photon_alone == 3 && !ticks) assert (first_out == first_gray);
         // What the proof knows of the inside.
         assert (knows_next);
         if (is_marked && !is_out && !is_leaving) begin
-            assert (ahead < fill && place_at == {one[1], 1'b1, one[0]});
+            assert (ahead < fill && entry_at == {one[1], 1'b1, one[0]});
             assert (photons_before - photons_out == photons_ahead + valid);
             assert (end_is_lost || ends_before - ends_out == ends_ahead + cycle_end);
         end
@@ -153,11 +158,11 @@ module top (
         if (photon_alone >= 2 && !ticks) assert (first_taken == first_gray);
         // The photons' side is in reset a little longer.
         assert (reset_taken <= photon_reset);
-        if (!photon_reset) assert (knows_first);
+        if (!photon_reset) assert (knows_first && (!loses || room_3 == 4 || pending != 0));
         else begin
             assert ({next, next_before, next_taken, next_out, first, first_before} == 0);
-            assert ({owed, photons, photons_out, ends, ends_out, losses, is_marked, end_is_lost} == 0);
-            assert ({lost_here, valid, cycle_end} == 0);
+            assert ({pending, photons, photons_out, ends, ends_out, losses, is_marked, end_is_lost} == 0);
+            assert ({lost_here, valid, cycle_end, was_waiting} == 0);
             if (!reset_taken) assert (first_taken == 0);
         end
     end else begin
@@ -166,9 +171,9 @@ module top (
         if (photon_clocks >= 2) assert (reset_taken);
         if (photon_clocks >= 3) assert (photon_reset);
         if (photon_clocks >= 4)
-            assert ({next, next_gray, owed, end_is_lost, lost_here, lost_gray, photons, ends, losses, is_marked} == 0);
+            assert ({next, next_gray, pending, end_is_lost, lost_here, lost_gray, photons, ends, losses, is_marked} == 0);
         if (clocks >= 1) begin
-            assert ({first, first_gray, valid, cycle_end, photons_out, ends_out, is_out, is_leaving} == 0);
+            assert ({first, first_gray, valid, cycle_end, photons_out, ends_out, is_out, is_leaving, was_waiting} == 0);
             assert ({next_before, lost_before, end_before} == 0);
         end
         if (clocks >= 2) assert ({next_taken, lost_taken, end_taken, first_before} == 0);

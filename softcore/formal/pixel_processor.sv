@@ -19,10 +19,12 @@ module top (
     input [7:0]  wb_adr,
     input [31:0] wb_dat_i
 );
+    wire word_valid;
+    wire [127:0] word;
     pixel_processor #(.PIXELS_LOG2(1)) dut (
         .clk(clk), .reset(reset),
         .photon_valid(photon_valid), .photon_pixel(photon_pixel), .photon_code(photon_code),
-        .cycle_end(cycle_end), .word_taken(1'b0),
+        .cycle_end(cycle_end), .word_valid(word_valid), .word(word), .word_taken(1'b0),
         .wb_cyc(wb_cyc), .wb_stb(wb_stb), .wb_we(wb_we), .wb_adr(wb_adr), .wb_dat_i(wb_dat_i)
     );
     wire wb_ack;                // probe dut.registers.wb_ack
@@ -103,6 +105,10 @@ module top (
     wire found_piled_up;        // probe dut.scanner.found_piled_up
     wire [23:0] full_ended;     // probe dut.scanner.full_ended
     wire [63:0] scanned;        // probe dut.scanner.cycle
+    wire expired;               // probe dut.scanner.expired
+    wire expired_deferred;      // probe dut.scanner.expired_deferred
+    wire deferred;              // probe dut.scanner.deferred
+    wire [9:0] happens;         // probe dut.registers.happens
     wire event_waiting;         // probe dut.registers.event_waiting
     wire [127:0] event_word;    // probe dut.registers.event_word
     wire [9:0] event_left;      // probe dut.registers.event_left
@@ -199,6 +205,8 @@ module top (
         assert ({event_word[97:88], event_word[73:64]} == head[27:8] && event_word[31:16] == head[43:28]);
         assert ({event_word[58:52], event_word[15:0]} == {head[7:1], 15'd0, head[0]});
         assert (registers_full == full_ended && cycle == scanned);
+        assert (happens[7:4] == {expired_deferred, expired, deferred, found});
+        assert ({word_valid, word} == packer_out[128:0]);
     end
 
     always @* begin

@@ -13,7 +13,7 @@
 namespace {
 
 constexpr unsigned PHASES = 4000;
-constexpr unsigned CLOCKS = 200; // of the photons in a phase: fewer ends than may be owed
+constexpr unsigned CLOCKS = 200; // of the photons in a phase: fewer ends than may be pending
 constexpr unsigned REST = 400;   // of both, until the slower one has all
 
 struct Sent {

@@ -158,20 +158,31 @@ const PROOFS: [Proof; 10] = [
                 from: "wire has_room = !fill[DEPTH_LOG2];",
                 to: "wire has_room = 1;",
             },
+            // Nothing comes out, all is lost.
             Mutant {
                 file: "photon_crossing",
-                from: "photon_valid && has_room && !owes;",
+                from: "wire has_room = !fill[DEPTH_LOG2];",
+                to: "wire has_room = 0;",
+            },
+            Mutant {
+                file: "photon_crossing",
+                from: "assign waiting = next_seen != first;",
+                to: "assign waiting = 0;",
+            },
+            Mutant {
+                file: "photon_crossing",
+                from: "photon_valid && has_room && !has_pending;",
                 to: "photon_valid && has_room;",
             },
             Mutant {
                 file: "photon_crossing",
-                from: "photon_cycle_end && (!has_room || owes);",
+                from: "photon_cycle_end && (!has_room || has_pending);",
                 to: "photon_cycle_end && !has_room;",
             },
             Mutant {
                 file: "photon_crossing",
-                from: "if (&owed) end_is_lost <= 1;",
-                to: "if (&owed) end_is_lost <= 0;",
+                from: "if (&pending) end_is_lost <= 1;",
+                to: "if (&pending) end_is_lost <= 0;",
             },
             Mutant {
                 file: "photon_crossing",
@@ -219,6 +230,11 @@ const PROOFS: [Proof; 10] = [
                 file: "pixel_processor",
                 from: "a_look <= look;",
                 to: "a_look <= look_begins;",
+            },
+            Mutant {
+                file: "pixel_processor",
+                from: "look_begins, expired_deferred, expired, deferred, found,",
+                to: "look_begins, expired, expired_deferred, deferred, found,",
             },
             Mutant {
                 file: "pixel_processor",

@@ -1,4 +1,4 @@
-//! Drivers over embedded-hal-async: the same transfers and the same data as over embedded-hal, and
+//! The same transfers and the same data as over embedded-hal, and
 //! each transfer is awaited.
 
 use std::cell::{Cell, RefCell};

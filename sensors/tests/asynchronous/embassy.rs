@@ -1,6 +1,6 @@
 //! The program of the example for embassy, against a simulated chip.
 
-#[path = "../examples/embassy/src/depth.rs"]
+#[path = "../../examples/embassy/src/depth.rs"]
 mod depth;
 
 use std::cell::{Cell, RefCell};
@@ -129,6 +129,6 @@ fn the_example_ends_when_its_bus_hangs() {
 /// Bus, pins and timer of a board come on top.
 #[test]
 fn the_example_is_short() {
-    let lines = include_str!("../examples/embassy/src/depth.rs").lines();
+    let lines = include_str!("../../examples/embassy/src/depth.rs").lines();
     assert!(lines.count() <= 60);
 }
