@@ -158,11 +158,11 @@ const PROOFS: [Proof; 10] = [
                 from: "wire has_room = !fill[DEPTH_LOG2];",
                 to: "wire has_room = 1;",
             },
-            // Nothing comes out, all is lost.
+            // An entry stays free; nothing comes out.
             Mutant {
                 file: "photon_crossing",
                 from: "wire has_room = !fill[DEPTH_LOG2];",
-                to: "wire has_room = 0;",
+                to: "wire has_room = !fill[DEPTH_LOG2] && !(&fill[1:0]);",
             },
             Mutant {
                 file: "photon_crossing",
