@@ -157,6 +157,8 @@ def shows_few(report, path, columns, count):
     check("a click chooses a pixel", report.run("$pixel.chosen.pixel") == 1)
     page.keyboard.press("ArrowDown")
     check("an arrow key the one below", report.run("$pixel.chosen.pixel") == 1 + columns)
+    # Plots are drawn with the next frame.
+    report.settle()
     check("its plot is pressed", plots.nth(1 + columns).get_attribute("aria-pressed") == "true")
     texts = plots.all_inner_texts()
     rows = rows_of(path)
