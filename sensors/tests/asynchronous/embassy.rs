@@ -6,9 +6,10 @@ mod depth;
 use std::cell::{Cell, RefCell};
 use std::pin::pin;
 use std::rc::Rc;
-use std::task::{Context, Poll, Waker};
+use std::task::{Context, Waker};
 
 use crate::common::tmf8829::bus::{Bus, Fault};
+use crate::wait::Timer;
 use dtof_chips::Tmf8829 as Chip;
 use dtof_sensors::SensorFault;
 use dtof_sensors::protocol::Timing;
@@ -35,23 +36,6 @@ impl I2c for Awaited {
     ) -> Result<(), ErrorKind> {
         self.1.delay_ms(1).await;
         embedded_hal::i2c::I2c::transaction(&mut self.0, address, operations)
-    }
-}
-
-/// A timer of a clock that the test turns.
-#[derive(Clone)]
-struct Timer(Rc<Cell<u32>>);
-
-impl DelayNs for Timer {
-    async fn delay_ns(&mut self, ns: u32) {
-        let end = self.0.get() + ns.div_ceil(1_000_000);
-        std::future::poll_fn(|_| {
-            if self.0.get() < end {
-                return Poll::Pending;
-            }
-            Poll::Ready(())
-        })
-        .await;
     }
 }
 

@@ -10,6 +10,7 @@ use crate::common::tmf8828;
 use crate::common::tmf8829::bench::{IMAGE, over, settings};
 use crate::common::tmf8829::bus::{Bus, Fault};
 use crate::common::{RecordingSink, SinkCall};
+use crate::wait::Timer;
 use dtof_chips::tmf8829::varied_counts;
 use dtof_chips::{Chip as _, Tmf8829 as Chip};
 use dtof_core::fixed::types::U16F16;
@@ -21,7 +22,6 @@ use dtof_sensors::tmf8829::{self, Config, Spi, Tmf8829, Zones};
 use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, ErrorType, Operation};
 use embedded_hal::spi;
-use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::i2c::I2c;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -136,20 +136,6 @@ fn drop_after<T>(future: impl Future<Output = T>, polls: u32) -> bool {
     let mut future = pin!(future);
     let mut context = Context::from_waker(Waker::noop());
     (0..polls).any(|_| future.as_mut().poll(&mut context).is_ready())
-}
-
-/// A timer of the clock.
-struct Timer(Rc<Cell<u32>>);
-
-impl DelayNs for Timer {
-    async fn delay_ns(&mut self, ns: u32) {
-        let end = self.0.get().wrapping_add(ns.div_ceil(1_000_000));
-        std::future::poll_fn(|_| match end.wrapping_sub(self.0.get()) {
-            0 | 0x8000_0000.. => Poll::Ready(()),
-            _ => Poll::Pending,
-        })
-        .await;
-    }
 }
 
 /// The clock, and the timing of a driver by it.

@@ -1,13 +1,31 @@
-//! INT of the chip for drivers that wait for it.
+//! What drivers wait for: INT of the chip, and a clock.
 
+use std::cell::Cell;
 use std::future::poll_fn;
+use std::rc::Rc;
 use std::task::Poll;
 
 use embedded_hal::digital::InputPin;
+use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::digital::Wait;
 
 use crate::common::Broken;
 use crate::common::tmf8829::bus::Bus;
+
+/// A timer of a clock that the test turns, in milliseconds.
+#[derive(Clone)]
+pub struct Timer(pub Rc<Cell<u32>>);
+
+impl DelayNs for Timer {
+    async fn delay_ns(&mut self, ns: u32) {
+        let end = self.0.get().wrapping_add(ns.div_ceil(1_000_000));
+        poll_fn(|_| match end.wrapping_sub(self.0.get()) {
+            0 | 0x8000_0000.. => Poll::Ready(()),
+            _ => Poll::Pending,
+        })
+        .await;
+    }
+}
 
 /// INT goes low when the chip does: each look is one of the test's milliseconds.
 impl Wait for Bus {
