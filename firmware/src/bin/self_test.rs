@@ -16,24 +16,41 @@ use core::panic::PanicInfo;
 
 use cortex_m_rt::entry;
 use dtof_firmware::self_test;
+use heapless::Vec;
 use semihosting::process::ExitCode;
 use semihosting::{io, println};
 
 #[entry]
 fn main() -> ! {
-    let code = match io::stdout().map(|out| self_test::run(&mut Lines(out))) {
+    let lines = |out| {
+        let line = Vec::new();
+        self_test::run(&mut Lines { out, line })
+    };
+    let code = match io::stdout().map(lines) {
         Ok(Ok(())) => ExitCode::SUCCESS,
         _ => ExitCode::FAILURE,
     };
     code.exit_process()
 }
 
-/// The debugger's or emulator's standard output.
-struct Lines(io::Stdout);
+/// The debugger's or emulator's standard output, a line at a time: each write halts the processor.
+struct Lines {
+    out: io::Stdout,
+    /// The line so far.
+    line: Vec<u8, 128>,
+}
 
 impl fmt::Write for Lines {
     fn write_str(&mut self, text: &str) -> fmt::Result {
-        io::Write::write_all(&mut self.0, text.as_bytes()).map_err(|_| fmt::Error)
+        for byte in text.bytes() {
+            // It is written when full.
+            let _ = self.line.push(byte);
+            if byte == b'\n' || self.line.is_full() {
+                io::Write::write_all(&mut self.out, &self.line).map_err(|_| fmt::Error)?;
+                self.line.clear();
+            }
+        }
+        Ok(())
     }
 }
 
