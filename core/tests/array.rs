@@ -1,6 +1,6 @@
 //! Blocks of an array: each pixel is in one block of each level, whatever the array's size.
 
-use dtof_core::{Array, BlockLevel, PixelAddress};
+use dtof_core::{Array, BlockLevel, Neighbours, PixelAddress};
 use proptest::prelude::*;
 
 fn levels() -> impl Iterator<Item = BlockLevel> {
@@ -86,6 +86,14 @@ fn an_array_has_pixels_and_no_more_than_addresses() {
     ] {
         assert_eq!(Array::new(columns, rows), None, "{columns}x{rows}");
     }
+}
+
+#[test]
+fn neighbours_are_four_or_eight() {
+    let numbers = (0..=u8::MAX).filter_map(|number| Some((number, Neighbours::new(number)?)));
+    let expected = [(4, Neighbours::Four), (8, Neighbours::Eight)];
+    assert!(numbers.eq(expected));
+    assert_eq!(expected.map(|(_, neighbours)| neighbours.raw()), [4, 8]);
 }
 
 #[test]

@@ -1,6 +1,7 @@
 // Of photons in one clock each comes out once in the other, as it was, after as many ends of laser
 // cycles as were before it, or is counted as lost. No end is lost unless `end_lost` says so. If
-// one of the clocks stops, the other side sees all that was done after three clocks.
+// one of the clocks stops, the other side sees all that was done after three clocks. A reset ends
+// after three clocks of the photons at most.
 //
 // Two clocks: any two, with edges at any time. Reset at any time, as long as it has to be.
 // two clocks
@@ -92,6 +93,10 @@ module top (
         if (in_reset) {photons_out, ends_out, is_out, is_leaving, was_waiting} <= 0;
     end
 
+    // Clocks of the photons since a reset.
+    reg [1:0] free = 0;
+    always @($global_clock) free <= in_reset ? 2'd0 : free + (photon_ticks && !(&free));
+
     // Clocks of each since the other had one.
     reg [1:0] alone = 0, photon_alone = 0;
     always @($global_clock) begin
@@ -158,6 +163,9 @@ module top (
         if (photon_alone >= 2 && !ticks) assert (first_taken == first_gray);
         // The photons' side is in reset a little longer.
         assert (reset_taken <= photon_reset);
+        if (free >= 1) assert (!reset_before);
+        if (free >= 2) assert (!reset_taken);
+        if (free >= 3) assert (!photon_reset);
         if (!photon_reset) assert (knows_first && (!loses || room_3 == 4 || pending != 0));
         else begin
             assert ({next, next_before, next_taken, next_out, first, first_before} == 0);
