@@ -84,7 +84,8 @@ int main() {
                 if (photon.cycle != cycle_out) return fail("another laser cycle", phase);
                 uint64_t delay = clock - photon.clock;
                 if (photon.is_alone) {
-                    if (delay < 3 || delay > 4) return fail("a photon that nothing waits before is late", phase);
+                    // In hardware a bit that is taken late makes it four.
+                    if (delay != 3) return fail("a photon alone does not take three clocks", phase);
                     alone++;
                 }
                 if (!may_lose && delay > longest) longest = delay;
@@ -101,7 +102,7 @@ int main() {
         told = crossing.lost;
     }
     std::printf("photon crossing: %zu photons and %u laser cycles, %zu photons lost where the clock is slower, "
-                "at most %llu clocks where it is not; %llu photons alone, three or four clocks each\n",
+                "at most %llu clocks where it is not; %llu photons alone, three clocks each\n",
                 sent.size(), cycle, lost, static_cast<unsigned long long>(longest),
                 static_cast<unsigned long long>(alone));
     return lost > 1 << 16 && alone > 1 << 10 ? 0 : 1;

@@ -33,11 +33,12 @@ fn main() -> ! {
     code.exit_process()
 }
 
-/// The debugger's or emulator's standard output, a line at a time: each write halts the processor.
+/// The debugger's or emulator's standard output, a line at a time: each write halts the processor. Text after the last
+/// end of a line is not written.
 struct Lines {
     out: io::Stdout,
     /// The line so far.
-    line: Vec<u8, 128>,
+    line: Vec<u8, 256>,
 }
 
 impl fmt::Write for Lines {

@@ -49,7 +49,7 @@ fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     let board = Board::Mps2An386;
     let image = board.image(&[])?;
     let mut used = ends(board, &image)?;
-    // 64 macropixels. 10^8 photons: `soak`.
+    // 64 macropixels.
     let array = Array::new(8, 8).unwrap();
     for (settings, cycles, reads_every) in [
         (settings(), 1000, 0),

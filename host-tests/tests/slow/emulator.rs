@@ -17,7 +17,8 @@ use crate::stack::{self, Image};
 /// The longest wait for something that should take no time.
 pub const PATIENCE: Duration = Duration::from_secs(20);
 
-/// The longest run of an image that ends by itself, on a busy computer. It takes 2 seconds.
+/// The longest run of an image that ends by itself, on a busy computer. The self-test takes half a second. From stop to
+/// stop it is [`PATIENCE`].
 const LONGEST: Duration = Duration::from_secs(120);
 
 /// The semihosting operations that end an image: `SYS_EXIT` and `SYS_EXIT_EXTENDED`.

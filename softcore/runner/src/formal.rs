@@ -144,7 +144,7 @@ const PROOFS: [Proof; 10] = [
             "rtl/crossing_counter.v",
             "formal/synchronizer.sv",
         ],
-        claim: "of photons in another clock each comes out once, in order and in its laser cycle, or is counted as lost",
+        claim: "of photons in another clock each comes out once, in order and in its laser cycle, or is counted as lost; a reset ends",
         engine: Engine::Induction(3),
         faults: &[
             // Not Gray code: several bits change at a time.
@@ -198,6 +198,12 @@ const PROOFS: [Proof; 10] = [
                 file: "photon_crossing",
                 from: ".clk(photon_clk), .reset(photon_reset), .counts(put)",
                 to: ".clk(photon_clk), .reset(1'b0), .counts(put)",
+            },
+            // A reset never ends.
+            Mutant {
+                file: "photon_crossing",
+                from: ".in(reset), .out(photon_reset)",
+                to: ".in(reset || photon_reset), .out(photon_reset)",
             },
         ],
     },
