@@ -28,6 +28,9 @@ enum Command {
     /// Simulate a scene from a file.
     Simulate(Box<command::simulate::Simulate>),
     /// Turn recorded photons into events.
+    ///
+    /// Without --settings, and without an option that says how pixels decide, it first finds in the recording what `calibrate`
+    /// does: the window rule, the pulse, a gate, hot pixels.
     Replay(Box<command::replay::Replay>),
     /// Find the settings of a sensor from a recording or a device.
     Calibrate(Box<command::calibrate::Calibrate>),

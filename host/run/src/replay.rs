@@ -106,7 +106,7 @@ impl Replay {
                 !flags.is_empty(),
                 "settings",
                 format!(
-                    "not searched for in the recording because of {}; calibrate finds them",
+                    "not searched for in the recording because of {}; calibrate finds them, for --settings beside these options",
                     flags.join(", ")
                 ),
             ),
