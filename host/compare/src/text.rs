@@ -16,8 +16,7 @@ const FAILS: &str = "fails";
 
 /// The heading of the harder conditions, and what their table has.
 pub(super) const HARDER: &str = "harder conditions";
-pub(super) const STRESS_NOTE: &str =
-    "×: time to a report over that without. fails: the error grows by half, or 5 % are wrong";
+pub(super) const STRESS_NOTE: &str = "×: time to a report over that without. fails: the error grows by half, or 5 % are wrong. –: fails without, too";
 
 /// A warning says that this share of the pixels or more does not report.
 const MANY_SILENT: f64 = 0.1;
@@ -322,7 +321,7 @@ impl Comparison {
     }
 
     /// A row for the methods to take, with their minimum count, and for each method, with the lowest: in each
-    /// harder condition its time over that without, or that it fails.
+    /// harder condition its time over that without, or that it fails there, or without it, too.
     pub(super) fn stress_rows(&self) -> Vec<(String, Vec<String>)> {
         let Answer { best, fastest, .. } = &self.answer;
         let answers = [(best, "take"), (fastest, "fastest")];
@@ -342,10 +341,11 @@ impl Comparison {
                 .iter()
                 .map(|(_, all)| all.iter().find(is_same));
             let before = outcomes.next().flatten();
-            let before = before.map_or(f64::NAN, |outcome| outcome.figures.cycles);
-            let cells = outcomes.map(|outcome| match outcome {
-                Some(outcome) if self.holds(outcome) => {
-                    format!("×{:.1}", outcome.figures.cycles / before)
+            let before = before.filter(|outcome| self.holds(outcome));
+            let cells = outcomes.map(|outcome| match (before, outcome) {
+                (None, _) => "–".to_owned(),
+                (Some(before), Some(outcome)) if self.holds(outcome) => {
+                    format!("×{:.1}", outcome.figures.cycles / before.figures.cycles)
                 }
                 _ => FAILS.to_owned(),
             });
@@ -424,15 +424,15 @@ fn short(value: f64) -> String {
 mod tests {
     use super::super::answer::answer;
     use super::super::measure::Trial;
-    use super::super::stress::Light;
+    use super::super::stress::{Light, Stress};
     use super::super::truth::Truth;
     use super::super::{Figures, Settings};
     use super::*;
     use dtof_core::fixed::types::U8F8;
 
-    /// What there is to take within 10 mm, of trials with these errors in millimetres, numbers of reports, and shares of
-    /// wrong reports and of silent pixels.
-    fn take(trials: &[(f64, u64, f64, f64)]) -> String {
+    /// A comparison of trials of a window of 3 with these errors in millimetres, numbers of reports, and shares of wrong
+    /// reports and of silent pixels.
+    fn comparison(trials: &[(f64, u64, f64, f64)]) -> Comparison {
         let settings = Settings::static_scene(1);
         let methods = Method::all(U8F8::ONE, 0, false, &settings);
         let outcome = |(effort, &(error_mm, reports, wrong, silent))| Outcome {
@@ -453,7 +453,7 @@ mod tests {
             instructions: 50.0,
         };
         let outcomes: Vec<Outcome> = (5..).zip(trials).map(outcome).collect();
-        let comparison = Comparison {
+        Comparison {
             thresholds: vec![None; methods.len()],
             answer: answer(&methods, &outcomes, 10.0),
             outcomes,
@@ -474,9 +474,33 @@ mod tests {
             pixels: 64,
             cycles: 10_000,
             laser_hz: None,
-        };
-        let mut rows = comparison.rows().into_iter();
+        }
+    }
+
+    /// What there is to take within 10 mm.
+    fn take(trials: &[(f64, u64, f64, f64)]) -> String {
+        let mut rows = comparison(trials).rows().into_iter();
         rows.find(|(name, _)| name == "take").unwrap().1
+    }
+
+    #[test]
+    fn a_method_fails_where_it_held_without() {
+        let many = 1_000_000_000;
+        let cell = |before: (f64, u64, f64, f64), in_drift: (f64, u64, f64, f64)| {
+            let mut compared = comparison(&[]);
+            let outcomes = |trial| (Stress::NONE, comparison(&[trial]).outcomes);
+            compared.stressed = vec![outcomes(before), outcomes(in_drift)];
+            let mut rows = compared.stress_rows().into_iter();
+            let (_, cells) = rows.find(|(name, _)| name == "window of 3").unwrap();
+            cells.concat()
+        };
+        let good = (8.0, many, 0.01, 0.0);
+        assert_eq!(cell(good, (12.0, many, 0.05, 0.0)), "×1.0");
+        assert_eq!(cell(good, (12.1, many, 0.05, 0.0)), "fails");
+        assert_eq!(cell(good, (8.0, many, 0.051, 0.0)), "fails");
+        let wrong = (8.0, many, 0.06, 0.0);
+        assert_eq!(cell(wrong, wrong), "–");
+        assert_eq!(cell(wrong, good), "–");
     }
 
     #[test]
