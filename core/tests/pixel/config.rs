@@ -67,6 +67,16 @@ fn every_setting_arrives() {
 }
 
 #[test]
+fn a_dead_time_of_all_bins_leaves_the_first_photon_only() {
+    for dead_time in [0, 1, 20, 63, 64, 65, u16::MAX] {
+        let config = PixelConfig::<64>::paper().dead_time(dead_time).build();
+        let config = config.unwrap();
+        assert_eq!(config.dead_time(), dead_time);
+        assert_eq!(config.is_first_photon_only(), dead_time >= 64);
+    }
+}
+
+#[test]
 fn large_configurations_are_checked_without_overflow() {
     let rule = PaperRule::new(U8F8::lit("8"), Count::saturating(5));
     for (x, l1, l2, expected) in [
