@@ -199,6 +199,24 @@ fn an_offset_at_its_limit_is_clipped() {
     assert!(at_limits.iter().all(|&sum| sum > 0), "{at_limits:?}");
 }
 
+/// The last offset is one, too, if the photons balance there and not beyond.
+#[test]
+fn an_offset_that_is_just_its_limit_is_clipped() {
+    let mut balanced = 0;
+    for (fewer, more) in (0..40).flat_map(|more| (1..=900).map(move |fewer| (fewer, more))) {
+        let mut counts = [0; BINS];
+        counts[17..19].copy_from_slice(&[fewer + more, fewer]);
+        for half_width in [256, 512, 1024] {
+            let depth = depth::<Count10>(&counts, 16, half_width, U24F8::ZERO);
+            let is_at_limit = depth.offset == SubBinOffset::MAX;
+            assert_eq!(depth.flags.contains(Flags::CLIPPED), is_at_limit);
+            // With as many photons on both sides of two bins they balance at two bins.
+            balanced += u32::from(is_at_limit && more > 0);
+        }
+    }
+    assert!(balanced > 0);
+}
+
 #[test]
 fn a_full_counter_is_flagged() {
     fn flags<W: CounterWidth>(count: u32) -> Flags {
