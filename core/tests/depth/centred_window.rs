@@ -210,7 +210,7 @@ fn an_offset_that_is_just_its_limit_is_clipped() {
             let depth = depth::<Count10>(&counts, 16, half_width, U24F8::ZERO);
             let is_at_limit = depth.offset == SubBinOffset::MAX;
             assert_eq!(depth.flags.contains(Flags::CLIPPED), is_at_limit);
-            // With as many photons on both sides of two bins they balance at two bins.
+            // With as many photons on both sides of the limit they balance past the last offset, at two bins.
             balanced += u32::from(is_at_limit && more > 0);
         }
     }

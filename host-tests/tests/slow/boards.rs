@@ -49,11 +49,11 @@ fn mps2_an386_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     let board = Board::Mps2An386;
     let image = board.image(&[])?;
     let mut used = ends(board, &image)?;
-    // 64 macropixels.
+    // A million photons of 64 macropixels.
     let array = Array::new(8, 8).unwrap();
     for (settings, cycles, reads_every) in [
-        (settings(), 1000, 0),
-        (with_windows(), 1000, 150),
+        (settings(), 5300, 0),
+        (with_windows(), 5300, 150),
         (with_all(), 2000, 0),
         (with_all(), 500, 150),
         (with_dead_time(), 2000, 0),
