@@ -49,8 +49,11 @@ def photon_list(photons):
 def main():
     program = sys.argv[1]
     photons = int(float(sys.argv[2])) if len(sys.argv) > 2 else 100_000_000
-    options = {"rule": "paper", "cycles": 10_000_000, "columns": 64}
     with tempfile.TemporaryDirectory() as folder:
+        # Settings, so that none are looked for in the recording.
+        settings = Path(folder) / "defaults.toml"
+        settings.write_text("")
+        options = {"settings": settings, "cycles": 10_000_000, "columns": 64}
         failed = False
         for name, make in [("histograms", histograms), ("photon list", photon_list)]:
             array = make(photons)

@@ -150,7 +150,7 @@ def test_a_pixel_decides_as_a_replay_and_counts_what_it_cannot_see():
 )
 def test_what_cannot_be_used_is_refused(options, words):
     for call in (
-        lambda: dtof.photons([0], [0], [5], columns=1, **options),
+        lambda: dtof.photons([0], [0], [5], columns=1, settings={}, **options),
         lambda: dtof.Pixel(**options),
     ):
         with pytest.raises(dtof.Error) as caught:

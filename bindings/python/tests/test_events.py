@@ -11,10 +11,10 @@ import dtof
 OPTIONS = {
     "plain": {},
     "window": {"rule": "window", "sigma_bins": 0.8, "l1": 4, "echoes": 2, "echo_wait": 4},
-    "blocks": {"binning": 2, "patience": 16, "alpha": 8, "min_count": 7},
+    "blocks": {"binning": 2, "patience": 16, "rule": "paper", "alpha": 8, "min_count": 7},
     "frame": {"frame": 500},
     "sensor": {"bin_width_ps": 92.1, "offset_mm": -179.5, "gate": (2, 90), "mask": [0, 5]},
-    "offsets": {"offsets_mm": [-78.0, 12.5, *range(22)], "mask": [2], "binning": 1, "patience": 16, "alpha": 8},
+    "offsets": {"offsets_mm": [-78.0, 12.5, *range(22)], "mask": [2], "binning": 1, "patience": 16, "l1": 60},
     "run": {"photons_per_cycle": 0.3, "seed": 9, "cycles": 3001, "laser_hz": 5_000_000},
     "bins": {"rebin": 3, "bins": 32},
 }
@@ -176,7 +176,7 @@ def test_photons_are_replayed_to_the_last(tmp_path):
 
 def test_the_tmf8820_log(program, tmp_path, recorded):
     log = recorded("tmf8820_plane_gt/distance_data.json")
-    options = {"photons_per_cycle": 0.5, "rule": "window", "sigma_bins": 0.75, "l1": 4}
+    options = {"photons_per_cycle": 0.5, "rule": "window", "sigma_bins": 0.75, "l1": 4, "x": 4}
     out = tmp_path / "out"
     program("replay", "--input", log, "--out", out, "--quiet", *flags_of(options))
     run = dtof.replay(log, **options)
@@ -203,9 +203,9 @@ def test_a_scene(program, tmp_path):
     from conftest import ROOT
 
     scene = ROOT / "scenes" / "fan.toml"
-    options = {"cycles": 3000, "array": (8, 6), "alpha": 8, "seed": 2}
+    options = {"cycles": 3000, "array": (8, 6), "l1": 60, "seed": 2}
     out = tmp_path / "out"
-    texts = ["--cycles", "3000", "--array", "8x6", "--alpha", "8", "--seed", "2"]
+    texts = ["--cycles", "3000", "--array", "8x6", "--l1", "60", "--seed", "2"]
     program("simulate", "--scene", scene, "--out", out, "--quiet", *texts)
     run = dtof.simulate(scene, **options)
     equals_the_program(run, out, tmp_path / "file.aer")

@@ -23,7 +23,7 @@ def test_a_pixel_reports_as_in_a_replay(options):
     cycle[-1] = 3999
     near = random.random(photons) < 0.2
     bin = numpy.where(near, random.normal(50.3, 0.6, photons).astype(int), random.integers(0, 128, photons))
-    run = dtof.photons(3, cycle, bin, **options)
+    run = dtof.photons(3, cycle, bin, settings={}, **options)
     pixel = dtof.Pixel(address=3, **options)
     events = []
     for now in range(4000):

@@ -39,7 +39,7 @@ def photons(seed, cycles=600, rows=8, columns=8, bins=64):
 )
 def test_the_events_are_those_of_photons(options, seed):
     pixel, cycle, bin = photons(seed)
-    run = dtof.photons(pixel, cycle, bin, columns=8, bins=64, **options)
+    run = dtof.photons(pixel, cycle, bin, columns=8, bins=64, settings={}, **options)
     pixels = dtof.Pixels(8, 8, 64, **options)
     events = []
     for now in range(600):

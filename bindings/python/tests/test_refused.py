@@ -171,7 +171,7 @@ def test_the_line_is_that_of_the_program(program, tmp_path):
 )
 def test_a_mistake_is_the_line_of_the_program_with_keywords(options, line):
     """The test of the program's flags and files, `mistakes`, has the same."""
-    assert refused(lambda: dtof.replay(GOOD, **options)) == line
+    assert refused(lambda: dtof.replay(GOOD, settings={}, **options)) == line
 
 
 @pytest.mark.parametrize(

@@ -26,8 +26,9 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
     row(
         "looked at",
         format!(
-            "{} pixels, {} capture{several}, {} bins",
+            "{} pixel{}, {} capture{several}, {} bins",
             grouped(found.array_pixels as u64),
+            if found.array_pixels == 1 { "" } else { "s" },
             grouped(found.captures as u64),
             found.bins
         ),

@@ -29,8 +29,8 @@ enum Command {
     Simulate(Box<command::simulate::Simulate>),
     /// Turn recorded photons into events.
     ///
-    /// Without --settings, and without an option that says how pixels decide, it first finds in the recording what `calibrate`
-    /// does: the window rule, the pulse, a gate, hot pixels.
+    /// Without --settings it first finds in the recording what `calibrate` does: the window rule, the pulse, a gate, hot
+    /// pixels. Options override that. Defaults hold for what is not found, or with --settings.
     Replay(Box<command::replay::Replay>),
     /// Find the settings of a sensor from a recording or a device.
     Calibrate(Box<command::calibrate::Calibrate>),

@@ -1,6 +1,6 @@
 //! `replay`: recorded photons or histograms through the engine.
 //!
-//! Without chosen settings it finds them in the recording first, as `calibrate` does.
+//! Without a settings file it finds the settings in the recording first, as `calibrate` does. Options override them.
 
 use anyhow::{Result, ensure};
 
@@ -18,7 +18,7 @@ use dtof_engine::settings::{DetectionSettings, Settings, SettingsFile};
 use dtof_events::clock::LaserClock;
 use dtof_options::progress::Progress;
 use dtof_options::rows::Row;
-use dtof_options::{Refused, option_name};
+use dtof_options::{KeysOfFile, Refused};
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
@@ -27,8 +27,6 @@ use dtof_photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
 
 /// The options that settle which photons are replayed, and whether pixels decide once.
 const RUN: &[&str] = &["cycles", "seed", "decide_once"];
-/// The options of detection that a search does not find. All others choose how pixels decide.
-const WANTED: &[&str] = &["masked", "neighbours", "sigma_bins", "tracking"];
 
 /// The options of a replay.
 #[derive(Clone, Debug, Default)]
@@ -62,8 +60,6 @@ pub struct Replay {
     pub metadata: Metadata,
     /// What was found in the recording, one a row, if its settings come from there.
     pub found: Vec<Row>,
-    /// The keys of the options that chose how pixels decide, so that nothing was searched for.
-    choosing: Vec<&'static str>,
 }
 
 impl Replay {
@@ -99,17 +95,7 @@ impl Replay {
         let is_of_found = self.found.iter().any(|(name, _)| name == "bin width");
         let view = FieldOfView::default_for([array.columns(), array.rows()]);
         let rays = &self.requested.rays;
-        let flag = |key: &&str| format!("--{}", option_name(key).replace('_', "-"));
-        let flags: Vec<String> = self.choosing.iter().map(flag).collect();
         let rows = [
-            (
-                !flags.is_empty(),
-                "settings",
-                format!(
-                    "not searched for in the recording because of {}; calibrate finds them, for --settings beside these options",
-                    flags.join(", ")
-                ),
-            ),
             (
                 self.metadata.is_width_assumed && !is_of_found,
                 "bin width",
@@ -158,8 +144,8 @@ impl Options {
         let mut requested = requested.clone();
         let captures = recording.metadata().captures;
         mask_capture(&mut requested, recording.array().pixels(), captures)?;
-        let choosing = self.choosing();
-        let found = match self.has_file() || !choosing.is_empty() {
+        let has_file = self.given.file.is_some() || self.given.text.is_some();
+        let found = match has_file {
             true => Ok((Vec::new(), None)),
             false => find(&mut requested, &mut recording),
         };
@@ -174,7 +160,7 @@ impl Options {
         });
         metadata.warnings.extend(warning);
         let requested = requested.or(settings_of_file(&metadata, photons.array()));
-        if !self.has_file() && choosing.is_empty() && requested.detection.rule.is_none() {
+        if !has_file && requested.detection.rule.is_none() {
             let detection = &requested.detection;
             for (key, is_on) in [
                 ("neighbours", detection.neighbours.unwrap_or(0) > 0),
@@ -184,8 +170,8 @@ impl Options {
                 ensure!(!is_on, Refused::new(key, reason));
             }
         }
-        let settings = requested.settings(metadata.bins)?;
-        let settings = settings.for_source(photons.as_ref());
+        let settings = requested.settings(metadata.bins);
+        let settings = settings.and_then(|settings| settings.for_source(photons.as_ref()));
         let settings = settings.map_err(|error| requested.add_file_name(error))?;
         let refused = |refused: Refused| anyhow::Error::from(refused).context(input.to_string());
         let asks_neighbours = settings.neighbours.is_some() && settings.frame.is_none();
@@ -240,7 +226,8 @@ impl Options {
         }
         let photons = Masked::new(photons, &settings.masked)?;
         let photons = photons.with_laser_hz(requested.sensor.laser_hz);
-        let engine = host_engine(&settings, photons.array(), &photons.addresses())?;
+        let engine = host_engine(&settings, photons.array(), &photons.addresses());
+        let engine = engine.map_err(|error| requested.add_file_name(error))?;
         Ok(Replay {
             photons,
             engine,
@@ -248,28 +235,7 @@ impl Options {
             requested,
             metadata,
             found,
-            choosing: match self.has_file() {
-                true => Vec::new(),
-                false => choosing,
-            },
         })
-    }
-
-    /// Whether there is a settings file.
-    const fn has_file(&self) -> bool {
-        self.given.file.is_some() || self.given.text.is_some()
-    }
-
-    /// The options that choose how pixels decide. Options that describe the recording do not.
-    fn choosing(&self) -> Vec<&'static str> {
-        let keys = self.given.options.keys().unwrap_or_default();
-        let all = <Self as dtof_options::Options>::KEYS
-            .iter()
-            .copied()
-            .flatten()
-            .copied();
-        let others = all.filter(|key| ![RECORDING, RUN, WANTED].concat().contains(key));
-        others.filter(|key| keys.contains(*key)).collect()
     }
 }
 
@@ -298,7 +264,7 @@ fn find(
     if requested.sensor.offsets_mm.is_some() {
         found.pixel_offsets = None;
     }
-    let settings = found.settings(
+    let mut settings = found.settings(
         requested
             .clone()
             .or(settings_of_file(metadata, counts.array)),
@@ -311,6 +277,13 @@ fn find(
     let warning = missed.filter(|missed| !missed.is_empty()).map(|missed| {
         let pixels = missed.join(",");
         format!("hot or dead pixels that --mask does not leave out: {pixels}")
+    });
+    // Rules and blocks that cannot weigh a dead time leave it out.
+    settings.dead_time_of_sensor = settings.sensor.dead_time.take();
+    // An error about a key that was found says so.
+    settings.file = Some(KeysOfFile {
+        path: "found in the recording".into(),
+        keys: settings.keys()?,
     });
     *requested = requested.clone().or(settings);
     let mut rows = rows(&found);

@@ -303,7 +303,8 @@ impl Options {
         let source = "formula: Eq. 11, one look, background known; not for use";
         lines.push(Line("gaussian_alpha", gaussian, source.to_owned()));
         let alpha = shortest(tuned.alpha);
-        Ok((lines, format!("--alpha {alpha} --l1 {}", tuned.l1)))
+        let options = format!("--rule paper --alpha {alpha} --l1 {}", tuned.l1);
+        Ok((lines, options))
     }
 
     fn simulated(&self, detections: &Detections) -> String {
@@ -384,7 +385,7 @@ impl TuneResult {
         text
     }
 
-    /// The options for other commands, such as `--alpha 4.5 --l1 40`.
+    /// The options for other commands, such as `--rule paper --alpha 4.5 --l1 40`.
     #[must_use]
     pub fn options(&self) -> &str {
         &self.options

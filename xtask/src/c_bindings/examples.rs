@@ -51,6 +51,8 @@ fn events(dtof: &Path, host: &Path, folder: &Path) -> Result<()> {
         folder.join("replay"),
     );
     fs::write(&photons, list())?;
+    let defaults = folder.join("defaults.toml");
+    fs::write(&defaults, "")?;
     let mut example = Command::new(host.join("events"));
     let example = example.arg(&c).arg("-");
     let status = example
@@ -63,7 +65,9 @@ fn events(dtof: &Path, host: &Path, folder: &Path) -> Result<()> {
     replay
         .arg("--out")
         .arg(&rust)
-        .args(["--rule", "paper", "--bin-width-ps", "250", "--quiet"]);
+        .arg("--settings")
+        .arg(&defaults)
+        .args(["--bin-width-ps", "250", "--quiet"]);
     succeed(&mut replay)?;
     let found = printed(Command::new(dtof).arg("decode").arg(&c))?;
     let expected = fs::read_to_string(rust.join("events.csv"))?;

@@ -103,9 +103,8 @@ def replay(recorded: Any, *, axis: int = -1, progress: Progress = None, **option
     counts the photons after them, unless ``cycles`` is given.
     ``decide_once`` takes all photons for one decision a pixel: see :attr:`Replay.confidence`.
     ``settings`` is the name or the text of a settings file, a dict of its sections, or a calibration, a
-    comparison or a run. Without ``settings`` and without an option of detection, the settings are those of
-    :func:`calibrate`: ``statistics["found"]``. ``mask``, ``neighbours``, ``sigma_bins``, ``tracking`` and ``decide_once``
-    keep that.
+    comparison or a run. Without ``settings``, those of :func:`calibrate` are found in the recording:
+    ``statistics["found"]``. Options override them. With ``settings``, even ``{}``, the defaults hold for what it leaves out.
     Options of reports and files are not available:
     ``echo``, ``dynamic_depth``, ``threshold_mm``, ``reference`` and ``no_csv``.
 

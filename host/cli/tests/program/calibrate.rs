@@ -205,36 +205,54 @@ fn a_recording_alone_is_calibrated_first() {
     }
 }
 
-/// An option of detection, or any settings, keep the defaults for the rest.
+/// Options change what is found, as they change a settings file.
 #[test]
-fn an_option_of_detection_calibrates_nothing() {
+fn options_override_what_is_found() {
     let scratch = Scratch::new();
     scratch.file("glass.npy", recording(&scene(0.02, 5.0)));
-    scratch.file("empty.toml", "");
+    scratch.printed("calibrate glass.npy --out found.toml");
     let run = |options: &str| {
         let printed = scratch.printed(&format!("replay glass.npy --out out {options}"));
-        assert!(!printed.contains("Found"), "{printed}");
-        let rows = printed.lines();
-        let rows = rows.filter(|row| row.contains("not searched for"));
-        let rows: Vec<&str> = rows.collect();
-        (scratch.read("out/events.csv"), rows.join("\n"))
+        let files = ["events.csv", "dtof.toml"].map(|name| scratch.read(&format!("out/{name}")));
+        (printed.contains("Found in the recording:"), files)
     };
-    let (defaults, row) = run("--settings empty.toml");
-    assert_eq!(row, "");
+    let (_, [found, _]) = run("");
     for options in [
+        "--l1 60",
+        "--min-count 8",
+        "--gate 20..100",
+        "--false-alarm 0.001",
+        "--z 6",
+        "--window 5",
+        "--estimator centroid",
+        "--echoes 2 --echo-wait 4",
+        "--binning 2",
+        "--counter-bits 8 --x 8",
+        "--rule average --alpha 5",
         "--rule paper",
-        "--alpha 4",
-        "--l1 40",
-        "--gate 0..127",
-        "--echoes 1",
+        "--frame 200",
+        "--once-per-bin=false --l1 8 --mask 5",
     ] {
-        let (events, row) = run(options);
-        assert_eq!(events, defaults, "{options}");
-        let flag = options.split(' ').next().unwrap();
-        assert_contains(&row, &format!("because of {flag}; calibrate finds them"));
+        let (is_found, files) = run(options);
+        let (is_found_again, by_hand) = run(&format!("{options} --settings found.toml"));
+        assert_eq!([is_found, is_found_again], [true, false], "{options}");
+        assert_eq!(files, by_hand, "{options}");
+        assert_ne!(files[0], found, "{options}");
     }
-    let (_, row) = run("--l1 8 --mask 5 --rule paper --neighbours 0");
-    assert_contains(&row, "because of --rule, --l1; calibrate finds them");
+    // An error names what was found.
+    std::fs::remove_dir_all(scratch.path("out")).unwrap();
+    scratch.all_refused(
+        "replay glass.npy --out out",
+        "
+        --l1 2 | error: found in the recording: x 4: must not be greater than --l1 2
+        --x 50 | error: found in the recording: --x 50: must not be greater than l1 40
+        ",
+    );
+    // A settings file says all.
+    scratch.file("empty.toml", "");
+    let (is_found, [defaults, _]) = run("--settings empty.toml");
+    assert!(!is_found && defaults != found);
+    assert_eq!(scratch.summary()["settings"]["rule"], "paper");
     assert_eq!(scratch.summary()["found"], serde_json::json!({}));
 }
 

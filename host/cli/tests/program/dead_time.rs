@@ -67,10 +67,10 @@ fn a_dead_time_that_cannot_be_used_is_refused() {
     scratch.all_refused(
         "replay --out out --input photons.csv",
         "
-        --dead-time 20 | --dead-time 20: is for --rule window, unless it is 128 bins or more
+        --dead-time 20 --rule paper | --dead-time 20: is for --rule window, unless it is 128 bins or more
         --dead-time 127 --rule average | --dead-time 127: is for --rule window
         --dead-time 1 --rule window --window 3 --binning 1 | --dead-time 1: cannot be used with --binning
-        --dead-time 1 --frame 100 | --dead-time 1: is for --rule window
+        --dead-time 1 --frame 100 | --dead-time 1: cannot be used with --frame
         --dead-time -1 | --dead-time -1: must be a whole number from 0 to 65535
         --dead-time 65536 | --dead-time 65536: must be a whole number from 0 to 65535
         --dead-time 2.5 | --dead-time 2.5: must be a whole number
@@ -198,6 +198,25 @@ fn recorded_histograms_are_weighed() {
             refused("", "--dead-time 128: needs --recorded-cycles");
         }
     }
+}
+
+/// A dead time that is found is weighed where it can be.
+#[test]
+fn a_dead_time_that_is_found_refuses_no_option() {
+    let scratch = Scratch::new();
+    let counts = histogram(20).repeat(16);
+    let bytes: Vec<u8> = counts.into_iter().flat_map(u32::to_le_bytes).collect();
+    let input = scratch.file("recorded.npy", npy("<u4", "(4, 4, 128)", &bytes));
+    let with = |options: &str| {
+        let summary = scratch.replayed(&input, &format!("--recorded-cycles 20000 {options}"));
+        used(&summary).0
+    };
+    let bins = with("");
+    assert!((18..=22).contains(&bins), "{bins}");
+    for options in ["--rule paper", "--binning 1", "--frame 100"] {
+        assert_eq!(with(options), 0, "{options}");
+    }
+    assert_eq!(with("--l1 60"), bins);
 }
 
 #[test]

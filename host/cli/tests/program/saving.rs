@@ -94,7 +94,7 @@ impl Work {
                 ["--seed 7", ""],
                 "summary.json",
             ),
-            ("replayed", replay, ["--alpha 5", ""], "summary.json"),
+            ("replayed", replay, ["--l1 60", ""], "summary.json"),
             (
                 "calibrated",
                 calibrate,

@@ -156,7 +156,7 @@ fn results_of_an_earlier_run_are_replaced() {
     scratch.replayed(&photons, "");
     assert_eq!(names(&scratch.path("out")), RESULTS);
     scratch.file("out/notes.txt", "mine\n");
-    scratch.replayed(&photons, "--alpha 8");
+    scratch.replayed(&photons, "--l1 8");
     for name in "summary.json report.html events.aer depth-last.svg".split(' ') {
         fs::remove_file(scratch.path("out").join(name)).unwrap();
         scratch.replayed(&photons, "");

@@ -75,6 +75,7 @@ const MISTAKES: [Mistake; 5] = [
 fn a_mistake_is_one_error_however_it_is_made() {
     let scratch = Scratch::new();
     scratch.file("photons.csv", PHOTONS);
+    scratch.file("defaults.toml", "");
     let replay = "replay --input photons.csv --out out";
     let refused = |line: &str| {
         let output = scratch.run(line);
@@ -86,7 +87,10 @@ fn a_mistake_is_one_error_however_it_is_made() {
         let text = format!("[{section}]\n{keys}\n");
         scratch.file("my.toml", &text);
         let [by_flag, by_file] = mistake.lines;
-        let line = refused(&format!("{replay} {}", mistake.flags));
+        let line = refused(&format!(
+            "{replay} --settings defaults.toml {}",
+            mistake.flags
+        ));
         assert_eq!(line, format!("error: {by_flag}\n"));
         let line = refused(&format!("{replay} --settings my.toml"));
         assert_eq!(line, format!("error: {by_file}\n"));

@@ -19,16 +19,22 @@ fn photons(scratch: &Scratch) -> PathBuf {
     scratch.file("photons.csv", text)
 }
 
-/// The settings in the summary, and the events.
+/// A settings file that leaves all to the defaults.
+const DEFAULTS: &str = "--settings defaults.toml";
+
+/// The settings in the summary, and the events. Without a settings file the defaults hold.
 #[track_caller]
 fn replayed(options: &str) -> (Value, String) {
     let scratch = Scratch::new();
-    let summary = scratch.replayed(&photons(&scratch), options);
+    scratch.file("defaults.toml", "");
+    let has_file = options.contains("--settings");
+    let options = format!("{options} {}", if has_file { "" } else { DEFAULTS });
+    let summary = scratch.replayed(&photons(&scratch), &options);
     (summary["settings"].clone(), scratch.read("out/events.csv"))
 }
 
 #[test]
-fn an_option_of_detection_takes_the_papers_rule_and_centroid_for_the_rest() {
+fn the_defaults_are_the_papers_rule_and_centroid() {
     let (settings, events) = replayed("--min-count 5");
     assert_eq!(settings["rule"], "paper");
     assert_eq!(settings["estimator"], "centroid");
@@ -165,8 +171,9 @@ fn what_was_used_is_printed_and_in_the_report() {
 fn options_that_contradict_each_other_are_refused_in_one_line() {
     let scratch = Scratch::new();
     photons(&scratch);
+    scratch.file("defaults.toml", "");
     scratch.all_refused(
-        "replay --input photons.csv --out out",
+        &format!("replay --input photons.csv --out out {DEFAULTS}"),
         r#"
             --rule window --window 3 --alpha 4 | --alpha | --rule paper
             --z 4 | --z is for --rule window

@@ -98,6 +98,7 @@ fn what_contradicts_the_file_is_refused() {
     scratch.file("key.toml", "[detection]\nl_1 = 4\n");
     scratch.file("section.toml", "[detecton]\nl1 = 4\n");
     scratch.file("z.toml", "[detection]\nrule = 'window'\n");
+    scratch.file("empty.toml", "");
     scratch.all_refused(
         "replay --input photons.csv --out out",
         "--settings missing.toml | missing.toml: No such file
@@ -108,7 +109,7 @@ fn what_contradicts_the_file_is_refused() {
         --mask x | must be a whole number from 0 to 65535
         --patience 8 | --patience is for --binning
         --echo-wait 8 | --echo-wait is for --echoes of 2 or more
-        --estimator window | --estimator window needs --sigma-bins or --half-widths
+        --settings empty.toml --estimator window | --estimator window needs --sigma-bins or --half-widths
         --estimator centroid --half-widths 2,3 | --half-widths is for --estimator window
         --half-widths 2 | must be BEFORE,AFTER, each 1 to 4 bins
         --half-widths 2,4.1 | must be BEFORE,AFTER, each 1 to 4 bins

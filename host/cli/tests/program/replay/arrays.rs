@@ -15,6 +15,7 @@ fn array(name: &str) -> PathBuf {
 #[test]
 fn every_order_and_type_gives_the_same_events() {
     let scratch = Scratch::new();
+    let defaults = scratch.file("defaults.toml", "");
     let mut all = Vec::new();
     for (name, options) in [
         ("plain.npy", "--axes captures,rows,columns,bins"),
@@ -26,7 +27,8 @@ fn every_order_and_type_gives_the_same_events() {
         ("one.npz", "--axes captures,rows,columns,bins"),
         ("two.npz", "--axes captures,rows,columns,bins --array lit"),
     ] {
-        let options = format!("{options} --recorded-cycles 100 --rule paper");
+        let settings = defaults.display();
+        let options = format!("{options} --recorded-cycles 100 --settings {settings}");
         let summary = scratch.replayed(&array(name), &options);
         assert_eq!(
             [&summary["pixels"], &summary["photons"]],
@@ -148,8 +150,11 @@ fn neighbours_are_added_up_and_bins_cut_off_and_all_is_counted() {
 #[test]
 fn what_is_surely_wrong_is_said() {
     let scratch = Scratch::new();
+    let defaults = scratch.file("defaults.toml", "");
+    // So few bins that no settings are found.
     let warned = |input: &Path, options: &str, part: &str| {
-        let output = scratch.replay(input, options);
+        let options = format!("--settings {} {options}", defaults.display());
+        let output = scratch.replay(input, &options);
         let said = String::from_utf8(output.stderr).unwrap();
         assert!(
             output.status.success() && said.lines().count() == 1,
@@ -168,23 +173,19 @@ fn what_is_surely_wrong_is_said() {
     let plain = array("plain.npy");
     warned(
         &plain,
-        "--rule paper --bin-width-ps 0.25",
+        "--bin-width-ps 0.25",
         "bins of 0.25 ps: --bin-width-ps takes picoseconds; 0.25 ns are 250",
     );
     warned(
         &plain,
-        "--rule paper --bin-width-ps 0.0001",
+        "--bin-width-ps 0.0001",
         "bins of 0.0001 ps: --bin-width-ps takes picoseconds; no TDC has such bins",
     );
     // 16 bins, the pulse in bin 9, before 4 rows of 8 columns.
     let mut counts = vec![10u8; 16 * 32];
     counts[9 * 32..10 * 32].fill(200);
     let turned = scratch.file("turned.npy", npy("|u1", "(16, 4, 8)", &counts));
-    warned(
-        &turned,
-        "--rule paper",
-        "the first axis looks like the bins",
-    );
+    warned(&turned, "", "the first axis looks like the bins");
     // The same with the bins in the middle.
     let mut counts = vec![10u8; 16 * 32];
     for row in 0..4 {
@@ -192,7 +193,7 @@ fn what_is_surely_wrong_is_said() {
         counts[first..first + 8].fill(200);
     }
     let middle = scratch.file("middle.npy", npy("|u1", "(4, 16, 8)", &counts));
-    warned(&middle, "--rule paper", "axis 2 of 3 looks like the bins");
+    warned(&middle, "", "axis 2 of 3 looks like the bins");
     let summary = scratch.replayed(&middle, "--axes rows,bins,columns");
     assert_eq!(summary["warnings"], serde_json::json!([]));
     let summary = scratch.replayed(&turned, "--axes bins,rows,columns");

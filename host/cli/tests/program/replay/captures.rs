@@ -43,12 +43,12 @@ fn one_capture_of_several_can_be_chosen() {
     let all = scratch.file("all.npy", npy("|u1", "(3, 2, 2, 16)", &bytes(0..3)));
     let one = scratch.file("one.npy", npy("|u1", "(1, 2, 2, 16)", &bytes(1..2)));
     let axes = "--axes captures,rows,columns,bins";
-    let summary = scratch.replayed(&all, &format!("{axes} --alpha 4 --capture 1"));
+    let summary = scratch.replayed(&all, &format!("{axes} --rule paper --capture 1"));
     assert_eq!(summary["pixels"], 4);
     assert_eq!(summary["recording"]["capture"], "1 of 3, counted from 0");
     let chosen = scratch.events();
     assert!(!chosen.is_empty());
-    scratch.replayed(&one, &format!("{axes} --alpha 4"));
+    scratch.replayed(&one, &format!("{axes} --rule paper"));
     assert_eq!(scratch.events(), chosen);
     // Pixels of one capture are neighbours.
     scratch.replayed(

@@ -21,7 +21,10 @@ fn steady(pixel: u16, bin: u16, cycles: u64) -> String {
 fn a_steady_pixel_reports_when_the_flow_chart_says() {
     let scratch = Scratch::new();
     let input = scratch.file("photons.csv", steady(7, 60, 100));
-    let summary = scratch.replayed(&input, "--alpha 8 --x 4 --l1 40 --l2 2000");
+    let summary = scratch.replayed(
+        &input,
+        "--rule paper --alpha 8 --x 4 --l1 40 --l2 2000 --estimator centroid",
+    );
     // N = 44 is the first multiple of 4 above 40; cycles count from 0. All in
     // bin 60 puts the centroid at 60.5 bins of 37.474 mm.
     let expected =
@@ -273,13 +276,14 @@ fn dynamic_depth_is_shown_over_time_where_it_is_asked_for() {
     let far = steady(0, 60, 1000);
     let near = (1000..2000).map(|cycle| format!("0,{cycle},40\n"));
     let input = scratch.file("photons.csv", far + &near.collect::<String>());
-    scratch.replayed(&input, "--rule paper");
+    let defaults = format!("--settings {}", scratch.file("defaults.toml", "").display());
+    scratch.replayed(&input, &defaults);
     let (plain, events) = (
         scratch.read("out/report.html"),
         scratch.read("out/events.csv"),
     );
     assert!(!plain.contains("Dynamic depth"));
-    scratch.replayed(&input, "--rule paper --dynamic-depth");
+    scratch.replayed(&input, &format!("{defaults} --dynamic-depth"));
     let shown = scratch.read("out/report.html");
     assert!(shown.contains("<figcaption>Dynamic depth: 3 changes in place of 45 events."));
     let figures = |report: &str| report.matches("<svg").count();
@@ -287,7 +291,7 @@ fn dynamic_depth_is_shown_over_time_where_it_is_asked_for() {
     assert_eq!(scratch.read("out/events.csv"), events);
     // More than a third of 20 bins; a wall has no changes.
     for options in ["--threshold-mm 300", "--cycles 1000"] {
-        scratch.replayed(&input, &format!("--rule paper --dynamic-depth {options}"));
+        scratch.replayed(&input, &format!("{defaults} --dynamic-depth {options}"));
         assert_eq!(figures(&scratch.read("out/report.html")), figures(&plain));
     }
 }
@@ -296,7 +300,9 @@ fn dynamic_depth_is_shown_over_time_where_it_is_asked_for() {
 fn replay_takes_the_stated_defaults_and_keeps_quiet() {
     let scratch = Scratch::new();
     let input = scratch.file("photons.csv", steady(0, 60, 100));
-    let output = scratch.replay(&input, "--alpha 4 --quiet");
+    scratch.file("empty.toml", "");
+    let empty = scratch.path("empty.toml");
+    let output = scratch.replay(&input, &format!("--settings {} --quiet", empty.display()));
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
     let summary = scratch.summary();
     let settings = serde_json::json!({

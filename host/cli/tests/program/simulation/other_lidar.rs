@@ -165,7 +165,9 @@ fn a_dithered_run_is_the_same_on_any_number_of_threads_and_its_photons_replay_to
         .chain(rows)
         .collect();
     scratch.file("photons.csv", recorded);
-    scratch.printed("replay --input photons.csv --columns 4 --rule paper --out replayed");
+    scratch.file("empty.toml", "");
+    let replay = "replay --input photons.csv --columns 4 --settings empty.toml --out replayed";
+    scratch.printed(replay);
     let replayed = read("replayed", "events.csv");
     let lines = |bytes: &[u8]| String::from_utf8_lossy(bytes).lines().count();
     assert!(lines(&one[0]) > 100);
