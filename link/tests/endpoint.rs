@@ -78,13 +78,16 @@ fn a_host_greets_until_it_is_answered_and_a_device_waits() {
         assert_eq!(sent(&mut device, now), [[0; 0]; 0]);
     }
     assert_eq!(greeted, [1000, 1100, 1200, 1300, 1400]);
+    // Another host opens nothing.
+    host.receive(Ok(&[&frame(HELLO, 0, 0)[..], &HOST].concat()), 1500);
+    assert!(!host.is_open() && host.counters().foreign == 1);
     // A welcome to another session, or without a greeting, opens nothing.
     host.receive(
         Ok(&[WELCOME, LOW ^ 1, HIGH, 0, 0, 4, 2, 2, 2, 2, 2, 2, 2, 2]),
         1500,
     );
     host.receive(Ok(&frame(WELCOME, 0, 0)), 1500);
-    assert!(!host.is_open() && host.counters().foreign == 1);
+    assert!(!host.is_open() && host.counters().foreign == 2);
 }
 
 #[test]
@@ -136,6 +139,7 @@ fn what_is_of_another_session_or_of_the_own_kind_is_foreign_and_a_device_answers
 
             let mut host = host();
             host.receive(Ok(&strange), 30);
+            assert!(host.take_began() && !host.take_began());
             assert_eq!(host.is_lost(), is_ours && kind == NO_SESSION);
             let is_known = is_ours && of_device.contains(&kind);
             assert_eq!(host.counters().foreign, u32::from(!is_known));
@@ -234,6 +238,10 @@ fn frames_that_are_none_are_counted() {
     assert_eq!((counters.corrupt, counters.oversized), (2, 2));
     assert_eq!(counters.frames, frames);
     assert_eq!(device.silent_ms(9), 9);
+    // The longest body is none too many.
+    let longest = [&frame(MESSAGE, 0, 0)[..], &[7; BODY_BYTES]].concat();
+    device.receive(Ok(&longest), 1);
+    assert_eq!(device.take().unwrap().body, [7; BODY_BYTES]);
 }
 
 #[test]
@@ -274,10 +282,50 @@ fn messages_are_taken_once_and_in_order_while_there_is_room() {
         [[KEEP_ALIVE_OF_DEVICE, LOW, HIGH, 0, 4, 4]]
     );
     assert_eq!(sent(&mut device, 1), [[0; 0]; 0]);
-    for number in 0..4 {
+    for number in 0..4_u8 {
+        assert_eq!(device.waiting(), 4 - usize::from(number));
+        assert_eq!(device.peek().unwrap().body, [number]);
         assert_eq!(device.take().unwrap().body, [number]);
     }
+    assert_eq!((device.waiting(), device.peek()), (0, None));
     assert_eq!(device.take(), None);
+}
+
+#[test]
+fn a_device_that_forgets_the_session_has_no_messages_and_says_nothing() {
+    let mut device = device();
+    device.receive(Ok(&[&frame(MESSAGE, 0, 0)[..], b"1"].concat()), 1);
+    device.offer(ANSWER, b"2").unwrap();
+    device.close();
+    assert!(!device.is_open() && device.is_settled() && !device.take_ended());
+    assert_eq!((device.waiting(), sent(&mut device, 1000)), (0, vec![]));
+}
+
+#[test]
+fn a_full_window_is_named() {
+    assert_eq!(Full.to_string(), "the window is full");
+}
+
+/// What is sent after a silence waits no longer than what is sent at once, and an acknowledgement of nothing
+/// postpones nothing.
+#[test]
+fn a_message_is_repeated_after_the_shortest_wait() {
+    let mut host = host();
+    for now in 0..5000 {
+        host.receive(Ok(&frame(KEEP_ALIVE_OF_DEVICE, 0, 0)), now);
+        assert!(
+            kinds(&sent(&mut host, now))
+                .iter()
+                .all(|&(kind, _)| kind == KEEP_ALIVE)
+        );
+    }
+    host.offer(MESSAGE, b"1").unwrap();
+    assert_eq!(kinds(&sent(&mut host, 5000)), [(MESSAGE, 0)]);
+    let repeated = |now: &u32| {
+        host.receive(Ok(&frame(KEEP_ALIVE_OF_DEVICE, 0, 0)), *now);
+        kinds(&sent(&mut host, *now)).contains(&(MESSAGE, 0))
+    };
+    assert_eq!((5001..9000).find(repeated), Some(5000 + RETRANSMIT_MS));
 }
 
 #[test]

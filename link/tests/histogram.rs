@@ -45,6 +45,16 @@ fn read(head: HistogramHead, bodies: &[Vec<u8>]) -> Vec<u32> {
 }
 
 #[test]
+fn a_histogram_is_whole_or_not() {
+    let mut body = bodies(HEAD, &[1; 8]).remove(0);
+    for (whole, is_whole) in [(0, Some(false)), (1, Some(true)), (2, None), (255, None)] {
+        body[3] = whole;
+        let part = HistogramPart::from_le_bytes(&body);
+        assert_eq!(part.map(|part| part.unwrap().head().is_whole), is_whole);
+    }
+}
+
+#[test]
 fn the_width_is_the_smallest_and_decides_how_many_messages_there_are() {
     for width in 1..=24 {
         let mut counts = [0; 128];

@@ -16,6 +16,7 @@ use dtof_link::{
     StopReason, Token,
 };
 use proptest::prelude::*;
+use proptest::strategy::ValueTree as _;
 
 use crate::common::{give, golden};
 
@@ -145,6 +146,56 @@ fn what_is_too_long_is_named_so() {
         .filter_map(|&byte| deframer.push(byte).map(|frame| frame.err()))
         .last();
     assert_eq!(found, Some(Some(FrameError::Oversized)));
+}
+
+/// One byte more than the longest frame is too long, and that many are only corrupt.
+#[test]
+fn the_longest_frame_has_two_bytes_for_its_code() {
+    for (bytes, error) in [
+        (WIRE_BYTES - 1, FrameError::Corrupt),
+        (WIRE_BYTES, FrameError::Oversized),
+    ] {
+        let mut deframer = Deframer::new();
+        assert!((0..bytes).all(|_| deframer.push(1).is_none()));
+        assert_eq!(deframer.push(0), Some(Err(error)), "{bytes}");
+    }
+}
+
+#[test]
+fn blocks_need_a_patience() {
+    let binning = |patience| AdaptiveBinning {
+        levels: BlockLevel::saturating(1),
+        patience,
+    };
+    let mut runner = proptest::test_runner::TestRunner::deterministic();
+    let mut any = configuration().new_tree(&mut runner).unwrap().current();
+    any.binning = Some(binning(1));
+    assert_eq!(Configuration::from_le_bytes(&any.to_le_bytes()), Ok(any));
+    any.binning = Some(binning(0));
+    let refused = Configuration::from_le_bytes(&any.to_le_bytes());
+    assert_eq!(refused, Err(Refusal::Patience));
+}
+
+#[test]
+fn every_token_comes_back() {
+    let photons = (0..=u16::MAX).map(|code| Token::Photon { code });
+    let advances = (1..=64).map(|pixels| Token::Advance { pixels });
+    let ends = (0..=u16::MAX).map(|cycles| Token::EndOfCycles { cycles });
+    for token in photons.chain(advances).chain(ends) {
+        let mut bytes = token.to_bytes().to_vec();
+        bytes.push(7);
+        assert_eq!(Token::split_first(&bytes), Some((token, &[7][..])));
+    }
+}
+
+#[test]
+fn a_sensor_without_a_bin_width_has_none() {
+    let mut bytes = [0; SensorRecord::BYTES];
+    bytes[0] = 9;
+    let (sensor, _) = SensorRecord::from_le_bytes(&bytes).unwrap();
+    let sensor = sensor.unwrap();
+    assert_eq!((sensor.pixels, sensor.bin_width), (9, None));
+    assert_eq!(SensorRecord::to_le_bytes(Some(&sensor), 10), bytes);
 }
 
 /// Any rule, estimator and source with any numbers. Only a device checks numbers such as X and the gate.

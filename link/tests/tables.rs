@@ -3,7 +3,7 @@
 
 use std::fmt::Display;
 
-use dtof_core::Statistics;
+use dtof_core::{GateError, PixelConfigError, Statistics};
 use dtof_link::endpoint::{BODY_BYTES, LinkCounters, WINDOW};
 use dtof_link::frame::WIRE_BYTES;
 use dtof_link::{
@@ -115,6 +115,23 @@ fn every_refusal_has_its_own_number_and_reason() {
     let all: Vec<Refusal> = (0..=255).filter_map(Refusal::from_number).collect();
     assert_eq!(all.len(), 24);
     are_documented(&all, |&refusal| refusal as u8, "\n| reason | |\n");
+}
+
+/// Core's errors and the device's refusals have the same words.
+#[test]
+fn every_error_of_core_has_the_refusal_of_its_words() {
+    let pixel = [
+        PixelConfigError::ZeroX,
+        PixelConfigError::XAboveL1,
+        PixelConfigError::L2NotAboveL1,
+        PixelConfigError::NoLook,
+    ];
+    let pixel = pixel.map(|error| (Refusal::from(error), error.text()));
+    let gate = [GateError::PastLastBin, GateError::TooNarrow];
+    let gate = gate.map(|error| (Refusal::from(error), error.text()));
+    for (refusal, text) in pixel.into_iter().chain(gate) {
+        assert_eq!(refusal.to_string(), text);
+    }
 }
 
 #[test]
