@@ -5,9 +5,10 @@ use std::num::NonZeroU16;
 
 use crate::common::{RecordingSink, SinkCall};
 use dtof_core::PixelAddress;
-use dtof_core::fixed::types::{U0F32, U8F24};
+use dtof_core::fixed::types::{U0F32, U8F24, U16F16};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::simulated::{Pulse, RateError, Settings, Simulated, SimulatedPixel};
-use dtof_sensors::{Polled, Sensor};
+use dtof_sensors::{Polled, Sensor, SensorInfo};
 
 const SHARES: [U0F32; 2] = [U0F32::lit("0.25"), U0F32::lit("0.5")];
 const PULSE: Pulse = Pulse::new(&SHARES);
@@ -40,6 +41,7 @@ fn run(sensor: &mut Simulated, cycles: u32) -> Vec<SinkCall> {
 
 fn ended(given: &[SinkCall]) -> u32 {
     let cycles = given.iter().map(|given| match given {
+        SinkCall::End(0) => panic!("no laser cycle has ended"),
         SinkCall::End(cycles) => u32::from(*cycles),
         _ => 0,
     });
@@ -67,6 +69,27 @@ fn says_how_fast_its_laser_is_and_how_many_pixels_it_has() {
     let pixels = [pixel(0, 60, 0.1, 0.1), pixel(6, 60, 0.1, 0.1)];
     let info = Simulated::new(&pixels, PULSE, settings(1)).info();
     assert_eq!((info.laser_millihertz, info.pixels), (100_000_000, 7));
+}
+
+#[test]
+fn bins_are_as_wide_as_those_of_a_sensor_within_a_sixteenth() {
+    let own = U16F16::lit("256");
+    let sensor = SensorInfo {
+        bin_width: Some(own),
+        ..SensorInfo::new(1)
+    };
+    let least = own - own / 16;
+    let most = own + own / 16;
+    for (width, is_near) in [
+        (least - U16F16::DELTA, false),
+        (least, true),
+        (own, true),
+        (most, true),
+        (most + U16F16::DELTA, false),
+    ] {
+        assert_eq!(sensor.has_bins_of(width), is_near, "{width}");
+        assert!(SensorInfo::new(1).has_bins_of(width));
+    }
 }
 
 #[test]
@@ -171,6 +194,11 @@ fn the_time_says_how_many_laser_cycles_are_due() {
     // 15 are due, 10 are made up for.
     assert_eq!(poll(18), (10, 5));
     assert_eq!(poll(19), (1, 5));
+    // What a start finds due is from before it.
+    sensor.start(U16F16::ONE, Dither::OFF);
+    assert_eq!(sensor.poll(7, &mut sink), Ok(Polled::Idle));
+    assert_eq!(sensor.poll(8, &mut sink), Ok(Polled::Data));
+    assert_eq!(ended(&sink.take()), 1);
 }
 
 #[test]

@@ -2,7 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use dtof_sensors::{tdc7200, tmf882x, tmf8829};
+use dtof_core::PixelAddress;
+use dtof_core::fixed::types::U8F24;
+use dtof_sensors::dither::Dither;
+use dtof_sensors::simulated::SimulatedPixel;
+use dtof_sensors::{i2c, photon_timer, tdc7200, tmf882x, tmf8829};
 
 #[test]
 fn every_error_of_settings_names_what_is_wrong() {
@@ -60,6 +64,20 @@ fn every_error_of_a_poll_says_what_happened() {
     type Bus = &'static str;
     let texts = [
         (
+            tdc7200::Error::<Bus, Bus>::Pin("cut").to_string(),
+            "TDC7200: pin: \"cut\"",
+        ),
+        (
+            tdc7200::Error::<Bus, Bus>::NotWritten {
+                register: 1,
+                wrote: 0x42,
+                read: 0x40,
+            }
+            .to_string(),
+            "TDC7200: register 0x01 reads 0x40, not 0x42",
+        ),
+        (i2c::Error::Pin.to_string(), "a pin failed"),
+        (
             Tmf882x::<Bus, Bus>::Bus("cut").to_string(),
             "TMF882x: bus: \"cut\"",
         ),
@@ -106,4 +124,37 @@ fn every_error_of_settings_of_a_tmf8829_is_its_own_line() {
         assert!(error.text().len() > 20);
         assert_eq!(error.text(), error.to_string());
     }
+}
+
+#[test]
+fn every_error_of_a_photon_timer_is_its_own_line() {
+    use photon_timer::ConfigError as Of;
+
+    let all = [
+        (Of::TooFast, "at most 922509 a second"),
+        (Of::TooSlow, "a laser cycle a second"),
+        (Of::NoPulse, "is 0 ns"),
+        (Of::LongPulse, "leaves no pause"),
+        (Of::PulseBeyondLimit, "longer than 1000 ns"),
+        (Of::DutyBeyondLimit, "more than 2 % of the time"),
+    ];
+    for (error, part) in all {
+        assert!(error.text().contains(part), "{error}");
+        assert_eq!(error.text(), error.to_string());
+    }
+}
+
+#[test]
+fn what_a_dither_and_a_simulated_pixel_cannot_be_is_said() {
+    let error = Dither::new(3, 1).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "the range of the dither must be an even number of bins, at most 254"
+    );
+    let more = U8F24::lit("2.5");
+    let error = SimulatedPixel::new(PixelAddress::new(0), 0, more, more).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "more than 4 photons a laser cycle in a pixel"
+    );
 }

@@ -401,3 +401,18 @@ fn between(here: i32, there: i32) -> i16 {
     let part = (128 * part + whole / 2).checked_div(whole).unwrap_or(0) as i16;
     if here > 0 { part } else { -part }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::has_crossed;
+
+    #[test]
+    fn a_moment_crosses_where_it_is_0_or_changes_its_sign() {
+        for before in [i32::MIN / 64, -7, -1, 1, 7, i32::MAX / 64] {
+            for moment in [i32::MIN / 64, -7, -1, 0, 1, 7, i32::MAX / 64] {
+                let is_other = before.signum() != moment.signum();
+                assert_eq!(has_crossed(before, moment), is_other, "{before} {moment}");
+            }
+        }
+    }
+}

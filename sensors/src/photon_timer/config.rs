@@ -357,6 +357,13 @@ mod tests {
     }
 
     #[test]
+    fn clocks_are_those_of_the_laser_and_the_rest_is_not_sampled() {
+        let config = config(100_000, 100).unwrap();
+        assert_eq!(config.laser_clocks(), [125_000_000, 1250, 13]);
+        assert_eq!(config.unsampled_clocks(), 1250 - 128);
+    }
+
+    #[test]
     fn the_rate_is_that_of_whole_clocks() {
         let millihertz = |hz| config(hz, 100).unwrap().laser_millihertz();
         assert_eq!(millihertz(100_000), 100_000_000);

@@ -80,18 +80,23 @@ struct Ring {
     polls: usize,
     stalls_at: Option<u32>,
     starts: u32,
+    /// While the laser fires.
+    dither: Option<Dither>,
 }
 
 impl Sampler for Ring {
     const KEPT: u32 = 40;
 
-    fn start(&mut self, _: &Config, _: Dither) {
+    fn start(&mut self, _: &Config, dither: Dither) {
         self.completed = 0;
         self.starts += 1;
+        self.dither = Some(dither);
         self.stalls_at = self.stalls_at.filter(|_| self.starts < 2);
     }
 
-    fn stop(&mut self) {}
+    fn stop(&mut self) {
+        self.dither = None;
+    }
 
     fn completed(&mut self) -> u32 {
         let more = self.steps[self.polls % self.steps.len()];
@@ -161,6 +166,7 @@ fn timer(cycles: Vec<Levels>, steps: Vec<u32>) -> PhotonTimer<Ring> {
         polls: 0,
         stalls_at: None,
         starts: 0,
+        dither: None,
     };
     let mut timer = PhotonTimer::new(ring, Config::new(SETTINGS).unwrap());
     timer.start(U16F16::from_num(BIN_PS), Dither::OFF);
@@ -326,6 +332,53 @@ fn between_two_starts_the_laser_rests_for_a_laser_cycle() {
             assert!(clocks.min().unwrap() >= config.period(), "{laser_hz} Hz");
         }
     }
+}
+
+/// Dark laser cycles.
+fn dark(cycles: usize, steps: Vec<u32>) -> PhotonTimer<Ring> {
+    timer(vec![Levels(vec![false; 129]); cycles], steps)
+}
+
+#[test]
+fn as_many_laser_cycles_as_are_kept_may_wait_and_of_more_half_of_those_stay() {
+    let mut seen = Seen::default();
+    // Twice for each batch: before and after it is copied.
+    let mut timer = dark(40, vec![40, 0]);
+    assert_eq!(timer.poll(LATER_MS, &mut seen), Ok(Polled::Data));
+    assert_eq!((timer.lost(), seen.ended.len()), (0, 40));
+    for late in 41..80 {
+        let mut timer = dark(late as usize, vec![late, 0]);
+        let lost = timer.poll(LATER_MS, &mut seen);
+        assert_eq!(lost, Err(Error::Lost(late - 20)));
+    }
+}
+
+#[test]
+fn a_poll_takes_eight_batches_and_says_whether_there_was_anything() {
+    let mut seen = Seen::default();
+    let mut timer = dark(133, vec![16, 0]);
+    assert_eq!(timer.poll(LATER_MS, &mut seen), Ok(Polled::Data));
+    assert_eq!(seen.ended.len(), 128);
+    assert_eq!(timer.poll(LATER_MS, &mut seen), Ok(Polled::Data));
+    assert_eq!(seen.ended.len(), 133);
+    assert_eq!(timer.poll(LATER_MS, &mut seen), Ok(Polled::Idle));
+}
+
+#[test]
+fn the_laser_is_off_until_the_poll_after_its_rest_and_after_a_stop() {
+    let dither = Dither::new(64, 5).unwrap();
+    let mut timer = dark(10, vec![1, 0]);
+    let poll = |timer: &mut PhotonTimer<Ring>, now_ms| {
+        timer.poll(now_ms, &mut Seen::default()).unwrap();
+        timer.sampler.dither
+    };
+    assert_eq!(poll(&mut timer, LATER_MS), Some(Dither::OFF));
+    timer.start(U16F16::from_num(BIN_PS), dither);
+    assert_eq!(timer.sampler.dither, None);
+    assert_eq!(poll(&mut timer, 10), None);
+    assert_eq!(poll(&mut timer, 20), Some(dither));
+    timer.stop();
+    assert_eq!(timer.sampler.dither, None);
 }
 
 #[test]

@@ -61,5 +61,10 @@ mod tests {
             assert!(far.signal < near.signal);
         }
         assert_eq!(PIXELS[15].position, 110);
+        // Of the photons of a pixel: 0.5 of 1 a laser cycle, and 0.1 of 0.6.
+        let share = |share: u32, of: u32| (u64::from(share) << 32) / u64::from(of);
+        for (pixel, share) in [(PIXELS[0], share(1, 2)), (PIXELS[15], share(1, 6))] {
+            assert!(pixel.signal.abs_diff(share) < 1 << 12, "{pixel:?}");
+        }
     }
 }
