@@ -287,7 +287,7 @@ fn read(input: &Input, options: &ReadOptions) -> Result<Content> {
         return Ok(content);
     }
     let (axes, name) = (options.axes.as_ref(), options.array.as_deref());
-    let content = match kind {
+    let mut content = match kind {
         Kind::Csv => list::<CsvReader>(input, options)?,
         Kind::Log => log(input.file().context("a log is a file")?, options)?,
         Kind::Array => array(input, options, histograms::read(input, axes)?)?,
@@ -296,6 +296,14 @@ fn read(input: &Input, options: &ReadOptions) -> Result<Content> {
             array(input, options, archive::read(path, name, axes)?)?
         }
     };
+    if let (Content::Histograms(counts), Some(RecordingLength::Cycles(cycles))) =
+        (&mut content, options.length)
+    {
+        let all = counts.captures.iter().flatten();
+        let highest = all.filter_map(|counts| counts.iter().max().copied());
+        let warning = warnings::few_cycles(highest.collect(), cycles, options.rebin);
+        counts.metadata.warnings.extend(warning);
+    }
     if let (Content::Histograms(counts), Some(columns)) = (&content, options.columns) {
         let has = counts.array.columns();
         ensure!(

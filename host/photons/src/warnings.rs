@@ -33,6 +33,21 @@ pub fn empty_histograms(is_empty: impl Iterator<Item = bool>) -> Option<String> 
     (empty == all).then(|| format!("no photons: all {all} histograms are empty"))
 }
 
+/// Warns if half of the histograms have a bin with more than a photon a laser cycle. `highest` are their highest bins, each
+/// the sum of `rebin`.
+#[must_use]
+pub fn few_cycles(mut highest: Vec<u64>, cycles: u64, rebin: u16) -> Option<String> {
+    highest.sort_unstable();
+    let median = highest.get(highest.len() / 2).copied().unwrap_or(0);
+    (median > cycles.saturating_mul(rebin.into())).then(|| {
+        let (cycles, median) = (grouped(cycles), grouped(median));
+        format!(
+            "--recorded-cycles {cycles}: half of the histograms have a bin of {median} photons or more; it is the number of \
+             laser cycles that each histogram counted"
+        )
+    })
+}
+
 /// Warns if the first photon of a list comes after the `cycles` laser cycles that are read.
 #[must_use]
 pub fn late_photons(first_cycle: u64, cycles: u64) -> Option<String> {

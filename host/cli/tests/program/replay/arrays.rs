@@ -181,6 +181,13 @@ fn what_is_surely_wrong_is_said() {
         "--bin-width-ps 0.0001",
         "bins of 0.0001 ps: --bin-width-ps takes picoseconds; no TDC has such bins",
     );
+    warned(
+        &plain,
+        "--recorded-cycles 9",
+        "--recorded-cycles 9: half of the histograms have a bin of 10",
+    );
+    let summary = scratch.replayed(&plain, "--recorded-cycles 1000");
+    assert_eq!(summary["warnings"].as_array().map(Vec::len), Some(1));
     // 16 bins, the pulse in bin 9, before 4 rows of 8 columns.
     let mut counts = vec![10u8; 16 * 32];
     counts[9 * 32..10 * 32].fill(200);
