@@ -140,8 +140,69 @@ impl Counted {
 const LN_2: u64 = 11_629_080;
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test")]
 mod tests {
-    use super::Counted;
+    use super::{Counted, PEAK, REACH, Rates};
+    use crate::flags::Flags;
+    use crate::histogram::gate::RangeGate;
+    use crate::units::BinIndex;
+
+    #[test]
+    fn the_highest_bin_becomes_1023_and_the_others_are_rounded() {
+        for highest in [1, 2, 5, 1023, 1024, 1 << 24, 1 << 30] {
+            for part in 0..=64 {
+                let mut light = [0; REACH];
+                light[3] = highest;
+                light[8] = highest / 64 * part;
+                let found = Rates::relative(&light, light[8] / 2);
+                let rounded = |light: u32| {
+                    let twice = u64::from(light) * 2 * 1023 / u64::from(highest);
+                    u16::try_from(twice.div_ceil(2)).unwrap()
+                };
+                assert_eq!(found.bins[3], 1023);
+                assert_eq!(found.bins[8], rounded(light[8]));
+                assert_eq!(found.background, rounded(light[8] / 2));
+                assert_eq!(found.bins[0], 0);
+            }
+        }
+        // Nothing anywhere.
+        assert_eq!(Rates::relative(&[0; REACH], 0).bins, [0; REACH]);
+    }
+
+    /// In 1/256 bin, within half of that.
+    #[test]
+    fn the_centroid_is_that_of_three_bins_above_the_background_within_the_gate() {
+        const PLACE: u16 = 10;
+        for (first, last, has_left, has_right) in [
+            (0, 31, true, true),
+            (PLACE - 1, 31, true, true),
+            (0, PLACE + 1, true, true),
+            (PLACE, 31, false, true),
+            (0, PLACE, true, false),
+        ] {
+            let gate = RangeGate::<32>::new(first, last).unwrap();
+            for left in [0, 30, 200, 900] {
+                for right in [0, 31, 250, 1000] {
+                    for background in [0, 30, 120] {
+                        let mut bins = [77; REACH];
+                        bins[PEAK - 1..=PEAK + 1].copy_from_slice(&[left, 1023, right]);
+                        let found = Rates { bins, background }
+                            .centroid(&gate, BinIndex::new(PLACE).unwrap());
+                        let above = |light: u16| i32::from(light.saturating_sub(background));
+                        let left = if has_left { above(left) } else { 0 };
+                        let right = if has_right { above(right) } else { 0 };
+                        let sum = left + above(1023) + right;
+                        let off =
+                            (i32::from(found.offset.raw()) - 128) * sum - 256 * (right - left);
+                        assert!(2 * off.abs() <= sum, "{left} {right} {background}");
+                        let clipped =
+                            [Flags::CLIPPED, Flags::NONE][usize::from(has_left && has_right)];
+                        assert_eq!(found.flags, clipped);
+                    }
+                }
+            }
+        }
+    }
 
     /// Few photons, many, all, and more than there were laser cycles.
     #[test]
