@@ -119,7 +119,7 @@ fn every_refusal_has_its_own_number_and_reason() {
 
 /// Core's errors and the device's refusals have the same words.
 #[test]
-fn every_error_of_core_has_the_refusal_of_its_words() {
+fn the_errors_of_core_have_the_refusals_of_their_words() {
     let pixel = [
         PixelConfigError::ZeroX,
         PixelConfigError::XAboveL1,

@@ -60,8 +60,7 @@ const FOUND: &str = "Found in the recording";
 
 /// Prints the summary of a run, with `more` rows, after what was found in the recording.
 fn print_summary(summary: &Summary, more: &[Row], folder: &Path) -> io::Result<()> {
-    let detection = summary.settings.detection_rows();
-    let rows = [&summary.rows()[..], more, &detection].concat();
+    let rows = [&summary.rows()[..], more, &summary.settings.rows()].concat();
     let report = folder.join("report.html");
     let mut out = io::stdout().lock();
     if !summary.found.is_empty() {

@@ -46,7 +46,7 @@ pub struct Refused {
 /// The keys that a settings file sets.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct KeysOfFile {
-    /// The path itself, with links resolved.
+    /// The path itself, with links resolved, or what else set the keys.
     pub path: PathBuf,
     /// Its keys, except those that an option has overridden.
     pub keys: BTreeSet<String>,

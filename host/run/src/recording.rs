@@ -164,7 +164,12 @@ pub fn read_options(requested: &SettingsFile) -> ReadOptions {
         }),
         seed: seed.unwrap_or(1),
         masked: requested.sensor.masked.clone().unwrap_or_default(),
-        dead_time: requested.sensor.dead_time.unwrap_or(0),
+        // Whether or not the rule weighs it.
+        dead_time: requested
+            .sensor
+            .dead_time
+            .or(requested.dead_time_of_sensor)
+            .unwrap_or(0),
     }
 }
 

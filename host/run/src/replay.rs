@@ -10,15 +10,15 @@ use super::recording::{
     RECORDING, check_once_per_bin, mask_capture, read_options, settings_of_file,
 };
 use super::run::{RunResult, Sink, run};
-use dtof_calibrate::CalibrationOptions;
 use dtof_calibrate::report::rows;
+use dtof_calibrate::{Calibration, CalibrationOptions};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
-use dtof_engine::settings::{DetectionSettings, Settings, SettingsFile};
+use dtof_engine::settings::{DetectionSettings, EstimatorName, RuleName, Settings, SettingsFile};
 use dtof_events::clock::LaserClock;
 use dtof_options::progress::Progress;
 use dtof_options::rows::Row;
-use dtof_options::{KeysOfFile, Refused};
+use dtof_options::{KeysOfFile, Refused, option_name};
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
@@ -27,6 +27,11 @@ use dtof_photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
 
 /// The options that settle which photons are replayed, and whether pixels decide once.
 const RUN: &[&str] = &["cycles", "seed", "decide_once"];
+
+/// The options that were part of the search, so that what is found is for them.
+const SEARCHED_WITH: &[&str] = &["bins", "bin_width_ps", "sigma_bins"];
+/// What a z that is found depends on.
+const OF_Z: &[&str] = &["gate", "window", "min_count", "l1", "l2", "x", "binning"];
 
 /// The options of a replay.
 #[derive(Clone, Debug, Default)]
@@ -146,7 +151,7 @@ impl Options {
         mask_capture(&mut requested, recording.array().pixels(), captures)?;
         let has_file = self.given.file.is_some() || self.given.text.is_some();
         let found = match has_file {
-            true => Ok((Vec::new(), None)),
+            true => Ok((Vec::new(), Vec::new())),
             false => find(&mut requested, &mut recording),
         };
         let options = read_options(&requested);
@@ -154,17 +159,20 @@ impl Options {
             photons,
             mut metadata,
         } = recording.photons(&options)?;
-        let (found, warning) = found.unwrap_or_else(|reason| {
+        let (found, warnings) = found.unwrap_or_else(|reason| {
             let warning = format!("no settings were found: {reason:#}; the defaults are used");
-            (Vec::new(), Some(warning))
+            (Vec::new(), vec![warning])
         });
-        metadata.warnings.extend(warning);
+        metadata.warnings.extend(warnings);
         let requested = requested.or(settings_of_file(&metadata, photons.array()));
         if !has_file && requested.detection.rule.is_none() {
             let detection = &requested.detection;
             for (key, is_on) in [
                 ("neighbours", detection.neighbours.unwrap_or(0) > 0),
                 ("tracking", detection.tracking == Some(true)),
+                ("window", detection.window.is_some()),
+                ("z", detection.z.is_some()),
+                ("false_alarm", detection.false_alarm.is_some()),
             ] {
                 let reason = "needs the window rule, but no settings were found in the recording: give `rule` window and `sigma_bins`";
                 ensure!(!is_on, Refused::new(key, reason));
@@ -240,16 +248,16 @@ impl Options {
 }
 
 /// Finds the settings of the sensor in a recording, and puts them under those that were requested. Of a
-/// photon list it reads the laser cycles that are replayed. Gives what was found, one a row, and a warning
-/// about pixels that the mask should leave out.
+/// photon list it reads the laser cycles that are replayed. Gives what was found, one a row, and warnings
+/// about options that do not suit it.
 fn find(
     requested: &mut SettingsFile,
     recording: &mut CheckedRecording,
-) -> Result<(Vec<Row>, Option<String>)> {
+) -> Result<(Vec<Row>, Vec<String>)> {
     let counts = recording.counts()?;
     let all_counts = || counts.captures.iter().flatten().flatten();
     if all_counts().all(|&count| count == 0) {
-        return Ok((Vec::new(), None)); // A warning says so already.
+        return Ok((Vec::new(), Vec::new())); // A warning says so already.
     }
     let metadata = &counts.metadata;
     let source = match requested.sensor.bin_width_ps {
@@ -258,8 +266,10 @@ fn find(
         None => "that of the sensor",
     };
     let width = format!("{} ps, {source}", metadata.bin_width_ps);
-    // Without a settings file the pulse is an option.
-    let options = CalibrationOptions::default().with_pulse_of(requested, true);
+    // Without a settings file the pulse and the share of false alarms are options.
+    let mut options = CalibrationOptions::default().with_pulse_of(requested, true);
+    let share = requested.detection.false_alarm;
+    options.false_alarm = share.unwrap_or(options.false_alarm);
     let mut found = calibrate_counts(requested, &counts, &options, &mut ())?;
     if requested.sensor.offsets_mm.is_some() {
         found.pixel_offsets = None;
@@ -269,23 +279,31 @@ fn find(
             .clone()
             .or(settings_of_file(metadata, counts.array)),
     )?;
-    let found_masked = settings.sensor.masked.iter().flatten();
-    let missed = requested.sensor.masked.as_ref().map(|masked| {
-        let missed = found_masked.filter(|pixel| !masked.contains(pixel));
-        missed.map(u16::to_string).collect::<Vec<_>>()
-    });
-    let warning = missed.filter(|missed| !missed.is_empty()).map(|missed| {
-        let pixels = missed.join(",");
-        format!("hot or dead pixels that --mask does not leave out: {pixels}")
-    });
-    // Rules and blocks that cannot weigh a dead time leave it out.
-    settings.dead_time_of_sensor = settings.sensor.dead_time.take();
+    let mut given = requested.clone();
+    given.detection.false_alarm = None;
+    let given_keys = given.keys()?;
+    let warnings = [
+        masked_too_few(&given, &settings),
+        unsuited_offset(&given, &found),
+    ];
+    // A z is for the exposures that were simulated.
+    if settings.detection.z.is_some() && OF_Z.iter().any(|key| given_keys.contains(*key)) {
+        settings.detection.z = None;
+        settings.detection.false_alarm = Some(options.false_alarm);
+    }
+    let cannot_weigh = given.run.frame.is_some()
+        || given.detection.binning.unwrap_or(0) > 0
+        || given.detection.rule.unwrap_or(RuleName::Window) != RuleName::Window;
+    if cannot_weigh {
+        settings.dead_time_of_sensor = settings.sensor.dead_time.take();
+    }
     // An error about a key that was found says so.
+    let found_keys = found.settings(SettingsFile::default())?.keys()?;
     settings.file = Some(KeysOfFile {
         path: "found in the recording".into(),
-        keys: settings.keys()?,
+        keys: found_keys.clone(),
     });
-    *requested = requested.clone().or(settings);
+    *requested = given.or(settings);
     let mut rows = rows(&found);
     if requested.run.decide_once == Some(true) {
         // Its z, L1 and L2 are for looks. The settings have the rule.
@@ -295,5 +313,37 @@ fn find(
     if !rows.iter().any(|(name, _)| name == "bin width") {
         rows.insert(1, ("bin width".to_owned(), width));
     }
-    Ok((rows, warning))
+    let overridden = given_keys.intersection(&found_keys);
+    let flags = overridden
+        .filter(|key| !SEARCHED_WITH.contains(&key.as_str()))
+        .map(|key| format!("--{}", option_name(key).replace('_', "-")));
+    let flags: Vec<String> = flags.collect();
+    if !flags.is_empty() {
+        rows.push(("overridden".to_owned(), format!("by {}", flags.join(", "))));
+    }
+    Ok((rows, warnings.into_iter().flatten().collect()))
+}
+
+/// Warns if the mask that is given leaves hot or dead pixels in.
+fn masked_too_few(given: &SettingsFile, found: &SettingsFile) -> Option<String> {
+    let masked = given.sensor.masked.as_ref()?;
+    let found = found.sensor.masked.iter().flatten();
+    let missed = found.filter(|pixel| !masked.contains(pixel));
+    let missed: Vec<String> = missed.map(u16::to_string).collect();
+    let pixels = missed.join(",");
+    (!missed.is_empty()).then(|| {
+        format!("hot or dead pixels that --mask does not leave out: {pixels}; add them to it")
+    })
+}
+
+/// Warns if the offset that is found is for another estimator than the one that is given.
+fn unsuited_offset(given: &SettingsFile, found: &Calibration) -> Option<String> {
+    let detection = &given.detection;
+    let is_other =
+        detection.half_widths.is_some() || detection.estimator == Some(EstimatorName::Centroid);
+    let is_used = found.offset.is_some() && given.sensor.offset_mm.is_none();
+    (is_other && is_used).then(|| {
+        "the offset was found with another estimator, so all ranges may be off: --offset-mm sets it"
+            .to_owned()
+    })
 }

@@ -303,7 +303,10 @@ impl Options {
         let source = "formula: Eq. 11, one look, background known; not for use";
         lines.push(Line("gaussian_alpha", gaussian, source.to_owned()));
         let alpha = shortest(tuned.alpha);
-        let options = format!("--rule paper --alpha {alpha} --l1 {}", tuned.l1);
+        let options = format!(
+            "--rule paper --estimator centroid --alpha {alpha} --l1 {}",
+            tuned.l1
+        );
         Ok((lines, options))
     }
 
@@ -385,7 +388,7 @@ impl TuneResult {
         text
     }
 
-    /// The options for other commands, such as `--rule paper --alpha 4.5 --l1 40`.
+    /// The options for other commands, such as `--rule paper --estimator centroid --alpha 4.5 --l1 40`.
     #[must_use]
     pub fn options(&self) -> &str {
         &self.options

@@ -23,7 +23,7 @@ use core::error;
 use core::fmt;
 
 use dtof_core::PixelAddress;
-use dtof_core::fixed::types::{I24F8, U16F16};
+use dtof_core::fixed::types::U16F16;
 
 use crate::dither::Dither;
 use crate::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
@@ -183,7 +183,6 @@ impl<S: Sampler> Sensor for PhotonTimer<S> {
     fn info(&self) -> SensorInfo {
         SensorInfo {
             bin_width: Some(U16F16::from_num(BIN_PS)),
-            offset: I24F8::ZERO,
             laser_millihertz: self.config.laser_millihertz(),
             most_dither: self.config.most_dither(),
             ..SensorInfo::new(1)

@@ -132,6 +132,36 @@ mod tests {
         }
     }
 
+    /// Beside halves, which floating point may round the other way.
+    #[test]
+    fn e_to_the_minus_x_is_rounded_to_the_nearest() {
+        for x in (0..=4 << 24).step_by(9973).chain([1, 4 << 24]) {
+            let exact = (f64::from(x) / -f64::from(1 << 24)).exp() * 2f64.powi(32);
+            let error = (exp_of_minus(x) as f64 - exact).abs();
+            assert!(error < 0.5 + 2f64.powi(-15), "{x}: {error}");
+        }
+    }
+
+    /// Counts with a probability of 2⁻³³ or more are drawn.
+    #[test]
+    fn the_last_count_is_the_last_that_rounds_to_a_number() {
+        for hundredths in 1..=400 {
+            let mean = U8F24::from_num(f64::from(hundredths) / 100.0);
+            let lambda: f64 = mean.to_num();
+            let (mut probability, mut likely) = ((-lambda).exp(), 0_u32);
+            // Each step rounds once more.
+            while probability > 1.2 * 2f64.powi(-33) {
+                likely += 1;
+                probability *= lambda / f64::from(likely);
+            }
+            let drawn = Poisson::new(mean).unwrap().cumulative().count();
+            assert!(
+                drawn >= usize::try_from(likely).unwrap(),
+                "{mean}: {drawn} of {likely}"
+            );
+        }
+    }
+
     #[test]
     fn counts_have_the_mean_and_the_variance_of_their_rate() {
         const DRAWS: u32 = 1_000_000;

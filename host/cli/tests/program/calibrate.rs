@@ -205,39 +205,65 @@ fn a_recording_alone_is_calibrated_first() {
     }
 }
 
-/// Options change what is found, as they change a settings file.
+/// Options change what is found, as they change a settings file. With the laser cycles a z is found as well, which is for what
+/// was found.
 #[test]
 fn options_override_what_is_found() {
     let scratch = Scratch::new();
     scratch.file("glass.npy", recording(&scene(0.02, 5.0)));
-    scratch.printed("calibrate glass.npy --out found.toml");
-    let run = |options: &str| {
-        let printed = scratch.printed(&format!("replay glass.npy --out out {options}"));
+    let run = |length: &str, options: &str| {
+        let line = format!("replay glass.npy --cycles 3000 --out out {length} {options}");
+        let printed = scratch.printed(&line);
         let files = ["events.csv", "dtof.toml"].map(|name| scratch.read(&format!("out/{name}")));
-        (printed.contains("Found in the recording:"), files)
+        (printed, files)
     };
-    let (_, [found, _]) = run("");
-    for options in [
-        "--l1 60",
-        "--min-count 8",
-        "--gate 20..100",
-        "--false-alarm 0.001",
-        "--z 6",
-        "--window 5",
-        "--estimator centroid",
-        "--echoes 2 --echo-wait 4",
-        "--binning 2",
-        "--counter-bits 8 --x 8",
-        "--rule average --alpha 5",
-        "--rule paper",
-        "--frame 200",
-        "--once-per-bin=false --l1 8 --mask 5",
-    ] {
-        let (is_found, files) = run(options);
-        let (is_found_again, by_hand) = run(&format!("{options} --settings found.toml"));
-        assert_eq!([is_found, is_found_again], [true, false], "{options}");
-        assert_eq!(files, by_hand, "{options}");
-        assert_ne!(files[0], found, "{options}");
+    for length in ["", "--recorded-cycles 8000"] {
+        scratch.printed(&format!("calibrate glass.npy {length} --out found.toml"));
+        let without_z = |row: &str| match row.starts_with("z = ") {
+            true => "false_alarm = 0.01\n".to_owned(),
+            false => format!("{row}\n"),
+        };
+        let text = scratch.read("found.toml");
+        assert_eq!(text.contains("\nz = "), !length.is_empty());
+        scratch.file(
+            "for-z.toml",
+            text.lines().map(without_z).collect::<String>(),
+        );
+        let (printed, [found, _]) = run(length, "");
+        assert!(!printed.contains("overridden"), "{printed}");
+        for (options, settings, overridden) in [
+            ("--l1 60", "for-z.toml", "--l1"),
+            ("--min-count 8", "for-z.toml", "--min-count"),
+            ("--gate 20..100", "for-z.toml", "--gate"),
+            ("--window 5", "for-z.toml", "--window"),
+            ("--binning 2", "for-z.toml", ""),
+            ("--counter-bits 8 --x 8", "for-z.toml", "--x"),
+            ("--false-alarm 0.001 --l1 50", "for-z.toml", "--l1"),
+            ("--z 6", "found.toml", ""),
+            ("--estimator centroid", "found.toml", ""),
+            ("--echoes 2 --echo-wait 4", "found.toml", ""),
+            ("--rule average --alpha 5", "found.toml", "--rule"),
+            ("--rule paper", "found.toml", "--rule"),
+            ("--frame 200", "found.toml", ""),
+        ] {
+            let (printed, files) = run(length, options);
+            assert_contains(&printed, "Found in the recording:");
+            let row = printed.lines().find(|row| row.contains("  overridden "));
+            let flags = row.and_then(|row| row.split(" by ").nth(1)).unwrap_or("");
+            let is_of_z = overridden.is_empty() && options == "--z 6" && !length.is_empty();
+            assert_eq!(flags, if is_of_z { "--z" } else { overridden }, "{options}");
+            let (again, by_hand) = run(length, &format!("{options} --settings {settings}"));
+            assert!(!again.contains("Found in the recording"), "{again}");
+            assert_eq!(files, by_hand, "{length} {options}");
+            assert_ne!(files[0], found, "{length} {options}");
+        }
+        // The search is for these false alarms.
+        scratch.printed(&format!(
+            "calibrate glass.npy {length} --false-alarm 0.001 --out rare.toml"
+        ));
+        let (_, files) = run(length, "--false-alarm 0.001");
+        let (_, by_hand) = run(length, "--settings rare.toml");
+        assert_eq!(files, by_hand, "{length}");
     }
     // An error names what was found.
     std::fs::remove_dir_all(scratch.path("out")).unwrap();
@@ -246,12 +272,13 @@ fn options_override_what_is_found() {
         "
         --l1 2 | error: found in the recording: x 4: must not be greater than --l1 2
         --x 50 | error: found in the recording: --x 50: must not be greater than l1 40
+        --alpha 4 | error: found in the recording: --alpha is for rule paper or average
         ",
     );
     // A settings file says all.
     scratch.file("empty.toml", "");
-    let (is_found, [defaults, _]) = run("--settings empty.toml");
-    assert!(!is_found && defaults != found);
+    let (printed, _) = run("", "--settings empty.toml");
+    assert!(!printed.contains("Found in the recording"), "{printed}");
     assert_eq!(scratch.summary()["settings"]["rule"], "paper");
     assert_eq!(scratch.summary()["found"], serde_json::json!({}));
 }
@@ -263,7 +290,7 @@ fn a_mask_that_leaves_hot_pixels_in_is_warned_of() {
     let hot = scratch.file("hot.npy", with_hot(&scene(0.02, 5.0), Some((3, 20_000))));
     let summary = scratch.replayed(&hot, "--mask 5");
     assert_eq!(summary["settings"]["masked"], serde_json::json!([5]));
-    let warning = "hot or dead pixels that --mask does not leave out: 3";
+    let warning = "hot or dead pixels that --mask does not leave out: 3; add them to it";
     assert_eq!(summary["warnings"], serde_json::json!([warning]));
     let summary = scratch.replayed(&hot, "--mask 5,3");
     assert_eq!(summary["warnings"], serde_json::json!([]));
@@ -299,12 +326,13 @@ fn a_list_is_calibrated_from_what_is_replayed() {
 fn a_dim_recording_gets_the_window_rule() {
     let scratch = Scratch::new();
     let dim = scratch.file("dim.npy", recording(DIM));
+    let defaults = format!("--settings {}", scratch.file("defaults.toml", "").display());
     for (length, most_before, least_after) in [("", 90, 100), ("--recorded-cycles 8000", 25, 75)] {
         let with = |options: &str| {
             let summary = scratch.replayed(&dim, &format!("{length} {options}"));
             (right(&scratch, DIM), summary)
         };
-        let (before, _) = with("--rule paper");
+        let (before, _) = with(&defaults);
         let (after, summary) = with("");
         let (once, _) = with("--decide-once");
         println!(

@@ -200,9 +200,9 @@ fn recorded_histograms_are_weighed() {
     }
 }
 
-/// A dead time that is found is weighed where it can be.
+/// A dead time that is found is weighed where it can be, and its photons are drawn with it.
 #[test]
-fn a_dead_time_that_is_found_refuses_no_option() {
+fn a_dead_time_that_is_found_is_that_of_calibrate() {
     let scratch = Scratch::new();
     let counts = histogram(20).repeat(16);
     let bytes: Vec<u8> = counts.into_iter().flat_map(u32::to_le_bytes).collect();
@@ -216,7 +216,21 @@ fn a_dead_time_that_is_found_refuses_no_option() {
     for options in ["--rule paper", "--binning 1", "--frame 100"] {
         assert_eq!(with(options), 0, "{options}");
     }
-    assert_eq!(with("--l1 60"), bins);
+    scratch.printed("calibrate recorded.npy --recorded-cycles 20000 --quiet --out found.toml");
+    for options in ["", "--estimator centroid"] {
+        with(options);
+        let alone = scratch.read("out/events.csv");
+        let summary = scratch.replayed(
+            &input,
+            &format!(
+                "--recorded-cycles 20000 --settings {} {options}",
+                scratch.path("found.toml").display()
+            ),
+        );
+        assert_eq!(used(&summary).0, bins);
+        assert!(alone.lines().count() > 100);
+        assert_eq!(scratch.read("out/events.csv"), alone, "{options}");
+    }
 }
 
 #[test]

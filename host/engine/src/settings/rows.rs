@@ -6,6 +6,9 @@ use dtof_options::rows::Row;
 
 use super::engine::Settings;
 
+/// The most pixels that a row lists.
+const LISTED: usize = 24;
+
 impl Settings {
     /// The settings.
     #[must_use]
@@ -26,8 +29,12 @@ impl Settings {
             rows.insert(2, row("offsets of pixels", text));
         }
         if !self.masked.is_empty() {
-            let pixels: Vec<String> = self.masked.iter().map(u16::to_string).collect();
-            rows.push(row("pixels left out", pixels.join(", ")));
+            let pixels = self.masked.iter().take(LISTED).map(u16::to_string);
+            let mut text = pixels.collect::<Vec<_>>().join(", ");
+            if self.masked.len() > LISTED {
+                text += &format!(" and {} more", self.masked.len() - LISTED);
+            }
+            rows.push(row("pixels left out", text));
         }
         if self.dither_bins > 0 {
             let (half, seed) = (self.dither_bins / 2, self.dither_seed);
@@ -114,8 +121,7 @@ impl Settings {
     }
 
     /// Rule, or frame, estimator, and neighbours and dead time if there are any.
-    #[must_use]
-    pub fn detection_rows(&self) -> Vec<Row> {
+    fn detection_rows(&self) -> Vec<Row> {
         let decision = match self.frame {
             None => ("threshold".to_owned(), threshold(&self.rule)),
             Some(length) => (

@@ -26,7 +26,7 @@ impl Options {
         ];
         lines.extend(self.expected(request, &tuned.detections));
         let options = format!(
-            "--rule average --alpha {} --l1 {}",
+            "--rule average --estimator centroid --alpha {} --l1 {}",
             shortest(tuned.alpha),
             tuned.l1
         );

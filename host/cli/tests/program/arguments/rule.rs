@@ -22,7 +22,7 @@ fn photons(scratch: &Scratch) -> PathBuf {
 /// A settings file that leaves all to the defaults.
 const DEFAULTS: &str = "--settings defaults.toml";
 
-/// The settings in the summary, and the events. Without a settings file the defaults hold.
+/// The settings in the summary, and the events. An empty settings file, unless one is given, makes the defaults hold.
 #[track_caller]
 fn replayed(options: &str) -> (Value, String) {
     let scratch = Scratch::new();

@@ -44,9 +44,12 @@ fn every_line_says_where_it_comes_from() {
         assert_contains(results, part);
     }
     // `dtof replay` accepts them.
-    assert!(options.starts_with("--rule paper --alpha "), "{options}");
+    assert!(
+        options.starts_with("--rule paper --estimator centroid --alpha "),
+        "{options}"
+    );
     assert_eq!(options.lines().count(), 1);
-    let l1 = options.split_whitespace().nth(5).unwrap();
+    let l1 = options.split_whitespace().nth(7).unwrap();
     assert!(l1.parse::<u16>().unwrap() > 0);
 }
 

@@ -151,7 +151,7 @@ fn neighbours_are_added_up_and_bins_cut_off_and_all_is_counted() {
 fn what_is_surely_wrong_is_said() {
     let scratch = Scratch::new();
     let defaults = scratch.file("defaults.toml", "");
-    // So few bins that no settings are found.
+    // Without a search, which would warn that 8 bins are too few.
     let warned = |input: &Path, options: &str, part: &str| {
         let options = format!("--settings {} {options}", defaults.display());
         let output = scratch.replay(input, &options);

@@ -125,3 +125,34 @@ fn one_capture_of_a_log_has_its_own_truth() {
     let known = truth(1).unwrap();
     assert_eq!((known.len(), known[4]), (9, Some(250.0)));
 }
+
+/// True distances give an offset, which is for the estimator that is found.
+#[test]
+fn an_offset_of_another_estimator_is_warned_of() {
+    let scratch = Scratch::new();
+    let captures = (0..4_usize).map(|capture| {
+        let mut counts = [3; 128];
+        let at = 30 + 10 * capture;
+        counts[at..at + 5].copy_from_slice(&[100, 400, 700, 400, 100]);
+        let zone = format!("[{}]", counts.map(|count| count.to_string()).join(","));
+        let metres = (at as f64 + 2.5) * 0.0138 - 0.1;
+        let zones = [zone.as_str(); 9].join(",");
+        format!("{{\"hists\": [{zones}], \"dist_to_plane\": {metres:.4}}}")
+    });
+    let log = format!("[{}]", captures.collect::<Vec<_>>().join(","));
+    let log = scratch.file("log.json", log);
+    let warns = |options: &str| {
+        let summary = scratch.replayed(&log, &format!("--photons-per-cycle 0.5 {options}"));
+        assert!(
+            summary["settings"]["offset_mm"]
+                .as_f64()
+                .is_some_and(|mm| mm < -50.0),
+            "{summary}"
+        );
+        let warnings = summary["warnings"].to_string();
+        warnings.contains("the offset was found with another estimator")
+    };
+    assert!(!warns("") && !warns("--sigma-bins 1.2") && !warns("--estimator window"));
+    assert!(warns("--estimator centroid") && warns("--half-widths 2,3"));
+    assert!(!warns("--estimator centroid --offset-mm -99"));
+}
