@@ -409,6 +409,18 @@ fn a_pixel_that_tracks_needs_fewer_photons_where_it_expects_the_target() {
     }
 }
 
+/// The rule that is chosen at run time weighs as the rule itself does.
+#[test]
+fn any_window_rule_weighs() {
+    let rule = WindowRule::new(3, U4F12::lit("4"), Count::saturating(5)).unwrap();
+    let gate = RangeGate::new(4, 15).unwrap();
+    let any = PixelConfig::<16, AnyRule>::with_rule(rule.into()).gate(gate);
+    let any = any.dead_time(3).build().unwrap();
+    let own = PixelConfig::<16, WindowRule>::with_rule(rule).gate(gate);
+    let own = own.dead_time(3).build().unwrap();
+    assert!(any.weighs_dead_time() && own.weighs_dead_time());
+}
+
 /// With other rules nothing is weighed: only the first photon's TDC has a flag (`pile_up`).
 #[test]
 fn other_rules_take_every_bin_as_live() {

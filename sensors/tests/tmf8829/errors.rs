@@ -470,3 +470,72 @@ fn a_stop_that_the_chip_does_not_acknowledge_switches_it_off() {
         recovers(&mut bench);
     }
 }
+
+/// Polls a millisecond until the next transfer.
+fn until_the_next_transfer(bench: &mut Bench<128>) -> u32 {
+    let before = bench.bus.0.borrow().log.len();
+    let mut waited_ms = 0;
+    while bench.bus.0.borrow().log.len() == before {
+        poll(bench).unwrap();
+        waited_ms += 1;
+    }
+    waited_ms
+}
+
+/// More than 3 ms from ENABLE to the first access, as long before it if ENABLE goes low, and more than 10 ms from the start
+/// of the image.
+#[test]
+fn a_sensor_that_starts_is_given_its_time() {
+    let mut bench = bench();
+    // The first poll drives ENABLE.
+    assert_eq!(until_the_next_transfer(&mut bench), 1 + 4);
+    until_written(&mut bench, &[0x08, 0x16]);
+    assert_eq!(until_the_next_transfer(&mut bench), 11);
+    let mut bench = Bench::<128>::new(Settings {
+        interface: Interface::I2c { address: 0x42 },
+        ..settings(Zones::Z8x8)
+    });
+    assert_eq!(until_the_next_transfer(&mut bench), 1 + 4 + 4);
+}
+
+/// Of an image that fills its transfers no empty one is sent. The longest fits.
+#[test]
+fn an_image_is_sent_in_as_many_transfers_as_it_needs() {
+    for (bytes, transfers) in [(1, 1), (128, 1), (129, 2), (256, 2), (16 * 1024, 128)] {
+        let mut bench = bench();
+        bench.load_with(settings(Zones::Z8x8), vec![0x5A; bytes].leak());
+        // The program is not that of the chip, so it does not start.
+        while poll(&mut bench).is_ok() {}
+        let wires = bench.bus.0.borrow();
+        let is_data = |written: &Vec<u8>| written.first() == Some(&0xFF) && written.len() > 1;
+        let data = wires.log.iter().filter(|(written, _)| is_data(written));
+        let empty = wires.log.iter().filter(|(written, read)| {
+            written == &[0xFF] && read.as_ref().is_some_and(Vec::is_empty)
+        });
+        assert_eq!((data.count(), empty.count()), (transfers, 0), "{bytes}");
+    }
+}
+
+/// A sensor that measures keeps its program.
+#[test]
+fn a_start_switches_off_only_a_sensor_that_does_not_measure() {
+    let uploads = |bench: &Bench<128>| {
+        let wires = bench.bus.0.borrow();
+        let all = wires
+            .log
+            .iter()
+            .filter(|(written, _)| written.starts_with(&[0x08, 0x45]));
+        all.count()
+    };
+    let mut bench = measuring();
+    assert_eq!(uploads(&bench), 1);
+    bench.sensor.start(U16F16::ONE, Dither::OFF);
+    recovers(&mut bench);
+    assert_eq!(uploads(&bench), 1);
+    // After the program has begun it is switched off, and needs its program again.
+    let mut bench = self::bench();
+    until_written(&mut bench, &[0x08, 0x40]);
+    bench.sensor.start(U16F16::ONE, Dither::OFF);
+    recovers(&mut bench);
+    assert_eq!(uploads(&bench), 2);
+}

@@ -115,6 +115,29 @@ fn bins_and_laser_are_described_as_they_are() {
 }
 
 #[test]
+fn over_spi_data_time_out_a_second_after_the_period() {
+    for zones in Zones::ALL {
+        let settings = Settings::over_spi(PixelAddress::new(0), zones);
+        assert_eq!(
+            settings.data_timeout_ms,
+            u32::from(settings.period_ms) + 1000
+        );
+    }
+}
+
+/// The pixels are those up to the last address, of a zone or of a reference.
+#[test]
+fn reference_pixels_may_come_before_the_zones() {
+    for (reference, pixels) in [(None, 74), (Some(0), 74), (Some(74), 78)] {
+        let config = Config::new(Settings {
+            reference: reference.map(PixelAddress::new),
+            ..settings(Zones::Z8x8)
+        });
+        assert_eq!(config.unwrap().info().pixels, pixels, "{reference:?}");
+    }
+}
+
+#[test]
 fn settings_that_cannot_be_are_refused() {
     let refused = |change: fn(&mut Settings)| {
         let mut settings = settings(Zones::Z48x32);
