@@ -14,7 +14,7 @@ use dtof_calibrate::report::rows;
 use dtof_calibrate::{Calibration, CalibrationOptions};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
-use dtof_engine::settings::{DetectionSettings, EstimatorName, RuleName, Settings, SettingsFile};
+use dtof_engine::settings::{DetectionSettings, EstimatorName, Settings, SettingsFile};
 use dtof_events::clock::LaserClock;
 use dtof_options::progress::Progress;
 use dtof_options::rows::Row;
@@ -291,10 +291,8 @@ fn find(
         settings.detection.z = None;
         settings.detection.false_alarm = Some(options.false_alarm);
     }
-    let cannot_weigh = given.run.frame.is_some()
-        || given.detection.binning.unwrap_or(0) > 0
-        || given.detection.rule.unwrap_or(RuleName::Window) != RuleName::Window;
-    if cannot_weigh {
+    let together = given.clone().or(settings.clone());
+    if together.dead_time_obstacle().is_some() {
         settings.dead_time_of_sensor = settings.sensor.dead_time.take();
     }
     // An error about a key that was found says so.

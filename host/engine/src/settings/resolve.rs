@@ -158,12 +158,12 @@ impl SettingsFile {
         }
     }
 
-    /// The dead time of the settings, or else that of the sensor if it can be used.
+    /// Why a dead time shorter than a histogram cannot be used, if it cannot.
     ///
     /// Only the window rule weighs bins by their live laser cycles, and only those of pixels. For all
     /// others a TDC of the first photon is known, but no shorter dead time.
-    fn dead_time(&self, bins: usize) -> Result<u16, Refused> {
-        let whole = u16::try_from(bins).unwrap_or(u16::MAX);
+    #[must_use]
+    pub fn dead_time_obstacle(&self) -> Option<&'static str> {
         let Self { detection, run, .. } = self;
         let obstacles = [
             (
@@ -177,9 +177,16 @@ impl SettingsFile {
             (run.frame.is_some(), "cannot be used with `frame`"),
         ];
         let obstacle = obstacles.iter().find(|(is_there, _)| *is_there);
+        obstacle.map(|(_, reason)| *reason)
+    }
+
+    /// The dead time of the settings, or else that of the sensor if it can be used.
+    fn dead_time(&self, bins: usize) -> Result<u16, Refused> {
+        let whole = u16::try_from(bins).unwrap_or(u16::MAX);
+        let obstacle = self.dead_time_obstacle();
         let is_short = |dead_time: u16| (1..whole).contains(&dead_time);
         match (self.sensor.dead_time, obstacle) {
-            (Some(dead_time), Some((_, reason))) if is_short(dead_time) => {
+            (Some(dead_time), Some(reason)) if is_short(dead_time) => {
                 let reason = format!("{reason}, unless it is {bins} bins or more");
                 Err(Refused::value("dead_time", dead_time, reason))
             }
