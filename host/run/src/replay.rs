@@ -284,6 +284,7 @@ fn find(
     let given_keys = given.keys()?;
     let warnings = [
         masked_too_few(&given, &settings),
+        glass_in_gate(&given, &found),
         unsuited_offset(&given, &found),
     ];
     // A z is for the exposures that were simulated.
@@ -331,6 +332,18 @@ fn masked_too_few(given: &SettingsFile, found: &SettingsFile) -> Option<String> 
     let pixels = missed.join(",");
     (!missed.is_empty()).then(|| {
         format!("hot or dead pixels that --mask does not leave out: {pixels}; add them to it")
+    })
+}
+
+/// Warns if the gate that is given takes in crosstalk of the cover glass.
+fn glass_in_gate(given: &SettingsFile, found: &Calibration) -> Option<String> {
+    let (first, _) = given.sensor.gate?;
+    let end = found.glass()?.end;
+    (usize::from(first) < end).then(|| {
+        format!(
+            "--gate begins at bin {first}, but photons of a cover glass matter up to bin {}: events may show the glass",
+            end - 1
+        )
     })
 }
 

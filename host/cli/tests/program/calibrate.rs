@@ -296,6 +296,25 @@ fn a_mask_that_leaves_hot_pixels_in_is_warned_of() {
     assert_eq!(summary["warnings"], serde_json::json!([]));
 }
 
+/// A gate is taken as it is, so that a warning says where the photons of the glass are.
+#[test]
+fn a_gate_that_takes_the_glass_in_is_warned_of() {
+    let scratch = Scratch::new();
+    let glass = scratch.file("glass.npy", recording(&scene(0.02, 5.0)));
+    let found = &scratch.replayed(&glass, "")["settings"]["gate"];
+    let (first, last) = (found[0].as_u64().unwrap(), found[1].as_u64().unwrap());
+    let warnings = |first: u64| {
+        let summary = scratch.replayed(&glass, &format!("--gate {first}..{last}"));
+        summary["warnings"].clone()
+    };
+    assert_eq!(warnings(first), serde_json::json!([]));
+    let before = first - 1;
+    let warning = format!(
+        "--gate begins at bin {before}, but photons of a cover glass matter up to bin {before}: events may show the glass"
+    );
+    assert_eq!(warnings(before), serde_json::json!([warning]));
+}
+
 /// It reads no laser cycle that it does not replay.
 #[test]
 fn a_list_is_calibrated_from_what_is_replayed() {
