@@ -160,6 +160,35 @@ fn it_is_described_as_64_pixels() {
     assert!(Config::new(settings).is_ok());
 }
 
+/// A measurement takes 0.8 s at 400 kHz.
+#[test]
+fn its_period_is_a_second() {
+    let settings = Settings::of_8x8(PixelAddress::new(10));
+    assert_eq!((settings.period_ms, settings.data_timeout_ms), (1000, 2000));
+}
+
+/// Targets 18 to 35 of a result are the second ones.
+#[test]
+fn a_second_target_is_given_as_such() {
+    let mut bench = bench(0);
+    bench.chip.borrow_mut().has_second_targets = true;
+    bench.bring_up();
+    bench.take(61);
+    let mut targets: Vec<(u16, u8, I24F8)> = Vec::new();
+    for given in bench.sink.take() {
+        if let SinkCall::Target(pixel, target) = given {
+            targets.push((pixel - 10, target.number, target.distance));
+        }
+    }
+    targets.sort_unstable();
+    let zones = (0..64).filter(|&at| MAP.concat()[usize::from(at)].starts_with('0'));
+    let expected = zones.flat_map(|zone| {
+        let distance = |more: u16| I24F8::from_num(1000 + zone + more);
+        [(zone, 0, distance(0)), (zone, 1, distance(500))]
+    });
+    assert_eq!(targets, expected.collect::<Vec<_>>());
+}
+
 #[test]
 fn a_sensor_without_8x8_zones_is_an_error() {
     let mut bench = bench(0);

@@ -139,6 +139,24 @@ mod sets {
     }
 }
 
+/// Pixels are numbered from 0 to the last one, zone or reference.
+#[test]
+fn the_number_of_pixels_follows_the_last_one() {
+    let pixels = |first: u16, reference: Option<u16>| {
+        let config = Config::new(Settings {
+            first_pixel: PixelAddress::new(first),
+            reference: reference.map(PixelAddress::new),
+            ..settings()
+        });
+        config.unwrap().info().pixels
+    };
+    assert_eq!(pixels(20, None), 29);
+    assert_eq!(pixels(20, Some(29)), 30);
+    assert_eq!(pixels(20, Some(100)), 101);
+    assert_eq!(pixels(20, Some(19)), 29);
+    assert_eq!(pixels(20, Some(0)), 29);
+}
+
 #[test]
 fn settings_that_cannot_be_are_refused() {
     let refused = |change: fn(&mut Settings)| {

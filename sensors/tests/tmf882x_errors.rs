@@ -392,3 +392,21 @@ fn a_stop_switches_the_chip_off_whether_or_not_it_acknowledges() {
         assert_eq!(*bench.enable.driven.borrow(), [false]);
     }
 }
+
+/// Nothing but the command to measure makes a command to stop needed.
+#[test]
+fn a_stop_before_it_measures_sends_nothing() {
+    let mut bench = Bench::<128>::new(settings(), IMAGE);
+    bench.switch_on(false);
+    bench.identify(0x03, &[0x08, 0xFF]);
+    bench.work(&[
+        read(0x41, 0x08, &[0x00]),
+        read(0x41, 0x10, &[0x00]),
+        write(0x41, &[0x08, 0x16]),
+    ]);
+    bench.enable.driven.take();
+    bench.i2c.update_expectations(&[]);
+    bench.sensor.stop();
+    bench.i2c.done();
+    assert_eq!(*bench.enable.driven.borrow(), [false]);
+}

@@ -173,4 +173,22 @@ mod tests {
             assert_eq!((number(true), number(false)), (Ok(expected), Ok(sent)));
         }
     }
+
+    /// Only the packets of a set may be left out until the next set begins.
+    #[test]
+    fn a_number_that_no_set_has_is_out_of_order() {
+        let take = |number: u8, all: u8| {
+            let data = &[0; BINS];
+            Assembly::new().take(Packet { number, data }, all, &mut [0; BINS])
+        };
+        for all in [PACKETS, 2 * PACKETS] {
+            for found in 1..=u8::MAX {
+                let expected = match found < all {
+                    true => Ok(Taken::LeftOut),
+                    false => Err(DeviceError::OutOfOrder { expected: 0, found }),
+                };
+                assert_eq!(take(found, all), expected);
+            }
+        }
+    }
 }

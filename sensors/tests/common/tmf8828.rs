@@ -34,6 +34,8 @@ pub struct Chip {
     pub number: u8,
     pub is_measuring: bool,
     interrupt: u8,
+    /// A result has second targets, half a metre behind the first ones.
+    pub has_second_targets: bool,
     /// The next transfer is not acknowledged.
     pub nack: bool,
     /// Each transfer.
@@ -51,6 +53,7 @@ impl Chip {
             number,
             is_measuring: false,
             interrupt: 0,
+            has_second_targets: false,
             nack: false,
             transfers: 0,
         }
@@ -87,6 +90,16 @@ impl Chip {
                 let [low, high] = mm.to_le_bytes();
                 let at = 24 + 3 * usize::from(entry);
                 bytes[at..at + 3].copy_from_slice(&[100 + half, low, high]);
+            }
+            if self.has_second_targets {
+                for entry in 18..36 {
+                    let at = 24 + 3 * entry;
+                    let [first_low, first_high] = [bytes[at - 53], bytes[at - 52]];
+                    let mm = 500 + u16::from_le_bytes([first_low, first_high]);
+                    let [low, high] = mm.to_le_bytes();
+                    bytes[at..at + 3].copy_from_slice(&[50, low, high]);
+                }
+                return bytes;
             }
             // No second targets: they have no confidence, or no distance.
             for (entry, none) in (18..36).zip([[0, 200, 1], [100, 0, 0]].into_iter().cycle()) {

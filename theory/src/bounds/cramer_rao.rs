@@ -49,7 +49,7 @@ impl Pulse {
     pub fn position_error(&self) -> f64 {
         const POSITIONS: u32 = 64;
         let variance = |index: u32| {
-            let within = (f64::from(index) + 0.5) / f64::from(POSITIONS);
+            let within = f64::from(index) / f64::from(POSITIONS);
             self.position_variance(128, 64.0 + within)
         };
         let mean = (0..POSITIONS).map(variance).sum::<f64>() / f64::from(POSITIONS);
@@ -76,6 +76,13 @@ mod tests {
 
     #[test]
     fn it_equals_gauss_jordan_on_numerical_derivatives() {
+        // The end of the histogram cuts the second pulse.
+        for (bins, position) in [(32, 15.3), (8, 0.4)] {
+            check_position_variance(bins, position);
+        }
+    }
+
+    fn check_position_variance(bins: u32, position: f64) {
         let pulse = Pulse {
             signal: 60.0,
             background: 2.0,
@@ -83,24 +90,28 @@ mod tests {
         };
         let means = |position: f64, signal: f64, background: f64| {
             let mean = move |bin| signal * bin_share(bin, position, 0.7) + background;
-            (0..32).map(mean).collect::<Vec<f64>>()
+            (0..bins).map(mean).collect::<Vec<f64>>()
         };
         let step = 1e-5;
         let slope = |by: [f64; 3]| {
-            let at =
-                |sign: f64| means(15.3 + sign * by[0], 60.0 + sign * by[1], 2.0 + sign * by[2]);
+            let at = |sign: f64| {
+                means(
+                    position + sign * by[0],
+                    60.0 + sign * by[1],
+                    2.0 + sign * by[2],
+                )
+            };
             let pairs = at(1.0).into_iter().zip(at(-1.0));
             pairs.map(|(up, down)| (up - down) / (2.0 * step)).collect()
         };
         let slopes: [Vec<f64>; 3] =
             [[step, 0.0, 0.0], [0.0, step, 0.0], [0.0, 0.0, step]].map(slope);
-        let mean = means(15.3, 60.0, 2.0);
+        let mean = means(position, 60.0, 2.0);
         let mut rows: Vec<Vec<f64>> = (0..3)
             .map(|row| {
                 let information = |column: usize| {
-                    (0..32)
-                        .map(|bin| slopes[row][bin] * slopes[column][bin] / mean[bin])
-                        .sum()
+                    let pairs = slopes[row].iter().zip(&slopes[column]).zip(&mean);
+                    pairs.map(|((row, column), mean)| row * column / mean).sum()
                 };
                 let mut row_of: Vec<f64> = (0..3).map(information).collect();
                 // The right side: the unit vector of position.
@@ -124,7 +135,7 @@ mod tests {
                 }
             }
         }
-        let found = pulse.position_variance(32, 15.3);
+        let found = pulse.position_variance(bins, position);
         assert!(
             (found / rows[0][3] - 1.0).abs() < 1e-6,
             "{found} {}",

@@ -116,7 +116,7 @@ impl Evidence<'_> {
 #[must_use]
 pub fn information(background: f64, signal: f64, position: f64, sigma: f64) -> f64 {
     // Far from both ends; only the position within a bin matters.
-    let far = (8.0 * sigma).ceil() + 1.0;
+    let far = (8.0 * sigma).ceil();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let bins = 2 * far as u32 + 1;
     let position = far + position.fract();
@@ -180,6 +180,24 @@ mod tests {
                 let highest = ratios.fold(f64::NEG_INFINITY, f64::max);
                 let found = evidence.highest(cycles);
                 assert!((found - highest).abs() < 1e-5, "{sigma}: {found} {highest}");
+            }
+        }
+    }
+
+    #[test]
+    fn information_has_all_bins_of_the_pulse() {
+        for sigma in [0.05, 0.3, 5.0] {
+            for within in [0.1, 0.3, 0.9] {
+                let (background, signal) = (0.02, 3.0);
+                let divergence = |bin| {
+                    let mean = background + signal * bin_share(bin, 200.0 + within, sigma);
+                    mean * (mean / background).ln() - (mean - background)
+                };
+                let expected: f64 = (0..400).map(divergence).sum();
+                let found = information(background, signal, 7.0 + within, sigma);
+                assert!((found / expected - 1.0).abs() < 1e-9, "{sigma} {within}");
+                let inverse = signal_for_information(background, within, sigma, expected);
+                assert!((inverse / signal - 1.0).abs() < 1e-9, "{sigma} {within}");
             }
         }
     }

@@ -120,6 +120,13 @@ mod tests {
         }
     }
 
+    /// The probability of that count alone is below the least float.
+    #[test]
+    fn a_count_far_above_the_mean_is_certain() {
+        assert_eq!(at_most(9_000, 10_000, 0.01), 1.0);
+        assert_eq!(at_least(1_000, 10_000, 0.99), 1.0);
+    }
+
     /// None of n: the upper end solves (1 − p)ⁿ = tail. The others are from tables of
     /// the F distribution: 10 of 100 at 95 % lie within 0.0490 and 0.1762.
     #[test]
