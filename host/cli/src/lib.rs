@@ -16,7 +16,7 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use dtof_options::rows::printable;
-use dtof_options::{Refused, option_name};
+use dtof_options::{Refused, flag};
 
 /// Parses the command line and runs it.
 #[must_use]
@@ -45,15 +45,6 @@ fn refuse(error: &clap::Error, flags: &[String]) -> ExitCode {
     }
     complain(&format!("error: {}", reason(error, flags)));
     ExitCode::from(2)
-}
-
-/// The flag of a key. Other names, such as `<FILE>`, stay as they are.
-#[must_use]
-pub fn flag(key: &str) -> String {
-    if !key.starts_with(char::is_alphabetic) {
-        return key.to_owned();
-    }
-    format!("--{}", option_name(key).replace('_', "-"))
 }
 
 /// The names of the flags of the command that the command line begins with.

@@ -5,10 +5,9 @@
 //! Whoever prints the error replaces a key with the name its user knows, such as `--false-alarm`.
 //!
 //! ```
-//! use dtof_options::{Refused, line};
+//! use dtof_options::{Refused, flag, line};
 //!
 //! let refused = Refused::new("alpha", "is for the rules paper and average; see `false_alarm`");
-//! let flag = |key: &str| format!("--{}", key.replace('_', "-"));
 //! assert_eq!(
 //!     line(&refused.into(), &flag),
 //!     "--alpha is for the rules paper and average; see --false-alarm"
@@ -211,6 +210,15 @@ pub fn add_file_name(mut error: anyhow::Error, file: Option<&KeysOfFile>) -> any
 pub fn option_name(key: &str) -> &str {
     let found = OTHER_NAMES.iter().find(|(other, _)| *other == key);
     found.map_or(key, |(_, name)| name)
+}
+
+/// The flag of a key. Other names, such as `<FILE>`, stay as they are.
+#[must_use]
+pub fn flag(key: &str) -> String {
+    if !key.starts_with(char::is_alphabetic) {
+        return key.to_owned();
+    }
+    format!("--{}", option_name(key).replace('_', "-"))
 }
 
 /// Options whose keys in a settings file are longer than their names.

@@ -18,7 +18,7 @@ use dtof_engine::settings::{DetectionSettings, EstimatorName, Settings, Settings
 use dtof_events::clock::LaserClock;
 use dtof_options::progress::Progress;
 use dtof_options::rows::Row;
-use dtof_options::{KeysOfFile, Refused, option_name};
+use dtof_options::{KeysOfFile, Refused, flag};
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
@@ -315,7 +315,7 @@ fn find(
     let overridden = given_keys.intersection(&found_keys);
     let flags = overridden
         .filter(|key| !SEARCHED_WITH.contains(&key.as_str()))
-        .map(|key| format!("--{}", option_name(key).replace('_', "-")));
+        .map(|key| flag(key));
     let flags: Vec<String> = flags.collect();
     if !flags.is_empty() {
         rows.push(("overridden".to_owned(), format!("by {}", flags.join(", "))));

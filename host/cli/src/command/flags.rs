@@ -5,11 +5,10 @@ use std::ffi::{OsStr, OsString};
 use clap::builder::{OsStringValueParser, PossibleValue, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
-use dtof::flag;
 use dtof_engine::settings::{EstimatorName, RuleName};
 use dtof_events::echoes::Echo;
 use dtof_export::ProjectionOptions;
-use dtof_options::{Named, Options, named, option_name};
+use dtof_options::{Named, Options, flag, named, option_name};
 use dtof_run::given::Operation;
 use dtof_run::{calibrate, compare, replay, simulate, tune};
 

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 
 use anyhow::{Result, ensure};
 use clap::Args;
-use dtof::{complain, flag, interrupt, path};
+use dtof::{complain, interrupt, path};
 use dtof_live::{Device, Feed, Folder, Foxglove, Origin, Playback, Served, Terminal};
+use dtof_options::flag;
 use dtof_options::numbers::{integer, laser_hz, positive};
 
 use super::device_options::DeviceOptions;
