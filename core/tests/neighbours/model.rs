@@ -22,8 +22,9 @@ fn exposed<W: CounterWidth>(
     trial: u32,
 ) -> (Vec<AsyncPixel<BINS, W>>, Vec<Vec<u16>>) {
     let mut rng = Pcg64Mcg::seed_from_u64(trial.into());
-    // From almost no photons to a hundred a bin, of exposures of different lengths, with a target.
+    // From almost no photons to a hundred a bin, of exposures of different lengths, with a target somewhere.
     let light = 1 << (trial % 8);
+    let target_bin = (trial / 8 % 30) as u16;
     let pixel = |address| {
         let mut pixel = AsyncPixel::<BINS, W>::new(PixelAddress::new(address));
         let mut statistics = Statistics::default();
@@ -40,7 +41,14 @@ fn exposed<W: CounterWidth>(
             let code = rng.next_u32();
             let at = (code >> 8) as u16;
             let is_target = code % 16 < target;
-            pixel.count(config, if is_target { 12 + at % 3 } else { at % 32 });
+            pixel.count(
+                config,
+                if is_target {
+                    target_bin + at % 3
+                } else {
+                    at % 32
+                },
+            );
         }
         let cycles = [44, 60, 100, 400][rng.next_u32() as usize % 4];
         pixel.begin_look(config, &mut statistics, cycles);

@@ -457,3 +457,46 @@ fn full_counters_do_not_overflow() {
     }
     assert_eq!(decide(0..1024), None);
 }
+
+/// Of windows with as many photons, the first is taken: its highest bin is another one than that of the last.
+#[test]
+fn the_first_of_windows_that_are_equal_is_confirmed() {
+    let rule = neighbours(3, 3, Neighbours::Eight);
+    let config = config(&rule);
+    let mut pixels = pixels(9);
+    for (pixel, number) in pixels.iter_mut().zip(0..) {
+        // All together: 6, 3, 4 and 6 photons in bins 30 to 33.
+        let codes: &[u16] = match number {
+            4 => &[30, 32, 33],
+            0..4 | 8 => &[30, 33],
+            _ => &[31, 32],
+        };
+        pixel.count_batch(&config, codes);
+    }
+    let events = end(&mut pixels, &config, &rule, &mut Statistics::default());
+    let event = events.iter().find(|event| event.pixel.raw() == 4).unwrap();
+    assert_eq!((event.peak_bin.raw(), event.peak_count.raw()), (30, 2));
+}
+
+/// A window that is full in all nine pixels has the photons of all nine: those of eight would not do.
+#[test]
+fn windows_that_are_full_count_for_all_pixels() {
+    let rule = WindowRule::new(3, U4F12::MAX, Count::saturating(5)).unwrap();
+    let rule = NeighbourConfig::new(Array::new(3, 3).unwrap(), Neighbours::Eight, &rule);
+    let config = config(&rule);
+    let mut pixels: Vec<AsyncPixel<64, Count8>> = (0..9)
+        .map(|pixel| AsyncPixel::new(PixelAddress::new(pixel)))
+        .collect();
+    let codes: Vec<u16> = (0..64).collect();
+    for pixel in &mut pixels {
+        // 765 photons in the window, where 600 are expected: 6.7 standard deviations in each, 20 in all, 9.8 of eight in
+        // all.
+        (0..200).for_each(|_| pixel.count_batch(&config, &codes));
+        (0..55).for_each(|_| pixel.count_batch(&config, &[30, 31, 32]));
+        assert!(pixel.begin_look(&config, &mut Statistics::default(), 300));
+    }
+    let detection = rule.decide(&pixels, 4, &config).unwrap();
+    let full = Flags::CONFIRMED | Flags::SATURATED;
+    assert!(detection.depth.flags.contains(full));
+    assert_eq!(detection.peak.count.raw(), 765);
+}
