@@ -1,11 +1,11 @@
 //! Live counts against the formulas of the module's documentation, in floating point. `core/tests/proofs/live.rs` has all
 //! small histograms.
 
-use dtof_core::fixed::types::U4F12;
+use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::rule::{ExcludedBins, LiveCounts};
 use dtof_core::{
-    BinIndex, Count, Count10, Count16, Count24, CounterWidth, DetectionRule, Histogram, RangeGate,
-    WindowRule,
+    BinIndex, CentredWindow, Count, Count10, Count16, Count24, CounterWidth, DepthEstimator,
+    Detection, DetectionRule, EchoNumber, Flags, Histogram, PixelConfig, RangeGate, WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -193,4 +193,155 @@ fn behind_bright_bins_the_brightest_window_is_reported() {
     assert!(check::<1024, Count16>(
         &counts, gate, &none, 65_535, 63, &rule, None
     ));
+}
+
+/// Photons of an exposure: with a bin that leaves those behind it hardly a laser cycle, with two bright bins, or neither.
+fn blinding(rng: &mut Pcg32, dead_time: usize, cycles: u32) -> [u32; 64] {
+    let mut counts = drawn::<64>(rng, dead_time, cycles);
+    let code = rng.next_u32() >> 8;
+    let first = code as usize % 50;
+    let mut shine = |bin: usize, photons: &dyn Fn(u32) -> u32| {
+        let before: u32 = counts[bin.saturating_sub(dead_time)..bin].iter().sum();
+        counts[bin] = photons(cycles - before);
+        let blind = bin + 1..(bin + 1 + dead_time).min(64);
+        counts[blind].fill(0);
+    };
+    match code % 3 {
+        0 => shine(first, &|live| live.saturating_sub(code % 7)),
+        1 => {
+            shine(first, &|live| live / 3);
+            shine(first + 2 + (code >> 8) as usize % 8, &|live| live / 2);
+        }
+        _ => {}
+    }
+    counts
+}
+
+/// What [`check_detection`] has seen: clipped, not clipped, behind an echo, offsets other than the middle.
+type Seen = [u32; 4];
+
+/// Checks depth, flags and background of a detection after `echoes` by the formulas.
+fn check_detection(
+    found: &Detection,
+    counts: &[u32; 64],
+    config: &PixelConfig<64, WindowRule>,
+    [guard, dead_time]: [u16; 2],
+    cycles: u32,
+    echoes: &[u16],
+    seen: &mut Seen,
+) {
+    let gate = config.gate();
+    let mut excluded = ExcludedBins::new(guard as u8);
+    for &echo in echoes {
+        excluded.push(BinIndex::saturating(echo));
+    }
+    let mut histogram = Histogram::<64, Count16>::new();
+    let _ = histogram.add_frame(counts, &RangeGate::full());
+    let weighed = LiveCounts::new(&histogram, gate, &excluded, cycles, dead_time).unwrap();
+    let window = config.rule().detect_live(&weighed, None).window.unwrap();
+    let peak = weighed.brightest(window.first, window.width);
+    assert_eq!(found.peak, peak);
+    let peak = peak.bin.raw();
+
+    let live = |bin: u16| {
+        let bin = usize::from(bin);
+        let before = &counts[bin.saturating_sub(dead_time.into())..bin];
+        f64::from(cycles) - before.iter().map(|&count| f64::from(count)).sum::<f64>()
+    };
+    let is_gated = |bin: &u16| (gate.first()..=gate.last()).contains(bin);
+    let is_excluded = |bin: u16| echoes.iter().any(|echo| echo.abs_diff(bin) <= guard);
+    let is_blind = |bin: u16| live(bin) * 1024.0 < f64::from(cycles);
+
+    let outside = (
+        f64::from(window.photons_outside),
+        window.live_outside as f64,
+    );
+    if outside.1 > 0.0 {
+        let background = outside.0 * live(peak) / outside.1;
+        let rest = background - f64::from(found.background.raw());
+        assert!((-0.5..0.5).contains(&rest), "{background} {found:?}");
+    }
+
+    let flags = found.depth.flags;
+    let is_tail = echoes.iter().any(|echo| {
+        let behind = i32::from(peak) - i32::from(echo + guard);
+        (1..=i32::from(guard)).contains(&behind)
+    });
+    assert_eq!(flags.contains(Flags::TAIL), is_tail);
+    let reach = config.estimator().reach();
+    let mut around = (peak.saturating_sub(reach)..=peak + reach).filter(is_gated);
+    let is_clipped = around.any(|bin| is_excluded(bin) || is_blind(bin));
+    // A centred window may leave the gate, or the bins that it can reach.
+    let is_amid = *config.estimator() == DepthEstimator::Centroid3
+        && gate.first() < peak
+        && peak < gate.last();
+    if is_clipped || is_amid {
+        assert_eq!(flags.contains(Flags::CLIPPED), is_clipped, "{found:?}");
+    }
+    seen[0] += u32::from(is_clipped);
+    seen[1] += u32::from(is_amid && !is_clipped);
+    seen[2] += u32::from(is_tail);
+
+    if *config.estimator() != DepthEstimator::Centroid3 {
+        return;
+    }
+    // A bin with a photon in each laser cycle counts as half a cycle short of that.
+    let light = |photons: f64, live: f64| {
+        let live = live.max(1.0);
+        (live / (live - photons).max(0.5)).ln()
+    };
+    let above = |bin: u16| {
+        if !is_gated(&bin) || is_excluded(bin) || is_blind(bin) {
+            return 0.0;
+        }
+        let own = light(counts[usize::from(bin)].into(), live(bin));
+        (own - light(outside.0, outside.1)).max(0.0)
+    };
+    let [left, centre, right] = [peak.wrapping_sub(1), peak, peak + 1].map(above);
+    let sum = left + centre + right;
+    let offset = if sum > 0.0 { (right - left) / sum } else { 0.0 };
+    let middle = f64::from(found.depth.offset.raw()) / 256.0 - 0.5;
+    assert!((middle - offset).abs() < 2.0 / 256.0, "{middle} {offset}");
+    seen[3] += u32::from(offset != 0.0);
+}
+
+/// The first and the second echo, of three bins and of windows about the centre.
+#[test]
+fn detections_are_those_of_live_counts() {
+    let mut rng = Pcg32::seed_from_u64(9);
+    let mut seen = Seen::default();
+    for trial in 0..20_000u32 {
+        let mut below = |limit: u32| rng.next_u32() % limit;
+        let cycles = 100 + below(3000);
+        let (dead_time, guard) = (1 + below(20) as u16, below(4) as u16);
+        let (first, last) = (below(24) as u16, 63 - below(16) as u16);
+        let gate = RangeGate::new(first, last).unwrap();
+        let width = 1 + below(5) as u8;
+        let rule = WindowRule::new(width, U4F12::lit("4"), Count::saturating(5)).unwrap();
+        let estimator = match trial % 3 {
+            0 => {
+                let half = U8F8::from_num(1.0 + f64::from(below(3)));
+                DepthEstimator::CentredWindow(CentredWindow::new(half).unwrap())
+            }
+            _ => DepthEstimator::Centroid3,
+        };
+        let config = PixelConfig::<64, _>::with_rule(rule)
+            .gate(gate)
+            .estimator(estimator)
+            .echoes(EchoNumber::new(2).unwrap(), guard as u8)
+            .build()
+            .unwrap()
+            .with_dead_time(dead_time);
+        let counts = blinding(&mut rng, dead_time.into(), cycles);
+        let mut histogram = Histogram::<64, Count16>::new();
+        let _ = histogram.add_frame(&counts, &RangeGate::full());
+        let mut echoes = Vec::new();
+        config.detect_echoes(&mut histogram, cycles, |_, found| {
+            let known = [guard, dead_time];
+            check_detection(found, &counts, &config, known, cycles, &echoes, &mut seen);
+            echoes.push(found.peak.bin.raw());
+        });
+    }
+    println!("{seen:?} of 20,000");
+    assert!(seen.iter().all(|&seen| seen > 50), "{seen:?}");
 }
