@@ -47,7 +47,9 @@ mod tests {
                 let blind: f64 = counts[bin.saturating_sub(dead_time)..].iter().sum();
                 counts.push((cycles - blind) * -(-rate).exp_m1());
             }
-            for (arrived, rate) in arrived(&counts, cycles, dead_time).iter().zip(rates) {
+            let found = arrived(&counts, cycles, dead_time);
+            assert_eq!(found.len(), rates.len());
+            for (arrived, rate) in found.iter().zip(rates) {
                 assert!((arrived / cycles - rate).abs() < 1e-9);
             }
         }
