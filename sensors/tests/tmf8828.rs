@@ -160,7 +160,7 @@ fn it_is_described_as_64_pixels() {
     assert!(Config::new(settings).is_ok());
 }
 
-/// A measurement takes 0.8 s at 400 kHz.
+/// 244 packets and results need 0.8 s of a bus of 400 kHz.
 #[test]
 fn its_period_is_a_second() {
     let settings = Settings::of_8x8(PixelAddress::new(10));

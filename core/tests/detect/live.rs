@@ -5,7 +5,8 @@ use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::rule::{ExcludedBins, LiveCounts};
 use dtof_core::{
     BinIndex, CentredWindow, Count, Count10, Count16, Count24, CounterWidth, DepthEstimator,
-    Detection, DetectionRule, EchoNumber, Flags, Histogram, PixelConfig, RangeGate, WindowRule,
+    Detection, DetectionRule, EchoNumber, Flags, Histogram, PixelConfig, RangeGate, SubBinOffset,
+    WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -195,7 +196,7 @@ fn behind_bright_bins_the_brightest_window_is_reported() {
     ));
 }
 
-/// Photons of an exposure: with a bin that leaves those behind it hardly a laser cycle, with two bright bins, or neither.
+/// Photons of an exposure: with a bin behind which the TDC is live in hardly a laser cycle, with two bright bins, or neither.
 fn blinding(rng: &mut Pcg32, dead_time: usize, cycles: u32) -> [u32; 64] {
     let mut counts = drawn::<64>(rng, dead_time, cycles);
     let code = rng.next_u32() >> 8;
@@ -241,7 +242,11 @@ fn check_detection(
     let window = config.rule().detect_live(&weighed, None).window.unwrap();
     let peak = weighed.brightest(window.first, window.width);
     assert_eq!(found.peak, peak);
-    let peak = peak.bin.raw();
+    let bins = (gate.first().into(), gate.last().into());
+    let exposure = Exposure::new(counts, bins, &excluded, cycles, dead_time.into());
+    assert!(exposure.has_most_light(window.first, window.width, peak.bin));
+    let (count, peak) = (peak.count.raw(), peak.bin.raw());
+    assert_eq!(count, counts[usize::from(peak)]);
 
     let live = |bin: u16| {
         let bin = usize::from(bin);
@@ -271,15 +276,20 @@ fn check_detection(
     let reach = config.estimator().reach();
     let mut around = (peak.saturating_sub(reach)..=peak + reach).filter(is_gated);
     let is_clipped = around.any(|bin| is_excluded(bin) || is_blind(bin));
-    // A centred window may leave the gate, or the bins that it can reach.
-    let is_amid = *config.estimator() == DepthEstimator::Centroid3
-        && gate.first() < peak
-        && peak < gate.last();
-    if is_clipped || is_amid {
-        assert_eq!(flags.contains(Flags::CLIPPED), is_clipped, "{found:?}");
-    }
-    seen[0] += u32::from(is_clipped);
-    seen[1] += u32::from(is_amid && !is_clipped);
+    let at = f64::from(peak) + f64::from(found.depth.offset.raw()) / 256.0;
+    let leaves_gate = match config.estimator() {
+        DepthEstimator::Centroid3 => peak == gate.first() || peak == gate.last(),
+        DepthEstimator::CentredWindow(window) => {
+            let limits = [SubBinOffset::MIN, SubBinOffset::MAX];
+            at - window.before().to_num::<f64>() < f64::from(gate.first())
+                || at + window.after().to_num::<f64>() > f64::from(gate.last()) + 1.0
+                || limits.contains(&found.depth.offset)
+        }
+    };
+    let is_clipped = is_clipped || leaves_gate;
+    assert_eq!(flags.contains(Flags::CLIPPED), is_clipped, "{found:?}");
+    seen[0] += u32::from(is_clipped && !leaves_gate);
+    seen[1] += u32::from(!is_clipped);
     seen[2] += u32::from(is_tail);
 
     if *config.estimator() != DepthEstimator::Centroid3 {
@@ -301,7 +311,14 @@ fn check_detection(
     let sum = left + centre + right;
     let offset = if sum > 0.0 { (right - left) / sum } else { 0.0 };
     let middle = f64::from(found.depth.offset.raw()) / 256.0 - 0.5;
-    assert!((middle - offset).abs() < 2.0 / 256.0, "{middle} {offset}");
+    // The offset is rounded to 1/256, and light to 1/1023 of the highest of 12 bins.
+    let reached = (peak.saturating_sub(6)..peak + 6).map(above);
+    let highest = reached.fold(0.0, f64::max);
+    let rounding = 0.51 / 256.0 + 3.0 / 1023.0 * highest / sum.max(1e-9);
+    assert!(
+        (middle - offset).abs() < rounding,
+        "{middle} {offset} {rounding}"
+    );
     seen[3] += u32::from(offset != 0.0);
 }
 

@@ -105,9 +105,6 @@ fn refused(error: &clap::Error, flags: &[String]) -> Option<Refused> {
             let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidArg) else {
                 return None;
             };
-            if !name.starts_with('-') {
-                return Some(Refused::input(format!("{name}: one name too many")));
-            }
             Refused::unknown(name, flags.iter().map(String::as_str))
         }
         ErrorKind::ArgumentConflict => {

@@ -335,14 +335,15 @@ fn masked_too_few(given: &SettingsFile, found: &SettingsFile) -> Option<String> 
     })
 }
 
-/// Warns if the gate that is given takes in crosstalk of the cover glass.
+/// Warns if the gate that is given surely takes in what seems to be crosstalk of a cover glass.
 fn glass_in_gate(given: &SettingsFile, found: &Calibration) -> Option<String> {
-    let (first, _) = given.sensor.gate?;
-    let end = found.glass()?.end;
-    (usize::from(first) < end).then(|| {
+    let (first, last) = given.sensor.gate?;
+    let glass = found.glass()?;
+    let surely = glass.end.min(glass.end_between.0);
+    (usize::from(first) < surely && usize::from(last) >= glass.top).then(|| {
         format!(
-            "--gate begins at bin {first}, but photons of a cover glass matter up to bin {}: events may show the glass",
-            end - 1
+            "--gate begins at bin {first}, but what seems to be a cover glass matters up to bin {}: events may show it",
+            glass.end.saturating_sub(1)
         )
     })
 }

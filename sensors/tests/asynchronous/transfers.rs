@@ -411,7 +411,7 @@ fn a_poll_of_a_tmf8828_that_is_dropped_costs_at_most_its_set() {
             continue;
         }
         match present.take() {
-            // That can be repeated.
+            // The reason of an interrupt is read again, so nothing is lost.
             Some((0xE1, _)) if measured => {
                 reasons += 1;
                 assert!(run(sensor.poll_async(poll, &mut sink)).0.is_ok());

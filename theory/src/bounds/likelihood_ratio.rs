@@ -119,7 +119,7 @@ pub fn information(background: f64, signal: f64, position: f64, sigma: f64) -> f
     let far = (8.0 * sigma).ceil();
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let bins = 2 * far as u32 + 1;
-    let position = far + position.fract();
+    let position = far + (position - position.floor());
     let one_bin = |bin| {
         let mean = signal * bin_share(bin, position, sigma);
         (background + mean) * (mean / background).ln_1p() - mean

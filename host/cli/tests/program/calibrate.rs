@@ -303,16 +303,16 @@ fn a_gate_that_takes_the_glass_in_is_warned_of() {
     let glass = scratch.file("glass.npy", recording(&scene(0.02, 5.0)));
     let found = &scratch.replayed(&glass, "")["settings"]["gate"];
     let (first, last) = (found[0].as_u64().unwrap(), found[1].as_u64().unwrap());
-    let warnings = |first: u64| {
-        let summary = scratch.replayed(&glass, &format!("--gate {first}..{last}"));
+    let warnings = |gate: String| {
+        let summary = scratch.replayed(&glass, &format!("--gate {gate}"));
         summary["warnings"].clone()
     };
-    assert_eq!(warnings(first), serde_json::json!([]));
-    let before = first - 1;
+    assert_eq!(warnings(format!("{first}..{last}")), serde_json::json!([]));
     let warning = format!(
-        "--gate begins at bin {before}, but photons of a cover glass matter up to bin {before}: events may show the glass"
+        "--gate begins at bin 0, but what seems to be a cover glass matters up to bin {}: events may show it",
+        first - 1
     );
-    assert_eq!(warnings(before), serde_json::json!([warning]));
+    assert_eq!(warnings(format!("0..{last}")), serde_json::json!([warning]));
 }
 
 /// It reads no laser cycle that it does not replay.

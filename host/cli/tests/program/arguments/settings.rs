@@ -156,10 +156,6 @@ fn what_contradicts_the_file_is_refused() {
         ),
     );
     scratch.all_refused(
-        "replay photons.csv --out out",
-        "other.csv | error: other.csv: one name too many\n",
-    );
-    scratch.all_refused(
         "compare --scene scene.toml --out out --cycles 100",
         "--settings gate.toml | error: scene.toml: gate.toml: gate 100..200: with 128 bins",
     );
