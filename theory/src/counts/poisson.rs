@@ -97,7 +97,8 @@ impl Poisson {
     pub fn highest_mass(&self, count: u32, bins: u32) -> f64 {
         let mass = self.mass(count);
         let (below, at_most) = (self.ln_below(count), self.ln_below(count.saturating_add(1)));
-        if mass == 0.0 || at_most == f64::NEG_INFINITY {
+        // Also if all fewer have none.
+        if mass == 0.0 {
             return 0.0;
         }
         let bins = f64::from(bins);
