@@ -5,7 +5,7 @@ use std::cell::RefCell;
 
 use crate::common::tmf882x::{
     Bench, Counts, IMAGE, NACK, measure, measuring, packet, packets, page, read, settings,
-    some_counts, write,
+    some_counts, stopped, write,
 };
 use crate::common::{Line, RecordingSink};
 use dtof_core::PixelAddress;
@@ -80,11 +80,7 @@ fn every_setting_reaches_its_register() {
     );
     bench.switch_on(false);
     bench.identify(0x03, &[0x08, 0xFF]);
-    bench.work(&[
-        read(0x41, 0x08, &[0x00]),
-        read(0x41, 0x10, &[0x00]),
-        write(0x41, &[0x08, 0x16]),
-    ]);
+    bench.work(&stopped(0x41));
     bench.work(&[
         read(0x41, 0x08, &[0x00]),
         read(0x41, 0x20, &[0x16]),
@@ -218,11 +214,7 @@ fn an_address_that_is_not_taken_starts_over_at_the_first() {
         bench.switch_on(true);
         assert_eq!(bench.sensor.address(), 0x41);
         bench.identify(0x03, &[0x08, 0xFF]);
-        bench.work(&[
-            read(0x41, 0x08, &[0x00]),
-            read(0x41, 0x10, &[0x00]),
-            write(0x41, &[0x08, 0x16]),
-        ]);
+        bench.work(&stopped(0x41));
         let [page, change, ..] = move_to(0x42);
         bench.work(&page);
         bench.work(&change);
@@ -263,11 +255,7 @@ fn two_sensors_share_a_bus() {
             read(0x41, 0x00, &[0x03]),
             write(0x41, &[0x08, 0xFF]),
         ];
-        let load = vec![
-            read(0x41, 0x08, &[0x00]),
-            read(0x41, 0x10, &[0x00]),
-            write(0x41, &[0x08, 0x16]),
-        ];
+        let load = stopped(0x41).to_vec();
         // ENABLE low, ENABLE high, ready to be asked.
         let steps = [vec![], vec![], vec![], identify, load];
         for accesses in steps.into_iter().chain(move_to(address)) {

@@ -3,7 +3,7 @@
 
 use crate::common::tmf882x::{
     Bench, IMAGE, NACK, measure, measuring, packet, packets, page, read, settings, some_counts,
-    write,
+    stopped, write,
 };
 use crate::common::{Broken, SinkCall};
 use dtof_sensors::tmf882x::{BootCommand, Command, DeviceError, Error, Waiting};
@@ -218,21 +218,13 @@ fn an_application_that_refuses_never_ends_or_shows_another_page() {
     }
 
     begin(&mut bench, true);
-    bench.work(&[
-        read(0x41, 0x08, &[0x00]),
-        read(0x41, 0x10, &[0x00]),
-        write(0x41, &[0x08, 0x16]),
-    ]);
+    bench.work(&stopped(0x41));
     let accesses = [read(0x41, 0x08, &[0x00]), read(0x41, 0x20, &[0x19])];
     assert_eq!(bench.poll(&accesses), Err(Error::WrongPage { page: 0x19 }));
 
     // `accepted` is the end of measure alone.
     begin(&mut bench, true);
-    bench.work(&[
-        read(0x41, 0x08, &[0x00]),
-        read(0x41, 0x10, &[0x00]),
-        write(0x41, &[0x08, 0x16]),
-    ]);
+    bench.work(&stopped(0x41));
     bench.work(&page(0x41));
     bench.work(&measure(0x41));
     let refused = Error::Refused {
@@ -399,11 +391,7 @@ fn a_stop_before_it_measures_sends_nothing() {
     let mut bench = Bench::<128>::new(settings(), IMAGE);
     bench.switch_on(false);
     bench.identify(0x03, &[0x08, 0xFF]);
-    bench.work(&[
-        read(0x41, 0x08, &[0x00]),
-        read(0x41, 0x10, &[0x00]),
-        write(0x41, &[0x08, 0x16]),
-    ]);
+    bench.work(&stopped(0x41));
     bench.enable.driven.take();
     bench.i2c.update_expectations(&[]);
     bench.sensor.stop();

@@ -19,7 +19,7 @@ pub struct Exposure<'a> {
     excluded: &'a ExcludedBins,
     cycles: u32,
     /// Laser cycles in which each bin was live; below 0 if the counts contradict the dead time.
-    live: Vec<i64>,
+    pub live: Vec<i64>,
     /// Photons of the gated bins that are not excluded, and their live laser cycles.
     photons: f64,
     all_live: f64,

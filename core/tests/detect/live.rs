@@ -248,11 +248,7 @@ fn check_detection(
     let (count, peak) = (peak.count.raw(), peak.bin.raw());
     assert_eq!(count, counts[usize::from(peak)]);
 
-    let live = |bin: u16| {
-        let bin = usize::from(bin);
-        let before = &counts[bin.saturating_sub(dead_time.into())..bin];
-        f64::from(cycles) - before.iter().map(|&count| f64::from(count)).sum::<f64>()
-    };
+    let live = |bin: u16| exposure.live[usize::from(bin)] as f64;
     let is_gated = |bin: &u16| (gate.first()..=gate.last()).contains(bin);
     let is_excluded = |bin: u16| echoes.iter().any(|echo| echo.abs_diff(bin) <= guard);
     let is_blind = |bin: u16| live(bin) * 1024.0 < f64::from(cycles);

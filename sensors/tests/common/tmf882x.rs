@@ -21,6 +21,15 @@ pub fn read(address: u8, register: u8, bytes: &[u8]) -> Access {
     Access::write_read(address, vec![register], bytes.to_vec())
 }
 
+/// The answer to a stop and the mode, and the command to load the configuration page.
+pub fn stopped(address: u8) -> [Access; 3] {
+    [
+        read(address, 0x08, &[0x00]),
+        read(address, 0x10, &[0x00]),
+        write(address, &[0x08, 0x16]),
+    ]
+}
+
 /// The pages and commands from the common page on, and what they answer.
 pub fn page(address: u8) -> Vec<Access> {
     vec![
@@ -192,11 +201,7 @@ impl<const CHUNK: usize> Bench<CHUNK> {
         self.switch_on(false);
         self.identify(0x03, &[0x08, 0xFF]);
         assert_eq!(self.poll(&[read(0x41, 0x08, &[0xFF])]), Ok(Polled::Idle));
-        self.work(&[
-            read(0x41, 0x08, &[0x00]),
-            read(0x41, 0x10, &[0x00]),
-            write(0x41, &[0x08, 0x16]),
-        ]);
+        self.work(&stopped(0x41));
         self.configure();
     }
 
