@@ -86,11 +86,30 @@ pub struct Laser<'a> {
 
 /// Builds and runs the simulation of a module that is compared with a model there.
 pub fn check(root: &Path, name: &str) -> Result<()> {
-    let test = verilate(root, name, name, Path::new(""), &[])?;
+    check_with(root, name, Path::new(""))
+}
+
+fn check_with(root: &Path, name: &str, data: &Path) -> Result<()> {
+    let test = verilate(root, name, name, data, &[])?;
     let ran = program::run(&mut Command::new(test), PATIENCE, None)?;
     ensure!(ran.code == Some(0), ran.output());
     print!("{}", ran.output);
     Ok(())
+}
+
+/// Whether the pixel processor, wired to another clock as `docs/softcore.md` has it, does what
+/// one does that has the clock of the photons.
+pub fn check_two_clocks(root: &Path) -> Result<()> {
+    let document = fs::read_to_string(root.join("docs/softcore.md"))?;
+    let wiring = document
+        .split_once("```verilog\n")
+        .and_then(|(_, rest)| rest.split_once("```"))
+        .context("docs/softcore.md has no wiring")?
+        .0;
+    let folder = target_folder(root).join("softcore/wiring");
+    fs::create_dir_all(&folder)?;
+    fs::write(folder.join("wiring.v"), wiring)?;
+    check_with(root, "two_clocks", &folder)
 }
 
 /// Whether the FIFO does with random words what a model of it does, and its memory is

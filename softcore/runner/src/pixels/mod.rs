@@ -77,6 +77,7 @@ pub fn run(parser: lexopt::Parser) -> Result<()> {
     let proofs = prove(root, options.photons)?;
     let latencies = system::measure(root)?;
     rtl::check(root, "photon_crossing")?;
+    rtl::check_two_clocks(root)?;
     let page = page::text(&proofs, &latencies);
     println!("\n{page}");
     if options.check {
