@@ -130,7 +130,7 @@ pub struct Calibration {
     pub bin_width_ps: f64,
     /// Background, hot and dead pixels.
     pub pixels: Pixels,
-    /// The TDC, where laser cycles are known.
+    /// The TDC, where laser cycles are known or the background shows it.
     pub tdc: Option<Tdc>,
     /// The nearest peak that all pixels share.
     pub nearest: Nearest,
@@ -174,7 +174,10 @@ impl AllHistograms {
     fn new(observed: &Observed, hot: &[usize]) -> Result<Self> {
         let mut traces = observed.traces(hot)?;
         let last_bin = cut_unmeasured(&mut traces);
-        let tdc = observed.length.is_known().then(|| pile_up::tdc(&traces));
+        let tdc = match observed.length.is_known() {
+            true => Some(pile_up::tdc(&traces)),
+            false => pile_up::tdc_without_cycles(&traces),
+        };
         if let Some(Tdc::DeadTime { bins, .. }) = tdc {
             for trace in &mut traces {
                 trace.counts =

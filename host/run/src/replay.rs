@@ -286,6 +286,7 @@ fn find(
         masked_too_few(&given, &settings),
         glass_in_gate(&given, &found),
         unsuited_offset(&given, &found),
+        found.hidden_photons(),
     ];
     // A z is for the exposures that were simulated.
     if settings.detection.z.is_some() && OF_Z.iter().any(|key| given_keys.contains(*key)) {

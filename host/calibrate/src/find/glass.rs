@@ -3,7 +3,8 @@
 //!
 //! A peak is common if groups of histograms share it. Groups are so large that its mean height shows in
 //! each. In nine groups of ten the peak must have at least half of the median height, in groups along
-//! rows as well as along columns.
+//! rows as well as along columns. It must also stand out from the bins before it: after pile-up every near bin
+//! is above the mean background, in all pixels.
 //!
 //! The gate begins where crosstalk no longer matters: from that bin on, its photons in an exposure of L2
 //! laser cycles are below half a standard deviation of the background.
@@ -101,28 +102,44 @@ fn common(good: &GoodHistograms) -> Option<Peak> {
         .collect();
     let peaks = Peak::all(&flat, mean);
     let peak = *peaks.first()?;
+    let lowest = lowest_before(&counts, peak.top);
     let is_common = good.orders().iter().all(|order| {
-        let share = share_with(good, order, peak.top);
+        let share = share_with(good, order, peak.top, lowest);
         share.is_some_and(|share| share >= COMMON)
     });
     is_common.then_some(peak)
 }
 
-/// The share of groups along `order` that have at least half of the median height at `top`;
-/// `None` if groups would have to be so large that there are too few.
-fn share_with(good: &GoodHistograms, order: &[usize], top: usize) -> Option<f64> {
+/// The middle of the three bins with the fewest photons of those before `top` and its neighbours, if
+/// there are three.
+fn lowest_before(counts: &[f64], top: usize) -> Option<usize> {
+    let before = counts.get(..top.saturating_sub(1)).unwrap_or_default();
+    let sums = before.windows(3).map(|bins| bins.iter().sum::<f64>());
+    let lowest = sums.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b));
+    lowest.map(|(first, _)| first + 1)
+}
+
+/// The share of groups along `order` that have at least half of the median height at `top`, and at least a
+/// quarter above the bins at `lowest`; `None` if groups would have to be so large that there are too few.
+fn share_with(
+    good: &GoodHistograms,
+    order: &[usize],
+    top: usize,
+    lowest: Option<usize>,
+) -> Option<f64> {
     let around = top.saturating_sub(1)..=(top + 1).min(good.bins() - 1);
-    // Signal photons, laser cycles and all photons.
-    let of: Vec<[f64; 3]> = order
+    // Signal photons, laser cycles, all photons, and photons above the lowest bins.
+    let of: Vec<[f64; 4]> = order
         .iter()
         .map(|&index| {
             let trace = &good.traces[index];
             let sum: f64 = trace.counts[around.clone()].iter().sum();
             let below: f64 = around.clone().map(|bin| good.background(index, bin)).sum();
-            [sum - below, trace.cycles, sum.max(below)]
+            let before = lowest.map_or(below, |bin| trace.counts[bin - 1..=bin + 1].iter().sum());
+            [sum - below, trace.cycles, sum.max(below), sum - before]
         })
         .collect();
-    let sum = |rows: &[[f64; 3]], column: usize| rows.iter().map(|row| row[column]).sum::<f64>();
+    let sum = |rows: &[[f64; 4]], column: usize| rows.iter().map(|row| row[column]).sum::<f64>();
     let mut height = sum(&of, 0) / sum(&of, 1);
     let mut group = 0;
     // A few histograms may give the mean its height: then larger groups are needed for the median.
@@ -136,13 +153,14 @@ fn share_with(good: &GoodHistograms, order: &[usize], top: usize) -> Option<f64>
         }
         let is_shown = needed <= group;
         group = needed.max(group);
-        let heights: Vec<f64> = of
+        let heights: Vec<[f64; 2]> = of
             .chunks_exact(group)
-            .map(|rows| sum(rows, 0) / sum(rows, 1))
+            .map(|rows| [0, 3].map(|column| sum(rows, column) / sum(rows, 1)))
             .collect();
-        height = median(heights.iter().copied());
+        height = median(heights.iter().map(|of| of[0]));
         if is_shown {
-            let having = heights.iter().filter(|&&of| of >= height / 2.0).count();
+            let has = |of: &&[f64; 2]| of[0] >= height / 2.0 && of[1] >= height / 4.0;
+            let having = heights.iter().filter(has).count();
             return Some(having as f64 / heights.len() as f64);
         }
     }

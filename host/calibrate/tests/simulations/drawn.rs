@@ -12,6 +12,8 @@ use dtof_calibrate::{Calibration, Length, Observed};
 use dtof_core::fixed::types::U4F12;
 use dtof_core::rule::detect;
 use dtof_core::{Array, Count, DepthEstimator, RangeGate, WindowRule};
+use dtof_engine::host::host_engine;
+use dtof_engine::settings::SettingsFile;
 use dtof_photons::recorded::Capture;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_simulate::scene::Scene;
@@ -206,6 +208,24 @@ pub fn recorded(scene: &Scene, cycles: u64, seed: u64) -> Capture {
         }
     });
     capture
+}
+
+/// Events of the scene with these settings, and how many are more than three bins away from the
+/// surface that their pixel sees.
+pub fn events(scene: &Scene, settings: &SettingsFile, cycles: u64) -> (usize, usize) {
+    let settings = settings.settings(128).unwrap();
+    let photons = scene.photons(99, cycles).unwrap();
+    let mut engine = host_engine(&settings, photons.array(), &photons.addresses()).unwrap();
+    let (mut all, mut wrong) = (0, 0);
+    slices(photons, cycles, |slice| {
+        for event in engine.run(slice).unwrap() {
+            let truth = scene.truth(event.pixel, 0).unwrap().range_mm / scene.mm_per_bin();
+            let at = f64::from(event.position().raw()) / 256.0;
+            all += 1;
+            wrong += usize::from((at - truth).abs() > 3.0);
+        }
+    });
+    (all, wrong)
 }
 
 /// The share of exposures to `background` alone that have an event, with the settings of the

@@ -1,14 +1,12 @@
 //! Crosstalk of the cover glass: gates that exclude it, crosstalk with a tail, and crosstalk that grows.
 
-use crate::drawn::{observed, recorded, slices};
+use crate::drawn::{events, observed, recorded};
 use crate::slow_or_quick;
 use dtof_calibrate::{
     Calibration, CalibrationOptions, Change, Length, Nearest, RunPhotons, calibrate, glass_change,
 };
-use dtof_engine::host::host_engine;
 use dtof_engine::settings::SettingsFile;
 use dtof_photons::recorded::Capture;
-use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 
 /// A wall, two nearer surfaces and the cover glass. A bin is 37.5 mm.
@@ -32,24 +30,6 @@ fn found(scene: &Scene, cycles: u64, seed: u64) -> Calibration {
         250.0,
     );
     calibrate(&observed, &CalibrationOptions::default()).unwrap()
-}
-
-/// Events of the scene with these settings, and how many are more than three bins away from the
-/// surface that their pixel sees.
-fn events(scene: &Scene, settings: &SettingsFile, cycles: u64) -> (usize, usize) {
-    let settings = settings.settings(128).unwrap();
-    let photons = scene.photons(99, cycles).unwrap();
-    let mut engine = host_engine(&settings, photons.array(), &photons.addresses()).unwrap();
-    let (mut all, mut wrong) = (0, 0);
-    slices(photons, cycles, |slice| {
-        for event in engine.run(slice).unwrap() {
-            let truth = scene.truth(event.pixel, 0).unwrap().range_mm / scene.mm_per_bin();
-            let at = f64::from(event.position().raw()) / 256.0;
-            all += 1;
-            wrong += usize::from((at - truth).abs() > 3.0);
-        }
-    });
-    (all, wrong)
 }
 
 #[test]
@@ -106,6 +86,31 @@ fn a_glass_with_a_long_tail_ends_where_its_photons_do() {
             found.gate.0.abs_diff(end) <= 1,
             "{} for {end}",
             found.gate.0
+        );
+    }
+}
+
+/// After pile-up all pixels hold more photons in near bins than in far ones, also where nothing is near.
+#[test]
+fn a_near_surface_after_pile_up_is_no_glass() {
+    let near = "[[surface]]\nposition_bins = 12.3\nsignal = 0.3\nrectangle = { columns = [0, 10], rows = [0, 24] }";
+    let glass = "[cover_glass]\nposition_bins = 12.3\nsignal = 0.3";
+    for (nearest, top) in [(near, None), (glass, Some(12))] {
+        let text = format!(
+            "columns = 32\nrows = 24\nbackground = 0.02\n[tdc]\nhits_per_cycle = 1\n\
+             [[surface]]\nposition_bins = 80.1\nsignal = 0.3\n\
+             [[surface]]\nposition_bins = 60.1\nsignal = 0.3\nrectangle = {{ columns = [0, 20], rows = [0, 24] }}\n\
+             {nearest}"
+        );
+        let scene = Scene::parse(&text).unwrap();
+        let captures = [recorded(&scene, 1000, 1)];
+        let observed = observed(scene.array().unwrap(), &captures, Length::Unknown, 250.0);
+        let found = calibrate(&observed, &CalibrationOptions::default()).unwrap();
+        assert_eq!(
+            found.glass().map(|glass| glass.top),
+            top,
+            "{:?}",
+            found.nearest
         );
     }
 }

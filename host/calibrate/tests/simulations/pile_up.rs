@@ -1,24 +1,38 @@
 //! Pile-up: which TDC a recording comes from, and rates that are corrected for it.
 
-use crate::drawn::{observed, recorded};
+use crate::drawn::{events, observed, recorded};
 use crate::slow_or_quick;
 use dtof_calibrate::{Calibration, CalibrationOptions, Length, Tdc, calibrate};
 use dtof_core::Array;
+use dtof_engine::settings::SettingsFile;
 use dtof_simulate::scene::Scene;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg32;
 use rayon::prelude::*;
 
-fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibration {
+/// The share of the photons that a TDC of one hit loses: each laser cycle with photons counts one of them.
+fn lost_of(background: f64) -> f64 {
+    let all = 128.0 * background + 0.3;
+    1.0 - -(-all).exp_m1() / all
+}
+
+fn scene(background: f64, more: &str) -> Scene {
     let text = format!(
         "columns = 8\nrows = 4\nbackground = {background:?}\npulse_sigma_bins = 0.9\n\
          [[surface]]\nposition_bins = 70.3\nsignal = 0.3\n\
          [[surface]]\nposition_bins = 40.8\nsignal = 0.3\nrectangle = {{ columns = [0, 3], rows = [0, 4] }}\n\
          {more}\n"
     );
-    let scene = Scene::parse(&text).unwrap();
-    let captures = [recorded(&scene, 20_000, 4)];
+    Scene::parse(&text).unwrap()
+}
+
+fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibration {
+    found_in(&scene(background, more), length)
+}
+
+fn found_in(scene: &Scene, length: impl Fn(u64) -> Length) -> Calibration {
+    let captures = [recorded(scene, 20_000, 4)];
     let observed = observed(scene.array().unwrap(), &captures, length(20_000), 250.0);
     calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }
@@ -31,9 +45,7 @@ fn a_tdc_of_one_hit_is_recognised_and_its_rates_are_corrected() {
             panic!("{background}: {:?}", found.tdc);
         };
         assert_eq!(bins, 128);
-        // Each laser cycle with photons counts one of them.
-        let all = 128.0 * background + 0.3;
-        let truth = 1.0 - -(-all).exp_m1() / all;
+        let truth = lost_of(background);
         assert!((lost - truth).abs() < 0.01, "{lost} for {truth}");
         let rate = found.pixels.background;
         assert!(
@@ -48,9 +60,50 @@ fn a_tdc_of_one_hit_is_recognised_and_its_rates_are_corrected() {
 }
 
 #[test]
-fn without_laser_cycles_the_tdc_is_unknown() {
-    let found = found(0.02, "[tdc]\nhits_per_cycle = 1", |_| Length::Unknown);
-    assert_eq!(found.tdc, None);
+fn without_laser_cycles_one_photon_in_each_still_shows() {
+    for &background in slow_or_quick(&[0.003, 0.01, 0.02, 0.04][..], &[0.02]) {
+        let found = found(background, "[tdc]\nhits_per_cycle = 1", |_| Length::Unknown);
+        let Some(Tdc::OnePhotonIn { cycles, lost }) = found.tdc else {
+            panic!("{background}: {:?}", found.tdc);
+        };
+        let [cycles, lost] = [cycles / 20_000.0, lost / lost_of(background)];
+        assert!((cycles - 1.0).abs() < 0.1, "{background}: {cycles}");
+        assert!((lost - 1.0).abs() < 0.1, "{background}: {lost}");
+    }
+    let found = found(0.02, "", |_| Length::Unknown);
+    assert_eq!((found.tdc, found.hidden_photons()), (None, None));
+}
+
+/// Without a correction depths are right while no more than half of the photons are lost. From there on it is
+/// warned of.
+#[test]
+fn half_of_the_photons_may_be_lost_without_a_warning() {
+    for &background in slow_or_quick(&[0.002, 0.004, 0.008, 0.01][..], &[0.008]) {
+        let scene = scene(background, "[tdc]\nhits_per_cycle = 1");
+        let found = found_in(&scene, |_| Length::Unknown);
+        assert_eq!(found.hidden_photons(), None, "{background}");
+        let settings = found.settings(SettingsFile::default()).unwrap();
+        let (all, wrong) = events(&scene, &settings, 10_000);
+        assert!(
+            all > 2000 && 100 * wrong < all,
+            "{background}: {wrong} of {all}"
+        );
+    }
+    let found = found(0.014, "[tdc]\nhits_per_cycle = 1", |_| Length::Unknown);
+    let told = found.hidden_photons().unwrap();
+    assert!(told.contains("one photon in each of about "), "{told}");
+}
+
+/// From three photons in four on rates are not right, which is warned of.
+#[test]
+fn too_many_lost_photons_are_told() {
+    let told = |background| {
+        let found = found(background, "[tdc]\nhits_per_cycle = 1", Length::Cycles);
+        found.hidden_photons()
+    };
+    assert_eq!(told(0.02), None);
+    let told = told(0.04).unwrap();
+    assert!(told.starts_with("the TDC loses 8"), "{told}");
 }
 
 #[test]
