@@ -187,7 +187,7 @@ pub(crate) fn detection_in<const BINS: usize, W: CounterWidth>(
             return None;
         }
         let counted = counts.counted(other);
-        let is_known = !counts.is_left_out(counted.live, 1);
+        let is_known = !counts.is_left_out(counted.live);
         is_clipped |= !is_known && other.abs_diff(bin) <= estimator.reach();
         is_known.then_some(counted)
     });

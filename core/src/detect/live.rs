@@ -174,7 +174,7 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         let (mut brightest, mut highest) = (first, 0);
         for bin in first..first.saturating_add(width) {
             let counted = self.counted(bin);
-            let light = if self.is_left_out(counted.live, 1) {
+            let light = if self.is_left_out(counted.live) {
                 0
             } else {
                 counted.light()
@@ -197,10 +197,10 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         }
     }
 
-    /// Whether a bin, or a window on average, was live in too few laser cycles.
+    /// Whether a bin was live in too few laser cycles.
     #[must_use]
-    pub fn is_left_out(&self, live: u64, bins: u16) -> bool {
-        live * u64::from(Self::LEAST_SHARE) < u64::from(self.cycles) * u64::from(bins)
+    pub fn is_left_out(&self, live: u64) -> bool {
+        live * u64::from(Self::LEAST_SHARE) < u64::from(self.cycles)
     }
 
     /// The window of `width` bins with the largest excess, if it stands `z` (in 1/4096) standard

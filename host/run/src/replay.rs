@@ -10,6 +10,7 @@ use super::recording::{
     RECORDING, check_once_per_bin, mask_capture, read_options, settings_of_file,
 };
 use super::run::{RunResult, Sink, run};
+use super::summary::Summary;
 use dtof_calibrate::report::rows;
 use dtof_calibrate::{Calibration, CalibrationOptions};
 use dtof_engine::Engine;
@@ -87,12 +88,31 @@ impl Replay {
         result.summary.found.clone_from(&self.found);
         result.summary.assumed = self.assumed();
         let warnings = self.metadata.warnings.iter().cloned();
+        let warnings = warnings.chain(self.few_reports(&result.summary));
         result.summary.warnings.extend(warnings);
         Ok(result)
     }
 }
 
 impl Replay {
+    /// Names the options that find more, if most pixels report nothing, no other warning says why, and these options do not
+    /// hold already.
+    fn few_reports(&self, summary: &Summary) -> Option<String> {
+        let settings = &self.settings;
+        let array = self.photons.array();
+        let may_help = !self.found.is_empty()
+            && self.metadata.warnings.is_empty()
+            && settings.binning.is_none()
+            && !(settings.decide_once && settings.neighbours.is_some())
+            && array.columns().min(array.rows()) > 1;
+        let (reporting, pixels) = (summary.pixels_reporting, summary.pixels);
+        (may_help && 2 * reporting < pixels).then(|| {
+            format!(
+                "{reporting} of {pixels} pixels report: if others see dim targets, --decide-once --neighbours 8 finds more of them"
+            )
+        })
+    }
+
     /// What neither options nor settings nor the recording give.
     fn assumed(&self) -> Vec<Row> {
         let array = self.photons.array();

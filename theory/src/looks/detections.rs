@@ -131,13 +131,17 @@ mod tests {
             position: 40.25,
             sigma: 1.0,
         };
+        trial_at(&rates, alpha, 200)
+    }
+
+    fn trial_at(rates: &Rates, alpha: &str, exposures: u32) -> Detections {
         let settings = DetectionSettings {
             looks: Looks::new(4, 40, 1000),
             rule: PaperRule::new(alpha.parse::<U8F8>().unwrap(), Count::saturating(2)).into(),
             estimator: DepthEstimator::Centroid3,
         };
-        let part = Part::new(NONE, 200).unwrap();
-        Detections::trial::<128>(3, 7, &rates, &settings, 200, &part).unwrap()
+        let part = Part::new(NONE, exposures.into()).unwrap();
+        Detections::trial::<128>(3, 7, rates, &settings, exposures, &part).unwrap()
     }
 
     #[test]
@@ -158,6 +162,31 @@ mod tests {
         assert!((0.05..0.3).contains(&error), "{error}");
         let squares = found.squared_errors as f64 / 200.0;
         assert!(((error * 256.0).powi(2) / squares - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_dim_target_is_found_in_a_part_of_the_exposures() {
+        let found = trial(0.1, "4");
+        assert!((20..180).contains(&found.near), "{found:?}");
+        let share = found.near as f64 / 200.0;
+        assert!((found.detected() - share).abs() < 1e-12);
+    }
+
+    /// Two photons in a bin, and most often none beside it, are an event in the middle of the bin.
+    #[test]
+    fn an_event_just_three_bins_away_is_near() {
+        let rates = Rates {
+            background: 0.0005,
+            signal: 0.0,
+            position: 40.5,
+            sigma: 1.0,
+        };
+        let found = trial_at(&rates, "0", 20_000);
+        let events = found.near + found.far;
+        assert!(events > 10_000, "{found:?}");
+        // Seven bins of 128, but for events that a photon beside them moves away.
+        let near = 128 * found.near;
+        assert!((6 * events..8 * events).contains(&near), "{found:?}");
     }
 
     #[test]

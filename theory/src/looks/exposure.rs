@@ -347,6 +347,69 @@ mod tests {
     }
 
     #[test]
+    fn the_highest_alphas_of_an_exposure_are_those_of_its_looks() {
+        let minimum_count = Count::saturating(3);
+        let rates = Rates::without_target(0.02);
+        let looks = Looks::new(4, 40, 400);
+        let exposures = Exposures::new(&rates, 32, looks).unwrap();
+        let lasts = [looks.first, 20, 50, looks.last];
+        let mut grown = 0;
+        for exposure in 0..200 {
+            let mut rng = trial_rng(9, exposure);
+            let found = exposures.highest_alphas::<32>(minimum_count, &lasts, &mut rng);
+            let mut rng = trial_rng(9, exposure);
+            let mut alphas = Vec::new();
+            exposures.run::<32>(&RangeGate::full(), &mut rng, |step, histogram| {
+                alphas.push((step, highest_alpha(histogram, minimum_count)));
+                false
+            });
+            let until = |last| {
+                let looks = alphas.iter().filter(move |(step, _)| *step <= last);
+                looks.filter_map(|(_, alpha)| *alpha).max()
+            };
+            assert_eq!(found, lasts.map(until));
+            grown += u32::from(found[0] < found[1] && found[1] < found[2]);
+        }
+        assert!(grown > 20, "{grown}");
+    }
+
+    #[test]
+    fn frames_come_with_the_laser_cycles_of_their_looks() {
+        let rates = Rates {
+            background: 0.05,
+            signal: 0.3,
+            position: 20.0,
+            sigma: 1.0,
+        };
+        let looks = Looks::new(7, 30, 100);
+        let exposures = Exposures::new(&rates, 32, looks).unwrap();
+        let mut rng = trial_rng(4, 4);
+        let mut sums = [0u32; 10];
+        let times = 2000;
+        for _ in 0..times {
+            let mut seen = Vec::new();
+            exposures.frames::<32>(&mut rng, |cycles, photons| {
+                sums[seen.len()] += photons.iter().map(|&count| u32::from(count)).sum::<u32>();
+                seen.push(cycles);
+                false
+            });
+            assert_eq!(seen, [35, 42, 49, 56, 63, 70, 77, 84, 91, 98]);
+        }
+        for (look, sum) in sums.into_iter().enumerate() {
+            let cycles = if look == 0 { 35.0 } else { 7.0 };
+            let expected = f64::from(times) * cycles * (32.0 * 0.05 + 0.3);
+            let deviation = (f64::from(sum) - expected) / expected.sqrt();
+            assert!(deviation.abs() < 5.0, "{look}: {sum} {expected}");
+        }
+        let mut looked = 0;
+        exposures.frames::<32>(&mut rng, |cycles, _| {
+            looked += 1;
+            cycles == 49
+        });
+        assert_eq!(looked, 3);
+    }
+
+    #[test]
     fn counts_have_the_means_of_the_rates() {
         let rates = Rates {
             background: 0.05,

@@ -368,6 +368,29 @@ fn a_dim_recording_gets_the_window_rule() {
     }
 }
 
+/// A third of the light of the dim one.
+#[test]
+fn few_reports_name_the_options_that_find_more() {
+    let scratch = Scratch::new();
+    let scene = DIM
+        .replace("0.003", "0.001")
+        .replace("0.0015", "0.001")
+        .replace("0.00019", "0.00006");
+    let dim = scratch.file("dim.npy", recording(&scene));
+    let with = |options: &str| {
+        let summary = scratch.replayed(&dim, options);
+        (right(&scratch, &scene), summary["warnings"].clone())
+    };
+    let (alone, warnings) = with("");
+    let (together, none) = with("--decide-once --neighbours 8");
+    println!("of 128 pixels {alone} right, {together} once with 8 neighbours");
+    assert!(alone < 64 && together >= 120);
+    let warning = warnings[0].as_str().unwrap();
+    let text = "of 128 pixels report: if others see dim targets, --decide-once --neighbours 8 finds more of them";
+    assert!(warning.ends_with(text), "{warning}");
+    assert_eq!(none, serde_json::json!([]));
+}
+
 /// The pulse is the given one, else the measured one, else that of older settings with its half widths.
 #[test]
 fn settings_are_for_the_pulse_that_is_known() {
