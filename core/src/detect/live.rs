@@ -250,21 +250,15 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         count.map_or(0, |&count| count.into())
     }
 
-    /// Photons of some bins. Saturates.
+    /// Photons of some bins. Those of all fit 32 bits.
     #[inline(never)]
     fn photons(&self, bins: Range<usize>) -> u32 {
         let bins = self.histogram.counts().get(bins).unwrap_or_default();
-        bins.iter().fold(0, |sum: u32, &count| {
-            // 10 + 10 bits fit.
-            if W::BITS <= 10 {
-                sum.wrapping_add(count.into())
-            } else {
-                sum.saturating_add(count.into())
-            }
-        })
+        bins.iter()
+            .fold(0, |sum: u32, &count| sum.wrapping_add(count.into()))
     }
 
-    /// Photons of the bins that blind `bin`. Saturates.
+    /// Photons of the bins that blind `bin`.
     fn blind(&self, bin: usize) -> u32 {
         self.photons(bin.saturating_sub(self.dead_time.into())..bin)
     }
@@ -286,7 +280,6 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         let mut blind_sum = Sum::<W>::ZERO;
         for &count in early {
             blind_sum.add(blind);
-            // At most 28 bits and 24.
             blind = blind.wrapping_add(count.into());
         }
         let mut highest = blind;

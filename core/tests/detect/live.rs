@@ -136,9 +136,50 @@ fn the_brightest_bin_is_the_one_with_the_most_light() {
     assert_eq!(brightest([(51, 100), (57, 40), (58, 20)], 100), (57, 40));
     // Bin 56 has a photon in its only live laser cycle, bin 57 one in 399 of 400.
     assert_eq!(brightest([(51, 399), (56, 1), (57, 398)], 400), (57, 398));
+    // Bin 57 is live in one of 1024 laser cycles, which is enough, or in fewer.
+    let live_twice = [(52, 2046), (57, 1), (58, 0)];
+    assert_eq!(brightest(live_twice, 2048), (57, 1));
+    assert_eq!(brightest([(52, 2047), (57, 1), (58, 0)], 2049), (56, 0));
     // The first of two.
     assert_eq!(brightest([(51, 0), (56, 30), (57, 21)], 100), (56, 30));
     assert_eq!(brightest([(51, 0), (56, 0), (58, 0)], 100), (56, 0));
+}
+
+/// Where next to nothing is expected, `z²/6` photons decide: 2.7 for a z of 4.
+#[test]
+fn two_photons_where_none_are_expected_are_no_detection() {
+    fn fires<W: CounterWidth>(photons: u32) -> bool {
+        let rule = WindowRule::new(1, U4F12::lit("4"), Count::saturating(1)).unwrap();
+        let mut counts = [0; 1024];
+        counts[500] = photons;
+        let (gate, none) = (RangeGate::full(), ExcludedBins::NONE);
+        check::<1024, W>(&counts, gate, &none, 1000, 3, &rule, None)
+    }
+    for photons in 1..6 {
+        assert_eq!(fires::<Count10>(photons), photons > 2);
+        assert_eq!(fires::<Count16>(photons), photons > 2);
+    }
+}
+
+/// Nothing is brighter than a window that has every photon and all light. No bin behind it is ever live.
+#[test]
+fn a_window_of_all_light_is_no_detection() {
+    fn fires<W: CounterWidth>(cycles: u32) -> bool {
+        let mut counts = [0; 16];
+        counts[8] = cycles / 2 + 1;
+        counts[9] = cycles - counts[8];
+        // A window without bin 8 has too few photons.
+        let minimum = Count::saturating(counts[8]);
+        let rule = WindowRule::new(3, U4F12::lit("1"), minimum).unwrap();
+        let gate = RangeGate::new(8, 15).unwrap();
+        let none = ExcludedBins::NONE;
+        check::<16, W>(&counts, gate, &none, cycles, 16, &rule, None)
+    }
+    for cycles in 7..1000 {
+        assert!(!fires::<Count10>(cycles));
+        assert!(!fires::<Count16>(cycles));
+        assert!(!fires::<Count24>(cycles * 1000));
+    }
 }
 
 /// Windows of up to 7 nearly full counters of 24 bits, wherever they lie.

@@ -108,7 +108,7 @@ impl Replay {
         let (reporting, pixels) = (summary.pixels_reporting, summary.pixels);
         (may_help && 2 * reporting < pixels).then(|| {
             format!(
-                "{reporting} of {pixels} pixels report: if others see dim targets, --decide-once --neighbours 8 finds more of them"
+                "{reporting} of {pixels} pixels report: if others see dim targets, --decide-once with --neighbours 8 finds more of them"
             )
         })
     }

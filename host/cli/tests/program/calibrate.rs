@@ -386,7 +386,7 @@ fn few_reports_name_the_options_that_find_more() {
     println!("of 128 pixels {alone} right, {together} once with 8 neighbours");
     assert!(alone < 64 && together >= 120);
     let warning = warnings[0].as_str().unwrap();
-    let text = "of 128 pixels report: if others see dim targets, --decide-once --neighbours 8 finds more of them";
+    let text = "of 128 pixels report: if others see dim targets, --decide-once with --neighbours 8 finds more of them";
     assert!(warning.ends_with(text), "{warning}");
     assert_eq!(none, serde_json::json!([]));
 }
