@@ -1,6 +1,7 @@
 //! The table against the grid.
 
 use super::*;
+use crate::looks::single_look::SingleLook;
 
 #[test]
 fn the_table_has_this_grid() {
@@ -80,4 +81,58 @@ fn the_table_equals_a_new_simulation() {
         compared += rows.len();
     }
     assert!(compared > 100, "{compared}");
+}
+
+#[test]
+fn points_reach_the_highest_look_and_mean() {
+    let all = points();
+    for (first_mean, first, lasts) in [
+        (0.1, 2, &[2, 4, 8, 16, 32, 64, 128, 256, 512, 1024][..]),
+        (0.1, 101, &[101, 202, 404, 808, 1616]),
+        (25.0, 5, &[5, 10, 20, 40, 80, 160, 320]),
+        (300.0, 2, &[2, 4, 8]),
+    ] {
+        let is_here = |point: &&Point| (point.first_mean, point.first) == (first_mean, first);
+        assert_eq!(all.iter().find(is_here).unwrap().lasts, lasts);
+    }
+}
+
+/// Two last looks with so many events of 1000 exposures; a probability near 0 or 1 is left out.
+#[test]
+fn rows_are_tallies_and_the_intensity_of_their_looks() {
+    let point = Point {
+        first_mean: 1.1,
+        first: 2,
+        lasts: vec![2, 8],
+    };
+    let mut tally = FalseAlarms::new(2);
+    tally.exposures = 1000;
+    tally.events[0][..5].copy_from_slice(&[951, 950, 20, 19, 0]);
+    tally.events[1][..3].copy_from_slice(&[1000, 949, 500]);
+    let rows = rows(&point, &tally);
+    let found = rows.iter().map(|row| (row.last, row.alpha, row.events));
+    let found: Vec<_> = found.collect();
+    assert_eq!(
+        found,
+        [(2, 384, 950), (2, 512, 20), (8, 384, 949), (8, 512, 500)]
+    );
+    for row in &rows {
+        let minimum = Count::saturating(MINIMUM_COUNT.into());
+        let threshold = Threshold::new(U8F8::from_bits(row.alpha), minimum);
+        let none = (2..=row.last).map(|step| {
+            let look = SingleLook::new(128, 0.55 * f64::from(step));
+            1.0 - look.false_alarm_probability(&threshold)
+        });
+        let expected = -none.product::<f64>().ln();
+        assert!((row.intensity / expected - 1.0).abs() < 1e-9, "{row:?}");
+        assert_eq!((row.first_mean, row.first), (1.1, 2));
+    }
+    // The file has five digits.
+    let read = Table::read(&csv(&[(point, tally)]).unwrap()).unwrap();
+    assert_eq!((read.exposures, read.rows.len()), (1000, 4));
+    for (read, row) in read.rows.iter().zip(&rows) {
+        assert!((read.intensity / row.intensity - 1.0).abs() < 1e-4);
+        let intensity = row.intensity;
+        assert_eq!(Row { intensity, ..*read }, *row);
+    }
 }
