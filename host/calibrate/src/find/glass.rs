@@ -3,7 +3,7 @@
 //!
 //! A peak is common if groups of histograms share it. Groups are so large that its mean height shows in
 //! each. In nine groups of ten the peak must have at least half of the median height, in groups along
-//! rows as well as along columns. It must also stand out from the bins before it: after pile-up every near bin
+//! rows as well as along columns. Its height is that above bins beside it: after pile-up every near bin
 //! is above the mean background, in all pixels.
 //!
 //! The gate begins where crosstalk no longer matters: from that bin on, its photons in an exposure of L2
@@ -102,44 +102,45 @@ fn common(good: &GoodHistograms) -> Option<Peak> {
         .collect();
     let peaks = Peak::all(&flat, mean);
     let peak = *peaks.first()?;
-    let lowest = lowest_before(&counts, peak.top);
+    let beside = beside(&counts, mean, peak.top);
     let is_common = good.orders().iter().all(|order| {
-        let share = share_with(good, order, peak.top, lowest);
+        let share = share_with(good, order, peak.top, beside);
         share.is_some_and(|share| share >= COMMON)
     });
     is_common.then_some(peak)
 }
 
-/// The middle of the three bins with the fewest photons of those before `top` and its neighbours, if
-/// there are three.
-fn lowest_before(counts: &[f64], top: usize) -> Option<usize> {
-    let before = counts.get(..top.saturating_sub(1)).unwrap_or_default();
+/// The middle of three bins beside the peak at `top`: those with the fewest photons of all before it; if there are
+/// none, those just behind it. Bins in front that were not measured, with less than half of the `background`, do not
+/// count.
+fn beside(counts: &[f64], background: f64, top: usize) -> usize {
+    let measured = counts.iter().position(|&count| count >= background / 2.0);
+    let start = measured.unwrap_or(0);
+    let before = counts.get(start..top.saturating_sub(1)).unwrap_or_default();
     let sums = before.windows(3).map(|bins| bins.iter().sum::<f64>());
     let lowest = sums.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b));
-    lowest.map(|(first, _)| first + 1)
+    let behind = (top + 4).min(counts.len().saturating_sub(2));
+    lowest.map_or(behind, |(first, _)| start + first + 1)
 }
 
-/// The share of groups along `order` that have at least half of the median height at `top`, and at least a
-/// quarter above the bins at `lowest`; `None` if groups would have to be so large that there are too few.
-fn share_with(
-    good: &GoodHistograms,
-    order: &[usize],
-    top: usize,
-    lowest: Option<usize>,
-) -> Option<f64> {
-    let around = top.saturating_sub(1)..=(top + 1).min(good.bins() - 1);
-    // Signal photons, laser cycles, all photons, and photons above the lowest bins.
-    let of: Vec<[f64; 4]> = order
+/// The share of groups along `order` that have at least half of the median height at `top`, above the three bins
+/// about `beside`; `None` if groups would have to be so large that there are too few.
+fn share_with(good: &GoodHistograms, order: &[usize], top: usize, beside: usize) -> Option<f64> {
+    let last = good.bins() - 1;
+    let about = |bin: usize| bin.saturating_sub(1)..=(bin + 1).min(last);
+    // Signal photons, laser cycles and all photons.
+    let of: Vec<[f64; 3]> = order
         .iter()
         .map(|&index| {
             let trace = &good.traces[index];
-            let sum: f64 = trace.counts[around.clone()].iter().sum();
-            let below: f64 = around.clone().map(|bin| good.background(index, bin)).sum();
-            let before = lowest.map_or(below, |bin| trace.counts[bin - 1..=bin + 1].iter().sum());
-            [sum - below, trace.cycles, sum.max(below), sum - before]
+            let [here, there] = [top, beside].map(|bin| {
+                let counts = &trace.counts[about(bin)];
+                3.0 * counts.iter().sum::<f64>() / counts.len() as f64
+            });
+            [here - there, trace.cycles, here + there]
         })
         .collect();
-    let sum = |rows: &[[f64; 4]], column: usize| rows.iter().map(|row| row[column]).sum::<f64>();
+    let sum = |rows: &[[f64; 3]], column: usize| rows.iter().map(|row| row[column]).sum::<f64>();
     let mut height = sum(&of, 0) / sum(&of, 1);
     let mut group = 0;
     // A few histograms may give the mean its height: then larger groups are needed for the median.
@@ -153,14 +154,13 @@ fn share_with(
         }
         let is_shown = needed <= group;
         group = needed.max(group);
-        let heights: Vec<[f64; 2]> = of
+        let heights: Vec<f64> = of
             .chunks_exact(group)
-            .map(|rows| [0, 3].map(|column| sum(rows, column) / sum(rows, 1)))
+            .map(|rows| sum(rows, 0) / sum(rows, 1))
             .collect();
-        height = median(heights.iter().map(|of| of[0]));
+        height = median(heights.iter().copied());
         if is_shown {
-            let has = |of: &&[f64; 2]| of[0] >= height / 2.0 && of[1] >= height / 4.0;
-            let having = heights.iter().filter(has).count();
+            let having = heights.iter().filter(|&&of| of >= height / 2.0).count();
             return Some(having as f64 / heights.len() as f64);
         }
     }
