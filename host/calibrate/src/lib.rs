@@ -174,9 +174,10 @@ impl AllHistograms {
     fn new(observed: &Observed, hot: &[usize]) -> Result<Self> {
         let mut traces = observed.traces(hot)?;
         let last_bin = cut_unmeasured(&mut traces);
-        let tdc = match observed.length.is_known() {
-            true => Some(pile_up::tdc(&traces)),
-            false => pile_up::tdc_without_cycles(&traces),
+        let tdc = match observed.length {
+            Length::Cycles(_) => Some(pile_up::tdc(&traces)),
+            Length::PhotonsPerCycle(_) => None,
+            Length::Unknown => pile_up::tdc_without_cycles(&traces),
         };
         if let Some(Tdc::DeadTime { bins, .. }) = tdc {
             for trace in &mut traces {

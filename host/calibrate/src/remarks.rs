@@ -5,38 +5,41 @@ use dtof_engine::settings::SettingsFile;
 use dtof_options::numbers::shortest;
 use dtof_options::rows::{Row, bins, grouped};
 
-/// A TDC may lose this share of the photons if rates are corrected for it, and this one if they are not: beyond,
-/// replays have wrong depths.
+/// From this share of lost photons on, far targets are missed or wrong although rates are corrected.
 const MOST_LOST: f64 = 0.75;
+/// The same without a correction.
 const MOST_LOST_UNCORRECTED: f64 = 0.5;
 
 impl Calibration {
     /// That early photons have hidden so many late ones, or seem to have, that depths may be wrong.
     #[must_use]
-    #[allow(
-        clippy::cast_possible_truncation,
-        clippy::cast_sign_loss,
-        reason = "laser cycles"
-    )]
     pub fn hidden_photons(&self) -> Option<String> {
         match self.tdc? {
-            Tdc::OnePhotonIn { cycles, lost } if lost > MOST_LOST_UNCORRECTED => {
-                // Two digits.
-                let unit = 10f64.powf((cycles.log10().floor() - 1.0).max(0.0));
-                Some(format!(
-                    "the background falls as if the TDC recorded one photon in each of about {} laser cycles and lost \
-                     {:.0} %: far targets may be missed or wrong, unless --recorded-cycles says how many there were",
-                    grouped((cycles / unit).round() as u64 * unit as u64),
-                    lost * 100.0
-                ))
-            }
+            Tdc::OnePhotonIn { cycles, lost } if lost > MOST_LOST_UNCORRECTED => Some(format!(
+                "the background falls as if the TDC recorded one photon in each of about {} laser cycles and lost \
+                 {:.1} %: far targets may be missed or wrong. --recorded-cycles N, with the N of the sensor, corrects \
+                 that",
+                two_digits(cycles),
+                lost * 100.0
+            )),
             Tdc::DeadTime { lost, .. } if lost > MOST_LOST => Some(format!(
-                "the TDC loses {:.0} % of the photons: far targets may be missed or wrong with so much light",
+                "the TDC loses {:.1} % of the photons: far targets may be missed or wrong with so much light",
                 lost * 100.0
             )),
             _ => None,
         }
     }
+}
+
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "laser cycles"
+)]
+fn two_digits(number: f64) -> String {
+    let number = number.round() as u64;
+    let unit = 10u64.pow(number.max(1).ilog10().saturating_sub(1));
+    grouped((number + unit / 2) / unit * unit)
 }
 
 /// Remarks on the `settings`, each a topic and a sentence or two.
@@ -171,7 +174,10 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
         _ => {}
     }
     if let Some(text) = found.hidden_photons() {
-        remark("pile-up", text.replacen("the", "The", 1) + ".");
+        remark(
+            "pile-up",
+            format!("{}{}.", text[..1].to_uppercase(), &text[1..]),
+        );
     }
     let detection = &found.detection;
     if detection.is_by_count {

@@ -13,6 +13,7 @@ use super::run::{RunResult, Sink, run};
 use super::summary::Summary;
 use dtof_calibrate::report::rows;
 use dtof_calibrate::{Calibration, CalibrationOptions};
+use dtof_core::Neighbours;
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{DetectionSettings, EstimatorName, Settings, SettingsFile};
@@ -88,28 +89,35 @@ impl Replay {
         result.summary.found.clone_from(&self.found);
         result.summary.assumed = self.assumed();
         let warnings = self.metadata.warnings.iter().cloned();
-        let warnings = warnings.chain(self.few_reports(&result.summary));
         result.summary.warnings.extend(warnings);
+        result.summary.dim_targets = self.dim_targets(&result.summary);
         Ok(result)
     }
 }
 
 impl Replay {
-    /// Names the options that find more, if most pixels report nothing, no other warning says why, and these options do not
-    /// hold already.
-    fn few_reports(&self, summary: &Summary) -> Option<String> {
-        let settings = &self.settings;
-        let array = self.photons.array();
-        let may_help = !self.found.is_empty()
-            && self.metadata.warnings.is_empty()
-            && settings.binning.is_none()
-            && !(settings.decide_once && settings.neighbours.is_some())
-            && array.columns().min(array.rows()) > 1;
-        let (reporting, pixels) = (summary.pixels_reporting, summary.pixels);
-        (may_help && 2 * reporting < pixels).then(|| {
-            format!(
-                "{reporting} of {pixels} pixels report: if others see dim targets, --decide-once with --neighbours 8 finds more of them"
-            )
+    /// Names the options that find more dim targets, if most pixels report nothing and settings were found that allow these
+    /// options.
+    fn dim_targets(&self, summary: &Summary) -> Option<String> {
+        let with_them = Settings {
+            decide_once: true,
+            neighbours: Some(Neighbours::Eight),
+            ..self.settings.clone()
+        };
+        let reports_little = 2 * summary.pixels_reporting
+            < summary.pixels.saturating_sub(self.settings.masked.len());
+        let has_them = self.settings.decide_once && self.settings.neighbours.is_some();
+        if !reports_little || has_them || self.found.is_empty() || self.settings.frame.is_some() {
+            return None;
+        }
+        let (array, addresses) = (self.photons.array(), self.photons.addresses());
+        let may_help = self.metadata.has_shape
+            && array.columns().min(array.rows()) > 1
+            && is_one_capture(&self.photons)
+            && host_engine(&with_them, array, &addresses).is_ok();
+        may_help.then(|| {
+            "--decide-once with --neighbours 8 finds more of them, if pixels that do not report see any"
+                .to_owned()
         })
     }
 

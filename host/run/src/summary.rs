@@ -88,6 +88,9 @@ pub struct Summary {
     /// What was assumed about the recording, one a row, for people.
     #[serde(skip)]
     pub assumed: Vec<Row>,
+    /// The options that find more dim targets, for people.
+    #[serde(skip)]
+    pub dim_targets: Option<String>,
     /// Warnings about the recording.
     pub warnings: Vec<String>,
     /// How the events of a simulated scene compare with it.
@@ -222,6 +225,7 @@ impl Summary {
             recording: Vec::new(),
             found: Vec::new(),
             assumed: Vec::new(),
+            dim_targets: None,
             warnings: Vec::new(),
             against_truth: None,
             settings: settings.clone(),
@@ -267,6 +271,9 @@ impl Summary {
                 },
             ),
         ]);
+        if let Some(options) = &self.dim_targets {
+            rows.push(("dim targets".to_owned(), options.clone()));
+        }
         if self.settings.binning.is_some() {
             rows.push(row("events of blocks", self.events_of_blocks));
         }

@@ -90,24 +90,35 @@ pub fn check(root: &Path, name: &str) -> Result<()> {
 }
 
 fn check_with(root: &Path, name: &str, data: &Path) -> Result<()> {
-    let test = verilate(root, name, name, data, &[])?;
-    let ran = program::run(&mut Command::new(test), PATIENCE, None)?;
+    let ran = run_with(root, name, data)?;
     ensure!(ran.code == Some(0), ran.output());
     print!("{}", ran.output);
     Ok(())
 }
 
+fn run_with(root: &Path, name: &str, data: &Path) -> Result<ProgramRun> {
+    let test = verilate(root, name, name, data, &[])?;
+    program::run(&mut Command::new(test), PATIENCE, None)
+}
+
 /// Whether the pixel processor, wired to another clock as `docs/softcore.md` has it, does what
-/// one does that has the clock of the photons.
+/// one does that has the clock of the photons, and does not if code and macropixel are exchanged.
 pub fn check_two_clocks(root: &Path) -> Result<()> {
     let document = fs::read_to_string(root.join("docs/softcore.md"))?;
     let wiring = document
-        .split_once("```verilog\n")
+        .split_once("### Photons from another clock domain")
+        .and_then(|(_, rest)| rest.split_once("```verilog\n"))
         .and_then(|(_, rest)| rest.split_once("```"))
         .context("docs/softcore.md has no wiring")?
         .0;
     let folder = target_folder(root).join("softcore/wiring");
     fs::create_dir_all(&folder)?;
+    let right = "{tdc_pixel, tdc_code}";
+    ensure!(wiring.contains(right), "docs/softcore.md: no {right}");
+    let wrong = wiring.replace(right, "{tdc_code, tdc_pixel}");
+    fs::write(folder.join("wiring.v"), wrong)?;
+    let ran = run_with(root, "two_clocks", &folder)?;
+    ensure!(ran.code == Some(1), "wrong wiring: {}", ran.output());
     fs::write(folder.join("wiring.v"), wiring)?;
     check_with(root, "two_clocks", &folder)
 }

@@ -17,13 +17,16 @@
 //! of them. Something else than a dead time may make a background fall, so the fall must be neither half nor
 //! twice as steep.
 //!
-//! Where the laser cycles are not known, they are looked for in the same way, for a TDC that takes one photon
-//! in each.
+//! Both depend on the number of photons of each histogram alone, which is given, and on the bins without a peak.
+//!
+//! Where the laser cycles are not known, they are looked for in the same way, for a TDC that takes one photon in each, and
+//! captures that are equally long. Another fall would fit some number of laser cycles, too. But after pile-up brighter
+//! histograms fall more steeply; if all fall alike, it is none.
 
 use std::ops::Range;
 
 use super::observed::Trace;
-use super::significance::is_surely_more;
+use super::significance::{is_surely_more, median};
 
 use dtof_theory::counts::dead_time::{arrived, live};
 
@@ -40,9 +43,10 @@ const SIDES: [(usize, usize); 3] = [(2, 8), (8, 32), (24, 96)];
 const MOST: usize = 4096;
 /// The same to find the dead time itself.
 const MOST_TO_REFINE: usize = 512;
-/// Powers of two by which the laser cycles to try exceed the photons of the brightest histogram, in parts of
-/// these photons.
+/// Laser cycles to try: the photons of the brightest histogram times `1 + 2^e`, for these e.
 const EXCESSES: Range<i8> = -8..5;
+/// Steps between two e for the likeliest laser cycles.
+const FINER: i8 = 8;
 
 /// The kind of TDC, as histograms show it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +56,7 @@ pub enum Tdc {
         /// Bins for which it is blind after a photon: all of the histogram if only the first photon of a
         /// laser cycle counts.
         bins: usize,
-        /// The share of the arriving photons that is lost.
+        /// The share of the arriving photons that is lost in the median histogram.
         lost: f64,
     },
     /// It takes several photons a laser cycle, or there is so little light that it makes no difference.
@@ -63,13 +67,12 @@ pub enum Tdc {
     OnePhotonIn {
         /// So many laser cycles.
         cycles: f64,
-        /// The share of the arriving photons that would be lost.
+        /// The share of the arriving photons that would be lost in the median histogram.
         lost: f64,
     },
 }
 
 /// A histogram, and its background.
-#[derive(Clone)]
 struct Background<'a> {
     counts: &'a [f64],
     cycles: f64,
@@ -83,11 +86,12 @@ pub fn tdc(traces: &[Trace]) -> Tdc {
     let bins = traces.first().map_or(0, |trace| trace.counts.len());
     let backgrounds = backgrounds(traces);
     let lost = |dead_time| {
-        let all = traces.iter().map(|trace| (&trace.counts[..], trace.cycles));
-        lost(all, dead_time)
+        let all = traces.iter().map(|trace| (trace, trace.cycles));
+        share_lost(all, dead_time)
     };
     let sum = |dead_time| {
-        let ratios = backgrounds.iter().map(|one| one.log_ratio(dead_time));
+        let ratios = backgrounds.iter();
+        let ratios = ratios.map(|one| one.log_ratio(one.cycles, dead_time));
         ratios.sum::<f64>()
     };
     let candidates = candidates(bins);
@@ -116,33 +120,40 @@ pub fn tdc_without_cycles(traces: &[Trace]) -> Option<Tdc> {
     let backgrounds = backgrounds(traces);
     let totals = traces.iter().map(|trace| trace.counts.iter().sum::<f64>());
     let brightest = totals.fold(1.0, f64::max);
-    let lasting = |excess: f64| {
-        let cycles = brightest * (1.0 + excess.exp2());
-        let all = backgrounds.iter().map(move |one| one.lasting(cycles));
-        (cycles, all.collect::<Vec<_>>())
+    let ratio = |e: i8| {
+        let cycles = brightest * (1.0 + f64::from(e).exp2());
+        let ratios = backgrounds.iter().map(|one| one.log_ratio(cycles, bins));
+        ratios.sum::<f64>()
     };
-    let ratio = |excess| {
-        let ratios = lasting(excess).1.into_iter();
-        ratios.map(|one| one.log_ratio(bins)).sum::<f64>()
+    let ratios: Vec<f64> = EXCESSES.map(ratio).collect();
+    decided(&ratios)?;
+    // The likeliest laser cycles, and the likelihood; `photons` of a histogram set the laser cycles of it.
+    let step = backgrounds.len().div_ceil(MOST_TO_REFINE).max(1);
+    let used = || backgrounds.iter().step_by(step);
+    let likeliest = |photons: &dyn Fn(&Background) -> f64| {
+        let steps = FINER * EXCESSES.start..FINER * EXCESSES.end;
+        let factors = steps.map(|step| 1.0 + f64::from(step).exp2().powf(1.0 / f64::from(FINER)));
+        let scored = factors.map(|factor| {
+            let each = used().map(|one| one.log_likelihood(factor * photons(one), bins, 1.0));
+            (factor, each.sum::<f64>())
+        });
+        scored.max_by(|a, b| a.1.total_cmp(&b.1))
     };
-    let ratios: Vec<f64> = EXCESSES.map(|excess| ratio(excess.into())).collect();
-    let best = f64::from(EXCESSES.start) + decided(&ratios)? as f64;
-    let (cycles, all) = (-8..=8)
-        .map(|step| lasting(best + f64::from(step) / 8.0))
-        .max_by(|(_, a), (_, b)| {
-            let [a, b] = [a, b].map(|all| log_likelihood(all, bins, 1.0));
-            a.total_cmp(&b)
-        })?;
-    let lost = lost(all.iter().map(|one| (one.counts, cycles)), bins);
-    has_the_slope(&all, bins).then_some(Tdc::OnePhotonIn { cycles, lost })
+    let (factor, likelihood) = likeliest(&|_| brightest)?;
+    let (_, alike) = likeliest(&|one| one.counts.iter().sum::<f64>().max(1.0))?;
+    let cycles = factor * brightest;
+    (likelihood > alike - DECIDES).then(|| Tdc::OnePhotonIn {
+        cycles,
+        lost: share_lost(traces.iter().map(|trace| (trace, cycles)), bins),
+    })
 }
 
 /// The number of the likeliest alternative, if the mean of these ratios of likelihoods decides for them. They
 /// are logarithms.
 fn decided(ratios: &[f64]) -> Option<usize> {
     let highest = ratios.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let ratios_of_highest = ratios.iter().map(|ratio| (ratio - highest).exp());
-    let mean = ratios_of_highest.sum::<f64>() / ratios.len() as f64;
+    let relative = ratios.iter().map(|ratio| (ratio - highest).exp());
+    let mean = relative.sum::<f64>() / ratios.len() as f64;
     let best = ratios.iter().position(|&ratio| ratio >= highest);
     best.filter(|_| highest + mean.ln() > DECIDES)
 }
@@ -173,7 +184,10 @@ fn refined(backgrounds: &[Background], candidates: &[usize], best: usize) -> usi
         .map_or(candidates[best], |&next| next - 1);
     let step = backgrounds.len().div_ceil(MOST_TO_REFINE).max(1);
     let used = || backgrounds.iter().step_by(step);
-    let likelihood = |dead_time: usize| log_likelihood(used(), dead_time, 1.0);
+    let likelihood = |dead_time: usize| {
+        let each = used().map(|one| one.log_likelihood(one.cycles, dead_time, 1.0));
+        each.sum::<f64>()
+    };
     let scored: Vec<(usize, f64)> = (low..=high).map(|bins| (bins, likelihood(bins))).collect();
     let highest = scored
         .iter()
@@ -189,19 +203,13 @@ fn refined(backgrounds: &[Background], candidates: &[usize], best: usize) -> usi
 
 /// Whether the background falls neither half nor twice as steeply as with this dead time.
 fn has_the_slope(backgrounds: &[Background], dead_time: usize) -> bool {
-    let likelihood = |power| log_likelihood(backgrounds, dead_time, power);
+    let likelihood = |power| {
+        let backgrounds = backgrounds.iter();
+        let each = backgrounds.map(|one| one.log_likelihood(one.cycles, dead_time, power));
+        each.sum::<f64>()
+    };
     let here = likelihood(1.0);
     here > likelihood(0.5) && here > likelihood(2.0)
-}
-
-/// The sum of [`Background::log_likelihood`].
-fn log_likelihood<'a>(
-    backgrounds: impl IntoIterator<Item = &'a Background<'a>>,
-    dead_time: usize,
-    power: f64,
-) -> f64 {
-    let all = backgrounds.into_iter();
-    all.map(|one| one.log_likelihood(dead_time, power)).sum()
 }
 
 /// Bins that hold no more than the bins around them, on the brighter side: those of a pulse or its tail do.
@@ -251,18 +259,14 @@ fn clear_bins(counts: &[f64]) -> Vec<bool> {
     clear
 }
 
-/// The share of the photons that a TDC with this dead time loses. Histograms are counts and laser cycles.
-fn lost<'a>(histograms: impl Iterator<Item = (&'a [f64], f64)>, dead_time: usize) -> f64 {
-    let (counted, came) = histograms.fold((0.0, 0.0), |(counted, came), (counts, cycles)| {
-        let photons = counts.iter().sum::<f64>();
-        let all = arrived(counts, cycles, dead_time);
-        (counted + photons, came + all.iter().sum::<f64>())
+/// The share of the photons that a TDC with this dead time loses of the median histogram, in laser cycles.
+fn share_lost<'a>(histograms: impl Iterator<Item = (&'a Trace, f64)>, dead_time: usize) -> f64 {
+    let lost = histograms.filter_map(|(trace, cycles)| {
+        let came = arrived(&trace.counts, cycles, dead_time);
+        let came = came.iter().sum::<f64>();
+        (came > 0.0).then(|| 1.0 - trace.counts.iter().sum::<f64>() / came)
     });
-    if came > 0.0 {
-        1.0 - counted / came
-    } else {
-        0.0
-    }
+    median(lost)
 }
 
 impl<'a> Background<'a> {
@@ -274,16 +278,8 @@ impl<'a> Background<'a> {
         }
     }
 
-    /// The same after other laser cycles.
-    fn lasting(&self, cycles: f64) -> Self {
-        Self {
-            cycles,
-            ..self.clone()
-        }
-    }
-
-    /// The logarithm of the likelihood with a dead time over that without.
-    fn log_ratio(&self, dead_time: usize) -> f64 {
+    /// The logarithm of the likelihood with a dead time over that without, in so many laser cycles.
+    fn log_ratio(&self, cycles: f64, dead_time: usize) -> f64 {
         let bins = self.counts.len();
         let is_clear = |bin: usize| f64::from(u8::from(self.clear[bin]));
         let mut before = vec![0.0; bins + 1];
@@ -309,13 +305,12 @@ impl<'a> Background<'a> {
         for bin in 0..bins {
             let count = self.counts[bin];
             if self.clear[bin] {
-                let live = self.cycles - blind;
+                let live = cycles - blind;
                 if live < 0.0 {
                     return f64::NEG_INFINITY;
                 }
                 if left_bins > 1.0 && left > 0.0 {
-                    let to_come =
-                        left_bins * self.cycles - known - others - each * left / left_bins;
+                    let to_come = left_bins * cycles - known - others - each * left / left_bins;
                     let even = 1.0 / left_bins;
                     let share = live / to_come.max(live.max(1.0));
                     let share = share.clamp(0.1 * even, (10.0 * even).min(0.5 + 0.5 * even));
@@ -340,8 +335,8 @@ impl<'a> Background<'a> {
 
     /// The logarithm of the likelihood that each background photon lies where it does, if a bin's share is
     /// this power of its live laser cycles.
-    fn log_likelihood(&self, dead_time: usize, power: f64) -> f64 {
-        let live = live(self.counts, self.cycles, dead_time);
+    fn log_likelihood(&self, cycles: f64, dead_time: usize, power: f64) -> f64 {
+        let live = live(self.counts, cycles, dead_time);
         let clear = live
             .iter()
             .zip(self.counts)
@@ -424,8 +419,37 @@ mod tests {
         }
     }
 
+    /// Fog, tails and lenses make light fall in all pixels alike.
+    #[test]
+    fn a_fall_that_all_pixels_share_is_no_pile_up() {
+        let mut rng = Pcg32::seed_from_u64(7);
+        for (decay, floor) in [(20.0, 0.0), (30.0, 0.2), (90.0, 0.0)] {
+            let fog = |pixel: usize, rng: &mut Pcg32| {
+                let bright = 2.0 + (pixel % 8) as f64;
+                let mean = |bin| bright * (floor + f64::exp(-f64::from(bin) / decay));
+                let counts = (0..128u16).map(|bin| Poisson::new(mean(bin)).unwrap().sample(rng));
+                trace(pixel, 1, counts.collect())
+            };
+            let traces: Vec<Trace> = (0..256).map(|pixel| fog(pixel, &mut rng)).collect();
+            assert_eq!(tdc_without_cycles(&traces), None, "{decay} {floor}");
+        }
+    }
+
+    /// One hot pixel loses nearly all of its photons, the others nearly none.
+    #[test]
+    fn a_hot_pixel_does_not_say_what_is_lost() {
+        let mut rng = Pcg32::seed_from_u64(8);
+        let mut traces = flat(&mut rng, 2000, 0.004, 128);
+        traces[9].counts = flat(&mut rng, 2000, 0.1, 128).swap_remove(9).counts;
+        let Some(Tdc::OnePhotonIn { cycles, lost }) = tdc_without_cycles(&traces) else {
+            panic!("not found");
+        };
+        assert!((1900.0..2100.0).contains(&cycles), "{cycles}");
+        assert!((0.18..0.26).contains(&lost), "{lost}");
+    }
+
     /// Flat counts of a TDC without a dead time, as sparse and as dense as they come, and with laser cycles
-    /// that would allow one, or without. At most two recordings in 1000 appear to have a dead time (Ville's
+    /// that would allow one, or unknown ones. At most two recordings in 1000 appear to have a dead time (Ville's
     /// inequality), so none or one in all. `DTOF_SLOW=1` draws larger and more of them.
     #[test]
     fn flat_counts_have_no_dead_time() {

@@ -370,25 +370,36 @@ fn a_dim_recording_gets_the_window_rule() {
 
 /// A third of the light of the dim one.
 #[test]
-fn few_reports_name_the_options_that_find_more() {
+fn few_reports_name_the_options_that_find_dim_targets() {
     let scratch = Scratch::new();
     let scene = DIM
         .replace("0.003", "0.001")
         .replace("0.0015", "0.001")
         .replace("0.00019", "0.00006");
     let dim = scratch.file("dim.npy", recording(&scene));
-    let with = |options: &str| {
-        let summary = scratch.replayed(&dim, options);
-        (right(&scratch, &scene), summary["warnings"].clone())
+    let with = |file: &Path, options: &str| {
+        let printed = scratch.printed(&format!("replay {} --out out {options}", file.display()));
+        let hint = "dim targets";
+        (right(&scratch, &scene), printed.contains(hint))
     };
-    let (alone, warnings) = with("");
-    let (together, none) = with("--decide-once --neighbours 8");
+    let (alone, is_hinted) = with(&dim, "");
+    assert!(is_hinted);
+    let (together, is_hinted) = with(&dim, "--decide-once --neighbours 8");
     println!("of 128 pixels {alone} right, {together} once with 8 neighbours");
-    assert!(alone < 64 && together >= 120);
-    let warning = warnings[0].as_str().unwrap();
-    let text = "of 128 pixels report: if others see dim targets, --decide-once with --neighbours 8 finds more of them";
-    assert!(warning.ends_with(text), "{warning}");
-    assert_eq!(none, serde_json::json!([]));
+    assert!(alone < 64 && together >= 120 && !is_hinted);
+    // Not if these options would be refused, nor if most of the pixels report.
+    for options in [
+        "--frame 8000",
+        "--rule paper",
+        "--binning 2",
+        "--axes captures,columns,bins",
+    ] {
+        assert!(!with(&dim, options).1, "{options}");
+    }
+    let bright = scratch.file("bright.npy", recording(&self::scene(0.02, 0.0)));
+    assert!(!with(&bright, "").1);
+    let half: Vec<String> = (0..70).map(|pixel| pixel.to_string()).collect();
+    assert!(!with(&bright, &format!("--mask {}", half.join(","))).1);
 }
 
 /// The pulse is the given one, else the measured one, else that of older settings with its half widths.
