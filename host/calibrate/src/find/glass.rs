@@ -3,8 +3,8 @@
 //!
 //! A peak is common if groups of histograms share it. Groups are so large that its mean height shows in
 //! each. In nine groups of ten the peak must have at least half of the median height, in groups along
-//! rows as well as along columns. Its height is that above bins beside it: after pile-up every near bin
-//! is above the mean background, in all pixels.
+//! rows as well as along columns. Its height is that above the bins before it, if there are enough: after pile-up every
+//! near bin is above the mean background, in all pixels.
 //!
 //! The gate begins where crosstalk no longer matters: from that bin on, its photons in an exposure of L2
 //! laser cycles are below half a standard deviation of the background.
@@ -102,42 +102,50 @@ fn common(good: &GoodHistograms) -> Option<Peak> {
         .collect();
     let peaks = Peak::all(&flat, mean);
     let peak = *peaks.first()?;
-    let beside = beside(&counts, mean, peak.top);
+    let lowest = lowest_before(&counts, mean, peak.top);
     let is_common = good.orders().iter().all(|order| {
-        let share = share_with(good, order, peak.top, beside);
+        let share = share_with(good, order, peak.top, lowest);
         share.is_some_and(|share| share >= COMMON)
     });
     is_common.then_some(peak)
 }
 
-/// The middle of three bins beside the peak at `top`: those with the fewest photons of all before it; if there are
-/// none, those just behind it. Bins in front that were not measured, with less than half of the `background`, do not
-/// count.
-fn beside(counts: &[f64], background: f64, top: usize) -> usize {
-    let measured = counts.iter().position(|&count| count >= background / 2.0);
-    let start = measured.unwrap_or(0);
-    let before = counts.get(start..top.saturating_sub(1)).unwrap_or_default();
+/// The middle of the three bins with the fewest photons before the peak at `top`. Bins that were not measured, with
+/// less than half of the `background`, do not count. `None` if there are no three.
+fn lowest_before(counts: &[f64], background: f64, top: usize) -> Option<usize> {
+    let start = counts.iter().position(|&count| count >= background / 2.0)?;
+    let before = counts.get(start..top.saturating_sub(1))?;
     let sums = before.windows(3).map(|bins| bins.iter().sum::<f64>());
     let lowest = sums.enumerate().min_by(|(_, a), (_, b)| a.total_cmp(b));
-    let behind = (top + 4).min(counts.len().saturating_sub(2));
-    lowest.map_or(behind, |(first, _)| start + first + 1)
+    lowest.map(|(first, _)| start + first + 1)
 }
 
 /// The share of groups along `order` that have at least half of the median height at `top`, above the three bins
-/// about `beside`; `None` if groups would have to be so large that there are too few.
-fn share_with(good: &GoodHistograms, order: &[usize], top: usize, beside: usize) -> Option<f64> {
-    let last = good.bins() - 1;
-    let about = |bin: usize| bin.saturating_sub(1)..=(bin + 1).min(last);
-    // Signal photons, laser cycles and all photons.
+/// about `lowest` or else above the background; `None` if groups would have to be so large that there are too few.
+fn share_with(
+    good: &GoodHistograms,
+    order: &[usize],
+    top: usize,
+    lowest: Option<usize>,
+) -> Option<f64> {
+    let around = top.saturating_sub(1)..=(top + 1).min(good.bins() - 1);
+    // Signal photons, laser cycles and photons that make noise.
     let of: Vec<[f64; 3]> = order
         .iter()
         .map(|&index| {
             let trace = &good.traces[index];
-            let [here, there] = [top, beside].map(|bin| {
-                let counts = &trace.counts[about(bin)];
-                3.0 * counts.iter().sum::<f64>() / counts.len() as f64
-            });
-            [here - there, trace.cycles, here + there]
+            let sum: f64 = trace.counts[around.clone()].iter().sum();
+            let [below, noise] = match lowest {
+                Some(bin) => {
+                    let before = trace.counts[bin - 1..=bin + 1].iter().sum::<f64>();
+                    [before, sum + before]
+                }
+                None => {
+                    let below = around.clone().map(|bin| good.background(index, bin)).sum();
+                    [below, sum.max(below)]
+                }
+            };
+            [sum - below, trace.cycles, noise]
         })
         .collect();
     let sum = |rows: &[[f64; 3]], column: usize| rows.iter().map(|row| row[column]).sum::<f64>();

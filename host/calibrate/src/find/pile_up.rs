@@ -21,12 +21,12 @@
 //!
 //! Where the laser cycles are not known, they are looked for in the same way, for a TDC that takes one photon in each, and
 //! captures that are equally long. Another fall would fit some number of laser cycles, too. But after pile-up brighter
-//! histograms fall more steeply; if all fall alike, it is none.
+//! histograms fall more steeply: if some are clearly brighter and all fall alike, it is none.
 
 use std::ops::Range;
 
 use super::observed::Trace;
-use super::significance::{is_surely_more, median};
+use super::significance::{is_surely_more, median, quantile};
 
 use dtof_theory::counts::dead_time::{arrived, live};
 
@@ -45,6 +45,9 @@ const MOST: usize = 4096;
 const MOST_TO_REFINE: usize = 512;
 /// Laser cycles to try: the photons of the brightest histogram times `1 + 2^e`, for these e.
 const EXCESSES: Range<i8> = -8..5;
+/// Histograms are of different brightness if eight in ten have photons that differ by more than this part of the median:
+/// by more than chance.
+const DIFFERENT: f64 = 0.2;
 /// Steps between two e for the likeliest laser cycles.
 const FINER: i8 = 8;
 
@@ -119,33 +122,37 @@ pub fn tdc_without_cycles(traces: &[Trace]) -> Option<Tdc> {
     let bins = traces.first()?.counts.len();
     let backgrounds = backgrounds(traces);
     let totals = traces.iter().map(|trace| trace.counts.iter().sum::<f64>());
-    let brightest = totals.fold(1.0, f64::max);
-    let ratio = |e: i8| {
-        let cycles = brightest * (1.0 + f64::from(e).exp2());
-        let ratios = backgrounds.iter().map(|one| one.log_ratio(cycles, bins));
+    let totals: Vec<f64> = totals.collect();
+    let brightest = totals.iter().copied().fold(1.0, f64::max);
+    let step = backgrounds.len().div_ceil(MOST_TO_REFINE).max(1);
+    // Of every `step`-th histogram, whose laser cycles are `factor` times `photons`.
+    let ratio = |factor: f64, photons: &dyn Fn(&Background) -> f64, step: usize| {
+        let used = backgrounds.iter().step_by(step);
+        let ratios = used.map(|one| one.log_ratio(factor * photons(one), bins));
         ratios.sum::<f64>()
     };
-    let ratios: Vec<f64> = EXCESSES.map(ratio).collect();
-    decided(&ratios)?;
-    // The likeliest laser cycles, and the likelihood; `photons` of a histogram set the laser cycles of it.
-    let step = backgrounds.len().div_ceil(MOST_TO_REFINE).max(1);
-    let used = || backgrounds.iter().step_by(step);
+    let of_brightest = |_: &Background| brightest;
+    let each = |one: &Background| one.counts.iter().sum::<f64>().max(1.0);
+    let factors = |finer: i8| {
+        let steps = finer * EXCESSES.start..finer * EXCESSES.end;
+        steps.map(move |step| 1.0 + (f64::from(step) / f64::from(finer)).exp2())
+    };
+    let coarse: Vec<f64> = factors(1)
+        .map(|factor| ratio(factor, &of_brightest, 1))
+        .collect();
+    decided(&coarse)?;
     let likeliest = |photons: &dyn Fn(&Background) -> f64| {
-        let steps = FINER * EXCESSES.start..FINER * EXCESSES.end;
-        let factors = steps.map(|step| 1.0 + f64::from(step).exp2().powf(1.0 / f64::from(FINER)));
-        let scored = factors.map(|factor| {
-            let each = used().map(|one| one.log_likelihood(factor * photons(one), bins, 1.0));
-            (factor, each.sum::<f64>())
-        });
+        let scored = factors(FINER).map(|factor| (factor, ratio(factor, photons, step)));
         scored.max_by(|a, b| a.1.total_cmp(&b.1))
     };
-    let (factor, likelihood) = likeliest(&|_| brightest)?;
-    let (_, alike) = likeliest(&|one| one.counts.iter().sum::<f64>().max(1.0))?;
+    let (factor, equal) = likeliest(&of_brightest)?;
+    let [low, middle, high] = [0.1, 0.5, 0.9].map(|share| quantile(totals.iter().copied(), share));
+    if high - low > DIFFERENT * middle && likeliest(&each)?.1 > equal + DECIDES {
+        return None;
+    }
     let cycles = factor * brightest;
-    (likelihood > alike - DECIDES).then(|| Tdc::OnePhotonIn {
-        cycles,
-        lost: share_lost(traces.iter().map(|trace| (trace, cycles)), bins),
-    })
+    let lost = share_lost(traces.iter().map(|trace| (trace, cycles)), bins);
+    Some(Tdc::OnePhotonIn { cycles, lost })
 }
 
 /// The number of the likeliest alternative, if the mean of these ratios of likelihoods decides for them. They

@@ -103,7 +103,6 @@ fn a_near_surface_after_pile_up_is_no_glass() {
     for (nearest, unmeasured, top) in [
         (near(12.3), 0, None),
         (near(12.3), 4, None),
-        (near(3.3), 0, None),
         (glass(12.3, 0.3), 0, Some(12)),
         (glass(12.3, 0.3), 4, Some(12)),
         (glass(12.3, 0.02), 0, Some(12)),

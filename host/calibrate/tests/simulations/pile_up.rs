@@ -93,6 +93,34 @@ fn half_of_the_photons_may_be_lost_without_a_warning() {
     assert!(told.contains("one photon in each of about "), "{told}");
 }
 
+/// In a short recording, too, whether all pixels get as much light or some get more.
+#[test]
+fn of_a_thousand_laser_cycles_pile_up_shows() {
+    for (background, brighter) in [(0.02, 0.0), (0.05, 0.0), (0.005, 0.1)] {
+        let surface = |row: u8| {
+            format!(
+                "[[surface]]\nposition_bins = {}.3\nsignal = {:?}\n\
+                 rectangle = {{ columns = [0, 32], rows = [{row}, {}] }}\n",
+                40 + row,
+                0.3 + brighter * f64::from(row),
+                row + 1
+            )
+        };
+        let text = format!(
+            "columns = 32\nrows = 24\nbackground = {background}\n[tdc]\nhits_per_cycle = 1\n{}",
+            (0..24).map(surface).collect::<String>()
+        );
+        let scene = Scene::parse(&text).unwrap();
+        let captures = [recorded(&scene, 1000, 2)];
+        let observed = observed(scene.array().unwrap(), &captures, Length::Unknown, 250.0);
+        let found = calibrate(&observed, &CalibrationOptions::default()).unwrap();
+        let Some(Tdc::OnePhotonIn { cycles, .. }) = found.tdc else {
+            panic!("{background}: {:?}", found.tdc);
+        };
+        assert!((900.0..1100.0).contains(&cycles), "{background}: {cycles}");
+    }
+}
+
 /// From three photons in four on rates are not right.
 #[test]
 fn too_many_lost_photons_give_a_warning() {
