@@ -49,3 +49,26 @@ impl<'a> Part<'a> {
         (self.progress)(done, self.total)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Mutex;
+
+    use super::*;
+
+    #[test]
+    fn a_part_reports_what_is_done_and_ends_if_it_is_told_to() {
+        let told = Mutex::new(Vec::new());
+        let progress = |done: u64, total: u64| {
+            told.lock().unwrap().push((done, total));
+            anyhow::ensure!(done < 2, "ended");
+            Ok(())
+        };
+        let part = Part::new(&progress, 5).unwrap();
+        part.check().unwrap();
+        part.next().unwrap();
+        assert!(part.next().is_err() && part.check().is_err());
+        let expected = [(0, 5), (0, 5), (1, 5), (2, 5), (2, 5)];
+        assert_eq!(*told.lock().unwrap(), expected);
+    }
+}

@@ -136,3 +136,14 @@ fn rows_are_tallies_and_the_intensity_of_their_looks() {
         assert_eq!(Row { intensity, ..*read }, *row);
     }
 }
+
+/// Events that were simulated, and so few that there were none.
+#[test]
+fn an_estimate_says_whether_there_were_such_events() {
+    let table = Table::load().unwrap();
+    let at = |independent| table.look_up(1.3, 3, 40, independent).unwrap();
+    assert!(at(0.1).is_observed && !at(1e-12).is_observed);
+    // At most the smallest in the table.
+    assert_eq!(at(1e-12).probability, at(1e-20).probability);
+    assert!(at(0.01).probability < at(0.1).probability);
+}
