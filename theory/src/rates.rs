@@ -162,6 +162,8 @@ mod tests {
         // Φ(1/1.5) − Φ(0).
         assert!((share - 0.247_507_46).abs() < 1e-8, "{share}");
         assert_eq!(peak_share(8, 4.01, 1.5).0, 4);
+        // Of bins that hold nothing the first.
+        assert_eq!(peak_share(8, 500.0, 1.0), (0, 0.0));
     }
 
     #[test]
