@@ -62,7 +62,8 @@ fn a_refusal_suggests_a_fix() {
     let too_long = full(0.5, 4, None);
     let error = refused(&too_long);
     assert!(
-        error.ends_with("before L2 = 5000: lower --l2 to 1720"),
+        error.starts_with("a background of 0.5 photons a bin fills")
+            && error.ends_with("before L2 = 5000: lower --l2 to 1720"),
         "{error}"
     );
     assert!(

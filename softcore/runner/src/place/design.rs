@@ -156,7 +156,7 @@ mod tests {
         }
         let places = verilog_in(&root, "softcore/rtl/place").unwrap();
         assert!(places.is_sorted() && places.len() == 4);
-        assert!(verilog_in(&root, "softcore/sim").is_err());
+        assert!(verilog_in(&root, "softcore/src").is_err());
         assert!(verilog_in(&root, "softcore/rtl/none").is_err());
     }
 }
