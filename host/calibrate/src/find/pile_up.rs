@@ -266,7 +266,7 @@ fn clear_bins(counts: &[f64]) -> Vec<bool> {
     clear
 }
 
-/// The share of the photons that a TDC with this dead time loses of the median histogram, in laser cycles.
+/// The share of its photons that the median histogram loses to this dead time. Histograms come with their laser cycles.
 fn share_lost<'a>(histograms: impl Iterator<Item = (&'a Trace, f64)>, dead_time: usize) -> f64 {
     let lost = histograms.filter_map(|(trace, cycles)| {
         let came = arrived(&trace.counts, cycles, dead_time);
@@ -285,7 +285,7 @@ impl<'a> Background<'a> {
         }
     }
 
-    /// The logarithm of the likelihood with a dead time over that without, in so many laser cycles.
+    /// The logarithm of the likelihood with a dead time over that without, for an exposure of `cycles`.
     fn log_ratio(&self, cycles: f64, dead_time: usize) -> f64 {
         let bins = self.counts.len();
         let is_clear = |bin: usize| f64::from(u8::from(self.clear[bin]));
