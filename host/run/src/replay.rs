@@ -99,17 +99,17 @@ impl Replay {
     /// Names the options that find more dim targets, if most pixels report nothing and settings were found that allow these
     /// options.
     fn dim_targets(&self, summary: &Summary) -> Option<String> {
-        let with_them = Settings {
-            decide_once: true,
-            neighbours: Some(Neighbours::Eight),
-            ..self.settings.clone()
-        };
         let reports_little = 2 * summary.pixels_reporting
             < summary.pixels.saturating_sub(self.settings.masked.len());
         let has_them = self.settings.decide_once && self.settings.neighbours.is_some();
         if !reports_little || has_them || self.found.is_empty() || self.settings.frame.is_some() {
             return None;
         }
+        let with_them = Settings {
+            decide_once: true,
+            neighbours: Some(Neighbours::Eight),
+            ..self.settings.clone()
+        };
         let (array, addresses) = (self.photons.array(), self.photons.addresses());
         let may_help = self.metadata.has_shape
             && array.columns().min(array.rows()) > 1

@@ -124,7 +124,7 @@ pub fn tdc_without_cycles(traces: &[Trace]) -> Option<Tdc> {
     let totals = traces.iter().map(|trace| trace.counts.iter().sum::<f64>());
     let totals: Vec<f64> = totals.collect();
     let brightest = totals.iter().copied().fold(1.0, f64::max);
-    let step = backgrounds.len().div_ceil(MOST_TO_REFINE).max(1);
+    let step = step_through(backgrounds.len(), MOST_TO_REFINE);
     // Of every `step`-th histogram, whose laser cycles are `factor` times `photons`.
     let ratio = |factor: f64, photons: &dyn Fn(&Background) -> f64, step: usize| {
         let used = backgrounds.iter().step_by(step);
@@ -165,9 +165,14 @@ fn decided(ratios: &[f64]) -> Option<usize> {
     best.filter(|_| highest + mean.ln() > DECIDES)
 }
 
+/// The step from one histogram to the next that uses `most` of `all` at most.
+fn step_through(all: usize, most: usize) -> usize {
+    all.div_ceil(most).max(1)
+}
+
 /// The backgrounds of histograms spread over the recording.
 fn backgrounds(traces: &[Trace]) -> Vec<Background<'_>> {
-    let step = traces.len().div_ceil(MOST).max(1);
+    let step = step_through(traces.len(), MOST);
     traces.iter().step_by(step).map(Background::of).collect()
 }
 
@@ -189,7 +194,7 @@ fn refined(backgrounds: &[Background], candidates: &[usize], best: usize) -> usi
     let high = candidates
         .get(best + 1)
         .map_or(candidates[best], |&next| next - 1);
-    let step = backgrounds.len().div_ceil(MOST_TO_REFINE).max(1);
+    let step = step_through(backgrounds.len(), MOST_TO_REFINE);
     let used = || backgrounds.iter().step_by(step);
     let likelihood = |dead_time: usize| {
         let each = used().map(|one| one.log_likelihood(one.cycles, dead_time, 1.0));
