@@ -21,7 +21,7 @@
 //! ```
 //!
 //! All gated windows are looked at, because the highest bin is often the front of the slope.
-//! Of those above the threshold the one with the largest `(S - E)²/E` is reported.
+//! Of those above the threshold the one with the largest `(S - E)²/E` is reported; the lowest index wins a tie.
 //!
 //! A window that was live in fewer than one of [`LiveCounts::LEAST_SHARE`] laser cycles, or in fewer than
 //! the rule's minimum of photons, is left out. Bins around an echo that was reported are left out, too, but their photons go on
@@ -375,10 +375,17 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
     }
 
     /// The level that a better window than this one exceeds. `None` if this one has too few photons
-    /// or live laser cycles, touches an echo, does not stand clear, or has a lower level than the best.
+    /// or live laser cycles, touches an echo, does not stand clear, or does not exceed the level of the best,
+    /// if there is one.
     #[cold]
     #[inline(never)]
-    fn next_level(&self, window: &Candidate, width: usize, levels: &Levels) -> Option<u64> {
+    fn next_level(
+        &self,
+        window: &Candidate,
+        width: usize,
+        levels: &Levels,
+        is_first: bool,
+    ) -> Option<u64> {
         if window.photons < levels.minimum
             || window.live < levels.least
             || self.touches_excluded(window.first, width)
@@ -395,7 +402,7 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
             let level = upper.wrapping_mul(upper).checked_div(window.expected)?;
             level.saturating_mul(1 << 8)
         };
-        (level >= levels.excess).then_some(level)
+        (level > levels.excess || is_first).then_some(level)
     }
 
     /// Where windows may start: in the gate, and so that they contain `expected`.
@@ -480,7 +487,8 @@ impl Scan {
                 live,
                 expected,
             };
-            if let Some(level) = counts.next_level(&candidate, width, &self.levels) {
+            let is_first = self.best.is_none();
+            if let Some(level) = counts.next_level(&candidate, width, &self.levels, is_first) {
                 self.levels.excess = level;
                 self.best = Some(candidate);
             }

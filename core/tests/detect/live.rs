@@ -212,6 +212,37 @@ fn of_windows_that_are_nearly_as_bright_one_is_reported() {
     }
 }
 
+/// As of equal bins, the lowest wins.
+#[test]
+fn the_first_of_windows_with_equal_light_is_reported() {
+    fn first<W: CounterWidth>(photons: u32, width: u8) -> u16 {
+        let mut counts = [0; 64];
+        for bin in [20, 40, 50] {
+            counts[bin] = photons;
+        }
+        let mut histogram = Histogram::<64, W>::new();
+        let _ = histogram.add_frame(&counts, &RangeGate::full());
+        let (gate, excluded) = (RangeGate::full(), ExcludedBins::new(0));
+        let live = LiveCounts::new(&histogram, &gate, &excluded, 1000, 4).unwrap();
+        let rule = WindowRule::new(width, U4F12::lit("2"), Count::saturating(1)).unwrap();
+        rule.detect_live(&live, None).window.unwrap().first
+    }
+    for photons in 20..=200 {
+        for width in 1..=5 {
+            let firsts = [
+                first::<Count10>(photons, width),
+                first::<Count16>(photons, width),
+                first::<Count24>(photons, width),
+            ];
+            let expected = 21 - u16::from(width);
+            assert!(
+                firsts.iter().all(|&first| first <= 20 && first >= expected),
+                "{photons} {width}: {firsts:?}"
+            );
+        }
+    }
+}
+
 fn check_wide(counts: &[u32; 64], width: u8) {
     let rule = WindowRule::new(width, U4F12::lit("4"), Count::saturating(5)).unwrap();
     let cycles = LiveCounts::<64, Count24>::MAX_CYCLES;
