@@ -114,7 +114,7 @@ pub struct Tuned {
 const MAX_SATURATED: f64 = 0.01;
 
 /// The most looks of an exposure: they take half a minute.
-const MAX_LOOKS: u16 = 5000;
+const MAX_LOOKS: u32 = 5000;
 
 /// Finds α and L1.
 ///
@@ -124,7 +124,7 @@ const MAX_LOOKS: u16 = 5000;
 pub fn tune(request: &Request, table: &Table, progress: Progress) -> Result<Tuned> {
     check(request)?;
     let mean_a_step = request.background * f64::from(request.x);
-    let last = u32::from(request.l2 - 1) / u32::from(request.x);
+    let Looks { last, .. } = Looks::new(request.x, request.x, request.l2);
     let part = Part::new(progress, last.into())?;
     let look = |step: u32| {
         let look = SingleLook::new(request.bins.into(), mean_a_step * f64::from(step));
@@ -188,13 +188,13 @@ fn check(request: &Request) -> Result<()> {
             "--x {x} --l2 {l2}: L2 must be greater than 2 X, so that there is a look"
         );
     }
-    let looks = (l2 - 1) / x;
+    let looks = Looks::new(x, x, l2).last;
     ensure!(
         looks <= MAX_LOOKS,
         "--x {x} --l2 {l2}: {looks} looks an exposure, at most {MAX_LOOKS} looks are calculated; \
          raise --x"
     );
-    let last = f64::from(looks * x);
+    let last = f64::from(looks * u32::from(x));
     // Limits the size of the Poisson table; such a mean is far too high anyway.
     let mean = (background * last).min(5000.0);
     let full = Poisson::new(mean).highest_at_least(Count10::MAX, bins.into());

@@ -267,6 +267,7 @@ fn progress_is_reported_and_ends_the_work() {
             .map(|call| call.1)
             .collect();
         assert_eq!(ended, begun, "{rule}");
+        assert!(calls.iter().all(|&(done, total)| done <= total), "{rule}");
         // Calls after an error are those of items that were under way.
         for last in [0, calls.len() / 2, calls.len() - 2] {
             let count = AtomicUsize::new(0);
