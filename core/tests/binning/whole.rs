@@ -4,7 +4,7 @@ use dtof_core::binning::{Binning, Block, count_in_blocks, end_laser_cycles_of_bl
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{
     Array, AsyncPixel, Count, Count16, DepthEvent, EchoNumber, LaserCycle, PaperRule, PixelAddress,
-    PixelConfig, Statistics,
+    PixelConfig, RangeGate, Statistics,
 };
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -235,6 +235,29 @@ fn compare(columns: u32, rows: u32, settings: Settings, cycles: u64, rng: &mut P
         assert_eq!(pixel.level().raw(), node.level);
     }
     events
+}
+
+/// In the gate, outside it, or of no bin.
+#[test]
+fn a_photon_that_a_block_gets_is_counted_or_counted_as_lost() {
+    let array = Array::new(2, 2).unwrap();
+    let binning = Binning::new(array, level(1)).unwrap();
+    let config = PixelConfig::<BINS>::paper().gate(RangeGate::new(4, 11).unwrap());
+    let config = config.build().unwrap();
+    let mut link = binning.link_of(PixelAddress::new(0));
+    link.tick(false);
+    let mut blocks: Vec<Block<BINS>> = binning.blocks().map(Block::new).collect();
+    for code in 0..BINS as u16 + 3 {
+        count_in_blocks(&mut blocks, &link, &config, code);
+    }
+    let mut statistics = Statistics::new();
+    blocks[0].pixel().add_photons_to(&mut statistics);
+    let found = [
+        statistics.counted,
+        statistics.gated_out,
+        statistics.rejected,
+    ];
+    assert_eq!(found, [8, 8, 3]);
 }
 
 fn settings(x: u16, l1: u16, l2: u16, patience: u64, levels: u8) -> Settings {
