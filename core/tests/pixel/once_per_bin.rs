@@ -12,6 +12,14 @@ use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, Normal, Poisson};
 use rand_pcg::Pcg32;
 
+#[test]
+fn every_bin_has_a_bit() {
+    for bins in 8..=1024 {
+        let words = OncePerBin::words(bins);
+        assert!(words * 32 >= bins && (words - 1) * 32 < bins, "{bins}");
+    }
+}
+
 proptest! {
     /// However the photons of a laser cycle are split over calls.
     #[test]
