@@ -20,6 +20,45 @@ fn every_bin_has_a_bit() {
     }
 }
 
+/// Laser cycles whose photons come in parts of `split`.
+fn once<const WORDS: usize>(
+    cycles: &[Vec<u16>],
+    split: usize,
+    first: u16,
+) -> Result<(), TestCaseError> {
+    let gate = RangeGate::<64>::new(first, 63).unwrap();
+    let config = PixelConfig::<64>::paper().gate(gate).build().unwrap();
+    let mut pixel = AsyncPixel::<64>::new(PixelAddress::new(0));
+    let mut bins = OncePerBin::<WORDS>::new();
+    let mut statistics = Statistics::default();
+    let mut expected = [0u16; 64];
+    let (mut gated_out, mut rejected) = (0, 0);
+    for cycle in cycles {
+        for codes in cycle.chunks(split) {
+            pixel.count_once_per_bin(&config, &mut statistics, &mut bins, codes);
+        }
+        bins.end_laser_cycle();
+        let set: BTreeSet<u16> = cycle.iter().copied().filter(|&code| code < 64).collect();
+        for code in set {
+            if code < first {
+                gated_out += 1;
+            } else {
+                expected[usize::from(code)] += 1;
+            }
+        }
+        rejected += cycle.iter().filter(|&&code| code >= 64).count();
+    }
+    prop_assert_eq!(pixel.histogram().counts(), &expected);
+    pixel.add_photons_to(&mut statistics);
+    let all: usize = cycles.iter().map(Vec::len).sum();
+    prop_assert_eq!(statistics.photons(), all as u64);
+    prop_assert_eq!(
+        (statistics.gated_out, statistics.rejected),
+        (gated_out, rejected as u64)
+    );
+    Ok(())
+}
+
 proptest! {
     /// However the photons of a laser cycle are split over calls.
     #[test]
@@ -28,33 +67,9 @@ proptest! {
         split in 1usize..20,
         first in 0u16..20,
     ) {
-        let gate = RangeGate::<64>::new(first, 63).unwrap();
-        let config = PixelConfig::<64>::paper().gate(gate).build().unwrap();
-        let mut pixel = AsyncPixel::<64>::new(PixelAddress::new(0));
-        let mut bins = OncePerBin::<2>::new();
-        let mut statistics = Statistics::default();
-        let mut expected = [0u16; 64];
-        let (mut gated_out, mut rejected) = (0, 0);
-        for cycle in &cycles {
-            for codes in cycle.chunks(split) {
-                pixel.count_once_per_bin(&config, &mut statistics, &mut bins, codes);
-            }
-            bins.end_laser_cycle();
-            let set: BTreeSet<u16> = cycle.iter().copied().filter(|&code| code < 64).collect();
-            for code in set {
-                if code < first {
-                    gated_out += 1;
-                } else {
-                    expected[usize::from(code)] += 1;
-                }
-            }
-            rejected += cycle.iter().filter(|&&code| code >= 64).count();
-        }
-        prop_assert_eq!(pixel.histogram().counts(), &expected);
-        pixel.add_photons_to(&mut statistics);
-        let all: usize = cycles.iter().map(Vec::len).sum();
-        prop_assert_eq!(statistics.photons(), all as u64);
-        prop_assert_eq!((statistics.gated_out, statistics.rejected), (gated_out, rejected as u64));
+        once::<2>(&cycles, split, first)?;
+        // More words than bins need.
+        once::<4>(&cycles, split, first)?;
     }
 }
 
