@@ -276,6 +276,11 @@ fn a_detection_is_kept_only_while_a_look_decides() {
     pixel.count_batch(&config, &[20; 9]);
     let detection = config.detect(pixel.histogram()).unwrap();
     let (now, late) = (LaserCycle::new(5), LaserCycle::new(6));
+    let decides = |pixel: &AsyncPixel<64>| {
+        let found = pixel.decide(&config, rule.rule(), std::iter::empty());
+        found.is_some()
+    };
+    assert!(!decides(&pixel));
     pixel.keep_detection(now, &detection);
     assert_eq!(
         pixel.end_look(&config, &mut statistics, now, |_| ()),
@@ -287,6 +292,7 @@ fn a_detection_is_kept_only_while_a_look_decides() {
         Look::NotDue
     );
     assert!(pixel.begin_look(&config, &mut statistics, 9));
+    assert!(decides(&pixel));
     pixel.keep_detection(now, &detection);
     assert_eq!(
         pixel.end_look(&config, &mut statistics, now, |_| ()),
@@ -295,6 +301,7 @@ fn a_detection_is_kept_only_while_a_look_decides() {
     // It waits. The next one does not take its place.
     pixel.count_batch(&config, &[40; 9]);
     assert!(pixel.begin_look(&config, &mut statistics, 12));
+    assert!(!decides(&pixel));
     let next = config.detect(pixel.histogram()).unwrap();
     pixel.keep_detection(late, &next);
     assert_eq!(
@@ -335,15 +342,24 @@ fn a_pixel_without_neighbours_is_one_without_an_array() {
             .tracking((trial % 4 == 3).then(|| rule.rule().own().tracking(&gate)))
             .build()
             .unwrap();
+        let config = if trial % 5 == 4 {
+            config.with_dead_time(5)
+        } else {
+            config
+        };
         let (mut array, mut alone) = (pixels(1), pixels(1).remove(0));
         let (mut statistics, mut others) = (Statistics::default(), Statistics::default());
         for look in 0..2000u64 {
-            let codes: Vec<u16> = (0..rng.next_u32() % 4)
+            let mut codes: Vec<u16> = (0..rng.next_u32() % 4)
                 .map(|_| match rng.next_u32() {
                     code if code % 12 == 0 => 40 + (code >> 8) as u16 % 2,
                     code => (code >> 8) as u16 % 66,
                 })
                 .collect();
+            // A target may appear in the last laser cycles, too.
+            if rng.next_u32().is_multiple_of(64) {
+                codes.extend([30; 20]);
+            }
             array[0].count_batch(&config, &codes);
             alone.count_batch(&config, &codes);
             let (last, cycles) = (LaserCycle::new(look), 1 + trial as u16 % 2);
