@@ -121,12 +121,15 @@ fn statistics_add_up_field_by_field() {
         statistics.deferred = number(6);
         statistics.expired = number(7);
         statistics.expired_deferred = number(8);
+        statistics.repeated = number(9);
+        statistics.ended_full = number(10);
+        statistics.blind_looks = number(11);
         statistics
     };
     let mut sum = of(3, 10);
     sum += of(7, 1000);
     assert_eq!(sum, of(10, 1010));
-    assert_eq!(sum.photons(), 5 * 10 + (1 + 2 + 3 + 4) * 1010);
+    assert_eq!(sum.photons(), 6 * 10 + (1 + 2 + 3 + 4 + 9) * 1010);
 }
 
 #[test]

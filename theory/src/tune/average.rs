@@ -137,10 +137,8 @@ fn trial<const BINS: usize>(
 ) -> Result<Vec<Vec<Option<u16>>>> {
     let rates = Rates::without_target(request.background);
     let minimum_count = Count::saturating(request.minimum_count.into());
-    // The looks of all candidates.
-    let first = looks.iter().map(|looks| looks.first).min().unwrap_or(1);
-    let all = Looks { first, ..looks[0] };
-    let simulated = Exposures::new(&rates, request.bins, all)?;
+    // The first candidate has the looks of all.
+    let simulated = Exposures::new(&rates, request.bins, looks[0])?;
     let mut rng = trial_rng(request.seed, number);
     let exposure = |_| {
         let mut highest = vec![None; looks.len()];

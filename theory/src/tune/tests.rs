@@ -213,6 +213,24 @@ fn a_bright_target_waits_until_z_holds() {
     assert_eq!(found.unwrap().l1, 36);
 }
 
+/// 64 trials of so many exposures that they have 5e8 photons, but of 2000 at most.
+#[test]
+fn the_average_simulates_as_many_photons_whatever_the_background() {
+    for (background, exposures) in [(0.4, 152), (0.05, 1220), (0.001, 2000)] {
+        let request = Request {
+            background,
+            ..REQUEST
+        };
+        let asked = std::sync::Mutex::new(0);
+        let refused = average::tune(&request, &|_, total| {
+            *asked.lock().unwrap() = total;
+            anyhow::bail!("enough")
+        });
+        assert!(refused.is_err());
+        assert_eq!(asked.into_inner().unwrap(), 64 * exposures, "{background}");
+    }
+}
+
 /// The number of exposures follows from the photons simulated in a second.
 #[test]
 fn much_background_has_fewer_exposures_without_a_target() {
