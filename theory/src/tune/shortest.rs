@@ -107,12 +107,10 @@ fn detections(
     let trials: Vec<Detections> = (0..POSITIONS)
         .into_par_iter()
         .map(|index| {
-            // In the second quadrant, clear of the middle and of both ends.
-            let bin = f64::from(request.bins / 8 * 3);
             let rates = Rates {
                 background: request.background,
                 signal: request.signal,
-                position: bin + (f64::from(index) + 0.5) / f64::from(POSITIONS),
+                position: position(request.bins, index),
                 sigma: request.sigma,
             };
             let number = first_trial + index;
@@ -124,4 +122,23 @@ fn detections(
         sum += trial;
     }
     Ok(sum)
+}
+
+/// The middle of an eighth of a bin in the second quadrant, clear of the middle and of both ends.
+fn position(bins: u16, index: u16) -> f64 {
+    f64::from(bins / 8 * 3) + (f64::from(index) + 0.5) / f64::from(POSITIONS)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_are_spread_over_a_bin() {
+        for (bins, bin) in [(8, 3.0), (128, 48.0), (1024, 384.0)] {
+            let all = (0..POSITIONS).map(|index| position(bins, index));
+            let eighths = (0..8).map(|eighth| bin + f64::from(eighth) / 8.0 + 1.0 / 16.0);
+            assert!(all.eq(eighths), "{bins}");
+        }
+    }
 }
