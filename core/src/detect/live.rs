@@ -21,7 +21,8 @@
 //! ```
 //!
 //! All gated windows are looked at, because the highest bin is often the front of the slope.
-//! Of those above the threshold the one with the largest `(S - E)²/E` is reported; the lowest index wins a tie.
+//! Of those above the threshold the one with the largest `(S - E)²/E` is reported. That is rounded
+//! down to 1/256. The last of several wins a tie: of windows around the same photons, it was live least.
 //!
 //! A window that was live in fewer than one of [`LiveCounts::LEAST_SHARE`] laser cycles, or in fewer than
 //! the rule's minimum of photons, is left out. Bins around an echo that was reported are left out, too, but their photons go on
@@ -374,18 +375,11 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
         scan.best
     }
 
-    /// The level that a better window than this one exceeds. `None` if this one has too few photons
-    /// or live laser cycles, touches an echo, does not stand clear, or does not exceed the level of the best,
-    /// if there is one.
+    /// The level that a window reaches which is at least as good as this one. `None` if this one has too few photons
+    /// or live laser cycles, touches an echo, does not stand clear, or has a lower level than the best.
     #[cold]
     #[inline(never)]
-    fn next_level(
-        &self,
-        window: &Candidate,
-        width: usize,
-        levels: &Levels,
-        is_first: bool,
-    ) -> Option<u64> {
+    fn next_level(&self, window: &Candidate, width: usize, levels: &Levels) -> Option<u64> {
         if window.photons < levels.minimum
             || window.live < levels.least
             || self.touches_excluded(window.first, width)
@@ -402,7 +396,7 @@ impl<'a, const BINS: usize, W: CounterWidth> LiveCounts<'a, BINS, W> {
             let level = upper.wrapping_mul(upper).checked_div(window.expected)?;
             level.saturating_mul(1 << 8)
         };
-        (level > levels.excess || is_first).then_some(level)
+        (level >= levels.excess).then_some(level)
     }
 
     /// Where windows may start: in the gate, and so that they contain `expected`.
@@ -480,15 +474,14 @@ impl Scan {
         } else {
             expected + 1
         };
-        if exceeds::<W>(photons, expected, self.levels.excess) {
+        if reaches::<W>(photons, expected, self.levels.excess) {
             let candidate = Candidate {
                 first: self.start,
                 photons,
                 live,
                 expected,
             };
-            let is_first = self.best.is_none();
-            if let Some(level) = counts.next_level(&candidate, width, &self.levels, is_first) {
+            if let Some(level) = counts.next_level(&candidate, width, &self.levels) {
                 self.levels.excess = level;
                 self.best = Some(candidate);
             }
@@ -590,10 +583,10 @@ fn excess(photons: u32, expected: u64) -> u64 {
     (u64::from(photons) << 8).saturating_sub(expected)
 }
 
-/// Whether the square of the excess is more than `level` times the `expected` photons, all in 1/256.
+/// Whether the square of the excess is at least `level` times the `expected` photons, all in 1/256.
 /// With counters of 10 bits the lower word of `level` is compared, which is no more than all of it.
 #[inline(always)]
-fn exceeds<W: CounterWidth>(photons: u32, expected: u64, level: u64) -> bool {
+fn reaches<W: CounterWidth>(photons: u32, expected: u64, level: u64) -> bool {
     if W::BITS <= 10 {
         // A window has 13 bits of photons, and all bins have 20.
         #[allow(
@@ -604,9 +597,9 @@ fn exceeds<W: CounterWidth>(photons: u32, expected: u64, level: u64) -> bool {
         let Some(excess) = (photons << 8).checked_sub(expected) else {
             return false;
         };
-        u64::from(excess) * u64::from(excess) > u64::from(level) * u64::from(expected)
+        u64::from(excess) * u64::from(excess) >= u64::from(level) * u64::from(expected)
     } else {
         let excess = u128::from(excess(photons, expected));
-        excess * excess > u128::from(level) * u128::from(expected)
+        excess * excess >= u128::from(level) * u128::from(expected)
     }
 }

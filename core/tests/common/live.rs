@@ -212,6 +212,9 @@ impl<'a> Exposure<'a> {
         assert_eq!(outside, [self.photons, self.all_live]);
         let is_same = |one: &&Window| (one.inside, one.live) == (window.inside, window.live);
         let same = windows.iter().filter(is_same).count();
+        // The last of equals.
+        let last = windows.iter().rfind(is_same).map(|one| one.first);
+        assert_eq!(last, Some(window.first), "{:?}", self.counts);
         Found {
             fires: true,
             is_close: !is_sure || windows.len() > same,

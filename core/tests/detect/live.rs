@@ -212,11 +212,29 @@ fn of_windows_that_are_nearly_as_bright_one_is_reported() {
     }
 }
 
-/// As of equal bins, the lowest wins.
+/// With a z of 0 a photon more than anywhere else is enough.
 #[test]
-fn the_first_of_windows_with_equal_light_is_reported() {
+fn any_excess_is_above_no_threshold() {
+    fn first<W: CounterWidth>() -> Option<u16> {
+        let mut counts = [1000u32; 64];
+        counts[30] = 1001;
+        let mut histogram = Histogram::<64, W>::new();
+        let _ = histogram.add_frame(&counts, &RangeGate::full());
+        let (gate, excluded) = (RangeGate::full(), ExcludedBins::new(0));
+        let live = LiveCounts::new(&histogram, &gate, &excluded, 1 << 20, 1).unwrap();
+        let rule = WindowRule::new(1, U4F12::ZERO, Count::saturating(1)).unwrap();
+        let window = rule.detect_live(&live, None).window;
+        window.map(|window| window.first)
+    }
+    let firsts = [first::<Count10>(), first::<Count16>(), first::<Count24>()];
+    assert_eq!(firsts, [Some(30); 3]);
+}
+
+/// Far from each other, or around the same photons.
+#[test]
+fn the_last_of_windows_with_equal_light_is_reported() {
     fn first<W: CounterWidth>(photons: u32, width: u8) -> u16 {
-        let mut counts = [0; 64];
+        let mut counts = [0u32; 64];
         for bin in [20, 40, 50] {
             counts[bin] = photons;
         }
@@ -234,11 +252,7 @@ fn the_first_of_windows_with_equal_light_is_reported() {
                 first::<Count16>(photons, width),
                 first::<Count24>(photons, width),
             ];
-            let expected = 21 - u16::from(width);
-            assert!(
-                firsts.iter().all(|&first| first <= 20 && first >= expected),
-                "{photons} {width}: {firsts:?}"
-            );
+            assert_eq!(firsts, [50; 3], "{photons} {width}");
         }
     }
 }

@@ -183,7 +183,7 @@ mod tests {
     fn the_highest_alpha_is_the_last_that_fires() {
         let mut fired = 0;
         for seed in 0..2000u32 {
-            // Up to 15 photons a bin, or up to 7: then the peak is often the minimum.
+            // Up to 15 photons a bin, or up to 7: then the peak is sometimes the minimum.
             let mask = [15, 7][seed as usize % 2];
             let frame: [u32; 8] =
                 std::array::from_fn(|bin| (seed.wrapping_mul(2_654_435_761) >> (4 * bin)) & mask);

@@ -98,6 +98,39 @@ fn a_refusal_suggests_a_fix() {
         error.contains("5001 looks an exposure, at most 5000"),
         "{error}"
     );
+
+    for (x, l2) in [(0, 1000), (500, 1000)] {
+        let l1 = None;
+        let error = refused(&Request {
+            x,
+            l1,
+            l2,
+            ..REQUEST
+        });
+        assert!(error.ends_with("so that there is a look"), "{error}");
+    }
+    for limit in [0.0, 1.0] {
+        for limit in [
+            FalseAlarmLimit::PerExposure(limit),
+            FalseAlarmLimit::PerCycle(limit),
+        ] {
+            let error = refused(&Request { limit, ..REQUEST });
+            assert!(error.starts_with("the limit on false alarms"), "{error}");
+        }
+    }
+}
+
+/// A false alarm in every exposure may be rare enough. Its probability is the bound, 1, not one from the table.
+#[test]
+fn a_limit_of_more_than_one_an_exposure_needs_no_threshold() {
+    let request = Request {
+        limit: FalseAlarmLimit::PerCycle(0.2),
+        ..REQUEST
+    };
+    let tuned = tune(&request, &Table::load().unwrap(), NONE).unwrap();
+    assert!(tuned.limit > 1.0);
+    assert_eq!(tuned.alpha, U8F8::ZERO);
+    assert_eq!((tuned.false_alarms, tuned.source), (1.0, Source::Bound));
 }
 
 /// The upper limit of false alarms is within the limit at α, and not one step below.
@@ -215,7 +248,7 @@ fn a_bright_target_waits_until_z_holds() {
 
 /// 64 trials of so many exposures that they have 5e8 photons, but of 2000 at most.
 #[test]
-fn the_average_simulates_as_many_photons_whatever_the_background() {
+fn the_exposures_of_the_average_follow_from_their_photons() {
     for (background, exposures) in [(0.4, 152), (0.05, 1220), (0.001, 2000)] {
         let request = Request {
             background,
