@@ -212,47 +212,54 @@ fn of_windows_that_are_nearly_as_bright_one_is_reported() {
     }
 }
 
+/// The first bin of the window that is reported, with counters of 10, 16 and 24 bits.
+fn reported(
+    counts: &[u32; 64],
+    cycles: u32,
+    dead_time: u16,
+    rule: &WindowRule,
+) -> [Option<u16>; 3] {
+    fn first<W: CounterWidth>(
+        counts: &[u32; 64],
+        cycles: u32,
+        dead_time: u16,
+        rule: &WindowRule,
+    ) -> Option<u16> {
+        let mut histogram = Histogram::<64, W>::new();
+        let gate = RangeGate::full();
+        let _ = histogram.add_frame(counts, &gate);
+        let live = LiveCounts::new(&histogram, &gate, &ExcludedBins::NONE, cycles, dead_time);
+        let window = rule.detect_live(&live.unwrap(), None).window;
+        window.map(|window| window.first)
+    }
+    [
+        first::<Count10>(counts, cycles, dead_time, rule),
+        first::<Count16>(counts, cycles, dead_time, rule),
+        first::<Count24>(counts, cycles, dead_time, rule),
+    ]
+}
+
 /// With a z of 0 a photon more than anywhere else is enough.
 #[test]
 fn any_excess_is_above_no_threshold() {
-    fn first<W: CounterWidth>() -> Option<u16> {
-        let mut counts = [1000u32; 64];
-        counts[30] = 1001;
-        let mut histogram = Histogram::<64, W>::new();
-        let _ = histogram.add_frame(&counts, &RangeGate::full());
-        let (gate, excluded) = (RangeGate::full(), ExcludedBins::new(0));
-        let live = LiveCounts::new(&histogram, &gate, &excluded, 1 << 20, 1).unwrap();
-        let rule = WindowRule::new(1, U4F12::ZERO, Count::saturating(1)).unwrap();
-        let window = rule.detect_live(&live, None).window;
-        window.map(|window| window.first)
-    }
-    let firsts = [first::<Count10>(), first::<Count16>(), first::<Count24>()];
-    assert_eq!(firsts, [Some(30); 3]);
+    let mut counts = [1000; 64];
+    counts[30] = 1001;
+    let rule = WindowRule::new(1, U4F12::ZERO, Count::saturating(1)).unwrap();
+    assert_eq!(reported(&counts, 1 << 20, 1, &rule), [Some(30); 3]);
 }
 
 /// Far from each other, or around the same photons.
 #[test]
 fn the_last_of_windows_with_equal_light_is_reported() {
-    fn first<W: CounterWidth>(photons: u32, width: u8) -> u16 {
-        let mut counts = [0u32; 64];
+    for photons in 20..=200 {
+        let mut counts = [0; 64];
         for bin in [20, 40, 50] {
             counts[bin] = photons;
         }
-        let mut histogram = Histogram::<64, W>::new();
-        let _ = histogram.add_frame(&counts, &RangeGate::full());
-        let (gate, excluded) = (RangeGate::full(), ExcludedBins::new(0));
-        let live = LiveCounts::new(&histogram, &gate, &excluded, 1000, 4).unwrap();
-        let rule = WindowRule::new(width, U4F12::lit("2"), Count::saturating(1)).unwrap();
-        rule.detect_live(&live, None).window.unwrap().first
-    }
-    for photons in 20..=200 {
         for width in 1..=5 {
-            let firsts = [
-                first::<Count10>(photons, width),
-                first::<Count16>(photons, width),
-                first::<Count24>(photons, width),
-            ];
-            assert_eq!(firsts, [50; 3], "{photons} {width}");
+            let rule = WindowRule::new(width, U4F12::lit("2"), Count::saturating(1)).unwrap();
+            let firsts = reported(&counts, 1000, 4, &rule);
+            assert_eq!(firsts, [Some(50); 3], "{photons} {width}");
         }
     }
 }
