@@ -1,4 +1,4 @@
-//! Every link on a page leads to an existing file and heading.
+//! Every link on a page leads to an existing file and heading, and every promise names tests that exist.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -65,4 +65,38 @@ fn every_link_of_a_page_leads_somewhere() {
     }
     assert!(links > 80, "{links} links in {} pages", found.len());
     assert_eq!(broken, [""; 0]);
+}
+
+/// A span of code that is a path of the repository.
+fn is_path(span: &str, root: &Path) -> bool {
+    let top = span.split('/').next().unwrap();
+    span.contains('/') && !span.contains(' ') && root.join(top).is_dir()
+}
+
+#[test]
+fn every_promise_has_a_figure_and_tests_that_exist() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let text = fs::read_to_string(root.join("docs/reliability.md")).unwrap();
+    let promises = text.split("## Promises").nth(1).unwrap();
+    let promises = promises.split("## ").next().unwrap();
+    let rows = promises
+        .lines()
+        .filter(|line| line.starts_with("| "))
+        .skip(1);
+    let (mut count, mut tests, mut missing) = (0, 0, Vec::new());
+    for row in rows {
+        let cells: Vec<&str> = row.trim_matches('|').split(" | ").map(str::trim).collect();
+        let full = cells.len() == 3 && cells.iter().all(|cell| !cell.is_empty());
+        assert!(full, "{row}");
+        count += 1;
+        let paths = cells[1].split('`').skip(1).step_by(2);
+        for path in paths.filter(|span| is_path(span, &root)) {
+            tests += 1;
+            if !root.join(path).exists() {
+                missing.push(path.to_owned());
+            }
+        }
+    }
+    assert!(count > 20 && tests > 20, "{count} promises, {tests} tests");
+    assert_eq!(missing, [""; 0]);
 }
