@@ -251,7 +251,49 @@ mod tests {
                 let histograms: Vec<_> = layout.histograms(&elements).collect();
                 assert_eq!(histograms, expected, "{names} {fortran}");
                 assert_eq!(layout.array, Array::new(4, 3).unwrap());
+                assert_eq!(layout.bins(), 8);
             }
+        }
+    }
+
+    #[test]
+    fn names_are_printed_as_they_are_read_and_one_must_be_the_bins() {
+        let known = "must be some of captures, rows, columns, bins";
+        for (text, expected) in [
+            ("bins,rows,columns", Ok("bins,rows,columns")),
+            (" captures, bins ", Ok("captures,bins")),
+            ("bins", Ok("bins")),
+            ("rows,columns", Err("one axis must be the bins")),
+            ("bins,rows, rows", Err("rows is given twice")),
+            ("bins,layers", Err(known)),
+            ("", Err(known)),
+        ] {
+            let read = text.parse::<Axes>().map(|axes| axes.to_string());
+            let read = read.as_deref().map_err(String::as_str);
+            assert_eq!(read, expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn arrays_that_have_no_layout_are_refused() {
+        let axes: Axes = "bins,columns".parse().unwrap();
+        for (shape, axes, expected) in [
+            (&[][..], None, "the array has no axis; one must be the bins"),
+            (&[0, 8], None, "the array [0, 8] is empty"),
+            (
+                &[2, 3, 8],
+                Some(&axes),
+                "axes bins,columns: has 2 names, but the array [2, 3, 8] has 3 axes",
+            ),
+            (
+                &[256, 257, 8],
+                None,
+                "65,792 pixels are more than 65,536: cut the array into tiles, as docs/recordings.md shows (see axes if \
+                 one axis is the bins)",
+            ),
+        ] {
+            let error = AxisLayout::new(shape, false, axes).unwrap_err();
+            assert_eq!(error.to_string(), expected);
         }
     }
 

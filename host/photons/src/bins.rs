@@ -172,22 +172,83 @@ mod tests {
         let cut = fit(1, Some(64));
         assert_eq!((cut.bins(), cut.gate()), (64, None));
         assert_eq!(cut.apply(counts).1, (65..=100).sum::<u64>());
+        // As many bins as the recording has, but half of them are empty.
+        let halved = BinFit::new(16, 16, 2, Some(16)).unwrap();
+        assert_eq!(halved.gate(), Some((0, 7)));
+        assert_eq!(halved.apply(vec![3; 16]), ([[6; 8], [0; 8]].concat(), 0));
+    }
+
+    #[test]
+    fn rows_say_what_was_changed() {
+        let summed = "neighbours added up";
+        let (added, cut_off) = ("empty bins added", "bins cut off");
+        for (recorded, rebin, requested, expected) in [
+            (128, 1, None, &[][..]),
+            (100, 1, None, &[(added, "28")]),
+            (
+                100,
+                1,
+                Some(64),
+                &[(cut_off, "the last 36, with 12,345 photons")],
+            ),
+            (64, 2, None, &[(summed, "32 sums of 2")]),
+            (64, 2, Some(64), &[(summed, "32 sums of 2"), (added, "32")]),
+            (
+                100,
+                7,
+                None,
+                &[(summed, "15 sums of 7, the last of 2"), (added, "1")],
+            ),
+            (
+                67,
+                2,
+                Some(16),
+                &[
+                    (summed, "34 sums of 2, the last of 1"),
+                    (cut_off, "the last 18, with 12,345 photons"),
+                ],
+            ),
+        ] {
+            let rows = BinFit::new(recorded, recorded, rebin, requested)
+                .unwrap()
+                .rows(12_345);
+            let rows: Vec<_> = rows
+                .iter()
+                .map(|(name, value)| (&name[..], &value[..]))
+                .collect();
+            let of_recording = recorded.to_string();
+            let first =
+                (!expected.is_empty()).then_some(("bins of the recording", &of_recording[..]));
+            let expected: Vec<_> = first.into_iter().chain(expected.iter().copied()).collect();
+            assert_eq!(rows, expected);
+        }
     }
 
     #[test]
     fn what_fits_no_run_is_refused() {
-        for (recorded, rebin, requested) in [
-            (7, 1, None),
-            (4097, 1, None),
-            (1025, 1, None),
-            (64, 9, None),
-            (4096, 3, None),
-        ] {
-            assert!(
-                BinFit::new(recorded, recorded, rebin, requested).is_err(),
-                "{recorded}"
+        let refused = |recorded, rebin| {
+            let error = BinFit::new(recorded, recorded, rebin, None).unwrap_err();
+            error.to_string()
+        };
+        for recorded in [7, 4097] {
+            assert_eq!(
+                refused(recorded, 1),
+                format!("{recorded} bins: must be from 8 to 4096 (axes says which axis they are)")
             );
         }
+        for (recorded, rebin, sums, least) in [(1025, 1, 1025, 2), (4096, 3, 1366, 4)] {
+            assert_eq!(
+                refused(recorded, rebin),
+                format!(
+                    "{sums} bins are more than 1024: add up neighbours with rebin {least}, or cut off the last with \
+                     bins 1024"
+                )
+            );
+        }
+        assert_eq!(
+            refused(64, 9),
+            "rebin 9: makes 7 whole bins of 64: must be at least 8"
+        );
         assert!(
             BinFit::new(4096, 4096, 4, None).is_ok() && BinFit::new(4096, 4096, 1, Some(8)).is_ok()
         );

@@ -52,6 +52,16 @@ impl Read for Elements {
 }
 
 impl Input {
+    /// A file of these bytes, in memory.
+    #[cfg(test)]
+    pub fn in_memory(name: &str, bytes: impl Into<Vec<u8>>) -> Self {
+        Self::Array(Arc::new(NpyArray {
+            name: name.to_owned(),
+            header: Vec::new(),
+            data: Box::new(bytes.into()),
+        }))
+    }
+
     /// All bytes from the start, and their number.
     ///
     /// # Errors
@@ -126,13 +136,32 @@ mod tests {
             data: Box::new(b"elements".to_vec()),
         }));
         for _ in 0..2 {
-            let (mut bytes, length) = input.open().unwrap();
+            let (bytes, length) = input.open().unwrap();
             let mut all = Vec::new();
-            bytes.read_to_end(&mut all).unwrap();
+            // Elements that do not end are found, too.
+            bytes.take(20).read_to_end(&mut all).unwrap();
             assert_eq!(all, b"headerelements");
             assert_eq!(length, 14);
         }
         assert_eq!(input.to_string(), "counts");
+        assert_eq!(format!("{input:?}"), "Array(counts)");
         assert!(input.file().is_none());
+    }
+
+    #[test]
+    fn a_file_is_named_by_its_path_and_a_folder_is_none() {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let path = folder.join("Cargo.toml");
+        for input in [Input::from(&path), Input::from(&*path)] {
+            assert_eq!(input.to_string(), path.display().to_string());
+            assert_eq!(input.file(), Some(&*path));
+            let (mut bytes, length) = input.open().unwrap();
+            let mut all = Vec::new();
+            bytes.read_to_end(&mut all).unwrap();
+            assert_eq!(all, std::fs::read(&path).unwrap());
+            assert_eq!(length, all.len() as u64);
+        }
+        let error = Input::from(folder).open().err().unwrap();
+        assert_eq!(error.to_string(), "is a folder; name a file in it");
     }
 }

@@ -93,3 +93,66 @@ impl PhotonSource for Masked {
         Ok(slice)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::input::Input;
+    use crate::photon_csv::CsvReader;
+    use crate::photon_list::{ListOptions, PhotonList};
+    use crate::recorded::{RecordedHistograms, RecordingLength};
+
+    #[test]
+    fn photons_of_masked_pixels_are_removed_and_counted() {
+        let rows = "pixel,cycle,bin\n0,0,1\n2,0,2\n2,1,2\n5,1,3\n5,300,3\n2,300,4\n";
+        let shape = ListOptions {
+            bins: 8,
+            rebin: 1,
+            columns: None,
+        };
+        let list = PhotonList::<CsvReader>::open(&Input::in_memory("a.csv", rows), shape, u64::MAX);
+        // Pixel 3 has no photons.
+        let mut masked = Masked::new(Box::new(list.unwrap()), &[2, 3]).unwrap();
+        assert_eq!(
+            (masked.array(), masked.cycles()),
+            (Array::new(6, 1).unwrap(), 301)
+        );
+        assert_eq!(masked.addresses(), [0, 2, 5].map(PixelAddress::new));
+        for (expected, removed) in [([1, 0, 1], 2), ([0, 0, 1], 3), ([0, 0, 0], 3)] {
+            let slice = masked.next_slice(256).unwrap();
+            let photons = slice.pixels.iter().map(|pixel| pixel.photons.len());
+            assert_eq!(photons.collect::<Vec<_>>(), expected);
+            assert!(slice.pixels.iter().all(|pixel| pixel.cycles == 256));
+            assert_eq!(masked.masked(), removed);
+        }
+    }
+
+    fn histograms() -> Box<dyn PhotonSource> {
+        let array = Array::new(3, 1).unwrap();
+        let length = RecordingLength::Cycles(100);
+        let photons = RecordedHistograms::new(array, &[vec![vec![2; 8]; 3]], length, 100, 1);
+        Box::new(photons.unwrap())
+    }
+
+    #[test]
+    fn all_else_is_that_of_the_source() {
+        let masked = Masked::new(histograms(), &[1]).unwrap();
+        assert_eq!(masked.recorded_cycles(), Some((100, 100)));
+        assert_eq!(masked.laser_hz(), None);
+        // A laser rate that is given stays.
+        let masked = masked.with_laser_hz(Some(5)).with_laser_hz(None);
+        let mut again = Masked::new(Box::new(masked), &[]).unwrap();
+        assert_eq!(again.laser_hz(), Some(5));
+        again.limit_to(&|address| address.raw() == 2);
+        let slice = again.next_slice(100).unwrap();
+        let photons = slice.pixels.iter().map(|pixel| pixel.photons.len());
+        assert_eq!(photons.collect::<Vec<_>>(), [0, 0, 16]);
+    }
+
+    #[test]
+    fn pixels_that_are_not_in_the_array_are_refused() {
+        assert!(Masked::new(histograms(), &[0, 1, 2]).is_ok());
+        let error = Masked::new(histograms(), &[2, 3, 9]).err().unwrap();
+        assert_eq!(error.to_string(), "masked 3: there are 3 pixels");
+    }
+}

@@ -542,3 +542,6 @@ fn metadata(bins: usize, width_ps: Option<U16F16>, options: &ReadOptions) -> Res
         warnings: warnings::narrow_bins(requested).into_iter().collect(),
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -196,33 +196,4 @@ fn plain(line: &[u8], separator: char) -> Option<[u64; 3]> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn reader(line: &str) -> CsvReader {
-        CsvReader {
-            input: Input::File("photons.csv".into()),
-            file: BufReader::new(Box::new(std::io::empty())),
-            left: 0,
-            line: line.into(),
-            line_number: 1,
-            columns: Columns::new("pixel,cycle,bin").unwrap(),
-        }
-    }
-
-    proptest! {
-        #[test]
-        fn a_plain_row_is_the_photon_that_any_row_is(line in prop_oneof![
-            "[0-9]{1,20},[0-9]{1,20},[0-9]{1,20}",
-            "[0-9,. +x-]{0,12}",
-        ]) {
-            if let Some(photon) = plain(line.as_bytes(), ',') {
-                prop_assert_eq!(reader(&line).parse().unwrap(), photon);
-            } else {
-                let is_long = line.split(',').any(|field| field.len() > 19);
-                prop_assert!(is_long || reader(&line).parse().is_err());
-            }
-        }
-    }
-}
+mod tests;

@@ -16,3 +16,20 @@ pub fn within(key: &str, value: f64, range: RangeInclusive<f64>) -> Result<()> {
     );
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::within;
+
+    #[test]
+    fn the_ends_are_within_and_what_is_no_number_is_not() {
+        let check = |value| within("angle", value, -1.5..=2.0).map_err(|error| error.to_string());
+        for value in [-1.5, 0.0, 2.0] {
+            assert_eq!(check(value), Ok(()));
+        }
+        for value in [-1.6, 2.1, f64::INFINITY, f64::NAN] {
+            let error = format!("angle {value}: must be from -1.5 to 2");
+            assert_eq!(check(value), Err(error));
+        }
+    }
+}

@@ -122,3 +122,159 @@ pub fn has_only_neighbours(source: &dyn PhotonSource, level: BlockLevel) -> bool
 pub fn is_one_capture(source: &dyn PhotonSource) -> bool {
     source.axis_names()[0] == "column" && source.capture_rows() == source.array().rows()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recorded::{RecordedHistograms, RecordingLength};
+
+    fn array(columns: u32, rows: u32) -> Array {
+        Array::new(columns, rows).unwrap()
+    }
+
+    /// A source without photons that has only what each must have.
+    struct Plain;
+
+    impl PhotonSource for Plain {
+        fn array(&self) -> Array {
+            array(2, 3)
+        }
+
+        fn cycles(&self) -> u64 {
+            70
+        }
+
+        fn next_slice(&mut self, _: u16) -> Result<Slice> {
+            unreachable!()
+        }
+    }
+
+    /// The same with all else.
+    struct Full;
+
+    impl PhotonSource for Full {
+        fn array(&self) -> Array {
+            Plain.array()
+        }
+
+        fn axis_names(&self) -> [&'static str; 2] {
+            ["zone", "capture"]
+        }
+
+        fn capture_rows(&self) -> u32 {
+            7
+        }
+
+        fn addresses(&self) -> Vec<PixelAddress> {
+            [3, 5].map(PixelAddress::new).into()
+        }
+
+        fn cycles(&self) -> u64 {
+            Plain.cycles()
+        }
+
+        fn photons_per_cycle(&self) -> f64 {
+            2.5
+        }
+
+        fn not_replayed(&self) -> u64 {
+            8
+        }
+
+        fn masked(&self) -> u64 {
+            9
+        }
+
+        fn recorded_cycles(&self) -> Option<(u64, u64)> {
+            Some((10, 11))
+        }
+
+        fn laser_hz(&self) -> Option<u64> {
+            Some(12)
+        }
+
+        fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
+            Plain.next_slice(cycles)
+        }
+    }
+
+    /// Changes the photons of another.
+    struct Outer;
+
+    impl PhotonSource for Outer {
+        fn inner(&self) -> Option<&dyn PhotonSource> {
+            Some(&Full)
+        }
+
+        fn array(&self) -> Array {
+            Plain.array()
+        }
+
+        fn cycles(&self) -> u64 {
+            Plain.cycles()
+        }
+
+        fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
+            Plain.next_slice(cycles)
+        }
+    }
+
+    #[test]
+    fn what_a_source_does_not_say_is_that_of_the_source_it_changes() {
+        let values = |source: &dyn PhotonSource| {
+            (
+                (source.axis_names(), source.capture_rows()),
+                source
+                    .addresses()
+                    .iter()
+                    .map(|address| address.raw())
+                    .collect::<Vec<_>>(),
+                source.photons_per_cycle(),
+                [source.not_replayed(), source.masked()],
+                source.recorded_cycles(),
+                source.laser_hz(),
+            )
+        };
+        let full = (
+            (["zone", "capture"], 7),
+            vec![3, 5],
+            2.5,
+            [8, 9],
+            Some((10, 11)),
+            Some(12),
+        );
+        assert_eq!(values(&Full), full);
+        assert_eq!(values(&Outer), full);
+        let plain = (
+            (["column", "row"], 3),
+            vec![0, 1, 2, 3, 4, 5],
+            0.0,
+            [0, 0],
+            None,
+            None,
+        );
+        assert_eq!(values(&Plain), plain);
+    }
+
+    #[test]
+    fn blocks_have_only_neighbours_within_captures_of_columns_and_rows() {
+        for (captures, rows, names, levels, is_one) in [
+            (1, 5, ["column", "row"], [true; 4], true),
+            (2, 4, ["column", "row"], [true, true, true, false], false),
+            (2, 3, ["column", "row"], [true, false, false, false], false),
+            (1, 4, ["zone", "capture"], [false; 4], false),
+            (2, 4, ["zone", "capture"], [false; 4], false),
+        ] {
+            let each = array(3, rows);
+            let capture = vec![vec![1; 8]; each.pixels() as usize];
+            let captures = vec![capture; captures];
+            let length = RecordingLength::Cycles(9);
+            let source = RecordedHistograms::new(each, &captures, length, 9, 1).unwrap();
+            let source = source.with_axis_names(names);
+            let by_level = [0, 1, 2, 3]
+                .map(|level| has_only_neighbours(&source, BlockLevel::saturating(level)));
+            assert_eq!(by_level, levels, "{rows} {names:?}");
+            assert_eq!(is_one_capture(&source), is_one);
+        }
+    }
+}

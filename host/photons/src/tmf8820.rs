@@ -103,3 +103,92 @@ pub fn read(name: &str, text: impl Read) -> Result<Tmf8820Log> {
         truth_mm,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A capture as JSON, in which all bins of a zone have its number plus `first`.
+    fn capture(zones: u64, first: u64, more: &str) -> String {
+        let zone = |zone: u64| format!("{:?}", [first + zone; BINS]);
+        let zones: Vec<String> = (0..zones).map(zone).collect();
+        format!("{{\"hists\": [{}]{more}}}", zones.join(","))
+    }
+
+    fn parse(text: &str) -> Result<Tmf8820Log> {
+        read("a.json", text.as_bytes())
+    }
+
+    #[test]
+    fn nine_zones_are_a_row_and_the_truth_is_that_of_the_centre() {
+        let first = capture(9, 100, ", \"result\": [1]");
+        let known = capture(9, 200, ", \"dist_to_plane\": 0.25");
+        let log = parse(&format!("[{first}, {known}]")).unwrap();
+        assert_eq!(log.array, Array::new(9, 1).unwrap());
+        assert_eq!(log.axis_names, ["zone", "capture"]);
+        assert_eq!(log.bin_width_ps, BIN_WIDTH_PS);
+        assert_eq!(log.offset_mm, Some(OFFSET_MM));
+        let zones = |first: u64| (first..first + 9).map(|count| vec![count; BINS]);
+        let captures: Vec<Capture> = [100, 200].map(|first| zones(first).collect()).into();
+        assert_eq!(log.captures, captures);
+        let mut truth = vec![None; 18];
+        truth[9 + 4] = Some(250.0);
+        assert_eq!(log.truth_mm, Some(truth));
+        assert_eq!(parse(&format!("[{first}]")).unwrap().truth_mm, None);
+    }
+
+    #[test]
+    fn sixty_four_zones_are_an_array_without_centre_or_offset() {
+        let known = capture(64, 0, ", \"dist_to_plane\": 0.25");
+        let log = parse(&format!("[{known}, {known}]")).unwrap();
+        assert_eq!(log.array, Array::new(8, 8).unwrap());
+        assert_eq!(log.axis_names, ["column", "row"]);
+        assert_eq!(log.bin_width_ps, BIN_WIDTH_8X8_PS);
+        assert_eq!((log.offset_mm, log.truth_mm), (None, None));
+        assert_eq!(log.captures.len(), 2);
+        assert_eq!(log.captures[1][63], [63; BINS]);
+    }
+
+    #[test]
+    fn logs_that_are_damaged_are_refused() {
+        let nine = capture(9, 0, "");
+        for (text, expected) in [
+            ("[]", ": no captures"),
+            (
+                "[{}]",
+                ":1: not a TMF8820 capture log: missing field `hists` at line 1 column 3",
+            ),
+            (
+                "[\n{\"hists\": [[1,\n",
+                ":3: not a TMF8820 capture log: EOF while parsing a value at line 3 column 0",
+            ),
+            (
+                &format!("[{}]", capture(16, 0, "")),
+                ": capture 0 has 16 zones, not 9 or 64",
+            ),
+            (
+                &format!("[{nine}, {}]", capture(64, 0, "")),
+                ": capture 1 has 64 zones, not 9 or 64",
+            ),
+            (
+                &format!("[{}, {nine}]", capture(64, 0, "")),
+                ": capture 1 has 9 zones, not 64 as capture 0",
+            ),
+            (
+                &format!("[{nine}, {}]", nine.replacen("1, 1,", "1,", 1)),
+                ": capture 1, zone 1 has 127 bins, not 128",
+            ),
+        ] {
+            let error = parse(text).unwrap_err();
+            assert_eq!(error.to_string(), format!("a.json{expected}"));
+        }
+        for number in ["-1", "1.5"] {
+            let text = format!("[{}]", nine.replacen("1,", &format!("{number},"), 1));
+            let error = parse(&text).unwrap_err().to_string();
+            assert!(
+                error.starts_with("a.json:1: not a TMF8820 capture log: invalid"),
+                "{error}"
+            );
+        }
+    }
+}

@@ -140,3 +140,6 @@ fn parse_log(log: Log) -> Result<Tmf8829Log> {
             .collect(),
     })
 }
+
+#[cfg(test)]
+mod tests;

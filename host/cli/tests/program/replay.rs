@@ -3,7 +3,6 @@
 mod arrays;
 mod captures;
 mod odd;
-mod opened;
 mod recorded;
 mod refused;
 mod speed;

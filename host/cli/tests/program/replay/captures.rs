@@ -1,7 +1,5 @@
 //! A capture log has zones and captures, where other arrays have columns and rows.
 
-use dtof_photons::open::{ReadOptions, counts};
-
 use crate::common::{Scratch, assert_contains, npy};
 
 #[test]
@@ -103,27 +101,6 @@ fn pixels_that_are_left_out_are_those_of_the_capture() {
         let settings = &scratch.summary()["settings"];
         assert_eq!(settings["masked"].to_string(), masked, "{options}");
     }
-}
-
-#[test]
-fn one_capture_of_a_log_has_its_own_truth() {
-    let scratch = Scratch::new();
-    let zone = format!("[{}]", ["3"; 128].join(","));
-    let zones = format!("\"hists\": [{}]", [zone.as_str(); 9].join(","));
-    let log = format!("[{{{zones}}}, {{{zones}, \"dist_to_plane\": 0.25}}]");
-    let path = scratch.file("log.json", log);
-    let truth = |capture| {
-        let options = ReadOptions {
-            capture: Some(capture),
-            ..ReadOptions::default()
-        };
-        let counts = counts(&path, &options).unwrap();
-        assert_eq!(counts.captures.len(), 1);
-        counts.truth_mm
-    };
-    assert_eq!(truth(0), None);
-    let known = truth(1).unwrap();
-    assert_eq!((known.len(), known[4]), (9, Some(250.0)));
 }
 
 /// True distances give an offset, which is for the estimator that is found.

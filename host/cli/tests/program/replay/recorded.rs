@@ -345,58 +345,12 @@ fn histogram_photons_after_the_last_cycle_are_counted() {
 }
 
 #[test]
-fn spreadsheets_may_add_a_byte_order_mark_line_ends_and_blank_lines() {
-    let scratch = Scratch::new();
-    let plain = steady(7, 60, 100);
-    let input = scratch.file("plain.csv", &plain);
-    scratch.replayed(&input, "");
-    let expected = scratch.read("out/events.csv");
-    let dressed = format!("\u{feff}{}\r\n\r\n", plain.replace('\n', "\r\n"));
-    let input = scratch.file("dressed.csv", dressed);
-    scratch.replayed(&input, "");
-    assert_eq!(scratch.read("out/events.csv"), expected);
-    assert!(expected.lines().count() > 2);
-}
-
-#[test]
 fn a_run_too_short_for_an_event_says_so() {
     let scratch = Scratch::new();
     let input = scratch.file("photons.csv", steady(7, 60, 100));
     let output = scratch.replay(&input, "--cycles 40");
     let stdout = String::from_utf8(output.stdout).unwrap();
     assert_contains(&stdout, "the first decision comes after 44 laser cycles");
-}
-
-/// Columns by their names, in any order and case, beside others, between commas, semicolons or tabs.
-#[test]
-fn columns_of_a_csv_file_are_found_by_name() {
-    let scratch = Scratch::new();
-    let input = scratch.file("photons.csv", steady(7, 60, 100));
-    scratch.replayed(&input, "");
-    let events = scratch.read("out/events.csv");
-    assert!(events.lines().count() > 2);
-    let rows = steady(7, 60, 100);
-    for (header, row) in [
-        ("cycle,bin,pixel", "C,B,P"),
-        ("Bin;Pixel;Cycle", "B;P;C"),
-        ("pixel\tcycle\tbin\ttime", "P\tC\tB\t0.5 s"),
-        (" Pixel , note , Cycle , BIN", "P , \"a\" , C , B"),
-        ("pixel;cycle;bin", "P;C;B\r"),
-    ] {
-        let mut text = format!("{header}\n");
-        for line in rows.lines().skip(1) {
-            let values: Vec<&str> = line.split(',').collect();
-            let pairs = ['P', 'C', 'B'].into_iter().zip(values);
-            let filled = pairs.fold(row.to_owned(), |row, (name, value)| {
-                row.replace(name, value)
-            });
-            text += &filled;
-            text += "\n";
-        }
-        let input = scratch.file("other.csv", text);
-        scratch.replayed(&input, "");
-        assert_eq!(scratch.read("out/events.csv"), events, "{header}");
-    }
 }
 
 /// The file needs no option, and the results go into a folder of its name.
