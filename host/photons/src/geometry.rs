@@ -16,8 +16,10 @@ use std::fmt;
 use std::path::Path;
 use std::str::FromStr;
 
+use anyhow::Context;
 use dtof_core::{Array, BlockLevel, PixelAddress};
 
+use dtof_options::files::read_text;
 use dtof_options::numbers::real;
 
 /// Degrees across the longer side of an array by default.
@@ -155,7 +157,9 @@ impl Rays {
     /// # Errors
     /// Returns one line with the name of the file and the wrong line.
     pub fn read(path: &Path, array: Array) -> anyhow::Result<Self> {
-        let rays = calibration::read(path, array)?;
+        let text = read_text(path)?;
+        let rays = calibration::parse(&text, array);
+        let rays = rays.with_context(|| path.display().to_string())?;
         Ok(Self { array, rays })
     }
 
@@ -198,7 +202,7 @@ impl Rays {
             pixels += 1.0;
         }
         let has_length = direction.iter().any(|&side| side != 0.0);
-        (pixels > 0.0 && has_length).then(|| Ray {
+        has_length.then(|| Ray {
             direction: unit(direction),
             bias_mm: bias_mm / pixels,
         })

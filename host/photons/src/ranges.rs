@@ -188,6 +188,8 @@ mod tests {
             offsets[2] = Some(I24F8::from_num(own));
             let error = new(wide, I24F8::from_num(offset), offsets).unwrap_err();
             assert_eq!(error, RangesError::Pixel(2));
+            let text = "that of pixel 2 and the offset of all reach beyond 8388 m";
+            assert_eq!(error.to_string(), text);
         }
     }
 

@@ -1,7 +1,5 @@
 //! Calibration files: a direction and a range bias for each pixel.
 
-use std::path::Path;
-
 use anyhow::{Context, Result, anyhow, ensure};
 use dtof_core::Array;
 use serde::Deserialize;
@@ -9,7 +7,6 @@ use toml::Spanned;
 
 use super::{Ray, unit};
 use crate::range::within;
-use dtof_options::files::read_text;
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -20,12 +17,11 @@ struct CalibrationFile {
     pixels: Vec<Spanned<[f64; 4]>>,
 }
 
-pub fn read(path: &Path, array: Array) -> Result<Vec<Ray>> {
-    let text = read_text(path)?;
-    parse(&text, array).with_context(|| path.display().to_string())
-}
-
-pub(super) fn parse(text: &str, array: Array) -> Result<Vec<Ray>> {
+/// The rays of a calibration, row by row.
+///
+/// # Errors
+/// Returns what is wrong, after its line.
+pub fn parse(text: &str, array: Array) -> Result<Vec<Ray>> {
     let line = |at: usize| {
         let before = text.get(..at).unwrap_or(text);
         before.matches('\n').count() + 1

@@ -89,6 +89,10 @@ fn fields_of_view_that_cannot_be_are_refused() {
         assert_eq!(text.parse::<FieldOfView>(), Err(FieldOfViewError), "{text}");
     }
     assert_eq!("60x40".parse(), FieldOfView::new([60.0, 40.0]));
+    assert_eq!(
+        FieldOfViewError.to_string(),
+        "must be HORIZONTALxVERTICAL in degrees, as 60x32.2, each from 0.01 to 179"
+    );
 }
 
 #[test]
@@ -103,20 +107,70 @@ fn a_field_of_view_is_printed_as_it_is_read() {
     );
 }
 
+/// The rays of a calibration: x, y, z and range bias of each pixel.
+fn calibrated(array: Array, pixels: &[[f64; 4]]) -> Rays {
+    let (columns, rows) = (array.columns(), array.rows());
+    let text = format!("columns = {columns}\nrows = {rows}\npixels = {pixels:?}\n");
+    let file = tempfile::NamedTempFile::new().unwrap();
+    std::fs::write(&file, text).unwrap();
+    Rays::read(file.path(), array).unwrap()
+}
+
 #[test]
 fn a_calibration_gives_directions_and_takes_the_bias_off() {
-    let text = "columns = 2\nrows = 1\npixels = [\n  [0, 0, 1, 0],\n  [3, 0.0, 4, 12.5],\n]\n";
-    let array = array(2, 1);
-    let rays = calibration::parse(text, array).unwrap();
-    let rays = Rays { array, rays };
-    assert_eq!(
-        rays.point(PixelAddress::new(0), BlockLevel::PIXEL, 1500.0),
-        Some([0.0, 0.0, 1.5])
+    // The longest and the shortest directions, and the largest biases.
+    let rays = calibrated(
+        array(2, 2),
+        &[
+            [0.0, 0.0, 1e-6, -1e6],
+            [3.0, 0.0, 4.0, 12.5],
+            [-1e6, 0.0, 0.0, 1e6],
+            [0.0, 3.0, -4.0, 0.0],
+        ],
     );
-    let [x, y, z] = rays
-        .point(PixelAddress::new(1), BlockLevel::PIXEL, 2012.5)
-        .unwrap();
-    assert!((x - 1.2).abs() < 1e-12 && y == 0.0 && (z - 1.6).abs() < 1e-12);
+    assert_eq!(rays.biases(), [-1e6, 12.5, 1e6, 0.0]);
+    for (pixel, range_mm, [x, y, z]) in [
+        (0, 500.0, [0.0, 0.0, 1000.5]),
+        (1, 2012.5, [1.2, 0.0, 1.6]),
+        (2, 1_001_000.0, [-1.0, 0.0, 0.0]),
+        (3, 1000.0, [0.0, 0.6, -0.8]),
+    ] {
+        let point = rays.point(PixelAddress::new(pixel), BlockLevel::PIXEL, range_mm);
+        let point = point.unwrap();
+        let off = length([point[0] - x, point[1] - y, point[2] - z]);
+        assert!(off < 1e-12, "pixel {pixel}: {point:?}");
+    }
+    // A plane lies 1/cos as far along a ray; what points to the side or back is limited.
+    assert_eq!(rays.slants(), [1.0, 1.25, 100.0, 100.0]);
+}
+
+#[test]
+fn the_point_of_a_block_is_on_the_mean_of_its_rays() {
+    let rays = calibrated(
+        array(3, 2),
+        &[
+            [2.0, 0.0, 0.0, 10.0],
+            [0.0, 5.0, 0.0, 20.0],
+            [0.0, 0.0, 1.0, 70.0],
+            [0.0, 0.0, 1.0, 30.0],
+            [0.0, 0.0, 3.0, 60.0],
+            [0.0, 1.0, 0.0, 80.0],
+        ],
+    );
+    let level = BlockLevel::new(1).unwrap();
+    let point = |pixel, range_mm| rays.point(PixelAddress::new(pixel), level, range_mm);
+    // Four pixels: their unit rays add up to (1, 1, 2), their biases to 120 mm.
+    let side = 2.0 / 6f64.sqrt();
+    let [x, y, z] = point(0, 2030.0).unwrap();
+    assert!(length([x - side, y - side, z - 2.0 * side]) < 1e-12);
+    // Two pixels at the edge: (0, 1, 1) and 150 mm.
+    let [x, y, z] = point(2, 2075.0).unwrap();
+    assert!(length([x, y - 2f64.sqrt(), z - 2f64.sqrt()]) < 1e-12);
+    // No block begins here.
+    assert_eq!([point(1, 1000.0), point(3, 1000.0)], [None; 2]);
+    let opposite = [1.0, -1.0].map(|x| [x, 0.0, 0.0, 0.0]);
+    let cancel = calibrated(array(2, 1), &opposite);
+    assert_eq!(cancel.point(PixelAddress::new(0), level, 1000.0), None);
 }
 
 #[test]
@@ -154,11 +208,24 @@ fn calibrations_that_cannot_be_are_refused_with_the_line() {
         (&pixels(&good.repeat(2), good), "line 6: 3 pixels"),
         (&other, "line 1: is of 2x3 pixels, the events are of 2x1"),
         (&(pixels("", "") + "bias = 1\n"), "line 6: unknown field"),
+        (
+            &pixels(good, "[0, -1000001, 0, 0]"),
+            "line 5: direction -1000001: must be from -1000000 to 1000000",
+        ),
     ] {
         let error = calibration::parse(text, array(2, 1)).unwrap_err();
         let message = format!("{error:#}");
         assert!(message.contains(part), "{message:?} does not say {part:?}");
     }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("rays.toml");
+    std::fs::write(&file, pixels(good, "[0, 0, 0, 0]")).unwrap();
+    let error = Rays::read(&file, array(2, 1)).unwrap_err();
+    let reason = "line 5: the direction has no length";
+    assert_eq!(
+        format!("{error:#}"),
+        format!("{}: {reason}", file.display())
+    );
 }
 
 proptest! {
