@@ -27,3 +27,6 @@ pub fn header(descr: &str, shape: &[u64], bytes: usize) -> Vec<u8> {
     header.extend(text.bytes());
     header
 }
+
+#[cfg(test)]
+mod tests;

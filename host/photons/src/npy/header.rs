@@ -184,11 +184,8 @@ impl Header {
     /// Fails if it is not a header, or does not match the length of the file.
     pub fn read(file: &mut impl Read, length: u64) -> Result<Self> {
         let mut start = [0; 10];
-        let read = file.read_exact(&mut start);
-        ensure!(
-            read.is_ok() && start.starts_with(b"\x93NUMPY"),
-            "not an .npy file as numpy.save writes it"
-        );
+        fill(file, &mut start, NOT_NPY)?;
+        ensure!(start.starts_with(b"\x93NUMPY"), NOT_NPY);
         let version = start[6];
         ensure!(
             (1..=3).contains(&version) && start[7] == 0,
@@ -198,8 +195,7 @@ impl Header {
         let mut before = start.len() as u64;
         if version > 1 {
             let mut high = [0; 2];
-            let read = file.read_exact(&mut high);
-            ensure!(read.is_ok(), not_npy(CUT));
+            fill(file, &mut high, not_npy(CUT))?;
             bytes |= u64::from(u16::from_le_bytes(high)) << 16;
             before += 2;
         }
@@ -280,12 +276,14 @@ impl Header {
     }
 }
 
+/// The file is of another format.
+const NOT_NPY: &str = "not an .npy file as numpy.save writes it";
 /// The file is shorter than its header.
 const CUT: &str = "the file ends within its header";
 
 /// The error of a file that is not in NumPy's format.
 fn not_npy(reason: impl fmt::Display) -> Error {
-    anyhow!("not an .npy file as numpy.save writes it: {reason}")
+    anyhow!("{NOT_NPY}: {reason}")
 }
 
 impl Field {
@@ -386,8 +384,13 @@ impl<'a> Literal<'a> {
 
 /// Fills `bytes`. The file had them when it was opened.
 pub(super) fn read_all(file: &mut impl Read, bytes: &mut [u8]) -> Result<()> {
+    fill(file, bytes, "the file became shorter while it was read")
+}
+
+/// Fills `bytes`. The error is `short` if the file has fewer.
+fn fill(file: &mut impl Read, bytes: &mut [u8], short: impl fmt::Display) -> Result<()> {
     file.read_exact(bytes).map_err(|error| match error.kind() {
-        ErrorKind::UnexpectedEof => anyhow!("the file became shorter while it was read"),
+        ErrorKind::UnexpectedEof => anyhow!("{short}"),
         _ => error.into(),
     })
 }
@@ -586,145 +589,4 @@ impl Array<BufReader<Box<dyn Read>>> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    fn header(dictionary: &str, data: u64) -> Result<Header> {
-        let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
-        bytes.extend(u16::try_from(dictionary.len()).unwrap().to_le_bytes());
-        bytes.extend(dictionary.as_bytes());
-        let length = bytes.len() as u64 + data;
-        Header::read(&mut &bytes[..], length)
-    }
-
-    /// Headers as written by numpy.save of Python 2 and 3, and by hand.
-    #[test]
-    fn what_numpy_writes_is_read() {
-        for (text, shape, fortran, data) in [
-            (
-                "{'descr': '<u2', 'fortran_order': False, 'shape': (3, 4), }    \n",
-                vec![3, 4],
-                false,
-                24,
-            ),
-            (
-                "{'descr': '|u1', 'fortran_order': True, 'shape': (5,), }\n",
-                vec![5],
-                true,
-                5,
-            ),
-            (
-                "{'descr': '>f8', 'fortran_order': False, 'shape': (), }\n",
-                vec![],
-                false,
-                8,
-            ),
-            (
-                "{'shape': (10L, 2L), 'fortran_order': False, 'descr': '<i4'}",
-                vec![10, 2],
-                false,
-                80,
-            ),
-            (
-                "{\"descr\":\"<u4\",\"shape\":[7],\"fortran_order\":False}",
-                vec![7],
-                false,
-                28,
-            ),
-        ] {
-            let found = header(text, data).unwrap();
-            assert_eq!((found.shape, found.fortran), (shape, fortran), "{text}");
-            assert!(matches!(found.elements, Elements::Plain(_)));
-            let error = header(text, data + 1).unwrap_err().to_string();
-            assert!(error.starts_with("the header claims ["), "{error}");
-        }
-        let text = "{'descr': [('pixel', '<u2'), ('', '|V2'), (('a title', 'it\\'s'), '<f4', (2, 3))], \
-                    'fortran_order': False, 'shape': (2,), }";
-        let Elements::Records(fields) = header(text, 56).unwrap().elements else {
-            panic!("no records");
-        };
-        let named = fields.iter().map(|field| (&field.name[..], field.bytes));
-        assert!(named.eq([("pixel", 2), ("", 2), ("it's", 24)]));
-        assert!(fields[0].element.is_some() && fields[2].element.is_none());
-    }
-
-    #[test]
-    fn what_is_no_header_is_refused() {
-        for text in [
-            "",
-            "{",
-            "{'descr': '<u2'}",
-            "{'descr': '<u2', 'fortran_order': 0, 'shape': (3,)}",
-            "{'descr': '<u2', 'fortran_order': False, 'shape': (-3,)}",
-            "{'descr': '<u2', 'fortran_order': False, 'shape': (3,)} more",
-            "{'descr': '<u2', 'fortran_order': False 'shape': (3,)}",
-            "{'descr': '<u2', 'fortran_order': False, 'shape': (3,), 'shape': (3,)}",
-            "{'descr': '<u2', \"descr\": '<u2', 'fortran_order': False, 'shape': (3,)}",
-            "{'descr': 'u2', 'fortran_order': False, 'shape': (3,)}",
-            "{'descr': '<u', 'fortran_order': False, 'shape': (3,)}",
-            "{'descr': '<u2, 'fortran_order': False, 'shape': (3,)}",
-            "{'descr': [('a',)], 'fortran_order': False, 'shape': (3,)}",
-            "{'descr': ('a', '<u2'), 'fortran_order': False, 'shape': (3,)}",
-            "{'descr': [['a', '<u2']], 'fortran_order': False, 'shape': (3,)}",
-            "{'descr': '<u2', 'fortran_order': False, 'shape': 3}",
-            "{'descr': '<u2', 'fortran_order': False, 'shape': (3)}",
-            "{'descr': '<u2',\n 'fortran_order': False, 'shape': (3,)}",
-            "{'descr': '<u2', 'fortran\n_order': False, 'shape': (3,)}",
-            "{'descr': '<u2\\q', 'fortran_order': False, 'shape': (3,)}",
-            "[1, 2]",
-        ] {
-            let error = format!("{:#}", header(text, 6).unwrap_err());
-            assert!(
-                error.starts_with("not an .npy file as numpy.save writes it: "),
-                "{text}: {error}"
-            );
-        }
-        for kind in [
-            "|u2",
-            "|i4",
-            "|f8",
-            "|U2",
-            "<u2[rubbish",
-            "<u2[s]",
-            "<M8[s",
-            "<z4",
-            "<u3",
-            "<f3",
-            "<u+2",
-            "|O9",
-            "<b2",
-            "=u2",
-            "<c4",
-        ] {
-            let text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': (3,)}}");
-            let error = header(&text, 6).unwrap_err().to_string();
-            assert!(error.ends_with(&format!("no type '{kind}'")), "{error}");
-        }
-        for kind in ["|u1", "<u1", "|b1", "<M8[ns]", "|S3", "<U3", ">c16", "|V0"] {
-            let text = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': (0,)}}");
-            assert!(header(&text, 0).is_ok(), "{kind}");
-        }
-        let nested = "{'descr': [('a', [('b', '<u2')])], 'fortran_order': False, 'shape': (3,)}";
-        for text in ["((((((((((1))))))))))", nested] {
-            let error = header(text, 6).unwrap_err().to_string();
-            assert_eq!(error, "the elements are not plain numbers");
-        }
-        let mut other = b"\x93NUMPY\x04\x00\x02\x00{}".to_vec();
-        assert!(Header::read(&mut &other[..], 12).is_err());
-        other[6..8].copy_from_slice(&[1, 1]);
-        assert!(Header::read(&mut &other[..], 12).is_err());
-        let objects = "{'descr': '|O', 'fortran_order': False, 'shape': (3,)}";
-        assert!(header(objects, 24).is_err());
-        let huge = "{'descr': '<u8', 'fortran_order': False, 'shape': (4294967296, 4294967296)}";
-        assert!(header(huge, 0).is_err());
-    }
-
-    proptest! {
-        #[test]
-        fn no_text_is_a_panic(text in "\\PC{0,80}", start in "[{(\\['\"]{0,6}", data in 0..100u64) {
-            let _ = header(&text, data);
-            let _ = header(&(start + &text), data);
-        }
-    }
-}
+mod tests;

@@ -47,7 +47,7 @@ impl IntegerField {
         let bytes = *bytes[self.offset..].first_chunk::<8>()?;
         // The highest bit of the value becomes bit 63.
         let value = match self.is_big_endian {
-            true => u64::from_be_bytes(bytes) & (u64::MAX << self.unused),
+            true => u64::from_be_bytes(bytes),
             false => u64::from_le_bytes(bytes) << self.unused,
         };
         let is_negative = self.is_signed && value >> 63 == 1;
@@ -186,9 +186,7 @@ impl PhotonReader for RecordReader {
 }
 
 fn size(fields: &[Field]) -> Result<usize> {
-    let mut sizes = fields.iter().map(|field| field.bytes);
-    let bytes = sizes.try_fold(0u64, u64::checked_add);
-    let bytes = bytes.context("records of no fixed size")?;
+    let bytes: u64 = fields.iter().map(|field| field.bytes).sum();
     ensure!(
         (1..=4096).contains(&bytes),
         "records of {bytes} bytes: must be at most 4096"

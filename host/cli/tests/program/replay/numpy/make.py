@@ -19,8 +19,6 @@ numpy.savez("two.npz", dark=numpy.zeros((2, 8), dtype=numpy.uint8), lit=counts)
 wrong = counts.astype(numpy.float32)
 wrong[1, 0, 1, 3] = 0.5
 numpy.save("fraction.npy", wrong)
-wrong[1, 0, 1, 3] = numpy.nan
-numpy.save("nan.npy", wrong)
 
 # 60 laser cycles of two pixels; in each the first has a photon in bin 40, each second one
 # in bin 7 of the other.
