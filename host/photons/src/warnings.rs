@@ -70,11 +70,9 @@ pub fn list_shape(pixels: usize, columns: Option<u32>) -> Option<String> {
         (None, Some(side)) => Some(format!(
             "{pixels} pixels are taken as one row; --columns {side} makes {side}x{side}"
         )),
-        (Some(columns), _) if columns > 0 && !pixels.is_multiple_of(columns as usize) => {
-            Some(format!(
-                "{pixels} pixels do not fill rows of {columns} columns, or the last pixels have no photon"
-            ))
-        }
+        (Some(columns), _) if !pixels.is_multiple_of(columns as usize) => Some(format!(
+            "{pixels} pixels do not fill rows of {columns} columns, or the last pixels have no photon"
+        )),
         _ => None,
     }
 }
@@ -116,15 +114,15 @@ impl Concentration {
         *total += value;
     }
 
-    /// The mean of the lines with photons.
+    /// The mean of the lines with two photons or more; 0 if there are none.
     fn mean(&self) -> f64 {
         let lines: f64 = self.classes.values().map(|(lines, _)| lines).sum();
         let total: f64 = self.classes.values().map(|(_, total)| total).sum();
-        if lines > 0.0 { total / lines } else { 1.0 }
+        total / lines.max(1.0)
     }
 
-    /// The mean of the less concentrated half of the lines, so that hot pixels do not speak for all. A line without
-    /// photons is even.
+    /// The mean of the less concentrated half of the lines, so that hot pixels do not speak for all. A line with less than
+    /// two photons is even.
     fn of_lower_half(&self) -> f64 {
         let lines: f64 = self.classes.values().map(|(lines, _)| lines).sum();
         let half = (lines + self.empty) / 2.0;
@@ -134,12 +132,12 @@ impl Concentration {
             taken += part;
             sum += total * part / lines;
         }
-        if taken > 0.0 { sum / taken } else { 1.0 }
+        sum / half
     }
 }
 
 /// Warns if another axis than the last looks like the bins although the last was read as such. `axes` are
-/// the lengths of the others. Photons concentrate in a pulse along the bins: in most lines, while a hot pixel is in few.
+/// the lengths of the others, and their product is the number of `pixels`. Photons concentrate in a pulse along the bins: in most lines, while a hot pixel is in few.
 #[must_use]
 pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
     let mut along_last = Concentration::default();
@@ -157,9 +155,9 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
     let mut found = (least, None);
     for (number, &length) in axes.iter().enumerate() {
         let whole = apart;
-        apart /= length.max(1);
+        apart /= length;
         // A histogram has at least 8 bins.
-        if length < 8 || apart * length != whole {
+        if length < 8 {
             continue;
         }
         // If all lines pass one pixel, it may be hot, and a pulse is wider.
@@ -193,6 +191,192 @@ mod tests {
     use super::*;
     use rand_distr::{Distribution, Poisson};
     use rand_pcg::Pcg64;
+
+    #[test]
+    fn bins_below_a_picosecond_are_probably_in_nanoseconds() {
+        let warning = |ps: &str| narrow_bins(ps.parse().unwrap());
+        for (ps, hint) in [
+            ("0.9999", "0.9999 ns are 1000"),
+            ("0.25", "0.25 ns are 250"),
+            ("0.001", "0.001 ns are 1"),
+            ("0.00099", "no TDC has such bins"),
+        ] {
+            let whole = format!("bins of {ps} ps: --bin-width-ps takes picoseconds; {hint}");
+            assert_eq!(warning(ps), Some(whole));
+        }
+        for ps in ["0", "1", "1.5", "250"] {
+            assert_eq!(warning(ps), None, "{ps}");
+        }
+    }
+
+    #[test]
+    fn only_a_recording_without_photons_is_empty() {
+        let warning = |empty: [bool; 3]| empty_histograms(empty.into_iter());
+        let whole = "no photons: all 3 histograms are empty";
+        assert_eq!(warning([true; 3]).as_deref(), Some(whole));
+        assert_eq!(warning([true, false, true]), None);
+        assert_eq!(warning([false; 3]), None);
+    }
+
+    #[test]
+    fn half_of_the_histograms_cannot_have_more_photons_in_a_bin_than_laser_cycles() {
+        for (highest, cycles, rebin, median) in [
+            (&[2001, 1, 2000, 1][..], 1999, 1, Some("2,000")),
+            (&[1, 2000, 1, 1], 1999, 1, None),
+            (&[2000, 1, 2000], 1999, 1, Some("2,000")),
+            (&[1, 2000, 1], 1999, 1, None),
+            (&[2000], 2000, 1, None),
+            (&[4000], 1999, 2, Some("4,000")),
+            (&[4000], 2000, 2, None),
+            (&[], 1, 1, None),
+        ] {
+            let whole = median.map(|median| {
+                format!(
+                    "--recorded-cycles 1,999: half of the histograms have a bin of {median} photons or more; it is \
+                     the number of laser cycles that each histogram counted"
+                )
+            });
+            let warning = few_cycles(highest.to_vec(), cycles, rebin);
+            assert_eq!(warning, whole, "{highest:?} {cycles} {rebin}");
+        }
+    }
+
+    #[test]
+    fn photons_after_the_last_laser_cycle_may_have_times() {
+        let more = "--cycles takes more, or count laser cycles from 0";
+        let times = "if these are times, turn them into laser cycles counted from 0";
+        for (first, number, hint) in [
+            (2_000, "2,000", more),
+            (999_999_999, "999,999,999", more),
+            (1_000_000_000, "1,000,000,000", times),
+        ] {
+            let whole = format!(
+                "no photon in the first 2,000 laser cycles: the first comes in laser cycle {number}; {hint}"
+            );
+            assert_eq!(late_photons(first, 2_000), Some(whole));
+        }
+        assert_eq!(late_photons(1_999, 2_000), None);
+    }
+
+    #[test]
+    fn pixels_of_a_list_fill_their_rows() {
+        let one_row = |pixels, side| {
+            format!("{pixels} pixels are taken as one row; --columns {side} makes {side}x{side}")
+        };
+        let rest = |pixels, columns| {
+            format!(
+                "{pixels} pixels do not fill rows of {columns} columns, or the last pixels have no photon"
+            )
+        };
+        for (pixels, columns, warning) in [
+            (16, None, Some(one_row(16, 4))),
+            (1024, None, Some(one_row(1024, 32))),
+            // Too small for an array, or no square.
+            (9, None, None),
+            (15, None, None),
+            (17, None, None),
+            (16, Some(16), None),
+            (16, Some(4), None),
+            (15, Some(4), Some(rest(15, 4))),
+            (16, Some(32), Some(rest(16, 32))),
+        ] {
+            assert_eq!(list_shape(pixels, columns), warning, "{pixels} {columns:?}");
+        }
+    }
+
+    /// Two of n photons are in one place with the probability of pairs in one place ÷ pairs, and with 1 ÷ places if spread
+    /// evenly.
+    #[test]
+    fn concentration_is_of_all_lines_or_of_their_less_concentrated_half() {
+        let all_in_one = [2, 0, 0, 0]; // 4
+        let most_in_one = [0, 3, 1, 0]; // 3 of 6 pairs: 2
+        let a_little_more = [4, 0, 0, 1]; // 6 of 10 pairs: 2.4
+        let apart = [1, 0, 1, 0]; // 0
+        let even = [5; 4]; // 40 of 190 pairs: 16/19
+        let one = [0, 0, 0, 1];
+        let dark = [0; 4];
+        for (lines, mean, lower) in [
+            (&[all_in_one][..], 4.0, 4.0),
+            (&[most_in_one], 2.0, 2.0),
+            (&[apart], 0.0, 0.0),
+            (&[even], 16.0 / 19.0, 16.0 / 19.0),
+            // Without a pair a line is even, or left out of the mean.
+            (&[one, dark], 0.0, 1.0),
+            (&[one, dark, all_in_one, most_in_one], 3.0, 1.0),
+            (&[one, apart, all_in_one], 2.0, 2.0 / 3.0),
+            // Half of them are not always whole lines.
+            (&[apart, most_in_one, all_in_one], 2.0, 2.0 / 3.0),
+            (
+                &[most_in_one, most_in_one, most_in_one, all_in_one],
+                2.5,
+                2.0,
+            ),
+            (&[most_in_one, all_in_one, all_in_one, all_in_one], 3.5, 3.0),
+            (&[a_little_more, most_in_one], 2.2, 2.0),
+        ] {
+            let mut all = Concentration::default();
+            lines.iter().for_each(|line| all.add(line.iter().copied()));
+            let is_near = |value: f64, expected: f64| (value - expected).abs() < 1e-9;
+            assert!(is_near(all.mean(), mean), "{lines:?} {}", all.mean());
+            let half = all.of_lower_half();
+            assert!(is_near(half, lower), "{lines:?} {half}");
+        }
+    }
+
+    /// Pixels of which those in the first `places` along an axis have such histograms, and the others no photon.
+    fn lit(axes: &[usize], axis: usize, places: usize, bins: &[u64]) -> Vec<Vec<u64>> {
+        let next: usize = axes[axis + 1..].iter().product();
+        let is_lit = |pixel: usize| pixel / next % axes[axis] < places;
+        let pixel = |pixel| {
+            if is_lit(pixel) {
+                bins.to_vec()
+            } else {
+                vec![0; bins.len()]
+            }
+        };
+        (0..axes.iter().product()).map(pixel).collect()
+    }
+
+    #[test]
+    fn the_axis_with_the_most_concentrated_lines_looks_like_the_bins() {
+        let even = [100; 8];
+        // The last axis has 3.83, so another needs 5.75.
+        let uneven = [1500, 100, 100, 100, 100, 100, 100, 100];
+        for (axes, axis, places, bins, which) in [
+            (&[8, 3][..], 0, 1, even, Some("the first axis")),
+            (&[3, 8], 1, 1, even, Some("axis 2 of 3")),
+            (&[2, 8, 3], 1, 1, even, Some("axis 2 of 4")),
+            (&[2, 3, 8], 2, 1, even, Some("axis 3 of 4")),
+            // Too short for a histogram.
+            (&[7, 3], 0, 1, even, None),
+            // 99 of 199 pairs, and so 3.98 and 4.48.
+            (&[8, 3], 0, 2, even, None),
+            (&[9, 3], 0, 2, even, Some("the first axis")),
+            // 5.5 and 6.
+            (&[11, 3], 0, 2, uneven, None),
+            (&[12, 3], 0, 2, uneven, Some("the first axis")),
+            // The last axis has 8.
+            (&[32, 3], 0, 1, [500, 0, 0, 0, 0, 0, 0, 0], None),
+            // One pixel of a row may be hot.
+            (&[16], 0, 1, even, None),
+            (&[16], 0, 2, even, Some("the first axis")),
+        ] {
+            let warning = swapped_axes(axes, &lit(axes, axis, places, &bins));
+            let whole = which.map(|which| {
+                format!("{which} looks like the bins, and the last like pixels; --axes says which is which")
+            });
+            assert_eq!(warning, whole, "{axes:?} {axis} {places} {bins:?}");
+        }
+    }
+
+    /// A diagonal is as concentrated along rows as along columns.
+    #[test]
+    fn the_first_of_two_axes_that_look_alike_is_named() {
+        let pixel = |pixel| vec![if pixel % 9 == 0 { 100 } else { 0 }; 8];
+        let diagonal: Vec<_> = (0..64).map(pixel).collect();
+        let warning = swapped_axes(&[8, 8], &diagonal).unwrap();
+        assert!(warning.starts_with("the first axis "), "{warning}");
+    }
 
     /// Histograms of 16 bins for an array of these rows and columns, with so many photons of the background in a bin, and
     /// of the pulse in bin 9. Pixel 5 is hot.
