@@ -404,10 +404,8 @@ impl RecordedPixel {
                 photon.cycle = cycle;
             }
             let end = next + count as usize;
-            if count as usize > AT_ONCE {
-                for photon in &mut photons[next + AT_ONCE..end] {
-                    photon.cycle = cycle;
-                }
+            for photon in photons[next..end].iter_mut().skip(AT_ONCE) {
+                photon.cycle = cycle;
             }
             next = end;
         }

@@ -83,6 +83,8 @@ mod tests {
     use super::*;
     use dtof_core::PixelAddress;
     use dtof_theory::random::pixel_rng;
+    use rand_core::TryRng;
+    use std::convert::Infallible;
 
     /// Draws all laser cycles. Returns the photons of each.
     fn drawn(counts: &[u64], dead_time: u16, cycles: u64, seed: u64) -> Vec<Vec<usize>> {
@@ -127,6 +129,44 @@ mod tests {
         // Four standard deviations.
         assert!((both(1) - 0.25).abs() < 0.02, "{}", both(1));
         assert!(both(2) < 1e-9);
+    }
+
+    /// Bin 1 has more photons than laser cycles, all in the dead time of the photon in bin 0.
+    #[test]
+    fn a_contradiction_does_not_keep_later_bins_from_having_photons() {
+        let mut hits = Hits::new(&[1, 5, 0, 1], 1);
+        let mut photons = Vec::new();
+        let mut rng = pixel_rng(1, PixelAddress::new(0));
+        hits.draw(1, &mut rng, |bin| photons.push(bin));
+        assert_eq!(photons, [0, 3]);
+        assert_eq!(hits.photons(), 5);
+    }
+
+    /// Random numbers that are all 0.
+    struct Zeros;
+
+    impl TryRng for Zeros {
+        type Error = Infallible;
+
+        fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+            Ok(0)
+        }
+
+        fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+            Ok(0)
+        }
+
+        fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
+            bytes.fill(0);
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn no_random_number_prevents_a_photon_of_every_laser_cycle() {
+        let mut photons = Vec::new();
+        Hits::new(&[0, 4], 1).draw(4, &mut Zeros, |bin| photons.push(bin));
+        assert_eq!(photons, [1]);
     }
 
     #[test]

@@ -18,8 +18,8 @@ const LIST: u64 = 1024;
 /// The photons of a histogram that have not been drawn.
 ///
 /// The photons of a bin are interchangeable. A number is drawn among all photons, and again if that
-/// photon is gone. When a quarter of them are gone, the others are renumbered. A table gives the
-/// bin at which to start the search for a number. The last photons are a list.
+/// photon is gone. When more than a quarter of them are gone, the others are renumbered. A table
+/// gives the bin at which to start the search for a number. The last photons are a list.
 #[derive(Clone, Debug)]
 pub struct Remaining {
     bins: Vec<Bin>,
@@ -86,7 +86,7 @@ impl Remaining {
         }
     }
 
-    /// Lists all photons.
+    /// Lists all photons. Once they are listed, that changes nothing.
     fn make_list(&mut self) {
         let mut start = 0;
         for (number, bin) in (0..=u16::MAX).zip(&self.bins) {
@@ -99,7 +99,7 @@ impl Remaining {
     /// Draws a photon. Returns its bin, or `None` if none is left.
     #[inline]
     pub fn draw(&mut self, rng: &mut impl Rng) -> Option<u16> {
-        if 4 * self.photons < 3 * self.numbers && self.list.is_empty() {
+        if 4 * self.photons < 3 * self.numbers {
             self.number_anew();
         }
         #[allow(clippy::cast_possible_truncation, reason = "indices of what is there")]
@@ -163,6 +163,28 @@ mod tests {
         }
         // The standard deviation is 100.
         assert!((differ - 20_000).abs() < 500, "{differ}");
+    }
+
+    /// Four bins have a table of at most 32 entries, so 4,096 photons have one of 16, each for 256 numbers.
+    #[test]
+    fn the_table_has_the_bin_of_the_first_number() {
+        let remaining = Remaining::new(&[1024, 0, 1024, 2048]);
+        assert_eq!(remaining.shift, 8);
+        let guide = [0, 0, 0, 0, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3, 3, 3];
+        assert_eq!(remaining.guide, guide);
+    }
+
+    #[test]
+    fn photons_are_renumbered_when_more_than_a_quarter_is_gone() {
+        let mut rng = pixel_rng(3, PixelAddress::new(0));
+        let mut remaining = Remaining::new(&[2000, 2000]);
+        let numbers = (0..1002).map(|_| {
+            remaining.draw(&mut rng);
+            remaining.numbers
+        });
+        let numbers: Vec<u64> = numbers.collect();
+        assert_eq!(numbers[..1001], [4000; 1001]);
+        assert_eq!(numbers[1001], 2999);
     }
 
     #[test]

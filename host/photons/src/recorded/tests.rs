@@ -28,14 +28,16 @@ fn every_recorded_photon_is_used_exactly_once() {
     assert!(photons.is_sorted_by_key(|photon| photon.cycle));
 }
 
-/// Two captures, one of which ends first.
+/// Two captures, one of which ends first. With a dead time no photon is in that of another.
 #[test]
 fn slices_of_any_length_hold_the_same_photons() {
-    let photons = |lengths: &[u16]| {
+    let photons = |dead_time: u16, lengths: &[u16]| {
         let captures = [vec![vec![700; 8]], vec![vec![90; 8]]];
         let length = RecordingLength::PhotonsPerCycle(0.9);
         let array = Array::new(1, 1).unwrap();
-        let mut source = RecordedHistograms::new(array, &captures, length, u64::MAX, 3).unwrap();
+        let source = RecordedHistograms::new(array, &captures, length, u64::MAX, 3).unwrap();
+        let source = source.with_dead_time(&captures, &[], dead_time);
+        let mut source = source.unwrap();
         let mut all = [(); 2].map(|()| Vec::new());
         for &length in lengths.iter().cycle().take(9_000) {
             let before = source.not_replayed();
@@ -54,10 +56,88 @@ fn slices_of_any_length_hold_the_same_photons() {
         assert_eq!(source.not_replayed(), 0);
         all
     };
-    let expected = photons(&[7000]);
-    assert_eq!([expected[0].len(), expected[1].len()], [5600, 720]);
-    for lengths in [&[1][..], &[256], &[3, 2048, 1, 700], &[2049]] {
-        assert!(photons(lengths) == expected, "{lengths:?}");
+    let photons_of = |dead_time| {
+        let expected = photons(dead_time, &[7000]);
+        assert_eq!([expected[0].len(), expected[1].len()], [5600, 720]);
+        for lengths in [&[1][..], &[256], &[3, 2048, 1, 700], &[2049]] {
+            assert!(photons(dead_time, lengths) == expected, "{lengths:?}");
+        }
+        expected
+    };
+    let is_apart = |pair: &[(u64, u16)]| pair[0].0 < pair[1].0 || pair[0].1 + 3 < pair[1].1;
+    let are_apart = |pixel: &Vec<(u64, u16)>| pixel.windows(2).all(is_apart);
+    assert!(!photons_of(0).iter().any(are_apart));
+    assert!(photons_of(3).iter().all(are_apart));
+}
+
+/// In 40 of 100 laser cycles the TDC was live in bin 2, if photons in bin 0 had blinded it.
+#[test]
+fn photons_in_the_dead_time_of_others_are_refused() {
+    let array = Array::new(2, 1).unwrap();
+    let captures = [[60, 40], [60, 41]].map(|[first, third]| {
+        let right = vec![0, 100, 0, 0, 0, 0, 0, 0];
+        vec![right, vec![first, 0, third, 0, 0, 0, 0, 0]]
+    });
+    let refused = |masked: &[u16], dead_time| {
+        let length = RecordingLength::Cycles(100);
+        let source = RecordedHistograms::new(array, &captures, length, 100, 1).unwrap();
+        let source = source.with_dead_time(&captures, masked, dead_time);
+        source.err().map(|error| error.to_string())
+    };
+    assert_eq!(
+        refused(&[1], 2).as_deref(),
+        Some(
+            "dead_time 2: bin 2 of pixel 3 has 41 photons, but was live in 40 of 100 laser cycles; give the laser \
+             cycles with recorded_cycles, or a shorter dead time"
+        )
+    );
+    assert_eq!(refused(&[3], 2), None);
+    assert_eq!(refused(&[], 1), None);
+}
+
+#[test]
+fn captures_follow_each_other() {
+    let array = Array::new(3, 2).unwrap();
+    let captures = [2, 6].map(|count| vec![vec![count; 8]; 6]);
+    let length = RecordingLength::Cycles(50);
+    let source = RecordedHistograms::new(array, &captures, length, 40, 1).unwrap();
+    assert_eq!(source.axis_names(), ["column", "row"]);
+    let source = source.with_axis_names(["zone", "subcapture"]);
+    assert_eq!(source.axis_names(), ["zone", "subcapture"]);
+    assert_eq!(source.array(), Array::new(3, 4).unwrap());
+    assert_eq!(source.capture_rows(), 2);
+    let addresses: Vec<_> = (0..12).map(PixelAddress::new).collect();
+    assert_eq!(source.addresses(), addresses);
+    assert_eq!(source.cycles(), 40);
+    assert_eq!(source.recorded_cycles(), Some((50, 50)));
+    // Of 6 pixels with 16 photons and 6 with 48.
+    assert!((source.photons_per_cycle() - 384.0 / 50.0).abs() < 1e-9);
+    assert_eq!(source.not_replayed(), 384);
+}
+
+#[test]
+fn photons_of_pixels_that_are_not_needed_are_left_out() {
+    let mut all = recorded(vec![vec![100; 8]; 3], 1000, 1).unwrap();
+    let mut limited = all.clone();
+    limited.limit_to(&|address| address.raw() == 1);
+    let all = all.next_slice(1000).unwrap().pixels;
+    let limited = limited.next_slice(1000).unwrap().pixels;
+    let nothing = PixelPhotons::default();
+    assert_eq!(limited, [nothing.clone(), all[1].clone(), nothing]);
+}
+
+/// The chunks of a recording hold about four million photons.
+#[test]
+fn chunks_are_shorter_if_there_are_many_photons() {
+    for (photons_per_cycle, cycles) in [
+        (0.0, 2048),
+        (1953.125, 2048),
+        (1954.0, 2047),
+        (4e3, 1000),
+        (3e6, 1),
+        (5e7, 1),
+    ] {
+        assert_eq!(chunk(photons_per_cycle), cycles, "{photons_per_cycle}");
     }
 }
 
@@ -119,12 +199,36 @@ fn pixels_of_later_captures_have_the_next_addresses() {
 }
 
 #[test]
-fn what_does_not_fit_into_memory_is_refused() {
-    let refused = |count: u64, cycles| recorded(vec![vec![count; 8]], cycles, 1).is_err();
-    assert!(refused(1 << 38, 1 << 40));
-    assert!(refused(1 << 30, 1));
-    assert!(refused(1, (1 << 40) + 1));
-    assert!(!refused(1 << 30, 1 << 20));
+fn what_cannot_be_counted_or_does_not_fit_into_memory_is_refused() {
+    use RecordingLength::{Cycles, PhotonsPerCycle};
+    let refused = |count, length| {
+        let captures = [vec![vec![count, 0, 0, 0, 0, 0, 0, count]]];
+        let array = Array::new(1, 1).unwrap();
+        let source = RecordedHistograms::new(array, &captures, length, u64::MAX, 1);
+        source.err().map(|error| error.to_string())
+    };
+    let most = 1 << 40;
+    let most_a_cycle = 25_000_000;
+    let photons = "a histogram holds more than 2^40 photons";
+    let cycles = "recorded_cycles 1099511627777: must be at most 2^40";
+    let rate = "photons_per_cycle 0.5: makes the recording longer than 2^40 laser cycles";
+    let memory = "50000002 photons a laser cycle are more than 50000000";
+    for (count, length, reason) in [
+        (most / 2, Cycles(most), None),
+        (most / 2 + 1, Cycles(most), Some(photons)),
+        (u64::MAX, Cycles(most), Some(photons)),
+        (1, Cycles(most + 1), Some(cycles)),
+        (most / 4, PhotonsPerCycle(0.5), None),
+        (most / 4 + 1, PhotonsPerCycle(0.5), Some(rate)),
+        (most_a_cycle, Cycles(1), None),
+        (most_a_cycle + 1, Cycles(1), Some(memory)),
+    ] {
+        assert_eq!(
+            refused(count, length).as_deref(),
+            reason,
+            "{count} {length:?}"
+        );
+    }
 }
 
 #[test]
