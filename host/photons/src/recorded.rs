@@ -332,14 +332,15 @@ impl RecordedPixel {
     /// The next `cycles` laser cycles, from chunks of `chunk` laser cycles.
     fn next_cycles(&mut self, cycles: u16, chunk: u16) -> Result<PixelPhotons> {
         let mut received = PixelPhotons::default();
-        while received.cycles < cycles {
+        loop {
             if self.replayed_cycles == self.chunk.cycles {
                 self.next_chunk(chunk)?;
-                if self.chunk.cycles == 0 {
-                    break;
-                }
             }
             let taken = (self.chunk.cycles - self.replayed_cycles).min(cycles - received.cycles);
+            // No more were requested, or the recording ends.
+            if taken == 0 {
+                return Ok(received);
+            }
             let end = self.replayed_cycles + taken;
             let left = &self.chunk.photons[self.replayed_photons..];
             let next = left.iter().take_while(|photon| photon.cycle < end).count();
@@ -353,7 +354,6 @@ impl RecordedPixel {
             self.replayed_cycles = end;
             received.cycles += taken;
         }
-        Ok(received)
     }
 
     /// Draws the photons of the next `cycles` laser cycles, or of all that are left.

@@ -80,11 +80,11 @@ impl Hits {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::Numbers;
     use super::*;
     use dtof_core::PixelAddress;
     use dtof_theory::random::pixel_rng;
-    use rand_core::TryRng;
-    use std::convert::Infallible;
+    use std::iter::repeat;
 
     /// Draws all laser cycles. Returns the photons of each.
     fn drawn(counts: &[u64], dead_time: u16, cycles: u64, seed: u64) -> Vec<Vec<usize>> {
@@ -142,30 +142,10 @@ mod tests {
         assert_eq!(hits.photons(), 5);
     }
 
-    /// Random numbers that are all 0.
-    struct Zeros;
-
-    impl TryRng for Zeros {
-        type Error = Infallible;
-
-        fn try_next_u32(&mut self) -> Result<u32, Infallible> {
-            Ok(0)
-        }
-
-        fn try_next_u64(&mut self) -> Result<u64, Infallible> {
-            Ok(0)
-        }
-
-        fn try_fill_bytes(&mut self, bytes: &mut [u8]) -> Result<(), Infallible> {
-            bytes.fill(0);
-            Ok(())
-        }
-    }
-
     #[test]
     fn no_random_number_prevents_a_photon_of_every_laser_cycle() {
         let mut photons = Vec::new();
-        Hits::new(&[0, 4], 1).draw(4, &mut Zeros, |bin| photons.push(bin));
+        Hits::new(&[0, 4], 1).draw(4, &mut Numbers(repeat(0)), |bin| photons.push(bin));
         assert_eq!(photons, [1]);
     }
 

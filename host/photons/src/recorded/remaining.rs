@@ -74,10 +74,8 @@ impl Remaining {
             return;
         }
         let entries = 8 * self.bins.len() as u64;
-        self.shift = 0;
-        while self.numbers >> self.shift >= entries {
-            self.shift += 1;
-        }
+        let is_short = |shift: &u32| self.numbers >> shift < entries;
+        self.shift = (0..u64::BITS).find(is_short).unwrap_or(0);
         for (number, bin) in (0..=u16::MAX).zip(&self.bins) {
             // Numbers below `bin.end` are in this bin or an earlier one.
             while ((self.guide.len() as u64) << self.shift) < bin.end {
@@ -98,11 +96,11 @@ impl Remaining {
 
     /// Draws a photon. Returns its bin, or `None` if none is left.
     #[inline]
+    #[allow(clippy::cast_possible_truncation, reason = "indices of what is there")]
     pub fn draw(&mut self, rng: &mut impl Rng) -> Option<u16> {
         if 4 * self.photons < 3 * self.numbers {
             self.number_anew();
         }
-        #[allow(clippy::cast_possible_truncation, reason = "indices of what is there")]
         if !self.list.is_empty() {
             let place = UniformInt::<u32>::sample_single(0, self.list.len() as u32, rng).ok()?;
             self.photons -= 1;
@@ -110,16 +108,13 @@ impl Remaining {
         }
         loop {
             let number = UniformInt::<u64>::sample_single(0, self.numbers, rng).ok()?;
-            #[allow(clippy::cast_possible_truncation, reason = "an index of the table")]
-            let mut bin = self.guide[(number >> self.shift) as usize];
-            while self.bins[usize::from(bin)].end <= number {
-                bin += 1;
-            }
-            let of_bin = &mut self.bins[usize::from(bin)];
+            let first = usize::from(self.guide[(number >> self.shift) as usize]);
+            let mut bins = (first..).zip(&mut self.bins[first..]);
+            let (bin, of_bin) = bins.find(|(_, bin)| number < bin.end)?;
             if number < of_bin.left {
                 of_bin.left -= 1;
                 self.photons -= 1;
-                return Some(bin);
+                return Some(bin as u16);
             }
         }
     }
@@ -127,6 +122,7 @@ impl Remaining {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::Numbers;
     use super::*;
     use dtof_core::PixelAddress;
     use dtof_theory::random::pixel_rng;
@@ -185,6 +181,17 @@ mod tests {
         let numbers: Vec<u64> = numbers.collect();
         assert_eq!(numbers[..1001], [4000; 1001]);
         assert_eq!(numbers[1001], 2999);
+    }
+
+    /// At least three quarters of the numbers are those of photons, so a photon takes 4/3 of them at most, on average.
+    #[test]
+    fn photons_take_few_random_numbers() {
+        let mut rng = pixel_rng(4, PixelAddress::new(0));
+        let numbers = (0..5000 * 4 / 3).map(|_| rng.next_u64());
+        let mut numbers = Numbers(numbers);
+        let mut remaining = Remaining::new(&[3000, 2000]);
+        while remaining.draw(&mut numbers).is_some() {}
+        assert_eq!(remaining.photons(), 0);
     }
 
     #[test]

@@ -1,6 +1,27 @@
+use std::convert::Infallible;
 use std::slice::from_ref;
 
 use super::*;
+use rand_core::TryRng;
+
+/// These numbers as if they were random.
+pub struct Numbers<I>(pub I);
+
+impl<I: Iterator<Item = u64>> TryRng for Numbers<I> {
+    type Error = Infallible;
+
+    fn try_next_u32(&mut self) -> Result<u32, Infallible> {
+        Ok((self.try_next_u64()? >> 32) as u32)
+    }
+
+    fn try_next_u64(&mut self) -> Result<u64, Infallible> {
+        Ok(self.0.next().expect("all numbers were taken"))
+    }
+
+    fn try_fill_bytes(&mut self, _bytes: &mut [u8]) -> Result<(), Infallible> {
+        unreachable!("numbers are taken one by one")
+    }
+}
 
 /// A capture of pixels in a row.
 fn recorded(capture: Capture, cycles: u64, seed: u64) -> Result<RecordedHistograms> {
