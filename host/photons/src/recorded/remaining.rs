@@ -127,6 +127,7 @@ mod tests {
     use dtof_core::PixelAddress;
     use dtof_theory::random::pixel_rng;
     use proptest::prelude::*;
+    use std::iter::once;
 
     proptest! {
         #[test]
@@ -168,6 +169,16 @@ mod tests {
         assert_eq!(remaining.shift, 8);
         let guide = [0, 0, 0, 0, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3, 3, 3];
         assert_eq!(remaining.guide, guide);
+    }
+
+    /// The upper 11 bits of a random number choose one of 2,048 photons.
+    #[test]
+    fn photons_of_a_bin_have_consecutive_numbers() {
+        for (number, bin) in [(0, 0), (999, 0), (1000, 2), (2047, 2)] {
+            let mut remaining = Remaining::new(&[1000, 0, 1048]);
+            let drawn = remaining.draw(&mut Numbers(once(number << 53)));
+            assert_eq!(drawn, Some(bin), "{number}");
+        }
     }
 
     #[test]
