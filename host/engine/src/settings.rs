@@ -11,6 +11,8 @@ mod file;
 mod resolve;
 mod rows;
 mod sections;
+#[cfg(test)]
+mod tests;
 
 pub use detection::{DetectionSettings, EstimatorName, RuleName, share};
 pub use engine::{AdaptiveBinning, Settings};

@@ -59,26 +59,12 @@ fn a_dead_time_that_cannot_be_used_is_refused() {
     let scratch = Scratch::new();
     photons(&scratch);
     let short = scratch.file("short.toml", "[sensor]\ndead_time = 20\n");
-    scratch.file("negative.toml", "[sensor]\ndead_time = -1\n");
-    scratch.file(
-        "both.toml",
-        "[sensor]\none_hit_tdc = true\ndead_time = 20\n",
-    );
     scratch.all_refused(
         "replay --out out --input photons.csv",
         "
         --dead-time 20 --rule paper | --dead-time 20: is for --rule window, unless it is 128 bins or more
-        --dead-time 127 --rule average | --dead-time 127: is for --rule window
-        --dead-time 1 --rule window --window 3 --binning 1 | --dead-time 1: cannot be used with --binning
-        --dead-time 1 --frame 100 | --dead-time 1: cannot be used with --frame
         --dead-time -1 | --dead-time -1: must be a whole number from 0 to 65535
-        --dead-time 65536 | --dead-time 65536: must be a whole number from 0 to 65535
-        --dead-time 2.5 | --dead-time 2.5: must be a whole number
-        --dead-time ten | --dead-time ten: must be a whole number
         --settings short.toml | short.toml: dead_time 20: is for --rule window
-        --settings short.toml --rule average | short.toml: dead_time 20: is for --rule window
-        --settings negative.toml | negative.toml: dead_time -1: must be a whole number from 0
-        --settings both.toml | both.toml: one_hit_tdc cannot be used with dead_time
         ",
     );
     // 0 overrides the file, and all bins are for any rule.

@@ -79,11 +79,7 @@ fn what_they_cannot_be_used_with_is_refused() {
         "simulate --scene scene.toml --out out",
         "
         --neighbours 8 | --neighbours is for --rule window
-        --rule paper --neighbours 4 | --neighbours is for --rule window
-        --rule window --window 3 --neighbours 5 | --neighbours 5: must be 0, 4 or 8
         --rule window --window 3 --neighbours 8 --binning 1 | --neighbours cannot be used with --binning
-        --rule window --window 3 --neighbours 8 --dead-time 20 | --neighbours cannot be used with --dead-time
-        --rule window --window 3 --neighbours 8 --dead-time 128 | --neighbours cannot be used with --dead-time
         ",
     );
 }

@@ -116,26 +116,6 @@ fn the_pulse_chooses_estimator_and_window() {
     assert_eq!(settings["estimator"], "centroid");
 }
 
-/// The result of `z_for` for one in 100 exposures, from `core/tests/detect/window_z.rs`.
-#[test]
-fn the_false_alarms_choose_z() {
-    let z = |options: &str| {
-        let (settings, _) = replayed(&format!("--rule window --window 2 {options}"));
-        settings["z"].as_f64().unwrap()
-    };
-    let z_for = |one_in, first, last, l1| {
-        let gate = dtof_core::RangeGate::<128>::new(first, last).unwrap();
-        dtof_core::z_for(one_in, &gate, 4, l1, 2000).to_num::<f64>()
-    };
-    assert_eq!(z(""), z_for(100, 0, 127, 40));
-    assert_eq!(z("--false-alarm 0.01"), z(""));
-    assert_eq!(z("--false-alarm 1e-3"), z_for(1000, 0, 127, 40));
-    // A share that is not one in a whole number is rounded to the next rarer one.
-    assert_eq!(z("--false-alarm 0.03"), z_for(34, 0, 127, 40));
-    assert_eq!(z("--gate 20..119 --l1 8"), z_for(100, 20, 119, 8));
-    assert!(z("--false-alarm 0.001") > z("") && z("") > z("--gate 20..119"));
-}
-
 #[test]
 fn the_summary_says_how_to_do_it_again() {
     for options in [
@@ -175,28 +155,12 @@ fn options_that_contradict_each_other_are_refused_in_one_line() {
     scratch.all_refused(
         &format!("replay --input photons.csv --out out {DEFAULTS}"),
         r#"
-            --rule window --window 3 --alpha 4 | --alpha | --rule paper
-            --z 4 | --z is for --rule window
-            --window 3 | --window is for --rule window
-            --false-alarm 0.02 | --false-alarm is for --rule window
-            --rule window --window 3 --z 4 --false-alarm 0.02 | --z | --false-alarm
-            --rule window | --window | --sigma-bins
-            --rule window --window 0 | --window | from 1 to 7
-            --rule window --window 8 | --window | from 1 to 7
-            --rule window --window -1 | --window | from 1 to 7
-            --rule window --window 3 --z 16 | --z | a number from 0
-            --rule window --window 3 --z -1 | --z | a number from 0
-            --rule window --window 3 --false-alarm 0.11 | --false-alarm | at most 0.1
-            --rule window --window 3 --false-alarm 0 | --false-alarm | above 0
+            --rule window --window 3 --alpha 4 | --alpha is for --rule paper or average; --rule window takes --z or --false-alarm
+            --rule window --window -1 | --window -1: must be a whole number from 1 to 7
             --rule window --window 3 --false-alarm 1e-9 | --false-alarm 0.000000001 | no z for so few
-            --sigma-bins 0 | --sigma-bins | above 0
-            --sigma-bins -1 | --sigma-bins
-            --sigma-bins 0.0001 | --sigma-bins | smallest step
-            --rule other | --rule | paper | window
-            --rule window --window 3 --gate 0..3 | --gate 0..3
+            --sigma-bins -1 | --sigma-bins -1: must be a number above 0
             --rule window --window 3 --gate 100..200 | --gate 100..200 | 128 bins
-            --rule window --window 3 --bins 100 | --bins | power of two
-            --rule window --window 3 --bins 5 | --bins | power of two
+            --rule window --window 3 --bins 100 | --bins 100: must be a power of two
         "#,
     );
 }
