@@ -120,15 +120,21 @@ impl DetectionSettings {
     pub fn or(self, mut other: Self) -> Self {
         let decided = self.rule.or(other.rule);
         if decided != other.rule {
-            other = Self {
-                alpha: None,
-                window: None,
-                z: None,
-                false_alarm: None,
-                neighbours: None,
-                tracking: None,
-                ..other
-            };
+            // Without a rule of their own, numbers may be meant for this one.
+            let kept = decided.filter(|_| other.rule.is_none());
+            if matches!(kept, None | Some(RuleName::Window)) {
+                other.alpha = None;
+            }
+            if kept != Some(RuleName::Window) {
+                other = Self {
+                    window: None,
+                    z: None,
+                    false_alarm: None,
+                    neighbours: None,
+                    tracking: None,
+                    ..other
+                };
+            }
         }
         if self.estimator == Some(EstimatorName::Centroid) {
             other.half_widths = None;

@@ -18,6 +18,9 @@ fn an_option_replaces_what_it_excludes_in_the_file() {
         rule = 'paper'         | rule = 'window'; false_alarm = 0.02 | rule = 'paper'
         rule = 'window'        | rule = 'paper'; alpha = 6        | rule = 'window'
         rule = 'average'       | rule = 'paper'; alpha = 6        | rule = 'average'
+        rule = 'window'        | window = 3; z = 4; neighbours = 8; alpha = 6 | rule = 'window'; window = 3; z = 4; neighbours = 8
+        rule = 'paper'         | window = 3; z = 4; neighbours = 8; alpha = 6 | rule = 'paper'; alpha = 6
+        rule = 'average'       | tracking = true; false_alarm = 0.02; alpha = 6 | rule = 'average'; alpha = 6
         z = 4                  | false_alarm = 0.02               | z = 4
         false_alarm = 0.02     | z = 4                            | false_alarm = 0.02
         l1 = 8                 | z = 4                            | z = 4; l1 = 8

@@ -100,8 +100,10 @@ fn other_settings_have_other_rows() {
     ) {
         assert_eq!(changed(&settings(keys), ""), [row], "{keys}");
     }
-    let mut blind = SettingsFile::default();
-    blind.dead_time_of_sensor = Some(128);
+    let blind = SettingsFile {
+        dead_time_of_sensor: Some(128),
+        ..SettingsFile::default()
+    };
     let row =
         "dead time: all bins after the first photon of a laser cycle, from the sensor or scene";
     assert_eq!(changed(&blind.settings(128).unwrap(), ""), [row]);
