@@ -223,12 +223,11 @@ impl<R: Read> Reader<R> {
     /// Fails if there is no header, or one of another format.
     pub fn new(mut input: R) -> Result<Self> {
         let mut bytes = [0; HEADER_BYTES as usize];
-        input
-            .read_exact(&mut bytes)
-            .map_err(|error| match error.kind() {
-                io::ErrorKind::UnexpectedEof => anyhow!("not an AER file: shorter than its header"),
-                _ => error.into(),
-            })?;
+        fill(
+            &mut input,
+            &mut bytes,
+            "not an AER file: shorter than its header",
+        )?;
         let mut digest = CRC_32.digest();
         digest.update(&bytes);
         let mut header = Header::from_bytes(&bytes)?;
@@ -236,9 +235,7 @@ impl<R: Read> Reader<R> {
         let settings = usize::from(length - HEADER_BYTES);
         let offsets = offset_bytes(&bytes, header.array);
         let mut rest = vec![0; settings + offsets];
-        input
-            .read_exact(&mut rest)
-            .context("the file ends inside its header")?;
+        fill(&mut input, &mut rest, "the file ends inside its header")?;
         digest.update(&rest);
         header.offsets_mm = offsets_from_bytes(&rest[settings..], header.array.pixels())?;
         Ok(Self {
@@ -346,92 +343,14 @@ impl<R: Read> Reader<R> {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use dtof_core::Array;
-    use dtof_core::fixed::types::{I24F8, U16F16};
-
-    fn file(offsets_mm: Vec<Option<I24F8>>) -> (Header, Vec<u8>) {
-        let header = Header {
-            bins: 128,
-            array: Array::new(3, 1).unwrap(),
-            bin_width_ps: U16F16::lit("250"),
-            offset_mm: I24F8::lit("-12.5"),
-            offsets_mm,
-            laser_millihertz: 7,
-            start_us: 9,
-        };
-        let mut writer = Writer::new(Vec::new(), &header).unwrap();
-        let event = Event::Depth(crate::fixtures::event(2, 100, 60));
-        writer.write(&event).unwrap();
-        (header, writer.finish().unwrap())
-    }
-
-    #[test]
-    fn offsets_of_pixels_are_read_as_they_were_written() {
-        let offsets = [Some("-78.25"), None, Some("0.00390625")];
-        let offsets = offsets.map(|mm| mm.map(|mm| mm.parse().unwrap()));
-        let (header, bytes) = file(offsets.to_vec());
-        assert_eq!((bytes[8], bytes.len()), (6, 64 + 16 + 3 * 16));
-        let mut reader = Reader::new(&bytes[..]).unwrap();
-        assert_eq!((reader.header(), reader.offset()), (&header, 80));
-        assert!(reader.next_event().unwrap().is_some());
-        assert!(reader.next_event().unwrap().is_none());
-        // Any byte of them is under the checksum, and the padding is 0.
-        for at in 64..80 {
-            let mut damaged = bytes.clone();
-            damaged[at] ^= 1;
-            let read = Reader::new(&damaged[..]).and_then(|mut reader| {
-                reader.next_event()?;
-                reader.next_event()
-            });
-            let error = format!("{:#}", read.unwrap_err());
-            let part = if at < 76 { "checksum" } else { "damaged" };
-            assert!(error.contains(part), "{at}: {error}");
-        }
-        for length in [64, 70, 79] {
-            let error = Reader::new(&bytes[..length]).map(|_| ()).unwrap_err();
-            assert_eq!(error.to_string(), "the file ends inside its header");
-        }
-    }
-
-    #[test]
-    fn a_file_without_offsets_is_of_version_5_as_before() {
-        let (header, bytes) = file(Vec::new());
-        assert_eq!((bytes[8], bytes.len()), (5, 64 + 3 * 16));
-        assert_eq!(Reader::new(&bytes[..]).unwrap().header(), &header);
-        // Offsets of other pixels cannot be written.
-        let offsets_mm = vec![None; 2];
-        let header = Header {
-            offsets_mm,
-            ..header
-        };
-        assert!(Writer::new(Vec::new(), &header).is_err());
-    }
-
-    #[test]
-    fn settings_in_a_header_are_read_back_unless_they_are_too_long() {
-        let header = Header {
-            bins: 128,
-            array: Array::new(2, 2).unwrap(),
-            bin_width_ps: U16F16::lit("250"),
-            offset_mm: I24F8::ZERO,
-            offsets_mm: Vec::new(),
-            laser_millihertz: 0,
-            start_us: 0,
-        };
-        let event = Event::Depth(crate::fixtures::event(1, 9, 3));
-        for (length, kept) in [(0, 0), (1, 1), (16, 16), (65_456, 65_456), (65_457, 0)] {
-            let settings = "x".repeat(length);
-            let mut writer = Writer::with_settings(Vec::new(), &header, &settings).unwrap();
-            writer.write(&event).unwrap();
-            let bytes = writer.finish().unwrap();
-            let mut reader = Reader::new(&bytes[..]).unwrap();
-            assert_eq!(reader.settings(), &settings[..kept]);
-            assert_eq!(reader.header(), &header);
-            assert_eq!(reader.next_event().unwrap(), Some(event));
-            assert_eq!(reader.next_event().unwrap(), None);
-        }
-    }
+/// Reads so many bytes. Fails with `too_short` if the file has fewer.
+fn fill(input: &mut impl Read, bytes: &mut [u8], too_short: &'static str) -> Result<()> {
+    let read = input.read_exact(bytes);
+    read.map_err(|error| match error.kind() {
+        io::ErrorKind::UnexpectedEof => anyhow!(too_short),
+        _ => error.into(),
+    })
 }
+
+#[cfg(test)]
+mod tests;

@@ -172,24 +172,100 @@ pub(super) fn header_length(bytes: &[u8; HEADER_BYTES as usize]) -> Option<u16> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures;
+    use dtof_core::events::DynamicDepthEvent;
+    use dtof_core::{BinIndex, BlockLevel, DepthEvent, Flags, LaserCycle, PixelAddress};
 
-    #[test]
-    fn a_header_of_each_version_that_is_known_reads_the_same() {
-        let header = Header {
+    /// 5×3 pixels, 128 bins of 250 ps.
+    fn header() -> Header {
+        Header {
             bins: 128,
-            array: Array::new(64, 32).unwrap(),
+            array: Array::new(5, 3).unwrap(),
             bin_width_ps: U16F16::lit("250"),
             offset_mm: I24F8::lit("-12.5"),
             offsets_mm: Vec::new(),
             laser_millihertz: 7,
-            start_us: 9,
-        };
+            start_us: -9,
+        }
+    }
+
+    #[test]
+    fn a_header_of_each_version_that_is_known_reads_the_same() {
         for version in 0..=u8::MAX {
-            let mut bytes = header.to_bytes(HEADER_BYTES);
+            let mut bytes = header().to_bytes(HEADER_BYTES);
             bytes[8] = version;
-            let read = Header::from_bytes(&bytes).ok();
-            let known = [4, 5, 6].contains(&version);
-            assert_eq!(read, known.then(|| header.clone()), "{version}");
+            let read = Header::from_bytes(&bytes).map_err(|error| error.to_string());
+            let expected = match version {
+                4..=6 => Ok(header()),
+                _ => Err(format!("AER version {version}; this program reads 4 to 6")),
+            };
+            assert_eq!(read, expected);
+        }
+    }
+
+    #[test]
+    fn a_header_that_cannot_be_is_refused() {
+        let pixels = |size| format!("the header says {size} pixels: must be 1 to 65,536");
+        let damaged = || "the header is damaged".to_owned();
+        for (bytes, to, expected) in [
+            (0..1, 0, "not an AER file".to_owned()),
+            // The length of the header: not of whole words, or less than 64.
+            (10..11, 65, damaged()),
+            (10..11, 48, damaged()),
+            (48..49, 1, damaged()),
+            (63..64, 1, damaged()),
+            (16..20, 0, pixels("0x3")),
+            (16..24, 255, pixels("4294967295x4294967295")),
+        ] {
+            let mut header = header().to_bytes(HEADER_BYTES);
+            header[bytes].fill(to);
+            let error = Header::from_bytes(&header).unwrap_err();
+            assert_eq!(error.to_string(), expected);
+        }
+    }
+
+    #[test]
+    fn an_event_outside_the_array_or_the_bins_is_refused() {
+        let depth = |pixel, level, bin| {
+            Event::Depth(DepthEvent {
+                level: BlockLevel::new(level).unwrap(),
+                peak_bin: BinIndex::new(bin).unwrap(),
+                ..fixtures::event(pixel, 1, 0)
+            })
+        };
+        // Its position in 1/256 bins.
+        let dynamic = |pixel, level, position| {
+            let (pixel, level) = (PixelAddress::new(pixel), BlockLevel::new(level).unwrap());
+            let position = BinPosition::new(position).unwrap();
+            let cycle = LaserCycle::new(1);
+            let event = DynamicDepthEvent::new(pixel, level, cycle, position, 5, Flags::NONE);
+            Event::DynamicDepth(event.unwrap())
+        };
+        for (event, reason) in [
+            (depth(14, 0, 127), ""),
+            (depth(15, 0, 127), "pixel 15 of 15"),
+            (depth(0, 0, 128), "bin 128 of 128"),
+            // Columns 4 and 5, rows 2 and 3: only column 4 and row 2 are there.
+            (depth(14, 1, 0), ""),
+            (
+                depth(9, 1, 0),
+                "pixel 9 is not the first of a block of level 1",
+            ),
+            (dynamic(14, 0, 128 * 256 + 255), ""),
+            (dynamic(14, 0, -512), ""),
+            (dynamic(14, 0, 129 * 256), "bin 129 of 128"),
+            (dynamic(15, 0, 0), "pixel 15 of 15"),
+            (
+                dynamic(3, 2, 0),
+                "pixel 3 is not the first of a block of level 2",
+            ),
+        ] {
+            let checked = header().check(&event).map_err(|error| error.to_string());
+            let expected = match reason {
+                "" => Ok(()),
+                reason => Err(reason.to_owned()),
+            };
+            assert_eq!(checked, expected, "{event:?}");
         }
     }
 }
