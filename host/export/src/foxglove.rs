@@ -132,11 +132,11 @@ impl Statistics {
     #[must_use]
     pub fn over(self, time: u64, duration_ns: u64, events_so_far: u64) -> Self {
         let duration_s = duration_ns as f64 / 1e9;
-        let rate = self.events as f64 / duration_s;
         Self {
             timestamp: Time::from_nanoseconds(time),
             duration_s,
-            events_per_s: if duration_ns > 0 { rate } else { f64::NAN },
+            // JSON has no infinity: null.
+            events_per_s: self.events as f64 / duration_s,
             events_so_far,
             ..self
         }
@@ -269,4 +269,106 @@ where
     let mut bytes = Vec::new();
     message.encode(&mut bytes)?;
     Ok(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use foxglove::Decode;
+    use foxglove::messages::packed_element_field::NumericType;
+
+    #[test]
+    fn a_cloud_describes_its_points() {
+        let data = vec![5; 62];
+        let message = cloud(EventKind::DynamicDepth, 7_000_000_009, data.clone()).unwrap();
+        let field = |(name, offset, number): (&str, _, NumericType)| PackedElementField {
+            name: name.to_owned(),
+            offset,
+            r#type: number.into(),
+        };
+        let fields = [
+            ("x", 0, NumericType::Float32),
+            ("y", 4, NumericType::Float32),
+            ("z", 8, NumericType::Float32),
+            ("change", 12, NumericType::Float32),
+            ("pixel", 16, NumericType::Uint32),
+            ("flags", 20, NumericType::Uint8),
+            ("level", 21, NumericType::Uint8),
+            ("echo", 22, NumericType::Uint8),
+            ("t_ns", 23, NumericType::Float64),
+        ];
+        let expected = PointCloud {
+            timestamp: Some(Timestamp::new(7, 9)),
+            frame_id: "dtof_optical".to_owned(),
+            // Where the lens is.
+            pose: Some(Pose {
+                position: Some(Vector3 {
+                    x: 0.0,
+                    y: 0.0,
+                    z: 0.0,
+                }),
+                orientation: Some(Quaternion {
+                    x: 0.0,
+                    y: 0.0,
+                    z: 0.0,
+                    w: 1.0,
+                }),
+            }),
+            point_stride: 31,
+            fields: fields.map(field).to_vec(),
+            data: data.into(),
+        };
+        assert_eq!(PointCloud::decode(&message[..]).unwrap(), expected);
+    }
+
+    #[test]
+    fn a_channel_of_json_has_the_type_of_each_field() {
+        let sample = json!({
+            "at": Time::default(), "text": "", "count": 3u64, "share": 0.5, "unknown": f64::NAN,
+        });
+        let channel = Channel::json("/all", "All", &sample).unwrap();
+        assert_eq!((channel.topic, channel.encoding), ("/all", "json"));
+        assert_eq!(
+            (&*channel.schema.name, &*channel.schema.encoding),
+            ("dtof.All", "jsonschema")
+        );
+        let schema: Value = serde_json::from_slice(&channel.schema.data).unwrap();
+        let time = json!({
+            "type": "object",
+            "title": "time",
+            "properties": { "sec": { "type": "integer" }, "nsec": { "type": "integer" } },
+        });
+        let expected = json!({
+            "title": "dtof.All",
+            "type": "object",
+            "properties": {
+                "at": time,
+                "text": { "type": "string" },
+                "count": { "type": "integer" },
+                "share": { "type": "number" },
+                "unknown": { "type": "number" },
+            },
+        });
+        assert_eq!(schema, expected);
+        let error = Channel::json("/all", "All", &3).err().unwrap();
+        assert_eq!(error.to_string(), "a message has fields");
+    }
+
+    #[test]
+    fn a_slice_of_length_0_has_no_rate() {
+        let mut tally = Tally::new(2);
+        let event = |pixel| Event::Depth(dtof_events::fixtures::event(pixel, 9, 60));
+        tally.add(&event(1), 0).unwrap();
+        let error = tally.add(&event(2), 0).unwrap_err();
+        assert_eq!(error.to_string(), "the array has no such pixel");
+        assert_eq!(tally.so_far(), 1);
+        let statistics = tally.take().over(3_000_000_007, 0, tally.so_far());
+        let json = serde_json::to_value(&statistics).unwrap();
+        assert_eq!(json["timestamp"], json!({ "sec": 3, "nsec": 7 }));
+        assert_eq!(
+            (&json["events"], &json["duration_s"]),
+            (&json!(1), &json!(0.0))
+        );
+        assert_eq!(json["events_per_s"], Value::Null);
+    }
 }

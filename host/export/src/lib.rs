@@ -398,3 +398,6 @@ pub fn points<'a>(
 fn boxed<S: Sink + 'static>(sink: S) -> Box<dyn Sink> {
     Box::new(sink)
 }
+
+#[cfg(test)]
+mod tests;
