@@ -1,8 +1,7 @@
-//! `dtof export`: each format, and files and options that it refuses.
+//! `dtof export`: what the program prints and refuses. `dtof-export` tests what is in the files, and so does the test
+//! `readers` of `dtof-host-tests` with other projects' readers.
 
 mod damage;
-mod echoes;
-mod event_camera;
 #[cfg(target_os = "linux")]
 mod memory;
 mod one_per_pixel;

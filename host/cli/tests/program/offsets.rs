@@ -327,24 +327,6 @@ fn the_file_of_the_document_is_decoded_as_it_says() {
     let csv = scratch.printed("decode offsets.aer");
     let expected = [("1".to_owned(), 2176.43), ("2".to_owned(), 2285.43)];
     assert_eq!(ranges(&csv), expected, "{csv}");
-    // The same words after a header of version 5: files as they were before offsets.
-    let mut old = document("offsets");
-    old[8] = 5;
-    old.drain(64..96);
-    let words = old.len() - 16;
-    let checksum = crc32(&old[..words]);
-    old[words..words + 4].copy_from_slice(&checksum.to_le_bytes());
-    scratch.file("old.aer", old);
-    let csv = scratch.printed("decode old.aer");
-    let expected = [("1".to_owned(), 2254.68), ("2".to_owned(), 2254.68)];
-    assert_eq!(ranges(&csv), expected, "{csv}");
-}
-
-fn crc32(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(u32::MAX, |crc, byte| {
-        let shift = |crc: u32, _| (crc >> 1) ^ ((crc & 1) * 0xedb8_8320);
-        (0..8).fold(crc ^ u32::from(*byte), shift)
-    })
 }
 
 #[test]

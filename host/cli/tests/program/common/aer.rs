@@ -7,9 +7,6 @@ use dtof_core::{
     PixelAddress, SubBinOffset,
 };
 use dtof_events::aer_file::{Event, Header, Writer};
-use dtof_export::{ExportSummary, Format, Options, export};
-
-use super::{Scratch, names};
 
 /// 64 columns, 32 rows, 128 bins of 250 ps.
 pub const HEADER: Header = Header {
@@ -21,11 +18,6 @@ pub const HEADER: Header = Header {
     laser_millihertz: 0,
     start_us: 0,
 };
-
-/// Byte at which the word of a number begins.
-pub fn byte_of(word: usize) -> usize {
-    64 + 16 * word
-}
 
 /// An event in a pixel and laser cycle, its peak in a bin.
 pub fn depth(pixel: u16, cycle: u64, bin: u16) -> Event {
@@ -72,26 +64,8 @@ pub fn file(header: &Header, events: &[Event]) -> Vec<u8> {
     writer.finish().unwrap()
 }
 
-/// The bytes after the end of a header.
-pub fn below<'a>(bytes: &'a [u8], end: &str) -> &'a [u8] {
-    let mut places = bytes.windows(end.len());
-    let header = places.position(|part| part == end.as_bytes());
-    &bytes[header.unwrap() + end.len()..]
-}
-
 /// Twelve events, one of them in the laser cycle of another time word.
 pub fn events() -> Vec<Event> {
     let near = (0..11).map(|index| depth(index * 150, u64::from(index) * 13, 20 + index));
     near.chain([depth(2047, 1 << 20, 60)]).collect()
-}
-
-/// Exports `bytes` and returns the written file.
-pub fn exported(bytes: &[u8], format: Format, options: &Options) -> (ExportSummary, Vec<u8>) {
-    let scratch = Scratch::new();
-    let input = scratch.file("events.aer", bytes);
-    let out = scratch.path("out");
-    let exported = export(&input, &out, format, options, &mut ()).unwrap();
-    let written = std::fs::read(out).unwrap();
-    assert_eq!(names(&scratch.path("")).len(), 2, "files were left");
-    (exported, written)
 }

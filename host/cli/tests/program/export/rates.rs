@@ -1,4 +1,4 @@
-//! `dtof export`: the laser rate and the start of a recording, and what is said of them.
+//! `dtof export`: the laser rate, and what is said of it.
 
 use crate::common::Scratch;
 use crate::common::aer::{HEADER, depth, file};
@@ -64,34 +64,4 @@ fn what_is_said_comes_before_the_rate_of_the_file_and_a_line_says_so() {
         warning_and_end(of_file, "--settings set.toml"),
         (warning(2), 5.0)
     );
-}
-
-#[test]
-fn a_start_that_a_format_cannot_hold_is_refused() {
-    let last_of = |seconds: i64| (seconds - 1) * 1_000_000;
-    for (start_us, mcap, ros2) in [
-        (last_of(1 << 31), true, true),
-        (last_of(1 << 31) + 1_000_000, true, false),
-        (last_of(1 << 32), true, false),
-        (last_of(1 << 32) + 1_000_000, false, false),
-        (-1, false, false),
-    ] {
-        let scratch = Scratch::new();
-        let header = Header {
-            laser_millihertz: 10_000_000_000,
-            start_us,
-            ..HEADER
-        };
-        scratch.file("events.aer", file(&header, &[depth(0, 9, 40)]));
-        scratch.printed(EXPORT);
-        for (format, is_held) in [("mcap", mcap), ("ros2", ros2)] {
-            let line = format!("export events.aer --format {format} --out y.mcap");
-            let output = scratch.run(&line);
-            if is_held {
-                assert!(output.status.success(), "{start_us}");
-            } else {
-                scratch.refused(&output, &["error: events.aer: its events are "]);
-            }
-        }
-    }
 }

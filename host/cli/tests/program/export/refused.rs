@@ -52,6 +52,12 @@ fn options_that_cannot_be_are_refused_in_one_line() {
             events.aer --format mcap --out x --one-per-pixel | --one-per-pixel is only for csv, pcd and ply
             events.aer --format evt2 --out x --one-per-pixel | --one-per-pixel is only for csv, pcd and ply
             events.aer --format csv --out x --one-per-pixel=maybe | --one-per-pixel maybe: must be true or false
+            changes.aer --format csv --out x --echo strongest | --echo is only for depth events
+            events.aer --format csv --out x --echo second | --echo
+            events.aer --format evt2 --out x --threshold-mm 0.004 | --threshold-mm 0.004: the threshold of dynamic
+            events.aer --format evt2 --out x --threshold-mm -1 | --threshold-mm
+            events.aer --format evt2 --out x --reference next | --reference
+            own.toml --format csv --out x | own.toml: not an AER file
             changes.aer --format csv --out x --one-per-pixel | --one-per-pixel is only for depth events
             events.aer --format csv --out x --events dynamic-depth | 12 events, none of them a dynamic depth event
             events.aer --format csv --out x --calibration none.toml | none.toml: No such file
