@@ -94,6 +94,13 @@ fn file(events: &[Event]) -> Vec<u8> {
     file_with(&header(), events)
 }
 
+/// The calibration file with [`RAYS`].
+fn rays(folder: &TempDir) -> PathBuf {
+    let path = folder.path().join("rays.toml");
+    fs::write(&path, RAYS).unwrap();
+    path
+}
+
 /// Exports `bytes` to a file, which is returned, or stays as it was. Messages name files without their folder.
 fn try_export(
     bytes: &[u8],
@@ -103,11 +110,10 @@ fn try_export(
     let folder = TempDir::new().unwrap();
     let path = |name: &str| folder.path().join(name);
     fs::write(path("events.aer"), bytes).unwrap();
-    fs::write(path("rays.toml"), RAYS).unwrap();
+    let rays = rays(&folder);
     fs::write(path("out"), "old").unwrap();
     let mut options = options.clone();
-    let calibration = &mut options.rays.calibration;
-    *calibration = calibration.take().map(|name| folder.path().join(name));
+    options.rays.calibration = options.rays.calibration.map(|_| rays);
 
     let result = export(&path("events.aer"), &path("out"), format, &options, &mut ());
     let out = fs::read(path("out")).unwrap();

@@ -140,10 +140,8 @@ time_us,x_m,y_m,z_m,cycle,pixel,polarity,range_mm,change_mm,flags,level
 #[test]
 fn events_in_memory_are_the_same_records() {
     let folder = TempDir::new().unwrap();
-    let calibration = folder.path().join("rays.toml");
-    fs::write(&calibration, RAYS).unwrap();
     let mut options = options();
-    options.rays.calibration = Some(calibration);
+    options.rays.calibration = Some(rays(&folder));
     assert_eq!(points(&events(), &header(), &options).unwrap(), records());
 
     // Two events of a pixel are one point of it, the newest at the mean range.
