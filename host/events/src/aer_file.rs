@@ -19,7 +19,7 @@ pub use header::Header;
 pub use header::MAGIC;
 use header::{HEADER_BYTES, header_length, offset_bytes, offsets_from_bytes, offsets_to_bytes};
 
-use dtof_options::files::is_file;
+use dtof_options::files::{fill, is_file};
 use dtof_options::named_values;
 
 /// Processes 16 bytes at a time, the size of a word.
@@ -341,15 +341,6 @@ impl<R: Read> Reader<R> {
         self.digest.update(bytes);
         self.offset += AerWord::BYTES as u64;
     }
-}
-
-/// Reads so many bytes. Fails with `too_short` if the file has fewer.
-fn fill(input: &mut impl Read, bytes: &mut [u8], too_short: &'static str) -> Result<()> {
-    let read = input.read_exact(bytes);
-    read.map_err(|error| match error.kind() {
-        io::ErrorKind::UnexpectedEof => anyhow!(too_short),
-        _ => error.into(),
-    })
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! An event and ranges for tests of several modules.
+//! An event, a file and ranges for tests of several packages.
 
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
@@ -6,6 +6,8 @@ use dtof_core::{
     SubBinOffset,
 };
 use dtof_photons::ranges::Ranges;
+
+use crate::aer_file::{Event, Header, Writer};
 
 /// An event in the middle of a bin.
 #[must_use]
@@ -22,6 +24,19 @@ pub fn event(pixel: u16, cycle: u64, bin: u16) -> DepthEvent {
         background: Count::saturating(1),
         flags: Flags::NONE,
     }
+}
+
+/// The bytes of a complete AER file.
+///
+/// # Panics
+/// Panics if an event is not one of the header's array and bins.
+#[must_use]
+pub fn aer_file(header: &Header, settings: &str, events: &[Event]) -> Vec<u8> {
+    let mut writer = Writer::with_settings(Vec::new(), header, settings).unwrap();
+    for event in events {
+        writer.write(event).unwrap();
+    }
+    writer.finish().unwrap()
 }
 
 /// Of bins of 250 ps, without an offset.

@@ -4,7 +4,8 @@ use std::collections::BTreeMap;
 
 use dtof_core::Array;
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_events::aer_file::{Event, EventKind, Header, Reader, Writer};
+use dtof_events::aer_file::{Event, EventKind, Header, Reader};
+use dtof_events::fixtures::aer_file;
 
 const DOCUMENT: &str = include_str!("../../../docs/aer-format.md");
 
@@ -45,15 +46,6 @@ fn read(bytes: &[u8]) -> (Header, String, Vec<Event>) {
         reader.settings().to_owned(),
         events,
     )
-}
-
-/// The bytes of such a file.
-fn written(header: &Header, settings: &str, events: &[Event]) -> Vec<u8> {
-    let mut writer = Writer::with_settings(Vec::new(), header, settings).unwrap();
-    for event in events {
-        writer.write(event).unwrap();
-    }
-    writer.finish().unwrap()
 }
 
 #[test]
@@ -98,7 +90,7 @@ fn the_golden_file_is_read_as_its_table_says_and_written_again() {
         assert_eq!(place, [echo, position]);
     }
     assert_eq!(events_left.next(), None);
-    assert_eq!(written(&header, &settings, &events), file);
+    assert_eq!(aer_file(&header, &settings, &events), file);
 }
 
 #[test]
@@ -127,7 +119,7 @@ fn the_file_with_offsets_has_those_of_the_document_and_is_written_again() {
         ..header_without.clone()
     };
     assert_eq!((&header, settings.as_str()), (&expected, ""));
-    assert_eq!(written(&header, "", &events), file);
+    assert_eq!(aer_file(&header, "", &events), file);
 
     // Both events lie at 60.5 bins. Without offsets the same words have other ranges.
     let ranges_mm = |header: &Header| {
@@ -137,7 +129,7 @@ fn the_file_with_offsets_has_those_of_the_document_and_is_written_again() {
         events.iter().map(range).collect::<Vec<_>>()
     };
     assert_eq!(ranges_mm(&header), ["2176.430", "2285.430"]);
-    let old = read(&written(&header_without, "", &events));
+    let old = read(&aer_file(&header_without, "", &events));
     assert_eq!(old, (header_without, String::new(), events.clone()));
     assert_eq!(ranges_mm(&old.0), ["2254.680", "2254.680"]);
 }

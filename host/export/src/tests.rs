@@ -12,7 +12,6 @@ use std::fs;
 use dtof_core::events::DynamicDepthEvent;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{Array, BinPosition, BlockLevel, DepthEvent, Flags, LaserCycle, PixelAddress};
-use dtof_events::aer_file::Writer;
 use dtof_events::fixtures;
 use tempfile::TempDir;
 
@@ -81,13 +80,8 @@ fn dynamic(pixel: u16, of_level: u8, cycle: u64, bin: i32, change: i32) -> Event
     Event::DynamicDepth(event.unwrap())
 }
 
-/// The bytes of a complete file.
 fn file_with(header: &Header, events: &[Event]) -> Vec<u8> {
-    let mut writer = Writer::new(Vec::new(), header).unwrap();
-    for event in events {
-        writer.write(event).unwrap();
-    }
-    writer.finish().unwrap()
+    fixtures::aer_file(header, "", events)
 }
 
 fn file(events: &[Event]) -> Vec<u8> {

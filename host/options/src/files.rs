@@ -41,6 +41,17 @@ pub fn read_text(path: &Path) -> Result<String> {
     })
 }
 
+/// Fills `bytes`.
+///
+/// # Errors
+/// Fails if it cannot be read, or with `too_short` if fewer are left.
+pub fn fill(input: &mut impl Read, bytes: &mut [u8], too_short: &str) -> Result<()> {
+    input.read_exact(bytes).map_err(|error| match error.kind() {
+        ErrorKind::UnexpectedEof => anyhow!("{too_short}"),
+        _ => error.into(),
+    })
+}
+
 /// The path of an output file.
 pub struct Destination {
     /// Its folder, where the temporary file is written.

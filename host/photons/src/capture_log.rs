@@ -143,7 +143,7 @@ mod tests {
             let error = format!("{:#}", read(&path).err().unwrap());
             error.replace(&path.display().to_string(), "NAME")
         };
-        assert_eq!(refused(), "NAME: No such file or directory (os error 2)");
+        assert!(refused().starts_with("NAME: "), "{}", refused());
         let whole = packed(&logs(7)[0]);
         let damaged = "NAME: the compressed file is damaged: ";
         for (bytes, expected) in [

@@ -333,14 +333,7 @@ impl RecordedPixel {
     fn next_cycles(&mut self, cycles: u16, chunk: u16) -> Result<PixelPhotons> {
         let mut received = PixelPhotons::default();
         loop {
-            if self.replayed_cycles == self.chunk.cycles {
-                self.next_chunk(chunk)?;
-            }
             let taken = (self.chunk.cycles - self.replayed_cycles).min(cycles - received.cycles);
-            // No more were requested, or the recording ends.
-            if taken == 0 {
-                return Ok(received);
-            }
             let end = self.replayed_cycles + taken;
             let left = &self.chunk.photons[self.replayed_photons..];
             let next = left.iter().take_while(|photon| photon.cycle < end).count();
@@ -353,6 +346,14 @@ impl RecordedPixel {
             self.replayed_photons += next.len();
             self.replayed_cycles = end;
             received.cycles += taken;
+            if received.cycles == cycles {
+                return Ok(received);
+            }
+            self.next_chunk(chunk)?;
+            // The recording ends.
+            if self.chunk.cycles == 0 {
+                return Ok(received);
+            }
         }
     }
 

@@ -121,8 +121,8 @@ impl Concentration {
         total / lines.max(1.0)
     }
 
-    /// The mean of the less concentrated half of the lines, so that hot pixels do not speak for all. A line with less than
-    /// two photons is even.
+    /// The mean of the less concentrated half of the lines, so that hot pixels do not speak for all. A line with fewer than
+    /// two photons is even. There must be a line.
     fn of_lower_half(&self) -> f64 {
         let lines: f64 = self.classes.values().map(|(lines, _)| lines).sum();
         let half = (lines + self.empty) / 2.0;
@@ -137,7 +137,11 @@ impl Concentration {
 }
 
 /// Warns if another axis than the last looks like the bins although the last was read as such. `axes` are
-/// the lengths of the others, and their product is the number of `pixels`. Photons concentrate in a pulse along the bins: in most lines, while a hot pixel is in few.
+/// the lengths of the others, and their product is the number of `pixels`. Photons concentrate in a pulse along the bins:
+/// in most lines, while a hot pixel is in few.
+///
+/// # Panics
+/// Panics if an axis has no length, or if there are fewer pixels.
 #[must_use]
 pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
     let mut along_last = Concentration::default();

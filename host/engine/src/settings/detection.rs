@@ -120,7 +120,7 @@ impl DetectionSettings {
     pub fn or(self, mut other: Self) -> Self {
         let decided = self.rule.or(other.rule);
         if decided != other.rule {
-            // Without a rule of their own, numbers may be meant for this one.
+            // A file without a rule may have numbers of any: those of the requested one are kept.
             let kept = decided.filter(|_| other.rule.is_none());
             if matches!(kept, None | Some(RuleName::Window)) {
                 other.alpha = None;

@@ -17,7 +17,7 @@ use dtof_options::{KeysOfFile, NO_OPTION, Refused};
 pub const MARK: &str = "# dtof settings";
 
 /// The sections with their keys and comments, in the order in which they are written.
-const SECTIONS: [(&str, &[&str], &[&str]); 4] = [
+pub(super) const SECTIONS: [(&str, &[&str], &[&str]); 4] = [
     ("sensor", SensorSettings::KEYS, SensorSettings::COMMENTS),
     (
         "detection",

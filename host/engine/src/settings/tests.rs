@@ -8,20 +8,8 @@ mod rows;
 
 use dtof_core::{Count, WindowRule};
 
-use super::{DetectionSettings, RaySettings, RunSettings, SensorSettings};
+use super::file::SECTIONS;
 use super::{Settings, SettingsFile};
-
-/// The sections with their keys and comments.
-const SECTIONS: [(&str, &[&str], &[&str]); 4] = [
-    ("sensor", SensorSettings::KEYS, SensorSettings::COMMENTS),
-    (
-        "detection",
-        DetectionSettings::KEYS,
-        DetectionSettings::COMMENTS,
-    ),
-    ("rays", RaySettings::KEYS, RaySettings::COMMENTS),
-    ("run", RunSettings::KEYS, RunSettings::COMMENTS),
-];
 
 /// Every setting of pixels that decide alone with the window rule.
 const ALL: &str = "bin_width_ps = 92.1; offset_mm = -179.5; offsets_mm = [1.5, -78.04, 0.0]; gate = [12, 119];

@@ -23,15 +23,6 @@ fn depth(pixel: u16, cycle: u64, bin: u16) -> Event {
     Event::Depth(fixtures::event(pixel, cycle, bin))
 }
 
-/// The bytes of a complete file.
-fn written(header: &Header, settings: &str, events: &[Event]) -> Vec<u8> {
-    let mut writer = Writer::with_settings(Vec::new(), header, settings).unwrap();
-    for event in events {
-        writer.write(event).unwrap();
-    }
-    writer.finish().unwrap()
-}
-
 /// How many events come before the end or an error, and the error.
 fn read(bytes: &[u8]) -> (usize, Option<String>) {
     let mut reader = match Reader::new(bytes) {
@@ -54,7 +45,7 @@ fn offsets_of_pixels_are_under_the_checksum_and_their_padding_is_0() {
         offsets_mm: vec![Some(I24F8::lit("-78.25")), None, Some(I24F8::ZERO)],
         ..header(3, 1)
     };
-    let bytes = written(&header, "", &[depth(2, 100, 60)]);
+    let bytes = fixtures::aer_file(&header, "", &[depth(2, 100, 60)]);
     assert_eq!((bytes[8], bytes.len()), (6, 64 + 16 + 3 * 16));
     assert_eq!(read(&bytes), (1, None));
     let checksum = "byte 112: the checksum does not match: a word before this one is damaged";
@@ -71,7 +62,7 @@ fn offsets_of_pixels_are_under_the_checksum_and_their_padding_is_0() {
 
 #[test]
 fn a_file_without_offsets_is_of_version_5_and_offsets_of_other_pixels_are_refused() {
-    let bytes = written(&header(3, 1), "", &[]);
+    let bytes = fixtures::aer_file(&header(3, 1), "", &[]);
     assert_eq!((bytes[8], bytes.len()), (5, 64 + 16));
     for number in [1, 2, 4] {
         let header = Header {
@@ -90,7 +81,7 @@ fn settings_in_a_header_are_read_back_unless_they_are_too_long() {
     let event = depth(1, 9, 3);
     for (length, kept) in [(0, 0), (1, 1), (16, 16), (65_456, 65_456), (65_457, 0)] {
         let settings = "x".repeat(length);
-        let bytes = written(&header, &settings, &[event]);
+        let bytes = fixtures::aer_file(&header, &settings, &[event]);
         let mut reader = Reader::new(&bytes[..]).unwrap();
         assert_eq!(reader.settings(), &settings[..kept]);
         assert_eq!(reader.header(), &header);
@@ -115,7 +106,7 @@ fn what_was_written_is_flushed() {
 fn a_cut_file_is_read_up_to_the_word_that_is_cut() {
     // Two time words, three events, the end word.
     let events = [depth(0, 1, 60), depth(1, 2, 60), depth(2, 1 << 16, 60)];
-    let bytes = written(&header(3, 1), "x = 1", &events);
+    let bytes = fixtures::aer_file(&header(3, 1), "x = 1", &events);
     assert_eq!((bytes.len(), read(&bytes)), (80 + 6 * 16, (3, None)));
     for length in 0..bytes.len() {
         let words = length.saturating_sub(80) / 16;
@@ -140,7 +131,7 @@ fn a_cut_file_is_read_up_to_the_word_that_is_cut() {
 #[test]
 fn what_is_wrong_is_named_with_its_byte() {
     // The words begin at bytes 64 (time), 80, 96 and 112 (end).
-    let bytes = written(&header(3, 1), "", &[depth(0, 1, 60), depth(1, 2, 60)]);
+    let bytes = fixtures::aer_file(&header(3, 1), "", &[depth(0, 1, 60), depth(1, 2, 60)]);
     let longer = [&bytes[..], &[0]].concat();
     assert_eq!(
         read(&longer),
@@ -184,7 +175,7 @@ fn an_error_of_the_input_is_that_of_the_reader() {
         }
     }
 
-    let bytes = written(&header(3, 1), "x = 1", &[]);
+    let bytes = fixtures::aer_file(&header(3, 1), "x = 1", &[]);
     for (length, expected) in [(0, "broken"), (70, "broken"), (80, "byte 80: broken")] {
         let mut reader = Reader::new((&bytes[..length]).chain(Broken));
         let error = match &mut reader {

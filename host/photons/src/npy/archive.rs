@@ -65,7 +65,7 @@ fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histogr
     let mut entry = BufReader::new(entry);
     let array = Array::read(&mut entry, length);
     let histograms = array.and_then(|array| read_array(array, axes));
-    // At the end of the data the checksum is compared. More data than the archive says are an error as well.
+    // At the end of the data zip compares the checksum. It also refuses more data than the archive says.
     let checked = histograms.and_then(|histograms| {
         entry.read(&mut [0]).context("the archive is damaged")?;
         Ok(histograms)

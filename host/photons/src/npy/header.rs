@@ -1,10 +1,12 @@
 //! The header of an array (NumPy's `NEP 1`): a Python dictionary of type, order and shape. It is
 //! checked against the length of the file before anything is allocated.
 
-use std::io::{BufReader, ErrorKind, Read};
+use std::io::{BufReader, Read};
 use std::{fmt, iter};
 
 use anyhow::{Context, Error, Result, anyhow, bail, ensure};
+
+use dtof_options::files::fill;
 
 use crate::input::Input;
 
@@ -195,7 +197,7 @@ impl Header {
         let mut before = start.len() as u64;
         if version > 1 {
             let mut high = [0; 2];
-            fill(file, &mut high, not_npy(CUT))?;
+            fill(file, &mut high, &format!("{NOT_NPY}: {CUT}"))?;
             bytes |= u64::from(u16::from_le_bytes(high)) << 16;
             before += 2;
         }
@@ -385,14 +387,6 @@ impl<'a> Literal<'a> {
 /// Fills `bytes`. The file had them when it was opened.
 pub(super) fn read_all(file: &mut impl Read, bytes: &mut [u8]) -> Result<()> {
     fill(file, bytes, "the file became shorter while it was read")
-}
-
-/// Fills `bytes`. The error is `short` if the file has fewer.
-fn fill(file: &mut impl Read, bytes: &mut [u8], short: impl fmt::Display) -> Result<()> {
-    file.read_exact(bytes).map_err(|error| match error.kind() {
-        ErrorKind::UnexpectedEof => anyhow!("{short}"),
-        _ => error.into(),
-    })
 }
 
 /// A parser of literals.

@@ -186,6 +186,7 @@ impl PhotonReader for RecordReader {
 }
 
 fn size(fields: &[Field]) -> Result<usize> {
+    // The header holds that the sum is no larger than 64 bits hold.
     let bytes: u64 = fields.iter().map(|field| field.bytes).sum();
     ensure!(
         (1..=4096).contains(&bytes),

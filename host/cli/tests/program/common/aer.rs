@@ -6,7 +6,8 @@ use dtof_core::{
     Array, BinIndex, BinPosition, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle,
     PixelAddress, SubBinOffset,
 };
-use dtof_events::aer_file::{Event, Header, Writer};
+use dtof_events::aer_file::{Event, Header};
+use dtof_events::fixtures::aer_file;
 
 /// 64 columns, 32 rows, 128 bins of 250 ps.
 pub const HEADER: Header = Header {
@@ -57,11 +58,7 @@ pub fn dynamic(pixel: u16, cycle: u64, bin: i32, change: i32) -> Event {
 
 /// The bytes of a complete file.
 pub fn file(header: &Header, events: &[Event]) -> Vec<u8> {
-    let mut writer = Writer::new(Vec::new(), header).unwrap();
-    for event in events {
-        writer.write(event).unwrap();
-    }
-    writer.finish().unwrap()
+    aer_file(header, "", events)
 }
 
 /// Twelve events, one of them in the laser cycle of another time word.

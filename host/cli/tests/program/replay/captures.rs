@@ -1,5 +1,10 @@
 //! A capture log has zones and captures, where other arrays have columns and rows.
 
+use std::io::Write;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
 use crate::common::{Scratch, assert_contains, npy};
 
 #[test]
@@ -24,6 +29,43 @@ fn the_report_of_a_capture_log_calls_them_so() {
         }
         let sides = format!("\"sides\":[\"{across}\",\"{down}\"]");
         assert_eq!(report.contains(&sides), has_events);
+    }
+}
+
+/// The log of a TMF8829: one capture of 2×1 pixels with peaks in bins 20 and 40.
+#[test]
+fn a_log_is_replayed_packed_or_not() {
+    let pixel = |peak: usize| {
+        let mut counts = [1; 64];
+        counts[peak] = 900;
+        format!("{{\"bin\": {counts:?}}}")
+    };
+    let row = format!("[{}, {}]", pixel(20), pixel(40));
+    let log = format!(
+        "{{\"Result_Set\": [{{\"mp_histo\": [{row}], \"results\": []}}], \"configuration\": {{\"bin_shift\": 2}}}}"
+    );
+    let mut packed = GzEncoder::new(Vec::new(), Compression::default());
+    packed.write_all(log.as_bytes()).unwrap();
+    let packed = packed.finish().unwrap();
+    let scratch = Scratch::new();
+    let defaults = scratch.file("defaults.toml", "");
+    for (name, bytes) in [("log.json", log.as_bytes()), ("log.json.gz", &packed[..])] {
+        let file = scratch.file(name, bytes);
+        let options = format!("--recorded-cycles 1000 --settings {}", defaults.display());
+        let summary = scratch.replayed(&file, &options);
+        assert_eq!(
+            [&summary["pixels"], &summary["photons"]],
+            [2, 1926],
+            "{name}"
+        );
+        let events = scratch.events();
+        let mut peaks: Vec<[&str; 2]> = events
+            .iter()
+            .map(|event| [&*event[1], &*event[3]])
+            .collect();
+        peaks.sort_unstable();
+        peaks.dedup();
+        assert_eq!(peaks, [["0", "20"], ["1", "40"]], "{name}");
     }
 }
 

@@ -55,6 +55,22 @@ fn npy_files_that_are_not_recordings_are_refused() {
 }
 
 #[test]
+fn a_damaged_archive_is_refused() {
+    let mut damaged = include_bytes!("numpy/one.npz").to_vec();
+    // The checksum in the list of arrays.
+    let entry = damaged.windows(4).position(|four| four == b"PK\x01\x02");
+    damaged[entry.unwrap() + 16] ^= 1;
+    refused(
+        "one.npz",
+        damaged,
+        &[
+            "one.npz: array ",
+            "the archive is damaged: Invalid checksum",
+        ],
+    );
+}
+
+#[test]
 fn json_files_that_are_not_logs_are_refused() {
     for row in table(
         r#"

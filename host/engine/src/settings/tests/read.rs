@@ -6,7 +6,7 @@ use dtof_core::Array;
 use dtof_options::{flag, line};
 
 use super::*;
-use crate::settings::MARK;
+use crate::settings::{MARK, RaySettings, SensorSettings};
 
 /// Keys with a value as an option has it, and as it is written.
 const VALUES: &str = r#"
