@@ -48,8 +48,9 @@ pub fn shortest<T: Copy>(
     let mut best: Option<(&(DetectionSettings, T), f64)> = None;
     for entry in all {
         let detections = detections(request, &entry.0, 0, EXPOSURES.0, &part)?;
+        // Infinite without an event.
         let time = detections.cycles_to_event();
-        if detections.near > 0 && best.is_none_or(|best| time < best.1) {
+        if best.is_none_or(|best| time < best.1) {
             best = Some((entry, time));
         }
     }

@@ -1,5 +1,6 @@
 use dtof_core::paper::Threshold;
-use dtof_core::{BlockLevel, Count};
+use dtof_core::rule::z_for_levels;
+use dtof_core::{BlockLevel, Count, DepthEstimator, RangeGate, WindowRule};
 
 use super::*;
 use crate::looks::repeated_looks::single_looks;
@@ -229,6 +230,65 @@ fn no_other_l1_is_much_faster() {
         others.iter().any(|&(_, other)| best < 0.8 * other),
         "{chosen} {best} {others:?}"
     );
+}
+
+/// Of a bright target: a pixel that looks sooner reports it sooner.
+#[test]
+fn the_first_of_the_shortest_is_chosen() {
+    use std::sync::atomic::{AtomicU64, Ordering};
+
+    let request = Request {
+        bins: 8,
+        signal: 4.0,
+        l2: 200,
+        ..REQUEST
+    };
+    let settings = |l1, minimum| DetectionSettings {
+        looks: Looks::new(4, l1, 200),
+        rule: WindowRule::new(3, "4".parse().unwrap(), Count::saturating(minimum))
+            .unwrap()
+            .into(),
+        estimator: DepthEstimator::for_pulse("1".parse().unwrap()),
+    };
+    let [slow, fast, never] = [(40, 5), (4, 5), (4, 1023)].map(|(l1, of)| settings(l1, of));
+    let total = AtomicU64::new(0);
+    let progress = |_, all| {
+        total.store(all, Ordering::Relaxed);
+        Ok(())
+    };
+    for (all, chosen) in [
+        ([slow, fast], 1),
+        ([fast, slow], 0),
+        ([fast, fast], 0),
+        ([never, fast], 1),
+    ] {
+        let all = [(all[0], 0), (all[1], 1)];
+        let (found, detections) = shortest::shortest(&request, &all, &progress).unwrap();
+        assert_eq!(found, chosen);
+        assert!(detections.detected() > 0.9);
+        // Exposures at each of eight positions: 50 of each settings, 500 of the chosen.
+        assert_eq!(total.load(Ordering::Relaxed), 8 * (2 * 50 + 500));
+    }
+    let refused = shortest::shortest(&request, &[(never, 0)], NONE);
+    let line =
+        "the signal is too weak: fewer than 1 % of exposures report the target before L2 = 200";
+    assert_eq!(refused.unwrap_err().to_string(), line);
+
+    let (exposures, _) = shortest::false_alarms(&request, &fast, &progress).unwrap();
+    assert_eq!([exposures, total.into_inner()], [8 * 500; 2]);
+}
+
+#[test]
+fn z_is_that_of_all_bins() {
+    let request = Request {
+        bins: 8,
+        signal: 2.0,
+        l2: 200,
+        ..REQUEST
+    };
+    let gate = RangeGate::<1024>::new(0, 7).unwrap();
+    let z = z_for_levels(100, &gate, 4, 40, 200, BlockLevel::PIXEL);
+    assert_eq!(window::tune(&request, NONE).unwrap().z, z);
 }
 
 /// z holds from 0.4 background photons a bin at the first look on: 40 laser cycles here.

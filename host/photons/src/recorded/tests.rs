@@ -72,7 +72,7 @@ fn slices_of_any_length_hold_the_same_photons() {
             for (all, pixel) in all.iter_mut().zip(&slice.pixels) {
                 given += pixel.photons.len() as u64;
                 let at = |photon: &Photon| {
-                    assert!(photon.cycle < pixel.cycles);
+                    assert!(photon.cycle < pixel.cycles && pixel.cycles <= length);
                     (slice.first_cycle + u64::from(photon.cycle), photon.code)
                 };
                 all.extend(pixel.photons.iter().map(at));
