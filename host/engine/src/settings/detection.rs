@@ -121,11 +121,12 @@ impl DetectionSettings {
         let decided = self.rule.or(other.rule);
         if decided != other.rule {
             // A file without a rule may have numbers of any: those of the requested one are kept.
-            let kept = decided.filter(|_| other.rule.is_none());
-            if matches!(kept, None | Some(RuleName::Window)) {
+            let is_open = other.rule.is_none();
+            let is_window = decided == Some(RuleName::Window);
+            if !is_open || is_window {
                 other.alpha = None;
             }
-            if kept != Some(RuleName::Window) {
+            if !is_open || !is_window {
                 other = Self {
                     window: None,
                     z: None,

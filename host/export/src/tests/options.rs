@@ -1,4 +1,4 @@
-//! Options, and what is said of them.
+//! Options: what is assumed, warned of and refused.
 
 use super::*;
 

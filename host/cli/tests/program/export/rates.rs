@@ -1,4 +1,4 @@
-//! `dtof export`: the laser rate, and what is said of it.
+//! `dtof export`: the laser rate and its warning.
 
 use crate::common::Scratch;
 use crate::common::aer::{HEADER, depth, file};
