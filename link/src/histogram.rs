@@ -205,6 +205,6 @@ impl NoHistogram {
     #[must_use]
     pub fn message(self, pixel: PixelAddress) -> Vec<u8, BODY_BYTES> {
         let [a, b] = pixel.raw().to_le_bytes();
-        [a, b, self as u8].into_iter().collect()
+        Vec::from_array([a, b, self as u8])
     }
 }

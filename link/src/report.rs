@@ -1,9 +1,7 @@
 //! The statistics of a device.
 
-use dtof_core::Statistics;
-use heapless::Vec;
-
 use crate::endpoint::LinkCounters;
+use dtof_core::Statistics;
 
 /// The statistics of the device since it was configured, and of the link since the
 /// device was switched on.
@@ -107,16 +105,18 @@ impl Report {
 
     /// The bytes to send.
     #[must_use]
-    pub fn to_le_bytes(mut self) -> Vec<u8, { Self::BYTES }> {
+    pub fn to_le_bytes(mut self) -> [u8; Self::BYTES] {
         let codes = [self.last_sensor_error, self.stop_reason];
         let (wide, narrow, last) = self.numbers();
         let wide = wide.into_iter().flat_map(|number| number.to_le_bytes());
         let narrow = narrow.into_iter().flat_map(|number| number.to_le_bytes());
         let last = last.into_iter().flat_map(|number| number.to_le_bytes());
-        let mut bytes = Vec::new();
-        for byte in wide.chain(narrow).chain(codes).chain(last) {
-            // There is room for each. `collect` could panic.
-            let _ = bytes.push(byte);
+        let mut bytes = [0; Self::BYTES];
+        for (byte, value) in bytes
+            .iter_mut()
+            .zip(wide.chain(narrow).chain(codes).chain(last))
+        {
+            *byte = value;
         }
         bytes
     }

@@ -90,7 +90,11 @@ impl Sidecar<'_> {
                 return;
             }
             let words = core::iter::from_fn(|| self.words.dequeue()).take(WORDS);
-            let body: Vec<u8, BODY_BYTES> = words.flat_map(AerWord::to_le_bytes).collect();
+            let mut body: Vec<u8, BODY_BYTES> = Vec::new();
+            for word in words {
+                // There is room for each. `collect` could panic.
+                let _ = body.extend_from_slice(&word.to_le_bytes());
+            }
             // There is room: checked above.
             let _ = self.endpoint.offer(message::EVENTS, &body);
         }

@@ -382,7 +382,7 @@ impl<'a> Sidecar<'a> {
         match message.kind {
             message::CONFIGURE => Some(match self.configure(&message.body) {
                 Ok(()) => (message::CONFIGURED, Vec::new()),
-                Err(refusal) => (message::REFUSED, [refusal as u8].into_iter().collect()),
+                Err(refusal) => (message::REFUSED, Vec::from_array([refusal as u8])),
             }),
             message::PHOTONS if self.config.is_some() && self.source == Source::Link => {
                 self.photons = Some(Photons::new(message.body));
@@ -392,11 +392,11 @@ impl<'a> Sidecar<'a> {
             message::SENSOR_REQUEST => {
                 let sensor = self.sensor.as_ref().map(records::sensor);
                 let sensor = SensorRecord::to_le_bytes(sensor.as_ref(), Self::COUNTER_BITS);
-                Some((message::SENSOR, sensor.into_iter().collect()))
+                Some((message::SENSOR, Vec::from_array(sensor)))
             }
             message::STATISTICS_REQUEST => {
                 let report = self.report(overrun).to_le_bytes();
-                Some((message::STATISTICS, report.into_iter().collect()))
+                Some((message::STATISTICS, Vec::from_array(report)))
             }
             _ => {
                 self.unknown = self.unknown.saturating_add(1);

@@ -192,7 +192,11 @@ impl Config {
     /// Laser cycles in a thousand seconds, rounded down.
     #[must_use]
     pub const fn laser_millihertz(&self) -> u64 {
-        CLOCK_HZ as u64 * 1000 / self.period as u64
+        // `/` could panic. No period is 0.
+        match (CLOCK_HZ as u64 * 1000).checked_div(self.period as u64) {
+            Some(millihertz) => millihertz,
+            None => 0,
+        }
     }
 
     /// The start values of the two counters of the laser's pulse, pulse and pause, for a dither of this

@@ -61,7 +61,7 @@ impl Poisson {
             count += 1;
             // 33 + 27 bits.
             let divisor = count << U8F24::FRAC_NBITS;
-            probability = (probability * mean + divisor / 2) / divisor;
+            probability = (probability * mean + divisor / 2).checked_div(divisor)?;
             Some(sum)
         })
     }

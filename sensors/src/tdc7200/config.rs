@@ -233,6 +233,8 @@ impl Config {
         };
         // 40 bits, 1.1 s, are past the last bin of any width.
         let since = since.min(1 << 40) << 16;
-        u16::try_from(since / u64::from(self.0.bin_width.to_bits())).unwrap_or(u16::MAX)
+        let code = since.checked_div(self.0.bin_width.to_bits().into());
+        code.and_then(|code| u16::try_from(code).ok())
+            .unwrap_or(u16::MAX)
     }
 }
