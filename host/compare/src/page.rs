@@ -156,7 +156,12 @@ pub fn write(
     let files: Vec<MarkedFile> = all
         .filter_map(|((place, (_, mark)), text)| {
             let text = text.as_deref()?;
-            Some(MarkedFile { place, text, mark })
+            Some(MarkedFile {
+                place,
+                text,
+                mark,
+                is_edited: false,
+            })
         })
         .collect();
     // Without its page the folder does not look complete. Settings of an earlier comparison would look like the
@@ -164,5 +169,6 @@ pub fn write(
     let old = places.iter().zip(FILES).zip(&texts);
     let old = old.filter(|((_, (name, _)), text)| text.is_none() || *name == PAGE);
     let removed: Vec<&Path> = old.map(|((place, _), _)| place.as_path()).collect();
-    write_marked(&files, &removed, inputs)
+    write_marked(&files, &removed, inputs)?;
+    Ok(())
 }

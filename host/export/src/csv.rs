@@ -11,7 +11,7 @@ use dtof_events::aer_file::{Event, EventKind};
 use dtof_events::events_csv;
 
 /// The columns before those of `events.csv`.
-const COLUMNS: &str = "time_us,x_m,y_m,z_m";
+pub(super) const COLUMNS: &str = "time_us,x_m,y_m,z_m";
 
 /// Begins a file.
 pub fn begin(out: Out, projection: Projection, kind: EventKind) -> Result<Points> {

@@ -33,7 +33,7 @@ use dtof_events::aer_file::{self, Event, EventKind, Header};
 use dtof_events::clock::LaserClock;
 use dtof_events::echoes::Echo;
 use dtof_events::histories::PixelHistories;
-use dtof_options::files::{destination, flush_to_disk, temporary_file};
+use dtof_options::files::{destination, flush_to_disk, is_new_or_marked, temporary_file};
 use dtof_options::numbers::boolean;
 use dtof_options::progress::Progress;
 use dtof_options::{Refused, named, named_values};
@@ -61,6 +61,19 @@ named_values! {
         Ros2 = "ros2",
         /// Changes of depth as an event camera's RAW file (EVT2)
         Evt2 = "evt2",
+    }
+}
+
+impl Format {
+    /// Near the start of each file of this format.
+    fn mark(self) -> &'static str {
+        match self {
+            Self::Csv => csv::COLUMNS,
+            Self::Pcd => "# .PCD v0.7",
+            Self::Ply => "ply\nformat binary_little_endian",
+            Self::Mcap | Self::Ros2 => "MCAP0",
+            Self::Evt2 => "% evt 2.0",
+        }
     }
 }
 
@@ -212,6 +225,12 @@ pub fn export(
     let others = others.into_iter().flatten().map(PathBuf::as_path);
     let inputs: Vec<&Path> = [input].into_iter().chain(others).collect();
     let place = destination(out, &inputs)?;
+    ensure!(
+        is_new_or_marked(out, format.mark(), &inputs)?,
+        "{}: is there and no {} file; move it away, or take another name",
+        out.display(),
+        format.name()
+    );
     let survey =
         Survey::read(input, format, options.clock, options.echo, progress).with_context(name)?;
     let kind = survey.kind(options.kind).with_context(name)?;

@@ -65,7 +65,7 @@ impl Format {
     }
 
     /// Its name in messages.
-    fn name(self) -> String {
+    pub(super) fn name(self) -> String {
         format!("{self:?}").to_uppercase()
     }
 

@@ -105,7 +105,7 @@ fn try_export(
     let path = |name: &str| folder.path().join(name);
     fs::write(path("events.aer"), bytes).unwrap();
     let rays = rays(&folder);
-    fs::write(path("out"), "old").unwrap();
+    fs::write(path("out"), format.mark()).unwrap();
     let mut options = options.clone();
     options.rays.calibration = options.rays.calibration.map(|_| rays);
 
@@ -120,7 +120,7 @@ fn try_export(
             Ok((summary, out))
         }
         Err(error) => {
-            assert_eq!(out, b"old");
+            assert_eq!(out, format.mark().as_bytes());
             Err(format!("{error:#}").replace(&prefix, ""))
         }
     }

@@ -95,8 +95,21 @@ pub fn destination(out: &Path, inputs: &[&Path]) -> Result<Destination> {
 /// # Errors
 /// Fails if `file` was not written by this program, or is one of `inputs`.
 pub fn may_replace(file: &Path, mark: &str, inputs: &[&Path]) -> Result<()> {
+    ensure!(
+        is_new_or_marked(file, mark, inputs)?,
+        "{}: was not written by this program; move it away, or write into another folder",
+        file.display()
+    );
+    Ok(())
+}
+
+/// Returns whether nothing is at `file` yet, or a file that has `mark` near its start.
+///
+/// # Errors
+/// Fails if `file` cannot be read, is no file, or is one of `inputs`.
+pub fn is_new_or_marked(file: &Path, mark: &str, inputs: &[&Path]) -> Result<bool> {
     if !is_no_input(file, inputs)? {
-        return Ok(());
+        return Ok(true);
     }
     let name = || file.display().to_string();
     let mut head = Vec::new();
@@ -105,12 +118,42 @@ pub fn may_replace(file: &Path, mark: &str, inputs: &[&Path]) -> Result<()> {
         .take(HEAD)
         .read_to_end(&mut head)
         .with_context(name)?;
-    ensure!(
-        head.windows(mark.len()).any(|part| part == mark.as_bytes()),
-        "{}: was not written by this program; move it away, or write into another folder",
-        name()
-    );
-    Ok(())
+    Ok(head.windows(mark.len()).any(|part| part == mark.as_bytes()))
+}
+
+/// Renames the file in `place` that `text` will replace, unless it is the same: somebody may have edited it. Returns the
+/// new name, which ends in `~1`, or in the first number that is free.
+///
+/// # Errors
+/// Fails if it cannot be read or renamed; the error begins with its name.
+pub fn keep_edited(place: &Path, text: &str) -> Result<Option<PathBuf>> {
+    let name = || place.display().to_string();
+    let there = match fs::read(place) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => return Err(error).with_context(name),
+        Ok(there) if there == text.as_bytes() => return Ok(None),
+        Ok(there) => there,
+    };
+    for number in 1u64.. {
+        let mut kept = place.as_os_str().to_owned();
+        kept.push(format!("~{number}"));
+        let kept = PathBuf::from(kept);
+        if fs::read(&kept).is_ok_and(|other| other == there) {
+            return Ok(Some(kept));
+        }
+        // Fails if the name is taken, so that nothing is replaced.
+        match fs::hard_link(place, &kept) {
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
+            // Not every file system has links.
+            Err(_) if !kept.exists() => {
+                fs::rename(place, &kept).with_context(name)?;
+                return Ok(Some(kept));
+            }
+            Err(error) => return Err(error).with_context(name),
+            Ok(()) => return Ok(Some(kept)),
+        }
+    }
+    Ok(None)
 }
 
 /// Returns whether `file` exists. If it does, it must be a file and none of `inputs`.
@@ -199,16 +242,25 @@ pub struct MarkedFile<'a> {
     pub text: &'a str,
     /// Marks files of this kind.
     pub mark: &'a str,
+    /// People edit such files: one that differs is kept under another name.
+    pub is_edited: bool,
 }
 
 /// Writes all `files` in this order, or none. None of `inputs` is replaced. Once all are written, those at `removed` are
-/// removed, if they exist, before the first moves to its place.
+/// removed, if they exist, before the first moves to its place. Returns the new name of a file that was kept.
 ///
 /// # Errors
 /// Fails if one of the files cannot be written, replaced or removed.
-pub fn write_marked(files: &[MarkedFile], removed: &[&Path], inputs: &[&Path]) -> Result<()> {
+pub fn write_marked(
+    files: &[MarkedFile],
+    removed: &[&Path],
+    inputs: &[&Path],
+) -> Result<Option<PathBuf>> {
     let mut written = Vec::new();
-    for MarkedFile { place, text, mark } in files {
+    for MarkedFile {
+        place, text, mark, ..
+    } in files
+    {
         may_replace(place, mark, inputs)?;
         let name = || place.display().to_string();
         let to = destination(place, inputs)?;
@@ -217,6 +269,12 @@ pub fn write_marked(files: &[MarkedFile], removed: &[&Path], inputs: &[&Path]) -
         file.write_all(text.as_bytes()).with_context(name)?;
         written.push((flush_to_disk(file).with_context(name)?, to.file, place));
     }
+    let mut kept = None;
+    for (file, (_, to, _)) in files.iter().zip(&written) {
+        if file.is_edited {
+            kept = keep_edited(to, file.text)?;
+        }
+    }
     for old in removed {
         remove(old)?;
     }
@@ -224,7 +282,7 @@ pub fn write_marked(files: &[MarkedFile], removed: &[&Path], inputs: &[&Path]) -
         let moved = file.persist(to).map_err(|error| error.error);
         moved.with_context(|| place.display().to_string())?;
     }
-    Ok(())
+    Ok(kept)
 }
 
 /// Removes a file, if it exists.

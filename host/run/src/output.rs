@@ -8,8 +8,8 @@ mod changes;
 mod depth;
 mod pictures;
 
-use std::fs;
-use std::io::{BufWriter, ErrorKind, Write};
+use std::fs::{self, File, TryLockError};
+use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Error, Result, ensure};
@@ -30,7 +30,8 @@ use dtof_events::histories::PixelHistories;
 use dtof_events::sample::Sample;
 use dtof_link::DynamicDepth;
 use dtof_options::files::{
-    PARTIAL, destination, flush_to_disk, is_same_file, may_replace, remove, temporary_file,
+    PARTIAL, destination, flush_to_disk, is_same_file, keep_edited, may_replace, remove,
+    temporary_file,
 };
 use dtof_options::rows::Row;
 use dtof_photons::ranges::Ranges;
@@ -50,6 +51,8 @@ const UNFINISHED: &str = ".dtof-run-";
 /// The files of a run, until they are in the output folder.
 pub struct Output {
     folder: PathBuf,
+    /// Locked while it is there: no other run writes to the folder.
+    _lock: NamedTempFile,
     /// Files that the run reads: they must not be replaced.
     inputs: Vec<PathBuf>,
     /// The settings of the run.
@@ -82,8 +85,8 @@ impl Output {
     /// Creates the folder if it does not exist, and begins the event files for the array of `source`.
     ///
     /// # Errors
-    /// Fails if nothing can be written there, if the range scale is invalid, or if a result would replace
-    /// `input` or a file that no run has written.
+    /// Fails if nothing can be written there, if another run writes there, if the range scale is invalid, or if a
+    /// result would replace `input` or a file that no run has written.
     pub fn create(
         folder: &Path,
         settings: &Settings,
@@ -100,7 +103,7 @@ impl Output {
             .with_context(|| format!("{}: cannot be the output folder", folder.display()))?;
         let inputs: Vec<PathBuf> = input.into_iter().map(Path::to_owned).collect();
         may_hold_results(folder, &inputs)?;
-        remove_leftovers(folder, &inputs);
+        let lock = lock(folder, &inputs)?;
         let array = source.array();
         let name = || folder.display().to_string();
         let mut csv = BufWriter::new(temporary_file(folder, UNFINISHED)?);
@@ -110,6 +113,7 @@ impl Output {
         let aer = aer_file::Writer::new(aer, &header).with_context(name)?;
         Ok(Self {
             folder: folder.to_owned(),
+            _lock: lock,
             inputs,
             settings: SettingsFile::default().with_settings(settings),
             bins: settings.bins,
@@ -412,47 +416,33 @@ fn may_hold_results(folder: &Path, inputs: &[PathBuf]) -> Result<()> {
     results().try_for_each(|(name, mark)| may_replace(&folder.join(name), mark, &inputs))
 }
 
-/// Renames the settings in `place`, if they are not `text`: somebody may have edited them. Returns the new name, which
-/// ends in `~1`, or in the first number that is free.
-fn keep_edited(place: &Path, text: &str) -> Result<Option<PathBuf>> {
-    let name = || place.display().to_string();
-    let there = match fs::read(place) {
-        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) => return Err(error).with_context(name),
-        Ok(there) if there == text.as_bytes() => return Ok(None),
-        Ok(there) => there,
-    };
-    for number in 1u64.. {
-        let kept = place.with_file_name(format!("{SETTINGS}~{number}"));
-        if fs::read(&kept).is_ok_and(|other| other == there) {
-            return Ok(Some(kept));
-        }
-        // Fails if the name is taken, so that nothing is replaced.
-        match fs::hard_link(place, &kept) {
-            Err(error) if error.kind() == ErrorKind::AlreadyExists => {}
-            // Not every file system has links.
-            Err(_) if !kept.exists() => {
-                fs::rename(place, &kept).with_context(name)?;
-                return Ok(Some(kept));
-            }
-            Err(error) => return Err(error).with_context(name),
-            Ok(()) => return Ok(Some(kept)),
-        }
-    }
-    Ok(None)
-}
-
-/// Removes files that a killed run has left. Those of an export or a recording stay: it may still run.
-/// Failures are ignored.
-fn remove_leftovers(folder: &Path, inputs: &[PathBuf]) {
+/// Creates an unfinished file and locks it, so that other runs see that this one is alive. Files that a killed run has
+/// left are removed; failures of that are ignored. Those of an export or a recording stay: it may still run.
+///
+/// # Errors
+/// Fails if nothing can be written there, or if another run is alive.
+fn lock(folder: &Path, inputs: &[PathBuf]) -> Result<NamedTempFile> {
+    // Locked before it looks: of two runs that begin together one sees the other.
+    let own = temporary_file(folder, UNFINISHED)?;
+    // Not every file system has locks.
+    let _ = own.as_file().try_lock();
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
         let name = entry.file_name();
+        let is_own = own.path().file_name() == Some(&name);
         let name = name.to_string_lossy();
-        let is_read = inputs
-            .iter()
-            .any(|input| is_same_file(input, &entry.path()));
-        if name.starts_with(UNFINISHED) && name.ends_with(PARTIAL) && !is_read {
-            let _ = fs::remove_file(entry.path());
+        let is_unfinished = name.starts_with(UNFINISHED) && name.ends_with(PARTIAL);
+        let is_read = inputs.iter().any(|input| is_same_file(input, &path));
+        if is_own || is_read || !is_unfinished {
+            continue;
         }
+        let other = File::open(&path).map(|file| file.try_lock());
+        ensure!(
+            !matches!(other, Ok(Err(TryLockError::WouldBlock))),
+            "{}: another run writes there; take another folder, or wait for it",
+            folder.display()
+        );
+        let _ = fs::remove_file(path);
     }
+    Ok(own)
 }

@@ -19,7 +19,7 @@ use dtof_run::calibrate::Options;
 use self::from_device::{DeviceArgs, FromDevice};
 use super::flags::Flags;
 use super::job::Recorded;
-use super::warn;
+use super::{say_kept, warn};
 
 #[derive(Args)]
 pub struct Calibrate {
@@ -95,12 +95,20 @@ impl Calibrate {
         let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
         // Settings are written last: if they exist, so does the report.
         let text = settings.to_toml()?;
-        let marked = |place, text, mark| MarkedFile { place, text, mark };
-        let files = [
-            marked(place.as_path(), page.as_str(), MARKS[1]),
-            marked(&self.out, &text, MARKS[0]),
-        ];
-        write_marked(&files, &[], &inputs)?;
+        let report = MarkedFile {
+            place: &place,
+            text: &page,
+            mark: MARKS[1],
+            is_edited: false,
+        };
+        let settings_file = MarkedFile {
+            place: &self.out,
+            text: &text,
+            mark: MARKS[0],
+            is_edited: true,
+        };
+        let kept = write_marked(&[report, settings_file], &[], &inputs)?;
+        say_kept(kept.as_deref(), self.quiet)?;
         if !self.quiet {
             let mut out = io::stdout().lock();
             let rows = [collected, report::rows(&found)].concat();

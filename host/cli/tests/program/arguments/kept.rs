@@ -1,6 +1,7 @@
 //! No command replaces a file that it reads, nor one in its folder that it did not write.
 
 use std::fs;
+use std::process::Stdio;
 
 use crate::common::aer::{HEADER, events, file};
 use crate::common::{Scratch, assert_contains, names};
@@ -146,6 +147,63 @@ fn settings_that_a_run_would_replace_are_kept_under_another_name() {
     scratch.printed(&format!("{REPLAY} --quiet"));
     assert!(!scratch.path("out/dtof.toml~3").exists());
     assert_eq!(scratch.read("out/dtof.toml"), first);
+}
+
+#[test]
+fn settings_that_a_calibration_would_replace_are_kept_under_another_name() {
+    let scratch = Scratch::new();
+    scratch.file("photons.csv", PHOTONS);
+    let calibrate = "calibrate photons.csv --out own.toml";
+    scratch.printed(calibrate);
+    let first = scratch.read("own.toml");
+    scratch.printed(calibrate);
+    assert!(!scratch.path("own.toml~1").exists());
+    let edited = format!("{first}# mine\n");
+    scratch.file("own.toml", &edited);
+    let line = "own.toml~1 has the settings that were here\n";
+    assert_contains(&scratch.printed(calibrate), line);
+    assert_eq!(scratch.read("own.toml~1"), edited);
+    assert_eq!(scratch.read("own.toml"), first);
+    // Nothing is kept where nothing is replaced.
+    scratch.file("own.toml", "mine\n");
+    kept(
+        &scratch,
+        &format!("{calibrate} --quiet"),
+        "own.toml",
+        "was not written by this program",
+    );
+    assert!(!scratch.path("own.toml~2").exists());
+}
+
+/// If one of two runs that begin together succeeds, the folder is complete and of one run.
+#[test]
+fn runs_that_begin_together_leave_no_mixture() {
+    let scratch = Scratch::new();
+    scratch.file("photons.csv", PHOTONS);
+    for round in 0..8 {
+        let runs = ["8", "16"].map(|l1| {
+            let line = format!("replay photons.csv --quiet --out {round} --l1 {l1}");
+            let run = scratch.command(&line).stderr(Stdio::null()).spawn();
+            (l1, run.unwrap())
+        });
+        let runs = runs.map(|(l1, mut run)| (l1, run.wait().unwrap().success()));
+        let succeeded: Vec<_> = runs.iter().filter(|run| run.1).map(|run| run.0).collect();
+        if succeeded.is_empty() {
+            continue;
+        }
+        let summary = scratch.read(&format!("{round}/summary.json"));
+        let summary: serde_json::Value = serde_json::from_str(&summary).unwrap();
+        let l1 = summary["settings"]["l1"].to_string();
+        assert!(succeeded.contains(&&*l1), "{l1}, {succeeded:?}");
+        assert_contains(
+            &scratch.read(&format!("{round}/dtof.toml")),
+            &format!("l1 = {l1} "),
+        );
+        let mut names = names(&scratch.path(&round.to_string()));
+        // If one began after the other.
+        names.retain(|name| name != "dtof.toml~1");
+        assert_eq!(names, RESULTS);
+    }
 }
 
 /// This also holds after a run that was ended between any two of its files.

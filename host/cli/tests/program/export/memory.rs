@@ -1,6 +1,6 @@
 //! The memory that `dtof export` takes does not grow with the file.
 
-use std::fs::File;
+use std::fs::{self, File};
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::process::Stdio;
@@ -29,6 +29,7 @@ fn peaks(events: u64) -> Vec<u64> {
     let peak = |format: &&str| {
         let mut dtof = scratch.command(&format!("export events.aer --format {format} --out out"));
         let peak = peak_kb(dtof.stdout(Stdio::null()).spawn().unwrap());
+        fs::remove_file(scratch.path("out")).unwrap();
         println!("{events} events as {format}: at most {peak} kB");
         peak
     };

@@ -1,5 +1,7 @@
 //! `dtof export`: points, kinds of event, the result line, links.
 
+use std::fs;
+
 use crate::common::aer::{HEADER, depth, depth_event, dynamic, events, file};
 use crate::common::{Scratch, assert_contains, table};
 use dtof_core::{Array, BlockLevel, DepthEvent, EchoNumber, PixelAddress};
@@ -78,6 +80,7 @@ fn the_result_line_says_what_points_and_times_rest_on() {
         assert!(printed.starts_with("x: "), "{printed}");
         assert!(printed.ends_with(&format!("{}\n", row[1])), "{printed}");
         assert_eq!(scratch.printed(&format!("{line} --quiet")), "");
+        fs::remove_file(scratch.path("x")).unwrap();
     }
 }
 
@@ -88,7 +91,7 @@ fn a_link_stays_and_what_it_leads_to_is_replaced() {
 
     let scratch = Scratch::new();
     scratch.file("events.aer", file(&HEADER, &events()));
-    scratch.file("folder/points.csv", "old");
+    scratch.file("folder/points.csv", "time_us,x_m,y_m,z_m\n");
     symlink("folder/points.csv", scratch.path("link.csv")).unwrap();
     symlink("folder/none.csv", scratch.path("lost.csv")).unwrap();
     scratch.printed("export events.aer --format csv --out link.csv");

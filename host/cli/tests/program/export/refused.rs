@@ -23,6 +23,7 @@ fn options_that_cannot_be_are_refused_in_one_line() {
         "columns = 64\nrows = 32\npixels = [\n]\n",
     );
     scratch.file("own.toml", "[sensor]\nbins = 128\n");
+    scratch.file("truth.npy", "mine");
     scratch.file("late.aer", file(&HEADER, &[depth(0, 1 << 60, 5)]));
     scratch.file("changes.aer", file(&HEADER, &[dynamic(5, 3, 40, -3)]));
     std::fs::create_dir(scratch.path("folder")).unwrap();
@@ -35,6 +36,8 @@ fn options_that_cannot_be_are_refused_in_one_line() {
             none.aer --format csv --out x | none.aer: No such file
             folder --format csv --out x | folder: is a folder
             events.aer --format csv --out folder | folder: exists and is not a file
+            events.aer --format pcd --out truth.npy | truth.npy: is there and no PCD file; move it away
+            events.aer --format csv --out own.toml | own.toml: is there and no CSV file; move it away
             events.aer --format csv --out /dev/null | is not a file
             events.aer --format csv --out ./events.aer | is an input file
             events.aer --format csv --settings own.toml --out own.toml | own.toml: is an input file

@@ -196,6 +196,23 @@ fn what_a_run_that_was_killed_has_left_is_removed() {
 }
 
 #[test]
+fn a_folder_to_which_another_run_writes_is_refused() {
+    let scratch = Scratch::new();
+    let input = scratch.file("photons.csv", PHOTON);
+    let other = scratch.file("out/.dtof-run-other.partial", "");
+    let other_run = File::open(&other).unwrap();
+    other_run.lock().unwrap();
+    let refused = scratch.replay(&input, "");
+    let message = String::from_utf8(refused.stderr).unwrap();
+    assert!(!refused.status.success());
+    assert_contains(&message, "out: another run writes there");
+    assert_eq!(names(&scratch.path("out")), [".dtof-run-other.partial"]);
+    drop(other_run);
+    scratch.replayed(&input, "");
+    assert!(!other.exists());
+}
+
+#[test]
 fn output_that_cannot_be_written_is_an_error_not_a_panic() {
     let scratch = Scratch::new();
     scratch.file("photons.csv", PHOTON);
