@@ -143,6 +143,11 @@ impl Simulation {
         result.summary.input.clone_from(&self.input);
         result.summary.field_of_view_degrees = Some(self.scene.effective_field_of_view().degrees());
         result.summary.against_truth = Some(comparison.finish(result.summary.cycles));
+        if result.summary.photons == 0 {
+            let warning = "no photons: the scene is dark, or too short".to_owned();
+            result.summary.warnings.push(warning.clone());
+            result.warnings.push(warning);
+        }
         Ok(result)
     }
 }

@@ -265,3 +265,15 @@ fn another_array_sees_as_much_of_a_plane() {
         assert!((here / mean - 1.0).abs() < 1e-3, "{here} and {mean}");
     }
 }
+
+#[test]
+fn a_run_without_a_photon_is_warned_of() {
+    let scratch = Scratch::new();
+    scratch.file("dark.toml", "cycles = 100\n");
+    scratch.file("lit.toml", "cycles = 100\nbackground = 0.1\n");
+    let printed = |scene| scratch.printed(&format!("simulate --scene {scene}.toml --out {scene}"));
+    let warning = "no photons: the scene is dark, or too short";
+    assert_contains(&printed("dark"), warning);
+    assert_contains(&scratch.read("dark/summary.json"), warning);
+    assert!(!printed("lit").contains(warning));
+}
