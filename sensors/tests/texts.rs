@@ -131,7 +131,7 @@ fn every_error_of_a_photon_timer_is_its_own_line() {
     use photon_timer::ConfigError as Of;
 
     let all = [
-        (Of::TooFast, "at most 922509 a second"),
+        (Of::TooFast, "at most 919117 a second"),
         (Of::TooSlow, "a laser cycle a second"),
         (Of::NoPulse, "is 0 ns"),
         (Of::LongPulse, "leaves no pause"),

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
 
-use crate::laser::Laser;
+use crate::laser::{self, Laser};
 use crate::{cargo, cargo_home, layout, target_folder, toolchain, uf2};
 
 const PROFILE: &str = "firmware";
@@ -180,8 +180,11 @@ impl Choice {
     }
 }
 
-/// The features of `choices` for an image. Warns of each.
+/// The features of `choices` for an image, whose laser is checked. Warns of each.
 fn features(what: Build, choices: &[Choice]) -> Result<Vec<&'static str>> {
+    if what == Build::With(Sensor::PhotonTimer) {
+        laser::check(!choices.contains(&Choice::LaserBeyondLimits))?;
+    }
     for &choice in choices {
         let applies = match choice {
             Choice::LaserBeyondLimits => what == Build::With(Sensor::PhotonTimer),
@@ -232,14 +235,6 @@ impl Build {
                     sensor.name(),
                     Self::names(board)
                 )
-            }
-            Self::With(Sensor::PhotonTimer) => {
-                for variable in ["LASER_HZ", "LASER_PULSE_NS"] {
-                    let value = env::var(variable).unwrap_or_else(|_| "1".into());
-                    let number = value.parse::<u32>();
-                    number.with_context(|| format!("{variable}={value}: not a whole number"))?;
-                }
-                Ok(build)
             }
             _ => Ok(build),
         }
@@ -378,13 +373,17 @@ fn link(
     let more = features.iter().filter(|&&feature| !image.contains(feature));
     let name: Vec<&str> = iter::once(&*image).chain(more.copied()).collect();
     let name = name.join("+");
-    if !is_kept(&folder, &name) {
+    let is_first = !is_kept(&folder, &name);
+    if is_first {
         eprintln!("building {name} for the first time");
     }
     // No other run replaces what is built before it is copied.
     let lock = folder.join("lock");
     let lock = File::create(&lock).with_context(|| lock.display().to_string())?;
-    lock.lock()?;
+    if lock.try_lock().is_err() {
+        eprintln!("waiting for another build of an image");
+        lock.lock()?;
+    }
     let mut cargo = cargo();
     let sensors = Board::ALL.into_iter().flat_map(Sensor::of);
     for (variable, _) in sensors.filter_map(|sensor| sensor.image()) {
@@ -397,7 +396,7 @@ fn link(
         .current_dir(root)
         .env("CARGO_ENCODED_RUSTFLAGS", compiler_flags(root)?)
         .args(["build", "--locked", "--package", "dtof-firmware"])
-        .args((!io::stderr().is_terminal()).then_some("--quiet"))
+        .args((!is_first && !io::stderr().is_terminal()).then_some("--quiet"))
         .args(["--bin", binary, "--features", &features.join(",")])
         .args(["--target", target, "--profile", profile, "--target-dir"])
         .arg(&target_folder)

@@ -1,9 +1,10 @@
-//! The laser pulses of an image for the photon timer, read from the image.
+//! The laser pulses of an image for the photon timer: checked before it is built, and read from the image.
 
+use std::env;
 use std::fs;
 use std::path::Path;
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use object::{Object, ObjectSection, ObjectSymbol};
 
 /// A symbol of the image: its clock in Hz, the clocks per laser cycle and the clocks per laser
@@ -85,6 +86,54 @@ impl Laser {
     }
 }
 
+/// Checks `LASER_HZ` and `LASER_PULSE_NS`, so that an image that cannot be built says so in one line.
+pub fn check(is_limited: bool) -> Result<()> {
+    let number = |variable, default: u32| {
+        let value = env::var(variable).unwrap_or_else(|_| default.to_string());
+        let number = value.parse::<u32>();
+        let number = number.with_context(|| format!("{variable}={value}: not a whole number"))?;
+        Ok::<u32, anyhow::Error>(number)
+    };
+    let (laser_hz, pulse_ns) = (number("LASER_HZ", 100_000)?, number("LASER_PULSE_NS", 16)?);
+    if let Some(reason) = refusal(laser_hz, pulse_ns, is_limited) {
+        bail!("LASER_HZ={laser_hz} LASER_PULSE_NS={pulse_ns}: {reason}");
+    }
+    Ok(())
+}
+
+/// Why an image cannot have these laser pulses. The image asks `photon_timer::Config`, and a test compares them: this
+/// package compiles none of the product.
+fn refusal(laser_hz: u32, pulse_ns: u32, is_limited: bool) -> Option<&'static str> {
+    const CLOCK_HZ: u64 = 125_000_000;
+    let hz = u64::from(laser_hz);
+    if hz == 0 {
+        return Some("there is to be a laser cycle a second or more");
+    }
+    let period = (CLOCK_HZ + hz / 2) / hz;
+    let pulse = u64::from(pulse_ns).div_ceil(8).max(2);
+    let reasons = [
+        (
+            period < 136,
+            "a laser cycle is shorter than its bins: at most 919117 a second",
+        ),
+        (pulse_ns == 0, "the laser's pulse is 0 ns"),
+        (
+            pulse + 5 > period,
+            "the laser's pulse leaves no pause in its laser cycle",
+        ),
+        (
+            is_limited && pulse > 125,
+            "the laser's pulse is longer than 1000 ns: only an image with laser-beyond-limits may do that",
+        ),
+        (
+            is_limited && 50 * pulse > period,
+            "the laser is on for more than 2 % of the time: only an image with laser-beyond-limits may do that",
+        ),
+    ];
+    let reason = reasons.into_iter().find(|(is_wrong, _)| *is_wrong);
+    reason.map(|(_, reason)| reason)
+}
+
 /// A fraction rounded to `digits` decimals, which are left out if they are 0 and `short` is set.
 fn decimal(numerator: u64, denominator: u64, digits: usize, short: bool) -> String {
     let scale = 10_u64.pow(u32::try_from(digits).unwrap_or(0));
@@ -98,7 +147,10 @@ fn decimal(numerator: u64, denominator: u64, digits: usize, short: bool) -> Stri
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
+    use dtof_sensors::photon_timer::{Config, Settings};
 
     fn laser(clock_hz: u32, period: u32, pulse: u32) -> Result<Laser> {
         let words = [clock_hz, period, pulse].map(u32::to_le_bytes);
@@ -126,6 +178,49 @@ mod tests {
         // Longer by half a nanosecond.
         let other = laser(133_000_000, 1330, 13).unwrap();
         assert_eq!(other.file_name(), "97.744ns+100.000kHz+0.98pct");
+    }
+
+    #[test]
+    fn what_is_refused_is_what_the_image_refuses() {
+        let mut reasons = BTreeSet::new();
+        for laser_hz in [
+            0,
+            1,
+            100,
+            19_999,
+            20_002,
+            100_000,
+            192_455,
+            192_456,
+            922_509,
+            922_510,
+            u32::MAX,
+        ] {
+            for pulse_ns in [
+                0,
+                1,
+                16,
+                96,
+                97,
+                104,
+                1000,
+                1001,
+                1040,
+                1048,
+                9960,
+                9961,
+                u32::MAX,
+            ] {
+                let settings = Settings { laser_hz, pulse_ns };
+                let image = Config::new(settings).err().map(|error| error.text());
+                assert_eq!(refusal(laser_hz, pulse_ns, true), image, "{settings:?}");
+                reasons.extend(image);
+                let image = Config::beyond_limits(settings).err();
+                let image = image.map(|error| error.text());
+                assert_eq!(refusal(laser_hz, pulse_ns, false), image, "{settings:?}");
+            }
+        }
+        assert_eq!(reasons.len(), 6);
     }
 
     #[test]

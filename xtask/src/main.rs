@@ -35,22 +35,23 @@ cargo xtask <command>
                 (emulators, Verilator, compilers); prints the command for those that
                 need an administrator, and fails if a tool is still missing
   image BOARD [SENSOR | self-test] [--emulator] [--count8] [LASER]
-                build an image and print its path: the sidecar or the self-test.
-                BOARD is mps2-an386, pico, pico2 or stm32f405. SENSOR is tdc7200, tmf8829,
-                tmf8829-spi, tmf882x or tmf8828-8x8 on stm32f405, photon-timer on pico and
-                pico2. For these two it also writes a .uf2, to copy onto the board without a
-                probe. --emulator builds for QEMU, with its slower clock and without the sensor's
-                own program. --count8 gives pixels counters of 8 bits, and the board room for
-                more. LASER is --laser-beyond-limits (the photon timer may have pulses over 1 us
-                and a duty cycle over 2 %) or --laser-on-without-host (a host may let the laser
-                stay on after it falls silent)
+                build an image and print its path: the sidecar, which is the firmware beside a
+                sensor, or the self-test. BOARD is mps2-an386, pico, pico2 or stm32f405. SENSOR
+                is tdc7200, tmf8829, tmf8829-spi, tmf882x or tmf8828-8x8 on stm32f405,
+                photon-timer on pico and pico2. For these two it also writes a .uf2, to copy onto
+                the board without a probe. --emulator builds for QEMU, with its slower clock and
+                without the sensor's own program. --count8 gives pixels counters of 8 bits, and
+                the board room for more. LASER is --laser-beyond-limits (the photon timer may
+                have pulses over 1 us and a duty cycle over 2 %) or --laser-on-without-host (a
+                host may let the laser stay on after it falls silent)
   flash [--chip CHIP] [BOARD] [SENSOR | self-test] [--count8] [LASER]
                 write an image onto a board (stm32f405) with a debug probe, and show its
                 log. CHIP is the probe-rs name, by default that of the Discovery
   hil --device DEVICE [--chip CHIP] [--out DIR] [BOARD]
-                test a board (stm32f405) with a debug probe and its serial line at DEVICE:
-                the self-test, the clock cycles of the core's operations, and the events of
-                the demo against this computer's. Writes BOARD.md to DIR, by default out/hil
+                hardware in the loop: test a board (stm32f405) with a debug probe and its serial
+                line at DEVICE: the self-test, the clock cycles of the core's operations, and
+                the events of the demo against this computer's. Writes BOARD.md to DIR, by
+                default out/hil
   emulate [--port PORT] [BOARD] [exit | panic | fault | overflow]
                 run the sidecar of a board (mps2-an386) in its emulator, with its serial
                 port on a TCP port (5386). The last word makes mps2-an386 end that way

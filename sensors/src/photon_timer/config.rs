@@ -53,7 +53,8 @@ pub struct Config {
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 #[non_exhaustive]
 pub enum ConfigError {
-    /// A laser cycle would be shorter than the bins, and 8 clocks: above 922,509 a second.
+    /// A laser cycle would be shorter than the bins, and 8 clocks. 919,117 a second are the most; up to 922,509
+    /// are rounded to them.
     TooFast,
     /// Fewer than 1 a second.
     TooSlow,
@@ -72,7 +73,7 @@ impl ConfigError {
     #[must_use]
     pub const fn text(self) -> &'static str {
         match self {
-            Self::TooFast => "a laser cycle is shorter than its bins: at most 922509 a second",
+            Self::TooFast => "a laser cycle is shorter than its bins: at most 919117 a second",
             Self::TooSlow => "there is to be a laser cycle a second or more",
             Self::NoPulse => "the laser's pulse is 0 ns",
             Self::LongPulse => "the laser's pulse leaves no pause in its laser cycle",

@@ -47,7 +47,10 @@ pub fn check(root: &Path) -> Result<()> {
         let bytes = |example: &str, arrays: u32| {
             let path = examples.join(example);
             let memory = Image::read(&path)?.memory;
-            ensure!(memory >= arrays.into(), "{example} has no arrays of pixels");
+            ensure!(
+                memory >= u64::from(arrays),
+                "{example} has no arrays of pixels"
+            );
             let (name, bytes) = stack_bound::largest_frame(&path)?;
             println!("{target}, {profile}, {example}: the largest stack frame has {bytes} bytes");
             Ok((name, bytes))
