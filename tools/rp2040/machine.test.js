@@ -1,7 +1,12 @@
 // `node --test`: what a machine does with its pins and resets, without an image of Rust.
 
 import assert from 'node:assert/strict';
+import { spawnSync } from 'node:child_process';
+import { copyFileSync, mkdtempSync, readdirSync, rmSync } from 'node:fs';
+import { tmpdir } from 'node:os';
+import { join } from 'node:path';
 import { test } from 'node:test';
+import { fileURLToPath } from 'node:url';
 import { Machine } from './machine.js';
 import { milliseconds } from './pulses.js';
 
@@ -170,4 +175,14 @@ test('an exception that cannot save its registers locks the core up', () => {
   assert.equal(machine.chip.isLockedUp, true);
   machine.run(1000);
   assert.ok(machine.clocks >= 1010);
+});
+
+test('without its package the runner says in one line how to install it', () => {
+  const folder = mkdtempSync(join(tmpdir(), 'rp2040-'));
+  const here = fileURLToPath(new URL('.', import.meta.url));
+  const files = readdirSync(here).filter((name) => /\.js$|^package\.json$/.test(name));
+  files.forEach((name) => copyFileSync(join(here, name), join(folder, name)));
+  const { status, stderr } = spawnSync('node', [join(folder, 'run.js'), 'image']);
+  rmSync(folder, { recursive: true });
+  assert.deepEqual([status, String(stderr)], [1, 'error: rp2040js is missing: npm ci --prefix tools/rp2040\n']);
 });

@@ -4,9 +4,16 @@ import { createServer } from 'node:net';
 import { parseArgs } from 'node:util';
 import { CLOCK_NS, readEdges } from './edges.js';
 import { readElf } from './elf.js';
-import { FAULTS } from './faults.js';
-import { Machine } from './machine.js';
 import { milliseconds } from './pulses.js';
+
+// Both need a package.
+const files = [import('./faults.js'), import('./machine.js')];
+const [{ FAULTS }, { Machine }] = await Promise.all(files).catch((error) => {
+  const isMissing = error.code === 'ERR_MODULE_NOT_FOUND';
+  const reason = isMissing ? 'rp2040js is missing: npm ci --prefix tools/rp2040' : error.message;
+  process.stderr.write(`error: ${reason}\n`);
+  process.exit(1);
+});
 
 const HELP = `\
 node run.js IMAGE [options]
