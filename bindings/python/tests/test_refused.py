@@ -113,7 +113,7 @@ def test_invalid_arrays(array):
         ({"array": "counts"}, ["array is for .npz files"]),
         ({"settings": "no.toml"}, ["no.toml"]),
         ({"settings": {"alpha": 4}}, ["settings: alpha belongs in [detection]"]),
-        ({"settings": {"detection": {"alfa": 4}}}, ["settings: alfa is unknown; is it alpha?"]),
+        ({"settings": {"detection": {"alfa": 4}}}, ["settings: alfa is unknown in [detection]; is it alpha?"]),
         ({"settings": {"detection": {"l1": 50, "l2": 20}}}, ["settings: l2 20: must be greater than l1 50"]),
         (
             {"settings": {"detection": {"l1": {}}}},
@@ -218,7 +218,7 @@ def test_invalid_files(tmp_path):
     refused(lambda: dtof.simulate("surfaces = 3\n\n"), "the scene")
     refused(lambda: dtof.compare(), "a recording or a scene is needed")
     refused(lambda: dtof.compare(GOOD, scene="x.toml"))
-    refused(lambda: dtof.tune(), "background, signal or snr, sigma_bins or sigma_ps are needed")
+    refused(lambda: dtof.tune(), "needed: background; signal or snr; sigma_bins or sigma_ps")
 
 
 def test_invalid_events(tmp_path):

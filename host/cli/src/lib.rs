@@ -16,49 +16,66 @@ use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
 use dtof_options::rows::printable;
-use dtof_options::{Refused, flag};
+use dtof_options::{Refused, flag, plain};
 
 /// Parses the command line and runs it.
 #[must_use]
 pub fn run<C: Parser>(run: impl FnOnce(C) -> Result<()>) -> ExitCode {
     let done = match C::try_parse() {
         Ok(cli) => run(cli),
-        Err(error) => return refuse(&error, &flags_of(&C::command())),
+        Err(error) => return refuse(&error, &C::command()),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
         // The reader has closed the output.
         Err(error) if is_broken_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
+            if let Some(error) = error.downcast_ref() {
+                return refuse(error, &C::command());
+            }
             complain(&format!("error: {}", dtof_options::line(&error, &flag)));
             ExitCode::FAILURE
         }
     }
 }
 
+/// The command line lacks the argument `name`.
+#[must_use]
+pub fn missing(name: &str, reason: &str) -> anyhow::Error {
+    let refused = Refused::new(name, reason);
+    clap::Error::raw(ErrorKind::MissingRequiredArgument, refused.line(&flag)).into()
+}
+
 /// Prints help, or an error with its hints in one line.
-fn refuse(error: &clap::Error, flags: &[String]) -> ExitCode {
+fn refuse(error: &clap::Error, command: &clap::Command) -> ExitCode {
     if !error.use_stderr() {
         return error
             .print()
             .map_or(ExitCode::FAILURE, |()| ExitCode::SUCCESS);
     }
-    complain(&format!("error: {}", reason(error, flags)));
+    complain(&format!("error: {}", reason(error, command)));
     ExitCode::from(2)
 }
 
-/// The names of the flags of the command that the command line begins with.
-fn flags_of(command: &clap::Command) -> Vec<String> {
+/// What is wrong with an argument that the command, which the command line begins with, does not take.
+fn unknown(argument: &str, command: &clap::Command) -> Refused {
     let name = std::env::args_os().nth(1).unwrap_or_default();
     let command = command.find_subcommand(name).unwrap_or(command);
     let flags = command.get_arguments().filter(|arg| !arg.is_hide_set());
     let names = flags.filter_map(clap::Arg::get_long);
-    names.map(|name| name.replace('-', "_")).collect()
+    let names: Vec<String> = names.map(|name| name.replace('-', "_")).collect();
+    let hint = match argument.starts_with('-') {
+        true => return Refused::unknown(argument, None, names.iter().map(String::as_str)),
+        false if command.get_positionals().next().is_some() => ": one file at a time",
+        false if names.iter().any(|name| name == "scene") => ": a scene is given by `scene`",
+        false => "",
+    };
+    Refused::input(format!("{} is not expected here{hint}", plain(argument)))
 }
 
 /// The reason of an error in one line.
-fn reason(error: &clap::Error, flags: &[String]) -> String {
-    if let Some(refused) = refused(error, flags) {
+fn reason(error: &clap::Error, command: &clap::Command) -> String {
+    if let Some(refused) = refused(error, command) {
         return refused.line(&flag);
     }
     let text = error.to_string();
@@ -73,7 +90,7 @@ fn reason(error: &clap::Error, flags: &[String]) -> String {
 }
 
 /// The error in the form that settings files and Python keywords use.
-fn refused(error: &clap::Error, flags: &[String]) -> Option<Refused> {
+fn refused(error: &clap::Error, command: &clap::Command) -> Option<Refused> {
     let all = |kind| match error.get(kind) {
         Some(ContextValue::String(text)) => vec![key(text)],
         Some(ContextValue::Strings(texts)) => texts.iter().map(|text| key(text)).collect(),
@@ -105,7 +122,7 @@ fn refused(error: &clap::Error, flags: &[String]) -> Option<Refused> {
             let Some(ContextValue::String(name)) = error.get(ContextKind::InvalidArg) else {
                 return None;
             };
-            Refused::unknown(name, flags.iter().map(String::as_str))
+            unknown(name, command)
         }
         ErrorKind::ArgumentConflict => {
             let others = all(ContextKind::PriorArg);

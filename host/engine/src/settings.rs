@@ -15,6 +15,6 @@ mod sections;
 mod tests;
 
 pub use detection::{DetectionSettings, EstimatorName, RuleName, share};
-pub use engine::{AdaptiveBinning, Settings};
+pub use engine::{AdaptiveBinning, DEFAULT_L2, Settings};
 pub use file::{MARK, SettingsFile};
 pub use sections::{DITHER_BINS, RaySettings, RunSettings, SensorSettings};

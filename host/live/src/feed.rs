@@ -138,8 +138,11 @@ impl FeedContext<'_> {
         self.stop.load(Ordering::Relaxed)
     }
 
-    /// Prints a line on standard error.
+    /// Prints a line on standard error, with the name once.
     fn complain(&self, text: &str) {
+        let text = text
+            .strip_prefix(&format!("{}: ", self.name))
+            .unwrap_or(text);
         (self.terminal.complain)(&printable(&format!("{}: {text}", self.name)));
     }
 

@@ -90,14 +90,20 @@ impl Refused {
         }
     }
 
-    /// No option is called `name`, as the user wrote it. Suggests the most similar of `keys`, if one is.
+    /// No option is called `name`, as the user wrote it. Suggests the most similar of `keys`, if one is. A key of a
+    /// settings file is unknown in its section, such as `[sensor]`.
     #[must_use]
-    pub fn unknown<'a>(name: &str, keys: impl IntoIterator<Item = &'a str>) -> Self {
+    pub fn unknown<'a>(
+        name: &str,
+        section: Option<&str>,
+        keys: impl IntoIterator<Item = &'a str>,
+    ) -> Self {
+        let place = section.map_or(String::new(), |section| format!(" in [{section}]"));
         let nearest = most_similar(name, keys);
         let hint = nearest.map_or(String::new(), |key| format!("; is it `{key}`?"));
         Self {
             is_unknown: true,
-            ..Self::new(name, format!("is unknown{hint}"))
+            ..Self::new(name, format!("is unknown{place}{hint}"))
         }
     }
 
@@ -266,7 +272,7 @@ pub fn read<O: Options>(
             .copied()
             .flatten()
             .map(|key| option_name(key));
-        let key = key.ok_or_else(|| Refused::unknown(name, keys))?;
+        let key = key.ok_or_else(|| Refused::unknown(name, None, keys))?;
         if value.is_empty() {
             return Err(Refused::new(key, "needs a value"));
         }

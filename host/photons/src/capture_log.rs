@@ -5,7 +5,7 @@ use std::fs::File;
 use std::io::{self, BufRead, BufReader, Read};
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use flate2::bufread::MultiGzDecoder;
 
 use crate::tmf8820::{self, Tmf8820Log};
@@ -71,6 +71,7 @@ fn parse(name: &str, mut text: impl BufRead) -> Result<CaptureLog> {
         text.consume(3);
     }
     let start = text.fill_buf().with_context(|| name.to_owned())?;
+    ensure!(!start.is_empty(), "{name}: the file is empty");
     let first = start.iter().find(|byte| !byte.is_ascii_whitespace());
     let is_object = first == Some(&b'{');
     Ok(if is_object {
@@ -150,7 +151,7 @@ mod tests {
             (whole[..5].to_vec(), damaged),
             (whole[..whole.len() / 2].to_vec(), damaged),
             ([&whole[..], b"garbage garbage"].concat(), damaged),
-            (vec![], "NAME:1: not a TMF8820 capture log: "),
+            (vec![], "NAME: the file is empty"),
             (b" {".to_vec(), "NAME:1: not a TMF8829 log: "),
         ] {
             std::fs::write(&path, bytes).unwrap();

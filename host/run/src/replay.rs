@@ -16,7 +16,7 @@ use dtof_calibrate::{Calibration, CalibrationOptions};
 use dtof_core::Neighbours;
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
-use dtof_engine::settings::{DetectionSettings, EstimatorName, Settings, SettingsFile};
+use dtof_engine::settings::{DEFAULT_L2, DetectionSettings, EstimatorName, Settings, SettingsFile};
 use dtof_events::clock::LaserClock;
 use dtof_options::progress::Progress;
 use dtof_options::rows::Row;
@@ -178,6 +178,7 @@ impl Options {
         let captures = recording.metadata().captures;
         mask_capture(&mut requested, recording.array().pixels(), captures)?;
         let has_file = self.given.file.is_some() || self.given.text.is_some();
+        let has_rule = requested.detection.rule.is_some();
         let found = match has_file {
             true => Ok((Vec::new(), Vec::new())),
             false => find(&mut requested, &mut recording),
@@ -193,6 +194,11 @@ impl Options {
         });
         metadata.warnings.extend(warnings);
         let requested = requested.or(settings_of_file(&metadata, photons.array()));
+        let detection = &requested.detection;
+        ensure!(
+            has_file || has_rule || detection.alpha.is_none() || detection.rule.is_none(),
+            Refused::new("alpha", "is for `rule` paper or average: say which")
+        );
         if !has_file && requested.detection.rule.is_none() {
             let detection = &requested.detection;
             for (key, is_on) in [
@@ -327,9 +333,14 @@ fn find(
     }
     // An error about a key that was found says so.
     let found_keys = found.settings(SettingsFile::default())?.keys()?;
+    let mut keys = found_keys.clone();
+    // The default is nothing found.
+    if found.detection.l2 == DEFAULT_L2 {
+        keys.remove("l2");
+    }
     settings.file = Some(KeysOfFile {
         path: "found in the recording".into(),
-        keys: found_keys.clone(),
+        keys,
     });
     *requested = given.or(settings);
     let mut rows = rows(&found);

@@ -250,7 +250,7 @@ impl Summary {
             };
             rows.push((
                 "taken to have lasted".to_owned(),
-                format!("{cycles} laser cycles"),
+                format!("{cycles} laser cycles; --recorded-cycles gives another number"),
             ));
         }
         rows.extend([

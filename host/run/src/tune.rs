@@ -143,7 +143,7 @@ impl dtof_options::Options for Options {
         let missing = needed.iter().filter(|(_, value)| value.is_none());
         let missing: Vec<&str> = missing.map(|(keys, _)| *keys).collect();
         if missing.len() > 1 {
-            let reason = format!("{} are needed", missing.join(", "));
+            let reason = format!("needed: {}", missing.join("; "));
             return Err(Refused::input(reason));
         }
         self.request().map(drop)

@@ -9,7 +9,6 @@ use clap::Args;
 use dtof::path;
 use dtof::progress::Steps;
 use dtof_compare::page::{self, FILES};
-use dtof_options::Refused;
 use dtof_options::rows::aligned;
 use dtof_photons::input::Input;
 use dtof_run::compare::{Callbacks, CompareInput, CompareResult, Options};
@@ -43,7 +42,7 @@ pub struct Compare {
 impl Compare {
     pub fn run(&self) -> Result<()> {
         let name = self.recorded.file().or(self.scene.as_deref());
-        let name = name.ok_or_else(|| Refused::new("input", "is needed, or `scene`"))?;
+        let name = name.ok_or_else(|| dtof::missing("input", "is needed, or `scene`"))?;
         let requested = self.options.0.requested(self.scene.is_some())?;
         let input = match &self.scene {
             Some(file) => {

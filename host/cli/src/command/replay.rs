@@ -2,9 +2,9 @@
 
 use anyhow::Result;
 use clap::Args;
+use dtof::missing;
 use dtof::progress::Bar;
 use dtof_engine::settings::SettingsFile;
-use dtof_options::Refused;
 use dtof_photons::input::Input;
 use dtof_photons::source::PhotonSource;
 use dtof_report::Section;
@@ -37,7 +37,7 @@ impl Replay {
         // Wrong options are refused before anything is read.
         self.results.dynamic_depth.get()?;
         let file = self.recorded.file();
-        let file = file.ok_or_else(|| Refused::new("<FILE>", "is needed"))?;
+        let file = file.ok_or_else(|| missing("<FILE>", "is needed"))?;
         let input = Input::from(file);
         let mut replay = self.options.0.open(&input, requested)?;
         let mut output = self.results.output(

@@ -272,7 +272,8 @@ fn options_override_what_is_found() {
         "
         --l1 2 | error: found in the recording: x 4: must not be greater than --l1 2
         --x 50 | error: found in the recording: --x 50: must not be greater than l1 40
-        --alpha 4 | error: found in the recording: --alpha is for rule paper or average
+        --l1 3000 | error: --l2 2000: must be greater than --l1 3000; 2000 is the default of --l2
+        --alpha 4 | error: --alpha is for --rule paper or average: say which
         ",
     );
     // A settings file says all.

@@ -270,7 +270,7 @@ fn what_cannot_be_compared_is_refused() {
             --scene scene.toml --photons-per-cycle 1 | --photons-per-cycle is for recordings
             --scene scene.toml --within 0 | must be a number above 0
             --scene scene.toml --false-alarm 0.5 | at most 0.1
-            --scene scene.toml --settings key.toml | key.toml: rules is unknown; is it rule?
+            --scene scene.toml --settings key.toml | key.toml: rules is unknown in [detection]; is it rule?
             --scene missing.toml | missing.toml: No such file
             --scene dark.toml | dark.toml: no pixel has a target: there is nothing to compare
             {recording} --truth three.npy | three.npy: 3 ranges, but there are 4 pixels

@@ -14,7 +14,7 @@ use dtof_photons::ranges::{Ranges, RangesError};
 use dtof_photons::source::PhotonSource;
 
 /// The default of L2 in laser cycles.
-pub(crate) const DEFAULT_L2: u16 = 2000;
+pub const DEFAULT_L2: u16 = 2000;
 
 /// Everything an engine and its output need beside the photons.
 #[derive(Clone, Debug, PartialEq)]

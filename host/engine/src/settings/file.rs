@@ -119,7 +119,7 @@ impl SettingsFile {
             let Some((_, keys, _)) = SECTIONS.iter().find(|(name, ..)| name == section) else {
                 return Err(match section_of(section) {
                     Some(name) => Refused::new(section, format!("belongs in [{name}]")),
-                    None => Refused::unknown(section, SECTIONS.map(|(section, ..)| section)),
+                    None => Refused::unknown(section, None, SECTIONS.map(|(section, ..)| section)),
                 }
                 .into());
             };
@@ -131,7 +131,7 @@ impl SettingsFile {
                 if section_of(key) != Some(section) {
                     return Err(match section_of(key) {
                         Some(name) => Refused::new(key, format!("belongs in [{name}]")),
-                        None => Refused::unknown(key, keys.iter().copied()),
+                        None => Refused::unknown(key, Some(section), keys.iter().copied()),
                     }
                     .into());
                 }

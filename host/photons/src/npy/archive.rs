@@ -1,10 +1,11 @@
 //! `.npz` files: arrays by name in a zip archive.
 
 use std::fs::File;
-use std::io::{BufReader, Read};
+use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Error, Result, bail, ensure};
+use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
 use super::header::Array;
@@ -21,8 +22,18 @@ pub fn read(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Hist
 }
 
 fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histograms> {
-    let file = BufReader::new(File::open(path)?);
-    let mut zip = ZipArchive::new(file).context("not an .npz file as numpy.savez writes it")?;
+    let mut file = BufReader::new(File::open(path)?);
+    let start = file.fill_buf()?;
+    ensure!(!start.is_empty(), "the file is empty");
+    let is_archive = start.starts_with(b"PK");
+    let reason = match is_archive {
+        true => "the archive is damaged or cut off",
+        false => "not an .npz file as numpy.savez writes it",
+    };
+    let mut zip = ZipArchive::new(file).map_err(|error| match error {
+        ZipError::InvalidArchive(_) => Error::msg(reason),
+        error => Error::from(error).context(reason),
+    })?;
     let mut arrays = Vec::new();
     for name in zip.file_names() {
         let name = name.context("a file without a name")?;

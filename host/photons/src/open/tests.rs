@@ -307,10 +307,7 @@ fn files_are_told_by_their_names() {
     let (_folder, path) = file("a.Npy", array);
     assert_eq!(counts(&path, &default).unwrap().captures, [[[9; 8]; 2]]);
     for (name, expected) in [
-        (
-            "a.npz",
-            "a.npz: not an .npz file as numpy.savez writes it: invalid Zip archive: Could not find EOCD",
-        ),
+        ("a.npz", "a.npz: not an .npz file as numpy.savez writes it"),
         (
             "a.json",
             "a.json:1: not a TMF8820 capture log: expected value at line 1 column 1",

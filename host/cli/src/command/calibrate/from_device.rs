@@ -80,7 +80,7 @@ impl DeviceArgs {
     /// Fails if no device is given, it cannot be opened, or an option is not for devices.
     pub fn open(&self, given: &Given) -> Result<Box<dyn Port>> {
         let name = self.device.as_deref();
-        let name = name.ok_or_else(|| Refused::new("input", "is needed, or `device`"))?;
+        let name = name.ok_or_else(|| dtof::missing("input", "is needed, or `device`"))?;
         given.suits_device()?;
         dtof_device::open(name, self.image.as_deref())
     }

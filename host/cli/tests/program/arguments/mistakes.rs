@@ -46,7 +46,7 @@ const MISTAKES: [Mistake; 5] = [
         keywords: &[("alfa", "4")],
         lines: [
             "--alfa is unknown; is it --alpha?",
-            "my.toml: alfa is unknown; is it alpha?",
+            "my.toml: alfa is unknown in [detection]; is it alpha?",
         ],
     },
     // Missing.
@@ -96,7 +96,9 @@ fn a_mistake_is_one_error_however_it_is_made() {
         assert_eq!(line, format!("error: {by_file}\n"));
         // Flag and file give the same value.
         let of_file = SettingsFile::parse(&text).and_then(|file| file.settings(128).map(drop));
-        let of_file = of_file.unwrap_err().downcast::<Refused>().unwrap();
+        let mut of_file = of_file.unwrap_err().downcast::<Refused>().unwrap();
+        // A key is unknown in its section.
+        of_file.reason = of_file.reason.replace(&format!(" in [{section}]"), "");
         let of_keywords = dtof_options::read::<Options>(mistake.keywords.iter().copied());
         let of_keywords = of_keywords
             .map_err(anyhow::Error::from)

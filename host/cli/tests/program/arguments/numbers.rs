@@ -124,10 +124,27 @@ fn a_serial_port_that_is_not_there_is_answered_with_those_that_are() {
 }
 
 #[test]
-fn a_calibration_of_nothing_says_what_it_takes() {
+fn a_command_line_without_its_file_says_what_it_takes() {
     let scratch = Scratch::new();
-    let output = scratch.run("calibrate --out dtof.toml");
-    scratch.refused(&output, &["error: --input is needed, or --device\n"]);
+    for (line, reason) in [
+        ("replay", "<FILE> is needed"),
+        ("decode", "<FILE> is needed"),
+        ("view", "<FILE.aer> is needed"),
+        (
+            "calibrate --out dtof.toml",
+            "--input is needed, or --device",
+        ),
+        ("compare --out out", "--input is needed, or --scene"),
+        (
+            "simulate scene.toml",
+            "scene.toml is not expected here: a scene is given by --scene",
+        ),
+        ("demo scene.toml", "scene.toml is not expected here"),
+    ] {
+        let output = scratch.run(line);
+        assert_eq!(output.status.code(), Some(2), "{line}");
+        scratch.refused(&output, &[format!("error: {reason}\n")]);
+    }
 }
 
 #[test]

@@ -102,7 +102,7 @@ fn what_contradicts_the_file_is_refused() {
         "replay --input photons.csv --out out",
         "--settings missing.toml | missing.toml: No such file
         --settings section.toml | error: section.toml: detecton is unknown; is it detection?
-        --settings key.toml | error: key.toml: l_1 is unknown
+        --settings key.toml | error: key.toml: l_1 is unknown in [
         --settings z.toml | error: z.toml: rule window needs --window or --sigma-bins
         --mask 4 | --mask 4: there are 4 pixels
         --mask x | must be a whole number from 0 to 65535

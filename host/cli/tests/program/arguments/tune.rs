@@ -167,6 +167,7 @@ fn what_cannot_be_met_is_refused_in_one_line() {
 fn options_that_are_missing_or_no_numbers_are_named() {
     refused(
         "
+            | error: needed: --background; --signal or --snr; --sigma-bins or --sigma-ps
             --background 0.05 --sigma-bins 1 | --signal
             --background 0.05 --signal 1 | --sigma-bins
             --signal 1 --sigma-bins 1 | --background

@@ -370,6 +370,7 @@ fn a_recording_is_a_plain_argument_and_names_the_folder() {
         "
         | <FILE> is needed
         photons.csv --input photons.csv | cannot be used with
+        photons.csv other.csv | error: other.csv is not expected here: one file at a time
         ",
     );
 }

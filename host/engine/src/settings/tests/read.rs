@@ -247,7 +247,10 @@ fn an_error_in_a_file_names_it_and_the_key_or_the_line() {
             "[run]\nrecorded_cycles = 9\nphotons_per_cycle = 1",
             "photons_per_cycle cannot be used with recorded_cycles",
         ),
-        ("[detection]\nalfa = 4", "alfa is unknown; is it alpha?"),
+        (
+            "[detection]\nalfa = 4",
+            "alfa is unknown in [detection]; is it alpha?",
+        ),
         (
             "[detections]\nl1 = 4",
             "detections is unknown; is it detection?",
