@@ -10,6 +10,7 @@ mod aer;
 #[cfg(feature = "host")]
 mod aer_file;
 mod link;
+mod memory;
 #[cfg(feature = "host")]
 mod recordings;
 mod sensors;
