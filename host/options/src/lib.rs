@@ -132,10 +132,11 @@ impl Refused {
                 _ => text += &format!("`{part}`"),
             }
         }
-        match from_file {
-            None => text,
-            Some(file) => format!("{}: {text}", file.path.display()),
+        if let Some(file) = from_file {
+            text = format!("{}: {text}", file.path.display());
         }
+        // What a user or a file wrote may have several lines.
+        rows::printable(&text)
     }
 }
 

@@ -2,6 +2,7 @@
 
 use anyhow::{Context, Result, anyhow, ensure};
 use dtof_core::Array;
+use dtof_options::rows::printable;
 use serde::Deserialize;
 use toml::Spanned;
 
@@ -28,7 +29,7 @@ pub fn parse(text: &str, array: Array) -> Result<Vec<Ray>> {
     };
     let file: CalibrationFile = toml::from_str(text).map_err(|error| {
         let at = error.span().map_or(0, |span| span.start);
-        anyhow!("line {}: {}", line(at), error.message())
+        anyhow!("line {}: {}", line(at), printable(error.message()))
     })?;
     let size = (*file.columns.get_ref(), file.rows);
     ensure!(

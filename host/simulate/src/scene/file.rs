@@ -20,6 +20,7 @@ use crate::effects::tdc::Tdc;
 use dtof_options::Refused;
 use dtof_options::files::read_text;
 use dtof_options::numbers::bins_of;
+use dtof_options::rows::printable;
 use dtof_photons::MM_PER_PS;
 use dtof_photons::geometry::FieldOfView;
 use dtof_photons::range::within;
@@ -120,7 +121,7 @@ impl Scene {
         let file: SceneFile = toml::from_str(text).map_err(|error| {
             let before = error.span().and_then(|span| text.get(..span.start));
             let line = before.map_or(1, |text| text.matches('\n').count() + 1);
-            anyhow!("line {line}: {}", error.message())
+            anyhow!("line {line}: {}", printable(error.message()))
         })?;
         file.scene()
     }
