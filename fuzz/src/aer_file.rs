@@ -5,16 +5,9 @@ use std::io::Cursor;
 
 use dtof_events::aer_file::{Reader, Writer};
 use dtof_export::{Format, Options, export};
+use dtof_options::Named;
 
 use crate::{folder, is_one_line};
-
-const FORMATS: [Format; 5] = [
-    Format::Csv,
-    Format::Pcd,
-    Format::Ply,
-    Format::Mcap,
-    Format::Evt2,
-];
 
 /// Any bytes are a file, or an error.
 pub fn aer_file(data: &[u8]) {
@@ -51,23 +44,25 @@ pub fn aer_file(data: &[u8]) {
     assert!(again.next_event().expect("what was written").is_none());
 }
 
-/// What came before the damage is there, and the damage is said.
+/// In each format what came before the damage is there, and the damage is said.
 fn exported(data: &[u8], events: usize, damage: bool) {
     let folder = folder();
-    let [input, out] = ["a.aer", "b"].map(|name| folder.path().join(name));
+    let input = folder.path().join("a.aer");
     fs::write(&input, data).expect("a file");
-    let format = FORMATS[data.len() / 16 % FORMATS.len()];
-    match export(&input, &out, format, &Options::default(), &mut ()) {
-        Ok(exported) => {
-            assert_eq!(exported.damage.is_some(), damage);
-            // An event camera sends a change as several.
-            let most = if format == Format::Evt2 { 1 << 16 } else { 1 };
-            assert!(exported.written + exported.late <= most * events as u64);
-            assert!(out.exists());
-        }
-        Err(error) => {
-            is_one_line(&error);
-            assert!(!out.exists());
+    for &(name, format, _) in Format::NAMES {
+        let out = folder.path().join(name);
+        match export(&input, &out, format, &Options::default(), &mut ()) {
+            Ok(exported) => {
+                assert_eq!(exported.damage.is_some(), damage);
+                // An event camera sends a change as several.
+                let most = if format == Format::Evt2 { 1 << 16 } else { 1 };
+                assert!(exported.written + exported.late <= most * events as u64);
+                assert!(out.exists());
+            }
+            Err(error) => {
+                is_one_line(&error);
+                assert!(!out.exists());
+            }
         }
     }
     assert_eq!(fs::read(&input).expect("the input"), data);
