@@ -25,3 +25,9 @@ pub mod serial;
 pub mod sidecar;
 
 pub use dtof_sensors::photon_timer;
+
+/// The laser of the Pico's image as it comes: 100 kHz, and pulses of two bins.
+pub const DEFAULT_LASER: photon_timer::Settings = photon_timer::Settings {
+    laser_hz: 100_000,
+    pulse_ns: 16,
+};

@@ -11,6 +11,8 @@ use core::panic::PanicInfo;
 use cortex_m_rt::entry;
 #[cfg(feature = "sensor-photon-timer")]
 use dtof_core::checked;
+#[cfg(feature = "sensor-photon-timer")]
+use dtof_firmware::DEFAULT_LASER;
 use dtof_firmware::board::{on_panic, pico::Pico, run};
 #[cfg(feature = "sensor-photon-timer")]
 use dtof_firmware::photon_timer::{Config, ConfigError, Settings};
@@ -32,12 +34,11 @@ const MOST_BLOCKS: usize = if cfg!(feature = "pico2") { 336 } else { 84 };
 static PIXELS: ConstStaticCell<Vec<Pixel, MOST_PIXELS>> = ConstStaticCell::new(Vec::new());
 static BLOCKS: ConstStaticCell<Vec<Block, MOST_BLOCKS>> = ConstStaticCell::new(Vec::new());
 
-/// 100 kHz and pulses of 16 ns, two bins, unless `LASER_HZ` and `LASER_PULSE_NS` say otherwise when
-/// the image is built.
+/// [`DEFAULT_LASER`], unless `LASER_HZ` and `LASER_PULSE_NS` say otherwise when the image is built.
 #[cfg(feature = "sensor-photon-timer")]
 const LASER: Config = checked!(laser(Settings {
-    laser_hz: number(option_env!("LASER_HZ"), 100_000),
-    pulse_ns: number(option_env!("LASER_PULSE_NS"), 16),
+    laser_hz: number(option_env!("LASER_HZ"), DEFAULT_LASER.laser_hz),
+    pulse_ns: number(option_env!("LASER_PULSE_NS"), DEFAULT_LASER.pulse_ns),
 }));
 
 #[cfg(feature = "sensor-photon-timer")]

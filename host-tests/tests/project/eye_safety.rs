@@ -1,6 +1,7 @@
 //! The figures of `docs/eye-safety.md`, computed from the limits on the page and the
 //! default laser of the Pico's image.
 
+use dtof_firmware::DEFAULT_LASER;
 use dtof_firmware::photon_timer::{BINS, CLOCK_HZ, Config, Settings};
 
 /// Class 1 of IEC 60825-1:2014 for 700 to 1050 nm, C6 = C7 = 1: a pulse of 10 ps to 5 µs, in
@@ -44,11 +45,7 @@ fn says(text: &str) {
 
 /// The laser of the Pico's image: seconds of a pulse, pulses a second.
 fn as_it_comes() -> (f64, f64) {
-    let config = Config::new(Settings {
-        laser_hz: 100_000,
-        pulse_ns: 16,
-    });
-    let config = config.unwrap();
+    let config = Config::new(DEFAULT_LASER).unwrap();
     let clock = f64::from(CLOCK_HZ);
     let pulse_s = f64::from(config.pulse()) / clock;
     (pulse_s, clock / f64::from(config.period()))
@@ -98,7 +95,7 @@ fn the_short_pulses_of_the_sensor_page_follow_from_the_limits() {
     ));
     let config = Config::new(Settings {
         laser_hz: 50_000,
-        pulse_ns: 16,
+        ..DEFAULT_LASER
     });
     let config = config.unwrap();
     assert_eq!((config.pulse(), config.period()), (2, 2_500));
