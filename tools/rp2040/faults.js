@@ -8,6 +8,10 @@ const SYST_CSR = 0xe000e010;
 /** CTRL of the DMA's channel that sends the dither to the first shift register, without a start. */
 const DITHER_CTRL = 0x50000000 + 6 * 0x40 + 0x10;
 const ENABLED = 1;
+/** CTRL of the watchdog: it runs, and pauses while a debugger halts a core or uses JTAG (RP2040 datasheet, 4.7.6). */
+const WATCHDOG_CTRL = 0x40058000;
+const WATCHDOG_ENABLE = 1 << 30;
+const WATCHDOG_PAUSES = 7 << 24;
 /** Clocks for which it pauses: more than the four laser cycles for which its queue lasts. */
 const PAUSE = 7500;
 /** Milliseconds of a reset of the bus: a hub takes 10 to 20. */
@@ -30,6 +34,15 @@ export const FAULTS = {
   /** The core stops for good; all else goes on. */
   lockup: ({ chip }) => {
     chip.isLockedUp = true;
+    return true;
+  },
+  /** A debugger halts the core, and with it a watchdog that was told to wait for it. */
+  halt: ({ chip, rp2040 }) => {
+    chip.isLockedUp = true;
+    const control = rp2040.readUint32(WATCHDOG_CTRL);
+    if (control & WATCHDOG_PAUSES) {
+      rp2040.writeUint32(WATCHDOG_CTRL, (control & ~WATCHDOG_ENABLE) >>> 0);
+    }
     return true;
   },
   /** The processor's timer stops: no millisecond ends any more. */

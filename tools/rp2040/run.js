@@ -29,6 +29,7 @@ node run.js IMAGE [options]
                     fault       an undefined instruction: a hard fault
                     hang        a loop without end; interrupts go on
                     lockup      the core stops; all else goes on
+                    halt        a debugger halts the core
                     clock       the processor's timer stops; all else goes on
                     core-reset  the core is reset, and nothing else
                     overflow    a function begins with no room on the stack: the core locks up

@@ -128,13 +128,7 @@ fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     let Some(_alone) = enabled(test, &[QEMU, DEFMT_PRINT]) else {
         return Ok(());
     };
-    let version = version(QEMU).unwrap_or_default();
-    if !version.contains(KNOWN) {
-        let first = version.lines().next().unwrap_or_default();
-        skipped(
-            test,
-            &format!("known to run in QEMU {KNOWN}x, this is {first}"),
-        );
+    if !is_known(test) {
         return Ok(());
     }
     let board = Board::Stm32F405;
@@ -196,6 +190,20 @@ fn the_demo_on_an_emulated_device_gives_the_same_files() -> Result<()> {
         );
     }
     Ok(())
+}
+
+/// Whether this QEMU runs `stm32f405`. Prints the reason if it does not.
+pub fn is_known(test: &str) -> bool {
+    let version = version(QEMU).unwrap_or_default();
+    let is_known = version.contains(KNOWN);
+    if !is_known {
+        let first = version.lines().next().unwrap_or_default();
+        skipped(
+            test,
+            &format!("known to run in QEMU {KNOWN}x, this is {first}"),
+        );
+    }
+    is_known
 }
 
 /// The self-test calls through function pointers, so its stack has no bound and is only measured.
@@ -262,7 +270,7 @@ fn ends(board: Board, image: &Path) -> Result<Vec<u64>> {
 }
 
 /// An image whose stack overflows logs it, does not damage its statics, resets the board, and logs
-/// the reason of the restart. QEMU has no pins, so the sensor's is not checked.
+/// the reason of the restart. `enable` has the pin of the sensor.
 fn overflows(board: Board, image: &Path) -> Result<()> {
     let Overflow { logs, changed } = Emulator::start(board, image, &[])?.overflow()?;
     let [before, after] = logs.map(|bytes| log(image, bytes));

@@ -66,15 +66,23 @@ impl Debugger {
         words.try_into().ok().context("not 16 registers")
     }
 
-    /// Sets the stack pointer and the next instruction.
-    pub fn set_registers(&mut self, stack_pointer: u32, next: u32) -> Result<()> {
+    /// Sets core registers, by their numbers.
+    pub fn set_registers(&mut self, values: &[(usize, u32)]) -> Result<()> {
         self.send("g")?;
         let mut digits = self.reply()?;
-        for (register, value) in [(13, stack_pointer), (15, next)] {
+        for &(register, value) in values {
             let value = format!("{:08x}", value.swap_bytes());
             digits.replace_range(8 * register..8 * register + 8, &value);
         }
         self.send(&format!("G{digits}"))?;
+        let reply = self.reply()?;
+        ensure!(reply == "OK", "the debugger answers `{reply}`");
+        Ok(())
+    }
+
+    /// Writes a word.
+    pub fn write(&mut self, address: u64, word: u32) -> Result<()> {
+        self.send(&format!("M{address:x},4:{:08x}", word.swap_bytes()))?;
         let reply = self.reply()?;
         ensure!(reply == "OK", "the debugger answers `{reply}`");
         Ok(())

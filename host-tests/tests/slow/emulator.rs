@@ -1,5 +1,6 @@
 //! Runs an image in QEMU, with its serial port on a TCP port and a debugger attached.
 
+use std::ffi::OsStr;
 use std::io::Read;
 use std::net::{Ipv4Addr, TcpListener};
 use std::path::{Path, PathBuf};
@@ -71,6 +72,21 @@ fn command(board: Board, image: &Path, port: u16, words: &[&str]) -> Command {
     command
 }
 
+/// What is done to a running image of a board with a flash at `0x0800_0000`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Planted {
+    /// A function that panics is called.
+    Panic,
+    /// The next instruction lies where no memory is: a hard fault.
+    Fault,
+    /// A function begins with no room on the stack.
+    Overflow,
+    /// A loop without end; interrupts go on.
+    Hang,
+    /// The handler of the processor's timer returns at once: no millisecond ends any more.
+    Clock,
+}
+
 /// An emulator, ended when dropped. A debugger reads its stack before it ends.
 pub struct Emulator {
     board: Board,
@@ -112,9 +128,30 @@ impl Emulator {
     /// Starts an image with its serial port on a free TCP port. It waits before its first
     /// instruction.
     pub fn start(board: Board, path: &Path, words: &[&str]) -> Result<Self> {
+        Self::spawn(board, path, words, &[])
+    }
+
+    /// Starts an image as [`Self::start`] does. The file `log` gets a line for each access to a part that QEMU does not
+    /// have.
+    pub fn start_logged(board: Board, path: &Path, log: &Path) -> Result<Self> {
+        Self::spawn(
+            board,
+            path,
+            &[],
+            &[
+                "-d".as_ref(),
+                "unimp".as_ref(),
+                "-D".as_ref(),
+                log.as_os_str(),
+            ],
+        )
+    }
+
+    fn spawn(board: Board, path: &Path, words: &[&str], more: &[&OsStr]) -> Result<Self> {
         let image = Image::read(path)?;
         let [port, debugger_port] = free_ports()?;
         let mut child = command(board, path, port, words)
+            .args(more)
             .args(["-S", "-gdb", &format!("tcp:127.0.0.1:{debugger_port}")])
             .stdout(Stdio::piped())
             .spawn()
@@ -211,6 +248,51 @@ impl Emulator {
         })
     }
 
+    /// Stops the image while it runs.
+    pub fn interrupt(&mut self) -> Result<()> {
+        self.debugger.interrupt()
+    }
+
+    /// Lets the image run.
+    pub fn resume(&mut self) -> Result<()> {
+        self.debugger.resume()
+    }
+
+    /// Plants a fault into an image that is stopped.
+    pub fn plant(&mut self, what: Planted) -> Result<()> {
+        const NO_MEMORY: u32 = 0x6000_0000;
+        /// `bx lr`, and an instruction that does nothing.
+        const RETURN: u32 = 0xbf00_4770;
+        /// Reserved vectors: a `Location` without a file.
+        const ZEROS: u32 = 0x0800_001c;
+        let image = &self.image;
+        let at = |part: &str| anyhow::Ok(u32::try_from(image.function(part)?)?);
+        let registers = match what {
+            // An index, a length, and where it is.
+            Planted::Panic => vec![
+                (0, 7),
+                (1, 3),
+                (2, ZEROS),
+                (15, at("9panicking18panic_bounds_check")?),
+            ],
+            Planted::Fault => vec![(15, NO_MEMORY)],
+            // The first instruction of `main` is a push.
+            Planted::Overflow => {
+                let full = u32::try_from(image.stack.start)? + 4;
+                vec![
+                    (13, full),
+                    (15, u32::try_from(image.address("main")? & !1)?),
+                ]
+            }
+            Planted::Hang => vec![(15, at("DefaultHandler_")?)],
+            Planted::Clock => {
+                let handler = image.address("SysTick")? & !1;
+                return self.debugger.write(handler, RETURN);
+            }
+        };
+        self.debugger.set_registers(&registers)
+    }
+
     /// Lets the image run for a while, then call a function on a full stack, which resets its board,
     /// and run again.
     pub fn overflow(mut self) -> Result<Overflow> {
@@ -219,10 +301,7 @@ impl Emulator {
         thread::sleep(while_it_runs);
         self.debugger.interrupt()?;
         let before = self.statics()?;
-        // The first instruction of `main` is a push.
-        let full = u32::try_from(self.image.stack.start)? + 4;
-        let main = u32::try_from(self.image.address("main")? & !1)?;
-        self.debugger.set_registers(full, main)?;
+        self.plant(Planted::Overflow)?;
         let reset = self.image.address("Reset")? & !1;
         self.debugger.set_breakpoint(reset, true)?;
         self.debugger.resume()?;

@@ -1,5 +1,5 @@
-//! The laser of the Pico's photon timer goes off and stays off after every fault.
-//! Needs Node.js and npm, which installs rp2040js.
+//! The laser of the Pico's photon timer goes off and stays off after every fault, and no image has pulses beyond the
+//! limits. Needs Node.js and npm, which installs rp2040js.
 //!
 //! The runner records the laser's pin as it leaves the chip, over all resets.
 //!
@@ -23,7 +23,7 @@ use dtof_device::{Client, HostTimeout, Port, Stopped, Task};
 use dtof_link::{Report, Source, StopReason};
 
 use crate::pico::senses;
-use crate::rp2040::{Done, NODE, NPM, Rp2040, image, install};
+use crate::rp2040::{Done, NODE, NPM, Rp2040, image, install, refusal};
 use crate::{dtof, enabled, root, stack, succeed};
 
 /// The pulse length of the image as it comes.
@@ -73,11 +73,13 @@ const fn fault(
     }
 }
 
-const FAULTS: [Fault; 8] = [
+const FAULTS: [Fault; 9] = [
     fault("panic", HANDLER_MS, "forced", StopReason::Panic),
     fault("fault", HANDLER_MS, "forced", StopReason::Fault),
     fault("hang", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
     fault("lockup", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
+    // By a debugger.
+    fault("halt", WATCHDOG_MS, "watchdog", StopReason::Watchdog),
     // The current millisecond still feeds the watchdog in the next round.
     fault(
         "clock",
@@ -176,6 +178,23 @@ fn laser_record_and_resets_of_the_runner_are_right() -> Result<()> {
             .arg("--test")
             .current_dir(root().join("tools/rp2040")),
     )
+}
+
+/// 1 µs and 2 %, and 8 ns more.
+#[test]
+fn laser_pulses_beyond_the_limits_are_not_compiled() -> Result<()> {
+    let Some(_alone) = enabled("images with pulses beyond the limits", &[]) else {
+        return Ok(());
+    };
+    for (within, beyond, reason) in [
+        ((20_000, 1000), (20_000, 1008), "longer than 1000 ns"),
+        ((100_000, 200), (100_000, 208), "more than 2 % of the time"),
+    ] {
+        image(&["photon-timer"], Some(within))?;
+        let refused = refusal(beyond)?;
+        ensure!(refused.contains(reason), "{beyond:?}: {refused}");
+    }
+    Ok(())
 }
 
 #[test]

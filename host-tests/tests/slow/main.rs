@@ -13,6 +13,7 @@ mod boards;
 mod compare;
 mod debugger;
 mod emulator;
+mod enable;
 mod hil;
 mod histograms;
 mod large;

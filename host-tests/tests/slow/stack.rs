@@ -62,6 +62,13 @@ impl Image {
         Ok(image)
     }
 
+    /// The address of a function, by a part of its name.
+    pub fn function(&self, part: &str) -> Result<u64> {
+        let found = self.symbols.iter().find(|(name, _)| name.contains(part));
+        let (_, address) = found.with_context(|| format!("no {part} in the image"))?;
+        Ok(address & !1)
+    }
+
     /// The address of a symbol.
     pub fn address(&self, name: &str) -> Result<u64> {
         let address = self.symbols.get(name);

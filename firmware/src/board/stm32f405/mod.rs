@@ -7,7 +7,7 @@
 //! | serial port | USART2, 1 Mbaud, 8 data bits, no parity, 1 stop bit |
 //! | PA2 | sends; pin 14 of P1 on the Discovery, to RX of a USB adapter of 3.3 V |
 //! | PA3 | receives; pin 13 of P1 on the Discovery, to TX of the adapter |
-//! | watchdog | the independent one, resets after about a second |
+//! | watchdog | the independent one, resets after 0.3 to 1 s: its own oscillator has 17 to 47 kHz |
 //! | supply | below about 2.7 V the laser goes off and the board resets, until the supply is back |
 //! | log | defmt over RTT, which the debugger reads |
 //!
@@ -149,7 +149,8 @@ impl Stm32F405 {
 
         let mut watchdog = IndependentWatchdog::new(device.IWDG);
         watchdog.stop_on_debug(&device.DBGMCU, !DRIVES_SENSOR);
-        watchdog.start(1000.millis());
+        // At 32 kHz. Its oscillator has 17 kHz at least (data sheet DS8626, LSI oscillator characteristics): 0.94 s.
+        watchdog.start(500.millis());
         let board = Self {
             watchdog,
             fed_ms: 0,

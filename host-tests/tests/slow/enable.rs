@@ -1,0 +1,249 @@
+//! PC6 of the STM32F405, ENABLE of its sensor, goes low and stays low after every fault, and its watchdog is not fed
+//! any more in a hang. QEMU has neither, but logs what is written to them. The time of its processor is not that of
+//! the image: here is what comes after what, and not when.
+//!
+//! ```sh
+//! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow enable:: -- --nocapture
+//! ```
+
+use std::fs;
+use std::path::PathBuf;
+use std::sync::MutexGuard;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, ensure};
+use dtof_device::{Client, HostTimeout, Task};
+use dtof_link::Source;
+use tempfile::TempDir;
+
+use crate::boards::{is_known, settings};
+use crate::emulator::{Board, Emulator, PATIENCE, Planted, QEMU};
+use crate::enabled;
+
+/// How long a pin must stay low, and the watchdog not be fed.
+const LONG: Duration = Duration::from_millis(500);
+/// A host timeout of 3 s takes 0.3 s, one of 60 s 5.7: QEMU's clock has 168 MHz, the image's 16.
+const SOON: Duration = Duration::from_secs(4);
+/// Milliseconds of a watchdog whose oscillator is as slow as the data sheet allows: 17 kHz.
+const MOST_WATCHDOG_MS: u32 = 1_000;
+const SLOWEST_KHZ: u32 = 17;
+
+/// What is written to the pin and to the watchdog.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Written {
+    Enable(bool),
+    Prescaler(u32),
+    Reload(u32),
+    Start,
+    Feed,
+    /// Anything else that QEMU does not have.
+    Other,
+}
+
+impl Written {
+    /// From a line of QEMU's log. It has another name for the page of the independent watchdog.
+    fn of(line: &str) -> Self {
+        let Some((place, value)) = line.trim_end_matches(')').split_once(", value 0x") else {
+            return Self::Other;
+        };
+        let value = u32::from_str_radix(value, 16).unwrap_or_default();
+        let is_at = |part: &str, offset: &str| place.starts_with(part) && place.ends_with(offset);
+        // GPIOC_BSRR (RM0090, 8.4.7); IWDG_KR, IWDG_PR and IWDG_RLR (21.4).
+        if is_at("GPIOC: ", "offset 0x018") && value & 1 << 22 != 0 {
+            Self::Enable(false)
+        } else if is_at("GPIOC: ", "offset 0x018") && value & 1 << 6 != 0 {
+            Self::Enable(true)
+        } else if is_at("I2S2ext: ", "offset 0x004") {
+            Self::Prescaler(4 << value)
+        } else if is_at("I2S2ext: ", "offset 0x008") {
+            Self::Reload(value + 1)
+        } else if is_at("I2S2ext: ", "offset 0x000") && value == 0xcccc {
+            Self::Start
+        } else if is_at("I2S2ext: ", "offset 0x000") && value == 0xaaaa {
+            Self::Feed
+        } else {
+            Self::Other
+        }
+    }
+}
+
+/// A board with a TMF8829 that never answers: ENABLE stays high as long as the driver waits for it.
+struct Bench {
+    emulator: Emulator,
+    folder: TempDir,
+}
+
+impl Bench {
+    fn start() -> Result<Self> {
+        let image = Board::Stm32F405.image(&["tmf8829-spi"])?;
+        let folder = tempfile::tempdir()?;
+        let log = folder.path().join("log");
+        let emulator = Emulator::start_logged(Board::Stm32F405, &image, &log)?;
+        Ok(Self { emulator, folder })
+    }
+
+    fn log(&self) -> PathBuf {
+        self.folder.path().join("log")
+    }
+
+    /// All that has been written so far.
+    fn written(&self) -> Result<Vec<Written>> {
+        let text = fs::read_to_string(self.log())?;
+        let (whole, _) = text.rsplit_once('\n').unwrap_or_default();
+        Ok(whole.lines().map(Written::of).collect())
+    }
+
+    fn is_high(&self) -> Result<bool> {
+        let written = self.written()?;
+        let mut levels = written.iter().rev();
+        Ok(levels.find(|written| matches!(written, Written::Enable(_)))
+            == Some(&Written::Enable(true)))
+    }
+
+    fn until(&self, what: &str, is: impl Fn(&Self) -> Result<bool>) -> Result<()> {
+        let start = Instant::now();
+        while !is(self)? {
+            ensure!(start.elapsed() < PATIENCE, "{what}");
+            thread::sleep(Duration::from_millis(2));
+        }
+        Ok(())
+    }
+
+    /// A host that has started the sensor.
+    fn light(&mut self, host_timeout_ms: u16) -> Result<Client> {
+        let mut client = Client::new(self.emulator.connect()?)?;
+        let mut settings = settings();
+        let sensor = client.sensor()?.context("no sensor")?;
+        if let Some(bin_width) = sensor.bin_width {
+            settings.bin_width_ps = bin_width;
+        }
+        let task = Task {
+            settings: &settings,
+            pixels: 1,
+            columns: 1,
+            dynamic_depth: None,
+            host_timeout: HostTimeout::from_milliseconds(host_timeout_ms).context("no timeout")?,
+        };
+        ensure!(!self.is_high()?, "ENABLE is high before a host asks for it");
+        client.configure(&task.configuration(Source::Sensor)?)?;
+        self.until("ENABLE never goes high", Self::is_high)?;
+        Ok(client)
+    }
+
+    /// Stops the image while ENABLE is high, and plants a fault. How much was written before.
+    fn plant(&mut self, what: Planted) -> Result<usize> {
+        loop {
+            self.emulator.interrupt()?;
+            if self.is_high()? {
+                break;
+            }
+            self.emulator.resume()?;
+            self.until("ENABLE stays low", Self::is_high)?;
+        }
+        self.emulator.plant(what)?;
+        let before = self.written()?.len();
+        self.emulator.resume()?;
+        Ok(before)
+    }
+
+    /// Waits until ENABLE is low and stays so, while the image runs.
+    fn goes_low(&self, most: Duration) -> Result<()> {
+        let start = Instant::now();
+        loop {
+            let before = self.written()?.len();
+            let was_high = self.is_high()?;
+            thread::sleep(LONG);
+            let more = &self.written()?[before..];
+            ensure!(more.contains(&Written::Feed), "the image does not run");
+            if !was_high && !more.contains(&Written::Enable(true)) {
+                return Ok(());
+            }
+            ensure!(start.elapsed() < most, "ENABLE does not stay low");
+        }
+    }
+}
+
+/// Milliseconds of the watchdog with the slowest oscillator, if it starts.
+fn watchdog_ms(written: &[Written]) -> Option<u32> {
+    let starts = written.iter().position(|&of| of == Written::Start)?;
+    let before = || written[..starts].iter().rev();
+    let clocks = before().find_map(|of| match of {
+        Written::Prescaler(clocks) => Some(clocks),
+        _ => None,
+    })?;
+    let count = before().find_map(|of| match of {
+        Written::Reload(count) => Some(count),
+        _ => None,
+    })?;
+    Some((clocks * count).div_ceil(SLOWEST_KHZ))
+}
+
+#[test]
+fn enable_goes_low_and_stays_low_after_every_fault() -> Result<()> {
+    let Some(_alone) = ready("ENABLE of stm32f405 in QEMU") else {
+        return Ok(());
+    };
+    for what in [Planted::Panic, Planted::Fault, Planted::Overflow] {
+        let mut bench = Bench::start()?;
+        let _client = bench.light(60_000)?;
+        let before = bench.plant(what)?;
+        // The board has been reset, and has started again.
+        bench.until("no reset", |bench| {
+            Ok(bench.written()?[before..].contains(&Written::Start))
+        })?;
+        let first = bench.written()?[before];
+        ensure!(first == Written::Enable(false), "{what:?}: first {first:?}");
+        bench.goes_low(Duration::ZERO)?;
+        println!("stm32f405, {what:?}: ENABLE goes low, the board is reset, and ENABLE stays low");
+    }
+    Ok(())
+}
+
+#[test]
+fn the_watchdog_is_not_fed_when_the_image_hangs_or_its_clock_stops() -> Result<()> {
+    let Some(_alone) = ready("the watchdog of stm32f405 in QEMU") else {
+        return Ok(());
+    };
+    for what in [Planted::Hang, Planted::Clock] {
+        let mut bench = Bench::start()?;
+        let _client = bench.light(60_000)?;
+        let before = bench.plant(what)?;
+        thread::sleep(LONG);
+        let written = bench.written()?;
+        let (before, after) = written.split_at(before);
+        let fed = |of: &[Written]| of.iter().filter(|&&of| of == Written::Feed).count();
+        // The main loop may not have seen the last millisecond before.
+        ensure!(
+            fed(before) > 10 && fed(after) <= 1,
+            "{what:?}: fed {} times, then {}",
+            fed(before),
+            fed(after)
+        );
+        let ms = watchdog_ms(before).context("no watchdog")?;
+        ensure!(ms <= MOST_WATCHDOG_MS, "a watchdog of {ms} ms");
+        println!("stm32f405, {what:?}: its watchdog of at most {ms} ms is not fed any more");
+    }
+    Ok(())
+}
+
+#[test]
+fn enable_goes_low_when_the_host_ends_its_session_or_is_silent() -> Result<()> {
+    let Some(_alone) = ready("ENABLE of stm32f405 without a host") else {
+        return Ok(());
+    };
+    let mut bench = Bench::start()?;
+    drop(bench.light(60_000)?);
+    bench.goes_low(SOON)?;
+    let mut bench = Bench::start()?;
+    let _silent = bench.light(3_000)?;
+    bench.goes_low(SOON)?;
+    println!(
+        "stm32f405: ENABLE goes low and stays low when the session ends, and when the host is silent"
+    );
+    Ok(())
+}
+
+fn ready(test: &str) -> Option<MutexGuard<'static, ()>> {
+    enabled(test, &[QEMU]).filter(|_| is_known(test))
+}
