@@ -2,6 +2,7 @@
 
 mod from_device;
 
+use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -93,7 +94,10 @@ impl Calibrate {
         );
         let inputs = [input, self.settings.as_deref()];
         let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
-        // Settings are written last: if they exist, so does the report.
+        // The report of the older settings goes first: a report is that of the settings beside it. A link to it stays.
+        let linked = fs::canonicalize(&place).ok();
+        let linked = linked.filter(|_| place.is_symlink());
+        let older = linked.as_deref().unwrap_or(&place);
         let text = settings.to_toml()?;
         let report = MarkedFile {
             place: &place,
@@ -107,7 +111,7 @@ impl Calibrate {
             mark: MARKS[0],
             is_edited: true,
         };
-        let kept = write_marked(&[report, settings_file], &[], &inputs)?;
+        let kept = write_marked(&[settings_file, report], &[older], &inputs)?;
         say_kept(kept.as_deref(), self.quiet)?;
         if !self.quiet {
             let mut out = io::stdout().lock();

@@ -99,7 +99,7 @@ impl Work {
                 "calibrated",
                 calibrate,
                 ["/found.toml --bin-width-ps 200", "/found.toml"],
-                "found.toml",
+                "found.html",
             ),
             (
                 "compared",

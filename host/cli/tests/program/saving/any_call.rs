@@ -6,8 +6,8 @@ use super::full::{is_named, is_there};
 use super::{Files, Work, Writer, files, partial, times};
 use crate::common::strace::{Fault, calls, faulty};
 
-/// Settings that a run replaces are kept under this name.
-const KEPT: [&str; 2] = ["dtof.toml", "dtof.toml~1"];
+/// Settings that are replaced are kept, under names that end so.
+const KEPT: &str = "~1";
 /// A signal that cannot be caught.
 const KILL: i32 = 9;
 /// Calls by which files move to their places.
@@ -15,9 +15,11 @@ const MOVES: [&str; 5] = ["rename", "renameat", "renameat2", "unlink", "unlinkat
 
 /// The files without the incomplete ones, and without settings that were kept.
 fn complete(mut files: Files, earlier: &Files) -> Files {
-    let kept = files.remove(KEPT[1]);
-    assert!(kept.is_none() || kept.as_ref() == earlier.get(KEPT[0]));
-    files.retain(|name, _| !name.ends_with(".partial"));
+    files.retain(|name, bytes| {
+        let kept = name.strip_suffix(KEPT);
+        assert!(kept.is_none_or(|of| earlier.get(of) == Some(bytes)));
+        kept.is_none() && !name.ends_with(".partial")
+    });
     files
 }
 
@@ -29,12 +31,12 @@ fn check(found: &Files, earlier: &Files, new: &Files, writer: &Writer) -> bool {
         let complete = [earlier.get(name), new.get(name)];
         assert!(complete.contains(&Some(bytes)), "{name} is not whole");
     }
-    let last = found.get(writer.last);
-    // A new report may stand beside older settings, as two files cannot move at the same time.
-    let is_mixture = last.is_some() && found != new && found != earlier;
-    let is_report = writer.out == "calibrated" && last == earlier.get(writer.last);
-    assert!(!is_mixture || is_report, "a mixture looks complete");
-    last.is_some() && found == new
+    let has_last = found.contains_key(writer.last);
+    assert!(
+        !has_last || found == new || found == earlier,
+        "a mixture looks complete"
+    );
+    has_last && found == new
 }
 
 #[test]

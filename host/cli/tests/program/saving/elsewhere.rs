@@ -131,3 +131,18 @@ fn links_in_the_folder_named_are_replaced_and_not_followed() {
         assert!(!scratch.path("a/b/out").join(name).is_symlink(), "{name}");
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn a_link_to_a_report_stays_and_what_it_leads_to_is_replaced() {
+    let work = super::Work::new();
+    work.earlier("calibrated");
+    let [report, link] = ["report.html", "calibrated/found.html"];
+    let [place, linked] = [report, link].map(|name| work.scratch.path(name));
+    std::fs::rename(&linked, &place).unwrap();
+    std::os::unix::fs::symlink(&place, &linked).unwrap();
+    let older = work.scratch.read(report);
+    work.scratch.printed(&work.line("calibrated", true));
+    assert!(linked.is_symlink());
+    assert_ne!(work.scratch.read(report), older);
+}
