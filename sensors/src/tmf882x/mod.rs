@@ -22,7 +22,8 @@
 //! With [`Zones::SixtyFour`] a TMF8828 measures its zones in four captures of two halves. Only the
 //! result after a capture tells which of the four it was. So the driver drops the histograms of the
 //! first capture and assigns the next ones in turn; each result confirms them. If it does not, the poll
-//! returns [`DeviceError::WrongCapture`] or [`DeviceError::OutOfOrder`], and the driver is in step again.
+//! returns [`DeviceError::WrongCapture`] or [`DeviceError::OutOfOrder`], and the driver is in step again. If the
+//! measurement ends with another error before the result, nothing confirms those of its last capture.
 //! Zones are numbered row by row as in the vendor's examples; their place in space is not published.
 //! The sensor's own targets come with each result ([`PhotonSink::target`]).
 //!
