@@ -21,19 +21,6 @@ pub const NPM: &str = "npm";
 /// The path of the image, by default the sidecar. `laser` is the rate of the photon timer in Hz and its
 /// pulse in nanoseconds.
 pub fn image(what: &[&str], laser: Option<(u32, u32)>) -> Result<PathBuf> {
-    let output = build(what, laser).stderr(Stdio::inherit()).output()?;
-    ensure!(output.status.success(), "no image of {what:?}, see above");
-    Ok(String::from_utf8(output.stdout)?.trim().into())
-}
-
-/// What is printed when there is to be no image of the photon timer with such a laser.
-pub fn refusal(laser: (u32, u32)) -> Result<String> {
-    let output = build(&["photon-timer"], Some(laser)).output()?;
-    ensure!(!output.status.success(), "an image of {laser:?}");
-    Ok(String::from_utf8(output.stderr)?)
-}
-
-fn build(what: &[&str], laser: Option<(u32, u32)>) -> Command {
     let mut cargo = Command::new(env!("CARGO"));
     cargo
         .args(["--locked", "xtask", "image", "pico"])
@@ -44,8 +31,25 @@ fn build(what: &[&str], laser: Option<(u32, u32)>) -> Command {
             .env("LASER_PULSE_NS", pulse_ns.to_string()),
         None => cargo.env_remove("LASER_HZ").env_remove("LASER_PULSE_NS"),
     };
-    cargo.current_dir(root()).stdin(Stdio::null());
+    let cargo = cargo.current_dir(root()).stdin(Stdio::null());
+    let output = cargo.stderr(Stdio::inherit()).output()?;
+    ensure!(output.status.success(), "no image of {what:?}, see above");
+    Ok(String::from_utf8(output.stdout)?.trim().into())
+}
+
+/// Why the compiler refuses an image of the photon timer with such a laser, if it does. `cargo xtask` would refuse it
+/// before.
+pub fn refusal((hz, pulse_ns): (u32, u32)) -> Result<Option<String>> {
+    let mut cargo = Command::new(env!("CARGO"));
     cargo
+        .args(["check", "--locked", "--quiet", "--package", "dtof-firmware"])
+        .args(["--features", "pico,sensor-photon-timer"])
+        .args(["--target", "thumbv6m-none-eabi"])
+        .env("LASER_HZ", hz.to_string())
+        .env("LASER_PULSE_NS", pulse_ns.to_string());
+    let output = cargo.current_dir(root()).stdin(Stdio::null()).output()?;
+    let refused = String::from_utf8(output.stderr)?;
+    Ok((!output.status.success()).then_some(refused))
 }
 
 /// Installs rp2040js unless it is installed.
