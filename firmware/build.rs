@@ -23,7 +23,6 @@ const TARGETS: [&str; 3] = [
 
 fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=build.rs");
-    println!("cargo::rerun-if-changed=core-image.x");
     println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=../memory.x");
 
@@ -37,9 +36,6 @@ fn main() -> Result<(), Box<dyn Error>> {
     let link = |image: &str, argument: &str| {
         println!("cargo::rustc-link-arg-bin={image}={argument}");
     };
-
-    link("core-image", &format!("-L{here}/.."));
-    link("core-image", &format!("-T{here}/core-image.x"));
 
     for (image, boards) in IMAGES {
         let is_for = |board: &&&str| env::var_os(format!("CARGO_FEATURE_{board}")).is_some();

@@ -27,11 +27,19 @@ pub fn encode(parts: [&[u8]; 2], wire: &mut [u8; WIRE_BYTES]) -> usize {
     }
     let checksum = CRC_32.checksum(&frame);
     let _ = frame.extend_from_slice(&checksum.to_le_bytes());
-    let Some((end, body)) = wire.split_last_mut() else {
-        return 0;
-    };
-    *end = 0;
-    let length = cobs::try_encode(&frame, body).unwrap_or(0);
+    let [first, places @ .., _] = wire;
+    // COBS: each zero becomes the distance to the next one. One more is before the frame, one behind it.
+    let mut distance = 1;
+    for (place, &byte) in places.iter_mut().zip(&frame).rev() {
+        if byte == 0 {
+            *place = core::mem::replace(&mut distance, 1);
+        } else {
+            *place = byte;
+            distance += 1;
+        }
+    }
+    *first = distance;
+    let length = frame.len() + 1;
     if let Some(end) = wire.get_mut(length) {
         *end = 0;
     }
@@ -90,10 +98,20 @@ impl Deframer {
     }
 }
 
-/// The payload of a frame.
+/// The payload of a frame. No byte of `bytes` is 0.
 fn open(bytes: &mut [u8]) -> Result<&[u8], FrameError> {
-    let length = cobs::decode_in_place(bytes).map_err(|_| FrameError::Corrupt)?;
-    let frame = bytes.get(..length).ok_or(FrameError::Corrupt)?;
+    // COBS: a byte that is a distance was a zero of the frame; the first was the one before it.
+    let mut distance = 1;
+    for byte in bytes.iter_mut() {
+        distance -= 1;
+        if distance == 0 {
+            distance = core::mem::take(byte);
+        }
+    }
+    // The last distance leads to the zero behind the frame.
+    let Some((_, frame)) = bytes.split_first().filter(|_| distance == 1) else {
+        return Err(FrameError::Corrupt);
+    };
     let (payload, checksum) = frame.split_last_chunk().ok_or(FrameError::Corrupt)?;
     if CRC_32.checksum(payload) != u32::from_le_bytes(*checksum) {
         return Err(FrameError::Corrupt);

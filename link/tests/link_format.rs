@@ -161,6 +161,36 @@ fn the_longest_frame_has_two_bytes_for_its_code() {
     }
 }
 
+/// Its first byte is the distance to its end.
+#[test]
+fn the_longest_frame_without_a_zero_comes_back() {
+    let payload = [7; PAYLOAD_BYTES];
+    let mut wire = [0; WIRE_BYTES];
+    assert_eq!(encode([&payload, &[]], &mut wire), WIRE_BYTES);
+    let (first, frame) = wire.split_first().unwrap();
+    assert_eq!((*first, &frame[..PAYLOAD_BYTES]), (255, &payload[..]));
+    let mut deframer = Deframer::new();
+    let found = wire.map(|byte| deframer.push(byte).map(|frame| frame == Ok(&payload)));
+    assert_eq!(found[WIRE_BYTES - 1], Some(true));
+}
+
+/// The checksum of nothing is 0: a frame of four zeros.
+#[test]
+fn a_last_distance_past_the_end_is_corrupt() {
+    let mut wire = [0xff; WIRE_BYTES];
+    let length = encode([&[], &[]], &mut wire);
+    assert_eq!(wire[..length], [1, 1, 1, 1, 1, 0]);
+    for (last, frame) in [(1, Ok(&[][..])), (2, Err(FrameError::Corrupt))] {
+        let mut deframer = Deframer::new();
+        assert!(
+            [1, 1, 1, 1, last]
+                .iter()
+                .all(|&byte| deframer.push(byte).is_none())
+        );
+        assert_eq!(deframer.push(0), Some(frame));
+    }
+}
+
 #[test]
 fn blocks_need_a_patience() {
     let binning = |patience| AdaptiveBinning {

@@ -81,7 +81,8 @@ pub struct RateError;
 
 impl fmt::Display for RateError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let most = Poisson::MAX_MEAN;
+        // As a whole number: the text of a fraction could panic.
+        let most = Poisson::MAX_MEAN.to_bits() >> U8F24::FRAC_NBITS;
         write!(f, "more than {most} photons a laser cycle in a pixel")
     }
 }

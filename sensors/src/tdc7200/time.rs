@@ -74,6 +74,8 @@ pub struct Calibration {
 
 impl Calibration {
     const PS_PER_MS: i64 = 1_000_000_000;
+    /// A time past the last bin of any width, so that it is counted as rejected.
+    const NEVER: i64 = i64::MAX;
 
     /// From CALIBRATION1 and CALIBRATION2 and the reference clock in kHz, or
     /// `None` unless CALIBRATION2 is greater, both fit 23 bits and the clock is within 1 to 16 MHz.
@@ -118,10 +120,16 @@ impl Calibration {
         // Whole picoseconds of the clock first, so that all fits 63 bits:
         // 23 + 6 + 30 for the counts, 14 + 23 for what the clock leaves.
         let clock_ps = clocks * Self::PS_PER_MS;
-        let whole = clock_ps / self.clock_khz;
-        let rest = clock_ps % self.clock_khz;
-        let numerator = counts * self.periods * Self::PS_PER_MS + rest * self.counts;
         let denominator = self.clock_khz * self.counts;
-        whole + (numerator + denominator / 2).div_euclid(denominator)
+        // `/` could panic. Neither divisor is 0.
+        let Some(whole) = clock_ps.checked_div(self.clock_khz) else {
+            return Self::NEVER;
+        };
+        let rest = clock_ps - whole * self.clock_khz;
+        let numerator = counts * self.periods * Self::PS_PER_MS + rest * self.counts;
+        match (numerator + denominator / 2).checked_div_euclid(denominator) {
+            Some(rounded) => whole + rounded,
+            None => Self::NEVER,
+        }
     }
 }

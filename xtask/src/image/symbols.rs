@@ -154,7 +154,7 @@ mod tests {
             _RNvNvNtCs1234_4core5slice20copy_from_slice_impl17len_mismatch_fail
             core::panicking::panic rust_begin_unwind rust_eh_personality
             _RNvCs1234_7___rustc17rust_begin_unwind
-            _Unwind_Resume dtof_core_has_a_reachable_panic";
+            _Unwind_Resume dtof_has_a_reachable_panic";
         assert_all(names, Some("panics"));
     }
 
@@ -200,7 +200,7 @@ mod tests {
             __ucmpdi2 __clzsi2 __ctzdi2 __popcountsi2 __bswapsi2 __ffssi2
             memcpy memset memmove memcmp bcmp strlen _start
             _ZN9dtof_core5isqrt5isqrt17h0123456789abcdefE
-            _ZN10core_image5roots17h0123456789abcdefE
+            _ZN13library_image5roots17h0123456789abcdefE
             _RINvNtCs1234_9dtof_core5pixel6detectKj8_NtNtB4_9histogram7Count10E
             $t.0 $d $x .L1";
         assert_all(names, None);

@@ -9,7 +9,7 @@ use dtof_core::events::DynamicDepthEvent;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
 use dtof_core::rule::{Tracking, background_from_count};
 use dtof_core::{
-    AverageRule, BinIndex, BinPosition, BlockLevel, CentredWindow, Count, DepthEstimator,
+    AnyRule, AverageRule, BinIndex, BinPosition, BlockLevel, CentredWindow, Count, DepthEstimator,
     DepthEvent, DetectionRule, EchoNumber, Flags, LaserCycle, PaperRule, PixelAddress, PixelConfig,
     PixelConfigBuilder, RangeGate, RangeScale, SubBinOffset, WindowRule,
 };
@@ -49,6 +49,14 @@ pub fn window_rule() -> Option<WindowRule> {
     let rule = or_text(rule)?;
     keep((rule.width(), rule.z(), rule.minimum_count()));
     Some(rule)
+}
+
+pub fn any_rule() -> AnyRule {
+    match window_rule() {
+        Some(rule) => rule.into(),
+        None if more() => average_rule().into(),
+        None => rule().into(),
+    }
 }
 
 pub fn estimator() -> DepthEstimator {
@@ -153,6 +161,20 @@ pub fn more() -> bool {
 /// The first of `all`: how many, the optimiser does not know either.
 pub fn some<T>(all: &[T]) -> &[T] {
     all.get(..usize::from(half())).unwrap_or(all)
+}
+
+/// The same to change.
+pub fn some_mut<T>(all: &mut [T]) -> &mut [T] {
+    let end = usize::from(half()).min(all.len());
+    all.get_mut(..end).unwrap_or_default()
+}
+
+pub fn one_of<T: Copy, const N: usize>(all: [T; N]) -> T {
+    loop {
+        if let Some(one) = all.get(usize::from(byte())) {
+            return *one;
+        }
+    }
 }
 
 pub fn values<T, const N: usize>(one: fn() -> T) -> [T; N] {
