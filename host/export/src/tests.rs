@@ -16,6 +16,7 @@ use dtof_events::fixtures;
 use tempfile::TempDir;
 
 use super::*;
+use dtof_options::Named;
 
 /// A bin is 266.8513 ps × 0.149896229 mm/ps = 40 mm, so the middle of bin 60 is at 60.5 × 40 mm + 80 mm = 2500 mm.
 fn header() -> Header {
@@ -122,6 +123,27 @@ fn try_export(
         Err(error) => {
             assert_eq!(out, format.mark().as_bytes());
             Err(format!("{error:#}").replace(&prefix, ""))
+        }
+    }
+}
+
+#[test]
+fn a_file_of_the_same_format_is_replaced_and_no_other() {
+    let folder = TempDir::new().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    fs::write(path("events.aer"), file(&[])).unwrap();
+    let export = |format, out: &str| {
+        let options = Options::default();
+        export(&path("events.aer"), &path(out), format, &options, &mut ())
+    };
+    for (name, format, _) in Format::NAMES {
+        export(*format, name).unwrap();
+        export(*format, name).unwrap();
+        for other in ["", "mine"] {
+            fs::write(path("other"), other).unwrap();
+            let refused = export(*format, "other").unwrap_err().to_string();
+            assert!(refused.contains("other: is there and no "), "{refused}");
+            assert_eq!(fs::read_to_string(path("other")).unwrap(), other);
         }
     }
 }
