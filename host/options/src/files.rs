@@ -276,7 +276,9 @@ pub fn write_marked(
         }
     }
     for old in removed {
-        remove(old)?;
+        // As above, a link stays.
+        let linked = fs::canonicalize(old).ok();
+        remove(linked.as_deref().unwrap_or(old))?;
     }
     for (file, to, place) in written {
         let moved = file.persist(to).map_err(|error| error.error);

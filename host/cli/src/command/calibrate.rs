@@ -2,7 +2,6 @@
 
 mod from_device;
 
-use std::fs;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -94,10 +93,7 @@ impl Calibrate {
         );
         let inputs = [input, self.settings.as_deref()];
         let inputs: Vec<&Path> = inputs.into_iter().flatten().collect();
-        // The report of the older settings goes first: a report is that of the settings beside it. A link to it stays.
-        let linked = fs::canonicalize(&place).ok();
-        let linked = linked.filter(|_| place.is_symlink());
-        let older = linked.as_deref().unwrap_or(&place);
+        // The report of the older settings goes first: a report is that of the settings beside it.
         let text = settings.to_toml()?;
         let report = MarkedFile {
             place: &place,
@@ -111,7 +107,7 @@ impl Calibrate {
             mark: MARKS[0],
             is_edited: true,
         };
-        let kept = write_marked(&[settings_file, report], &[older], &inputs)?;
+        let kept = write_marked(&[settings_file, report], &[&place], &inputs)?;
         say_kept(kept.as_deref(), self.quiet)?;
         if !self.quiet {
             let mut out = io::stdout().lock();
