@@ -91,9 +91,9 @@ impl Sidecar<'_> {
             }
             let words = core::iter::from_fn(|| self.words.dequeue()).take(WORDS);
             let mut body: Vec<u8, BODY_BYTES> = Vec::new();
-            for word in words {
+            for byte in words.flat_map(AerWord::to_le_bytes) {
                 // There is room for each. `collect` could panic.
-                let _ = body.extend_from_slice(&word.to_le_bytes());
+                let _ = body.push(byte);
             }
             // There is room: checked above.
             let _ = self.endpoint.offer(message::EVENTS, &body);
