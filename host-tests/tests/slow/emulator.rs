@@ -268,12 +268,12 @@ impl Emulator {
         let image = &self.image;
         let at = |part: &str| anyhow::Ok(u32::try_from(image.function(part)?)?);
         let registers = match what {
-            // An index, a length, and where it is.
+            // An empty message, and where it is.
             Planted::Panic => vec![
-                (0, 7),
-                (1, 3),
+                (0, ZEROS),
+                (1, 0),
                 (2, ZEROS),
-                (15, at("9panicking18panic_bounds_check")?),
+                (15, at("9panicking5panic")?),
             ],
             Planted::Fault => vec![(15, NO_MEMORY)],
             // The first instruction of `main` is a push.

@@ -1,9 +1,9 @@
 //! PC6 of the STM32F405, ENABLE of its sensor, goes low and stays low after every fault, and its watchdog is not fed
-//! any more in a hang. QEMU has neither, but logs what is written to them. The time of its processor is not that of
-//! the image: here is what comes after what, and not when.
+//! any more in a hang. QEMU has neither, but logs what is written to them. The image's milliseconds are counted, since it
+//! feeds its watchdog at most once in each.
 //!
 //! ```sh
-//! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow enable:: -- --ignored --nocapture
+//! DTOF_SLOW=1 cargo test --package dtof-host-tests --test slow enable:: -- --nocapture
 //! ```
 
 use std::fs;
@@ -21,10 +21,13 @@ use crate::boards::{is_known, settings};
 use crate::emulator::{Board, Emulator, PATIENCE, Planted, QEMU};
 use crate::enabled;
 
-/// How long a pin must stay low, and the watchdog not be fed.
+/// How long the watchdog must not be fed.
 const LONG: Duration = Duration::from_millis(500);
-/// A host timeout of 3 s takes 0.3 s, one of 60 s 5.7: QEMU's clock has 168 MHz, the image's 16.
-const SOON: Duration = Duration::from_secs(4);
+/// For so many feeds of the watchdog ENABLE must stay low. A driver that is on raises it again within ten.
+const LONG_FEEDS: usize = 1_000;
+/// Milliseconds of a host timeout: of one that must not pass, and of one that must.
+const NEVER_MS: u16 = 60_000;
+const SILENCE_MS: u16 = 3_000;
 /// Milliseconds of a watchdog whose oscillator is as slow as the data sheet allows: 17 kHz.
 const MOST_WATCHDOG_MS: u32 = 1_000;
 const SLOWEST_KHZ: u32 = 17;
@@ -101,7 +104,7 @@ impl Bench {
             == Some(&Written::Enable(true)))
     }
 
-    fn until(&self, what: &str, is: impl Fn(&Self) -> Result<bool>) -> Result<()> {
+    fn until(&self, what: &str, mut is: impl FnMut(&Self) -> Result<bool>) -> Result<()> {
         let start = Instant::now();
         while !is(self)? {
             ensure!(start.elapsed() < PATIENCE, "{what}");
@@ -147,21 +150,39 @@ impl Bench {
         Ok(before)
     }
 
-    /// Waits until ENABLE is low and stays so, while the image runs.
-    fn goes_low(&self, most: Duration) -> Result<()> {
-        let start = Instant::now();
-        loop {
-            let before = self.written()?.len();
-            let was_high = self.is_high()?;
-            thread::sleep(LONG);
-            let more = &self.written()?[before..];
-            ensure!(more.contains(&Written::Feed), "the image does not run");
-            if !was_high && !more.contains(&Written::Enable(true)) {
-                return Ok(());
-            }
-            ensure!(start.elapsed() < most, "ENABLE does not stay low");
-        }
+    /// Where ENABLE went high first.
+    fn first_high(&self) -> Result<usize> {
+        let mut written = self.written()?.into_iter();
+        let first = written.position(|what| what == Written::Enable(true));
+        first.context("ENABLE was never high")
     }
+
+    /// Waits until ENABLE has stayed low for long. How often the watchdog was fed from the write `from` until it went low.
+    fn goes_low(&self, from: usize) -> Result<usize> {
+        let mut low_after = 0;
+        self.until("ENABLE does not stay low", |bench| {
+            let written = bench.written()?;
+            let (mut feeds, mut is_high) = (0, true);
+            for &what in &written[from..] {
+                match what {
+                    Written::Feed => feeds += 1,
+                    Written::Enable(level) => {
+                        if is_high {
+                            low_after = feeds;
+                        }
+                        is_high = level;
+                    }
+                    _ => {}
+                }
+            }
+            Ok(!is_high && feeds >= low_after + LONG_FEEDS)
+        })?;
+        Ok(low_after)
+    }
+}
+
+fn fed(written: &[Written]) -> usize {
+    written.iter().filter(|&&of| of == Written::Feed).count()
 }
 
 /// Milliseconds of the watchdog with the slowest oscillator, if it starts.
@@ -180,48 +201,51 @@ fn watchdog_ms(written: &[Written]) -> Option<u32> {
 }
 
 #[test]
-#[ignore = "needs a computer that does nothing else: .ci/long faults runs it"]
 fn enable_goes_low_and_stays_low_after_every_fault() -> Result<()> {
     let Some(_alone) = ready("ENABLE of stm32f405 in QEMU") else {
         return Ok(());
     };
     for what in [Planted::Panic, Planted::Fault, Planted::Overflow] {
         let mut bench = Bench::start()?;
-        let _client = bench.light(60_000)?;
+        let _client = bench.light(NEVER_MS)?;
         let before = bench.plant(what)?;
         // The board has been reset, and has started again.
         bench.until("no reset", |bench| {
             Ok(bench.written()?[before..].contains(&Written::Start))
         })?;
-        let first = bench.written()?[before];
-        ensure!(first == Written::Enable(false), "{what:?}: first {first:?}");
-        bench.goes_low(Duration::ZERO)?;
+        bench.goes_low(before)?;
+        let after = &bench.written()?[before..];
+        ensure!(
+            after[0] == Written::Enable(false),
+            "{what:?}: first {:?}",
+            after[0]
+        );
+        ensure!(
+            !after.contains(&Written::Enable(true)),
+            "{what:?}: ENABLE goes high again"
+        );
         println!("stm32f405, {what:?}: ENABLE goes low, the board is reset, and ENABLE stays low");
     }
     Ok(())
 }
 
 #[test]
-#[ignore = "needs a computer that does nothing else: .ci/long faults runs it"]
 fn the_watchdog_is_not_fed_when_the_image_hangs_or_its_clock_stops() -> Result<()> {
     let Some(_alone) = ready("the watchdog of stm32f405 in QEMU") else {
         return Ok(());
     };
     for what in [Planted::Hang, Planted::Clock] {
         let mut bench = Bench::start()?;
-        let _client = bench.light(60_000)?;
+        let _client = bench.light(NEVER_MS)?;
+        bench.until("the watchdog is not fed", |bench| {
+            Ok(fed(&bench.written()?) > 10)
+        })?;
         let before = bench.plant(what)?;
         thread::sleep(LONG);
         let written = bench.written()?;
         let (before, after) = written.split_at(before);
-        let fed = |of: &[Written]| of.iter().filter(|&&of| of == Written::Feed).count();
         // The main loop may not have seen the last millisecond before.
-        ensure!(
-            fed(before) > 10 && fed(after) <= 1,
-            "{what:?}: fed {} times, then {}",
-            fed(before),
-            fed(after)
-        );
+        ensure!(fed(after) <= 1, "{what:?}: fed {} times", fed(after));
         let ms = watchdog_ms(before).context("no watchdog")?;
         ensure!(ms <= MOST_WATCHDOG_MS, "a watchdog of {ms} ms");
         println!("stm32f405, {what:?}: its watchdog of at most {ms} ms is not fed any more");
@@ -230,19 +254,22 @@ fn the_watchdog_is_not_fed_when_the_image_hangs_or_its_clock_stops() -> Result<(
 }
 
 #[test]
-#[ignore = "needs a computer that does nothing else: .ci/long faults runs it"]
 fn enable_goes_low_when_the_host_ends_its_session_or_is_silent() -> Result<()> {
     let Some(_alone) = ready("ENABLE of stm32f405 without a host") else {
         return Ok(());
     };
     let mut bench = Bench::start()?;
-    drop(bench.light(60_000)?);
-    bench.goes_low(SOON)?;
+    drop(bench.light(NEVER_MS)?);
+    let ended = bench.goes_low(bench.first_high()?)?;
+    ensure!(ended < usize::from(NEVER_MS) / 2, "low after {ended} ms");
     let mut bench = Bench::start()?;
-    let _silent = bench.light(3_000)?;
-    bench.goes_low(SOON)?;
+    let _silent = bench.light(SILENCE_MS)?;
+    let silent = bench.goes_low(bench.first_high()?)?;
+    // The host was last heard before ENABLE went high.
+    ensure!(silent <= usize::from(SILENCE_MS), "low after {silent} ms");
     println!(
-        "stm32f405: ENABLE goes low and stays low when the session ends, and when the host is silent"
+        "stm32f405: ENABLE goes low and stays low when the session ends, after {ended} ms, and when the host is silent for \
+         {SILENCE_MS} ms, after {silent} ms"
     );
     Ok(())
 }

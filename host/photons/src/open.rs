@@ -405,7 +405,8 @@ fn array(input: &Input, options: &ReadOptions, read: Histograms) -> Result<Conte
         pixels,
     } = read;
     let swapped = match &options.axes {
-        None => warnings::swapped_axes(&axes, &pixels),
+        None => warnings::swapped_axes(&axes, &pixels)
+            .or_else(|| warnings::bins_may_be_first(&axes, layout.bins())),
         Some(_) => None,
     };
     let bins = layout.bins();

@@ -190,6 +190,19 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
     ))
 }
 
+/// Warns of three axes of which the last two are equal and the first is longer: perhaps bins, rows and columns. They were
+/// read as rows, columns and bins. `axes` are the lengths of the first two.
+#[must_use]
+pub fn bins_may_be_first(axes: &[usize], bins: usize) -> Option<String> {
+    match *axes {
+        [rows, columns] if columns == bins && rows > bins => Some(format!(
+            "{rows}x{columns}x{bins}: read as {rows} rows of {columns} columns with {bins} bins; if the first axis is the bins: \
+             --axes bins,rows,columns"
+        )),
+        _ => None,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -324,6 +337,23 @@ mod tests {
             assert!(is_near(all.mean(), mean), "{lines:?} {}", all.mean());
             let half = all.of_lower_half();
             assert!(is_near(half, lower), "{lines:?} {half}");
+        }
+    }
+
+    #[test]
+    fn a_square_behind_a_longer_axis_may_be_rows_and_columns() {
+        let warning = bins_may_be_first(&[17, 16], 16).unwrap();
+        let line = "17x16x16: read as 17 rows of 16 columns with 16 bins; if the first axis is the bins: \
+                    --axes bins,rows,columns";
+        assert_eq!(warning, line);
+        for (axes, bins) in [
+            (&[16, 16][..], 16),
+            (&[17, 16], 15),
+            (&[17, 16], 17),
+            (&[17], 16),
+            (&[2, 17, 16], 16),
+        ] {
+            assert_eq!(bins_may_be_first(axes, bins), None, "{axes:?} {bins}");
         }
     }
 

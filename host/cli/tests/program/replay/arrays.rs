@@ -56,6 +56,22 @@ fn without_names_the_last_axis_is_the_bins() {
     assert_eq!(summary, named);
 }
 
+/// 40 bins of 8x8 pixels, read as 40 rows of 8 pixels with 8 bins each unless the axes are named.
+#[test]
+fn a_shape_that_may_begin_with_the_bins_is_said_unless_the_axes_are_named() {
+    let scratch = Scratch::new();
+    let path = scratch.file("bins.npy", npy("<u2", "(40, 8, 8)", &[5; 2 * 40 * 8 * 8]));
+    let warnings = |options: &str| scratch.replayed(&path, options)["warnings"].to_string();
+    assert_contains(
+        &warnings(""),
+        "40x8x8: read as 40 rows of 8 columns with 8 bins;",
+    );
+    for named in ["bins,rows,columns", "rows,columns,bins"] {
+        let warnings = warnings(&format!("--axes {named}"));
+        assert!(!warnings.contains("40x8x8"), "{warnings}");
+    }
+}
+
 #[test]
 fn a_capture_has_a_length_of_its_own() {
     let scratch = Scratch::new();
