@@ -109,10 +109,18 @@ def test_messages_name_keywords():
         ("--glass yes, --glass no; --fov HxV says", "glass=True, glass=False; fov=(H, V) says"),
         ("--bin-width-ps takes picoseconds", "bin_width_ps takes picoseconds"),
         ("a -- b --mask does not", "a -- b mask does not"),
+        ("--axes bins,rows,columns, else", 'axes="bins,rows,columns", else'),
     ]:
         assert _warn.with_keywords(text) == expected
     with pytest.warns(UserWarning, match="bins of 0.25 ps: bin_width_ps takes picoseconds"):
         dtof.replay(COUNTS, bin_width_ps=0.25)
+    square = numpy.full((40, 8, 8), 5)
+    with pytest.warns(UserWarning, match='40x8x8: .* axes="bins,rows,columns", else axes="rows,columns,bins"'):
+        dtof.replay(square)
+    with warnings.catch_warnings(record=True) as issued:
+        warnings.simplefilter("always")
+        dtof.replay(square, axis=0)
+    assert not [warning for warning in issued if "40x8x8" in str(warning.message)]
     found = dtof.calibrate(COUNTS)
     assert found.found["offset"].startswith("not found: calibrate target_mm=D gives it")
     texts = [*found.found.values(), *(text for _, text in found.remarks)]

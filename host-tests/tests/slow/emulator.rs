@@ -268,7 +268,7 @@ impl Emulator {
         let image = &self.image;
         let at = |part: &str| anyhow::Ok(u32::try_from(image.function(part)?)?);
         let registers = match what {
-            // An empty message, and where it is.
+            // An empty message, and the place of the panic.
             Planted::Panic => vec![
                 (0, ZEROS),
                 (1, 0),

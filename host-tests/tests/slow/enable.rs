@@ -13,8 +13,8 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, ensure};
-use dtof_device::{Client, HostTimeout, Task};
-use dtof_link::Source;
+use dtof_device::{Client, HostTimeout, Stopped, Task};
+use dtof_link::{Source, StopReason};
 use tempfile::TempDir;
 
 use crate::boards::{is_known, settings};
@@ -25,7 +25,7 @@ use crate::enabled;
 const LONG: Duration = Duration::from_millis(500);
 /// For so many feeds of the watchdog ENABLE must stay low. A driver that is on raises it again within ten.
 const LONG_FEEDS: usize = 1_000;
-/// Milliseconds of a host timeout: of one that must not pass, and of one that must.
+/// Host timeouts in milliseconds: one that must not run out, and one that must.
 const NEVER_MS: u16 = 60_000;
 const SILENCE_MS: u16 = 3_000;
 /// Milliseconds of a watchdog whose oscillator is as slow as the data sheet allows: 17 kHz.
@@ -113,7 +113,7 @@ impl Bench {
         Ok(())
     }
 
-    /// A host that has started the sensor.
+    /// A host that has started the sensor. ENABLE was high at least once.
     fn light(&mut self, host_timeout_ms: u16) -> Result<Client> {
         let mut client = Client::new(self.emulator.connect()?)?;
         let mut settings = settings();
@@ -130,7 +130,9 @@ impl Bench {
         };
         ensure!(!self.is_high()?, "ENABLE is high before a host asks for it");
         client.configure(&task.configuration(Source::Sensor)?)?;
-        self.until("ENABLE never goes high", Self::is_high)?;
+        self.until("ENABLE never goes high", |bench| {
+            Ok(bench.first_high()?.is_some())
+        })?;
         Ok(client)
     }
 
@@ -151,13 +153,12 @@ impl Bench {
     }
 
     /// Where ENABLE went high first.
-    fn first_high(&self) -> Result<usize> {
+    fn first_high(&self) -> Result<Option<usize>> {
         let mut written = self.written()?.into_iter();
-        let first = written.position(|what| what == Written::Enable(true));
-        first.context("ENABLE was never high")
+        Ok(written.position(|what| what == Written::Enable(true)))
     }
 
-    /// Waits until ENABLE has stayed low for long. How often the watchdog was fed from the write `from` until it went low.
+    /// Waits until ENABLE has stayed low for long. Returns how often the watchdog was fed from the write `from` until it went low.
     fn goes_low(&self, from: usize) -> Result<usize> {
         let mut low_after = 0;
         self.until("ENABLE does not stay low", |bench| {
@@ -205,14 +206,26 @@ fn enable_goes_low_and_stays_low_after_every_fault() -> Result<()> {
     let Some(_alone) = ready("ENABLE of stm32f405 in QEMU") else {
         return Ok(());
     };
-    for what in [Planted::Panic, Planted::Fault, Planted::Overflow] {
+    for (what, reason) in [
+        (Planted::Panic, StopReason::Panic),
+        (Planted::Fault, StopReason::Fault),
+        (Planted::Overflow, StopReason::Fault),
+    ] {
         let mut bench = Bench::start()?;
-        let _client = bench.light(NEVER_MS)?;
+        let mut client = bench.light(NEVER_MS)?;
         let before = bench.plant(what)?;
         // The board has been reset, and has started again.
         bench.until("no reset", |bench| {
             Ok(bench.written()?[before..].contains(&Written::Start))
         })?;
+        let start = Instant::now();
+        let lost = loop {
+            match client.exchange() {
+                Err(lost) if lost.is::<Stopped>() => break format!("{lost:#}"),
+                _ => ensure!(start.elapsed() < PATIENCE, "{what:?}: no report"),
+            }
+        };
+        ensure!(lost.contains(&format!("({reason})")), "{what:?}: {lost}");
         bench.goes_low(before)?;
         let after = &bench.written()?[before..];
         ensure!(
@@ -260,13 +273,16 @@ fn enable_goes_low_when_the_host_ends_its_session_or_is_silent() -> Result<()> {
     };
     let mut bench = Bench::start()?;
     drop(bench.light(NEVER_MS)?);
-    let ended = bench.goes_low(bench.first_high()?)?;
-    ensure!(ended < usize::from(NEVER_MS) / 2, "low after {ended} ms");
+    let high = bench.first_high()?.context("never high")?;
+    let ended = bench.goes_low(high)?;
+    ensure!(ended < usize::from(SILENCE_MS), "low after {ended} ms");
     let mut bench = Bench::start()?;
     let _silent = bench.light(SILENCE_MS)?;
-    let silent = bench.goes_low(bench.first_high()?)?;
-    // The host was last heard before ENABLE went high.
-    ensure!(silent <= usize::from(SILENCE_MS), "low after {silent} ms");
+    let high = bench.first_high()?.context("never high")?;
+    let silent = bench.goes_low(high)?;
+    // The host was last heard about when ENABLE went high.
+    let about = usize::from(SILENCE_MS) * 9 / 10..usize::from(SILENCE_MS) * 3 / 2;
+    ensure!(about.contains(&silent), "low after {silent} ms");
     println!(
         "stm32f405: ENABLE goes low and stays low when the session ends, after {ended} ms, and when the host is silent for \
          {SILENCE_MS} ms, after {silent} ms"

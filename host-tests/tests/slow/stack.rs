@@ -62,10 +62,13 @@ impl Image {
         Ok(image)
     }
 
-    /// The address of a function, by a part of its name.
+    /// The address of the function with such a part in its name.
     pub fn function(&self, part: &str) -> Result<u64> {
-        let found = self.symbols.iter().find(|(name, _)| name.contains(part));
-        let (_, address) = found.with_context(|| format!("no {part} in the image"))?;
+        let mut found = self.symbols.iter().filter(|(name, _)| name.contains(part));
+        let (_, address) = found
+            .next()
+            .with_context(|| format!("no {part} in the image"))?;
+        ensure!(found.next().is_none(), "more than one {part} in the image");
         Ok(address & !1)
     }
 

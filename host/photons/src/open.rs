@@ -405,8 +405,7 @@ fn array(input: &Input, options: &ReadOptions, read: Histograms) -> Result<Conte
         pixels,
     } = read;
     let swapped = match &options.axes {
-        None => warnings::swapped_axes(&axes, &pixels)
-            .or_else(|| warnings::bins_may_be_first(&axes, layout.bins())),
+        None => warnings::swapped_axes(&axes, &pixels),
         Some(_) => None,
     };
     let bins = layout.bins();

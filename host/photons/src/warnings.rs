@@ -7,6 +7,8 @@ use dtof_core::fixed::types::U16F16;
 use dtof_options::numbers::shortest;
 use dtof_options::rows::grouped;
 
+use crate::bins::MOST_BINS;
+
 /// No SPAD resolves a picosecond, so a narrower bin was probably given in nanoseconds.
 #[must_use]
 pub fn narrow_bins(width_ps: U16F16) -> Option<String> {
@@ -136,9 +138,9 @@ impl Concentration {
     }
 }
 
-/// Warns if another axis than the last looks like the bins although the last was read as such. `axes` are
-/// the lengths of the others, and their product is the number of `pixels`. Photons concentrate in a pulse along the bins:
-/// in most lines, while a hot pixel is in few.
+/// Warns if another axis than the last looks like the bins although the last was read as such, or if it may be the bins by
+/// the shape alone. `axes` are the lengths of the others, and their product is the number of `pixels`. Photons concentrate in a
+/// pulse along the bins: in most lines, while a hot pixel is in few.
 ///
 /// # Panics
 /// Panics if an axis has no length, or if there are fewer pixels.
@@ -181,9 +183,10 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
             found = (value, Some(number));
         }
     }
-    let which = match found.1? {
-        0 => "the first axis".to_owned(),
-        number => format!("axis {} of {}", number + 1, axes.len() + 1),
+    let which = match found.1 {
+        None => return bins_may_be_first(axes, pixels.first()?.len()),
+        Some(0) => "the first axis".to_owned(),
+        Some(number) => format!("axis {} of {}", number + 1, axes.len() + 1),
     };
     Some(format!(
         "{which} looks like the bins, and the last like pixels; --axes says which is which"
@@ -192,12 +195,11 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
 
 /// Warns of three axes of which the last two are equal and the first is longer: perhaps bins, rows and columns. They were
 /// read as rows, columns and bins. `axes` are the lengths of the first two.
-#[must_use]
-pub fn bins_may_be_first(axes: &[usize], bins: usize) -> Option<String> {
+fn bins_may_be_first(axes: &[usize], bins: usize) -> Option<String> {
     match *axes {
-        [rows, columns] if columns == bins && rows > bins => Some(format!(
+        [rows, columns] if columns == bins && rows > bins && rows <= MOST_BINS => Some(format!(
             "{rows}x{columns}x{bins}: read as {rows} rows of {columns} columns with {bins} bins; if the first axis is the bins: \
-             --axes bins,rows,columns"
+             --axes bins,rows,columns, else --axes rows,columns,bins"
         )),
         _ => None,
     }
@@ -342,19 +344,29 @@ mod tests {
 
     #[test]
     fn a_square_behind_a_longer_axis_may_be_rows_and_columns() {
-        let warning = bins_may_be_first(&[17, 16], 16).unwrap();
+        let even =
+            |axes: &[usize], bins| swapped_axes(axes, &lit(axes, 0, axes[0], &vec![100; bins]));
         let line = "17x16x16: read as 17 rows of 16 columns with 16 bins; if the first axis is the bins: \
-                    --axes bins,rows,columns";
-        assert_eq!(warning, line);
+                    --axes bins,rows,columns, else --axes rows,columns,bins";
+        assert_eq!(even(&[17, 16], 16).unwrap(), line);
+        assert!(even(&[4096, 8], 8).is_some());
         for (axes, bins) in [
             (&[16, 16][..], 16),
             (&[17, 16], 15),
             (&[17, 16], 17),
             (&[17], 16),
             (&[2, 17, 16], 16),
+            (&[4097, 8], 8),
         ] {
-            assert_eq!(bins_may_be_first(axes, bins), None, "{axes:?} {bins}");
+            assert_eq!(even(axes, bins), None, "{axes:?} {bins}");
         }
+        // The last axis looks like the bins.
+        let mut sharp = [0; 16];
+        sharp[3] = 100;
+        assert_eq!(
+            swapped_axes(&[17, 16], &vec![sharp.to_vec(); 17 * 16]),
+            None
+        );
     }
 
     /// Pixels of which those in the first `places` along an axis have such histograms, and the others no photon.

@@ -193,6 +193,9 @@ def _bins_last(recorded: Any, axis: int, options: Any) -> numpy.ndarray:
     if isinstance(recorded, (str, os.PathLike)):
         raise _native.Error("axis is for arrays; axes names those of a file")
     try:
-        return numpy.moveaxis(numpy.asanyarray(recorded), axis, -1)
+        moved = numpy.moveaxis(numpy.asanyarray(recorded), axis, -1)
     except (TypeError, ValueError) as error:
         raise _native.Error(f"axis {axis}: {error}") from error
+    if moved.ndim == 3:
+        options["axes"] = "rows,columns,bins"
+    return moved

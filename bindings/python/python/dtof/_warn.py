@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 import warnings
 
-#: A flag, and perhaps a value: a number, a placeholder such as N or HxV, yes or no.
-_FLAG = re.compile(r"(?<![\w-])--([a-z][a-z0-9-]*)(?: (\d[\d.]*\b|[A-Z](?:xV)?\b|FILE\b|yes\b|no\b))?")
+#: A flag, and perhaps a value: a number, a placeholder such as N or HxV, yes or no, names with commas.
+_FLAG = re.compile(r"(?<![\w-])--([a-z][a-z0-9-]*)(?: (\d[\d.]*\b|[A-Z](?:xV)?\b|FILE\b|yes\b|no\b|[a-z]+(?:,[a-z]+)+))?")
 _SWITCH = {"yes": "True", "no": "False", "HxV": "(H, V)"}
 
 
@@ -19,7 +19,9 @@ def with_keywords(text: str) -> str:
 
     def keyword(flag: re.Match[str]) -> str:
         name, value = flag[1].replace("-", "_"), flag[2]
-        return name if value is None else f"{name}={_SWITCH.get(value, value)}"
+        if value is None:
+            return name
+        return f'{name}="{value}"' if "," in value else f"{name}={_SWITCH.get(value, value)}"
 
     return _FLAG.sub(keyword, text)
 
