@@ -6,7 +6,9 @@ import re
 import warnings
 
 #: A flag, and perhaps a value: a number, a placeholder such as N or HxV, yes or no, names with commas.
-_FLAG = re.compile(r"(?<![\w-])--([a-z][a-z0-9-]*)(?: (\d[\d.]*\b|[A-Z](?:xV)?\b|FILE\b|yes\b|no\b|[a-z]+(?:,[a-z]+)+))?")
+_FLAG = re.compile(
+    r"(?<![\w-])--([a-z][a-z0-9-]*)(?: (\d[\d.]*\b|[A-Z](?:xV)?\b|FILE\b|yes\b|no\b|[a-z]+(?:,[a-z]+)+))?"
+)
 _SWITCH = {"yes": "True", "no": "False", "HxV": "(H, V)"}
 
 
