@@ -3,7 +3,8 @@
 //!
 //! A peak is common if groups of histograms share it. Groups are so large that its mean height shows in
 //! each. In nine groups of ten the peak must have at least half of the median height, in groups along
-//! rows as well as along columns. Its height is that above the bins before it, if there are enough: after pile-up every
+//! rows, along columns, and of squares: a surface across all rows and one across all columns are in each column and in each row.
+//! Its height is that above the bins before it, if there are enough: after pile-up every
 //! near bin is above the mean background, in all pixels.
 //!
 //! The gate begins where crosstalk no longer matters: from that bin on, its photons in an exposure of L2
@@ -368,4 +369,55 @@ fn smooth(rates: &[(f64, f64)], bin: usize, top: usize) -> (f64, f64) {
         of.iter().map(|rate| rate.0).sum::<f64>() / bins,
         variance.sqrt() / bins,
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::find::background::Level;
+    use crate::find::observed::Trace;
+    use dtof_core::Array;
+
+    /// 32x16 pixels with a wall in bin 94, and so many photons in bin 51 by column and row, half as many beside it.
+    fn top_with(photons: &dyn Fn(usize, usize) -> f64) -> Option<usize> {
+        let traces: Vec<Trace> = (0..32 * 16)
+            .map(|pixel| {
+                let mut counts = vec![14.0; 128];
+                counts[94] = 200.0;
+                let photons = photons(pixel % 32, pixel / 32);
+                for (bin, share) in [(50, 0.5), (51, 1.0), (52, 0.5)] {
+                    counts[bin] += share * photons;
+                }
+                Trace {
+                    pixel,
+                    cycles: 4500.0,
+                    counts,
+                    truth_mm: None,
+                }
+            })
+            .collect();
+        let levels = traces.iter().map(|trace| Level::of(&trace.counts));
+        let levels = levels.collect();
+        let good = GoodHistograms::new(Array::new(32, 16).unwrap(), 0.003, traces, levels);
+        nearest(&good, None, 2000.0).glass().map(|glass| glass.top)
+    }
+
+    /// A strip across all rows and one across all columns are in each column and in each row.
+    #[test]
+    fn strips_that_cross_are_no_glass() {
+        let with = |is_strip: &dyn Fn(usize, usize) -> bool, other: f64| {
+            // A few photons in every other pixel: so the median of single pixels is no help.
+            top_with(&|column, row| match is_strip(column, row) {
+                true => 90.0,
+                false => other * ((column + row) % 2) as f64,
+            })
+        };
+        let crossing = |column, row| column < 5 || (4..6).contains(&row);
+        assert_eq!(with(&crossing, 8.0), None);
+        assert_eq!(with(&crossing, 0.0), None);
+        assert_eq!(with(&|column, _| column < 5, 0.0), None);
+        assert_eq!(with(&|_, row| (4..6).contains(&row), 0.0), None);
+        assert_eq!(with(&|_, _| true, 0.0), Some(51));
+        assert_eq!(top_with(&|_, _| 5.0), Some(51));
+    }
 }

@@ -76,17 +76,25 @@ impl GoodHistograms {
         self.traces.iter().map(|trace| trace.cycles).sum()
     }
 
-    /// The indices of the histograms in the order of rows, and in that of columns.
+    /// The indices of the histograms in the order of rows, in that of columns, and so that those of a square are together:
+    /// the bits of column and row take turns (Z-order).
     #[must_use]
-    pub fn orders(&self) -> [Vec<usize>; 2] {
+    pub fn orders(&self) -> [Vec<usize>; 3] {
         let columns = self.array.columns() as usize;
-        let mut order: Vec<usize> = (0..self.traces.len()).collect();
-        let along_rows = order.clone();
-        order.sort_by_key(|&index| {
-            let trace = &self.traces[index];
-            (trace.pixel % columns, trace.pixel / columns)
-        });
-        [along_rows, order]
+        let rows: Vec<usize> = (0..self.traces.len()).collect();
+        let by = |key: &dyn Fn(usize, usize) -> (usize, usize)| {
+            let mut order = rows.clone();
+            order.sort_by_key(|&index| {
+                let pixel = self.traces[index].pixel;
+                key(pixel % columns, pixel / columns)
+            });
+            order
+        };
+        let spread =
+            |number: usize| (0..32).fold(0, |all, bit| all | (number >> bit & 1) << (2 * bit));
+        let along_columns = by(&|column, row| (column, row));
+        let squares = by(&|column, row| (spread(column) | spread(row) << 1, 0));
+        [rows, along_columns, squares]
     }
 }
 
