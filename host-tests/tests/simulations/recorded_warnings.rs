@@ -82,7 +82,12 @@ fn simulated_scenes_are_not_warned_of() {
             );
             let (bins, turned) = bins_first(&pixels, columns);
             let is_warned = swapped_axes(&[bins, rows], &turned).is_some();
-            assert!(!(laser_off && is_warned), "{name}: a passive image");
+            // Without a pulse only the shape tells: a square behind more bins.
+            let by_shape = rows == columns && columns >= 8;
+            assert!(
+                !laser_off || is_warned == by_shape,
+                "{name}: a passive image"
+            );
             println!("{name}: {rows} rows, {columns} columns, turned: warned {is_warned}");
         }
         scenes += 1;

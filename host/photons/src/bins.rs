@@ -15,7 +15,7 @@ pub const MOST_BINS: usize = 4096;
 /// The most bins of a run.
 const MOST_OF_A_RUN: usize = 1024;
 /// The fewest bins in which a peak can be found.
-const FEWEST: usize = 8;
+pub const FEWEST: usize = 8;
 
 /// How the bins of a recording become those of a run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

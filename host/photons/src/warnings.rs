@@ -7,7 +7,7 @@ use dtof_core::fixed::types::U16F16;
 use dtof_options::numbers::shortest;
 use dtof_options::rows::grouped;
 
-use crate::bins::MOST_BINS;
+use crate::bins::{FEWEST, MOST_BINS};
 
 /// No SPAD resolves a picosecond, so a narrower bin was probably given in nanoseconds.
 #[must_use]
@@ -197,10 +197,14 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
 /// read as rows, columns and bins. `axes` are the lengths of the first two.
 fn bins_may_be_first(axes: &[usize], bins: usize) -> Option<String> {
     match *axes {
-        [rows, columns] if columns == bins && rows > bins && rows <= MOST_BINS => Some(format!(
-            "{rows}x{columns}x{bins}: read as {rows} rows of {columns} columns with {bins} bins; if the first axis is the bins: \
+        [rows, columns]
+            if columns == bins && bins >= FEWEST && rows > bins && rows <= MOST_BINS =>
+        {
+            Some(format!(
+                "{rows}x{columns}x{bins}: read as {rows} rows of {columns} columns with {bins} bins; if the first axis is the bins: \
              --axes bins,rows,columns, else --axes rows,columns,bins"
-        )),
+            ))
+        }
         _ => None,
     }
 }
@@ -353,6 +357,7 @@ mod tests {
         for (axes, bins) in [
             (&[16, 16][..], 16),
             (&[17, 16], 15),
+            (&[17, 7], 7),
             (&[17, 16], 17),
             (&[17], 16),
             (&[2, 17, 16], 16),
