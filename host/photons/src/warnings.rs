@@ -162,8 +162,7 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
     for (number, &length) in axes.iter().enumerate() {
         let whole = apart;
         apart /= length;
-        // A histogram has at least 8 bins.
-        if length < 8 {
+        if length < FEWEST {
             continue;
         }
         // If all lines pass one pixel, it may be hot, and a pulse is wider.

@@ -82,8 +82,9 @@ impl GoodHistograms {
     pub fn orders(&self) -> [Vec<usize>; 3] {
         let columns = self.array.columns() as usize;
         let rows: Vec<usize> = (0..self.traces.len()).collect();
-        let by = |key: &dyn Fn(usize, usize) -> (usize, usize)| {
+        let by = |key: &dyn Fn(usize, usize) -> usize| {
             let mut order = rows.clone();
+            // Stable: within a column the order of rows stays.
             order.sort_by_key(|&index| {
                 let pixel = self.traces[index].pixel;
                 key(pixel % columns, pixel / columns)
@@ -92,8 +93,8 @@ impl GoodHistograms {
         };
         let spread =
             |number: usize| (0..32).fold(0, |all, bit| all | (number >> bit & 1) << (2 * bit));
-        let along_columns = by(&|column, row| (column, row));
-        let squares = by(&|column, row| (spread(column) | spread(row) << 1, 0));
+        let along_columns = by(&|column, _| column);
+        let squares = by(&|column, row| spread(column) | spread(row) << 1);
         [rows, along_columns, squares]
     }
 }
