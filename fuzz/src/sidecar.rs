@@ -88,9 +88,9 @@ pub fn sidecar(data: &[u8]) {
             }
         }
     }
-    // All that was asked has an answer. The device looks 64 times, and then sees what else there
-    // is to do.
-    for _ in 0..5000 + cycles / 64 {
+    // All that was asked has an answer. The device looks twice with neighbours or a dead time, or
+    // else 64 times, and then sees what else there is to do.
+    for _ in 0..5000 + cycles / 2 {
         now += 1;
         host.exchange(&mut device, now);
         if host.endpoint.is_lost() || (host.endpoint.is_open() && host.endpoint.is_settled()) {
