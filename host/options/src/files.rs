@@ -270,15 +270,16 @@ pub fn write_marked(
         written.push((flush_to_disk(file).with_context(name)?, to.file, place));
     }
     let mut kept = None;
-    for (file, (_, to, _)) in files.iter().zip(&written) {
+    for (file, (_, to, place)) in files.iter().zip(&written) {
         if file.is_edited {
-            kept = keep_edited(to, file.text)?;
+            kept = keep_edited(to, file.text).with_context(|| place.display().to_string())?;
         }
     }
     for old in removed {
         // As above, a link stays.
         let linked = fs::canonicalize(old).ok();
-        remove(linked.as_deref().unwrap_or(old))?;
+        let removed = remove(linked.as_deref().unwrap_or(old));
+        removed.with_context(|| old.display().to_string())?;
     }
     for (file, to, place) in written {
         let moved = file.persist(to).map_err(|error| error.error);
