@@ -94,19 +94,23 @@ fn prove(root: &Path, sample: Option<usize>, only: Option<&str>) -> Result<()> {
     ensure!(!chosen.is_empty(), "no faults to plant");
     let scenes = proof::scenes(root, PHOTONS)?;
     let folder = target_folder(root).join("softcore/mutants");
-    let mut of_chosen = chosen.iter().map(|&number| &faults[number]);
-    if let Some(held) = of_chosen.find(|fault| fault.held.is_some()) {
-        // Where none is held, all is right.
-        let none = Fault {
-            what: String::new(),
-            file: held.file.clone(),
-            text: Arc::clone(&held.text),
-            held: None,
-        };
-        let folder = folder.join("none");
-        let found = judge(root, &folder, &none, &scenes, &mut Built::default())?;
-        ensure!(found.is_none(), "with no input held: {found:?}");
-    }
+    // Where no input is held, all is right: a simulation that cannot run finds nothing.
+    let held = faults.iter().find(|fault| fault.held.is_some());
+    let held = held.context("no inputs")?;
+    let none = Fault {
+        what: String::new(),
+        file: held.file.clone(),
+        text: Arc::clone(&held.text),
+        held: None,
+    };
+    let found = judge(
+        root,
+        &folder.join("none"),
+        &none,
+        &scenes,
+        &mut Built::default(),
+    )?;
+    ensure!(found.is_none(), "without a fault: {found:?}");
     let (next, chosen) = (&AtomicUsize::new(0), &chosen);
     let (scenes, of) = (&scenes, &folder);
     let mut survivors = 0;
