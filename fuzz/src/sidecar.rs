@@ -90,14 +90,24 @@ pub fn sidecar(data: &[u8]) {
     }
     // All that was asked has an answer. The device looks twice with neighbours or a dead time, or
     // else 64 times, and then sees what else there is to do.
+    let mut asked = false;
     for _ in 0..5000 + cycles / 2 {
         now += 1;
         host.exchange(&mut device, now);
-        if host.endpoint.is_lost() || (host.endpoint.is_open() && host.endpoint.is_settled()) {
+        if host.endpoint.is_lost() || (asked && host.requests.is_empty()) {
             return;
         }
+        if !asked && host.endpoint.is_open() {
+            asked = host
+                .endpoint
+                .offer(message::STATISTICS_REQUEST, &[])
+                .is_ok();
+            if asked {
+                host.note(message::STATISTICS_REQUEST, &[]);
+            }
+        }
     }
-    panic!("the device takes no more messages");
+    panic!("a request has no answer");
 }
 
 /// Not messages: for a while the host says nothing; its port is closed, or open again; its session
