@@ -6,6 +6,8 @@
 //! limit below 4.6 over the number of exposures cannot be met. The L1 with the shortest mean
 //! time to an event wins. False alarms are counted in separate exposures.
 
+use std::ops::Range;
+
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{AverageRule, Count, DepthEstimator, Histogram, RangeGate};
@@ -24,10 +26,10 @@ use crate::rates::Rates;
 const PHOTONS: f64 = 5e8;
 /// Trials that share the exposures.
 const TRIALS: u16 = 64;
+/// Their numbers, which no other simulation of this crate uses.
+pub(super) const NUMBERS: Range<u16> = 1000..1000 + TRIALS;
 /// The most exposures of a trial.
 const LONGEST_TRIAL: f64 = 2000.0;
-/// The number of the first trial; no other simulation of this crate uses these numbers.
-const FIRST_TRIAL: u16 = 1000;
 /// The upper limit of a simulated share is one-sided, for 99 % confidence.
 const UPPER_TAIL: f64 = 0.01;
 
@@ -121,9 +123,9 @@ fn highest_alphas(
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let exposures = most as u32;
     let part = Part::new(progress, (u32::from(TRIALS) * exposures).into())?;
-    let trials = (0..TRIALS)
+    let trials = NUMBERS
         .into_par_iter()
-        .map(|number| trial(request, looks, FIRST_TRIAL + number, exposures, &part))
+        .map(|number| trial(request, looks, number, exposures, &part))
         .collect::<Result<Vec<_>>>()?;
     Ok(trials.into_iter().flatten().collect())
 }

@@ -1,5 +1,7 @@
 //! The settings with the shortest time to an event, by simulated exposures.
 
+use std::ops::Range;
+
 use anyhow::{Context, Result};
 use rayon::prelude::*;
 
@@ -27,6 +29,11 @@ pub(super) use for_bins;
 
 /// Simulated positions of the pulse within a bin, evenly spread.
 const POSITIONS: u16 = 8;
+/// Trials, one for each position: to compare settings, for the chosen one, and without a target. Those of one have no
+/// photon of another.
+const COMPARED: Range<u16> = 0..POSITIONS;
+const CHOSEN: Range<u16> = POSITIONS..2 * POSITIONS;
+const WITHOUT_TARGET: Range<u16> = 2 * POSITIONS..3 * POSITIONS;
 /// Exposures at each position: to compare settings, and for the chosen one.
 const EXPOSURES: (u32, u32) = (50, 500);
 /// The signal is too weak if a smaller share of exposures reports the target.
@@ -47,7 +54,7 @@ pub fn shortest<T: Copy>(
     let part = Part::new(progress, u64::from(POSITIONS) * exposures)?;
     let mut best: Option<(&(DetectionSettings, T), f64)> = None;
     for entry in all {
-        let detections = detections(request, &entry.0, 0, EXPOSURES.0, &part)?;
+        let detections = detections(request, &entry.0, COMPARED, EXPOSURES.0, &part)?;
         // Infinite without an event.
         let time = detections.cycles_to_event();
         if best.is_none_or(|best| time < best.1) {
@@ -57,7 +64,7 @@ pub fn shortest<T: Copy>(
     let mut found = None;
     if let Some(((settings, value), _)) = best {
         // Fresh photons: those that chose it would flatter it.
-        let detections = detections(request, settings, POSITIONS, EXPOSURES.1, &part)?;
+        let detections = detections(request, settings, CHOSEN, EXPOSURES.1, &part)?;
         found = Some((*value, detections));
     }
     found
@@ -91,30 +98,29 @@ pub fn false_alarms(
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let exposures = (PHOTONS / photons / f64::from(POSITIONS)).clamp(50.0, most) as u32;
     let part = Part::new(progress, (u32::from(POSITIONS) * exposures).into())?;
-    let first = 2 * POSITIONS;
-    let found = detections(&without_target, settings, first, exposures, &part)?;
+    let found = detections(&without_target, settings, WITHOUT_TARGET, exposures, &part)?;
     Ok((found.exposures, found.near + found.far))
 }
 
-/// Exposures with the target at all positions within a bin, in trials from `first_trial` on.
+/// Exposures with the target at all positions within a bin, in as many trials.
 fn detections(
     request: &Request,
     settings: &DetectionSettings,
-    first_trial: u16,
+    trials: Range<u16>,
     exposures: u32,
     part: &Part,
 ) -> Result<Detections> {
     let trial = for_bins!(request.bins, Detections::trial);
     let trials: Vec<Detections> = (0..POSITIONS)
         .into_par_iter()
-        .map(|index| {
+        .zip(trials)
+        .map(|(index, number)| {
             let rates = Rates {
                 background: request.background,
                 signal: request.signal,
                 position: position(request.bins, index),
                 sigma: request.sigma,
             };
-            let number = first_trial + index;
             trial(request.seed, number, &rates, settings, exposures, part)
         })
         .collect::<Result<_>>()?;
@@ -132,7 +138,26 @@ fn position(bins: u16, index: u16) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
+    use crate::tune::average;
+
+    #[test]
+    fn no_trial_has_the_photons_of_another() {
+        let all = [COMPARED, CHOSEN, WITHOUT_TARGET];
+        assert!(
+            all.iter()
+                .all(|trials| trials.len() == usize::from(POSITIONS))
+        );
+        let all: Vec<u16> = all
+            .into_iter()
+            .chain([average::NUMBERS])
+            .flatten()
+            .collect();
+        let different: BTreeSet<u16> = all.iter().copied().collect();
+        assert_eq!(different.len(), all.len());
+    }
 
     #[test]
     fn positions_are_spread_over_a_bin() {
