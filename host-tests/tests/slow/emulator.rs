@@ -263,6 +263,8 @@ impl Emulator {
         const NO_MEMORY: u32 = 0x6000_0000;
         /// `bx lr`, and an instruction that does nothing.
         const RETURN: u32 = 0xbf00_4770;
+        /// `cpsie i`, and a branch to itself.
+        const ON_FOR_EVER: u32 = 0xe7fe_b662;
         /// Reserved vectors: a `Location` without a file.
         const ZEROS: u32 = 0x0800_001c;
         let image = &self.image;
@@ -284,7 +286,12 @@ impl Emulator {
                     (15, u32::try_from(image.address("main")? & !1)?),
                 ]
             }
-            Planted::Hang => vec![(15, at("DefaultHandler_")?)],
+            // Stopped while it sleeps, the image has interrupts off. The loop replaces a function that is not called.
+            Planted::Hang => {
+                let place = at("9panicking5panic")?;
+                self.debugger.write(place.into(), ON_FOR_EVER)?;
+                vec![(15, place)]
+            }
             Planted::Clock => {
                 let handler = image.address("SysTick")? & !1;
                 return self.debugger.write(handler, RETURN);
@@ -350,7 +357,8 @@ impl Emulator {
         })
     }
 
-    fn statics(&mut self) -> Result<Vec<u8>> {
+    /// The statics of an image that is stopped.
+    pub fn statics(&mut self) -> Result<Vec<u8>> {
         self.debugger.memory(self.image.statics.clone())
     }
 

@@ -158,6 +158,17 @@ impl Bench {
         Ok(written.position(|what| what == Written::Enable(true)))
     }
 
+    /// What the image has in its memory after a while in which its host speaks.
+    fn after(&mut self, client: &mut Client, end: Instant) -> Result<Vec<u8>> {
+        while Instant::now() < end {
+            client.exchange()?;
+        }
+        self.emulator.interrupt()?;
+        let statics = self.emulator.statics()?;
+        self.emulator.resume()?;
+        Ok(statics)
+    }
+
     /// Waits until ENABLE has stayed low for long. Returns how often the watchdog was fed from the write `from` until it went low.
     fn goes_low(&self, from: usize) -> Result<usize> {
         let mut low_after = 0;
@@ -249,12 +260,16 @@ fn the_watchdog_is_not_fed_when_the_image_hangs_or_its_clock_stops() -> Result<(
     };
     for what in [Planted::Hang, Planted::Clock] {
         let mut bench = Bench::start()?;
-        let _client = bench.light(NEVER_MS)?;
+        let mut client = bench.light(NEVER_MS)?;
         bench.until("the watchdog is not fed", |bench| {
             Ok(fed(&bench.written()?) > 10)
         })?;
         let before = bench.plant(what)?;
-        thread::sleep(LONG);
+        let start = Instant::now();
+        // A host that speaks, so that interrupts of the serial port go on.
+        let statics = bench.after(&mut client, start + LONG / 2)?;
+        let later = bench.after(&mut client, start + LONG)?;
+        ensure!(statics != later, "{what:?}: the image does not run");
         let written = bench.written()?;
         let (before, after) = written.split_at(before);
         // The main loop may not have seen the last millisecond before.
