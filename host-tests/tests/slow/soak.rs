@@ -115,11 +115,18 @@ fn compare(
     let mut engine = host_engine(settings, ARRAY, &addresses)?;
     let mut sent = sensed.events.iter();
     let (mut cycle, cycles) = (0, sensed.report.cycles);
+    let mut made = 0;
     while cycle < cycles {
         let length = u16::try_from(cycles - cycle).unwrap_or(SLICE).min(SLICE);
         let mut photons = Photons::new(PIXELS);
         sensor(length, &mut photons);
-        for event in engine.run(&photons.slice(cycle))? {
+        let slice = photons.slice(cycle);
+        made += slice
+            .pixels
+            .iter()
+            .map(|pixel| pixel.photons.len() as u64)
+            .sum::<u64>();
+        for event in engine.run(&slice)? {
             let expected = Event::Depth(event);
             let sent = sent.next().with_context(|| {
                 let number = sensed.events.len();
@@ -139,6 +146,8 @@ fn compare(
     let expected = engine.statistics();
     ensure!(counted == expected, "{counted:?}, not {expected:?}");
     let [pixels, blocks] = expected;
+    let photons = pixels.photons();
+    ensure!(photons == made, "{photons} of {made} photons counted");
     let events = pixels.events + blocks.events;
     ensure!(
         events == sensed.events.len() as u64,
