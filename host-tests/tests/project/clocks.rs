@@ -4,10 +4,12 @@
 use crate::doors::{files, root};
 
 /// How code reads the time of day, or times of files.
-const READS: [&str; 13] = [
+const READS: [&str; 17] = [
     "SystemTime",
     "chrono::",
     ".modified()",
+    ".created()",
+    ".accessed()",
     ".mtime",
     "CLOCK_REALTIME",
     "gettimeofday",
@@ -16,6 +18,8 @@ const READS: [&str; 13] = [
     "new Date",
     "Date()",
     "time.time(",
+    "from time import",
+    "st_mtime",
     "datetime",
     "getmtime",
 ];

@@ -116,6 +116,6 @@ fn recordings_are_decided_alike() {
     if newer.exists() {
         recording_is_decided_alike("TMF8829", newer);
     } else {
-        tell("SKIPPED: counters: no TMF8829 log beside the workspace");
+        tell("SKIPPED: recorded counters: no TMF8829 log beside the workspace");
     }
 }

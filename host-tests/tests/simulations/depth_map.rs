@@ -22,7 +22,11 @@ fn vgroove() -> Option<PathBuf> {
     if found.is_none() {
         // Past the test harness, which hides the output of passing tests.
         let mut out = std::io::stderr().lock();
-        writeln!(out, "SKIPPED: depth map: no vgroove beside the workspace").unwrap();
+        writeln!(
+            out,
+            "SKIPPED: recorded depth map: no vgroove beside the workspace"
+        )
+        .unwrap();
     }
     found
 }
