@@ -1,6 +1,7 @@
 """Invalid input is a `dtof.Error` of one line, never a crash."""
 
 import os
+import resource
 from datetime import datetime
 
 import numpy
@@ -392,3 +393,21 @@ def test_any_file_gives_events_or_an_error(tmp_path_factory, bytes, end):
         take(path)
     except dtof.Error as error:
         assert "\n" not in str(error) and "fault of dtof" not in str(error)
+
+
+def test_a_file_stays_if_a_new_one_cannot_be_written(tmp_path):
+    run = dtof.replay(numpy.full((8, 8, 16), 3) + 60 * (numpy.arange(16) == 8))
+    path = tmp_path / "a.aer"
+    run.write_events(path)
+    before = path.read_bytes()
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for room in [0, 16, len(before) // 2, len(before) - 1]:
+        # Like a disk with so much room.
+        resource.setrlimit(resource.RLIMIT_FSIZE, (room, hard))
+        try:
+            refused(lambda: run.write_events(path), "a.aer: File too large")
+            refused(lambda: run.write_events(tmp_path / "new.aer"), "new.aer: File too large")
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+        assert [file.name for file in tmp_path.iterdir()] == ["a.aer"], room
+        assert path.read_bytes() == before, room
