@@ -36,6 +36,8 @@ fn check(found: &Files, earlier: &Files, new: &Files, writer: &Writer) -> bool {
         !has_last || found == new || found == earlier,
         "a mixture looks complete"
     );
+    // A file alone is never missing.
+    assert!(!writer.last.is_empty() || has_last, "no file is left");
     has_last && found == new
 }
 
@@ -94,6 +96,8 @@ fn each_file_is_the_old_or_the_new_one_whatever_call_fails_or_is_the_last() {
             assert_eq!(output.status.signal(), Some(KILL), "{at}: {output:?}");
             let found = complete(work.written(out), &earlier);
             let is_new = check(&found, &earlier, &new, writer);
+            let is_moving = MOVES.contains(&&call.name[..]);
+            assert!(found == earlier || is_new || is_moving, "{at}");
             killed[0] += 1;
             killed[1] += u32::from(found == earlier);
             killed[2] += u32::from(!is_new && found != earlier);
