@@ -63,21 +63,23 @@ pub struct Answer {
     pub fastest: Option<Choice>,
 }
 
-/// The error in millimetres and the share of wrong reports of the longest frame, that of L2.
-pub(super) fn longest_frame(methods: &[Method], outcomes: &[Outcome]) -> Option<(f64, f64)> {
+/// The longest frames that were measured: of L2, unless there are fewer laser cycles.
+pub(super) fn longest_frame<'a>(
+    methods: &[Method],
+    outcomes: &'a [Outcome],
+) -> Option<&'a Outcome> {
     let frames = outcomes.iter().filter(|outcome| {
         methods
             .get(outcome.trial.method)
             .is_some_and(Method::is_frames)
     });
-    let longest = frames.max_by_key(|outcome| outcome.trial.effort)?;
-    Some((longest.figures.error_mm, longest.figures.wrong))
+    frames.max_by_key(|outcome| outcome.trial.effort)
 }
 
 /// Chooses among `outcomes`, in which those of each method are in order of effort.
 #[must_use]
 pub fn answer(methods: &[Method], outcomes: &[Outcome], within_mm: f64) -> Answer {
-    let frame_wrong = longest_frame(methods, outcomes).map_or(0.0, |frame| frame.1);
+    let frame_wrong = longest_frame(methods, outcomes).map_or(0.0, |frame| frame.figures.wrong);
     let events_of_all = outcomes.iter().filter(|outcome| {
         let method = methods.get(outcome.trial.method);
         method.is_some_and(|method| !method.is_frames() && method.has_full_resolution())

@@ -56,7 +56,7 @@ const MIN_COUNTS: [u16; 16] = [
 /// The fewest reports of a trial; a trial with fewer is left out.
 const MIN_REPORTS: u64 = 100;
 
-/// If no method with full resolution is as exact as frames of L2, the allowed error grows by this factor until one is, but not
+/// If no method with full resolution is as exact as the longest frames, the allowed error grows by this factor until one is, but not
 /// beyond that of a wrong report.
 const RELAXATION: f64 = std::f64::consts::SQRT_2;
 
@@ -75,7 +75,7 @@ pub struct Task<'a> {
     pub sigma: f64,
     /// The share of exposures without a target that may end with an event.
     pub false_alarm: f64,
-    /// The error that is allowed, in millimetres; by default that of frames of L2, or the lowest that
+    /// The error that is allowed, in millimetres; by default that of the longest frames, or the lowest that
     /// any method reaches.
     pub within_mm: Option<f64>,
     /// Why pixels report no sooner than after L1, for the answer.
@@ -98,7 +98,7 @@ pub struct Comparison {
     /// The methods with the lowest minimum count, and the longest frame, under each stress. The first is
     /// without stress.
     pub stressed: Vec<(Stress, Vec<Outcome>)>,
-    /// The error of frames of L2, in millimetres.
+    /// The error of the longest frames, of L2 or of fewer laser cycles if there are not as many, in millimetres.
     pub frame_mm: Option<f64>,
     /// The methods to take.
     pub answer: Answer,
@@ -178,11 +178,11 @@ impl<'a> Methods<'a> {
         trials.collect()
     }
 
-    /// All methods with the lowest minimum count, and the longest frame.
-    fn fastest(&self) -> Result<Vec<Trial>> {
+    /// All methods with the lowest minimum count, and frames of so many laser cycles.
+    fn fastest(&self, frame_cycles: u16) -> Result<Vec<Trial>> {
         let methods = self.all.iter().enumerate();
         let trials = methods.map(|(number, method)| match method.kind {
-            Kind::Frames => self.trial(number, self.settings.l2),
+            Kind::Frames => self.trial(number, frame_cycles),
             Kind::Events(_) => self.trial(number, MIN_COUNT),
         });
         trials.collect()
@@ -193,7 +193,7 @@ impl<'a> Methods<'a> {
 ///
 /// # Errors
 /// Fails if the photons cannot be read, if settings are invalid, if no pixel has a target, or if frames
-/// of L2 give too few reports and no error is given.
+/// give too few reports and no error is given.
 pub fn compare(task: &Task) -> Result<Comparison> {
     let Task {
         settings, sigma, ..
@@ -258,7 +258,9 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     )?;
     outcomes.retain(|outcome| is_measured(outcome, cycles));
 
-    let frame_mm = longest_frame(&methods.all, &outcomes).map(|frame| frame.0);
+    let frame = longest_frame(&methods.all, &outcomes);
+    let frame_mm = frame.map(|frame| frame.figures.error_mm);
+    let frame_cycles = frame.map_or(settings.l2, |frame| frame.trial.effort);
     let answer = choose(task, &methods.all, &outcomes, frame_mm)?;
     let trial = |choice: Option<Choice>| {
         let trial = choice.map(|choice| methods.trial(choice.method, choice.effort));
@@ -266,7 +268,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     };
     let (best, fastest) = (trial(answer.best)?, trial(answer.fastest)?);
     // The methods to take are tried under stress with the minimum count that they are taken with.
-    let mut trials = methods.fastest()?;
+    let mut trials = methods.fastest(frame_cycles)?;
     trials.extend(best.iter().chain(&fastest).cloned());
     let each = cost.under_stress(trials.len());
     let mut stressed = Vec::new();
@@ -335,7 +337,7 @@ fn photons(task: &Task, nth_seed: u64, most: f64) -> Result<Box<dyn PhotonSource
     limited((task.photons)(seed + nth_seed)?, most, l2)
 }
 
-/// The methods to take. Their error is at most the one given, or else that of frames of L2, `frame_mm`.
+/// The methods to take. Their error is at most the one given, or else that of the longest frames, `frame_mm`.
 fn choose(
     task: &Task,
     methods: &[Method],
@@ -347,7 +349,7 @@ fn choose(
     }
     let frame_mm = frame_mm.ok_or_else(|| {
         Refused::input(format!(
-            "frames of L2 give fewer than {MIN_REPORTS} reports here; set `within`, or take more \
+            "frames give fewer than {MIN_REPORTS} reports here; set `within`, or take more pixels or \
              laser cycles"
         ))
     })?;

@@ -16,7 +16,7 @@ const FAILS: &str = "fails";
 
 /// The heading of the harder conditions, and what their table has.
 pub(super) const HARDER: &str = "harder conditions";
-pub(super) const STRESS_NOTE: &str = "×: time to a report over that without. fails: the error grows by half, or 5 % are wrong. –: fails without, too";
+pub(super) const STRESS_NOTE: &str = "×: time to a report over that without. fails: the error grows by half, or 5 % are wrong. –: it fails without, too, or reports nothing";
 
 /// A warning says that this share of the pixels or more does not report.
 const MANY_SILENT: f64 = 0.1;
@@ -294,7 +294,7 @@ impl Comparison {
         let within = self.answer.limits.within_mm;
         let frame = self.frame_mm.filter(|frame| *frame < within);
         let frame = frame.map_or(String::new(), |frame| {
-            format!("; frames of L2 have {} mm", short(frame))
+            format!("; the longest frames have {} mm", short(frame))
         });
         format!("errors of at most {} mm{frame}", short(within))
     }

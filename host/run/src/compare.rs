@@ -26,7 +26,7 @@ use dtof_simulate::scene::Scene;
 /// The options of a comparison.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
-    /// The highest error of 68 % of the reports, in millimetres; by default that of frames of L2.
+    /// The highest error of 68 % of the reports, in millimetres; by default that of the longest frames.
     pub within: Option<f64>,
     /// The share of exposures without a target that may end with an event; by default 0.01.
     pub false_alarm: Option<f64>,

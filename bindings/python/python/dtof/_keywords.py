@@ -358,7 +358,7 @@ class CompareOptions(RecordingOptions, SensorOptions, total=False):
     within: Annotated[
         Number,
         "number above 0, millimetres",
-        "Largest error of 68 % of the reports in millimetres [default: that of frames of L2]",
+        "Largest error of 68 % of the reports in millimetres [default: that of the longest frames]",
     ]
     false_alarm: FalseAlarm
     once_per_bin: Annotated[

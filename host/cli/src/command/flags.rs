@@ -290,8 +290,8 @@ flags! {
 
 flags! {
     ACCURACY:
-    within Text("MM") => "Largest error of 68 % of the reports in millimetres [default: that of frames \
-        of L2]";
+    within Text("MM") => "Largest error of 68 % of the reports in millimetres [default: that of the \
+        longest frames]";
     false_alarm Text("SHARE") => "Share of exposures without a target that end with an event, at most 0.1 \
         [default: 0.01]";
 }

@@ -106,6 +106,36 @@ fn a_scene_has_an_answer_that_simulate_takes() {
     assert!((9.0..15.0).contains(&rms), "{rms}");
 }
 
+#[test]
+fn frames_are_no_longer_than_the_photons_last() {
+    let scratch = Scratch::new();
+    // Frames of each pixel once are enough reports. L2 is 2000.
+    let scene = SCENE.replace(
+        "columns = 8\nrows = 4\ncycles = 6000",
+        "columns = 16\nrows = 8\ncycles = 1000",
+    );
+    scratch.file("scene.toml", scene);
+    let printed = scratch.printed("compare --scene scene.toml --out out");
+    let stress = scratch.read("out/stress.csv");
+    let frames: Vec<&str> = stress
+        .lines()
+        .filter(|line| line.contains("\"frames\""))
+        .collect();
+    assert_eq!(frames.len(), 9, "{stress}");
+    assert!(
+        frames
+            .iter()
+            .all(|line| line.contains(",\"frames\",,1000,")),
+        "{frames:?}"
+    );
+    assert!(!frames[0].contains("inf"), "{}", frames[0]);
+    let row = printed
+        .lines()
+        .find(|line| line.starts_with("  frames "))
+        .unwrap();
+    assert!(row.contains("×1.0"), "{row}");
+}
+
 /// A dim wall: blocks are faster than any method that keeps every pixel.
 const DIM: &str = "columns = 8\nrows = 6\ncycles = 8000\nbackground = 0.005\nlaser_rate_mhz = 1\n\
      [[surface]]\nrange_mm = 2000\nsignal = 0.06\n";
