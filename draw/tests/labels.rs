@@ -198,6 +198,48 @@ fn labels_of_the_kept_figures_touch_nothing() {
     assert!(found.is_empty(), "{charts} charts\n{}", found.join("\n"));
 }
 
+/// A chart of one ring, which has no name beside the plot.
+fn ring(title: &str, x: f64, range: Option<(f64, f64)>) -> String {
+    let axis = Axis::linear("a quantity, unit");
+    let drawn = chart(&Chart {
+        finding: "A finding".to_owned(),
+        holds: true,
+        note: "A note".to_owned(),
+        x: axis.clone(),
+        y: Axis { range, ..axis },
+        key: Vec::new(),
+        columns: 1,
+        panels: vec![Panel {
+            title: title.to_owned(),
+            series: vec![Series::named(
+                "a",
+                STEPS[0],
+                Style::Ring,
+                vec![Point::exact(x, 0.1)],
+            )],
+        }],
+    });
+    drawn.unwrap()
+}
+
+#[test]
+fn a_label_at_the_end_of_an_axis_is_not_cut() {
+    // The axis ends at 0.1203.
+    let drawn = ring("", 0.113_494, None);
+    assert_eq!(touching(&drawn), [""; 0]);
+    assert!(
+        drawn.contains(">0.1</text>") && !drawn.contains(">0.12</text>"),
+        "{drawn}"
+    );
+}
+
+#[test]
+fn a_title_as_wide_as_its_panel_is_not_cut() {
+    let title = "aawaaini amakkaakama maia kakaa aiaaaaaama adawaaaaa";
+    let drawn = ring(title, 0.01, Some((0.05, 0.3)));
+    assert_eq!(touching(&drawn), [""; 0]);
+}
+
 /// Curves of any form: their names, kinds and points.
 fn panels(most: usize) -> impl Strategy<Value = Vec<Panel>> {
     let style = prop::sample::select(vec![

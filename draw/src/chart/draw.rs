@@ -147,7 +147,7 @@ impl Layout {
             .iter()
             .map(|names| names.height - LINE)
             .fold(height, f64::max);
-        let y_ticks = y.ticks(height, |_| TEXT);
+        let y_ticks = y.ticks(height, (TEXT, TEXT), |_| TEXT);
         let widest = |ticks: &[Tick]| {
             let widths = ticks.iter().map(|tick| text_width(&tick.label, TEXT));
             widths.fold(0.0, f64::max)
@@ -156,7 +156,9 @@ impl Layout {
         let beside: f64 = names.iter().map(|names| names.width).sum();
         let whole = WIDTH - left - EDGE - beside;
         let plot = |gap: f64| (whole - gap * (columns as f64 - 1.0)) / columns as f64;
-        let ticks = |gap| x.ticks(plot(gap), |label| text_width(label, TEXT));
+        // Up to the edges of the picture.
+        let room = (left, EDGE + names.last().map_or(0.0, |names| names.width));
+        let ticks = |gap| x.ticks(plot(gap), room, |label| text_width(label, TEXT));
         // The outermost labels extend beyond the plots by half of their widths.
         let gap = widest(&ticks(20.0)) + GAP;
         Ok(Self {
@@ -182,11 +184,8 @@ impl Layout {
 
     fn title(&self, panel: &Panel) -> Vec<String> {
         let has_names = self.names.iter().any(|names| names.width > 0.0);
-        let beside = if has_names {
-            TO_NAME / 2.0
-        } else {
-            self.gap / 2.0
-        };
+        // The last column ends at the edge.
+        let beside = if has_names { TO_NAME / 2.0 } else { EDGE };
         wrapped(
             &panel.title,
             BOLD * TEXT,

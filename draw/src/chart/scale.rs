@@ -76,19 +76,26 @@ impl Scale {
     }
 
     /// As many labels as fit on an axis of `length`. `size` is the size of a label along the axis.
-    pub fn ticks(&self, length: f64, size: impl Fn(&str) -> f64) -> Vec<Tick> {
+    /// A label that extends beyond the low or the high end by more than `room` is left out.
+    pub fn ticks(&self, length: f64, room: (f64, f64), size: impl Fn(&str) -> f64) -> Vec<Tick> {
         let mut candidates = if self.logarithmic {
             self.factors()
         } else {
             self.steps()
         };
+        let span = |tick: &Tick| {
+            let (middle, half) = (length * self.position(tick.value), size(&tick.label) / 2.0);
+            (middle - half, middle + half)
+        };
+        for ticks in &mut candidates {
+            ticks.retain(|tick| {
+                let (start, end) = span(tick);
+                start >= -room.0 && end <= length + room.1
+            });
+        }
         candidates.retain(|ticks| !ticks.is_empty());
         let fits = |ticks: &Vec<Tick>| {
-            let spans = ticks.iter().map(|tick| {
-                let (middle, half) = (length * self.position(tick.value), size(&tick.label) / 2.0);
-                (middle - half, middle + half)
-            });
-            let spans: Vec<(f64, f64)> = spans.collect();
+            let spans: Vec<(f64, f64)> = ticks.iter().map(span).collect();
             spans.windows(2).all(|pair| pair[0].1 + GAP <= pair[1].0)
         };
         let found = candidates.iter().find(|ticks| fits(ticks));

@@ -99,7 +99,9 @@ fn a_logarithmic_axis_labels_decades_and_2_and_5_where_there_is_room() {
         Scale::new(&axis, [low, high].into_iter()).unwrap()
     };
     let labels = |scale: &Scale, length| {
-        let ticks = scale.ticks(length, |label| text_width(label, 14.0));
+        let ticks = scale.ticks(length, (f64::INFINITY, f64::INFINITY), |label| {
+            text_width(label, 14.0)
+        });
         ticks.into_iter().map(|tick| tick.label).collect::<Vec<_>>()
     };
     let two = scale(1.0, 100.0);
@@ -113,8 +115,24 @@ fn a_logarithmic_axis_labels_decades_and_2_and_5_where_there_is_room() {
     assert_eq!(labels(&scale(0.95, 2.2), 300.0), ["1", "1.2", "1.5", "2"]);
 }
 
+#[test]
+fn a_label_that_would_be_cut_is_left_out() {
+    let axis = Axis::linear("x").within(0.0, 0.121);
+    let scale = Scale::new(&axis, [0.1].into_iter()).unwrap();
+    // "0.12" has its middle at 297.5 of 300.
+    let labels = |low, high| {
+        let ticks = scale.ticks(300.0, (low, high), |label| 7.0 * label.len() as f64);
+        ticks.into_iter().map(|tick| tick.label).collect::<Vec<_>>()
+    };
+    let all = ["0", "0.02", "0.04", "0.06", "0.08", "0.1", "0.12"];
+    assert_eq!(labels(4.0, 12.0), all);
+    assert_eq!(labels(4.0, 11.0), all[..6]);
+    assert_eq!(labels(3.0, 12.0), all[1..]);
+}
+
 proptest! {
-    /// Labels do not touch, for any range and length, and there is at least one.
+    /// Labels do not touch, for any range and length, and extend no further than there is room.
+    /// There is at least one if there is room for any.
     #[test]
     fn ticks_never_touch(
         logarithmic: bool,
@@ -124,6 +142,7 @@ proptest! {
         shift in -2.0..2.0_f64,
         length in 20.0..800.0_f64,
         size in 8.0..24.0_f64,
+        room in prop_oneof![Just((f64::INFINITY, f64::INFINITY)), (0.0..40.0_f64, 0.0..40.0_f64)],
     ) {
         let (from, to) = if logarithmic {
             (10f64.powf(low), 10f64.powf(low + span))
@@ -135,7 +154,7 @@ proptest! {
         let axis = if percent { axis.percent() } else { axis };
         let scale = Scale::new(&axis, [from, to].into_iter()).unwrap();
         let size_of = |label: &str| text_width(label, size);
-        let ticks = scale.ticks(length, size_of);
+        let ticks = scale.ticks(length, room, size_of);
         for pair in ticks.windows(2) {
             let [first, second] = [&pair[0], &pair[1]].map(|tick| {
                 (length * scale.position(tick.value), size_of(&tick.label) / 2.0)
@@ -144,10 +163,13 @@ proptest! {
             prop_assert!(pair[0].label != pair[1].label, "{pair:?}");
         }
         for tick in &ticks {
-            prop_assert!((-1e-6..=1.0 + 1e-6).contains(&scale.position(tick.value)), "{tick:?}");
+            let position = scale.position(tick.value);
+            prop_assert!((-1e-6..=1.0 + 1e-6).contains(&position), "{tick:?}");
+            let (middle, half) = (length * position, size_of(&tick.label) / 2.0);
+            prop_assert!(middle - half >= -room.0 && middle + half <= length + room.1, "{tick:?}");
         }
         // Less than a third of a decade may lie between two round numbers.
-        prop_assert!(!ticks.is_empty() || (logarithmic && span < 0.5));
+        prop_assert!(!ticks.is_empty() || room.0.is_finite() || (logarithmic && span < 0.5));
     }
 
     /// Names keep their order and do not overlap if there is space for all.
