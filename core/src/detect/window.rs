@@ -232,12 +232,11 @@ pub(super) fn stands_clear<const NARROW: bool>(
     let skew = bins_outside.saturating_sub(width) * ((z_squared / 6) >> 20);
     let (inside_times, total_times) = (bins << 4, width << 4);
     let above = if NARROW {
-        // Of nine pixels: 14 + 16 bits, 7 + 24 bits and 20 bits. The square of 30 bits fits 4 times over.
-        let level = total_times * total + skew;
-        let Some(above) = (inside_times * inside).checked_sub(level) else {
+        // Of nine pixels: 14 + 16 bits, 7 + 24 bits and 20 bits, so `above` has 30. Any total if memory was overwritten.
+        let level = total_times.wrapping_mul(total).wrapping_add(skew);
+        let Some(above) = inside_times.wrapping_mul(inside).checked_sub(level) else {
             return false;
         };
-        debug_assert!(above < 1 << 30);
         above
     } else {
         let level = u64::from(total_times) * u64::from(total) + u64::from(skew);
@@ -250,7 +249,8 @@ pub(super) fn stands_clear<const NARROW: bool>(
     // At most 8 + 3 + 32 bits, or 10 + 3 + 30; in 1/16, and with z², 20 more.
     let spread = u64::from(bins_outside * width) * u64::from(total);
     let exceeds = |sixteenths: u64| {
-        (u64::from(above) * u64::from(above)) << 4 > sixteenths * u64::from(z_squared >> 16)
+        (u64::from(above) * u64::from(above)) << 4
+            > sixteenths.wrapping_mul((z_squared >> 16).into())
     };
     // 20 + 12 bits, and after the division 23.
     let most = bins * bins * (z_squared >> 20) / (36 << 4);
@@ -313,5 +313,26 @@ impl DetectionRule for WindowRule {
             self.minimum_count.raw(),
             expected,
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::stands_clear;
+
+    #[test]
+    fn any_counts_are_weighed() {
+        // Those of a histogram whose memory was overwritten, too.
+        let counts = || (0..u32::BITS).flat_map(|bit| [(1 << bit) - 1, 1 << bit, u32::MAX - bit]);
+        for (inside, total) in
+            counts().flat_map(|inside| counts().map(move |total| (inside, total)))
+        {
+            for (width, bins) in [(1, 8), (7, 8), (3, 256), (1, 1024), (7, 1024)] {
+                for z in [0, 1, 4096, 20_000, u16::MAX] {
+                    let _ = stands_clear::<true>(inside, total, width, bins, z);
+                    let _ = stands_clear::<false>(inside, total, width, bins, z);
+                }
+            }
+        }
     }
 }

@@ -445,7 +445,7 @@ fn version_and_bins_are_those_of_the_build() {
 }
 
 proptest! {
-    /// A program may have overwritten all but the tags.
+    /// A program may have overwritten all but the tags, or all from a byte on.
     #[test]
     fn any_bytes_are_a_pixel_a_histogram_a_scale_bins_and_statistics(
         mut bytes in prop::collection::vec(any::<u8>(), DTOF_HISTOGRAM_SIZE - 4),
@@ -453,8 +453,13 @@ proptest! {
         dead_time in prop_oneof![Just(0u16), Just(20), Just(u16::MAX)],
         code in any::<u16>(),
         cycles in any::<u16>(),
-        exposure in any::<u32>(),
+        exposure in prop_oneof![any::<u32>(), 1..4000_u32],
         last in any::<u64>(),
+        from in prop_oneof![Just(4), 4..200_usize],
+        (rule, tracking) in prop::sample::select(vec![
+            (DTOF_RULE_PAPER, 0), (DTOF_RULE_AVERAGE, 0), (DTOF_RULE_WINDOW, 0), (DTOF_RULE_WINDOW, 1),
+        ]),
+        echoes in 1..3_u8,
     ) {
         if ones {
             bytes.fill(0xff);
@@ -467,10 +472,11 @@ proptest! {
             Memory::with(statistics()),
         ];
         for memory in &mut memories {
-            memory.0[4..4 + bytes.len()].write_copy_of_slice(&bytes);
+            memory.0[from..4 + bytes.len()].write_copy_of_slice(&bytes[from - 4..]);
         }
         let [mut pixel, mut histogram, mut scale, mut bins, mut read] = memories;
-        let settings = dtof_config_t { rule: DTOF_RULE_WINDOW, dead_time, echoes: 2, ..paper() };
+        let dead_time = if rule == DTOF_RULE_WINDOW { dead_time } else { 0 };
+        let settings = dtof_config_t { rule, dead_time, tracking, echoes, ..paper() };
         let (config, mut done) = (checked(&settings).unwrap(), statistics());
         let mut events = [dtof_event_t::default(); DTOF_ECHOES];
         let mut body = [0; DTOF_BODY_BYTES];

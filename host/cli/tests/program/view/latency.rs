@@ -86,5 +86,6 @@ fn from_the_port_to_the_page() {
         let of = |of| percentile(&times, of);
         let (median, most) = (of(50), of(99));
         println!("latency: {name} after {median:.2} ms, 99 % within {most:.2} ms");
+        assert!(most < 1000.0);
     }
 }
