@@ -199,7 +199,7 @@ fn labels_of_the_kept_figures_touch_nothing() {
 }
 
 /// A chart of one ring, which has no name beside the plot.
-fn ring(title: &str, x: f64, range: Option<(f64, f64)>) -> String {
+fn ring(title: &str, (x, y): (f64, f64), range: Option<(f64, f64)>) -> String {
     let axis = Axis::linear("a quantity, unit");
     let drawn = chart(&Chart {
         finding: "A finding".to_owned(),
@@ -215,7 +215,7 @@ fn ring(title: &str, x: f64, range: Option<(f64, f64)>) -> String {
                 "a",
                 STEPS[0],
                 Style::Ring,
-                vec![Point::exact(x, 0.1)],
+                vec![Point::exact(x, y)],
             )],
         }],
     });
@@ -225,7 +225,7 @@ fn ring(title: &str, x: f64, range: Option<(f64, f64)>) -> String {
 #[test]
 fn a_label_at_the_end_of_an_axis_is_not_cut() {
     // The axis ends at 0.1203.
-    let drawn = ring("", 0.113_494, None);
+    let drawn = ring("", (0.113_494, 5.0), None);
     assert_eq!(touching(&drawn), [""; 0]);
     assert!(
         drawn.contains(">0.1</text>") && !drawn.contains(">0.12</text>"),
@@ -236,8 +236,9 @@ fn a_label_at_the_end_of_an_axis_is_not_cut() {
 #[test]
 fn a_title_as_wide_as_its_panel_is_not_cut() {
     let title = "aawaaini amakkaakama maia kakaa aiaaaaaama adawaaaaa";
-    let drawn = ring(title, 0.01, Some((0.05, 0.3)));
+    let drawn = ring(title, (0.01, 0.1), Some((0.05, 0.3)));
     assert_eq!(touching(&drawn), [""; 0]);
+    assert_eq!(drawn.matches("ink panel").count(), 2);
 }
 
 /// Curves of any form: their names, kinds and points.

@@ -232,7 +232,8 @@ pub(super) fn stands_clear<const NARROW: bool>(
     let skew = bins_outside.saturating_sub(width) * ((z_squared / 6) >> 20);
     let (inside_times, total_times) = (bins << 4, width << 4);
     let above = if NARROW {
-        // Of nine pixels: 14 + 16 bits, 7 + 24 bits and 20 bits, so `above` has 30. Any total if memory was overwritten.
+        // Of nine pixels: 14 + 16 bits, 7 + 24 bits and 20 bits, so `above` has 30.
+        // Overwritten memory may have any total; the products then wrap.
         let level = total_times.wrapping_mul(total).wrapping_add(skew);
         let Some(above) = inside_times.wrapping_mul(inside).checked_sub(level) else {
             return false;
@@ -321,16 +322,19 @@ mod tests {
     use super::stands_clear;
 
     #[test]
-    fn any_counts_are_weighed() {
-        // Those of a histogram whose memory was overwritten, too.
+    fn overwritten_counts_overflow_no_product() {
         let counts = || (0..u32::BITS).flat_map(|bit| [(1 << bit) - 1, 1 << bit, u32::MAX - bit]);
         for (inside, total) in
             counts().flat_map(|inside| counts().map(move |total| (inside, total)))
         {
             for (width, bins) in [(1, 8), (7, 8), (3, 256), (1, 1024), (7, 1024)] {
                 for z in [0, 1, 4096, 20_000, u16::MAX] {
-                    let _ = stands_clear::<true>(inside, total, width, bins, z);
-                    let _ = stands_clear::<false>(inside, total, width, bins, z);
+                    let narrow = stands_clear::<true>(inside, total, width, bins, z);
+                    let wide = stands_clear::<false>(inside, total, width, bins, z);
+                    // Those of nine pixels with counters of 10 bits.
+                    let is_valid =
+                        inside <= total.min(9 * 1023 * width) && total <= 9 * 1023 * bins;
+                    assert!(!is_valid || narrow == wide, "{inside} of {total}");
                 }
             }
         }

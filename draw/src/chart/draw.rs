@@ -36,13 +36,14 @@ pub fn chart(chart: &Chart) -> Result<String> {
     let mut left_out: Vec<Key> = Vec::new();
     let rows: Vec<&[Panel]> = chart.panels.chunks(layout.columns).collect();
     for (row, panels) in rows.iter().enumerate() {
-        let title_lines = panels.iter().map(|panel| layout.title(panel).len());
+        let title_lines = panels.iter().enumerate();
+        let title_lines = title_lines.map(|(column, panel)| layout.title(panel, column).len());
         let top = y + LINE * title_lines.max().unwrap_or(0) as f64;
         let below = rows.get(row + 1).map_or(0, |below| below.len());
         for (column, panel) in panels.iter().enumerate() {
             let area = layout.area(column, top);
             // Clear of a dot or ring at the upper edge of the plot.
-            let (at, lines) = ((area.left, y - 7.5), layout.title(panel));
+            let (at, lines) = ((area.left, y - 7.5), layout.title(panel, column));
             svg.lines("ink panel", at, (TEXT, LINE), Anchor::Start, &lines);
             layout.frame(&mut svg, &area, column, column >= below);
             let scales = (&layout.x, &layout.y);
@@ -156,8 +157,9 @@ impl Layout {
         let beside: f64 = names.iter().map(|names| names.width).sum();
         let whole = WIDTH - left - EDGE - beside;
         let plot = |gap: f64| (whole - gap * (columns as f64 - 1.0)) / columns as f64;
-        // Up to the edges of the picture.
-        let room = (left, EDGE + names.last().map_or(0.0, |names| names.width));
+        // Almost up to the edges of the picture.
+        let beside_last = names.last().map_or(0.0, |names| names.width);
+        let room = (left - 1.0, beside_last + EDGE - 1.0);
         let ticks = |gap| x.ticks(plot(gap), room, |label| text_width(label, TEXT));
         // The outermost labels extend beyond the plots by half of their widths.
         let gap = widest(&ticks(20.0)) + GAP;
@@ -182,10 +184,15 @@ impl Layout {
         Area::around((left, top), (left + self.width, top + self.height), 0.0)
     }
 
-    fn title(&self, panel: &Panel) -> Vec<String> {
+    fn title(&self, panel: &Panel, column: usize) -> Vec<String> {
         let has_names = self.names.iter().any(|names| names.width > 0.0);
-        // The last column ends at the edge.
-        let beside = if has_names { TO_NAME / 2.0 } else { EDGE };
+        let beside = if has_names {
+            TO_NAME / 2.0
+        } else if column + 1 == self.columns {
+            EDGE - 1.0
+        } else {
+            self.gap / 2.0
+        };
         wrapped(
             &panel.title,
             BOLD * TEXT,

@@ -98,7 +98,10 @@ impl Scale {
             let spans: Vec<(f64, f64)> = ticks.iter().map(span).collect();
             spans.windows(2).all(|pair| pair[0].1 + GAP <= pair[1].0)
         };
-        let found = candidates.iter().find(|ticks| fits(ticks));
+        let several = candidates
+            .iter()
+            .find(|ticks| ticks.len() > 1 && fits(ticks));
+        let found = several.or_else(|| candidates.iter().find(|ticks| fits(ticks)));
         // A single label always fits.
         let single = || candidates.last().map(|ticks| ticks[..1].to_vec());
         found.cloned().or_else(single).unwrap_or_default()

@@ -170,6 +170,12 @@ proptest! {
         }
         // Less than a third of a decade may lie between two round numbers.
         prop_assert!(!ticks.is_empty() || room.0.is_finite() || (logarithmic && span < 0.5));
+        if ticks.is_empty() {
+            for tick in scale.ticks(length, (f64::INFINITY, f64::INFINITY), size_of) {
+                let (middle, half) = (length * scale.position(tick.value), size_of(&tick.label) / 2.0);
+                prop_assert!(middle - half < -room.0 || middle + half > length + room.1, "{tick:?}");
+            }
+        }
     }
 
     /// Names keep their order and do not overlap if there is space for all.

@@ -445,7 +445,7 @@ fn version_and_bins_are_those_of_the_build() {
 }
 
 proptest! {
-    /// A program may have overwritten all but the tags, or all from a byte on.
+    /// A program may have overwritten all but the tags, or all bytes from one on.
     #[test]
     fn any_bytes_are_a_pixel_a_histogram_a_scale_bins_and_statistics(
         mut bytes in prop::collection::vec(any::<u8>(), DTOF_HISTOGRAM_SIZE - 4),
