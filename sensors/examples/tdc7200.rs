@@ -15,6 +15,7 @@ use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{
     AsyncPixel, LaserCycle, PixelAddress, PixelConfig, RangeScale, Statistics, checked,
 };
+use dtof_sensors::dither::Dither;
 use dtof_sensors::tdc7200::{Config, Settings, Tdc7200};
 use dtof_sensors::{PhotonSink, Sensor};
 
@@ -69,6 +70,7 @@ fn main() {
         range: None,
     };
     // As a main loop that a timer wakes each millisecond, and INTB as well.
+    sensor.start(BIN_WIDTH, Dither::OFF);
     for now_ms in 0..100 {
         if let Err(error) = sensor.poll(now_ms, &mut sink) {
             print_line!("{error}");

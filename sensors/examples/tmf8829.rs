@@ -11,8 +11,9 @@ mod pin;
 #[macro_use]
 mod platform;
 
-use dtof_core::fixed::types::I24F8;
+use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{Count24, Histogram, PixelAddress, PixelConfig, RangeGate, RangeScale, checked};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::tmf8829::{Config, Settings, Tmf8829, Zones};
 use dtof_sensors::{PhotonSink, Sensor, Target};
 
@@ -76,6 +77,8 @@ fn main() {
         zones: [(); 64].map(|()| none()),
     };
     // As a main loop that a timer wakes each millisecond, and INT as well.
+    // It has bins of its own. Before a start nothing shines.
+    sensor.start(U16F16::ZERO, Dither::OFF);
     for now_ms in 0..600 {
         if let Err(error) = sensor.poll(now_ms, &mut sink) {
             print_line!("{error}");

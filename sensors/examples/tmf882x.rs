@@ -11,8 +11,9 @@ mod pin;
 #[macro_use]
 mod platform;
 
-use dtof_core::fixed::types::I24F8;
+use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{Count24, Histogram, PixelAddress, PixelConfig, RangeScale, checked};
+use dtof_sensors::dither::Dither;
 use dtof_sensors::tmf882x::{Config, Settings, Tmf882x};
 use dtof_sensors::{PhotonSink, Sensor};
 
@@ -58,6 +59,8 @@ fn main() {
         ranges: [None; 9],
     };
     // A main loop would poll each millisecond and after each edge of INT.
+    // It has bins of its own. Before a start nothing shines.
+    sensor.start(U16F16::ZERO, Dither::OFF);
     for now_ms in 0..100 {
         if let Err(error) = sensor.poll(now_ms, &mut sink) {
             print_line!("{error}");

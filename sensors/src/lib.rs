@@ -19,7 +19,7 @@
 //! A driver keeps in its state what it waits for, and the time is an argument of
 //! [`Sensor::poll`]. A sensor that is unplugged or hangs therefore costs one error every few
 //! milliseconds and blocks nothing else. Every error leaves the driver usable: the next
-//! polls bring the sensor up again.
+//! polls bring the sensor up again. If nobody polls any more, the sensor is off: see [`Sensor`].
 
 #![no_std]
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -39,6 +39,7 @@
 extern crate std;
 
 pub mod dither;
+mod enable;
 mod fault;
 pub mod i2c;
 pub mod photon_timer;
@@ -54,6 +55,7 @@ use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 
 use self::dither::Dither;
+pub use self::enable::ReleaseError;
 pub use self::fault::SensorFault;
 
 /// Where a sensor's photons go. `BINS` is the number of bins of its histograms; the drivers of this
@@ -98,6 +100,12 @@ pub struct Target {
 /// up and notices that it is gone. Poll again at once while the answer is not [`Polled::Idle`], up
 /// to a limit: a fast sensor may always have more.
 ///
+/// # When it is on
+///
+/// A sensor may fire a laser. It is on only between [`Self::start`] and [`Self::stop`]: a poll before a start, or after
+/// a stop, switches nothing on. It is off once its driver is dropped. An error that ends a measurement switches
+/// it off before the poll returns, and the next poll begins anew. So a loop that ends with `?` leaves nothing on.
+///
 /// `BINS` is the number of bins of the histograms that it gives.
 pub trait Sensor<const BINS: usize = 128> {
     /// The driver's error, which contains that of the bus. The host receives its kind.
@@ -112,9 +120,15 @@ pub trait Sensor<const BINS: usize = 128> {
     /// [`SensorInfo::most_dither`].
     fn start(&mut self, bin_width: U16F16, dither: Dither);
 
-    /// Stops the sensor, as far as that is possible at once and without an answer. It is not polled
-    /// before the next [`Self::start`].
+    /// Stops the sensor, as far as that is possible at once and without an answer. It need not be polled
+    /// before the next [`Self::start`], unless [`Self::is_stopping`].
     fn stop(&mut self);
+
+    /// Whether the sensor may not know yet that it is to be off, as its bus or a pin has failed, or nobody has
+    /// told it since the driver was made. Poll it on then: each poll tries again.
+    fn is_stopping(&self) -> bool {
+        false
+    }
 
     /// Takes the next step. `now_ms` counts milliseconds and may wrap.
     ///

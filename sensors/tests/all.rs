@@ -4,6 +4,7 @@ mod common;
 mod dither;
 mod many_bins;
 mod nonsense;
+mod off;
 mod simulated;
 mod software_i2c;
 mod tdc7200;

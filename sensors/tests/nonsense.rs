@@ -5,7 +5,7 @@
 use std::cell::{Cell, RefCell, RefMut};
 use std::rc::Rc;
 
-use crate::common::{Line, RecordingSink, SinkCall};
+use crate::common::{Line, RecordingSink, SinkCall, started};
 use dtof_chips::{Chip, Tdc7200 as TdcChip, Tmf882x as TmfChip};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::U16F16;
@@ -338,7 +338,8 @@ fn a_tdc7200_that_answers_nonsense() {
         };
         let config = tdc7200::Config::new(settings).unwrap();
         let (interrupt, enable) = (bus.interrupt.clone(), bus.enable.clone());
-        let mut sensor: Tdc7200<_, _, _> = Tdc7200::new(bus.clone(), interrupt, enable, config);
+        let sensor: Tdc7200<_, _, _> = Tdc7200::new(bus.clone(), interrupt, enable, config);
+        let mut sensor = started(sensor);
         let sane = [SinkCall::Photon(0, 28), SinkCall::End(1)];
         let is_sane = |given: &SinkCall| sane.contains(given);
         let errors = survive(&mut sensor, &bus, OfTdc { config }, 19, is_sane);
@@ -356,8 +357,9 @@ fn a_tmf882x_that_answers_nonsense() {
         let settings = tmf882x::Settings::new(PixelAddress::new(0));
         let config = tmf882x::Config::new(settings).unwrap();
         let (interrupt, enable) = (bus.interrupt.clone(), bus.enable.clone());
-        let mut sensor: Tmf882x<'_, _, _, _> =
+        let sensor: Tmf882x<'_, _, _, _> =
             Tmf882x::new(bus.clone(), interrupt, enable, &[1, 2, 3], config);
+        let mut sensor = started(sensor);
         let is_sane = |given: &SinkCall| match given {
             SinkCall::Frame(cycles) => *cycles == 537 * 1024,
             SinkCall::Histogram(pixel, counts) => *pixel < 9 && *counts == sane,

@@ -3,7 +3,7 @@
 
 use std::num::NonZeroU16;
 
-use crate::common::{RecordingSink, SinkCall};
+use crate::common::{RecordingSink, SinkCall, started};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{U0F32, U8F24, U16F16};
 use dtof_sensors::dither::Dither;
@@ -96,7 +96,7 @@ fn bins_are_as_wide_as_those_of_a_sensor_within_a_sixteenth() {
 fn photons_come_at_their_rates_in_their_bins() {
     const CYCLES: u32 = 100_000;
     let pixels = [pixel(3, 60, 0.5, 0.0), pixel(4, 9, 0.2, 1.28)];
-    let mut sensor = Simulated::new(&pixels, PULSE, settings(5));
+    let mut sensor = started(Simulated::new(&pixels, PULSE, settings(5)));
     let photons = photons(&run(&mut sensor, CYCLES));
     let count = |pixel: u16, code: u16| {
         let of_bin = |photon: &&(u32, u16, u16)| (photon.1, photon.2) == (pixel, code);
@@ -124,7 +124,7 @@ fn photons_come_at_their_rates_in_their_bins() {
 #[test]
 fn a_pulse_past_the_last_bin_is_passed_on() {
     let pixels = [pixel(0, 127, 1.0, 0.0), pixel(1, u16::MAX, 1.0, 0.0)];
-    let mut sensor = Simulated::new(&pixels, PULSE, settings(5));
+    let mut sensor = started(Simulated::new(&pixels, PULSE, settings(5)));
     let photons = photons(&run(&mut sensor, 1000));
     let codes = |pixel| {
         let mut codes: Vec<u16> = photons
@@ -143,7 +143,7 @@ fn a_pulse_past_the_last_bin_is_passed_on() {
 fn the_same_seed_gives_the_same_photons_however_often_it_is_asked() {
     let pixels = [pixel(0, 20, 0.3, 0.4), pixel(1, 90, 0.01, 0.02)];
     let stream = |seed, step: usize| {
-        let mut sensor = Simulated::new(&pixels, PULSE, settings(seed));
+        let mut sensor = started(Simulated::new(&pixels, PULSE, settings(seed)));
         let mut sink = RecordingSink::default();
         for now_ms in (0..=600).step_by(step) {
             sensor.poll(now_ms, &mut sink).unwrap();
@@ -165,7 +165,7 @@ const GOLDEN: [(u32, u16, u16); 4] = [(0, 0, 9), (1, 0, 21), (1, 0, 22), (2, 0, 
 #[test]
 fn the_time_says_how_many_laser_cycles_are_due() {
     let dark = [pixel(0, 0, 0.0, 0.0)];
-    let mut sensor = Simulated::new(
+    let mut sensor = started(Simulated::new(
         &dark,
         PULSE,
         Settings {
@@ -173,7 +173,7 @@ fn the_time_says_how_many_laser_cycles_are_due() {
             cycles_per_poll: NonZeroU16::new(10).unwrap(),
             ..settings(0)
         },
-    );
+    ));
     let mut sink = RecordingSink::default();
     let start = u32::MAX - 2;
     let mut poll = |after: u32| {
@@ -214,9 +214,9 @@ fn too_many_photons_are_refused() {
 #[test]
 fn laser_cycles_that_are_asked_for_are_those_of_the_clock() {
     let pixels = [pixel(3, 60, 0.5, 0.0), pixel(4, 9, 0.2, 1.28)];
-    let mut sensor = Simulated::new(&pixels, PULSE, settings(5));
+    let mut sensor = started(Simulated::new(&pixels, PULSE, settings(5)));
     let by_clock = photons(&run(&mut sensor, 1_000));
-    let mut sensor = Simulated::new(&pixels, PULSE, settings(5)).without_clock();
+    let mut sensor = started(Simulated::new(&pixels, PULSE, settings(5)).without_clock());
     let mut sink = RecordingSink::default();
     assert_eq!(sensor.laser_cycles(0, &mut sink), Polled::Idle);
     for cycles in [1, 99, 900] {

@@ -7,7 +7,7 @@ use crate::common::tdc7200::{
     ARM_1, Access, Bench, CALIBRATIONS, MODE_1, configure, example, mode_1, over, read,
     read_results, write, writes,
 };
-use crate::common::{Broken, Line, RecordingSink, SinkCall};
+use crate::common::{Broken, Line, RecordingSink, SinkCall, started};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_sensors::dither::Dither;
@@ -359,7 +359,8 @@ fn two_sensors_share_a_bus() {
         let select = selects[index].clone();
         let device = RefCellDevice::new(&shared, select, NoDelay).unwrap();
         let enable = Line::new(false);
-        Tdc7200::<_, _, _>::new(device, interrupts[index].clone(), enable, config)
+        let interrupt = interrupts[index].clone();
+        started(Tdc7200::<_, _, _>::new(device, interrupt, enable, config))
     });
     let mut sink = RecordingSink::default();
 

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 use std::rc::Rc;
 
 use crate::common::tmf8828::{Bus, Chip, MAP, count, zone};
-use crate::common::{Broken, RecordingSink, SinkCall};
+use crate::common::{Broken, RecordingSink, SinkCall, started};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_sensors::dither::Dither;
@@ -28,7 +28,7 @@ fn bench(number: u8) -> Bench {
     let bus = Bus(Rc::clone(&chip));
     let config = Config::new(Settings::of_8x8(PixelAddress::new(10))).unwrap();
     Bench {
-        sensor: Tmf882x::new(bus.clone(), bus.clone(), bus, &[], config),
+        sensor: started(Tmf882x::new(bus.clone(), bus.clone(), bus, &[], config)),
         chip,
         sink: RecordingSink::default(),
         now_ms: 0,
@@ -362,7 +362,13 @@ fn a_sensor_left_in_its_8x8_mode_is_switched_off_for_nine_zones() {
     bench.bring_up();
     let bus = Bus(Rc::clone(&bench.chip));
     let config = Config::new(Settings::new(PixelAddress::new(10))).unwrap();
-    bench.sensor = Tmf882x::new(bus.clone(), bus.clone(), bus, &[], config);
+    bench.sensor = started(Tmf882x::new(bus.clone(), bus.clone(), bus, &[], config));
+    // Another firmware has left it so; our driver has switched it off.
+    {
+        let mut chip = bench.chip.borrow_mut();
+        assert_eq!((chip.mode, chip.is_measuring), (0, false));
+        (chip.mode, chip.is_measuring) = (8, true);
+    }
     assert_eq!(
         bench.error(),
         Error::Device(DeviceError::WrongMode { mode: 8 })

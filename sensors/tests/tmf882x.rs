@@ -7,7 +7,7 @@ use crate::common::tmf882x::{
     Bench, Counts, IMAGE, NACK, measure, measuring, packet, packets, page, read, settings,
     some_counts, stopped, write,
 };
-use crate::common::{Line, RecordingSink};
+use crate::common::{Line, RecordingSink, started};
 use dtof_core::PixelAddress;
 use dtof_sensors::tmf882x::{Config, ConfigError, Error, Settings, SpadMap, Tmf882x, Zones};
 use dtof_sensors::{Polled, Sensor};
@@ -244,7 +244,14 @@ fn two_sensors_share_a_bus() {
         });
         let device = RefCellDevice::new(&shared);
         let interrupt = interrupts[index].clone();
-        Tmf882x::<_, _, _>::new(device, interrupt, Line::new(false), &[], config.unwrap())
+        let enable = Line::new(false);
+        started(Tmf882x::<_, _, _>::new(
+            device,
+            interrupt,
+            enable,
+            &[],
+            config.unwrap(),
+        ))
     });
 
     let mut now_ms = 0;

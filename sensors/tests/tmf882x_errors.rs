@@ -3,7 +3,7 @@
 
 use crate::common::tmf882x::{
     Bench, IMAGE, NACK, measure, measuring, packet, packets, page, read, settings, some_counts,
-    stopped, write,
+    stop, stopped, write,
 };
 use crate::common::{Broken, SinkCall};
 use dtof_sensors::tmf882x::{BootCommand, Command, DeviceError, Error, Waiting};
@@ -11,7 +11,7 @@ use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::Transaction as Access;
 
-/// An error while measuring that stops it; then measuring again without a reset.
+/// An error while measuring that stops it; then measuring again without a reset. The poll has sent [`stop`].
 fn stops_measuring(bench: &mut Bench<128>, polled: Result<Polled, Error<ErrorKind, Broken>>) {
     assert!(polled.is_err());
     assert!(!bench.sensor.is_measuring());
@@ -39,7 +39,7 @@ fn starts_over(bench: &mut Bench<128>) {
 #[test]
 fn not_acknowledged_while_measuring() {
     let mut bench = measuring();
-    let polled = bench.serve(&[read(0x41, 0xE1, &[0]).with_error(NACK)]);
+    let polled = bench.serve(&[read(0x41, 0xE1, &[0]).with_error(NACK), stop()]);
     assert_eq!(polled, Err(Error::Nack(NACK)));
     stops_measuring(&mut bench, polled);
 
@@ -50,7 +50,7 @@ fn not_acknowledged_while_measuring() {
     }
     let mut accesses = packet(0x41, &packets[15], 128);
     let last = accesses.pop().unwrap();
-    accesses.push(last.with_error(NACK));
+    accesses.extend([last.with_error(NACK), stop()]);
     let polled = bench.serve(&accesses);
     assert_eq!(polled, Err(Error::Nack(NACK)));
     stops_measuring(&mut bench, polled);
@@ -66,7 +66,7 @@ fn only_an_address_not_acknowledged_is_no_answer() {
     ] {
         let kind = ErrorKind::NoAcknowledge(source);
         let mut bench = measuring();
-        let polled = bench.serve(&[read(0x41, 0xE1, &[0]).with_error(kind)]);
+        let polled = bench.serve(&[read(0x41, 0xE1, &[0]).with_error(kind), stop()]);
         assert_eq!(polled.map_err(SensorFault::from), Err(fault));
         stops_measuring(&mut bench, polled);
     }
@@ -76,10 +76,16 @@ fn only_an_address_not_acknowledged_is_no_answer() {
 fn an_unplugged_sensor_says_so_again_and_again_and_is_found_when_it_is_back() {
     let mut bench = measuring();
     bench.set(&some_counts());
-    times_out(&mut bench, 1000, &[], Waiting::Data);
-    for reset in [false, true, true] {
-        bench.switch_on(reset);
-        let polled = bench.poll(&[read(0x41, 0xE0, &[0]).with_error(NACK)]);
+    let stop = || stop().with_error(NACK);
+    bench.wait(1000);
+    assert_eq!(bench.poll(&[]), Ok(Polled::Idle));
+    bench.wait(1);
+    assert_eq!(bench.poll(&[stop()]), Err(Error::Timeout(Waiting::Data)));
+    for _ in 0..3 {
+        // It does not take the stop, so ENABLE has gone low.
+        assert_eq!(bench.enable.driven.borrow().last(), Some(&false));
+        bench.switch_on(true);
+        let polled = bench.poll(&[read(0x41, 0xE0, &[0]).with_error(NACK), stop()]);
         assert_eq!(polled, Err(Error::Nack(NACK)));
     }
     assert_eq!(bench.sensor.counts().errors, 4);
@@ -89,7 +95,8 @@ fn an_unplugged_sensor_says_so_again_and_again_and_is_found_when_it_is_back() {
 #[test]
 fn another_error_of_the_bus_is_inside() {
     let mut bench = measuring();
-    let polled = bench.serve(&[read(0x41, 0xE1, &[0]).with_error(ErrorKind::ArbitrationLoss)]);
+    let lost = read(0x41, 0xE1, &[0]).with_error(ErrorKind::ArbitrationLoss);
+    let polled = bench.serve(&[lost, stop()]);
     assert_eq!(polled, Err(Error::Bus(ErrorKind::ArbitrationLoss)));
     stops_measuring(&mut bench, polled);
 }
@@ -98,11 +105,11 @@ fn another_error_of_the_bus_is_inside() {
 fn an_error_of_a_pin_is_inside() {
     let mut bench = measuring();
     bench.interrupt.broken.set(true);
-    let polled = bench.poll(&[]);
+    let polled = bench.poll(&[stop()]);
     assert_eq!(polled, Err(Error::Pin(Broken)));
     bench.interrupt.broken.set(false);
     bench.enable.broken.set(true);
-    assert_eq!(bench.poll(&[]), Err(Error::Pin(Broken)));
+    assert_eq!(bench.poll(&[stop()]), Err(Error::Pin(Broken)));
     bench.enable.broken.set(false);
     starts_over(&mut bench);
 }
@@ -123,7 +130,7 @@ fn a_stuck_interrupt_is_an_error_at_the_limit() {
     for _ in 0..2 {
         assert_eq!(bench.poll(&[read(0x41, 0xE1, &[0x00])]), Ok(Polled::Idle));
     }
-    let polled = bench.poll(&[read(0x41, 0xE1, &[0x40])]);
+    let polled = bench.poll(&[read(0x41, 0xE1, &[0x40]), stop()]);
     assert_eq!(polled, Err(Error::StuckInterrupt { status: 0x40 }));
     stops_measuring(&mut bench, polled);
 }
@@ -231,12 +238,19 @@ fn an_application_that_refuses_never_ends_or_shows_another_page() {
         command: Command::Measure,
         status: 0x00,
     };
-    assert_eq!(bench.poll(&[read(0x41, 0x08, &[0x00])]), Err(refused));
+    let polled = bench.poll(&[read(0x41, 0x08, &[0x00]), stop()]);
+    assert_eq!(polled, Err(refused));
 
     for status in [0x10, 0xFF] {
         begin(&mut bench, true);
-        let busy = [read(0x41, 0x08, &[status])];
-        times_out(&mut bench, 50, &busy, Waiting::Command(Command::Stop));
+        let busy = || read(0x41, 0x08, &[status]);
+        bench.wait(50);
+        assert_eq!(bench.poll(&[busy()]), Ok(Polled::Idle));
+        bench.wait(1);
+        // It may have taken the command to measure.
+        let polled = bench.poll(&[busy(), stop()]);
+        let timeout = Error::Timeout(Waiting::Command(Command::Stop));
+        assert_eq!(polled, Err(timeout));
     }
     starts_over(&mut bench);
 }
@@ -257,12 +271,12 @@ fn a_result_is_cleared_and_results_alone_are_an_error() {
     bench.interrupt.set(false);
     bench.work(&result);
     bench.work(&result);
-    let polled = bench.poll(&result[..1]);
+    let polled = bench.poll(&[result[0].clone(), stop()]);
     assert_eq!(polled, Err(Error::StuckInterrupt { status: 0x03 }));
     stops_measuring(&mut bench, polled);
 
     bench.wait(1001);
-    let polled = bench.serve(&result[..1]);
+    let polled = bench.serve(&[result[0].clone(), stop()]);
     assert_eq!(polled, Err(Error::Timeout(Waiting::Data)));
     stops_measuring(&mut bench, polled);
 }
@@ -276,14 +290,16 @@ fn packets_that_make_no_set_time_out() {
     bench.wait(1000);
     assert_eq!(bench.packet(&good[7]), Ok(Polled::Idle));
     bench.wait(1);
-    let polled = bench.packet(&good[7]);
+    let mut accesses = packet(0x41, &good[7], 128);
+    accesses.push(stop());
+    let polled = bench.serve(&accesses);
     assert_eq!(polled, Err(Error::Timeout(Waiting::Data)));
     assert_eq!(bench.sensor.counts().left_out, 3);
     // It has given none that is good: to stop it does not help.
     bench.interrupt.set(true);
     starts_over(&mut bench);
     bench.wait(1001);
-    let polled = bench.poll(&[]);
+    let polled = bench.poll(&[stop()]);
     assert_eq!(polled, Err(Error::Timeout(Waiting::Data)));
     stops_measuring(&mut bench, polled);
 }
@@ -364,21 +380,19 @@ fn out_of_order(expected: u8, found: u8) -> Error<ErrorKind, Broken> {
 
 #[test]
 fn a_stop_switches_the_chip_off_whether_or_not_it_acknowledges() {
-    let stop = write(0x41, &[0x08, 0xFF]);
-    let not_acknowledged = stop.clone().with_error(NACK);
-    for (has_failed, accesses) in [
-        (false, &[stop.clone()][..]),
-        (false, &[not_acknowledged]),
-        // After an error it may measure all the same.
-        (true, &[stop]),
+    for (has_failed, access) in [
+        (false, stop()),
+        (false, stop().with_error(NACK)),
+        // It has not answered the stop after the error.
+        (true, stop()),
     ] {
         let mut bench = measuring();
         if has_failed {
-            let polled = bench.serve(&[read(0x41, 0xE1, &[0]).with_error(NACK)]);
+            let polled = bench.serve(&[read(0x41, 0xE1, &[0]).with_error(NACK), stop()]);
             assert_eq!(polled, Err(Error::Nack(NACK)));
         }
         bench.enable.driven.take();
-        bench.i2c.update_expectations(accesses);
+        bench.i2c.update_expectations(&[access]);
         bench.sensor.stop();
         bench.i2c.done();
         assert_eq!(*bench.enable.driven.borrow(), [false]);

@@ -84,6 +84,8 @@ where
     S::Error: std::error::Error,
 {
     let mut now_ms = 0u32.wrapping_sub(50);
+    sensor.start(U16F16::lit("250"), Dither::OFF);
+    let mut is_on = true;
     while let Some(what) = bus.next() {
         now_ms = now_ms.wrapping_add([0, 1, 1, 3, 11, 60, 150, 1001][usize::from(what & 7)]);
         match what >> 3 {
@@ -94,17 +96,27 @@ where
             3 => {
                 model.restart();
                 sensor.start(U16F16::lit("250"), Dither::OFF);
+                is_on = true;
             }
             4 => {
                 model.restart();
                 sensor.stop();
+                is_on = false;
                 bus.take_answers();
             }
             _ => bus.set_line(bus::Line::Chip),
         }
-        let _ = poll(sensor, bus, now_ms, model);
+        let polled = poll(sensor, bus, now_ms, model);
+        assert!(
+            is_on || polled != Ok(Polled::Data),
+            "a sensor that is off gives something"
+        );
     }
     bus.set_line(bus::Line::Chip);
+    if !is_on {
+        model.restart();
+        sensor.start(U16F16::lit("250"), Dither::OFF);
+    }
     let began = now_ms;
     while poll(sensor, bus, now_ms, model) != Ok(Polled::Data) {
         now_ms = now_ms.wrapping_add(1);

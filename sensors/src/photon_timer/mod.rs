@@ -57,12 +57,14 @@ pub trait Sampler {
     fn has_stalled(&self) -> bool;
 }
 
-/// The photons of one pixel.
+/// The photons of one pixel. When it is dropped, the laser goes off.
 #[derive(Debug)]
-pub struct PhotonTimer<S> {
+pub struct PhotonTimer<S: Sampler> {
     sampler: S,
     config: Config,
     dither: Dither,
+    /// Between a start and a stop.
+    is_started: bool,
     /// The laser fires. It starts after a pause of a whole laser cycle, so that no laser cycle is
     /// shorter than configured.
     fires: bool,
@@ -116,6 +118,7 @@ impl<S: Sampler> PhotonTimer<S> {
             sampler,
             config,
             dither: Dither::OFF,
+            is_started: false,
             fires: false,
             off_since: None,
             next: 0,
@@ -191,15 +194,20 @@ impl<S: Sampler> Sensor for PhotonTimer<S> {
 
     fn start(&mut self, _: U16F16, dither: Dither) {
         self.dither = dither;
+        self.is_started = true;
         self.rest();
     }
 
     fn stop(&mut self) {
+        self.is_started = false;
         self.rest();
     }
 
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Error> {
         if !self.fires {
+            if !self.is_started {
+                return Ok(Polled::Idle);
+            }
             let since = *self.off_since.get_or_insert(now_ms);
             // The first of these milliseconds may be nearly over.
             if now_ms.wrapping_sub(since) <= self.config.period().div_ceil(CLOCK_HZ / 1000) {
@@ -222,6 +230,12 @@ impl<S: Sampler> Sensor for PhotonTimer<S> {
             }
         }
         Ok(Polled::Data)
+    }
+}
+
+impl<S: Sampler> Drop for PhotonTimer<S> {
+    fn drop(&mut self) {
+        self.sampler.stop();
     }
 }
 

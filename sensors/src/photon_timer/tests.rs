@@ -1,5 +1,7 @@
 //! Against a model that has one level a bin, and a ring that is overwritten.
 
+use std::cell::Cell;
+use std::rc::Rc;
 use std::string::ToString;
 use std::vec;
 use std::vec::Vec;
@@ -379,6 +381,59 @@ fn the_laser_is_off_until_the_poll_after_its_rest_and_after_a_stop() {
     assert_eq!(poll(&mut timer, 20), Some(dither));
     timer.stop();
     assert_eq!(timer.sampler.dither, None);
+}
+
+/// A laser: whether it fires, and how often it has begun.
+#[derive(Clone, Default)]
+struct Laser(Rc<Cell<(bool, u32)>>);
+
+impl Sampler for Laser {
+    const KEPT: u32 = 40;
+
+    fn start(&mut self, _: &Config, _: Dither) {
+        self.0.set((true, self.0.get().1 + 1));
+    }
+
+    fn stop(&mut self) {
+        self.0.set((false, self.0.get().1));
+    }
+
+    fn completed(&mut self) -> u32 {
+        0
+    }
+
+    fn samples(&self, _: u32) -> Samples {
+        unreachable!("none is complete")
+    }
+
+    fn has_stalled(&self) -> bool {
+        false
+    }
+}
+
+#[test]
+fn the_laser_fires_only_between_a_start_and_a_stop_and_not_once_it_is_dropped() {
+    for polls in 0..10 {
+        let laser = Laser::default();
+        let mut timer = PhotonTimer::new(laser.clone(), Config::new(SETTINGS).unwrap());
+        let poll = |timer: &mut PhotonTimer<Laser>, times| {
+            for now_ms in 0..times {
+                assert_eq!(timer.poll(now_ms, &mut Seen::default()), Ok(Polled::Idle));
+            }
+            laser.0.get()
+        };
+        assert_eq!(poll(&mut timer, 100), (false, 0));
+        timer.start(U16F16::from_num(BIN_PS), Dither::OFF);
+        let fires = polls > LATER_MS;
+        let starts = u32::from(fires);
+        assert_eq!(poll(&mut timer, polls), (fires, starts));
+        timer.stop();
+        assert_eq!(poll(&mut timer, 100), (false, starts));
+        timer.start(U16F16::from_num(BIN_PS), Dither::OFF);
+        assert_eq!(poll(&mut timer, polls), (fires, 2 * starts));
+        drop(timer);
+        assert_eq!(laser.0.get(), (false, 2 * starts));
+    }
 }
 
 #[test]

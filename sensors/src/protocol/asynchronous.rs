@@ -8,7 +8,7 @@ use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
 use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::digital::Wait;
 
-use super::{AsyncBus, Done, Driver, Failure, Protocol, Request};
+use super::{AsyncBus, Done, Driver, Failure, Power, Protocol, Request, Sent};
 use crate::{PhotonSink, Polled};
 
 /// Time for a driver: the clock, a timer, and how long the bus may take.
@@ -60,6 +60,8 @@ where
     /// low or for a millisecond, whichever comes first.
     ///
     /// The future may be dropped, as with [`Self::poll_async`]. While it waits for INT nothing is lost.
+    ///
+    /// Call [`Self::start_async`] first: a driver that was not started waits without end.
     ///
     /// # Errors
     /// Fails if a poll fails, or if the bus takes longer than `bus_ms` ([`Failure::BusTimeout`]). Call it
@@ -118,19 +120,18 @@ where
         let limit = timing.delay.delay_ms(timing.bus_ms);
         match race(self.poll_async(now_ms, sink), limit).await {
             Ok(polled) => polled,
-            Err(()) => {
-                self.is_under_way = false;
-                Err(self.fail(Failure::BusTimeout))
-            }
+            Err(()) => Err(self.fail(Failure::BusTimeout)),
         }
     }
 
+    /// A failure after which the bus is not tried again.
     fn fail(
         &mut self,
         failure: Failure<BUS::Error, INT::Error>,
     ) -> P::Error<BUS::Error, INT::Error> {
         let error = failure.into();
         self.protocol.failed(&error);
+        self.cut();
         error
     }
 
@@ -138,9 +139,9 @@ where
     /// order. It awaits nothing else, and as long as the bus does. [`Self::next`] calls it as often as
     /// needed.
     ///
-    /// The future may be dropped. If it is dropped within a transfer of a frame, the frame is lost; the next
-    /// poll counts it and begins to bring the sensor up again. A frame that the sensor has ready when it is
-    /// stopped is not given and not counted.
+    /// The future may be dropped. If it is dropped within a transfer of a frame, the frame is lost and
+    /// counted, ENABLE goes low, and the next poll begins to bring the sensor up again. A frame that the sensor has
+    /// ready when it is stopped is not given and not counted.
     ///
     /// # Errors
     /// Fails if this step fails. The next polls bring the sensor up again.
@@ -149,28 +150,75 @@ where
         now_ms: u32,
         sink: &mut impl PhotonSink,
     ) -> Result<Polled, P::Error<BUS::Error, INT::Error>> {
-        self.settle();
-        self.is_under_way = true;
-        let polled = self.step_async(now_ms, sink).await;
-        self.is_under_way = false;
-        polled.inspect_err(|error| self.protocol.failed(error))
+        let mut call = Call {
+            driver: self,
+            is_over: false,
+        };
+        let polled = call.driver.polled(now_ms, sink).await;
+        call.is_over = true;
+        polled
     }
 
-    /// Starts with a new configuration: abandons the present measurement.
+    async fn polled(
+        &mut self,
+        now_ms: u32,
+        sink: &mut impl PhotonSink,
+    ) -> Result<Polled, P::Error<BUS::Error, INT::Error>> {
+        let polled = match self.power {
+            Power::Off => return Ok(Polled::Idle),
+            Power::Stopping { .. } => self.switch_off_async().await.map_err(P::Error::from),
+            Power::On => self.step_async(now_ms, sink).await,
+        };
+        if let Err(error) = &polled {
+            self.protocol.failed(error);
+            if self.power == Power::On && !self.protocol.is_measuring() {
+                self.darken_async().await;
+            }
+        }
+        polled
+    }
+
+    /// Begins to measure with the next poll. Abandons the present measurement.
     pub fn start_async(&mut self) {
-        self.settle();
-        self.protocol.restart();
+        self.switch_on();
     }
 
-    /// Drives ENABLE low, and also sends the command to stop, as ENABLE may not be wired. Errors are
-    /// ignored. It takes at most `bus_ms` milliseconds of the timer.
+    /// Drives ENABLE low, and also sends the command to stop, as ENABLE may not be wired. It takes at most
+    /// `bus_ms` milliseconds of the timer. If it fails or is dropped, each poll tries again
+    /// ([`Self::is_stopping`]).
     pub async fn stop_async(&mut self, timing: &mut Timing<impl FnMut() -> u32, impl DelayNs>) {
-        // Before the first await: a dropped future has stopped the sensor all the same.
-        let _ = self.enable.set_low();
-        self.settle();
-        if let Request::Write { address, bytes } = self.protocol.stop() {
-            let written = self.bus.write(address, bytes);
-            let _ = race(written, timing.delay.delay_ms(timing.bus_ms)).await;
+        self.power = Power::STOPPING;
+        let limit = timing.delay.delay_ms(timing.bus_ms);
+        let failure = match race(self.switch_off_async(), limit).await {
+            Ok(Ok(_)) => return,
+            Ok(Err(failure)) => failure,
+            Err(()) => Failure::BusTimeout,
+        };
+        self.fail(failure);
+    }
+
+    /// Sends the command to stop, if there is one.
+    async fn send_stop_async(&mut self) -> Sent<BUS::Error, INT::Error> {
+        let Request::Write { address, bytes } = self.protocol.stop() else {
+            return None;
+        };
+        Some(self.bus.write(address, bytes).await.map_err(BUS::failure))
+    }
+
+    /// As [`Self::stop_async`], without a limit.
+    async fn switch_off_async(&mut self) -> Result<Polled, Failure<BUS::Error, INT::Error>> {
+        // Before the first await: the bus may hang, and the future may be dropped.
+        let low = self.enable.set(false);
+        self.protocol.reset();
+        let sent = self.send_stop_async().await;
+        self.switched_off(low, sent)
+    }
+
+    /// A measurement was given up: the sensor stops now, as nobody may poll again.
+    async fn darken_async(&mut self) {
+        // Without a command it may measure all the same: another firmware may have left it so.
+        if !matches!(self.send_stop_async().await, Some(Ok(()))) {
+            self.cut();
         }
     }
 
@@ -185,7 +233,7 @@ where
                 return level.map(Done::Level).map_err(Failure::Pin);
             }
             Request::Enable(high) => {
-                let set = self.enable.set_state(high.into());
+                let set = self.enable.set(high);
                 set.map_err(Failure::Pin)?;
             }
             Request::Write { address, bytes } => {
@@ -218,6 +266,24 @@ where
                     }
                 }
             }
+        }
+    }
+}
+
+/// A poll that may be dropped.
+struct Call<'a, P: Protocol, BUS, INT, EN: OutputPin> {
+    driver: &'a mut Driver<P, BUS, INT, EN>,
+    is_over: bool,
+}
+
+impl<P: Protocol, BUS, INT, EN: OutputPin> Drop for Call<'_, P, BUS, INT, EN> {
+    fn drop(&mut self) {
+        if self.is_over {
+            return;
+        }
+        self.driver.protocol.dropped();
+        if !self.driver.protocol.is_measuring() {
+            self.driver.cut();
         }
     }
 }

@@ -3,7 +3,7 @@
 use dtof_core::fixed::types::U16F16;
 use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
 
-use super::{Bus, Done, Driver, Failure, Protocol, Request};
+use super::{Bus, Done, Driver, Failure, Power, Protocol, Request, Sent};
 use crate::dither::Dither;
 use crate::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
@@ -23,7 +23,7 @@ where
                 return level.map(Done::Level).map_err(Failure::Pin);
             }
             Request::Enable(high) => {
-                let set = self.enable.set_state(high.into());
+                let set = self.enable.set(high);
                 set.map_err(Failure::Pin)?;
             }
             Request::Write { address, bytes } => {
@@ -40,6 +40,31 @@ where
             }
         }
         Ok(Done::Level(false))
+    }
+
+    /// Sends the command to stop, if there is one.
+    fn send_stop(&mut self) -> Sent<BUS::Error, INT::Error> {
+        let Request::Write { address, bytes } = self.protocol.stop() else {
+            return None;
+        };
+        Some(self.bus.write(address, bytes).map_err(BUS::failure))
+    }
+
+    /// Drives ENABLE low, and also sends the command to stop, as ENABLE may not be wired.
+    fn switch_off(&mut self) -> Result<Polled, Failure<BUS::Error, INT::Error>> {
+        // First, as the bus may hang.
+        let low = self.enable.set(false);
+        self.protocol.reset();
+        let sent = self.send_stop();
+        self.switched_off(low, sent)
+    }
+
+    /// A measurement was given up: the sensor stops now, as nobody may poll again.
+    fn darken(&mut self) {
+        // Without a command it may measure all the same: another firmware may have left it so.
+        if !matches!(self.send_stop(), Some(Ok(()))) {
+            self.cut();
+        }
     }
 
     fn step(
@@ -75,23 +100,33 @@ where
     }
 
     fn start(&mut self, _: U16F16, _: Dither) {
-        self.settle();
-        self.protocol.restart();
+        self.switch_on();
     }
 
-    /// Drives ENABLE low, and also sends the command to stop, as ENABLE may not be wired. Errors are
-    /// ignored.
+    /// Drives ENABLE low, and also sends the command to stop, as ENABLE may not be wired.
     fn stop(&mut self) {
-        let _ = self.enable.set_low();
-        self.settle();
-        if let Request::Write { address, bytes } = self.protocol.stop() {
-            let _ = self.bus.write(address, bytes);
+        self.power = Power::STOPPING;
+        if let Err(failure) = self.switch_off() {
+            self.protocol.failed(&failure.into());
         }
     }
 
+    fn is_stopping(&self) -> bool {
+        Self::is_stopping(self)
+    }
+
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Self::Error> {
-        self.settle();
-        self.step(now_ms, sink)
-            .inspect_err(|error| self.protocol.failed(error))
+        let polled = match self.power {
+            Power::Off => return Ok(Polled::Idle),
+            Power::Stopping { .. } => self.switch_off().map_err(Self::Error::from),
+            Power::On => self.step(now_ms, sink),
+        };
+        if let Err(error) = &polled {
+            self.protocol.failed(error);
+            if self.power == Power::On && !self.protocol.is_measuring() {
+                self.darken();
+            }
+        }
+        polled
     }
 }

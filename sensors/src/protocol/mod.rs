@@ -5,15 +5,33 @@
 //! [`Sensor`](crate::Sensor), which never waits, or over embedded-hal-async
 //! (`Driver::next`, with the feature `async`). Both make the same transfers.
 //! The [`Bus`] is I²C or, for a TMF8829, SPI.
+//!
+//! # When the sensor is off
+//!
+//! The sensor measures, and its laser fires, only between a start and a stop. When a driver returns, the
+//! sensor is on only if the next poll goes on with its measurement:
+//!
+//! | what happens | the driver |
+//! |---|---|
+//! | it was not started | drives ENABLE low at its first poll |
+//! | it is stopped | drives ENABLE low and sends the command to stop. If either fails, each poll tries again |
+//! | a poll gives the measurement up with an error | sends the command to stop, or else drives ENABLE low |
+//! | a poll is dropped within a transfer that cannot be repeated, or the bus hangs | drives ENABLE low |
+//! | it is dropped or released | drives ENABLE low |
+//!
+//! A driver that is kept, but neither polled nor stopped, leaves the sensor as it is. A watchdog has to cover that.
+//! If ENABLE is not wired, stop the driver before you drop it.
 
 #[cfg(feature = "async")]
 mod asynchronous;
 mod blocking;
 mod bus;
 
+use embedded_hal::digital::OutputPin;
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 
-use crate::{PhotonSink, Polled, SensorInfo};
+use crate::enable::Enable;
+use crate::{PhotonSink, Polled, ReleaseError, SensorInfo};
 
 #[cfg(feature = "async")]
 pub use self::asynchronous::Timing;
@@ -92,14 +110,20 @@ pub trait Protocol {
     /// The description for a host.
     fn info(&self) -> SensorInfo;
 
+    /// Whether the sensor measures.
+    fn is_measuring(&self) -> bool;
+
     /// Abandons the present measurement; the next requests begin again.
     fn restart(&mut self);
+
+    /// ENABLE was driven low. Abandons the present measurement; the next requests begin with a reset.
+    fn reset(&mut self);
 
     /// A transfer was begun and its future dropped, so that the sensor may have executed it. Begins
     /// again, unless the transfer can be repeated. What is lost is counted.
     fn dropped(&mut self);
 
-    /// The command that stops the sensor, if it is up. Restarts the protocol.
+    /// The command that stops the sensor, if it may measure. Restarts the protocol.
     fn stop(&mut self) -> Request<'_>;
 
     /// The next request.
@@ -121,44 +145,91 @@ pub trait Protocol {
     fn failed<B, P>(&mut self, error: &Self::Error<B, P>);
 }
 
-/// A sensor's protocol on a bus, with INT and ENABLE.
+/// What came of a command, if there was one.
+type Sent<B, P> = Option<Result<(), Failure<B, P>>>;
+
+/// What the sensor is to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Power {
+    /// To be off, and it is as far as a driver can know.
+    Off,
+    /// To be off, which it may not know yet: the next poll tells it. This many times nobody has acknowledged it.
+    Stopping { unanswered: u8 },
+    /// To measure.
+    On,
+}
+
+impl Power {
+    const STOPPING: Self = Self::Stopping { unanswered: 0 };
+}
+
+/// A sensor that ENABLE has switched off does not acknowledge a stop. One whose ENABLE is not wired does, but for a
+/// disturbance of the bus: it is told this often.
+const TRIES: u8 = 3;
+
+/// A sensor's protocol on a bus, with INT and ENABLE. The [module](self) says when the sensor is off.
 ///
 /// The driver owns INT. Nothing else may wait for the same pin.
 #[derive(Debug)]
-pub struct Driver<P, BUS, INT, EN> {
+pub struct Driver<P, BUS, INT, EN: OutputPin> {
     protocol: P,
     bus: BUS,
     interrupt: INT,
-    enable: EN,
-    /// A transfer began and did not end: its future was dropped.
-    #[cfg(feature = "async")]
-    is_under_way: bool,
+    enable: Enable<EN>,
+    power: Power,
 }
 
-impl<P: Protocol, BUS, INT, EN> Driver<P, BUS, INT, EN> {
+impl<P: Protocol, BUS, INT, EN: OutputPin> Driver<P, BUS, INT, EN> {
     /// The description for a host. The `Config` of the sensor has the same as a constant.
     pub fn info(&self) -> SensorInfo {
         self.protocol.info()
     }
 
-    /// Counts what the last poll lost if it was dropped within a transfer.
-    fn settle(&mut self) {
-        #[cfg(feature = "async")]
-        if core::mem::take(&mut self.is_under_way) {
-            self.protocol.dropped();
-        }
+    /// Whether the sensor measures.
+    pub fn is_measuring(&self) -> bool {
+        self.protocol.is_measuring()
+    }
+
+    /// Begins to measure with the next poll, and abandons the present measurement.
+    fn switch_on(&mut self) {
+        self.protocol.restart();
+        self.power = Power::On;
+    }
+
+    /// What came of a stop: of ENABLE, and of the command if there was one.
+    fn switched_off<B>(
+        &mut self,
+        low: Result<(), EN::Error>,
+        sent: Sent<B, EN::Error>,
+    ) -> Result<Polled, Failure<B, EN::Error>> {
+        low.map_err(Failure::Pin)?;
+        self.power = match (self.power, sent) {
+            (_, None | Some(Ok(()))) => Power::Off,
+            (Power::Stopping { unanswered }, Some(Err(Failure::Nack(_)))) => match unanswered + 1 {
+                TRIES.. => Power::Off,
+                unanswered => Power::Stopping { unanswered },
+            },
+            (_, Some(Err(failure))) => return Err(failure),
+        };
+        Ok(Polled::Idle)
+    }
+
+    /// The light ends by ENABLE.
+    fn cut(&mut self) {
+        // If the pin fails, the next poll begins with it.
+        let _ = self.enable.set(false);
+        self.protocol.reset();
     }
 }
 
-impl<P, BUS, INT, EN> Driver<P, BUS, INT, EN> {
+impl<P, BUS, INT, EN: OutputPin> Driver<P, BUS, INT, EN> {
     pub(crate) const fn of(protocol: P, bus: BUS, interrupt: INT, enable: EN) -> Self {
         Self {
             protocol,
             bus,
             interrupt,
-            enable,
-            #[cfg(feature = "async")]
-            is_under_way: false,
+            enable: Enable::new(enable),
+            power: Power::STOPPING,
         }
     }
 
@@ -166,8 +237,16 @@ impl<P, BUS, INT, EN> Driver<P, BUS, INT, EN> {
         &self.protocol
     }
 
-    /// Gives the bus and the pins (INT, ENABLE) back.
-    pub fn release(self) -> (BUS, INT, EN) {
-        (self.bus, self.interrupt, self.enable)
+    /// Whether the sensor may not know yet that it is to be off. Each poll tells it again.
+    pub const fn is_stopping(&self) -> bool {
+        matches!(self.power, Power::Stopping { .. })
+    }
+
+    /// Drives ENABLE low, and gives the bus and the pins (INT, ENABLE) back.
+    ///
+    /// # Errors
+    /// Fails if ENABLE does; the error has the bus and the pins.
+    pub fn release(self) -> Result<(BUS, INT, EN), ReleaseError<BUS, INT, EN>> {
+        self.enable.release(self.bus, self.interrupt)
     }
 }

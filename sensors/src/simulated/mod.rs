@@ -141,6 +141,8 @@ pub struct Simulated<'a> {
     pulse: Pulse<'a>,
     settings: Settings,
     random: Pcg32,
+    /// Between a start and a stop.
+    is_started: bool,
     last_ms: Option<u32>,
     /// Thousandths of a laser cycle that are due.
     due: u64,
@@ -148,7 +150,7 @@ pub struct Simulated<'a> {
 }
 
 impl<'a> Simulated<'a> {
-    /// The first laser cycles are due a while after the first poll.
+    /// The first laser cycles are due a while after the first poll that follows [`Sensor::start`].
     #[must_use]
     pub fn new(pixels: &'a [SimulatedPixel], pulse: Pulse<'a>, settings: Settings) -> Self {
         Self {
@@ -156,6 +158,7 @@ impl<'a> Simulated<'a> {
             pulse,
             settings,
             random: Pcg32::new(settings.seed, STREAM),
+            is_started: false,
             last_ms: None,
             due: 0,
             skipped: 0,
@@ -240,13 +243,19 @@ impl Sensor for Simulated<'_> {
     }
 
     fn start(&mut self, _: U16F16, _: Dither) {
+        self.is_started = true;
         self.last_ms = None;
         self.due = 0;
     }
 
-    fn stop(&mut self) {}
+    fn stop(&mut self) {
+        self.is_started = false;
+    }
 
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Infallible> {
+        if !self.is_started {
+            return Ok(Polled::Idle);
+        }
         let cycles = self.cycles(now_ms);
         Ok(self.laser_cycles(cycles, sink))
     }

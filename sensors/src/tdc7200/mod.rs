@@ -25,9 +25,9 @@
 //!
 //! # Wiring
 //!
-//! CSB belongs to the `SpiDevice`. ENABLE is an output and must be low before
-//! the first poll; INTB is an input with a pull-up; TRIGG goes to the laser
-//! driver.
+//! CSB belongs to the `SpiDevice`. ENABLE is an output; INTB is an input with a pull-up; TRIGG goes to the laser
+//! driver. ENABLE is low, and so TRIGG silent, before a start, after a stop, after an error of a poll, and once the
+//! driver is dropped or released.
 //!
 //! # Cost
 //!
@@ -52,8 +52,9 @@ use self::registers::{
 };
 use self::results::Results;
 use crate::dither::Dither;
+use crate::enable::Enable;
 use crate::timer::Since;
-use crate::{PhotonSink, Polled, Sensor, SensorInfo};
+use crate::{PhotonSink, Polled, ReleaseError, Sensor, SensorInfo};
 
 pub use self::config::{Config, ConfigError, Edge, Mode, Settings, Stops};
 pub use self::error::Error;
@@ -71,10 +72,10 @@ const START_MS: u32 = 2;
 /// 13 (checked when compiled). Another device on the bus may have to wait for that
 /// long.
 #[derive(Debug)]
-pub struct Tdc7200<SPI, INT, EN, const CHUNK: usize = RESULTS> {
+pub struct Tdc7200<SPI, INT, EN: OutputPin, const CHUNK: usize = RESULTS> {
     spi: SPI,
     interrupt: INT,
-    enable: EN,
+    enable: Enable<EN>,
     config: Config,
     state: State,
     counts: Counts,
@@ -99,8 +100,12 @@ pub struct Counts {
 /// The state of the driver.
 #[derive(Clone, Copy, Debug)]
 enum State {
-    /// Reset the device next.
+    /// ENABLE is low until the next start.
     Off,
+    /// Drive ENABLE low, and leave it so.
+    Stopping,
+    /// Reset the device next.
+    Reset,
     /// ENABLE is low.
     Resetting { since: Since },
     /// ENABLE is high, the regulator is not stable yet.
@@ -126,9 +131,9 @@ where
         Self {
             spi,
             interrupt,
-            enable,
+            enable: Enable::new(enable),
             config,
-            state: State::Off,
+            state: State::Stopping,
             counts: Counts {
                 cycles: 0,
                 empty: 0,
@@ -149,23 +154,32 @@ where
         matches!(self.state, State::Armed { .. })
     }
 
-    /// Gives the bus and the pins (INTB, ENABLE) back.
-    pub fn release(self) -> (SPI, INT, EN) {
-        (self.spi, self.interrupt, self.enable)
+    /// Drives ENABLE low, and gives the bus and the pins (INTB, ENABLE) back.
+    ///
+    /// # Errors
+    /// Fails if ENABLE does; the error has the bus and the pins.
+    pub fn release(self) -> core::result::Result<(SPI, INT, EN), ReleaseError<SPI, INT, EN>> {
+        self.enable.release(self.spi, self.interrupt)
     }
 
     fn step(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, SPI, INT> {
         let since = Since::new(now_ms);
         match self.state {
-            State::Off => {
-                self.enable.set_low().map_err(Error::Pin)?;
+            State::Off => return Ok(Polled::Idle),
+            State::Stopping => {
+                self.enable.set(false).map_err(Error::Pin)?;
+                self.state = State::Off;
+                return Ok(Polled::Idle);
+            }
+            State::Reset => {
+                self.enable.set(false).map_err(Error::Pin)?;
                 self.state = State::Resetting { since };
             }
             State::Resetting { since: began } => {
                 if !began.is_over(RESET_MS, now_ms) {
                     return Ok(Polled::Idle);
                 }
-                self.enable.set_high().map_err(Error::Pin)?;
+                self.enable.set(true).map_err(Error::Pin)?;
                 self.state = State::Starting { since };
             }
             State::Starting { since: began } => {
@@ -361,21 +375,34 @@ where
 
     fn start(&mut self, bin_width: U16F16, _: Dither) {
         self.config.set_bin_width(bin_width);
-        self.state = State::Off;
+        self.state = State::Reset;
     }
 
-    /// ENABLE goes low. An error of the pin shows at the next start.
+    /// ENABLE goes low.
     fn stop(&mut self) {
-        let _ = self.enable.set_low();
-        self.state = State::Off;
+        self.state = match self.enable.set(false) {
+            Ok(()) => State::Off,
+            Err(_) => {
+                self.counts.errors = self.counts.errors.saturating_add(1);
+                State::Stopping
+            }
+        };
     }
 
-    /// After an error the next polls reset and configure the device again, within some 5 ms.
+    fn is_stopping(&self) -> bool {
+        matches!(self.state, State::Stopping)
+    }
+
+    /// After an error ENABLE is low, and the next polls configure the device again, within some 5 ms.
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, SPI, INT> {
         let polled = self.step(now_ms, sink);
         if polled.is_err() {
             self.counts.errors = self.counts.errors.saturating_add(1);
-            self.state = State::Off;
+            if !self.is_stopping() {
+                // Now, as nobody may poll again. If the pin fails, the next poll begins with it.
+                let _ = self.enable.set(false);
+                self.state = State::Reset;
+            }
         }
         polled
     }

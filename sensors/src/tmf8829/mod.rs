@@ -103,6 +103,7 @@ mod stream;
 mod zones;
 
 use dtof_core::fixed::types::I24F8;
+use embedded_hal::digital::OutputPin;
 
 use self::registers::DEFAULT_ADDRESS;
 use self::stream::Stream;
@@ -232,7 +233,7 @@ enum State {
     Reading,
 }
 
-impl<'a, BUS, INT, EN, const CHUNK: usize> Tmf8829<'a, BUS, INT, EN, CHUNK> {
+impl<'a, BUS, INT, EN: OutputPin, const CHUNK: usize> Tmf8829<'a, BUS, INT, EN, CHUNK> {
     /// A driver that has not accessed its device yet. `image` may be empty for a sensor that
     /// already runs the application.
     pub const fn new(
@@ -253,11 +254,6 @@ impl<'a, BUS, INT, EN, const CHUNK: usize> Tmf8829<'a, BUS, INT, EN, CHUNK> {
     /// The I²C address the sensor answers at now; with SPI it has none.
     pub const fn address(&self) -> u8 {
         self.protocol().address
-    }
-
-    /// Whether the sensor measures.
-    pub const fn is_measuring(&self) -> bool {
-        self.protocol().is_measuring()
     }
 }
 
@@ -304,19 +300,6 @@ impl<'a, const CHUNK: usize> Tmf8829Protocol<'a, CHUNK> {
         self.counts
     }
 
-    /// Whether the sensor measures.
-    #[must_use]
-    pub const fn is_measuring(&self) -> bool {
-        matches!(
-            self.state,
-            State::Measuring
-                | State::Asking
-                | State::Clearing { .. }
-                | State::Beginning
-                | State::Reading
-        )
-    }
-
     /// Abandons the measurement and begins again, with a reset or without.
     fn give_up(&mut self, reset: bool) {
         if self.state == State::Reading {
@@ -333,10 +316,25 @@ impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
         self.config.info()
     }
 
+    fn is_measuring(&self) -> bool {
+        matches!(
+            self.state,
+            State::Measuring
+                | State::Asking
+                | State::Clearing { .. }
+                | State::Beginning
+                | State::Reading
+        )
+    }
+
     fn restart(&mut self) {
         if !matches!(self.state, State::Off { .. }) {
             self.give_up(!self.is_measuring());
         }
+    }
+
+    fn reset(&mut self) {
+        self.give_up(true);
     }
 
     fn dropped(&mut self) {

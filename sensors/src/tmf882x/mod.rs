@@ -88,6 +88,7 @@ mod registers;
 mod requests;
 
 use dtof_core::fixed::types::{I24F8, U16F16};
+use embedded_hal::digital::OutputPin;
 
 use self::captures::Captures;
 use self::frame::{Assembly, PACKET};
@@ -207,7 +208,7 @@ enum State {
     Reading { at: u8 },
 }
 
-impl<'a, BUS, INT, EN, const CHUNK: usize> Tmf882x<'a, BUS, INT, EN, CHUNK> {
+impl<'a, BUS, INT, EN: OutputPin, const CHUNK: usize> Tmf882x<'a, BUS, INT, EN, CHUNK> {
     /// A driver that has not accessed its device yet. `image` may be empty for a
     /// sensor that already runs the application.
     pub const fn new(
@@ -229,11 +230,6 @@ impl<'a, BUS, INT, EN, const CHUNK: usize> Tmf882x<'a, BUS, INT, EN, CHUNK> {
     /// The I²C address the sensor answers at now.
     pub const fn address(&self) -> u8 {
         self.protocol().address
-    }
-
-    /// Whether the sensor measures.
-    pub const fn is_measuring(&self) -> bool {
-        self.protocol().is_measuring()
     }
 }
 
@@ -274,17 +270,8 @@ impl<'a, const CHUNK: usize> Tmf882xProtocol<'a, CHUNK> {
         self.counts
     }
 
-    /// Whether the sensor measures.
-    #[must_use]
-    pub const fn is_measuring(&self) -> bool {
-        matches!(
-            self.state,
-            State::Measuring | State::Asking | State::Clearing { .. } | State::Reading { .. }
-        )
-    }
-
     /// Abandons the measurement. Only a sensor that measures is known to work; others are reset.
-    const fn give_up(&mut self) {
+    fn give_up(&mut self) {
         self.state = State::Off {
             reset: !self.is_measuring(),
         };
@@ -298,10 +285,21 @@ impl<const CHUNK: usize> Protocol for Tmf882xProtocol<'_, CHUNK> {
         self.config.info()
     }
 
+    fn is_measuring(&self) -> bool {
+        matches!(
+            self.state,
+            State::Measuring | State::Asking | State::Clearing { .. } | State::Reading { .. }
+        )
+    }
+
     fn restart(&mut self) {
         if !matches!(self.state, State::Off { .. }) {
             self.give_up();
         }
+    }
+
+    fn reset(&mut self) {
+        self.state = State::Off { reset: true };
     }
 
     fn dropped(&mut self) {

@@ -5,5 +5,6 @@
 #[path = "../common/mod.rs"]
 mod common;
 mod embassy;
+mod off;
 mod transfers;
 mod wait;

@@ -9,7 +9,7 @@ use std::task::{Context, Poll, Waker};
 use crate::common::tmf8828;
 use crate::common::tmf8829::bench::{IMAGE, over, settings};
 use crate::common::tmf8829::bus::{Bus, Fault};
-use crate::common::{RecordingSink, SinkCall};
+use crate::common::{RecordingSink, SinkCall, started};
 use crate::wait::Timer;
 use dtof_chips::tmf8829::varied_counts;
 use dtof_chips::{Chip as _, Tmf8829 as Chip};
@@ -27,23 +27,23 @@ use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
 /// A transfer: its register, and how many bytes are read.
-type Transfer = (u8, usize);
+pub type Transfer = (u8, usize);
 
 /// A bus on which each transfer takes a while, before the chip takes it and after. `present` is the
 /// one that is not over; clones share it.
 #[derive(Clone)]
-struct Slow<B> {
+pub struct Slow<B> {
     bus: B,
     present: Rc<Cell<Option<Transfer>>>,
     /// After so many transfers it never ends one.
-    left: Rc<Cell<Option<u32>>>,
+    pub left: Rc<Cell<Option<u32>>>,
 }
 
 /// The future of a transfer is not ready so often.
-const WAITS: u32 = 4;
+pub const WAITS: u32 = 4;
 
 impl<B> Slow<B> {
-    fn new(bus: B) -> Self {
+    pub fn new(bus: B) -> Self {
         Self {
             bus,
             present: Rc::default(),
@@ -110,12 +110,12 @@ impl embedded_hal_async::spi::SpiDevice for Slow<Bus> {
 }
 
 /// What came of a future, and how often it was not ready.
-fn run<T>(future: impl Future<Output = T>) -> (T, u32) {
+pub fn run<T>(future: impl Future<Output = T>) -> (T, u32) {
     run_at(&Cell::new(0), future)
 }
 
 /// The same; a millisecond passes whenever it is not ready.
-fn run_at<T>(clock: &Cell<u32>, future: impl Future<Output = T>) -> (T, u32) {
+pub fn run_at<T>(clock: &Cell<u32>, future: impl Future<Output = T>) -> (T, u32) {
     let mut future = pin!(future);
     let mut context = Context::from_waker(Waker::noop());
     let mut pending = 0;
@@ -131,15 +131,18 @@ fn run_at<T>(clock: &Cell<u32>, future: impl Future<Output = T>) -> (T, u32) {
     }
 }
 
-/// Polls a future until it is ready, but at most so often, and drops it. Returns whether it was ready.
-fn drop_after<T>(future: impl Future<Output = T>, polls: u32) -> bool {
+/// Polls a future until it is ready, but at most so often, and drops it. Returns what came of it if it was ready.
+pub fn drop_after<T>(future: impl Future<Output = T>, polls: u32) -> Option<T> {
     let mut future = pin!(future);
     let mut context = Context::from_waker(Waker::noop());
-    (0..polls).any(|_| future.as_mut().poll(&mut context).is_ready())
+    (0..polls).find_map(|_| match future.as_mut().poll(&mut context) {
+        Poll::Ready(done) => Some(done),
+        Poll::Pending => None,
+    })
 }
 
 /// The clock, and the timing of a driver by it.
-fn timing(bus_ms: u32) -> (Rc<Cell<u32>>, Timing<impl FnMut() -> u32, Timer>) {
+pub fn timing(bus_ms: u32) -> (Rc<Cell<u32>>, Timing<impl FnMut() -> u32, Timer>) {
     // The milliseconds wrap in the middle of it.
     let clock = Rc::new(Cell::new(u32::MAX - 100));
     let now = Rc::clone(&clock);
@@ -154,10 +157,17 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
     let [blocking, waiting] = &buses;
     let pins = |bus: &Bus| (bus.clone(), bus.clone());
     let (interrupt, enable) = pins(blocking);
-    let mut sensor = Tmf8829::<_, _, _>::new(blocking.clone(), interrupt, enable, &IMAGE, config);
+    let mut sensor = started(Tmf8829::<_, _, _>::new(
+        blocking.clone(),
+        interrupt,
+        enable,
+        &IMAGE,
+        config,
+    ));
     let (interrupt, enable) = pins(waiting);
     let slow = Slow::new(waiting.clone());
     let mut awaited = Tmf8829::<_, _, _>::new(slow, interrupt, enable, &IMAGE, config);
+    awaited.start_async();
     let mut sinks = [(); 2].map(|()| RecordingSink::default());
     let mut data = 0;
     for now_ms in 0..3000 {
@@ -207,10 +217,13 @@ fn an_awaited_tmf8829_on_spi_makes_the_same_transfers() {
     let pins = |bus: &Bus| (bus.clone(), bus.clone());
     let (interrupt, enable) = pins(blocking);
     let bus = Spi(blocking.clone());
-    let mut sensor = Tmf8829::<_, _, _>::new(bus, interrupt, enable, &IMAGE, config);
+    let mut sensor = started(Tmf8829::<_, _, _>::new(
+        bus, interrupt, enable, &IMAGE, config,
+    ));
     let (interrupt, enable) = pins(waiting);
     let slow = Spi(Slow::new(waiting.clone()));
     let mut awaited = Tmf8829::<_, _, _>::new(slow, interrupt, enable, &IMAGE, config);
+    awaited.start_async();
     let mut sinks = [(); 2].map(|()| RecordingSink::default());
     for now_ms in 0..3000 {
         let fault = match now_ms % 500 {
@@ -242,6 +255,7 @@ fn a_poll_of_a_tmf8829_that_is_dropped_costs_at_most_its_frame() {
     let slow = Slow::new(bus.clone());
     let present = Rc::clone(&slow.present);
     let mut sensor = Tmf8829::<_, _, _, 252>::new(slow, bus.clone(), bus.clone(), &IMAGE, config);
+    sensor.start_async();
     let mut sink = RecordingSink::default();
     // Of reasons, headers and data; and how far each poll had come.
     let (mut reasons, mut missed, mut broken) = (0, 0, 0);
@@ -256,7 +270,7 @@ fn a_poll_of_a_tmf8829_that_is_dropped_costs_at_most_its_frame() {
             continue;
         }
         let polls = 1 + rng.next_u32() % (3 * WAITS);
-        if drop_after(sensor.poll_async(poll, &mut sink), polls) {
+        if drop_after(sensor.poll_async(poll, &mut sink), polls).is_some() {
             continue;
         }
         let transfer = present.take().unwrap();
@@ -346,6 +360,7 @@ fn after_a_dropped_poll_each_call_counts_the_frame() {
             let (interrupt, enable) = (bus.clone(), bus.clone());
             let mut sensor =
                 Tmf8829::<_, _, _, 252>::new(Both(slow), interrupt, enable, &IMAGE, config);
+            sensor.start_async();
             let mut sink = RecordingSink::default();
             // The chip has answered, and the driver does not know.
             let mut now_ms = 0;
@@ -399,6 +414,7 @@ fn a_poll_of_a_tmf8828_that_is_dropped_costs_at_most_its_set() {
     let slow = Slow::new(bus.clone());
     let present = Rc::clone(&slow.present);
     let mut sensor = Tmf882x::<_, _, _>::new(slow, bus.clone(), bus, &[], config);
+    sensor.start_async();
     let mut sink = RecordingSink::default();
     let (mut reasons, mut broken) = (0, 0);
     for poll in 0..20_000 {
@@ -407,7 +423,7 @@ fn a_poll_of_a_tmf8828_that_is_dropped_costs_at_most_its_set() {
             continue;
         }
         let measured = sensor.is_measuring();
-        if drop_after(sensor.poll_async(poll, &mut sink), 1 + poll / 331 % 12) {
+        if drop_after(sensor.poll_async(poll, &mut sink), 1 + poll / 331 % 12).is_some() {
             continue;
         }
         match present.take() {
@@ -450,6 +466,7 @@ fn next_waits_for_the_sensor() {
         &IMAGE,
         config,
     );
+    sensor.start_async();
     assert_eq!(sensor.info(), config.info());
     let (clock, mut timing) = timing(100);
     let mut sink = RecordingSink::default();
@@ -489,6 +506,7 @@ fn a_bus_that_hangs_ends_a_poll_in_time() {
         let (present, left) = (Rc::clone(&slow.present), Rc::clone(&slow.left));
         let (interrupt, enable) = (bus.clone(), bus.clone());
         let mut sensor = Tmf8829::<_, _, _, 252>::new(slow, interrupt, enable, &[7; 100], config);
+        sensor.start_async();
         let (clock, mut timing) = timing(BUS_MS);
         let mut sink = RecordingSink::default();
         left.set(Some(transfers));
@@ -523,6 +541,7 @@ fn a_bus_that_hangs_ends_a_stop_in_time() {
     let slow = Slow::new(bus.clone());
     let left = Rc::clone(&slow.left);
     let mut sensor = Tmf8829::<_, _, _>::new(slow, bus.clone(), bus.clone(), &IMAGE, config);
+    sensor.start_async();
     let (clock, mut timing) = timing(50);
     let mut sink = RecordingSink::default();
     run_at(&clock, sensor.next(&mut timing, &mut sink))
@@ -558,9 +577,10 @@ fn an_awaited_tmf8828_gives_the_same() {
     let chips = [(); 2].map(|()| Rc::new(RefCell::new(tmf8828::Chip::new(0))));
     let [one, other] = [0, 1].map(|at: usize| tmf8828::Bus(Rc::clone(&chips[at])));
     let (interrupt, enable) = (one.clone(), one.clone());
-    let mut sensor = Tmf882x::<_, _, _>::new(one, interrupt, enable, &[], config);
+    let mut sensor = started(Tmf882x::<_, _, _>::new(one, interrupt, enable, &[], config));
     let (interrupt, enable) = (other.clone(), other.clone());
     let mut awaited = Tmf882x::<_, _, _>::new(Slow::new(other), interrupt, enable, &[], config);
+    awaited.start_async();
     let mut sinks = [(); 2].map(|()| RecordingSink::default());
     let mut histograms = 0;
     for now_ms in 0..1000 {

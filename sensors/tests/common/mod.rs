@@ -1,6 +1,7 @@
 //! What the tests of the drivers share: a sink that records its calls, and
 //! a pin whose level the test sets.
 
+pub mod rig;
 pub mod tdc7200;
 pub mod tmf8828;
 pub mod tmf8829;
@@ -11,8 +12,16 @@ use std::cell::{Cell, RefCell};
 use std::rc::Rc;
 
 use dtof_core::PixelAddress;
-use dtof_sensors::{PhotonSink, Target};
+use dtof_core::fixed::types::U16F16;
+use dtof_sensors::dither::Dither;
+use dtof_sensors::{PhotonSink, Sensor, Target};
 use embedded_hal::digital::{Error, ErrorKind, ErrorType, InputPin, OutputPin};
+
+/// The driver, started.
+pub fn started<S: Sensor>(mut sensor: S) -> S {
+    sensor.start(U16F16::from_num(250), Dither::OFF);
+    sensor
+}
 
 /// One call of the sink.
 #[derive(Clone, Debug, PartialEq, Eq)]

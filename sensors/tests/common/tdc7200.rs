@@ -11,7 +11,7 @@ use dtof_sensors::{Polled, Sensor};
 use embedded_hal::spi::{ErrorKind, ErrorType, Operation, SpiDevice};
 use embedded_hal_mock::eh1::spi::{Mock, Transaction};
 
-use super::{Broken, Line, RecordingSink, SinkCall};
+use super::{Broken, Line, RecordingSink, SinkCall, started};
 
 pub type Access = Transaction<u8>;
 
@@ -122,7 +122,12 @@ impl<const CHUNK: usize> Bench<CHUNK> {
         let enable = Line::new(false);
         let config = Config::new(settings).unwrap();
         Self {
-            sensor: Tdc7200::new(spi.clone(), interrupt.clone(), enable.clone(), config),
+            sensor: started(Tdc7200::new(
+                spi.clone(),
+                interrupt.clone(),
+                enable.clone(),
+                config,
+            )),
             spi,
             interrupt,
             enable,

@@ -9,7 +9,7 @@ use dtof_sensors::{Polled, Sensor};
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 use embedded_hal_mock::eh1::i2c::{Mock, Transaction as Access};
 
-use super::{Broken, Line, RecordingSink};
+use super::{Broken, Line, RecordingSink, started};
 
 pub type Counts = [[u32; 128]; 10];
 
@@ -19,6 +19,11 @@ pub fn write(address: u8, bytes: &[u8]) -> Access {
 
 pub fn read(address: u8, register: u8, bytes: &[u8]) -> Access {
     Access::write_read(address, vec![register], bytes.to_vec())
+}
+
+/// The command to stop.
+pub fn stop() -> Access {
+    write(0x41, &[0x08, 0xFF])
 }
 
 /// The answer to a stop and the mode, and the command to load the configuration page.
@@ -119,13 +124,13 @@ impl<const CHUNK: usize> Bench<CHUNK> {
         let enable = Line::new(false);
         let config = Config::new(settings).unwrap();
         Self {
-            sensor: Tmf882x::new(
+            sensor: started(Tmf882x::new(
                 i2c.clone(),
                 interrupt.clone(),
                 enable.clone(),
                 image,
                 config,
-            ),
+            )),
             i2c,
             interrupt,
             enable,

@@ -99,11 +99,17 @@ fn a_bus_or_a_sensor_that_fails_costs_one_error_and_a_new_start() {
     for _ in 0..3000 {
         let before = bench.bus.0.borrow().log.len();
         let unplugged = [Error::Nack(NACK), Error::Timeout(Waiting::Data)];
-        if let Err(error) = poll(&mut bench) {
+        let polled = poll(&mut bench);
+        let log = &bench.bus.0.borrow().log[before..];
+        if let Err(error) = polled {
             assert!(unplugged.contains(&error), "{error}");
             errors += 1;
+            // The transfer that failed, and the command to stop.
+            assert_eq!(log.len(), 1 + usize::from(error == Error::Nack(NACK)));
+            assert_eq!(log.last().unwrap().0, [0x08, 0xFF]);
+        } else {
+            assert!(log.len() <= 1);
         }
-        assert!(bench.bus.0.borrow().log.len() - before <= 1);
     }
     assert!(errors > 50);
     assert_eq!(errors, bench.sensor.counts().errors);
@@ -454,7 +460,7 @@ fn a_stop_after_an_error_sends_the_command_to_stop() {
 /// Its laser is off then, whatever the bus does.
 #[test]
 fn a_stop_that_the_chip_does_not_acknowledge_switches_it_off() {
-    // The driver has met the error before, or meets it now.
+    // The driver has met the error before, and has switched it off, or meets it now.
     for has_failed in [false, true] {
         let mut bench = measuring();
         bench.bus.0.borrow_mut().is_unplugged = true;
@@ -462,7 +468,7 @@ fn a_stop_that_the_chip_does_not_acknowledge_switches_it_off() {
             error(&mut bench, 10_000);
         }
         assert_eq!(bench.sensor.is_measuring(), !has_failed);
-        assert!(bench.bus.0.borrow().chip.is_measuring);
+        assert_eq!(bench.bus.0.borrow().chip.is_measuring, !has_failed);
         bench.sensor.stop();
         assert!(!bench.bus.0.borrow().chip.is_measuring);
         bench.bus.0.borrow_mut().is_unplugged = false;

@@ -71,7 +71,8 @@ fn await_all<P: Protocol, B: AsyncBus>(mut sensor: Driver<P, B, Device, Device>)
         keep(awaited(sensor.poll_async(word(), &mut Sink)).map(|done| done.is_ok()));
         keep(awaited(sensor.stop_async(&mut timing)));
     }
-    keep(sensor.release());
+    keep(sensor.is_stopping());
+    keep(sensor.release().is_ok());
 }
 
 /// The output of a future, or nothing if it is dropped before it is ready.

@@ -52,6 +52,7 @@ where
         if let Err(error) = sensor.poll(word(), &mut Sink) {
             keep::<SensorFault>(error.into());
         }
+        keep(sensor.is_stopping());
     }
     sensor
 }
@@ -94,7 +95,7 @@ fn tdc7200() {
     let sensor = run(tdc7200::Tdc7200::<_, _, _, 4>::new(
         Device, Device, Device, config,
     ));
-    keep(sensor.release());
+    keep(or_text(sensor.release()));
 }
 
 fn periods() -> CalibrationPeriods {
@@ -126,7 +127,7 @@ fn tmf882x() {
     let sensor = run(sensor);
     keep((sensor.counts(), sensor.address(), sensor.is_measuring()));
     let sensor = tmf882x::Tmf882x::<_, _, _, 32>::new(Device, Device, Device, some(image), config);
-    keep(run(sensor).release());
+    keep(or_text(run(sensor).release()));
 }
 
 pub fn tmf882x_config() -> Option<tmf882x::Config> {
@@ -171,7 +172,7 @@ fn tmf8829() {
     keep((sensor.counts(), sensor.address(), sensor.is_measuring()));
     let sensor =
         tmf8829::Tmf8829::<_, _, _, 32>::new(Spi(Device), Device, Device, some(image), config);
-    keep(run(sensor).release().0.0);
+    keep(or_text(run(sensor).release()).map(|(bus, ..)| bus.0));
 }
 
 pub fn tmf8829_config() -> Option<tmf8829::Config> {

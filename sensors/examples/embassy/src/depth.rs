@@ -43,6 +43,7 @@ pub async fn run<INT: InputPin + Wait, EN: OutputPin + ErrorType<Error = INT::Er
 ) {
     let mut events = Events(report);
     let mut sensor = Tmf8829::<_, _, _>::new(bus, int, enable, program, SENSOR);
+    sensor.start_async();
     loop {
         if let Err(error) = sensor.next(&mut timing, &mut events).await {
             let hangs = matches!(error, Error::BusTimeout);

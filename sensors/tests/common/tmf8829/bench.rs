@@ -8,7 +8,7 @@ use dtof_core::PixelAddress;
 use dtof_sensors::tmf8829::{Config, Preset, Settings, Tmf8829, Zones};
 use dtof_sensors::{Polled, Sensor};
 
-use super::super::{RecordingSink, SinkCall};
+use super::super::{RecordingSink, SinkCall, started};
 use super::bus::{Bus, Wired};
 
 pub const IMAGE: [u8; 1234] = [0x5A; 1234];
@@ -94,11 +94,17 @@ impl<const CHUNK: usize, B: Wired<Error: Debug>> Bench<CHUNK, B> {
     }
 }
 
-fn sensor<const CHUNK: usize, B: Wired>(
+fn sensor<const CHUNK: usize, B: Wired<Error: Debug>>(
     bus: &Bus,
     settings: Settings,
     image: &'static [u8],
 ) -> Tmf8829<'static, B, Bus, Bus, CHUNK> {
     let config = Config::new(settings).unwrap();
-    Tmf8829::new(B::to(bus), bus.clone(), bus.clone(), image, config)
+    started(Tmf8829::new(
+        B::to(bus),
+        bus.clone(),
+        bus.clone(),
+        image,
+        config,
+    ))
 }

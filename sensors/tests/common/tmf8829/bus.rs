@@ -152,7 +152,7 @@ impl SpiDevice for Bus {
 }
 
 /// What a fault makes of bytes that are read.
-fn spoil(fault: Option<Fault>, bytes: &mut [u8]) {
+pub fn spoil(fault: Option<Fault>, bytes: &mut [u8]) {
     match fault {
         Some(Fault::All(byte)) => bytes.fill(byte),
         Some(Fault::Bit(at, bit)) => bytes[at % bytes.len()] ^= 1 << (bit & 7),

@@ -129,6 +129,9 @@ impl Sensor for WallSensor {
 
     fn start(&mut self, bin_width: U16F16, dither: Dither) {
         self.photons.start(bin_width, dither);
+        if let Some(later) = &mut self.later {
+            later.start(bin_width, dither);
+        }
     }
 
     fn stop(&mut self) {}
