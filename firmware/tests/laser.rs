@@ -310,8 +310,10 @@ fn a_configuration_from_before_the_silence_starts_nothing_after_it() {
     assert!(laser.is_on);
 }
 
-/// A port that fails at every call.
-struct Broken;
+/// A port that fails at every call, or at those that send.
+struct Broken {
+    sends_only: bool,
+}
 
 impl ErrorType for Broken {
     type Error = ErrorKind;
@@ -319,6 +321,9 @@ impl ErrorType for Broken {
 
 impl ReadReady for Broken {
     fn read_ready(&mut self) -> Result<bool, ErrorKind> {
+        if self.sends_only {
+            return Ok(false);
+        }
         Err(ErrorKind::Other)
     }
 }
@@ -345,17 +350,132 @@ impl Write for Broken {
     }
 }
 
+/// Before the error is returned, as nobody may poll again. Then nothing but a configuration starts it.
 #[test]
-fn a_port_that_fails_keeps_no_sensor_running() {
-    let (mut device, mut laser, _) = running(500, 0);
-    for now_ms in 1..2_000 {
-        assert!(
-            device
-                .poll_with(&mut laser, &mut Broken, 0, now_ms)
-                .is_err()
-        );
-        assert_eq!(laser.is_on, now_ms < 500, "after {now_ms} ms");
+fn a_port_that_fails_stops_the_sensor_at_once_and_for_good() {
+    for sends_only in [false, true] {
+        let (mut device, mut laser, mut host) = running(60_000, 0);
+        let mut port = Broken { sends_only };
+        // What the host has sent before is still to be worked on.
+        host.ask(message::CONFIGURE, &CONFIGURATION.to_le_bytes());
+        let (mut deframer, mut wire) = (Deframer::new(), [0; WIRE_BYTES]);
+        let length = host.endpoint.transmit(1, &mut wire);
+        deliver(&mut deframer, &wire[..length], |frame| {
+            device.receive(frame, 1);
+        });
+        let failed = (1..100).find(|&now_ms| {
+            let polled = device.poll_with(&mut laser, &mut port, 0, now_ms);
+            assert_eq!(laser.is_on, polled.is_ok(), "after {now_ms} ms");
+            polled.is_err()
+        });
+        // It sends a frame every 50 ms.
+        let failed = failed.expect("it sends a frame");
+        assert!(failed == 1 || sends_only);
+        for now_ms in failed..1_000 {
+            let _ = device.poll_with(&mut laser, &mut port, 0, now_ms);
+            alone(&mut device, &mut laser, now_ms);
+            assert!(!laser.is_on, "after {now_ms} ms");
+        }
+        // The port is back, and the host hears why.
+        host.exchange(&mut device, 1_000);
+        host.read(usize::MAX);
+        device.poll_sensor(&mut laser, 1_000);
+        assert!(!laser.is_on, "a configuration from before");
+        let report = host.report(&mut device, 1_001);
+        assert_eq!(report.stop_reason, StopReason::PortFailed as u8);
+        assert_eq!(report.sensor_starts, report.sensor_stops);
+        host.configure(&mut device, 1_002, &CONFIGURATION);
+        device.poll_sensor(&mut laser, 1_002);
+        assert!(laser.is_on);
     }
+}
+
+/// A sensor whose first stops do not reach it.
+struct Deaf {
+    laser: Laser,
+    /// So many more.
+    fails: u32,
+    is_stopping: bool,
+}
+
+impl Deaf {
+    fn try_to_stop(&mut self) -> Result<Polled, SensorFault> {
+        self.is_stopping = self.fails > 0;
+        if self.is_stopping {
+            self.fails -= 1;
+            return Err(SensorFault::Bus);
+        }
+        self.laser.is_on = false;
+        Ok(Polled::Idle)
+    }
+}
+
+impl Sensor for Deaf {
+    type Error = SensorFault;
+
+    fn info(&self) -> SensorInfo {
+        self.laser.info()
+    }
+
+    fn start(&mut self, bin_width: U16F16, dither: Dither) {
+        self.laser.start(bin_width, dither);
+        self.is_stopping = false;
+    }
+
+    fn stop(&mut self) {
+        let _ = self.try_to_stop();
+    }
+
+    fn is_stopping(&self) -> bool {
+        self.is_stopping
+    }
+
+    fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, SensorFault> {
+        if self.is_stopping {
+            return self.try_to_stop();
+        }
+        self.laser.poll(now_ms, sink)
+    }
+}
+
+/// Also one that was not started yet, as a driver cannot know what its sensor does.
+#[test]
+fn a_stop_that_does_not_reach_the_sensor_is_tried_again_at_every_poll() {
+    for fails in 0..5 {
+        let (mut device, laser, mut host) = running(500, 0);
+        let mut sensor = Deaf {
+            laser,
+            fails,
+            is_stopping: false,
+        };
+        for now_ms in 1..500 {
+            device.poll_sensor(&mut sensor, now_ms);
+            assert!(sensor.laser.is_on);
+        }
+        // The host is silent: the first stop, and a try at each poll after it.
+        for now_ms in 500..510 {
+            device.poll_sensor(&mut sensor, now_ms);
+            assert_eq!(sensor.laser.is_on, now_ms - 500 < fails, "{fails} {now_ms}");
+        }
+        let report = host.report(&mut device, 510);
+        assert_eq!((report.sensor_starts, report.sensor_stops), (1, 1));
+        // The first try has no error of a poll.
+        assert_eq!(report.sensor_errors, fails.saturating_sub(1));
+    }
+    let mut device = device::<8>(Some(SensorInfo::new(8)));
+    let mut sensor = Deaf {
+        laser: Laser {
+            is_on: true,
+            ..Laser::default()
+        },
+        fails: 2,
+        is_stopping: true,
+    };
+    for now_ms in 0..3 {
+        assert!(sensor.laser.is_on);
+        device.poll_sensor(&mut sensor, now_ms);
+    }
+    assert!(!sensor.laser.is_on);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use crate::numbered::numbered;
 
 numbered! {
-    /// Why the sensor stopped last. Reasons from [`Self::Panic`] on are those of a reset: the
+    /// Why the sensor stopped last. [`Self::Panic`] to [`Self::Reset`] are reasons of a reset: the
     /// device has restarted, and its sensor is off until a host configures it.
     StopReason {
         /// Another configuration, possibly one with photons from the link.
@@ -26,5 +26,7 @@ numbered! {
         BrownOut = 9: "the supply voltage was too low",
         /// The reset pin or a debugger.
         Reset = 10: "a reset",
+        /// The device's port to the host failed. The session may go on over it.
+        PortFailed = 11: "the device's port failed",
     }
 }

@@ -265,6 +265,9 @@
 // The reset pin or a debugger reset the device.
 #define DTOF_STOP_RESET 10
 
+// The device's port to the host failed.
+#define DTOF_STOP_PORT_FAILED 11
+
 // Bytes of a dtof_link_t.
 #define DTOF_LINK_SIZE 2528
 

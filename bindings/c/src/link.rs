@@ -99,6 +99,8 @@ pub const DTOF_STOP_WATCHDOG: u8 = 8;
 pub const DTOF_STOP_BROWN_OUT: u8 = 9;
 /// The reset pin or a debugger reset the device.
 pub const DTOF_STOP_RESET: u8 = 10;
+/// The device's port to the host failed.
+pub const DTOF_STOP_PORT_FAILED: u8 = 11;
 const _: () = assert!(
     DTOF_STOP_CONFIGURATION == StopReason::Configuration as u8
         && DTOF_STOP_NEW_SESSION == StopReason::NewSession as u8
@@ -110,7 +112,8 @@ const _: () = assert!(
         && DTOF_STOP_WATCHDOG == StopReason::Watchdog as u8
         && DTOF_STOP_BROWN_OUT == StopReason::BrownOut as u8
         && DTOF_STOP_RESET == StopReason::Reset as u8
-        && StopReason::from_number(DTOF_STOP_RESET + 1).is_none()
+        && DTOF_STOP_PORT_FAILED == StopReason::PortFailed as u8
+        && StopReason::from_number(DTOF_STOP_PORT_FAILED + 1).is_none()
 );
 
 /// Bytes of a dtof_link_t.

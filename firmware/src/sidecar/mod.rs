@@ -1,20 +1,20 @@
 //! The engine beside the sensor: pixels, configuration, link.
 //!
-//! One call does all that is due and never waits: [`Sidecar::poll`] takes bytes
-//! from the serial port, acts on the messages they make, moves events from the
+//! One call does all that is due and never waits: [`Sidecar::poll_with`] takes bytes
+//! from the serial port, acts on the messages they make, polls the sensor, moves events from the
 //! pixels' slots through the queue into messages, and sends bytes while the port
 //! takes them.
 //!
 //! Photons come from the link or from a sensor. From the link they wait while
 //! an event cannot leave its slot: the host gets no acknowledgement and stops
 //! sending, so that no event is lost. A sensor cannot wait. While the slot is full, the pixel
-//! defers its decisions, as in the paper. [`Sidecar::poll_with`] polls the sensor
-//! as well.
+//! defers its decisions, as in the paper.
 //!
 //! The sensor, and with it a laser, runs only on request of a host: from a configuration
 //! that uses its photons until another configuration or session, the end of the session,
-//! [`Sidecar::set_listening`], or a host that is silent for as long as it has configured.
-//! Only another configuration starts it again.
+//! [`Sidecar::set_listening`], a port that fails, or a host that is silent for as long as it has configured.
+//! Only another configuration starts it again. A sidecar that is not polled any more cannot stop its sensor:
+//! drop the sensor, or let a watchdog reset the board.
 
 mod configuration;
 mod events;
@@ -259,13 +259,8 @@ impl<'a> Sidecar<'a> {
         }
     }
 
-    /// Does all that can be done without waiting: processes the bytes that `serial` has
-    /// received, and sends as much as it takes. `lost` is the number of bytes the port has lost so
-    /// far.
-    ///
-    /// # Errors
-    /// Fails if `serial` fails.
-    pub fn poll<S: Read + ReadReady + Write + WriteReady>(
+    /// Processes the bytes that `serial` has received, and sends as much as it takes.
+    fn serve<S: Read + ReadReady + Write + WriteReady>(
         &mut self,
         serial: &mut S,
         lost: u32,
@@ -371,9 +366,12 @@ impl<'a> Sidecar<'a> {
             if next == message::HISTOGRAM_REQUEST {
                 self.accept_request(&message.body);
             } else {
-                let was_off = self.off;
+                let (was_off, stopping) = (self.off, self.stopping);
                 self.answer = self.act(message, overrun);
-                self.off |= was_off && is_stale;
+                if was_off && is_stale {
+                    // The reason stays, too.
+                    (self.off, self.stopping) = (true, stopping);
+                }
             }
         }
     }

@@ -19,11 +19,13 @@ const POLLS: usize = 4;
 const UNPACED: u16 = 4096;
 
 impl Sidecar<'_> {
-    /// [`Self::poll`], and polls `sensor` while a configuration takes photons from it.
-    /// The report counts its errors and names the last.
+    /// Does all that can be done without waiting: processes the bytes that `serial` has
+    /// received, polls `sensor` while a configuration takes photons from it, and sends as much as
+    /// `serial` takes. `lost` is the number of bytes the port has lost so far. The report counts
+    /// the errors of the sensor and names the last.
     ///
     /// # Errors
-    /// Fails if `serial` fails.
+    /// Fails if `serial` fails. The sensor is stopped then, and only another configuration starts it again.
     pub fn poll_with<S: Read + ReadReady + Write + WriteReady>(
         &mut self,
         sensor: &mut impl Sensor,
@@ -31,13 +33,18 @@ impl Sidecar<'_> {
         lost: u32,
         now_ms: u32,
     ) -> Result<(), S::Error> {
-        // The last configuration takes effect before the next message is answered, and no sensor
-        // runs on when the port fails.
+        // The last configuration takes effect before the next message is answered.
         self.steer(sensor, now_ms);
-        let polled = self.poll(serial, lost, now_ms);
-        self.poll_sensor(sensor, now_ms);
-        polled?;
-        self.poll(serial, lost, now_ms)
+        let done = self.serve(serial, lost, now_ms).and_then(|()| {
+            self.poll_sensor(sensor, now_ms);
+            self.serve(serial, lost, now_ms)
+        });
+        if done.is_err() {
+            // Now, as the caller may not poll again.
+            self.stop_sensor(StopReason::PortFailed);
+            self.steer(sensor, now_ms);
+        }
+        done
     }
 
     /// Polls `sensor` while a configuration takes photons from it, and again while
@@ -69,7 +76,7 @@ impl Sidecar<'_> {
         self.sensor_has_more
     }
 
-    /// Starts the sensor, or stops it.
+    /// Starts the sensor, or stops it; again if a stop did not reach it.
     #[inline(never)]
     fn steer(&mut self, sensor: &mut impl Sensor, now_ms: u32) {
         if !self.listens {
@@ -94,13 +101,18 @@ impl Sidecar<'_> {
             sensor.stop();
             self.running = false;
             self.answer_sensor_failure();
+        } else if !self.running
+            && sensor.is_stopping()
+            && let Err(error) = sensor.poll(now_ms, self)
+        {
+            self.sensor_failed(error.into());
         }
         self.stopping = None;
     }
 
     /// Takes laser cycles from a simulated sensor as fast as they are processed, without a clock.
     /// It does so while its photons count, every event has left its slot, and `left`, which it
-    /// counts down, is not 0. So no decision is deferred. Call [`Self::poll`] between the calls.
+    /// counts down, is not 0. So no decision is deferred. Call [`Self::poll_with`] between the calls.
     pub fn simulate(&mut self, sensor: &mut Simulated<'_>, left: &mut u64) {
         for _ in 0..UNPACED {
             if *left == 0 || !self.takes_sensor() || self.has_waiting_events() {

@@ -33,7 +33,10 @@ impl Stopped {
     pub fn check(report: &Report, host_timeout: HostTimeout) -> Result<(), Self> {
         let reason = StopReason::from_number(report.stop_reason);
         // These also keep a sensor from its first start.
-        let is_prevented = matches!(reason, Some(StopReason::Silence | StopReason::NotListening));
+        let is_prevented = matches!(
+            reason,
+            Some(StopReason::Silence | StopReason::NotListening | StopReason::PortFailed)
+        );
         let runs = report.sensor_starts != report.sensor_stops;
         if runs || (report.sensor_starts == 0 && !is_prevented) {
             return Ok(());

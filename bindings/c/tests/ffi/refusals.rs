@@ -221,7 +221,7 @@ fn pointers_and_numbers_are_checked() {
             let offer = dtof_link_offer(&mut link, kind, null(), 0);
             assert_eq!(offer, DTOF_ERROR_MESSAGE_KIND);
         }
-        for reason in [DTOF_STOP_NONE, DTOF_STOP_RESET + 1, u8::MAX] {
+        for reason in [DTOF_STOP_NONE, DTOF_STOP_PORT_FAILED + 1, u8::MAX] {
             let status = dtof_link_set_stop_reason(&mut link, reason);
             assert_eq!(status, DTOF_ERROR_REASON);
         }
