@@ -26,6 +26,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=../memory.x");
 
+    // A Cortex-M0 or M0+ has fewer registers of faults.
+    println!("cargo::rustc-check-cfg=cfg(armv6m)");
+    if env::var("TARGET")?.starts_with("thumbv6m") {
+        println!("cargo::rustc-cfg=armv6m");
+    }
+
     sensor_image("TMF8829")?;
     sensor_image("TMF882X")?;
 

@@ -15,6 +15,7 @@ use core::fmt;
 use core::panic::PanicInfo;
 
 use cortex_m_rt::entry;
+use dtof_firmware::board::LaserOff;
 use dtof_firmware::self_test;
 use heapless::Vec;
 use semihosting::process::ExitCode;
@@ -60,3 +61,17 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     println!("{info}");
     ExitCode::FAILURE.exit_process()
 }
+
+/// It has no laser. After a reset it would begin again.
+struct Ends;
+
+impl LaserOff for Ends {
+    fn laser_off() {}
+
+    fn end() -> ! {
+        println!("hard fault");
+        ExitCode::FAILURE.exit_process()
+    }
+}
+
+dtof_firmware::hard_fault!(Ends);

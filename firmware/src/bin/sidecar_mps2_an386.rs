@@ -51,7 +51,9 @@ fn main() -> ! {
     }
 }
 
+dtof_firmware::hard_fault!(Mps2An386);
+
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    on_panic(info)
+    on_panic::<Mps2An386>(info)
 }

@@ -86,7 +86,9 @@ fn main() -> ! {
     run(board, serial, reason, sensor, PIXELS.take(), BLOCKS.take())
 }
 
+dtof_firmware::hard_fault!(Pico);
+
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    on_panic(info)
+    on_panic::<Pico>(info)
 }

@@ -51,7 +51,9 @@ fn main() -> ! {
     run(board, serial, reason, sensor, PIXELS.take(), BLOCKS.take())
 }
 
+dtof_firmware::hard_fault!(Stm32F405);
+
 #[panic_handler]
 fn panic(info: &PanicInfo<'_>) -> ! {
-    on_panic(info)
+    on_panic::<Stm32F405>(info)
 }

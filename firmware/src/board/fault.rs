@@ -1,12 +1,24 @@
 //! The end of an image by a panic or a hard fault: first the laser goes off.
 //!
+//! A board says with `LaserOff` how. An image of any crate has these handlers with the feature `handlers`:
+//!
+//! ```text
+//! struct Board;
+//! impl LaserOff for Board {
+//!     fn laser_off() { /* the pin of the laser goes low */ }
+//! }
+//! dtof_firmware::hard_fault!(Board);
+//! #[panic_handler]
+//! fn panic(info: &PanicInfo<'_>) -> ! { on_panic::<Board>(info) }
+//! ```
+//!
 //! The stack is lowest in RAM (see the linker scripts), so that its overflow is a fault and
 //! reaches no static. The handler cannot use a full stack: it resets the stack pointer first.
 
 use core::ops::Range;
 
-#[cfg(all(target_os = "none", feature = "board"))]
-pub use self::handlers::on_panic;
+#[cfg(all(target_os = "none", feature = "handlers"))]
+pub use self::handlers::{LaserOff, after_hard_fault, on_panic};
 
 /// Bytes that the processor pushes for an exception: eight registers. Those of the
 /// floating-point unit lie above (Armv7-M Architecture Reference Manual, DDI 0403, B1.5.6;
@@ -42,62 +54,37 @@ impl Fault {
     }
 }
 
-#[cfg(all(target_os = "none", feature = "board"))]
+#[cfg(all(target_os = "none", feature = "handlers"))]
 mod handlers {
-    use core::arch::naked_asm;
     use core::panic::PanicInfo;
     use core::ptr;
 
-    #[cfg(not(feature = "pico"))]
     use cortex_m::peripheral::SCB;
     use cortex_m_rt::ExceptionFrame;
 
     use super::Fault;
+    #[cfg(feature = "defmt")]
+    use crate::board::report;
     use crate::board::reset_reason::{self, ResetReason};
-    use crate::board::{chip, report};
 
-    /// Drops registers of the floating-point unit that the processor has not saved yet, as the stack
-    /// may be full: LSPACT of FPCCR (DDI 0403, B3.2.21).
-    #[cfg(not(feature = "pico"))]
-    macro_rules! give_up_float_registers {
-        () => {
-            "ldr r1, =0xe000ef34
-             ldr r2, [r1]
-             bic r2, r2, #1
-             str r2, [r1]
-             dsb
-             isb"
-        };
-    }
-    /// A Cortex-M0+ has none.
-    #[cfg(feature = "pico")]
-    macro_rules! give_up_float_registers {
-        () => {
-            ""
-        };
+    /// What a board does when its image has lost control. The handlers are made for it: [`on_panic`] and
+    /// [`hard_fault!`](crate::hard_fault).
+    pub trait LaserOff {
+        /// Holds the laser off, in a register write or two. What runs without the processor stops here. It may be
+        /// called at any time, also before the board has started, and must not panic or wait.
+        fn laser_off();
+
+        /// Ends the image: resets the processor and its peripherals. On a chip where other parts survive this, reset
+        /// all of it.
+        fn end() -> ! {
+            SCB::sys_reset()
+        }
     }
 
-    /// The handler in the vector table. It pushes nothing before the stack pointer is reset.
-    #[unsafe(naked)]
-    #[unsafe(no_mangle)]
-    #[unsafe(link_section = ".HardFault.board")]
-    #[allow(non_snake_case, reason = "cortex-m-rt knows it by this name")]
-    #[allow(unsafe_code, reason = "the stack pointer is set in assembly alone")]
-    unsafe extern "C" fn HardFault() -> ! {
-        naked_asm!(
-            "mov r0, sp",
-            "ldr r1, =_stack_start",
-            "mov sp, r1",
-            give_up_float_registers!(),
-            "bl {on_hard_fault}",
-            ".pool",
-            on_hard_fault = sym on_hard_fault,
-        )
-    }
-
-    /// `pointer` is the stack pointer before.
-    extern "C" fn on_hard_fault(pointer: usize) -> ! {
-        chip::laser_off();
+    /// What the handler of hard faults does: switches the laser off, reports the fault, and ends the image. `pointer` is the
+    /// stack pointer before.
+    pub extern "C" fn after_hard_fault<B: LaserOff>(pointer: usize) -> ! {
+        B::laser_off();
         #[allow(unsafe_code, reason = "the linker script knows where the stack is")]
         // SAFETY: nothing is read of them but their address.
         unsafe extern "C" {
@@ -115,18 +102,21 @@ mod handlers {
             }
         });
         reset_reason::remember(ResetReason::Fault);
+        #[cfg(feature = "defmt")]
         report::hard_fault(fault.is_overflow, frame.as_ref());
-        chip::end()
+        #[cfg(not(feature = "defmt"))]
+        let _ = (fault.is_overflow, frame);
+        B::end()
     }
 
     /// A Cortex-M0+ does not report it.
-    #[cfg(feature = "pico")]
+    #[cfg(armv6m)]
     const fn failed_address() -> Option<usize> {
         None
     }
 
     /// BFAR, if CFSR says that it is valid (DDI 0403, B3.2.15 and B3.2.18).
-    #[cfg(not(feature = "pico"))]
+    #[cfg(not(armv6m))]
     fn failed_address() -> Option<usize> {
         const BFARVALID: u32 = 1 << 15;
         // SAFETY: the registers are only read, and reading them changes nothing.
@@ -135,12 +125,68 @@ mod handlers {
         (scb.cfsr.read() & BFARVALID != 0).then(|| scb.bfar.read() as usize)
     }
 
-    /// Switches the laser off, reports a panic, and resets the board or ends its emulator.
-    pub fn on_panic(info: &PanicInfo<'_>) -> ! {
-        chip::laser_off();
+    /// For the panic handler of an image: switches the laser off, reports the panic, and ends the image.
+    pub fn on_panic<B: LaserOff>(info: &PanicInfo<'_>) -> ! {
+        B::laser_off();
         reset_reason::remember(ResetReason::Panic);
+        #[cfg(feature = "defmt")]
         report::panic(info);
-        chip::end()
+        #[cfg(not(feature = "defmt"))]
+        let _ = info;
+        B::end()
+    }
+
+    /// The first instructions of the handler, without a push, as the stack may be full. Registers of the floating-point
+    /// unit that the processor has not saved yet are dropped: LSPACT of FPCCR (DDI 0403, B3.2.21). Without the unit the
+    /// register reads as 0.
+    #[cfg(not(armv6m))]
+    #[doc(hidden)]
+    #[macro_export]
+    macro_rules! __reset_stack {
+        () => {
+            "mov r0, sp
+             ldr r1, =_stack_start
+             mov sp, r1
+             ldr r1, =0xe000ef34
+             ldr r2, [r1]
+             bic r2, r2, #1
+             str r2, [r1]
+             dsb
+             isb"
+        };
+    }
+    /// The same of a Cortex-M0+, which has no such unit.
+    #[cfg(armv6m)]
+    #[doc(hidden)]
+    #[macro_export]
+    macro_rules! __reset_stack {
+        () => {
+            "mov r0, sp
+             ldr r1, =_stack_start
+             mov sp, r1"
+        };
+    }
+
+    /// Makes [`after_hard_fault`](crate::board::fault::after_hard_fault) of a board the handler of hard faults of an
+    /// image, once the stack pointer is reset. The linker script has `_stack_start` and `_stack_end`; that of
+    /// cortex-m-rt does.
+    #[macro_export]
+    macro_rules! hard_fault {
+        ($board:ty) => {
+            // The vector table of cortex-m-rt has it by this name.
+            #[unsafe(naked)]
+            #[unsafe(no_mangle)]
+            #[unsafe(link_section = ".HardFault.board")]
+            #[allow(non_snake_case, unsafe_code, reason = "a handler of an exception")]
+            unsafe extern "C" fn HardFault() -> ! {
+                ::core::arch::naked_asm!(
+                    $crate::__reset_stack!(),
+                    "bl {after}",
+                    ".pool",
+                    after = sym $crate::board::fault::after_hard_fault::<$board>,
+                )
+            }
+        };
     }
 }
 

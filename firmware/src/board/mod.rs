@@ -7,15 +7,14 @@
 //! of its board and one file in `src/bin`; its memory is in the linker script
 //! `build.rs` chooses.
 //!
-//! The file also has `laser_off`, which [`fault`] calls first on a panic or a hard fault, and
-//! `end`, which it calls last.
+//! The file also implements `LaserOff`: what [`fault`] does first and last on a panic or a hard fault.
 
 pub mod fault;
 #[cfg(all(target_os = "none", feature = "mps2-an386"))]
 pub mod mps2_an386;
 #[cfg(all(target_os = "none", feature = "pico-boards"))]
 pub mod pico;
-#[cfg(all(target_os = "none", feature = "board"))]
+#[cfg(all(target_os = "none", feature = "handlers", feature = "defmt"))]
 mod report;
 pub mod reset_reason;
 #[cfg(all(target_os = "none", feature = "stm32f405"))]
@@ -41,14 +40,8 @@ compile_error!("choose pico or pico2");
 ))]
 compile_error!("an image is for one sensor: choose one of the features sensor-*");
 
-#[cfg(all(target_os = "none", feature = "board"))]
-pub use self::fault::on_panic;
-#[cfg(all(target_os = "none", feature = "mps2-an386"))]
-use self::mps2_an386 as chip;
-#[cfg(all(target_os = "none", feature = "pico-boards"))]
-use self::pico as chip;
-#[cfg(all(target_os = "none", feature = "stm32f405"))]
-use self::stm32f405 as chip;
+#[cfg(all(target_os = "none", feature = "handlers"))]
+pub use self::fault::{LaserOff, on_panic};
 pub use self::transmit::{Transmitter, transmit};
 
 use dtof_sensors::Sensor;
@@ -76,7 +69,7 @@ pub trait Board {
     /// Milliseconds since the start; after 2³² (49 days) from 0 again.
     fn now_ms(&self) -> u32;
 
-    /// Keeps the watchdog from resetting the board, if it has one.
+    /// Keeps the watchdog from resetting the board, if it has one: see [`LastFed`].
     fn feed_watchdog(&mut self) {}
 
     /// Makes the interrupt handler of the serial port run soon, so that it
@@ -89,6 +82,20 @@ pub trait Board {
     /// Sleeps until an interrupt is pending, even a masked one; the timer's comes within a
     /// millisecond. It may return sooner.
     fn sleep(&mut self);
+}
+
+/// When a watchdog was fed last. It is fed only while the milliseconds go on: otherwise a host would never time out.
+#[derive(Debug, Default)]
+pub struct LastFed(u32);
+
+impl LastFed {
+    /// Calls `feed` if a millisecond has ended since the last time.
+    pub fn at(&mut self, now_ms: u32, feed: impl FnOnce()) {
+        if now_ms != self.0 {
+            self.0 = now_ms;
+            feed();
+        }
+    }
 }
 
 /// One turn of the main loop: `work` gets the port and the time, does what

@@ -22,7 +22,7 @@ use semihosting::process::ExitCode;
 use static_cell::ConstStaticCell;
 
 use super::reset_reason::{self, ResetReason};
-use super::{Board, Transmitter, transmit};
+use super::{Board, LaserOff, Transmitter, transmit};
 use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
 
 /// The clock of processor and UART.
@@ -132,14 +132,16 @@ extern "C" fn overflow() -> ! {
     core::arch::naked_asm!("nop", "0: push {{lr}}", "b 0b")
 }
 
-/// Switches LED0 off, which stands for a laser.
-pub(super) fn laser_off() {
-    Mps2An386::set_laser(false);
-}
+impl LaserOff for Mps2An386 {
+    /// Switches LED0 off, which stands for a laser.
+    fn laser_off() {
+        Self::set_laser(false);
+    }
 
-/// Ends the emulator with a failure.
-pub(super) fn end() -> ! {
-    Mps2An386::exit(ExitCode::FAILURE)
+    /// Ends the emulator with a failure.
+    fn end() -> ! {
+        Self::exit(ExitCode::FAILURE)
+    }
 }
 
 impl Board for Mps2An386 {

@@ -3,7 +3,7 @@
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-#[cfg(not(any(feature = "pico", feature = "bench", feature = "self-test")))]
+#[cfg(not(armv6m))]
 use cortex_m::peripheral::SCB;
 use cortex_m_rt::ExceptionFrame;
 
@@ -14,7 +14,6 @@ pub fn panic(info: &PanicInfo<'_>) {
 
 /// Reports a hard fault: where it happened, if `frame` is left, and what the processor says of
 /// it.
-#[cfg(not(any(feature = "bench", feature = "self-test")))]
 pub fn hard_fault(is_overflow: bool, frame: Option<&ExceptionFrame>) {
     once(|| {
         if is_overflow {
@@ -31,26 +30,11 @@ pub fn hard_fault(is_overflow: bool, frame: Option<&ExceptionFrame>) {
     });
 }
 
-/// The same of an image that ends by itself. It ends here: after a reset it would begin again.
-#[cfg(any(feature = "bench", feature = "self-test"))]
-pub fn hard_fault(is_overflow: bool, frame: Option<&ExceptionFrame>) {
-    let what = if is_overflow {
-        "stack overflow"
-    } else {
-        "hard fault"
-    };
-    match frame {
-        Some(frame) => semihosting::println!("{what} at {:#010x}", frame.pc()),
-        None => semihosting::println!("{what}"),
-    }
-    semihosting::process::ExitCode::FAILURE.exit_process()
-}
-
 /// A Cortex-M0+ has none of a fault.
-#[cfg(all(feature = "pico", not(any(feature = "bench", feature = "self-test"))))]
+#[cfg(armv6m)]
 const fn registers() {}
 
-#[cfg(not(any(feature = "pico", feature = "bench", feature = "self-test")))]
+#[cfg(not(armv6m))]
 fn registers() {
     // SAFETY: the registers are only read, and reading them changes nothing.
     #[allow(unsafe_code, reason = "there is no handle of the peripheral here")]

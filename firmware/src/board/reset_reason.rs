@@ -1,6 +1,6 @@
 //! Why a board has started: from a word that the previous image has left in RAM, or else from the chip.
 
-#[cfg(all(target_os = "none", feature = "board"))]
+#[cfg(all(target_os = "none", feature = "handlers"))]
 pub use self::word::{remember, take};
 
 use dtof_link::StopReason;
@@ -128,7 +128,7 @@ impl ResetReason {
     }
 }
 
-#[cfg(all(target_os = "none", feature = "board"))]
+#[cfg(all(target_os = "none", feature = "handlers"))]
 mod word {
     use core::ptr;
     use core::sync::atomic::{AtomicU32, Ordering};

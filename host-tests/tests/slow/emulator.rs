@@ -270,12 +270,15 @@ impl Emulator {
         let image = &self.image;
         let at = |part: &str| anyhow::Ok(u32::try_from(image.function(part)?)?);
         let registers = match what {
-            // An empty message, and the place of the panic.
+            // An empty message, and the place of the panic. An image that reports nothing may have the other alone.
             Planted::Panic => vec![
                 (0, ZEROS),
                 (1, 0),
                 (2, ZEROS),
-                (15, at("9panicking5panic")?),
+                (
+                    15,
+                    at("9panicking5panic").or_else(|_| at("9panicking9panic_fmt"))?,
+                ),
             ],
             Planted::Fault => vec![(15, NO_MEMORY)],
             // The first instruction of `main` is a push.
@@ -298,6 +301,28 @@ impl Emulator {
             }
         };
         self.debugger.set_registers(&registers)
+    }
+
+    /// Plants a fault into an image whose laser is on, and counts the instructions until it is off.
+    pub fn instructions_until_dark(&mut self, what: Planted, most: u32) -> Result<u32> {
+        let start = Instant::now();
+        loop {
+            thread::sleep(Duration::from_millis(20));
+            self.debugger.interrupt()?;
+            if self.laser_is_on()? {
+                break;
+            }
+            ensure!(start.elapsed() < PATIENCE, "the laser is never on");
+            self.debugger.resume()?;
+        }
+        self.plant(what)?;
+        for instructions in 0..most {
+            self.debugger.step()?;
+            if !self.laser_is_on()? {
+                return Ok(instructions);
+            }
+        }
+        bail!("the laser is on {most} instructions after {what:?}")
     }
 
     /// Lets the image run for a while, then call a function on a full stack, which resets its board,

@@ -18,6 +18,7 @@ mod hil;
 mod histograms;
 mod large;
 mod laser;
+mod own_board;
 mod pico;
 mod ports;
 mod readers;

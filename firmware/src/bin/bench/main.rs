@@ -10,7 +10,7 @@
 #[cfg(not(all(target_os = "none", feature = "board")))]
 compile_error!("an image for a board: cargo xtask bench");
 
-// What the board boots with, its interrupts and its hard fault. Elsewhere the library is left out:
+// What the board boots with, and its interrupts. Elsewhere the library is left out:
 // optimised for size, the compiler would take generic functions from it and count them.
 #[cfg(feature = "pico")]
 use dtof_firmware as _;
@@ -29,9 +29,7 @@ mod windows;
 
 use core::panic::PanicInfo;
 
-use cortex_m_rt::entry;
-#[cfg(not(feature = "pico"))]
-use cortex_m_rt::{ExceptionFrame, exception};
+use cortex_m_rt::{ExceptionFrame, entry, exception};
 use semihosting::println;
 use semihosting::process::ExitCode;
 
@@ -66,7 +64,6 @@ fn panic(info: &PanicInfo<'_>) -> ! {
     ExitCode::FAILURE.exit_process()
 }
 
-#[cfg(not(feature = "pico"))]
 #[allow(unsafe_code, reason = "the attribute asks for it")]
 #[exception]
 unsafe fn HardFault(frame: &ExceptionFrame) -> ! {

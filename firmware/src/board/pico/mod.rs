@@ -51,7 +51,7 @@ use self::rp2040 as chip;
 use self::rp2350 as chip;
 use self::usb::Usb;
 use super::reset_reason::{self, ResetReason};
-use super::{Board, DRIVES_SENSOR, Transmitter, systick, transmit};
+use super::{Board, DRIVES_SENSOR, LaserOff, LastFed, Transmitter, systick, transmit};
 use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
 
 const BAUD: u32 = 1_000_000;
@@ -98,8 +98,7 @@ pub struct SensorPort {
 /// The board, once started.
 pub struct Pico {
     watchdog: Watchdog,
-    /// When it was fed last.
-    fed_ms: u32,
+    last_fed: LastFed,
     reset_reason: ResetReason,
 }
 
@@ -196,7 +195,7 @@ impl Pico {
         };
         let board = Self {
             watchdog,
-            fed_ms: 0,
+            last_fed: LastFed::default(),
             reset_reason,
         };
         (board, serial, sensor)
@@ -209,15 +208,17 @@ impl Pico {
     }
 }
 
-/// Holds the pin of the laser low, if the image drives one.
-pub(super) fn laser_off() {
-    #[cfg(feature = "sensor-photon-timer")]
-    photon_timer::laser_off();
-}
+impl LaserOff for Pico {
+    /// Holds the pin of the laser low, if the image drives one.
+    fn laser_off() {
+        #[cfg(feature = "sensor-photon-timer")]
+        photon_timer::laser_off();
+    }
 
-/// Resets all of the chip: its processor can reset itself alone, and the PIO would go on.
-pub(super) fn end() -> ! {
-    chip::hal::reset()
+    /// Resets all of the chip: its processor can reset itself alone, and the PIO would go on.
+    fn end() -> ! {
+        chip::hal::reset()
+    }
 }
 
 /// Whether the watchdog waits while a debugger halts the processor. Only once it has started:
@@ -239,13 +240,9 @@ impl Board for Pico {
         MILLISECONDS.load(Ordering::Relaxed)
     }
 
-    /// Feeds only while the clock runs: otherwise a host would never time out.
     fn feed_watchdog(&mut self) {
         let now_ms = self.now_ms();
-        if now_ms != self.fed_ms {
-            self.fed_ms = now_ms;
-            self.watchdog.feed();
-        }
+        self.last_fed.at(now_ms, || self.watchdog.feed());
     }
 
     fn start_sending() {

@@ -22,8 +22,8 @@ mod sensor_port;
 use core::cell::RefCell;
 use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
+use cortex_m::peripheral::NVIC;
 use cortex_m::peripheral::syst::SystClkSource;
-use cortex_m::peripheral::{NVIC, SCB};
 use cortex_m_rt::exception;
 use critical_section::Mutex;
 use defmt_rtt as _;
@@ -39,7 +39,7 @@ use stm32f4xx_hal::watchdog::IndependentWatchdog;
 pub use self::sensor_port::SensorPort;
 
 use super::reset_reason::{self, ResetReason};
-use super::{Board, DRIVES_SENSOR, Transmitter, systick, transmit};
+use super::{Board, DRIVES_SENSOR, LaserOff, LastFed, Transmitter, systick, transmit};
 use crate::serial::{BoardBuffers, Buffers, Serial, SerialInterrupt};
 
 const BAUD: u32 = 1_000_000;
@@ -61,8 +61,7 @@ static SENSOR_READY: AtomicBool = AtomicBool::new(false);
 /// The board, once started.
 pub struct Stm32F405 {
     watchdog: IndependentWatchdog,
-    /// When it was fed last.
-    fed_ms: u32,
+    last_fed: LastFed,
     reset_reason: ResetReason,
 }
 
@@ -153,7 +152,7 @@ impl Stm32F405 {
         watchdog.start(500.millis());
         let board = Self {
             watchdog,
-            fed_ms: 0,
+            last_fed: LastFed::default(),
             reset_reason,
         };
         (board, serial, sensor)
@@ -187,18 +186,15 @@ fn wait_for_supply(rcc: &RCC, exti: &EXTI, pwr: &PWR) {
     exti.imr().modify(|_, w| w.mr16().set_bit());
 }
 
-/// Drives PC6 low, ENABLE or EN of the sensor: `BR6` of `GPIOC_BSRR` (RM0090, 8.4.7). Before
-/// the port has started nothing happens.
-pub(super) fn laser_off() {
-    // SAFETY: a write of 1 concerns this pin alone, and the image does nothing more.
-    #[allow(unsafe_code, reason = "there is no handle of the peripheral here")]
-    let port = unsafe { &*pac::GPIOC::PTR };
-    port.bsrr().write(|w| w.br6().reset());
-}
-
-/// Resets the chip.
-pub(super) fn end() -> ! {
-    SCB::sys_reset()
+impl LaserOff for Stm32F405 {
+    /// Drives PC6 low, ENABLE or EN of the sensor: `BR6` of `GPIOC_BSRR` (RM0090, 8.4.7). Before
+    /// the port has started nothing happens.
+    fn laser_off() {
+        // SAFETY: a write of 1 concerns this pin alone, and the image does nothing more.
+        #[allow(unsafe_code, reason = "there is no handle of the peripheral here")]
+        let port = unsafe { &*pac::GPIOC::PTR };
+        port.bsrr().write(|w| w.br6().reset());
+    }
 }
 
 impl Board for Stm32F405 {
@@ -206,13 +202,9 @@ impl Board for Stm32F405 {
         MILLISECONDS.load(Ordering::Relaxed)
     }
 
-    /// Feeds only while the clock runs: otherwise a host would never time out.
     fn feed_watchdog(&mut self) {
         let now_ms = self.now_ms();
-        if now_ms != self.fed_ms {
-            self.fed_ms = now_ms;
-            self.watchdog.feed();
-        }
+        self.last_fed.at(now_ms, || self.watchdog.feed());
     }
 
     fn start_sending() {
@@ -239,9 +231,9 @@ fn SysTick() {
 /// The supply is too low. The next start waits until it is back.
 #[interrupt]
 fn PVD() {
-    laser_off();
+    Stm32F405::laser_off();
     reset_reason::remember(ResetReason::BrownOut);
-    end()
+    Stm32F405::end()
 }
 
 #[interrupt]
