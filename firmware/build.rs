@@ -26,9 +26,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("cargo::rerun-if-changed=memory");
     println!("cargo::rerun-if-changed=../memory.x");
 
-    // A Cortex-M0 or M0+ has fewer registers of faults.
+    // A Cortex-M0, M0+ or M23 has fewer instructions and registers of faults.
     println!("cargo::rustc-check-cfg=cfg(armv6m)");
-    if env::var("TARGET")?.starts_with("thumbv6m") {
+    let target = env::var("TARGET")?;
+    if target.starts_with("thumbv6m") || target.starts_with("thumbv8m.base") {
         println!("cargo::rustc-cfg=armv6m");
     }
 

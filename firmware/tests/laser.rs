@@ -87,7 +87,8 @@ fn a_silent_hour_stops_the_sensor_once_and_the_reason_is_reported() {
         }
         let later = from.wrapping_add(HOUR_MS);
         let report = host.report(&mut device, later);
-        assert_eq!((laser.started, laser.stopped), (1, 1));
+        // The first stop is that of a new sidecar.
+        assert_eq!((laser.started, laser.stopped), (1, 2));
         assert_eq!((report.sensor_starts, report.sensor_stops), (1, 1));
         assert_eq!(report.stop_reason, StopReason::Silence as u8);
         // The host is back, and the sensor is off all the same until it is configured anew.
@@ -189,7 +190,7 @@ fn the_end_of_a_session_stops_the_sensor_at_the_next_poll() {
         alone(&mut device, &mut laser, now_ms);
         assert!(!laser.is_on);
     }
-    assert_eq!((laser.started, laser.stopped), (1, 1));
+    assert_eq!((laser.started, laser.stopped), (1, 2));
     let report = Host::new(2, 1_000).report(&mut device, 1_000);
     assert_eq!(report.stop_reason, StopReason::EndOfSession as u8);
 }
@@ -310,84 +311,175 @@ fn a_configuration_from_before_the_silence_starts_nothing_after_it() {
     assert!(laser.is_on);
 }
 
-/// A port that fails at every call, or at those that send.
-struct Broken {
-    sends_only: bool,
+/// A port that takes all and has nothing, and fails at one of its calls, or from there on.
+struct Failing {
+    /// Calls that do not fail.
+    left: u32,
+    /// Calls that do.
+    fails: u32,
+    /// It has bytes.
+    has_bytes: bool,
 }
 
-impl ErrorType for Broken {
+impl Failing {
+    fn call(&mut self) -> Result<(), ErrorKind> {
+        if self.left > 0 {
+            self.left -= 1;
+        } else if self.fails > 0 {
+            self.fails -= 1;
+            return Err(ErrorKind::Other);
+        }
+        Ok(())
+    }
+}
+
+impl ErrorType for Failing {
     type Error = ErrorKind;
 }
 
-impl ReadReady for Broken {
+impl ReadReady for Failing {
     fn read_ready(&mut self) -> Result<bool, ErrorKind> {
-        if self.sends_only {
-            return Ok(false);
-        }
-        Err(ErrorKind::Other)
+        self.call()?;
+        Ok(self.has_bytes)
     }
 }
 
-impl Read for Broken {
-    fn read(&mut self, _: &mut [u8]) -> Result<usize, ErrorKind> {
-        Err(ErrorKind::Other)
+impl Read for Failing {
+    fn read(&mut self, bytes: &mut [u8]) -> Result<usize, ErrorKind> {
+        self.call()?;
+        // Noise.
+        bytes[0] = 7;
+        Ok(1)
     }
 }
 
-impl WriteReady for Broken {
+impl WriteReady for Failing {
     fn write_ready(&mut self) -> Result<bool, ErrorKind> {
-        Err(ErrorKind::Other)
+        self.call()?;
+        Ok(true)
     }
 }
 
-impl Write for Broken {
-    fn write(&mut self, _: &[u8]) -> Result<usize, ErrorKind> {
-        Err(ErrorKind::Other)
+impl Write for Failing {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
+        self.call()?;
+        Ok(bytes.len().min(3))
     }
 
     fn flush(&mut self) -> Result<(), ErrorKind> {
-        Err(ErrorKind::Other)
+        Ok(())
     }
 }
 
-/// Before the error is returned, as nobody may poll again. Then nothing but a configuration starts it.
+/// Checks that the sensor is off for good, but for a configuration: the port is back, and the host hears why.
+fn stays_off(device: &mut Sidecar, laser: &mut Laser, host: &mut Host, from: u32, why: StopReason) {
+    for now_ms in from..from + 200 {
+        host.exchange(device, now_ms);
+        host.read(usize::MAX);
+        alone(device, laser, now_ms);
+        assert!(!laser.is_on, "after {now_ms} ms");
+    }
+    let report = host.report(device, from + 200);
+    assert_eq!(report.stop_reason, why as u8);
+    assert_eq!(report.sensor_starts, report.sensor_stops);
+    host.configure(device, from + 201, &CONFIGURATION);
+    device.poll_sensor(laser, from + 201);
+    assert!(laser.is_on);
+}
+
+/// Before the error is returned, from whatever call, as the caller may not poll again. A configuration that has arrived
+/// and is not worked on starts nothing.
 #[test]
 fn a_port_that_fails_stops_the_sensor_at_once_and_for_good() {
-    for sends_only in [false, true] {
+    for (left, fails, has_bytes) in (0..400)
+        .flat_map(|left| [1, u32::MAX].map(|fails| (left, fails)))
+        .flat_map(|(left, fails)| [false, true].map(|has_bytes| (left, fails, has_bytes)))
+    {
         let (mut device, mut laser, mut host) = running(60_000, 0);
-        let mut port = Broken { sends_only };
-        // What the host has sent before is still to be worked on.
-        host.ask(message::CONFIGURE, &CONFIGURATION.to_le_bytes());
-        let (mut deframer, mut wire) = (Deframer::new(), [0; WIRE_BYTES]);
-        let length = host.endpoint.transmit(1, &mut wire);
-        deliver(&mut deframer, &wire[..length], |frame| {
-            device.receive(frame, 1);
-        });
-        let failed = (1..100).find(|&now_ms| {
+        let mut port = Failing {
+            left,
+            fails,
+            has_bytes,
+        };
+        let failed = (1..1_000).find(|&now_ms| {
             let polled = device.poll_with(&mut laser, &mut port, 0, now_ms);
-            assert_eq!(laser.is_on, polled.is_ok(), "after {now_ms} ms");
+            assert_eq!(laser.is_on, polled.is_ok(), "{left} {now_ms}");
             polled.is_err()
         });
-        // It sends a frame every 50 ms.
-        let failed = failed.expect("it sends a frame");
-        assert!(failed == 1 || sends_only);
-        for now_ms in failed..1_000 {
-            let _ = device.poll_with(&mut laser, &mut port, 0, now_ms);
-            alone(&mut device, &mut laser, now_ms);
-            assert!(!laser.is_on, "after {now_ms} ms");
+        let failed = failed.expect("a call that fails");
+        if left % 10 == 0 {
+            stays_off(
+                &mut device,
+                &mut laser,
+                &mut host,
+                failed,
+                StopReason::PortFailed,
+            );
         }
-        // The port is back, and the host hears why.
-        host.exchange(&mut device, 1_000);
-        host.read(usize::MAX);
-        device.poll_sensor(&mut laser, 1_000);
-        assert!(!laser.is_on, "a configuration from before");
-        let report = host.report(&mut device, 1_001);
-        assert_eq!(report.stop_reason, StopReason::PortFailed as u8);
-        assert_eq!(report.sensor_starts, report.sensor_stops);
-        host.configure(&mut device, 1_002, &CONFIGURATION);
-        device.poll_sensor(&mut laser, 1_002);
-        assert!(laser.is_on);
     }
+}
+
+/// Gives the device a configuration that it does not work on yet.
+fn configure_later(device: &mut Sidecar, host: &mut Host, now_ms: u32) {
+    host.ask(message::CONFIGURE, &CONFIGURATION.to_le_bytes());
+    let (mut deframer, mut wire) = (Deframer::new(), [0; WIRE_BYTES]);
+    while let length @ 1.. = host.endpoint.transmit(now_ms, &mut wire) {
+        deliver(&mut deframer, &wire[..length], |frame| {
+            device.receive(frame, now_ms);
+        });
+    }
+}
+
+/// Whatever has switched it off first, and also if it was never on.
+#[test]
+fn a_configuration_from_before_a_failure_starts_nothing_after_it() {
+    for was_on in [false, true] {
+        for (first, second) in [(false, false), (false, true), (true, false), (true, true)] {
+            let (mut device, mut laser) = (device::<8>(Some(SensorInfo::new(8))), Laser::default());
+            let mut host = Host::new(1, 0);
+            let mut now_ms = 0;
+            if was_on {
+                host.configure(&mut device, 0, &CONFIGURATION);
+            } else {
+                host.exchange(&mut device, 0);
+            }
+            device.poll_sensor(&mut laser, 0);
+            assert_eq!(laser.is_on, was_on);
+            let mut fail = |device: &mut Sidecar, laser: &mut Laser, by_port| {
+                if by_port {
+                    let mut port = Failing {
+                        left: 0,
+                        fails: 1,
+                        has_bytes: false,
+                    };
+                    now_ms += 1;
+                    assert!(device.poll_with(laser, &mut port, 0, now_ms).is_err());
+                } else {
+                    // The host is silent.
+                    now_ms += u32::from(Configuration::HOST_TIMEOUT_MS) + 1;
+                    device.poll_sensor(laser, now_ms);
+                }
+                assert!(!laser.is_on);
+                now_ms
+            };
+            let at = fail(&mut device, &mut laser, first);
+            configure_later(&mut device, &mut host, at);
+            let at = fail(&mut device, &mut laser, second);
+            let reasons = [StopReason::Silence, StopReason::PortFailed];
+            let why = reasons[usize::from(first)];
+            stays_off(&mut device, &mut laser, &mut host, at + 1, why);
+        }
+    }
+}
+
+/// An earlier sidecar of the same firmware may have started it.
+#[test]
+fn a_new_sidecar_stops_its_sensor() {
+    let (_, mut laser, _) = running(500, 0);
+    let mut device = device::<8>(Some(SensorInfo::new(8)));
+    device.poll_sensor(&mut laser, 1);
+    assert!(!laser.is_on && !device.sensor_is_running());
+    assert_eq!(Host::new(1, 2).report(&mut device, 2).sensor_stops, 0);
 }
 
 /// A sensor whose first stops do not reach it.
@@ -469,13 +561,13 @@ fn a_stop_that_does_not_reach_the_sensor_is_tried_again_at_every_poll() {
             ..Laser::default()
         },
         fails: 2,
-        is_stopping: true,
+        is_stopping: false,
     };
-    for now_ms in 0..3 {
-        assert!(sensor.laser.is_on);
-        device.poll_sensor(&mut sensor, now_ms);
+    // The first poll tries twice.
+    for is_on in [true, false, false] {
+        device.poll_sensor(&mut sensor, 0);
+        assert_eq!(sensor.laser.is_on, is_on);
     }
-    assert!(!sensor.laser.is_on);
 }
 
 #[test]
@@ -499,7 +591,7 @@ fn after_a_reset_the_sensor_is_off_and_hosts_are_told_why() {
     for now_ms in 0..10_000 {
         alone(&mut device, &mut laser, now_ms);
     }
-    assert_eq!((laser.started, laser.stopped), (0, 0));
+    assert_eq!((laser.started, laser.stopped), (0, 1));
     // The host of before still speaks in its session.
     let (_, _, mut before) = running(3_000, 0);
     before

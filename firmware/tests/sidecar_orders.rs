@@ -61,8 +61,17 @@ fn a_sensor_is_started_for_each_configuration_and_stopped_once() {
         device.poll_sensor(&mut sensor, 1);
     }
     let start = |bin_width| Order::Start(U16F16::from_num(bin_width));
-    let (poll, stop) = (|| Order::Poll, Order::Stop);
-    let expected = [start(160), poll(), poll(), start(150), poll(), poll(), stop];
+    let (poll, stop) = (|| Order::Poll, || Order::Stop);
+    let expected = [
+        stop(),
+        start(160),
+        poll(),
+        poll(),
+        start(150),
+        poll(),
+        poll(),
+        stop(),
+    ];
     assert_eq!(sensor.0, expected);
 
     // A new session stops it, too.

@@ -144,7 +144,7 @@ fn every_sensor_fault_has_its_own_number_and_words() {
 #[test]
 fn every_reason_of_a_stop_has_its_own_number_and_words() {
     let all: Vec<StopReason> = (0..=255).filter_map(StopReason::from_number).collect();
-    assert_eq!(all.len(), 10);
+    assert_eq!(all.len(), 11);
     are_documented(
         &all,
         |&reason| reason as u8,

@@ -52,7 +52,7 @@ impl<EN: OutputPin> Enable<EN> {
 
 impl<EN: OutputPin> Drop for Enable<EN> {
     fn drop(&mut self) {
-        // Nobody is left to take an error.
+        // There is no caller to take an error.
         let _ = self.set(false);
     }
 }
@@ -80,6 +80,13 @@ impl<BUS, INT, EN: OutputPin> fmt::Debug for ReleaseError<BUS, INT, EN> {
 impl<BUS, INT, EN: OutputPin> fmt::Display for ReleaseError<BUS, INT, EN> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "ENABLE did not go low: {:?}", self.error)
+    }
+}
+
+#[cfg(feature = "defmt")]
+impl<BUS, INT, EN: OutputPin> defmt::Format for ReleaseError<BUS, INT, EN> {
+    fn format(&self, f: defmt::Formatter<'_>) {
+        defmt::write!(f, "ENABLE did not go low");
     }
 }
 

@@ -7,6 +7,7 @@
 //!
 //! ```text
 //! let mut timing = Timing::new(|| Instant::now().as_millis() as u32, Delay, 100); // a poll takes 100 ms at most
+//! sensor.start_async(); // before it the sensor is off, and `next` waits without end
 //! loop {
 //!     if let Err(error) = sensor.next(&mut timing, &mut sink).await {
 //!         warn!("{}", error); // the next call starts the sensor again
@@ -19,7 +20,7 @@
 //! A driver keeps in its state what it waits for, and the time is an argument of
 //! [`Sensor::poll`]. A sensor that is unplugged or hangs therefore costs one error every few
 //! milliseconds and blocks nothing else. Every error leaves the driver usable: the next
-//! polls bring the sensor up again. If nobody polls any more, the sensor is off: see [`Sensor`].
+//! polls bring the sensor up again. [`Sensor`] says when it is off.
 
 #![no_std]
 #![cfg_attr(docsrs, feature(doc_cfg))]
@@ -104,7 +105,9 @@ pub struct Target {
 ///
 /// A sensor may fire a laser. It is on only between [`Self::start`] and [`Self::stop`]: a poll before a start, or after
 /// a stop, switches nothing on. It is off once its driver is dropped. An error that ends a measurement switches
-/// it off before the poll returns, and the next poll begins anew. So a loop that ends with `?` leaves nothing on.
+/// it off before the poll returns, and the next poll begins anew. Some errors do not end a measurement, such as a missed
+/// frame, and the sensor stays on. If you poll no more, stop the sensor or drop its driver. A watchdog covers a loop
+/// that hangs.
 ///
 /// `BINS` is the number of bins of the histograms that it gives.
 pub trait Sensor<const BINS: usize = 128> {
@@ -124,8 +127,8 @@ pub trait Sensor<const BINS: usize = 128> {
     /// before the next [`Self::start`], unless [`Self::is_stopping`].
     fn stop(&mut self);
 
-    /// Whether the sensor may not know yet that it is to be off, as its bus or a pin has failed, or nobody has
-    /// told it since the driver was made. Poll it on then: each poll tries again.
+    /// Whether the last stop may not have reached the sensor, as its bus or a pin has failed. A new driver is stopping,
+    /// too. Poll it on then: each poll tries again.
     fn is_stopping(&self) -> bool {
         false
     }

@@ -5,6 +5,7 @@ mod dither;
 mod many_bins;
 mod nonsense;
 mod off;
+mod parts;
 mod simulated;
 mod software_i2c;
 mod tdc7200;

@@ -1,6 +1,6 @@
 //! Sensors that answer nonsense: arbitrary bytes, errors of the bus and an interrupt at any level,
 //! as often as proptest likes. Drivers never panic, a poll is as short as ever, what is marked as
-//! wrong is given to nobody, and all is right again once the sensor is.
+//! wrong is not given, and all is right again once the sensor is.
 
 use std::cell::{Cell, RefCell, RefMut};
 use std::rc::Rc;

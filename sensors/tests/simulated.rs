@@ -232,3 +232,25 @@ fn laser_cycles_that_are_asked_for_are_those_of_the_clock() {
     // Nor does it keep photons of a laser cycle back.
     assert_eq!(sensor.info().dead_time, 0);
 }
+
+/// Photons come only between a start and a stop.
+#[test]
+fn it_gives_photons_only_while_it_is_on() {
+    let pixels = [pixel(0, 5, 1.0, 0.0)];
+    let mut sensor = Simulated::new(&pixels, PULSE, settings(1));
+    let given = |sensor: &mut Simulated<'_>, from_ms| {
+        let mut sink = RecordingSink::default();
+        for now_ms in from_ms..from_ms + 50 {
+            let _ = sensor.poll(now_ms, &mut sink).unwrap();
+        }
+        !sink.0.is_empty()
+    };
+    assert!(!given(&mut sensor, 0));
+    for round in 1..3 {
+        sensor.start(U16F16::ZERO, Dither::OFF);
+        assert!(given(&mut sensor, 200 * round));
+        sensor.stop();
+        assert!(!given(&mut sensor, 200 * round + 100));
+        assert!(!sensor.is_stopping());
+    }
+}

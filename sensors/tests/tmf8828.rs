@@ -1,9 +1,7 @@
 //! The 8×8 zones of a TMF8828.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-
-use crate::common::tmf8828::{Bus, Chip, MAP, count, zone};
+use crate::common::bus::{self, Fault};
+use crate::common::tmf8828::{Chip, MAP, count, zone};
 use crate::common::{Broken, RecordingSink, SinkCall, started};
 use dtof_core::PixelAddress;
 use dtof_core::fixed::types::{I24F8, U16F16};
@@ -14,22 +12,23 @@ use embedded_hal::i2c::ErrorKind;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
 
+type Bus = bus::Bus<Chip>;
 type DriverError = Error<ErrorKind, Broken>;
 
 struct Bench {
     sensor: Tmf882x<'static, Bus, Bus, Bus, 128>,
-    chip: Rc<RefCell<Chip>>,
+    bus: Bus,
     sink: RecordingSink,
     now_ms: u32,
 }
 
 fn bench(number: u8) -> Bench {
-    let chip = Rc::new(RefCell::new(Chip::new(number)));
-    let bus = Bus(Rc::clone(&chip));
+    let bus = Bus::new(Chip::new(number));
+    let [i2c, interrupt, enable] = [(); 3].map(|()| bus.clone());
     let config = Config::new(Settings::of_8x8(PixelAddress::new(10))).unwrap();
     Bench {
-        sensor: started(Tmf882x::new(bus.clone(), bus.clone(), bus, &[], config)),
-        chip,
+        sensor: started(Tmf882x::new(i2c, interrupt, enable, &[], config)),
+        bus,
         sink: RecordingSink::default(),
         now_ms: 0,
     }
@@ -60,7 +59,7 @@ impl Bench {
 
     /// Loses the next packet or result.
     fn lose(&self) {
-        self.chip.borrow_mut().next();
+        self.bus.0.borrow_mut().chip.next();
     }
 
     fn error(&mut self) -> DriverError {
@@ -103,8 +102,8 @@ fn each_of_64_zones_comes_once_in_four_captures() {
     for number in [0, 2, 255] {
         let mut bench = bench(number);
         bench.bring_up();
-        assert_eq!(bench.chip.borrow().page[0x34..0x36], [15, 0x84]);
-        assert_eq!(bench.chip.borrow().page[0x39], 1);
+        assert_eq!(bench.bus.0.borrow().chip.page[0x34..0x36], [15, 0x84]);
+        assert_eq!(bench.bus.0.borrow().chip.page[0x39], 1);
         // The driver does not know the number of the first capture before its result.
         bench.take(61);
         let given = bench.sink.take();
@@ -171,7 +170,7 @@ fn its_period_is_a_second() {
 #[test]
 fn a_second_target_is_given_as_such() {
     let mut bench = bench(0);
-    bench.chip.borrow_mut().has_second_targets = true;
+    bench.bus.0.borrow_mut().chip.has_second_targets = true;
     bench.bring_up();
     bench.take(61);
     let mut targets: Vec<(u16, u8, I24F8)> = Vec::new();
@@ -192,12 +191,12 @@ fn a_second_target_is_given_as_such() {
 #[test]
 fn a_sensor_without_8x8_zones_is_an_error() {
     let mut bench = bench(0);
-    bench.chip.borrow_mut().is_fixed = true;
+    bench.bus.0.borrow_mut().chip.is_fixed = true;
     assert_eq!(
         bench.error(),
         Error::Device(DeviceError::WrongMode { mode: 0 })
     );
-    bench.chip.borrow_mut().is_fixed = false;
+    bench.bus.0.borrow_mut().chip.is_fixed = false;
     bench.bring_up();
 }
 
@@ -263,7 +262,7 @@ fn the_next_result_reveals_a_lost_capture() {
     let mut bench = bench(0);
     bench.bring_up();
     bench.take(61);
-    bench.chip.borrow_mut().number = 2;
+    bench.bus.0.borrow_mut().chip.number = 2;
     let expected = Error::Device(DeviceError::WrongCapture {
         expected: 1,
         found: 2,
@@ -297,17 +296,21 @@ fn no_fault_puts_a_histogram_into_another_zone_unreported() {
         for polls in 0..20_000u32 {
             if polls < 18_000 && rng.next_u32().is_multiple_of(one_in) {
                 faults += 1;
-                let mut chip = bench.chip.borrow_mut();
-                match rng.next_u32() % 4 {
+                let kind = rng.next_u32() % 4;
+                if kind == 1 {
+                    bench.bus.fail_next(Fault::Nack);
+                }
+                let chip = &mut bench.bus.0.borrow_mut().chip;
+                match kind {
                     0 => chip.next(),
-                    1 => chip.nack = true,
+                    1 => {}
                     2 => chip.number = chip.number.wrapping_add(1),
                     _ => (chip.packets_sent, chip.mode) = (0, 0),
                 }
             }
-            let before = bench.chip.borrow().transfers;
+            let before = bench.bus.0.borrow().transfers;
             let polled = bench.poll();
-            assert!(bench.chip.borrow().transfers - before <= 7);
+            assert!(bench.bus.0.borrow().transfers - before <= 7);
             for given in bench.sink.take() {
                 let SinkCall::Histogram(pixel, _) = given else {
                     continue;
@@ -360,12 +363,12 @@ fn no_fault_puts_a_histogram_into_another_zone_unreported() {
 fn a_sensor_left_in_its_8x8_mode_is_switched_off_for_nine_zones() {
     let mut bench = bench(0);
     bench.bring_up();
-    let bus = Bus(Rc::clone(&bench.chip));
+    let bus = bench.bus.clone();
     let config = Config::new(Settings::new(PixelAddress::new(10))).unwrap();
     bench.sensor = started(Tmf882x::new(bus.clone(), bus.clone(), bus, &[], config));
     // Another firmware has left it so; our driver has switched it off.
     {
-        let mut chip = bench.chip.borrow_mut();
+        let chip = &mut bench.bus.0.borrow_mut().chip;
         assert_eq!((chip.mode, chip.is_measuring), (0, false));
         (chip.mode, chip.is_measuring) = (8, true);
     }
@@ -375,6 +378,6 @@ fn a_sensor_left_in_its_8x8_mode_is_switched_off_for_nine_zones() {
     );
     assert_eq!(bench.sink.take(), []);
     bench.bring_up();
-    assert_eq!(bench.chip.borrow().mode, 0);
+    assert_eq!(bench.bus.0.borrow().chip.mode, 0);
     assert_eq!(bench.sensor.counts().errors, 1);
 }

@@ -56,7 +56,7 @@ fn not_acknowledged_while_measuring() {
     stops_measuring(&mut bench, polled);
 }
 
-/// Nobody answers, or somebody does and takes no more.
+/// No device answers, or one does and takes no more.
 #[test]
 fn only_an_address_not_acknowledged_is_no_answer() {
     for (source, fault) in [

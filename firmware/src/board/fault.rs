@@ -70,20 +70,25 @@ mod handlers {
     /// What a board does when its image has lost control. The handlers are made for it: [`on_panic`] and
     /// [`hard_fault!`](crate::hard_fault).
     pub trait LaserOff {
-        /// Holds the laser off, in a register write or two. What runs without the processor stops here. It may be
-        /// called at any time, also before the board has started, and must not panic or wait.
+        /// Holds the laser off, in a register write or two. What runs without the processor stops here, such as DMA, and
+        /// a second core. It may be called at any time, also before the board has started, with interrupts off. It must
+        /// not panic or wait.
         fn laser_off();
 
-        /// Ends the image: resets the processor and its peripherals. On a chip where other parts survive this, reset
-        /// all of it.
+        /// Ends the image with a reset. This one is by AIRCR, which leaves some peripherals of some chips as they are,
+        /// those of an RP2040 for instance: reset all of such a chip.
         fn end() -> ! {
             SCB::sys_reset()
         }
     }
 
-    /// What the handler of hard faults does: switches the laser off, reports the fault, and ends the image. `pointer` is the
-    /// stack pointer before.
-    pub extern "C" fn after_hard_fault<B: LaserOff>(pointer: usize) -> ! {
+    /// What the handler of hard faults does: switches the laser off, reports the fault, and ends the image.
+    ///
+    /// # Safety
+    /// For `hard_fault!` alone: `pointer` is the stack pointer before it.
+    #[doc(hidden)]
+    #[allow(unsafe_code, reason = "the pointer is read")]
+    pub unsafe extern "C" fn after_hard_fault<B: LaserOff>(pointer: usize) -> ! {
         B::laser_off();
         #[allow(unsafe_code, reason = "the linker script knows where the stack is")]
         // SAFETY: nothing is read of them but their address.
@@ -127,6 +132,8 @@ mod handlers {
 
     /// For the panic handler of an image: switches the laser off, reports the panic, and ends the image.
     pub fn on_panic<B: LaserOff>(info: &PanicInfo<'_>) -> ! {
+        // No handler of an interrupt switches it on again.
+        cortex_m::interrupt::disable();
         B::laser_off();
         reset_reason::remember(ResetReason::Panic);
         #[cfg(feature = "defmt")]
@@ -167,9 +174,12 @@ mod handlers {
         };
     }
 
-    /// Makes [`after_hard_fault`](crate::board::fault::after_hard_fault) of a board the handler of hard faults of an
-    /// image, once the stack pointer is reset. The linker script has `_stack_start` and `_stack_end`; that of
-    /// cortex-m-rt does.
+    /// Defines the handler of hard faults of an image, for a board that is [`LaserOff`](crate::board::fault::LaserOff):
+    /// it resets the stack pointer, switches the laser off, reports the fault, and ends the image.
+    ///
+    /// The linker script has `_stack_start` and `_stack_end`; that of cortex-m-rt does. The stack is the main one: under
+    /// an operating system with stacks of its own the report may call a fault an overflow. A crate that forbids
+    /// `unsafe_code` cannot use it, as a handler is named by `no_mangle`.
     #[macro_export]
     macro_rules! hard_fault {
         ($board:ty) => {

@@ -106,7 +106,7 @@ impl Sidecar<'_> {
         self.host_timeout_ms = requested.host_timeout_ms;
         self.stopping.get_or_insert(StopReason::Configuration);
         self.started = false;
-        self.off = false;
+        self.off = None;
         self.restart_counts();
         Ok(())
     }

@@ -148,14 +148,16 @@ pub struct Sidecar<'a> {
     /// Of the configuration in force, if photons of one laser cycle in one bin count once.
     once_per_bin: Option<BinsOfPixel>,
     sensor: Option<SensorInfo>,
+    /// The sensor was told once to be off.
+    has_steered: bool,
     /// The sensor has been started and not been stopped.
     running: bool,
     /// It had still more when it was polled last.
     sensor_has_more: bool,
     /// It was started for the configuration in force.
     started: bool,
-    /// It stays off until another configuration.
-    off: bool,
+    /// It stays off until another configuration, for this reason.
+    off: Option<StopReason>,
     /// A program has the host's port open, as far as the port can tell.
     listens: bool,
     /// Of the configuration in force: how long the host may be silent, 0 without a limit.
@@ -229,10 +231,11 @@ impl<'a> Sidecar<'a> {
             source: Source::Link,
             once_per_bin: None,
             sensor,
+            has_steered: false,
             running: false,
             sensor_has_more: false,
             started: false,
-            off: false,
+            off: None,
             stale: 0,
             listens: true,
             host_timeout_ms: Configuration::HOST_TIMEOUT_MS,
@@ -366,11 +369,11 @@ impl<'a> Sidecar<'a> {
             if next == message::HISTOGRAM_REQUEST {
                 self.accept_request(&message.body);
             } else {
-                let (was_off, stopping) = (self.off, self.stopping);
+                let off = self.off.filter(|_| is_stale);
                 self.answer = self.act(message, overrun);
-                if was_off && is_stale {
-                    // The reason stays, too.
-                    (self.off, self.stopping) = (true, stopping);
+                if off.is_some() {
+                    // The host of a configuration that starts nothing gets the reason.
+                    (self.off, self.stopping) = (off, off);
                 }
             }
         }

@@ -24,6 +24,9 @@ impl Sidecar<'_> {
     /// `serial` takes. `lost` is the number of bytes the port has lost so far. The report counts
     /// the errors of the sensor and names the last.
     ///
+    /// The first call stops the sensor, as it may be on. It is the same sensor each time: a sidecar stops only the one that it
+    /// is given.
+    ///
     /// # Errors
     /// Fails if `serial` fails. The sensor is stopped then, and only another configuration starts it again.
     pub fn poll_with<S: Read + ReadReady + Write + WriteReady>(
@@ -84,12 +87,17 @@ impl Sidecar<'_> {
         } else if self.host_is_silent(now_ms) {
             self.stop_sensor(StopReason::Silence);
         }
+        if !self.has_steered {
+            // Another firmware, or another sidecar of this one, may have left it on.
+            self.has_steered = true;
+            sensor.stop();
+        }
         let is_configured = self.config.is_some() && self.source == Source::Sensor;
-        let should_run = is_configured && !self.off;
+        let should_run = is_configured && self.off.is_none();
         if self.running && !(should_run && self.started) {
             self.sensor_stops = self.sensor_stops.saturating_add(1);
             self.set_stop_reason(self.stopping);
-        } else if is_configured && self.off && self.stopping.is_some() {
+        } else if is_configured && self.off.is_some() && self.stopping.is_some() {
             // Before it has started.
             self.set_stop_reason(self.stopping);
         }
@@ -197,10 +205,11 @@ impl Sidecar<'_> {
 
     /// The sensor is off from the next poll on, until a configuration.
     fn stop_sensor(&mut self, reason: StopReason) {
-        if !self.off {
-            self.off = true;
+        // Whether it is off already or not: no configuration from before starts it.
+        self.stale = self.endpoint.waiting();
+        if self.off.is_none() {
+            self.off = Some(reason);
             self.stopping = Some(reason);
-            self.stale = self.endpoint.waiting();
         }
     }
 
@@ -214,7 +223,7 @@ impl Sidecar<'_> {
     fn takes_sensor(&self) -> bool {
         self.config.is_some()
             && self.source == Source::Sensor
-            && !self.off
+            && self.off.is_none()
             && self.question() != Some(message::CONFIGURE)
     }
 }

@@ -107,11 +107,13 @@ fn a_loss_of_control_switches_the_laser_of_ones_own_board_off() -> Result<()> {
     install()?;
     let pico = image("rp2040", "thumbv6m-none-eabi")?;
     for (fault, most_ms, reset) in [
-        ("panic", HANDLER_MS, "core"),
-        ("fault", HANDLER_MS, "core"),
-        ("overflow-entered", HANDLER_MS, "core"),
+        ("panic", HANDLER_MS, "forced"),
+        ("fault", HANDLER_MS, "forced"),
+        ("overflow-entered", HANDLER_MS, "forced"),
         ("core-reset", START_MS, "core"),
         ("hang", WATCHDOG_MS, "watchdog"),
+        ("lockup", WATCHDOG_MS, "watchdog"),
+        ("halt", WATCHDOG_MS, "watchdog"),
     ] {
         let (lit, boots) = after(&pico, fault, false)?;
         ensure!(lit <= most_ms, "{fault}: {lit} ms of light");

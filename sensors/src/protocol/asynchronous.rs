@@ -131,7 +131,7 @@ where
     ) -> P::Error<BUS::Error, INT::Error> {
         let error = failure.into();
         self.protocol.failed(&error);
-        self.cut();
+        self.drive_low();
         error
     }
 
@@ -140,8 +140,9 @@ where
     /// needed.
     ///
     /// The future may be dropped. If it is dropped within a transfer of a frame, the frame is lost and
-    /// counted, ENABLE goes low, and the next poll begins to bring the sensor up again. A frame that the sensor has
-    /// ready when it is stopped is not given and not counted.
+    /// counted, ENABLE goes low, and the next poll begins to bring the sensor up again. Elsewhere the next poll goes on,
+    /// so the sensor stays on: if you drop a future for good, as `select` does, stop or drop the driver. A frame that
+    /// the sensor has ready when it is stopped is not given and not counted.
     ///
     /// # Errors
     /// Fails if this step fails. The next polls bring the sensor up again.
@@ -166,13 +167,16 @@ where
     ) -> Result<Polled, P::Error<BUS::Error, INT::Error>> {
         let polled = match self.power {
             Power::Off => return Ok(Polled::Idle),
-            Power::Stopping { .. } => self.switch_off_async().await.map_err(P::Error::from),
+            Power::Stopping { .. } => self
+                .switch_off_async(Some(now_ms))
+                .await
+                .map_err(P::Error::from),
             Power::On => self.step_async(now_ms, sink).await,
         };
         if let Err(error) = &polled {
             self.protocol.failed(error);
-            if self.power == Power::On && !self.protocol.is_measuring() {
-                self.darken_async().await;
+            if matches!(self.power, Power::On) && !self.protocol.is_measuring() {
+                self.stop_after_error_async().await;
             }
         }
         polled
@@ -184,12 +188,12 @@ where
     }
 
     /// Drives ENABLE low, and also sends the command to stop, as ENABLE may not be wired. It takes at most
-    /// `bus_ms` milliseconds of the timer. If it fails or is dropped, each poll tries again
+    /// `bus_ms` milliseconds of the timer. If it fails, or is dropped once it has begun, each poll tries again
     /// ([`Self::is_stopping`]).
     pub async fn stop_async(&mut self, timing: &mut Timing<impl FnMut() -> u32, impl DelayNs>) {
         self.power = Power::STOPPING;
         let limit = timing.delay.delay_ms(timing.bus_ms);
-        let failure = match race(self.switch_off_async(), limit).await {
+        let failure = match race(self.switch_off_async(None), limit).await {
             Ok(Ok(_)) => return,
             Ok(Err(failure)) => failure,
             Err(()) => Failure::BusTimeout,
@@ -206,19 +210,25 @@ where
     }
 
     /// As [`Self::stop_async`], without a limit.
-    async fn switch_off_async(&mut self) -> Result<Polled, Failure<BUS::Error, INT::Error>> {
+    async fn switch_off_async(
+        &mut self,
+        now_ms: Option<u32>,
+    ) -> Result<Polled, Failure<BUS::Error, INT::Error>> {
         // Before the first await: the bus may hang, and the future may be dropped.
         let low = self.enable.set(false);
         self.protocol.reset();
         let sent = self.send_stop_async().await;
-        self.switched_off(low, sent)
+        self.switched_off(now_ms, low, sent)
     }
 
-    /// A measurement was given up: the sensor stops now, as nobody may poll again.
-    async fn darken_async(&mut self) {
-        // Without a command it may measure all the same: another firmware may have left it so.
-        if !matches!(self.send_stop_async().await, Some(Ok(()))) {
-            self.cut();
+    /// As for a bus that blocks: an error has ended the measurement.
+    async fn stop_after_error_async(&mut self) {
+        let is_reset = self.protocol.is_reset_next();
+        if is_reset {
+            self.drive_low();
+        }
+        if !matches!(self.send_stop_async().await, Some(Ok(()))) && !is_reset {
+            self.drive_low();
         }
     }
 
@@ -283,7 +293,7 @@ impl<P: Protocol, BUS, INT, EN: OutputPin> Drop for Call<'_, P, BUS, INT, EN> {
         }
         self.driver.protocol.dropped();
         if !self.driver.protocol.is_measuring() {
-            self.driver.cut();
+            self.driver.drive_low();
         }
     }
 }

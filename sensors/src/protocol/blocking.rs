@@ -51,19 +51,27 @@ where
     }
 
     /// Drives ENABLE low, and also sends the command to stop, as ENABLE may not be wired.
-    fn switch_off(&mut self) -> Result<Polled, Failure<BUS::Error, INT::Error>> {
+    fn switch_off(
+        &mut self,
+        now_ms: Option<u32>,
+    ) -> Result<Polled, Failure<BUS::Error, INT::Error>> {
         // First, as the bus may hang.
         let low = self.enable.set(false);
         self.protocol.reset();
         let sent = self.send_stop();
-        self.switched_off(low, sent)
+        self.switched_off(now_ms, low, sent)
     }
 
-    /// A measurement was given up: the sensor stops now, as nobody may poll again.
-    fn darken(&mut self) {
-        // Without a command it may measure all the same: another firmware may have left it so.
-        if !matches!(self.send_stop(), Some(Ok(()))) {
-            self.cut();
+    /// An error has ended the measurement: stops the sensor now, as the caller may not poll again.
+    fn stop_after_error(&mut self) {
+        // A sensor that is reset next is not known to work: it may ignore the command, or another firmware may have
+        // left it on.
+        let is_reset = self.protocol.is_reset_next();
+        if is_reset {
+            self.drive_low();
+        }
+        if !matches!(self.send_stop(), Some(Ok(()))) && !is_reset {
+            self.drive_low();
         }
     }
 
@@ -106,7 +114,7 @@ where
     /// Drives ENABLE low, and also sends the command to stop, as ENABLE may not be wired.
     fn stop(&mut self) {
         self.power = Power::STOPPING;
-        if let Err(failure) = self.switch_off() {
+        if let Err(failure) = self.switch_off(None) {
             self.protocol.failed(&failure.into());
         }
     }
@@ -118,13 +126,13 @@ where
     fn poll(&mut self, now_ms: u32, sink: &mut impl PhotonSink) -> Result<Polled, Self::Error> {
         let polled = match self.power {
             Power::Off => return Ok(Polled::Idle),
-            Power::Stopping { .. } => self.switch_off().map_err(Self::Error::from),
+            Power::Stopping { .. } => self.switch_off(Some(now_ms)).map_err(Self::Error::from),
             Power::On => self.step(now_ms, sink),
         };
         if let Err(error) = &polled {
             self.protocol.failed(error);
-            if self.power == Power::On && !self.protocol.is_measuring() {
-                self.darken();
+            if matches!(self.power, Power::On) && !self.protocol.is_measuring() {
+                self.stop_after_error();
             }
         }
         polled

@@ -14,13 +14,20 @@
 //! | what happens | the driver |
 //! |---|---|
 //! | it was not started | drives ENABLE low at its first poll |
-//! | it is stopped | drives ENABLE low and sends the command to stop. If either fails, each poll tries again |
-//! | a poll gives the measurement up with an error | sends the command to stop, or else drives ENABLE low |
+//! | it is stopped | drives ENABLE low, then sends the command to stop. If one of them fails, each poll tries both again |
+//! | a poll fails before the sensor measures, with a TMF8829 before its first frame | drives ENABLE low, then sends the command to stop |
+//! | a later error ends the measurement | sends the command to stop. If that fails, it drives ENABLE low |
 //! | a poll is dropped within a transfer that cannot be repeated, or the bus hangs | drives ENABLE low |
 //! | it is dropped or released | drives ENABLE low |
 //!
-//! A driver that is kept, but neither polled nor stopped, leaves the sensor as it is. A watchdog has to cover that.
-//! If ENABLE is not wired, stop the driver before you drop it.
+//! # What it cannot do
+//!
+//! - Wire ENABLE, with a pull-down. Without it the commands alone switch the sensor off: not when the driver is dropped, not
+//!   after a reset of the board, and not at an address of its own after a stop.
+//! - A sensor that ENABLE has switched off acknowledges nothing. So a stop that is not acknowledged for 100 ms counts as done.
+//!   An I²C driver that reports a missing acknowledgement as another error makes each poll after a stop fail.
+//! - A driver that is kept, but neither polled nor stopped, leaves the sensor as it is. A watchdog has to cover that.
+//! - Some errors do not end a measurement, such as a missed frame: the sensor stays on.
 
 #[cfg(feature = "async")]
 mod asynchronous;
@@ -31,6 +38,7 @@ use embedded_hal::digital::OutputPin;
 use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
 
 use crate::enable::Enable;
+use crate::timer::Since;
 use crate::{PhotonSink, Polled, ReleaseError, SensorInfo};
 
 #[cfg(feature = "async")]
@@ -113,6 +121,9 @@ pub trait Protocol {
     /// Whether the sensor measures.
     fn is_measuring(&self) -> bool;
 
+    /// Whether the next request drives ENABLE low.
+    fn is_reset_next(&self) -> bool;
+
     /// Abandons the present measurement; the next requests begin again.
     fn restart(&mut self);
 
@@ -149,23 +160,23 @@ pub trait Protocol {
 type Sent<B, P> = Option<Result<(), Failure<B, P>>>;
 
 /// What the sensor is to do.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug)]
 enum Power {
     /// To be off, and it is as far as a driver can know.
     Off,
-    /// To be off, which it may not know yet: the next poll tells it. This many times nobody has acknowledged it.
-    Stopping { unanswered: u8 },
+    /// To be off. Each poll tells it again; the first of these polls was then.
+    Stopping { since: Option<Since> },
     /// To measure.
     On,
 }
 
 impl Power {
-    const STOPPING: Self = Self::Stopping { unanswered: 0 };
+    const STOPPING: Self = Self::Stopping { since: None };
 }
 
-/// A sensor that ENABLE has switched off does not acknowledge a stop. One whose ENABLE is not wired does, but for a
-/// disturbance of the bus: it is told this often.
-const TRIES: u8 = 3;
+/// A sensor that ENABLE has switched off does not acknowledge a stop. One whose ENABLE is not wired does, unless the bus is
+/// disturbed: each poll tries again for so many milliseconds.
+const UNANSWERED_MS: u32 = 100;
 
 /// A sensor's protocol on a bus, with INT and ENABLE. The [module](self) says when the sensor is off.
 ///
@@ -196,27 +207,32 @@ impl<P: Protocol, BUS, INT, EN: OutputPin> Driver<P, BUS, INT, EN> {
         self.power = Power::On;
     }
 
-    /// What came of a stop: of ENABLE, and of the command if there was one.
+    /// What came of a stop: of ENABLE, and of the command if there was one. `now_ms` is that of a poll.
     fn switched_off<B>(
         &mut self,
+        now_ms: Option<u32>,
         low: Result<(), EN::Error>,
         sent: Sent<B, EN::Error>,
     ) -> Result<Polled, Failure<B, EN::Error>> {
-        low.map_err(Failure::Pin)?;
-        self.power = match (self.power, sent) {
-            (_, None | Some(Ok(()))) => Power::Off,
-            (Power::Stopping { unanswered }, Some(Err(Failure::Nack(_)))) => match unanswered + 1 {
-                TRIES.. => Power::Off,
-                unanswered => Power::Stopping { unanswered },
-            },
-            (_, Some(Err(failure))) => return Err(failure),
+        let Power::Stopping { since } = &mut self.power else {
+            return Ok(Polled::Idle);
         };
+        let began = now_ms.map(|now_ms| (*since.get_or_insert(Since::new(now_ms)), now_ms));
+        low.map_err(Failure::Pin)?;
+        match sent {
+            None | Some(Ok(())) => self.power = Power::Off,
+            Some(Err(Failure::Nack(_))) => {
+                if began.is_some_and(|(since, now_ms)| since.is_over(UNANSWERED_MS, now_ms)) {
+                    self.power = Power::Off;
+                }
+            }
+            Some(Err(failure)) => return Err(failure),
+        }
         Ok(Polled::Idle)
     }
 
-    /// The light ends by ENABLE.
-    fn cut(&mut self) {
-        // If the pin fails, the next poll begins with it.
+    /// Drives ENABLE low. If the pin fails, the next poll begins with it.
+    fn drive_low(&mut self) {
         let _ = self.enable.set(false);
         self.protocol.reset();
     }
@@ -237,7 +253,7 @@ impl<P, BUS, INT, EN: OutputPin> Driver<P, BUS, INT, EN> {
         &self.protocol
     }
 
-    /// Whether the sensor may not know yet that it is to be off. Each poll tells it again.
+    /// Whether the last stop may not have reached the sensor. Each poll tries again.
     pub const fn is_stopping(&self) -> bool {
         matches!(self.power, Power::Stopping { .. })
     }

@@ -399,7 +399,7 @@ where
         if polled.is_err() {
             self.counts.errors = self.counts.errors.saturating_add(1);
             if !self.is_stopping() {
-                // Now, as nobody may poll again. If the pin fails, the next poll begins with it.
+                // Now, as the caller may not poll again. If the pin fails, the next poll begins with it.
                 let _ = self.enable.set(false);
                 self.state = State::Reset;
             }

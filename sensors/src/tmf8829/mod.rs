@@ -235,7 +235,7 @@ enum State {
 
 impl<'a, BUS, INT, EN: OutputPin, const CHUNK: usize> Tmf8829<'a, BUS, INT, EN, CHUNK> {
     /// A driver that has not accessed its device yet. `image` may be empty for a sensor that
-    /// already runs the application.
+    /// already runs the application. ENABLE low ends the application: start the driver before its first poll.
     pub const fn new(
         bus: BUS,
         interrupt: INT,
@@ -325,6 +325,10 @@ impl<const CHUNK: usize> Protocol for Tmf8829Protocol<'_, CHUNK> {
                 | State::Beginning
                 | State::Reading
         )
+    }
+
+    fn is_reset_next(&self) -> bool {
+        matches!(self.state, State::Off { reset: true })
     }
 
     fn restart(&mut self) {

@@ -210,7 +210,8 @@ enum State {
 
 impl<'a, BUS, INT, EN: OutputPin, const CHUNK: usize> Tmf882x<'a, BUS, INT, EN, CHUNK> {
     /// A driver that has not accessed its device yet. `image` may be empty for a
-    /// sensor that already runs the application.
+    /// sensor that already runs the application. ENABLE low ends the application: start the driver before its first
+    /// poll.
     pub const fn new(
         bus: BUS,
         interrupt: INT,
@@ -290,6 +291,10 @@ impl<const CHUNK: usize> Protocol for Tmf882xProtocol<'_, CHUNK> {
             self.state,
             State::Measuring | State::Asking | State::Clearing { .. } | State::Reading { .. }
         )
+    }
+
+    fn is_reset_next(&self) -> bool {
+        matches!(self.state, State::Off { reset: true })
     }
 
     fn restart(&mut self) {

@@ -60,7 +60,9 @@ fn the_example_reports_events_in_millimetres() {
     for now_ms in 0..2000 {
         clock.set(now_ms);
         // An error of the bus: it is reported once, and all goes on.
-        bus.0.borrow_mut().fault = (now_ms == 1000).then_some(Fault::Late);
+        if now_ms == 1000 {
+            bus.fail_next(Fault::Late);
+        }
         assert!(program.as_mut().poll(&mut context).is_pending());
     }
     let reports = reports.borrow();

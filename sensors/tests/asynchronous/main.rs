@@ -6,5 +6,8 @@
 mod common;
 mod embassy;
 mod off;
+#[path = "../off.rs"]
+mod off_as_blocking;
+mod parts;
 mod transfers;
 mod wait;

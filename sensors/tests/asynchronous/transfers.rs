@@ -1,24 +1,25 @@
 //! The same transfers and the same data as over embedded-hal, and
 //! each transfer is awaited.
 
-use std::cell::{Cell, RefCell};
+use std::cell::Cell;
+use std::fmt::Debug;
 use std::pin::pin;
 use std::rc::Rc;
 use std::task::{Context, Poll, Waker};
 
-use crate::common::tmf8828;
 use crate::common::tmf8829::bench::{IMAGE, over, settings};
 use crate::common::tmf8829::bus::{Bus, Fault};
 use crate::common::{RecordingSink, SinkCall, started};
+use crate::common::{bus, tmf8828};
 use crate::wait::Timer;
 use dtof_chips::tmf8829::varied_counts;
 use dtof_chips::{Chip as _, Tmf8829 as Chip};
 use dtof_core::fixed::types::U16F16;
 use dtof_core::{PixelAddress, RangeGate, checked};
 use dtof_sensors::dither::Dither;
-use dtof_sensors::protocol::{self, Timing};
+use dtof_sensors::protocol::{self, AsyncBus, Timing};
 use dtof_sensors::tmf882x::{self, Tmf882x};
-use dtof_sensors::tmf8829::{self, Config, Spi, Tmf8829, Zones};
+use dtof_sensors::tmf8829::{self, Config, Settings, Spi, Tmf8829, Zones};
 use dtof_sensors::{Polled, Sensor, SensorFault};
 use embedded_hal::i2c::{ErrorKind, ErrorType, Operation};
 use embedded_hal::spi;
@@ -95,6 +96,13 @@ impl<B: embedded_hal::i2c::I2c<Error = ErrorKind>> I2c for Slow<B> {
     }
 }
 
+/// It does not wait if it is not awaited.
+impl<B: embedded_hal::i2c::I2c<Error = ErrorKind>> embedded_hal::i2c::I2c for Slow<B> {
+    fn transaction(&mut self, to: u8, of: &mut [Operation<'_>]) -> Result<(), ErrorKind> {
+        self.bus.transaction(to, of)
+    }
+}
+
 impl spi::ErrorType for Slow<Bus> {
     type Error = spi::ErrorKind;
 }
@@ -141,32 +149,48 @@ pub fn drop_after<T>(future: impl Future<Output = T>, polls: u32) -> Option<T> {
     })
 }
 
+pub type Clocked = Timing<Box<dyn FnMut() -> u32>, Timer>;
+
 /// The clock, and the timing of a driver by it.
-pub fn timing(bus_ms: u32) -> (Rc<Cell<u32>>, Timing<impl FnMut() -> u32, Timer>) {
+pub fn timing(bus_ms: u32) -> (Rc<Cell<u32>>, Clocked) {
     // The milliseconds wrap in the middle of it.
     let clock = Rc::new(Cell::new(u32::MAX - 100));
-    let now = Rc::clone(&clock);
-    let timing = Timing::new(move || now.get(), Timer(Rc::clone(&clock)), bus_ms);
-    (clock, timing)
+    let (now, timer) = (Rc::clone(&clock), Timer(Rc::clone(&clock)));
+    let now_ms: Box<dyn FnMut() -> u32> = Box::new(move || now.get());
+    (clock, Timing::new(now_ms, timer, bus_ms))
 }
 
-#[test]
-fn an_awaited_tmf8829_makes_the_same_transfers() {
+type OnSlowBus = Tmf8829<'static, Slow<Bus>, Bus, Bus, 252>;
+
+/// A driver that awaits its bus, started, with 8×8 zones.
+fn awaited(image: &'static [u8]) -> (OnSlowBus, Bus, Slow<Bus>) {
+    let bus = Bus::new(Chip::new(image, varied_counts()));
+    let slow = Slow::new(bus.clone());
     let config = Config::new(settings(Zones::Z8x8)).unwrap();
+    let mut sensor = Tmf8829::new(slow.clone(), bus.clone(), bus.clone(), image, config);
+    sensor.start_async();
+    (sensor, bus, slow)
+}
+
+/// The same transfers and the same data, faults included.
+fn makes_the_same_transfers<B, S, E: Debug + PartialEq>(
+    settings: Settings,
+    on: impl Fn(Bus) -> B,
+    slowly_on: impl Fn(Bus) -> S,
+) where
+    B: protocol::Bus<Error = E>,
+    S: AsyncBus<Error = E>,
+{
+    let config = Config::new(settings).unwrap();
     let buses = [(); 2].map(|()| Bus::new(Chip::new(&IMAGE, varied_counts())));
-    let [blocking, waiting] = &buses;
-    let pins = |bus: &Bus| (bus.clone(), bus.clone());
-    let (interrupt, enable) = pins(blocking);
-    let mut sensor = started(Tmf8829::<_, _, _>::new(
-        blocking.clone(),
-        interrupt,
-        enable,
-        &IMAGE,
-        config,
-    ));
-    let (interrupt, enable) = pins(waiting);
-    let slow = Slow::new(waiting.clone());
-    let mut awaited = Tmf8829::<_, _, _>::new(slow, interrupt, enable, &IMAGE, config);
+    let [
+        [bus, interrupt, enable],
+        [slow, other_interrupt, other_enable],
+    ] = [0, 1].map(|at: usize| [(); 3].map(|()| buses[at].clone()));
+    let sensor = Tmf8829::<_, _, _>::new(on(bus), interrupt, enable, &IMAGE, config);
+    let mut sensor = started(sensor);
+    let slow = slowly_on(slow);
+    let mut awaited = Tmf8829::<_, _, _>::new(slow, other_interrupt, other_enable, &IMAGE, config);
     awaited.start_async();
     let mut sinks = [(); 2].map(|()| RecordingSink::default());
     let mut data = 0;
@@ -179,7 +203,9 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
             _ => None,
         };
         for bus in &buses {
-            bus.0.borrow_mut().fault = fault;
+            if let Some(fault) = fault {
+                bus.fail_next(fault);
+            }
             bus.0.borrow_mut().log.clear();
         }
         let [first, second] = &mut sinks;
@@ -187,75 +213,35 @@ fn an_awaited_tmf8829_makes_the_same_transfers() {
         let (later, pending) = run(awaited.poll_async(now_ms, second));
         assert_eq!(polled, later);
         data += u32::from(polled == Ok(Polled::Data));
-        let logs = [blocking, waiting].map(|bus| bus.0.borrow().log.clone());
-        assert_eq!(logs[0], logs[1]);
-        assert_eq!(pending, WAITS * u32::try_from(logs[1].len()).unwrap());
+        let [log, slow_log] = [0, 1].map(|at: usize| buses[at].0.borrow().log.clone());
+        assert_eq!(log, slow_log);
+        assert_eq!(pending, WAITS * u32::try_from(log.len()).unwrap());
         assert_eq!(first.take(), second.take());
     }
     assert!(data > 300, "{data}");
     assert_eq!(sensor.counts(), awaited.counts());
-    assert!(awaited.counts().errors > 5);
+    assert!(awaited.counts().errors > 5 && awaited.counts().histograms > 300);
 
     let (clock, mut timing) = timing(100);
     run_at(&clock, awaited.stop_async(&mut timing));
     sensor.stop();
-    assert!(!waiting.0.borrow().chip.is_measuring);
-    awaited.start_async();
-    sensor.start(U16F16::ZERO, Dither::OFF);
-    assert_eq!(
-        blocking.0.borrow().log.last(),
-        waiting.0.borrow().log.last()
-    );
+    assert!(!buses[1].shines());
+    let [last, slow_last] = [0, 1].map(|at: usize| buses[at].0.borrow().log.last().cloned());
+    assert_eq!(last, slow_last);
 }
 
-/// Over SPI: the same transfers and the same data, faults included.
 #[test]
-fn an_awaited_tmf8829_on_spi_makes_the_same_transfers() {
-    let config = Config::new(over::<Spi<Bus>>(settings(Zones::Z16x16))).unwrap();
-    let buses = [(); 2].map(|()| Bus::new(Chip::new(&IMAGE, varied_counts())));
-    let [blocking, waiting] = &buses;
-    let pins = |bus: &Bus| (bus.clone(), bus.clone());
-    let (interrupt, enable) = pins(blocking);
-    let bus = Spi(blocking.clone());
-    let mut sensor = started(Tmf8829::<_, _, _>::new(
-        bus, interrupt, enable, &IMAGE, config,
-    ));
-    let (interrupt, enable) = pins(waiting);
-    let slow = Spi(Slow::new(waiting.clone()));
-    let mut awaited = Tmf8829::<_, _, _>::new(slow, interrupt, enable, &IMAGE, config);
-    awaited.start_async();
-    let mut sinks = [(); 2].map(|()| RecordingSink::default());
-    for now_ms in 0..3000 {
-        let fault = match now_ms % 500 {
-            20 => Some(Fault::Late),
-            300 => Some(Fault::Nack),
-            _ => None,
-        };
-        for bus in &buses {
-            bus.0.borrow_mut().fault = fault;
-            bus.0.borrow_mut().log.clear();
-        }
-        let [first, second] = &mut sinks;
-        let polled = sensor.poll(now_ms, first);
-        assert_eq!(polled, run(awaited.poll_async(now_ms, second)).0);
-        let logs = [blocking, waiting].map(|bus| bus.0.borrow().log.clone());
-        assert_eq!(logs[0], logs[1]);
-        assert_eq!(first.take(), second.take());
-    }
-    assert_eq!(sensor.counts(), awaited.counts());
-    assert!(awaited.counts().errors > 5 && awaited.counts().histograms > 1000);
+fn an_awaited_tmf8829_makes_the_same_transfers() {
+    makes_the_same_transfers(settings(Zones::Z8x8), |bus| bus, Slow::new);
+    let settings = over::<Spi<Bus>>(settings(Zones::Z16x16));
+    makes_the_same_transfers(settings, Spi, |bus| Spi(Slow::new(bus)));
 }
 
 /// Polls are dropped at each place where they wait. A frame of which the header or the data were on the
 /// bus is lost and counted; all others come, and what comes is right.
 #[test]
 fn a_poll_of_a_tmf8829_that_is_dropped_costs_at_most_its_frame() {
-    let config = Config::new(settings(Zones::Z8x8)).unwrap();
-    let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
-    let slow = Slow::new(bus.clone());
-    let present = Rc::clone(&slow.present);
-    let mut sensor = Tmf8829::<_, _, _, 252>::new(slow, bus.clone(), bus.clone(), &IMAGE, config);
-    sensor.start_async();
+    let (mut sensor, bus, slow) = awaited(&IMAGE);
     let mut sink = RecordingSink::default();
     // Of reasons, headers and data; and how far each poll had come.
     let (mut reasons, mut missed, mut broken) = (0, 0, 0);
@@ -273,7 +259,7 @@ fn a_poll_of_a_tmf8829_that_is_dropped_costs_at_most_its_frame() {
         if drop_after(sensor.poll_async(poll, &mut sink), polls).is_some() {
             continue;
         }
-        let transfer = present.take().unwrap();
+        let transfer = slow.present.take().unwrap();
         dropped_at.insert((transfer, (polls - 1) % WAITS));
         match transfer {
             (0xE1, _) if measured => {
@@ -318,53 +304,17 @@ fn a_poll_of_a_tmf8829_that_is_dropped_costs_at_most_its_frame() {
     assert!(histograms > 200, "{histograms}");
 }
 
-/// A bus of both traits; its awaited transfers take a while.
-struct Both(Slow<Bus>);
-
-impl protocol::Bus for Both {
-    type Error = ErrorKind;
-    fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), ErrorKind> {
-        protocol::Bus::write(&mut self.0.bus, address, bytes)
-    }
-    fn read(&mut self, address: u8, register: u8, bytes: &mut [u8]) -> Result<(), ErrorKind> {
-        protocol::Bus::read(&mut self.0.bus, address, register, bytes)
-    }
-    fn failure<P>(error: ErrorKind) -> protocol::Failure<ErrorKind, P> {
-        <Bus as protocol::Bus>::failure(error)
-    }
-}
-
-impl protocol::AsyncBus for Both {
-    type Error = ErrorKind;
-    async fn write(&mut self, address: u8, bytes: &[u8]) -> Result<(), ErrorKind> {
-        protocol::AsyncBus::write(&mut self.0, address, bytes).await
-    }
-    async fn read(&mut self, address: u8, register: u8, bytes: &mut [u8]) -> Result<(), ErrorKind> {
-        protocol::AsyncBus::read(&mut self.0, address, register, bytes).await
-    }
-    fn failure<P>(error: ErrorKind) -> protocol::Failure<ErrorKind, P> {
-        <Bus as protocol::Bus>::failure(error)
-    }
-}
-
 /// An awaited poll is dropped when the FIFO has given a chunk, or the header. What is called next,
 /// blocking or not, counts the frame and gives nothing of it.
 #[test]
 fn after_a_dropped_poll_each_call_counts_the_frame() {
-    let config = Config::new(settings(Zones::Z8x8)).unwrap();
     for (register, lost) in [(0xFF, [1, 0]), (0xFA, [0, 1])] {
         for call in 0..5 {
-            let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
-            let slow = Slow::new(bus.clone());
-            let present = Rc::clone(&slow.present);
-            let (interrupt, enable) = (bus.clone(), bus.clone());
-            let mut sensor =
-                Tmf8829::<_, _, _, 252>::new(Both(slow), interrupt, enable, &IMAGE, config);
-            sensor.start_async();
+            let (mut sensor, _, slow) = awaited(&IMAGE);
             let mut sink = RecordingSink::default();
             // The chip has answered, and the driver does not know.
             let mut now_ms = 0;
-            while sensor.counts().histograms < 20 || present.get().is_some() {
+            while sensor.counts().histograms < 20 || slow.present.get().is_some() {
                 now_ms += 1;
                 run(sensor.poll_async(now_ms, &mut sink)).0.unwrap();
             }
@@ -377,7 +327,8 @@ fn after_a_dropped_poll_each_call_counts_the_frame() {
                     if poll.as_mut().poll(&mut context).is_ready() {
                         break false;
                     }
-                    let found = present
+                    let found = slow
+                        .present
                         .get()
                         .is_some_and(|(at, read)| at == register && read > 0);
                     waits = if found { waits + 1 } else { 0 };
@@ -409,8 +360,7 @@ fn after_a_dropped_poll_each_call_counts_the_frame() {
 #[test]
 fn a_poll_of_a_tmf8828_that_is_dropped_costs_at_most_its_set() {
     let config = tmf882x::Config::new(tmf882x::Settings::of_8x8(PixelAddress::new(10))).unwrap();
-    let chip = Rc::new(RefCell::new(tmf8828::Chip::new(0)));
-    let bus = tmf8828::Bus(Rc::clone(&chip));
+    let bus = bus::Bus::new(tmf8828::Chip::new(0));
     let slow = Slow::new(bus.clone());
     let present = Rc::clone(&slow.present);
     let mut sensor = Tmf882x::<_, _, _>::new(slow, bus.clone(), bus, &[], config);
@@ -457,19 +407,11 @@ fn a_poll_of_a_tmf8828_that_is_dropped_costs_at_most_its_set() {
 /// INT wakes the driver, and a timer brings it up. Each frame comes, none twice.
 #[test]
 fn next_waits_for_the_sensor() {
+    let (mut sensor, bus, _) = awaited(&IMAGE);
+    let mut sink = RecordingSink::default();
     let config = Config::new(settings(Zones::Z8x8)).unwrap();
-    let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
-    let mut sensor = Tmf8829::<_, _, _, 252>::new(
-        Slow::new(bus.clone()),
-        bus.clone(),
-        bus.clone(),
-        &IMAGE,
-        config,
-    );
-    sensor.start_async();
     assert_eq!(sensor.info(), config.info());
     let (clock, mut timing) = timing(100);
-    let mut sink = RecordingSink::default();
     while sensor.counts().frames < 7 {
         let before = sensor.counts().histograms;
         let (given, _) = run_at(&clock, sensor.next(&mut timing, &mut sink));
@@ -498,18 +440,12 @@ fn next_waits_for_the_sensor() {
 #[test]
 fn a_bus_that_hangs_ends_a_poll_in_time() {
     const BUS_MS: u32 = 50;
-    let config = Config::new(settings(Zones::Z8x8)).unwrap();
     let mut hung = std::collections::BTreeSet::new();
     for transfers in 0..160 {
-        let bus = Bus::new(Chip::new(&[7; 100], varied_counts()));
-        let slow = Slow::new(bus.clone());
-        let (present, left) = (Rc::clone(&slow.present), Rc::clone(&slow.left));
-        let (interrupt, enable) = (bus.clone(), bus.clone());
-        let mut sensor = Tmf8829::<_, _, _, 252>::new(slow, interrupt, enable, &[7; 100], config);
-        sensor.start_async();
-        let (clock, mut timing) = timing(BUS_MS);
+        let (mut sensor, _, slow) = awaited(&[7; 100]);
         let mut sink = RecordingSink::default();
-        left.set(Some(transfers));
+        let (clock, mut timing) = timing(BUS_MS);
+        slow.left.set(Some(transfers));
         let failed = loop {
             clock.set(clock.get().wrapping_add(1));
             let began = clock.get();
@@ -522,8 +458,8 @@ fn a_bus_that_hangs_ends_a_poll_in_time() {
         assert_eq!(failed, tmf8829::Error::BusTimeout);
         assert_eq!(sensor.counts().errors, 1);
         assert_eq!(SensorFault::from(failed), SensorFault::Bus);
-        hung.insert(present.take().unwrap().0);
-        left.set(None);
+        hung.insert(slow.present.take().unwrap().0);
+        slow.left.set(None);
         let given = run_at(&clock, sensor.next(&mut timing, &mut sink)).0;
         assert_eq!(given, Ok(()));
     }
@@ -536,19 +472,14 @@ fn a_bus_that_hangs_ends_a_poll_in_time() {
 /// The sensor is off all the same.
 #[test]
 fn a_bus_that_hangs_ends_a_stop_in_time() {
-    let config = Config::new(settings(Zones::Z8x8)).unwrap();
-    let bus = Bus::new(Chip::new(&IMAGE, varied_counts()));
-    let slow = Slow::new(bus.clone());
-    let left = Rc::clone(&slow.left);
-    let mut sensor = Tmf8829::<_, _, _>::new(slow, bus.clone(), bus.clone(), &IMAGE, config);
-    sensor.start_async();
-    let (clock, mut timing) = timing(50);
+    let (mut sensor, bus, slow) = awaited(&IMAGE);
     let mut sink = RecordingSink::default();
+    let (clock, mut timing) = timing(50);
     run_at(&clock, sensor.next(&mut timing, &mut sink))
         .0
         .unwrap();
     assert!(bus.0.borrow().chip.is_measuring);
-    left.set(Some(0));
+    slow.left.set(Some(0));
     let began = clock.get();
     run_at(&clock, sensor.stop_async(&mut timing));
     assert_eq!(clock.get().wrapping_sub(began), 50);
@@ -574,8 +505,8 @@ fn a_sensor_is_described_as_a_constant() {
 #[test]
 fn an_awaited_tmf8828_gives_the_same() {
     let config = tmf882x::Config::new(tmf882x::Settings::of_8x8(PixelAddress::new(10))).unwrap();
-    let chips = [(); 2].map(|()| Rc::new(RefCell::new(tmf8828::Chip::new(0))));
-    let [one, other] = [0, 1].map(|at: usize| tmf8828::Bus(Rc::clone(&chips[at])));
+    let buses = [(); 2].map(|()| bus::Bus::new(tmf8828::Chip::new(0)));
+    let [one, other] = buses.clone();
     let (interrupt, enable) = (one.clone(), one.clone());
     let mut sensor = started(Tmf882x::<_, _, _>::new(one, interrupt, enable, &[], config));
     let (interrupt, enable) = (other.clone(), other.clone());
@@ -584,15 +515,15 @@ fn an_awaited_tmf8828_gives_the_same() {
     let mut sinks = [(); 2].map(|()| RecordingSink::default());
     let mut histograms = 0;
     for now_ms in 0..1000 {
-        for chip in &chips {
-            chip.borrow_mut().nack = now_ms % 300 == 299;
+        if now_ms % 300 == 299 {
+            buses.iter().for_each(|bus| bus.fail_next(Fault::Nack));
         }
         let [first, second] = &mut sinks;
         let polled = sensor.poll(now_ms, first);
-        let before = chips[1].borrow().transfers;
+        let before = buses[1].0.borrow().transfers;
         let (later, pending) = run(awaited.poll_async(now_ms, second));
         assert_eq!(polled, later);
-        assert_eq!(pending, WAITS * (chips[1].borrow().transfers - before));
+        assert_eq!(pending, WAITS * (buses[1].0.borrow().transfers - before));
         let given = first.take();
         assert_eq!(given, second.take());
         let is_histogram = |given: &&SinkCall| matches!(given, SinkCall::Histogram(..));

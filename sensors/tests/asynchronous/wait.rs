@@ -10,8 +10,7 @@ use embedded_hal_async::delay::DelayNs;
 use embedded_hal_async::digital::Wait;
 
 use crate::common::Broken;
-use crate::common::rig::{Lit, Rig};
-use crate::common::tmf8829::bus::Bus;
+use crate::common::bus::{Bus, Lit};
 
 /// A timer of a clock that the test turns, in milliseconds.
 #[derive(Clone)]
@@ -29,31 +28,24 @@ impl DelayNs for Timer {
 }
 
 /// INT goes low when the chip does: each look is one of the test's milliseconds.
-macro_rules! waits {
-    ($pin:ty $(, $chip:ident: $lit:ident)?) => {
-        impl$(<$chip: $lit>)? Wait for $pin {
-            async fn wait_for_low(&mut self) -> Result<(), Broken> {
-                poll_fn(|_| match self.is_low() {
-                    Ok(false) => Poll::Pending,
-                    low => Poll::Ready(low.map(drop)),
-                })
-                .await
-            }
-            async fn wait_for_high(&mut self) -> Result<(), Broken> {
-                unreachable!("nothing waits for it")
-            }
-            async fn wait_for_rising_edge(&mut self) -> Result<(), Broken> {
-                unreachable!("nothing waits for it")
-            }
-            async fn wait_for_falling_edge(&mut self) -> Result<(), Broken> {
-                unreachable!("nothing waits for it")
-            }
-            async fn wait_for_any_edge(&mut self) -> Result<(), Broken> {
-                unreachable!("nothing waits for it")
-            }
-        }
-    };
+impl<C: Lit> Wait for Bus<C> {
+    async fn wait_for_low(&mut self) -> Result<(), Broken> {
+        poll_fn(|_| match self.is_low() {
+            Ok(false) => Poll::Pending,
+            low => Poll::Ready(low.map(drop)),
+        })
+        .await
+    }
+    async fn wait_for_high(&mut self) -> Result<(), Broken> {
+        unreachable!("nothing waits for it")
+    }
+    async fn wait_for_rising_edge(&mut self) -> Result<(), Broken> {
+        unreachable!("nothing waits for it")
+    }
+    async fn wait_for_falling_edge(&mut self) -> Result<(), Broken> {
+        unreachable!("nothing waits for it")
+    }
+    async fn wait_for_any_edge(&mut self) -> Result<(), Broken> {
+        unreachable!("nothing waits for it")
+    }
 }
-
-waits!(Bus);
-waits!(Rig<C>, C: Lit);

@@ -1,7 +1,8 @@
 //! What the tests of the drivers share: a sink that records its calls, and
 //! a pin whose level the test sets.
 
-pub mod rig;
+pub mod bus;
+pub mod part;
 pub mod tdc7200;
 pub mod tmf8828;
 pub mod tmf8829;

@@ -1,13 +1,7 @@
 //! A simulated TMF8828 with 8×8 zones, written from the vendor's drivers and not from ours. It runs
 //! its application; a test can make it lose packets.
 
-use std::cell::RefCell;
-use std::rc::Rc;
-
-use embedded_hal::digital::{ErrorType as PinErrorType, InputPin, OutputPin};
-use embedded_hal::i2c::{self, ErrorKind, I2c, NoAcknowledgeSource, Operation};
-
-use super::Broken;
+use super::bus::Lit;
 
 /// Capture, half and channel of each zone, row by row: the map of the vendor's example for 8×8
 /// zones, written out.
@@ -36,10 +30,6 @@ pub struct Chip {
     interrupt: u8,
     /// A result has second targets, half a metre behind the first ones.
     pub has_second_targets: bool,
-    /// The next transfer is not acknowledged.
-    pub nack: bool,
-    /// Each transfer.
-    pub transfers: u32,
 }
 
 impl Chip {
@@ -54,8 +44,6 @@ impl Chip {
             is_measuring: false,
             interrupt: 0,
             has_second_targets: false,
-            nack: false,
-            transfers: 0,
         }
     }
 
@@ -127,6 +115,19 @@ impl Chip {
         }
         self.interrupt = if self.packets_sent == 60 { 0x02 } else { 0x08 };
     }
+}
+
+impl dtof_chips::Chip for Chip {
+    fn write(&mut self, bytes: &[u8]) {
+        match bytes {
+            [0x08, command] => self.command(*command),
+            [register, data @ ..] => {
+                let at = usize::from(*register);
+                self.page[at..at + data.len()].copy_from_slice(data);
+            }
+            [] => panic!("a register"),
+        }
+    }
 
     fn read(&mut self, register: u8, bytes: &mut [u8]) {
         match (register, &mut *bytes) {
@@ -146,6 +147,26 @@ impl Chip {
             }
         }
     }
+
+    fn interrupts(&self) -> bool {
+        self.is_measuring
+    }
+
+    fn reset(&mut self) {
+        (self.mode, self.is_measuring) = (0, false);
+    }
+}
+
+impl Lit for Chip {
+    fn fresh() -> Self {
+        Self::new(0)
+    }
+    fn shines(&self) -> bool {
+        self.is_measuring
+    }
+    fn leave_on(&mut self) {
+        self.is_measuring = true;
+    }
 }
 
 /// The zone of a channel.
@@ -159,56 +180,4 @@ pub fn zone(capture: u8, half: u8, channel: u8) -> Option<u16> {
 pub fn count(zone: Option<u16>, bin: u32) -> u32 {
     let zone = zone.map_or(255, u32::from);
     zone << 16 | (bin * 7 + zone) & 0xFFFF
-}
-
-/// The bus of a chip, and its pins; clones are the same.
-#[derive(Clone)]
-pub struct Bus(pub Rc<RefCell<Chip>>);
-
-impl i2c::ErrorType for Bus {
-    type Error = ErrorKind;
-}
-
-impl I2c for Bus {
-    fn transaction(&mut self, _: u8, operations: &mut [Operation<'_>]) -> Result<(), ErrorKind> {
-        let mut chip = self.0.borrow_mut();
-        chip.transfers += 1;
-        if std::mem::take(&mut chip.nack) {
-            return Err(ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address));
-        }
-        match operations {
-            [Operation::Write([0x08, command])] => chip.command(*command),
-            [Operation::Write([register, data @ ..])] => {
-                let at = usize::from(*register);
-                chip.page[at..at + data.len()].copy_from_slice(data);
-            }
-            [Operation::Write([register]), Operation::Read(bytes)] => chip.read(*register, bytes),
-            other => panic!("{other:?}"),
-        }
-        Ok(())
-    }
-}
-
-impl PinErrorType for Bus {
-    type Error = Broken;
-}
-
-impl InputPin for Bus {
-    fn is_high(&mut self) -> Result<bool, Broken> {
-        Ok(!self.0.borrow().is_measuring)
-    }
-    fn is_low(&mut self) -> Result<bool, Broken> {
-        self.is_high().map(|is_high| !is_high)
-    }
-}
-
-impl OutputPin for Bus {
-    fn set_low(&mut self) -> Result<(), Broken> {
-        let mut chip = self.0.borrow_mut();
-        (chip.mode, chip.is_measuring) = (0, false);
-        Ok(())
-    }
-    fn set_high(&mut self) -> Result<(), Broken> {
-        Ok(())
-    }
 }

@@ -100,7 +100,7 @@ impl Wires {
         self.free_since[wire].is_some_and(|since| since + self.rise_ns <= self.now_ns)
     }
 
-    /// A wire begins to rise once nobody holds it any more.
+    /// A wire begins to rise once it is not held any more.
     fn settle(&mut self) {
         for wire in [SCL, SDA] {
             let stretched = wire == SCL && self.now_ns < self.stretched_until;

@@ -65,9 +65,7 @@ fn write(bench: &Bench<128>, bytes: &[u8]) {
 fn until_written(bench: &mut Bench<128>, start: &[u8]) {
     for _ in 0..500 {
         poll(bench).unwrap();
-        let wires = bench.bus.0.borrow();
-        let mut log = wires.log.iter();
-        if log.any(|(written, _)| written.starts_with(start)) {
+        if bench.bus.written(start) > 0 {
             return;
         }
     }
@@ -82,7 +80,7 @@ fn a_bus_or_a_sensor_that_fails_costs_one_error_and_a_new_start() {
         // In the middle of a frame.
         poll(&mut bench).unwrap();
         poll(&mut bench).unwrap();
-        bench.bus.0.borrow_mut().fault = Some(fault);
+        bench.bus.fail_next(fault);
         let expected = match fault {
             Fault::Nack => Error::Nack(NACK),
             _ => Error::Bus(ErrorKind::Bus),
@@ -328,19 +326,13 @@ fn a_sensor_that_begins_again_keeps_its_address() {
     });
     bench.bring_up();
     bench.frames(1);
-    bench.bus.0.borrow_mut().fault = Some(Fault::Late);
+    bench.bus.fail_next(Fault::Late);
     while poll(&mut bench).is_ok() {}
     bench.bus.0.borrow_mut().log.clear();
     recovers(&mut bench);
     assert_eq!(bench.sensor.address(), 0x42);
     // It was not loaded again.
-    let wires = bench.bus.0.borrow();
-    assert!(
-        wires
-            .log
-            .iter()
-            .all(|(written, _)| *written != [0x08, 0x16])
-    );
+    assert_eq!(bench.bus.written(&[0x08, 0x16]), 0);
 }
 
 /// Its histograms so far have been given; that it broke off is counted.
@@ -414,16 +406,13 @@ fn a_stop_stops_the_chip_and_a_start_begins_anew() {
     bench.frames(1);
     bench.sensor.stop();
     assert!(!bench.bus.0.borrow().chip.is_measuring);
-    let log = bench.bus.0.borrow().log.len();
+    bench.bus.0.borrow_mut().log.clear();
     bench.sensor.start(U16F16::ZERO, Dither::OFF);
     recovers(&mut bench);
     bench.sensor.stop();
     bench.sensor.stop();
-    let wires = bench.bus.0.borrow();
-    let stops = wires.log[log..].iter();
-    let stops = stops.filter(|(written, _)| **written == [0x08, 0xFF]);
     // Both at the end: the first may be lost. When it came up it had been switched off, and was not measuring.
-    assert_eq!(stops.count(), 2);
+    assert_eq!(bench.bus.written(&[0x08, 0xFF]), 2);
 }
 
 /// After an error at any transfer from the command to measure on, with an ENABLE that is not wired.
@@ -435,23 +424,13 @@ fn a_stop_after_an_error_sends_the_command_to_stop() {
         for _ in 0..transfers {
             bench.poll();
         }
-        bench.bus.0.borrow_mut().fault = Some(Fault::Late);
+        bench.bus.fail_next(Fault::Late);
         error(&mut bench, 500);
-        let was_sent = {
-            let wires = bench.bus.0.borrow();
-            wires
-                .log
-                .iter()
-                .any(|(written, _)| **written == [0x08, 0x10])
-        };
+        let was_sent = bench.bus.written(&[0x08, 0x10]) > 0;
         bench.bus.0.borrow_mut().log.clear();
         bench.sensor.stop();
-        let wires = bench.bus.0.borrow();
-        let stops = wires
-            .log
-            .iter()
-            .filter(|(written, _)| **written == [0x08, 0xFF]);
-        assert_eq!(stops.count(), usize::from(was_sent), "{transfers}");
+        let stops = bench.bus.written(&[0x08, 0xFF]);
+        assert_eq!(stops, usize::from(was_sent), "{transfers}");
         *(if was_sent { &mut later } else { &mut before }) += 1;
     }
     assert!(before > 10 && later > 10, "{before} {later}");
@@ -525,14 +504,7 @@ fn an_image_is_sent_in_as_many_transfers_as_it_needs() {
 /// A sensor that measures keeps its program.
 #[test]
 fn a_start_switches_off_only_a_sensor_that_does_not_measure() {
-    let uploads = |bench: &Bench<128>| {
-        let wires = bench.bus.0.borrow();
-        let all = wires
-            .log
-            .iter()
-            .filter(|(written, _)| written.starts_with(&[0x08, 0x45]));
-        all.count()
-    };
+    let uploads = |bench: &Bench<128>| bench.bus.written(&[0x08, 0x45]);
     let mut bench = measuring();
     assert_eq!(uploads(&bench), 1);
     bench.sensor.start(U16F16::ONE, Dither::OFF);

@@ -185,16 +185,22 @@ impl Oracle {
 
 /// Does one fault, of the bus or of the chip.
 fn fault<B>(bench: &Bench<CHUNK, B>, rng: &mut Pcg32) {
-    let mut wires = bench.bus.0.borrow_mut();
     let random = rng.next_u32();
     let byte = random.to_le_bytes()[3];
-    match random % 13 {
-        0 => wires.fault = Some(Fault::Nack),
-        1 => wires.fault = Some(Fault::Late),
-        2 => wires.fault = Some(Fault::All(0)),
-        3 => wires.fault = Some(Fault::All(0xFF)),
-        4 => wires.fault = Some(Fault::All(byte)),
-        5 => wires.fault = Some(Fault::Bit(usize::from(byte), byte)),
+    let of_the_bus = [
+        Fault::Nack,
+        Fault::Late,
+        Fault::All(0),
+        Fault::All(0xFF),
+        Fault::All(byte),
+        Fault::Bit(usize::from(byte), byte),
+    ];
+    let kind = random % 13;
+    if let Some(&fault) = of_the_bus.get(kind as usize) {
+        return bench.bus.fail_next(fault);
+    }
+    let mut wires = bench.bus.0.borrow_mut();
+    match kind {
         6 => wires.stuck = Some(byte & 1 == 0),
         7 => wires.is_unplugged = true,
         8 => wires.chip.reset(),

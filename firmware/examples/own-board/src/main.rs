@@ -34,6 +34,9 @@ impl LaserOff for Laser {
     fn laser_off() {
         chip::set_laser(false);
     }
+    fn end() -> ! {
+        chip::end()
+    }
 }
 dtof_firmware::hard_fault!(Laser);
 #[panic_handler]

@@ -101,7 +101,7 @@ fn sensor<const CHUNK: usize, B: Wired<Error: Debug>>(
 ) -> Tmf8829<'static, B, Bus, Bus, CHUNK> {
     let config = Config::new(settings).unwrap();
     started(Tmf8829::new(
-        B::to(bus),
+        B::on(bus),
         bus.clone(),
         bus.clone(),
         image,

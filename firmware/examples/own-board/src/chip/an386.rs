@@ -44,6 +44,10 @@ fn SysTick() {
     MILLISECONDS.fetch_add(1, Ordering::Relaxed);
 }
 
+pub fn end() -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
+}
+
 /// It is not used: QEMU ends with the image.
 pub struct Watchdog;
 

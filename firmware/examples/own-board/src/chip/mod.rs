@@ -6,9 +6,9 @@ mod an386;
 mod rp2040;
 
 #[cfg(feature = "an386")]
-pub use an386::{now_ms, set_laser, start};
+pub use an386::{end, now_ms, set_laser, start};
 #[cfg(feature = "rp2040")]
-pub use rp2040::{now_ms, set_laser, start};
+pub use rp2040::{end, now_ms, set_laser, start};
 
 /// Whether the image polls on after its port has failed.
 pub const POLLS_AGAIN: bool = cfg!(feature = "poll-again");

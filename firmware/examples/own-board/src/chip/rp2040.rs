@@ -6,7 +6,7 @@ use heapless::Vec;
 use rp2040_hal::clocks::init_clocks_and_plls;
 use rp2040_hal::fugit::ExtU32;
 use rp2040_hal::gpio::Pins;
-use rp2040_hal::pac::{self, SIO, TIMER, USBCTRL_REGS};
+use rp2040_hal::pac::{self, SIO, TIMER, USBCTRL_REGS, WATCHDOG};
 use rp2040_hal::usb::UsbBus;
 use rp2040_hal::{Sio, Timer, Watchdog as HalWatchdog};
 use static_cell::StaticCell;
@@ -37,7 +37,20 @@ pub fn set_laser(on: bool) {
 
 pub fn now_ms() -> u32 {
     // SAFETY: reading the time changes nothing.
-    unsafe { &*TIMER::PTR }.timerawl().read().bits() / 1000
+    let timer = unsafe { &*TIMER::PTR };
+    loop {
+        let high = timer.timerawh().read().bits();
+        let low = timer.timerawl().read().bits();
+        if timer.timerawh().read().bits() == high {
+            // It begins anew after 2^32 milliseconds.
+            return ((u64::from(high) << 32 | u64::from(low)) / 1000) as u32;
+        }
+    }
+}
+
+/// Resets all of the chip: a reset of the processor alone leaves its other parts as they are.
+pub fn end() -> ! {
+    rp2040_hal::reset()
 }
 
 pub struct Watchdog(HalWatchdog);
@@ -101,6 +114,14 @@ pub fn start() -> (Port, Watchdog, ResetReason) {
     let device = UsbDeviceBuilder::new(bus, UsbVidPid(0x16c0, 0x27dd)).device_class(USB_CLASS_CDC);
     let device = device.max_packet_size_0(64).expect("a size of USB").build();
     watchdog.start(1.secs());
+    // The laser would stay on while a debugger halts the processor.
+    // SAFETY: the watchdog goes on, and nothing else writes the register meanwhile.
+    let control = unsafe { &*WATCHDOG::PTR }.ctrl();
+    control.modify(|_, w| {
+        w.pause_dbg0().clear_bit();
+        w.pause_dbg1().clear_bit();
+        w.pause_jtag().clear_bit()
+    });
     let port = Port {
         device,
         class,
