@@ -83,11 +83,4 @@ impl<BUS, INT, EN: OutputPin> fmt::Display for ReleaseError<BUS, INT, EN> {
     }
 }
 
-#[cfg(feature = "defmt")]
-impl<BUS, INT, EN: OutputPin> defmt::Format for ReleaseError<BUS, INT, EN> {
-    fn format(&self, f: defmt::Formatter<'_>) {
-        defmt::write!(f, "ENABLE did not go low");
-    }
-}
-
 impl<BUS, INT, EN: OutputPin> core::error::Error for ReleaseError<BUS, INT, EN> {}

@@ -69,7 +69,11 @@ macro_rules! driven {
             fn give_back(self) -> (Bus<$chip>, Option<Broken>) {
                 match self.release() {
                     Ok((_, _, enable)) => (enable, None),
-                    Err(failed) => (failed.enable, Some(failed.error)),
+                    Err(failed) => {
+                        assert_eq!(failed.to_string(), "ENABLE did not go low: Broken");
+                        assert!(format!("{failed:?}").contains("error: Broken"));
+                        (failed.enable, Some(failed.error))
+                    }
                 }
             }
         }
