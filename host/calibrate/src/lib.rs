@@ -86,6 +86,8 @@ pub struct WindowDetection {
 pub struct CalibrationOptions {
     /// Whether the nearest peak that all pixels share is crosstalk of a cover glass.
     pub glass: Option<bool>,
+    /// Bins for which the TDC is dead after a photon, if the user knows; 0 if it takes all.
+    pub dead_time: Option<u16>,
     /// Distance in millimetres, straight ahead, of a flat target that most of the pixels see. If the rays of the pixels are
     /// not known, the median pixel is taken to see it at this range.
     pub target_mm: Option<f64>,
@@ -111,6 +113,7 @@ impl Default for CalibrationOptions {
     fn default() -> Self {
         Self {
             glass: None,
+            dead_time: None,
             target_mm: None,
             false_alarm: 0.01,
             known_pulse: KnownPulse::default(),
@@ -146,6 +149,8 @@ pub struct Calibration {
     pub pixel_offsets: Option<PixelOffsets>,
     /// First and last bin of the range gate.
     pub gate: (u16, u16),
+    /// The share of the histograms that have a surface only outside of the gate, beside the crosstalk.
+    pub hidden: f64,
     /// Settings of the window rule.
     pub detection: WindowDetection,
     /// The best use of photons, where true distances are known.
@@ -171,24 +176,28 @@ struct AllHistograms {
 }
 
 impl AllHistograms {
-    fn new(observed: &Observed, hot: &[usize]) -> Result<Self> {
+    fn new(observed: &Observed, hot: &[usize], dead_time: Option<u16>) -> Result<Self> {
         let mut traces = observed.traces(hot)?;
         let last_bin = cut_unmeasured(&mut traces);
         let tdc = match observed.length {
-            Length::Cycles(_) => Some(pile_up::tdc(&traces)),
+            Length::Cycles(_) => Some(match dead_time {
+                Some(bins) => pile_up::known_tdc(&traces, bins.into()),
+                None => pile_up::tdc(&traces),
+            }),
             Length::PhotonsPerCycle(_) => None,
             Length::Unknown => pile_up::tdc_without_cycles(&traces),
         };
         if let Some(Tdc::DeadTime { bins, .. }) = tdc {
             for trace in &mut traces {
-                trace.counts =
-                    dtof_theory::counts::dead_time::arrived(&trace.counts, trace.cycles, bins);
+                trace.correct(trace.cycles, bins);
             }
         }
-        let levels = traces.iter().map(|trace| Level::of(&trace.counts));
-        let levels: Vec<Level> = levels.collect();
+        let levels = traces.iter();
+        let levels: Vec<Level> = levels
+            .map(|trace| Level::of(&trace.counts, &trace.live))
+            .collect();
         Ok(Self {
-            pixels: Pixels::new(observed.array.pixels() as usize, &traces, &levels),
+            pixels: Pixels::new(observed.array, &traces, &levels),
             traces,
             levels,
             last_bin,
@@ -216,10 +225,10 @@ pub fn calibrate_with(
     options: &CalibrationOptions,
     progress: Progress,
 ) -> Result<Calibration> {
-    let mut all = AllHistograms::new(observed, &[])?;
+    let mut all = AllHistograms::new(observed, &[], options.dead_time)?;
     if !all.pixels.hot.is_empty() && !observed.length.is_known() {
         // A hot pixel is the brightest, but does not show how long the recording lasted.
-        all = AllHistograms::new(observed, &all.pixels.hot)?;
+        all = AllHistograms::new(observed, &all.pixels.hot, options.dead_time)?;
     }
     let AllHistograms {
         traces,
@@ -235,10 +244,17 @@ pub fn calibrate_with(
     let good = GoodHistograms::new(observed.array, pixels.background, traces, levels);
 
     let l2 = settle::l2(pixels.background);
-    let nearest = glass::nearest(&good, options.glass, l2.into());
+    let early = observed.early_of(|pixel| pixels.is_good(pixel));
+    let with_glass =
+        |good: &GoodHistograms| glass::nearest(good, options.glass, early.as_deref(), l2.into());
+    let nearest = match tdc {
+        Some(Tdc::OnePhotonIn { cycles, .. }) => with_glass(&good.corrected(cycles)),
+        _ => with_glass(&good),
+    };
     let glass = nearest.glass();
     let bins = observed.bins();
     let gate = settle::gate(last_bin, glass.map_or(0, |glass| glass.end))?;
+    let hidden = hidden(&good, gate, glass);
     let pulse = pulse::pulse(&windows(&good, gate.0, glass), options.seed);
     let used = UsedPulse::new(pulse.as_ref(), &options.known_pulse);
     let found = offset_of(&good, gate, used.window(), observed, options);
@@ -247,7 +263,7 @@ pub fn calibrate_with(
     if let (Some(offset), Some(pixels)) = (&mut offset, &pixel_offsets) {
         offset.mm += pixels.median_mm;
     }
-    let (counts, _) = good.pooled();
+    let counts = good.pooled().counts;
     let cycles = good.cycles();
     let findings = settle::Findings {
         bins,
@@ -299,6 +315,7 @@ pub fn calibrate_with(
         offset,
         pixel_offsets,
         gate,
+        hidden,
         detection,
         photon_budget,
         mean: counts.iter().map(|count| count / cycles).collect(),
@@ -328,8 +345,20 @@ fn cut_unmeasured(traces: &mut [Trace]) -> usize {
     let end = end - usize::from(is_cut);
     for trace in traces {
         trace.counts.truncate(end);
+        trace.live.truncate(end);
     }
     end - 1
+}
+
+/// The share of the histograms that have peaks only outside of the `gate`, at least one of them beside the crosstalk.
+fn hidden(good: &GoodHistograms, gate: (u16, u16), glass: Option<&Glass>) -> f64 {
+    let gate = usize::from(gate.0)..=usize::from(gate.1);
+    let is_surface = |peak: &peaks::Peak| glass.is_none_or(|glass| !peak.is_near(glass.top));
+    let is_hidden = |peaks: &&Vec<peaks::Peak>| {
+        peaks.iter().any(is_surface) && !peaks.iter().any(|peak| gate.contains(&peak.top))
+    };
+    let hidden = good.peaks.iter().filter(is_hidden).count();
+    hidden as f64 / good.peaks.len() as f64
 }
 
 /// One window for each histogram: its strongest peak behind the first bin of the gate. If there is
@@ -348,7 +377,8 @@ fn windows(good: &GoodHistograms, first: u16, glass: Option<&Glass>) -> Vec<Wind
             let peak = peaks[strongest];
             let background = good.background(index, peak.top);
             let bins = (before.min(peak.first), peak.top, after.max(peak.last));
-            Some(Window::new(&trace.counts, background, trace.cycles, bins))
+            let counts = (&trace.counts[..], &trace.live[..]);
+            Some(Window::new(counts, background, trace.cycles, bins))
         })
         .collect()
     };
@@ -475,8 +505,9 @@ mod tests {
             slant: Some(&slants),
             bias_mm: None,
             offsets_mm: &[],
+            early: None,
         };
-        let all = AllHistograms::new(&observed, &[]).unwrap();
+        let all = AllHistograms::new(&observed, &[], None).unwrap();
         let rate = all.pixels.background;
         let good = GoodHistograms::new(observed.array, rate, all.traces, all.levels);
         let options = CalibrationOptions {
@@ -523,6 +554,7 @@ mod tests {
                 slant: None,
                 bias_mm: None,
                 offsets_mm: &[],
+                early: None,
             };
             calibrate(&observed, &CalibrationOptions::default()).unwrap()
         };

@@ -1,5 +1,6 @@
 //! Remarks: what a recording does not show, and the option that would help.
 
+use super::find::glass::SEVERAL;
 use super::{Calibration, Length, Nearest, PulseSource, Tdc};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::numbers::shortest;
@@ -10,7 +11,31 @@ const MOST_LOST: f64 = 0.75;
 /// The same without a correction.
 const MOST_LOST_UNCORRECTED: f64 = 0.5;
 
+/// The same of a TDC that may take all.
+const MOST_LOST_UNCLEAR: f64 = 0.2;
+/// A gate may hide the only surface of so many histograms without a word: false peaks are rarer than that.
+const MOST_HIDDEN: f64 = 0.01;
+/// Sensors have fewer hot pixels than this.
+const MOST_HOT: f64 = 0.05;
+
 impl Calibration {
+    /// What the settings hide, or what makes depths wrong, each with the option that helps.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let all = [
+            self.unclear_glass().filter(|_| !self.is_alone()),
+            self.hidden_surfaces(),
+            self.many_hot(),
+            self.hidden_photons(),
+        ];
+        all.into_iter().flatten().collect()
+    }
+
+    /// Whether there are so few histograms that each may have two surfaces.
+    const fn is_alone(&self) -> bool {
+        self.captures * self.array_pixels < SEVERAL
+    }
+
     /// That early photons have hidden so many late ones, or seem to have, that depths may be wrong.
     #[must_use]
     pub fn hidden_photons(&self) -> Option<String> {
@@ -22,12 +47,59 @@ impl Calibration {
                 two_digits(cycles),
                 lost * 100.0
             )),
+            Tdc::Unclear(lost) if lost > MOST_LOST_UNCLEAR && self.pulse.is_some() => {
+                Some(format!(
+                    "if the TDC takes only the first photon of a laser cycle, {:.0} % of the photons are lost to pile-up, and \
+                 ranges are too short, which the background does not show: --dead-time 0 says that it takes all, \
+                 --dead-time {} that it does not",
+                    lost * 100.0,
+                    self.bins
+                ))
+            }
             Tdc::DeadTime { lost, .. } if lost > MOST_LOST => Some(format!(
                 "the TDC loses {:.1} % of the photons: far targets may be missed or wrong with so much light",
                 lost * 100.0
             )),
             _ => None,
         }
+    }
+
+    /// That most pixels see a surface that may be a cover glass or not.
+    fn unclear_glass(&self) -> Option<String> {
+        let Nearest::Unclear { bin, share, behind } = self.nearest else {
+            return None;
+        };
+        let [share, behind] = [share, behind].map(|share| (share * 100.0).round());
+        Some(format!(
+            "{share} % of the histograms have a surface at bin {bin}, and {behind} % of these another behind it: a cover \
+             glass, or a wall. Nothing is left out, so pixels with both show the brighter one. --glass yes leaves it out; \
+             --glass no says that it is a wall"
+        ))
+    }
+
+    /// That the gate leaves out all that some pixels see.
+    fn hidden_surfaces(&self) -> Option<String> {
+        let (first, last) = self.gate;
+        (self.hidden > MOST_HIDDEN).then(|| {
+            format!(
+                "the gate, {first}..{last}, leaves out the only surface of {:.0} % of the histograms, beside the cover \
+                 glass: --glass no keeps it",
+                (self.hidden * 100.0).max(1.0)
+            )
+        })
+    }
+
+    /// That so many pixels are hot that it may be the scene.
+    fn many_hot(&self) -> Option<String> {
+        let (hot, all) = (self.pixels.hot.len(), self.array_pixels);
+        (hot > 1 && hot as f64 > MOST_HOT * all as f64).then(|| {
+            format!(
+                "{} of {} pixels are left out as hot: flat, and more than ten times as bright as others. --mask none keeps \
+                 them",
+                grouped(hot as u64),
+                grouped(all as u64)
+            )
+        })
     }
 }
 
@@ -65,14 +137,6 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
         ),
     }
     match &found.nearest {
-        Nearest::WallOrGlass(bin) => remark(
-            "cover glass",
-            format!(
-                "All pixels see a surface at bin {bin}. The recording does not show whether it is a wall or a \
-             cover glass: nothing lies behind it, or there are too few pixels. It is taken as a wall. \
-             --glass yes takes it as a cover glass, --glass no confirms the wall."
-            ),
-        ),
         Nearest::Glass(glass) if glass.end == 0 => remark(
             "cover glass",
             format!(
@@ -163,7 +227,7 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
                 ),
             );
         }
-        Some(Tdc::Unclear(lost)) if lost > 0.01 => remark(
+        Some(Tdc::Unclear(lost)) if lost > 0.01 && lost <= MOST_LOST_UNCLEAR => remark(
             "pile-up",
             format!(
                 "If the TDC records one photon a laser cycle, {:.1} % of the photons are lost. The \
@@ -173,9 +237,12 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
         ),
         _ => {}
     }
-    if let Some(text) = found.hidden_photons() {
+    if let Some(text) = found.unclear_glass().filter(|_| found.is_alone()) {
+        remark("cover glass", text + ".");
+    }
+    for text in found.warnings() {
         remark(
-            "pile-up",
+            "warning",
             format!("{}{}.", text[..1].to_uppercase(), &text[1..]),
         );
     }

@@ -55,8 +55,8 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
         "cover glass",
         match &found.nearest {
             Nearest::NotCommon => "none: no peak is the same in all pixels".to_owned(),
-            Nearest::Wall(bin) => format!("none: bin {bin} is a wall, as given"),
-            Nearest::WallOrGlass(bin) => format!("bin {bin} is a wall or a cover glass"),
+            Nearest::Wall(bin) => format!("none: bin {bin} is a wall"),
+            Nearest::Unclear { bin, .. } => format!("bin {bin} is a wall or a cover glass"),
             Nearest::Glass(glass) => format!(
                 "{} {} photons a laser cycle and pixel at bin {}",
                 short(glass.photons),
@@ -405,8 +405,8 @@ fn finding(found: &Calibration) -> String {
         (Nearest::Glass(_), _) => {
             "Crosstalk of the cover glass is so dim that no gate is needed".to_owned()
         }
-        (Nearest::WallOrGlass(bin), _) => {
-            format!("All pixels see one surface at bin {bin}: a wall or a cover glass")
+        (Nearest::Unclear { bin, .. }, _) => {
+            format!("Most pixels see one surface at bin {bin}: a wall or a cover glass")
         }
         (_, Some(signal)) if found.pixels.background > 0.0 => format!(
             "No cover glass; targets have {} times the photons of a background bin",

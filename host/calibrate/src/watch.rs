@@ -46,15 +46,15 @@ pub fn glass_change(run: &RunPhotons, shape: &[f64], gate_first: u16) -> Change 
     if behind.len() < 8 || exposures <= 0.0 {
         return Change::NotSure;
     }
-    let level = Level::of(&behind);
-    let clear = level.clear_bins() as f64;
+    let level = Level::of(&behind, &vec![1.0; behind.len()]);
     // If surfaces lie everywhere, the background may be as low as the lowest bins.
     let lowest = behind
         .chunks(4)
         .filter(|chunk| chunk.len() == 4)
         .map(|chunk| chunk.iter().sum::<f64>() / 4.0)
         .fold(f64::INFINITY, f64::min);
-    let level_error = (level.mean / clear.max(1.0)).sqrt() + 0.3 * (level.mean - lowest).abs();
+    let level_error =
+        (level.mean / level.clear_bins.max(1.0)).sqrt() + 0.3 * (level.mean - lowest).abs();
     let highest = shape.iter().copied().fold(0.0, f64::max);
     // Factor, weight and error of each bin.
     let mut factors: Vec<(f64, f64, f64)> = Vec::new();

@@ -97,6 +97,8 @@ pub struct Counts {
     /// Histograms that were recorded together, one a pixel. Captures follow each other in the
     /// address space.
     pub captures: Vec<Capture>,
+    /// Photon lists: the photons of the first half of the laser cycles.
+    pub early: Option<Capture>,
     /// Laser cycles of the recording, if known, as for photon lists.
     pub cycles: Option<u64>,
     /// The true distance of each pixel in millimetres, if the file gives it.
@@ -256,10 +258,12 @@ pub fn counts(input: impl Into<Input>, options: &ReadOptions) -> Result<Counts> 
 }
 
 fn counts_of(photons: &mut dyn CountedSource, metadata: Metadata) -> Result<Counts> {
+    let [counts, early] = photons.counts()?;
     Ok(Counts {
         array: photons.array(),
         axis_names: photons.axis_names(),
-        captures: vec![photons.counts()?],
+        captures: vec![counts],
+        early: Some(early),
         cycles: Some(photons.cycles()),
         truth_mm: None,
         metadata,
@@ -514,6 +518,7 @@ fn fit_bins(
         array,
         axis_names: ["column", "row"],
         captures,
+        early: None,
         cycles: None,
         truth_mm: None,
         metadata,

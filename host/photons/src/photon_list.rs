@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{Array, PixelAddress};
 
 use crate::input::Input;
+use crate::recorded::Capture;
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_options::Refused;
 use dtof_options::rows::grouped;
@@ -37,12 +38,12 @@ const SPAN: u64 = 256;
 
 /// A source that can also give histograms.
 pub trait CountedSource: PhotonSource {
-    /// The photons of all laser cycles to replay: one histogram a pixel of the array. The replay still begins
-    /// at the first photon.
+    /// The photons of all laser cycles to replay, one histogram a pixel of the array, and those of the first half of these
+    /// laser cycles. The replay still begins at the first photon.
     ///
     /// # Errors
     /// Fails if the file has changed since it was checked.
-    fn counts(&mut self) -> Result<Vec<Vec<u64>>>;
+    fn counts(&mut self) -> Result<[Capture; 2]>;
 }
 
 /// The options of a photon list.
@@ -301,9 +302,11 @@ impl<R> PhotonList<R> {
 }
 
 impl<R: PhotonReader> CountedSource for PhotonList<R> {
-    fn counts(&mut self) -> Result<Vec<Vec<u64>>> {
+    fn counts(&mut self) -> Result<[Capture; 2]> {
         let bins = self.rows.shape.bins.into();
         let mut counts = vec![vec![0; bins]; self.array.pixels() as usize];
+        let mut early = counts.clone();
+        let half = self.cycles / 2;
         while let Some(row) = self.rows.next()? {
             if row.cycle >= self.cycles {
                 break;
@@ -312,9 +315,12 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
                 bail!("{} changed while it was read", self.input);
             };
             histogram[usize::from(row.bin())] += 1;
+            if row.cycle < half {
+                early[row.pixel()][usize::from(row.bin())] += 1;
+            }
         }
         self.rows = Validator::open(&self.input, self.rows.shape, self.rows.expected)?;
-        Ok(counts)
+        Ok([counts, early])
     }
 }
 

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 
-use super::given::Given;
+use super::given::{Given, TDC};
 use super::recording::{RECORDING, bin_width_warning, read_options, settings_of_file, warnings};
 use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate_with};
 use dtof_engine::settings::{SettingsFile, share};
@@ -32,7 +32,7 @@ pub struct Options {
 }
 
 impl dtof_options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] = &[RECORDING, PULSE, RAYS, OWN];
+    const KEYS: &'static [&'static [&'static str]] = &[RECORDING, PULSE, TDC, RAYS, OWN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
@@ -60,7 +60,7 @@ fn in_metres(target_mm: f64) -> Option<String> {
     })
 }
 
-fn yes_or_no(text: &str) -> Result<bool, String> {
+pub(super) fn yes_or_no(text: &str) -> Result<bool, String> {
     match text {
         "yes" => Ok(true),
         "no" => Ok(false),
@@ -95,8 +95,10 @@ impl Options {
     /// The options of the calibration itself, with the pulse of the settings from [`Self::requested`].
     #[must_use]
     pub const fn calibration(&self, requested: &SettingsFile) -> CalibrationOptions {
-        let is_given = self.given.options.sensor.sigma_bins.is_some();
-        self.calibration.with_pulse_of(requested, is_given)
+        let given = &self.given.options.sensor;
+        let mut options = self.calibration;
+        options.dead_time = given.dead_time;
+        options.with_pulse_of(requested, given.sigma_bins.is_some())
     }
 
     /// Calibrates the sensor that recorded `input`, with the settings from [`Self::requested`].
@@ -156,6 +158,7 @@ pub(super) fn calibrate_counts(
         slant: rays.as_ref().map(|[slants, _]| &slants[..]),
         bias_mm: rays.as_ref().map(|[_, biases]| &biases[..]),
         offsets_mm: &requested.sensor.pixel_offsets_mm(),
+        early: counts.early.as_ref(),
     };
     calibrate_with(&observed, options, &shared(progress, "steps"))
 }

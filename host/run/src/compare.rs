@@ -1,10 +1,10 @@
 //! `compare`: all methods on the photons of a recording or a scene.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 
-use super::calibrate::calibrate_counts;
+use super::calibrate::{calibrate_counts, yes_or_no};
 use super::given::{Given, SENSOR, TDC, of_given};
 use super::recording::{
     RECORDING, bin_width_warning, check_once_per_bin, mask_capture, read_options, settings_of_file,
@@ -30,13 +30,15 @@ pub struct Options {
     pub within: Option<f64>,
     /// The share of exposures without a target that may end with an event; by default 0.01.
     pub false_alarm: Option<f64>,
+    /// Whether the nearest surface is a cover glass, if the user knows.
+    pub glass: Option<bool>,
     /// Settings of recording and sensor.
     pub given: Given,
 }
 
 impl dtof_options::Options for Options {
     const KEYS: &'static [&'static [&'static str]] = &[
-        &["within", "false_alarm"],
+        &["within", "false_alarm", "glass"],
         RECORDING,
         SENSOR,
         TDC,
@@ -47,6 +49,7 @@ impl dtof_options::Options for Options {
         match key {
             "within" => self.within = Some(positive(text)?),
             "false_alarm" => self.false_alarm = Some(share(text)?),
+            "glass" => self.glass = Some(yes_or_no(text)?),
             // One more is the seed of a second run.
             "seed" => self.given.options.run.seed = Some(integer(0..=MAX_INTEGER - 1)(text)?),
             key => self.given.set(key, text)?,
@@ -157,6 +160,10 @@ impl Options {
     ) -> Result<CompareResult> {
         let name = input.name();
         let subject = match input {
+            CompareInput::Scene(..) if self.glass.is_some() => {
+                let reason = "is for recordings, not for a scene";
+                return Err(Refused::new("glass", reason).into());
+            }
             CompareInput::Scene(scene, name) => subject_of_scene(*scene, &name, requested)?,
             CompareInput::Recording(input, truth) => {
                 self.subject_of_recording(input, truth.as_ref(), requested, callbacks)?
@@ -267,12 +274,21 @@ impl Options {
             None if is_calibrated => "which `calibrate` found for this background and signal",
             None => SECOND_LOOK,
         };
+        ensure!(
+            is_calibrated || self.glass.is_none(),
+            Refused::new(
+                "glass",
+                "is for the search, which `sigma_bins` replaces: give `gate`"
+            )
+        );
         let requested = if !is_calibrated {
             merged
         } else {
             (callbacks.step)("calibrates", 0.0)?;
             let options = CalibrationOptions {
                 false_alarm: self.false_alarm_share(&requested),
+                glass: self.glass,
+                dead_time: requested.sensor.dead_time,
                 ..CalibrationOptions::default()
             };
             let found = calibrate_counts(&requested, &counts, &options, &mut ());
@@ -280,6 +296,7 @@ impl Options {
             if found.pulse.is_none() {
                 return Err(unknown_pulse(&input.to_string()).into());
             }
+            found.warnings().into_iter().for_each(callbacks.warning);
             requested.or(found.settings(merged)?)
         };
         Ok(Subject {

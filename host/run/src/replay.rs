@@ -4,7 +4,7 @@
 
 use anyhow::{Result, ensure};
 
-use super::calibrate::calibrate_counts;
+use super::calibrate::{calibrate_counts, yes_or_no};
 use super::given::{FRAME, Given, SENSOR, TDC, of_given};
 use super::recording::{
     RECORDING, check_once_per_bin, mask_capture, read_options, settings_of_file,
@@ -27,6 +27,8 @@ use dtof_photons::masked::Masked;
 use dtof_photons::open::{CheckedRecording, Metadata, Recording, check};
 use dtof_photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
 
+/// What the user knows of the scene: an option of the search.
+const SEARCH: &[&str] = &["glass"];
 /// The options that settle which photons are replayed, and whether pixels decide once.
 const RUN: &[&str] = &["cycles", "seed", "decide_once"];
 
@@ -40,14 +42,27 @@ const OF_Z: &[&str] = &["gate", "window", "min_count", "l1", "l2", "x", "binning
 pub struct Options {
     /// The settings.
     pub given: Given,
+    /// Whether the nearest surface is a cover glass, if the user knows.
+    pub glass: Option<bool>,
 }
 
 impl dtof_options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] =
-        &[RECORDING, SENSOR, TDC, DetectionSettings::KEYS, FRAME, RUN];
+    const KEYS: &'static [&'static [&'static str]] = &[
+        RECORDING,
+        SENSOR,
+        TDC,
+        DetectionSettings::KEYS,
+        FRAME,
+        SEARCH,
+        RUN,
+    ];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
-        self.given.set(key, text)
+        match key {
+            "glass" => self.glass = Some(yes_or_no(text)?),
+            key => self.given.set(key, text)?,
+        }
+        Ok(())
     }
 
     of_given!();
@@ -178,10 +193,17 @@ impl Options {
         let captures = recording.metadata().captures;
         mask_capture(&mut requested, recording.array().pixels(), captures)?;
         let has_file = self.given.file.is_some() || self.given.text.is_some();
+        ensure!(
+            !has_file || self.glass.is_none(),
+            Refused::new(
+                "glass",
+                "is for the search, which a settings file replaces: give `gate`"
+            )
+        );
         let has_rule = requested.detection.rule.is_some();
         let found = match has_file {
             true => Ok((Vec::new(), Vec::new())),
-            false => find(&mut requested, &mut recording),
+            false => find(&mut requested, &mut recording, self.glass),
         };
         let options = read_options(&requested);
         let Recording {
@@ -287,6 +309,7 @@ impl Options {
 fn find(
     requested: &mut SettingsFile,
     recording: &mut CheckedRecording,
+    glass: Option<bool>,
 ) -> Result<(Vec<Row>, Vec<String>)> {
     let counts = recording.counts()?;
     let all_counts = || counts.captures.iter().flatten().flatten();
@@ -304,6 +327,8 @@ fn find(
     let mut options = CalibrationOptions::default().with_pulse_of(requested, true);
     let share = requested.detection.false_alarm;
     options.false_alarm = share.unwrap_or(options.false_alarm);
+    options.glass = glass;
+    options.dead_time = requested.sensor.dead_time;
     let mut found = calibrate_counts(requested, &counts, &options, &mut ())?;
     if requested.sensor.offsets_mm.is_some() {
         found.pixel_offsets = None;
@@ -317,15 +342,26 @@ fn find(
     given.detection.false_alarm = None;
     let given_keys = given.keys()?;
     let warnings = [
-        masked_too_few(&given, &settings),
         glass_in_gate(&given, &found),
         unsuited_offset(&given, &found),
-        found.hidden_photons(),
     ];
+    let warnings = warnings.into_iter().flatten().chain(found.warnings());
+    let warnings: Vec<String> = warnings.collect();
     // A z is for the exposures that were simulated.
     if settings.detection.z.is_some() && OF_Z.iter().any(|key| given_keys.contains(*key)) {
         settings.detection.z = None;
         settings.detection.false_alarm = Some(options.false_alarm);
+    }
+    // Pixels to leave out come on top of those that are found.
+    if let Some(masked) = given
+        .sensor
+        .masked
+        .as_mut()
+        .filter(|masked| !masked.is_empty())
+    {
+        masked.extend(settings.sensor.masked.iter().flatten());
+        masked.sort_unstable();
+        masked.dedup();
     }
     let together = given.clone().or(settings.clone());
     if together.dead_time_obstacle().is_some() {
@@ -360,19 +396,7 @@ fn find(
     if !flags.is_empty() {
         rows.push(("overridden".to_owned(), format!("by {}", flags.join(", "))));
     }
-    Ok((rows, warnings.into_iter().flatten().collect()))
-}
-
-/// Warns if the mask that is given leaves hot or dead pixels in.
-fn masked_too_few(given: &SettingsFile, found: &SettingsFile) -> Option<String> {
-    let masked = given.sensor.masked.as_ref()?;
-    let found = found.sensor.masked.iter().flatten();
-    let missed = found.filter(|pixel| !masked.contains(pixel));
-    let missed: Vec<String> = missed.map(u16::to_string).collect();
-    let pixels = missed.join(",");
-    (!missed.is_empty()).then(|| {
-        format!("hot or dead pixels that --mask does not leave out: {pixels}; add them to it")
-    })
+    Ok((rows, warnings))
 }
 
 /// Warns if the gate that is given surely takes in what seems to be crosstalk of a cover glass.

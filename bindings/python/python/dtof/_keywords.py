@@ -71,6 +71,19 @@ DecideOnce = Annotated[
     "Decide once for each pixel, on all of its photons, and write how clear its peak stands: "
     "confidence.npy. Takes all laser cycles unless cycles says less",
 ]
+DeadTime = Annotated[
+    Integer,
+    "whole number, 0 to 65535, bins",
+    "Bins for which the TDC is blind after a photon, 0 to 65535. With all bins of a histogram it "
+    "takes the first photon of a laser cycle only. Fewer are for the window rule without binning "
+    "[default: the sensor's, else 0]",
+]
+Glass = Annotated[
+    Switch,
+    "True or False",
+    "Whether the nearest surface that most pixels see is a cover glass, which the gate then leaves out [default: if all "
+    "pixels have it at one place and half of them see something behind it]",
+]
 FalseAlarm = Annotated[
     Number,
     "number above 0",
@@ -146,8 +159,8 @@ class SensorOptions(TypedDict, total=False):
     ]
     mask: Annotated[
         Integers,
-        "addresses, [3, 70]; [] is none",
-        "Pixels to leave out, such as hot and dead ones, as 3,70",
+        "addresses, [3, 70], or 'none'; [] adds none",
+        "Pixels to leave out, such as hot and dead ones, as 3,70, beside those that are found; none leaves out none",
     ]
     sigma_bins: Annotated[
         Number,
@@ -155,13 +168,7 @@ class SensorOptions(TypedDict, total=False):
         "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. It sets the window for "
         "the depth [default: the depth is the centroid of three bins]",
     ]
-    dead_time: Annotated[
-        Integer,
-        "whole number, 0 to 65535, bins",
-        "Bins for which the TDC is blind after a photon, 0 to 65535. With all bins of a histogram it "
-        "takes the first photon of a laser cycle only. Fewer are for the window rule without binning "
-        "[default: the sensor's, else 0]",
-    ]
+    dead_time: DeadTime
 
 
 class DetectionOptions(TypedDict, total=False):
@@ -285,6 +292,7 @@ class ReplayOptions(RecordingOptions, SensorOptions, DetectionOptions, total=Fal
     """Of ``replay`` and ``photons``."""
 
     frame: Frame
+    glass: Glass
     decide_once: DecideOnce
     cycles: CyclesToReplay
     seed: Annotated[
@@ -343,11 +351,8 @@ class CalibrateOptions(RecordingOptions, total=False):
         "Distance in millimetres of a flat target that most pixels see: with fov straight ahead, as a tape "
         "measures it, else along the ray of the median pixel",
     ]
-    glass: Annotated[
-        Switch,
-        "True or False",
-        "Whether the nearest surface is a cover glass, if all pixels have it at the same bin",
-    ]
+    dead_time: DeadTime
+    glass: Glass
     false_alarm: FalseAlarm
     seed: Annotated[Integer, "whole number, 0 to 9223372036854775807", "Seed of the simulation [default: 1]"]
 
@@ -361,6 +366,7 @@ class CompareOptions(RecordingOptions, SensorOptions, total=False):
         "Largest error of 68 % of the reports in millimetres [default: that of the longest frames]",
     ]
     false_alarm: FalseAlarm
+    glass: Glass
     once_per_bin: Annotated[
         Switch,
         "True or False",

@@ -4,7 +4,7 @@
 //! bin on either side. The mean of the rest is the next estimate. This is repeated until nothing changes.
 //! The first estimate is the median, or the mean of a sparse histogram.
 
-use super::significance::{is_surely_more, median};
+use super::significance::{are_surely_more, median};
 
 /// By chance a bin is left out in one of so many histograms.
 const ONE_IN: f64 = 100.0;
@@ -18,46 +18,50 @@ pub struct Level {
     pub mean: f64,
     /// For each bin whether it holds only background.
     pub clear: Vec<bool>,
+    /// The number of bins that hold only background; one in which the TDC was live in half of the laser cycles is half a
+    /// bin.
+    pub clear_bins: f64,
 }
 
 impl Level {
-    /// Estimates the background of a histogram.
+    /// Estimates the background of a histogram, whose TDC was `live` in so much of the laser cycles in each bin.
     #[must_use]
-    pub fn of(counts: &[f64]) -> Self {
-        let all = counts.iter().sum::<f64>() / counts.len() as f64;
-        let middle = median(counts.iter().copied());
-        let mut mean = if middle >= 5.0 { middle } else { all };
+    pub fn of(counts: &[f64], live: &[f64]) -> Self {
         let mut clear = vec![true; counts.len()];
+        let all = mean_of(counts, live, &clear);
+        let mostly_live = counts.iter().zip(live).filter(|(_, live)| **live >= 0.5);
+        let middle = median(mostly_live.map(|(count, _)| *count));
+        let mut mean = if middle >= 5.0 { middle } else { all };
         for _ in 0..ROUNDS {
-            let next = clear_bins(counts, mean);
+            let next = clear_bins(counts, live, mean);
             // All bins are peaks: the last estimate has to do.
             if !next.contains(&true) {
                 break;
             }
             let settled = next == clear;
             clear = next;
-            mean = mean_of(counts, &clear);
+            mean = mean_of(counts, live, &clear);
             if settled {
                 break;
             }
         }
-        Self { mean, clear }
-    }
-
-    /// The number of bins that hold only background.
-    #[must_use]
-    pub fn clear_bins(&self) -> usize {
-        self.clear.iter().filter(|&&clear| clear).count()
+        let live = clear.iter().zip(live).filter(|(clear, _)| **clear);
+        let clear_bins = live.map(|(_, live)| live).sum();
+        Self {
+            mean,
+            clear,
+            clear_bins,
+        }
     }
 
     /// Photons in these bins.
     #[must_use]
     pub fn photons(&self) -> f64 {
-        self.mean * self.clear_bins() as f64
+        self.mean * self.clear_bins
     }
 }
 
-fn clear_bins(counts: &[f64], mean: f64) -> Vec<bool> {
+fn clear_bins(counts: &[f64], live: &[f64], mean: f64) -> Vec<bool> {
     let bins = counts.len();
     let one_in = ONE_IN * bins as f64;
     let mut clear = vec![true; bins];
@@ -66,9 +70,9 @@ fn clear_bins(counts: &[f64], mean: f64) -> Vec<bool> {
         clear[first..=last].fill(false);
     };
     for width in [1, 3] {
-        for (first, window) in counts.windows(width).enumerate() {
-            let sum = window.iter().sum();
-            if is_surely_more(sum, mean * width as f64, one_in) {
+        let windows = counts.windows(width).zip(live.windows(width));
+        for (first, (window, live)) in windows.enumerate() {
+            if are_surely_more(window, live, mean, one_in) {
                 leave_out(first, first + width - 1);
             }
         }
@@ -76,12 +80,14 @@ fn clear_bins(counts: &[f64], mean: f64) -> Vec<bool> {
     clear
 }
 
-fn mean_of(counts: &[f64], clear: &[bool]) -> f64 {
-    let kept = counts.iter().zip(clear).filter(|(_, clear)| **clear);
-    let (sum, bins) = kept.fold((0.0, 0.0), |(sum, bins), (count, _)| {
-        (sum + count, bins + 1.0)
+/// What was recorded in the clear bins over what was live of them.
+fn mean_of(counts: &[f64], live: &[f64], clear: &[bool]) -> f64 {
+    let kept = counts.iter().zip(live).zip(clear);
+    let kept = kept.filter(|(_, clear)| **clear);
+    let (sum, bins) = kept.fold((0.0, 0.0), |(sum, bins), ((count, live), _)| {
+        (sum + count * live, bins + live)
     });
-    sum / f64::max(bins, 1.0)
+    sum / f64::max(bins, 1e-9)
 }
 
 #[cfg(test)]
@@ -94,7 +100,7 @@ mod tests {
         for (bin, count) in counts.iter_mut().enumerate().take(80).skip(40) {
             *count += 9000.0 * (-(bin as f64 - 40.0) / 4.0).exp();
         }
-        let level = Level::of(&counts);
+        let level = Level::of(&counts, &[1.0; 128]);
         // The tail no longer shows where it is below the noise of three bins.
         assert!((level.mean - 20.0).abs() < 0.4, "{}", level.mean);
         assert!(!level.clear[39] && !level.clear[60] && level.clear[90]);
@@ -105,7 +111,7 @@ mod tests {
         let mut counts = vec![0.0; 64];
         counts[3] = 1.0;
         counts[50] = 2.0;
-        assert!((Level::of(&counts).mean - 3.0 / 64.0).abs() < 1e-12);
-        assert_eq!(Level::of(&[0.0; 64]).mean, 0.0);
+        assert!((Level::of(&counts, &[1.0; 64]).mean - 3.0 / 64.0).abs() < 1e-12);
+        assert_eq!(Level::of(&[0.0; 64], &[1.0; 64]).mean, 0.0);
     }
 }

@@ -1,5 +1,6 @@
-//! Crosstalk of the cover glass: the nearest peak, at the same bin in nearly all pixels and captures,
-//! with surfaces behind it in many of them.
+//! Crosstalk of the cover glass: the nearest peak, at the same bin in nearly all pixels and captures, from the start of the
+//! recording to its end, with surfaces behind it in at least half of them. A gate hides what lies in it, so all of this is
+//! needed: a wall that fills the view has the same peak, and a pixel at its edge sees past it.
 //!
 //! A peak is common if groups of histograms share it. Groups are so large that its mean height shows in
 //! each. In nine groups of ten the peak must have at least half of the median height, in groups along
@@ -22,9 +23,18 @@ const GROUPS: usize = 8;
 /// The share of groups that must have the peak.
 const COMMON: f64 = 0.9;
 /// With fewer histograms, crosstalk cannot be told from the nearer of two surfaces.
-const SEVERAL: usize = 4;
-/// At least this share of the histograms has a surface behind the crosstalk.
-const BEHIND: f64 = 0.1;
+pub const SEVERAL: usize = 4;
+/// At least this share of the histograms has a surface behind the crosstalk, and so many of them, or all.
+const BEHIND: f64 = 0.5;
+const BEHIND_IN: usize = 6;
+/// So many histograms are no fault of a single pixel.
+const FEW: usize = 2;
+/// Peaks of a layer lie within so many bins. If this share of the histograms has it, and half of them a surface behind it,
+/// it may be a cover glass that some pixels do not show, or not at the same place.
+const LAYER_BINS: usize = 4;
+const LAYER: f64 = 0.6;
+/// The first half of a recording has this share of the photons of a surface that stays, or more, and so has the second.
+const STAYS: f64 = 1.0 / 3.0;
 /// A peak of all pixels together exceeds the background at least by this factor: backgrounds are no
 /// flatter than that.
 const EVEN: f64 = 1.02;
@@ -38,11 +48,17 @@ pub enum Nearest {
     NotCommon,
     /// Crosstalk of a cover glass.
     Glass(Glass),
-    /// A surface at this bin in all pixels: a wall or crosstalk. Nothing lies behind it, or there are
-    /// very few histograms.
-    WallOrGlass(usize),
-    /// The user says that the peak at this bin is not crosstalk.
+    /// No crosstalk, at this bin: nothing lies behind it, or the user says so.
     Wall(usize),
+    /// A wall or crosstalk.
+    Unclear {
+        /// The bin where most pixels see it.
+        bin: usize,
+        /// The share of the histograms that have it there, or up to four bins farther.
+        share: f64,
+        /// The share of these that have another surface behind it.
+        behind: f64,
+    },
 }
 
 impl Nearest {
@@ -75,35 +91,139 @@ pub struct Glass {
     pub has_tail: bool,
 }
 
-/// Finds the nearest common peak. `is_glass` is given if the user knows whether that is crosstalk;
-/// `l2` are the laser cycles of an exposure.
+/// Finds the nearest common peak. `is_glass` is given if the user knows whether that is crosstalk; `l2` are the laser cycles
+/// of an exposure. `early` are the photons of each bin and those of its first half, if the recording has a time.
 #[must_use]
-pub fn nearest(good: &GoodHistograms, is_glass: Option<bool>, l2: f64) -> Nearest {
-    let Some(peak) = common(good) else {
-        return Nearest::NotCommon;
+pub fn nearest(
+    good: &GoodHistograms,
+    is_glass: Option<bool>,
+    early: Option<&[[f64; 2]]>,
+    l2: f64,
+) -> Nearest {
+    let common = common(good);
+    let layer = Layer::nearest(&good.peaks);
+    if is_glass == Some(true) {
+        let peak = common.or_else(|| Some(layer?.peak));
+        return peak.map_or(Nearest::NotCommon, |peak| {
+            Nearest::Glass(glass(good, &peak, l2))
+        });
+    }
+    let stays = |peak: &Peak| early.is_none_or(|early| stays(early, good, peak));
+    let Some(peak) = common.filter(stays) else {
+        let layer = layer.filter(|layer| common.is_none() && layer.may_be_glass());
+        return match is_glass {
+            None => layer.map_or(Nearest::NotCommon, |layer| layer.unclear()),
+            Some(_) => Nearest::NotCommon,
+        };
     };
     if is_glass == Some(false) {
         return Nearest::Wall(peak.top);
     }
-    if is_glass != Some(true) && !has_something_behind(good, &peak) {
-        return Nearest::WallOrGlass(peak.top);
+    let all = good.traces.len();
+    let has_surface = |peaks: &&Vec<Peak>| peaks.iter().any(|one| one.first > peak.last);
+    let behind = good.peaks.iter().filter(has_surface).count();
+    let needed = BEHIND_IN.min(all).max(all.div_ceil(2));
+    if all >= SEVERAL && behind >= needed {
+        Nearest::Glass(glass(good, &peak, l2))
+    } else if behind >= FEW.min(all.div_ceil(FEW)) || is_behind_of_all(good, &peak) {
+        Nearest::Unclear {
+            bin: peak.top,
+            share: 1.0,
+            behind: behind as f64 / all as f64,
+        }
+    } else {
+        Nearest::Wall(peak.top)
     }
-    Nearest::Glass(glass(good, &peak, l2))
+}
+
+/// The nearest surfaces of histograms that lie within a few bins.
+#[derive(Clone, Copy)]
+struct Layer {
+    /// Its peak in the histogram that has it brightest.
+    peak: Peak,
+    share: f64,
+    behind: f64,
+}
+
+impl Layer {
+    /// Where most histograms have their nearest peak.
+    fn nearest(of: &[Vec<Peak>]) -> Option<Self> {
+        let mut nearest: Vec<(&Peak, bool)> = of
+            .iter()
+            .filter_map(|peaks| Some((peaks.first()?, peaks.len() > 1)))
+            .collect();
+        nearest.sort_by_key(|(peak, _)| peak.top);
+        let within = |first: usize| {
+            let from = nearest[first].0.top;
+            let end = nearest.partition_point(|(peak, _)| peak.top <= from + LAYER_BINS);
+            &nearest[first..end]
+        };
+        let most = (0..nearest.len()).map(within);
+        let most = most.max_by_key(|layer| layer.len())?;
+        let brightest = most
+            .iter()
+            .max_by(|one, other| one.0.photons.total_cmp(&other.0.photons))?;
+        let behind = most.iter().filter(|(_, has_more)| *has_more).count();
+        Some(Self {
+            peak: *brightest.0,
+            share: most.len() as f64 / of.len() as f64,
+            behind: behind as f64 / most.len() as f64,
+        })
+    }
+
+    fn may_be_glass(&self) -> bool {
+        self.share >= LAYER && self.behind >= BEHIND
+    }
+
+    fn unclear(&self) -> Nearest {
+        Nearest::Unclear {
+            bin: self.peak.top,
+            share: self.share,
+            behind: self.behind,
+        }
+    }
+}
+
+/// Whether both halves of the recording have the peak. `early` has the photons of each bin, and those of the first half.
+fn stays(early: &[[f64; 2]], good: &GoodHistograms, peak: &Peak) -> bool {
+    let around = peak.top.saturating_sub(1)..=(peak.top + 1).min(good.bins() - 1);
+    let bins = around.clone().count() as f64;
+    let level = median(early.iter().map(|[all, _]| *all)) * bins;
+    let [all, first] = early[around]
+        .iter()
+        .fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
+    let share = (first - level / 2.0) / (all - level).max(1.0);
+    (STAYS..=1.0 - STAYS).contains(&share)
+}
+
+/// Whether all pixels together have a surface behind the peak that single ones are too dim to show.
+fn is_behind_of_all(good: &GoodHistograms, peak: &Peak) -> bool {
+    let seen = |peaks: &&Vec<Peak>| peaks.iter().any(|one| one.is_near(peak.top));
+    let seen = good.peaks.iter().filter(seen).count();
+    if seen as f64 >= COMMON * good.traces.len() as f64 {
+        return false;
+    }
+    let pooled = good.pooled();
+    let mean = pooled.background.iter().sum::<f64>() / pooled.background.len() as f64;
+    let behind = Peak::all(&pooled.robust, &pooled.live, mean * EVEN);
+    behind.iter().any(|one| one.first > peak.last)
 }
 
 /// The nearest peak of all histograms together, if it is common.
 fn common(good: &GoodHistograms) -> Option<Peak> {
-    let (counts, background) = good.pooled();
+    let pooled = good.pooled();
+    let background = &pooled.background;
     // The level may fall with the bins: the excess over it is put on its mean.
     let mean = background.iter().sum::<f64>() / background.len() as f64 * EVEN;
-    let flat: Vec<f64> = counts
+    let flat: Vec<f64> = pooled
+        .robust
         .iter()
-        .zip(&background)
+        .zip(background)
         .map(|(count, background)| (count - background * EVEN + mean).max(0.0))
         .collect();
-    let peaks = Peak::all(&flat, mean);
+    let peaks = Peak::all(&flat, &pooled.live, mean);
     let peak = *peaks.first()?;
-    let lowest = lowest_before(&counts, mean, peak.top);
+    let lowest = lowest_before(&pooled.robust, mean, peak.top);
     let is_common = good.orders().iter().all(|order| {
         let share = share_with(good, order, peak.top, lowest);
         share.is_some_and(|share| share >= COMMON)
@@ -135,15 +255,15 @@ fn share_with(
         .iter()
         .map(|&index| {
             let trace = &good.traces[index];
-            let sum: f64 = trace.counts[around.clone()].iter().sum();
+            let [sum, noise] = trace.photons(around.clone());
             let [below, noise] = match lowest {
                 Some(bin) => {
-                    let before = trace.counts[bin - 1..=bin + 1].iter().sum::<f64>();
-                    [before, sum + before]
+                    let [below, noise_below] = trace.photons(bin - 1..=bin + 1);
+                    [below, noise + noise_below]
                 }
                 None => {
                     let below = around.clone().map(|bin| good.background(index, bin)).sum();
-                    [below, sum.max(below)]
+                    [below, noise.max(below)]
                 }
             };
             [sum - below, trace.cycles, noise]
@@ -175,40 +295,16 @@ fn share_with(
     }
 }
 
-fn has_something_behind(good: &GoodHistograms, glass: &Peak) -> bool {
-    if good.traces.len() < SEVERAL {
-        return false;
-    }
-    let holds = |peak: &Peak| peak.is_near(glass.top);
-    let all = good.traces.len() as f64;
-    let behind = good.peaks.iter().filter(|peaks| {
-        let mine = peaks.iter().position(holds);
-        mine.is_some_and(|mine| peaks.len() > mine + 1)
-    });
-    if behind.count() as f64 >= BEHIND * all {
-        return true;
-    }
-    // Too dim for single pixels: all of them together.
-    let seen = good.peaks.iter().filter(|peaks| peaks.iter().any(holds));
-    if seen.count() as f64 >= COMMON * all {
-        return false;
-    }
-    let (counts, background) = good.pooled();
-    let mean = background.iter().sum::<f64>() / background.len() as f64;
-    let behind = Peak::all(&counts, mean * EVEN);
-    behind.iter().any(|peak| peak.first > glass.last)
-}
-
 /// The crosstalk of all histograms together, bin by bin.
 struct Template {
     /// Photons a laser cycle and their standard error, as far as enough histograms show them.
     rates: Vec<(f64, f64)>,
-    /// Photons, background photons and laser cycles of each bin.
-    sums: Vec<[f64; 3]>,
+    /// Photons, background photons, laser cycles, and the variance of the photons, of each bin.
+    sums: Vec<[f64; 4]>,
 }
 
 fn template(good: &GoodHistograms, glass: &Peak) -> Template {
-    let mut sums = vec![[0.0; 3]; good.bins()];
+    let mut sums = vec![[0.0; 4]; good.bins()];
     let mut all = 0.0;
     for (index, (trace, peaks)) in good.traces.iter().zip(&good.peaks).enumerate() {
         all += trace.cycles;
@@ -221,17 +317,19 @@ fn template(good: &GoodHistograms, glass: &Peak) -> Template {
         }
         for (bin, sum) in sums.iter_mut().enumerate() {
             if !others[bin] {
-                sum[0] += trace.counts[bin];
+                let [photons, variance] = trace.photons(bin..=bin);
+                sum[0] += photons;
                 sum[1] += good.background(index, bin);
                 sum[2] += trace.cycles;
+                sum[3] += variance;
             }
         }
     }
     let seen = sums.iter().take_while(|sum| sum[2] >= 0.2 * all);
-    let rates = seen.map(|[count, below, cycles]| {
+    let rates = seen.map(|[count, below, cycles, variance]| {
         (
             (count - below) / cycles,
-            count.max(*below).max(1.0).sqrt() / cycles,
+            variance.max(*below).max(1.0).sqrt() / cycles,
         )
     });
     Template {
@@ -309,7 +407,7 @@ fn glass(good: &GoodHistograms, peak: &Peak, l2: f64) -> Glass {
 /// The Gaussian that fits the crosstalk: σ and fit.
 fn gaussian(template: &Template, peak: &Peak) -> (f64, Fit) {
     // Counts are scaled to the laser cycles of the top bin.
-    let [_, below, cycles] = template.sums[peak.top];
+    let [_, below, cycles, _] = template.sums[peak.top];
     let counts: Vec<f64> = template
         .sums
         .iter()
@@ -324,7 +422,8 @@ fn gaussian(template: &Template, peak: &Peak) -> (f64, Fit) {
         .map(|count| count.max(0.0))
         .collect();
     let whole = (0, peak.top, counts.len() - 1);
-    let window = [Window::new(&counts, below, cycles, whole)];
+    let live = vec![1.0; counts.len()];
+    let window = [Window::new((&counts, &live), below, cycles, whole)];
     let (sigma, fits) = best(&window);
     (sigma, fits[0])
 }
@@ -391,15 +490,20 @@ mod tests {
                 Trace {
                     pixel,
                     cycles: 4500.0,
+                    live: vec![1.0; 128],
                     counts,
                     truth_mm: None,
                 }
             })
             .collect();
-        let levels = traces.iter().map(|trace| Level::of(&trace.counts));
+        let levels = traces
+            .iter()
+            .map(|trace| Level::of(&trace.counts, &trace.live));
         let levels = levels.collect();
         let good = GoodHistograms::new(Array::new(32, 16).unwrap(), 0.003, traces, levels);
-        nearest(&good, None, 2000.0).glass().map(|glass| glass.top)
+        nearest(&good, None, None, 2000.0)
+            .glass()
+            .map(|glass| glass.top)
     }
 
     /// A strip across all rows and one across all columns are in each column and in each row.

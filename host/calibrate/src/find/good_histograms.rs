@@ -5,9 +5,14 @@ use dtof_core::Array;
 use super::background::Level;
 use super::observed::Trace;
 use super::peaks::Peak;
+use super::significance::median;
 
 /// Standard deviations from which on a slope of the background is taken as real.
 const SLOPE: f64 = 6.0;
+/// From so many histograms on, the brightest of each bin may be left out: a stuck bin of one pixel is no surface.
+const MANY: usize = 16;
+/// No histogram weighs more in the slope than one with so many times the background of the median.
+const BRIGHTEST: f64 = 4.0;
 
 /// The histograms of pixels that are neither hot nor dead.
 #[derive(Clone, Debug)]
@@ -31,7 +36,7 @@ impl GoodHistograms {
     #[must_use]
     pub fn new(array: Array, rate: f64, traces: Vec<Trace>, levels: Vec<Level>) -> Self {
         let peaks = traces.iter().zip(&levels);
-        let peaks = peaks.map(|(trace, level)| Peak::all(&trace.counts, level.mean));
+        let peaks = peaks.map(|(trace, level)| Peak::all(&trace.counts, &trace.live, level.mean));
         let peaks: Vec<Vec<Peak>> = peaks.collect();
         let trend = trend(&traces, &levels);
         Self {
@@ -42,6 +47,20 @@ impl GoodHistograms {
             peaks,
             trend,
         }
+    }
+
+    /// The same if the TDC took the first photon in each of so many laser cycles: near bins have more of the background
+    /// then, which is no surface.
+    #[must_use]
+    pub fn corrected(&self, cycles: f64) -> Self {
+        let mut traces = self.traces.clone();
+        for trace in &mut traces {
+            trace.correct(cycles, self.bins());
+        }
+        let levels = traces.iter();
+        let levels = levels.map(|trace| Level::of(&trace.counts, &trace.live));
+        let levels = levels.collect();
+        Self::new(self.array, self.rate, traces, levels)
     }
 
     /// Bins of a histogram.
@@ -56,18 +75,38 @@ impl GoodHistograms {
         self.levels[index].mean * self.trend[bin]
     }
 
-    /// The sums over all histograms of the counts of each bin, and of the background of each bin.
+    /// All histograms together.
     #[must_use]
-    pub fn pooled(&self) -> (Vec<f64>, Vec<f64>) {
-        let mut counts = vec![0.0; self.bins()];
+    pub fn pooled(&self) -> Pooled {
+        let all = self.traces.len() as f64;
+        let mut pooled = Pooled {
+            counts: vec![0.0; self.bins()],
+            robust: Vec::new(),
+            background: Vec::new(),
+            live: vec![0.0; self.bins()],
+        };
+        let mut brightest = vec![0.0; self.bins()];
         for trace in &self.traces {
-            for (sum, count) in counts.iter_mut().zip(&trace.counts) {
-                *sum += count;
+            for (bin, &count) in trace.counts.iter().enumerate() {
+                pooled.counts[bin] += count;
+                pooled.live[bin] += 1.0 / trace.live[bin].max(1e-6);
+                brightest[bin] = f64::max(brightest[bin], count);
             }
         }
+        let of_others = |(sum, brightest)| (sum - brightest) * all / (all - 1.0);
+        pooled.robust = match self.traces.len() >= MANY {
+            true => pooled
+                .counts
+                .iter()
+                .zip(&brightest)
+                .map(of_others)
+                .collect(),
+            false => pooled.counts.clone(),
+        };
+        pooled.live.iter_mut().for_each(|live| *live = all / *live);
         let level: f64 = self.levels.iter().map(|level| level.mean).sum();
-        let background = self.trend.iter().map(|trend| trend * level).collect();
-        (counts, background)
+        pooled.background = self.trend.iter().map(|trend| trend * level).collect();
+        pooled
     }
 
     /// Laser cycles of all histograms.
@@ -99,17 +138,31 @@ impl GoodHistograms {
     }
 }
 
+/// The sums over all histograms.
+pub struct Pooled {
+    /// Of the counts of each bin.
+    pub counts: Vec<f64>,
+    /// The same from all but the brightest histogram of each bin, if there are many.
+    pub robust: Vec<f64>,
+    /// Of the background of each bin.
+    pub background: Vec<f64>,
+    /// The harmonic mean of what was live: so many of the counts would be noise as large.
+    pub live: Vec<f64>,
+}
+
 /// Fits a straight line through the bins that hold background in most histograms. The trend is flat
 /// if these bins span too little, or if the slope is not significant.
 fn trend(traces: &[Trace], levels: &[Level]) -> Vec<f64> {
     let bins = levels.first().map_or(0, |level| level.clear.len());
-    // Counts and expectation of each bin.
+    let usual = median(levels.iter().map(|level| level.mean));
+    // What was recorded of counts and expectation of each bin.
     let mut sums = vec![(0.0, 0.0); bins];
     for (trace, level) in traces.iter().zip(levels) {
+        let weight = (BRIGHTEST * usual / level.mean.max(1e-9)).min(1.0);
         for (bin, sum) in sums.iter_mut().enumerate() {
             if level.clear[bin] {
-                sum.0 += trace.counts[bin];
-                sum.1 += level.mean;
+                sum.0 += weight * trace.counts[bin] * trace.live[bin];
+                sum.1 += weight * level.mean * trace.live[bin];
             }
         }
     }

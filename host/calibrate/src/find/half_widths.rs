@@ -144,7 +144,14 @@ mod tests {
 
     /// Peaks at all positions within a bin.
     fn peaks(fall: f64) -> Vec<Window> {
-        let of = |number| Window::new(&counts(number, fall), 12.0, 100.0, (0, 20, 63));
+        let of = |number| {
+            Window::new(
+                (&counts(number, fall), &[1.0; 64]),
+                12.0,
+                100.0,
+                (0, 20, 63),
+            )
+        };
         (0..16).map(of).collect()
     }
 
@@ -169,7 +176,7 @@ mod tests {
                 0.6 * of(0.4) + 0.4 * of(2.6)
             };
             let counts: Vec<f64> = (0..64).map(|bin| 12.0 + 4000.0 * share(bin)).collect();
-            Window::new(&counts, 12.0, 100.0, (0, 20, 63))
+            Window::new((&counts, &[1.0; 64]), 12.0, 100.0, (0, 20, 63))
         };
         let peaks: Vec<Window> = (0..16).map(of).collect();
         for seed in 1..7 {
@@ -189,7 +196,7 @@ mod tests {
             .map(|number| {
                 let mut counts = counts(number, 2.5 * SIGMA);
                 counts[8] += 40_000.0;
-                Window::new(&counts, 12.0, 100.0, (11, 20, 63))
+                Window::new((&counts, &[1.0; 64]), 12.0, 100.0, (11, 20, 63))
             })
             .collect();
         let found = asymmetric_window(&with_glass, U8F8::from_num(SIGMA), 1).unwrap();
@@ -219,7 +226,7 @@ mod tests {
     #[test]
     fn without_peaks_there_is_no_window() {
         assert_eq!(asymmetric_window(&[], U8F8::ONE, 1), None);
-        let empty = Window::new(&[0.0; 64], 0.0, 1.0, (0, 20, 63));
+        let empty = Window::new((&[0.0; 64], &[1.0; 64]), 0.0, 1.0, (0, 20, 63));
         assert_eq!(asymmetric_window(&[empty], U8F8::ONE, 1), None);
     }
 }

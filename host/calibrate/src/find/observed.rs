@@ -1,10 +1,13 @@
 //! The input of a calibration: whole histograms, and how long they took.
 
+use std::ops::RangeInclusive;
+
 use anyhow::{Result, bail, ensure};
 use dtof_core::Array;
 
 use dtof_options::Refused;
 use dtof_photons::recorded::Capture;
+use dtof_theory::counts::dead_time;
 
 /// How long each capture lasted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -60,6 +63,8 @@ pub struct Observed<'a> {
     pub bias_mm: Option<&'a [f64]>,
     /// The offset that each pixel of the array has already, in millimetres; empty if none has.
     pub offsets_mm: &'a [f64],
+    /// The photons of the first half of the laser cycles, one histogram a pixel, if the recording has a time.
+    pub early: Option<&'a Capture>,
 }
 
 /// One histogram.
@@ -71,8 +76,29 @@ pub struct Trace {
     pub cycles: f64,
     /// Photons of each bin, corrected for pile-up where that is known.
     pub counts: Vec<f64>,
+    /// The share of the laser cycles in which the TDC was live in each bin. So many of `counts` were recorded, which
+    /// settles their noise.
+    pub live: Vec<f64>,
     /// The true distance in millimetres, if it is known, with [`Observed::bias`].
     pub truth_mm: Option<f64>,
+}
+
+impl Trace {
+    /// Corrects the counts for a TDC that is dead for so many bins after a photon.
+    pub fn correct(&mut self, cycles: f64, dead_time: usize) {
+        let live = dead_time::live(&self.counts, cycles, dead_time);
+        self.live = live.iter().map(|live| (live / cycles).max(0.0)).collect();
+        self.counts = dead_time::arrived(&self.counts, cycles, dead_time);
+    }
+
+    /// The photons of some bins, and the variance of their number.
+    #[must_use]
+    pub fn photons(&self, bins: RangeInclusive<usize>) -> [f64; 2] {
+        let photons = self.counts[bins.clone()].iter().zip(&self.live[bins]);
+        photons.fold([0.0; 2], |[sum, variance], (count, live)| {
+            [sum + count, variance + count / live.max(1e-6)]
+        })
+    }
 }
 
 impl Observed<'_> {
@@ -129,11 +155,28 @@ impl Observed<'_> {
                     pixel,
                     cycles,
                     truth_mm,
+                    live: vec![1.0; bins],
                     counts: counts.iter().map(|&count| count as f64).collect(),
                 });
             }
         }
         Ok(traces)
+    }
+
+    /// For each bin the photons of the pixels that are `good`, and those of the first half of the laser cycles; `None` if
+    /// the recording has no time.
+    #[must_use]
+    pub fn early_of(&self, good: impl Fn(usize) -> bool) -> Option<Vec<[f64; 2]>> {
+        let (early, [all]) = (self.early?, self.captures) else {
+            return None;
+        };
+        let mut sums = vec![[0.0; 2]; self.bins()];
+        for pixel in (0..all.len()).filter(|&pixel| good(pixel)) {
+            for ((sum, &all), &early) in sums.iter_mut().zip(&all[pixel]).zip(&early[pixel]) {
+                *sum = [sum[0] + all as f64, sum[1] + early as f64];
+            }
+        }
+        Some(sums)
     }
 
     /// The range bias of a pixel in millimetres, less the offset that it has already: ranges without that offset are

@@ -124,7 +124,7 @@ pub fn noise(
     let is_near = |bin: &usize| (*bin as f64 + 0.5 - position).abs() < NOISE_BINS;
     for bin in (0..trace.counts.len()).filter(is_near) {
         let count = trace.counts[bin];
-        moved.counts[bin] = count + count.max(0.0).sqrt();
+        moved.counts[bin] = count + (count / trace.live[bin].max(1e-6)).sqrt();
         let place = self::position(&moved, bins, gate, window);
         variance += place.map_or(0.0, |place| (place - position).powi(2));
         moved.counts[bin] = count;

@@ -116,6 +116,18 @@ pub fn tdc(traces: &[Trace]) -> Tdc {
     }
 }
 
+/// A TDC that is dead for so many bins after a photon.
+#[must_use]
+pub fn known_tdc(traces: &[Trace], dead_time: usize) -> Tdc {
+    let bins = dead_time.min(traces.first().map_or(0, |trace| trace.counts.len()));
+    if bins == 0 {
+        return Tdc::SeveralHits;
+    }
+    let all = traces.iter().map(|trace| (trace, trace.cycles));
+    let lost = share_lost(all, bins);
+    Tdc::DeadTime { bins, lost }
+}
+
 /// The TDC that recorded `traces`, whose laser cycles are not known; `None` if the background does not show it.
 #[must_use]
 pub fn tdc_without_cycles(traces: &[Trace]) -> Option<Tdc> {
@@ -378,6 +390,7 @@ mod tests {
         Trace {
             pixel,
             cycles: cycles.into(),
+            live: vec![1.0; counts.len()],
             counts,
             truth_mm: None,
         }

@@ -1,11 +1,18 @@
 //! The pixels of an array: their background, and those that are hot or dead.
 
+use dtof_core::Array;
+
 use super::background::Level;
 use super::observed::Trace;
+use super::peaks::Peak;
 use super::significance::{is_surely_less, is_surely_more, median, quantile};
 
-/// A hot pixel has more than this many times the background of the median pixel.
+/// A hot pixel has more than this many times the background of the median pixel and of its neighbours.
 const HOT: f64 = 10.0;
+/// A hot pixel is flat: no peak is higher than so many times its background.
+const FLAT: f64 = 2.0;
+/// Neighbours in a single row: so many on either side. In a row or a column of light each has two that are as bright.
+const BESIDE: u32 = 2;
 /// By chance at most one pixel in so many is called hot or dead: one in a thousand of the largest arrays.
 const ONE_IN: f64 = 65_536.0 * 1000.0;
 
@@ -18,7 +25,8 @@ pub struct Pixels {
     pub between: (f64, f64),
     /// The 10th and 90th percentile of the pixels.
     pub spread: (f64, f64),
-    /// Hot pixels: with many times the background of the others.
+    /// Hot pixels: flat, with many times the background of the others, and of all but one of their neighbours. Pixels in the
+    /// sun have such neighbours, or see a pulse.
     pub hot: Vec<usize>,
     /// Dead pixels: without a photon, where even the darkest of the others have so many that chance does not
     /// explain it.
@@ -26,11 +34,13 @@ pub struct Pixels {
 }
 
 impl Pixels {
-    /// Classifies `pixels` pixels from the background of each trace.
+    /// Classifies the pixels of `array` from the background of each trace.
     #[must_use]
-    pub fn new(pixels: usize, traces: &[Trace], levels: &[Level]) -> Self {
+    pub fn new(array: Array, traces: &[Trace], levels: &[Level]) -> Self {
+        let pixels = array.pixels() as usize;
         let mut of = vec![Sum::default(); pixels];
-        for (trace, level) in traces.iter().zip(levels) {
+        let all = || traces.iter().zip(levels);
+        for (trace, level) in all() {
             of[trace.pixel].add(trace, level);
         }
         // Most of the pixels may be dead: the median is that of pixels with photons.
@@ -45,15 +55,21 @@ impl Pixels {
         let alive = of.iter().filter(|pixel| !is_dead(pixel));
         let rate = median(alive.map(Sum::rate));
         // One photon more, as the median may be 0.
-        let is_hot = |pixel: &Sum| {
-            let most = HOT * (rate * pixel.exposure + 1.0);
+        let is_brighter = |pixel: &Sum, than: f64| {
+            let most = HOT * (than * pixel.exposure + 1.0);
             is_surely_more(pixel.photons, most, ONE_IN)
         };
-        let indices = |is: &dyn Fn(&Sum) -> bool| (0..pixels).filter(|&at| is(&of[at])).collect();
-        let mut good: Vec<&Sum> = of
-            .iter()
-            .filter(|pixel| !is_dead(pixel) && !is_hot(pixel))
-            .collect();
+        let is_hot = |&at: &usize| {
+            let neighbours = neighbours(array, at).map(|other| of[other].rate());
+            is_brighter(&of[at], rate)
+                && is_brighter(&of[at], second_highest(neighbours))
+                && !all().any(|(trace, level)| trace.pixel == at && has_pulse(trace, level))
+        };
+        let hot: Vec<usize> = (0..pixels).filter(is_hot).collect();
+        let dead: Vec<usize> = (0..pixels).filter(|&at| is_dead(&of[at])).collect();
+        let is_bad = |at: &usize| hot.binary_search(at).is_ok() || dead.binary_search(at).is_ok();
+        let good = (0..pixels).filter(|at| !is_bad(at));
+        let mut good: Vec<&Sum> = good.map(|at| &of[at]).collect();
         good.sort_by(|one, other| one.rate().total_cmp(&other.rate()));
         let quarter = good.len() / 4;
         let middle = &good[quarter..good.len() - quarter];
@@ -71,8 +87,8 @@ impl Pixels {
             background,
             between: ((background - error).max(0.0), background + error),
             spread: (quantile(rates(), 0.1), quantile(rates(), 0.9)),
-            hot: indices(&is_hot),
-            dead: indices(&is_dead),
+            hot,
+            dead,
         }
     }
 
@@ -96,11 +112,99 @@ struct Sum {
 impl Sum {
     fn add(&mut self, trace: &Trace, level: &Level) {
         self.photons += level.photons();
-        self.exposure += level.clear_bins() as f64 * trace.cycles;
+        self.exposure += level.clear_bins * trace.cycles;
         self.total += trace.counts.iter().sum::<f64>();
     }
 
     fn rate(&self) -> f64 {
         self.photons / self.exposure.max(1.0)
+    }
+}
+
+/// Whether a histogram has a peak that rises after its first bin, from a background that is lower.
+fn has_pulse(trace: &Trace, level: &Level) -> bool {
+    let peaks = Peak::all(&trace.counts, &trace.live, level.mean);
+    let is_pulse = |peak: &Peak| peak.first > 0 && trace.counts[peak.top] > FLAT * level.mean;
+    peaks.iter().any(is_pulse)
+}
+
+/// The pixels around pixel `at`, without those past the edges.
+fn neighbours(array: Array, at: usize) -> impl Iterator<Item = usize> {
+    let (columns, rows) = (array.columns(), array.rows());
+    let reach = match columns.min(rows) {
+        1 => BESIDE,
+        _ => 1,
+    };
+    #[allow(clippy::cast_possible_truncation, reason = "at most 65,536 pixels")]
+    let (column, row) = (at as u32 % columns, at as u32 / columns);
+    let about =
+        move |place: u32, end: u32| place.saturating_sub(reach)..(place + reach + 1).min(end);
+    let all = about(row, rows)
+        .flat_map(move |row| about(column, columns).map(move |column| row * columns + column));
+    all.map(|other| other as usize)
+        .filter(move |&other| other != at)
+}
+
+/// The second highest value, the highest if there is only one, 0 without any.
+fn second_highest(values: impl Iterator<Item = f64>) -> f64 {
+    let mut values: Vec<f64> = values.collect();
+    values.sort_by(|one, other| other.total_cmp(one));
+    values.get(1).or(values.first()).copied().unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The pixels that are hot in an array of 8×8 or 1×64, where these are `times` as bright as the others.
+    fn hot(array: Array, bright: &[usize], times: f64, pulse: f64) -> Vec<usize> {
+        let traces: Vec<Trace> = (0..64)
+            .map(|pixel| {
+                let level = if bright.contains(&pixel) {
+                    20.0 * times
+                } else {
+                    20.0
+                };
+                let mut counts = vec![level; 64];
+                counts[40] += pulse * level;
+                Trace {
+                    pixel,
+                    cycles: 1000.0,
+                    counts,
+                    live: vec![1.0; 64],
+                    truth_mm: None,
+                }
+            })
+            .collect();
+        let levels = traces.iter();
+        let levels: Vec<Level> = levels
+            .map(|trace| Level::of(&trace.counts, &trace.live))
+            .collect();
+        Pixels::new(array, &traces, &levels).hot
+    }
+
+    #[test]
+    fn pixels_alone_or_in_pairs_are_hot_and_patches_are_not() {
+        let (square, row) = (Array::new(8, 8).unwrap(), Array::new(64, 1).unwrap());
+        for pixel in 0..64 {
+            assert_eq!(hot(square, &[pixel], 30.0, 0.0), [pixel]);
+            assert_eq!(hot(row, &[pixel], 30.0, 0.0), [pixel]);
+            // Not much brighter, or with a pulse.
+            assert!(hot(square, &[pixel], 8.0, 0.0).is_empty());
+            assert!(hot(square, &[pixel], 30.0, 1.2).is_empty());
+        }
+        for (column, row) in (0..7).flat_map(|column| (0..7).map(move |row| (column, row))) {
+            let corner = 8 * row + column;
+            assert_eq!(
+                hot(square, &[corner, corner + 9], 30.0, 0.0),
+                [corner, corner + 9]
+            );
+            let patch = [corner, corner + 1, corner + 8, corner + 9];
+            assert!(hot(square, &patch, 30.0, 0.0).is_empty(), "{patch:?}");
+        }
+        assert!(hot(row, &[20, 21, 22], 30.0, 0.0).is_empty());
+        let strip: Vec<usize> = (0..8).map(|row| 8 * row + 3).collect();
+        // But for the ends of a line.
+        assert_eq!(hot(square, &strip, 30.0, 0.0), [strip[0], strip[7]]);
     }
 }

@@ -23,6 +23,8 @@ pub struct Window {
     pub about_top: Vec<f64>,
     /// Counts of the bins around the top, up to the next peaks.
     counts: Vec<f64>,
+    /// The share of the laser cycles in which the TDC was live in each of them.
+    live: Vec<f64>,
     /// The first bin of `counts`.
     start: usize,
     /// The index of the top in `counts`, and the first and last index that is fitted.
@@ -31,10 +33,11 @@ pub struct Window {
 }
 
 impl Window {
-    /// The peak at `top` of a histogram, which has no other peak in `first..=last`.
+    /// The peak at `top` of a histogram, which has no other peak in `first..=last`. The TDC was `live` in so much of the
+    /// laser cycles in each bin.
     #[must_use]
     pub fn new(
-        counts: &[f64],
+        (counts, live): (&[f64], &[f64]),
         background: f64,
         cycles: f64,
         (first, top, last): (usize, usize, usize),
@@ -50,7 +53,7 @@ impl Window {
                 }
             })
             .collect();
-        let counts = counts[first..=last].to_vec();
+        let (counts, live) = (counts[first..=last].to_vec(), live[first..=last].to_vec());
         let top = top - first;
         // The full width at half maximum, one and a half times on either side.
         let half = background + (counts[top] - background) / 2.0;
@@ -72,6 +75,7 @@ impl Window {
             photons,
             about_top,
             counts,
+            live,
             start: first,
             top,
             fitted,
@@ -81,8 +85,10 @@ impl Window {
     /// The signal-to-noise ratio.
     #[must_use]
     pub fn snr(&self) -> f64 {
-        let all = self.counts[self.fitted.0..=self.fitted.1].iter();
-        self.photons / all.sum::<f64>().max(1.0).sqrt()
+        let all = self.fitted.0..=self.fitted.1;
+        let variance = self.counts[all.clone()].iter().zip(&self.live[all]);
+        let variance = variance.map(|(count, live)| count / live.max(1e-6));
+        self.photons / variance.sum::<f64>().max(1.0).sqrt()
     }
 
     /// With fewer background bins in the fit: at most those within 4σ and two more of the top.
@@ -130,11 +136,27 @@ impl Window {
         bins.map(|(bin, count)| (self.start + bin, count))
     }
 
+    /// The photons that come from `side` to `side` + 4 bins after `position`, less those that come as much before it.
+    #[must_use]
+    pub fn late_excess(&self, position: f64, side: f64) -> f64 {
+        let at = position - self.start as f64;
+        let inside = |bin: usize, from: f64, to: f64| {
+            let (first, end) = (bin as f64, bin as f64 + 1.0);
+            (end.min(to) - first.max(from)).max(0.0)
+        };
+        let (near, far) = (side, side + 4.0);
+        let of_bin = |(bin, count): (usize, &f64)| {
+            let late = inside(bin, at + near, at + far) - inside(bin, at - far, at - near);
+            late * (count - self.background)
+        };
+        self.counts.iter().enumerate().map(of_bin).sum()
+    }
+
     /// The Gaussian of `sigma` that fits best.
     #[must_use]
     pub fn fit(&self, sigma: f64) -> Fit {
         let (first, last) = self.fitted;
-        let counts = &self.counts[first..=last];
+        let (counts, live) = (&self.counts[first..=last], &self.live[first..=last]);
         let mut amplitude = self.photons.max(1.0);
         // In bins from the start of the window.
         let mut position = self.centroid();
@@ -143,15 +165,15 @@ impl Window {
         for _ in 0..STEPS {
             share(&mut shares, first, position, sigma);
             let (mut score, mut info) = ([0.0; 2], [0.0; 3]);
-            for (count, (share, slope)) in counts.iter().zip(&shares) {
+            for ((count, live), (share, slope)) in counts.iter().zip(live).zip(&shares) {
                 let mean = (self.background + amplitude * share).max(1e-12);
-                let off = count / mean - 1.0;
+                let off = live * (count / mean - 1.0);
                 let moved = amplitude * slope;
                 score[0] += off * share;
                 score[1] += off * moved;
-                info[0] += share * share / mean;
-                info[1] += share * moved / mean;
-                info[2] += moved * moved / mean;
+                info[0] += live * share * share / mean;
+                info[1] += live * share * moved / mean;
+                info[2] += live * moved * moved / mean;
             }
             let determinant = info[0] * info[2] - info[1] * info[1];
             if determinant <= 0.0 || !determinant.is_finite() {
@@ -169,17 +191,19 @@ impl Window {
             }
         }
         share(&mut shares, first, position, sigma);
-        let (mut likelihood, mut deviance) = (0.0, 0.0);
-        for (&count, (share, _)) in counts.iter().zip(&shares) {
+        let (mut likelihood, mut deviance, mut recorded) = (0.0, 0.0, 0.0);
+        for ((&count, live), (share, _)) in counts.iter().zip(live).zip(&shares) {
             let mean = (self.background + amplitude * share).max(1e-12);
-            likelihood += count * mean.ln() - mean;
-            deviance += 2.0 * (mean - count);
+            recorded += live * amplitude * share;
+            likelihood += live * (count * mean.ln() - mean);
+            deviance += 2.0 * live * (mean - count);
             if count > 0.0 {
-                deviance += 2.0 * count * (count / mean).ln();
+                deviance += 2.0 * live * count * (count / mean).ln();
             }
         }
         Fit {
             amplitude,
+            recorded,
             position: self.start as f64 + position,
             likelihood: likelihood - information / 2.0,
             deviance,
@@ -222,6 +246,8 @@ pub struct Fit {
     pub amplitude: f64,
     /// Its centre, in bins from the start of bin 0.
     pub position: f64,
+    /// Those of its photons that were recorded.
+    recorded: f64,
     likelihood: f64,
     deviance: f64,
     freedom: f64,
@@ -237,7 +263,7 @@ impl Fit {
     /// The root mean square of the residuals as a share of the photons, less shot noise.
     #[must_use]
     pub fn residual_share(&self) -> f64 {
-        ((self.deviance - self.freedom).max(0.0) / self.amplitude.max(1.0)).sqrt()
+        ((self.deviance - self.freedom).max(0.0) / self.recorded.max(1.0)).sqrt()
     }
 }
 
@@ -293,7 +319,7 @@ mod tests {
             let counts: Vec<f64> = (0..64)
                 .map(|bin| 12.0 + 4000.0 * bin_share(bin, position, sigma))
                 .collect();
-            let window = Window::new(&counts, 12.0, 100.0, (0, 20, 63));
+            let window = Window::new((&counts, &[1.0; 64]), 12.0, 100.0, (0, 20, 63));
             let (found, fits) = best(&[window]);
             // Cox and Reid's term moves it by about 1/(2·4000).
             assert!((found / sigma - 1.0).abs() < 2e-3, "{found} for {sigma}");

@@ -25,6 +25,19 @@ pub fn is_surely_more(count: f64, mean: f64, one_in: f64) -> bool {
     count > mean && chernoff_exponent(count, mean) > one_in.ln()
 }
 
+/// Whether the bins `counts`, corrected for pile-up, hold more than `background` a bin, and so much that chance
+/// explains it less than once in `one_in`. The TDC was `live` in so much of the laser cycles: that share of both was
+/// recorded.
+#[must_use]
+pub fn are_surely_more(counts: &[f64], live: &[f64], background: f64, one_in: f64) -> bool {
+    let recorded = counts.iter().zip(live).map(|(count, live)| count * live);
+    is_surely_more(
+        recorded.sum(),
+        background * live.iter().sum::<f64>(),
+        one_in,
+    )
+}
+
 /// The same for a count below `mean`.
 #[must_use]
 pub fn is_surely_less(count: f64, mean: f64, one_in: f64) -> bool {

@@ -35,6 +35,8 @@ pub struct Drawn {
     pub offset_mm: f64,
     pub hot: Vec<usize>,
     pub dead: Vec<usize>,
+    /// Whether the pulse may be seen above the noise of a hot pixel, which then is none.
+    pub shows_in_hot: bool,
     surfaces: usize,
 }
 
@@ -128,6 +130,8 @@ impl Drawn {
             offset_mm: between(-300.0, 300.0),
             hot,
             dead,
+            // Surfaces have up to twice the signal; a pulse is as high as the background, at least.
+            shows_in_hot: 2.0 * signal * bin_share(0, 0.5, sigma) > 0.8 * 100.0 * background,
             surfaces,
         }
     }
@@ -182,6 +186,7 @@ pub fn observed(
         slant: None,
         bias_mm: None,
         offsets_mm: &[],
+        early: None,
     }
 }
 

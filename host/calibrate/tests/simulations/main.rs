@@ -9,6 +9,7 @@
 mod drawn;
 mod glass;
 mod pile_up;
+mod robust;
 mod scenes;
 
 /// Returns `slow` if `DTOF_SLOW` is set, and `quick` in a plain `cargo test`.

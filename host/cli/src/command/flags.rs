@@ -181,7 +181,8 @@ flags! {
     settings Text("FILE") => "Settings file in TOML, such as every run writes; options override it. \
         docs/settings.md lists its keys";
     gate Text("FIRST..LAST") => "First and last bin that may hold the peak, as 20..119 [default: all bins]";
-    masked Text("PIXELS") => "Pixels to leave out, such as hot and dead ones, as 3,70";
+    masked Text("PIXELS") => "Pixels to leave out, such as hot and dead ones, as 3,70, beside those that are found; \
+        none leaves out none";
     sigma_bins Signed("S") => "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. It \
         sets the window for the depth [default: the depth is the centroid of three bins]";
 }
@@ -274,10 +275,15 @@ flags! {
     CALIBRATE:
     target_mm Signed("MM") => "Distance in millimetres of a flat target that most pixels see: with --fov straight \
         ahead, as a tape measures it, else along the ray of the median pixel";
-    glass OneOf(yes_or_no) => "Whether the nearest surface is a cover glass, if all pixels have it at the same bin";
     false_alarm Text("SHARE") => "Share of exposures without a target that end with an event, at most 0.1 \
         [default: 0.01]";
     seed Text("N") => "Seed of the simulation [default: 1]";
+}
+
+flags! {
+    SEARCH:
+    glass OneOf(yes_or_no) => "Whether the nearest surface that most pixels see is a cover glass, which the gate then \
+        leaves out [default: if all pixels have it at one place and half of them see something behind it]";
 }
 
 flags! {
@@ -365,10 +371,10 @@ macro_rules! has_flags {
 has_flags! {
     ProjectionOptions: PROJECTION;
     Operation: DEVICE SENSOR TDC DITHER DETECTION;
-    replay::Options: RECORDING SENSOR TDC DETECTION FRAME REPLAY;
+    replay::Options: RECORDING SENSOR TDC DETECTION FRAME SEARCH REPLAY;
     simulate::Options: ARRAY SENSOR TDC DETECTION FRAME SIMULATE;
-    calibrate::Options: RECORDING PULSE RAYS CALIBRATE;
-    compare::Options: ACCURACY RECORDING SENSOR TDC COMPARE;
+    calibrate::Options: RECORDING PULSE TDC RAYS SEARCH CALIBRATE;
+    compare::Options: ACCURACY RECORDING SENSOR TDC SEARCH COMPARE;
     tune::Options: TUNE;
 }
 

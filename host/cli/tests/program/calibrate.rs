@@ -286,15 +286,19 @@ fn options_override_what_is_found() {
 
 /// A mask is taken as it is, so that a warning names the hot pixels that it leaves in.
 #[test]
-fn a_mask_that_leaves_hot_pixels_in_is_warned_of() {
+fn a_mask_adds_to_what_is_found_unless_it_is_none() {
     let scratch = Scratch::new();
     let hot = scratch.file("hot.npy", with_hot(&scene(0.02, 5.0), Some((3, 20_000))));
-    let summary = scratch.replayed(&hot, "--mask 5");
-    assert_eq!(summary["settings"]["masked"], serde_json::json!([5]));
-    let warning = "hot or dead pixels that --mask does not leave out: 3; add them to it";
-    assert_eq!(summary["warnings"], serde_json::json!([warning]));
-    let summary = scratch.replayed(&hot, "--mask 5,3");
-    assert_eq!(summary["warnings"], serde_json::json!([]));
+    for (options, masked) in [
+        ("", serde_json::json!([3])),
+        ("--mask 5", serde_json::json!([3, 5])),
+        ("--mask 3,5", serde_json::json!([3, 5])),
+        ("--mask none", serde_json::Value::Null),
+    ] {
+        let summary = scratch.replayed(&hot, options);
+        assert_eq!(summary["settings"]["masked"], masked, "{options}");
+        assert_eq!(summary["warnings"], serde_json::json!([]), "{options}");
+    }
 }
 
 /// A gate is taken as it is, so that a warning says where the photons of the glass are.

@@ -191,9 +191,12 @@ fn offsets(text: &str) -> Result<Vec<I24F8>, String> {
     list(text, &[','], fixed)
 }
 
-/// Reads addresses.
+/// Reads addresses; `none` leaves no pixel out, whatever a search finds.
 fn masked(text: &str) -> Result<Vec<u16>, String> {
-    list(text, &[','], integer(0..=u16::MAX))
+    match text {
+        "none" => Ok(Vec::new()),
+        text => list(text, &[','], integer(0..=u16::MAX)),
+    }
 }
 
 /// Reads the standard deviation of a pulse in bins.

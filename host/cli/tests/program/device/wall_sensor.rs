@@ -46,13 +46,9 @@ pub const WHOLE_BIN_PS: U16F16 = U16F16::lit("100");
 /// Photons a laser cycle of signal and background, by pixel.
 pub type Rates = fn(u16) -> (f64, f64);
 
-pub const WALL: Rates = |pixel| {
-    let hot = if pixel == HOT {
-        HOT_BACKGROUND
-    } else {
-        BACKGROUND
-    };
-    (SIGNAL, hot)
+pub const WALL: Rates = |pixel| match pixel {
+    HOT => (0.0, HOT_BACKGROUND),
+    _ => (SIGNAL, BACKGROUND),
 };
 
 /// The highest bin of one pixel would fill its counter in 700 laser cycles.
