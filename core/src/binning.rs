@@ -47,7 +47,7 @@ use crate::config::PixelConfig;
 use crate::detect::DetectionRule;
 use crate::event::DepthEvent;
 use crate::histogram::counter::Count16;
-use crate::pixel::{AsyncPixel, DecisionInput, Look};
+use crate::pixel::{AsyncPixel, DecisionInput, Look, unobserved};
 use crate::statistics::Statistics;
 use crate::units::{BlockLevel, LaserCycle, PixelAddress};
 
@@ -205,6 +205,25 @@ impl<const BINS: usize> Block<BINS> {
         }
     }
 
+    /// Ends `cycles` laser cycles at once, as [`AsyncPixel::end_laser_cycles_with`] does for a pixel.
+    #[inline]
+    pub fn end_laser_cycles_with<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        last: LaserCycle,
+        cycles: u16,
+        observe: impl FnOnce(&DecisionInput<'_, BINS, Count16>),
+    ) -> Look {
+        let pixel = &mut self.pixel;
+        let look = pixel.end_cycles::<R, false>(config, statistics, last, cycles, observe);
+        // Also where it has waited for another echo, after a report.
+        if matches!(look, Look::Event | Look::Ended) {
+            self.link.reported();
+        }
+        look
+    }
+
     /// A tick: see [`BlockLink::tick`].
     pub const fn tick(&mut self) {
         self.link.tick(self.pixel.has_reported());
@@ -263,34 +282,11 @@ pub fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule>(
     last: LaserCycle,
     cycles: u16,
 ) -> bool {
-    end_laser_cycles_of_blocks_with(blocks, config, statistics, last, cycles, |_, _| ())
-}
-
-/// The same with an observer. For each event it gets the number of the block in `blocks` and
-/// what the decision was made from.
-pub fn end_laser_cycles_of_blocks_with<const BINS: usize, R: DetectionRule>(
-    blocks: &mut [impl AsMut<Block<BINS>>],
-    config: &PixelConfig<BINS, R>,
-    statistics: &mut Statistics,
-    last: LaserCycle,
-    cycles: u16,
-    mut observe: impl FnMut(usize, &DecisionInput<'_, BINS, Count16>),
-) -> bool {
     let mut fired = false;
-    for (number, block) in blocks.iter_mut().enumerate() {
+    for block in blocks {
         let block = block.as_mut();
-        let look = block
-            .pixel
-            .end_cycles::<R, false>(config, statistics, last, cycles, |input| {
-                observe(number, input);
-            });
-        if look == Look::Event {
-            block.link.reported();
-            fired = true;
-        } else if look == Look::Ended {
-            // It has waited for another echo, after a report.
-            block.link.reported();
-        }
+        let look = block.end_laser_cycles_with(config, statistics, last, cycles, unobserved);
+        fired |= look == Look::Event;
     }
     fired
 }

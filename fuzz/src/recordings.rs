@@ -26,7 +26,7 @@ const CYCLES: u16 = 300;
 fn opening(choice: u8) -> ReadOptions {
     let is = |bit: u8| choice >> bit & 1 == 1;
     ReadOptions {
-        cycles: CYCLES.into(),
+        cycles: Some(CYCLES.into()),
         rebin: if is(0) { 2 } else { 1 },
         columns: is(1).then_some(2),
         bins: is(2).then_some(8),

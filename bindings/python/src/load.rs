@@ -38,7 +38,7 @@ pub fn load<'py>(py: Python<'py>, input: PyInput, keywords: Keywords) -> PyResul
         let requested = options.requested()?;
         let mut options = read_options(&requested);
         if requested.run.cycles.is_none() {
-            options.cycles = u64::MAX;
+            options.cycles = Some(u64::MAX);
         }
         counts(&input, &options).map_err(|error| requested.add_file_name(error))
     })?;

@@ -12,7 +12,7 @@ use dtof_photons::input::Input;
 use dtof_photons::ranges::Ranges;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_run::output::header;
-use dtof_run::recording::{read_options, warnings};
+use dtof_run::recording::warnings;
 use dtof_run::replay::Options;
 use dtof_run::simulate::Options as SimulateOptions;
 use dtof_run::{RunResult, Sink};
@@ -55,24 +55,18 @@ pub fn check_options(keywords: Keywords) -> PyResult<()> {
     options_over::<Options>(keywords).map(drop)
 }
 
-/// Replays a recording, a file or an array. `cycles` are the laser cycles of a recording that is replayed
-/// to its end by default.
+/// Replays a recording, a file or an array.
 #[pyfunction]
-#[pyo3(signature = (input, keywords, progress, cycles=None))]
 pub fn replay<'py>(
     py: Python<'py>,
     input: PyInput,
     keywords: Keywords,
     progress: Option<Bound<'py, PyAny>>,
-    cycles: Option<u64>,
 ) -> PyResult<PyRunResult<'py>> {
     let options: Options = options_over(keywords)?;
     let input = Input::from(input);
     let finished = work(py, progress, move |control| {
-        let mut requested = options.requested()?;
-        // Only more than the default replays.
-        let cycles = cycles.filter(|&cycles| cycles > read_options(&requested).cycles);
-        requested.run.cycles = requested.run.cycles.or(cycles);
+        let requested = options.requested()?;
         run_replay(&options, &input, &requested, control)
             .map_err(|error| requested.add_file_name(error))
     })?;

@@ -129,8 +129,10 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             .unwrap_or(Look::NoPeak)
     }
 
-    /// The length at which this exposure ends without an event.
-    fn longest<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> u16 {
+    /// The length at which this exposure ends without another event: L2, or where the wait for the next echo is over.
+    #[inline]
+    #[must_use]
+    pub fn longest<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> u16 {
         if self.state.contains(State::HAS_ECHO) {
             self.longest_after_echo(config)
         } else {

@@ -187,6 +187,11 @@ impl PhotonSource for Stressed {
         self.cycles
     }
 
+    /// It adds photons.
+    fn sparse_cycles(&self, _photons: u64) -> u64 {
+        0
+    }
+
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
         use rayon::prelude::*;
 

@@ -15,7 +15,7 @@ use super::group::sort;
 use crate::Engine;
 use crate::settings::Settings;
 use dtof_options::Refused;
-use dtof_photons::source::Slice;
+use dtof_photons::source::{Photon, Slice};
 
 /// Accepts any peak above the background.
 pub const ANY: PaperRule = PaperRule::new(U8F8::ZERO, Count::saturating(1));
@@ -63,7 +63,13 @@ impl<const BINS: usize> FramePixel<BINS> {
         }
     }
 
-    /// Ends laser cycle `cycle`. Returns an event when the frame ends, if a bin is above the
+    /// The first laser cycle after the frame.
+    #[must_use]
+    pub fn end(&self) -> u64 {
+        self.first + u64::from(self.length)
+    }
+
+    /// Ends the laser cycles up to and with `cycle`, which are of one frame. Returns an event when the frame ends, if a bin is above the
     /// paper's background.
     pub fn end_laser_cycle(
         &mut self,
@@ -71,7 +77,7 @@ impl<const BINS: usize> FramePixel<BINS> {
         estimator: &DepthEstimator,
         cycle: u64,
     ) -> Option<DepthEvent> {
-        if cycle + 1 < self.first + u64::from(self.length) {
+        if cycle + 1 < self.end() {
             return None;
         }
         self.first = cycle + 1;
@@ -138,12 +144,19 @@ impl<const BINS: usize> Engine for FrameEngine<BINS> {
         let mut events = Vec::new();
         for (pixel, received) in self.pixels.iter_mut().zip(&slice.pixels) {
             let mut photons = received.photons.iter().peekable();
-            for cycle in 0..received.cycles {
-                let now = slice.first_cycle + u64::from(cycle);
-                while let Some(photon) = photons.next_if(|photon| photon.cycle == cycle) {
-                    pixel.count(&self.gate, now, photon.code);
+            let (mut now, end) = (
+                slice.first_cycle,
+                slice.first_cycle + u64::from(received.cycles),
+            );
+            // Up to the end of each frame, and of the slice.
+            while now < end {
+                let next = pixel.end().clamp(now + 1, end);
+                let cycle = |photon: &Photon| slice.first_cycle + u64::from(photon.cycle);
+                while let Some(photon) = photons.next_if(|photon| cycle(photon) < next) {
+                    pixel.count(&self.gate, cycle(photon), photon.code);
                 }
-                events.extend(pixel.end_laser_cycle(&self.gate, &self.estimator, now));
+                events.extend(pixel.end_laser_cycle(&self.gate, &self.estimator, next - 1));
+                now = next;
             }
         }
         sort(&mut events, slice.first_cycle);

@@ -2,17 +2,16 @@
 //! blocks. Groups are independent, so each may run on its own thread.
 
 use anyhow::{Context, Result};
-use dtof_core::binning::{
-    Binning, Block, BlockLink, BlockPlace, count_in_blocks, end_laser_cycles_of_blocks_with,
-};
+use dtof_core::binning::{Binning, Block, BlockLink, BlockPlace, count_in_blocks};
 use dtof_core::rule::DecisionInput;
 use dtof_core::{
-    AnyRule, Array, AsyncPixel, BlockLevel, Count16, CounterWidth, DepthEvent, EchoNumber,
-    LaserCycle, Look, PixelAddress, PixelConfig, Statistics,
+    AnyRule, Array, AsyncPixel, BlockLevel, CounterWidth, DepthEvent, LaserCycle, Look,
+    PixelAddress, PixelConfig, Statistics,
 };
 use dtof_link::AdaptiveBinning;
 
 use super::decisions::{Decision, LastDecision};
+use super::jump::{after, has_too_few_photons, idle_cycles, look_after, within};
 use dtof_photons::source::PixelPhotons;
 
 /// The configurations of pixels and blocks.
@@ -33,14 +32,71 @@ struct Member<const BINS: usize, W: CounterWidth> {
     number: usize,
     pixel: AsyncPixel<BINS, W>,
     link: Option<BlockLink>,
+    /// The last look found no peak, and a later one does not without a photon. None has come since.
+    has_no_peak: bool,
     /// The last decision, if it is kept.
     last: Option<Box<LastDecision<BINS>>>,
 }
 
+/// A block of a group.
+#[derive(Clone, Debug)]
+struct BlockMember<const BINS: usize> {
+    block: Block<BINS>,
+    /// The photons of the last look, if it found no peak.
+    without_peak: Option<u32>,
+    /// The last decision, if it is kept.
+    last: Option<Box<LastDecision<BINS>>>,
+}
+
+/// A pixel or a block, which looks for itself while no photon comes.
+trait Looks<const BINS: usize> {
+    /// Laser cycles from now on in which its looks decide nothing.
+    fn idle_cycles(&self, configs: &Configs<BINS>) -> u16;
+
+    /// Ends `cycles` laser cycles, up to `last`. Takes the event at once.
+    fn end_laser_cycles(
+        &mut self,
+        configs: &Configs<BINS>,
+        done: &mut Done,
+        last: LaserCycle,
+        cycles: u16,
+    ) -> Look;
+
+    /// Ends `cycles` laser cycles from `first` on, whose photons are counted: they are all in those up to the first look.
+    fn advance(
+        &mut self,
+        configs: &Configs<BINS>,
+        done: &mut Done,
+        first: u64,
+        cycles: u16,
+        mut since_look: u16,
+    ) {
+        let (x, mut ended) = (configs.pixels.x(), 0);
+        while ended < cycles {
+            let idle = self.idle_cycles(configs).into();
+            let step = look_after(idle, since_look, x);
+            let step = within(cycles - ended, step, since_look, x);
+            ended += step;
+            let last = LaserCycle::new(first + u64::from(ended) - 1);
+            self.end_laser_cycles(configs, done, last, step);
+            since_look = after(since_look, step, x);
+        }
+    }
+}
+
 impl<const BINS: usize, W: CounterWidth> Member<BINS, W> {
-    /// Runs a single pixel, `since_look` laser cycles after its last look. Looks before L1 decide
-    /// nothing, and a look without a new photon decides as the last did, so the photons up to the first
-    /// look that can decide otherwise are counted at once.
+    fn new(number: usize, address: PixelAddress, link: Option<BlockLink>) -> Self {
+        Self {
+            number,
+            pixel: AsyncPixel::new(address),
+            link,
+            has_no_peak: false,
+            last: None,
+        }
+    }
+
+    /// Runs a single pixel, `since_look` laser cycles after its last look. The photons up to the first look that can
+    /// decide otherwise than the last are counted at once.
     fn run(
         &mut self,
         configs: &Configs<BINS>,
@@ -50,37 +106,20 @@ impl<const BINS: usize, W: CounterWidth> Member<BINS, W> {
         done: &mut Done,
     ) {
         let (config, x) = (&configs.pixels, configs.pixels.x());
-        // With a dead time, or after an echo, a decision depends on the laser cycles, too.
-        let by_photons = !config.weighs_dead_time() && config.echoes() == EchoNumber::FIRST;
-        let mut has_no_peak = false;
         let mut photons = &received.photons[..];
         let mut cycle = 0;
         while cycle < received.cycles {
-            let left = received.cycles - cycle;
-            let mut cycles = x - *since_look;
-            let exposure = self.pixel.exposure();
-            let mut early = config.l1().saturating_sub(exposure);
-            if has_no_peak && by_photons {
-                let next = photons
-                    .first()
-                    .map_or(received.cycles, |photon| photon.cycle);
-                early = (next - cycle).min(config.l2() - 1 - exposure);
+            let next = photons.first();
+            let next = next.map_or(received.cycles, |photon| photon.cycle) - cycle;
+            // Photons before L1 may wait for the first look after it.
+            let early = config.l1().saturating_sub(self.pixel.exposure());
+            let idle = self.idle_cycles(configs).min(next).max(early);
+            let step = look_after(idle.into(), *since_look, x);
+            let step = within(received.cycles - cycle, step, *since_look, x);
+            cycle += step;
+            if next < step {
+                self.has_no_peak = false;
             }
-            if early >= cycles {
-                cycles = cycles
-                    .saturating_add((early - cycles) / x * x)
-                    .saturating_add(x);
-            }
-            if cycles > left {
-                // Up to the last look in the slice, if there is one, and then to its end.
-                let after_look = after(*since_look, left, x);
-                cycles = if left > after_look {
-                    left - after_look
-                } else {
-                    left
-                };
-            }
-            cycle += cycles;
             while let Some((photon, later)) = photons.split_first()
                 && photon.cycle < cycle
             {
@@ -88,32 +127,49 @@ impl<const BINS: usize, W: CounterWidth> Member<BINS, W> {
                 photons = later;
             }
             let last = LaserCycle::new(first + u64::from(cycle) - 1);
-            let look = self.end_laser_cycles(config, done, last, cycles);
-            has_no_peak = look == Look::NoPeak;
-            *since_look = match look {
-                Look::NotDue => *since_look + cycles,
-                _ => 0,
-            };
+            self.end_laser_cycles(configs, done, last, step);
+            *since_look = after(*since_look, step, x);
         }
     }
+}
 
-    /// Ends `cycles` laser cycles, up to `last`. Takes the event at once.
+impl<const BINS: usize, W: CounterWidth> Looks<BINS> for Member<BINS, W> {
+    fn idle_cycles(&self, configs: &Configs<BINS>) -> u16 {
+        let config = &configs.pixels;
+        let is_empty = self.pixel.histogram().total() == 0 && !config.weighs_dead_time();
+        idle_cycles(&self.pixel, config, self.has_no_peak || is_empty)
+    }
+
     fn end_laser_cycles(
         &mut self,
-        config: &PixelConfig<BINS, AnyRule>,
+        configs: &Configs<BINS>,
         done: &mut Done,
         last: LaserCycle,
         cycles: u16,
     ) -> Look {
-        let kept = &mut self.last;
+        let (config, kept, statistics) = (&configs.pixels, &mut self.last, &mut done.pixels);
         let observe = |input: &DecisionInput<'_, BINS, _>| {
             if let Some(kept) = kept {
                 kept.record_input(input);
             }
         };
-        let look =
-            self.pixel
-                .end_laser_cycles_with(config, &mut done.pixels, last, cycles, observe);
+        let blind_looks = statistics.blind_looks;
+        let pixel = &mut self.pixel;
+        let look = pixel.end_laser_cycles_with(config, statistics, last, cycles, observe);
+        match look {
+            // Only the end of a slice.
+            Look::NotDue => {}
+            Look::NoPeak if config.weighs_dead_time() => {
+                let is_blind = statistics.blind_looks > blind_looks;
+                self.has_no_peak = !is_blind && has_too_few_photons(pixel, config);
+            }
+            look => self.has_no_peak = look == Look::NoPeak,
+        }
+        // It is not silent: it reports, or has reported in this exposure.
+        let has_reported = matches!(look, Look::Event | Look::Ended);
+        if let Some(link) = self.link.as_mut().filter(|_| has_reported) {
+            link.reported();
+        }
         if let Some(event) = self.pixel.take_event() {
             if let Some(kept) = &mut self.last {
                 kept.record_event(event);
@@ -124,19 +180,60 @@ impl<const BINS: usize, W: CounterWidth> Member<BINS, W> {
     }
 }
 
-/// Laser cycles since the last look, `cycles` later, with a look every `x`.
-fn after(since_look: u16, cycles: u16, x: u16) -> u16 {
-    let rest = (u32::from(since_look) + u32::from(cycles)) % u32::from(x);
-    u16::try_from(rest).unwrap_or(0)
+impl<const BINS: usize> BlockMember<BINS> {
+    /// The photons that it decides on: more whenever one comes.
+    fn photons(&self) -> u32 {
+        let histogram = self.block.pixel().histogram();
+        histogram.total().wrapping_add(histogram.saturated())
+    }
+}
+
+impl<const BINS: usize> AsMut<Block<BINS>> for BlockMember<BINS> {
+    fn as_mut(&mut self) -> &mut Block<BINS> {
+        &mut self.block
+    }
+}
+
+impl<const BINS: usize> Looks<BINS> for BlockMember<BINS> {
+    fn idle_cycles(&self, configs: &Configs<BINS>) -> u16 {
+        let photons = self.photons();
+        let has_no_peak = photons == 0 || self.without_peak == Some(photons);
+        idle_cycles(self.block.pixel(), &configs.blocks, has_no_peak)
+    }
+
+    fn end_laser_cycles(
+        &mut self,
+        configs: &Configs<BINS>,
+        done: &mut Done,
+        last: LaserCycle,
+        cycles: u16,
+    ) -> Look {
+        let (config, kept, statistics) = (&configs.blocks, &mut self.last, &mut done.blocks);
+        let observe = |input: &DecisionInput<'_, BINS, _>| {
+            if let Some(kept) = kept {
+                kept.record_input(input);
+            }
+        };
+        let block = &mut self.block;
+        let look = block.end_laser_cycles_with(config, statistics, last, cycles, observe);
+        if look != Look::NotDue {
+            self.without_peak = (look == Look::NoPeak).then(|| self.photons());
+        }
+        if let Some(event) = self.block.take_event() {
+            if let Some(kept) = &mut self.last {
+                kept.record_event(event);
+            }
+            done.events.push(event);
+        }
+        look
+    }
 }
 
 /// Pixels and blocks in the order in which they report.
 #[derive(Clone, Debug)]
 pub struct Group<const BINS: usize, W: CounterWidth> {
     members: Vec<Member<BINS, W>>,
-    blocks: Vec<Block<BINS>>,
-    /// The last decision of each block, if it is kept.
-    block_decisions: Vec<Option<Box<LastDecision<BINS>>>>,
+    blocks: Vec<BlockMember<BINS>>,
     /// Laser cycles since the last look, and of blocks since the last tick.
     since_look: u16,
     since_tick: u16,
@@ -157,16 +254,9 @@ impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
     /// A single pixel with its index among the pixels of the source.
     #[must_use]
     pub fn single(number: usize, address: PixelAddress) -> Self {
-        let member = Member {
-            number,
-            pixel: AsyncPixel::new(address),
-            link: None,
-            last: None,
-        };
         Self {
-            members: vec![member],
+            members: vec![Member::new(number, address, None)],
             blocks: Vec::new(),
-            block_decisions: Vec::new(),
             since_look: 0,
             since_tick: 0,
         }
@@ -209,24 +299,19 @@ impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
         let local = (0..=u16::MAX).map(PixelAddress::new);
         let members = local.zip(pixels).filter_map(|(local, &address)| {
             let number = addresses.binary_search(&address).ok()?;
-            Some(Member {
-                number,
-                pixel: AsyncPixel::new(address),
-                link: Some(binning.link_of(local)),
-                last: None,
-            })
+            Some(Member::new(number, address, Some(binning.link_of(local))))
         });
-        let blocks = binning.blocks().map(|place| {
-            Block::new(BlockPlace {
+        let blocks = binning.blocks().map(|place| BlockMember {
+            block: Block::new(BlockPlace {
                 first: pixels[usize::from(place.first.raw())],
                 ..place
-            })
+            }),
+            without_peak: None,
+            last: None,
         });
-        let blocks: Vec<_> = blocks.collect();
         Ok(Self {
             members: members.collect(),
-            block_decisions: vec![None; blocks.len()],
-            blocks,
+            blocks: blocks.collect(),
             since_look: 0,
             since_tick: 0,
         })
@@ -240,69 +325,90 @@ impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
             member.run(configs, first, photons, &mut self.since_look, &mut done);
             return done;
         }
-        let photons_of = |member: &Member<BINS, W>| &photons[member.number];
-        let cycles = self.members.iter().map(|member| photons_of(member).cycles);
+        let of_slice = self.members.iter();
+        let cycles = of_slice.map(|member| photons[member.number].cycles);
         let cycles = cycles.max().unwrap_or(0);
         let mut next = vec![0; self.members.len()];
-        for cycle in 0..cycles {
-            let now = LaserCycle::new(first + u64::from(cycle));
-            for (member, next) in self.members.iter_mut().zip(&mut next) {
-                let received = &photons[member.number];
-                while let Some(photon) = received.photons.get(*next)
-                    && photon.cycle == cycle
-                {
-                    *next += 1;
-                    member.pixel.count(&configs.pixels, photon.code);
-                    if let Some(link) = &member.link {
-                        count_in_blocks(&mut self.blocks, link, &configs.blocks, photon.code);
-                    }
-                }
-                if cycle < received.cycles {
-                    let look = member.end_laser_cycles(&configs.pixels, &mut done, now, 1);
-                    // It is not silent: it reports, or has reported in this exposure.
-                    let has_reported = matches!(look, Look::Event | Look::Ended);
-                    if let Some(link) = member.link.as_mut().filter(|_| has_reported) {
-                        link.reported();
-                    }
-                }
+        let mut from = 0;
+        while from < cycles {
+            let step = self.step(configs, photons, &next, from, cycles);
+            let to = from + step;
+            self.count(configs, photons, &mut next, to);
+            let first = first + u64::from(from);
+            for member in &mut self.members {
+                let recorded = photons[member.number].cycles;
+                let cycles = to.min(recorded).saturating_sub(from);
+                member.advance(configs, &mut done, first, cycles, self.since_look);
             }
-            if !self.blocks.is_empty() {
-                self.end_laser_cycle_of_blocks(configs, now, &mut done);
+            for block in &mut self.blocks {
+                block.advance(configs, &mut done, first, step, self.since_look);
             }
+            self.end_step(configs, step);
+            from = to;
         }
         done
     }
 
-    fn end_laser_cycle_of_blocks(
+    /// Laser cycles that the pixels and blocks may end each for itself, from laser cycle `from` of a slice of `cycles` on:
+    /// up to the next look, tick or end. Without a photon before that look, up to the last look before one.
+    fn step(
+        &self,
+        configs: &Configs<BINS>,
+        photons: &[PixelPhotons],
+        next: &[usize],
+        from: u16,
+        cycles: u16,
+    ) -> u16 {
+        let x = configs.pixels.x();
+        let of_members = self.members.iter().zip(next);
+        let next =
+            of_members.filter_map(|(member, &next)| photons[member.number].photons.get(next));
+        let photon = next.map(|photon| photon.cycle).min();
+        let to_look = u64::from(x - self.since_look);
+        let dark = u64::from(photon.unwrap_or(cycles).min(cycles) - from);
+        let up_to_look = dark.max(to_look) - (dark.max(to_look) - to_look) % u64::from(x);
+        // A tick comes with a look.
+        let to_tick = configs.patience.saturating_sub(self.since_tick);
+        let looks_to_tick = to_tick.div_ceil(x).max(1);
+        let to_tick = to_look + u64::from(looks_to_tick - 1) * u64::from(x);
+        within(cycles - from, up_to_look.min(to_tick), self.since_look, x)
+    }
+
+    /// Counts the photons before laser cycle `to` of a slice.
+    fn count(
         &mut self,
         configs: &Configs<BINS>,
-        now: LaserCycle,
-        done: &mut Done,
+        photons: &[PixelPhotons],
+        next: &mut [usize],
+        to: u16,
     ) {
-        let (blocks, statistics) = (&mut self.blocks, &mut done.blocks);
-        let block_decisions = &mut self.block_decisions;
-        let observe = |number: usize, input: &DecisionInput<'_, BINS, Count16>| {
-            if let Some(Some(last)) = block_decisions.get_mut(number) {
-                last.record_input(input);
-            }
-        };
-        if end_laser_cycles_of_blocks_with(blocks, &configs.blocks, statistics, now, 1, observe) {
-            for (block, last) in blocks.iter_mut().zip(block_decisions) {
-                let Some(event) = block.take_event() else {
-                    continue;
-                };
-                if let Some(last) = last {
-                    last.record_event(event);
+        for (member, next) in self.members.iter_mut().zip(next) {
+            let received = &photons[member.number];
+            while let Some(photon) = received.photons.get(*next)
+                && photon.cycle < to
+            {
+                *next += 1;
+                member.has_no_peak = false;
+                member.pixel.count(&configs.pixels, photon.code);
+                if let Some(link) = &member.link {
+                    count_in_blocks(&mut self.blocks, link, &configs.blocks, photon.code);
                 }
-                done.events.push(event);
             }
         }
-        self.since_look += 1;
-        if self.since_look < configs.pixels.x() {
+    }
+
+    /// All have ended `cycles` laser cycles, up to a look or the end of a slice. A tick comes after a look.
+    fn end_step(&mut self, configs: &Configs<BINS>, cycles: u16) {
+        let x = configs.pixels.x();
+        let before = self.since_look;
+        self.since_look = after(before, cycles, x);
+        // Laser cycles up to the last look.
+        let looked = (u32::from(before) + u32::from(cycles)) - u32::from(self.since_look);
+        if looked == 0 {
             return;
         }
-        self.since_tick = self.since_tick.saturating_add(self.since_look);
-        self.since_look = 0;
+        let looked = u16::try_from(looked).unwrap_or(u16::MAX);
+        self.since_tick = self.since_tick.saturating_add(looked);
         if self.since_tick >= configs.patience {
             self.since_tick = 0;
             for member in &mut self.members {
@@ -310,7 +416,9 @@ impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
                     link.tick(member.pixel.has_reported());
                 }
             }
-            self.blocks.iter_mut().for_each(Block::tick);
+            for block in &mut self.blocks {
+                block.block.tick();
+            }
         }
     }
 
@@ -320,15 +428,17 @@ impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
         for member in &mut self.members {
             member.last = LastDecision::allocate(is_kept(member.pixel.address()));
         }
-        for (block, last) in self.blocks.iter().zip(&mut self.block_decisions) {
-            *last = LastDecision::allocate(is_kept(block.pixel().address()));
+        for member in &mut self.blocks {
+            let address = member.block.pixel().address();
+            member.last = LastDecision::allocate(is_kept(address));
         }
     }
 
     /// The decisions that were kept.
     pub fn decisions(&self) -> impl Iterator<Item = Decision> {
         let of_members = self.members.iter().map(|member| &member.last);
-        let all = of_members.chain(&self.block_decisions).flatten();
+        let of_blocks = self.blocks.iter().map(|member| &member.last);
+        let all = of_members.chain(of_blocks).flatten();
         all.filter_map(|last| last.decision())
     }
 
@@ -338,7 +448,7 @@ impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
             member.pixel.add_photons_to(pixels);
         }
         for block in &self.blocks {
-            block.pixel().add_photons_to(blocks);
+            block.block.pixel().add_photons_to(blocks);
         }
     }
 }

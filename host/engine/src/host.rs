@@ -135,3 +135,6 @@ impl<const BINS: usize, W: CounterWidth> Engine for HostEngine<BINS, W> {
         all
     }
 }
+
+#[cfg(test)]
+mod tests;

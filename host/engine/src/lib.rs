@@ -7,6 +7,7 @@ pub mod explain;
 pub mod frame;
 pub mod group;
 pub mod host;
+mod jump;
 mod neighbours;
 mod once;
 mod once_per_bin;

@@ -7,13 +7,14 @@ use anyhow::{Result, ensure};
 use dtof_core::neighbours::{ArrayPixel, NeighbourConfig};
 use dtof_core::rule::DecisionInput;
 use dtof_core::{
-    AnyRule, Array, AsyncPixel, CounterWidth, DepthEvent, Detection, LaserCycle, Neighbours,
+    AnyRule, Array, AsyncPixel, CounterWidth, DepthEvent, Detection, LaserCycle, Look, Neighbours,
     PixelAddress, PixelConfig, Statistics, WindowRule,
 };
 
 use super::Engine;
 use super::decisions::{Decision, LastDecision};
 use super::group::sort;
+use super::jump::{after, idle_cycles, look_after, within};
 use super::parallel::of_parts;
 use crate::settings::Settings;
 use dtof_options::Refused;
@@ -33,6 +34,8 @@ struct Member<const BINS: usize, W: CounterWidth> {
     pixel: AsyncPixel<BINS, W>,
     /// The next photon of the slice.
     next: usize,
+    /// The last look found no peak, and no photon has come since.
+    has_no_peak: bool,
     /// The last decision, if it is kept.
     last: Option<Box<LastDecision<BINS>>>,
 }
@@ -95,6 +98,7 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
                 number,
                 pixel: AsyncPixel::new(address),
                 next: 0,
+                has_no_peak: false,
                 last: None,
             }))
         };
@@ -111,6 +115,36 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
         })
     }
 
+    fn members(&self) -> impl Iterator<Item = &Member<BINS, W>> {
+        self.places.iter().filter_map(|place| place.0.as_ref())
+    }
+
+    /// Whether one of the `cycles` laser cycles from `from` on has a photon.
+    fn has_photon(&self, photons: &[PixelPhotons], from: u16, cycles: u16) -> bool {
+        let next = |member: &Member<BINS, W>| photons[member.number].photons.get(member.next);
+        let mut next = self.members().filter_map(next);
+        next.any(|photon| photon.cycle - from < cycles)
+    }
+
+    /// Laser cycles from laser cycle `from` of the slice on up to the first look of which some pixel decides, or ends its
+    /// exposure, or its part of the slice, or has a photon.
+    ///
+    /// What neighbours confirm depends on how long they have counted, so a pixel decides at each look once it has the two
+    /// photons that a promising window needs.
+    fn idle_step(&self, photons: &[PixelPhotons], from: u16) -> u64 {
+        let idle = |member: &Member<BINS, W>| {
+            let total = member.pixel.histogram().total();
+            let finds_none = total == 0 || total < 2 && member.has_no_peak;
+            let received = &photons[member.number];
+            let left = received.cycles.checked_sub(from).filter(|&left| left > 0)?;
+            let next = received.photons.get(member.next);
+            let next = next.map_or(left, |photon| photon.cycle - from);
+            Some(idle_cycles(&member.pixel, &self.config, finds_none).min(next))
+        };
+        let idle = self.members().filter_map(idle).min().unwrap_or(0);
+        look_after(idle.into(), self.since_look, self.config.x())
+    }
+
     /// The first step of all pixels: their photons from laser cycle `from` to before `to` of the slice.
     /// Returns whether one of them decides.
     fn count(&mut self, photons: &[PixelPhotons], from: u16, to: u16) -> bool {
@@ -121,6 +155,7 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
                 number,
                 pixel,
                 next,
+                has_no_peak,
                 ..
             } in places.iter_mut().flat_map(|place| &mut place.0)
             {
@@ -130,6 +165,7 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
                 {
                     pixel.count(config, photon.code);
                     *next += 1;
+                    *has_no_peak = false;
                 }
                 let cycles = to.min(received.cycles).saturating_sub(from);
                 if cycles > 0 {
@@ -160,7 +196,10 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
             let (mut statistics, mut events) = (Statistics::new(), Vec::new());
             for (Place(member), detection) in places.iter_mut().zip(&detections[first..]) {
                 let Some(Member {
-                    pixel, last: kept, ..
+                    pixel,
+                    has_no_peak,
+                    last: kept,
+                    ..
                 }) = member
                 else {
                     continue;
@@ -168,7 +207,7 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
                 if let Some(detection) = detection {
                     pixel.keep_detection(last, detection);
                 }
-                pixel.end_look(
+                let look = pixel.end_look(
                     config,
                     &mut statistics,
                     last,
@@ -178,6 +217,9 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
                         }
                     },
                 );
+                if look != Look::NotDue {
+                    *has_no_peak = look == Look::NoPeak;
+                }
                 if let Some(event) = pixel.take_event() {
                     if let Some(kept) = kept {
                         kept.record_event(event);
@@ -204,9 +246,13 @@ impl<const BINS: usize, W: CounterWidth> Engine for NeighbourEngine<BINS, W> {
         let (mut events, mut done) = (Vec::new(), 0);
         while done < cycles {
             let x = self.config.x();
-            let to = done + (x - self.since_look).min(cycles - done);
+            let step = match self.has_photon(&slice.pixels, done, x - self.since_look) {
+                true => u64::from(x - self.since_look),
+                false => self.idle_step(&slice.pixels, done),
+            };
+            let to = done + within(cycles - done, step, self.since_look, x);
             let decides = self.count(&slice.pixels, done, to);
-            self.since_look = (self.since_look + (to - done)) % x;
+            self.since_look = after(self.since_look, to - done, x);
             done = to;
             if decides {
                 let last = LaserCycle::new(slice.first_cycle + u64::from(to) - 1);
@@ -232,8 +278,7 @@ impl<const BINS: usize, W: CounterWidth> Engine for NeighbourEngine<BINS, W> {
     }
 
     fn decisions(&self) -> Vec<Decision> {
-        let members = self.places.iter().filter_map(|place| place.0.as_ref());
-        members
+        self.members()
             .filter_map(|member| member.last.as_ref()?.decision())
             .collect()
     }

@@ -8,6 +8,9 @@ use dtof_photons::source::{PhotonSource, Slice};
 
 /// The most laser cycles of a slice. It does not change events.
 const SLICE: u16 = 256;
+/// A slice is longer if it surely has no more photons than that: each slice is work for each pixel, and where photons
+/// are few there would be more of it than of theirs.
+const SPARSE: u64 = 1 << 14;
 /// About the photons of a slice: so few a pixel that they stay in the cache, but enough in all to
 /// be worth a slice, and no more than fit into memory.
 const PHOTONS_A_PIXEL: f64 = 128.0;
@@ -63,5 +66,7 @@ pub fn next_cycles(source: &dyn PhotonSource, done: u64) -> u16 {
         reason = "1 to SLICE"
     )]
     let most = (photons / source.photons_per_cycle()).clamp(1.0, SLICE.into()) as u16;
+    let sparse = source.sparse_cycles(SPARSE);
+    let most = u16::try_from(sparse).unwrap_or(u16::MAX).max(most);
     u16::try_from(source.cycles() - done).map_or(most, |left| left.min(most))
 }

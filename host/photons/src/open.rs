@@ -27,6 +27,8 @@ use dtof_sensors::tmf8829::OFFSET_MM;
 
 /// The default bin width in picoseconds, if neither the user nor the file gives one.
 pub const BIN_WIDTH_PS: U16F16 = U16F16::lit("250");
+/// The default of the most laser cycles of histograms: their photons come in random ones, so more show little else.
+pub const HISTOGRAM_CYCLES: u64 = 10_000;
 /// The default number of bins of a photon list.
 const LIST_BINS: u16 = 128;
 
@@ -50,8 +52,8 @@ pub struct ReadOptions {
     pub bin_width_ps: Option<U16F16>,
     /// Histograms: the length of the recording; by default one photon a laser cycle.
     pub length: Option<RecordingLength>,
-    /// The most laser cycles to read.
-    pub cycles: u64,
+    /// The most laser cycles to replay. By default all of a photon list, and [`HISTOGRAM_CYCLES`] of histograms.
+    pub cycles: Option<u64>,
     /// The seed for the random laser cycles of recorded photons.
     pub seed: u64,
     /// Pixels that do not count for the length of histograms.
@@ -71,7 +73,7 @@ impl Default for ReadOptions {
             capture: None,
             bin_width_ps: None,
             length: None,
-            cycles: u64::MAX,
+            cycles: None,
             seed: 1,
             masked: Vec::new(),
             dead_time: 0,
@@ -117,7 +119,8 @@ impl Counts {
     pub fn photons(&self, options: &ReadOptions) -> Result<RecordedHistograms> {
         let length = options.length;
         let length = length.unwrap_or(RecordingLength::PhotonsPerCycle(1.0));
-        let (cycles, seed) = (options.cycles, options.seed);
+        let cycles = options.cycles.unwrap_or(HISTOGRAM_CYCLES);
+        let seed = options.seed;
         let (masked, dead_time) = (&options.masked, options.dead_time);
         let (array, captures) = (self.array, &self.captures);
         let photons =
@@ -385,12 +388,12 @@ fn list<R: PhotonReader + 'static>(input: &Input, options: &ReadOptions) -> Resu
     };
     let mut metadata =
         metadata(shape.bins.into(), None, options).with_context(|| input.to_string())?;
-    let photons = PhotonList::<R>::open(input, shape, options.cycles)?;
+    let cycles = options.cycles.unwrap_or(u64::MAX);
+    let photons = PhotonList::<R>::open(input, shape, cycles)?;
     metadata.is_list = true;
-    metadata.warnings.extend(warnings::late_photons(
-        photons.first_cycle(),
-        options.cycles,
-    ));
+    metadata
+        .warnings
+        .extend(warnings::late_photons(photons.first_cycle(), cycles));
     metadata
         .warnings
         .extend(warnings::list_shape(photons.pixels(), shape.columns));

@@ -216,6 +216,8 @@ pub struct PhotonList<R> {
     /// The laser cycle of the first photon.
     first_cycle: u64,
     photons_per_cycle: f64,
+    /// The most photons of the laser cycles of any span.
+    most_of_span: u64,
     not_replayed: u64,
     next_cycle: u64,
     rows: Validator<R>,
@@ -279,6 +281,7 @@ impl<R: PhotonReader> PhotonList<R> {
             cycles: cycles.min(recorded),
             first_cycle,
             photons_per_cycle: most as f64 / SPAN.min(recorded) as f64,
+            most_of_span: most,
             not_replayed,
             next_cycle: 0,
             ahead: None,
@@ -291,6 +294,12 @@ impl<R> PhotonList<R> {
     /// The laser cycle of the first photon.
     pub fn first_cycle(&self) -> u64 {
         self.first_cycle
+    }
+
+    /// Laser cycles before the next photon, if that has been read already.
+    fn dark_cycles(&self) -> u64 {
+        let next = self.ahead.map_or(0, |row| row.cycle);
+        next.saturating_sub(self.next_cycle)
     }
 
     /// Pixels up to the last with a photon.
@@ -341,6 +350,12 @@ impl<R: PhotonReader> PhotonSource for PhotonList<R> {
         self.photons_per_cycle
     }
 
+    fn sparse_cycles(&self, photons: u64) -> u64 {
+        // So many spans in a row reach into one more, and each has at most the photons of the brightest.
+        let spans = (photons / self.most_of_span).saturating_sub(1);
+        self.dark_cycles() + spans.saturating_mul(SPAN)
+    }
+
     fn not_replayed(&self) -> u64 {
         self.not_replayed
     }
@@ -352,8 +367,9 @@ impl<R: PhotonReader> PhotonSource for PhotonList<R> {
     )]
     fn next_slice(&mut self, cycles: u16) -> Result<Slice> {
         let first_cycle = self.next_cycle;
+        let lit = u64::from(cycles).saturating_sub(self.dark_cycles());
         self.next_cycle += u64::from(cycles);
-        let all = self.photons_per_cycle * f64::from(cycles);
+        let all = self.photons_per_cycle * lit as f64;
         // A quarter more than the mean in the brightest span.
         let expected = (1.25 * all / self.addresses.len() as f64) as usize + 4;
         let pixels = self.addresses.iter().map(|_| PixelPhotons {

@@ -76,6 +76,11 @@ pub trait PhotonSource {
         self.inner().map_or(0.0, |inner| inner.photons_per_cycle())
     }
 
+    /// Laser cycles from now on that surely hold at most `photons` photons of all pixels; 0 if unknown.
+    fn sparse_cycles(&self, photons: u64) -> u64 {
+        self.inner().map_or(0, |inner| inner.sparse_cycles(photons))
+    }
+
     /// Recorded photons that no slice has contained yet.
     fn not_replayed(&self) -> u64 {
         self.inner().map_or(0, |inner| inner.not_replayed())
@@ -177,6 +182,10 @@ mod tests {
             2.5
         }
 
+        fn sparse_cycles(&self, photons: u64) -> u64 {
+            photons + 1
+        }
+
         fn not_replayed(&self) -> u64 {
             8
         }
@@ -229,7 +238,7 @@ mod tests {
                     .iter()
                     .map(|address| address.raw())
                     .collect::<Vec<_>>(),
-                source.photons_per_cycle(),
+                (source.photons_per_cycle(), source.sparse_cycles(6)),
                 [source.not_replayed(), source.masked()],
                 source.recorded_cycles(),
                 source.laser_hz(),
@@ -238,7 +247,7 @@ mod tests {
         let full = (
             (["zone", "capture"], 7),
             vec![3, 5],
-            2.5,
+            (2.5, 7),
             [8, 9],
             Some((10, 11)),
             Some(12),
@@ -248,7 +257,7 @@ mod tests {
         let plain = (
             (["column", "row"], 3),
             vec![0, 1, 2, 3, 4, 5],
-            0.0,
+            (0.0, 0),
             [0, 0],
             None,
             None,

@@ -113,7 +113,7 @@ impl Options {
         progress: &mut dyn Progress,
     ) -> Result<CalibrateResult> {
         let mut options = read_options(&requested);
-        options.cycles = u64::MAX;
+        options.cycles = Some(u64::MAX);
         let counts = counts(input, &options)?;
         self.given.suits(input, &counts.metadata)?;
         let options = self.calibration(&requested);

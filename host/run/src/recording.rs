@@ -158,10 +158,7 @@ pub fn read_options(requested: &SettingsFile) -> ReadOptions {
         capture,
         bin_width_ps: width.map(|width| width / U16F16::from_num(rebin.max(1))),
         length: recorded.or(rate),
-        cycles: cycles.unwrap_or(match decide_once {
-            Some(true) => u64::MAX,
-            _ => 10_000,
-        }),
+        cycles: cycles.or(decide_once.filter(|&once| once).map(|_| u64::MAX)),
         seed: seed.unwrap_or(1),
         masked: requested.sensor.masked.clone().unwrap_or_default(),
         // Whether or not the rule weighs it.

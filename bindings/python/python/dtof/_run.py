@@ -99,8 +99,8 @@ def replay(recorded: Any, *, axis: int = -1, progress: Progress = None, **option
     them instead: ``axes="captures,rows,columns,bins"``. At most 65,536 pixels and 4096 bins.
 
     ``photons_per_cycle`` (1.0, in the brightest pixel) or ``recorded_cycles`` determine how long
-    histograms were recorded. ``cycles`` (10,000) laser cycles are replayed with random ``seed`` (1); a warning
-    counts the photons after them, unless ``cycles`` is given.
+    histograms were recorded. ``cycles`` (10,000; all of photons) laser cycles are replayed with random ``seed`` (1);
+    a warning counts the photons after them, unless ``cycles`` is given.
     ``decide_once`` takes all photons for one decision a pixel: see :attr:`Replay.confidence`.
     ``settings`` is the name or the text of a settings file, a dict of its sections, or a calibration, a
     comparison or a run. Without ``settings``, those of :func:`calibrate` are found in the recording:
@@ -131,14 +131,11 @@ def photons(
     row), ``bins`` the number of bins (128). All laser cycles up to the last photon are replayed,
     or as many as ``cycles`` or a settings file requests. Further options are those of
     :func:`replay`. The photons are copied twice; if they do not fit into memory, save them with
-    ``numpy.save`` and replay the file, with ``cycles``.
+    ``numpy.save`` and replay the file.
     """
     listed = photon_list(*_columns(pixel) if cycle is None and bin is None else (pixel, cycle, bin))
-    # Laser cycles do not decrease. Invalid values are refused later.
-    last = int(listed["cycle"][-1]) if listed.size else 0
-    cycles = min(max(last, 0) + 1, 2**63 - 1)
     source = native_input(listed, "photons")
-    return result(_native.replay(source, arguments(ReplayOptions, options), progress, cycles))
+    return result(_native.replay(source, arguments(ReplayOptions, options), progress))
 
 
 @takes(SimulateOptions)

@@ -249,7 +249,7 @@ flags! {
 
 flags! {
     REPLAY:
-    cycles Text("N") => "Laser cycles to replay at most [default: 10000; all with --decide-once]";
+    cycles Text("N") => "Laser cycles to replay at most [default: all of a photon list and with --decide-once, else 10000]";
     seed Text("N") => "Seed of the laser cycles that recorded photons get [default: 1]";
 }
 

@@ -257,7 +257,7 @@ fn a_list_has_128_bins_and_may_leave_its_shape_open() {
         (
             &sixteen[..1],
             ReadOptions {
-                cycles: 9,
+                cycles: Some(9),
                 ..columns(None)
             },
             true,
@@ -484,7 +484,7 @@ fn histograms_are_replayed_as_the_options_say() {
     let length = Some(RecordingLength::Cycles(100));
     let known = ReadOptions {
         length,
-        cycles: 90,
+        cycles: Some(90),
         dead_time: 7,
         ..default.clone()
     };

@@ -302,3 +302,45 @@ fn another_file_in_the_place_of_a_list_is_refused() {
         "a.csv changed while it was read"
     );
 }
+
+proptest! {
+    /// So a slice of that length has a bounded size, also if a burst comes after it.
+    #[test]
+    fn sparse_laser_cycles_hold_at_most_so_many_photons(
+        steps in prop::collection::vec(prop_oneof![Just(0u64), 0u64..3, 0u64..300, 0u64..5000], 1..200),
+        most in 0u64..60,
+        lengths in prop::collection::vec(1u16..2000, 1..5),
+    ) {
+        let mut cycle = 0;
+        let photons = steps.iter().map(|wait| {
+            cycle += wait;
+            [0, cycle, 5]
+        });
+        let photons: Vec<RawPhoton> = photons.collect();
+        let mut list = open(&csv(&photons), SHAPE, u64::MAX).unwrap();
+        let mut at = 0;
+        for &length in lengths.iter().cycle() {
+            let end = at + list.sparse_cycles(most);
+            let held = photons.iter().filter(|photon| (at..end).contains(&photon[1]));
+            prop_assert!(held.count() as u64 <= most);
+            if at > cycle {
+                break;
+            }
+            list.next_slice(length).unwrap();
+            at += u64::from(length);
+        }
+    }
+}
+
+/// The slice with the first photon after 65,000 dark laser cycles has no room for a burst of that length.
+#[test]
+fn dark_laser_cycles_need_no_memory() {
+    let dark = [[0, 0, 5], [0, 66_000, 5]].into_iter();
+    let burst = (0..100_000).map(|at| [0, 70_000 + at / 100, 5]);
+    let photons: Vec<RawPhoton> = dark.chain(burst).collect();
+    let mut list = open(&csv(&photons), SHAPE, u64::MAX).unwrap();
+    list.next_slice(256).unwrap();
+    assert_eq!(list.sparse_cycles(1 << 14), 66_000 - 256);
+    let slice = list.next_slice(65_535).unwrap();
+    assert!(slice.pixels[0].photons.capacity() < 10);
+}

@@ -232,7 +232,7 @@ fn a_folder_that_cannot_be_completed_is_left_as_it_was() {
     let photons = scratch.file("photons.csv", PHOTONS);
     scratch.replayed(&photons, "");
     let options = ReadOptions {
-        cycles: 1,
+        cycles: Some(1),
         ..ReadOptions::default()
     };
     let source = open(&photons, &options).unwrap().photons;

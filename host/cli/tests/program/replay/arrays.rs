@@ -458,11 +458,12 @@ fn what_a_photon_list_leaves_open_is_said() {
             "--columns 4",
             "15 pixels do not fill rows of 4 columns",
         ),
-        (3, 9999, "", ""),
+        (3, 10_000, "", ""),
+        (3, 9999, "--cycles 10000", ""),
         (
             3,
             10_000,
-            "",
+            "--cycles 10000",
             "--cycles takes more, or count laser cycles from 0",
         ),
     ] {
@@ -474,7 +475,7 @@ fn what_a_photon_list_leaves_open_is_said() {
         );
         assert_contains(&error, warning);
     }
-    let printed = scratch.printed("replay p.csv --out out");
+    let printed = scratch.printed("replay p.csv --out out --cycles 10000");
     assert_contains(&printed, "30 of 30: --cycles N takes more");
     assert_contains(
         &printed,
