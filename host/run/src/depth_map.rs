@@ -25,14 +25,16 @@ pub const CONTRADICTION: u8 = 2;
 /// How the depth map of a run is decided.
 pub struct MapInput {
     settings: Settings,
+    /// The gate without that of a cover glass that was found: what moves in front may look like one.
+    given_gate: Option<(u16, u16)>,
     /// All photons of recorded histograms.
     counts: Option<PixelCounts>,
 }
 
 impl MapInput {
     /// The map of a run with these settings, each pixel by itself if they have blocks; `None` if they read frames.
-    /// `counts` are all photons of recorded histograms; others are counted during the run. `false_alarm` takes the place of
-    /// a z that was found for exposures with many looks.
+    /// `counts` are all photons of recorded histograms; others are counted during the run. `given` are the settings before
+    /// others were found in the recording: a z that was found is for many looks.
     ///
     /// # Errors
     /// Fails if settings contradict each other.
@@ -40,14 +42,14 @@ impl MapInput {
         requested: &SettingsFile,
         settings: &Settings,
         counts: Option<PixelCounts>,
-        false_alarm: Option<f64>,
+        given: &SettingsFile,
     ) -> Result<Option<Self>> {
         if settings.frame.is_some() {
             return Ok(None);
         }
         let mut once = requested.clone().deciding_once();
         if once.detection.z.is_none() {
-            once.detection.false_alarm = once.detection.false_alarm.or(false_alarm);
+            once.detection.false_alarm = once.detection.false_alarm.or(given.detection.false_alarm);
         }
         let once = once.settings(settings.bins)?;
         Ok(Some(Self {
@@ -55,6 +57,7 @@ impl MapInput {
                 offsets_mm: settings.offsets_mm.clone(),
                 ..once
             },
+            given_gate: given.sensor.gate,
             counts,
         }))
     }
@@ -141,12 +144,21 @@ impl DepthMap {
         let contradicts = match run.filter(|_| input.counts.is_none()) {
             Some(run) => {
                 let halves = [run.first_half.clone(), run.all.without(&run.first_half)];
-                let [first, second] =
-                    [decide(settings, &halves[0])?, decide(settings, &halves[1])?];
-                let pairs = first.iter().zip(&second).enumerate();
-                let contradicts =
-                    pairs.map(|(place, pair)| have_changed(settings, &halves, place, pair));
-                contradicts.collect()
+                let mut contradicts = vec![false; addresses.len()];
+                let other = Settings {
+                    gate: input.given_gate,
+                    ..settings.clone()
+                };
+                let has_other = other.gate != settings.gate;
+                for settings in [settings].into_iter().chain(has_other.then_some(&other)) {
+                    let [first, second] = halves.each_ref().map(|half| decide(settings, half));
+                    let (first, second) = (first?, second?);
+                    let pairs = first.iter().zip(&second).enumerate();
+                    for ((place, pair), contradicts) in pairs.zip(&mut contradicts) {
+                        *contradicts |= have_changed(settings, &halves, place, pair);
+                    }
+                }
+                contradicts
             }
             None => vec![false; addresses.len()],
         };

@@ -183,7 +183,7 @@ impl Options {
         mask_capture(&mut requested, recording.array().pixels(), captures)?;
         let has_file = self.given.file.is_some() || self.given.text.is_some();
         let has_rule = requested.detection.rule.is_some();
-        let false_alarm = requested.detection.false_alarm;
+        let given = requested.clone();
         let found = match has_file {
             true => Ok((Vec::new(), Vec::new())),
             false => find(&mut requested, &mut recording),
@@ -277,7 +277,7 @@ impl Options {
         let engine = host_engine(&settings, photons.array(), &photons.addresses());
         let engine = engine.map_err(|error| requested.add_file_name(error))?;
         Ok(Replay {
-            map: MapInput::new(&requested, &settings, counts, false_alarm)?,
+            map: MapInput::new(&requested, &settings, counts, &given)?,
             photons,
             engine,
             settings,

@@ -121,7 +121,7 @@ impl Simulation {
         };
         Ok(Self {
             photons: Masked::new(Box::new(photons), &settings.masked)?,
-            map: MapInput::new(&requested, &settings, None, None)?,
+            map: MapInput::new(&requested, &settings, None, &requested)?,
             scene,
             settings,
             requested,

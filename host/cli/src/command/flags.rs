@@ -347,8 +347,8 @@ flags! {
         else 10000000 with a warning]";
     echo OneOf(names::<Echo>) => "Depth events: echo of each exposure of a pixel or block [default: all; the \
         strongest with --one-per-pixel]";
-    one_per_pixel Optional("YES") => "CSV, PCD and PLY: one point a pixel, at the depth of depth-events.npy, in place of \
-        a point an event";
+    one_per_pixel Optional("YES") => "CSV, PCD and PLY: one point a pixel, at the depth of depth-events.npy, in \
+        place of a point an event";
 }
 
 /// The tables of the flags of each job, in the order of its help.

@@ -73,7 +73,8 @@ pub fn pictures(
             "depth-last.svg",
             &format!("Range of the last {one}"),
             "mm",
-            Some(format!("The range of the last {one} of each pixel.")),
+            map.is_none()
+                .then(|| format!("The range of the last {one} of each pixel.")),
             all(&PixelHistory::last_mm),
         )?,
         draw(
@@ -149,8 +150,24 @@ mod tests {
     #[test]
     fn every_picture_has_its_name_and_mark() {
         let maps = PixelHistories::new(Array::new(1, 1).unwrap());
-        let pictures = pictures(&maps, ["column", "row"], ["event", "events"]).unwrap();
-        assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
+        let map = DepthMap {
+            positions: vec![None],
+            depth_mm: vec![f64::NAN],
+            echoes_mm: None,
+            best_mm: vec![f64::NAN],
+            confidence: vec![0.0],
+            flags: vec![0],
+        };
+        let (axes, nouns) = (["column", "row"], ["event", "events"]);
+        let of_events = pictures(&maps, None, axes, nouns).unwrap();
+        assert!(
+            of_events
+                .iter()
+                .map(|picture| picture.name)
+                .eq(NAMES[1..].iter().copied())
+        );
+        let pictures = pictures(&maps, Some(&map), axes, nouns).unwrap();
+        assert!(pictures.iter().map(|picture| picture.name).eq(NAMES));
         for picture in pictures {
             // A pixel that has reported in blocks only is reported, and no light was measured.
             let is_of_light = picture.name.starts_with("reflectivity");
