@@ -11,6 +11,7 @@ use dtof_options::rows::grouped;
 use dtof_photons::input::Input;
 use dtof_photons::ranges::Ranges;
 use dtof_photons::source::{PhotonSource, Slice};
+use dtof_run::depth_map::DepthMap;
 use dtof_run::output::header;
 use dtof_run::recording::warnings;
 use dtof_run::replay::Options;
@@ -37,7 +38,8 @@ pub struct PyRunResult<'py> {
     settings: String,
     array: Array,
     warnings: Vec<String>,
-    /// How clear the peak of each pixel stands, if pixels decide once.
+    /// The depth of each pixel, decided on all photons, in millimetres, and how clear its peak stands.
+    depth: Option<Vec<f64>>,
     confidence: Option<Vec<f64>>,
 }
 
@@ -181,7 +183,7 @@ struct Records {
     array: Array,
     /// One vector for each slice.
     events: Vec<Vec<u8>>,
-    confidence: Option<Vec<f64>>,
+    map: Option<DepthMap>,
 }
 
 impl Records {
@@ -190,7 +192,7 @@ impl Records {
             ranges: settings.ranges(source.array())?,
             array: Array::of(&header(settings, source)?),
             events: Vec::new(),
-            confidence: None,
+            map: None,
         })
     }
 }
@@ -205,8 +207,8 @@ impl Sink for Records {
         Ok(())
     }
 
-    fn end(&mut self, engine: &dyn Engine) {
-        self.confidence = engine.confidence().map(<[f64]>::to_vec);
+    fn end(&mut self, _engine: &dyn Engine, map: Option<&DepthMap>) {
+        self.map = map.cloned();
     }
 }
 
@@ -229,6 +231,8 @@ impl Finished {
                 serde_json::to_string(&self.requested)?,
             ))
         })?;
+        let map = self.records.map.map(|map| (map.depth_mm, map.confidence));
+        let (depth, confidence) = map.unzip();
         Ok(PyRunResult {
             events,
             summary,
@@ -236,7 +240,8 @@ impl Finished {
             settings,
             array: self.records.array,
             warnings: self.warnings,
-            confidence: self.records.confidence,
+            depth,
+            confidence,
         })
     }
 }

@@ -67,6 +67,12 @@ def test_the_depth_map_is_depth_npy_and_the_points_of_pixels(program, tmp_path, 
     depth = run.depth_map()
     assert numpy.array_equal(depth, numpy.load(tmp_path / "out/depth.npy"), equal_nan=True)
     assert (~numpy.isnan(depth)).sum() > 30
+    if "frame" in options:
+        assert run.depth is None and run.confidence is None
+    else:
+        assert numpy.array_equal(run.confidence, numpy.load(tmp_path / "out/confidence.npy"), equal_nan=True)
+        depth = run.depth_map(of="events")
+        assert numpy.array_equal(depth, numpy.load(tmp_path / "out/depth-events.npy"), equal_nan=True)
     # One point for each, at that depth.
     points = run.points(one_per_pixel=True)
     assert points["pixel"].tolist() == numpy.flatnonzero(~numpy.isnan(depth)).tolist()
@@ -83,7 +89,7 @@ def test_reflectivity_follows_its_formulas(run):
     events = run.events
     by_events = dtof.reflectivity(events, run.array, of="events", echo="all")
     by_signal = run.reflectivity(echo="first")
-    mean = run.depth_map(echo="all")
+    mean = run.depth_map(of="events", echo="all")
     for pixel in range(48):
         own = events[events["pixel"] == pixel]
         expected = own.size * mean.flat[pixel] ** 2

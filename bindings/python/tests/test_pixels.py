@@ -64,7 +64,7 @@ def test_the_events_are_those_of_photons(options, seed):
     ):
         assert statistics[name] == run.statistics[name], name
     depth = dtof.depth_map(events, pixels.array)
-    assert numpy.array_equal(depth, run.depth_map(), equal_nan=True)
+    assert numpy.array_equal(depth, run.depth_map(of="events"), equal_nan=True)
 
 
 def test_the_histogram_of_an_event():

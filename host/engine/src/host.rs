@@ -12,7 +12,7 @@ use super::once::OnceEngine;
 use super::once_per_bin::OncePerBinEngine;
 use super::parallel::of_parts;
 use crate::settings::Settings;
-use crate::{with_bins, with_widest};
+use crate::with_bins;
 use dtof_photons::source::Slice;
 
 /// Runs groups of pixels on all threads.
@@ -36,9 +36,7 @@ pub fn host_engine(
     addresses: &[PixelAddress],
 ) -> Result<Box<dyn Engine>> {
     let engine = if settings.decide_once {
-        with_widest!(settings.bins, BINS, W => {
-            OnceEngine::<BINS, W>::new(settings, array, addresses).map(|engine| Box::new(engine) as _)
-        })?
+        OnceEngine::new(settings, array, addresses).map(|engine| Box::new(engine) as _)
     } else {
         with_bins!(settings.bins, BINS => match settings.counter_bits {
             8 => HostEngine::<BINS, Count8>::boxed(settings, array, addresses),

@@ -1,7 +1,8 @@
 //! One decision a pixel, on all photons of the recording: what users of frames expect first.
 //!
 //! The rule is that of asynchronous pixels, and so are depth, echoes and dead time. Only the looks are missing: a pixel
-//! decides when the recording has ended.
+//! decides when the recording has ended. [`decide_once`] decides on given counts, and [`OnceEngine`] on the photons that
+//! it receives.
 //!
 //! With neighbours each pixel also decides on the sum of its histogram and theirs, as a larger pixel would. Each of the
 //! two decisions has half of the false alarms.
@@ -20,38 +21,43 @@
 //! above its background. So a surface does not grow into pixels that do not see it. The photons of an event are always
 //! the pixel's own.
 //!
-//! A pixel with a full counter has no event, as its depth could be wrong. It counts as an exposure that
-//! [ended full](Statistics::ended_full).
+//! Counts that do not fit their counters are divided by a power of two, all of a pixel by the same. They are then less
+//! noisy than Poisson numbers of their size, so there are no more false alarms. No depth is lost, and statistics count
+//! all photons; the photons of the event are divided, too.
 
 use std::marker::PhantomData;
 
 use anyhow::{Result, ensure};
+use dtof_core::fixed::types::{U4F12, U24F8};
 use dtof_core::rule::{ExcludedBins, LiveCounts};
 use dtof_core::{
-    AnyRule, Array, Count, CounterWidth, DepthEvent, Detection, EchoNumber, Flags, Histogram,
-    LaserCycle, Neighbours, PixelAddress, PixelConfig, Statistics,
+    AnyRule, Array, BinIndex, BinPosition, Count, CounterWidth, DepthEvent, Detection, EchoNumber,
+    Flags, Histogram, LaserCycle, Neighbours, PixelAddress, PixelConfig, Statistics, WindowRule,
 };
 
 use super::Engine;
 use super::decisions::Decision;
 use super::neighbours::check;
-use super::parallel::{of_each, of_parts};
+use super::parallel::of_each;
 use crate::settings::Settings;
+use crate::with_widest;
 use dtof_options::Refused;
+use dtof_photons::pixel_counts::PixelCounts;
 use dtof_photons::source::Slice;
 
-/// A pixel.
-struct Pixel<const BINS: usize> {
-    address: PixelAddress,
-    /// All photons within the histogram, gated or not.
-    counts: Box<[u32; BINS]>,
-    /// Photons past the last bin.
-    rejected: u64,
-    /// Laser cycles.
-    cycles: u64,
-    is_masked: bool,
-    /// Whether its decision is kept.
-    is_kept: bool,
+/// The decision of a pixel.
+#[derive(Clone, Debug)]
+pub struct OnceDecision {
+    /// Its echoes, as they are found: without neighbours the highest peak first.
+    pub echoes: Vec<(EchoNumber, Detection)>,
+    /// How many standard deviations its best window stands above the background; not a number if it is left out or has
+    /// no laser cycles.
+    pub confidence: f64,
+    /// The first echo, or else the peak of the best window, however unsure; `None` without a photon in the gate.
+    pub best: Option<BinPosition>,
+    statistics: Statistics,
+    /// Its gated photons, if they are kept.
+    kept: Option<Vec<u32>>,
 }
 
 /// What was decided on a histogram.
@@ -62,77 +68,174 @@ struct Decided<const BINS: usize, W: CounterWidth> {
     statistics: Statistics,
     echoes: Vec<(EchoNumber, Detection)>,
     confidence: f64,
+    best: Option<BinPosition>,
 }
 
-/// The engine.
-pub struct OnceEngine<const BINS: usize, W: CounterWidth> {
+/// The decisions of the pixels `addresses` of an array, ascending, on their `counts`. The photons of pixels for which
+/// `is_kept` is true are kept.
+///
+/// # Errors
+/// Fails if the settings break a constraint.
+pub fn decide_once(
+    settings: &Settings,
+    array: Array,
+    addresses: &[PixelAddress],
+    counts: &PixelCounts,
+    is_kept: impl Fn(PixelAddress) -> bool + Sync,
+) -> Result<Vec<OnceDecision>> {
+    ensure!(
+        settings.binning.is_none(),
+        Refused::new("decide_once", "cannot be used with `binning`")
+    );
+    if settings.neighbours.is_some() {
+        check(settings)?;
+    }
+    let is_masked = |address: &PixelAddress| settings.masked.contains(&address.raw());
+    let is_masked: Vec<bool> = addresses.iter().map(is_masked).collect();
+    with_widest!(settings.bins, BINS, W => Pixels::<BINS, W> {
+        config: settings.config()?,
+        any_peak: settings.any_peak().config()?,
+        array,
+        neighbours: settings.neighbours,
+        addresses,
+        is_masked: &is_masked,
+        counts,
+        counters: PhantomData,
+    }.decide_all(&is_kept))
+    .map_err(Into::into)
+}
+
+impl Settings {
+    /// The same with a window rule that takes any peak.
+    fn any_peak(&self) -> Self {
+        let rule = match self.rule {
+            AnyRule::Window(rule) => {
+                WindowRule::new(rule.width(), U4F12::ZERO, Count::saturating(1))
+                    .map_or(self.rule, AnyRule::Window)
+            }
+            rule => rule,
+        };
+        Self {
+            rule,
+            neighbours: None,
+            ..self.clone()
+        }
+    }
+}
+
+/// Pixels that decide.
+struct Pixels<'a, const BINS: usize, W: CounterWidth> {
     config: PixelConfig<BINS, AnyRule>,
+    /// The same with a rule that takes any peak.
+    any_peak: PixelConfig<BINS, AnyRule>,
     array: Array,
     neighbours: Option<Neighbours>,
-    /// By address.
-    pixels: Vec<Pixel<BINS>>,
-    statistics: Statistics,
-    /// Of each place of the array.
-    confidence: Vec<f64>,
-    decisions: Vec<Decision>,
+    /// Ascending.
+    addresses: &'a [PixelAddress],
+    is_masked: &'a [bool],
+    counts: &'a PixelCounts,
     counters: PhantomData<W>,
 }
 
-impl<const BINS: usize, W: CounterWidth> OnceEngine<BINS, W> {
-    /// An engine for the pixels `addresses` of an array, ascending.
-    ///
-    /// # Errors
-    /// Fails if the settings break a constraint.
-    pub fn new(settings: &Settings, array: Array, addresses: &[PixelAddress]) -> Result<Self> {
-        ensure!(
-            settings.binning.is_none(),
-            Refused::new("decide_once", "cannot be used with `binning`")
-        );
-        if settings.neighbours.is_some() {
-            check(settings)?;
-        }
-        let pixel = |&address: &PixelAddress| Pixel {
-            address,
-            counts: Box::new([0; BINS]),
-            rejected: 0,
-            cycles: 0,
-            is_masked: settings.masked.contains(&address.raw()),
-            is_kept: false,
+impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
+    fn decide_all(&self, is_kept: &(impl Fn(PixelAddress) -> bool + Sync)) -> Vec<OnceDecision> {
+        let pixels = self.addresses.len();
+        let end = |place: usize, decided: Decided<BINS, W>| {
+            let is_used = !self.is_masked[place] && self.counts.cycles(place) > 0;
+            let mut statistics = decided.statistics;
+            statistics.expired = u64::from(is_used && decided.echoes.is_empty());
+            OnceDecision {
+                echoes: match is_used {
+                    true => decided.echoes,
+                    false => Vec::new(),
+                },
+                confidence: match is_used {
+                    true => decided.confidence,
+                    false => f64::NAN,
+                },
+                best: decided.best.filter(|_| is_used),
+                statistics,
+                kept: is_kept(self.addresses[place]).then(|| counts(&decided.histogram)),
+            }
         };
-        Ok(Self {
-            config: settings.config()?,
-            array,
-            neighbours: settings.neighbours,
-            pixels: addresses.iter().map(pixel).collect(),
-            statistics: Statistics::new(),
-            confidence: vec![f64::NAN; usize::try_from(array.pixels())?],
-            decisions: Vec::new(),
-            counters: PhantomData,
+        let alone = |place: usize| {
+            let counts = self.counts.histogram(place).iter();
+            let counts: Vec<u64> = counts.map(|&count| count.into()).collect();
+            self.decide(&counts, self.counts.cycles(place))
+        };
+        let Some(neighbours) = self.neighbours else {
+            return of_each(pixels, |place| end(place, alone(place)));
+        };
+        let decided = of_each(pixels, alone);
+        of_each(pixels, |place| {
+            end(place, self.with_neighbours(neighbours, place, &decided))
         })
     }
 
     /// The decision on `counts` of so many laser cycles.
-    fn decide(&self, counts: &[u32; BINS], cycles: u64) -> Decided<BINS, W> {
+    fn decide(&self, counts: &[u64], cycles: u64) -> Decided<BINS, W> {
         let config = &self.config;
-        let mut histogram = Histogram::<BINS, W>::new();
-        let gated_out = config.add_frame(&mut histogram, counts);
-        let mut statistics = Statistics::new();
-        statistics.add_photons_of(&histogram, gated_out);
-        let cycles = u32::try_from(cycles).unwrap_or(u32::MAX);
-        let mut echoes = Vec::new();
-        if histogram.saturated() > 0 {
-            statistics.ended_full = 1;
-        } else {
-            let echo = |number, detection: &Detection| echoes.push((number, *detection));
-            let is_blind = config.detect_echoes(&mut histogram.clone(), cycles, echo);
-            statistics.blind_looks = is_blind.into();
+        let (most, most_cycles) = match config.weighs_dead_time() {
+            // Full counters and more laser cycles cannot be weighed.
+            true => (W::MAX - 1, LiveCounts::<BINS, W>::MAX_CYCLES.into()),
+            false => (W::MAX, u64::MAX),
+        };
+        let highest = counts.iter().copied().max().unwrap_or(0);
+        let fits =
+            |&shift: &u32| highest >> shift <= u64::from(most) && cycles >> shift <= most_cycles;
+        let shift = (0..64).find(fits).unwrap_or(63);
+        let mut frame = [0_u32; BINS];
+        for (count, photons) in frame.iter_mut().zip(counts) {
+            *count = u32::try_from(photons >> shift).unwrap_or(u32::MAX);
         }
+        let mut histogram = Histogram::<BINS, W>::new();
+        config.add_frame(&mut histogram, &frame);
+        let all: u64 = counts.iter().sum();
+        let [first, last] = [config.gate().first(), config.gate().last()].map(usize::from);
+        let gated: u64 = counts[first..=last].iter().sum();
+        let mut statistics = Statistics::new();
+        (statistics.counted, statistics.gated_out) = (gated, all - gated);
+        let cycles = u32::try_from(cycles >> shift).unwrap_or(u32::MAX);
+        let mut echoes = Vec::new();
+        let echo = |number, detection: &Detection| echoes.push((number, *detection));
+        let is_blind = config.detect_echoes(&mut histogram.clone(), cycles, echo);
+        statistics.blind_looks = is_blind.into();
+        statistics.events = echoes.len() as u64;
         Decided {
             confidence: confidence(config, &histogram, cycles),
+            best: match echoes.first() {
+                Some((_, detection)) => Some(detection.position()),
+                None => self.best(&histogram, cycles),
+            },
             histogram,
             statistics,
             echoes,
         }
+    }
+
+    /// The peak of the best window, if there is a photon.
+    fn best(&self, histogram: &Histogram<BINS, W>, cycles: u32) -> Option<BinPosition> {
+        if histogram.total() == 0 {
+            return None;
+        }
+        let mut best = None;
+        if self.config.weighs_dead_time() {
+            self.any_peak
+                .detect_echoes(&mut histogram.clone(), cycles, |number, detection| {
+                    if number == EchoNumber::FIRST {
+                        best = Some(detection.position());
+                    }
+                });
+        }
+        // Without a dead time that is weighed, the highest bin decides.
+        best.or_else(|| {
+            let (gate, peak) = (self.config.gate(), histogram.peak());
+            let background = self.own_photons(peak.bin, histogram).background;
+            let background = U24F8::saturating_from_num(background);
+            let estimator = self.config.estimator();
+            let depth = estimator.estimate(histogram, gate, peak, background);
+            Some(BinPosition::of(peak.bin, depth.offset))
+        })
     }
 
     /// The decision of pixel number `place` with its neighbours; `decided_alone` are those of all pixels alone.
@@ -142,29 +245,25 @@ impl<const BINS: usize, W: CounterWidth> OnceEngine<BINS, W> {
         place: usize,
         decided_alone: &[Decided<BINS, W>],
     ) -> Decided<BINS, W> {
-        let has_say = |place: usize| {
-            !self.pixels[place].is_masked && decided_alone[place].statistics.ended_full == 0
-        };
-        let (pixel, own) = (&self.pixels[place], &decided_alone[place]);
+        let own = &decided_alone[place];
         let mut decided = own.clone();
-        if !has_say(place) {
+        if self.is_masked[place] {
             return decided;
         }
-        let mut sum = pixel.counts.clone();
+        let own_counts = self.counts.histogram(place).iter();
+        let mut sum: Vec<u64> = own_counts.map(|&count| count.into()).collect();
         let mut asked = Vec::new();
-        for other in self.array.neighbours(pixel.address, neighbours) {
-            let other = self
-                .pixels
-                .binary_search_by_key(&other, |other| other.address);
-            if let Some(other) = other.ok().filter(|&other| has_say(other)) {
-                let counts = self.pixels[other].counts.iter();
+        for other in self.array.neighbours(self.addresses[place], neighbours) {
+            let other = self.addresses.binary_search(&other);
+            if let Some(other) = other.ok().filter(|&other| !self.is_masked[other]) {
+                let counts = self.counts.histogram(other).iter();
                 for (sum, &count) in sum.iter_mut().zip(counts) {
-                    *sum = sum.saturating_add(count);
+                    *sum += u64::from(count);
                 }
                 asked.push(&decided_alone[other].histogram);
             }
         }
-        let all = self.decide(&sum, pixel.cycles);
+        let all = self.decide(&sum, self.counts.cycles(place));
         let mut uses_sum = false;
         for (_, detection) in &mut decided.echoes {
             let deviation = self.deviation(detection, &own.histogram);
@@ -173,13 +272,16 @@ impl<const BINS: usize, W: CounterWidth> OnceEngine<BINS, W> {
                 f64::from(apart) / 256.0 <= 2.0 * deviation
             };
             if let Some((_, other)) = all.echoes.iter().find(is_same) {
-                *detection = self.own_photons(other, &own.histogram).of_pixel(other);
+                *detection = self
+                    .own_photons(other.peak.bin, &own.histogram)
+                    .of_pixel(other);
                 uses_sum = true;
             }
         }
         for (echo, detection) in all.echoes.iter().filter(|_| own.echoes.is_empty()) {
-            let own = self.own_photons(detection, &own.histogram);
-            let around = asked.iter().map(|other| self.own_photons(detection, other));
+            let bin = detection.peak.bin;
+            let own = self.own_photons(bin, &own.histogram);
+            let around = asked.iter().map(|other| self.own_photons(bin, other));
             let sums = around.fold([0.0; 2], |[squares, sum], other| {
                 let above = other.above();
                 // The variance of a Poisson number is its mean.
@@ -197,6 +299,10 @@ impl<const BINS: usize, W: CounterWidth> OnceEngine<BINS, W> {
         if uses_sum {
             decided.confidence = own.confidence.max(all.confidence);
         }
+        if let Some((_, detection)) = decided.echoes.first() {
+            decided.best = Some(detection.position());
+        }
+        decided.statistics.events = decided.echoes.len() as u64;
         decided
     }
 
@@ -213,14 +319,15 @@ impl<const BINS: usize, W: CounterWidth> OnceEngine<BINS, W> {
             inside += photons;
             width += 1.0;
         }
-        let above = inside - width * self.own_photons(detection, histogram).background;
+        let own = self.own_photons(detection.peak.bin, histogram);
+        let above = inside - width * own.background;
         spread.sqrt() / above.max(1.0)
     }
 
-    /// The photons of `histogram` in the window around a peak.
-    fn own_photons(&self, detection: &Detection, histogram: &Histogram<BINS, W>) -> AroundPeak {
+    /// The photons of `histogram` in the window around the bin of a peak.
+    fn own_photons(&self, peak: BinIndex, histogram: &Histogram<BINS, W>) -> AroundPeak {
         let gate = self.config.gate();
-        let (peak, width) = (usize::from(detection.peak.bin.raw()), width(&self.config));
+        let (peak, width) = (usize::from(peak.raw()), width(self.config.rule()));
         let first = peak.saturating_sub(width / 2).max(gate.first().into());
         let end = (peak + width / 2 + 1).min(usize::from(gate.last()) + 1);
         let count = |bin: usize| histogram.count(bin).unwrap_or(0);
@@ -271,59 +378,85 @@ impl AroundPeak {
     }
 }
 
-impl<const BINS: usize, W: CounterWidth> Engine for OnceEngine<BINS, W> {
+/// The engine: it decides on all photons that it receives.
+pub struct OnceEngine {
+    settings: Settings,
+    array: Array,
+    addresses: Vec<PixelAddress>,
+    counts: PixelCounts,
+    is_kept: Vec<bool>,
+    statistics: Statistics,
+    /// Of each place of the array.
+    confidence: Vec<f64>,
+    decisions: Vec<Decision>,
+}
+
+impl OnceEngine {
+    /// An engine for the pixels `addresses` of an array, ascending.
+    ///
+    /// # Errors
+    /// Fails if the settings break a constraint.
+    pub fn new(settings: &Settings, array: Array, addresses: &[PixelAddress]) -> Result<Self> {
+        // Fails as it would at the end.
+        decide_once(
+            settings,
+            array,
+            &[],
+            &PixelCounts::new(0, settings.bins),
+            |_| false,
+        )?;
+        Ok(Self {
+            settings: settings.clone(),
+            array,
+            addresses: addresses.to_vec(),
+            counts: PixelCounts::new(addresses.len(), settings.bins),
+            is_kept: vec![false; addresses.len()],
+            statistics: Statistics::new(),
+            confidence: vec![f64::NAN; usize::try_from(array.pixels())?],
+            decisions: Vec::new(),
+        })
+    }
+
+    fn is_kept(&self, pixel: PixelAddress) -> bool {
+        let place = self.addresses.binary_search(&pixel);
+        place.is_ok_and(|place| self.is_kept[place])
+    }
+}
+
+impl Engine for OnceEngine {
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
-        of_parts(&mut self.pixels, 1, |first, pixels| {
-            let slice = slice.pixels.iter().skip(first);
-            for (pixel, received) in pixels.iter_mut().zip(slice) {
-                for photon in &received.photons {
-                    match pixel.counts.get_mut(usize::from(photon.code)) {
-                        Some(count) => *count = count.saturating_add(1),
-                        None => pixel.rejected += 1,
-                    }
-                }
-                pixel.cycles += u64::from(received.cycles);
-            }
-        });
+        self.counts.add(slice);
         Ok(Vec::new())
     }
 
     fn finish(&mut self) -> Vec<DepthEvent> {
-        let mut decided = of_each(self.pixels.len(), |place| {
-            let pixel = &self.pixels[place];
-            self.decide(&pixel.counts, pixel.cycles)
-        });
-        if let Some(neighbours) = self.neighbours {
-            decided = of_each(decided.len(), |place| {
-                self.with_neighbours(neighbours, place, &decided)
-            });
-        }
+        let (addresses, counts) = (&self.addresses, &self.counts);
+        let is_kept = |pixel| self.is_kept(pixel);
+        let decided = decide_once(&self.settings, self.array, addresses, counts, is_kept);
+        self.statistics.rejected = counts.rejected();
         let mut events = Vec::new();
-        for (pixel, decided) in self.pixels.iter().zip(&decided) {
+        // The settings were checked.
+        for (place, decided) in decided.unwrap_or_default().into_iter().enumerate() {
+            let (address, cycles) = (self.addresses[place], counts.cycles(place));
             self.statistics += decided.statistics;
-            self.statistics.rejected += pixel.rejected;
-            let is_used = !pixel.is_masked && pixel.cycles > 0;
-            self.statistics.expired += u64::from(is_used && decided.echoes.is_empty());
-            if is_used {
-                self.confidence[usize::from(pixel.address.raw())] = decided.confidence;
-            }
-            let last = LaserCycle::new(pixel.cycles.saturating_sub(1));
-            let exposure = u16::try_from(pixel.cycles).unwrap_or(u16::MAX);
+            self.confidence[usize::from(address.raw())] = decided.confidence;
+            let last = LaserCycle::new(cycles.saturating_sub(1));
+            let exposure = u16::try_from(cycles).unwrap_or(u16::MAX);
             let event = |&(echo, detection): &(EchoNumber, Detection)| DepthEvent {
                 echo,
-                ..detection.event(pixel.address, last, exposure)
+                ..detection.event(address, last, exposure)
             };
             events.extend(decided.echoes.iter().map(event));
-            let kept = decided.echoes.first().filter(|_| pixel.is_kept);
-            self.decisions.extend(kept.map(|first| Decision {
-                event: event(first),
-                counts: counts(&decided.histogram),
-                cycles: u32::try_from(pixel.cycles).unwrap_or(u32::MAX),
-                expected: None,
-                excluded: ExcludedBins::NONE,
-            }));
+            if let (Some(first), Some(counts)) = (decided.echoes.first(), decided.kept) {
+                self.decisions.push(Decision {
+                    event: event(first),
+                    counts,
+                    cycles: u32::try_from(cycles).unwrap_or(u32::MAX),
+                    expected: None,
+                    excluded: ExcludedBins::NONE,
+                });
+            }
         }
-        self.statistics.events = events.len() as u64;
         sort(&mut events);
         events
     }
@@ -337,8 +470,8 @@ impl<const BINS: usize, W: CounterWidth> Engine for OnceEngine<BINS, W> {
     }
 
     fn keep_decisions(&mut self, is_kept: &dyn Fn(PixelAddress) -> bool) {
-        for pixel in &mut self.pixels {
-            pixel.is_kept = is_kept(pixel.address);
+        for (kept, pixel) in self.is_kept.iter_mut().zip(&self.addresses) {
+            *kept = is_kept(*pixel);
         }
     }
 
@@ -358,8 +491,9 @@ fn sort(events: &mut [DepthEvent]) {
 }
 
 /// Bins of the rule's window: 1 for rules that test the highest bin.
-fn width<const BINS: usize>(config: &PixelConfig<BINS, AnyRule>) -> usize {
-    match config.rule() {
+#[must_use]
+pub fn width(rule: &AnyRule) -> usize {
+    match rule {
         AnyRule::Window(rule) => rule.width().into(),
         AnyRule::Paper(_) | AnyRule::Average(_) => 1,
     }
@@ -393,7 +527,7 @@ fn confidence<const BINS: usize, W: CounterWidth>(
     // Windows that contain the highest bin, or all of them where bins are weighed.
     // That of an empty histogram is bin 0.
     let peak = usize::from(histogram.peak().bin.raw().saturating_sub(gate.first()));
-    let width = width(config);
+    let width = width(config.rule());
     let is_tested = |start: usize| weighed.is_some() || (start..start + width).contains(&peak);
     let mut best = 0.0;
     for (_, window) in (0..)

@@ -47,18 +47,25 @@ fn first(received: &PixelPhotons, bins: usize) -> PixelPhotons {
     }
 }
 
+/// The photons of a slice that count, for histograms with so many bins.
+#[must_use]
+pub fn once_per_bin(slice: &Slice, bins: usize) -> Slice {
+    let pixels = slice.pixels.par_iter();
+    Slice {
+        first_cycle: slice.first_cycle,
+        pixels: pixels.map(|pixel| first(pixel, bins)).collect(),
+    }
+}
+
 impl Engine for OncePerBinEngine {
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
-        let pixels = slice.pixels.par_iter();
-        let pixels: Vec<PixelPhotons> = pixels.map(|pixel| first(pixel, self.bins)).collect();
-        let photons = |pixels: &[PixelPhotons]| -> usize {
-            pixels.iter().map(|pixel| pixel.photons.len()).sum()
+        let once = once_per_bin(slice, self.bins);
+        let photons = |slice: &Slice| -> usize {
+            let pixels = slice.pixels.iter();
+            pixels.map(|pixel| pixel.photons.len()).sum()
         };
-        self.repeated += (photons(&slice.pixels) - photons(&pixels)) as u64;
-        self.engine.run(&Slice {
-            first_cycle: slice.first_cycle,
-            pixels,
-        })
+        self.repeated += (photons(slice) - photons(&once)) as u64;
+        self.engine.run(&once)
     }
 
     fn finish(&mut self) -> Vec<DepthEvent> {

@@ -11,6 +11,7 @@ pub mod npy;
 pub mod open;
 mod photon_csv;
 mod photon_list;
+pub mod pixel_counts;
 pub mod range;
 pub mod ranges;
 pub mod recorded;

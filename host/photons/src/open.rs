@@ -17,6 +17,7 @@ use crate::npy::records::{self, RecordReader};
 use crate::npy::{archive, histograms};
 use crate::photon_csv::CsvReader;
 use crate::photon_list::{CountedSource, ListOptions, PhotonList, PhotonReader};
+use crate::pixel_counts::PixelCounts;
 use crate::recorded::{Capture, RecordedHistograms, RecordingLength};
 use crate::source::PhotonSource;
 use crate::{tmf8820, tmf8829, warnings};
@@ -209,14 +210,27 @@ impl CheckedRecording {
     /// # Errors
     /// Those of [`Counts::photons`], after the name of the recording.
     pub fn photons(self, options: &ReadOptions) -> Result<Recording> {
+        Ok(self.photons_and_counts(options)?.0)
+    }
+
+    /// The same, and all photons of histograms.
+    ///
+    /// # Errors
+    /// As for [`Self::photons`].
+    pub fn photons_and_counts(
+        self,
+        options: &ReadOptions,
+    ) -> Result<(Recording, Option<PixelCounts>)> {
         match self.content {
-            Content::Photons(photons, metadata) => Ok(Recording { photons, metadata }),
+            Content::Photons(photons, metadata) => Ok((Recording { photons, metadata }, None)),
             Content::Histograms(counts) => {
                 let photons = counts.photons(options);
-                Ok(Recording {
-                    photons: Box::new(photons.with_context(|| self.input.to_string())?),
-                    metadata: counts.metadata,
-                })
+                let photons = photons.with_context(|| self.input.to_string())?;
+                let (captures, metadata) = (counts.captures, counts.metadata);
+                let cycles = photons.cycles_left();
+                let all = PixelCounts::of_captures(&captures, metadata.bins, cycles);
+                let photons = Box::new(photons);
+                Ok((Recording { photons, metadata }, Some(all)))
             }
         }
     }

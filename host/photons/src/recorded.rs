@@ -187,6 +187,12 @@ impl RecordedHistograms {
         Ok(self)
     }
 
+    /// Laser cycles of each pixel that have not been drawn: those of its recording, before the first slice.
+    #[must_use]
+    pub fn cycles_left(&self) -> Vec<u64> {
+        self.pixels.iter().map(|pixel| pixel.cycles_left).collect()
+    }
+
     /// Renames columns and rows.
     #[must_use]
     pub fn with_axis_names(self, axis_names: [&'static str; 2]) -> Self {

@@ -1,86 +1,55 @@
 //! Whether targets are too bright for photons that count once per bin.
 
 use dtof_core::PixelAddress;
-use dtof_photons::source::Slice;
+use dtof_photons::pixel_counts::PixelCounts;
 
 /// Photons a bin and laser cycle above which the depth of a pulse suffers: a fifth of them is lost in its
 /// middle, and less at its sides.
 const MOST: f64 = 0.5;
 
-/// All photons of each pixel, bin by bin.
-pub(crate) struct Brightness {
-    bins: usize,
-    counts: Vec<u32>,
-    /// Laser cycles of each pixel.
-    cycles: Vec<u64>,
-}
-
-impl Brightness {
-    pub(crate) fn new(pixels: usize, bins: usize) -> Self {
-        Self {
-            bins,
-            counts: vec![0; pixels * bins],
-            cycles: vec![0; pixels],
-        }
-    }
-
-    /// Photons past the last bin are left out.
-    pub(crate) fn add(&mut self, slice: &Slice) {
-        let pixels = self.counts.chunks_mut(self.bins).zip(&mut self.cycles);
-        for ((counts, cycles), received) in pixels.zip(&slice.pixels) {
-            *cycles += u64::from(received.cycles);
-            for photon in &received.photons {
-                if let Some(count) = counts.get_mut(usize::from(photon.code)) {
-                    *count = count.saturating_add(1);
-                }
-            }
-        }
-    }
-
-    /// Names the brightest pixel if it has more than half a photon a laser cycle in a bin, on average
-    /// over the run. `addresses` are those of the pixels.
-    pub(crate) fn warning(&self, addresses: &[PixelAddress]) -> Option<String> {
-        let pixels = self.counts.chunks(self.bins).zip(&self.cycles);
-        let highest = pixels.map(|(counts, &cycles)| {
-            let highest = counts.iter().zip(0..).max()?;
-            Some((f64::from(*highest.0) / cycles.max(1) as f64, highest.1))
-        });
-        let bright = highest.zip(addresses);
-        let bright: Vec<(f64, usize, u16)> = bright
-            .filter_map(|(highest, address)| highest.map(|(rate, bin)| (rate, bin, address.raw())))
-            .filter(|&(rate, ..)| rate > MOST)
-            .collect();
-        let (rate, bin, pixel) = bright
-            .iter()
-            .max_by(|one, other| one.0.total_cmp(&other.0))?;
-        let number = bright.len();
-        Some(format!(
-            "{number} of {} pixels have more than half a photon a laser cycle in a bin, pixel {pixel} {rate:.2} in \
-             bin {bin}: counted once per bin they lose a fifth or more of their light, and depth suffers",
-            self.cycles.len()
-        ))
-    }
+/// Names the brightest pixel if it has more than half a photon a laser cycle in a bin, on average over the run.
+/// `addresses` are those of the pixels.
+pub(crate) fn bright_bins(counts: &PixelCounts, addresses: &[PixelAddress]) -> Option<String> {
+    let highest = (0..counts.pixels()).map(|place| {
+        let highest = counts.histogram(place).iter().zip(0..).max()?;
+        let cycles = counts.cycles(place).max(1) as f64;
+        Some((f64::from(*highest.0) / cycles, highest.1))
+    });
+    let bright = highest.zip(addresses);
+    let bright: Vec<(f64, usize, u16)> = bright
+        .filter_map(|(highest, address)| highest.map(|(rate, bin)| (rate, bin, address.raw())))
+        .filter(|&(rate, ..)| rate > MOST)
+        .collect();
+    let (rate, bin, pixel) = bright
+        .iter()
+        .max_by(|one, other| one.0.total_cmp(&other.0))?;
+    let number = bright.len();
+    Some(format!(
+        "{number} of {} pixels have more than half a photon a laser cycle in a bin, pixel {pixel} {rate:.2} in \
+         bin {bin}: counted once per bin they lose a fifth or more of their light, and depth suffers",
+        counts.pixels()
+    ))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_photons::source::{Photon, PixelPhotons};
+    use dtof_photons::source::{Photon, PixelPhotons, Slice};
 
     /// Pixels with so many photons in bin 5 in ten laser cycles, two slices each.
     fn warning(photons: [usize; 2]) -> Option<String> {
-        let mut brightness = Brightness::new(2, 8);
+        let mut counts = PixelCounts::new(2, 8);
         let pixel = |number| PixelPhotons {
             cycles: 5,
             photons: vec![Photon { cycle: 0, code: 5 }; number],
         };
         for first_cycle in [0, 5] {
-            brightness.add(&Slice {
+            counts.add(&Slice {
                 first_cycle,
                 pixels: photons.map(|number| pixel(number / 2)).into(),
             });
         }
-        brightness.warning(&[3, 9].map(PixelAddress::new))
+        bright_bins(&counts, &[3, 9].map(PixelAddress::new))
     }
 
     #[test]

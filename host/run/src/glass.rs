@@ -4,17 +4,14 @@ use crate::summary::Summary;
 use dtof_calibrate::{Change, RunPhotons, glass_change};
 use dtof_engine::settings::{SensorSettings, SettingsFile};
 
-/// Notes in the summary of a run whether crosstalk has become stronger, if `bins` has its photons bin by
-/// bin.
-pub(crate) fn watch_glass(requested: &SettingsFile, bins: Option<&[u64]>, summary: &mut Summary) {
-    if let Some(bins) = bins {
-        let run = RunPhotons {
-            bins,
-            cycles: summary.cycles,
-            pixels: summary.pixels.saturating_sub(summary.settings.masked.len()) as u64,
-        };
-        summary.cover_glass = brighter(requested, &run);
-    }
+/// Notes in the summary of a run whether crosstalk has become stronger; `bins` are its photons bin by bin.
+pub(crate) fn watch_glass(requested: &SettingsFile, bins: &[u64], summary: &mut Summary) {
+    let run = RunPhotons {
+        bins,
+        cycles: summary.cycles,
+        pixels: summary.pixels.saturating_sub(summary.settings.masked.len()) as u64,
+    };
+    summary.cover_glass = brighter(requested, &run);
 }
 
 /// How many times as bright crosstalk is as in the settings, and at least, if it is significantly

@@ -4,6 +4,7 @@
 mod bright;
 pub mod calibrate;
 pub mod compare;
+pub mod depth_map;
 pub mod given;
 pub mod glass;
 pub mod output;

@@ -1,9 +1,9 @@
-//! The output folder: `events.csv`, `events.aer`, `summary.json`, the depth as `depth.npy` and `depth.csv`, the maps as
-//! SVG, `report.html` that shows them, and `dtof.toml` with the settings.
+//! The output folder: `events.csv`, `events.aer`, `summary.json`, the depth as arrays and a table, the maps as SVG, `report.html` that shows them, and `dtof.toml` with the settings.
 //!
 //! Every file is written beside its place. When all are whole they are moved
 //! there, the summary last: a folder with a summary is complete.
 
+mod age;
 mod changes;
 mod depth;
 mod pictures;
@@ -17,7 +17,9 @@ use dtof_core::{DepthEvent, EchoNumber, PixelAddress};
 use tempfile::NamedTempFile;
 
 use crate::Sink;
+use crate::depth_map::DepthMap;
 use crate::summary::{self, Summary};
+use age::LastAtBin;
 use changes::Changes;
 use dtof_draw::svg;
 use dtof_engine::Engine;
@@ -71,10 +73,10 @@ pub struct Output {
     /// of the report unless it shows all.
     echo: Option<Echo>,
     selection: Option<EchoSelection>,
-    /// If pixels report several.
-    layers: Vec<depth::Layer>,
-    /// How clear the peak of each pixel stands, if pixels decide once.
-    confidence: Option<Vec<f64>>,
+    /// The depth of each pixel, decided on all photons.
+    map: Option<DepthMap>,
+    /// If events have the times of their photons.
+    last_events: Option<LastAtBin>,
     /// If they are requested.
     changes: Option<Changes>,
     /// The pixels of the photons.
@@ -126,8 +128,9 @@ impl Output {
             decisions: None,
             echo: None,
             selection: selection(None, settings),
-            layers: depth::Layer::all(settings, array),
-            confidence: None,
+            map: None,
+            last_events: (source.recorded_cycles().is_none() && !settings.decide_once)
+                .then(|| LastAtBin::new(array)),
             changes: None,
             pixels: source.addresses(),
         })
@@ -210,7 +213,8 @@ impl Output {
         sections: &[Section],
     ) -> Result<Option<PathBuf>> {
         let nouns = summary.settings.reports();
-        let pictures = pictures(&self.maps, self.axis_names, nouns)?;
+        let map = self.map.as_ref();
+        let pictures = pictures(&self.maps, map, self.axis_names, nouns)?;
         let changes = self.changes.as_ref();
         let changes = changes.map(|changes| changes.picture(summary.cycles, nouns[1]));
         let changes = changes.transpose()?.flatten();
@@ -231,7 +235,15 @@ impl Output {
         let section = |heading, rows| Section { heading, rows };
         let mut all = vec![section("Totals", &totals[..])];
         all.extend(sections);
-        let pixels = few.then(|| self.maps.rows(self.axis_names, nouns));
+        let mut pixels = few.then(|| self.maps.rows(self.axis_names, nouns));
+        for (pixels, map) in pixels.iter_mut().zip(map) {
+            for ((_, text), depth) in pixels.iter_mut().zip(&map.depth_mm) {
+                *text = match depth.is_nan() {
+                    true => format!("no depth; {text}"),
+                    false => format!("depth {depth:.1} mm, decided on all photons; {text}"),
+                };
+            }
+        }
         if let Some(pixels) = &pixels {
             all.insert(0, section("Pixels", pixels));
         }
@@ -273,15 +285,40 @@ impl Output {
         // Without a summary the folder does not look complete. A file that this run does not write would be
         // that of another run.
         let mut removed = vec![SUMMARY];
-        if self.layers.is_empty() {
-            removed.extend(depth::LAYERS.iter().flat_map(|layer| [layer.1, layer.2]));
-        }
-        match &self.confidence {
-            Some(confidence) => {
-                let array = depth::array(self.maps.array, confidence.iter().copied());
-                files.push(written(&array, depth::CONFIDENCE)?);
+        let array = self.maps.array;
+        let means = self.maps.pixels.iter().map(|pixel| pixel.mean_mm());
+        let means: Vec<f64> = means.map(|mean| mean.unwrap_or(f64::NAN)).collect();
+        let ages = self.last_events.as_ref().zip(map);
+        let ages = ages.map(|(last, map)| last.ages(&map.positions, summary.cycles));
+        let arrays = [
+            (depth::EVENTS, map.map(|_| &means)),
+            (depth::CONFIDENCE, map.map(|map| &map.confidence)),
+            (depth::BEST, map.map(|map| &map.best_mm)),
+            (depth::AGE, ages.as_ref()),
+        ];
+        for (name, values) in arrays {
+            match values {
+                Some(values) => files.push(written(&depth::array(array, values), name)?),
+                None => removed.push(name),
             }
-            None => removed.push(depth::CONFIDENCE),
+        }
+        let [nearest, farthest] = depth::LAYERS;
+        let layers = map.and_then(|map| map.echoes_mm.as_ref());
+        for (names, depths) in [
+            (
+                [depth::ARRAY, depth::TABLE],
+                Some(map.map_or(&means, |map| &map.depth_mm)),
+            ),
+            (nearest, layers.map(|[nearest, _]| nearest)),
+            (farthest, layers.map(|[_, farthest]| farthest)),
+        ] {
+            let Some(depths) = depths else {
+                removed.extend(names);
+                continue;
+            };
+            files.push(written(&depth::array(array, depths), names[0])?);
+            let table = depth::table(array, depths, map);
+            files.push(written(table.as_bytes(), names[1])?);
         }
         match self.csv {
             Some(csv) => files.push((flush_to_disk(csv).with_context(|| name(CSV))?, CSV)),
@@ -290,13 +327,8 @@ impl Output {
         for picture in &pictures {
             files.push(written(picture.svg.as_bytes(), picture.name)?);
         }
-        let layers = self.layers.iter().map(|layer| (&layer.maps, layer.names));
-        for (maps, [array, table]) in layers.chain([(&self.maps, [depth::ARRAY, depth::TABLE])]) {
-            let depths = maps.pixels.iter().map(|pixel| pixel.mean_mm());
-            let depths = depths.map(|depth| depth.unwrap_or(f64::NAN));
-            files.push(written(&depth::array(maps.array, depths), array)?);
-            let text = depth::table(maps, self.confidence.as_deref());
-            files.push(written(text.as_bytes(), table)?);
+        if map.is_none() {
+            removed.push(pictures::DEPTH);
         }
         files.push(written(report.as_bytes(), REPORT)?);
         let settings_text = self.settings.to_toml()?;
@@ -340,8 +372,8 @@ impl Sink for Output {
             if self.echo.is_none() {
                 self.sample.add(event, range_mm(event, &self.ranges));
             }
-            for layer in &mut self.layers {
-                layer.add(event, &self.ranges);
+            if let Some(last) = &mut self.last_events {
+                last.add(event);
             }
             match &mut self.selection {
                 Some(selection) => selection.push(*event),
@@ -353,10 +385,7 @@ impl Sink for Output {
     }
 
     /// Shows the events that still waited for another echo of their exposure.
-    fn end(&mut self, engine: &dyn Engine) {
-        for layer in &mut self.layers {
-            layer.end(&self.ranges);
-        }
+    fn end(&mut self, engine: &dyn Engine, map: Option<&DepthMap>) {
         if let Some(selection) = &mut self.selection {
             selection.finish();
         }
@@ -364,7 +393,7 @@ impl Sink for Output {
         if let Some((_, decisions)) = &mut self.decisions {
             *decisions = engine.decisions();
         }
-        self.confidence = engine.confidence().map(<[f64]>::to_vec);
+        self.map = map.cloned();
     }
 }
 
@@ -395,13 +424,18 @@ fn selection(echo: Option<Echo>, settings: &Settings) -> Option<EchoSelection> {
 fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
     let pictures = pictures::NAMES.map(|name| (name, svg::MARK));
     let layers = depth::LAYERS.into_iter();
-    let layers =
-        layers.flat_map(|(_, array, table)| [(array, depth::MARK), (table, depth::HEADER)]);
-    pictures.into_iter().chain(layers).chain([
+    let layers = layers.flat_map(|[array, table]| [(array, depth::MARK), (table, depth::HEADER)]);
+    let arrays = [
+        depth::ARRAY,
+        depth::EVENTS,
+        depth::BEST,
+        depth::CONFIDENCE,
+        depth::AGE,
+    ];
+    let arrays = arrays.map(|name| (name, depth::MARK));
+    pictures.into_iter().chain(layers).chain(arrays).chain([
         (CSV, events_csv::HEADER),
         (AER, aer_file::MAGIC),
-        (depth::ARRAY, depth::MARK),
-        (depth::CONFIDENCE, depth::MARK),
         (depth::TABLE, depth::HEADER),
         (REPORT, dtof_report::MARK),
         (SUMMARY, summary::MARK),

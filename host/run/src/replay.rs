@@ -5,6 +5,7 @@
 use anyhow::{Result, ensure};
 
 use super::calibrate::{calibrate_counts, yes_or_no};
+use super::depth_map::MapInput;
 use super::given::{FRAME, Given, SENSOR, TDC, of_given};
 use super::recording::{
     RECORDING, check_once_per_bin, mask_capture, read_options, settings_of_file,
@@ -80,6 +81,8 @@ pub struct Replay {
     pub requested: SettingsFile,
     /// Metadata of the recording.
     pub metadata: Metadata,
+    /// How its depth map is decided; `None` if it is that of the frames.
+    pub map: Option<MapInput>,
     /// What was found in the recording, one a row, if its settings come from there.
     pub found: Vec<Row>,
 }
@@ -97,7 +100,8 @@ impl Replay {
     ) -> Result<RunResult> {
         let settings = (&self.settings, &self.requested);
         let engine = self.engine.as_mut();
-        let mut result = run(&mut self.photons, engine, settings, &mut [sink], progress)?;
+        let (photons, map) = (&mut self.photons, self.map.as_ref());
+        let mut result = run(photons, engine, settings, map, &mut [sink], progress)?;
         result.summary.input = Some(input.to_string());
         result.summary.cut_off = self.metadata.cut_off;
         result.summary.recording.clone_from(&self.metadata.rows);
@@ -201,15 +205,17 @@ impl Options {
             )
         );
         let has_rule = requested.detection.rule.is_some();
+        let given = requested.clone();
         let found = match has_file {
             true => Ok((Vec::new(), Vec::new())),
             false => find(&mut requested, &mut recording, self.glass),
         };
         let options = read_options(&requested);
+        let (recording, counts) = recording.photons_and_counts(&options)?;
         let Recording {
             photons,
             mut metadata,
-        } = recording.photons(&options)?;
+        } = recording;
         let (found, warnings) = found.unwrap_or_else(|reason| {
             let warning = format!("no settings were found: {reason:#}; the defaults are used");
             (Vec::new(), vec![warning])
@@ -293,6 +299,7 @@ impl Options {
         let engine = host_engine(&settings, photons.array(), &photons.addresses());
         let engine = engine.map_err(|error| requested.add_file_name(error))?;
         Ok(Replay {
+            map: MapInput::new(&requested, &settings, counts, &given)?,
             photons,
             engine,
             settings,

@@ -5,14 +5,17 @@ use std::ops::ControlFlow;
 use anyhow::Result;
 use dtof_core::{Array, DepthEvent, Flags, PixelAddress};
 
-use crate::bright::Brightness;
+use crate::bright::bright_bins;
+use crate::depth_map::{DepthMap, MapInput, RunCounts};
 use crate::glass::watch_glass;
-use crate::summary::Summary;
+use crate::summary::{ALL_PHOTONS, Summary};
 use dtof_engine::Engine;
+use dtof_engine::once_per_bin::once_per_bin;
 use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_engine::slices::each_slice;
 use dtof_options::progress::Progress;
 use dtof_options::rows::grouped;
+use dtof_photons::pixel_counts::PixelCounts;
 use dtof_photons::source::{PhotonSource, PixelPhotons, Slice};
 
 /// Where the photons and the events of a run go.
@@ -26,8 +29,8 @@ pub trait Sink {
     /// Fails if they cannot be written.
     fn take(&mut self, slice: &Slice, events: &[DepthEvent]) -> Result<()>;
 
-    /// The run has ended.
-    fn end(&mut self, _engine: &dyn Engine) {}
+    /// The run has ended. `map` is the depth of its pixels, decided on all photons, if there is one.
+    fn end(&mut self, _engine: &dyn Engine, _map: Option<&DepthMap>) {}
 }
 
 /// The pixels that have reported, and how many events neighbours confirmed.
@@ -81,7 +84,8 @@ pub struct RunResult {
     pub warnings: Vec<String>,
 }
 
-/// Runs all of `source` with `settings`, which resolve `requested`, into `sinks`.
+/// Runs all of `source` with `settings`, which resolve `requested`, into `sinks`. The depth map is that of `map`; without
+/// one it is that of the events.
 ///
 /// # Errors
 /// Fails if the recording, the engine or a sink fails, or if `progress` ends the run.
@@ -89,15 +93,20 @@ pub fn run(
     source: &mut dyn PhotonSource,
     engine: &mut dyn Engine,
     (settings, requested): (&Settings, &SettingsFile),
+    map: Option<&MapInput>,
     sinks: &mut [&mut dyn Sink],
     progress: &mut dyn Progress,
 ) -> Result<RunResult> {
     let mut reported = Reported::new(source.array());
     let has_glass = requested.sensor.glass_bins.is_some();
-    let mut bins = has_glass.then(|| vec![0; settings.bins]);
     let addresses = source.addresses();
+    let (pixels, bins) = (addresses.len(), settings.bins);
     let is_once_per_bin = settings.counts_once_per_bin();
-    let mut brightness = is_once_per_bin.then(|| Brightness::new(addresses.len(), settings.bins));
+    let counts_run = map.is_some_and(MapInput::counts_run);
+    let mut counts = counts_run.then(|| RunCounts::new(pixels, bins, source.cycles()));
+    // Photons that count once per bin and those that are not for the map are other ones.
+    let has_other = is_once_per_bin || (has_glass && !counts_run);
+    let mut other_counts = has_other.then(|| PixelCounts::new(pixels, bins));
     // Laser cycles of each pixel that is left out. Its exposures all end without an event, as it has no photons.
     let is_masked = |pixel: &PixelAddress| settings.masked.contains(&pixel.raw());
     let masked = addresses
@@ -118,11 +127,13 @@ pub fn run(
             for (place, cycles) in &mut masked {
                 *cycles += u64::from(slice.pixels[*place].cycles);
             }
-            if let Some(bins) = &mut bins {
-                add_photons(slice, bins);
+            if let Some(counts) = &mut other_counts {
+                counts.add(slice);
             }
-            if let Some(brightness) = &mut brightness {
-                brightness.add(slice);
+            match &mut counts {
+                Some(counts) if is_once_per_bin => counts.add(&once_per_bin(slice, bins)),
+                Some(counts) => counts.add(slice),
+                None => {}
             }
             deliver(slice, &events, &mut reported, sinks)?;
             cycles = done;
@@ -142,8 +153,12 @@ pub fn run(
         deliver(&slice, &decided, &mut reported, sinks)?;
     }
     progress.end();
+    let map = match map {
+        Some(map) => DepthMap::decide(map, counts.as_ref(), source.array(), &addresses)?,
+        None => None,
+    };
     for sink in &mut *sinks {
-        sink.end(engine);
+        sink.end(engine, map.as_ref());
     }
     let x = settings.x.max(1);
     let longest = match settings.frame {
@@ -154,9 +169,20 @@ pub fn run(
     let expired_masked: u64 = masked.iter().map(|(_, cycles)| cycles / longest).sum();
     let mut summary = reported.summary(engine, source, settings);
     summary.expired = summary.expired.saturating_sub(expired_masked);
-    watch_glass(requested, bins.as_deref(), &mut summary);
-    let warning = brightness.and_then(|brightness| brightness.warning(&addresses));
-    let mut warnings: Vec<String> = warning.into_iter().collect();
+    let counts = other_counts
+        .as_ref()
+        .or(counts.as_ref().map(|counts| &counts.all));
+    if let (true, Some(counts)) = (has_glass, counts) {
+        watch_glass(requested, &counts.sum(), &mut summary);
+    }
+    let bright = counts.filter(|_| is_once_per_bin);
+    let bright = bright.and_then(|counts| bright_bins(counts, &addresses));
+    let mut warnings: Vec<String> = bright.into_iter().collect();
+    if let Some(map) = &map {
+        summary.depth_from = ALL_PHOTONS;
+        summary.pixels_with_depth = map.pixels_with_depth();
+        warnings.extend(map.warning(!settings.decide_once));
+    }
     if cycles < all {
         summary.cycles = cycles;
         let (cycles, all) = (grouped(cycles), grouped(all));
@@ -180,13 +206,4 @@ fn deliver(
         sink.take(slice, events)?;
     }
     Ok(())
-}
-
-/// Photons past the last bin are left out; statistics count them.
-fn add_photons(slice: &Slice, bins: &mut [u64]) {
-    for photon in slice.pixels.iter().flat_map(|pixel| &pixel.photons) {
-        if let Some(count) = bins.get_mut(usize::from(photon.code)) {
-            *count += 1;
-        }
-    }
 }

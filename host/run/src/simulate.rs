@@ -4,6 +4,7 @@ use anyhow::{Context, Result, ensure};
 use dtof_core::DepthEvent;
 use dtof_core::fixed::types::U16F16;
 
+use super::depth_map::MapInput;
 use super::given::{FRAME, Given, SENSOR, TDC, of_given};
 use super::run::{RunResult, Sink, run};
 use super::truth::SceneComparison;
@@ -94,6 +95,8 @@ pub struct Simulation {
     pub settings: Settings,
     /// The requested settings, over those of the scene.
     pub requested: SettingsFile,
+    /// How its depth map is decided; `None` if a device has the photons, so that it is that of the events.
+    pub map: Option<MapInput>,
     /// The name of the scene for summary and errors; none if it is built in.
     pub input: Option<String>,
 }
@@ -118,6 +121,7 @@ impl Simulation {
         };
         Ok(Self {
             photons: Masked::new(Box::new(photons), &settings.masked)?,
+            map: MapInput::new(&requested, &settings, None, &requested)?,
             scene,
             settings,
             requested,
@@ -139,7 +143,14 @@ impl Simulation {
         let mut comparison = SceneComparison::new(&self.scene, &self.settings)?;
         let settings = (&self.settings, &self.requested);
         let sinks: &mut [&mut dyn Sink] = &mut [sink, &mut comparison];
-        let mut result = run(&mut self.photons, engine, settings, sinks, progress)?;
+        let mut result = run(
+            &mut self.photons,
+            engine,
+            settings,
+            self.map.as_ref(),
+            sinks,
+            progress,
+        )?;
         result.summary.input.clone_from(&self.input);
         result.summary.field_of_view_degrees = Some(self.scene.effective_field_of_view().degrees());
         result.summary.against_truth = Some(comparison.finish(result.summary.cycles));

@@ -12,6 +12,9 @@ use dtof_engine::settings::Settings;
 use dtof_options::rows::{Row, grouped};
 use dtof_photons::source::PhotonSource;
 
+/// Where depth comes from: one decision a pixel, on all photons.
+pub(crate) const ALL_PHOTONS: &str = "all photons";
+
 /// Every `summary.json` begins with it, less the version.
 pub(crate) const MARK: &str = "\"program\": \"dtof ";
 
@@ -45,6 +48,10 @@ pub struct Summary {
     pub pixels: usize,
     /// Pixels with at least one event.
     pub pixels_reporting: usize,
+    /// Where the depth of a pixel comes from: all photons, events, or frames.
+    pub depth_from: &'static str,
+    /// Pixels with a depth.
+    pub pixels_with_depth: usize,
     /// Photons in the excluded bins around an echo that was reported.
     pub held: u64,
     /// Photons with a TDC code past the last bin.
@@ -207,6 +214,11 @@ impl Summary {
             events_confirmed: 0,
             pixels: source.addresses().len(),
             pixels_reporting,
+            depth_from: match settings.frame {
+                Some(_) => "frames",
+                None => "events",
+            },
+            pixels_with_depth: pixels_reporting,
             held: statistics.excluded,
             rejected: statistics.rejected,
             saturated: statistics.saturated,
@@ -253,6 +265,15 @@ impl Summary {
                 format!("{cycles} laser cycles; --recorded-cycles gives another number"),
             ));
         }
+        let recorded = self.recorded_cycles.map_or(0, |(_, longest)| longest);
+        if self.depth_from == ALL_PHOTONS && self.cycles < recorded {
+            let (cycles, recorded) = (grouped(self.cycles), grouped(recorded));
+            let text = format!(
+                "from {cycles} of {recorded} laser cycles; histograms have no time. depth.npy is decided on all \
+                 photons; --cycles N takes more"
+            );
+            rows.push(("events".to_owned(), text));
+        }
         rows.extend([
             row("laser cycles", self.cycles),
             row("photons", self.photons),
@@ -271,6 +292,10 @@ impl Summary {
                 },
             ),
         ]);
+        rows.push((
+            "pixels with depth".to_owned(),
+            format!("{} of {}", self.pixels_with_depth, self.pixels),
+        ));
         if let Some(options) = &self.dim_targets {
             rows.push(("dim targets".to_owned(), options.clone()));
         }
@@ -320,13 +345,7 @@ impl Summary {
             ),
             ("photons with a code past the last bin", self.rejected),
             ("decisions put off", self.deferred),
-            (
-                match self.settings.decide_once {
-                    true => "pixels with a full counter; --cycles N takes fewer photons",
-                    false => "exposures ended by a full counter",
-                },
-                self.ended_full,
-            ),
+            ("exposures ended by a full counter", self.ended_full),
             (
                 "decisions where bins were hardly ever live",
                 self.blind_looks,

@@ -68,8 +68,8 @@ Frame = Annotated[
 DecideOnce = Annotated[
     Switch,
     "True or False",
-    "Decide once for each pixel, on all of its photons, and write how clear its peak stands: "
-    "confidence.npy. Takes all laser cycles unless cycles says less",
+    "Events are the decisions of depth.npy, one a pixel on all of its photons, instead of asynchronous ones. "
+    "Takes all laser cycles unless cycles says less",
 ]
 DeadTime = Annotated[
     Integer,
@@ -481,7 +481,7 @@ class PointsOptions(TypedDict, total=False):
     one_per_pixel: Annotated[
         Switch,
         "True or False",
-        "CSV, PCD and PLY: one point a pixel, at the depth of depth.npy, in place of a point an event",
+        "CSV, PCD and PLY: one point a pixel, at the depth of depth-events.npy, in place of a point an event",
     ]
 
 

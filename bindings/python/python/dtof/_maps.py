@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def depth_map(events: Any, array: Array, *, mean: bool = True, echo: Echo = "strongest") -> numpy.ndarray:
     """The depth of each pixel in millimetres, rows by columns; NaN without an event.
 
-    It is that of ``depth.npy``: the mean of those of the last ten events that lie on one surface, where most of
+    It is that of ``depth-events.npy``: the mean of those of the last ten events that lie on one surface, where most of
     them lie. An event of a block counts for pixels that have never reported by themselves or in a smaller block.
     With ``mean=False`` it is the range of the last event, also of a block if the pixel has not reported since.
     ``echo`` selects the echo of each exposure: ``"first"``, ``"last"``, ``"strongest"`` or ``"all"``.

@@ -31,10 +31,10 @@ class Replay:
 
     ``events`` is an array of :data:`dtof.EVENT`, sorted by laser cycle, level and pixel.
     ``statistics`` has the contents of ``summary.json``; every loss is counted there. ``settings``
-    are those of the run, ``toml`` is the same as the text of a settings file. With ``decide_once``,
+    are those of the run, ``toml`` is the same as the text of a settings file. ``depth`` is ``depth.npy``:
+    millimetres of each pixel, decided once on all of its photons (rows by columns, NaN without a surface).
     ``confidence`` has how many standard deviations the peak of each pixel stands above its background
-    (rows by columns, NaN for pixels left out); else it is None. Two runs are never equal: compare their
-    events.
+    (NaN for pixels left out). With ``frame`` both are None. Two runs are never equal: compare their events.
     """
 
     events: numpy.ndarray
@@ -42,6 +42,7 @@ class Replay:
     statistics: dict[str, Any]
     settings: dict[str, Any]
     toml: str
+    depth: Optional[numpy.ndarray] = None
     confidence: Optional[numpy.ndarray] = None
 
     def __repr__(self) -> str:
@@ -60,8 +61,17 @@ class Replay:
         rows = "".join(f"<tr><td>{name}</td><td>{value}</td></tr>" for name, value in totals)
         return f"<table>{rows}</table>{depth_image(depth)}"
 
-    def depth_map(self, *, mean: bool = True, echo: Echo = "strongest") -> numpy.ndarray:
-        """See :func:`dtof.depth_map`."""
+    def depth_map(self, *, of: str = "photons", mean: bool = True, echo: Echo = "strongest") -> numpy.ndarray:
+        """The depth of each pixel in millimetres, rows by columns; NaN without a surface.
+
+        It is that of ``depth.npy``, decided once on all photons of each pixel. With ``of="events"`` it is that of
+        ``depth-events.npy``: see :func:`dtof.depth_map`, also for ``mean`` and ``echo``. Frames, ``mean=False`` and another
+        ``echo`` take that of the events, too.
+        """
+        if of not in ("photons", "events"):
+            raise _native.Error(f'of {of!r}: must be "photons" or "events"')
+        if of == "photons" and mean and echo == "strongest" and self.depth is not None:
+            return self.depth.copy()
         return depth_map(self.events, self.array, mean=mean, echo=echo)
 
     def reflectivity(self, *, of: str = "signal", echo: Echo = "strongest") -> numpy.ndarray:
@@ -100,8 +110,8 @@ def replay(recorded: Any, *, axis: int = -1, progress: Progress = None, **option
 
     ``photons_per_cycle`` (1.0, in the brightest pixel) or ``recorded_cycles`` determine how long
     histograms were recorded. ``cycles`` (10,000; all of photons) laser cycles are replayed with random ``seed`` (1);
-    a warning counts the photons after them, unless ``cycles`` is given.
-    ``decide_once`` takes all photons for one decision a pixel: see :attr:`Replay.confidence`.
+    a warning counts the photons after them, unless ``cycles`` is given. :attr:`Replay.depth` is decided on all photons.
+    ``decide_once`` has these decisions in place of asynchronous events.
     ``settings`` is the name or the text of a settings file, a dict of its sections, or a calibration, a
     comparison or a run. Without ``settings``, those of :func:`calibrate` are found in the recording:
     ``statistics["found"]``. Options override them. With ``settings``, even ``{}``, the defaults hold for what it leaves out.
@@ -160,14 +170,19 @@ def scene_of(scene: Any) -> Any:
 def result(done: dict[str, Any]) -> Replay:
     """The result of a native run; issues its warnings."""
     warn(done["warnings"], callers=3)
-    array, confidence = array_of(done["array"]), done["confidence"]
+    array = array_of(done["array"])
+    depth, confidence = (
+        None if values is None else numpy.array(values).reshape(array.shape)
+        for values in (done["depth"], done["confidence"])
+    )
     return Replay(
         events=events_of(done["events"]),
         array=array,
         statistics=json.loads(done["summary"]),
         settings=json.loads(done["settings"]),
         toml=done["toml"],
-        confidence=None if confidence is None else numpy.array(confidence).reshape(array.shape),
+        depth=depth,
+        confidence=confidence,
     )
 
 

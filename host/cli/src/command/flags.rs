@@ -243,8 +243,8 @@ flags! {
     FRAME:
     frame Text("N") => "Simulate a frame-based sensor for comparison: every N laser cycles each pixel \
         reports its highest bin, if that is above the background";
-    decide_once Optional("YES") => "Decide once for each pixel, on all of its photons, and write how clear its peak \
-        stands: confidence.npy. Takes all laser cycles unless --cycles says less";
+    decide_once Optional("YES") => "Events are the decisions of depth.npy, one a pixel on all of its photons, instead \
+        of asynchronous ones. Takes all laser cycles unless --cycles says less";
 }
 
 flags! {
@@ -353,8 +353,8 @@ flags! {
         else 10000000 with a warning]";
     echo OneOf(names::<Echo>) => "Depth events: echo of each exposure of a pixel or block [default: all; the \
         strongest with --one-per-pixel]";
-    one_per_pixel Optional("YES") => "CSV, PCD and PLY: one point a pixel, at the depth of depth.npy, in place of \
-        a point an event";
+    one_per_pixel Optional("YES") => "CSV, PCD and PLY: one point a pixel, at the depth of depth-events.npy, in \
+        place of a point an event";
 }
 
 /// The tables of the flags of each job, in the order of its help.

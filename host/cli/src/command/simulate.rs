@@ -88,6 +88,9 @@ pub struct Job<'a> {
 impl Job<'_> {
     pub fn run(mut self) -> Result<()> {
         let simulation = &mut self.simulation;
+        if self.engine.device.is_some() {
+            simulation.map = None;
+        }
         let (photons, settings) = (&simulation.photons, &simulation.settings);
         let mut engine = self.engine.engine(settings, photons)?;
         let effective = simulation.requested.with_settings(settings);

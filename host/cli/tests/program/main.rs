@@ -8,6 +8,7 @@ mod compare;
 mod counter_bits;
 mod dead_time;
 mod decide_once;
+mod depth_map;
 mod device;
 mod export;
 mod interrupt;

@@ -1,6 +1,7 @@
 use dtof_core::{Count24, WindowRule};
 use dtof_photons::source::{Photon, PixelPhotons};
 use proptest::prelude::*;
+use rand_distr::{Distribution, Poisson};
 
 use super::*;
 use crate::host::host_engine;
@@ -179,17 +180,103 @@ fn without_photons_the_confidence_is_0_and_of_pixels_left_out_unknown() {
 }
 
 #[test]
-fn a_full_counter_is_no_event() {
+fn counts_that_do_not_fit_a_counter_are_divided() {
     // 1024 bins have counters of 20 bits.
     let mut counts = vec![20; 1024];
     counts[40] = (1 << 20) - 1;
     let (events, _) = decided(&settings(1024), line(1), &[counts.clone()]);
-    assert_eq!(events.len(), 1);
+    assert_eq!(events[0].peak_count.raw(), (1 << 20) - 1);
     counts[40] += 3;
-    let (events, engine) = decided(&settings(1024), line(1), &[counts]);
-    assert!(events.is_empty());
+    let (events, engine) = decided(&settings(1024), line(1), &[counts.clone()]);
+    assert_eq!((events.len(), events[0].peak_bin.raw()), (1, 40));
+    assert_eq!(events[0].peak_count.raw(), counts[40] / 2);
     let [statistics, _] = engine.statistics();
-    assert_eq!((statistics.ended_full, statistics.saturated), (1, 3));
+    assert_eq!((statistics.ended_full, statistics.saturated), (0, 0));
+    assert_eq!(statistics.photons(), u64::from(counts.iter().sum::<u32>()));
+}
+
+/// Of 4,000 histograms without a target at most as many have an event as the rule's z allows for counts that fit.
+#[test]
+fn divided_counts_have_no_more_false_alarms() {
+    let mut random = dtof_theory::random::pixel_rng(5, PixelAddress::new(0));
+    let array = line(4000);
+    let mut share = |mean: f64| {
+        let poisson = Poisson::new(mean).unwrap();
+        let mut counts = PixelCounts::new(4000, 128);
+        let pixels = (0..4000).map(|_| {
+            let mut pixel: Vec<u64> = (0..128)
+                .map(|_| poisson.sample(&mut random) as u64)
+                .collect();
+            // A bin outside the gate does not fit.
+            pixel[0] = if mean > 1000.0 { 1 << 32 } else { 0 };
+            pixel
+        });
+        counts.clone_from(&PixelCounts::of_captures(
+            &[pixels.collect()],
+            128,
+            vec![1 << 20; 4000],
+        ));
+        let settings = Settings {
+            gate: Some((1, 127)),
+            rule: WindowRule::new(3, "3".parse().unwrap(), Count::saturating(5))
+                .unwrap()
+                .into(),
+            ..settings(128)
+        };
+        let decided = decide_once(&settings, array, &addresses(4000), &counts, |_| false).unwrap();
+        decided
+            .iter()
+            .filter(|decision| !decision.echoes.is_empty())
+            .count()
+    };
+    let fits = share(20.0);
+    assert!(fits > 100, "{fits}");
+    // 256 times as many, divided by 512.
+    let divided = share(5120.0);
+    assert!(divided <= fits, "{divided} {fits}");
+}
+
+proptest! {
+    /// A decision on counts is the event of an engine, and the best window is that of the event.
+    #[test]
+    fn the_engine_decides_as_the_function_does(
+        levels in prop::collection::vec(0_u32..60, 6), neighbours in prop::sample::select(vec![0, 4, 8]),
+    ) {
+        let settings = Settings { neighbours: Neighbours::new(neighbours), ..settings(128) };
+        let pixels: Vec<Vec<u32>> = levels.iter().map(|&level| {
+            let mut counts: Vec<u32> = (0..128).map(|bin| 20 + bin * level % 5).collect();
+            counts[70] += level;
+            counts
+        }).collect();
+        let array = Array::new(3, 2).unwrap();
+        let (events, engine) = decided(&settings, array, &pixels);
+        let mut counts = PixelCounts::new(6, 128);
+        counts.add(&slice(&pixels, 100));
+        let decisions = decide_once(&settings, array, &addresses(6), &counts, |_| true).unwrap();
+        let positions = decisions.iter().zip(addresses(6)).filter_map(|(decision, pixel)| {
+            let (_, first) = decision.echoes.first()?;
+            assert_eq!(decision.best, Some(first.position()));
+            Some((pixel, first.position()))
+        });
+        prop_assert!(positions.eq(events.iter().map(|event| (event.pixel, event.position()))));
+        let confidence: Vec<f64> = decisions.iter().map(|decision| decision.confidence).collect();
+        prop_assert_eq!(Some(&confidence[..]), engine.confidence());
+    }
+
+    /// The best window of a pixel with photons is within the gate, whatever the counts are.
+    #[test]
+    fn every_pixel_with_a_photon_has_a_best_window(
+        mut counts in prop::collection::vec(0_u64..3, 128), many in 0_u32..40, dead_time in 0_u16..40,
+    ) {
+        counts[30] <<= many;
+        let settings = Settings { gate: Some((10, 99)), dead_time, ..settings(128) };
+        let has_photon = counts[10..=99].iter().any(|&count| count > 0);
+        let counts = PixelCounts::of_captures(&[vec![counts]], 128, vec![1000]);
+        let decided = decide_once(&settings, line(1), &addresses(1), &counts, |_| false).unwrap();
+        let best = decided[0].best.map(|best| f64::from(best.raw()) / 256.0);
+        prop_assert_eq!(best.is_some(), has_photon);
+        prop_assert!(best.is_none_or(|best| (8.0..=102.0).contains(&best)));
+    }
 }
 
 #[test]

@@ -266,6 +266,19 @@ impl SettingsFile {
         self
     }
 
+    /// These settings for a single decision of each pixel by itself, or with its neighbours: with `decide_once`, without
+    /// blocks, and without the z of a file that is for looks.
+    #[must_use]
+    pub fn deciding_once(mut self) -> Self {
+        let is_of_file = |file: &KeysOfFile| file.keys.contains("z");
+        if self.run.decide_once != Some(true) && self.file.as_ref().is_some_and(is_of_file) {
+            self.detection.z = None;
+        }
+        self.run.decide_once = Some(true);
+        (self.detection.binning, self.detection.patience) = (None, None);
+        self
+    }
+
     /// These settings, and those of `other` that they lack.
     #[must_use]
     pub fn or(self, mut other: Self) -> Self {

@@ -2,11 +2,15 @@
 
 use anyhow::Result;
 
+use crate::depth_map::DepthMap;
 use dtof_draw::picture::{Map, heat_map};
 use dtof_events::histories::{PixelHistories, PixelHistory};
 
+/// The depth, decided on all photons.
+pub const DEPTH: &str = "depth.svg";
 /// The files, in the order of [`pictures`].
-pub const NAMES: [&str; 6] = [
+pub const NAMES: [&str; 7] = [
+    DEPTH,
     "depth-last.svg",
     "depth-mean.svg",
     "event-counts.svg",
@@ -23,13 +27,14 @@ pub struct Picture {
     pub caption: Option<String>,
 }
 
-/// The maps of a run. `axis_names` are those of columns and rows; an event of a pixel is called `one`,
+/// The maps of a run, that of the depth first if there is one. `axis_names` are those of columns and rows; an event of a pixel is called `one`,
 /// and several of them `several`.
 pub fn pictures(
     maps: &PixelHistories,
+    map: Option<&DepthMap>,
     axis_names: [&str; 2],
     [one, several]: [&str; 2],
-) -> Result<[Picture; 6]> {
+) -> Result<Vec<Picture>> {
     let draw_without = |missing, name, title: &str, unit, caption, values: Vec<Option<f64>>| {
         let svg = heat_map(&Map {
             title,
@@ -50,12 +55,26 @@ pub fn pictures(
     let all = |value: &dyn Fn(&PixelHistory) -> Option<f64>| -> Vec<Option<f64>> {
         maps.pixels.iter().map(value).collect()
     };
-    Ok([
+    let depth = map.map(|map| {
+        let depths = map.depth_mm.iter().copied();
+        let depths = depths.map(|depth| Some(depth).filter(|depth| !depth.is_nan()));
+        let caption = "The range of each pixel, decided once on all of its photons.".to_owned();
+        draw_without(
+            "surface",
+            DEPTH,
+            "Range, decided on all photons",
+            "mm",
+            Some(caption),
+            depths.collect(),
+        )
+    });
+    let of_events = [
         draw(
             "depth-last.svg",
             &format!("Range of the last {one}"),
             "mm",
-            Some(format!("The range of the last {one} of each pixel.")),
+            map.is_none()
+                .then(|| format!("The range of the last {one} of each pixel.")),
             all(&PixelHistory::last_mm),
         )?,
         draw(
@@ -109,7 +128,8 @@ pub fn pictures(
             ),
             all(&|pixel| (pixel.photons > 0).then_some(pixel.photons as f64)),
         )?,
-    ])
+    ];
+    Ok(depth.transpose()?.into_iter().chain(of_events).collect())
 }
 
 /// `values` relative to the highest.
@@ -130,8 +150,24 @@ mod tests {
     #[test]
     fn every_picture_has_its_name_and_mark() {
         let maps = PixelHistories::new(Array::new(1, 1).unwrap());
-        let pictures = pictures(&maps, ["column", "row"], ["event", "events"]).unwrap();
-        assert_eq!(pictures.each_ref().map(|picture| picture.name), NAMES);
+        let map = DepthMap {
+            positions: vec![None],
+            depth_mm: vec![f64::NAN],
+            echoes_mm: None,
+            best_mm: vec![f64::NAN],
+            confidence: vec![0.0],
+            flags: vec![0],
+        };
+        let (axes, nouns) = (["column", "row"], ["event", "events"]);
+        let of_events = pictures(&maps, None, axes, nouns).unwrap();
+        assert!(
+            of_events
+                .iter()
+                .map(|picture| picture.name)
+                .eq(NAMES[1..].iter().copied())
+        );
+        let pictures = pictures(&maps, Some(&map), axes, nouns).unwrap();
+        assert!(pictures.iter().map(|picture| picture.name).eq(NAMES));
         for picture in pictures {
             // A pixel that has reported in blocks only is reported, and no light was measured.
             let is_of_light = picture.name.starts_with("reflectivity");

@@ -12,11 +12,16 @@ use dtof_run::summary::Summary;
 
 const PHOTONS: &str = "pixel,cycle,bin\n0,0,0\n";
 const SCENE: &str = "cycles = 100\n[[surface]]\nrange_mm = 1000\nsignal = 1\n";
-const RESULTS: [&str; 13] = [
+const RESULTS: [&str; 18] = [
+    "age.npy",
+    "confidence.npy",
+    "depth-best.npy",
+    "depth-events.npy",
     "depth-last.svg",
     "depth-mean.svg",
     "depth.csv",
     "depth.npy",
+    "depth.svg",
     "dtof.toml",
     "event-counts.svg",
     "events.aer",

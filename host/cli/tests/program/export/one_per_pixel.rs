@@ -29,7 +29,7 @@ fn each_pixel_has_one_point_at_its_depth() {
         scratch.simulated(&scene, options);
         let printed =
             scratch.printed("export out/events.aer --format csv --out points.csv --one-per-pixel");
-        let depths = scratch.map("depth");
+        let depths = scratch.map("depth-events");
         let depths = (0u32..).zip(&depths).filter(|(_, depth)| !depth.is_nan());
         let depths: Vec<(u32, f64)> = depths.map(|(pixel, depth)| (pixel, *depth)).collect();
         assert!(depths.len() > 30, "{options}");

@@ -1,0 +1,180 @@
+//! The photons of pixels, bin by bin, summed over laser cycles.
+
+use rayon::prelude::*;
+
+use crate::recorded::Capture;
+use crate::source::Slice;
+
+/// A histogram of each pixel. It takes 4 bytes a bin, whatever the number of photons.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct PixelCounts {
+    bins: usize,
+    counts: Vec<u32>,
+    /// Laser cycles of each pixel.
+    cycles: Vec<u64>,
+    /// Photons past the last bin.
+    rejected: u64,
+}
+
+impl PixelCounts {
+    /// No photons of so many pixels with `bins` bins each.
+    #[must_use]
+    pub fn new(pixels: usize, bins: usize) -> Self {
+        Self {
+            bins,
+            counts: vec![0; pixels * bins],
+            cycles: vec![0; pixels],
+            rejected: 0,
+        }
+    }
+
+    /// The histograms of a recording, and the laser cycles of each. A histogram with a count past 32 bits is divided by a
+    /// power of two, and so are its laser cycles.
+    #[must_use]
+    pub fn of_captures(captures: &[Capture], bins: usize, cycles: Vec<u64>) -> Self {
+        let mut all = Self::new(cycles.len(), bins);
+        all.cycles = cycles;
+        let pixels = all.counts.chunks_mut(bins.max(1)).zip(&mut all.cycles);
+        for ((counts, cycles), histogram) in pixels.zip(captures.iter().flatten()) {
+            let highest = histogram.iter().copied().max().unwrap_or(0);
+            let shift = (64 - highest.leading_zeros()).saturating_sub(32);
+            for (count, photons) in counts.iter_mut().zip(histogram) {
+                *count = u32::try_from(photons >> shift).unwrap_or(u32::MAX);
+            }
+            *cycles >>= shift;
+        }
+        all
+    }
+
+    /// Adds the photons of a slice that come before laser cycle `end`.
+    pub fn add_until(&mut self, slice: &Slice, end: u64) {
+        let length = end.saturating_sub(slice.first_cycle);
+        let pixels = self.counts.par_chunks_mut(self.bins.max(1));
+        let pixels = pixels.zip(&mut self.cycles).zip(&slice.pixels);
+        let rejected = pixels.map(|((counts, cycles), received)| {
+            *cycles += u64::from(received.cycles).min(length);
+            let photons = &received.photons;
+            let taken = photons.partition_point(|photon| u64::from(photon.cycle) < length);
+            let mut rejected = 0;
+            for photon in &photons[..taken] {
+                match counts.get_mut(usize::from(photon.code)) {
+                    Some(count) => *count = count.saturating_add(1),
+                    None => rejected += 1,
+                }
+            }
+            rejected
+        });
+        self.rejected += rejected.sum::<u64>();
+    }
+
+    /// Adds the photons of a slice.
+    pub fn add(&mut self, slice: &Slice) {
+        self.add_until(slice, u64::MAX);
+    }
+
+    /// The photons that are not in `part`.
+    #[must_use]
+    pub fn without(&self, part: &Self) -> Self {
+        let counts = self.counts.iter().zip(&part.counts);
+        let cycles = self.cycles.iter().zip(&part.cycles);
+        Self {
+            bins: self.bins,
+            counts: counts
+                .map(|(all, part)| all.saturating_sub(*part))
+                .collect(),
+            cycles: cycles
+                .map(|(all, part)| all.saturating_sub(*part))
+                .collect(),
+            rejected: self.rejected.saturating_sub(part.rejected),
+        }
+    }
+
+    /// The photons of all pixels, bin by bin.
+    #[must_use]
+    pub fn sum(&self) -> Vec<u64> {
+        let mut sum = vec![0; self.bins];
+        for counts in self.counts.chunks(self.bins.max(1)) {
+            for (sum, &count) in sum.iter_mut().zip(counts) {
+                *sum += u64::from(count);
+            }
+        }
+        sum
+    }
+
+    /// The number of pixels.
+    #[must_use]
+    pub fn pixels(&self) -> usize {
+        self.cycles.len()
+    }
+
+    /// The histogram of pixel number `place`.
+    #[must_use]
+    pub fn histogram(&self, place: usize) -> &[u32] {
+        &self.counts[place * self.bins..][..self.bins]
+    }
+
+    /// The laser cycles of pixel number `place`.
+    #[must_use]
+    pub fn cycles(&self, place: usize) -> u64 {
+        self.cycles[place]
+    }
+
+    /// Photons past the last bin.
+    #[must_use]
+    pub const fn rejected(&self) -> u64 {
+        self.rejected
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::source::{Photon, PixelPhotons};
+    use proptest::prelude::*;
+
+    fn slice(first_cycle: u64, photons: &[(u16, u16)]) -> Slice {
+        let photon = |&(cycle, code): &(u16, u16)| Photon { cycle, code };
+        Slice {
+            first_cycle,
+            pixels: vec![PixelPhotons {
+                cycles: 10,
+                photons: photons.iter().map(photon).collect(),
+            }],
+        }
+    }
+
+    #[test]
+    fn a_count_past_32_bits_is_divided() {
+        let captures = vec![vec![vec![1 << 35, 16, 0, 7], vec![1, 2, 3, 4]]];
+        let counts = PixelCounts::of_captures(&captures, 4, vec![1 << 36; 2]);
+        assert_eq!(counts.histogram(0), [1 << 31, 1, 0, 0]);
+        assert_eq!(counts.histogram(1), [1, 2, 3, 4]);
+        assert_eq!((counts.cycles(0), counts.cycles(1)), (1 << 32, 1 << 36));
+    }
+
+    proptest! {
+        /// Every photon is in one of the two parts, and counted or rejected.
+        #[test]
+        fn parts_add_up(
+            mut photons in prop::collection::vec((0_u16..10, 0_u16..12), 0..50),
+            end in 0_u64..30,
+        ) {
+            photons.sort_unstable();
+            let slices = [slice(0, &photons), slice(10, &photons)];
+            let (mut all, mut first) = (PixelCounts::new(1, 8), PixelCounts::new(1, 8));
+            for slice in &slices {
+                all.add(slice);
+                first.add_until(slice, end);
+            }
+            let second = all.without(&first);
+            let before = |cycle: u64| slices.iter().flat_map(|slice| {
+                let cycles = slice.pixels[0].photons.iter();
+                cycles.map(|photon| slice.first_cycle + u64::from(photon.cycle))
+            }).filter(|&photon| photon < cycle).count() as u64;
+            let photons = |counts: &PixelCounts| counts.sum().iter().sum::<u64>() + counts.rejected();
+            prop_assert_eq!((all.cycles(0), photons(&all)), (20, before(20)));
+            prop_assert_eq!((first.cycles(0), photons(&first)), (end.min(20), before(end)));
+            prop_assert_eq!((second.cycles(0), photons(&second)), (20 - end.min(20), before(20) - before(end)));
+        }
+    }
+}
