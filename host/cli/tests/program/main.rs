@@ -11,6 +11,7 @@ mod decide_once;
 mod device;
 mod export;
 mod interrupt;
+mod kinds;
 mod neighbours;
 mod offsets;
 mod once_per_bin;
