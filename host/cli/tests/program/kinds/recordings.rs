@@ -57,6 +57,8 @@ pub struct Recording {
     pub sigma: f64,
     /// Of the histograms, or those that the photons of a list are from.
     pub bins: usize,
+    /// The laser cycles, if the TDC takes the first photon of each.
+    pub first_photons_of: Option<usize>,
 }
 
 /// A kind of recordings.
@@ -191,6 +193,11 @@ impl Sensor {
         }
     }
 
+    /// Of a photon list.
+    fn list_options(&self) -> String {
+        format!("--columns {} --bins {}", self.columns, self.bins)
+    }
+
     /// A recording that has to be right within a bin in all but a few pixels: of 16 one may be wrong.
     fn recording(&self, array: Array, options: impl Into<String>, truth: Vec<Truth>) -> Recording {
         Recording {
@@ -202,6 +209,15 @@ impl Sensor {
             need: Need::Right,
             sigma: self.sigma,
             bins: self.bins,
+            first_photons_of: None,
+        }
+    }
+
+    /// The same of a TDC that takes the first photon of each of so many laser cycles.
+    fn first_photons(&self, array: Array, cycles: usize, truth: Vec<Truth>) -> Recording {
+        Recording {
+            first_photons_of: Some(cycles),
+            ..self.recording(array, format!("--recorded-cycles {cycles}"), truth)
         }
     }
 }
@@ -359,7 +375,7 @@ fn a_wall_under_pile_up(rng: &mut Pcg64) -> Recording {
     let truth = vec![Truth::At(wall); sensor.pixels()];
     Recording {
         tolerance: 0.6,
-        ..sensor.recording(array, format!("--recorded-cycles {cycles}"), truth)
+        ..sensor.first_photons(array, cycles, truth)
     }
 }
 
@@ -379,7 +395,8 @@ fn a_wall_under_pile_up_as_list(rng: &mut Pcg64) -> Recording {
     let truth = vec![Truth::At(wall); sensor.pixels()];
     Recording {
         tolerance: 0.6,
-        ..sensor.recording(list.array(), format!("--columns {}", sensor.columns), truth)
+        options: sensor.list_options(),
+        ..sensor.first_photons(list.array(), cycles, truth)
     }
 }
 
@@ -407,7 +424,7 @@ fn near_targets_behind_glass_under_pile_up(rng: &mut Pcg64) -> Recording {
     let array = sensor.histograms(pixels);
     Recording {
         least_right: 0.9,
-        ..sensor.recording(array, format!("--recorded-cycles {cycles}"), at(&positions))
+        ..sensor.first_photons(array, cycles, at(&positions))
     }
 }
 
@@ -430,7 +447,7 @@ fn pile_up_moves_the_depth(rng: &mut Pcg64) -> Recording {
     let truth = vec![Truth::At(position); sensor.pixels()];
     Recording {
         tolerance: 0.25,
-        ..sensor.recording(array, format!("--recorded-cycles {cycles}"), truth)
+        ..sensor.first_photons(array, cycles, truth)
     }
 }
 
@@ -452,11 +469,8 @@ fn bright_pixels_are_not_hot(rng: &mut Pcg64) -> Recording {
     Recording {
         tolerance: 0.3 + sensor.sigma,
         least_right: 0.95,
-        ..sensor.recording(
-            array,
-            format!("--recorded-cycles {cycles} --decide-once"),
-            at(&positions),
-        )
+        options: format!("--recorded-cycles {cycles} --decide-once"),
+        ..sensor.first_photons(array, cycles, at(&positions))
     }
 }
 
@@ -655,11 +669,8 @@ fn pile_up_without_background(rng: &mut Pcg64) -> Recording {
     Recording {
         tolerance: 0.3,
         need: Need::Either(PILE_UP),
-        ..sensor.recording(
-            array,
-            format!("--recorded-cycles {cycles} --decide-once"),
-            at(&positions),
-        )
+        options: format!("--recorded-cycles {cycles} --decide-once"),
+        ..sensor.first_photons(array, cycles, at(&positions))
     }
 }
 
@@ -694,7 +705,7 @@ fn an_object_that_moves(rng: &mut Pcg64) -> Recording {
     let truth = vec![Truth::Either(first, second); sensor.pixels()];
     Recording {
         need: Need::Told(CHANGE),
-        ..sensor.recording(array, format!("--columns {}", sensor.columns), truth)
+        ..sensor.recording(array, sensor.list_options(), truth)
     }
 }
 
@@ -708,7 +719,7 @@ fn an_object_that_comes_near(rng: &mut Pcg64) -> Recording {
     let truth = vec![Truth::Either(near, far); sensor.pixels()];
     Recording {
         need: Need::RightAndTold(CHANGE),
-        ..sensor.recording(array, format!("--columns {}", sensor.columns), truth)
+        ..sensor.recording(array, sensor.list_options(), truth)
     }
 }
 
@@ -872,7 +883,7 @@ fn clean_list(rng: &mut Pcg64) -> Recording {
     }
     Recording {
         tolerance: 0.6,
-        ..sensor.recording(list.array(), format!("--columns {columns}"), at(&positions))
+        ..sensor.recording(list.array(), sensor.list_options(), at(&positions))
     }
 }
 
@@ -890,6 +901,6 @@ fn clean_pile_up(rng: &mut Pcg64) -> Recording {
     let array = sensor.histograms(pixels);
     Recording {
         tolerance: 0.6,
-        ..sensor.recording(array, format!("--recorded-cycles {cycles}"), at(&positions))
+        ..sensor.first_photons(array, cycles, at(&positions))
     }
 }
