@@ -3,9 +3,9 @@
 //! A test draws five recordings of its kind, `clean` forty. With `DTOF_SLOW` it draws 200, or 500, which takes long:
 //!
 //! ```sh
-//! cargo test --package dtof --test program kinds:: -- --nocapture     # prints a table
+//! cargo test --package dtof --test program kinds:: -- --nocapture # prints a table
 //! DTOF_SLOW=1 cargo test --release --package dtof --test program kinds:: -- --nocapture
-//! DTOF_DRAWS=17..18 cargo test --package dtof --test program kinds::a_sunlit_patch
+//! DTOF_DRAWS=17..18 cargo test --package dtof --test program kinds::a_sunlit_patch -- --exact
 //! ```
 //!
 //! `DTOF_DRAWS` names the draws. `DTOF_KEEP` names a folder for the recordings that fail, each with its command.
@@ -79,8 +79,8 @@ impl Recording {
             Array::Histograms { shape, counts } => {
                 let most = counts.iter().copied().max().unwrap();
                 let (descr, bytes) = match most {
-                    ..=0xffff => ("<u2", 2),
-                    ..=0xffff_ffff => ("<u4", 4),
+                    0..=0xffff => ("<u2", 2),
+                    0x1_0000..=0xffff_ffff => ("<u4", 4),
                     _ => ("<u8", 8),
                 };
                 let data: Vec<u8> = counts
@@ -136,7 +136,7 @@ struct Outcome {
     is_right: bool,
     is_told: bool,
     holds: bool,
-    /// For whom it fails.
+    /// The share that is right, and the warnings.
     text: String,
 }
 
@@ -192,7 +192,7 @@ fn replay(recording: &Recording) -> Outcome {
     }
 }
 
-/// `dtof` is called with these.
+/// The arguments of `dtof`.
 fn arguments(file: &str, recording: &Recording) -> String {
     let options = recording.options.trim();
     format!("replay {file} --out out --bin-width-ps {BIN_WIDTH_PS} --quiet {options}")

@@ -362,7 +362,7 @@ fn a_wall_and_something_behind(rng: &mut Pcg64) -> Recording {
 
 /// With λ signal photons a laser cycle the first photon comes 0.28 λσ earlier on average, here at most 0.3 bins.
 fn a_wall_under_pile_up(rng: &mut Pcg64) -> Recording {
-    let sensor = Sensor::draw(rng, 4, 20);
+    let sensor = Sensor::draw(rng, 4, 12);
     let cycles = whole(rng, 10_000, 40_000);
     let wall = sensor.position(rng, 0.3, 0.7);
     let background = between(rng, 0.5, 2.0);
@@ -380,7 +380,7 @@ fn a_wall_under_pile_up(rng: &mut Pcg64) -> Recording {
 }
 
 fn a_wall_under_pile_up_as_list(rng: &mut Pcg64) -> Recording {
-    let sensor = Sensor::draw(rng, 4, 8);
+    let sensor = Sensor::draw(rng, 4, 6);
     let cycles = whole(rng, 3000, 6000);
     let wall = sensor.position(rng, 0.3, 0.7);
     let background = between(rng, 0.5, 1.5);
@@ -404,7 +404,7 @@ fn a_wall_under_pile_up_as_list(rng: &mut Pcg64) -> Recording {
 fn near_targets_behind_glass_under_pile_up(rng: &mut Pcg64) -> Recording {
     let sensor = Sensor {
         sigma: between(rng, 0.6, 1.2),
-        ..Sensor::draw(rng, 6, 18)
+        ..Sensor::draw(rng, 6, 12)
     };
     let cycles = whole(rng, 15_000, 40_000);
     let glass = (between(rng, 0.7, 1.2), between(rng, 2.5, 4.0));
@@ -433,7 +433,7 @@ fn near_targets_behind_glass_under_pile_up(rng: &mut Pcg64) -> Recording {
 fn pile_up_moves_the_depth(rng: &mut Pcg64) -> Recording {
     let sensor = Sensor {
         sigma: between(rng, 0.6, 1.0),
-        ..Sensor::draw(rng, 4, 16)
+        ..Sensor::draw(rng, 4, 10)
     };
     let cycles = whole(rng, 15_000, 40_000);
     let background = between(rng, 2.0, 4.0);
@@ -455,7 +455,7 @@ fn pile_up_moves_the_depth(rng: &mut Pcg64) -> Recording {
 fn bright_pixels_are_not_hot(rng: &mut Pcg64) -> Recording {
     let sensor = Sensor {
         sigma: between(rng, 0.6, 1.0),
-        ..Sensor::draw(rng, 8, 24)
+        ..Sensor::draw(rng, 8, 20)
     };
     let cycles = whole(rng, 1000, 2000);
     let background = sensor.background(between(rng, 1.5, 2.5));
@@ -690,7 +690,7 @@ fn change(sensor: Sensor, surfaces: [(f64, f64); 2], rng: &mut Pcg64) -> Array {
 
 /// Bright first, then dimmer elsewhere.
 fn an_object_that_moves(rng: &mut Pcg64) -> Recording {
-    let sensor = Sensor::draw(rng, 3, 5);
+    let sensor = Sensor::draw(rng, 3, 4);
     let [first, second] = loop {
         let both = [0, 1].map(|_| sensor.position(rng, 0.3, 0.85));
         if (both[0] - both[1]).abs() > 12.0 {
@@ -711,7 +711,7 @@ fn an_object_that_moves(rng: &mut Pcg64) -> Recording {
 
 /// As near as a cover glass.
 fn an_object_that_comes_near(rng: &mut Pcg64) -> Recording {
-    let sensor = Sensor::draw(rng, 3, 5);
+    let sensor = Sensor::draw(rng, 3, 4);
     let far = sensor.position(rng, 0.4, 0.85);
     let near = between(rng, 4.0, 10.0);
     let surfaces = [far, near].map(|position| (between(rng, 0.3, 0.6), position));
@@ -775,7 +775,7 @@ fn surfaces(sensor: &Sensor, nearest: f64, rng: &mut Pcg64) -> Vec<f64> {
 /// the first 10,000 laser cycles, too.
 fn clean_histograms(rng: &mut Pcg64) -> Recording {
     // Photons that are replayed.
-    const MOST: f64 = 4e6;
+    const MOST: f64 = 1.5e6;
     let [bins, captures] = [one_of(rng, &[64, 128, 256]), one_of(rng, &[1, 1, 1, 2, 5])];
     let sigma = between(rng, 0.6, 1.5);
     let background = log_between(rng, 0.01, 1e6);
@@ -809,7 +809,7 @@ fn clean_histograms(rng: &mut Pcg64) -> Recording {
     let positions = surfaces(&sensor, if glass.is_some() { 20.0 } else { 6.0 }, rng);
     // At least 60 %. A few pixels may see nothing only if there are many.
     let number = match sensor.pixels() {
-        all if is_empty => 0 * all,
+        _ if is_empty => 0,
         all if all >= 25 && chance(rng, 0.4) => share_of(all, between(rng, 0.65, 1.0)),
         all => all,
     };
@@ -847,7 +847,7 @@ fn clean_histograms(rng: &mut Pcg64) -> Recording {
     let all = (0..captures).flat_map(|_| &lights);
     let array = sensor.histograms(all.map(|light| light.counts(rng)));
     let mut options = format!("--recorded-cycles {cycles}");
-    // Without it, a recording is as long as its brightest bin needs.
+    // It may be missing, unless the recording is so large that it would take minutes then.
     if captures == 1 && each / replayed < MOST && chance(rng, 0.3) {
         options.clear();
     }
@@ -860,9 +860,9 @@ fn clean_histograms(rng: &mut Pcg64) -> Recording {
     }
 }
 
-/// All photons of a list of up to 100 pixels.
+/// All photons of a list of up to 60 pixels.
 fn clean_list(rng: &mut Pcg64) -> Recording {
-    let pixels = log_between(rng, 1.0, 100.0) as usize;
+    let pixels = log_between(rng, 1.0, 60.0) as usize;
     let [rows, columns] = shape(rng, pixels);
     let sensor = Sensor {
         rows,
@@ -889,7 +889,7 @@ fn clean_list(rng: &mut Pcg64) -> Recording {
 
 /// First photons, and how many laser cycles there were.
 fn clean_pile_up(rng: &mut Pcg64) -> Recording {
-    let sensor = Sensor::draw(rng, 4, 20);
+    let sensor = Sensor::draw(rng, 4, 12);
     let cycles = log_between(rng, 10_000.0, 200_000.0) as usize;
     let background = sensor.background(between(rng, 0.2, 1.0));
     let signal = between(rng, 0.2, 0.5);
