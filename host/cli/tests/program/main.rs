@@ -12,6 +12,7 @@ mod depth_map;
 mod device;
 mod export;
 mod interrupt;
+mod kinds;
 mod neighbours;
 mod offsets;
 mod once_per_bin;
