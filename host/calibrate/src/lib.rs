@@ -244,9 +244,9 @@ pub fn calibrate_with(
     let good = GoodHistograms::new(observed.array, pixels.background, traces, levels);
 
     let l2 = settle::l2(pixels.background);
-    let early = observed.early_of(|pixel| pixels.is_good(pixel));
+    let halves = observed.halves();
     let with_glass =
-        |good: &GoodHistograms| glass::nearest(good, options.glass, early.as_deref(), l2.into());
+        |good: &GoodHistograms| glass::nearest(good, options.glass, halves.as_deref(), l2.into());
     let nearest = match tdc {
         Some(Tdc::OnePhotonIn { cycles, .. }) => with_glass(&good.corrected(cycles)),
         _ => with_glass(&good),

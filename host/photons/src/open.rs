@@ -100,8 +100,8 @@ pub struct Counts {
     /// Histograms that were recorded together, one a pixel. Captures follow each other in the
     /// address space.
     pub captures: Vec<Capture>,
-    /// Photon lists: the photons of the first half of the laser cycles.
-    pub early: Option<Capture>,
+    /// Photon lists: the photons of all pixels in the first half of the laser cycles, bin by bin.
+    pub early: Option<Vec<u64>>,
     /// Laser cycles of the recording, if known, as for photon lists.
     pub cycles: Option<u64>,
     /// The true distance of each pixel in millimetres, if the file gives it.
@@ -275,7 +275,7 @@ pub fn counts(input: impl Into<Input>, options: &ReadOptions) -> Result<Counts> 
 }
 
 fn counts_of(photons: &mut dyn CountedSource, metadata: Metadata) -> Result<Counts> {
-    let [counts, early] = photons.counts()?;
+    let (counts, early) = photons.counts()?;
     Ok(Counts {
         array: photons.array(),
         axis_names: photons.axis_names(),

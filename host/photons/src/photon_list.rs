@@ -39,11 +39,11 @@ const SPAN: u64 = 256;
 /// A source that can also give histograms.
 pub trait CountedSource: PhotonSource {
     /// The photons of all laser cycles to replay, one histogram a pixel of the array, and those of the first half of these
-    /// laser cycles. The replay still begins at the first photon.
+    /// laser cycles, one histogram of all pixels. The replay still begins at the first photon.
     ///
     /// # Errors
     /// Fails if the file has changed since it was checked.
-    fn counts(&mut self) -> Result<[Capture; 2]>;
+    fn counts(&mut self) -> Result<(Capture, Vec<u64>)>;
 }
 
 /// The options of a photon list.
@@ -311,10 +311,10 @@ impl<R> PhotonList<R> {
 }
 
 impl<R: PhotonReader> CountedSource for PhotonList<R> {
-    fn counts(&mut self) -> Result<[Capture; 2]> {
+    fn counts(&mut self) -> Result<(Capture, Vec<u64>)> {
         let bins = self.rows.shape.bins.into();
         let mut counts = vec![vec![0; bins]; self.array.pixels() as usize];
-        let mut early = counts.clone();
+        let mut early = vec![0; bins];
         let half = self.cycles / 2;
         while let Some(row) = self.rows.next()? {
             if row.cycle >= self.cycles {
@@ -325,11 +325,11 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
             };
             histogram[usize::from(row.bin())] += 1;
             if row.cycle < half {
-                early[row.pixel()][usize::from(row.bin())] += 1;
+                early[usize::from(row.bin())] += 1;
             }
         }
         self.rows = Validator::open(&self.input, self.rows.shape, self.rows.expected)?;
-        Ok([counts, early])
+        Ok((counts, early))
     }
 }
 

@@ -92,12 +92,12 @@ pub struct Glass {
 }
 
 /// Finds the nearest common peak. `is_glass` is given if the user knows whether that is crosstalk; `l2` are the laser cycles
-/// of an exposure. `early` are the photons of each bin and those of its first half, if the recording has a time.
+/// of an exposure. `halves` are the photons of each bin of all pixels, and those of the first half of the recording, if it has a time.
 #[must_use]
 pub fn nearest(
     good: &GoodHistograms,
     is_glass: Option<bool>,
-    early: Option<&[[f64; 2]]>,
+    halves: Option<&[[f64; 2]]>,
     l2: f64,
 ) -> Nearest {
     let common = common(good);
@@ -108,7 +108,7 @@ pub fn nearest(
             Nearest::Glass(glass(good, &peak, l2))
         });
     }
-    let stays = |peak: &Peak| early.is_none_or(|early| stays(early, good, peak));
+    let stays = |peak: &Peak| halves.is_none_or(|halves| stays(halves, peak));
     let Some(peak) = common.filter(stays) else {
         let layer = layer.filter(|layer| common.is_none() && layer.may_be_glass());
         return match is_glass {
@@ -184,15 +184,17 @@ impl Layer {
     }
 }
 
-/// Whether both halves of the recording have the peak. `early` has the photons of each bin, and those of the first half.
-fn stays(early: &[[f64; 2]], good: &GoodHistograms, peak: &Peak) -> bool {
-    let around = peak.top.saturating_sub(1)..=(peak.top + 1).min(good.bins() - 1);
-    let bins = around.clone().count() as f64;
-    let level = median(early.iter().map(|[all, _]| *all)) * bins;
-    let [all, first] = early[around]
-        .iter()
-        .fold([0.0; 2], |sum, of| [sum[0] + of[0], sum[1] + of[1]]);
-    let share = (first - level / 2.0) / (all - level).max(1.0);
+/// Whether both halves of the recording have the peak. `halves` has the photons of each bin, and those of the first half.
+fn stays(halves: &[[f64; 2]], peak: &Peak) -> bool {
+    let around = peak.top.saturating_sub(1)..=(peak.top + 1).min(halves.len() - 1);
+    let level = median(halves.iter().map(|[all, _]| *all)) * around.clone().count() as f64;
+    let sum = |of: usize| {
+        halves[around.clone()]
+            .iter()
+            .map(|half| half[of])
+            .sum::<f64>()
+    };
+    let share = (sum(1) - level / 2.0) / (sum(0) - level).max(1.0);
     (STAYS..=1.0 - STAYS).contains(&share)
 }
 

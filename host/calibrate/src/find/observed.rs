@@ -63,8 +63,8 @@ pub struct Observed<'a> {
     pub bias_mm: Option<&'a [f64]>,
     /// The offset that each pixel of the array has already, in millimetres; empty if none has.
     pub offsets_mm: &'a [f64],
-    /// The photons of the first half of the laser cycles, one histogram a pixel, if the recording has a time.
-    pub early: Option<&'a Capture>,
+    /// The photons of all pixels in the first half of the laser cycles, bin by bin, if the recording has a time.
+    pub early: Option<&'a [u64]>,
 }
 
 /// One histogram.
@@ -163,20 +163,18 @@ impl Observed<'_> {
         Ok(traces)
     }
 
-    /// For each bin the photons of the pixels that are `good`, and those of the first half of the laser cycles; `None` if
-    /// the recording has no time.
+    /// For each bin the photons of all pixels, and those of the first half of the laser cycles; `None` if the recording has
+    /// no time.
     #[must_use]
-    pub fn early_of(&self, good: impl Fn(usize) -> bool) -> Option<Vec<[f64; 2]>> {
-        let (early, [all]) = (self.early?, self.captures) else {
-            return None;
-        };
-        let mut sums = vec![[0.0; 2]; self.bins()];
-        for pixel in (0..all.len()).filter(|&pixel| good(pixel)) {
-            for ((sum, &all), &early) in sums.iter_mut().zip(&all[pixel]).zip(&early[pixel]) {
-                *sum = [sum[0] + all as f64, sum[1] + early as f64];
+    pub fn halves(&self) -> Option<Vec<[f64; 2]>> {
+        let early = self.early?.iter();
+        let mut halves: Vec<[f64; 2]> = early.map(|&early| [0.0, early as f64]).collect();
+        for counts in self.captures.iter().flatten() {
+            for ([all, _], &count) in halves.iter_mut().zip(counts) {
+                *all += count as f64;
             }
         }
-        Some(sums)
+        Some(halves)
     }
 
     /// The range bias of a pixel in millimetres, less the offset that it has already: ranges without that offset are

@@ -80,7 +80,9 @@ proptest! {
             }
             counts
         };
-        prop_assert_eq!(list.counts().unwrap(), [counts(limit), counts(list.cycles() / 2)]);
+        let early = counts(list.cycles() / 2);
+        let early = (0..32).map(|bin| early.iter().map(|pixel| pixel[bin]).sum()).collect();
+        prop_assert_eq!(list.counts().unwrap(), (counts(limit), early));
 
         // Slices go on to the end of the file, and are empty after it.
         let mut first_cycle = 0;
@@ -286,7 +288,7 @@ fn another_file_in_the_place_of_a_list_is_refused() {
     let refused = |before: &[RawPhoton], after: &[RawPhoton]| {
         let mut list: PhotonList<CsvReader> = replaced(csv(before), csv(after));
         // The file was open, and is opened again after the last photon.
-        let [all, _] = list.counts().unwrap();
+        let (all, _) = list.counts().unwrap();
         let all: u64 = all.iter().flatten().sum();
         assert_eq!(all, before.len() as u64);
         format!("{:#}", list.next_slice(500).unwrap_err())
