@@ -20,6 +20,7 @@ pub struct OncePerBinEngine {
 
 impl OncePerBinEngine {
     /// Wraps an engine whose histograms have so many bins.
+    #[must_use]
     pub fn new(engine: Box<dyn Engine>, bins: usize) -> Self {
         Self {
             engine,

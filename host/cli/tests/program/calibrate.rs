@@ -25,14 +25,15 @@ const DIM: &str = "columns = 16\nrows = 8\ncycles = 8000\nbackground = 0.00019\n
                    [[surface]]\nrange_mm = 2000\nsignal = 0.0015\n\
                    rectangle = { columns = [4, 12], rows = [2, 6] }\n";
 
-/// How many pixels of a depth map are within 150 mm of the scene, 4 bins.
+/// How many pixels have events within 150 mm of the scene, 4 bins.
 fn right(scratch: &Scratch, text: &str) -> usize {
     let scene = Scene::parse(text).unwrap();
     let is_right = |(pixel, depth): &(u16, f64)| {
         let truth = scene.truth(PixelAddress::new(*pixel), 0).unwrap();
         (depth - truth.range_mm).abs() < 150.0
     };
-    (0..).zip(scratch.map("depth")).filter(is_right).count()
+    let depths = scratch.map("depth-events");
+    (0..).zip(depths).filter(is_right).count()
 }
 
 /// The histograms of a scene as NumPy writes them.

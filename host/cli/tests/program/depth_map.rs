@@ -117,11 +117,10 @@ fn an_object_that_moves_is_told_and_its_old_place_is_old() {
     let mut list = "pixel,cycle,bin\n".to_owned();
     for cycle in 0..8000 {
         for pixel in 0..4 {
-            let number = cycle * 4 + pixel;
-            let bin = match (cycle < 4000, number % 10) {
-                (true, 0..6) => 59 + number / 10 % 3,
-                (false, 0..2) => 89 + number / 10 % 3,
-                (_, 9) => number / 7 % 128,
+            let bin = match (cycle < 4000, (cycle * 3 + pixel) % 10) {
+                (true, 0..6) => 59 + cycle / 10 % 3,
+                (false, 0..2) => 89 + cycle / 10 % 3,
+                (_, 9) => cycle / 7 % 128,
                 _ => continue,
             };
             writeln!(list, "{pixel},{cycle},{bin}").unwrap();

@@ -197,6 +197,11 @@ fn counts_that_do_not_fit_a_counter_are_divided() {
 
 /// Of 4,000 histograms without a target at most as many have an event as the rule's z allows for counts that fit.
 #[test]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a number of photons"
+)]
 fn divided_counts_have_no_more_false_alarms() {
     let mut random = dtof_theory::random::pixel_rng(5, PixelAddress::new(0));
     let array = line(4000);

@@ -20,6 +20,11 @@ fn input(more: &str) -> MapInput {
 }
 
 /// Photons of pixels with a background and two surfaces, in bins 40 and 90, of so many photons in each half.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a number of photons"
+)]
 fn run(seed: u64, surfaces: [[f64; 2]; 2]) -> RunCounts {
     let mut counts = RunCounts::new(PIXELS, 128, u64::from(CYCLES) * 2);
     for (half, surfaces) in (0..2).zip(surfaces) {
