@@ -180,6 +180,9 @@ fn photons() -> impl Strategy<Value = Vec<Row>> {
 }
 
 proptest! {
+    // Slices of one laser cycle take long.
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
     /// In slices of one laser cycle no look is skipped.
     #[test]
     fn laser_cycles_without_photons_may_be_skipped(

@@ -12,7 +12,11 @@ fn times_are_no_laser_cycles() {
     };
     list("unix.csv", &|row| 1_700_000_000 + row);
     let dark = list("dark.csv", &|row| row * 100);
-    for command in ["replay --decide-once --out out", "calibrate --out x.toml"] {
+    for command in [
+        "replay --out out",
+        "replay --decide-once --out out",
+        "calibrate --out x.toml",
+    ] {
         let output = scratch.run(&format!("{command} --input unix.csv"));
         let part = "unix.csv: the first photon comes in laser cycle 1,700,000,000";
         scratch.refused(&output, &[part]);
@@ -20,7 +24,7 @@ fn times_are_no_laser_cycles() {
     scratch.replayed(&dark, "--decide-once --rule window --sigma-bins 1");
     // The laser cycles that are replayed have no photon: a warning.
     let unix = scratch.path("unix.csv");
-    let output = scratch.replay(&unix, "--l1 40");
+    let output = scratch.replay(&unix, "--l1 40 --cycles 10000");
     assert_contains(
         &String::from_utf8_lossy(&output.stderr),
         "the first comes in laser cycle 1,700,000,000; if these are times",
