@@ -127,7 +127,8 @@ fn an_object_that_moves_is_told_and_its_old_place_is_old() {
         }
     }
     let list = scratch.file("list.csv", list);
-    let options = "--rule window --sigma-bins 1 --bin-width-ps 250 --cycles 8000 --columns 2";
+    let options =
+        "--rule window --sigma-bins 1 --bin-width-ps 250 --cycles 8000 --columns 2 --gate 0..127";
     scratch.replayed(&list, options);
     let warnings = scratch.summary()["warnings"].to_string();
     assert_contains(&warnings, "4 of 4 pixels see one surface in the first half");
@@ -135,7 +136,7 @@ fn an_object_that_moves_is_told_and_its_old_place_is_old() {
     assert!(near(&scratch.map("depth-events"), 90.0));
     let ages = scratch.map("age");
     assert!(
-        ages.iter().all(|age| (3000.0..4001.0).contains(age)),
+        ages.iter().all(|age| (4000.0..4100.0).contains(age)),
         "{ages:?}"
     );
     let table = scratch.read("out/depth.csv");
