@@ -57,7 +57,7 @@ Offsets = Annotated[
 CyclesToReplay = Annotated[
     Integer,
     "whole number, 1 to 9223372036854775807",
-    "Laser cycles to replay at most [default: 10000; all with decide_once]",
+    "Laser cycles to replay at most [default: all of a photon list and with decide_once, else 10000]",
 ]
 Frame = Annotated[
     Integer,
