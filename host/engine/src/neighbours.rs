@@ -126,23 +126,32 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
         next.any(|photon| photon.cycle - from < cycles)
     }
 
-    /// Laser cycles from laser cycle `from` of the slice on up to the first look of which some pixel decides, or ends its
-    /// exposure, or its part of the slice, or has a photon.
+    /// Laser cycles from laser cycle `from` of the slice on up to the first look at which some pixel decides or ends its
+    /// exposure, or that has a photon; at most to the last look before the recording of a pixel ends.
     ///
     /// What neighbours confirm depends on how long they have counted, so a pixel decides at each look once it has the two
     /// photons that a promising window needs.
     fn idle_step(&self, photons: &[PixelPhotons], from: u16) -> u64 {
-        let idle = |member: &Member<BINS, W>| {
+        let (mut idle, mut left) = (u16::MAX, u16::MAX);
+        for member in self.members() {
+            let received = &photons[member.number];
+            let Some(cycles) = received.cycles.checked_sub(from).filter(|&left| left > 0) else {
+                continue;
+            };
             let total = member.pixel.histogram().total();
             let finds_none = total == 0 || total < 2 && member.has_no_peak;
-            let received = &photons[member.number];
-            let left = received.cycles.checked_sub(from).filter(|&left| left > 0)?;
             let next = received.photons.get(member.next);
-            let next = next.map_or(left, |photon| photon.cycle - from);
-            Some(idle_cycles(&member.pixel, &self.config, finds_none).min(next))
-        };
-        let idle = self.members().filter_map(idle).min().unwrap_or(0);
-        look_after(idle.into(), self.since_look, self.config.x())
+            let next = next.map_or(cycles, |photon| photon.cycle - from);
+            idle = idle
+                .min(next)
+                .min(idle_cycles(&member.pixel, &self.config, finds_none));
+            left = left.min(cycles);
+        }
+        let (x, since_look) = (self.config.x(), self.since_look);
+        // A pixel whose recording ends takes part in no look after that.
+        let last = look_after(left.into(), since_look, x).saturating_sub(x.into());
+        let next = u64::from(x - since_look);
+        look_after(idle.into(), since_look, x).min(last.max(next))
     }
 
     /// The first step of all pixels: their photons from laser cycle `from` to before `to` of the slice.

@@ -19,7 +19,7 @@ use dtof_options::numbers::{MAX_INTEGER, integer, positive};
 use dtof_options::{Refused, plain};
 use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
-use dtof_photons::open::{Counts, ReadOptions, counts, open};
+use dtof_photons::open::{Counts, HISTOGRAM_CYCLES, ReadOptions, counts, open};
 use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 
@@ -183,7 +183,7 @@ impl Options {
         let photons = |seed: u64| -> Result<Box<dyn PhotonSource>> {
             let options = ReadOptions {
                 seed,
-                ..read_options(&requested)
+                ..first_cycles(&requested)
             };
             let photons: Box<dyn PhotonSource> = match &photons {
                 Photons::Scene(scene) => {
@@ -238,7 +238,7 @@ impl Options {
         callbacks: &Callbacks,
     ) -> Result<Subject> {
         (callbacks.step)("reads the recording", 0.0)?;
-        let counts = counts(&input, &read_options(&requested))?;
+        let counts = counts(&input, &first_cycles(&requested))?;
         mask_capture(
             &mut requested,
             counts.array.pixels(),
@@ -309,6 +309,16 @@ impl Options {
                 Photons::Histograms(counts)
             },
         })
+    }
+}
+
+/// How to open a recording. Of a list the same laser cycles are taken as of histograms: harder conditions add photons to
+/// each of them, also in the dark.
+fn first_cycles(requested: &SettingsFile) -> ReadOptions {
+    let options = read_options(requested);
+    ReadOptions {
+        cycles: options.cycles.or(Some(HISTOGRAM_CYCLES)),
+        ..options
     }
 }
 

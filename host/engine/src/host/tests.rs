@@ -190,7 +190,7 @@ proptest! {
         photons in photons(),
         lengths in vec(prop_oneof![1u16..40, 1u16..3000, Just(u16::MAX)], 1..5),
         after in 0u64..1500,
-        early in option::weighted(0.3, (0usize..19, 0u64..3000)),
+        early in option::weighted(0.5, (0usize..19, 0u64..3000)),
     ) {
         let end = photons.last().map_or(0, |last| last.0) + 1 + after;
         let mut ends = vec![end; 19];
@@ -199,6 +199,41 @@ proptest! {
         }
         let expected = run(&settings, &photons, &ends, &[1]);
         prop_assert_eq!(run(&settings, &photons, &ends, &lengths), expected);
+    }
+}
+
+/// It ends between two looks, and the exposure would expire at the second.
+#[test]
+fn a_pixel_whose_recording_ends_takes_no_part_in_later_looks() {
+    let neighbours = Settings {
+        bins: BINS.into(),
+        rule: rule(2, 3, 2.0),
+        neighbours: Some(Neighbours::Four),
+        x: 6,
+        l1: 25,
+        l2: 55,
+        ..Settings::static_scene(1)
+    };
+    let binning = Settings {
+        neighbours: None,
+        binning: Some(AdaptiveBinning {
+            levels: BlockLevel::saturating(2),
+            patience: 20,
+        }),
+        ..neighbours.clone()
+    };
+    for settings in [neighbours, binning] {
+        for early in 0..130 {
+            let mut ends = vec![300; 19];
+            ends[8] = early;
+            let photons = [(31, 8, 3), (33, 2, 3)];
+            let expected = run(&settings, &photons, &ends, &[1]);
+            assert_eq!(
+                run(&settings, &photons, &ends, &[u16::MAX]),
+                expected,
+                "{early}"
+            );
+        }
     }
 }
 
