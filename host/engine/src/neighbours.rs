@@ -130,7 +130,7 @@ impl<const BINS: usize, W: CounterWidth> NeighbourEngine<BINS, W> {
     /// exposure, or that has a photon; at most to the last look before the recording of a pixel ends.
     ///
     /// What neighbours confirm depends on how long they have counted, so a pixel decides at each look once it has the two
-    /// photons that a promising window needs.
+    /// photons that a candidate window needs.
     fn idle_step(&self, photons: &[PixelPhotons], from: u16) -> u64 {
         let (mut idle, mut left) = (u16::MAX, u16::MAX);
         for member in self.members() {

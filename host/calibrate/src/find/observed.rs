@@ -77,7 +77,7 @@ pub struct Trace {
     /// Photons of each bin, corrected for pile-up where that is known.
     pub counts: Vec<f64>,
     /// The share of the laser cycles in which the TDC was live in each bin. So many of `counts` were recorded, which
-    /// settles their noise.
+    /// determines their noise.
     pub live: Vec<f64>,
     /// The true distance in millimetres, if it is known, with [`Observed::bias`].
     pub truth_mm: Option<f64>,

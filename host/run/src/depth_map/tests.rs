@@ -132,7 +132,7 @@ fn z_is_that_of_a_single_decision() {
     assert_eq!(of(&merged, None), merged.settings(128).unwrap().rule);
 }
 
-/// 8,000 pixels with two surfaces that stay, of any brightness: at most one in 1,000 recordings is said to move.
+/// 8,000 pixels with two surfaces that stay, of any brightness: at most one in 1,000 recordings is flagged as moved.
 #[test]
 fn still_surfaces_do_not_contradict_themselves() {
     let input = input("");
