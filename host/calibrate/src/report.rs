@@ -69,7 +69,7 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
     row(
         "gate",
         match (found.written_gate(), between) {
-            (None, _) => "not needed".to_owned(),
+            (None, _) => "none needed".to_owned(),
             (Some((first, last)), Some((low, high))) if first > 0 && low < high => {
                 format!("{first}..{last} (begins at {low} to {high})")
             }

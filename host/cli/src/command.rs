@@ -58,19 +58,42 @@ fn check_complete(summary: &Summary, all: u64, folder: &Path) -> Result<()> {
 /// The heading of what was found in a recording.
 const FOUND: &str = "Found in the recording";
 
-/// Prints the summary of a run, with `more` rows, after what was found in the recording.
+/// What the terminal shows of what was found in a recording, unless there is none.
+const BRIEF: [&str; 8] = [
+    "background",
+    "hot pixels",
+    "dead pixels",
+    "pulse",
+    "cover glass",
+    "gate",
+    "rule",
+    "overridden",
+];
+
+/// Prints what was found in the recording, the totals of a run, and `more` rows. The report has the rest.
 fn print_summary(summary: &Summary, more: &[Row], folder: &Path) -> io::Result<()> {
-    let rows = [&summary.rows()[..], more, &summary.settings.rows()].concat();
-    let report = folder.join("report.html");
+    let rows = [&summary.brief()[..], more].concat();
     let mut out = io::stdout().lock();
     if !summary.found.is_empty() {
-        let settings = folder.join("dtof.toml").display().to_string();
-        let rows = [&summary.found[..], &[("settings".to_owned(), settings)]].concat();
-        writeln!(out, "{FOUND}:\n{}", aligned(&rows))?;
+        let found = summary.found.iter();
+        let found = found.filter(|(name, _)| BRIEF.contains(&name.as_str()));
+        let found: Vec<Row> = found
+            .filter(|(_, value)| !value.starts_with("none"))
+            .cloned()
+            .collect();
+        let settings = folder.join("dtof.toml");
+        let heading = format!("{FOUND}, saved as {}", settings.display());
+        writeln!(
+            out,
+            "{}:\n{}",
+            printable(&heading),
+            aligned(&found).trim_end()
+        )?;
     }
+    let report = folder.join("report.html");
     write!(
         out,
-        "{}\nOpen {} in a browser.\n",
+        "{}Open {} in a browser.\n",
         aligned(&rows),
         report.display()
     )?;

@@ -26,6 +26,7 @@
 //! all photons; the photons of the event are divided, too.
 
 use std::marker::PhantomData;
+use std::ops::Range;
 
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{U4F12, U24F8};
@@ -199,6 +200,7 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
         let mut echoes = Vec::new();
         let echo = |number, detection: &Detection| echoes.push((number, *detection));
         let is_blind = config.detect_echoes(&mut histogram.clone(), cycles, echo);
+        echoes.retain(|(_, detection)| !self.is_slope(counts, detection.peak.bin));
         statistics.blind_looks = is_blind.into();
         statistics.events = echoes.len() as u64;
         Decided {
@@ -326,20 +328,50 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
 
     /// The photons of `histogram` in the window around the bin of a peak.
     fn own_photons(&self, peak: BinIndex, histogram: &Histogram<BINS, W>) -> AroundPeak {
-        let gate = self.config.gate();
-        let (peak, width) = (usize::from(peak.raw()), width(self.config.rule()));
-        let first = peak.saturating_sub(width / 2).max(gate.first().into());
-        let end = (peak + width / 2 + 1).min(usize::from(gate.last()) + 1);
+        let (gate, window) = (self.config.gate(), self.window(peak));
         let count = |bin: usize| histogram.count(bin).unwrap_or(0);
-        let inside = (first..end).map(count).sum::<u32>();
-        let bins_outside = usize::from(gate.last() + 1 - gate.first()) - (end - first);
+        let bins = window.len();
+        let inside = window.map(count).sum::<u32>();
+        let bins_outside = usize::from(gate.last() + 1 - gate.first()) - bins;
         let outside = histogram.total().saturating_sub(inside);
         AroundPeak {
-            peak: count(peak),
+            peak: count(peak.raw().into()),
             inside: inside.into(),
-            bins: (end - first) as f64,
+            bins: bins as f64,
             background: f64::from(outside) / bins_outside as f64,
         }
+    }
+
+    /// The bins of the gate in the window around the bin of a peak.
+    fn window(&self, peak: BinIndex) -> Range<usize> {
+        let (gate, reach) = (self.config.gate(), width(self.config.rule()) / 2);
+        let peak = usize::from(peak.raw());
+        let first = peak.saturating_sub(reach).max(gate.first().into());
+        first..(peak + reach + 1).min(usize::from(gate.last()) + 1)
+    }
+
+    /// Whether a peak is the slope of something outside of the gate: near an edge, as many of the `counts` in the bins beside
+    /// its window, and no bin from the last one outside on up to the window with surely fewer than the mean of the window.
+    /// The gate of a cover glass is for short exposures: its tail shows in many laser cycles.
+    fn is_slope(&self, counts: &[u64], peak: BinIndex) -> bool {
+        let (gate, window) = (self.config.gate(), self.window(peak));
+        let [first, end] = [gate.first(), gate.last() + 1].map(usize::from);
+        let Range { start, end: past } = window;
+        let near = width(self.config.rule());
+        let mean = |bins: Range<usize>| {
+            let number = bins.len() as f64;
+            counts[bins].iter().map(|&count| count as f64).sum::<f64>() / number
+        };
+        let level = mean(start..past);
+        let falls_into = |beside: Range<usize>, mut up_to_window: Range<usize>| {
+            let is_filled =
+                |bin: usize| counts[bin] as f64 + 2.0 * (counts[bin] as f64).sqrt() >= level;
+            mean(beside) >= level && up_to_window.all(is_filled)
+        };
+        let from_before = first > 0 && start < first + near;
+        let from_behind = end < counts.len() && end < past + near;
+        from_before && falls_into(start.saturating_sub(near)..start, first - 1..start)
+            || from_behind && falls_into(past..(past + near).min(counts.len()), past..end + 1)
     }
 }
 

@@ -115,17 +115,15 @@ impl Replay {
 }
 
 impl Replay {
-    /// Names the options that find more dim targets, if most pixels report nothing and settings were found that allow these
-    /// options.
+    /// Names the option that finds more dim targets, if most pixels have no depth and settings were found that allow it.
     fn dim_targets(&self, summary: &Summary) -> Option<String> {
-        let reports_little = 2 * summary.pixels_reporting
+        let has_little = 2 * summary.pixels_with_depth
             < summary.pixels.saturating_sub(self.settings.masked.len());
-        let has_them = self.settings.decide_once && self.settings.neighbours.is_some();
-        if !reports_little || has_them || self.found.is_empty() || self.settings.frame.is_some() {
+        let may_have = self.settings.neighbours.is_none() && self.settings.frame.is_none();
+        if !has_little || !may_have || self.found.is_empty() {
             return None;
         }
-        let with_them = Settings {
-            decide_once: true,
+        let with_neighbours = Settings {
             neighbours: Some(Neighbours::Eight),
             ..self.settings.clone()
         };
@@ -133,10 +131,9 @@ impl Replay {
         let may_help = self.metadata.has_shape
             && array.columns().min(array.rows()) > 1
             && is_one_capture(&self.photons)
-            && host_engine(&with_them, array, &addresses).is_ok();
+            && host_engine(&with_neighbours, array, &addresses).is_ok();
         may_help.then(|| {
-            "--decide-once with --neighbours 8 finds more of them, if pixels that do not report see any"
-                .to_owned()
+            "--neighbours 8 finds more of them, if pixels without a depth see any".to_owned()
         })
     }
 

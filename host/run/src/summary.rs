@@ -18,6 +18,23 @@ pub(crate) const ALL_PHOTONS: &str = "all photons";
 /// Every `summary.json` begins with it, less the version.
 pub(crate) const MARK: &str = "\"program\": \"dtof ";
 
+/// The totals that the terminal shows.
+const BRIEF: [&str; 13] = [
+    "bin width",
+    "taken to have lasted",
+    "photons",
+    "photons not used",
+    "depth events",
+    "readings of frames",
+    "pixels with depth",
+    "dim targets",
+    "too short for an event",
+    "no event",
+    "cover glass",
+    "warning",
+    "export with",
+];
+
 /// The content of `summary.json`.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
@@ -244,7 +261,7 @@ impl Summary {
         }
     }
 
-    /// The totals.
+    /// The totals, for the report.
     #[must_use]
     pub fn rows(&self) -> Vec<Row> {
         let row = |name: &str, value: u64| (name.to_owned(), grouped(value));
@@ -265,33 +282,17 @@ impl Summary {
                 format!("{cycles} laser cycles; --recorded-cycles gives another number"),
             ));
         }
-        let recorded = self.recorded_cycles.map_or(0, |(_, longest)| longest);
-        if self.depth_from == ALL_PHOTONS && self.cycles < recorded {
-            let (cycles, recorded) = (grouped(self.cycles), grouped(recorded));
-            let text = format!(
-                "from {cycles} of {recorded} laser cycles; histograms have no time. depth.npy is decided on all \
-                 photons; --cycles N takes more"
-            );
-            rows.push(("events".to_owned(), text));
+        rows.push(row("laser cycles", self.cycles));
+        rows.push(row("photons", self.photons));
+        let not_used = self.not_used();
+        if !not_used.is_empty() {
+            rows.push(("photons not used".to_owned(), not_used.join(", ")));
         }
-        rows.extend([
-            row("laser cycles", self.cycles),
-            row("photons", self.photons),
-            match self.settings.frame {
-                None => row("depth events", self.events),
-                Some(_) => row("readings of frames", self.events),
-            },
-            (
-                "pixels reporting".to_owned(),
-                match self.settings.binning {
-                    None => format!("{} of {}", self.pixels_reporting, self.pixels),
-                    Some(_) => format!(
-                        "{} of {}, by themselves or in a block",
-                        self.pixels_reporting, self.pixels
-                    ),
-                },
-            ),
-        ]);
+        let name = match self.settings.frame {
+            None => "depth events",
+            Some(_) => "readings of frames",
+        };
+        rows.push((name.to_owned(), self.events_of_pixels()));
         rows.push((
             "pixels with depth".to_owned(),
             format!("{} of {}", self.pixels_with_depth, self.pixels),
@@ -333,40 +334,17 @@ impl Summary {
                 "all photons come after the laser cycles that were replayed: --cycles N takes more";
             rows.push(("no event".to_owned(), why.to_owned()));
         }
-        // Only losses that have occurred.
-        let losses = [
-            ("photons outside the range gate", self.gated_out),
-            ("photons after the first of a bin", self.repeated),
-            ("photons of pixels left out", self.masked),
-            ("photons lost to full counters", self.saturated),
-            (
-                "photons lost to full counters of blocks",
-                self.saturated_in_blocks,
-            ),
-            ("photons with a code past the last bin", self.rejected),
+        // Only what has occurred.
+        let of_decisions = [
             ("decisions put off", self.deferred),
             ("exposures ended by a full counter", self.ended_full),
             (
                 "decisions where bins were hardly ever live",
                 self.blind_looks,
             ),
-            ("recorded photons in bins cut off", self.cut_off),
         ];
-        rows.extend(
-            losses
-                .iter()
-                .filter(|loss| loss.1 > 0)
-                .map(|&(name, value)| row(name, value)),
-        );
-        if self.not_replayed > 0 {
-            let all = self.photons + self.masked + self.not_replayed;
-            let text = format!(
-                "{} of {}: --cycles N takes more",
-                grouped(self.not_replayed),
-                grouped(all)
-            );
-            rows.push(("recorded photons not replayed".to_owned(), text));
-        }
+        let of_decisions = of_decisions.iter().filter(|(_, number)| *number > 0);
+        rows.extend(of_decisions.map(|&(name, number)| row(name, number)));
         if let Some([times, least]) = self.cover_glass {
             let text = format!(
                 "{times:.1} times as bright as when it was calibrated, at least {least:.1}: clean it"
@@ -378,6 +356,63 @@ impl Summary {
         if let Some(options) = &self.export_with {
             rows.push(("export with".to_owned(), options.clone()));
         }
+        rows
+    }
+
+    /// How many events of how many pixels there are.
+    fn events_of_pixels(&self) -> String {
+        let mut text = format!(
+            "{} from {} of {} pixels",
+            grouped(self.events),
+            self.pixels_reporting,
+            self.pixels
+        );
+        if self.settings.binning.is_some() {
+            text += ", by themselves or in a block";
+        }
+        if self.is_map_longer() {
+            let recorded = self.recorded_cycles.map_or(0, |(_, longest)| longest);
+            text += &format!(
+                ", from {} of {} laser cycles: histograms have no time; --cycles N takes more",
+                grouped(self.cycles),
+                grouped(recorded)
+            );
+        }
+        text
+    }
+
+    /// Whether the depth map is decided on photons that were not replayed.
+    fn is_map_longer(&self) -> bool {
+        let recorded = self.recorded_cycles.map_or(0, |(_, longest)| longest);
+        self.depth_from == ALL_PHOTONS && self.cycles < recorded
+    }
+
+    /// The photons that did not count, by cause.
+    fn not_used(&self) -> Vec<String> {
+        let not_replayed = match self.is_map_longer() {
+            true => "for depth.npy only",
+            false => "not replayed: --cycles N takes more",
+        };
+        let losses = [
+            (self.gated_out, "outside the range gate"),
+            (self.repeated, "after the first of a bin"),
+            (self.masked, "of pixels left out"),
+            (self.saturated, "lost to full counters"),
+            (self.saturated_in_blocks, "lost to full counters of blocks"),
+            (self.rejected, "with a code past the last bin"),
+            (self.cut_off, "in bins cut off"),
+            (self.not_replayed, not_replayed),
+        ];
+        let losses = losses.iter().filter(|(photons, _)| *photons > 0);
+        let losses = losses.map(|(photons, cause)| format!("{} {cause}", grouped(*photons)));
+        losses.collect()
+    }
+
+    /// The rows of [`Self::rows`] that the terminal shows; the report has all.
+    #[must_use]
+    pub fn brief(&self) -> Vec<Row> {
+        let mut rows = self.rows();
+        rows.retain(|(name, _)| BRIEF.contains(&name.as_str()));
         rows
     }
 }

@@ -54,6 +54,12 @@ impl Level {
         }
     }
 
+    /// Photons a bin if there were one more: the background of a few bins without a photon is not 0.
+    #[must_use]
+    pub fn with_one_more(&self) -> f64 {
+        self.mean + 1.0 / self.clear_bins.max(1.0)
+    }
+
     /// Photons in these bins.
     #[must_use]
     pub fn photons(&self) -> f64 {

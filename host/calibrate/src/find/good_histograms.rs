@@ -36,7 +36,8 @@ impl GoodHistograms {
     #[must_use]
     pub fn new(array: Array, rate: f64, traces: Vec<Trace>, levels: Vec<Level>) -> Self {
         let peaks = traces.iter().zip(&levels);
-        let peaks = peaks.map(|(trace, level)| Peak::all(&trace.counts, &trace.live, level.mean));
+        let peaks = peaks
+            .map(|(trace, level)| Peak::all(&trace.counts, &trace.live, level.with_one_more()));
         let peaks: Vec<Vec<Peak>> = peaks.collect();
         let trend = trend(&traces, &levels);
         Self {

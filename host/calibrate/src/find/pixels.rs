@@ -123,7 +123,7 @@ impl Sum {
 
 /// Whether a histogram has a peak that rises after its first bin, from a background that is lower.
 fn has_pulse(trace: &Trace, level: &Level) -> bool {
-    let peaks = Peak::all(&trace.counts, &trace.live, level.mean);
+    let peaks = Peak::all(&trace.counts, &trace.live, level.with_one_more());
     let is_pulse = |peak: &Peak| peak.first > 0 && trace.counts[peak.top] > FLAT * level.mean;
     peaks.iter().any(is_pulse)
 }

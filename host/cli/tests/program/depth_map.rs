@@ -38,7 +38,7 @@ fn all_photons_of_histograms_decide() {
     ));
     assert_contains(
         &printed,
-        "from 10,000 of 549,888 laser cycles; histograms have no time",
+        "from 10,000 of 549,888 laser cycles: histograms have no time",
     );
     assert_contains(&printed, "8 of 8");
     let summary = scratch.summary();

@@ -40,19 +40,17 @@ fn interrupted(scratch: &Scratch, arguments: &str) {
     let status = terminal.wait().unwrap();
     let ended = pressed.elapsed();
     assert!(!status.success(), "{arguments}: {shown}");
-    assert!(ended < Duration::from_millis(500), "{arguments}: {ended:?}");
-    // A second, and the time to start on a busy machine.
-    assert!(
-        appeared < Duration::from_secs(3),
-        "{arguments}: {appeared:?}"
-    );
+    // Half a second and three on an idle machine, whose processors others may use.
+    for (took, most) in [(ended, 5), (appeared, 10)] {
+        assert!(took < Duration::from_secs(most), "{arguments}: {took:?}");
+    }
 }
 
 #[test]
 fn tune_shows_progress_and_ends_at_ctrl_c() {
     let light = "--background 0.01 --sigma-bins 1 --l2 50000 --x 11";
-    // Each takes at least a second.
-    for (rule, signal) in [("paper", 0.02), ("average", 0.02), ("window", 0.005)] {
+    // Each takes at least three seconds.
+    for (rule, signal) in [("paper", 0.02), ("average", 0.005), ("window", 0.001)] {
         let arguments = format!("tune --rule {rule} --signal {signal} {light}");
         interrupted(&Scratch::new(), &arguments);
     }

@@ -158,6 +158,9 @@ fn replay(recording: &Recording) -> Outcome {
         let share = right.count() as f64 / recording.truth.len() as f64;
         let warnings = scratch.summary()["warnings"].clone();
         let warnings: Vec<String> = serde_json::from_value(warnings).unwrap();
+        let printed = String::from_utf8_lossy(&output.stdout);
+        let is_short = !warnings.is_empty() || printed.lines().count() <= 15;
+        assert!(is_short, "{printed}");
         (share, warnings)
     } else {
         // An error names the cause as well, unless the program stopped on its own.
@@ -195,7 +198,7 @@ fn replay(recording: &Recording) -> Outcome {
 /// The arguments of `dtof`.
 fn arguments(file: &str, recording: &Recording) -> String {
     let options = recording.options.trim();
-    format!("replay {file} --out out --bin-width-ps {BIN_WIDTH_PS} --quiet {options}")
+    format!("replay {file} --out out --bin-width-ps {BIN_WIDTH_PS} {options}")
 }
 
 /// Writes a recording and its command into the folder `DTOF_KEEP`.

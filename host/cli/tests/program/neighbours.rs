@@ -62,11 +62,11 @@ fn dim_pixels_report_much_sooner() {
     // Switched off, those of single pixels come again.
     let off = simulated(&scratch, "--settings again.toml --neighbours 0");
     assert_eq!(events(&off), events(&alone));
-    let printed = scratch.printed(&format!(
+    scratch.printed(&format!(
         "simulate --scene scene.toml --out again {WINDOW} --neighbours 4"
     ));
     assert_contains(
-        &printed,
+        &scratch.read("again/report.html"),
         "4 confirm; half of the false alarms of z for a pixel alone, half with neighbours",
     );
 }

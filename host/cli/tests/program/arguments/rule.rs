@@ -135,15 +135,12 @@ fn the_summary_says_how_to_do_it_again() {
 }
 
 #[test]
-fn what_was_used_is_printed_and_in_the_report() {
+fn what_was_used_is_in_the_report() {
     let scratch = Scratch::new();
     let options = "--rule window --sigma-bins 1 --z 4.5";
-    let output = scratch.replay(&photons(&scratch), options);
-    let printed = String::from_utf8(output.stdout).unwrap();
-    for text in [printed, scratch.read("out/report.html")] {
-        for part in ["window of 3 bins", "4.5 standard deviations", "±2.5 bins"] {
-            assert_contains(&text, part);
-        }
+    scratch.replay(&photons(&scratch), options);
+    for part in ["window of 3 bins", "4.5 standard deviations", "±2.5 bins"] {
+        assert_contains(&scratch.read("out/report.html"), part);
     }
 }
 
