@@ -91,9 +91,9 @@ fn print_summary(summary: &Summary, more: &[Row], folder: &Path) -> io::Result<(
         )?;
     }
     let report = folder.join("report.html");
-    write!(
+    writeln!(
         out,
-        "{}Open {} in a browser.\n",
+        "{}Open {} in a browser.",
         aligned(&rows),
         report.display()
     )?;
