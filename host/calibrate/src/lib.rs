@@ -182,7 +182,7 @@ impl AllHistograms {
         let tdc = match observed.length {
             Length::Cycles(_) => Some(match dead_time {
                 Some(bins) => pile_up::known_tdc(&traces, bins.into()),
-                None => pile_up::tdc(&traces),
+                None => pile_up::tdc(&traces).or_by_times(&traces, observed.times),
             }),
             Length::PhotonsPerCycle(_) => None,
             Length::Unknown => pile_up::tdc_without_cycles(&traces),
@@ -505,7 +505,7 @@ mod tests {
             slant: Some(&slants),
             bias_mm: None,
             offsets_mm: &[],
-            early: None,
+            times: None,
         };
         let all = AllHistograms::new(&observed, &[], None).unwrap();
         let rate = all.pixels.background;
@@ -554,7 +554,7 @@ mod tests {
                 slant: None,
                 bias_mm: None,
                 offsets_mm: &[],
-                early: None,
+                times: None,
             };
             calibrate(&observed, &CalibrationOptions::default()).unwrap()
         };

@@ -1,6 +1,7 @@
 //! Remarks: what a recording does not show, and the option that would help.
 
 use super::find::glass::SEVERAL;
+use super::find::pile_up::MATTERS;
 use super::{Calibration, Length, Nearest, PulseSource, Tdc};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::numbers::shortest;
@@ -10,9 +11,6 @@ use dtof_options::rows::{Row, bins, grouped};
 const MOST_LOST: f64 = 0.75;
 /// The same without a correction.
 const MOST_LOST_UNCORRECTED: f64 = 0.5;
-
-/// The same of a TDC that may take all.
-const MOST_LOST_UNCLEAR: f64 = 0.2;
 /// A gate may hide the only surface of so many histograms without a word: false peaks are rarer than that.
 const MOST_HIDDEN: f64 = 0.01;
 /// Sensors have fewer hot pixels than this.
@@ -47,15 +45,13 @@ impl Calibration {
                 two_digits(cycles),
                 lost * 100.0
             )),
-            Tdc::Unclear(lost) if lost > MOST_LOST_UNCLEAR && self.pulse.is_some() => {
-                Some(format!(
-                    "if the TDC takes only the first photon of a laser cycle, {:.0} % of the photons are lost to pile-up, and \
+            Tdc::Unclear(lost) if lost > MATTERS && self.pulse.is_some() => Some(format!(
+                "if the TDC takes only the first photon of a laser cycle, {:.0} % of the photons are lost to pile-up, and \
                  ranges are too short, which the background does not show: --dead-time 0 says that it takes all, \
                  --dead-time {} that it does not",
-                    lost * 100.0,
-                    self.bins
-                ))
-            }
+                lost * 100.0,
+                self.bins
+            )),
             Tdc::DeadTime { lost, .. } if lost > MOST_LOST => Some(format!(
                 "the TDC loses {:.1} % of the photons: far targets may be missed or wrong with so much light",
                 lost * 100.0
@@ -227,7 +223,7 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
                 ),
             );
         }
-        Some(Tdc::Unclear(lost)) if lost > 0.01 && lost <= MOST_LOST_UNCLEAR => remark(
+        Some(Tdc::Unclear(lost)) if lost > 0.01 && lost <= MATTERS => remark(
             "pile-up",
             format!(
                 "If the TDC records one photon a laser cycle, {:.1} % of the photons are lost. The \

@@ -34,7 +34,7 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
         ),
     );
     let unit = if found.length == Length::Unknown {
-        "if the brightest pixel has one photon a laser cycle"
+        "photons a bin and laser cycle, if the brightest pixel has one a laser cycle"
     } else {
         "photons a bin and laser cycle"
     };
@@ -177,11 +177,12 @@ fn pulse(found: &Calibration) -> String {
             pulse.peaks
         ),
         Some(pulse) => format!(
-            "σ = {} ({} to {}) bins, from {} peaks",
+            "σ = {} ({} to {}) bins, from {} peak{}",
             short(pulse.sigma),
             short(pulse.between.0),
             short(pulse.between.1),
-            pulse.peaks
+            pulse.peaks,
+            if pulse.peaks == 1 { "" } else { "s" }
         ),
     };
     measured + &used

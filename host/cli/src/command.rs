@@ -24,11 +24,16 @@ use dtof::complain;
 use dtof_options::rows::{Row, aligned, grouped, printable};
 use dtof_run::summary::Summary;
 
-/// Prints warnings about `file` on standard error, a line each, unless `quiet`.
-fn warn(file: &Path, warnings: impl IntoIterator<Item = String>, quiet: bool) {
+/// Prints warnings, about `file` if there is one, on standard error, a line each, unless `quiet`.
+fn warn<'a>(
+    file: impl Into<Option<&'a Path>>,
+    warnings: impl IntoIterator<Item = String>,
+    quiet: bool,
+) {
+    let file = file.into().map(|file| format!("{}: ", file.display()));
+    let file = file.unwrap_or_default();
     for warning in warnings.into_iter().filter(|_| !quiet) {
-        let warning = format!("warning: {}: {warning}", file.display());
-        complain(&printable(&warning));
+        complain(&printable(&format!("warning: {file}{warning}")));
     }
 }
 
@@ -59,7 +64,8 @@ fn check_complete(summary: &Summary, all: u64, folder: &Path) -> Result<()> {
 const FOUND: &str = "Found in the recording";
 
 /// What the terminal shows of what was found in a recording, unless there is none.
-const BRIEF: [&str; 8] = [
+const BRIEF: [&str; 9] = [
+    "bin width",
     "background",
     "hot pixels",
     "dead pixels",
@@ -72,7 +78,14 @@ const BRIEF: [&str; 8] = [
 
 /// Prints what was found in the recording, the totals of a run, and `more` rows. The report has the rest.
 fn print_summary(summary: &Summary, more: &[Row], folder: &Path) -> io::Result<()> {
-    let rows = [&summary.brief()[..], more].concat();
+    let mut rows = [&summary.brief()[..], more].concat();
+    let map = folder.join("depth.npy");
+    let with_depth = rows
+        .iter_mut()
+        .find(|(name, _)| name == "pixels with depth");
+    with_depth
+        .into_iter()
+        .for_each(|(_, value)| *value += &format!(", in {} in mm", map.display()));
     let mut out = io::stdout().lock();
     if !summary.found.is_empty() {
         let found = summary.found.iter();

@@ -18,7 +18,7 @@ use crate::npy::{archive, histograms};
 use crate::photon_csv::CsvReader;
 use crate::photon_list::{CountedSource, ListOptions, PhotonList, PhotonReader};
 use crate::pixel_counts::PixelCounts;
-use crate::recorded::{Capture, RecordedHistograms, RecordingLength};
+use crate::recorded::{Capture, ListTimes, RecordedHistograms, RecordingLength};
 use crate::source::PhotonSource;
 use crate::{tmf8820, tmf8829, warnings};
 use dtof_options::files::is_file;
@@ -100,8 +100,8 @@ pub struct Counts {
     /// Histograms that were recorded together, one a pixel. Captures follow each other in the
     /// address space.
     pub captures: Vec<Capture>,
-    /// Photon lists: the photons of all pixels in the first half of the laser cycles, bin by bin.
-    pub early: Option<Vec<u64>>,
+    /// Photon lists: what they tell beside the histograms.
+    pub times: Option<ListTimes>,
     /// Laser cycles of the recording, if known, as for photon lists.
     pub cycles: Option<u64>,
     /// The true distance of each pixel in millimetres, if the file gives it.
@@ -275,12 +275,12 @@ pub fn counts(input: impl Into<Input>, options: &ReadOptions) -> Result<Counts> 
 }
 
 fn counts_of(photons: &mut dyn CountedSource, metadata: Metadata) -> Result<Counts> {
-    let (counts, early) = photons.counts()?;
+    let (counts, times) = photons.counts()?;
     Ok(Counts {
         array: photons.array(),
         axis_names: photons.axis_names(),
         captures: vec![counts],
-        early: Some(early),
+        times: Some(times),
         cycles: Some(photons.cycles()),
         truth_mm: None,
         metadata,
@@ -535,7 +535,7 @@ fn fit_bins(
         array,
         axis_names: ["column", "row"],
         captures,
-        early: None,
+        times: None,
         cycles: None,
         truth_mm: None,
         metadata,

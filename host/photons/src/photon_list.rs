@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{Array, PixelAddress};
 
 use crate::input::Input;
-use crate::recorded::Capture;
+use crate::recorded::{Capture, ListTimes};
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_options::Refused;
 use dtof_options::rows::grouped;
@@ -38,12 +38,12 @@ const SPAN: u64 = 256;
 
 /// A source that can also give histograms.
 pub trait CountedSource: PhotonSource {
-    /// The photons of all laser cycles to replay, one histogram a pixel of the array, and those of the first half of these
-    /// laser cycles, one histogram of all pixels. The replay still begins at the first photon.
+    /// The photons of all laser cycles to replay, one histogram a pixel of the array. The replay still begins at the first
+    /// photon.
     ///
     /// # Errors
     /// Fails if the file has changed since it was checked.
-    fn counts(&mut self) -> Result<(Capture, Vec<u64>)>;
+    fn counts(&mut self) -> Result<(Capture, ListTimes)>;
 }
 
 /// The options of a photon list.
@@ -311,10 +311,15 @@ impl<R> PhotonList<R> {
 }
 
 impl<R: PhotonReader> CountedSource for PhotonList<R> {
-    fn counts(&mut self) -> Result<(Capture, Vec<u64>)> {
+    fn counts(&mut self) -> Result<(Capture, ListTimes)> {
         let bins = self.rows.shape.bins.into();
         let mut counts = vec![vec![0; bins]; self.array.pixels() as usize];
-        let mut early = vec![0; bins];
+        let mut times = ListTimes {
+            early: vec![0; bins],
+            again: 0,
+        };
+        // The laser cycle of the last photon of each pixel.
+        let mut last = vec![u64::MAX; counts.len()];
         let half = self.cycles / 2;
         while let Some(row) = self.rows.next()? {
             if row.cycle >= self.cycles {
@@ -325,11 +330,13 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
             };
             histogram[usize::from(row.bin())] += 1;
             if row.cycle < half {
-                early[usize::from(row.bin())] += 1;
+                times.early[usize::from(row.bin())] += 1;
             }
+            let last = std::mem::replace(&mut last[row.pixel()], row.cycle);
+            times.again += u64::from(last == row.cycle);
         }
         self.rows = Validator::open(&self.input, self.rows.shape, self.rows.expected)?;
-        Ok((counts, early))
+        Ok((counts, times))
     }
 }
 

@@ -52,6 +52,15 @@ pub enum RecordingLength {
 /// The histograms of pixels that were recorded together, one a pixel.
 pub type Capture = Vec<Vec<u64>>;
 
+/// What a photon list tells beside its histograms.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct ListTimes {
+    /// The photons of all pixels in the first half of the laser cycles, bin by bin.
+    pub early: Vec<u64>,
+    /// Photons whose pixel had another before in the same laser cycle.
+    pub again: u64,
+}
+
 /// The captures of a file, which follow each other in the address space.
 #[derive(Clone, Debug)]
 pub struct RecordedHistograms {

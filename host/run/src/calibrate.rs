@@ -158,7 +158,7 @@ pub(super) fn calibrate_counts(
         slant: rays.as_ref().map(|[slants, _]| &slants[..]),
         bias_mm: rays.as_ref().map(|[_, biases]| &biases[..]),
         offsets_mm: &requested.sensor.pixel_offsets_mm(),
-        early: counts.early.as_deref(),
+        times: counts.times.as_ref(),
     };
     calibrate_with(&observed, options, &shared(progress, "steps"))
 }

@@ -17,7 +17,7 @@ pub(crate) const SURFACE_BINS: u16 = 3;
 /// Photons have surely changed if they differ by more than so many standard deviations.
 const SURELY: f64 = 4.0;
 
-/// There is a second clear surface; the depth is that of the stronger one.
+/// There is a second clear surface; the depth is that of the highest bin.
 pub const SECOND_SURFACE: u8 = 1;
 /// The halves of the recording contradict each other.
 pub const CONTRADICTION: u8 = 2;
@@ -229,7 +229,7 @@ impl DepthMap {
         (pixels > 0).then(|| {
             format!(
                 "{pixels} of {} pixels see one surface in the first half of the recording and another in the second: \
-                 something moved; depth.npy shows one of them{latest}",
+                 something moved; depth.npy shows the brighter one{latest}",
                 self.flags.len()
             )
         })

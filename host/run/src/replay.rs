@@ -392,6 +392,17 @@ fn find(
     if !rows.iter().any(|(name, _)| name == "bin width") {
         rows.insert(1, ("bin width".to_owned(), width));
     }
+    for (name, undone_by) in [
+        ("hot pixels", "; --mask none keeps them"),
+        ("dead pixels", "; --mask none keeps them"),
+        ("gate", "; --glass no keeps all bins"),
+    ] {
+        let is_left_out = |row: &&mut Row| row.0 == name && !row.1.starts_with("none");
+        let is_undone = name != "gate" || found.glass().is_some();
+        let rows = rows.iter_mut().filter(is_left_out);
+        rows.filter(|_| is_undone)
+            .for_each(|row| row.1 += undone_by);
+    }
     let overridden = given_keys.intersection(&found_keys);
     let flags = overridden
         .filter(|key| !SEARCHED_WITH.contains(&key.as_str()))

@@ -19,7 +19,7 @@ pub(crate) const ALL_PHOTONS: &str = "all photons";
 pub(crate) const MARK: &str = "\"program\": \"dtof ";
 
 /// The totals that the terminal shows.
-const BRIEF: [&str; 13] = [
+const BRIEF: [&str; 12] = [
     "bin width",
     "taken to have lasted",
     "photons",
@@ -31,7 +31,6 @@ const BRIEF: [&str; 13] = [
     "too short for an event",
     "no event",
     "cover glass",
-    "warning",
     "export with",
 ];
 
@@ -390,7 +389,7 @@ impl Summary {
     /// The photons that did not count, by cause.
     fn not_used(&self) -> Vec<String> {
         let not_replayed = match self.is_map_longer() {
-            true => "for depth.npy only",
+            true => "by events, but for depth.npy",
             false => "not replayed: --cycles N takes more",
         };
         let losses = [

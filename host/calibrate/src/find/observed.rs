@@ -6,7 +6,7 @@ use anyhow::{Result, bail, ensure};
 use dtof_core::Array;
 
 use dtof_options::Refused;
-use dtof_photons::recorded::Capture;
+use dtof_photons::recorded::{Capture, ListTimes};
 use dtof_theory::counts::dead_time;
 
 /// How long each capture lasted.
@@ -63,8 +63,8 @@ pub struct Observed<'a> {
     pub bias_mm: Option<&'a [f64]>,
     /// The offset that each pixel of the array has already, in millimetres; empty if none has.
     pub offsets_mm: &'a [f64],
-    /// The photons of all pixels in the first half of the laser cycles, bin by bin, if the recording has a time.
-    pub early: Option<&'a [u64]>,
+    /// What a photon list tells beside the histograms; `None` if the recording has no time.
+    pub times: Option<&'a ListTimes>,
 }
 
 /// One histogram.
@@ -167,7 +167,7 @@ impl Observed<'_> {
     /// no time.
     #[must_use]
     pub fn halves(&self) -> Option<Vec<[f64; 2]>> {
-        let early = self.early?.iter();
+        let early = self.times?.early.iter();
         let mut halves: Vec<[f64; 2]> = early.map(|&early| [0.0, early as f64]).collect();
         for counts in self.captures.iter().flatten() {
             for ([all, _], &count) in halves.iter_mut().zip(counts) {

@@ -28,6 +28,7 @@ use std::ops::Range;
 use super::observed::Trace;
 use super::significance::{is_surely_more, median, quantile};
 
+use dtof_photons::recorded::ListTimes;
 use dtof_theory::counts::dead_time::{arrived, live};
 
 /// The ratio of likelihoods that decides, as a logarithm: 1000.
@@ -48,6 +49,11 @@ const EXCESSES: Range<i8> = -8..5;
 /// Histograms are of different brightness if eight in ten have photons that differ by more than this part of the median:
 /// by more than chance.
 const DIFFERENT: f64 = 0.2;
+/// From this share of lost photons on, depths are wrong.
+pub(crate) const MATTERS: f64 = 0.2;
+/// If so many second photons of a laser cycle are expected and there is none, the TDC takes the first: by chance one list in
+/// a million has none.
+const SECOND_PHOTONS: f64 = 14.0;
 /// Steps between two e for the likeliest laser cycles.
 const FINER: i8 = 8;
 
@@ -113,6 +119,30 @@ pub fn tdc(traces: &[Trace]) -> Tdc {
     match ratios.last() {
         Some(&first_only) if first_only > -DECIDES => Tdc::Unclear(lost(bins)),
         _ => Tdc::SeveralHits,
+    }
+}
+
+impl Tdc {
+    /// If the background has not decided, and it matters, the times of a photon list do: a TDC that takes several photons has about
+    /// `n²/2N` second ones among `n` photons of a pixel in `N` laser cycles, and one that takes the first photon none.
+    pub(crate) fn or_by_times(self, traces: &[Trace], times: Option<&ListTimes>) -> Self {
+        let (Self::Unclear(lost), Some(times)) = (self, times) else {
+            return self;
+        };
+        if lost <= MATTERS {
+            return self;
+        }
+        let bins = traces.first().map_or(0, |trace| trace.counts.len());
+        let expected = traces.iter().map(|trace| {
+            let photons = trace.counts.iter().sum::<f64>();
+            photons * photons / (2.0 * trace.cycles)
+        });
+        let expected: f64 = expected.sum();
+        match times.again as f64 {
+            again if again > expected / 2.0 => Self::SeveralHits,
+            0.0 if expected > SECOND_PHOTONS => Self::DeadTime { bins, lost },
+            _ => self,
+        }
     }
 }
 

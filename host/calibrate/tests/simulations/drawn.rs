@@ -186,7 +186,7 @@ pub fn observed(
         slant: None,
         bias_mm: None,
         offsets_mm: &[],
-        early: None,
+        times: None,
     }
 }
 

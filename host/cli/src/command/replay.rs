@@ -49,7 +49,9 @@ impl Replay {
         )?;
         let quiet = self.results.quiet;
         warn(file, warnings(&replay.metadata), quiet);
-        let RunResult { summary, .. } = replay.run(&input, &mut output, &mut Bar::new(quiet))?;
+        let RunResult { summary, warnings } =
+            replay.run(&input, &mut output, &mut Bar::new(quiet))?;
+        warn(file, warnings, quiet);
         let lead = format!("Recorded photons of {input}.");
         let found = Section {
             heading: FOUND,

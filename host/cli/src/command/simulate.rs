@@ -17,7 +17,7 @@ use dtof_simulate::scene::Scene;
 use super::flags::Flags;
 use super::job::{EngineOptions, ResultOptions};
 use super::scene_options::SceneOptions;
-use super::{check_complete, print_summary, say_kept};
+use super::{check_complete, print_summary, say_kept, warn};
 
 #[derive(Args)]
 pub struct Simulate {
@@ -99,6 +99,7 @@ impl Job<'_> {
                 .output(settings, photons, self.input, effective, self.settings_file)?;
         let progress = &mut Bar::new(self.results.quiet);
         let ran = simulation.run(engine.as_mut(), &mut output, progress)?;
+        warn(self.input, ran.warnings, self.results.quiet);
         let mut summary = ran.summary;
         summary.export_with = export_with(&simulation.scene);
         let mut rows = self.scene_rows;

@@ -72,7 +72,7 @@ impl View {
                 );
                 let speed = self.speed.unwrap_or(1.0);
                 let playback = Playback::new(file.clone(), self.laser_hz, speed)?;
-                super::warn(&file, playback.warning.clone(), false);
+                super::warn(file.as_path(), playback.warning.clone(), false);
                 Feed::Playback(playback)
             }
         };

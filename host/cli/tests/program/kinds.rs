@@ -329,6 +329,11 @@ fn pile_up_without_background() {
 }
 
 #[test]
+fn much_light_without_background_as_list() {
+    holds("much_light_without_background_as_list");
+}
+
+#[test]
 fn glass_and_few_targets() {
     holds("glass_and_few_targets");
 }

@@ -89,7 +89,7 @@ fn a_scene_whose_tdc_has_a_dead_time_needs_it_left_out() {
     let scratch = Scratch::new();
     scratch.file("scene.toml", format!("{SCENE}[tdc]\nhits_per_cycle = 1\n"));
     let options = "simulate --scene scene.toml --out out --rule window --window 3 --neighbours 8";
-    let reason = "--neighbours cannot be used with the dead time of the sensor or scene; --dead-time 0 leaves it out";
+    let reason = "--neighbours cannot be used with a dead time; --dead-time 0 leaves it out";
     scratch.refused(&scratch.run(options), &[reason]);
     scratch.printed(&format!("{options} --dead-time 0"));
 }

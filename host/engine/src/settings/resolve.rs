@@ -65,12 +65,7 @@ impl SettingsFile {
         let neighbours = detection.confirming()?;
         let is_frame = self.run.frame.is_some();
         if neighbours.is_some() && dead_time > 0 && !is_frame {
-            let reason = match sensor.dead_time {
-                Some(_) => "cannot be used with `dead_time`",
-                None => {
-                    "cannot be used with the dead time of the sensor or scene; `dead_time` 0 leaves it out"
-                }
-            };
+            let reason = "cannot be used with a dead time; `dead_time` 0 leaves it out";
             return Err(Refused::new("neighbours", reason).into());
         }
         let requested = (sensor.dither_bins, sensor.dither_seed);

@@ -82,7 +82,11 @@ proptest! {
         };
         let early = counts(list.cycles() / 2);
         let early = (0..32).map(|bin| early.iter().map(|pixel| pixel[bin]).sum()).collect();
-        prop_assert_eq!(list.counts().unwrap(), (counts(limit), early));
+        let again = photons.iter().enumerate().filter(|(at, photon)| {
+            replayed(photon) && photons[..*at].iter().any(|before| before[..2] == photon[..2])
+        });
+        let again = again.count() as u64;
+        prop_assert_eq!(list.counts().unwrap(), (counts(limit), ListTimes { early, again }));
 
         // Slices go on to the end of the file, and are empty after it.
         let mut first_cycle = 0;

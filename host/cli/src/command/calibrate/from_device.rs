@@ -158,7 +158,7 @@ impl DeviceArgs {
             slant: rays.as_ref().map(|[slants, _]| &slants[..]),
             bias_mm: rays.as_ref().map(|[_, biases]| &biases[..]),
             offsets_mm: &requested.sensor.pixel_offsets_mm(),
-            early: None,
+            times: None,
         };
         let mut bar = Bar::new(quiet);
         let found = calibrate_with(&observed, options, &shared(&mut bar, "steps"))?;

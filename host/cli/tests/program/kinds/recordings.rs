@@ -87,6 +87,10 @@ pub const KINDS: &[Kind] = &[
     kind("retroreflectors", retroreflectors),
     kind("glass_before_most_targets", glass_before_most_targets),
     kind("pile_up_without_background", pile_up_without_background),
+    kind(
+        "much_light_without_background_as_list",
+        much_light_without_background_as_list,
+    ),
     kind("glass_and_few_targets", glass_and_few_targets),
     kind("glass_in_most_pixels", glass_in_most_pixels),
     kind("glass_that_shifts", glass_that_shifts),
@@ -671,6 +675,33 @@ fn pile_up_without_background(rng: &mut Pcg64) -> Recording {
         need: Need::Either(PILE_UP),
         options: format!("--recorded-cycles {cycles} --decide-once"),
         ..sensor.first_photons(array, cycles, at(&positions))
+    }
+}
+
+/// A list tells whether the TDC takes all photons or the first of each laser cycle.
+fn much_light_without_background_as_list(rng: &mut Pcg64) -> Recording {
+    let sensor = Sensor::draw(rng, 3, 6);
+    let cycles = whole(rng, 1000, 4000);
+    let signal = between(rng, 1.0, 3.0);
+    let positions = sensor.positions(rng, 0.25, 0.85);
+    let takes_first = chance(rng, 0.5);
+    let mut list = List::new();
+    for (pixel, &position) in positions.iter().enumerate() {
+        let light = sensor.background(0.0).with(signal, position, sensor.sigma);
+        match takes_first {
+            true => list.add_first(pixel, &light, cycles, rng),
+            false => list.add(pixel, &light, 0, cycles, rng),
+        }
+    }
+    let recording = Recording {
+        need: Need::Clean,
+        options: format!("{} --decide-once", sensor.list_options()),
+        ..sensor.first_photons(list.array(), cycles, at(&positions))
+    };
+    Recording {
+        tolerance: 0.3,
+        first_photons_of: recording.first_photons_of.filter(|_| takes_first),
+        ..recording
     }
 }
 

@@ -235,7 +235,7 @@ fn arrays_that_hold_no_counts_are_refused() {
             list.npy --bins 32 | list.npy: record 0: bin 40 is past the last of 32 bins
             list.npy --binning 1 | list.npy: --binning needs the array: give --columns
             list.csv --binning 1 | list.csv: --binning needs the array: give --columns
-            list.npy --rule window --window 3 --neighbours 8 | list.npy: --neighbours needs the array: give --columns
+            list.npy --rule window --window 3 --neighbours 8 --dead-time 0 | list.npy: --neighbours needs the array: give --columns
             plain.npy --axes captures,rows,columns,bins --rule window --window 3 --neighbours 8 | --neighbours needs one capture of columns and rows
             long.npy | 1500 bins are more than 1024: add up neighbours with --rebin 2
             plain.npy --rebin 400 | makes 0 whole bins of 8

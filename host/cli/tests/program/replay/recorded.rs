@@ -23,7 +23,7 @@ fn a_steady_pixel_reports_when_the_flow_chart_says() {
     let input = scratch.file("photons.csv", steady(7, 60, 100));
     let summary = scratch.replayed(
         &input,
-        "--rule paper --alpha 8 --x 4 --l1 40 --l2 2000 --estimator centroid",
+        "--rule paper --alpha 8 --x 4 --l1 40 --l2 2000 --estimator centroid --dead-time 0",
     );
     // N = 44 is the first multiple of 4 above 40; cycles count from 0. All in
     // bin 60 puts the centroid at 60.5 bins of 37.474 mm.

@@ -271,9 +271,13 @@ fn a_run_without_a_photon_is_warned_of() {
     let scratch = Scratch::new();
     scratch.file("dark.toml", "cycles = 100\n");
     scratch.file("lit.toml", "cycles = 100\nbackground = 0.1\n");
-    let printed = |scene| scratch.printed(&format!("simulate --scene {scene}.toml --out {scene}"));
+    let said = |scene| {
+        let output = scratch.run(&format!("simulate --scene {scene}.toml --out {scene}"));
+        assert!(output.status.success());
+        String::from_utf8(output.stderr).unwrap()
+    };
     let warning = "no photons: the scene is dark, or too short";
-    assert_contains(&printed("dark"), warning);
+    assert_contains(&said("dark"), &format!("warning: dark.toml: {warning}"));
     assert_contains(&scratch.read("dark/summary.json"), warning);
-    assert!(!printed("lit").contains(warning));
+    assert_eq!(said("lit"), "");
 }

@@ -162,7 +162,7 @@ fn settings_that_contradict_each_other_are_refused_in_one_line() {
         rule = 'window'; window = 3; gate = [0, 6] | gate 0..6: with 128 bins: the range gate leaves fewer than 8 bins
         patience = 8                             | patience is for binning
         rule = 'window'; window = 3; neighbours = 8; binning = 1 | neighbours cannot be used with binning
-        rule = 'window'; window = 3; neighbours = 8; dead_time = 1 | neighbours cannot be used with dead_time
+        rule = 'window'; window = 3; neighbours = 8; dead_time = 1 | neighbours cannot be used with a dead time; dead_time 0 leaves it out
         echo_wait = 8                            | echo_wait is for echoes of 2 or more
         estimator = 'window'                     | estimator window needs sigma_bins or half_widths
         estimator = 'centroid'; half_widths = [2, 3] | half_widths is for estimator window
@@ -199,7 +199,7 @@ fn settings_that_contradict_each_other_are_refused_in_one_line() {
 fn neighbours_need_a_sensor_without_a_dead_time() {
     let mut blind = file("rule = 'window'; window = 3; neighbours = 8");
     blind.dead_time_of_sensor = Some(20);
-    let line = "neighbours cannot be used with the dead time of the sensor or scene; dead_time 0 leaves it out";
+    let line = "neighbours cannot be used with a dead time; dead_time 0 leaves it out";
     assert_eq!(blind.settings(128).unwrap_err().to_string(), line);
 }
 
