@@ -138,6 +138,12 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
         Self { dead_time, ..self }
     }
 
+    /// The same configuration with another range gate, for histograms where something else fills the first bins.
+    #[must_use]
+    pub const fn with_gate(self, gate: RangeGate<BINS>) -> Self {
+        Self { gate, ..self }
+    }
+
     /// The detection in `histogram`, if its highest bin stands clear of the background.
     /// `histogram` must hold gated bins only. It is not weighed by a dead time:
     /// [`Self::detect_echoes`] does that.

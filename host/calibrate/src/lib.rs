@@ -30,7 +30,7 @@ use dtof_photons::MM_PER_PS;
 use dtof_theory::progress::{self, Progress};
 use rayon::prelude::*;
 
-pub use find::glass::{Glass, Nearest};
+pub use find::glass::{Glass, Layer, Nearest};
 pub use find::observed::{Length, Observed};
 pub use find::offset::Offset;
 pub use find::pile_up::Tdc;
@@ -244,9 +244,8 @@ pub fn calibrate_with(
     let good = GoodHistograms::new(observed.array, pixels.background, traces, levels);
 
     let l2 = settle::l2(pixels.background);
-    let halves = observed.halves();
     let with_glass =
-        |good: &GoodHistograms| glass::nearest(good, options.glass, halves.as_deref(), l2.into());
+        |good: &GoodHistograms| glass::nearest(good, options.glass, observed.times, l2.into());
     let nearest = match tdc {
         Some(Tdc::OnePhotonIn { cycles, .. }) => with_glass(&good.corrected(cycles)),
         _ => with_glass(&good),

@@ -1,6 +1,5 @@
 //! Remarks: what a recording does not show, and the option that would help.
 
-use super::find::glass::SEVERAL;
 use super::find::pile_up::MATTERS;
 use super::{Calibration, Length, Nearest, PulseSource, Tdc};
 use dtof_engine::settings::SettingsFile;
@@ -21,17 +20,12 @@ impl Calibration {
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let all = [
-            self.unclear_glass().filter(|_| !self.is_alone()),
+            self.unclear_glass(),
             self.hidden_surfaces(),
             self.many_hot(),
             self.hidden_photons(),
         ];
         all.into_iter().flatten().collect()
-    }
-
-    /// Whether there are so few histograms that each may have two surfaces.
-    const fn is_alone(&self) -> bool {
-        self.captures * self.array_pixels < SEVERAL
     }
 
     /// That early photons have hidden so many late ones, or seem to have, that depths may be wrong.
@@ -62,14 +56,23 @@ impl Calibration {
 
     /// That most pixels see a surface that may be a cover glass or not.
     fn unclear_glass(&self) -> Option<String> {
-        let Nearest::Unclear { bin, share, behind } = self.nearest else {
-            return None;
+        let (layer, what) = match self.nearest {
+            Nearest::Unclear(layer) => (layer, "a cover glass, or a wall"),
+            Nearest::Passing(layer) => (
+                layer,
+                "not all the time, so something moved, or the light changed",
+            ),
+            _ => return None,
         };
-        let [share, behind] = [share, behind].map(|share| (share * 100.0).round());
+        let percent = |share: f64| match (share * 100.0).round() {
+            0.0 => "less than 1 %".to_owned(),
+            percent => format!("{percent} %"),
+        };
+        let (bin, share, behind) = (layer.bin, percent(layer.share), percent(layer.behind));
         Some(format!(
-            "{share} % of the histograms have a surface at bin {bin}, and {behind} % of these another behind it: a cover \
-             glass, or a wall. Nothing is left out, so pixels with both show the brighter one. --glass yes leaves it out; \
-             --glass no says that it is a wall"
+            "{share} of the histograms have a surface at bin {bin}, and {behind} of these another behind it: {what}. \
+             Nothing is left out, so pixels with both show the brighter one. --glass yes leaves it out; --glass no says \
+             that it is a wall"
         ))
     }
 
@@ -232,9 +235,6 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
             ),
         ),
         _ => {}
-    }
-    if let Some(text) = found.unclear_glass().filter(|_| found.is_alone()) {
-        remark("cover glass", text + ".");
     }
     for text in found.warnings() {
         remark(

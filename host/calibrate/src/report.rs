@@ -5,7 +5,7 @@ use dtof_draw::chart::{Axis, Chart, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{AVERAGE, EVENTS, PAPER, REFERENCE};
 use dtof_draw::picture::{Map, heat_map};
 
-use super::{Calibration, Length, Nearest, PixelOffsets, PulseSource, remarks};
+use super::{Calibration, Layer, Length, Nearest, PixelOffsets, PulseSource, remarks};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::numbers::shortest;
 use dtof_options::rows::{Row, grouped, significant};
@@ -56,7 +56,8 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
         match &found.nearest {
             Nearest::NotCommon => "none: no peak is the same in all pixels".to_owned(),
             Nearest::Wall(bin) => format!("none: bin {bin} is a wall"),
-            Nearest::Unclear { bin, .. } => format!("bin {bin} is a wall or a cover glass"),
+            Nearest::Unclear(layer) => format!("bin {} is a wall or a cover glass", layer.bin),
+            Nearest::Passing(layer) => format!("none: what is at bin {} has moved", layer.bin),
             Nearest::Glass(glass) => format!(
                 "{} {} photons a laser cycle and pixel at bin {}",
                 short(glass.photons),
@@ -406,7 +407,7 @@ fn finding(found: &Calibration) -> String {
         (Nearest::Glass(_), _) => {
             "Crosstalk of the cover glass is so dim that no gate is needed".to_owned()
         }
-        (Nearest::Unclear { bin, .. }, _) => {
+        (Nearest::Unclear(Layer { bin, .. }) | Nearest::Passing(Layer { bin, .. }), _) => {
             format!("Most pixels see one surface at bin {bin}: a wall or a cover glass")
         }
         (_, Some(signal)) if found.pixels.background > 0.0 => format!(

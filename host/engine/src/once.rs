@@ -33,7 +33,8 @@ use dtof_core::fixed::types::{U4F12, U24F8};
 use dtof_core::rule::{ExcludedBins, LiveCounts};
 use dtof_core::{
     AnyRule, Array, BinIndex, BinPosition, Count, CounterWidth, DepthEvent, Detection, EchoNumber,
-    Flags, Histogram, LaserCycle, Neighbours, PixelAddress, PixelConfig, Statistics, WindowRule,
+    Flags, Histogram, LaserCycle, Neighbours, PixelAddress, PixelConfig, RangeGate, Statistics,
+    WindowRule,
 };
 
 use super::Engine;
@@ -189,53 +190,71 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
         for (count, photons) in frame.iter_mut().zip(counts) {
             *count = u32::try_from(photons >> shift).unwrap_or(u32::MAX);
         }
-        let mut histogram = Histogram::<BINS, W>::new();
-        config.add_frame(&mut histogram, &frame);
         let all: u64 = counts.iter().sum();
         let [first, last] = [config.gate().first(), config.gate().last()].map(usize::from);
         let gated: u64 = counts[first..=last].iter().sum();
         let mut statistics = Statistics::new();
         (statistics.counted, statistics.gated_out) = (gated, all - gated);
         let cycles = u32::try_from(cycles >> shift).unwrap_or(u32::MAX);
-        let mut echoes = Vec::new();
-        let echo = |number, detection: &Detection| echoes.push((number, *detection));
-        let is_blind = config.detect_echoes(&mut histogram.clone(), cycles, echo);
-        echoes.retain(|(_, detection)| !self.is_slope(counts, detection.peak.bin));
-        statistics.blind_looks = is_blind.into();
-        statistics.events = echoes.len() as u64;
-        Decided {
-            confidence: confidence(config, &histogram, cycles),
-            best: match echoes.first() {
-                Some((_, detection)) => Some(detection.position()),
-                None => self.best(&histogram, cycles),
-            },
-            histogram,
-            statistics,
-            echoes,
+        let (mut gate, mut echoes) = (*config.gate(), Vec::new());
+        loop {
+            let config = config.with_gate(gate);
+            let mut histogram = Histogram::<BINS, W>::new();
+            config.add_frame(&mut histogram, &frame);
+            echoes.clear();
+            let echo = |number, detection: &Detection| echoes.push((number, *detection));
+            let is_blind = config.detect_echoes(&mut histogram.clone(), cycles, echo);
+            let bins = || echoes.iter().map(|(_, one): &(_, Detection)| one.peak.bin);
+            let ends = bins().min().zip(bins().max());
+            match ends.and_then(|ends| self.without_slope(counts, &gate, ends)) {
+                Some(Some(narrower)) => {
+                    gate = narrower;
+                    continue;
+                }
+                Some(None) => echoes.clear(),
+                None => {}
+            }
+            statistics.blind_looks = is_blind.into();
+            statistics.events = echoes.len() as u64;
+            return Decided {
+                confidence: confidence(&config, &histogram, cycles),
+                best: match echoes.first() {
+                    Some((_, detection)) => Some(detection.position()),
+                    None => self.best(gate, &histogram, cycles),
+                },
+                histogram,
+                statistics,
+                echoes,
+            };
         }
     }
 
-    /// The peak of the best window, if there is a photon.
-    fn best(&self, histogram: &Histogram<BINS, W>, cycles: u32) -> Option<BinPosition> {
+    /// The peak of the best window in `gate`, if there is a photon.
+    fn best(
+        &self,
+        gate: RangeGate<BINS>,
+        histogram: &Histogram<BINS, W>,
+        cycles: u32,
+    ) -> Option<BinPosition> {
         if histogram.total() == 0 {
             return None;
         }
         let mut best = None;
         if self.config.weighs_dead_time() {
-            self.any_peak
-                .detect_echoes(&mut histogram.clone(), cycles, |number, detection| {
-                    if number == EchoNumber::FIRST {
-                        best = Some(detection.position());
-                    }
-                });
+            let any_peak = self.any_peak.with_gate(gate);
+            any_peak.detect_echoes(&mut histogram.clone(), cycles, |number, detection| {
+                if number == EchoNumber::FIRST {
+                    best = Some(detection.position());
+                }
+            });
         }
         // Without a dead time that is weighed, the highest bin decides.
         best.or_else(|| {
-            let (gate, peak) = (self.config.gate(), histogram.peak());
+            let peak = histogram.peak();
             let background = self.own_photons(peak.bin, histogram).background;
             let background = U24F8::saturating_from_num(background);
             let estimator = self.config.estimator();
-            let depth = estimator.estimate(histogram, gate, peak, background);
+            let depth = estimator.estimate(histogram, &gate, peak, background);
             Some(BinPosition::of(peak.bin, depth.offset))
         })
     }
@@ -350,28 +369,42 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
         first..(peak + reach + 1).min(usize::from(gate.last()) + 1)
     }
 
-    /// Whether a peak is the slope of something outside of the gate: near an edge, as many of the `counts` in the bins beside
-    /// its window, and no bin from the last one outside on up to the window with surely fewer than the mean of the window.
-    /// The gate of a cover glass is for short exposures: its tail shows in many laser cycles.
-    fn is_slope(&self, counts: &[u64], peak: BinIndex) -> bool {
-        let (gate, window) = (self.config.gate(), self.window(peak));
-        let [first, end] = [gate.first(), gate.last() + 1].map(usize::from);
-        let Range { start, end: past } = window;
-        let near = width(self.config.rule());
+    /// If the nearest or the farthest peak in `gate` is the slope of something outside of it, the gate without that slope,
+    /// unless nothing is left. It is a slope if as many of the `counts` lie in the bins beside its window, and no bin from
+    /// the last one outside on up to the window has surely fewer than the mean of the window. The gate of a cover glass is for
+    /// short exposures: its tail shows in many laser cycles.
+    fn without_slope(
+        &self,
+        counts: &[u64],
+        gate: &RangeGate<BINS>,
+        (nearest, farthest): (BinIndex, BinIndex),
+    ) -> Option<Option<RangeGate<BINS>>> {
+        let of_settings = self.config.gate();
+        let [first, end] = [of_settings.first(), of_settings.last() + 1].map(usize::from);
         let mean = |bins: Range<usize>| {
             let number = bins.len() as f64;
             counts[bins].iter().map(|&count| count as f64).sum::<f64>() / number
         };
-        let level = mean(start..past);
-        let falls_into = |beside: Range<usize>, mut up_to_window: Range<usize>| {
+        let falls_into = |window: Range<usize>, beside: Range<usize>, mut between: Range<usize>| {
+            let level = mean(window);
             let is_filled =
                 |bin: usize| counts[bin] as f64 + 2.0 * (counts[bin] as f64).sqrt() >= level;
-            mean(beside) >= level && up_to_window.all(is_filled)
+            mean(beside) >= level && between.all(is_filled)
         };
-        let from_before = first > 0 && start < first + near;
-        let from_behind = end < counts.len() && end < past + near;
-        from_before && falls_into(start.saturating_sub(near)..start, first - 1..start)
-            || from_behind && falls_into(past..(past + near).min(counts.len()), past..end + 1)
+        let width = width(self.config.rule());
+        let bin = |bin: usize| u16::try_from(bin).unwrap_or(u16::MAX);
+        let window = self.window(nearest);
+        let before = window.start.saturating_sub(width)..window.start;
+        if first > 0 && falls_into(window.clone(), before, first - 1..window.start) {
+            return Some(RangeGate::new(bin(window.end), gate.last()).ok());
+        }
+        let window = self.window(farthest);
+        let behind = window.end..(window.end + width).min(counts.len());
+        if end < counts.len() && falls_into(window.clone(), behind, window.end..end + 1) {
+            let last = window.start.checked_sub(1);
+            return Some(last.and_then(|last| RangeGate::new(gate.first(), bin(last)).ok()));
+        }
+        None
     }
 }
 

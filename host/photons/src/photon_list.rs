@@ -315,12 +315,12 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
         let bins = self.rows.shape.bins.into();
         let mut counts = vec![vec![0; bins]; self.array.pixels() as usize];
         let mut times = ListTimes {
-            early: vec![0; bins],
+            quarters: vec![[0; 4]; bins],
             again: 0,
         };
         // The laser cycle of the last photon of each pixel.
         let mut last = vec![u64::MAX; counts.len()];
-        let half = self.cycles / 2;
+        let quarter = self.cycles.div_ceil(4);
         while let Some(row) = self.rows.next()? {
             if row.cycle >= self.cycles {
                 break;
@@ -329,9 +329,9 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
                 bail!("{} changed while it was read", self.input);
             };
             histogram[usize::from(row.bin())] += 1;
-            if row.cycle < half {
-                times.early[usize::from(row.bin())] += 1;
-            }
+            #[allow(clippy::cast_possible_truncation, reason = "0 to 3")]
+            let quarter = (row.cycle / quarter) as usize;
+            times.quarters[usize::from(row.bin())][quarter] += 1;
             let last = std::mem::replace(&mut last[row.pixel()], row.cycle);
             times.again += u64::from(last == row.cycle);
         }

@@ -55,8 +55,8 @@ pub type Capture = Vec<Vec<u64>>;
 /// What a photon list tells beside its histograms.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ListTimes {
-    /// The photons of all pixels in the first half of the laser cycles, bin by bin.
-    pub early: Vec<u64>,
+    /// The photons of all pixels in each quarter of the laser cycles, bin by bin.
+    pub quarters: Vec<[u64; 4]>,
     /// Photons whose pixel had another before in the same laser cycle.
     pub again: u64,
 }

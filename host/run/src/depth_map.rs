@@ -129,18 +129,13 @@ impl DepthMap {
         let decide = |settings: &Settings, counts: &PixelCounts| {
             decide_once(settings, array, addresses, counts, |_| false)
         };
-        let decided = decide(settings, counts)?;
+        // Two echoes tell whether there is a second surface. The first is the same.
         let two = const { EchoNumber::new(2).unwrap() };
-        let with_two = match settings.echoes >= two {
-            true => None,
-            false => Some(decide(
-                &Settings {
-                    echoes: two,
-                    ..settings.clone()
-                },
-                counts,
-            )?),
+        let with_two = Settings {
+            echoes: settings.echoes.max(two),
+            ..settings.clone()
         };
+        let decided = decide(&with_two, counts)?;
         let contradicts = match run.filter(|_| input.counts.is_none()) {
             Some(run) => {
                 let halves = [run.first_half.clone(), run.all.without(&run.first_half)];
@@ -173,20 +168,15 @@ impl DepthMap {
             confidence: empty(),
             flags: vec![0; pixels],
         };
-        let with_two = with_two.as_ref().unwrap_or(&decided);
-        let pixels = addresses
-            .iter()
-            .zip(&decided)
-            .zip(with_two)
-            .zip(contradicts);
-        for (((&pixel, decided), with_two), contradicts) in pixels {
+        let pixels = addresses.iter().zip(&decided).zip(contradicts);
+        for ((&pixel, decided), contradicts) in pixels {
             map.set(pixel, decided, &ranges);
             if !decided.echoes.is_empty() {
                 let is_clear = |(_, second): &(EchoNumber, Detection)| {
                     !second.depth.flags.contains(Flags::TAIL)
                 };
                 let flags = &mut map.flags[usize::from(pixel.raw())];
-                *flags |= SECOND_SURFACE * u8::from(with_two.echoes.iter().skip(1).any(is_clear));
+                *flags |= SECOND_SURFACE * u8::from(decided.echoes.iter().skip(1).any(is_clear));
                 *flags |= CONTRADICTION * u8::from(contradicts);
             }
         }

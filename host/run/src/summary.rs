@@ -388,9 +388,10 @@ impl Summary {
 
     /// The photons that did not count, by cause.
     fn not_used(&self) -> Vec<String> {
+        // Others are for the depth map.
         let not_replayed = match self.is_map_longer() {
-            true => "by events, but for depth.npy",
-            false => "not replayed: --cycles N takes more",
+            true => 0,
+            false => self.not_replayed,
         };
         let losses = [
             (self.gated_out, "outside the range gate"),
@@ -400,7 +401,7 @@ impl Summary {
             (self.saturated_in_blocks, "lost to full counters of blocks"),
             (self.rejected, "with a code past the last bin"),
             (self.cut_off, "in bins cut off"),
-            (self.not_replayed, not_replayed),
+            (not_replayed, "not replayed: --cycles N takes more"),
         ];
         let losses = losses.iter().filter(|(photons, _)| *photons > 0);
         let losses = losses.map(|(photons, cause)| format!("{} {cause}", grouped(*photons)));

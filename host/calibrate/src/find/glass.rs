@@ -15,6 +15,7 @@ use super::good_histograms::GoodHistograms;
 use super::peaks::Peak;
 use super::shape::{Fit, Window, best};
 use super::significance::median;
+use dtof_photons::recorded::ListTimes;
 
 /// Standard deviations with which a group shows the peak.
 const CLEAR: f64 = 5.0;
@@ -24,17 +25,21 @@ const GROUPS: usize = 8;
 const COMMON: f64 = 0.9;
 /// With fewer histograms, crosstalk cannot be told from the nearer of two surfaces.
 pub const SEVERAL: usize = 4;
+/// A cover glass is in the first part of the bins: farther away, a surface and what lies behind it are no glass.
+const NEAR: f64 = 0.25;
 /// At least this share of the histograms has a surface behind the crosstalk, and so many of them, or all.
 const BEHIND: f64 = 0.5;
 const BEHIND_IN: usize = 6;
-/// So many histograms are no fault of a single pixel.
-const FEW: usize = 2;
+/// Of so many histograms two have to have it, before something is said: that is no fault of a single pixel.
+const MANY: usize = 16;
 /// Peaks of a layer lie within so many bins. If this share of the histograms has it, and half of them a surface behind it,
 /// it may be a cover glass that some pixels do not show, or not at the same place.
 const LAYER_BINS: usize = 4;
 const LAYER: f64 = 0.6;
-/// The first half of a recording has this share of the photons of a surface that stays, or more, and so has the second.
-const STAYS: f64 = 1.0 / 3.0;
+/// Each quarter of a recording has so much of the photons of a surface that stays, to within this and five standard
+/// deviations.
+const STAYS: f64 = 0.25;
+const STAYS_TO: f64 = 0.02;
 /// A peak of all pixels together exceeds the background at least by this factor: backgrounds are no
 /// flatter than that.
 const EVEN: f64 = 1.02;
@@ -51,14 +56,9 @@ pub enum Nearest {
     /// No crosstalk, at this bin: nothing lies behind it, or the user says so.
     Wall(usize),
     /// A wall or crosstalk.
-    Unclear {
-        /// The bin where most pixels see it.
-        bin: usize,
-        /// The share of the histograms that have it there, or up to four bins farther.
-        share: f64,
-        /// The share of these that have another surface behind it.
-        behind: f64,
-    },
+    Unclear(Layer),
+    /// A surface that all pixels see, but not all the time, with others behind it.
+    Passing(Layer),
 }
 
 impl Nearest {
@@ -91,111 +91,124 @@ pub struct Glass {
     pub has_tail: bool,
 }
 
+/// The nearest surfaces of histograms, within a few bins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Layer {
+    /// The bin where most pixels see it, or where it is brightest.
+    pub bin: usize,
+    /// The share of the histograms that have it.
+    pub share: f64,
+    /// The share of these that have another surface behind it.
+    pub behind: f64,
+}
+
 /// Finds the nearest common peak. `is_glass` is given if the user knows whether that is crosstalk; `l2` are the laser cycles
-/// of an exposure. `halves` are the photons of each bin of all pixels, and those of the first half of the recording, if it has a time.
+/// of an exposure. `times` are those of a photon list.
 #[must_use]
 pub fn nearest(
     good: &GoodHistograms,
     is_glass: Option<bool>,
-    halves: Option<&[[f64; 2]]>,
+    times: Option<&ListTimes>,
     l2: f64,
 ) -> Nearest {
     let common = common(good);
-    let layer = Layer::nearest(&good.peaks);
-    if is_glass == Some(true) {
-        let peak = common.or_else(|| Some(layer?.peak));
-        return peak.map_or(Nearest::NotCommon, |peak| {
-            Nearest::Glass(glass(good, &peak, l2))
-        });
-    }
-    let stays = |peak: &Peak| halves.is_none_or(|halves| stays(halves, peak));
-    let Some(peak) = common.filter(stays) else {
-        let layer = layer.filter(|layer| common.is_none() && layer.may_be_glass());
-        return match is_glass {
-            None => layer.map_or(Nearest::NotCommon, |layer| layer.unclear()),
-            Some(_) => Nearest::NotCommon,
+    let layer = nearest_layer(&good.peaks);
+    let as_glass = |peak: &Peak| Nearest::Glass(glass(good, peak, l2));
+    let Some(peak) = common else {
+        return match (is_glass, layer) {
+            (Some(true), Some((peak, _))) => as_glass(&peak),
+            (None, Some((_, layer))) if layer.share >= LAYER && layer.behind >= BEHIND => {
+                Nearest::Unclear(layer)
+            }
+            _ => Nearest::NotCommon,
         };
     };
-    if is_glass == Some(false) {
-        return Nearest::Wall(peak.top);
+    match is_glass {
+        Some(true) => return as_glass(&peak),
+        Some(false) => return Nearest::Wall(peak.top),
+        None => {}
     }
     let all = good.traces.len();
-    let has_surface = |peaks: &&Vec<Peak>| peaks.iter().any(|one| one.first > peak.last);
-    let behind = good.peaks.iter().filter(has_surface).count();
+    let has_it = |peaks: &[Peak]| peaks.iter().any(|one| one.is_near(peak.top));
+    // What fills the last bin may be all that came later.
+    let has_more = |peaks: &[Peak]| {
+        let is_behind = |one: &Peak| one.first > peak.last && one.last + 1 < good.bins();
+        peaks.iter().any(is_behind)
+    };
+    let number = |is: &dyn Fn(&[Peak]) -> bool| good.peaks.iter().filter(|peaks| is(peaks)).count();
+    let (having, behind) = (number(&has_it), number(&has_more));
+    let both = number(&|peaks| has_it(peaks) && has_more(peaks));
+    let is_few = both < 1 + usize::from(all >= MANY);
+    let is_wall = is_few && !is_behind_of_all(good, &peak);
+    // A dim one shows only in groups of histograms.
+    let (having, with_more) = match having as f64 >= COMMON * all as f64 {
+        true => (having, both),
+        false => (all, behind),
+    };
+    let layer = Layer {
+        bin: peak.top,
+        share: having as f64 / all as f64,
+        behind: with_more as f64 / having as f64,
+    };
     let needed = BEHIND_IN.min(all).max(all.div_ceil(2));
-    if all >= SEVERAL && behind >= needed {
-        Nearest::Glass(glass(good, &peak, l2))
-    } else if behind >= FEW.min(all.div_ceil(FEW)) || is_behind_of_all(good, &peak) {
-        Nearest::Unclear {
-            bin: peak.top,
-            share: 1.0,
-            behind: behind as f64 / all as f64,
+    if times.is_some_and(|times| !stays(&times.quarters, &peak)) {
+        match is_wall {
+            true => Nearest::NotCommon,
+            false => Nearest::Passing(layer),
         }
+    } else if all >= SEVERAL && behind >= needed && (peak.top as f64) < NEAR * good.bins() as f64 {
+        as_glass(&peak)
     } else {
-        Nearest::Wall(peak.top)
-    }
-}
-
-/// The nearest surfaces of histograms that lie within a few bins.
-#[derive(Clone, Copy)]
-struct Layer {
-    /// Its peak in the histogram that has it brightest.
-    peak: Peak,
-    share: f64,
-    behind: f64,
-}
-
-impl Layer {
-    /// Where most histograms have their nearest peak.
-    fn nearest(of: &[Vec<Peak>]) -> Option<Self> {
-        let mut nearest: Vec<(&Peak, bool)> = of
-            .iter()
-            .filter_map(|peaks| Some((peaks.first()?, peaks.len() > 1)))
-            .collect();
-        nearest.sort_by_key(|(peak, _)| peak.top);
-        let within = |first: usize| {
-            let from = nearest[first].0.top;
-            let end = nearest.partition_point(|(peak, _)| peak.top <= from + LAYER_BINS);
-            &nearest[first..end]
-        };
-        let most = (0..nearest.len()).map(within);
-        let most = most.max_by_key(|layer| layer.len())?;
-        let brightest = most
-            .iter()
-            .max_by(|one, other| one.0.photons.total_cmp(&other.0.photons))?;
-        let behind = most.iter().filter(|(_, has_more)| *has_more).count();
-        Some(Self {
-            peak: *brightest.0,
-            share: most.len() as f64 / of.len() as f64,
-            behind: behind as f64 / most.len() as f64,
-        })
-    }
-
-    fn may_be_glass(&self) -> bool {
-        self.share >= LAYER && self.behind >= BEHIND
-    }
-
-    fn unclear(&self) -> Nearest {
-        Nearest::Unclear {
-            bin: self.peak.top,
-            share: self.share,
-            behind: self.behind,
+        match is_wall {
+            true => Nearest::Wall(peak.top),
+            false => Nearest::Unclear(layer),
         }
     }
 }
 
-/// Whether both halves of the recording have the peak. `halves` has the photons of each bin, and those of the first half.
-fn stays(halves: &[[f64; 2]], peak: &Peak) -> bool {
-    let around = peak.top.saturating_sub(1)..=(peak.top + 1).min(halves.len() - 1);
-    let level = median(halves.iter().map(|[all, _]| *all)) * around.clone().count() as f64;
-    let sum = |of: usize| {
-        halves[around.clone()]
+/// Where most histograms have their nearest peak, and that peak in the histogram that has it brightest.
+fn nearest_layer(of: &[Vec<Peak>]) -> Option<(Peak, Layer)> {
+    let mut nearest: Vec<(&Peak, bool)> = of
+        .iter()
+        .filter_map(|peaks| Some((peaks.first()?, peaks.len() > 1)))
+        .collect();
+    nearest.sort_by_key(|(peak, _)| peak.top);
+    let within = |first: usize| {
+        let from = nearest[first].0.top;
+        let end = nearest.partition_point(|(peak, _)| peak.top <= from + LAYER_BINS);
+        &nearest[first..end]
+    };
+    let most = (0..nearest.len()).map(within);
+    let most = most.max_by_key(|layer| layer.len())?;
+    let by_photons =
+        |one: &&(&Peak, bool), other: &&(&Peak, bool)| one.0.photons.total_cmp(&other.0.photons);
+    let (peak, _) = most.iter().max_by(by_photons)?;
+    let behind = most.iter().filter(|(_, has_more)| *has_more).count();
+    let layer = Layer {
+        bin: peak.top,
+        share: most.len() as f64 / of.len() as f64,
+        behind: behind as f64 / most.len() as f64,
+    };
+    Some((**peak, layer))
+}
+
+/// Whether each quarter of the recording has its share of the peak.
+fn stays(quarters: &[[u64; 4]], peak: &Peak) -> bool {
+    let around = peak.top.saturating_sub(1)..=(peak.top + 1).min(quarters.len() - 1);
+    let all = |bin: &[u64; 4]| bin.iter().sum::<u64>() as f64;
+    let level = median(quarters.iter().map(all)) * around.clone().count() as f64;
+    let photons = |of: usize| {
+        quarters[around.clone()]
             .iter()
-            .map(|half| half[of])
+            .map(|bin| bin[of] as f64)
             .sum::<f64>()
     };
-    let share = (sum(1) - level / 2.0) / (sum(0) - level).max(1.0);
-    (STAYS..=1.0 - STAYS).contains(&share)
+    let photons = [0, 1, 2, 3].map(photons);
+    let signal = (photons.iter().sum::<f64>() - level).max(1.0);
+    photons.iter().all(|photons| {
+        let share = (photons - level / 4.0) / signal;
+        (share - STAYS).abs() <= STAYS_TO + 5.0 * photons.sqrt() / signal
+    })
 }
 
 /// Whether all pixels together have a surface behind the peak that single ones are too dim to show.
@@ -479,14 +492,14 @@ mod tests {
     use crate::find::observed::Trace;
     use dtof_core::Array;
 
-    /// 32x16 pixels with a wall in bin 94, and so many photons in bin 51 by column and row, half as many beside it.
+    /// 32x16 pixels with a wall in bin 94, and so many photons in bin 21 by column and row, half as many beside it.
     fn top_with(photons: &dyn Fn(usize, usize) -> f64) -> Option<usize> {
         let traces: Vec<Trace> = (0..32 * 16)
             .map(|pixel| {
                 let mut counts = vec![14.0; 128];
                 counts[94] = 200.0;
                 let photons = photons(pixel % 32, pixel / 32);
-                for (bin, share) in [(50, 0.5), (51, 1.0), (52, 0.5)] {
+                for (bin, share) in [(20, 0.5), (21, 1.0), (22, 0.5)] {
                     counts[bin] += share * photons;
                 }
                 Trace {
@@ -523,7 +536,7 @@ mod tests {
         assert_eq!(with(&crossing, 0.0), None);
         assert_eq!(with(&|column, _| column < 5, 0.0), None);
         assert_eq!(with(&|_, row| (4..6).contains(&row), 0.0), None);
-        assert_eq!(with(&|_, _| true, 0.0), Some(51));
-        assert_eq!(top_with(&|_, _| 5.0), Some(51));
+        assert_eq!(with(&|_, _| true, 0.0), Some(21));
+        assert_eq!(top_with(&|_, _| 5.0), Some(21));
     }
 }

@@ -163,20 +163,6 @@ impl Observed<'_> {
         Ok(traces)
     }
 
-    /// For each bin the photons of all pixels, and those of the first half of the laser cycles; `None` if the recording has
-    /// no time.
-    #[must_use]
-    pub fn halves(&self) -> Option<Vec<[f64; 2]>> {
-        let early = self.times?.early.iter();
-        let mut halves: Vec<[f64; 2]> = early.map(|&early| [0.0, early as f64]).collect();
-        for counts in self.captures.iter().flatten() {
-            for ([all, _], &count) in halves.iter_mut().zip(counts) {
-                *all += count as f64;
-            }
-        }
-        Some(halves)
-    }
-
     /// The range bias of a pixel in millimetres, less the offset that it has already: ranges without that offset are
     /// so much too long.
     #[must_use]

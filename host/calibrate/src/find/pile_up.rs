@@ -35,6 +35,8 @@ use dtof_theory::counts::dead_time::{arrived, live};
 const DECIDES: f64 = 6.91;
 /// By chance a bin is left out in fewer than one of so many histograms.
 const ONE_IN: f64 = 100.0;
+/// The share of the histograms that something is wrong with.
+const DOUBT: f64 = 1e-4;
 /// The most repetitions to find bins without a peak.
 const ROUNDS: usize = 10;
 /// Bins beside a window that are left out, and those behind them that it is compared with: for narrow
@@ -100,7 +102,7 @@ pub fn tdc(traces: &[Trace]) -> Tdc {
     };
     let sum = |dead_time| {
         let ratios = backgrounds.iter();
-        let ratios = ratios.map(|one| one.log_ratio(one.cycles, dead_time));
+        let ratios = ratios.map(|one| doubted(one.log_ratio(one.cycles, dead_time)));
         ratios.sum::<f64>()
     };
     let candidates = candidates(bins);
@@ -257,13 +259,22 @@ fn refined(backgrounds: &[Background], candidates: &[usize], best: usize) -> usi
 
 /// Whether the background falls neither half nor twice as steeply as with this dead time.
 fn has_the_slope(backgrounds: &[Background], dead_time: usize) -> bool {
-    let likelihood = |power| {
-        let backgrounds = backgrounds.iter();
-        let each = backgrounds.map(|one| one.log_likelihood(one.cycles, dead_time, power));
-        each.sum::<f64>()
+    let is_likelier_than = |power| {
+        let each = backgrounds.iter().map(|one| {
+            let likelihood = |power| one.log_likelihood(one.cycles, dead_time, power);
+            doubted(likelihood(1.0) - likelihood(power))
+        });
+        each.sum::<f64>() > 0.0
     };
-    let here = likelihood(1.0);
-    here > likelihood(0.5) && here > likelihood(2.0)
+    is_likelier_than(0.5) && is_likelier_than(2.0)
+}
+
+/// The logarithm of a ratio of likelihoods, if one histogram in so many is not what it seems: one pixel cannot outweigh the
+/// others. The expectation of such a ratio is at most 1, as it was.
+fn doubted(log_ratio: f64) -> f64 {
+    let doubt = DOUBT.ln();
+    let (high, low) = (log_ratio.max(doubt), log_ratio.min(doubt));
+    high + (low - high).exp().ln_1p()
 }
 
 /// Bins that hold no more than the bins around them, on the brighter side: those of a pulse or its tail do.

@@ -134,7 +134,7 @@ fn one_pixel_cannot_tell_a_glass_from_a_near_surface() {
     let scene = Scene::parse(text).unwrap();
     let found = found(&scene, 20_000, 1);
     assert!(
-        matches!(found.nearest, Nearest::Unclear { bin: 4..=5, .. }),
+        matches!(found.nearest, Nearest::Unclear(layer) if (4..=5).contains(&layer.bin)),
         "{:?}",
         found.nearest
     );

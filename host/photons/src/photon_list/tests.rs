@@ -80,13 +80,16 @@ proptest! {
             }
             counts
         };
-        let early = counts(list.cycles() / 2);
-        let early = (0..32).map(|bin| early.iter().map(|pixel| pixel[bin]).sum()).collect();
+        let mut quarters = vec![[0; 4]; 32];
+        for photon in photons.iter().filter(replayed) {
+            let quarter = photon[1] / list.cycles().div_ceil(4);
+            quarters[index(photon[2] / u64::from(rebin))][index(quarter)] += 1;
+        }
         let again = photons.iter().enumerate().filter(|(at, photon)| {
             replayed(photon) && photons[..*at].iter().any(|before| before[..2] == photon[..2])
         });
         let again = again.count() as u64;
-        prop_assert_eq!(list.counts().unwrap(), (counts(limit), ListTimes { early, again }));
+        prop_assert_eq!(list.counts().unwrap(), (counts(limit), ListTimes { quarters, again }));
 
         // Slices go on to the end of the file, and are empty after it.
         let mut first_cycle = 0;
