@@ -349,10 +349,22 @@ fn cut_unmeasured(traces: &mut [Trace]) -> usize {
     end - 1
 }
 
+/// No pixel sees crosstalk so many times as bright as the median pixel.
+const BRIGHT_GLASS: f64 = 1.5;
+
 /// The share of the histograms that have peaks only outside of the `gate`, at least one of them beside the crosstalk.
 fn hidden(good: &GoodHistograms, gate: (u16, u16), glass: Option<&Glass>) -> f64 {
     let gate = usize::from(gate.0)..=usize::from(gate.1);
-    let is_surface = |peak: &peaks::Peak| glass.is_none_or(|glass| !peak.is_near(glass.top));
+    let Some(glass) = glass else { return 0.0 };
+    // A surface may touch the crosstalk, which is then brighter than that of most.
+    let is_near = |peak: &&peaks::Peak| peak.is_near(glass.top);
+    let crosstalk = |peaks: &Vec<peaks::Peak>| {
+        let near = peaks.iter().filter(is_near);
+        near.map(|peak| peak.photons).sum::<f64>()
+    };
+    let usual = median(good.peaks.iter().map(crosstalk));
+    let most = BRIGHT_GLASS * usual + 5.0 * usual.max(1.0).sqrt();
+    let is_surface = |peak: &peaks::Peak| !is_near(&peak) || peak.photons > most;
     let is_hidden = |peaks: &&Vec<peaks::Peak>| {
         peaks.iter().any(is_surface) && !peaks.iter().any(|peak| gate.contains(&peak.top))
     };

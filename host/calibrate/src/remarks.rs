@@ -10,8 +10,6 @@ use dtof_options::rows::{Row, bins, grouped};
 const MOST_LOST: f64 = 0.75;
 /// The same without a correction.
 const MOST_LOST_UNCORRECTED: f64 = 0.5;
-/// A gate may hide the only surface of so many histograms without a word: false peaks are rarer than that.
-const MOST_HIDDEN: f64 = 0.01;
 /// Sensors have fewer hot pixels than this.
 const MOST_HOT: f64 = 0.05;
 
@@ -79,7 +77,7 @@ impl Calibration {
     /// That the gate leaves out all that some pixels see.
     fn hidden_surfaces(&self) -> Option<String> {
         let (first, last) = self.gate;
-        (self.hidden > MOST_HIDDEN).then(|| {
+        (self.hidden > 0.0).then(|| {
             format!(
                 "the gate, {first}..{last}, leaves out the only surface of {:.0} % of the histograms, beside the cover \
                  glass: --glass no keeps it",

@@ -204,9 +204,12 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
             echoes.clear();
             let echo = |number, detection: &Detection| echoes.push((number, *detection));
             let is_blind = config.detect_echoes(&mut histogram.clone(), cycles, echo);
+            // A slope may also hide what stands clear, if it has the highest bin.
+            let highest = histogram.peak().bin;
             let bins = || echoes.iter().map(|(_, one): &(_, Detection)| one.peak.bin);
-            let ends = bins().min().zip(bins().max());
-            match ends.and_then(|ends| self.without_slope(counts, &gate, ends)) {
+            let [nearest, farthest] =
+                [bins().min(), bins().max()].map(|bin| bin.unwrap_or(highest));
+            match self.without_slope(counts, &gate, (nearest, farthest)) {
                 Some(Some(narrower)) => {
                     gate = narrower;
                     continue;
