@@ -34,12 +34,6 @@ pub trait Engine: Send {
         Vec::new()
     }
 
-    /// After [`Self::finish`], if the engine decides then: how many standard deviations the peak of each place of the
-    /// array stands above the background; not a number where there is no pixel, or one that is left out.
-    fn confidence(&self) -> Option<&[f64]> {
-        None
-    }
-
     /// The counts of all pixels so far, and of all blocks.
     fn statistics(&self) -> [Statistics; 2];
 

@@ -205,11 +205,10 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
             let echo = |number, detection: &Detection| echoes.push((number, *detection));
             let is_blind = config.detect_echoes(&mut histogram.clone(), cycles, echo);
             // A slope may also hide what stands clear, if it has the highest bin.
-            let highest = histogram.peak().bin;
+            let highest = Some(histogram.peak().bin).filter(|_| histogram.total() > 0);
             let bins = || echoes.iter().map(|(_, one): &(_, Detection)| one.peak.bin);
-            let [nearest, farthest] =
-                [bins().min(), bins().max()].map(|bin| bin.unwrap_or(highest));
-            match self.without_slope(counts, &gate, (nearest, farthest)) {
+            let ends = bins().min().or(highest).zip(bins().max().or(highest));
+            match ends.and_then(|ends| self.without_slope(counts, &gate, ends)) {
                 Some(Some(narrower)) => {
                     gate = narrower;
                     continue;
@@ -373,7 +372,7 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
     }
 
     /// If the nearest or the farthest peak in `gate` is the slope of something outside of it, the gate without that slope,
-    /// unless nothing is left. It is a slope if as many of the `counts` lie in the bins beside its window, and no bin from
+    /// unless no photon is left. It is a slope if as many of the `counts` lie in the bins beside its window, and no bin from
     /// the last one outside on up to the window has surely fewer than the mean of the window. The gate of a cover glass is for
     /// short exposures: its tail shows in many laser cycles.
     fn without_slope(
@@ -395,17 +394,24 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
             mean(beside) >= level && between.all(is_filled)
         };
         let width = width(self.config.rule());
-        let bin = |bin: usize| u16::try_from(bin).unwrap_or(u16::MAX);
+        let with_photons = |first: usize, last: usize| {
+            let [from, to] = [first, last].map(|bin| u16::try_from(bin).unwrap_or(u16::MAX));
+            let gate = RangeGate::new(from, to).ok()?;
+            counts[first..=last]
+                .iter()
+                .any(|&count| count > 0)
+                .then_some(gate)
+        };
         let window = self.window(nearest);
         let before = window.start.saturating_sub(width)..window.start;
         if first > 0 && falls_into(window.clone(), before, first - 1..window.start) {
-            return Some(RangeGate::new(bin(window.end), gate.last()).ok());
+            return Some(with_photons(window.end, gate.last().into()));
         }
         let window = self.window(farthest);
         let behind = window.end..(window.end + width).min(counts.len());
         if end < counts.len() && falls_into(window.clone(), behind, window.end..end + 1) {
             let last = window.start.checked_sub(1);
-            return Some(last.and_then(|last| RangeGate::new(gate.first(), bin(last)).ok()));
+            return Some(last.and_then(|last| with_photons(gate.first().into(), last)));
         }
         None
     }
@@ -454,8 +460,6 @@ pub struct OnceEngine {
     counts: PixelCounts,
     is_kept: Vec<bool>,
     statistics: Statistics,
-    /// Of each place of the array.
-    confidence: Vec<f64>,
     decisions: Vec<Decision>,
 }
 
@@ -480,7 +484,6 @@ impl OnceEngine {
             counts: PixelCounts::new(addresses.len(), settings.bins),
             is_kept: vec![false; addresses.len()],
             statistics: Statistics::new(),
-            confidence: vec![f64::NAN; usize::try_from(array.pixels())?],
             decisions: Vec::new(),
         })
     }
@@ -507,7 +510,6 @@ impl Engine for OnceEngine {
         for (place, decided) in decided.unwrap_or_default().into_iter().enumerate() {
             let (address, cycles) = (self.addresses[place], counts.cycles(place));
             self.statistics += decided.statistics;
-            self.confidence[usize::from(address.raw())] = decided.confidence;
             let last = LaserCycle::new(cycles.saturating_sub(1));
             let exposure = u16::try_from(cycles).unwrap_or(u16::MAX);
             let event = |&(echo, detection): &(EchoNumber, Detection)| DepthEvent {
@@ -527,10 +529,6 @@ impl Engine for OnceEngine {
         }
         sort(&mut events);
         events
-    }
-
-    fn confidence(&self) -> Option<&[f64]> {
-        Some(&self.confidence)
     }
 
     fn statistics(&self) -> [Statistics; 2] {

@@ -73,10 +73,6 @@ impl Engine for OncePerBinEngine {
         self.engine.finish()
     }
 
-    fn confidence(&self) -> Option<&[f64]> {
-        self.engine.confidence()
-    }
-
     fn statistics(&self) -> [Statistics; 2] {
         let [mut pixels, blocks] = self.engine.statistics();
         pixels.repeated += self.repeated;

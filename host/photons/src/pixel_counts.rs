@@ -1,5 +1,7 @@
 //! The photons of pixels, bin by bin, summed over laser cycles.
 
+use std::ops::Range;
+
 use rayon::prelude::*;
 
 use crate::recorded::Capture;
@@ -46,17 +48,21 @@ impl PixelCounts {
         all
     }
 
-    /// Adds the photons of a slice that come before laser cycle `end`.
-    pub fn add_until(&mut self, slice: &Slice, end: u64) {
-        let length = end.saturating_sub(slice.first_cycle);
+    /// Adds the photons of the laser cycles `span` of a slice.
+    pub fn add_span(&mut self, slice: &Slice, span: Range<u64>) {
+        let [start, end] =
+            [span.start, span.end].map(|cycle| cycle.saturating_sub(slice.first_cycle));
         let pixels = self.counts.par_chunks_mut(self.bins.max(1));
         let pixels = pixels.zip(&mut self.cycles).zip(&slice.pixels);
         let rejected = pixels.map(|((counts, cycles), received)| {
-            *cycles += u64::from(received.cycles).min(length);
-            let photons = &received.photons;
-            let taken = photons.partition_point(|photon| u64::from(photon.cycle) < length);
+            let received_cycles = u64::from(received.cycles);
+            *cycles += received_cycles.min(end) - received_cycles.min(start);
+            let until = |end: u64| {
+                let photons = &received.photons;
+                photons.partition_point(|photon| u64::from(photon.cycle) < end)
+            };
             let mut rejected = 0;
-            for photon in &photons[..taken] {
+            for photon in &received.photons[until(start)..until(end)] {
                 match counts.get_mut(usize::from(photon.code)) {
                     Some(count) => *count = count.saturating_add(1),
                     None => rejected += 1,
@@ -69,24 +75,20 @@ impl PixelCounts {
 
     /// Adds the photons of a slice.
     pub fn add(&mut self, slice: &Slice) {
-        self.add_until(slice, u64::MAX);
+        self.add_span(slice, 0..u64::MAX);
     }
 
-    /// The photons that are not in `part`.
+    /// These photons and those of `other`, of the same pixels.
     #[must_use]
-    pub fn without(&self, part: &Self) -> Self {
-        let counts = self.counts.iter().zip(&part.counts);
-        let cycles = self.cycles.iter().zip(&part.cycles);
-        Self {
-            bins: self.bins,
-            counts: counts
-                .map(|(all, part)| all.saturating_sub(*part))
-                .collect(),
-            cycles: cycles
-                .map(|(all, part)| all.saturating_sub(*part))
-                .collect(),
-            rejected: self.rejected.saturating_sub(part.rejected),
+    pub fn with(mut self, other: &Self) -> Self {
+        for (count, other) in self.counts.iter_mut().zip(&other.counts) {
+            *count = count.saturating_add(*other);
         }
+        for (cycles, other) in self.cycles.iter_mut().zip(&other.cycles) {
+            *cycles += other;
+        }
+        self.rejected += other.rejected;
+        self
     }
 
     /// The photons of all pixels, bin by bin.
@@ -161,12 +163,13 @@ mod tests {
         ) {
             photons.sort_unstable();
             let slices = [slice(0, &photons), slice(10, &photons)];
-            let (mut all, mut first) = (PixelCounts::new(1, 8), PixelCounts::new(1, 8));
+            let [mut all, mut first, mut second] = [0; 3].map(|_| PixelCounts::new(1, 8));
             for slice in &slices {
                 all.add(slice);
-                first.add_until(slice, end);
+                first.add_span(slice, 0..end);
+                second.add_span(slice, end..u64::MAX);
             }
-            let second = all.without(&first);
+            prop_assert_eq!(&first.clone().with(&second), &all);
             let before = |cycle: u64| slices.iter().flat_map(|slice| {
                 let cycles = slice.pixels[0].photons.iter();
                 cycles.map(|photon| slice.first_cycle + u64::from(photon.cycle))

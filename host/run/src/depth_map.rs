@@ -70,8 +70,7 @@ impl MapInput {
 
 /// The photons of a run so far.
 pub(crate) struct RunCounts {
-    pub all: PixelCounts,
-    first_half: PixelCounts,
+    halves: [PixelCounts; 2],
     /// The laser cycle with which the second half begins.
     half: u64,
 }
@@ -79,17 +78,52 @@ pub(crate) struct RunCounts {
 impl RunCounts {
     pub(crate) fn new(pixels: usize, bins: usize, cycles: u64) -> Self {
         Self {
-            all: PixelCounts::new(pixels, bins),
-            first_half: PixelCounts::new(pixels, bins),
+            halves: [0; 2].map(|_| PixelCounts::new(pixels, bins)),
             half: cycles / 2,
         }
     }
 
     pub(crate) fn add(&mut self, slice: &Slice) {
-        self.all.add(slice);
-        if slice.first_cycle < self.half {
-            self.first_half.add_until(slice, self.half);
+        let [first, second] = &mut self.halves;
+        first.add_span(slice, 0..self.half);
+        second.add_span(slice, self.half..u64::MAX);
+    }
+
+    /// The pixels whose halves contradict each other.
+    ///
+    /// # Errors
+    /// Fails if the settings break a constraint.
+    pub(crate) fn contradictions(
+        &self,
+        input: &MapInput,
+        array: Array,
+        addresses: &[PixelAddress],
+    ) -> Result<Vec<bool>> {
+        let mut contradicts = vec![false; addresses.len()];
+        let other = Settings {
+            gate: input.given_gate,
+            ..input.settings.clone()
+        };
+        let has_other = other.gate != input.settings.gate;
+        for settings in [&input.settings]
+            .into_iter()
+            .chain(has_other.then_some(&other))
+        {
+            let decide = |half| decide_once(settings, array, addresses, half, |_| false);
+            let [first, second] = self.halves.each_ref().map(decide);
+            let (first, second) = (first?, second?);
+            let pairs = first.iter().zip(&second).enumerate();
+            for ((place, pair), contradicts) in pairs.zip(&mut contradicts) {
+                *contradicts |= have_changed(settings, &self.halves, place, pair);
+            }
         }
+        Ok(contradicts)
+    }
+
+    /// All photons.
+    pub(crate) fn all(self) -> PixelCounts {
+        let [first, second] = self.halves;
+        first.with(&second)
     }
 }
 
@@ -112,22 +146,21 @@ pub struct DepthMap {
 }
 
 impl DepthMap {
-    /// Decides on the photons of `input`, or on those of the run, of the pixels `addresses`, ascending.
+    /// Decides on the photons of `input`, or on those of the `run`, of the pixels `addresses`, ascending. Some may
+    /// contradict themselves.
     ///
     /// # Errors
     /// Fails if the settings break a constraint.
     pub(crate) fn decide(
         input: &MapInput,
-        run: Option<&RunCounts>,
+        run: Option<&PixelCounts>,
+        contradictions: &[bool],
         array: Array,
         addresses: &[PixelAddress],
     ) -> Result<Option<Self>> {
         let settings = &input.settings;
-        let Some(counts) = input.counts.as_ref().or(run.map(|run| &run.all)) else {
+        let Some(counts) = input.counts.as_ref().or(run) else {
             return Ok(None);
-        };
-        let decide = |settings: &Settings, counts: &PixelCounts| {
-            decide_once(settings, array, addresses, counts, |_| false)
         };
         // Two echoes tell whether there is a second surface. The first is the same.
         let two = const { EchoNumber::new(2).unwrap() };
@@ -135,28 +168,7 @@ impl DepthMap {
             echoes: settings.echoes.max(two),
             ..settings.clone()
         };
-        let decided = decide(&with_two, counts)?;
-        let contradicts = match run.filter(|_| input.counts.is_none()) {
-            Some(run) => {
-                let halves = [run.first_half.clone(), run.all.without(&run.first_half)];
-                let mut contradicts = vec![false; addresses.len()];
-                let other = Settings {
-                    gate: input.given_gate,
-                    ..settings.clone()
-                };
-                let has_other = other.gate != settings.gate;
-                for settings in [settings].into_iter().chain(has_other.then_some(&other)) {
-                    let [first, second] = halves.each_ref().map(|half| decide(settings, half));
-                    let (first, second) = (first?, second?);
-                    let pairs = first.iter().zip(&second).enumerate();
-                    for ((place, pair), contradicts) in pairs.zip(&mut contradicts) {
-                        *contradicts |= have_changed(settings, &halves, place, pair);
-                    }
-                }
-                contradicts
-            }
-            None => vec![false; addresses.len()],
-        };
+        let decided = decide_once(&with_two, array, addresses, counts, |_| false)?;
         let ranges = settings.ranges(array)?;
         let pixels = array.pixels() as usize;
         let empty = || vec![f64::NAN; pixels];
@@ -168,8 +180,7 @@ impl DepthMap {
             confidence: empty(),
             flags: vec![0; pixels],
         };
-        let pixels = addresses.iter().zip(&decided).zip(contradicts);
-        for ((&pixel, decided), contradicts) in pixels {
+        for (place, (&pixel, decided)) in addresses.iter().zip(&decided).enumerate() {
             map.set(pixel, decided, &ranges);
             if !decided.echoes.is_empty() {
                 let is_clear = |(_, second): &(EchoNumber, Detection)| {
@@ -177,6 +188,7 @@ impl DepthMap {
                 };
                 let flags = &mut map.flags[usize::from(pixel.raw())];
                 *flags |= SECOND_SURFACE * u8::from(decided.echoes.iter().skip(1).any(is_clear));
+                let contradicts = contradictions.get(place) == Some(&true);
                 *flags |= CONTRADICTION * u8::from(contradicts);
             }
         }

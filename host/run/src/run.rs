@@ -153,8 +153,14 @@ pub fn run(
         deliver(&slice, &decided, &mut reported, sinks)?;
     }
     progress.end();
+    let array = source.array();
+    let contradictions = match (map, &counts) {
+        (Some(map), Some(counts)) => counts.contradictions(map, array, &addresses)?,
+        _ => Vec::new(),
+    };
+    let counts = counts.map(RunCounts::all);
     let map = match map {
-        Some(map) => DepthMap::decide(map, counts.as_ref(), source.array(), &addresses)?,
+        Some(map) => DepthMap::decide(map, counts.as_ref(), &contradictions, array, &addresses)?,
         None => None,
     };
     for sink in &mut *sinks {
@@ -169,9 +175,7 @@ pub fn run(
     let expired_masked: u64 = masked.iter().map(|(_, cycles)| cycles / longest).sum();
     let mut summary = reported.summary(engine, source, settings);
     summary.expired = summary.expired.saturating_sub(expired_masked);
-    let counts = other_counts
-        .as_ref()
-        .or(counts.as_ref().map(|counts| &counts.all));
+    let counts = other_counts.as_ref().or(counts.as_ref());
     if let (true, Some(counts)) = (has_glass, counts) {
         watch_glass(requested, &counts.sum(), &mut summary);
     }

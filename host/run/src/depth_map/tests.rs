@@ -55,10 +55,16 @@ fn run(seed: u64, surfaces: [[f64; 2]; 2]) -> RunCounts {
     counts
 }
 
+fn all(run: &RunCounts) -> PixelCounts {
+    let [first, second] = &run.halves;
+    first.clone().with(second)
+}
+
 fn decide(input: &MapInput, run: &RunCounts) -> DepthMap {
     let array = Array::new(8, 1).unwrap();
     let addresses: Vec<_> = (0..8).map(PixelAddress::new).collect();
-    DepthMap::decide(input, Some(run), array, &addresses)
+    let contradictions = run.contradictions(input, array, &addresses).unwrap();
+    DepthMap::decide(input, Some(&all(run)), &contradictions, array, &addresses)
         .unwrap()
         .unwrap()
 }
@@ -156,7 +162,7 @@ proptest! {
         let map = decide(&input, &run);
         let addresses: Vec<_> = (0..8).map(PixelAddress::new).collect();
         let array = Array::new(8, 1).unwrap();
-        let decided = decide_once(&input.settings, array, &addresses, &run.all, |_| false).unwrap();
+        let decided = decide_once(&input.settings, array, &addresses, &all(&run), |_| false).unwrap();
         for (place, decided) in decided.iter().enumerate() {
             let first = decided.echoes.first().map(|(_, echo)| echo.position());
             prop_assert_eq!(map.positions[place], first);
