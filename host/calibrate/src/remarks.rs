@@ -10,6 +10,8 @@ use dtof_options::rows::{Row, bins, grouped};
 const MOST_LOST: f64 = 0.75;
 /// The same without a correction.
 const MOST_LOST_UNCORRECTED: f64 = 0.5;
+/// The standard deviation of the pulse that the widest window is for, in bins.
+const WIDEST: f64 = 1.75;
 /// Sensors have fewer hot pixels than this.
 const MOST_HOT: f64 = 0.05;
 
@@ -19,6 +21,7 @@ impl Calibration {
     pub fn warnings(&self) -> Vec<String> {
         let all = [
             self.unclear_glass(),
+            self.wide_pulse(),
             self.hidden_surfaces(),
             self.many_hot(),
             self.hidden_photons(),
@@ -72,6 +75,19 @@ impl Calibration {
              Nothing is left out, so pixels with both show the brighter one. --glass yes leaves it out; --glass no says \
              that it is a wall"
         ))
+    }
+
+    /// That no window is as wide as the pulse.
+    fn wide_pulse(&self) -> Option<String> {
+        let pulse = self.pulse.as_ref()?;
+        let is_wide = pulse.sigma > WIDEST && self.detection.pulse_source == PulseSource::Measured;
+        is_wide.then(|| {
+            format!(
+                "the pulse, of σ = {:.2} bins, is too wide for the widest window, which is for {WIDEST} bins: --rebin 2 suits \
+                 it, unless it is two surfaces that run into each other, as a cover glass and a near target",
+                pulse.sigma
+            )
+        })
     }
 
     /// That the gate leaves out all that some pixels see.
@@ -170,12 +186,7 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
                 ),
             );
         }
-        Some(pulse) if pulse.sigma > 1.75 => remark(
-            "pulse",
-            "The pulse is too wide for the widest window, which is for 1.75 bins: 1.75 is written. \
-             Wider bins would help."
-                .to_owned(),
-        ),
+        Some(pulse) if pulse.sigma > WIDEST => {}
         Some(pulse) if pulse.is_core => remark(
             "pulse",
             if pulse.tail < 0.005 {

@@ -1,5 +1,5 @@
-//! Crosstalk of the cover glass: the nearest peak, at the same bin in nearly all pixels and captures, from the start of the
-//! recording to its end, with surfaces behind it in at least half of them. A gate hides what lies in it, so all of this is
+//! Crosstalk of the cover glass: the nearest peak, in the first quarter of the bins, at the same bin in nearly all pixels and
+//! captures, from the start of the recording to its end, with surfaces behind it in at least half of them. A gate hides what lies in it, so all of this is
 //! needed: a wall that fills the view has the same peak, and a pixel at its edge sees past it.
 //!
 //! A peak is common if groups of histograms share it. Groups are so large that its mean height shows in

@@ -579,3 +579,25 @@ fn a_distance_in_metres_is_warned_of() {
     };
     assert!(warned("1.383") && !warned("1383"));
 }
+
+/// A pulse of σ = 2.5 bins, wider than the widest window.
+#[test]
+fn a_pulse_that_no_window_suits_is_warned_of() {
+    let scratch = Scratch::new();
+    let text = "columns = 8\nrows = 8\ncycles = 8000\nbackground = 0.001\npulse_sigma_bins = 2.5\n\
+                [[surface]]\nrange_mm = 3000\nsignal = 0.1\n";
+    let wide = scratch.file("wide.npy", recording(text));
+    for (options, is_warned) in [
+        ("", true),
+        ("--rebin 2", false),
+        ("--sigma-bins 1.75", false),
+    ] {
+        let summary = scratch.replayed(&wide, &format!("--recorded-cycles 8000 {options}"));
+        let warnings = summary["warnings"].to_string();
+        assert_eq!(
+            warnings.contains("--rebin 2"),
+            is_warned,
+            "{options}: {warnings}"
+        );
+    }
+}
