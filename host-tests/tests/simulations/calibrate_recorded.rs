@@ -113,7 +113,7 @@ fn a_recording_with_distances_calibrates_itself() {
         slant: None,
         bias_mm: None,
         offsets_mm: &[],
-        early: None,
+        times: None,
     };
     let found = calibrate(&observed, &CalibrationOptions::default()).unwrap();
     let pulse = found.pulse.as_ref().unwrap();

@@ -10,8 +10,8 @@ use dtof_options::rows::{Row, bins, grouped};
 const MOST_LOST: f64 = 0.75;
 /// The same without a correction.
 const MOST_LOST_UNCORRECTED: f64 = 0.5;
-/// The standard deviation of the pulse that the widest window is for, in bins.
-const WIDEST: f64 = 1.75;
+/// The widest window is for a pulse of σ = 1.75 bins, and does for those of this.
+const WIDEST: f64 = 2.2;
 /// Sensors have fewer hot pixels than this.
 const MOST_HOT: f64 = 0.05;
 
@@ -83,7 +83,7 @@ impl Calibration {
         let is_wide = pulse.sigma > WIDEST && self.detection.pulse_source == PulseSource::Measured;
         is_wide.then(|| {
             format!(
-                "the pulse, of σ = {:.2} bins, is too wide for the widest window, which is for {WIDEST} bins: --rebin 2 suits \
+                "the pulse, of σ = {:.2} bins, is too wide for the widest window, which is for 1.75 bins: --rebin 2 suits \
                  it, unless it is two surfaces that run into each other, as a cover glass and a near target",
                 pulse.sigma
             )
@@ -186,7 +186,13 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
                 ),
             );
         }
-        Some(pulse) if pulse.sigma > WIDEST => {}
+        Some(pulse) if pulse.sigma > WIDEST => {} // A warning says so.
+        Some(pulse) if pulse.sigma > 1.75 => remark(
+            "pulse",
+            "The pulse is too wide for the widest window, which is for 1.75 bins: 1.75 is written. \
+             Wider bins would help."
+                .to_owned(),
+        ),
         Some(pulse) if pulse.is_core => remark(
             "pulse",
             if pulse.tail < 0.005 {

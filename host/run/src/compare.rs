@@ -100,7 +100,7 @@ struct Subject {
 enum Photons {
     Scene(Box<Scene>),
     /// Histograms, in memory.
-    Histograms(Counts),
+    Histograms(Box<Counts>),
     /// A photon list, which is read each time.
     List(Input),
 }
@@ -306,7 +306,7 @@ impl Options {
             photons: if counts.metadata.is_list {
                 Photons::List(input)
             } else {
-                Photons::Histograms(counts)
+                Photons::Histograms(Box::new(counts))
             },
         })
     }

@@ -259,14 +259,13 @@ fn refined(backgrounds: &[Background], candidates: &[usize], best: usize) -> usi
 
 /// Whether the background falls neither half nor twice as steeply as with this dead time.
 fn has_the_slope(backgrounds: &[Background], dead_time: usize) -> bool {
-    let is_likelier_than = |power| {
-        let each = backgrounds.iter().map(|one| {
-            let likelihood = |power| one.log_likelihood(one.cycles, dead_time, power);
-            doubted(likelihood(1.0) - likelihood(power))
-        });
-        each.sum::<f64>() > 0.0
+    let likelihood = |power| {
+        let backgrounds = backgrounds.iter();
+        let each = backgrounds.map(|one| one.log_likelihood(one.cycles, dead_time, power));
+        each.sum::<f64>()
     };
-    is_likelier_than(0.5) && is_likelier_than(2.0)
+    let here = likelihood(1.0);
+    here > likelihood(0.5) && here > likelihood(2.0)
 }
 
 /// The logarithm of a ratio of likelihoods, if one histogram in so many is not what it seems: one pixel cannot outweigh the

@@ -10,7 +10,7 @@ use super::significance::{is_surely_less, is_surely_more, median, quantile};
 /// A hot pixel has more than this many times the background of the median pixel and of its neighbours.
 const HOT: f64 = 10.0;
 /// A hot pixel is flat: no peak is higher than so many times its background.
-const FLAT: f64 = 1.2;
+const FLAT: f64 = 2.0;
 /// Neighbours in a single row: so many on either side. In a row or a column of light each has two that are as bright.
 const BESIDE: u32 = 2;
 /// By chance at most one pixel in so many is called hot or dead: one in a thousand of the largest arrays.
