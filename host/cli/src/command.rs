@@ -64,9 +64,8 @@ fn check_complete(summary: &Summary, all: u64, folder: &Path) -> Result<()> {
 const FOUND: &str = "Found in the recording";
 
 /// What the terminal shows of what was found in a recording, unless there is none.
-const BRIEF: [&str; 9] = [
+const BRIEF: [&str; 8] = [
     "bin width",
-    "background",
     "hot pixels",
     "dead pixels",
     "pulse",
