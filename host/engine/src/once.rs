@@ -204,7 +204,7 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
             echoes.clear();
             let echo = |number, detection: &Detection| echoes.push((number, *detection));
             let is_blind = config.detect_echoes(&mut histogram.clone(), cycles, echo);
-            // A slope may also hide what stands clear, if it has the highest bin.
+            // A slope with the highest bin may also hide a peak.
             let highest = Some(histogram.peak().bin).filter(|_| histogram.total() > 0);
             let bins = || echoes.iter().map(|(_, one): &(_, Detection)| one.peak.bin);
             let ends = bins().min().or(highest).zip(bins().max().or(highest));

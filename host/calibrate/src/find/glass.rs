@@ -30,7 +30,7 @@ const NEAR: f64 = 0.25;
 /// At least this share of the histograms has a surface behind the crosstalk, and so many of them, or all.
 const BEHIND: f64 = 0.5;
 const BEHIND_IN: usize = 6;
-/// Of so many histograms two have to have it, before something is said: that is no fault of a single pixel.
+/// Of so many histograms two must have it for a warning: that is no fault of a single pixel.
 const MANY: usize = 16;
 /// Peaks of a layer lie within so many bins. If this share of the histograms has it, and half of them a surface behind it,
 /// it may be a cover glass that some pixels do not show, or not at the same place.

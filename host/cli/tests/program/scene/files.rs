@@ -271,13 +271,13 @@ fn a_run_without_a_photon_is_warned_of() {
     let scratch = Scratch::new();
     scratch.file("dark.toml", "cycles = 100\n");
     scratch.file("lit.toml", "cycles = 100\nbackground = 0.1\n");
-    let said = |scene| {
+    let stderr = |scene| {
         let output = scratch.run(&format!("simulate --scene {scene}.toml --out {scene}"));
         assert!(output.status.success());
         String::from_utf8(output.stderr).unwrap()
     };
     let warning = "no photons: the scene is dark, or too short";
-    assert_contains(&said("dark"), &format!("warning: dark.toml: {warning}"));
+    assert_contains(&stderr("dark"), &format!("warning: dark.toml: {warning}"));
     assert_contains(&scratch.read("dark/summary.json"), warning);
-    assert_eq!(said("lit"), "");
+    assert_eq!(stderr("lit"), "");
 }
