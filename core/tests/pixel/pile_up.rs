@@ -9,7 +9,9 @@ use super::model::Lone;
 #[test]
 fn pile_up_is_more_than_a_photon_in_every_other_laser_cycle() {
     let gate = RangeGate::new(1, 15).unwrap();
-    let multi = PixelConfig::<16>::paper().gate(gate).build().unwrap();
+    let multi = PixelConfig::<16>::paper().build().unwrap();
+    let multi = multi.with_gate(gate);
+    assert_eq!(multi.gate(), &gate);
     let one_hit = multi.with_dead_time(u16::MAX);
     assert!(one_hit.is_first_photon_only() && !multi.is_first_photon_only());
     // In the peak, gated out, past the last bin.

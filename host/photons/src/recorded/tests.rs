@@ -64,6 +64,8 @@ fn slices_of_any_length_hold_the_same_photons() {
         let source = RecordedHistograms::new(array, &captures, length, u64::MAX, 3).unwrap();
         let source = source.with_dead_time(&captures, &[], dead_time);
         let mut source = source.unwrap();
+        let (shortest, longest) = source.recorded_cycles().unwrap();
+        assert_eq!(source.cycles_left(), [longest, shortest]);
         let mut all = [(); 2].map(|()| Vec::new());
         for &length in lengths.iter().cycle().take(9_000) {
             let before = source.not_replayed();
