@@ -1,6 +1,7 @@
 //! Crosstalk of the cover glass: the nearest peak, in the first quarter of the bins, at the same bin in nearly all pixels and
-//! captures, from the start of the recording to its end, with surfaces behind it in at least half of them. A gate hides what lies in it, so all of this is
-//! needed: a wall that fills the view has the same peak, and a pixel at its edge sees past it.
+//! captures, from the start of the recording to its end, with surfaces behind it in at least half of them. A gate hides
+//! what lies in it, so all of this is needed: a wall that fills the view has the same peak, and a pixel at its edge sees
+//! past it.
 //!
 //! A peak is common if groups of histograms share it. Groups are so large that its mean height shows in
 //! each. In nine groups of ten the peak must have at least half of the median height, in groups along
@@ -24,7 +25,7 @@ const GROUPS: usize = 8;
 /// The share of groups that must have the peak.
 const COMMON: f64 = 0.9;
 /// With fewer histograms, crosstalk cannot be told from the nearer of two surfaces.
-pub const SEVERAL: usize = 4;
+const SEVERAL: usize = 4;
 /// A cover glass is in the first part of the bins: farther away, a surface and what lies behind it are no glass.
 const NEAR: f64 = 0.25;
 /// At least this share of the histograms has a surface behind the crosstalk, and so many of them, or all.
@@ -112,10 +113,9 @@ pub fn nearest(
     l2: f64,
 ) -> Nearest {
     let common = common(good);
-    let layer = nearest_layer(&good.peaks);
     let as_glass = |peak: &Peak| Nearest::Glass(glass(good, peak, l2));
     let Some(peak) = common else {
-        return match (is_glass, layer) {
+        return match (is_glass, nearest_layer(&good.peaks)) {
             (Some(true), Some((peak, _))) => as_glass(&peak),
             (None, Some((_, layer))) if layer.share >= LAYER && layer.behind >= BEHIND => {
                 Nearest::Unclear(layer)
