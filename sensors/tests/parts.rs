@@ -36,6 +36,9 @@ where
     fn stop(&mut self) {
         self.0.stop();
     }
+    fn is_stopping(&self) -> bool {
+        Sensor::is_stopping(&self.0)
+    }
     fn poll(&mut self, now_ms: u32, sink: &mut RecordingSink) -> Result<Polled, SensorFault> {
         self.0.poll(now_ms, sink).map_err(Into::into)
     }

@@ -152,6 +152,7 @@ mod tests {
         assert_eq!(counts.histogram(0), [1 << 31, 1, 0, 0]);
         assert_eq!(counts.histogram(1), [1, 2, 3, 4]);
         assert_eq!((counts.cycles(0), counts.cycles(1)), (1 << 32, 1 << 36));
+        assert_eq!(counts.pixels(), 2);
     }
 
     proptest! {

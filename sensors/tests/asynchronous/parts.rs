@@ -56,6 +56,9 @@ where
     fn stop(&mut self) {
         run_at(&self.clock, self.driver.stop_async(&mut self.timing));
     }
+    fn is_stopping(&self) -> bool {
+        self.driver.is_stopping()
+    }
     fn poll(&mut self, now_ms: u32, sink: &mut RecordingSink) -> Result<Polled, SensorFault> {
         self.clock.set(now_ms);
         let poll = self.driver.poll_within(&mut self.timing, sink);

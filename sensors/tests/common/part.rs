@@ -23,7 +23,6 @@ pub trait Driven: Sized {
     /// A stop may be not acknowledged, which is no error.
     const HAS_NACK: bool = true;
     fn new(bus: Self::Bus, pins: &Bus<Self::Chip>) -> Self;
-    fn stops(&self) -> bool;
     /// The next poll goes on with the measurement.
     fn measures(&self) -> bool;
     fn errors(&self) -> u32;
@@ -57,9 +56,6 @@ macro_rules! driven {
             fn new(bus: $bus, pins: &Bus<$chip>) -> Self {
                 Self::new(bus, pins.clone(), pins.clone(), $($more),*)
             }
-            fn stops(&self) -> bool {
-                self.is_stopping()
-            }
             fn measures(&self) -> bool {
                 self.$is_measuring()
             }
@@ -90,6 +86,7 @@ pub trait Part: Sized {
     fn into_driver(self) -> Self::Driver;
     fn start(&mut self);
     fn stop(&mut self);
+    fn is_stopping(&self) -> bool;
     fn poll(&mut self, now_ms: u32, sink: &mut RecordingSink) -> Result<Polled, SensorFault>;
 
     /// Drops a stop that is not ready after so many polls, if it is awaited.
@@ -173,7 +170,7 @@ impl<P: Part> Bench<P> {
     }
 
     pub fn is_stopping(&self) -> bool {
-        self.sensor.driver().stops()
+        self.sensor.is_stopping()
     }
 
     pub fn is_measuring(&self) -> bool {

@@ -63,6 +63,30 @@ fn pixels_with_looks_do_not_decide_once() {
     assert_eq!(looks.clone().with_looks(), looks);
 }
 
+/// Likewise the other way round, if the z is of a file. An option was given for this run, map and all.
+#[test]
+fn a_single_decision_has_no_blocks_and_no_z_of_looks() {
+    let rest = "rule = 'window'; window = 3; decide_once = true";
+    for [options, in_file, once] in table(
+        "
+        z = 4; binning = 2; patience = 32 |                                           | z = 4
+        z = 4                             | x = 3                                     | z = 4; x = 3
+                                          | z = 4; x = 3                              | x = 3
+                                          | z = 4; decide_once = true; binning = 0    | z = 4
+        decide_once = false               | z = 4; binning = 2; patience = 32         |
+        ",
+    ) {
+        let given = file(&format!("{options}; rule = 'window'; window = 3"));
+        let mut found = given.or(named("my.toml", in_file)).deciding_once();
+        found.file = None;
+        assert_eq!(
+            found,
+            file(&format!("{once}; {rest}")),
+            "{options} over {in_file}"
+        );
+    }
+}
+
 #[test]
 fn another_recording_has_other_axes_and_another_length() {
     let of_recording = "axes = 'rows,bins'; array = 'counts'; capture = 1; cycles = 9";
