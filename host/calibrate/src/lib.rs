@@ -356,15 +356,21 @@ const BRIGHT_GLASS: f64 = 1.5;
 fn hidden(good: &GoodHistograms, gate: (u16, u16), glass: Option<&Glass>) -> f64 {
     let gate = usize::from(gate.0)..=usize::from(gate.1);
     let Some(glass) = glass else { return 0.0 };
-    // A surface may touch the crosstalk, which is then brighter than that of most.
-    let is_near = |peak: &&peaks::Peak| peak.is_near(glass.top);
-    let crosstalk = |peaks: &Vec<peaks::Peak>| {
-        let near = peaks.iter().filter(is_near);
-        near.map(|peak| peak.photons).sum::<f64>()
+    // Crosstalk that is too dim for a peak in most histograms is in all of them.
+    let crosstalk = |(index, trace): (usize, &Trace)| {
+        let counts = trace.counts.iter().enumerate().take(glass.shape.len());
+        counts
+            .map(|(bin, count)| count - good.background(index, bin))
+            .sum::<f64>()
     };
-    let usual = median(good.peaks.iter().map(crosstalk));
-    let most = BRIGHT_GLASS * usual + 5.0 * usual.max(1.0).sqrt();
-    let is_surface = |peak: &peaks::Peak| !is_near(&peak) || peak.photons > most;
+    let usual = median(good.traces.iter().enumerate().map(crosstalk)).max(0.0);
+    let background = median(good.levels.iter().map(|level| level.mean));
+    let noise = (usual + background * glass.shape.len() as f64)
+        .max(1.0)
+        .sqrt();
+    // A surface may touch the crosstalk, which is then brighter than that of most.
+    let most = BRIGHT_GLASS * usual + 5.0 * noise;
+    let is_surface = |peak: &peaks::Peak| !peak.is_near(glass.top) || peak.photons > most;
     let is_hidden = |peaks: &&Vec<peaks::Peak>| {
         peaks.iter().any(is_surface) && !peaks.iter().any(|peak| gate.contains(&peak.top))
     };

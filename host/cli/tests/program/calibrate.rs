@@ -494,7 +494,8 @@ fn the_sample_recording_becomes_a_depth_map() {
     let scratch = Scratch::new();
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let scene = Scene::parse(&std::fs::read_to_string(scenes.join("room.toml")).unwrap()).unwrap();
-    scratch.replayed(&scenes.join("room.npy"), "");
+    let summary = scratch.replayed(&scenes.join("room.npy"), "");
+    assert_eq!(summary["warnings"], serde_json::json!([]));
     let depth = scratch.map("depth");
     let is_right = |(pixel, depth): &(u16, &f64)| {
         let truth = scene.truth(PixelAddress::new(*pixel), 0).unwrap();

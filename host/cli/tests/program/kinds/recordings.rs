@@ -834,7 +834,8 @@ fn clean_histograms(rng: &mut Pcg64) -> Recording {
     };
     // Before a few pixels it cannot be told from a target.
     let glass = (sensor.pixels() >= 9 && chance(rng, 0.3)).then(|| {
-        let photons = signal * between(rng, 1.0, 4.0);
+        // Also dimmer than a peak of one histogram.
+        let photons = signal * log_between(rng, 0.1, 4.0);
         (photons.min(cycles), between(rng, 2.5, 4.0))
     });
 
@@ -855,7 +856,8 @@ fn clean_histograms(rng: &mut Pcg64) -> Recording {
     }
     let mut multiples = vec![1.0; sensor.pixels()];
     if sensor.pixels() >= 36 && chance(rng, 0.25) {
-        let hot = whole(rng, 1, 3);
+        // More than one in twenty are doubted.
+        let hot = whole(rng, 1, (sensor.pixels() / 20).min(3));
         for pixel in some_pixels(rng, sensor.pixels(), hot) {
             // At most one photon a bin and laser cycle.
             let most = (cycles / background).clamp(30.0, 1000.0);
