@@ -23,8 +23,8 @@ const STEP: usize = 64;
 /// An asymmetric window must have less than this share of the error of a symmetric one.
 const GAIN: f64 = 0.97;
 
-/// No side of an asymmetric window is narrower. A narrower one draws places to the ends of their bin, by up to 0.3 bins
-/// with 1 bin, which peaks that all lie alike in their bins do not show.
+/// No side of an asymmetric window is narrower. A narrower one draws places to the ends of their bin, which peaks that all
+/// lie alike in their bins do not show.
 const NARROWEST: U8F8 = U8F8::lit("1.5");
 
 /// An asymmetric window that is better for a pulse than any symmetric one.
