@@ -1,10 +1,12 @@
 //! Warnings about recordings: none for a good recording.
 
 use crate::capture_log::{log, tell};
+use dtof_calibrate::Scatter;
 use dtof_photons::open::{ReadOptions, counts};
 use dtof_photons::source::PhotonSource;
 use dtof_photons::warnings::swapped_axes;
 use dtof_simulate::scene::Scene;
+use std::ops::Range;
 use std::path::Path;
 
 /// The same numbers with the bins as the first axis: a line for each bin and row, of `columns`.
@@ -26,6 +28,18 @@ fn recorded_photons_of_a_log_are_warned_of_when_turned_and_only_then() {
     for capture in &recorded.captures {
         assert_eq!(swapped_axes(&[9], capture), None);
     }
+    assert_scatter(&pixels, 0.99..1.05);
+    let zone = |zone: usize| {
+        let captures = recorded.captures.iter().map(|capture| &capture[zone]);
+        captures.fold(vec![0; 128], |sum: Vec<u64>, counts| {
+            sum.iter()
+                .zip(counts)
+                .map(|(sum, count)| sum + count)
+                .collect()
+        })
+    };
+    // So many photons show how unequal the bins are.
+    assert_scatter(&(0..9).map(zone).collect::<Vec<_>>(), 1.5..2.5);
     let (bins, turned) = bins_first(&pixels, 9);
     let rows = turned.len() / bins;
     assert!(swapped_axes(&[bins, rows], &turned).is_some());
@@ -39,6 +53,20 @@ fn recorded_photons_of_a_log_are_warned_of_when_turned_and_only_then() {
     assert_eq!(recorded.metadata.warnings, [""; 0]);
     let pixels = recorded.captures.concat();
     assert_eq!(swapped_axes(&[26, 16], &pixels), None);
+    // The sensor leaves out the last ten bins.
+    let measured: Vec<Vec<u64>> = pixels.iter().map(|counts| counts[..54].to_vec()).collect();
+    assert_scatter(&measured, 0.95..1.05);
+}
+
+/// How neighbouring bins differ, where photon counts have 1.
+fn assert_scatter(histograms: &[Vec<u64>], expected: Range<f64>) {
+    let counts: Vec<Vec<f64>> = histograms
+        .iter()
+        .map(|counts| counts.iter().map(|&count| count as f64).collect())
+        .collect();
+    let found = Scatter::of(counts.iter().map(|counts| (&counts[..], None)));
+    tell(&format!("{found:?}"));
+    assert!(expected.contains(&found.mean), "{found:?}");
 }
 
 /// The histograms of a scene of this repository over a number of laser cycles.

@@ -10,6 +10,7 @@
 
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
+mod audit;
 mod false_alarms;
 mod find;
 mod photon_budget;
@@ -30,6 +31,7 @@ use dtof_photons::MM_PER_PS;
 use dtof_theory::progress::{self, Progress};
 use rayon::prelude::*;
 
+pub use audit::{Audit, Scatter};
 pub use find::glass::{Glass, Layer, Nearest};
 pub use find::observed::{Length, Observed};
 pub use find::offset::Offset;
@@ -131,6 +133,8 @@ pub struct Calibration {
     pub bins: usize,
     /// Picoseconds a bin: fitted, or as they were given.
     pub bin_width_ps: f64,
+    /// Whether the recording holds photon counts.
+    pub audit: Audit,
     /// Background, hot and dead pixels.
     pub pixels: Pixels,
     /// The TDC, where laser cycles are known or the background shows it.
@@ -173,12 +177,14 @@ struct AllHistograms {
     /// The last bin that was measured.
     last_bin: usize,
     tdc: Option<Tdc>,
+    audit: Audit,
 }
 
 impl AllHistograms {
     fn new(observed: &Observed, hot: &[usize], dead_time: Option<u16>) -> Result<Self> {
         let mut traces = observed.traces(hot)?;
         let last_bin = cut_unmeasured(&mut traces);
+        let audit = Audit::of(&traces, observed.length.is_known());
         let tdc = match observed.length {
             Length::Cycles(_) => Some(match dead_time {
                 Some(bins) => pile_up::known_tdc(&traces, bins.into()),
@@ -202,6 +208,7 @@ impl AllHistograms {
             levels,
             last_bin,
             tdc,
+            audit,
         })
     }
 }
@@ -236,6 +243,7 @@ pub fn calibrate_with(
         pixels,
         last_bin,
         tdc,
+        audit,
     } = all;
     let good = traces.into_iter().zip(levels);
     let good = good.filter(|(trace, _)| pixels.is_good(trace.pixel));
@@ -306,6 +314,7 @@ pub fn calibrate_with(
         length: observed.length,
         bins,
         bin_width_ps,
+        audit,
         tdc,
         nearest,
         pulse,

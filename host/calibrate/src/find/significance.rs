@@ -54,11 +54,12 @@ pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
 #[must_use]
 pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {
     let mut values: Vec<f64> = values.into_iter().collect();
-    values.sort_by(f64::total_cmp);
-    let last = values.len().saturating_sub(1);
+    let Some(last) = values.len().checked_sub(1) else {
+        return 0.0;
+    };
     #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
     let index = (last as f64 * share) as usize;
-    values.get(index).copied().unwrap_or(0.0)
+    *values.select_nth_unstable_by(index, f64::total_cmp).1
 }
 
 #[cfg(test)]

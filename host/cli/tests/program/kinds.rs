@@ -359,6 +359,26 @@ fn an_object_that_comes_near() {
 }
 
 #[test]
+fn background_is_taken_off() {
+    holds("background_is_taken_off");
+}
+
+#[test]
+fn counts_are_multiplied() {
+    holds("counts_are_multiplied");
+}
+
+#[test]
+fn bins_differ_in_width() {
+    holds("bins_differ_in_width");
+}
+
+#[test]
+fn counts_are_averaged() {
+    holds("counts_are_averaged");
+}
+
+#[test]
 fn clean() {
     holds("clean");
 }

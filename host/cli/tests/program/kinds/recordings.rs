@@ -96,6 +96,10 @@ pub const KINDS: &[Kind] = &[
     kind("glass_that_shifts", glass_that_shifts),
     kind("an_object_that_moves", an_object_that_moves),
     kind("an_object_that_comes_near", an_object_that_comes_near),
+    kind("background_is_taken_off", background_is_taken_off),
+    kind("counts_are_multiplied", counts_are_multiplied),
+    kind("bins_differ_in_width", bins_differ_in_width),
+    kind("counts_are_averaged", counts_are_averaged),
     kind("clean", clean),
 ];
 
@@ -523,6 +527,119 @@ fn many_recorded_cycles(rng: &mut Pcg64) -> Recording {
     });
     let array = sensor.histograms(pixels);
     sensor.recording(array, format!("--recorded-cycles {cycles}"), at(&positions))
+}
+
+/// An even background, and targets in half of the pixels.
+struct HalfLit {
+    sensor: Sensor,
+    background: f64,
+    lights: Vec<Light>,
+    truth: Vec<Truth>,
+}
+
+impl HalfLit {
+    /// So many background photons a bin.
+    fn draw(rng: &mut Pcg64, least: f64, most: f64) -> Self {
+        let sensor = Sensor::draw(rng, 6, 18);
+        let background = log_between(rng, least, most);
+        let signal = between(rng, 25.0, 50.0) * background.max(4.0).sqrt();
+        let dark = sensor.background(background * sensor.bins as f64);
+        let positions = sensor.positions(rng, 0.25, 0.85);
+        let lit = some_pixels(rng, sensor.pixels(), sensor.pixels() / 2);
+        let mut lights = vec![dark.clone(); sensor.pixels()];
+        let mut truth = vec![Truth::Nothing; sensor.pixels()];
+        for pixel in lit {
+            let position = positions[pixel];
+            lights[pixel] = dark.clone().with(signal, position, sensor.sigma);
+            truth[pixel] = Truth::At(position);
+        }
+        Self {
+            sensor,
+            background,
+            lights,
+            truth,
+        }
+    }
+
+    /// What was made of the counts has to be told.
+    fn recording(self, pixels: Vec<Vec<u64>>, words: &'static [&'static str]) -> Recording {
+        let array = self.sensor.histograms(pixels);
+        Recording {
+            need: Need::Told(words),
+            ..self.sensor.recording(array, "", self.truth)
+        }
+    }
+}
+
+/// The mean of the background was subtracted, and what was below it is 0.
+fn background_is_taken_off(rng: &mut Pcg64) -> Recording {
+    let scene = HalfLit::draw(rng, 5.0, 500.0);
+    let mean = scene.background.round() as u64;
+    let left = |light: &Light| {
+        light
+            .counts(rng)
+            .iter()
+            .map(|count| count.saturating_sub(mean))
+            .collect()
+    };
+    let pixels = scene.lights.iter().map(left).collect();
+    scene.recording(pixels, &["background was subtracted"])
+}
+
+fn counts_are_multiplied(rng: &mut Pcg64) -> Recording {
+    let scene = HalfLit::draw(rng, 1.0, 200.0);
+    let factor = whole(rng, 2, 60) as u64;
+    let pixels = scene.lights.iter();
+    let pixels = pixels.map(|light| {
+        light
+            .counts(rng)
+            .iter()
+            .map(|count| count * factor)
+            .collect()
+    });
+    let pixels = pixels.collect();
+    scene.recording(pixels, &["multiples of"])
+}
+
+/// By a third or more, in all pixels alike or in each.
+fn bins_differ_in_width(rng: &mut Pcg64) -> Recording {
+    let scene = HalfLit::draw(rng, 30.0, 300.0);
+    let (differ, each) = (between(rng, 0.4, 0.7), chance(rng, 0.5));
+    let mut widths = Vec::new();
+    let pixels = scene.lights.iter().map(|light| {
+        if each || widths.is_empty() {
+            widths = light
+                .0
+                .iter()
+                .map(|_| between(rng, 1.0 - differ, 1.0 + differ))
+                .collect();
+        }
+        let means = light.0.iter().zip(&widths);
+        Light(means.map(|(mean, width)| mean * width).collect()).counts(rng)
+    });
+    let pixels = pixels.collect();
+    let targets = scene.truth.iter();
+    // A narrow bin hides a part of its pulse.
+    let truth = targets.map(|truth| match truth {
+        Truth::At(_) => Truth::Anything,
+        _ => Truth::Nothing,
+    });
+    let truth = truth.collect();
+    HalfLit { truth, ..scene }.recording(pixels, &["unequal width"])
+}
+
+/// Of 3 to 16 recordings the mean was saved.
+fn counts_are_averaged(rng: &mut Pcg64) -> Recording {
+    let scene = HalfLit::draw(rng, 20.0, 500.0);
+    let captures = whole(rng, 3, 16) as u64;
+    let pixels = scene.lights.iter().map(|light| {
+        let all = light.clone().times(captures as f64).counts(rng);
+        all.iter()
+            .map(|count| (count + captures / 2) / captures)
+            .collect()
+    });
+    let pixels = pixels.collect();
+    scene.recording(pixels, &["averaged"])
 }
 
 /// More background in the first 10 to 45 % of the pixels.
