@@ -5,6 +5,8 @@
 //! a − 2b + c, with the mean 0 and the variance 2, so (a − 2b + c)² ÷ 2n has the mean 1, whatever n is. A bin that counts at
 //! most once a laser cycle and is full in the share p of them scatters less, by 1 − p.
 
+use dtof_photons::warnings::greatest_divisor;
+
 use super::find::observed::Trace;
 use super::find::significance::median;
 
@@ -215,13 +217,6 @@ fn short(times: f64) -> String {
         1.0.. => format!("{times:.1}"),
         _ => format!("{times:.2}"),
     }
-}
-
-const fn greatest_divisor(mut one: u64, mut other: u64) -> u64 {
-    while other > 0 {
-        (one, other) = (other, one % other);
-    }
-    one
 }
 
 /// By how much the share of empty bins beside the peaks is above that of photons with the same mean.

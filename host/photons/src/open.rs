@@ -408,6 +408,7 @@ fn list<R: PhotonReader + 'static>(input: &Input, options: &ReadOptions) -> Resu
     metadata
         .warnings
         .extend(warnings::late_photons(photons.first_cycle(), cycles));
+    metadata.warnings.extend(photons.times_as_cycles());
     metadata
         .warnings
         .extend(warnings::list_shape(photons.pixels(), shape.columns));

@@ -9,6 +9,7 @@ use dtof_core::{Array, PixelAddress};
 use crate::input::Input;
 use crate::recorded::{Capture, ListTimes};
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
+use crate::warnings::{greatest_divisor, times_as_cycles};
 use dtof_options::Refused;
 use dtof_options::rows::grouped;
 
@@ -215,6 +216,8 @@ pub struct PhotonList<R> {
     cycles: u64,
     /// The laser cycle of the first photon.
     first_cycle: u64,
+    /// The greatest number that divides all laser cycles.
+    divisor: u64,
     photons_per_cycle: f64,
     /// The most photons of the laser cycles of any span.
     most_of_span: u64,
@@ -235,13 +238,16 @@ impl<R: PhotonReader> PhotonList<R> {
         let mut rows = Validator::<R>::open(input, shape, None)?;
         let mut is_there = vec![false; Array::MOST_PIXELS as usize];
         let (mut not_replayed, mut recorded) = (0, 0u64);
-        let mut first_cycle = 0;
+        let (mut first_cycle, mut divisor) = (0, 0);
         // The span of the last photon, its photons so far, and the most photons of any span.
         let (mut span, mut of_span, mut most) = (0, 0u64, 0);
         while let Some(row) = rows.next()? {
             is_there[row.pixel()] = true;
             if rows.photons == 1 {
                 first_cycle = row.cycle;
+            }
+            if divisor != 1 {
+                divisor = greatest_divisor(divisor, row.cycle);
             }
             recorded = row.cycle.saturating_add(1);
             if row.cycle >= cycles {
@@ -280,6 +286,7 @@ impl<R: PhotonReader> PhotonList<R> {
             places,
             cycles: cycles.min(recorded),
             first_cycle,
+            divisor,
             photons_per_cycle: most as f64 / SPAN.min(recorded) as f64,
             most_of_span: most,
             not_replayed,
@@ -294,6 +301,12 @@ impl<R> PhotonList<R> {
     /// The laser cycle of the first photon.
     pub fn first_cycle(&self) -> u64 {
         self.first_cycle
+    }
+
+    /// That the laser cycles may be times.
+    pub fn times_as_cycles(&self) -> Option<String> {
+        let (photons, last) = self.rows.expected?;
+        times_as_cycles(photons, self.first_cycle, last, self.divisor)
     }
 
     /// Laser cycles before the next photon, if that has been read already.

@@ -63,6 +63,40 @@ pub fn late_photons(first_cycle: u64, cycles: u64) -> Option<String> {
     })
 }
 
+/// The greatest number that divides both; the other one if one is 0.
+#[must_use]
+pub const fn greatest_divisor(mut one: u64, mut other: u64) -> u64 {
+    while other > 0 {
+        (one, other) = (other, one % other);
+    }
+    one
+}
+
+/// Warns if the laser cycles of a list with so many photons have a divisor in common, as times do, or are all alike. `first`
+/// and `last` are the first and the last of them.
+#[must_use]
+pub fn times_as_cycles(photons: u64, first: u64, last: u64, divisor: u64) -> Option<String> {
+    /// The laser cycles of fewer photons may all be even, and so on.
+    const FEWEST: u64 = 30;
+    if photons < FEWEST {
+        None
+    } else if first == last {
+        Some(format!(
+            "all {} photons come in laser cycle {}, so the recording lasted no longer: count the laser pulses, or save \
+             histograms",
+            grouped(photons),
+            grouped(first)
+        ))
+    } else {
+        (divisor > 1).then(|| {
+            format!(
+                "all laser cycles are multiples of {divisor}, as times are, so rates are {divisor} times too low: save `cycle // \
+                 {divisor}`, the number of the laser pulse"
+            )
+        })
+    }
+}
+
 /// Warns if `columns` do not divide the `pixels` of a list, or if they are missing and the pixels would make a square.
 #[must_use]
 pub fn list_shape(pixels: usize, columns: Option<u32>) -> Option<String> {
@@ -278,6 +312,41 @@ mod tests {
             assert_eq!(late_photons(first, 2_000), Some(whole));
         }
         assert_eq!(late_photons(1_999, 2_000), None);
+    }
+
+    #[test]
+    fn the_greatest_divisor_divides_both() {
+        for one in 0..60 {
+            for other in 0..60 {
+                let found = greatest_divisor(one, other);
+                let divides = |number: &u64| one % number == 0 && other % number == 0;
+                let expected = (1..=one.max(other)).rev().find(divides);
+                assert_eq!(found, expected.unwrap_or(0), "{one} {other}");
+            }
+        }
+    }
+
+    #[test]
+    fn laser_cycles_with_a_common_divisor_may_be_times() {
+        let times = "all laser cycles are multiples of 100, as times are, so rates are 100 times too low: save `cycle // 100`, \
+                     the number of the laser pulse";
+        let one = "all 1,000 photons come in laser cycle 7, so the recording lasted no longer: count the laser pulses, or save \
+                   histograms";
+        for (photons, first, last, divisor, warning) in [
+            (1000, 0, 900, 100, Some(times)),
+            (30, 100, 900, 100, Some(times)),
+            (29, 100, 900, 100, None),
+            (1000, 0, 900, 1, None),
+            (1000, 7, 7, 7, Some(one)),
+            (29, 7, 7, 7, None),
+        ] {
+            let found = times_as_cycles(photons, first, last, divisor);
+            assert_eq!(
+                found.as_deref(),
+                warning,
+                "{photons} {first} {last} {divisor}"
+            );
+        }
     }
 
     #[test]

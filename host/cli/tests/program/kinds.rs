@@ -379,6 +379,11 @@ fn counts_are_averaged() {
 }
 
 #[test]
+fn laser_cycles_are_times() {
+    holds("laser_cycles_are_times");
+}
+
+#[test]
 fn clean() {
     holds("clean");
 }

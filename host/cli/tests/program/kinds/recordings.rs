@@ -100,6 +100,7 @@ pub const KINDS: &[Kind] = &[
     kind("counts_are_multiplied", counts_are_multiplied),
     kind("bins_differ_in_width", bins_differ_in_width),
     kind("counts_are_averaged", counts_are_averaged),
+    kind("laser_cycles_are_times", laser_cycles_are_times),
     kind("clean", clean),
 ];
 
@@ -640,6 +641,31 @@ fn counts_are_averaged(rng: &mut Pcg64) -> Recording {
     });
     let pixels = pixels.collect();
     scene.recording(pixels, &["averaged"])
+}
+
+/// A list with the time of the laser pulse, in nanoseconds or picoseconds.
+fn laser_cycles_are_times(rng: &mut Pcg64) -> Recording {
+    let scene = HalfLit::draw(rng, 0.5, 5.0);
+    let (cycles, period) = (whole(rng, 1000, 4000), log_between(rng, 2.0, 1e5) as u32);
+    let mut list = List::new();
+    for (pixel, light) in scene.lights.iter().enumerate() {
+        list.add(
+            pixel,
+            &light.clone().times(1.0 / cycles as f64),
+            0,
+            cycles,
+            rng,
+        );
+    }
+    for [_, cycle, _] in &mut list.photons {
+        *cycle *= period;
+    }
+    Recording {
+        need: Need::Told(&["laser cycles are multiples"]),
+        ..scene
+            .sensor
+            .recording(list.array(), scene.sensor.list_options(), scene.truth)
+    }
 }
 
 /// More background in the first 10 to 45 % of the pixels.
