@@ -3,6 +3,9 @@
 use std::fmt::Write;
 use std::path::Path;
 
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, Poisson};
+use rand_pcg::Pcg64;
 use serde_json::Value;
 
 use crate::common::{Scratch, assert_contains, npy};
@@ -10,15 +13,21 @@ use crate::common::{Scratch, assert_contains, npy};
 /// Millimetres of a bin of 250 ps.
 const BIN_MM: f64 = 37.474;
 
-/// Two rows of four pixels with a wall in bin 60, as `u2`.
+/// Two rows of four pixels with a wall in bin 60, as `u2`, and five photons of the background a bin.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a few photons"
+)]
 fn wall() -> Vec<u8> {
-    let pixel = (0..128_u16).map(|bin| match bin {
+    let mut rng = Pcg64::seed_from_u64(1);
+    let background = Poisson::new(5.0).unwrap();
+    let counts = (0..8 * 128_u16).map(|place| match place % 128 {
         59 | 61 => 80,
         60 => 140,
-        bin => 3 + bin % 5,
+        _ => background.sample(&mut rng) as u16,
     });
-    let bytes: Vec<u8> = pixel.flat_map(u16::to_le_bytes).collect();
-    bytes.repeat(8)
+    counts.flat_map(u16::to_le_bytes).collect()
 }
 
 fn near(depths: &[f64], bin: f64) -> bool {
