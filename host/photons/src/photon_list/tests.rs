@@ -30,6 +30,28 @@ fn open(text: &str, shape: ListOptions, cycles: u64) -> Result<PhotonList<CsvRea
     PhotonList::open(&Input::in_memory("a.csv", text), shape, cycles)
 }
 
+/// Before and after the laser cycles that are replayed.
+#[test]
+fn times_are_no_laser_cycles() {
+    let told = |period: u64, start: u64| {
+        let photons: Vec<RawPhoton> = (0..40)
+            .map(|number| [0, start + number * period, 5])
+            .collect();
+        open(&csv(&photons), SHAPE, 1000).unwrap().times_as_cycles()
+    };
+    assert!(
+        told(100, 300)
+            .unwrap()
+            .starts_with("all laser cycles are multiples of 100,")
+    );
+    assert!(
+        told(0, 7)
+            .unwrap()
+            .starts_with("all 40 photons come in laser cycle 7,")
+    );
+    assert_eq!([told(1, 0), told(100, 1)], [None, None]);
+}
+
 proptest! {
     #[test]
     fn a_list_is_replayed_and_counted_as_it_is_written(
@@ -67,6 +89,8 @@ proptest! {
         let raw: Vec<u16> = list.addresses().iter().map(|address| address.raw()).collect();
         prop_assert_eq!(&raw, &addresses);
         prop_assert_eq!(list.first_cycle(), photons[0][1]);
+        let divides = |divisor: &u64| photons.iter().all(|photon| photon[1] % divisor == 0);
+        prop_assert_eq!(list.divisor, (1..=last).rev().find(divides).unwrap_or(0));
         prop_assert_eq!(list.cycles(), limit.min(end));
         let not_replayed = photons.iter().filter(|photon| !replayed(photon)).count();
         prop_assert_eq!(list.not_replayed(), not_replayed as u64);
