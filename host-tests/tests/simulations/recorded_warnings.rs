@@ -60,11 +60,12 @@ fn recorded_photons_of_a_log_are_warned_of_when_turned_and_only_then() {
 
 /// How neighbouring bins differ, where photon counts have 1.
 fn assert_scatter(histograms: &[Vec<u64>], expected: Range<f64>) {
+    let number = |&count: &u64| count as f64;
     let counts: Vec<Vec<f64>> = histograms
         .iter()
-        .map(|counts| counts.iter().map(|&count| count as f64).collect())
+        .map(|counts| counts.iter().map(number).collect())
         .collect();
-    let found = Scatter::of(counts.iter().map(|counts| (&counts[..], None)));
+    let found = Scatter::of(&counts.iter().map(|counts| &counts[..]).collect::<Vec<_>>());
     tell(&format!("{found:?}"));
     assert!(expected.contains(&found.mean), "{found:?}");
 }

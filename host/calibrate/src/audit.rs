@@ -10,55 +10,53 @@ use dtof_photons::warnings::greatest_divisor;
 use super::find::observed::Trace;
 use super::find::significance::median;
 
-/// Of larger recordings some of the histograms tell, with so many bins.
+/// A recording with more bins is judged by some of its histograms.
 const BINS: usize = 1 << 20;
 /// The most peaks of a histogram.
 const PEAKS: usize = 8;
 /// So many bins before and after the highest bin of a peak belong to it in any case.
 const REACH: usize = 3;
-/// Fewer triples of bins do not tell. So many scatter by 0.08.
+/// Fewer triples of bins do not tell. The mean of so many is off by 0.08.
 const FEWEST: usize = 600;
 /// From so many photons on a triple is nearly Gaussian. The median of the test then is as good as the mean, and a peak that
-/// was not found does not move it.
+/// was not found does not move it. In the dark most photons are of such peaks.
 const GAUSSIAN: f64 = 10.0;
 /// The median of the square of a Gaussian number of variance 1.
 const MEDIAN: f64 = 0.4549;
-/// Counts scatter between so little and so much of what photons do: anything else is none.
+/// Photon counts have a mean between these.
 const COUNTS: [f64; 2] = [0.7, 1.4];
-/// If the sum of all histograms scatters so many times as much as each, their bins are alike.
-const ALIKE: f64 = 10.0;
-/// From this share of empty bins on that photons would have filled, something was subtracted.
-const CUT: f64 = 0.1;
+/// So large a share of the bins has a cause: empty ones that photons would have filled, and full ones.
+const MANY: f64 = 0.1;
 
-/// How bins beside the peaks scatter.
+/// How neighbouring bins scatter beside the peaks.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Scatter {
-    /// The mean of (a − 2b + c)² ÷ 2n over neighbouring bins: 1 for photon counts.
+    /// The mean of (a − 2b + c)² ÷ 2n: 1 for photon counts.
     pub mean: f64,
     /// Its median, over that of a Gaussian.
     pub median: f64,
     /// The mean of n, the photons of three bins.
     pub photons: f64,
-    /// The share of the laser cycles in which a bin is full, if it counts at most once in each; 0 if they are not known.
-    pub full: f64,
     /// The number of triples.
     pub triples: usize,
 }
 
 impl Scatter {
-    /// Of histograms, each with its laser cycles, if they are known.
+    /// Of histograms with the same bins. Bins that are empty in all of them were not measured.
     #[must_use]
-    pub fn of<'a>(histograms: impl IntoIterator<Item = (&'a [f64], Option<f64>)>) -> Self {
-        let (mut tests, mut photons, mut full) = (Vec::new(), 0.0, 0.0);
-        for (counts, cycles) in histograms {
-            let is_beside = beside_peaks(counts);
+    pub fn of(histograms: &[&[f64]]) -> Self {
+        Self::beside(histograms, &beside_peaks(histograms))
+    }
+
+    fn beside(histograms: &[&[f64]], is_beside: &[Vec<bool>]) -> Self {
+        let (mut tests, mut photons) = (Vec::new(), 0.0);
+        for (counts, is_beside) in histograms.iter().zip(is_beside) {
             for (bins, is_beside) in counts.windows(3).zip(is_beside.windows(3)) {
                 let n: f64 = bins.iter().sum();
                 if n > 0.0 && !is_beside.contains(&false) {
                     let bend = bins[0] - 2.0 * bins[1] + bins[2];
                     tests.push(bend * bend / (2.0 * n));
                     photons += n;
-                    full += cycles.map_or(0.0, |cycles| (n / 3.0 / cycles).min(1.0));
                 }
             }
         }
@@ -68,35 +66,31 @@ impl Scatter {
             mean: tests.iter().sum::<f64>() / each,
             median: median(tests) / MEDIAN,
             photons: photons / each,
-            full: full / each,
             triples,
-        }
-    }
-
-    /// How many times the variance is that of photons, as far as it differs surely; `None` if too few bins tell, or if they
-    /// do not differ.
-    #[must_use]
-    pub fn unlike_counts(&self) -> Option<f64> {
-        let by_median = match self.photons >= GAUSSIAN {
-            true => self.median,
-            false => self.mean,
-        };
-        let [least, most] = COUNTS;
-        if self.triples < FEWEST {
-            None
-        } else if self.mean.min(by_median) > most {
-            Some(self.mean.min(by_median))
-        } else if self.mean.max(by_median) < least * (1.0 - self.full) {
-            Some(self.mean.max(by_median))
-        } else {
-            None
         }
     }
 }
 
-/// For each bin whether it lies beside the peaks. A peak reaches from its highest bin to where three bins together hold no
-/// more than usual.
-fn beside_peaks(counts: &[f64]) -> Vec<bool> {
+fn sum(histograms: &[&[f64]]) -> Vec<f64> {
+    let mut sum = vec![0.0; histograms.first().map_or(0, |counts| counts.len())];
+    for counts in histograms {
+        for (sum, count) in sum.iter_mut().zip(*counts) {
+            *sum += count;
+        }
+    }
+    sum
+}
+
+/// For each bin of each histogram whether it was measured and lies beside the peaks.
+fn beside_peaks(histograms: &[&[f64]]) -> Vec<Vec<bool>> {
+    let is_measured: Vec<bool> = sum(histograms).iter().map(|&sum| sum > 0.0).collect();
+    let of = |counts: &&[f64]| without_peaks(counts, is_measured.clone());
+    histograms.iter().map(of).collect()
+}
+
+/// These bins without those of peaks. A peak reaches from its highest bin to where three bins together hold no more than
+/// usual.
+fn without_peaks(counts: &[f64], mut is_beside: Vec<bool>) -> Vec<bool> {
     let all = counts.len();
     let around = |bin: usize| {
         counts[bin.saturating_sub(1)..(bin + 2).min(all)]
@@ -104,13 +98,19 @@ fn beside_peaks(counts: &[f64]) -> Vec<bool> {
             .sum()
     };
     let mut sums: Vec<f64> = (0..all).map(around).collect();
-    let usual = median(sums.iter().copied());
+    let measured = sums.iter().zip(&is_beside).filter(|(_, is)| **is);
+    let usual = median(measured.map(|(sum, _)| *sum));
     let noise = usual.sqrt();
     let belongs: Vec<bool> = sums.iter().map(|&sum| sum > usual + 2.0 * noise).collect();
-    let mut is_beside = vec![true; all];
+    // In the dark a peak of a few photons is not seen, but is most of the photons.
+    let least = if usual < GAUSSIAN {
+        0.0
+    } else {
+        usual + 6.0 * noise
+    };
     for _ in 0..PEAKS {
         let top = (0..all).max_by(|&one, &other| sums[one].total_cmp(&sums[other]));
-        let Some(top) = top.filter(|&top| sums[top] > usual + 6.0 * noise + 6.0) else {
+        let Some(top) = top.filter(|&top| sums[top] > least) else {
             break;
         };
         let before = (0..top.saturating_sub(REACH)).rev();
@@ -123,119 +123,146 @@ fn beside_peaks(counts: &[f64]) -> Vec<bool> {
     is_beside
 }
 
-/// What is known of a recording before anything is corrected or decided.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Audit {
-    /// Of each histogram by itself.
-    pub scatter: Scatter,
-    /// Of the sum of all.
-    pooled: Scatter,
-    /// The largest number that divides all counts; 0 without photons.
+/// What the counts beside the peaks are like.
+struct Seen {
+    /// The greatest number that divides all counts.
     divisor: u64,
-    /// The share of the bins beside the peaks that are empty and would not be.
-    cut: f64,
+    /// The least count above 0, and the highest.
+    least: f64,
+    highest: f64,
+    /// The share of the bins that are empty and would not be, and of those that hold the highest count.
+    empty: f64,
+    full: f64,
 }
 
-impl Audit {
-    /// Of histograms as they were recorded, with their laser cycles if they are known.
-    #[must_use]
-    pub fn of(traces: &[Trace], has_cycles: bool) -> Self {
-        let bins = traces.first().map_or(0, |trace| trace.counts.len());
-        // Odd, so that it is not always the same column.
-        let step = (traces.len() * bins / BINS) | 1;
-        let some = || traces.iter().step_by(step);
-        let cycles = |trace: &Trace| has_cycles.then_some(trace.cycles);
-        let each = some().map(|trace| (&trace.counts[..], cycles(trace)));
-        let mut pooled = vec![0.0; bins];
-        for trace in some() {
-            for (sum, count) in pooled.iter_mut().zip(&trace.counts) {
-                *sum += count;
-            }
+impl Seen {
+    fn new(histograms: &[&[f64]], is_beside: &[Vec<bool>]) -> Self {
+        let counts = histograms.iter().copied().flatten().copied();
+        let positive = counts.clone().filter(|&count| count > 0.0);
+        let highest = counts.clone().fold(0.0, f64::max);
+        let number = histograms.iter().map(|counts| counts.len()).sum::<usize>();
+        let full = counts.filter(|&count| count >= highest).count();
+        let (mut bins, mut empty, mut expected) = (0.0, 0.0, 0.0);
+        for (counts, is_beside) in histograms.iter().zip(is_beside) {
+            let beside = || counts.iter().zip(is_beside).filter(|(_, is)| **is);
+            let all = beside().count() as f64;
+            let mean = beside().map(|(count, _)| count).sum::<f64>() / all.max(1.0);
+            bins += all;
+            empty += beside().filter(|(count, _)| **count <= 0.0).count() as f64;
+            expected += all * (-mean).exp();
         }
-        let counts = traces.iter().flat_map(|trace| &trace.counts);
         #[allow(
             clippy::cast_possible_truncation,
             clippy::cast_sign_loss,
             reason = "counts"
         )]
-        let divisor = counts.fold(0, |divisor, &count| match divisor {
-            1 => 1,
-            divisor => greatest_divisor(divisor, count as u64),
-        });
         Self {
-            scatter: Scatter::of(each),
-            pooled: Scatter::of([(&pooled[..], None)]),
-            divisor,
-            cut: cut(some()),
+            divisor: positive.clone().fold(0, |divisor, count| match divisor {
+                1 => 1,
+                divisor => greatest_divisor(divisor, count as u64),
+            }),
+            least: positive.fold(f64::INFINITY, f64::min),
+            highest,
+            empty: (empty - expected) / f64::max(bins, 1.0),
+            full: full as f64 / number.max(1) as f64,
         }
     }
 
-    /// That these are no photon counts.
-    #[must_use]
-    pub fn no_counts(&self, false_alarm: f64) -> Option<String> {
-        let times = self.scatter.unlike_counts()?;
-        let differ = format!(
-            "neighbouring bins differ {} times as much as photon counts do (variance)",
-            short(times)
-        );
-        if times < 1.0 {
-            return Some(format!(
-                "{differ}: as if they were averaged, smoothed or divided, or distances. A decision needs the photons that \
-                 were counted: save their sums"
-            ));
-        }
-        let divisor = self.divisor;
-        let cause = if divisor > 1 {
-            format!("all are multiples of {divisor}: save `counts // {divisor}`")
-        } else if self.cut > CUT {
+    /// Why they scatter more. `is_alike` says that they do so in the same way in all histograms.
+    fn more(&self, is_alike: bool) -> String {
+        let Self { divisor, least, .. } = self;
+        if *divisor > 1 {
+            format!("All are multiples of {divisor}: save `counts // {divisor}`")
+        } else if self.empty > MANY && *least > 2.0 {
             format!(
-                "{:.0} % of the bins are 0, as if background was subtracted: save the counts as they were read",
-                self.cut * 100.0
+                "None is between 0 and {least}, so they were multiplied: save the counts as they were read"
             )
-        } else if self.pooled.mean > ALIKE * self.scatter.mean {
-            "the same ones in all pixels, so the bins are of unequal width: sum them to bins of equal width before you save \
-             them"
+        } else if self.empty > MANY {
+            format!(
+                "{:.0} % of the bins are 0 and would not be, as if background was subtracted: save the counts as they were read",
+                self.empty * 100.0
+            )
+        } else if is_alike {
+            "All pixels have the same differences, so the bins are of unequal width: sum them to bins of equal width before \
+             you save them"
                 .to_owned()
         } else {
-            "they were multiplied or corrected, or the bins of each pixel are of unequal width: save the counts as they were \
+            "Counts were multiplied or corrected, or the bins of each pixel are of unequal width: save the counts as they were \
              read"
                 .to_owned()
+        }
+    }
+
+    /// Why they scatter less.
+    fn less(&self, has_cycles: bool) -> String {
+        if self.full > MANY {
+            return format!(
+                "{:.0} % of the bins hold {}, the most that they can: record less light, or with wider counters",
+                self.full * 100.0,
+                self.highest
+            );
+        }
+        let once = match has_cycles {
+            true => "",
+            false => {
+                ", or a bin counts once a laser cycle, and --recorded-cycles says how many there were"
+            }
         };
-        Some(format!(
-            "{differ}, so more than {} % of the empty pixels may have a depth. {}{}",
-            false_alarm * 100.0,
-            cause[..1].to_uppercase(),
-            &cause[1..]
-        ))
+        format!(
+            "They were averaged, smoothed or divided, or are distances{once}. A decision needs the photons that were counted"
+        )
     }
 }
 
-/// Two digits.
-fn short(times: f64) -> String {
-    match times {
-        10.0.. => format!("{times:.0}"),
-        1.0.. => format!("{times:.1}"),
-        _ => format!("{times:.2}"),
+/// Why a recording holds no photon counts, if it does not: what was seen, what it means, and what helps. So many of the
+/// decisions on a pixel without a target may be a `false_alarm`.
+#[must_use]
+pub(super) fn no_counts(traces: &[Trace], has_cycles: bool, false_alarm: f64) -> Option<String> {
+    let bins = traces.first().map_or(0, |trace| trace.counts.len());
+    // Odd, so that it is not always the same column.
+    let step = (traces.len() * bins / BINS) | 1;
+    let some = || traces.iter().step_by(step);
+    let histograms: Vec<&[f64]> = some().map(|trace| &trace.counts[..]).collect();
+    let is_beside = beside_peaks(&histograms);
+    let scatter = Scatter::beside(&histograms, &is_beside);
+    let is_bright = scatter.photons >= GAUSSIAN;
+    let other = if is_bright {
+        scatter.median
+    } else {
+        scatter.mean
+    };
+    let (low, high) = (scatter.mean.min(other), scatter.mean.max(other));
+    let [least, most] = COUNTS;
+    if scatter.triples < FEWEST || (least..=most).contains(&low) && (least..=most).contains(&high) {
+        return None;
     }
-}
-
-/// By how much the share of empty bins beside the peaks is above that of photons with the same mean.
-fn cut<'a>(traces: impl Iterator<Item = &'a Trace>) -> f64 {
-    let (mut bins, mut empty, mut expected) = (0.0, 0.0, 0.0);
-    for trace in traces {
-        let is_beside = beside_peaks(&trace.counts);
-        let beside = trace.counts.iter().zip(&is_beside);
-        let counts: Vec<f64> = beside
-            .filter(|(_, is)| **is)
-            .map(|(count, _)| *count)
-            .collect();
-        let all = counts.len() as f64;
-        let mean = counts.iter().sum::<f64>() / all.max(1.0);
-        bins += all;
-        empty += counts.iter().filter(|&&count| count <= 0.0).count() as f64;
-        expected += all * (-mean).exp();
+    let seen = Seen::new(&histograms, &is_beside);
+    let differ = |times: f64| {
+        let times = if times < 10.0 {
+            format!("{times:.2}")
+        } else {
+            format!("{times:.0}")
+        };
+        format!("the variance between neighbouring bins is {times} times that of photon counts")
+    };
+    if low > most {
+        let pooled = Scatter::of(&[&sum(&histograms)]);
+        let is_alike = histograms.len() > 1
+            && pooled.median - 1.0 > 0.5 * histograms.len() as f64 * (low - 1.0);
+        return Some(format!(
+            "{}, so more than {} % of the pixels without a target may have a depth. {}",
+            differ(low),
+            (1e4 * false_alarm).round() / 100.0,
+            seen.more(is_alike)
+        ));
     }
-    (empty - expected) / f64::max(bins, 1.0)
+    let share = some().map(|trace| scatter.photons / 3.0 / trace.cycles);
+    let full = if has_cycles {
+        median(share).min(1.0)
+    } else {
+        0.0
+    };
+    (high < least * (1.0 - full)).then(|| format!("{}. {}", differ(high), seen.less(has_cycles)))
 }
 
 #[cfg(test)]
@@ -286,7 +313,16 @@ mod tests {
     }
 
     fn said(traces: &[Trace]) -> Option<String> {
-        Audit::of(traces, false).no_counts(0.01)
+        no_counts(traces, false, 0.01)
+    }
+
+    fn scatter(traces: &[Trace]) -> Scatter {
+        Scatter::of(
+            &traces
+                .iter()
+                .map(|trace| &trace.counts[..])
+                .collect::<Vec<_>>(),
+        )
     }
 
     proptest! {
@@ -295,17 +331,16 @@ mod tests {
         /// Whatever the light is: level, slope, pulses.
         #[test]
         fn photon_counts_are_counts(
-            background in -3.0..10.0_f64,
+            background in -7.0..10.0_f64,
             slope in 0.0..1.0_f64,
-            pulses in prop::collection::vec((1.0..9.0_f64, 5.0..120.0, 0.5..2.5), 0..5),
+            pulses in prop::collection::vec((1.0..9.0_f64, 5.0..120.0, 0.2..2.5), 0..6),
             seed: u64,
         ) {
             let pulses = pulses.into_iter().map(|(photons, place, sigma)| (photons.exp(), place, sigma));
             let even = scene(0.0, pulses.collect());
             let level = |bin: usize| background.exp() * (1.0 - slope * bin as f64 / BINS as f64);
             let traces = recorded(16, &|pixel, bin| level(bin) + even(pixel, bin), &|_, n| n, seed);
-            let audit = Audit::of(&traces, false);
-            prop_assert_eq!(audit.no_counts(0.01), None, "{:?}", audit);
+            prop_assert_eq!(said(&traces), None, "{:?}", scatter(&traces));
         }
 
         /// Counts times a number scatter so many times as much. A few peaks of noise are left out.
@@ -313,10 +348,9 @@ mod tests {
         fn a_factor_is_found(factor in 2_u32..100, background in 1.0..200.0_f64, seed: u64) {
             let light = scene(background, vec![(300.0, 60.5, 1.0)]);
             let traces = recorded(32, &light, &|_, n| n * f64::from(factor), seed);
-            let audit = Audit::of(&traces, false);
-            let found = audit.scatter.unlike_counts().unwrap() / f64::from(factor);
+            let found = scatter(&traces).mean / f64::from(factor);
             prop_assert!((0.7..1.2).contains(&found), "{}", found);
-            let says = audit.no_counts(0.01).unwrap();
+            let says = said(&traces).unwrap();
             let cause = format!("All are multiples of {factor}: save `counts // {factor}`");
             prop_assert!(says.ends_with(&cause), "{}", says);
         }
@@ -326,7 +360,7 @@ mod tests {
             let light = scene(background, vec![(3.0 * background, 60.5, 1.0)]);
             let traces = recorded(32, &light, &|_, n| (n - background.round()).max(0.0), seed);
             let says = said(&traces).unwrap();
-            prop_assert!(says.contains(" % of the bins are 0, as if background was subtracted"), "{}", says);
+            prop_assert!(says.contains(" % of the bins are 0 and would not be, as if background was subtracted"), "{}", says);
         }
 
         /// The same widths in all pixels, or others in each.
@@ -351,10 +385,44 @@ mod tests {
                 let mean = |at: usize| trace.counts[at..(at + window).min(BINS)].iter().sum::<f64>() / window as f64;
                 trace.counts = (0..BINS - window).map(|at| mean(at).round()).collect();
             }
-            prop_assert!(said(&traces).unwrap().contains("averaged, smoothed or divided, or distances"));
+            prop_assert!(said(&traces).unwrap().contains("averaged, smoothed or divided, or are distances"));
             let depths = recorded(32, &|_, _| 9.0, &|_, n| background + n, seed);
-            prop_assert!(said(&depths).unwrap().contains("averaged, smoothed or divided, or distances"));
+            prop_assert!(said(&depths).unwrap().contains("averaged, smoothed or divided, or are distances"));
         }
+    }
+
+    /// A factor that is no whole number, also over so little background that many bins are empty.
+    #[test]
+    fn counts_that_were_multiplied_are_not_taken_for_others() {
+        for background in [1.5, 20.0] {
+            let light = scene(background, vec![(3000.0, 60.5, 1.0)]);
+            let says = said(&recorded(256, &light, &|_, n| (10.5 * n).round(), 1)).unwrap();
+            assert!(says.contains("ultiplied"), "{says}");
+        }
+    }
+
+    /// Also of few pixels, of which bins are dead or were not measured.
+    #[test]
+    fn bins_that_are_alike_in_all_pixels_are_named() {
+        let width = |bin: usize| [0.4, 1.6, 0.7, 1.3, 1.0][bin * bin % 11 % 5];
+        let light = |_, bin: usize| {
+            if bin < 40 || bin == 90 {
+                0.0
+            } else {
+                60.0 * width(bin)
+            }
+        };
+        let says = said(&recorded(16, &light, &|_, n| n, 1)).unwrap();
+        assert!(says.contains("so the bins are of unequal width"), "{says}");
+    }
+
+    #[test]
+    fn counters_that_are_full_are_named() {
+        let says = said(&recorded(32, &|_, _| 250.0, &|_, n| n.min(255.0), 1)).unwrap();
+        assert!(
+            says.contains("% of the bins hold 255, the most that they can"),
+            "{says}"
+        );
     }
 
     #[test]
@@ -377,7 +445,11 @@ mod tests {
             trace.cycles = 1000.0;
             trace.counts.fill_with(|| half.sample(&mut rng) as f64);
         }
-        assert!(Audit::of(&traces, false).no_counts(0.01).is_some());
-        assert_eq!(Audit::of(&traces, true).no_counts(0.01), None);
+        assert!(
+            said(&traces)
+                .unwrap()
+                .contains("or a bin counts once a laser cycle, and --recorded-cycles")
+        );
+        assert_eq!(no_counts(&traces, true, 0.01), None);
     }
 }

@@ -31,7 +31,7 @@ use dtof_photons::MM_PER_PS;
 use dtof_theory::progress::{self, Progress};
 use rayon::prelude::*;
 
-pub use audit::{Audit, Scatter};
+pub use audit::Scatter;
 pub use find::glass::{Glass, Layer, Nearest};
 pub use find::observed::{Length, Observed};
 pub use find::offset::Offset;
@@ -133,8 +133,8 @@ pub struct Calibration {
     pub bins: usize,
     /// Picoseconds a bin: fitted, or as they were given.
     pub bin_width_ps: f64,
-    /// Whether the recording holds photon counts.
-    pub audit: Audit,
+    /// Why the recording holds no photon counts, if it does not.
+    pub no_counts: Option<String>,
     /// Background, hot and dead pixels.
     pub pixels: Pixels,
     /// The TDC, where laser cycles are known or the background shows it.
@@ -177,16 +177,16 @@ struct AllHistograms {
     /// The last bin that was measured.
     last_bin: usize,
     tdc: Option<Tdc>,
-    audit: Audit,
+    no_counts: Option<String>,
 }
 
 impl AllHistograms {
-    fn new(observed: &Observed, hot: &[usize], dead_time: Option<u16>) -> Result<Self> {
+    fn new(observed: &Observed, hot: &[usize], options: &CalibrationOptions) -> Result<Self> {
         let mut traces = observed.traces(hot)?;
         let last_bin = cut_unmeasured(&mut traces);
-        let audit = Audit::of(&traces, observed.length.is_known());
+        let no_counts = audit::no_counts(&traces, observed.length.is_known(), options.false_alarm);
         let tdc = match observed.length {
-            Length::Cycles(_) => Some(match dead_time {
+            Length::Cycles(_) => Some(match options.dead_time {
                 Some(bins) => pile_up::known_tdc(&traces, bins.into()),
                 None => pile_up::tdc(&traces).or_by_times(&traces, observed.times),
             }),
@@ -208,7 +208,7 @@ impl AllHistograms {
             levels,
             last_bin,
             tdc,
-            audit,
+            no_counts,
         })
     }
 }
@@ -232,10 +232,10 @@ pub fn calibrate_with(
     options: &CalibrationOptions,
     progress: Progress,
 ) -> Result<Calibration> {
-    let mut all = AllHistograms::new(observed, &[], options.dead_time)?;
+    let mut all = AllHistograms::new(observed, &[], options)?;
     if !all.pixels.hot.is_empty() && !observed.length.is_known() {
         // A hot pixel is the brightest, but does not show how long the recording lasted.
-        all = AllHistograms::new(observed, &all.pixels.hot, options.dead_time)?;
+        all = AllHistograms::new(observed, &all.pixels.hot, options)?;
     }
     let AllHistograms {
         traces,
@@ -243,7 +243,7 @@ pub fn calibrate_with(
         pixels,
         last_bin,
         tdc,
-        audit,
+        no_counts,
     } = all;
     let good = traces.into_iter().zip(levels);
     let good = good.filter(|(trace, _)| pixels.is_good(trace.pixel));
@@ -314,7 +314,7 @@ pub fn calibrate_with(
         length: observed.length,
         bins,
         bin_width_ps,
-        audit,
+        no_counts,
         tdc,
         nearest,
         pulse,
@@ -533,7 +533,7 @@ mod tests {
             offsets_mm: &[],
             times: None,
         };
-        let all = AllHistograms::new(&observed, &[], None).unwrap();
+        let all = AllHistograms::new(&observed, &[], &CalibrationOptions::default()).unwrap();
         let rate = all.pixels.background;
         let good = GoodHistograms::new(observed.array, rate, all.traces, all.levels);
         let options = CalibrationOptions {

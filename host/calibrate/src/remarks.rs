@@ -20,7 +20,7 @@ impl Calibration {
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let all = [
-            self.audit.no_counts(self.detection.false_alarm),
+            self.no_counts.clone(),
             self.unclear_glass(),
             self.wide_pulse(),
             self.hidden_surfaces(),

@@ -216,7 +216,8 @@ pub struct PhotonList<R> {
     cycles: u64,
     /// The laser cycle of the first photon.
     first_cycle: u64,
-    /// The greatest number that divides all laser cycles.
+    /// Different laser cycles with photons, and the greatest number that divides them, counted from the first.
+    different: u64,
     divisor: u64,
     photons_per_cycle: f64,
     /// The most photons of the laser cycles of any span.
@@ -238,7 +239,7 @@ impl<R: PhotonReader> PhotonList<R> {
         let mut rows = Validator::<R>::open(input, shape, None)?;
         let mut is_there = vec![false; Array::MOST_PIXELS as usize];
         let (mut not_replayed, mut recorded) = (0, 0u64);
-        let (mut first_cycle, mut divisor) = (0, 0);
+        let (mut first_cycle, mut different, mut divisor) = (0, 0, 0);
         // The span of the last photon, its photons so far, and the most photons of any span.
         let (mut span, mut of_span, mut most) = (0, 0u64, 0);
         while let Some(row) = rows.next()? {
@@ -246,8 +247,9 @@ impl<R: PhotonReader> PhotonList<R> {
             if rows.photons == 1 {
                 first_cycle = row.cycle;
             }
+            different += u64::from(row.cycle >= recorded);
             if divisor != 1 {
-                divisor = greatest_divisor(divisor, row.cycle);
+                divisor = greatest_divisor(divisor, row.cycle - first_cycle);
             }
             recorded = row.cycle.saturating_add(1);
             if row.cycle >= cycles {
@@ -286,6 +288,7 @@ impl<R: PhotonReader> PhotonList<R> {
             places,
             cycles: cycles.min(recorded),
             first_cycle,
+            different,
             divisor,
             photons_per_cycle: most as f64 / SPAN.min(recorded) as f64,
             most_of_span: most,
@@ -305,8 +308,8 @@ impl<R> PhotonList<R> {
 
     /// That the laser cycles may be times.
     pub fn times_as_cycles(&self) -> Option<String> {
-        let (photons, last) = self.rows.expected?;
-        times_as_cycles(photons, self.first_cycle, last, self.divisor)
+        let (photons, _) = self.rows.expected?;
+        times_as_cycles(photons, self.first_cycle, self.different, self.divisor)
     }
 
     /// Laser cycles before the next photon, if that has been read already.

@@ -72,29 +72,25 @@ pub const fn greatest_divisor(mut one: u64, mut other: u64) -> u64 {
     one
 }
 
-/// Warns if the laser cycles of a list with so many photons have a divisor in common, as times do, or are all alike. `first`
-/// and `last` are the first and the last of them.
+/// Warns if the photons of a list are all in the laser cycle `first`, or if their laser cycles, of which so many are
+/// `different`, lie multiples of `divisor` apart, as times do.
 #[must_use]
-pub fn times_as_cycles(photons: u64, first: u64, last: u64, divisor: u64) -> Option<String> {
-    /// The laser cycles of fewer photons may all be even, and so on.
+pub fn times_as_cycles(photons: u64, first: u64, different: u64, divisor: u64) -> Option<String> {
+    /// Fewer photons or laser cycles may be so by chance.
     const FEWEST: u64 = 30;
-    if photons < FEWEST {
-        None
-    } else if first == last {
-        Some(format!(
-            "all {} photons come in laser cycle {}, so the recording lasted no longer: count the laser pulses, or save \
-             histograms",
+    if photons >= FEWEST && different == 1 {
+        return Some(format!(
+            "all {} photons come in laser cycle {}: count the laser pulses, or save histograms",
             grouped(photons),
             grouped(first)
-        ))
-    } else {
-        (divisor > 1).then(|| {
-            format!(
-                "all laser cycles are multiples of {divisor}, as times are, so rates are {divisor} times too low: save `cycle // \
-                 {divisor}`, the number of the laser pulse"
-            )
-        })
+        ));
     }
+    (different >= FEWEST && divisor > 1).then(|| {
+        format!(
+            "all laser cycles are multiples of {divisor} apart: if they are times, rates are {divisor} times too low; save \
+             `cycle // {divisor}`, the number of the laser pulse"
+        )
+    })
 }
 
 /// Warns if `columns` do not divide the `pixels` of a list, or if they are missing and the pixels would make a square.
@@ -328,24 +324,20 @@ mod tests {
 
     #[test]
     fn laser_cycles_with_a_common_divisor_may_be_times() {
-        let times = "all laser cycles are multiples of 100, as times are, so rates are 100 times too low: save `cycle // 100`, \
-                     the number of the laser pulse";
-        let one = "all 1,000 photons come in laser cycle 7, so the recording lasted no longer: count the laser pulses, or save \
-                   histograms";
-        for (photons, first, last, divisor, warning) in [
-            (1000, 0, 900, 100, Some(times)),
-            (30, 100, 900, 100, Some(times)),
-            (29, 100, 900, 100, None),
-            (1000, 0, 900, 1, None),
-            (1000, 7, 7, 7, Some(one)),
-            (29, 7, 7, 7, None),
+        let times = "all laser cycles are multiples of 100 apart: if they are times, rates are 100 times too low; save `cycle // \
+                     100`, the number of the laser pulse";
+        let one =
+            "all 1,000 photons come in laser cycle 7: count the laser pulses, or save histograms";
+        for (photons, different, divisor, warning) in [
+            (1000, 900, 100, Some(times)),
+            (30, 30, 100, Some(times)),
+            (1000, 29, 100, None),
+            (1000, 900, 1, None),
+            (1000, 1, 0, Some(one)),
+            (29, 1, 0, None),
         ] {
-            let found = times_as_cycles(photons, first, last, divisor);
-            assert_eq!(
-                found.as_deref(),
-                warning,
-                "{photons} {first} {last} {divisor}"
-            );
+            let found = times_as_cycles(photons, 7, different, divisor);
+            assert_eq!(found.as_deref(), warning, "{photons} {different} {divisor}");
         }
     }
 

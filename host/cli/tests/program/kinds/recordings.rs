@@ -589,17 +589,20 @@ fn background_is_taken_off(rng: &mut Pcg64) -> Recording {
 
 fn counts_are_multiplied(rng: &mut Pcg64) -> Recording {
     let scene = HalfLit::draw(rng, 1.0, 200.0);
-    let factor = whole(rng, 2, 60) as u64;
+    let factor = match chance(rng, 0.5) {
+        true => whole(rng, 2, 60) as f64,
+        false => between(rng, 5.0, 60.0),
+    };
     let pixels = scene.lights.iter();
     let pixels = pixels.map(|light| {
         light
             .counts(rng)
             .iter()
-            .map(|count| count * factor)
+            .map(|&count| (count as f64 * factor).round() as u64)
             .collect()
     });
     let pixels = pixels.collect();
-    scene.recording(pixels, &["multiples of"])
+    scene.recording(pixels, &["multiples of", "were multiplied"])
 }
 
 /// By a third or more, in all pixels alike or in each.
@@ -647,6 +650,7 @@ fn counts_are_averaged(rng: &mut Pcg64) -> Recording {
 fn laser_cycles_are_times(rng: &mut Pcg64) -> Recording {
     let scene = HalfLit::draw(rng, 0.5, 5.0);
     let (cycles, period) = (whole(rng, 1000, 4000), log_between(rng, 2.0, 1e5) as u32);
+    let start = whole(rng, 0, 100_000) as u32;
     let mut list = List::new();
     for (pixel, light) in scene.lights.iter().enumerate() {
         list.add(
@@ -658,7 +662,7 @@ fn laser_cycles_are_times(rng: &mut Pcg64) -> Recording {
         );
     }
     for [_, cycle, _] in &mut list.photons {
-        *cycle *= period;
+        *cycle = start + *cycle * period;
     }
     Recording {
         need: Need::Told(&["laser cycles are multiples"]),
