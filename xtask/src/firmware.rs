@@ -364,15 +364,7 @@ fn link(
     let target_folder = target_folder(root);
     let folder = target_folder.join("images");
     fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-    let is_sidecar = binary == board.sidecar();
-    let image = if is_sidecar {
-        format!("sidecar-{}", board.name())
-    } else {
-        binary.to_owned()
-    };
-    let more = features.iter().filter(|&&feature| !image.contains(feature));
-    let name: Vec<&str> = iter::once(&*image).chain(more.copied()).collect();
-    let name = name.join("+");
+    let name = image_name(board, binary, features, profile);
     let is_first = !is_kept(&folder, &name);
     if is_first {
         eprintln!("building {name} for the first time");
@@ -402,7 +394,7 @@ fn link(
         .arg(&target_folder)
         .status()
         .context("cargo does not start")?;
-    ensure!(status.success(), "{image} does not build, see above");
+    ensure!(status.success(), "{name} does not build, see above");
 
     let built = target_folder.join(target).join(profile).join(binary);
     layout::check(&built, binary == "bench")?;
@@ -436,6 +428,21 @@ fn compiler_flags(root: &Path) -> Result<String> {
     }
     flags.retain(|flag| !flag.is_empty());
     Ok(flags.join("\u{1f}"))
+}
+
+/// The name of the file that keeps an image. Those for speed and for size have names of their own: a run beside this one may
+/// build the other before this one is started.
+fn image_name(board: Board, binary: &str, features: &[&str], profile: &str) -> String {
+    let image = match binary == board.sidecar() {
+        true => format!("sidecar-{}", board.name()),
+        false => binary.to_owned(),
+    };
+    let more = features.iter().filter(|&&feature| !image.contains(feature));
+    let mut name: Vec<&str> = iter::once(&*image).chain(more.copied()).collect();
+    if profile == SMALL_PROFILE {
+        name.push("small");
+    }
+    name.join("+")
 }
 
 /// Whether the folder has an image of this name. The numbers of its laser may follow the name.
@@ -491,6 +498,17 @@ mod tests {
             assert!(features(what, &[Choice::LaserBeyondLimits]).is_err());
         }
         assert!(features(Build::SelfTest, &[Choice::LaserOnWithoutHost]).is_err());
+    }
+
+    #[test]
+    fn each_image_has_its_own_name() {
+        let board = Board::Pico;
+        let bench = |profile| image_name(board, "bench", &["pico", "bench"], profile);
+        assert_eq!(bench(PROFILE), "bench+pico");
+        assert_eq!(bench(SMALL_PROFILE), "bench+pico+small");
+        let sidecar = |features| image_name(board, board.sidecar(), features, PROFILE);
+        assert_eq!(sidecar(&["pico"]), "sidecar-pico");
+        assert_eq!(sidecar(&["pico", "count8"]), "sidecar-pico+count8");
     }
 
     #[test]
