@@ -1,14 +1,31 @@
-//! Whether a recording holds photon counts.
+//! Whether a recording is what a decision needs: photon counts over bins of time, with a flat background and pulses.
+//!
+//! | what is looked at | what it may be |
+//! |---|---|
+//! | holes in peaks where no count needs another bit | counters that wrapped |
+//! | many bins with the highest count | counters that were full |
+//! | how neighbouring bins scatter | what is no photon count |
+//! | the level of eighths of the range | a background that is not flat |
+//! | peaks of one bin at one place, where others are wider | no light that came back |
+//! | the first and the last bins | a TDC whose range is shorter |
+//! | photons a laser cycle | a wrong number of laser cycles |
+//!
+//! The first of the upper five is the cause of others below, and of what else is found. The last two stand by themselves.
 //!
 //! Decisions rest on the scatter of photon counts: what is no count has another one. Let three neighbouring bins hold a, b
 //! and c photons, and n together. If their means lie on a straight line, each of the n photons adds 1, −2 or 1 to
 //! a − 2b + c, with the mean 0 and the variance 2, so (a − 2b + c)² ÷ 2n has the mean 1, whatever n is. A bin that counts at
 //! most once a laser cycle and is full in the share p of them scatters less, by 1 − p.
 
+use std::ops::{Range, RangeInclusive};
+
 use dtof_photons::warnings::greatest_divisor;
 
+use super::find::good_histograms::GoodHistograms;
 use super::find::observed::Trace;
-use super::find::significance::median;
+use super::find::pile_up::Tdc;
+use super::find::significance::{is_surely_less, median};
+use super::remarks::two_digits;
 
 /// A recording with more bins is judged by some of its histograms.
 const BINS: usize = 1 << 20;
@@ -27,6 +44,8 @@ const MEDIAN: f64 = 0.4549;
 const COUNTS: [f64; 2] = [0.7, 1.4];
 /// So large a share of the bins has a cause: empty ones that photons would have filled, and full ones.
 const MANY: f64 = 0.1;
+/// Standard deviations that chance does not reach.
+const SURE: f64 = 6.0;
 
 /// How neighbouring bins scatter beside the peaks.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,6 +88,27 @@ impl Scatter {
             triples,
         }
     }
+}
+
+/// The background of all histograms together in each bin, as far as it lies beside peaks.
+fn background(histograms: &[&[f64]]) -> Vec<f64> {
+    let mut sums = vec![(0.0, 0_usize); histograms.first().map_or(0, |counts| counts.len())];
+    for (counts, is_beside) in histograms.iter().zip(beside_peaks(histograms)) {
+        for ((sum, count), _) in sums
+            .iter_mut()
+            .zip(*counts)
+            .zip(is_beside)
+            .filter(|(_, is)| *is)
+        {
+            *sum = (sum.0 + count, sum.1 + 1);
+        }
+    }
+    let all = histograms.len() as f64;
+    let of_all = |(sum, number): (f64, usize)| sum * all / number as f64;
+    sums.into_iter()
+        .filter(|sum| sum.1 > 0)
+        .map(of_all)
+        .collect()
 }
 
 fn sum(histograms: &[&[f64]]) -> Vec<f64> {
@@ -263,6 +303,261 @@ pub(super) fn no_counts(traces: &[Trace], has_cycles: bool, false_alarm: f64) ->
         0.0
     };
     (high < least * (1.0 - full)).then(|| format!("{}. {}", differ(high), seen.less(has_cycles)))
+}
+
+/// What the counts say against the recording.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Audit {
+    /// What makes the rest of what was found mean little.
+    pub cause: Option<String>,
+    /// What else looks wrong.
+    pub others: Vec<String>,
+}
+
+/// "N % of the histograms".
+fn of_histograms(some: usize, all: usize) -> String {
+    let percent = (100.0 * some as f64 / all as f64).max(1.0);
+    format!("{percent:.0} % of the histograms")
+}
+
+/// Counts that wrapped look like holes in peaks, and counters that were full have the highest count in many bins.
+pub(super) fn narrow_counters(traces: &[Trace]) -> Option<String> {
+    let all = || traces.iter().flat_map(|trace| &trace.counts).copied();
+    let highest = all().fold(0.0, f64::max);
+    wrapped(traces, highest).or_else(|| full(traces, highest))
+}
+
+/// Holes in most of the peaks, in counts that need all bits of 8 or 16.
+fn wrapped(traces: &[Trace], highest: f64) -> Option<String> {
+    let values = [256.0, 65_536.0];
+    let values = values.into_iter().find(|values| highest < *values)?;
+    let high = values / 4.0;
+    let is_high = |trace: &&Trace| trace.counts.iter().any(|&count| count > high);
+    let has_hole = |trace: &&Trace| {
+        trace.counts.windows(5).any(|bins| {
+            let lower = f64::min(bins[0].max(bins[1]), bins[3].max(bins[4]));
+            lower > high && lower - bins[2] > SURE * (lower + bins[2]).sqrt()
+        })
+    };
+    let all = traces.iter().filter(is_high).count();
+    let holes = traces.iter().filter(has_hole).count();
+    let is_wrapped = highest >= values / 2.0 && holes > 1 && 2 * holes > all;
+    is_wrapped.then(|| {
+        let (most, wider) = match values < 1000.0 {
+            true => (255, "numpy.uint16"),
+            false => (65_535, "numpy.uint32"),
+        };
+        format!(
+            "{} have a hole in a peak, and no count is above {most}, as if those above it wrapped to 0: save them as {wider}, \
+             unless they see two surfaces a few bins apart",
+            of_histograms(holes, traces.len())
+        )
+    })
+}
+
+/// The highest count in more bins than the counts just below it together.
+fn full(traces: &[Trace], highest: f64) -> Option<String> {
+    /// Chance does not make so high a count the highest of several bins.
+    const HIGH: f64 = 64.0;
+    let below = highest - f64::min(highest / 32.0, 16.0);
+    let number = |counts: &[f64], is: &dyn Fn(f64) -> bool| {
+        counts.iter().filter(|&&count| is(count)).count()
+    };
+    let sum = |is: &dyn Fn(f64) -> bool| {
+        traces
+            .iter()
+            .map(|trace| number(&trace.counts, is))
+            .sum::<usize>()
+    };
+    let at = sum(&|count| count >= highest);
+    let near = sum(&|count| count >= below) - at;
+    let having = traces
+        .iter()
+        .filter(|trace| trace.counts.contains(&highest))
+        .count();
+    let is_full = highest >= HIGH && at > near + 3 && having > 1 && 100 * having >= traces.len();
+    is_full.then(|| {
+        format!(
+            "{} have a bin of {highest} and none has more, so their counters were full and their peaks are cut off: \
+             record less light, or with wider counters",
+            of_histograms(having, traces.len())
+        )
+    })
+}
+
+/// A background that no single level describes: more than half of the eighths of the range differ from it by a standard
+/// deviation of the photons in a window, which moves the threshold by as much.
+pub(super) fn uneven_background(
+    good: &GoodHistograms,
+    tdc: Option<Tdc>,
+    false_alarm: f64,
+) -> Option<String> {
+    const PARTS: usize = 8;
+    /// The usual window.
+    const WINDOW: f64 = 3.0;
+    let length = good.bins() / PARTS;
+    if length < 3 {
+        return None;
+    }
+    // Of each part the median bin of all histograms, and the level that they have: a pulse is in few bins. Behind bright
+    // peaks a TDC may have seen little.
+    let mut parts = [(0.0, 0.0); PARTS];
+    for trace in &good.traces {
+        let seen = |bins: Range<usize>| {
+            let bins = trace.counts[bins.clone()].iter().zip(&trace.live[bins]);
+            bins.filter(|(_, live)| **live >= 0.5)
+                .map(|(count, _)| *count)
+        };
+        let level = median(seen(0..good.bins()));
+        for (at, part) in parts.iter_mut().enumerate() {
+            let bins = at * length..(at + 1) * length;
+            if 2 * seen(bins.clone()).count() > length {
+                *part = (part.0 + median(seen(bins)), part.1 + level);
+            }
+        }
+    }
+    let shift = (WINDOW * median(good.levels.iter().map(|level| level.mean))).sqrt();
+    let share = |(sum, level): (f64, f64)| sum / level;
+    let differs = |&&(sum, level): &&(f64, f64)| {
+        level > 0.0
+            && (sum / level - 1.0).abs() * shift > 1.0
+            && (sum - level).abs() > SURE * level.sqrt()
+    };
+    (2 * parts.iter().filter(differs).count() > PARTS).then(|| {
+        let shares = parts.iter().filter(|part| part.1 > 0.0).copied().map(share);
+        let (least, most) = shares.fold((f64::INFINITY, 0.0), |(least, most), share| (share.min(least), share.max(most)));
+        let percent = |share: f64| (100.0 * share).round();
+        let helps = match tdc {
+            Some(Tdc::OnePhotonIn { .. }) => "if it is pile-up, --recorded-cycles N corrects it",
+            _ => "--gate FIRST..LAST keeps a part of the range that is flat",
+        };
+        format!(
+            "the background is not flat: eighths of the range have {} to {} % of its median, so more than {} % of the pixels \
+             without a target may have a depth. {}{}",
+            percent(least),
+            percent(most),
+            (1e4 * false_alarm).round() / 100.0,
+            helps[..1].to_uppercase(),
+            &helps[1..]
+        )
+    })
+}
+
+/// Peaks of a single bin at the same place, where other peaks are wider.
+pub(super) fn spike(good: &GoodHistograms) -> Option<String> {
+    /// Fewer histograms may have a stuck bin of one pixel.
+    const SHARE: f64 = 0.05;
+    let mut spikes = vec![0_usize; good.bins()];
+    let (mut narrow, mut wide) = (0, vec![0_usize; good.bins()]);
+    for (index, peaks) in good.peaks.iter().enumerate() {
+        let counts = &good.traces[index].counts;
+        for peak in peaks {
+            let background = good.background(index, peak.top);
+            let above = |bin: usize| counts.get(bin).map_or(0.0, |count| count - background);
+            let most = 0.02 * above(peak.top) + 3.0 * (background + 1.0).sqrt();
+            let is_narrow = above(peak.top) > 20.0
+                && above(peak.top + 1) <= most
+                && peak.top.checked_sub(1).is_none_or(|bin| above(bin) <= most);
+            if is_narrow {
+                spikes[peak.top] += 1;
+                narrow += 1;
+            } else {
+                wide[peak.top] += 1;
+            }
+        }
+    }
+    let (bin, &number) = spikes
+        .iter()
+        .enumerate()
+        .max_by_key(|(_, number)| **number)?;
+    let wide_elsewhere: usize = wide.iter().sum::<usize>() - wide[bin];
+    let all = good.traces.len();
+    // Those of a narrow pulse are everywhere.
+    let is_spike = number > 1
+        && number as f64 >= SHARE * all as f64
+        && wide_elsewhere > 2 * (narrow - number)
+        && wide_elsewhere > 0;
+    is_spike.then(|| {
+        let last = good.bins() - 1;
+        let helps = match bin {
+            0..8 => format!("--gate {}..{last} leaves it out", bin + 1),
+            _ if bin + 8 > last => format!("--gate 0..{} leaves it out", bin - 1),
+            _ => format!("`counts[..., {bin}] = counts[..., {}]` removes it", bin - 1),
+        };
+        format!(
+            "{} have a spike at bin {bin} that is narrower than the pulse, so it is no light that came back: {helps}",
+            of_histograms(number, all)
+        )
+    })
+}
+
+/// The first and the last bin of the range of the TDC, and a warning if bins beyond hold hardly anything. If they hold
+/// nothing, nothing is lost. Whether laser cycles are known helps to tell the end from pile-up.
+pub(super) fn range(traces: &[Trace], has_cycles: bool) -> (RangeInclusive<usize>, Option<String>) {
+    /// Bins with a smaller share of the photons of the others are hardly filled. The one beside them is partly.
+    const HARDLY: f64 = 0.2;
+    const PARTLY: f64 = 0.8;
+    /// By chance one in so many.
+    const ONE_IN: f64 = 1e6;
+    let bins = traces.first().map_or(0, |trace| trace.counts.len());
+    let histograms: Vec<&[f64]> = traces.iter().map(|trace| &trace.counts[..]).collect();
+    let sums = sum(&histograms);
+    let is_filled = |sum: &f64| *sum > 0.0;
+    let end = sums
+        .iter()
+        .rposition(is_filled)
+        .map_or(bins, |last| last + 1);
+    let start = sums.iter().position(is_filled).unwrap_or(0);
+    let usual = median(background(&histograms));
+    let is_below = |bin: usize, share: f64| is_surely_less(sums[bin], share * usual, ONE_IN);
+    // Its slope is no edge, and after a bright pulse it leaves few laser cycles.
+    let is_pile_up = |end: usize| {
+        let edge = &sums[end.saturating_sub(4)..end];
+        let recorded =
+            sums[..end].iter().sum::<f64>() / traces.iter().map(|trace| trace.cycles).sum::<f64>();
+        let is_sharp = edge.iter().rev().take(2).any(|&sum| sum >= 0.5 * usual);
+        !is_sharp
+            || match has_cycles {
+                // A TDC that takes one photon a laser cycle has no more.
+                true => (0.5..1.05).contains(&recorded),
+                false => edge.iter().any(|&sum| sum > 2.0 * usual),
+            }
+    };
+    let is_hardly = |bin: &usize| is_below(*bin, HARDLY);
+    let mut first = start + (start..end).take_while(is_hardly).count();
+    let hardly = (first..end).rev().take_while(is_hardly).count();
+    let mut last = match end - hardly {
+        0 => end - 1,
+        edge if is_pile_up(edge) => end - 1,
+        edge => edge - 1,
+    };
+    let beyond = || sums[..first].iter().chain(&sums[last + 1..]);
+    let lost: f64 = beyond().sum();
+    let warning = (lost > 0.0).then(|| {
+        let beyond = beyond().filter(|sum| is_filled(sum)).count();
+        format!(
+            "the {beyond} bins beyond {first}..{last} hold {:.1} % of the background of as many others: the range of the TDC \
+             ends there, so the gate leaves them out; --gate 0..{} keeps them",
+            100.0 * lost / beyond as f64 / usual,
+            end - 1
+        )
+    });
+    first += usize::from(first > 0 && is_below(first, PARTLY));
+    last -= usize::from(last + 1 < bins && last > 0 && is_below(last, PARTLY));
+    (first..=last, warning)
+}
+
+/// That a known number of laser cycles leaves far less light than any sensor is used with.
+pub(super) fn hardly_any_light(brightest: f64, cycles: u64) -> Option<String> {
+    /// Photons a laser cycle of the brightest pixel.
+    const LEAST: f64 = 1e-5;
+    (brightest > 0.0 && brightest < LEAST * cycles as f64).then(|| {
+        format!(
+            "the brightest pixel has a photon in {} laser cycles: --recorded-cycles is how many laser cycles each histogram \
+             counted",
+            two_digits(cycles as f64 / brightest)
+        )
+    })
 }
 
 #[cfg(test)]

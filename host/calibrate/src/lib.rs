@@ -22,6 +22,7 @@ mod watch;
 mod written;
 
 use std::collections::BTreeSet;
+use std::ops::RangeInclusive;
 
 use anyhow::Result;
 use dtof_core::CentredWindow;
@@ -31,7 +32,7 @@ use dtof_photons::MM_PER_PS;
 use dtof_theory::progress::{self, Progress};
 use rayon::prelude::*;
 
-pub use audit::Scatter;
+pub use audit::{Audit, Scatter};
 pub use find::glass::{Glass, Layer, Nearest};
 pub use find::observed::{Length, Observed};
 pub use find::offset::Offset;
@@ -49,7 +50,7 @@ use find::good_histograms::GoodHistograms;
 use find::observed::Trace;
 use find::pixel_offsets::{LARGEST_MM, Measured, pixel_offsets};
 use find::shape::Window;
-use find::significance::{is_surely_less, median};
+use find::significance::median;
 use find::{glass, offset, peaks, pile_up, pulse};
 use photon_budget::Replay;
 use used_pulse::UsedPulse;
@@ -133,8 +134,10 @@ pub struct Calibration {
     pub bins: usize,
     /// Picoseconds a bin: fitted, or as they were given.
     pub bin_width_ps: f64,
-    /// Why the recording holds no photon counts, if it does not.
-    pub no_counts: Option<String>,
+    /// What its counts say against the recording.
+    pub audit: Audit,
+    /// Whether the recording is known to hold something else than histograms, so that nothing here means anything.
+    pub is_void: bool,
     /// Background, hot and dead pixels.
     pub pixels: Pixels,
     /// The TDC, where laser cycles are known or the background shows it.
@@ -174,17 +177,30 @@ struct AllHistograms {
     traces: Vec<Trace>,
     levels: Vec<Level>,
     pixels: Pixels,
-    /// The last bin that was measured.
-    last_bin: usize,
+    /// The first and the last bin that were measured.
+    range: RangeInclusive<usize>,
     tdc: Option<Tdc>,
-    no_counts: Option<String>,
+    audit: Audit,
 }
 
 impl AllHistograms {
     fn new(observed: &Observed, hot: &[usize], options: &CalibrationOptions) -> Result<Self> {
         let mut traces = observed.traces(hot)?;
-        let last_bin = cut_unmeasured(&mut traces);
-        let no_counts = audit::no_counts(&traces, observed.length.is_known(), options.false_alarm);
+        let has_cycles = observed.length.is_known();
+        let cause = audit::narrow_counters(&traces);
+        let (range, short) = audit::range(&traces, has_cycles);
+        for trace in &mut traces {
+            trace.counts.truncate(range.end() + 1);
+            trace.live.truncate(range.end() + 1);
+        }
+        let cause = cause.or_else(|| audit::no_counts(&traces, has_cycles, options.false_alarm));
+        let dim = match observed.length {
+            Length::Cycles(cycles) if observed.times.is_none() => {
+                let photons = traces.iter().map(|trace| trace.counts.iter().sum());
+                audit::hardly_any_light(photons.fold(0.0, f64::max), cycles)
+            }
+            _ => None,
+        };
         let tdc = match observed.length {
             Length::Cycles(_) => Some(match options.dead_time {
                 Some(bins) => pile_up::known_tdc(&traces, bins.into()),
@@ -206,9 +222,12 @@ impl AllHistograms {
             pixels: Pixels::new(observed.array, &traces, &levels),
             traces,
             levels,
-            last_bin,
+            range,
             tdc,
-            no_counts,
+            audit: Audit {
+                cause,
+                others: short.into_iter().chain(dim).collect(),
+            },
         })
     }
 }
@@ -241,9 +260,9 @@ pub fn calibrate_with(
         traces,
         levels,
         pixels,
-        last_bin,
+        range,
         tdc,
-        no_counts,
+        mut audit,
     } = all;
     let good = traces.into_iter().zip(levels);
     let good = good.filter(|(trace, _)| pixels.is_good(trace.pixel));
@@ -251,16 +270,24 @@ pub fn calibrate_with(
     anyhow::ensure!(!traces.is_empty(), "every pixel is dead or hot");
     let good = GoodHistograms::new(observed.array, pixels.background, traces, levels);
 
+    let uneven = audit::uneven_background(&good, tdc, options.false_alarm);
     let l2 = settle::l2(pixels.background);
     let with_glass =
         |good: &GoodHistograms| glass::nearest(good, options.glass, observed.times, l2.into());
     let nearest = match tdc {
+        // Near bins stand above the mean, which is no glass.
+        _ if uneven.is_some() && options.glass.is_none() => Nearest::NotCommon,
         Some(Tdc::OnePhotonIn { cycles, .. }) => with_glass(&good.corrected(cycles)),
         _ => with_glass(&good),
     };
+    let cause = audit.cause.take();
+    audit.cause = cause.or_else(|| audit::spike(&good)).or(uneven);
     let glass = nearest.glass();
     let bins = observed.bins();
-    let gate = settle::gate(last_bin, glass.map_or(0, |glass| glass.end))?;
+    let gate = settle::gate(
+        *range.end(),
+        glass.map_or(0, |glass| glass.end).max(*range.start()),
+    )?;
     let hidden = hidden(&good, gate, glass);
     let pulse = pulse::pulse(&windows(&good, gate.0, glass), options.seed);
     let used = UsedPulse::new(pulse.as_ref(), &options.known_pulse);
@@ -314,7 +341,8 @@ pub fn calibrate_with(
         length: observed.length,
         bins,
         bin_width_ps,
-        no_counts,
+        audit,
+        is_void: false,
         tdc,
         nearest,
         pulse,
@@ -332,30 +360,6 @@ pub fn calibrate_with(
         columns: observed.array.columns() as usize,
         pixels,
     })
-}
-
-/// The last measured bin is cut too if it has less than this share of the photons of the others.
-const PARTLY_MEASURED: f64 = 0.8;
-
-/// Cuts off the bins at the end that hold no photon where others surely hold some: they were not
-/// measured. Gives the last bin that is left.
-fn cut_unmeasured(traces: &mut [Trace]) -> usize {
-    let bins = traces.first().map_or(0, |trace| trace.counts.len());
-    let sum = |bin: usize| traces.iter().map(|trace| trace.counts[bin]).sum::<f64>();
-    let sums: Vec<f64> = (0..bins).map(sum).collect();
-    let end = sums.iter().rposition(|&sum| sum > 0.0);
-    let end = end.map_or(bins, |last| last + 1);
-    let usual = median(sums[..end].iter().copied());
-    if !is_surely_less(0.0, usual, 1e6) {
-        return bins.saturating_sub(1);
-    }
-    let is_cut = end < bins && is_surely_less(sums[end - 1], PARTLY_MEASURED * usual, 1e6);
-    let end = end - usize::from(is_cut);
-    for trace in traces {
-        trace.counts.truncate(end);
-        trace.live.truncate(end);
-    }
-    end - 1
 }
 
 /// No pixel sees crosstalk so many times as bright as the median pixel.

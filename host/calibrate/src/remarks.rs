@@ -1,7 +1,7 @@
 //! Remarks: what a recording does not show, and the option that would help.
 
 use super::find::pile_up::MATTERS;
-use super::{Calibration, Length, Nearest, PulseSource, Tdc};
+use super::{Audit, Calibration, Length, Nearest, PulseSource, Tdc};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::numbers::shortest;
 use dtof_options::rows::{Row, bins, grouped};
@@ -16,18 +16,26 @@ const WIDEST: f64 = 2.2;
 const MOST_HOT: f64 = 0.05;
 
 impl Calibration {
-    /// What the settings hide, or what makes depths wrong, each with the option that helps.
+    /// What is wrong with the recording, what the settings hide, or what makes depths wrong, each with the option that helps.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
-        let all = [
-            self.no_counts.clone(),
+        if self.is_void {
+            return Vec::new();
+        }
+        let Audit { cause, others } = &self.audit;
+        let audit = cause.iter().chain(others).cloned();
+        // The others may follow from it.
+        if cause.is_some() {
+            return audit.collect();
+        }
+        let found = [
             self.unclear_glass(),
             self.wide_pulse(),
             self.hidden_surfaces(),
             self.many_hot(),
             self.hidden_photons(),
         ];
-        all.into_iter().flatten().collect()
+        audit.chain(found.into_iter().flatten()).collect()
     }
 
     /// That early photons have hidden so many late ones, or seem to have, that depths may be wrong.
@@ -122,7 +130,7 @@ impl Calibration {
     clippy::cast_sign_loss,
     reason = "laser cycles"
 )]
-fn two_digits(number: f64) -> String {
+pub(super) fn two_digits(number: f64) -> String {
     let number = number.round() as u64;
     let unit = 10u64.pow(number.max(1).ilog10().saturating_sub(1));
     grouped((number + unit / 2) / unit * unit)

@@ -150,6 +150,8 @@ pub struct Metadata {
     /// Whether rows and columns are known. A list without columns is taken for one row, and so are histograms in two axes
     /// without names; the first of more than three axes without names may be captures.
     pub has_shape: bool,
+    /// Whether another axis than the last looks like the bins. Then no histogram is one.
+    pub looks_swapped: bool,
     /// The captures of the file, whether one or all are used.
     pub captures: usize,
     /// Photons in bins that were cut off.
@@ -426,10 +428,11 @@ fn array(input: &Input, options: &ReadOptions, read: Histograms) -> Result<Conte
         axes,
         pixels,
     } = read;
-    let swapped = match &options.axes {
-        None => warnings::swapped_axes(&axes, &pixels),
-        Some(_) => None,
-    };
+    let (mut swapped, mut perhaps) = (None, None);
+    if options.axes.is_none() {
+        swapped = warnings::swapped_axes(&axes, &pixels);
+        perhaps = warnings::bins_may_be_first(&axes, &pixels).filter(|_| swapped.is_none());
+    }
     let bins = layout.bins();
     let mut pixels = pixels.into_iter();
     let capture = || {
@@ -444,7 +447,8 @@ fn array(input: &Input, options: &ReadOptions, read: Histograms) -> Result<Conte
     let mut counts = counts.with_context(|| input.to_string())?;
     counts.axis_names = layout.axis_names;
     counts.metadata.has_shape = layout.is_shape_known;
-    counts.metadata.warnings.extend(swapped);
+    counts.metadata.looks_swapped = swapped.is_some();
+    counts.metadata.warnings.extend(swapped.or(perhaps));
     Ok(Content::Histograms(counts))
 }
 
@@ -559,6 +563,7 @@ fn metadata(bins: usize, width_ps: Option<U16F16>, options: &ReadOptions) -> Res
         gate: None,
         is_list: false,
         has_shape: true,
+        looks_swapped: false,
         captures: 1,
         cut_off: 0,
         rows: Vec::new(),

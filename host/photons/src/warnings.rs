@@ -114,6 +114,9 @@ const LOOKS_LIKE_BINS: f64 = 4.0;
 /// And if it is so many times as concentrated as the last axis.
 const MORE_THAN_LAST: f64 = 1.5;
 
+/// Of larger arrays some lines tell, with about so many counts.
+const MOST_COUNTS: usize = 1 << 21;
+
 /// How much more often two photons of a line fall into one place than if they were spread evenly, of all lines along an
 /// axis. 1 for an even line whatever its noise, and its length if all are in one place.
 #[derive(Clone, Default)]
@@ -125,6 +128,12 @@ struct Concentration {
 }
 
 impl Concentration {
+    fn along_last(pixels: &[Vec<u64>]) -> Self {
+        let mut all = Self::default();
+        pixels.iter().for_each(|bins| all.add(bins.iter().copied()));
+        all
+    }
+
     fn add(&mut self, line: impl Iterator<Item = u64>) {
         let (mut places, mut sum, mut same) = (0.0, 0.0, 0.0);
         for count in line {
@@ -154,7 +163,7 @@ impl Concentration {
     }
 
     /// The mean of the less concentrated half of the lines, so that hot pixels do not speak for all. A line with fewer than
-    /// two photons is even. There must be a line.
+    /// two photons is even.
     fn of_lower_half(&self) -> f64 {
         let lines: f64 = self.classes.values().map(|(lines, _)| lines).sum();
         let half = (lines + self.empty) / 2.0;
@@ -164,31 +173,29 @@ impl Concentration {
             taken += part;
             sum += total * part / lines;
         }
-        sum / half
+        sum / half.max(f64::MIN_POSITIVE)
     }
 }
 
-/// Warns if another axis than the last looks like the bins although the last was read as such, or if it may be the bins by
-/// the shape alone. `axes` are the lengths of the others, and their product is the number of `pixels`. Photons concentrate in a
-/// pulse along the bins: in most lines, while a hot pixel is in few.
+/// Warns if another axis than the last looks like the bins although the last was read as such. `axes` are the lengths of the
+/// others, and their product is the number of `pixels`. Photons concentrate in a pulse along the bins: in most lines, while a
+/// hot pixel is in few.
 ///
 /// # Panics
 /// Panics if an axis has no length, or if there are fewer pixels.
 #[must_use]
 pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
-    let mut along_last = Concentration::default();
-    pixels
-        .iter()
-        .for_each(|bins| along_last.add(bins.iter().copied()));
-    let along_last = along_last.mean();
-    if along_last >= LOOKS_LIKE_BINS {
-        return None;
-    }
+    let mut along_last = Concentration::along_last(pixels);
+    // Pixels without photons tell nothing.
+    along_last.empty = 0.0;
+    let half = along_last.of_lower_half();
     let total = |bins: &[u64]| bins.iter().fold(0u64, |sum, &n| sum.saturating_add(n));
     let brightest = (0..pixels.len()).max_by_key(|&pixel| total(&pixels[pixel]));
+    let bins = pixels.first()?.len();
+    // Odd, so that all are seen of a regular pattern.
+    let step = (pixels.len() * bins / MOST_COUNTS) | 1;
     let mut apart = pixels.len();
-    let least = LOOKS_LIKE_BINS.max(MORE_THAN_LAST * along_last);
-    let mut found = (least, None);
+    let mut found = (LOOKS_LIKE_BINS.max(MORE_THAN_LAST * half), None);
     for (number, &length) in axes.iter().enumerate() {
         let whole = apart;
         apart /= length;
@@ -202,8 +209,7 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
             let line = (start..).step_by(apart).take(length);
             let line = line.filter(|&pixel| Some(pixel) != left_out);
             let line: Vec<&[u64]> = line.map(|pixel| &pixels[pixel][..]).collect();
-            let bins = line.first().map_or(0, |bins| bins.len());
-            for bin in 0..bins {
+            for bin in (start % step..bins).step_by(step) {
                 along.add(line.iter().map(|bins| bins[bin]));
             }
         }
@@ -213,7 +219,7 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
         }
     }
     let which = match found.1 {
-        None => return bins_may_be_first(axes, pixels.first()?.len()),
+        None => return None,
         Some(0) => "the first axis".to_owned(),
         Some(number) => format!("axis {} of {}", number + 1, axes.len() + 1),
     };
@@ -222,26 +228,27 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
     ))
 }
 
-/// Warns of three axes of which the last two are equal and the first is longer: perhaps bins, rows and columns. They were
-/// read as rows, columns and bins. `axes` are the lengths of the first two.
-fn bins_may_be_first(axes: &[usize], bins: usize) -> Option<String> {
-    match *axes {
-        [rows, columns]
-            if columns == bins && bins >= FEWEST && rows > bins && rows <= MOST_BINS =>
-        {
-            Some(format!(
-                "{rows}x{columns}x{bins}: read as {rows} rows of {columns} columns with {bins} bins; if the first axis is the bins: \
+/// Warns of three axes of which the last two are equal and the first is longer, unless the last looks like the bins: perhaps
+/// bins, rows and columns. They were read as rows, columns and bins. `axes` are the lengths of the first two.
+#[must_use]
+pub fn bins_may_be_first(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
+    let bins = pixels.first()?.len();
+    let [rows, columns] = *axes else { return None };
+    let may_be = columns == bins && bins >= FEWEST && rows > bins && rows <= MOST_BINS;
+    (may_be && Concentration::along_last(pixels).mean() < LOOKS_LIKE_BINS).then(|| {
+        format!(
+            "{rows}x{columns}x{bins}: read as {rows} rows of {columns} columns with {bins} bins; if the first axis is the bins: \
              --axes bins,rows,columns, else --axes rows,columns,bins"
-            ))
-        }
-        _ => None,
-    }
+        )
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use rand_distr::{Distribution, Poisson};
+    use proptest::prelude::*;
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, Poisson, Uniform};
     use rand_pcg::Pcg64;
 
     #[test]
@@ -408,8 +415,9 @@ mod tests {
 
     #[test]
     fn a_square_behind_a_longer_axis_may_be_rows_and_columns() {
-        let even =
-            |axes: &[usize], bins| swapped_axes(axes, &lit(axes, 0, axes[0], &vec![100; bins]));
+        let even = |axes: &[usize], bins| {
+            bins_may_be_first(axes, &lit(axes, 0, axes[0], &vec![100; bins]))
+        };
         let line = "17x16x16: read as 17 rows of 16 columns with 16 bins; if the first axis is the bins: \
                     --axes bins,rows,columns, else --axes rows,columns,bins";
         assert_eq!(even(&[17, 16], 16).unwrap(), line);
@@ -429,7 +437,7 @@ mod tests {
         let mut sharp = [0; 16];
         sharp[3] = 100;
         assert_eq!(
-            swapped_axes(&[17, 16], &vec![sharp.to_vec(); 17 * 16]),
+            bins_may_be_first(&[17, 16], &vec![sharp.to_vec(); 17 * 16]),
             None
         );
     }
@@ -578,6 +586,56 @@ mod tests {
                 let warning = swapped_axes(&[bins, 16], &turned);
                 assert!(warning.is_some(), "{bins} {sigma} {slopes}");
             }
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Pixels of any brightness, each with a target at another range or with none.
+        #[test]
+        fn scattered_targets_show_the_axis_of_the_bins(
+            (rows, columns) in (8_usize..40, 8_usize..40),
+            signal in 20.0..1000.0_f64,
+            background in 0.01..1.0_f64,
+            sigma in 0.4..1.5_f64,
+            targets in 0.0..1.0_f64,
+            seed: u64,
+        ) {
+            const BINS: usize = 128;
+            let mut rng = Pcg64::seed_from_u64(seed);
+            let mut uniform = |from: f64, to: f64| Uniform::new(from, to).unwrap().sample(&mut rng);
+            let pixels = |share: f64, uniform: &mut dyn FnMut(f64, f64) -> f64| -> Vec<Vec<f64>> {
+                (0..rows * columns)
+                    .map(|_| {
+                        let (at, bright) = (uniform(20.0, 110.0), uniform(-0.7, 0.7).exp());
+                        let photons = if uniform(0.0, 1.0) < share { signal } else { 0.0 };
+                        let peak = |bin: usize| {
+                            let away = (bin as f64 + 0.5 - at) / sigma;
+                            (-0.5 * away * away).exp() / (2.5066 * sigma)
+                        };
+                        (0..BINS)
+                            .map(|bin| bright * (photons * peak(bin) + signal * background / BINS as f64))
+                            .collect()
+                    })
+                    .collect()
+            };
+            let some = pixels(targets, &mut uniform);
+            let all = pixels(1.0, &mut uniform);
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "photons")]
+            let mut counts = |pixels: Vec<Vec<f64>>| -> Vec<Vec<u64>> {
+                let count = |mean: f64| Poisson::new(mean.max(1e-9)).unwrap().sample(&mut rng) as u64;
+                let mut count = count;
+                pixels.into_iter().map(|pixel| pixel.into_iter().map(&mut count).collect()).collect()
+            };
+            prop_assert_eq!(swapped_axes(&[rows, columns], &counts(some)), None);
+            let right = counts(all);
+            prop_assert_eq!(swapped_axes(&[rows, columns], &right), None);
+            let flat = (0..BINS).flat_map(|bin| right.iter().map(move |bins| bins[bin]));
+            let flat: Vec<u64> = flat.collect();
+            let turned: Vec<Vec<u64>> = flat.chunks(columns).map(<[u64]>::to_vec).collect();
+            let warning = swapped_axes(&[BINS, rows], &turned);
+            prop_assert!(warning.is_some_and(|text| text.starts_with("the first axis looks like the bins")));
         }
     }
 }

@@ -160,5 +160,7 @@ pub(super) fn calibrate_counts(
         offsets_mm: &requested.sensor.pixel_offsets_mm(),
         times: counts.times.as_ref(),
     };
-    calibrate_with(&observed, options, &shared(progress, "steps"))
+    let mut found = calibrate_with(&observed, options, &shared(progress, "steps"))?;
+    found.is_void = counts.metadata.looks_swapped;
+    Ok(found)
 }

@@ -41,6 +41,7 @@ fn plain_metadata() -> Metadata {
         offset_mm: None,
         gate: None,
         has_shape: true,
+        looks_swapped: false,
         captures: 1,
         cut_off: 0,
         rows: Vec::new(),

@@ -43,12 +43,12 @@ fn times_are_no_laser_cycles() {
     assert!(
         told(100, 300)
             .unwrap()
-            .starts_with("all laser cycles are multiples of 100,")
+            .starts_with("all laser cycles are multiples of 100 apart")
     );
     assert!(
         told(0, 7)
             .unwrap()
-            .starts_with("all 40 photons come in laser cycle 7,")
+            .starts_with("all 40 photons come in laser cycle 7: ")
     );
     assert_eq!(told(1, 0), None);
 }
