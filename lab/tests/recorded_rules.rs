@@ -227,6 +227,7 @@ impl Method {
 }
 
 #[test]
+#[ignore = "takes a minute: `.ci/long recorded` runs it"]
 fn window_rules_need_fewer_photons_than_the_papers() {
     let Some(log) = log() else {
         return;

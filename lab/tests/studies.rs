@@ -7,6 +7,7 @@ use dtof_lab::studies;
 use dtof_lab::sweep;
 
 #[test]
+#[ignore = "takes minutes: `.ci/long studies` runs it"]
 fn one_seed_of_every_study_gives_figures_and_claims() {
     let mut names = BTreeSet::new();
     for study in studies::ALL {
@@ -35,6 +36,7 @@ fn one_seed_of_every_study_gives_figures_and_claims() {
 }
 
 #[test]
+#[ignore = "takes minutes: `.ci/long studies` runs it"]
 fn a_trial_depends_on_its_point_and_random_numbers_only() {
     use rand_core::SeedableRng;
     use rand_pcg::Pcg64;

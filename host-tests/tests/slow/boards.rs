@@ -123,6 +123,7 @@ fn mps2_an386_with_counters_of_8_bits_decides_as_this_computer() -> Result<()> {
 }
 
 #[test]
+#[ignore = "takes minutes: `.ci/long boards` runs it"]
 fn stm32f405_decides_as_this_computer_and_keeps_to_its_stack() -> Result<()> {
     let test = "stm32f405 in QEMU";
     let Some(_alone) = enabled(test, &[QEMU, DEFMT_PRINT]) else {

@@ -19,6 +19,7 @@ const SCENE: &str = "scenes/radial.toml";
 const CYCLES: &str = "40000";
 
 #[test]
+#[ignore = "takes minutes: `.ci/long boards` runs it"]
 fn other_readers_find_in_exported_files_what_is_in_them() -> Result<()> {
     let test = "exported files in other readers";
     let Some(_alone) = enabled(test, &["python3"]) else {
@@ -44,6 +45,7 @@ fn other_readers_find_in_exported_files_what_is_in_them() -> Result<()> {
 }
 
 #[test]
+#[ignore = "takes minutes: `.ci/long boards` runs it"]
 fn another_client_finds_in_live_data_what_is_in_the_recording() -> Result<()> {
     let test = "live data in other readers";
     let Some(_alone) = enabled(test, &["python3"]) else {
