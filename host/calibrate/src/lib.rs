@@ -201,6 +201,10 @@ impl AllHistograms {
             }
             _ => None,
         };
+        let of_list = observed
+            .times
+            .into_iter()
+            .flat_map(|times| times.checks.warnings());
         let tdc = match observed.length {
             Length::Cycles(_) => Some(match options.dead_time {
                 Some(bins) => pile_up::known_tdc(&traces, bins.into()),
@@ -226,7 +230,7 @@ impl AllHistograms {
             tdc,
             audit: Audit {
                 cause,
-                others: short.into_iter().chain(dim).collect(),
+                others: short.into_iter().chain(dim).chain(of_list).collect(),
             },
         })
     }

@@ -6,6 +6,7 @@ mod bins;
 mod capture_log;
 pub mod geometry;
 pub mod input;
+pub mod list_checks;
 pub mod masked;
 pub mod npy;
 pub mod open;

@@ -7,6 +7,7 @@ use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{Array, PixelAddress};
 
 use crate::input::Input;
+use crate::list_checks::ListWatch;
 use crate::recorded::{Capture, ListTimes};
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use crate::warnings::{greatest_divisor, times_as_cycles};
@@ -332,8 +333,9 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
         let mut counts = vec![vec![0; bins]; self.array.pixels() as usize];
         let mut times = ListTimes {
             quarters: vec![[0; 4]; bins],
-            again: 0,
+            ..ListTimes::default()
         };
+        let mut watch = ListWatch::new(counts.len(), bins, self.cycles);
         // The laser cycle of the last photon of each pixel.
         let mut last = vec![u64::MAX; counts.len()];
         let quarter = self.cycles.div_ceil(4);
@@ -350,8 +352,10 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
             times.quarters[usize::from(row.bin())][quarter] += 1;
             let last = std::mem::replace(&mut last[row.pixel()], row.cycle);
             times.again += u64::from(last == row.cycle);
+            watch.photon(row.pixel(), row.cycle, row.bin().into());
         }
         self.rows = Validator::open(&self.input, self.rows.shape, self.rows.expected)?;
+        times.checks = watch.checks();
         Ok((counts, times))
     }
 }

@@ -23,6 +23,7 @@ use rayon::prelude::*;
 
 use self::hits::Hits;
 use self::remaining::Remaining;
+use crate::list_checks::ListChecks;
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_options::Refused;
 use dtof_theory::random::pixel_rng;
@@ -53,12 +54,14 @@ pub enum RecordingLength {
 pub type Capture = Vec<Vec<u64>>;
 
 /// What a photon list tells beside its histograms.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct ListTimes {
     /// The photons of all pixels in each quarter of the laser cycles, bin by bin.
     pub quarters: Vec<[u64; 4]>,
     /// Photons whose pixel had another before in the same laser cycle.
     pub again: u64,
+    /// What is wrong with them.
+    pub checks: ListChecks,
 }
 
 /// The captures of a file, which follow each other in the address space.

@@ -148,6 +148,10 @@ pub(super) fn calibrate_counts(
         (None, None) => Length::Unknown,
     };
     let rays = requested.rays.slants(counts.array)?;
+    let mut times = counts.times.clone();
+    if let (Some(true), Some(times)) = (requested.detection.once_per_bin, &mut times) {
+        times.checks.together = None;
+    }
     let observed = Observed {
         array: counts.array,
         captures: &counts.captures,
@@ -158,7 +162,7 @@ pub(super) fn calibrate_counts(
         slant: rays.as_ref().map(|[slants, _]| &slants[..]),
         bias_mm: rays.as_ref().map(|[_, biases]| &biases[..]),
         offsets_mm: &requested.sensor.pixel_offsets_mm(),
-        times: counts.times.as_ref(),
+        times: times.as_ref(),
     };
     let mut found = calibrate_with(&observed, options, &shared(progress, "steps"))?;
     found.is_void = counts.metadata.looks_swapped;

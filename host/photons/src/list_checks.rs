@@ -1,0 +1,202 @@
+//! What the photons of a list tell, as they pass, that no histogram shows: photons that come together, as those of raindrops
+//! do, and peaks that wander, as those of another LiDAR do.
+
+use dtof_options::rows::grouped;
+
+/// So many bins are watched at most. Of larger arrays some of the pixels tell.
+const MOST_BINS: usize = 1 << 17;
+/// The mean number of photons is compared over so many laser cycles.
+const LAGS: usize = 4;
+/// The parts of a recording in which peaks are sought, and how many in a row have to show that one wanders.
+const PARTS: u64 = 64;
+const IN_A_ROW: usize = 8;
+/// By so many bins at least meanwhile, within so many bins of a straight line.
+const FARTHER: f64 = 4.0;
+const WITHIN: f64 = 1.5;
+/// Standard deviations that chance does not reach.
+const SURE: f64 = 6.0;
+
+/// What is wrong with the photons of a list.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ListChecks {
+    /// Photons come so many times as often in one bin of a laser cycle as by chance, if that is surely too often.
+    pub together: Option<f64>,
+    /// Pixels in which a peak wanders, of those that were watched, and by how many bins in a laser cycle the median one
+    /// does.
+    pub wandering: Option<(usize, usize, f64)>,
+}
+
+impl ListChecks {
+    /// Each in words.
+    pub fn warnings(self) -> impl Iterator<Item = String> {
+        let together = self.together.map(|times| {
+            format!(
+                "photons of one pixel and laser cycle are {times:.1} times as often in the same bin as chance would have it: \
+                 rain or other flashes, or photons that are listed twice. --once-per-bin counts them once"
+            )
+        });
+        let wandering = self.wandering.map(|(some, all, bins)| {
+            #[allow(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "laser cycles"
+            )]
+            let cycles = (1.0 / bins.abs()).round() as u64;
+            format!(
+                "in {some} of {all} pixels a peak wanders through the range, by a bin in {} laser cycles: another LiDAR, or a \
+                 target that moves fast. Record with dither (docs/settings.md#dither): then only light of the own laser has peaks",
+                grouped(cycles)
+            )
+        });
+        together.into_iter().chain(wandering)
+    }
+}
+
+/// The photons of one bin of a pixel.
+#[derive(Clone, Copy, Default)]
+struct Watched {
+    /// The laser cycle of the last photon, and photons in it and those before it.
+    cycle: u64,
+    recent: [u8; LAGS + 1],
+    /// Photons of this part of the recording, and of those before.
+    now: u32,
+    before: u32,
+}
+
+impl Watched {
+    /// Another photon. Returns how many there are of each of the last laser cycles.
+    fn photon(&mut self, cycle: u64) -> [u8; LAGS + 1] {
+        let passed = usize::try_from(cycle - self.cycle).unwrap_or(usize::MAX);
+        if passed > 0 {
+            let kept = (LAGS + 1).saturating_sub(passed);
+            self.recent.copy_within(..kept, passed.min(LAGS + 1));
+            self.recent[..passed.min(LAGS + 1)].fill(0);
+            self.cycle = cycle;
+        }
+        let recent = self.recent;
+        self.recent[0] = self.recent[0].saturating_add(1);
+        self.now = self.now.saturating_add(1);
+        recent
+    }
+}
+
+/// Watches the photons of a list.
+pub(crate) struct ListWatch {
+    bins: usize,
+    /// One pixel in so many is watched.
+    step: usize,
+    watched: Vec<Watched>,
+    /// Pairs of photons in one bin, of the same laser cycle and of some that follow each other.
+    same: u64,
+    others: [u64; LAGS],
+    /// Laser cycles of a part, and the part of the last photon.
+    length: u64,
+    part: u64,
+    /// For each pixel the parts with a peak that was not there before, and its bin.
+    peaks: Vec<Vec<(u64, f64)>>,
+}
+
+impl ListWatch {
+    /// Of so many pixels and bins, for so many laser cycles.
+    pub(crate) fn new(pixels: usize, bins: usize, cycles: u64) -> Self {
+        // Odd, so that it is not always the same column.
+        let step = (pixels * bins / MOST_BINS) | 1;
+        let watched = pixels.div_ceil(step);
+        Self {
+            bins,
+            step,
+            watched: vec![Watched::default(); watched * bins],
+            same: 0,
+            others: [0; LAGS],
+            length: (cycles / PARTS).max(1),
+            part: 0,
+            peaks: vec![Vec::new(); watched],
+        }
+    }
+
+    /// Another photon.
+    pub(crate) fn photon(&mut self, pixel: usize, cycle: u64, bin: usize) {
+        if !pixel.is_multiple_of(self.step) {
+            return;
+        }
+        if cycle / self.length != self.part {
+            self.end_part();
+            self.part = cycle / self.length;
+        }
+        let recent = self.watched[pixel / self.step * self.bins + bin].photon(cycle);
+        self.same += u64::from(recent[0]);
+        for (pairs, recent) in self.others.iter_mut().zip(&recent[1..]) {
+            *pairs += u64::from(*recent);
+        }
+    }
+
+    /// Looks in each pixel for the bin that has most more than in the parts before.
+    fn end_part(&mut self) {
+        let parts = self.part as f64;
+        for (pixel, bins) in self.watched.chunks_mut(self.bins).enumerate() {
+            if self.part > 0 {
+                let more = |bins: &[Watched]| {
+                    let (now, before) = bins.iter().fold((0.0, 0.0), |(now, before), bin| {
+                        (now + f64::from(bin.now), before + f64::from(bin.before))
+                    });
+                    let expected = before / parts;
+                    (now - expected) / (expected * (1.0 + 1.0 / parts) + 1.0).sqrt()
+                };
+                let all = bins.windows(3).map(more).enumerate();
+                let most = all.max_by(|one, other| one.1.total_cmp(&other.1));
+                if let Some((bin, _)) = most.filter(|(_, more)| *more > SURE) {
+                    self.peaks[pixel].push((self.part, bin as f64));
+                }
+            }
+            for bin in bins {
+                bin.before = bin.before.saturating_add(bin.now);
+                bin.now = 0;
+            }
+        }
+    }
+
+    /// What they tell.
+    pub(crate) fn checks(self) -> ListChecks {
+        /// By its fluctuations light comes together up to twice as often.
+        const TIMES: f64 = 2.5;
+        /// Fewer pairs may be so by chance.
+        const FEWEST: f64 = 30.0;
+        // Ordered pairs, as those of two laser cycles are.
+        let same = 2.0 * self.same as f64;
+        let others = self.others.iter().copied().max().unwrap_or(0) as f64;
+        let is_sure = self.same as f64 >= FEWEST
+            && same - others > SURE * (2.0 * same + others).sqrt()
+            && same > TIMES * others;
+        let mut speeds: Vec<f64> = self.peaks.iter().filter_map(|peaks| speed(peaks)).collect();
+        speeds.sort_by(f64::total_cmp);
+        let all = self.peaks.len();
+        let is_several = speeds.len() > usize::from(all > 1);
+        let speed = speeds.get(speeds.len() / 2).filter(|_| is_several);
+        let speed = speed.map(|speed| (speeds.len(), all, speed / self.length as f64));
+        ListChecks {
+            together: is_sure.then(|| same / others.max(1.0)),
+            wandering: speed,
+        }
+    }
+}
+
+/// The bins a part by which a peak wanders, if it does.
+fn speed(peaks: &[(u64, f64)]) -> Option<f64> {
+    let of = |peaks: &[(u64, f64)]| {
+        let [(first, _), .., (last, _)] = *peaks else {
+            return None;
+        };
+        let is_in_a_row = last - first < PARTS.min(IN_A_ROW as u64 + 2);
+        let number = peaks.len() as f64;
+        let mean = |of: &dyn Fn(&(u64, f64)) -> f64| peaks.iter().map(of).sum::<f64>() / number;
+        let (part, bin) = (mean(&|peak| peak.0 as f64), mean(&|peak| peak.1));
+        let covariance = mean(&|peak| (peak.0 as f64 - part) * (peak.1 - bin));
+        let variance = mean(&|peak| (peak.0 as f64 - part).powi(2));
+        let slope = covariance / variance;
+        let is_line =
+            |peak: &(u64, f64)| (peak.1 - bin - slope * (peak.0 as f64 - part)).abs() <= WITHIN;
+        let is_far = slope.abs() * (last - first) as f64 >= FARTHER;
+        (is_in_a_row && is_far && peaks.iter().all(is_line)).then_some(slope)
+    };
+    peaks.windows(IN_A_ROW).find_map(of)
+}
