@@ -385,8 +385,8 @@ fn full(traces: &[Trace], highest: f64) -> Option<String> {
     })
 }
 
-/// A background that no single level describes: more than half of the eighths of the range differ from it by a standard
-/// deviation of the photons in a window, which moves the threshold by as much.
+/// A background that no single level describes: less than half of the eighths of the range are alike to within the standard
+/// deviation of the photons in a window. A difference of that moves the threshold by as much.
 pub(super) fn uneven_background(
     good: &GoodHistograms,
     tdc: Option<Tdc>,
@@ -395,36 +395,59 @@ pub(super) fn uneven_background(
     const PARTS: usize = 8;
     /// The usual window.
     const WINDOW: f64 = 3.0;
+    /// So many photons a bin, of so many pixels at most.
+    const LEVEL: f64 = 10.0;
+    const MOST_TOGETHER: f64 = 8.0;
+    /// No background is more even.
+    const EVEN: f64 = 0.02;
+    /// A median of medians has a larger error than a mean.
+    const OF_MEDIANS: f64 = 1.57;
     let length = good.bins() / PARTS;
     if length < 3 {
         return None;
     }
-    // Of each part the median bin of all histograms, and the level that they have: a pulse is in few bins. Behind bright
-    // peaks a TDC may have seen little.
-    let mut parts = [(0.0, 0.0); PARTS];
-    for trace in &good.traces {
+    // A single photon must not matter: in dim recordings some pixels together.
+    let level = median(good.levels.iter().map(|level| level.mean));
+    let together = (LEVEL / level).ceil();
+    if !(1.0..=MOST_TOGETHER).contains(&together) {
+        return None;
+    }
+    // The median bin of each part over that of the range, and the median of that: a pulse is in few bins, and in few pixels in
+    // the same ones. Behind bright peaks a TDC may have seen little.
+    let mut parts = vec![Vec::new(); PARTS];
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "1 to 8"
+    )]
+    for traces in good.traces.chunks_exact(together as usize) {
         let seen = |bins: Range<usize>| {
-            let bins = trace.counts[bins.clone()].iter().zip(&trace.live[bins]);
-            bins.filter(|(_, live)| **live >= 0.5)
-                .map(|(count, _)| *count)
+            let bins = bins.filter(|&bin| traces.iter().all(|trace| trace.live[bin] >= 0.5));
+            let sums = bins.map(|bin| traces.iter().map(|trace| trace.counts[bin]).sum::<f64>());
+            sums.collect::<Vec<f64>>()
         };
         let level = median(seen(0..good.bins()));
-        for (at, part) in parts.iter_mut().enumerate() {
-            let bins = at * length..(at + 1) * length;
-            if 2 * seen(bins.clone()).count() > length {
-                *part = (part.0 + median(seen(bins)), part.1 + level);
+        for (at, shares) in parts.iter_mut().enumerate() {
+            let bins = seen(at * length..(at + 1) * length);
+            if level > 0.0 && 2 * bins.len() > length {
+                shares.push(median(bins) / level);
             }
         }
     }
-    let shift = (WINDOW * median(good.levels.iter().map(|level| level.mean))).sqrt();
-    let share = |(sum, level): (f64, f64)| sum / level;
-    let differs = |&&(sum, level): &&(f64, f64)| {
-        level > 0.0
-            && (sum / level - 1.0).abs() * shift > 1.0
-            && (sum - level).abs() > SURE * level.sqrt()
+    let counts = level * together * length as f64;
+    let part = |shares: Vec<f64>| {
+        let error = SURE * OF_MEDIANS / (counts * shares.len() as f64).sqrt();
+        (!shares.is_empty()).then(|| (median(shares), error))
     };
-    (2 * parts.iter().filter(differs).count() > PARTS).then(|| {
-        let shares = parts.iter().filter(|part| part.1 > 0.0).copied().map(share);
+    let parts: Vec<(f64, f64)> = parts.into_iter().filter_map(part).collect();
+    let same = EVEN.max(1.0 / (WINDOW * level).sqrt());
+    let like = |&(share, _): &(f64, f64)| {
+        let is_like = |other: &&(f64, f64)| (other.0 - share).abs() <= share * same.max(other.1);
+        parts.iter().filter(is_like).count()
+    };
+    let most_alike = parts.iter().map(like).max()?;
+    (2 * most_alike < parts.len()).then(|| {
+        let shares = parts.iter().map(|part| part.0);
         let (least, most) = shares.fold((f64::INFINITY, 0.0), |(least, most), share| (share.min(least), share.max(most)));
         let percent = |share: f64| (100.0 * share).round();
         let helps = match tdc {
