@@ -2,7 +2,7 @@
 //!
 //! | what is looked at | what it may be |
 //! |---|---|
-//! | holes in peaks where no count needs another bit | counters that wrapped |
+//! | peaks that fit a pulse only if counts begin again at 0 | counters that wrapped |
 //! | many bins with the highest count | counters that were full |
 //! | how neighbouring bins scatter | what is no photon count |
 //! | the level of eighths of the range | a background that is not flat |
@@ -20,6 +20,7 @@
 use std::ops::{Range, RangeInclusive};
 
 use dtof_photons::warnings::greatest_divisor;
+use dtof_theory::rates::bin_share;
 
 use super::find::good_histograms::GoodHistograms;
 use super::find::observed::Trace;
@@ -106,7 +107,7 @@ fn background(histograms: &[&[f64]]) -> Vec<f64> {
     let all = histograms.len() as f64;
     let of_all = |(sum, number): (f64, usize)| sum * all / number as f64;
     sums.into_iter()
-        .filter(|sum| sum.1 > 0)
+        .filter(|sum| 4 * sum.1 > histograms.len())
         .map(of_all)
         .collect()
 }
@@ -320,39 +321,99 @@ fn of_histograms(some: usize, all: usize) -> String {
     format!("{percent:.0} % of the histograms")
 }
 
-/// Counts that wrapped look like holes in peaks, and counters that were full have the highest count in many bins.
+/// Counters that wrapped, or were full.
 pub(super) fn narrow_counters(traces: &[Trace]) -> Option<String> {
     let all = || traces.iter().flat_map(|trace| &trace.counts).copied();
     let highest = all().fold(0.0, f64::max);
     wrapped(traces, highest).or_else(|| full(traces, highest))
 }
 
-/// Holes in most of the peaks, in counts that need all bits of 8 or 16.
+/// Peaks that no pulse of the highest count fits, but a higher one whose counts begin again at 0.
 fn wrapped(traces: &[Trace], highest: f64) -> Option<String> {
-    let values = [256.0, 65_536.0];
-    let values = values.into_iter().find(|values| highest < *values)?;
-    let high = values / 4.0;
-    let is_high = |trace: &&Trace| trace.counts.iter().any(|&count| count > high);
-    let has_hole = |trace: &&Trace| {
-        trace.counts.windows(5).any(|bins| {
-            let lower = f64::min(bins[0].max(bins[1]), bins[3].max(bins[4]));
-            lower > high && lower - bins[2] > SURE * (lower + bins[2]).sqrt()
-        })
-    };
-    let all = traces.iter().filter(is_high).count();
-    let holes = traces.iter().filter(has_hole).count();
-    let is_wrapped = highest >= values / 2.0 && holes > 1 && 2 * holes > all;
-    is_wrapped.then(|| {
-        let (most, wider) = match values < 1000.0 {
-            true => (255, "numpy.uint16"),
-            false => (65_535, "numpy.uint32"),
-        };
+    const VALUES: f64 = 256.0;
+    /// So many histograms tell.
+    const SOME: usize = 16;
+    if !(VALUES / 2.0..VALUES).contains(&highest) {
+        return None;
+    }
+    let is_high = |trace: &&Trace| trace.counts.iter().any(|&count| count > VALUES / 4.0);
+    let high: Vec<&Trace> = traces.iter().filter(is_high).collect();
+    let some = high.iter().step_by(high.len().div_ceil(SOME).max(1));
+    let is_wrapped = |trace: &&&Trace| fits_if_wrapped(&trace.counts, VALUES);
+    let (all, wrapped) = (some.len(), some.filter(is_wrapped).count());
+    (2 * wrapped > all).then(|| {
         format!(
-            "{} have a hole in a peak, and no count is above {most}, as if those above it wrapped to 0: save them as {wider}, \
-             unless they see two surfaces a few bins apart",
-            of_histograms(holes, traces.len())
+            "no count is above {:.0}, and the peaks of {} are those of higher counts that began again at 0, as if they wrapped: \
+             save them as numpy.uint16",
+            VALUES - 1.0,
+            of_histograms(high.len() * wrapped / all, traces.len())
         )
     })
+}
+
+/// Whether the highest peak is a pulse of more than so many `values`, and none of fewer.
+fn fits_if_wrapped(counts: &[f64], values: f64) -> bool {
+    /// The mean square of the errors in standard deviations: of a pulse, and of what is none.
+    const GOOD: f64 = 3.0;
+    const BAD: f64 = 8.0;
+    let background = median(counts.iter().copied());
+    let stands = |bin: &usize| counts[*bin] > background + SURE * (background + 1.0).sqrt();
+    let top = counts
+        .iter()
+        .enumerate()
+        .max_by(|one, other| one.1.total_cmp(other.1))
+        .map_or(0, |top| top.0);
+    let about = top.saturating_sub(8)..(top + 9).min(counts.len());
+    let (Some(first), Some(last)) = (about.clone().find(stands), about.rev().find(stands)) else {
+        return false;
+    };
+    let bins = first.saturating_sub(1)..(last + 2).min(counts.len());
+    let middle = (first + last + 1) as f64 / 2.0;
+    let shares = |position: f64, sigma: f64| -> Vec<f64> {
+        #[allow(clippy::cast_possible_truncation, reason = "bins of a histogram")]
+        let shares: Vec<f64> = bins
+            .clone()
+            .map(|bin| bin_share(bin as u32, position, sigma))
+            .collect();
+        let highest = shares.iter().copied().fold(1e-9, f64::max);
+        shares.into_iter().map(|share| share / highest).collect()
+    };
+    // Of a pulse with this height, and the same if its counts begin again at 0.
+    let errors = |shares: &[f64], height: f64| {
+        let error = |(count, share): (&f64, &f64)| {
+            let mean = background + height * share;
+            let away = count - mean;
+            let least = away - values * (away / values).round();
+            [away, least].map(|error| error * error / (mean + 1.0) / bins.len() as f64)
+        };
+        let errors = counts[bins.clone()].iter().zip(shares).map(error);
+        errors.fold([0.0; 2], |[all, least], error| {
+            [all + error[0], least + error[1]]
+        })
+    };
+    let (mut plain, mut best) = (f64::INFINITY, (f64::INFINITY, [0.0; 3]));
+    for (place, width) in (-15..=15).flat_map(|place| (5..=20).map(move |width| (place, width))) {
+        let (position, sigma) = (middle + f64::from(place) / 10.0, f64::from(width) / 10.0);
+        let shares = shares(position, sigma);
+        // Peaks from a quarter of the values to eight times as many.
+        for step in 0..80 {
+            let height = values / 4.0 * 1.045_f64.powi(step);
+            let [all, wrapped] = errors(&shares, height);
+            plain = f64::min(plain, all);
+            if wrapped < best.0 {
+                best = (wrapped, [position, sigma, height]);
+            }
+        }
+    }
+    let [position, sigma, height] = best.1;
+    let about = || (-5..=5).map(|step| f64::from(step) / 100.0);
+    let nearer = about().flat_map(|place| about().map(move |width| (place, width)));
+    let nearer = nearer.flat_map(|(place, width)| {
+        let shares = shares(position + place, sigma + width);
+        let errors = &errors;
+        about().map(move |more| errors(&shares, height * (1.0 + more))[1])
+    });
+    plain > BAD && nearer.fold(best.0, f64::min) < GOOD
 }
 
 /// The highest count in more bins than the counts just below it together.
@@ -522,6 +583,8 @@ pub(super) fn range(traces: &[Trace], has_cycles: bool) -> (RangeInclusive<usize
     const PARTLY: f64 = 0.8;
     /// By chance one in so many.
     const ONE_IN: f64 = 1e6;
+    /// Else it is no range.
+    const FEWEST_BINS: usize = 16;
     let bins = traces.first().map_or(0, |trace| trace.counts.len());
     let histograms: Vec<&[f64]> = traces.iter().map(|trace| &trace.counts[..]).collect();
     let sums = sum(&histograms);
@@ -548,12 +611,11 @@ pub(super) fn range(traces: &[Trace], has_cycles: bool) -> (RangeInclusive<usize
     };
     let is_hardly = |bin: &usize| is_below(*bin, HARDLY);
     let mut first = start + (start..end).take_while(is_hardly).count();
-    let hardly = (first..end).rev().take_while(is_hardly).count();
-    let mut last = match end - hardly {
-        0 => end - 1,
-        edge if is_pile_up(edge) => end - 1,
-        edge => edge - 1,
-    };
+    let edge = end - (first..end).rev().take_while(is_hardly).count();
+    if edge < first + FEWEST_BINS {
+        return (0..=bins - 1, None);
+    }
+    let mut last = if is_pile_up(edge) { end - 1 } else { edge - 1 };
     let beyond = || sums[..first].iter().chain(&sums[last + 1..]);
     let lost: f64 = beyond().sum();
     let warning = (lost > 0.0).then(|| {
@@ -586,7 +648,6 @@ pub(super) fn hardly_any_light(brightest: f64, cycles: u64) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_theory::rates::bin_share;
     use proptest::prelude::*;
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, Poisson};

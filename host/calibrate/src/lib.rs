@@ -206,6 +206,8 @@ impl AllHistograms {
             .into_iter()
             .flat_map(|times| times.checks.warnings());
         let tdc = match observed.length {
+            // Full counters look like a dead time.
+            _ if cause.is_some() && options.dead_time.is_none() => None,
             Length::Cycles(_) => Some(match options.dead_time {
                 Some(bins) => pile_up::known_tdc(&traces, bins.into()),
                 None => pile_up::tdc(&traces).or_by_times(&traces, observed.times),
@@ -285,7 +287,7 @@ pub fn calibrate_with(
         _ => with_glass(&good),
     };
     let cause = audit.cause.take();
-    audit.cause = cause.or_else(|| audit::spike(&good)).or(uneven);
+    audit.cause = cause.or(uneven).or_else(|| audit::spike(&good));
     let glass = nearest.glass();
     let bins = observed.bins();
     let gate = settle::gate(

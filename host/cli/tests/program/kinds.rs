@@ -384,6 +384,51 @@ fn laser_cycles_are_times() {
 }
 
 #[test]
+fn ends_are_hardly_filled() {
+    holds("ends_are_hardly_filled");
+}
+
+#[test]
+fn counts_wrapped() {
+    holds("counts_wrapped");
+}
+
+#[test]
+fn counters_were_full() {
+    holds("counters_were_full");
+}
+
+#[test]
+fn a_spike_in_some_captures() {
+    holds("a_spike_in_some_captures");
+}
+
+#[test]
+fn bins_come_first() {
+    holds("bins_come_first");
+}
+
+#[test]
+fn a_background_that_is_not_flat() {
+    holds("a_background_that_is_not_flat");
+}
+
+#[test]
+fn too_many_recorded_cycles() {
+    holds("too_many_recorded_cycles");
+}
+
+#[test]
+fn rain() {
+    holds("rain");
+}
+
+#[test]
+fn another_lidar() {
+    holds("another_lidar");
+}
+
+#[test]
 fn clean() {
     holds("clean");
 }

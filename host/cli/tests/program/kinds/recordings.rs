@@ -101,6 +101,18 @@ pub const KINDS: &[Kind] = &[
     kind("bins_differ_in_width", bins_differ_in_width),
     kind("counts_are_averaged", counts_are_averaged),
     kind("laser_cycles_are_times", laser_cycles_are_times),
+    kind("ends_are_hardly_filled", ends_are_hardly_filled),
+    kind("counts_wrapped", counts_wrapped),
+    kind("counters_were_full", counters_were_full),
+    kind("a_spike_in_some_captures", a_spike_in_some_captures),
+    kind("bins_come_first", bins_come_first),
+    kind(
+        "a_background_that_is_not_flat",
+        a_background_that_is_not_flat,
+    ),
+    kind("too_many_recorded_cycles", too_many_recorded_cycles),
+    kind("rain", rain),
+    kind("another_lidar", another_lidar),
     kind("clean", clean),
 ];
 
@@ -898,6 +910,306 @@ fn an_object_that_comes_near(rng: &mut Pcg64) -> Recording {
     Recording {
         need: Need::RightAndTold(CHANGE),
         ..sensor.recording(array, sensor.list_options(), truth)
+    }
+}
+
+/// The TDC ends before the histogram does: the last bins, or the first, hold up to a tenth of the background.
+fn ends_are_hardly_filled(rng: &mut Pcg64) -> Recording {
+    let sensor = Sensor::draw(rng, 3, 10);
+    let all = (sensor.bins as f64 * between(rng, 0.75, 0.95)) as usize;
+    let level = log_between(rng, 20.0, 500.0);
+    let share = between(rng, 0.0, 0.1);
+    let is_first = chance(rng, 0.3);
+    let positions = match chance(rng, 0.5) {
+        // A wall, up to the end.
+        true => vec![between(rng, 0.3, 1.0) * (all as f64 - 4.0); sensor.pixels()],
+        false => sensor.positions(rng, 0.1, 0.7),
+    };
+    let offset = if is_first {
+        (sensor.bins - all) as f64
+    } else {
+        0.0
+    };
+    let signal = between(rng, 15.0, 40.0) * (level * (4.0 * sensor.sigma + 1.0)).sqrt();
+    let pixels: Vec<Vec<u64>> = positions
+        .iter()
+        .map(|&position| {
+            let mut light = Light(vec![level; sensor.bins]).with(signal, position, sensor.sigma);
+            light.0[all..].fill(share * level);
+            if is_first {
+                light.0.rotate_right(sensor.bins - all);
+            }
+            light.counts(rng)
+        })
+        .collect();
+    let cycles = (level * sensor.bins as f64 * log_between(rng, 0.3, 10.0)) as usize;
+    let truth: Vec<f64> = positions.iter().map(|position| position + offset).collect();
+    let array = sensor.histograms(pixels);
+    Recording {
+        need: Need::Either(&["range"]),
+        ..sensor.recording(array, format!("--recorded-cycles {cycles}"), at(&truth))
+    }
+}
+
+/// Counters of 8 bits that begin again at 0.
+fn counts_wrapped(rng: &mut Pcg64) -> Recording {
+    narrow_counters(rng, |count| count % 256, &["wrapped"])
+}
+
+/// Counters of 8, 10 or 12 bits that stop at the highest count.
+fn counters_were_full(rng: &mut Pcg64) -> Recording {
+    let most = one_of(rng, &[255, 1023, 4095]);
+    let recording = narrow_counters(rng, |count| count, &["full"]);
+    let Array::Histograms { shape, counts } = recording.array else {
+        return recording;
+    };
+    let highest = counts.iter().copied().max().unwrap_or(1);
+    let counts = counts
+        .iter()
+        .map(|count| (count * 2 * most / highest).min(most));
+    Recording {
+        array: Array::Histograms {
+            shape,
+            counts: counts.collect(),
+        },
+        ..recording
+    }
+}
+
+/// Peaks of 300 to 1000 photons a bin.
+fn narrow_counters(
+    rng: &mut Pcg64,
+    counted: fn(u64) -> u64,
+    words: &'static [&'static str],
+) -> Recording {
+    let sensor = Sensor {
+        sigma: between(rng, 0.9, 1.5),
+        ..Sensor::draw(rng, 4, 12)
+    };
+    let level = between(rng, 5.0, 60.0);
+    let highest = between(rng, 300.0, 1000.0);
+    let positions = match chance(rng, 0.5) {
+        true => vec![sensor.position(rng, 0.2, 0.8); sensor.pixels()],
+        false => sensor.positions(rng, 0.2, 0.8),
+    };
+    let pixels: Vec<Vec<u64>> = positions
+        .iter()
+        .map(|&position| {
+            let light = Light(vec![level; sensor.bins]).with(
+                highest * 2.5 * sensor.sigma,
+                position,
+                sensor.sigma,
+            );
+            light.counts(rng).into_iter().map(counted).collect()
+        })
+        .collect();
+    let array = sensor.histograms(pixels);
+    Recording {
+        need: Need::Told(words),
+        ..sensor.recording(
+            array,
+            "--recorded-cycles 10000",
+            vec![Truth::Anything; sensor.pixels()],
+        )
+    }
+}
+
+/// In some captures of each pixel a bin has hundreds of photons of no pulse.
+fn a_spike_in_some_captures(rng: &mut Pcg64) -> Recording {
+    let sensor = Sensor {
+        sigma: between(rng, 0.8, 1.5),
+        ..Sensor::draw(rng, 4, 8)
+    };
+    let (level, captures) = (log_between(rng, 1.0, 50.0), whole(rng, 4, 8));
+    let positions = sensor.positions(rng, 0.3, 0.7);
+    let signal = between(rng, 12.0, 30.0) * (level * (4.0 * sensor.sigma + 1.0)).sqrt();
+    let spike = signal * between(rng, 2.0, 10.0);
+    let bin = one_of(rng, &[0, 1, sensor.bins / 8, sensor.bins - 1]);
+    let number = whole(rng, 1, captures - 1);
+    let with_spike = some_pixels(rng, captures, number);
+    let mut pixels = Vec::new();
+    for capture in 0..captures {
+        for &position in &positions {
+            let mut light = Light(vec![level; sensor.bins]).with(signal, position, sensor.sigma);
+            if with_spike.contains(&capture) {
+                light.0[bin] += spike;
+            }
+            pixels.push(light.counts(rng));
+        }
+    }
+    let truth = at(&positions).repeat(captures);
+    Recording {
+        need: Need::Either(&["spike"]),
+        ..sensor.recording(
+            sensor.histograms(pixels),
+            "--axes captures,rows,columns,bins",
+            truth,
+        )
+    }
+}
+
+/// Saved with the bins as the first axis, and read without axes.
+fn bins_come_first(rng: &mut Pcg64) -> Recording {
+    let sensor = Sensor::draw(rng, 8, 40);
+    let signal = log_between(rng, 15.0, 1000.0);
+    let background = signal * between(rng, 0.02, 1.0) / sensor.bins as f64;
+    let positions = match chance(rng, 0.3) {
+        true => vec![sensor.position(rng, 0.2, 0.8); sensor.pixels()],
+        false => sensor.positions(rng, 0.2, 0.8),
+    };
+    let pixels: Vec<Vec<u64>> = positions
+        .iter()
+        .map(|&position| {
+            Light(vec![background; sensor.bins])
+                .with(signal, position, sensor.sigma)
+                .counts(rng)
+        })
+        .collect();
+    let counts: Vec<u64> = (0..sensor.bins)
+        .flat_map(|bin| pixels.iter().map(move |bins| bins[bin]))
+        .collect();
+    let shape = vec![sensor.bins, sensor.rows, sensor.columns];
+    let truth = vec![Truth::Anything; sensor.bins * sensor.rows];
+    Recording {
+        need: Need::Told(&["axis", "axes"]),
+        ..sensor.recording(Array::Histograms { shape, counts }, "", truth)
+    }
+}
+
+/// Ambient light that falls by a third to nine tenths over the range, or rises.
+fn a_background_that_is_not_flat(rng: &mut Pcg64) -> Recording {
+    let sensor = Sensor::draw(rng, 8, 16);
+    let level = log_between(rng, 30.0, 1000.0);
+    let fall = between(rng, 0.33, 0.9);
+    let is_curved = chance(rng, 0.5);
+    let is_rising = chance(rng, 0.5);
+    let positions = sensor.positions(rng, 0.2, 0.8);
+    let lit = some_pixels(rng, sensor.pixels(), share_of(sensor.pixels(), 0.5));
+    let signal = between(rng, 15.0, 40.0) * (level * (4.0 * sensor.sigma + 1.0)).sqrt();
+    let pixels: Vec<Vec<u64>> = positions
+        .iter()
+        .enumerate()
+        .map(|(pixel, &position)| {
+            let mean = |bin: usize| {
+                let along = bin as f64 / sensor.bins as f64;
+                match is_curved {
+                    true => level * (1.0 - fall).powf(along),
+                    false => level * (1.0 - fall * along),
+                }
+            };
+            let mut light = Light((0..sensor.bins).map(mean).collect());
+            if is_rising {
+                light.0.reverse();
+            }
+            let signal = if lit.contains(&pixel) { signal } else { 0.0 };
+            light.with(signal, position, sensor.sigma).counts(rng)
+        })
+        .collect();
+    let cycles = (level * sensor.bins as f64 / between(rng, 4.0, 20.0)) as usize;
+    Recording {
+        need: Need::Told(&["not flat"]),
+        ..sensor.recording(
+            sensor.histograms(pixels),
+            format!("--recorded-cycles {cycles}"),
+            vec![Truth::Anything; sensor.pixels()],
+        )
+    }
+}
+
+/// Right histograms, with so many laser cycles that there is hardly any light.
+fn too_many_recorded_cycles(rng: &mut Pcg64) -> Recording {
+    let sensor = Sensor::draw(rng, 4, 12);
+    let positions = sensor.positions(rng, 0.2, 0.8);
+    let level = log_between(rng, 1.0, 50.0);
+    let signal = 40.0 * (level * (4.0 * sensor.sigma + 1.0)).sqrt();
+    let pixels: Vec<Vec<u64>> = positions
+        .iter()
+        .map(|&position| {
+            Light(vec![level; sensor.bins])
+                .with(signal, position, sensor.sigma)
+                .counts(rng)
+        })
+        .collect();
+    let photons = level * sensor.bins as f64 + signal;
+    let cycles = (photons * log_between(rng, 2e5, 1e8)) as u64;
+    Recording {
+        need: Need::Told(&["recorded-cycles"]),
+        ..sensor.recording(
+            sensor.histograms(pixels),
+            format!("--recorded-cycles {cycles}"),
+            at(&positions),
+        )
+    }
+}
+
+/// Drops near the sensor, each with many photons in one laser cycle.
+fn rain(rng: &mut Pcg64) -> Recording {
+    let sensor = Sensor::draw(rng, 3, 6);
+    let cycles = whole(rng, 4000, 8000);
+    let signal = between(rng, 0.1, 0.3);
+    let positions = sensor.positions(rng, 0.4, 0.85);
+    let background = sensor.background(log_between(rng, 0.05, 5.0));
+    let drops = between(rng, 20.0, 60.0);
+    let each = between(rng, 20.0, 60.0);
+    let mut list = List::new();
+    for (pixel, &position) in positions.iter().enumerate() {
+        list.add(
+            pixel,
+            &background.clone().with(signal, position, sensor.sigma),
+            0,
+            cycles,
+            rng,
+        );
+        for _ in 0..whole(rng, (drops / 2.0) as usize, drops as usize) {
+            let place = between(rng, 2.0, 0.2 * sensor.bins as f64);
+            let cycle = whole(rng, 0, cycles - 1);
+            let drop = sensor.background(0.0).with(each, place, sensor.sigma);
+            list.add(pixel, &drop, cycle, cycle + 1, rng);
+        }
+    }
+    Recording {
+        need: Need::Told(&["rain"]),
+        ..sensor.recording(list.array(), sensor.list_options(), at(&positions))
+    }
+}
+
+/// Its pulses wander through the range of some pixels.
+fn another_lidar(rng: &mut Pcg64) -> Recording {
+    let sensor = Sensor::draw(rng, 4, 7);
+    let cycles = whole(rng, 4000, 8000);
+    let positions = sensor.positions(rng, 0.2, 0.85);
+    let background = sensor.background(log_between(rng, 0.05, 5.0));
+    let speed = one_of(rng, &[-1.0, 1.0]) * between(rng, 50.0, 400.0) / cycles as f64;
+    let photons = between(rng, 0.5, 1.5);
+    let period = between(rng, 1.5, 3.0) * sensor.bins as f64;
+    let mut list = List::new();
+    for (pixel, &position) in positions.iter().enumerate() {
+        list.add(
+            pixel,
+            &background
+                .clone()
+                .with(between(rng, 0.3, 0.6), position, sensor.sigma),
+            0,
+            cycles,
+            rng,
+        );
+        let start = between(rng, 0.0, period);
+        // For some laser cycles it stays.
+        for first in (0..cycles).step_by(20) {
+            let place = (start + speed * first as f64).rem_euclid(period);
+            if place < sensor.bins as f64 - 1.0 {
+                let pulse = sensor.background(0.0).with(photons, place, sensor.sigma);
+                list.add(pixel, &pulse, first, (first + 20).min(cycles), rng);
+            }
+        }
+    }
+    Recording {
+        need: Need::Told(&["lidar"]),
+        ..sensor.recording(
+            list.array(),
+            sensor.list_options(),
+            vec![Truth::Anything; sensor.pixels()],
+        )
     }
 }
 
