@@ -1,6 +1,6 @@
 //! `calibrate`: the settings of a sensor from a recording.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 use super::given::{Given, TDC};
 use super::recording::{RECORDING, bin_width_warning, read_options, settings_of_file, warnings};
@@ -104,7 +104,7 @@ impl Options {
     /// Calibrates the sensor that recorded `input`, with the settings from [`Self::requested`].
     ///
     /// # Errors
-    /// Fails if the recording cannot be read or calibrated, or if `progress` ends the work; the error begins with
+    /// Fails if the recording cannot be read or calibrated, or has no photons, or if `progress` ends the work; the error begins with
     /// the name of the recording.
     pub fn calibrate(
         &self,
@@ -116,6 +116,10 @@ impl Options {
         options.cycles = Some(u64::MAX);
         let counts = counts(input, &options)?;
         self.given.suits(input, &counts.metadata)?;
+        ensure!(
+            has_photons(&counts),
+            "{input}: no photons, so nothing can be measured: all histograms are empty"
+        );
         let options = self.calibration(&requested);
         let found = calibrate_counts(&requested, &counts, &options, progress);
         let found = found.with_context(|| input.to_string())?;
@@ -130,6 +134,12 @@ impl Options {
             warnings,
         })
     }
+}
+
+/// Whether there is a photon in any histogram.
+pub(super) fn has_photons(counts: &Counts) -> bool {
+    let mut all = counts.captures.iter().flatten().flatten();
+    all.any(|&count| count > 0)
 }
 
 /// Calibrates the sensor of a recording that has been read.

@@ -4,7 +4,7 @@
 
 use anyhow::{Result, ensure};
 
-use super::calibrate::{calibrate_counts, yes_or_no};
+use super::calibrate::{calibrate_counts, has_photons, yes_or_no};
 use super::depth_map::MapInput;
 use super::given::{FRAME, Given, SENSOR, TDC, of_given};
 use super::recording::{
@@ -316,8 +316,7 @@ fn find(
     glass: Option<bool>,
 ) -> Result<(Vec<Row>, Vec<String>)> {
     let counts = recording.counts()?;
-    let all_counts = || counts.captures.iter().flatten().flatten();
-    if all_counts().all(|&count| count == 0) {
+    if !has_photons(&counts) {
         return Ok((Vec::new(), Vec::new())); // A warning says so already.
     }
     let metadata = &counts.metadata;

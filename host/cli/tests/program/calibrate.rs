@@ -602,3 +602,17 @@ fn a_pulse_that_no_window_suits_is_warned_of() {
         );
     }
 }
+
+/// Nothing can be measured from no photons. A replay of them goes on.
+#[test]
+fn a_recording_without_photons_is_refused_and_replayed() {
+    let scratch = Scratch::new();
+    let zeros = scratch.file("zeros.npy", even(|_| [0; 32]));
+    scratch.all_refused(
+        "calibrate",
+        "zeros.npy --out new.toml | error: zeros.npy: no photons, so nothing can be measured",
+    );
+    assert!(!scratch.path("new.toml").exists() && !scratch.path("new.html").exists());
+    let summary = scratch.replayed(&zeros, "");
+    assert_contains(&summary["warnings"].to_string(), "no photons");
+}
