@@ -117,9 +117,9 @@ impl RecordedHistograms {
         let all = Array::new(array.columns(), rows).context("more than 65,536 pixels")?;
         let mut addresses = 0..=u16::MAX;
         let (mut addressed, mut lengths) = (Vec::new(), Vec::new());
-        for capture in captures {
+        for (number, capture) in captures.iter().enumerate() {
             // The totals end first, so that no address is taken and lost.
-            let totals = totals(capture)?.into_iter();
+            let totals = totals(capture, number * each)?.into_iter();
             let pixels: Vec<(u64, u16)> = totals.zip(addresses.by_ref()).collect();
             let unmasked = pixels
                 .iter()
@@ -212,14 +212,28 @@ impl RecordedHistograms {
     }
 }
 
-/// Photons of each pixel of a capture.
-fn totals(capture: &Capture) -> Result<Vec<u64>> {
+/// Checks that the photons of each pixel can be counted.
+///
+/// # Errors
+/// Names the first pixel with more.
+pub fn check_totals(captures: &[Capture]) -> Result<()> {
+    let mut first = 0;
+    for capture in captures {
+        totals(capture, first)?;
+        first += capture.len();
+    }
+    Ok(())
+}
+
+/// Photons of each pixel of a capture, whose first pixel is `first`.
+fn totals(capture: &Capture, first: usize) -> Result<Vec<u64>> {
     let add = |sum: u64, &count: &u64| sum.checked_add(count);
-    let totals = capture.iter().map(|counts| counts.iter().try_fold(0, add));
-    totals
-        .collect::<Option<Vec<u64>>>()
-        .filter(|totals| totals.iter().all(|&total| total <= MOST))
-        .context("a histogram holds more than 2^40 photons")
+    let total = |(pixel, counts): (usize, &Vec<u64>)| {
+        let total = counts.iter().try_fold(0, add);
+        let total = total.filter(|&total| total <= MOST);
+        total.with_context(|| format!("pixel {pixel} holds more than 2^40 photons"))
+    };
+    (first..).zip(capture).map(total).collect()
 }
 
 /// Photons a laser cycle.

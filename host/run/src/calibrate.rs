@@ -11,7 +11,7 @@ use dtof_options::numbers::{MAX_INTEGER, integer, within};
 use dtof_options::progress::{Progress, shared};
 use dtof_photons::input::Input;
 use dtof_photons::open::{Counts, counts};
-use dtof_photons::recorded::RecordingLength;
+use dtof_photons::recorded::{RecordingLength, check_totals};
 
 /// Options of this job; keys of settings files with these names mean something else.
 const OWN: &[&str] = &["target_mm", "glass", "false_alarm", "seed"];
@@ -145,13 +145,14 @@ pub(super) fn has_photons(counts: &Counts) -> bool {
 /// Calibrates the sensor of a recording that has been read.
 ///
 /// # Errors
-/// Those of [`calibrate_with`].
+/// Those of [`calibrate_with`], and a pixel with more photons than can be counted.
 pub(super) fn calibrate_counts(
     requested: &SettingsFile,
     counts: &Counts,
     options: &CalibrationOptions,
     progress: &mut dyn Progress,
 ) -> Result<Calibration> {
+    check_totals(&counts.captures)?;
     let length = match (counts.cycles, read_options(requested).length) {
         (Some(cycles), _) | (None, Some(RecordingLength::Cycles(cycles))) => Length::Cycles(cycles),
         (None, Some(RecordingLength::PhotonsPerCycle(rate))) => Length::PhotonsPerCycle(rate),

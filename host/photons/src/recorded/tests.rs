@@ -237,7 +237,7 @@ fn what_cannot_be_counted_or_does_not_fit_into_memory_is_refused() {
     };
     let most = 1 << 40;
     let most_a_cycle = 25_000_000;
-    let photons = "a histogram holds more than 2^40 photons";
+    let photons = "pixel 0 holds more than 2^40 photons";
     let cycles = "recorded_cycles 1099511627777: must be at most 2^40";
     let rate = "photons_per_cycle 0.5: makes the recording longer than 2^40 laser cycles";
     let memory = "50000002 photons a laser cycle are more than 50000000";

@@ -139,6 +139,29 @@ fn settings_that_cannot_be_are_refused() {
     );
 }
 
+/// Two counts of pixel 3, in the second of two captures, are together more than 64 bits hold.
+#[test]
+fn a_pixel_with_more_photons_than_can_be_counted_is_named() {
+    let scratch = Scratch::new();
+    let mut counts = [1u64; 4 * 8];
+    counts[25..27].fill(1 << 63);
+    let data: Vec<u8> = counts
+        .iter()
+        .flat_map(|count| count.to_le_bytes())
+        .collect();
+    scratch.file("h.npy", npy("<u8", "(2, 1, 2, 8)", &data));
+    scratch.file("given.toml", "");
+    let named = "h.npy: pixel 3 holds more than 2^40 photons";
+    for line in [
+        "replay h.npy --out out",
+        "replay h.npy --out out --settings given.toml",
+        "calibrate h.npy --out out/new.toml --bin-width-ps 250",
+        "compare h.npy --out out --bin-width-ps 250",
+    ] {
+        scratch.refused(&scratch.run(line), &[named]);
+    }
+}
+
 #[test]
 fn files_that_are_not_there_or_not_known_are_refused() {
     let scratch = Scratch::new();
