@@ -70,8 +70,7 @@ pub fn write_events(
     })
 }
 
-/// Writes events in `format`, as the program does from an AER file. Returns a warning about the laser rate, if
-/// it was assumed.
+/// Writes events in `format`, as the program does from an AER file. Returns its warnings.
 #[pyfunction]
 pub fn export(
     py: Python,
@@ -80,7 +79,7 @@ pub fn export(
     records: PyBackedBytes,
     array: Array,
     keywords: Keywords,
-) -> PyResult<Option<String>> {
+) -> PyResult<Vec<String>> {
     let options: ProjectionOptions = options(keywords)?;
     let format: Format = checked(|| {
         named(format).map_err(|reason| Refused::value("format", format, reason).into())
@@ -95,7 +94,7 @@ pub fn export(
             done.late == 0,
             "events are not in the order of their laser cycles"
         );
-        Ok(done.warning)
+        Ok(done.warnings)
     })
 }
 

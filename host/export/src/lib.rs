@@ -36,6 +36,7 @@ use dtof_events::histories::PixelHistories;
 use dtof_options::files::{destination, flush_to_disk, is_new_or_marked, temporary_file};
 use dtof_options::numbers::boolean;
 use dtof_options::progress::Progress;
+use dtof_options::rows::grouped;
 use dtof_options::{Refused, named, named_values};
 
 use depth_map::{DepthMap, depth_map};
@@ -188,8 +189,8 @@ pub struct ExportSummary {
     pub damage: Option<String>,
     /// The assumptions behind points and times: "60x32.2 degrees, 10 MHz".
     pub assumptions: String,
-    /// A warning about the laser rate, if it is not the file's.
-    pub warning: Option<String>,
+    /// That the laser rate is not the file's, and why nothing was written, a line each.
+    pub warnings: Vec<String>,
 }
 
 /// A temporary file.
@@ -327,12 +328,20 @@ pub fn export(
         .with_context(to)?
         .persist(&place.file);
     moved.map_err(|error| error.error).with_context(to)?;
+    let empty = (finished.written == 0).then(|| match points {
+        0 => "no events, so the new file has none".to_owned(),
+        _ => format!(
+            "no change of depth above {} mm in {} events, so the new file has none",
+            options.dynamic_depth.threshold_mm,
+            grouped(points)
+        ),
+    });
     Ok(ExportSummary {
         written: finished.written,
         late: finished.late,
         damage: survey.damage,
         assumptions,
-        warning: survey.warning,
+        warnings: survey.warning.into_iter().chain(empty).collect(),
     })
 }
 

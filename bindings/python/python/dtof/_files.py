@@ -105,5 +105,5 @@ def export_for(path: Any, events: Any, array: Array, format: Optional[str], opti
     """:func:`export` for a function that the user calls. Warnings name the line that called that."""
     name = os.fspath(path)
     format = os.path.splitext(name)[1][1:].lower() if format is None else format
-    warning = _native.export(name, format, records_of(events), array, arguments(PointsOptions, options))
-    warn([] if warning is None else [warning], callers=3)
+    warnings = _native.export(name, format, records_of(events), array, arguments(PointsOptions, options))
+    warn(warnings, callers=3)

@@ -84,7 +84,7 @@ impl Export {
                 self.file.display()
             );
         }
-        warn(self.file.as_path(), exported.warning, self.quiet);
+        warn(self.file.as_path(), exported.warnings, self.quiet);
         if !self.quiet {
             writeln!(
                 io::stdout(),

@@ -53,7 +53,7 @@ time_us,x_m,y_m,z_m,cycle,pixel,exposure,peak_bin,depth_bins,range_mm,peak_count
 ";
     assert_eq!(String::from_utf8(out).unwrap(), expected);
     assert_eq!((summary.written, summary.late), (4, 0));
-    assert_eq!((summary.damage, summary.warning), (None, None));
+    assert_eq!((summary.damage, summary.warnings), (None, Vec::new()));
 }
 
 #[test]

@@ -182,11 +182,11 @@ fn lasts_four_seconds(sensor: impl Sensor + Send + 'static, within: f64) {
         let file = fs::read(&out).unwrap();
         // Files of other formats are not replaced.
         fs::remove_file(&out).unwrap();
-        (file, exported.warning)
+        (file, exported.warnings)
     };
     let plain = |format| {
-        let (file, warning) = exported(format, &Options::default());
-        assert_eq!(warning, None);
+        let (file, warnings) = exported(format, &Options::default());
+        assert!(warnings.is_empty(), "{warnings:?}");
         file
     };
     let ends_within = |what: &str, seconds: f64, within: f64| {
@@ -227,8 +227,8 @@ fn lasts_four_seconds(sensor: impl Sensor + Send + 'static, within: f64) {
         clock: Some(LaserClock::new(1).unwrap()),
         ..Options::default()
     };
-    let (_, warning) = exported(Format::Csv, &options);
-    let warning = warning.unwrap();
+    let (_, warnings) = exported(Format::Csv, &options);
+    let warning = &warnings[0];
     assert!(warning.starts_with("the file has a laser of "), "{warning}");
 }
 

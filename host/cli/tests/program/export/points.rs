@@ -84,6 +84,29 @@ fn the_result_line_says_what_points_and_times_rest_on() {
     }
 }
 
+#[test]
+fn a_file_without_events_has_a_reason() {
+    let scratch = Scratch::new();
+    scratch.file("events.aer", file(&HEADER, &events()));
+    scratch.file("none.aer", file(&HEADER, &[]));
+    let none = "warning: none.aer: no events, so the new file has none\n";
+    let warned = |line: &str| {
+        let output = scratch.run(&format!("export {line} --laser-hz 10000000"));
+        assert!(output.status.success(), "{output:?}");
+        String::from_utf8(output.stderr).unwrap()
+    };
+    for format in ["csv", "pcd", "ply", "mcap", "ros2", "evt2"] {
+        let line = format!("none.aer --format {format} --out none.{format}");
+        assert_eq!(warned(&line), none);
+        assert_eq!(warned(&format!("{line} --quiet")), "");
+    }
+    assert_eq!(
+        warned("events.aer --format evt2 --out x --threshold-mm 50"),
+        "warning: events.aer: no change of depth above 50 mm in 12 events, so the new file has none\n"
+    );
+    assert_eq!(warned("events.aer --format csv --out y"), "");
+}
+
 #[cfg(unix)]
 #[test]
 fn a_link_stays_and_what_it_leads_to_is_replaced() {
