@@ -1,5 +1,6 @@
 //! `dtof view`: a device or a recording live in a browser.
 
+use std::cell::Cell;
 use std::io::{self, Write};
 use std::path::PathBuf;
 
@@ -51,14 +52,21 @@ impl View {
         let feed = match (self.device, self.file) {
             (Some(name), _) => {
                 let image = self.options.image.clone();
+                let requested = self.options.requested()?;
+                let dynamic_depth = self.options.dynamic_depth()?;
+                // One that is not there ends the command; one that goes away later does not.
+                let first = Cell::new(Some(dtof_device::open(&name, image.as_deref())?));
                 Feed::Device(Box::new(Device {
-                    requested: self.options.requested()?,
+                    requested,
                     pixels: self.options.pixels,
-                    dynamic_depth: self.options.dynamic_depth()?,
+                    dynamic_depth,
                     host_timeout: self.options.host_timeout(),
                     open: Box::new({
                         let name = name.clone();
-                        move || dtof_device::open(&name, image.as_deref())
+                        move || match first.take() {
+                            Some(port) => Ok(port),
+                            None => dtof_device::open(&name, image.as_deref()),
+                        }
                     }),
                     name,
                 }))

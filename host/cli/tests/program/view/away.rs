@@ -1,6 +1,8 @@
 //! A device that goes away and comes back.
 
+use std::process::Stdio;
 use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
 
 use crate::common::{Scratch, assert_contains, names};
 use crate::view::device::{feed, plugged};
@@ -59,6 +61,26 @@ fn a_device_that_is_unplugged_comes_back_and_so_does_the_recording() {
     );
 }
 
+/// The command ends at once, instead of looking for the device.
+#[test]
+fn a_device_that_is_not_there_at_the_start_is_an_error() {
+    let scratch = Scratch::new();
+    for name in ["/dev/none", "tcp:127.0.0.1:1"] {
+        let mut command = scratch.command(&format!("view --device {name}"));
+        command.stdout(Stdio::piped()).stderr(Stdio::piped());
+        let mut program = command.spawn().unwrap();
+        let begun = Instant::now();
+        while program.try_wait().unwrap().is_none() && begun.elapsed().as_secs() < 10 {
+            std::thread::sleep(Duration::from_millis(20));
+        }
+        // Does nothing to a program that has ended.
+        program.kill().unwrap();
+        let output = program.wait_with_output().unwrap();
+        scratch.refused(&output, &[&format!("error: {name}: ")]);
+        assert_eq!(output.status.code(), Some(1));
+    }
+}
+
 #[test]
 fn a_device_that_was_never_there_is_named() {
     let live = Live::of(feed("tcp:127.0.0.1:1", ""), None);
@@ -85,9 +107,9 @@ fn a_device_that_was_never_there_is_named() {
         let reason = frame["connection"]["reason"].as_str().unwrap();
         assert!(reason.starts_with("tcp:127.0.0.1:1: "), "{reason}");
     }
-    let begun = std::time::Instant::now();
+    let begun = Instant::now();
     live.end();
-    assert!(begun.elapsed() < std::time::Duration::from_secs(5));
+    assert!(begun.elapsed() < Duration::from_secs(5));
 }
 
 /// Settings that the device refuses at the start can be corrected on the page.
