@@ -197,6 +197,17 @@ def test_invalid_photons(photons, words):
     refused(lambda: dtof.photons(*photons), *words)
 
 
+@pytest.mark.parametrize("first", [0, 2**63 + 5])
+def test_laser_cycles_that_wrapped_are_named(first):
+    """A run would take all laser cycles before them, as many as ``cycles`` says."""
+    cycle = numpy.array([first, first + 1], dtype="u8") - numpy.uint64(3)
+    photons = numpy.zeros(2, dtype=[("pixel", "u2"), ("cycle", "u8"), ("bin", "u2")])
+    photons["cycle"] = cycle
+    why = f"record 0: cycle {cycle[0]} is 2^63 or more"
+    for take, name in [(dtof.photons, "photons"), (dtof.replay, "the array")]:
+        refused(lambda: take(photons, cycles=10**15), f"{name}: {why}", "wrapped")
+
+
 def test_invalid_files(tmp_path):
     for name, bytes in [
         ("a.npy", b""),

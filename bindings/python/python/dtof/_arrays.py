@@ -116,6 +116,7 @@ def native_input(value: Any, name: str) -> Input:
         raise Error(f"{name}: not an array: {_line(error)}") from error
     if array.dtype.hasobject:
         raise Error(f"{name}: the elements are Python objects: must be numbers; convert them, as with .astype(int)")
+    _check_cycles(array, name)
     small = {"bool": "u1", "float16": "f4"}.get(array.dtype.name)
     if small is not None:
         array = array.astype(small)
@@ -127,6 +128,20 @@ def native_input(value: Any, name: str) -> Input:
         raise Error(f"{name}: {_line(error)}") from error
     data = array.tobytes("F") if described["fortran_order"] else array.tobytes("C")
     return name, header.getvalue(), data
+
+
+def _check_cycles(array: numpy.ndarray, name: str) -> None:
+    """Refuses laser cycles of photons that are negative numbers in an unsigned type."""
+    if "cycle" not in (array.dtype.names or ()) or array["cycle"].dtype.kind != "u":
+        return
+    cycles = array["cycle"].ravel()
+    wrapped = cycles > numpy.iinfo("i8").max
+    if wrapped.any():
+        record = int(wrapped.argmax())
+        raise Error(
+            f"{name}: record {record}: cycle {cycles[record]} is 2^63 or more: a difference of unsigned numbers "
+            "probably wrapped below 0; subtract after .astype(int)"
+        )
 
 
 def recording_input(recorded: Any, options: Any) -> Input:
