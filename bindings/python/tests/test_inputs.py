@@ -140,6 +140,6 @@ def test_photons_that_are_left_out_are_warned_of(tmp_path):
     assert [warning.filename for warning in warned] == [__file__] * 2
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        dtof.replay(COUNTS, photons_per_cycle=0.005, cycles=500)  # as requested
-        dtof.replay(COUNTS, photons_per_cycle=0.005, decide_once=True)
-        dtof.photons([0, 0], [3, 20_000], [5, 5])
+        dtof.replay(COUNTS, bin_width_ps=250, photons_per_cycle=0.005, cycles=500)  # as requested
+        dtof.replay(COUNTS, bin_width_ps=250, photons_per_cycle=0.005, decide_once=True)
+        dtof.photons([0, 0], [3, 20_000], [5, 5], bin_width_ps=250)

@@ -183,7 +183,7 @@ def test_more_than_half_a_photon_in_a_bin_is_warned_of():
     def run(rate, **options):
         number = numpy.random.default_rng(5).poisson([rate, 0.2], (2000, 2))
         cycle, pixel = numpy.repeat(numpy.argwhere(number + 1), number.ravel(), axis=0).T
-        return dtof.photons(pixel, cycle, 60, columns=2, cycles=2000, **options)
+        return dtof.photons(pixel, cycle, 60, columns=2, cycles=2000, bin_width_ps=250, **options)
 
     with pytest.warns(UserWarning, match="1 of 2 pixels have .* pixel 0 0.[67].* in bin 60") as warned:
         run(0.7, once_per_bin=True)

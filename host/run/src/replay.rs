@@ -8,7 +8,7 @@ use super::calibrate::{calibrate_counts, has_photons, yes_or_no};
 use super::depth_map::MapInput;
 use super::given::{FRAME, Given, SENSOR, TDC, of_given};
 use super::recording::{
-    RECORDING, check_once_per_bin, mask_capture, read_options, settings_of_file,
+    RECORDING, bin_width_warning, check_once_per_bin, mask_capture, read_options, settings_of_file,
 };
 use super::run::{RunResult, Sink, run};
 use super::summary::Summary;
@@ -219,6 +219,10 @@ impl Options {
         });
         metadata.warnings.extend(warnings);
         let requested = requested.or(settings_of_file(&metadata, photons.array()));
+        // The search may have found another width in true distances.
+        if requested.sensor.bin_width_ps == Some(metadata.bin_width_ps) {
+            metadata.warnings.extend(bin_width_warning(&metadata));
+        }
         let detection = &requested.detection;
         ensure!(
             has_file || has_rule || detection.alpha.is_none() || detection.rule.is_none(),

@@ -295,7 +295,7 @@ fn a_mask_adds_to_what_is_found_unless_it_is_none() {
         ("--mask 3,5", serde_json::json!([3, 5])),
         ("--mask none", serde_json::Value::Null),
     ] {
-        let summary = scratch.replayed(&hot, options);
+        let summary = scratch.replayed(&hot, &format!("--bin-width-ps 250 {options}"));
         assert_eq!(summary["settings"]["masked"], masked, "{options}");
         assert_eq!(summary["warnings"], serde_json::json!([]), "{options}");
     }
@@ -309,7 +309,7 @@ fn a_gate_that_takes_the_glass_in_is_warned_of() {
     let found = &scratch.replayed(&glass, "")["settings"]["gate"];
     let (first, last) = (found[0].as_u64().unwrap(), found[1].as_u64().unwrap());
     let warnings = |gate: String| {
-        let summary = scratch.replayed(&glass, &format!("--gate {gate}"));
+        let summary = scratch.replayed(&glass, &format!("--bin-width-ps 250 --gate {gate}"));
         summary["warnings"].clone()
     };
     assert_eq!(warnings(format!("{first}..{last}")), serde_json::json!([]));
@@ -494,7 +494,7 @@ fn the_sample_recording_becomes_a_depth_map() {
     let scratch = Scratch::new();
     let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes");
     let scene = Scene::parse(&std::fs::read_to_string(scenes.join("room.toml")).unwrap()).unwrap();
-    let summary = scratch.replayed(&scenes.join("room.npy"), "");
+    let summary = scratch.replayed(&scenes.join("room.npy"), "--bin-width-ps 250");
     assert_eq!(summary["warnings"], serde_json::json!([]));
     let depth = scratch.map("depth");
     let is_right = |(pixel, depth): &(u16, &f64)| {
@@ -510,7 +510,7 @@ fn the_sample_recording_becomes_a_depth_map() {
 fn the_rows_of_the_readme_are_printed() {
     let scratch = Scratch::new();
     let room = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/room.npy");
-    let printed = scratch.printed(&format!("replay {room}"));
+    let printed = scratch.printed(&format!("replay {room} --bin-width-ps 250"));
     let readme = include_str!("../../../../README.md");
     let (_, rows) = readme.split_once("```text\n").unwrap();
     let (rows, _) = rows.split_once("```").unwrap();

@@ -24,7 +24,7 @@ fn photons(scratch: &Scratch, bright: u32) -> PathBuf {
     scratch.file("photons.csv", text)
 }
 
-const WINDOW: &str = "--rule window --window 3 --sigma-bins 1 --columns 1";
+const WINDOW: &str = "--bin-width-ps 250 --rule window --window 3 --sigma-bins 1 --columns 1";
 
 /// The positions of all events.
 fn positions(scratch: &Scratch) -> Vec<f64> {

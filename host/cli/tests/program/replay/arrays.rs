@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use crate::common::{Scratch, assert_contains, npy};
+use crate::common::{Scratch, assert_contains, npy, succeeded};
 use dtof_photons::npy::header;
 
 fn array(name: &str) -> PathBuf {
@@ -28,7 +28,8 @@ fn every_order_and_type_gives_the_same_events() {
         ("two.npz", "--axes captures,rows,columns,bins --array lit"),
     ] {
         let settings = defaults.display();
-        let options = format!("{options} --recorded-cycles 100 --settings {settings}");
+        let options =
+            format!("{options} --bin-width-ps 250 --recorded-cycles 100 --settings {settings}");
         let summary = scratch.replayed(&array(name), &options);
         assert_eq!(
             [&summary["pixels"], &summary["photons"]],
@@ -168,7 +169,7 @@ fn what_is_surely_wrong_is_said() {
     let defaults = scratch.file("defaults.toml", "");
     // Without a search, which would warn that 8 bins are too few.
     let warned = |input: &Path, options: &str, part: &str| {
-        let options = format!("--settings {} {options}", defaults.display());
+        let options = format!("--settings {} --bin-width-ps {options}", defaults.display());
         let output = scratch.replay(input, &options);
         let said = String::from_utf8(output.stderr).unwrap();
         assert!(
@@ -184,26 +185,26 @@ fn what_is_surely_wrong_is_said() {
         assert!(output.stderr.is_empty());
     };
     let dark = scratch.file("dark.npy", npy("|u1", "(2, 8)", &[0; 16]));
-    warned(&dark, "", "no photons: all 2 histograms are empty");
+    warned(&dark, "250", "no photons: all 2 histograms are empty");
     let plain = array("plain.npy");
     warned(
         &plain,
-        "--bin-width-ps 0.25",
+        "0.25",
         "bins of 0.25 ps: --bin-width-ps takes picoseconds; 0.25 ns are 250",
     );
     warned(
         &plain,
-        "--recorded-cycles 9",
+        "250 --recorded-cycles 9",
         "--recorded-cycles 9: half of the histograms have a bin of 10",
     );
-    let summary = scratch.replayed(&plain, "--recorded-cycles 1000");
+    let summary = scratch.replayed(&plain, "--bin-width-ps 250 --recorded-cycles 1000");
     assert_eq!(summary["warnings"].as_array().map(Vec::len), Some(1));
     // 16 bins, the pulse in bin 9, before 4 rows of 8 columns.
     let mut counts = vec![10u8; 16 * 32];
     counts[9 * 32..10 * 32].fill(200);
     let turned = scratch.file("turned.npy", npy("|u1", "(16, 4, 8)", &counts));
-    warned(&turned, "", "the first axis looks like the bins");
-    let summary = scratch.replayed(&turned, "--axes bins,rows,columns");
+    warned(&turned, "250", "the first axis looks like the bins");
+    let summary = scratch.replayed(&turned, "--bin-width-ps 250 --axes bins,rows,columns");
     assert_eq!(summary["warnings"], serde_json::json!([]));
 }
 
@@ -351,7 +352,13 @@ fn what_was_assumed_stands_in_the_rows() {
     scratch.file("a.npy", npy("|u1", "(2, 4, 8)", &[9; 64]));
     let line = "replay a.npy --out out --alpha 4";
     let width = "assumed: 250 ps; --bin-width-ps gives another";
-    let printed = scratch.printed(line);
+    let output = scratch.run(line);
+    let warning = "bins are taken to be 250 ps wide; --bin-width-ps changes that";
+    let said = String::from_utf8(output.stderr.clone()).unwrap();
+    assert_contains(&said, &format!("warning: a.npy: {warning}\n"));
+    let warnings = || scratch.summary()["warnings"].to_string();
+    assert_contains(&warnings(), warning);
+    let printed = succeeded(output);
     assert_contains(&printed, &format!("bin width             {width}"));
     let report = || std::fs::read_to_string(scratch.path("out/report.html")).unwrap();
     for text in [
@@ -365,6 +372,7 @@ fn what_was_assumed_stands_in_the_rows() {
     let given = "--bin-width-ps 250 --laser-hz 5000000 --settings rays.toml";
     let printed = scratch.printed(&format!("{line} {given}"));
     assert!(!(printed + &report()).contains("assumed"));
+    assert!(!warnings().contains("taken to be"));
 }
 
 #[test]
@@ -469,7 +477,8 @@ fn what_a_photon_list_leaves_open_is_said() {
             "--cycles takes more, or count laser cycles from 0",
         ),
     ] {
-        let output = scratch.replay(&list(pixels, first), options);
+        let options = format!("--bin-width-ps 250 {options}");
+        let output = scratch.replay(&list(pixels, first), &options);
         let error = String::from_utf8(output.stderr).unwrap();
         assert!(
             output.status.success() && error.is_empty() == warning.is_empty(),
