@@ -2,8 +2,8 @@
 //!
 //! | what is looked at | what it may be |
 //! |---|---|
-//! | peaks that fit a pulse only if counts begin again at 0 | counters that wrapped |
 //! | many bins with the highest count | counters that were full |
+//! | peaks that fit a pulse only if counts begin again at 0 | counters that wrapped |
 //! | how neighbouring bins scatter | what is no photon count |
 //! | the level of eighths of the range | a background that is not flat |
 //! | peaks of one bin at one place, where others are wider | no light that came back |
@@ -19,6 +19,7 @@
 
 use std::ops::{Range, RangeInclusive};
 
+use dtof_options::rows::percent;
 use dtof_photons::warnings::greatest_divisor;
 use dtof_theory::rates::bin_share;
 
@@ -53,6 +54,8 @@ const SURE: f64 = 6.0;
 pub struct Scatter {
     /// The mean of (a − 2b + c)² ÷ 2n: 1 for photon counts.
     pub mean: f64,
+    /// The standard error of the mean.
+    pub error: f64,
     /// Its median, over that of a Gaussian.
     pub median: f64,
     /// The mean of n, the photons of three bins.
@@ -65,7 +68,7 @@ impl Scatter {
     /// Of histograms with the same bins. Bins that are empty in all of them were not measured.
     #[must_use]
     pub fn of(histograms: &[&[f64]]) -> Self {
-        Self::beside(histograms, &beside_peaks(histograms))
+        Self::beside(histograms, &beside_peaks(histograms, line))
     }
 
     fn beside(histograms: &[&[f64]], is_beside: &[Vec<bool>]) -> Self {
@@ -82,8 +85,11 @@ impl Scatter {
         }
         let triples = tests.len();
         let each = triples.max(1) as f64;
+        let mean = tests.iter().sum::<f64>() / each;
+        let squares = tests.iter().map(|test| (test - mean).powi(2));
         Self {
-            mean: tests.iter().sum::<f64>() / each,
+            mean,
+            error: squares.sum::<f64>().sqrt() / each,
             median: median(tests) / MEDIAN,
             photons: photons / each,
             triples,
@@ -94,7 +100,7 @@ impl Scatter {
 /// The background of all histograms together in each bin, as far as it lies beside peaks.
 fn background(histograms: &[&[f64]]) -> Vec<f64> {
     let mut sums = vec![(0.0, 0_usize); histograms.first().map_or(0, |counts| counts.len())];
-    for (counts, is_beside) in histograms.iter().zip(beside_peaks(histograms)) {
+    for (counts, is_beside) in histograms.iter().zip(beside_peaks(histograms, level)) {
         for ((sum, count), _) in sums
             .iter_mut()
             .zip(*counts)
@@ -123,35 +129,35 @@ fn sum(histograms: &[&[f64]]) -> Vec<f64> {
 }
 
 /// For each bin of each histogram whether it was measured and lies beside the peaks.
-fn beside_peaks(histograms: &[&[f64]]) -> Vec<Vec<bool>> {
+fn beside_peaks(histograms: &[&[f64]], usual: Usual) -> Vec<Vec<bool>> {
     let is_measured: Vec<bool> = sum(histograms).iter().map(|&sum| sum > 0.0).collect();
-    let of = |counts: &&[f64]| without_peaks(counts, is_measured.clone());
+    let of = |counts: &&[f64]| without_peaks(counts, is_measured.clone(), usual);
     histograms.iter().map(of).collect()
 }
 
 /// These bins without those of peaks. A peak reaches from its highest bin to where three bins together hold no more than
 /// usual.
-fn without_peaks(counts: &[f64], mut is_beside: Vec<bool>) -> Vec<bool> {
+fn without_peaks(counts: &[f64], mut is_beside: Vec<bool>, usual: Usual) -> Vec<bool> {
     let all = counts.len();
     let around = |bin: usize| {
         counts[bin.saturating_sub(1)..(bin + 2).min(all)]
             .iter()
             .sum()
     };
-    let mut sums: Vec<f64> = (0..all).map(around).collect();
-    let measured = sums.iter().zip(&is_beside).filter(|(_, is)| **is);
-    let usual = median(measured.map(|(sum, _)| *sum));
-    let noise = usual.sqrt();
-    let belongs: Vec<bool> = sums.iter().map(|&sum| sum > usual + 2.0 * noise).collect();
+    let sums: Vec<f64> = (0..all).map(around).collect();
+    let usual = usual(&sums, &is_beside);
+    let above = |bin: usize, sigmas: f64| sums[bin] - usual[bin] - sigmas * usual[bin].sqrt();
+    let belongs: Vec<bool> = (0..all).map(|bin| above(bin, 2.0) > 0.0).collect();
     // In the dark a peak of a few photons is not seen, but is most of the photons.
-    let least = if usual < GAUSSIAN {
-        0.0
-    } else {
-        usual + 6.0 * noise
-    };
+    let mut stands: Vec<f64> = (0..all)
+        .map(|bin| match usual[bin] < GAUSSIAN {
+            true => sums[bin],
+            false => above(bin, SURE),
+        })
+        .collect();
     for _ in 0..PEAKS {
-        let top = (0..all).max_by(|&one, &other| sums[one].total_cmp(&sums[other]));
-        let Some(top) = top.filter(|&top| sums[top] > least) else {
+        let top = (0..all).max_by(|&one, &other| stands[one].total_cmp(&stands[other]));
+        let Some(top) = top.filter(|&top| stands[top] > 0.0) else {
             break;
         };
         let before = (0..top.saturating_sub(REACH)).rev();
@@ -159,9 +165,43 @@ fn without_peaks(counts: &[f64], mut is_beside: Vec<bool>) -> Vec<bool> {
         let after = (top + REACH + 1).min(all)..all;
         let end = after.start + after.take_while(|&bin| belongs[bin]).count();
         is_beside[first..end].fill(false);
-        sums[first..end].fill(f64::NEG_INFINITY);
+        stands[first..end].fill(f64::NEG_INFINITY);
     }
     is_beside
+}
+
+/// What some bins usually hold, for each bin.
+type Usual = fn(&[f64], &[bool]) -> Vec<f64>;
+
+/// The median of the bins.
+fn level(sums: &[f64], is_used: &[bool]) -> Vec<f64> {
+    let used = sums.iter().zip(is_used).filter(|(_, is)| **is);
+    vec![median(used.map(|(sum, _)| *sum)); sums.len()]
+}
+
+/// The straight line through the medians of eighths of some bins: the median of the slopes between two of them.
+fn line(sums: &[f64], is_used: &[bool]) -> Vec<f64> {
+    let length = sums.len().div_ceil(8).max(1);
+    let parts = sums.chunks(length).zip(is_used.chunks(length)).enumerate();
+    let medians: Vec<(f64, f64)> = parts
+        .filter(|(_, (_, is_used))| is_used.contains(&true))
+        .map(|(part, (sums, is_used))| {
+            let used = sums.iter().zip(is_used).filter(|(_, is)| **is);
+            (
+                part as f64 * length as f64 + length as f64 / 2.0,
+                median(used.map(|(sum, _)| *sum)),
+            )
+        })
+        .collect();
+    let pairs = medians
+        .iter()
+        .enumerate()
+        .flat_map(|(at, one)| medians[..at].iter().map(move |other| (one, other)));
+    let slope = median(pairs.map(|(one, other)| (one.1 - other.1) / (one.0 - other.0)));
+    let start = median(medians.iter().map(|(bin, sum)| sum - slope * bin));
+    (0..sums.len())
+        .map(|bin| (start + slope * (bin as f64 + 0.5)).max(0.0))
+        .collect()
 }
 
 /// What the counts beside the peaks are like.
@@ -264,7 +304,7 @@ pub(super) fn no_counts(traces: &[Trace], has_cycles: bool, false_alarm: f64) ->
     let step = (traces.len() * bins / BINS) | 1;
     let some = || traces.iter().step_by(step);
     let histograms: Vec<&[f64]> = some().map(|trace| &trace.counts[..]).collect();
-    let is_beside = beside_peaks(&histograms);
+    let is_beside = beside_peaks(&histograms, line);
     let scatter = Scatter::beside(&histograms, &is_beside);
     let is_bright = scatter.photons >= GAUSSIAN;
     let other = if is_bright {
@@ -274,7 +314,9 @@ pub(super) fn no_counts(traces: &[Trace], has_cycles: bool, false_alarm: f64) ->
     };
     let (low, high) = (scatter.mean.min(other), scatter.mean.max(other));
     let [least, most] = COUNTS;
-    if scatter.triples < FEWEST || (least..=most).contains(&low) && (least..=most).contains(&high) {
+    let error = 2.0 * scatter.error;
+    let (is_more, is_less) = (low - error > most, high + error < least);
+    if scatter.triples < FEWEST || !is_more && !is_less {
         return None;
     }
     let seen = Seen::new(&histograms, &is_beside);
@@ -286,14 +328,14 @@ pub(super) fn no_counts(traces: &[Trace], has_cycles: bool, false_alarm: f64) ->
         };
         format!("the variance between neighbouring bins is {times} times that of photon counts")
     };
-    if low > most {
+    if is_more {
         let pooled = Scatter::of(&[&sum(&histograms)]);
         let is_alike = histograms.len() > 1
-            && pooled.median - 1.0 > 0.5 * histograms.len() as f64 * (low - 1.0);
+            && pooled.median - 1.0 > (0.25 * histograms.len() as f64).max(3.0) * (low - 1.0);
         return Some(format!(
             "{}, so more than {} % of the pixels without a target may have a depth. {}",
             differ(low),
-            (1e4 * false_alarm).round() / 100.0,
+            percent(false_alarm),
             seen.more(is_alike)
         ));
     }
@@ -303,7 +345,8 @@ pub(super) fn no_counts(traces: &[Trace], has_cycles: bool, false_alarm: f64) ->
     } else {
         0.0
     };
-    (high < least * (1.0 - full)).then(|| format!("{}. {}", differ(high), seen.less(has_cycles)))
+    (high + error < least * (1.0 - full))
+        .then(|| format!("{}. {}", differ(high), seen.less(has_cycles)))
 }
 
 /// What the counts say against the recording.
@@ -325,14 +368,14 @@ fn of_histograms(some: usize, all: usize) -> String {
 pub(super) fn narrow_counters(traces: &[Trace]) -> Option<String> {
     let all = || traces.iter().flat_map(|trace| &trace.counts).copied();
     let highest = all().fold(0.0, f64::max);
-    wrapped(traces, highest).or_else(|| full(traces, highest))
+    full(traces, highest).or_else(|| wrapped(traces, highest))
 }
 
 /// Peaks that no pulse of the highest count fits, but a higher one whose counts begin again at 0.
 fn wrapped(traces: &[Trace], highest: f64) -> Option<String> {
     const VALUES: f64 = 256.0;
     /// So many histograms tell.
-    const SOME: usize = 16;
+    const SOME: usize = 8;
     if !(VALUES / 2.0..VALUES).contains(&highest) {
         return None;
     }
@@ -353,9 +396,10 @@ fn wrapped(traces: &[Trace], highest: f64) -> Option<String> {
 
 /// Whether the highest peak is a pulse of more than so many `values`, and none of fewer.
 fn fits_if_wrapped(counts: &[f64], values: f64) -> bool {
-    /// The mean square of the errors in standard deviations: of a pulse, and of what is none.
+    /// The mean square of the errors of a pulse, in standard deviations.
     const GOOD: f64 = 3.0;
-    const BAD: f64 = 8.0;
+    /// The sum of those of the best pulse of fewer is so many times as large.
+    const WORSE: f64 = 4.0;
     let background = median(counts.iter().copied());
     let stands = |bin: &usize| counts[*bin] > background + SURE * (background + 1.0).sqrt();
     let top = counts
@@ -367,7 +411,16 @@ fn fits_if_wrapped(counts: &[f64], values: f64) -> bool {
     let (Some(first), Some(last)) = (about.clone().find(stands), about.rev().find(stands)) else {
         return false;
     };
-    let bins = first.saturating_sub(1)..(last + 2).min(counts.len());
+    // A wrapped count may be as low as the background.
+    let bins = first.saturating_sub(3)..(last + 4).min(counts.len());
+    // Most pulses have no hole, and need no fit.
+    let has_hole = counts[bins.clone()].windows(5).any(|bins| {
+        let lower = f64::min(bins[0].max(bins[1]), bins[3].max(bins[4]));
+        lower - bins[2] > 3.0 * (lower + bins[2]).sqrt()
+    });
+    if !has_hole {
+        return false;
+    }
     let middle = (first + last + 1) as f64 / 2.0;
     let shares = |position: f64, sigma: f64| -> Vec<f64> {
         #[allow(clippy::cast_possible_truncation, reason = "bins of a histogram")]
@@ -384,7 +437,7 @@ fn fits_if_wrapped(counts: &[f64], values: f64) -> bool {
             let mean = background + height * share;
             let away = count - mean;
             let least = away - values * (away / values).round();
-            [away, least].map(|error| error * error / (mean + 1.0) / bins.len() as f64)
+            [away, least].map(|error| error * error / (mean + 1.0))
         };
         let errors = counts[bins.clone()].iter().zip(shares).map(error);
         errors.fold([0.0; 2], |[all, least], error| {
@@ -392,7 +445,7 @@ fn fits_if_wrapped(counts: &[f64], values: f64) -> bool {
         })
     };
     let (mut plain, mut best) = (f64::INFINITY, (f64::INFINITY, [0.0; 3]));
-    for (place, width) in (-15..=15).flat_map(|place| (5..=20).map(move |width| (place, width))) {
+    for (place, width) in (-30..=30).flat_map(|place| (5..=20).map(move |width| (place, width))) {
         let (position, sigma) = (middle + f64::from(place) / 10.0, f64::from(width) / 10.0);
         let shares = shares(position, sigma);
         // Peaks from a quarter of the values to eight times as many.
@@ -413,7 +466,9 @@ fn fits_if_wrapped(counts: &[f64], values: f64) -> bool {
         let errors = &errors;
         about().map(move |more| errors(&shares, height * (1.0 + more))[1])
     });
-    plain > BAD && nearer.fold(best.0, f64::min) < GOOD
+    let best = nearer.fold(best.0, f64::min);
+    let number = bins.len() as f64;
+    best < GOOD * number && plain > WORSE * best.max(number)
 }
 
 /// The highest count in more bins than the counts just below it together.
@@ -510,7 +565,7 @@ pub(super) fn uneven_background(
     (2 * most_alike < parts.len()).then(|| {
         let shares = parts.iter().map(|part| part.0);
         let (least, most) = shares.fold((f64::INFINITY, 0.0), |(least, most), share| (share.min(least), share.max(most)));
-        let percent = |share: f64| (100.0 * share).round();
+        let round = |share: f64| (100.0 * share).round();
         let helps = match tdc {
             Some(Tdc::OnePhotonIn { .. }) => "if it is pile-up, --recorded-cycles N corrects it",
             _ => "--gate FIRST..LAST keeps a part of the range that is flat",
@@ -518,9 +573,9 @@ pub(super) fn uneven_background(
         format!(
             "the background is not flat: eighths of the range have {} to {} % of its median, so more than {} % of the pixels \
              without a target may have a depth. {}{}",
-            percent(least),
-            percent(most),
-            (1e4 * false_alarm).round() / 100.0,
+            round(least),
+            round(most),
+            percent(false_alarm),
             helps[..1].to_uppercase(),
             &helps[1..]
         )
@@ -634,9 +689,9 @@ pub(super) fn range(traces: &[Trace], has_cycles: bool) -> (RangeInclusive<usize
 
 /// That a known number of laser cycles leaves far less light than any sensor is used with.
 pub(super) fn hardly_any_light(brightest: f64, cycles: u64) -> Option<String> {
-    /// Photons a laser cycle of the brightest pixel.
-    const LEAST: f64 = 1e-5;
-    (brightest > 0.0 && brightest < LEAST * cycles as f64).then(|| {
+    /// Laser cycles for each photon of the brightest pixel.
+    const MOST: f64 = 1e5;
+    (brightest > 0.0 && brightest * MOST < cycles as f64).then(|| {
         format!(
             "the brightest pixel has a photon in {} laser cycles: --recorded-cycles is how many laser cycles each histogram \
              counted",
@@ -648,6 +703,8 @@ pub(super) fn hardly_any_light(brightest: f64, cycles: u64) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::find::background::Level;
+    use dtof_core::Array;
     use proptest::prelude::*;
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, Poisson};
@@ -735,11 +792,11 @@ mod tests {
         }
 
         #[test]
-        fn background_that_was_taken_off_is_found(background in 5.0..1000.0_f64, seed: u64) {
+        fn background_that_was_taken_off_is_found(background in 8.0..1000.0_f64, seed: u64) {
             let light = scene(background, vec![(3.0 * background, 60.5, 1.0)]);
             let traces = recorded(32, &light, &|_, n| (n - background.round()).max(0.0), seed);
             let says = said(&traces).unwrap();
-            prop_assert!(says.contains(" % of the bins are 0 and would not be, as if background was subtracted"), "{}", says);
+            prop_assert!(says.contains(" % of the bins are 0 and would not be, as if background was subtracted"), "{} {}", background, says);
         }
 
         /// The same widths in all pixels, or others in each.
@@ -830,5 +887,166 @@ mod tests {
                 .contains("or a bin counts once a laser cycle, and --recorded-cycles")
         );
         assert_eq!(no_counts(&traces, true, 0.01), None);
+    }
+
+    /// As [`AllHistograms`] has them, without a correction for pile-up.
+    fn good(traces: Vec<Trace>) -> GoodHistograms {
+        let levels = traces.iter();
+        let levels = levels
+            .map(|trace| Level::of(&trace.counts, &trace.live))
+            .collect();
+        let array = Array::new(u32::try_from(traces.len()).unwrap(), 1).unwrap();
+        GoodHistograms::new(array, 0.01, traces, levels)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        /// Whatever is in the histograms.
+        #[test]
+        fn the_range_is_part_of_the_bins(
+            histograms in (1_usize..40, 1_usize..6).prop_flat_map(|(bins, number)| {
+                prop::collection::vec(prop::collection::vec(prop_oneof![Just(0_u32), 0..5_u32, 0..1_000_000_u32], bins), number)
+            }),
+            has_cycles: bool,
+        ) {
+            let traces: Vec<Trace> = histograms.iter().map(|counts| Trace {
+                counts: counts.iter().map(|&count| count.into()).collect(),
+                live: vec![1.0; counts.len()],
+                ..recorded(1, &|_, _| 0.0, &|_, n| n, 1).remove(0)
+            }).collect();
+            let (range, warning) = range(&traces, has_cycles);
+            let bins = histograms[0].len();
+            prop_assert!(range.start() <= range.end() && *range.end() < bins, "{:?}", range);
+            let lost = histograms.iter().flat_map(|counts| {
+                counts[..*range.start()].iter().chain(&counts[range.end() + 1..])
+            });
+            let lost: u32 = lost.map(|&count| count.min(1)).sum();
+            prop_assert!(warning.is_some() || lost as usize <= 2 * traces.len(), "{} {:?}", lost, range);
+        }
+
+        /// Bins that hold a twentieth of the others at one end; a half is no end.
+        #[test]
+        fn ends_that_are_hardly_filled_are_found(
+            background in 60.0..1000.0_f64,
+            bins in 1_usize..40,
+            is_first: bool,
+            share in 0.0..0.05_f64,
+            place in 0.4..0.6_f64,
+            seed: u64,
+        ) {
+            let light = scene(background, vec![(20.0 * background, place * 128.0, 1.0)]);
+            let is_end = |bin: usize| if is_first { bin < bins } else { bin >= BINS - bins };
+            let with = |share: f64| {
+                let mean = |pixel: usize, bin: usize| light(pixel, bin) * if is_end(bin) { share } else { 1.0 };
+                range(&recorded(16, &mean, &|_, n| n, seed), true)
+            };
+            let (found, warning) = with(share);
+            let whole = if is_first { bins..=BINS - 1 } else { 0..=BINS - 1 - bins };
+            prop_assert_eq!(found, whole);
+            prop_assert!(warning.is_some() || share * background * (16 * bins) as f64 <= 30.0);
+            prop_assert_eq!(with(0.5), (0..=BINS - 1, None));
+        }
+
+        /// The first photons of a wall: what is left behind it is no end of the range.
+        #[test]
+        fn what_pile_up_leaves_is_no_end(rate in 0.1..3.0_f64, signal in 1.0..5.0_f64, place in 20.0..110.0_f64, has_cycles: bool, seed: u64) {
+            let light = scene(rate / BINS as f64, vec![(signal, place, 1.0)]);
+            let mut left = 1.0;
+            let shares: Vec<f64> = (0..BINS).map(|bin| {
+                let before = left;
+                left *= (-light(0, bin)).exp();
+                before - left
+            }).collect();
+            let mut traces = recorded(16, &|_, bin| 20_000.0 * shares[bin], &|_, n| n, seed);
+            traces.iter_mut().for_each(|trace| trace.cycles = 20_000.0);
+            prop_assert_eq!(range(&traces, has_cycles).1, None);
+        }
+
+        /// Peaks up to four times what a counter of 8 bits holds; one that holds them is right.
+        #[test]
+        fn narrow_counters_are_found(
+            background in 1.0..50.0_f64,
+            highest in 350.0..1000.0_f64,
+            place in 20.0..100.0_f64,
+            sigma in 0.9..1.5_f64,
+            seed: u64,
+        ) {
+            let with = |highest: f64, counted: &dyn Fn(f64) -> f64| {
+                let light = scene(background, vec![(highest * 2.5 * sigma, place, sigma)]);
+                narrow_counters(&recorded(16, &light, &|_, n| counted(n), seed))
+            };
+            let says = with(highest, &|n| n.min(255.0)).unwrap();
+            prop_assert!(says.starts_with("100 % of the histograms have a bin of 255 and none has more"), "{}", says);
+            prop_assert_eq!(with(highest, &|n| n), None);
+            prop_assert_eq!(with(highest / 5.0, &|n| n % 256.0), None);
+        }
+
+        /// A line or an exponential, against walls, targets and their tails.
+        #[test]
+        fn a_background_that_is_not_flat_is_found(
+            background in 100.0..2000.0_f64,
+            fall in 0.5..0.9_f64,
+            is_curved: bool,
+            tail in 0.3..2.0_f64,
+            is_wall: bool,
+            seed: u64,
+        ) {
+            let place = |pixel: usize| if is_wall { 60.0 } else { 20.0 + (37 * pixel % 90) as f64 };
+            let pulse = |pixel: usize, bin: usize| {
+                let light = |delay: i32| {
+                    let share = bin_share(u32::try_from(bin).unwrap(), place(pixel) + f64::from(delay), 1.0);
+                    30.0 * background.sqrt() * share * (-f64::from(delay) / tail).exp()
+                };
+                (0..20).map(light).sum::<f64>()
+            };
+            let falls = |bin: usize| {
+                let along = bin as f64 / BINS as f64;
+                if is_curved { (1.0 - fall).powf(along) } else { 1.0 - fall * along }
+            };
+            let with = |falls: &dyn Fn(usize) -> f64| {
+                let mean = |pixel: usize, bin: usize| background * falls(bin) + pulse(pixel, bin);
+                uneven_background(&good(recorded(48, &mean, &|_, n| n, seed)), None, 0.01)
+            };
+            prop_assert_eq!(with(&|_| 1.0), None);
+            let says = with(&falls).unwrap();
+            prop_assert!(says.starts_with("the background is not flat"), "{}", says);
+        }
+
+        /// In a third of the histograms. A narrow pulse is one in all of them.
+        #[test]
+        fn spikes_are_found(background in 1.0..50.0_f64, bin in 0..BINS, seed: u64) {
+            let signal = 25.0 * (5.0 * background).sqrt() + 50.0;
+            let place = |pixel: usize| 20.5 + (37 * pixel % 90) as f64;
+            let light = |sigma: f64, spike: f64| {
+                let mean = move |pixel: usize, at: usize| {
+                    let is_spike = at == bin && pixel.is_multiple_of(3);
+                    background + signal * bin_share(u32::try_from(at).unwrap(), place(pixel), sigma)
+                        + if is_spike { spike } else { 0.0 }
+                };
+                spike_of(mean, seed)
+            };
+            let says = light(1.0, 5.0 * signal).unwrap();
+            let text = format!("have a spike at bin {bin} that is narrower than the pulse");
+            prop_assert!(says.contains(&text), "{}", says);
+            prop_assert_eq!(light(1.0, 0.0), None);
+            prop_assert_eq!(light(0.15, 0.0), None);
+        }
+    }
+
+    fn spike_of(mean: impl Fn(usize, usize) -> f64, seed: u64) -> Option<String> {
+        spike(&good(recorded(48, &mean, &|_, n| n, seed)))
+    }
+
+    /// One photon in 100,000 laser cycles is as dim as it gets.
+    #[test]
+    fn so_many_laser_cycles_leave_hardly_any_light() {
+        assert_eq!(hardly_any_light(50.0, 5_000_000), None);
+        let says = hardly_any_light(50.0, 5_000_001).unwrap();
+        assert!(
+            says.starts_with("the brightest pixel has a photon in 100,000 laser cycles"),
+            "{says}"
+        );
+        assert_eq!(hardly_any_light(0.0, u64::MAX), None);
     }
 }

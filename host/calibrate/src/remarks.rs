@@ -4,7 +4,7 @@ use super::find::pile_up::MATTERS;
 use super::{Audit, Calibration, Length, Nearest, PulseSource, Tdc};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::numbers::shortest;
-use dtof_options::rows::{Row, bins, grouped};
+use dtof_options::rows::{Row, bins, grouped, percent};
 
 /// From this share of lost photons on, far targets are missed or wrong although rates are corrected.
 const MOST_LOST: f64 = 0.75;
@@ -273,7 +273,7 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
             format!(
                 "There is so little background that the minimum count alone keeps false alarms \
              below {} %: z is the lowest that is written.",
-                detection.false_alarm * 100.0
+                percent(detection.false_alarm)
             ),
         );
     }

@@ -8,7 +8,7 @@ use dtof_draw::picture::{Map, heat_map};
 use super::{Calibration, Layer, Length, Nearest, PixelOffsets, PulseSource, remarks};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::numbers::shortest;
-use dtof_options::rows::{Row, grouped, significant};
+use dtof_options::rows::{Row, grouped, percent, significant};
 use dtof_report::{Figure, Section, still};
 
 /// Marks near the start of every settings file and of every report: such files may be replaced.
@@ -146,7 +146,7 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
             of.min_count,
             of.l1,
             of.l2,
-            of.false_alarm * 100.0
+            percent(of.false_alarm)
         ),
     );
     if let Some(photon_budget) = &found.photon_budget {

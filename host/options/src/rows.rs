@@ -40,6 +40,15 @@ pub fn significant(value: f64, digits: u8) -> String {
     format!("{value:.decimals$}")
 }
 
+/// A share other than 0 in percent, with at most two decimals unless it is below 0.01 %.
+#[must_use]
+pub fn percent(share: f64) -> String {
+    if share < 1e-4 {
+        return significant(100.0 * share, 2);
+    }
+    ((1e4 * share).round() / 100.0).to_string()
+}
+
 /// Replaces control characters, so that a name in a file cannot move the terminal's cursor.
 #[must_use]
 pub fn printable(text: &str) -> String {
@@ -89,6 +98,12 @@ mod tests {
     #[test]
     fn a_range_of_one_bin_is_that_bin() {
         assert_eq!([bins(21, 21), bins(3, 7)], ["bin 21", "bins 3 to 7"]);
+    }
+
+    #[test]
+    fn a_percentage_has_at_most_two_decimals_unless_it_would_be_0() {
+        let texts = [0.07, 0.01, 0.001_234, 0.15, 1.0, 1.2e-6].map(percent);
+        assert_eq!(texts, ["7", "1", "0.12", "15", "100", "0.00012"]);
     }
 
     #[test]

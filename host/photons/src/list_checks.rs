@@ -43,7 +43,7 @@ impl ListChecks {
             )]
             let cycles = (1.0 / bins.abs()).round() as u64;
             format!(
-                "in {some} of {all} pixels a peak wanders through the range, by a bin in {} laser cycles: another LiDAR, or a \
+                "in {some} of {all} pixels a peak wanders through the range, by a bin in about {} laser cycles: another LiDAR, or a \
                  target that moves fast. Record with dither (docs/settings.md#dither): then only light of the own laser has peaks",
                 grouped(cycles)
             )
@@ -199,4 +199,179 @@ fn speed(peaks: &[(u64, f64)]) -> Option<f64> {
         (is_in_a_row && is_far && peaks.iter().all(is_line)).then_some(slope)
     };
     peaks.windows(IN_A_ROW).find_map(of)
+}
+
+#[cfg(test)]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "photons, and bins of 0 to 63"
+)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use rand_core::SeedableRng;
+    use rand_distr::{Distribution, Normal, Poisson, Uniform};
+    use rand_pcg::Pcg64;
+
+    const BINS: usize = 64;
+
+    /// The photons of some pixels: pixel, laser cycle, bin.
+    struct Photons {
+        rng: Pcg64,
+        cycles: u64,
+        all: Vec<(u64, usize, usize)>,
+    }
+
+    impl Photons {
+        fn new(cycles: u64, seed: u64) -> Self {
+            Self {
+                rng: Pcg64::seed_from_u64(seed),
+                cycles,
+                all: Vec::new(),
+            }
+        }
+
+        /// So many photons in each laser cycle of a part of them, around a place that may move.
+        fn add(
+            &mut self,
+            pixel: usize,
+            cycles: std::ops::Range<u64>,
+            rate: f64,
+            place: impl Fn(u64) -> f64,
+            sigma: f64,
+        ) {
+            for cycle in cycles {
+                let number = Poisson::new(rate).unwrap().sample(&mut self.rng);
+                for _ in 0..number as u32 {
+                    let bin = Normal::new(place(cycle), sigma)
+                        .unwrap()
+                        .sample(&mut self.rng);
+                    if (0.0..BINS as f64).contains(&bin) {
+                        self.all.push((cycle, pixel, bin as usize));
+                    }
+                }
+            }
+        }
+
+        fn background(&mut self, pixel: usize, rate: f64) {
+            for cycle in 0..self.cycles {
+                for _ in 0..Poisson::new(rate).unwrap().sample(&mut self.rng) as u32 {
+                    let bin = Uniform::new(0, BINS).unwrap().sample(&mut self.rng);
+                    self.all.push((cycle, pixel, bin));
+                }
+            }
+        }
+
+        fn checks(mut self, pixels: usize) -> ListChecks {
+            self.all.sort_unstable();
+            let mut watch = ListWatch::new(pixels, BINS, self.cycles);
+            for (cycle, pixel, bin) in self.all {
+                watch.photon(pixel, cycle, bin);
+            }
+            watch.checks()
+        }
+    }
+
+    const PIXELS: usize = 4;
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+
+        /// Targets of any light that stay, flicker slowly, go, come, or move from place to place.
+        #[test]
+        fn light_that_stays_is_right(
+            background in 0.01..3.0_f64,
+            signal in 0.05..5.0_f64,
+            sigma in 0.2..1.5_f64,
+            flickers: bool,
+            goes: bool,
+            seed: u64,
+        ) {
+            let mut photons = Photons::new(4000, seed);
+            for pixel in 0..PIXELS {
+                photons.background(pixel, background);
+                let parts = if flickers { 0..10 } else { 0..1 };
+                let length = 4000 / parts.end;
+                for part in parts {
+                    let rate = if part % 2 == 0 { signal } else { signal / 3.0 };
+                    let place = if goes && part >= 5 { 50.0 } else { 20.0 + pixel as f64 };
+                    photons.add(pixel, part * length..(part + 1) * length, rate, |_| place, sigma);
+                }
+            }
+            prop_assert_eq!(photons.checks(PIXELS), ListChecks::default());
+        }
+
+        /// Drops of 20 to 60 photons in a laser cycle.
+        #[test]
+        fn photons_that_come_together_are_found(
+            background in 0.01..3.0_f64,
+            signal in 0.05..0.3_f64,
+            drops in 20_usize..60,
+            photons_each in 20.0..60.0_f64,
+            seed: u64,
+        ) {
+            let mut photons = Photons::new(4000, seed);
+            for pixel in 0..PIXELS {
+                photons.background(pixel, background);
+                photons.add(pixel, 0..4000, signal, |_| 40.0, 1.0);
+                for _ in 0..drops {
+                    let cycle = Uniform::new(0, 4000).unwrap().sample(&mut photons.rng);
+                    let place = Uniform::new(2.0, 15.0).unwrap().sample(&mut photons.rng);
+                    photons.add(pixel, cycle..cycle + 1, photons_each, |_| place, 1.0);
+                }
+            }
+            let found = photons.checks(PIXELS);
+            prop_assert!(found.together.is_some_and(|times| times > 2.5), "{:?}", found);
+            prop_assert_eq!(found.wandering, None);
+        }
+
+        /// By 30 to 200 bins in the whole recording; by two bins it stays.
+        #[test]
+        fn peaks_that_wander_are_found(
+            background in 0.01..3.0_f64,
+            bins in 30.0..200.0_f64,
+            is_back: bool,
+            seed: u64,
+        ) {
+            let with = |bins: f64| {
+                let mut photons = Photons::new(4000, seed);
+                let speed = if is_back { -bins } else { bins } / 4000.0;
+                for pixel in 0..PIXELS {
+                    photons.background(pixel, background);
+                    photons.add(pixel, 0..4000, 0.5, |_| 40.0, 1.0);
+                    let start = 10.0 * pixel as f64;
+                    let place = |cycle| (start + speed * cycle as f64).rem_euclid(BINS as f64);
+                    photons.add(pixel, 0..4000, 1.0, place, 1.0);
+                }
+                photons.checks(PIXELS).wandering
+            };
+            let (some, all, speed) = with(bins).unwrap();
+            prop_assert!(some > 1 && all == PIXELS);
+            let speed = speed * 4000.0;
+            prop_assert!((0.65..1.5).contains(&(speed.abs() / bins)) && (speed < 0.0) == is_back, "{}", speed);
+            prop_assert_eq!(with(2.0), None);
+        }
+    }
+
+    /// Rows that are there twice.
+    #[test]
+    fn photons_that_are_listed_twice_are_found() {
+        let mut photons = Photons::new(4000, 1);
+        photons.background(0, 0.1);
+        photons.add(0, 0..4000, 0.2, |_| 30.0, 1.0);
+        photons.all = photons.all.repeat(2);
+        assert!(photons.checks(1).together.is_some());
+    }
+
+    #[test]
+    fn many_pixels_are_watched_in_part() {
+        let watch = ListWatch::new(65_536, 1024, 1000);
+        assert!(
+            watch.watched.len() <= MOST_BINS + 1024,
+            "{}",
+            watch.watched.len()
+        );
+        assert!(!watch.step.is_multiple_of(2));
+    }
 }

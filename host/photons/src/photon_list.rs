@@ -193,14 +193,24 @@ impl<R: PhotonReader> Validator<R> {
 }
 
 /// Refuses numbers that are probably times: a replay would take hours for the empty laser cycles before the first
-/// photon. Photons come in the laser cycles from `first` to before `end`; an end before that has a warning.
+/// photon. Photons come in the laser cycles from `first` to before `end`; an early end before that has a warning.
 fn check_cycles(first: u64, end: u64) -> Result<(), Refused> {
     const MANY: u64 = 1_000_000_000;
     let span = end.saturating_sub(first);
-    if first < MANY || span == 0 || first <= span {
+    // Laser cycles that are replayed without a photon.
+    let dark = first.min(end);
+    if dark < MANY || dark <= span {
         return Ok(());
     }
-    let (first, span) = (grouped(first), grouped(span));
+    let first = grouped(first);
+    if span == 0 {
+        return Err(Refused::value(
+            "cycles",
+            end,
+            format!("the first photon comes in laser cycle {first}, after all of them"),
+        ));
+    }
+    let span = grouped(span);
     Err(Refused::input(format!(
         "the first photon comes in laser cycle {first}, and all within {span}: count laser cycles from 0; times are no \
          laser cycles"

@@ -253,6 +253,17 @@ fn times_are_refused_and_excerpts_are_not() {
     // Half of the laser cycles have photons; or none that is replayed.
     assert!(check_cycles(2_000_000_000, 4_000_000_000).is_ok());
     assert!(check_cycles(1_700_000_000, 10_000).is_ok());
+    assert!(check_cycles(1 << 63, 999_999_999).is_ok());
+    let reason = check_cycles(1 << 62, 1_000_000_000)
+        .unwrap_err()
+        .to_string();
+    let first = "4,611,686,018,427,387,904";
+    assert_eq!(
+        reason,
+        format!(
+            "cycles 1000000000: the first photon comes in laser cycle {first}, after all of them"
+        )
+    );
     assert!(check_cycles(1_700_000_000, 1_700_002_000).is_err());
 }
 
