@@ -30,7 +30,7 @@ use super::find::significance::{is_surely_less, median};
 use super::remarks::two_digits;
 
 /// A recording with more bins is judged by some of its histograms.
-const BINS: usize = 1 << 20;
+const BINS: usize = 1 << 18;
 /// The most peaks of a histogram.
 const PEAKS: usize = 8;
 /// So many bins before and after the highest bin of a peak belong to it in any case.
@@ -97,7 +97,7 @@ impl Scatter {
     }
 }
 
-/// The background of all histograms together in each bin, as far as it lies beside peaks.
+/// The mean background in each bin that lies beside peaks in some of the histograms.
 fn background(histograms: &[&[f64]]) -> Vec<f64> {
     let mut sums = vec![(0.0, 0_usize); histograms.first().map_or(0, |counts| counts.len())];
     for (counts, is_beside) in histograms.iter().zip(beside_peaks(histograms, level)) {
@@ -110,11 +110,10 @@ fn background(histograms: &[&[f64]]) -> Vec<f64> {
             *sum = (sum.0 + count, sum.1 + 1);
         }
     }
-    let all = histograms.len() as f64;
-    let of_all = |(sum, number): (f64, usize)| sum * all / number as f64;
+    let mean = |(sum, number): (f64, usize)| sum / number as f64;
     sums.into_iter()
         .filter(|sum| 4 * sum.1 > histograms.len())
-        .map(of_all)
+        .map(mean)
         .collect()
 }
 
@@ -126,6 +125,13 @@ fn sum(histograms: &[&[f64]]) -> Vec<f64> {
         }
     }
     sum
+}
+
+/// Some of the histograms of a large recording.
+fn some(traces: &[Trace]) -> impl Iterator<Item = &Trace> {
+    let bins = traces.first().map_or(0, |trace| trace.counts.len());
+    // Odd, so that it is not always the same column.
+    traces.iter().step_by((traces.len() * bins / BINS) | 1)
 }
 
 /// For each bin of each histogram whether it was measured and lies beside the peaks.
@@ -299,11 +305,7 @@ impl Seen {
 /// decisions on a pixel without a target may be a `false_alarm`.
 #[must_use]
 pub(super) fn no_counts(traces: &[Trace], has_cycles: bool, false_alarm: f64) -> Option<String> {
-    let bins = traces.first().map_or(0, |trace| trace.counts.len());
-    // Odd, so that it is not always the same column.
-    let step = (traces.len() * bins / BINS) | 1;
-    let some = || traces.iter().step_by(step);
-    let histograms: Vec<&[f64]> = some().map(|trace| &trace.counts[..]).collect();
+    let histograms: Vec<&[f64]> = some(traces).map(|trace| &trace.counts[..]).collect();
     let is_beside = beside_peaks(&histograms, line);
     let scatter = Scatter::beside(&histograms, &is_beside);
     let is_bright = scatter.photons >= GAUSSIAN;
@@ -339,7 +341,7 @@ pub(super) fn no_counts(traces: &[Trace], has_cycles: bool, false_alarm: f64) ->
             seen.more(is_alike)
         ));
     }
-    let share = some().map(|trace| scatter.photons / 3.0 / trace.cycles);
+    let share = some(traces).map(|trace| scatter.photons / 3.0 / trace.cycles);
     let full = if has_cycles {
         median(share).min(1.0)
     } else {
@@ -476,21 +478,14 @@ fn full(traces: &[Trace], highest: f64) -> Option<String> {
     /// Chance does not make so high a count the highest of several bins.
     const HIGH: f64 = 64.0;
     let below = highest - f64::min(highest / 32.0, 16.0);
-    let number = |counts: &[f64], is: &dyn Fn(f64) -> bool| {
-        counts.iter().filter(|&&count| is(count)).count()
-    };
-    let sum = |is: &dyn Fn(f64) -> bool| {
-        traces
-            .iter()
-            .map(|trace| number(&trace.counts, is))
-            .sum::<usize>()
-    };
-    let at = sum(&|count| count >= highest);
-    let near = sum(&|count| count >= below) - at;
-    let having = traces
-        .iter()
-        .filter(|trace| trace.counts.contains(&highest))
-        .count();
+    let (mut at, mut near, mut having) = (0, 0, 0);
+    for trace in traces {
+        let before = at;
+        for &count in trace.counts.iter().filter(|&&count| count >= below) {
+            *(if count >= highest { &mut at } else { &mut near }) += 1;
+        }
+        having += usize::from(at > before);
+    }
     let is_full = highest >= HIGH && at > near + 3 && having > 1 && 100 * having >= traces.len();
     is_full.then(|| {
         format!(
@@ -536,7 +531,9 @@ pub(super) fn uneven_background(
         clippy::cast_sign_loss,
         reason = "1 to 8"
     )]
-    for traces in good.traces.chunks_exact(together as usize) {
+    let groups = good.traces.chunks_exact(together as usize);
+    let step = (good.traces.len() * good.bins() / BINS) | 1;
+    for traces in groups.step_by(step) {
         let seen = |bins: Range<usize>| {
             let bins = bins.filter(|&bin| traces.iter().all(|trace| trace.live[bin] >= 0.5));
             let sums = bins.map(|bin| traces.iter().map(|trace| trace.counts[bin]).sum::<f64>());
@@ -643,13 +640,14 @@ pub(super) fn range(traces: &[Trace], has_cycles: bool) -> (RangeInclusive<usize
     let bins = traces.first().map_or(0, |trace| trace.counts.len());
     let histograms: Vec<&[f64]> = traces.iter().map(|trace| &trace.counts[..]).collect();
     let sums = sum(&histograms);
+    let some_histograms: Vec<&[f64]> = some(traces).map(|trace| &trace.counts[..]).collect();
     let is_filled = |sum: &f64| *sum > 0.0;
     let end = sums
         .iter()
         .rposition(is_filled)
         .map_or(bins, |last| last + 1);
     let start = sums.iter().position(is_filled).unwrap_or(0);
-    let usual = median(background(&histograms));
+    let usual = median(background(&some_histograms)) * traces.len() as f64;
     let is_below = |bin: usize, share: f64| is_surely_less(sums[bin], share * usual, ONE_IN);
     // Its slope is no edge, and after a bright pulse it leaves few laser cycles.
     let is_pile_up = |end: usize| {

@@ -115,7 +115,7 @@ const LOOKS_LIKE_BINS: f64 = 4.0;
 const MORE_THAN_LAST: f64 = 1.5;
 
 /// Of larger arrays some lines tell, with about so many counts.
-const MOST_COUNTS: usize = 1 << 21;
+const MOST_COUNTS: usize = 1 << 20;
 
 /// How much more often two photons of a line fall into one place than if they were spread evenly, of all lines along an
 /// axis. 1 for an even line whatever its noise, and its length if all are in one place.
