@@ -17,6 +17,7 @@
 //! a − 2b + c, with the mean 0 and the variance 2, so (a − 2b + c)² ÷ 2n has the mean 1, whatever n is. A bin that counts at
 //! most once a laser cycle and is full in the share p of them scatters less, by 1 − p.
 
+use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
 
 use dtof_options::rows::percent;
@@ -31,8 +32,9 @@ use super::remarks::two_digits;
 
 /// A recording with more bins is judged by some of its histograms.
 const BINS: usize = 1 << 18;
-/// The most peaks of a histogram.
+/// The most peaks of a histogram, one in so many bins.
 const PEAKS: usize = 8;
+const FOR_EACH: usize = 16;
 /// So many bins before and after the highest bin of a peak belong to it in any case.
 const REACH: usize = 3;
 /// Fewer triples of bins do not tell. The mean of so many is off by 0.08.
@@ -161,7 +163,7 @@ fn without_peaks(counts: &[f64], mut is_beside: Vec<bool>, usual: Usual) -> Vec<
             false => above(bin, SURE),
         })
         .collect();
-    for _ in 0..PEAKS {
+    for _ in 0..PEAKS.min((all / FOR_EACH).max(1)) {
         let top = (0..all).max_by(|&one, &other| stands[one].total_cmp(&stands[other]));
         let Some(top) = top.filter(|&top| stands[top] > 0.0) else {
             break;
@@ -377,7 +379,7 @@ pub(super) fn narrow_counters(traces: &[Trace]) -> Option<String> {
 fn wrapped(traces: &[Trace], highest: f64) -> Option<String> {
     const VALUES: f64 = 256.0;
     /// So many histograms tell.
-    const SOME: usize = 8;
+    const SOME: usize = 16;
     if !(VALUES / 2.0..VALUES).contains(&highest) {
         return None;
     }
@@ -386,7 +388,7 @@ fn wrapped(traces: &[Trace], highest: f64) -> Option<String> {
     let some = high.iter().step_by(high.len().div_ceil(SOME).max(1));
     let is_wrapped = |trace: &&&Trace| fits_if_wrapped(&trace.counts, VALUES);
     let (all, wrapped) = (some.len(), some.filter(is_wrapped).count());
-    (2 * wrapped > all).then(|| {
+    (4 * wrapped > 3 * all).then(|| {
         format!(
             "no count is above {:.0}, and the peaks of {} are those of higher counts that began again at 0, as if they wrapped: \
              save them as numpy.uint16",
@@ -415,14 +417,6 @@ fn fits_if_wrapped(counts: &[f64], values: f64) -> bool {
     };
     // A wrapped count may be as low as the background.
     let bins = first.saturating_sub(3)..(last + 4).min(counts.len());
-    // Most pulses have no hole, and need no fit.
-    let has_hole = counts[bins.clone()].windows(5).any(|bins| {
-        let lower = f64::min(bins[0].max(bins[1]), bins[3].max(bins[4]));
-        lower - bins[2] > 3.0 * (lower + bins[2]).sqrt()
-    });
-    if !has_hole {
-        return false;
-    }
     let middle = (first + last + 1) as f64 / 2.0;
     let shares = |position: f64, sigma: f64| -> Vec<f64> {
         #[allow(clippy::cast_possible_truncation, reason = "bins of a histogram")]
@@ -446,15 +440,32 @@ fn fits_if_wrapped(counts: &[f64], values: f64) -> bool {
             [all + error[0], least + error[1]]
         })
     };
-    let (mut plain, mut best) = (f64::INFINITY, (f64::INFINITY, [0.0; 3]));
+    // Peaks from a quarter of the values to eight times as many.
+    let height = |step: i32| values / 4.0 * 1.045_f64.powi(step);
+    let number = bins.len() as f64;
+    let plain = |every: usize| {
+        let places = (-30..=30)
+            .step_by(every)
+            .flat_map(|place| (5..=20).map(move |width| (place, width)));
+        let errors = places.flat_map(|(place, width)| {
+            let shares = shares(middle + f64::from(place) / 10.0, f64::from(width) / 10.0);
+            let errors = &errors;
+            (0..32)
+                .step_by(every)
+                .map(move |step| errors(&shares, height(step))[0])
+        });
+        errors.fold(f64::INFINITY, f64::min)
+    };
+    // Most peaks fit, and need no more.
+    if plain(3) <= WORSE * number {
+        return false;
+    }
+    let mut best = (f64::INFINITY, [0.0; 3]);
     for (place, width) in (-30..=30).flat_map(|place| (5..=20).map(move |width| (place, width))) {
         let (position, sigma) = (middle + f64::from(place) / 10.0, f64::from(width) / 10.0);
         let shares = shares(position, sigma);
-        // Peaks from a quarter of the values to eight times as many.
-        for step in 0..80 {
-            let height = values / 4.0 * 1.045_f64.powi(step);
-            let [all, wrapped] = errors(&shares, height);
-            plain = f64::min(plain, all);
+        for height in (0..80).map(height) {
+            let wrapped = errors(&shares, height)[1];
             if wrapped < best.0 {
                 best = (wrapped, [position, sigma, height]);
             }
@@ -469,8 +480,7 @@ fn fits_if_wrapped(counts: &[f64], values: f64) -> bool {
         about().map(move |more| errors(&shares, height * (1.0 + more))[1])
     });
     let best = nearer.fold(best.0, f64::min);
-    let number = bins.len() as f64;
-    best < GOOD * number && plain > WORSE * best.max(number)
+    best < GOOD * number && plain(1) > WORSE * best.max(number)
 }
 
 /// The highest count in more bins than the counts just below it together.
@@ -478,15 +488,26 @@ fn full(traces: &[Trace], highest: f64) -> Option<String> {
     /// Chance does not make so high a count the highest of several bins.
     const HIGH: f64 = 64.0;
     let below = highest - f64::min(highest / 32.0, 16.0);
-    let (mut at, mut near, mut having) = (0, 0, 0);
+    // Photons differ from pixel to pixel: what has the same neighbours is a copy.
+    let (mut at, mut near, mut having) = (BTreeSet::new(), BTreeSet::new(), 0);
     for trace in traces {
-        let before = at;
-        for &count in trace.counts.iter().filter(|&&count| count >= below) {
-            *(if count >= highest { &mut at } else { &mut near }) += 1;
+        let counts = &trace.counts;
+        for bin in (0..counts.len()).filter(|&bin| counts[bin] >= below) {
+            let neighbours = [bin.checked_sub(1), Some(bin + 1)].map(|bin| {
+                bin.and_then(|bin| counts.get(bin))
+                    .map(|count| count.to_bits())
+            });
+            let set = if counts[bin] >= highest {
+                &mut at
+            } else {
+                &mut near
+            };
+            set.insert(neighbours);
         }
-        having += usize::from(at > before);
+        having += usize::from(counts.contains(&highest));
     }
-    let is_full = highest >= HIGH && at > near + 3 && having > 1 && 100 * having >= traces.len();
+    let is_full =
+        highest >= HIGH && at.len() > near.len() + 3 && having > 1 && 100 * having >= traces.len();
     is_full.then(|| {
         format!(
             "{} have a bin of {highest} and none has more, so their counters were full and their peaks are cut off: \
@@ -648,6 +669,9 @@ pub(super) fn range(traces: &[Trace], has_cycles: bool) -> (RangeInclusive<usize
         .map_or(bins, |last| last + 1);
     let start = sums.iter().position(is_filled).unwrap_or(0);
     let usual = median(background(&some_histograms)) * traces.len() as f64;
+    if !is_surely_less(0.0, usual, ONE_IN) {
+        return (0..=bins.saturating_sub(1), None);
+    }
     let is_below = |bin: usize, share: f64| is_surely_less(sums[bin], share * usual, ONE_IN);
     // Its slope is no edge, and after a bright pulse it leaves few laser cycles.
     let is_pile_up = |end: usize| {
@@ -666,7 +690,7 @@ pub(super) fn range(traces: &[Trace], has_cycles: bool) -> (RangeInclusive<usize
     let mut first = start + (start..end).take_while(is_hardly).count();
     let edge = end - (first..end).rev().take_while(is_hardly).count();
     if edge < first + FEWEST_BINS {
-        return (0..=bins - 1, None);
+        return (0..=bins.saturating_sub(1), None);
     }
     let mut last = if is_pile_up(edge) { end - 1 } else { edge - 1 };
     let beyond = || sums[..first].iter().chain(&sums[last + 1..]);

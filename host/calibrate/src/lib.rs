@@ -187,13 +187,13 @@ impl AllHistograms {
     fn new(observed: &Observed, hot: &[usize], options: &CalibrationOptions) -> Result<Self> {
         let mut traces = observed.traces(hot)?;
         let has_cycles = observed.length.is_known();
-        let cause = audit::narrow_counters(&traces);
+        let narrow = audit::narrow_counters(&traces);
         let (range, short) = audit::range(&traces, has_cycles);
         for trace in &mut traces {
             trace.counts.truncate(range.end() + 1);
             trace.live.truncate(range.end() + 1);
         }
-        let cause = cause.or_else(|| audit::no_counts(&traces, has_cycles, options.false_alarm));
+        let no_counts = audit::no_counts(&traces, has_cycles, options.false_alarm);
         let dim = match observed.length {
             Length::Cycles(cycles) if observed.times.is_none() => {
                 let photons = traces.iter().map(|trace| trace.counts.iter().sum());
@@ -207,7 +207,7 @@ impl AllHistograms {
             .flat_map(|times| times.checks.warnings());
         let tdc = match observed.length {
             // Full counters look like a dead time.
-            _ if cause.is_some() && options.dead_time.is_none() => None,
+            _ if narrow.is_some() && options.dead_time.is_none() => None,
             Length::Cycles(_) => Some(match options.dead_time {
                 Some(bins) => pile_up::known_tdc(&traces, bins.into()),
                 None => pile_up::tdc(&traces).or_by_times(&traces, observed.times),
@@ -231,7 +231,7 @@ impl AllHistograms {
             range,
             tdc,
             audit: Audit {
-                cause,
+                cause: narrow.or(no_counts),
                 others: short.into_iter().chain(dim).chain(of_list).collect(),
             },
         })

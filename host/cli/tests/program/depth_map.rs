@@ -21,11 +21,14 @@ const BIN_MM: f64 = 37.474;
 )]
 fn wall() -> Vec<u8> {
     let mut rng = Pcg64::seed_from_u64(1);
-    let background = Poisson::new(5.0).unwrap();
-    let counts = (0..8 * 128_u16).map(|place| match place % 128 {
-        59 | 61 => 80,
-        60 => 140,
-        _ => background.sample(&mut rng) as u16,
+    let mean = |bin: u16| match bin {
+        59 | 61 => 80.0,
+        60 => 140.0,
+        _ => 5.0,
+    };
+    let counts = (0..8 * 128_u16).map(|place| {
+        let count = Poisson::new(mean(place % 128)).unwrap();
+        count.sample(&mut rng) as u16
     });
     counts.flat_map(u16::to_le_bytes).collect()
 }

@@ -4,6 +4,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use rand_core::SeedableRng;
+use rand_distr::{Distribution, Poisson};
+use rand_pcg::Pcg64;
+
 use crate::common::{Scratch, assert_contains, npy, succeeded};
 use dtof_photons::npy::header;
 
@@ -163,6 +167,11 @@ fn neighbours_are_added_up_and_bins_cut_off_and_all_is_counted() {
     assert_eq!(summary["photons"], 3);
 }
 
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "less than 256 photons"
+)]
 #[test]
 fn what_is_surely_wrong_is_said() {
     let scratch = Scratch::new();
@@ -200,8 +209,10 @@ fn what_is_surely_wrong_is_said() {
     let summary = scratch.replayed(&plain, "--bin-width-ps 250 --recorded-cycles 1000");
     assert_eq!(summary["warnings"].as_array().map(Vec::len), Some(1));
     // 16 bins, the pulse in bin 9, before 4 rows of 8 columns.
-    let mut counts = vec![10u8; 16 * 32];
-    counts[9 * 32..10 * 32].fill(200);
+    let mut rng = Pcg64::seed_from_u64(1);
+    let mut photons = |mean: f64| Poisson::new(mean).unwrap().sample(&mut rng) as u8;
+    let means = (0..16 * 32).map(|at| if at / 32 == 9 { 150.0 } else { 10.0 });
+    let counts: Vec<u8> = means.map(&mut photons).collect();
     let turned = scratch.file("turned.npy", npy("|u1", "(16, 4, 8)", &counts));
     warned(&turned, "250", "the first axis looks like the bins");
     let summary = scratch.replayed(&turned, "--bin-width-ps 250 --axes bins,rows,columns");
