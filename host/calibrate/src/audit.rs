@@ -446,7 +446,7 @@ fn fits_if_wrapped(counts: &[f64], values: f64) -> bool {
     let plain = |every: usize| {
         let places = (-30..=30)
             .step_by(every)
-            .flat_map(|place| (5..=20).map(move |width| (place, width)));
+            .flat_map(|place| (1..=20).map(move |width| (place, width)));
         let errors = places.flat_map(|(place, width)| {
             let shares = shares(middle + f64::from(place) / 10.0, f64::from(width) / 10.0);
             let errors = &errors;
@@ -985,7 +985,7 @@ mod tests {
             prop_assert_eq!(range(&traces, has_cycles).1, None);
         }
 
-        /// Peaks up to four times what a counter of 8 bits holds; one that holds them is right.
+        /// Peaks up to four times what a counter of 8 bits holds; one that holds them is right, and so is a narrow pulse.
         #[test]
         fn narrow_counters_are_found(
             background in 1.0..50.0_f64,
@@ -1002,6 +1002,8 @@ mod tests {
             prop_assert!(says.starts_with("100 % of the histograms have a bin of 255 and none has more"), "{}", says);
             prop_assert_eq!(with(highest, &|n| n), None);
             prop_assert_eq!(with(highest / 5.0, &|n| n % 256.0), None);
+            let narrow = scene(background, vec![(highest / 6.0, place, sigma / 5.0)]);
+            prop_assert_eq!(narrow_counters(&recorded(16, &narrow, &|_, n| n, seed)), None);
         }
 
         /// A line or an exponential, against walls, targets and their tails.
