@@ -3,14 +3,14 @@
 //! | what is looked at | what it may be |
 //! |---|---|
 //! | many bins with the highest count | counters that were full |
-//! | peaks that fit a pulse only if counts begin again at 0 | counters that wrapped |
 //! | how neighbouring bins scatter | what is no photon count |
 //! | the level of eighths of the range | a background that is not flat |
 //! | peaks of one bin at one place, where others are wider | no light that came back |
 //! | the first and the last bins | a TDC whose range is shorter |
 //! | photons a laser cycle | a wrong number of laser cycles |
 //!
-//! The first of the upper five is the cause of others below, and of what else is found. The last two stand by themselves.
+//! The first of the upper four that is found may be the cause of the others of them, and of what the search finds. The last
+//! two stand by themselves.
 //!
 //! Decisions rest on the scatter of photon counts: what is no count has another one. Let three neighbouring bins hold a, b
 //! and c photons, and n together. If their means lie on a straight line, each of the n photons adds 1, −2 or 1 to
@@ -22,11 +22,9 @@ use std::ops::{Range, RangeInclusive};
 
 use dtof_options::rows::percent;
 use dtof_photons::warnings::greatest_divisor;
-use dtof_theory::rates::bin_share;
 
 use super::find::good_histograms::GoodHistograms;
 use super::find::observed::Trace;
-use super::find::pile_up::Tdc;
 use super::find::significance::{is_surely_less, median};
 use super::remarks::two_digits;
 
@@ -368,125 +366,12 @@ fn of_histograms(some: usize, all: usize) -> String {
     format!("{percent:.0} % of the histograms")
 }
 
-/// Counters that wrapped, or were full.
-pub(super) fn narrow_counters(traces: &[Trace]) -> Option<String> {
-    let all = || traces.iter().flat_map(|trace| &trace.counts).copied();
-    let highest = all().fold(0.0, f64::max);
-    full(traces, highest).or_else(|| wrapped(traces, highest))
-}
-
-/// Peaks that no pulse of the highest count fits, but a higher one whose counts begin again at 0.
-fn wrapped(traces: &[Trace], highest: f64) -> Option<String> {
-    const VALUES: f64 = 256.0;
-    /// So many histograms tell.
-    const SOME: usize = 16;
-    if !(VALUES / 2.0..VALUES).contains(&highest) {
-        return None;
-    }
-    let is_high = |trace: &&Trace| trace.counts.iter().any(|&count| count > VALUES / 4.0);
-    let high: Vec<&Trace> = traces.iter().filter(is_high).collect();
-    let some = high.iter().step_by(high.len().div_ceil(SOME).max(1));
-    let is_wrapped = |trace: &&&Trace| fits_if_wrapped(&trace.counts, VALUES);
-    let (all, wrapped) = (some.len(), some.filter(is_wrapped).count());
-    (4 * wrapped > 3 * all).then(|| {
-        format!(
-            "no count is above {:.0}, and the peaks of {} are those of higher counts that began again at 0, as if they wrapped: \
-             save them as numpy.uint16",
-            VALUES - 1.0,
-            of_histograms(high.len() * wrapped / all, traces.len())
-        )
-    })
-}
-
-/// Whether the highest peak is a pulse of more than so many `values`, and none of fewer.
-fn fits_if_wrapped(counts: &[f64], values: f64) -> bool {
-    /// The mean square of the errors of a pulse, in standard deviations.
-    const GOOD: f64 = 3.0;
-    /// The sum of those of the best pulse of fewer is so many times as large.
-    const WORSE: f64 = 4.0;
-    let background = median(counts.iter().copied());
-    let stands = |bin: &usize| counts[*bin] > background + SURE * (background + 1.0).sqrt();
-    let top = counts
-        .iter()
-        .enumerate()
-        .max_by(|one, other| one.1.total_cmp(other.1))
-        .map_or(0, |top| top.0);
-    let about = top.saturating_sub(8)..(top + 9).min(counts.len());
-    let (Some(first), Some(last)) = (about.clone().find(stands), about.rev().find(stands)) else {
-        return false;
-    };
-    // A wrapped count may be as low as the background.
-    let bins = first.saturating_sub(3)..(last + 4).min(counts.len());
-    let middle = (first + last + 1) as f64 / 2.0;
-    let shares = |position: f64, sigma: f64| -> Vec<f64> {
-        #[allow(clippy::cast_possible_truncation, reason = "bins of a histogram")]
-        let shares: Vec<f64> = bins
-            .clone()
-            .map(|bin| bin_share(bin as u32, position, sigma))
-            .collect();
-        let highest = shares.iter().copied().fold(1e-9, f64::max);
-        shares.into_iter().map(|share| share / highest).collect()
-    };
-    // Of a pulse with this height, and the same if its counts begin again at 0.
-    let errors = |shares: &[f64], height: f64| {
-        let error = |(count, share): (&f64, &f64)| {
-            let mean = background + height * share;
-            let away = count - mean;
-            let least = away - values * (away / values).round();
-            [away, least].map(|error| error * error / (mean + 1.0))
-        };
-        let errors = counts[bins.clone()].iter().zip(shares).map(error);
-        errors.fold([0.0; 2], |[all, least], error| {
-            [all + error[0], least + error[1]]
-        })
-    };
-    // Peaks from a quarter of the values to eight times as many.
-    let height = |step: i32| values / 4.0 * 1.045_f64.powi(step);
-    let number = bins.len() as f64;
-    let plain = |every: usize| {
-        let places = (-30..=30)
-            .step_by(every)
-            .flat_map(|place| (1..=20).map(move |width| (place, width)));
-        let errors = places.flat_map(|(place, width)| {
-            let shares = shares(middle + f64::from(place) / 10.0, f64::from(width) / 10.0);
-            let errors = &errors;
-            (0..32)
-                .step_by(every)
-                .map(move |step| errors(&shares, height(step))[0])
-        });
-        errors.fold(f64::INFINITY, f64::min)
-    };
-    // Most peaks fit, and need no more.
-    if plain(3) <= WORSE * number {
-        return false;
-    }
-    let mut best = (f64::INFINITY, [0.0; 3]);
-    for (place, width) in (-30..=30).flat_map(|place| (5..=20).map(move |width| (place, width))) {
-        let (position, sigma) = (middle + f64::from(place) / 10.0, f64::from(width) / 10.0);
-        let shares = shares(position, sigma);
-        for height in (0..80).map(height) {
-            let wrapped = errors(&shares, height)[1];
-            if wrapped < best.0 {
-                best = (wrapped, [position, sigma, height]);
-            }
-        }
-    }
-    let [position, sigma, height] = best.1;
-    let about = || (-5..=5).map(|step| f64::from(step) / 100.0);
-    let nearer = about().flat_map(|place| about().map(move |width| (place, width)));
-    let nearer = nearer.flat_map(|(place, width)| {
-        let shares = shares(position + place, sigma + width);
-        let errors = &errors;
-        about().map(move |more| errors(&shares, height * (1.0 + more))[1])
-    });
-    let best = nearer.fold(best.0, f64::min);
-    best < GOOD * number && plain(1) > WORSE * best.max(number)
-}
-
-/// The highest count in more bins than the counts just below it together.
-fn full(traces: &[Trace], highest: f64) -> Option<String> {
+/// Counters that were full: the highest count in more bins than the counts just below it together.
+pub(super) fn full_counters(traces: &[Trace]) -> Option<String> {
     /// Chance does not make so high a count the highest of several bins.
     const HIGH: f64 = 64.0;
+    let counts = traces.iter().flat_map(|trace| &trace.counts);
+    let highest = counts.copied().fold(0.0, f64::max);
     let below = highest - f64::min(highest / 32.0, 16.0);
     // Photons differ from pixel to pixel: what has the same neighbours is a copy.
     let (mut at, mut near, mut having) = (BTreeSet::new(), BTreeSet::new(), 0);
@@ -521,7 +406,7 @@ fn full(traces: &[Trace], highest: f64) -> Option<String> {
 /// deviation of the photons in a window. A difference of that moves the threshold by as much.
 pub(super) fn uneven_background(
     good: &GoodHistograms,
-    tdc: Option<Tdc>,
+    gate: RangeInclusive<usize>,
     false_alarm: f64,
 ) -> Option<String> {
     const PARTS: usize = 8;
@@ -534,7 +419,8 @@ pub(super) fn uneven_background(
     const EVEN: f64 = 0.02;
     /// A median of medians has a larger error than a mean.
     const OF_MEDIANS: f64 = 1.57;
-    let length = good.bins() / PARTS;
+    let (from, end) = (*gate.start(), good.bins().min(gate.end() + 1));
+    let length = end.saturating_sub(from) / PARTS;
     if length < 3 {
         return None;
     }
@@ -560,9 +446,9 @@ pub(super) fn uneven_background(
             let sums = bins.map(|bin| traces.iter().map(|trace| trace.counts[bin]).sum::<f64>());
             sums.collect::<Vec<f64>>()
         };
-        let level = median(seen(0..good.bins()));
+        let level = median(seen(from..end));
         for (at, shares) in parts.iter_mut().enumerate() {
-            let bins = seen(at * length..(at + 1) * length);
+            let bins = seen(from + at * length..from + (at + 1) * length);
             if level > 0.0 && 2 * bins.len() > length {
                 shares.push(median(bins) / level);
             }
@@ -584,56 +470,58 @@ pub(super) fn uneven_background(
         let shares = parts.iter().map(|part| part.0);
         let (least, most) = shares.fold((f64::INFINITY, 0.0), |(least, most), share| (share.min(least), share.max(most)));
         let round = |share: f64| (100.0 * share).round();
-        let helps = match tdc {
-            Some(Tdc::OnePhotonIn { .. }) => "if it is pile-up, --recorded-cycles N corrects it",
-            _ => "--gate FIRST..LAST keeps a part of the range that is flat",
-        };
         format!(
             "the background is not flat: eighths of the range have {} to {} % of its median, so more than {} % of the pixels \
-             without a target may have a depth. {}{}",
+             without a target may have a depth",
             round(least),
             round(most),
             percent(false_alarm),
-            helps[..1].to_uppercase(),
-            &helps[1..]
         )
     })
 }
 
-/// Peaks of a single bin at the same place, where other peaks are wider.
-pub(super) fn spike(good: &GoodHistograms) -> Option<String> {
+/// Peaks of a single bin at the same place, where others have at least three.
+pub(super) fn spike(good: &GoodHistograms, gate: RangeInclusive<usize>) -> Option<String> {
     /// Fewer histograms may have a stuck bin of one pixel.
     const SHARE: f64 = 0.05;
-    let mut spikes = vec![0_usize; good.bins()];
-    let (mut narrow, mut wide) = (0, vec![0_usize; good.bins()]);
+    /// The bins beside a spike have less than this share of it together. A wide peak has as much in each.
+    const BESIDE: f64 = 0.1;
+    // Peaks that stand alone, the light of all of them and beside it, with its variance; and wide peaks.
+    let mut spikes = vec![(0_usize, 0.0, 0.0, 0.0); good.bins()];
+    let mut wide = vec![0_usize; good.bins()];
     for (index, peaks) in good.peaks.iter().enumerate() {
         let counts = &good.traces[index].counts;
-        for peak in peaks {
+        for peak in peaks.iter().filter(|peak| gate.contains(&peak.top)) {
             let background = good.background(index, peak.top);
-            let above = |bin: usize| counts.get(bin).map_or(0.0, |count| count - background);
-            let most = 0.02 * above(peak.top) + 3.0 * (background + 1.0).sqrt();
-            let is_narrow = above(peak.top) > 20.0
-                && above(peak.top + 1) <= most
-                && peak.top.checked_sub(1).is_none_or(|bin| above(bin) <= most);
-            if is_narrow {
-                spikes[peak.top] += 1;
-                narrow += 1;
-            } else {
+            let above = |bin: Option<usize>| {
+                let count = bin.and_then(|bin| counts.get(bin));
+                count.map_or(0.0, |count| count - background)
+            };
+            let top = above(Some(peak.top));
+            let beside = [peak.top.checked_sub(1), Some(peak.top + 1)].map(above);
+            let noise = 3.0 * (background + 1.0).sqrt();
+            if beside.iter().all(|light| *light > noise + BESIDE * top) {
                 wide[peak.top] += 1;
+            } else if beside.iter().all(|light| *light <= noise + BESIDE * top) {
+                let [before, after] = beside;
+                let (number, of, sum, variance) = &mut spikes[peak.top];
+                *number += 1;
+                *of += top;
+                *sum += before + after;
+                *variance += (before + after).max(0.0) + 2.0 * background + 1.0;
             }
         }
     }
-    let (bin, &number) = spikes
-        .iter()
-        .enumerate()
-        .max_by_key(|(_, number)| **number)?;
-    let wide_elsewhere: usize = wide.iter().sum::<usize>() - wide[bin];
+    let (bin, &(number, of, sum, variance)) =
+        spikes.iter().enumerate().max_by_key(|(_, spike)| spike.0)?;
+    let elsewhere: usize = wide.iter().sum::<usize>() - wide[bin];
+    let others: usize = spikes.iter().map(|spike| spike.0).sum::<usize>() - number;
     let all = good.traces.len();
-    // Those of a narrow pulse are everywhere.
     let is_spike = number > 1
         && number as f64 >= SHARE * all as f64
-        && wide_elsewhere > 2 * (narrow - number)
-        && wide_elsewhere > 0;
+        && sum + 3.0 * variance.sqrt() < BESIDE * of
+        // A narrow pulse has such peaks everywhere.
+        && elsewhere > 2 * others;
     is_spike.then(|| {
         let last = good.bins() - 1;
         let helps = match bin {
@@ -727,6 +615,7 @@ mod tests {
     use super::*;
     use crate::find::background::Level;
     use dtof_core::Array;
+    use dtof_theory::rates::bin_share;
     use proptest::prelude::*;
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, Poisson};
@@ -985,7 +874,7 @@ mod tests {
             prop_assert_eq!(range(&traces, has_cycles).1, None);
         }
 
-        /// Peaks up to four times what a counter of 8 bits holds; one that holds them is right, and so is a narrow pulse.
+        /// Peaks up to four times what a counter of 8 bits holds; one that holds them is right.
         #[test]
         fn narrow_counters_are_found(
             background in 1.0..50.0_f64,
@@ -996,14 +885,11 @@ mod tests {
         ) {
             let with = |highest: f64, counted: &dyn Fn(f64) -> f64| {
                 let light = scene(background, vec![(highest * 2.5 * sigma, place, sigma)]);
-                narrow_counters(&recorded(16, &light, &|_, n| counted(n), seed))
+                full_counters(&recorded(16, &light, &|_, n| counted(n), seed))
             };
             let says = with(highest, &|n| n.min(255.0)).unwrap();
             prop_assert!(says.starts_with("100 % of the histograms have a bin of 255 and none has more"), "{}", says);
             prop_assert_eq!(with(highest, &|n| n), None);
-            prop_assert_eq!(with(highest / 5.0, &|n| n % 256.0), None);
-            let narrow = scene(background, vec![(highest / 6.0, place, sigma / 5.0)]);
-            prop_assert_eq!(narrow_counters(&recorded(16, &narrow, &|_, n| n, seed)), None);
         }
 
         /// A line or an exponential, against walls, targets and their tails.
@@ -1030,7 +916,7 @@ mod tests {
             };
             let with = |falls: &dyn Fn(usize) -> f64| {
                 let mean = |pixel: usize, bin: usize| background * falls(bin) + pulse(pixel, bin);
-                uneven_background(&good(recorded(48, &mean, &|_, n| n, seed)), None, 0.01)
+                uneven_background(&good(recorded(48, &mean, &|_, n| n, seed)), 0..=BINS - 1, 0.01)
             };
             prop_assert_eq!(with(&|_| 1.0), None);
             let says = with(&falls).unwrap();
@@ -1059,7 +945,7 @@ mod tests {
     }
 
     fn spike_of(mean: impl Fn(usize, usize) -> f64, seed: u64) -> Option<String> {
-        spike(&good(recorded(48, &mean, &|_, n| n, seed)))
+        spike(&good(recorded(48, &mean, &|_, n| n, seed)), 0..=BINS - 1)
     }
 
     /// One photon in 100,000 laser cycles is as dim as it gets.

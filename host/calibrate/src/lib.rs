@@ -91,6 +91,8 @@ pub struct CalibrationOptions {
     pub glass: Option<bool>,
     /// Bins for which the TDC is dead after a photon, if the user knows; 0 if it takes all.
     pub dead_time: Option<u16>,
+    /// First and last bin of the gate, if the user gives one: what lies beyond is not looked at.
+    pub gate: Option<(u16, u16)>,
     /// Distance in millimetres, straight ahead, of a flat target that most of the pixels see. If the rays of the pixels are
     /// not known, the median pixel is taken to see it at this range.
     pub target_mm: Option<f64>,
@@ -117,6 +119,7 @@ impl Default for CalibrationOptions {
         Self {
             glass: None,
             dead_time: None,
+            gate: None,
             target_mm: None,
             false_alarm: 0.01,
             known_pulse: KnownPulse::default(),
@@ -187,7 +190,7 @@ impl AllHistograms {
     fn new(observed: &Observed, hot: &[usize], options: &CalibrationOptions) -> Result<Self> {
         let mut traces = observed.traces(hot)?;
         let has_cycles = observed.length.is_known();
-        let narrow = audit::narrow_counters(&traces);
+        let full = audit::full_counters(&traces);
         let (range, short) = audit::range(&traces, has_cycles);
         for trace in &mut traces {
             trace.counts.truncate(range.end() + 1);
@@ -207,7 +210,7 @@ impl AllHistograms {
             .flat_map(|times| times.checks.warnings());
         let tdc = match observed.length {
             // Full counters look like a dead time.
-            _ if narrow.is_some() && options.dead_time.is_none() => None,
+            _ if full.is_some() && options.dead_time.is_none() => None,
             Length::Cycles(_) => Some(match options.dead_time {
                 Some(bins) => pile_up::known_tdc(&traces, bins.into()),
                 None => pile_up::tdc(&traces).or_by_times(&traces, observed.times),
@@ -231,8 +234,13 @@ impl AllHistograms {
             range,
             tdc,
             audit: Audit {
-                cause: narrow.or(no_counts),
-                others: short.into_iter().chain(dim).chain(of_list).collect(),
+                cause: full.or(no_counts),
+                others: short
+                    .filter(|_| options.gate.is_none())
+                    .into_iter()
+                    .chain(dim)
+                    .chain(of_list)
+                    .collect(),
             },
         })
     }
@@ -276,7 +284,10 @@ pub fn calibrate_with(
     anyhow::ensure!(!traces.is_empty(), "every pixel is dead or hot");
     let good = GoodHistograms::new(observed.array, pixels.background, traces, levels);
 
-    let uneven = audit::uneven_background(&good, tdc, options.false_alarm);
+    let seen = options.gate.map_or(0..=good.bins() - 1, |(first, last)| {
+        first.into()..=last.into()
+    });
+    let uneven = uneven(&good, seen.clone(), tdc, observed.length, options);
     let l2 = settle::l2(pixels.background);
     let with_glass =
         |good: &GoodHistograms| glass::nearest(good, options.glass, observed.times, l2.into());
@@ -287,7 +298,7 @@ pub fn calibrate_with(
         _ => with_glass(&good),
     };
     let cause = audit.cause.take();
-    audit.cause = cause.or(uneven).or_else(|| audit::spike(&good));
+    audit.cause = cause.or(uneven).or_else(|| audit::spike(&good, seen));
     let glass = nearest.glass();
     let bins = observed.bins();
     let gate = settle::gate(
@@ -366,6 +377,37 @@ pub fn calibrate_with(
         columns: observed.array.columns() as usize,
         pixels,
     })
+}
+
+/// That the background is not flat, and what helps. Pile-up is no reason, where laser cycles are known or the background
+/// shows them, but a dead time that was not found is.
+fn uneven(
+    good: &GoodHistograms,
+    gate: RangeInclusive<usize>,
+    tdc: Option<Tdc>,
+    length: Length,
+    options: &CalibrationOptions,
+) -> Option<String> {
+    let text = audit::uneven_background(good, gate.clone(), options.false_alarm)?;
+    let cycles = match (tdc, length) {
+        (Some(Tdc::OnePhotonIn { cycles, .. }), _) => cycles,
+        (Some(Tdc::DeadTime { .. }), _) => 0.0,
+        (_, Length::Cycles(cycles)) => cycles as f64,
+        _ => 0.0,
+    };
+    let has_more = |trace: &Trace| trace.counts.iter().sum::<f64>() >= cycles;
+    let is_pile_up = !good.traces.iter().any(has_more)
+        && audit::uneven_background(&good.corrected(cycles), gate, options.false_alarm).is_none();
+    match tdc {
+        Some(Tdc::OnePhotonIn { .. }) if is_pile_up => None,
+        _ if is_pile_up => Some(format!(
+            "{text}. It is so if the TDC takes the first photon of a laser cycle: --dead-time {} corrects that",
+            good.bins()
+        )),
+        _ => Some(format!(
+            "{text}. --gate FIRST..LAST keeps a part of the range that is flat"
+        )),
+    }
 }
 
 /// No pixel sees crosstalk so many times as bright as the median pixel.

@@ -3,10 +3,10 @@
 
 use dtof_options::rows::grouped;
 
-/// So many bins are watched at most. Of larger arrays some of the pixels tell.
+/// So many bins are watched, or up to twice as many. Of larger arrays some of the pixels tell.
 const MOST_BINS: usize = 1 << 17;
 /// The mean number of photons is compared over so many laser cycles.
-const LAGS: usize = 4;
+const LAGS: usize = 16;
 /// The parts of a recording in which peaks are sought, and how many in a row have to show that one wanders.
 const PARTS: u64 = 64;
 const IN_A_ROW: usize = 8;
@@ -32,7 +32,7 @@ impl ListChecks {
         let together = self.together.map(|times| {
             format!(
                 "photons of one pixel and laser cycle are {times:.1} times as often in the same bin as chance would have it: \
-                 rain or other flashes, or photons that are listed twice. --once-per-bin counts them once"
+                 rain or other flashes, crosstalk between pixels, or photons that are listed twice. --once-per-bin counts them once"
             )
         });
         let wandering = self.wandering.map(|(some, all, bins)| {
@@ -43,8 +43,8 @@ impl ListChecks {
             )]
             let cycles = (1.0 / bins.abs()).round() as u64;
             format!(
-                "in {some} of {all} pixels a peak wanders through the range, by a bin in about {} laser cycles: another LiDAR, or a \
-                 target that moves fast. Record with dither (docs/settings.md#dither): then only light of the own laser has peaks",
+                "in {some} of {all} pixels a peak wanders through the range, by a bin in about {} laser cycles. If it is another \
+                 LiDAR, record with dither (docs/settings.md#dither); if it is a target that moves, take the events",
                 grouped(cycles)
             )
         });
@@ -164,7 +164,8 @@ impl ListWatch {
         // Ordered pairs, as those of two laser cycles are.
         let same = 2.0 * self.same as f64;
         let others = self.others.iter().copied().max().unwrap_or(0) as f64;
-        let is_sure = self.same as f64 >= FEWEST
+        // Without pairs a laser was not on in those.
+        let is_sure = (self.same as f64).min(others) >= FEWEST
             && same - others > SURE * (2.0 * same + others).sqrt()
             && same > TIMES * others;
         let mut speeds: Vec<f64> = self.peaks.iter().filter_map(|peaks| speed(peaks)).collect();
@@ -174,7 +175,7 @@ impl ListWatch {
         let speed = speeds.get(speeds.len() / 2).filter(|_| is_several);
         let speed = speed.map(|speed| (speeds.len(), all, speed / self.length as f64));
         ListChecks {
-            together: is_sure.then(|| same / others.max(1.0)),
+            together: is_sure.then(|| same / others),
             wandering: speed,
         }
     }

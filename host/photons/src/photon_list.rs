@@ -365,7 +365,9 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
             watch.photon(row.pixel(), row.cycle, row.bin().into());
         }
         self.rows = Validator::open(&self.input, self.rows.shape, self.rows.expected)?;
-        times.checks = watch.checks();
+        if self.times_as_cycles().is_none() {
+            times.checks = watch.checks();
+        }
         Ok((counts, times))
     }
 }

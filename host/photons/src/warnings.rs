@@ -113,6 +113,8 @@ pub fn list_shape(pixels: usize, columns: Option<u32>) -> Option<String> {
 const LOOKS_LIKE_BINS: f64 = 4.0;
 /// And if it is so many times as concentrated as the last axis.
 const MORE_THAN_LAST: f64 = 1.5;
+/// And so many times as much as the photons of all bins of its pixels, if the last looks like bins in some.
+const MORE_THAN_PLACES: f64 = 2.0;
 
 /// Of larger arrays some lines tell, with about so many counts.
 const MOST_COUNTS: usize = 1 << 20;
@@ -130,11 +132,13 @@ struct Concentration {
 impl Concentration {
     fn along_last(pixels: &[Vec<u64>]) -> Self {
         let mut all = Self::default();
-        pixels.iter().for_each(|bins| all.add(bins.iter().copied()));
+        let lines = pixels.iter();
+        lines.for_each(|bins| all.add(bins.iter().copied(), 1.0));
         all
     }
 
-    fn add(&mut self, line: impl Iterator<Item = u64>) {
+    /// Adds a line, whose places are so much concentrated themselves.
+    fn add(&mut self, line: impl Iterator<Item = u64>, places_are: f64) {
         let (mut places, mut sum, mut same) = (0.0, 0.0, 0.0);
         for count in line {
             let count = count as f64;
@@ -146,7 +150,7 @@ impl Concentration {
             self.empty += 1.0;
             return;
         }
-        let value: f64 = same * places / (sum * (sum - 1.0));
+        let value: f64 = same * places / (sum * (sum - 1.0)) / places_are;
         // In steps of a sixteenth of an octave. Zero is the lowest.
         #[allow(clippy::cast_possible_truncation, reason = "saturates")]
         let class = self.classes.entry((value.log2() * 16.0) as i32);
@@ -186,16 +190,21 @@ impl Concentration {
 #[must_use]
 pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
     let mut along_last = Concentration::along_last(pixels);
+    // If the last axis looks like bins in some pixels, bright ones among them make the others look so.
+    let has_peaks = along_last.mean() >= LOOKS_LIKE_BINS;
     // Pixels without photons tell nothing.
     along_last.empty = 0.0;
-    let half = along_last.of_lower_half();
-    let total = |bins: &[u64]| bins.iter().fold(0u64, |sum, &n| sum.saturating_add(n));
-    let brightest = (0..pixels.len()).max_by_key(|&pixel| total(&pixels[pixel]));
+    let of_last = along_last.of_lower_half();
+    let totals: Vec<u64> = pixels
+        .iter()
+        .map(|bins| bins.iter().fold(0, |sum: u64, &n| sum.saturating_add(n)))
+        .collect();
+    let brightest = (0..pixels.len()).max_by_key(|&pixel| totals[pixel]);
     let bins = pixels.first()?.len();
     // Odd, so that all are seen of a regular pattern.
     let step = (pixels.len() * bins / MOST_COUNTS) | 1;
     let mut apart = pixels.len();
-    let mut found = (LOOKS_LIKE_BINS.max(MORE_THAN_LAST * half), None);
+    let mut found = (LOOKS_LIKE_BINS.max(MORE_THAN_LAST * of_last), None);
     for (number, &length) in axes.iter().enumerate() {
         let whole = apart;
         apart /= length;
@@ -204,17 +213,23 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
         }
         // If all lines pass one pixel, it may be hot, and a pulse is wider.
         let left_out = brightest.filter(|_| length == pixels.len());
-        let mut along = Concentration::default();
+        let (mut along, mut beyond_places) = (Concentration::default(), Concentration::default());
         for start in (0..pixels.len()).filter(|start| start % whole < apart) {
             let line = (start..).step_by(apart).take(length);
             let line = line.filter(|&pixel| Some(pixel) != left_out);
-            let line: Vec<&[u64]> = line.map(|pixel| &pixels[pixel][..]).collect();
+            let line: Vec<usize> = line.collect();
+            let mut places = Concentration::default();
+            places.add(line.iter().map(|&pixel| totals[pixel]), 1.0);
+            let places_are = places.mean().max(1.0);
             for bin in (start % step..bins).step_by(step) {
-                along.add(line.iter().map(|bins| bins[bin]));
+                let line = || line.iter().map(|&pixel| pixels[pixel][bin]);
+                along.add(line(), 1.0);
+                beyond_places.add(line(), places_are);
             }
         }
         let value = along.of_lower_half();
-        if value > found.0 {
+        let is_brightness = has_peaks && beyond_places.of_lower_half() < MORE_THAN_PLACES;
+        if value > found.0 && !is_brightness {
             found = (value, Some(number));
         }
     }
@@ -405,7 +420,9 @@ mod tests {
             (&[a_little_more, most_in_one], 2.2, 2.0),
         ] {
             let mut all = Concentration::default();
-            lines.iter().for_each(|line| all.add(line.iter().copied()));
+            lines
+                .iter()
+                .for_each(|line| all.add(line.iter().copied(), 1.0));
             let is_near = |value: f64, expected: f64| (value - expected).abs() < 1e-9;
             assert!(is_near(all.mean(), mean), "{lines:?} {}", all.mean());
             let half = all.of_lower_half();
@@ -533,6 +550,24 @@ mod tests {
                     assert_eq!(warning, None, "{axes:?} {background} {pulse} {hot}");
                 }
             }
+        }
+    }
+
+    /// A line of light, or a part of the array that is read.
+    #[test]
+    fn a_few_lit_rows_do_not_look_like_the_bins() {
+        let wall = wall(64, 1.0, false);
+        for lit in [1, 2, 4] {
+            let dark = vec![0; 64];
+            let pixel = |pixel: usize| {
+                if pixel / 16 < lit {
+                    wall[pixel % 256].clone()
+                } else {
+                    dark.clone()
+                }
+            };
+            let pixels: Vec<Vec<u64>> = (0..32 * 16).map(pixel).collect();
+            assert_eq!(swapped_axes(&[32, 16], &pixels), None, "{lit}");
         }
     }
 

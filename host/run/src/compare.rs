@@ -289,6 +289,7 @@ impl Options {
                 false_alarm: self.false_alarm_share(&requested),
                 glass: self.glass,
                 dead_time: requested.sensor.dead_time,
+                gate: requested.sensor.gate,
                 ..CalibrationOptions::default()
             };
             let found = calibrate_counts(&requested, &counts, &options, &mut ());

@@ -336,6 +336,7 @@ fn find(
     options.false_alarm = share.unwrap_or(options.false_alarm);
     options.glass = glass;
     options.dead_time = requested.sensor.dead_time;
+    options.gate = requested.sensor.gate;
     let mut found = calibrate_counts(requested, &counts, &options, &mut ())?;
     if requested.sensor.offsets_mm.is_some() {
         found.pixel_offsets = None;

@@ -389,11 +389,6 @@ fn ends_are_hardly_filled() {
 }
 
 #[test]
-fn counts_wrapped() {
-    holds("counts_wrapped");
-}
-
-#[test]
 fn counters_were_full() {
     holds("counters_were_full");
 }

@@ -102,7 +102,6 @@ pub const KINDS: &[Kind] = &[
     kind("counts_are_averaged", counts_are_averaged),
     kind("laser_cycles_are_times", laser_cycles_are_times),
     kind("ends_are_hardly_filled", ends_are_hardly_filled),
-    kind("counts_wrapped", counts_wrapped),
     kind("counters_were_full", counters_were_full),
     kind("a_spike_in_some_captures", a_spike_in_some_captures),
     kind("bins_come_first", bins_come_first),
@@ -951,43 +950,16 @@ fn ends_are_hardly_filled(rng: &mut Pcg64) -> Recording {
     }
 }
 
-/// Counters of 8 bits that begin again at 0.
-fn counts_wrapped(rng: &mut Pcg64) -> Recording {
-    narrow_counters(rng, |count| count % 256, &["wrapped"])
-}
-
 /// Counters of 8, 10 or 12 bits that stop at the highest count.
 fn counters_were_full(rng: &mut Pcg64) -> Recording {
-    let most = one_of(rng, &[255, 1023, 4095]);
-    let recording = narrow_counters(rng, |count| count, &["full"]);
-    let Array::Histograms { shape, counts } = recording.array else {
-        return recording;
-    };
-    let highest = counts.iter().copied().max().unwrap_or(1);
-    let counts = counts
-        .iter()
-        .map(|count| (count * 2 * most / highest).min(most));
-    Recording {
-        array: Array::Histograms {
-            shape,
-            counts: counts.collect(),
-        },
-        ..recording
-    }
-}
-
-/// Peaks of 300 to 1000 photons a bin.
-fn narrow_counters(
-    rng: &mut Pcg64,
-    counted: fn(u64) -> u64,
-    words: &'static [&'static str],
-) -> Recording {
     let sensor = Sensor {
         sigma: between(rng, 0.9, 1.5),
         ..Sensor::draw(rng, 4, 12)
     };
-    let level = between(rng, 5.0, 60.0);
-    let highest = between(rng, 300.0, 1000.0);
+    let most = one_of(rng, &[255, 1023, 4095]);
+    // How much of the peaks they cut.
+    let highest = most as f64 * between(rng, 1.3, 4.0);
+    let level = most as f64 * between(rng, 0.02, 0.2);
     let positions = match chance(rng, 0.5) {
         true => vec![sensor.position(rng, 0.2, 0.8); sensor.pixels()],
         false => sensor.positions(rng, 0.2, 0.8),
@@ -995,22 +967,17 @@ fn narrow_counters(
     let pixels: Vec<Vec<u64>> = positions
         .iter()
         .map(|&position| {
-            let light = Light(vec![level; sensor.bins]).with(
-                highest * 2.5 * sensor.sigma,
-                position,
-                sensor.sigma,
-            );
-            light.counts(rng).into_iter().map(counted).collect()
+            let photons = highest * 2.5 * sensor.sigma;
+            let light = Light(vec![level; sensor.bins]).with(photons, position, sensor.sigma);
+            let counts = light.counts(rng).into_iter();
+            counts.map(|count| count.min(most)).collect()
         })
         .collect();
     let array = sensor.histograms(pixels);
+    let truth = vec![Truth::Anything; sensor.pixels()];
     Recording {
-        need: Need::Told(words),
-        ..sensor.recording(
-            array,
-            "--recorded-cycles 10000",
-            vec![Truth::Anything; sensor.pixels()],
-        )
+        need: Need::Told(&["full"]),
+        ..sensor.recording(array, "--recorded-cycles 10000", truth)
     }
 }
 
