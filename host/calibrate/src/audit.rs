@@ -20,13 +20,12 @@
 use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
 
-use dtof_options::rows::percent;
+use dtof_options::rows::{percent, two_digits};
 use dtof_photons::warnings::greatest_divisor;
 
 use super::find::good_histograms::GoodHistograms;
 use super::find::observed::Trace;
 use super::find::significance::{is_surely_less, median};
-use super::remarks::two_digits;
 
 /// A recording with more bins is judged by some of its histograms.
 const BINS: usize = 1 << 18;

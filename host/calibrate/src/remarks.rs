@@ -4,7 +4,7 @@ use super::find::pile_up::MATTERS;
 use super::{Audit, Calibration, Length, Nearest, PulseSource, Tdc};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::numbers::shortest;
-use dtof_options::rows::{Row, bins, grouped, percent};
+use dtof_options::rows::{Row, bins, grouped, percent, two_digits};
 
 /// From this share of lost photons on, far targets are missed or wrong although rates are corrected.
 const MOST_LOST: f64 = 0.75;
@@ -123,17 +123,6 @@ impl Calibration {
             )
         })
     }
-}
-
-#[allow(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "laser cycles"
-)]
-pub(super) fn two_digits(number: f64) -> String {
-    let number = number.round() as u64;
-    let unit = 10u64.pow(number.max(1).ilog10().saturating_sub(1));
-    grouped((number + unit / 2) / unit * unit)
 }
 
 /// Remarks on the `settings`, each a topic and a sentence or two.

@@ -40,6 +40,19 @@ pub fn significant(value: f64, digits: u8) -> String {
     format!("{value:.decimals$}")
 }
 
+/// A number that is not known to more than two digits, with commas.
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "saturates"
+)]
+#[must_use]
+pub fn two_digits(number: f64) -> String {
+    let number = number.round() as u64;
+    let unit = 10u64.pow(number.max(1).ilog10().saturating_sub(1));
+    grouped(number.saturating_add(unit / 2) / unit * unit)
+}
+
 /// A share other than 0 in percent, with at most two decimals unless it is below 0.01 %.
 #[must_use]
 pub fn percent(share: f64) -> String {
@@ -98,6 +111,20 @@ mod tests {
     #[test]
     fn a_range_of_one_bin_is_that_bin() {
         assert_eq!([bins(21, 21), bins(3, 7)], ["bin 21", "bins 3 to 7"]);
+    }
+
+    #[test]
+    fn two_digits_are_rounded() {
+        let texts = [0.0, 7.4, 99.6, 124.0, 136_500.0, 1e30].map(two_digits);
+        let whole = [
+            "0",
+            "7",
+            "100",
+            "120",
+            "140,000",
+            "18,000,000,000,000,000,000",
+        ];
+        assert_eq!(texts, whole);
     }
 
     #[test]
