@@ -409,6 +409,9 @@ pub(super) fn uneven_background(
     false_alarm: f64,
 ) -> Option<String> {
     const PARTS: usize = 8;
+    /// A peak so many times as high may have a tail over so many parts.
+    const BRIGHT: f64 = 4.0;
+    const TAIL: usize = 3;
     /// The usual window.
     const WINDOW: f64 = 3.0;
     /// So many photons a bin, of so many pixels at most.
@@ -440,12 +443,18 @@ pub(super) fn uneven_background(
     let groups = good.traces.chunks_exact(together as usize);
     let step = (good.traces.len() * good.bins() / BINS) | 1;
     for traces in groups.step_by(step) {
-        let seen = |bins: Range<usize>| {
-            let bins = bins.filter(|&bin| traces.iter().all(|trace| trace.live[bin] >= 0.5));
-            let sums = bins.map(|bin| traces.iter().map(|trace| trace.counts[bin]).sum::<f64>());
-            sums.collect::<Vec<f64>>()
+        let sums: Vec<f64> = (0..end)
+            .map(|bin| traces.iter().map(|trace| trace.counts[bin]).sum())
+            .collect();
+        let level = median(sums[from..].iter().copied());
+        let is_bright = |&bin: &usize| sums[bin] > BRIGHT * level;
+        let is_tail =
+            |bin: usize| (bin.saturating_sub(TAIL * length)..bin).any(|bin| is_bright(&bin));
+        let is_seen =
+            |&bin: &usize| !is_tail(bin) && traces.iter().all(|trace| trace.live[bin] >= 0.5);
+        let seen = |bins: Range<usize>| -> Vec<f64> {
+            bins.filter(is_seen).map(|bin| sums[bin]).collect()
         };
-        let level = median(seen(from..end));
         for (at, shares) in parts.iter_mut().enumerate() {
             let bins = seen(from + at * length..from + (at + 1) * length);
             if level > 0.0 && 2 * bins.len() > length {
@@ -465,7 +474,7 @@ pub(super) fn uneven_background(
         parts.iter().filter(is_like).count()
     };
     let most_alike = parts.iter().map(like).max()?;
-    (2 * most_alike < parts.len()).then(|| {
+    (parts.len() > PARTS / 2 && 2 * most_alike < parts.len()).then(|| {
         let shares = parts.iter().map(|part| part.0);
         let (least, most) = shares.fold((f64::INFINITY, 0.0), |(least, most), share| (share.min(least), share.max(most)));
         let round = |share: f64| (100.0 * share).round();
