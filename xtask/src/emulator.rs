@@ -13,7 +13,7 @@ use crate::tools::{NODE, NPM, QEMU};
 use crate::{root, succeed};
 
 /// Far longer than an image runs.
-const PATIENCE: Duration = Duration::from_secs(60);
+const PATIENCE: Duration = Duration::from_secs(300);
 
 /// The QEMU that runs `stm32f405`. QEMU 10, for instance, ends at a reset of the clocks.
 const KNOWN: &str = "version 7.2.";
