@@ -356,6 +356,36 @@ mod tests {
         }
     }
 
+    /// Eight peaks in at most ten parts, along a line of at least four bins.
+    #[test]
+    fn a_speed_is_that_of_a_line_that_is_long_enough() {
+        let at = |parts: [u64; 8], slope: f64, off: f64| {
+            let peak = |(number, part): (usize, u64)| {
+                let bin = 100.0 + slope * (part as f64 - 20.0);
+                (part, if number == 3 { bin + off } else { bin })
+            };
+            let peaks: Vec<(u64, f64)> = parts.into_iter().enumerate().map(peak).collect();
+            speed(&peaks)
+        };
+        let row = [10, 11, 12, 13, 14, 15, 16, 17];
+        for slope in [-3.0, -0.58, 0.58, 7.0] {
+            let found = at(row, slope, 0.0).unwrap();
+            assert!((found - slope).abs() < 1e-9, "{found}");
+        }
+        for slope in [-0.56, 0.0, 0.56] {
+            assert_eq!(at(row, slope, 0.0), None);
+        }
+        // Some parts have none.
+        assert!(at([10, 11, 12, 13, 14, 15, 16, 19], 2.0, 0.0).is_some());
+        assert_eq!(at([10, 11, 12, 13, 14, 15, 16, 20], 2.0, 0.0), None);
+        assert_eq!(at([1, 2, 3, 4, 5, 6, 7, 40], 2.0, 0.0), None);
+        // One lies beside the line.
+        assert!(at(row, 2.0, 1.6).is_some());
+        assert_eq!(at(row, 2.0, 2.0), None);
+        assert_eq!(at(row, 2.0, -2.0), None);
+        assert_eq!(speed(&[]), None);
+    }
+
     #[test]
     fn the_words_have_the_numbers() {
         let checks = ListChecks {
