@@ -569,6 +569,19 @@ mod tests {
             let pixels: Vec<Vec<u64>> = (0..32 * 16).map(pixel).collect();
             assert_eq!(swapped_axes(&[32, 16], &pixels), None, "{lit}");
         }
+        // More concentrated along the rows than along the bins.
+        let mut bins = vec![5; 64];
+        bins[40..42].fill(300);
+        let pixels: Vec<Vec<u64>> = (0..128 * 16)
+            .map(|pixel| {
+                if pixel / 16 == 3 {
+                    bins.clone()
+                } else {
+                    vec![0; 64]
+                }
+            })
+            .collect();
+        assert_eq!(swapped_axes(&[128, 16], &pixels), None);
     }
 
     #[test]
