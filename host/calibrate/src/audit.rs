@@ -447,11 +447,19 @@ pub(super) fn uneven_background(
             .map(|bin| traces.iter().map(|trace| trace.counts[bin]).sum())
             .collect();
         let level = median(sums[from..].iter().copied());
-        let is_bright = |&bin: &usize| sums[bin] > BRIGHT * level;
-        let is_tail =
-            |bin: usize| (bin.saturating_sub(TAIL * length)..bin).any(|bin| is_bright(&bin));
+        // Where the tail of the last bright bin ends.
+        let mut tail = 0;
+        let is_tail: Vec<bool> = (0..end)
+            .map(|bin| {
+                let is_tail = bin < tail;
+                if sums[bin] > BRIGHT * level {
+                    tail = bin + TAIL * length + 1;
+                }
+                is_tail
+            })
+            .collect();
         let is_seen =
-            |&bin: &usize| !is_tail(bin) && traces.iter().all(|trace| trace.live[bin] >= 0.5);
+            |&bin: &usize| !is_tail[bin] && traces.iter().all(|trace| trace.live[bin] >= 0.5);
         let seen = |bins: Range<usize>| -> Vec<f64> {
             bins.filter(is_seen).map(|bin| sums[bin]).collect()
         };
