@@ -3,21 +3,23 @@
 //! | what is looked at | what it may be |
 //! |---|---|
 //! | many bins with the highest count | counters that were full |
+//! | peaks that are whole with full counters added to some bins | counters that began again at 0 |
 //! | how neighbouring bins scatter | what is no photon count |
 //! | the level of eighths of the range | a background that is not flat |
 //! | peaks of one bin at one place, where others are wider | no light that came back |
 //! | the first and the last bins | a TDC whose range is shorter |
 //! | photons a laser cycle | a wrong number of laser cycles |
+//! | the brightest pixel, where they are not known | a pixel that says little of them |
 //!
-//! The first of the upper four that is found may be the cause of the others of them, and of what the search finds. The last
-//! two stand by themselves.
+//! The first of the upper five that is found may be the cause of the others of them, and of what the search finds. The last
+//! three stand by themselves.
 //!
 //! Decisions rest on the scatter of photon counts: what is no count has another one. Let three neighbouring bins hold a, b
 //! and c photons, and n together. If their means lie on a straight line, each of the n photons adds 1, −2 or 1 to
 //! a − 2b + c, with the mean 0 and the variance 2, so (a − 2b + c)² ÷ 2n has the mean 1, whatever n is. A bin that counts at
 //! most once a laser cycle and is full in the share p of them scatters less, by 1 − p.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::ops::{Range, RangeInclusive};
 
 use dtof_options::rows::{percent, two_digits};
@@ -401,6 +403,88 @@ pub(super) fn full_counters(traces: &[Trace]) -> Option<String> {
     })
 }
 
+/// Counters that began again at 0. In a peak the light of a bin, squared, is 1 to [`tears`]' `NARROWEST` times the product of
+/// that of its neighbours. A peak that wrapped is torn, and is whole again with full counters added to some of its bins.
+pub(super) fn wrapped_counters(traces: &[Trace]) -> Option<String> {
+    /// Counters of 8, 10 and 12 bits. Of wider ones no real peak is so even that it tells.
+    const FULL: [(u8, f64); 3] = [(8, 256.0), (10, 1024.0), (12, 4096.0)];
+    /// How often a counter may begin again.
+    const TURNS: usize = 4;
+    /// [`tears`] of what is torn, and of what is whole but for chance.
+    const TORN: f64 = 60.0;
+    const WHOLE: f64 = 8.0;
+    /// So large a share of the histograms is torn, and of these is whole with full counters.
+    const SHARE: f64 = 0.1;
+    const MENDED: f64 = 0.9;
+    /// So many histograms tell.
+    const TELL: usize = 64;
+    let counts = traces.iter().flat_map(|trace| &trace.counts);
+    let highest = counts.copied().fold(0.0, f64::max);
+    let is_near = |(_, full): &(u8, f64)| (full / 2.0..*full).contains(&highest);
+    let (bits, full) = FULL.into_iter().find(is_near)?;
+    let as_counted = some(traces).map(|trace| (trace, tears(&trace.counts, full, 0)));
+    let torn: Vec<(&Trace, f64)> = as_counted.filter(|torn| torn.1 > TORN).collect();
+    let looked_at = || torn.iter().take(TELL);
+    let is_whole = |(trace, _): &&(&Trace, f64)| tears(&trace.counts, full, TURNS) < WHOLE;
+    let whole = looked_at().filter(is_whole).count();
+    let (all, some) = (some(traces).count(), torn.len());
+    let has_wrapped = some > 1
+        && some as f64 > SHARE * all as f64
+        && whole as f64 > MENDED * looked_at().count() as f64;
+    has_wrapped.then(|| {
+        format!(
+            "{} have a torn peak that is whole if some of its bins counted {full} more, so counters of {bits} bits began again \
+             at 0: record less light, or with wider counters",
+            of_histograms(some, all)
+        )
+    })
+}
+
+/// How far the bins around the highest are from one peak, if each may have `full` so many `turns` more: the sum of squares of
+/// what they miss, in standard deviations.
+fn tears(counts: &[f64], full: f64, turns: usize) -> f64 {
+    /// So many bins before and after the highest.
+    const REACH: usize = 10;
+    /// For a Gaussian that ratio is `exp(1 / σ²)`. This is σ = 0.93 bins; narrower pulses look like parts of torn ones.
+    const NARROWEST: f64 = 3.2;
+    let top = (0..counts.len()).max_by(|&one, &other| counts[one].total_cmp(&counts[other]));
+    let level = median(counts.iter().copied());
+    let misses = |counts: [f64; 3]| {
+        let [a, b, c] = counts.map(|count| (count - level).max(0.0));
+        let [of_a, of_b, of_c] = counts.map(|count| count.max(1.0));
+        let of_square = 4.0 * b * b * of_b + 2.0 * of_b * of_b;
+        let of_product = c * c * of_a + a * a * of_c + of_a * of_c;
+        let (square, product) = (b * b, a * c);
+        let low = (product - square).max(0.0).powi(2) / (of_square + of_product);
+        let high = (square - NARROWEST * product).max(0.0).powi(2)
+            / (of_square + NARROWEST * NARROWEST * of_product);
+        low + high
+    };
+    let turns = || (0..=turns).map(|turn| full * turn as f64);
+    let Some(top) = top else { return 0.0 };
+    let bins = &counts[top.saturating_sub(REACH)..(top + REACH + 1).min(counts.len())];
+    // The least sum for each number of turns of the last two bins. The first and the last bin of all have none.
+    let number = turns().count();
+    let mut least = vec![vec![f64::INFINITY; number]; number];
+    least[0].fill(0.0);
+    for bins in bins.windows(3) {
+        let mut next = vec![vec![f64::INFINITY; number]; number];
+        for (at_a, a) in turns().enumerate() {
+            for (at_b, b) in turns().enumerate() {
+                for (at_c, c) in turns().enumerate() {
+                    let sum = least[at_a][at_b] + misses([bins[0] + a, bins[1] + b, bins[2] + c]);
+                    next[at_b][at_c] = sum.min(next[at_b][at_c]);
+                }
+            }
+        }
+        least = next;
+    }
+    least
+        .iter()
+        .map(|least| least[0])
+        .fold(f64::INFINITY, f64::min)
+}
+
 /// A background that no single level describes: less than half of the eighths of the range are alike to within the standard
 /// deviation of the photons in a window. A difference of that moves the threshold by as much.
 pub(super) fn uneven_background(
@@ -622,6 +706,33 @@ pub(super) fn hardly_any_light(brightest: f64, cycles: u64) -> Option<String> {
             "the brightest pixel has a photon in {} laser cycles: --recorded-cycles is how many laser cycles each histogram \
              counted",
             two_digits(cycles as f64 / brightest)
+        )
+    })
+}
+
+/// That one pixel is so much brighter than others that its photons say little about how long the recording lasted. `hot` ones
+/// say nothing.
+pub(super) fn sets_the_length(traces: &[Trace], hot: &[usize]) -> Option<String> {
+    /// So many times as bright as all but one in so many pixels.
+    const TIMES: f64 = 10.0;
+    const ONE_IN: usize = 50;
+    let mut photons = BTreeMap::<usize, f64>::new();
+    for trace in traces.iter().filter(|trace| !hot.contains(&trace.pixel)) {
+        *photons.entry(trace.pixel).or_default() += trace.counts.iter().sum::<f64>();
+    }
+    let mut photons: Vec<(f64, usize)> = photons
+        .into_iter()
+        .map(|(pixel, sum)| (sum, pixel))
+        .collect();
+    photons.sort_by(|one, other| other.0.total_cmp(&one.0));
+    let few = photons.len().div_ceil(ONE_IN);
+    let (&(brightest, pixel), &(others, _)) = photons.first().zip(photons.get(few))?;
+    (brightest > TIMES * others).then(|| {
+        format!(
+            "pixel {pixel} has {} times the photons of most others, and sets how long the recording is taken to have lasted, so \
+             the others seem dim and may have no events: --recorded-cycles says how many laser cycles there were, and \
+             --mask {pixel} leaves the pixel out",
+            two_digits(brightest / others.max(1.0))
         )
     })
 }
@@ -962,6 +1073,71 @@ mod tests {
 
     fn spike_of(mean: impl Fn(usize, usize) -> f64, seed: u64) -> Option<String> {
         spike(&good(recorded(48, &mean, &|_, n| n, seed)), 0..=BINS - 1)
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        /// Of 2 to 300 pixels, in up to three captures.
+        #[test]
+        fn a_pixel_that_sets_the_length_is_named(
+            pixels in 2_usize..300,
+            captures in 1_usize..4,
+            bright in 0_usize..300,
+            times in 15.0..1e4_f64,
+            seed: u64,
+        ) {
+            let bright = bright % pixels;
+            let with = |times: f64, hot: &[usize]| {
+                let level = |place: usize, _| 10.0 * if place % pixels == bright { times } else { 1.0 };
+                let mut traces = recorded(captures * pixels, &level, &|_, n| n, seed);
+                traces.iter_mut().for_each(|trace| trace.pixel %= pixels);
+                sets_the_length(&traces, hot)
+            };
+            prop_assert_eq!(with(8.0, &[]), None);
+            prop_assert_eq!(with(times, &[bright]), None);
+            let says = with(times, &[]).unwrap();
+            let start = format!("pixel {bright} has ");
+            prop_assert!(says.starts_with(&start), "{}", says);
+        }
+    }
+
+    /// A peak that wraps in some pixels, and two surfaces close together that do not.
+    #[test]
+    fn counters_that_began_again_are_found() {
+        let mut rng = Pcg64::seed_from_u64(7);
+        let mut between = |low: f64, high: f64| {
+            rand_distr::Uniform::new(low, high)
+                .unwrap()
+                .sample(&mut rng)
+        };
+        let (mut missed, mut wrong) = (0, 0);
+        for (seed, bits) in (0..300).zip([8, 10, 12].into_iter().cycle()) {
+            let full = 2_f64.powi(bits);
+            let background = between(1.0, 40.0);
+            let place = |pixel: usize| 40.0 + (pixel % 9) as f64 / 9.0;
+            let peak = |light: f64, at: f64, sigma: f64, bin: usize| {
+                light * 2.5 * sigma * bin_share(u32::try_from(bin).unwrap(), at, sigma)
+            };
+            let (highest, sigma) = (full * between(1.5, 4.0), between(0.9, 2.0));
+            let wraps = |pixel: usize, bin: usize| {
+                let light = highest * (0.5 + (pixel % 4) as f64 / 6.0);
+                background + peak(light, place(pixel), sigma, bin)
+            };
+            let says = wrapped_counters(&recorded(32, &wraps, &|_, n| n % full, seed));
+            let cause = format!("counted {full} more, so counters of {bits} bits began again at 0");
+            missed += usize::from(!says.is_some_and(|says| says.contains(&cause)));
+            let (sigma, share) = (between(0.3, 2.0), between(0.3, 1.0));
+            let gap = sigma * between(2.0, 9.0);
+            let two = |pixel: usize, bin: usize| {
+                let light = (full - background) * (0.5 + 0.2 * (pixel * 7 % 32) as f64 / 31.0);
+                let behind = peak(light * share, place(pixel) + gap, sigma, bin);
+                background + peak(light, place(pixel), sigma, bin) + behind
+            };
+            let two = recorded(32, &two, &|_, n| n.min(full - 1.0), seed);
+            wrong += usize::from(wrapped_counters(&two).is_some());
+        }
+        assert!(missed == 0 && wrong <= 15, "{missed} missed, {wrong} wrong");
     }
 
     /// One photon in 100,000 laser cycles is as dim as it gets.

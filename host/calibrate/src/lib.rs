@@ -189,8 +189,13 @@ struct AllHistograms {
 impl AllHistograms {
     fn new(observed: &Observed, hot: &[usize], options: &CalibrationOptions) -> Result<Self> {
         let mut traces = observed.traces(hot)?;
+        let mut counts = traces.iter().flat_map(|trace| &trace.counts);
+        anyhow::ensure!(
+            counts.any(|&count| count > 0.0),
+            "no photons, so nothing can be measured: all histograms are empty"
+        );
         let has_cycles = observed.length.is_known();
-        let full = audit::full_counters(&traces);
+        let full = audit::full_counters(&traces).or_else(|| audit::wrapped_counters(&traces));
         let (range, short) = audit::range(&traces, has_cycles);
         for trace in &mut traces {
             trace.counts.truncate(range.end() + 1);
@@ -202,7 +207,8 @@ impl AllHistograms {
                 let photons = traces.iter().map(|trace| trace.counts.iter().sum());
                 audit::hardly_any_light(photons.fold(0.0, f64::max), cycles)
             }
-            _ => None,
+            Length::Cycles(_) => None,
+            _ => audit::sets_the_length(&traces, hot),
         };
         let of_list = observed
             .times
@@ -249,8 +255,7 @@ impl AllHistograms {
 /// Calibrates a sensor from a recording.
 ///
 /// # Errors
-/// Fails if the recording is empty or its histograms differ in size, if every pixel is hot or dead,
-/// if the crosstalk of the cover glass leaves no gate, or if so few false alarms cannot be
+/// Fails if the recording is empty or has no photon, if its histograms differ in size, if every pixel is hot or dead, if the crosstalk of the cover glass leaves no gate, or if so few false alarms cannot be
 /// simulated.
 pub fn calibrate(observed: &Observed, options: &CalibrationOptions) -> Result<Calibration> {
     calibrate_with(observed, options, progress::NONE)
@@ -575,6 +580,7 @@ mod tests {
         let observed = Observed {
             array: Array::new(8, 8).unwrap(),
             captures: &captures,
+            masked: &[],
             // Without laser cycles no dead time is sought, which would take longest.
             length: Length::Unknown,
             cycles: None,
@@ -625,6 +631,7 @@ mod tests {
             let observed = Observed {
                 array: Array::new(4, 2).unwrap(),
                 captures: &captures,
+                masked: &[],
                 length: Length::Unknown,
                 cycles: None,
                 bin_width_ps: 250.0,

@@ -1,6 +1,7 @@
 //! Remarks: what a recording does not show, and the option that would help.
 
 use super::find::pile_up::MATTERS;
+use super::find::shape;
 use super::{Audit, Calibration, Length, Nearest, PulseSource, Tdc};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::numbers::shortest;
@@ -90,13 +91,27 @@ impl Calibration {
     fn wide_pulse(&self) -> Option<String> {
         let pulse = self.pulse.as_ref()?;
         let is_wide = pulse.sigma > WIDEST && self.detection.pulse_source == PulseSource::Measured;
-        is_wide.then(|| {
-            format!(
-                "the pulse, of σ = {:.2} bins, is too wide for the widest window, which is for 1.75 bins: --rebin 2 suits \
-                 it, unless it is two surfaces that run into each other, as a cover glass and a near target",
-                pulse.sigma
-            )
-        })
+        if !is_wide {
+            return None;
+        }
+        let sigma = pulse.sigma;
+        if sigma > 0.99 * shape::WIDEST {
+            return Some(format!(
+                "what stands above the background is wider than any pulse that was tried, up to σ = {} bins, so it may be \
+                 none. --gate FIRST..LAST leaves out what is no target; --rebin 8 suits a pulse of so many bins",
+                shape::WIDEST
+            ));
+        }
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "1 to 4"
+        )]
+        let rebin = ((sigma / WIDEST).ceil() as u32).next_power_of_two();
+        Some(format!(
+            "the pulse, of σ = {sigma:.2} bins, is too wide for the widest window, which is for 1.75 bins: --rebin {rebin} \
+             suits it, unless it is two surfaces that run into each other, as a cover glass and a near target"
+        ))
     }
 
     /// That the gate leaves out all that some pixels see.

@@ -135,7 +135,8 @@ impl Comparison {
         let mut rows = vec![row("take", self.none_is_exact(&|_| true))];
         if let Some(closest) = self.most_exact(&|_| true) {
             if closest.figures.wrong > 0.5 {
-                let text = "most reports are wrong: a cover glass? `calibrate` finds the gate";
+                let text = "most reports are wrong: `calibrate` says what it finds, as a cover glass or a background that \
+                            is not flat";
                 rows.push(row("hint", text.to_owned()));
             } else {
                 rows.push(row("hint", "a larger --within has an answer".to_owned()));

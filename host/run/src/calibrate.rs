@@ -10,14 +10,15 @@ use dtof_options::Refused;
 use dtof_options::numbers::{MAX_INTEGER, integer, within};
 use dtof_options::progress::{Progress, shared};
 use dtof_photons::input::Input;
+use dtof_photons::masked;
 use dtof_photons::open::{Counts, counts};
 use dtof_photons::recorded::{RecordingLength, check_totals};
 
 /// Options of this job; keys of settings files with these names mean something else.
 const OWN: &[&str] = &["target_mm", "glass", "false_alarm", "seed"];
 
-/// The pulse, if the user knows it.
-const PULSE: &[&str] = &["sigma_bins"];
+/// What the user knows of the sensor.
+const SENSOR: &[&str] = &["gate", "masked", "sigma_bins"];
 
 /// Where the pixels look.
 const RAYS: &[&str] = &["field_of_view_degrees", "calibration"];
@@ -32,7 +33,7 @@ pub struct Options {
 }
 
 impl dtof_options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] = &[RECORDING, PULSE, TDC, RAYS, OWN];
+    const KEYS: &'static [&'static [&'static str]] = &[RECORDING, SENSOR, TDC, RAYS, OWN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
@@ -98,14 +99,15 @@ impl Options {
         let given = &self.given.options.sensor;
         let mut options = self.calibration;
         options.dead_time = given.dead_time;
+        options.gate = given.gate;
         options.with_pulse_of(requested, given.sigma_bins.is_some())
     }
 
     /// Calibrates the sensor that recorded `input`, with the settings from [`Self::requested`].
     ///
     /// # Errors
-    /// Fails if the recording cannot be read or calibrated, or has no photons, or if `progress` ends the work; the error begins with
-    /// the name of the recording.
+    /// Fails if the recording cannot be read or calibrated, or if `progress` ends the work; the error begins with the name of
+    /// the recording.
     pub fn calibrate(
         &self,
         input: &Input,
@@ -116,12 +118,14 @@ impl Options {
         options.cycles = Some(u64::MAX);
         let counts = counts(input, &options)?;
         self.given.suits(input, &counts.metadata)?;
-        ensure!(
-            has_photons(&counts),
-            "{input}: no photons, so nothing can be measured: all histograms are empty"
-        );
+        let histograms = || counts.captures.iter().flatten();
+        self.check_sensor(
+            histograms().next().map_or(0, Vec::len),
+            histograms().count(),
+        )?;
         let options = self.calibration(&requested);
-        let found = calibrate_counts(&requested, &counts, &options, progress);
+        let masked = self.masked();
+        let found = calibrate_counts(&requested, &counts, masked, &options, progress);
         let found = found.with_context(|| input.to_string())?;
         let width = bin_width_warning(&counts.metadata);
         let metres = self.calibration.target_mm.and_then(in_metres);
@@ -129,11 +133,58 @@ impl Options {
         let warnings = warnings.chain(width).chain(metres).collect();
         let before = requested.or(settings_of_file(&counts.metadata, counts.array));
         Ok(CalibrateResult {
-            settings: found.settings(before)?,
+            settings: self.settings(&found, before)?,
             found,
             warnings,
         })
     }
+
+    /// Checks the gate and the pixels to leave out that are given.
+    ///
+    /// # Errors
+    /// Fails if there are not as many bins or pixels.
+    pub fn check_sensor(&self, bins: usize, pixels: usize) -> Result<()> {
+        if let Some((first, last)) = self.given.options.sensor.gate {
+            let reason = format!("there are {bins} bins");
+            ensure!(
+                usize::from(last) < bins,
+                Refused::value("gate", format_args!("{first}..{last}"), reason)
+            );
+        }
+        masked::check(self.masked(), pixels)
+    }
+
+    /// The pixels to leave out that are given.
+    #[must_use]
+    pub fn masked(&self) -> &[u16] {
+        self.given.options.sensor.masked.as_deref().unwrap_or(&[])
+    }
+
+    /// The settings that were `found` over those `before`, with the gate and the pixels to leave out that are given.
+    ///
+    /// # Errors
+    /// Fails if a number does not fit its format.
+    pub fn settings(&self, found: &Calibration, before: SettingsFile) -> Result<SettingsFile> {
+        let mut settings = found.settings(before)?;
+        let given = &self.given.options.sensor;
+        settings.sensor.gate = given.gate.or(settings.sensor.gate);
+        if let Some(masked) = &given.masked {
+            settings.sensor.masked =
+                Some(with_found(masked, &settings)).filter(|masked| !masked.is_empty());
+        }
+        Ok(settings)
+    }
+}
+
+/// The pixels to leave out: those that are given, beside those that were `found`. If none are given, none are.
+pub(super) fn with_found(given: &[u16], found: &SettingsFile) -> Vec<u16> {
+    let mut masked = given.to_vec();
+    if !masked.is_empty() {
+        masked.extend(found.sensor.masked.iter().flatten());
+        masked.sort_unstable();
+        masked.dedup();
+    }
+    masked
 }
 
 /// Whether there is a photon in any histogram.
@@ -142,13 +193,14 @@ pub(super) fn has_photons(counts: &Counts) -> bool {
     all.any(|&count| count > 0)
 }
 
-/// Calibrates the sensor of a recording that has been read.
+/// Calibrates the sensor of a recording that has been read, without the `masked` pixels.
 ///
 /// # Errors
 /// Those of [`calibrate_with`], and a pixel with more photons than can be counted.
 pub(super) fn calibrate_counts(
     requested: &SettingsFile,
     counts: &Counts,
+    masked: &[u16],
     options: &CalibrationOptions,
     progress: &mut dyn Progress,
 ) -> Result<Calibration> {
@@ -166,6 +218,7 @@ pub(super) fn calibrate_counts(
     let observed = Observed {
         array: counts.array,
         captures: &counts.captures,
+        masked,
         length,
         cycles: None,
         bin_width_ps: counts.metadata.bin_width_ps.to_num(),

@@ -292,12 +292,13 @@ impl Options {
                 gate: requested.sensor.gate,
                 ..CalibrationOptions::default()
             };
-            let found = calibrate_counts(&requested, &counts, &options, &mut ());
+            let masked = requested.sensor.masked.as_deref().unwrap_or(&[]);
+            let found = calibrate_counts(&requested, &counts, masked, &options, &mut ());
             let found = found.with_context(|| input.to_string())?;
+            found.warnings().into_iter().for_each(callbacks.warning);
             if found.pulse.is_none() {
                 return Err(unknown_pulse(&input.to_string()).into());
             }
-            found.warnings().into_iter().for_each(callbacks.warning);
             requested.or(found.settings(merged)?)
         };
         Ok(Subject {

@@ -145,6 +145,14 @@ pub struct DepthMap {
     pub flags: Vec<u8>,
 }
 
+/// The first echo, and the others that are no tail of one before.
+fn surfaces(decided: &OnceDecision) -> impl Iterator<Item = &Detection> {
+    let echoes = decided.echoes.iter().map(|(_, echo)| echo).enumerate();
+    let is_surface =
+        |(at, echo): &(usize, &Detection)| *at == 0 || !echo.depth.flags.contains(Flags::TAIL);
+    echoes.filter(is_surface).map(|(_, echo)| echo)
+}
+
 impl DepthMap {
     /// Decides on the photons of `input`, or on those of the `run`, of the pixels `addresses`, ascending. Some may
     /// contradict themselves.
@@ -183,11 +191,8 @@ impl DepthMap {
         for (place, (&pixel, decided)) in addresses.iter().zip(&decided).enumerate() {
             map.set(pixel, decided, &ranges);
             if !decided.echoes.is_empty() {
-                let is_clear = |(_, second): &(EchoNumber, Detection)| {
-                    !second.depth.flags.contains(Flags::TAIL)
-                };
                 let flags = &mut map.flags[usize::from(pixel.raw())];
-                *flags |= SECOND_SURFACE * u8::from(decided.echoes.iter().skip(1).any(is_clear));
+                *flags |= SECOND_SURFACE * u8::from(surfaces(decided).count() > 1);
                 let contradicts = contradictions.get(place) == Some(&true);
                 *flags |= CONTRADICTION * u8::from(contradicts);
             }
@@ -202,7 +207,7 @@ impl DepthMap {
                 .of(pixel, BlockLevel::PIXEL, position)
                 .to_num::<f64>()
         };
-        let positions = || decided.echoes.iter().map(|(_, echo)| echo.position());
+        let positions = || surfaces(decided).map(Detection::position);
         self.positions[place] = positions().next();
         self.depth_mm[place] = positions().next().map_or(f64::NAN, mm);
         self.best_mm[place] = decided.best.map_or(f64::NAN, mm);

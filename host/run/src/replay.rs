@@ -4,7 +4,7 @@
 
 use anyhow::{Result, ensure};
 
-use super::calibrate::{calibrate_counts, has_photons, yes_or_no};
+use super::calibrate::{calibrate_counts, has_photons, with_found, yes_or_no};
 use super::depth_map::MapInput;
 use super::given::{FRAME, Given, SENSOR, TDC, of_given};
 use super::recording::{
@@ -337,7 +337,8 @@ fn find(
     options.glass = glass;
     options.dead_time = requested.sensor.dead_time;
     options.gate = requested.sensor.gate;
-    let mut found = calibrate_counts(requested, &counts, &options, &mut ())?;
+    let masked = requested.sensor.masked.as_deref().unwrap_or(&[]);
+    let mut found = calibrate_counts(requested, &counts, masked, &options, &mut ())?;
     if requested.sensor.offsets_mm.is_some() {
         found.pixel_offsets = None;
     }
@@ -361,15 +362,8 @@ fn find(
         settings.detection.false_alarm = Some(options.false_alarm);
     }
     // Pixels to leave out come on top of those that are found.
-    if let Some(masked) = given
-        .sensor
-        .masked
-        .as_mut()
-        .filter(|masked| !masked.is_empty())
-    {
-        masked.extend(settings.sensor.masked.iter().flatten());
-        masked.sort_unstable();
-        masked.dedup();
+    if let Some(masked) = &mut given.sensor.masked {
+        *masked = with_found(masked, &settings);
     }
     let together = given.clone().or(settings.clone());
     if together.dead_time_obstacle().is_some() {

@@ -328,6 +328,16 @@ class SimulateOptions(SensorOptions, DetectionOptions, total=False):
 class CalibrateOptions(RecordingOptions, total=False):
     """Of ``calibrate``."""
 
+    gate: Annotated[
+        Integers,
+        "two bins, (20, 119)",
+        "First and last bin that may hold the peak, as 20..119 [default: found]",
+    ]
+    mask: Annotated[
+        Integers,
+        "addresses, [3, 70], or 'none'; [] adds none",
+        "Pixels to leave out, as 3,70, beside hot and dead ones that are found; none leaves out none",
+    ]
     sigma_bins: Annotated[
         Number,
         "number above 0, bins",

@@ -46,6 +46,8 @@ pub struct Observed<'a> {
     pub array: Array,
     /// Histograms: capture, then pixel, then bin.
     pub captures: &'a [Capture],
+    /// Pixels that are left out, numbered through all captures.
+    pub masked: &'a [u16],
     /// How long each capture lasted.
     pub length: Length,
     /// Laser cycles of each pixel of each capture, in the order of the pixels, where they differ.
@@ -102,7 +104,7 @@ impl Trace {
 }
 
 impl Observed<'_> {
-    /// All histograms. The `hot` pixels do not count where the brightest pixel gives the laser cycles.
+    /// All histograms but those of masked pixels. The `hot` pixels do not count where the brightest pixel gives the laser cycles.
     ///
     /// # Errors
     /// Fails if there are no captures or too few bins, if captures or histograms differ in size, if a
@@ -134,11 +136,16 @@ impl Observed<'_> {
                 "capture {index} has {found} pixels, not {pixels}"
             );
             let others = capture.iter().enumerate();
-            let others = others.filter(|(pixel, _)| !hot.contains(pixel));
+            let is_masked = |pixel: usize| {
+                let number = u16::try_from(index * pixels + pixel);
+                number.is_ok_and(|number| self.masked.contains(&number))
+            };
+            let others = others.filter(|(pixel, _)| !hot.contains(pixel) && !is_masked(*pixel));
             let totals = others.map(|(_, counts)| counts.iter().sum::<u64>());
             let cycles = self.length.cycles(totals.max().unwrap_or(0));
             for (pixel, counts) in capture.iter().enumerate() {
-                let own = self.cycles.map(|cycles| cycles.get(traces.len()).copied());
+                let number = index * pixels + pixel;
+                let own = self.cycles.map(|cycles| cycles.get(number).copied());
                 let cycles = match own {
                     None => cycles,
                     Some(Some(own @ 1..)) => own as f64,
@@ -149,7 +156,10 @@ impl Observed<'_> {
                     found == bins,
                     "capture {index}, pixel {pixel} has {found} bins, not {bins}"
                 );
-                let truth_mm = self.truth_mm.and_then(|truth| truth[traces.len()]);
+                if is_masked(pixel) {
+                    continue;
+                }
+                let truth_mm = self.truth_mm.and_then(|truth| truth[number]);
                 let truth_mm = truth_mm.map(|truth| truth + self.bias(pixel));
                 traces.push(Trace {
                     pixel,

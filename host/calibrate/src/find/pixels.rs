@@ -34,7 +34,7 @@ pub struct Pixels {
 }
 
 impl Pixels {
-    /// Classifies the pixels of `array` from the background of each trace.
+    /// Classifies the pixels of `array` that have traces from the background of each.
     #[must_use]
     pub fn new(array: Array, traces: &[Trace], levels: &[Level]) -> Self {
         let pixels = array.pixels() as usize;
@@ -43,6 +43,7 @@ impl Pixels {
         for (trace, level) in all() {
             of[trace.pixel].add(trace, level);
         }
+        let is_seen = |at: &usize| of[*at].traces > 0;
         // Most of the pixels may be dead: the median is that of pixels with photons.
         let with_photons = of.iter().filter(|pixel| pixel.total > 0.0);
         let usual = median(with_photons.map(|pixel| pixel.total));
@@ -52,7 +53,11 @@ impl Pixels {
         let darker = darker.filter(|&total| total > 0.0 && is_surely_less(total, usual, ONE_IN));
         let expected = darker.fold(usual, f64::min);
         let is_dead = |pixel: &Sum| pixel.total == 0.0 && expected > ONE_IN.ln();
-        let alive = of.iter().filter(|pixel| !is_dead(pixel));
+        let seen: Vec<usize> = (0..pixels).filter(is_seen).collect();
+        let alive = seen
+            .iter()
+            .map(|&at| &of[at])
+            .filter(|pixel| !is_dead(pixel));
         let rate = median(alive.map(Sum::rate));
         // One photon more, as the median may be 0.
         let is_brighter = |pixel: &Sum, than: f64| {
@@ -65,11 +70,12 @@ impl Pixels {
                 && is_brighter(&of[at], second_highest(neighbours))
                 && !all().any(|(trace, level)| trace.pixel == at && has_pulse(trace, level))
         };
-        let hot: Vec<usize> = (0..pixels).filter(is_hot).collect();
-        let dead: Vec<usize> = (0..pixels).filter(|&at| is_dead(&of[at])).collect();
+        let hot: Vec<usize> = seen.iter().copied().filter(is_hot).collect();
+        let dead = seen.iter().copied().filter(|&at| is_dead(&of[at]));
+        let dead: Vec<usize> = dead.collect();
         let is_bad = |at: &usize| hot.binary_search(at).is_ok() || dead.binary_search(at).is_ok();
-        let good = (0..pixels).filter(|at| !is_bad(at));
-        let mut good: Vec<&Sum> = good.map(|at| &of[at]).collect();
+        let good = seen.iter().filter(|at| !is_bad(at));
+        let mut good: Vec<&Sum> = good.map(|&at| &of[at]).collect();
         good.sort_by(|one, other| one.rate().total_cmp(&other.rate()));
         let quarter = good.len() / 4;
         let middle = &good[quarter..good.len() - quarter];
@@ -107,6 +113,8 @@ struct Sum {
     exposure: f64,
     /// Photons of all bins.
     total: f64,
+    /// Of a pixel that is left out there is no histogram.
+    traces: usize,
 }
 
 impl Sum {
@@ -114,6 +122,7 @@ impl Sum {
         self.photons += level.photons();
         self.exposure += level.clear_bins * trace.cycles;
         self.total += trace.counts.iter().sum::<f64>();
+        self.traces += 1;
     }
 
     fn rate(&self) -> f64 {

@@ -5,7 +5,8 @@ use dtof_theory::counts::normal;
 /// The most steps of Fisher scoring; it converges before.
 const STEPS: usize = 30;
 /// The lowest and the highest σ in bins that is tried.
-const SIGMAS: (f64, f64) = (0.12, 8.0);
+const SIGMAS: (f64, f64) = (0.12, WIDEST);
+pub const WIDEST: f64 = 8.0;
 
 /// The bins around the top that a window keeps.
 pub const ABOUT: usize = 32;

@@ -179,6 +179,7 @@ pub fn observed(
     Observed {
         array,
         captures,
+        masked: &[],
         length,
         cycles: None,
         bin_width_ps,

@@ -71,14 +71,18 @@ impl Calibrate {
                 let port = self.from_device.open(&options.given)?;
                 let device = &self.from_device;
                 let calibration = options.calibration(requested);
-                let calibrated =
-                    device.calibrate((&name, port), requested, &calibration, self.quiet);
+                let calibrated = device.calibrate(
+                    (&name, port),
+                    requested,
+                    (options, &calibration),
+                    self.quiet,
+                );
                 let FromDevice {
                     found,
                     settings,
                     rows,
                 } = calibrated.with_context(|| name.clone())?;
-                let settings = found.settings(requested.clone().or(settings))?;
+                let settings = options.settings(&found, requested.clone().or(settings))?;
                 (found, settings, rows)
             }
         };

@@ -266,7 +266,9 @@ flags! {
 }
 
 flags! {
-    PULSE:
+    KNOWN:
+    gate Text("FIRST..LAST") => "First and last bin that may hold the peak, as 20..119 [default: found]";
+    masked Text("PIXELS") => "Pixels to leave out, as 3,70, beside hot and dead ones that are found; none leaves out none";
     sigma_bins Signed("S") => "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256 [default: \
         measured; without a peak that is bright enough that of --settings, else 1]";
 }
@@ -373,7 +375,7 @@ has_flags! {
     Operation: DEVICE SENSOR TDC DITHER DETECTION;
     replay::Options: RECORDING SENSOR TDC DETECTION FRAME SEARCH REPLAY;
     simulate::Options: ARRAY SENSOR TDC DETECTION FRAME SIMULATE;
-    calibrate::Options: RECORDING PULSE TDC RAYS SEARCH CALIBRATE;
+    calibrate::Options: RECORDING KNOWN TDC RAYS SEARCH CALIBRATE;
     compare::Options: ACCURACY RECORDING SENSOR TDC SEARCH COMPARE;
     tune::Options: TUNE;
 }

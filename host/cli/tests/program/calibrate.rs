@@ -168,10 +168,10 @@ fn a_recording_alone_is_calibrated_first() {
         (list, ""),
         // What is wanted of the result is no rule of detection.
         ("hot.npy", "--neighbours 8"),
-        ("hot.npy", "--mask 3,70 --tracking"),
+        ("hot.npy --mask 3,70", "--tracking"),
         // A pulse that is known is that of both.
         ("hot.npy --sigma-bins 0.5", "--neighbours 4"),
-        (list, "--mask 7 --neighbours 8"),
+        (&format!("{list} --mask 7"), "--neighbours 8"),
     ] {
         for threads in ["1", "2"] {
             let mut dtof =
@@ -615,4 +615,40 @@ fn a_recording_without_photons_is_refused_and_replayed() {
     assert!(!scratch.path("new.toml").exists() && !scratch.path("new.html").exists());
     let summary = scratch.replayed(&zeros, "");
     assert_contains(&summary["warnings"].to_string(), "no photons");
+}
+
+/// A gate and pixels to leave out hold for the search, and are in its settings. A pixel that is left out does not set how long
+/// the recording lasted.
+#[test]
+fn a_gate_and_a_mask_hold_for_the_search() {
+    let scratch = Scratch::new();
+    let bright = even(|pixel| {
+        let times = if pixel == 2 { 20 } else { 1 };
+        let mut counts = [times; 32];
+        counts[15..18].copy_from_slice(&[3, 12, 3].map(|count| count * times));
+        counts
+    });
+    let empty = Scratch::new();
+    empty.file("bright.npy", &bright);
+    let bright = scratch.file("bright.npy", bright);
+    for (options, is_warned) in [("", true), ("--mask 2", false)] {
+        let summary = scratch.replayed(&bright, options);
+        let warnings = summary["warnings"].to_string();
+        assert_eq!(
+            warnings.contains("pixel 2 has 20 times"),
+            is_warned,
+            "{warnings}"
+        );
+    }
+    scratch.printed("calibrate --input bright.npy --gate 10..20 --mask 2 --out new.toml");
+    let settings = scratch.read("new.toml");
+    assert_contains(&settings, "gate = [10, 20]");
+    assert_contains(&settings, "masked = [2]");
+    empty.all_refused(
+        "calibrate",
+        "
+        bright.npy --gate 10..32 --out a.toml | error: --gate 10..32: there are 32 bins
+        bright.npy --mask 64 --out a.toml | error: --mask 64: there are 64 pixels
+        ",
+    );
 }

@@ -394,6 +394,11 @@ fn counters_were_full() {
 }
 
 #[test]
+fn counters_began_again() {
+    holds("counters_began_again");
+}
+
+#[test]
 fn a_spike_in_some_captures() {
     holds("a_spike_in_some_captures");
 }

@@ -20,26 +20,34 @@ fn input(more: &str) -> MapInput {
 }
 
 /// Photons of pixels with a background and two surfaces, in bins 40 and 90, of so many photons in each half.
+fn run(seed: u64, surfaces: [[f64; 2]; 2]) -> RunCounts {
+    let pulse = |code: u16, at: u16| match code.abs_diff(at) {
+        0 => 0.4,
+        1 => 0.3,
+        _ => 0.0,
+    };
+    run_with(seed, &|half, code| {
+        let surfaces = surfaces[half];
+        5.0 + surfaces[0] * pulse(code, 40) + surfaces[1] * pulse(code, 90)
+    })
+}
+
+/// Photons of pixels with these means in each half.
 #[allow(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "a number of photons"
 )]
-fn run(seed: u64, surfaces: [[f64; 2]; 2]) -> RunCounts {
+fn run_with(seed: u64, means: &dyn Fn(usize, u16) -> f64) -> RunCounts {
     let mut counts = RunCounts::new(PIXELS, 128, u64::from(CYCLES) * 2);
-    for (half, surfaces) in (0..2).zip(surfaces) {
+    for half in 0..2 {
         let pixels = (0..PIXELS).map(|pixel| {
             let address = u16::try_from(pixel).unwrap();
             let mut random = pixel_rng(seed * 2 + half, PixelAddress::new(address));
             let mut photons = Vec::new();
             for code in 0..128_u16 {
-                let pulse = |at: u16| match code.abs_diff(at) {
-                    0 => 0.4,
-                    1 => 0.3,
-                    _ => 0.0,
-                };
-                let mean = 5.0 + surfaces[0] * pulse(40) + surfaces[1] * pulse(90);
-                let number = Poisson::new(mean).unwrap().sample(&mut random) as u32;
+                let mean = Poisson::new(means(half as usize, code)).unwrap();
+                let number = mean.sample(&mut random) as u32;
                 photons.extend((0..number).map(|_| Photon { cycle: 0, code }));
             }
             PixelPhotons {
@@ -83,6 +91,29 @@ fn a_surface_that_moves_is_told() {
         );
         assert_eq!(map.pixels_with_depth(), 8);
         assert_eq!(map.echoes_mm.is_some(), more.starts_with("echoes"));
+    }
+}
+
+/// An echo on the tail of the first is no surface: the farthest is the first, or what lies behind.
+#[test]
+fn a_tail_is_no_farthest_surface() {
+    let input = input("echoes = 3");
+    for (behind, expected) in [(0.0, 41), (400.0, 90)] {
+        let map = decide(
+            &input,
+            &run_with(3, &|_, code| {
+                let tail = |code: u16| 900.0 * (-f64::from(code - 40) / 2.5).exp();
+                let first = if code < 40 { 0.0 } else { tail(code) };
+                5.0 + first + if code == 90 { behind } else { 0.0 }
+            }),
+        );
+        let [nearest, farthest] = map.echoes_mm.as_ref().unwrap();
+        assert_eq!(nearest, &map.depth_mm);
+        let mm = f64::from(expected) * 250.0 * 0.149_896_229;
+        let is_expected = |depth: &f64| (depth - mm).abs() < 100.0;
+        assert!(farthest.iter().all(is_expected), "{farthest:?}");
+        let flag = if behind > 0.0 { SECOND_SURFACE } else { 0 };
+        assert_eq!(map.flags, [flag; 8]);
     }
 }
 

@@ -17,6 +17,7 @@ use dtof_options::numbers::{MAX_INTEGER, integer};
 use dtof_options::progress::{Progress, shared};
 use dtof_options::rows::{Row, grouped};
 use dtof_photons::open::BIN_WIDTH_PS;
+use dtof_run::calibrate::Options;
 use dtof_run::given::Given;
 
 use crate::command::device_options::HostOptions;
@@ -93,7 +94,7 @@ impl DeviceArgs {
         &self,
         (name, port): (&str, Box<dyn Port>),
         requested: &SettingsFile,
-        options: &CalibrationOptions,
+        (options, calibration): (&Options, &CalibrationOptions),
         quiet: bool,
     ) -> Result<FromDevice> {
         let mut client = Client::new(port)?;
@@ -103,6 +104,7 @@ impl DeviceArgs {
         ensure!(pixels > 0, "the device has no pixels");
         let bins = client.bins();
         requested.check_bins(bins)?;
+        options.check_sensor(bins.into(), pixels.into())?;
         let array = array(pixels, requested.sensor.columns);
         let array = array.filter(|array| array.pixels() == u32::from(pixels));
         let array = array.ok_or_else(|| {
@@ -151,6 +153,7 @@ impl DeviceArgs {
         let observed = Observed {
             array,
             captures: &captures,
+            masked: options.masked(),
             length: Length::Cycles(median),
             cycles: Some(&collected.cycles),
             bin_width_ps: settings.bin_width_ps.to_num(),
@@ -161,7 +164,7 @@ impl DeviceArgs {
             times: None,
         };
         let mut bar = Bar::new(quiet);
-        let found = calibrate_with(&observed, options, &shared(&mut bar, "steps"))?;
+        let found = calibrate_with(&observed, calibration, &shared(&mut bar, "steps"))?;
         ensure!(
             found.pulse.is_some() || !interrupt::is_interrupted(),
             "ended too soon: no peak is bright enough to measure the pulse; nothing is written"

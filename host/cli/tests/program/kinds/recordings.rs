@@ -102,7 +102,8 @@ pub const KINDS: &[Kind] = &[
     kind("counts_are_averaged", counts_are_averaged),
     kind("laser_cycles_are_times", laser_cycles_are_times),
     kind("ends_are_hardly_filled", ends_are_hardly_filled),
-    kind("counters_were_full", counters_were_full),
+    kind("counters_were_full", |rng| counters(rng, true)),
+    kind("counters_began_again", |rng| counters(rng, false)),
     kind("a_spike_in_some_captures", a_spike_in_some_captures),
     kind("bins_come_first", bins_come_first),
     kind(
@@ -950,8 +951,8 @@ fn ends_are_hardly_filled(rng: &mut Pcg64) -> Recording {
     }
 }
 
-/// Counters of 8, 10 or 12 bits that stop at the highest count.
-fn counters_were_full(rng: &mut Pcg64) -> Recording {
+/// Counters of 8, 10 or 12 bits that stop at the highest count, or begin again at 0.
+fn counters(rng: &mut Pcg64, stop: bool) -> Recording {
     let sensor = Sensor {
         sigma: between(rng, 0.9, 1.5),
         ..Sensor::draw(rng, 4, 12)
@@ -970,13 +971,18 @@ fn counters_were_full(rng: &mut Pcg64) -> Recording {
             let photons = highest * 2.5 * sensor.sigma;
             let light = Light(vec![level; sensor.bins]).with(photons, position, sensor.sigma);
             let counts = light.counts(rng).into_iter();
-            counts.map(|count| count.min(most)).collect()
+            counts
+                .map(|count| match stop {
+                    true => count.min(most),
+                    false => count % (most + 1),
+                })
+                .collect()
         })
         .collect();
     let array = sensor.histograms(pixels);
     let truth = vec![Truth::Anything; sensor.pixels()];
     Recording {
-        need: Need::Told(&["full"]),
+        need: Need::Told(if stop { &["full"] } else { &["began again"] }),
         ..sensor.recording(array, "--recorded-cycles 10000", truth)
     }
 }
