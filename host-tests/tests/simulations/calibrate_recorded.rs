@@ -106,7 +106,7 @@ fn a_recording_with_distances_calibrates_itself() {
     let observed = Observed {
         array: Array::new(9, 1).unwrap(),
         captures: &counts.captures,
-        masked: &[],
+        masked: None,
         length: Length::PhotonsPerCycle(PHOTONS_PER_CYCLE),
         cycles: None,
         bin_width_ps: counts.metadata.bin_width_ps.to_num(),

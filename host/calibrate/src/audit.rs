@@ -19,14 +19,14 @@
 //! a − 2b + c, with the mean 0 and the variance 2, so (a − 2b + c)² ÷ 2n has the mean 1, whatever n is. A bin that counts at
 //! most once a laser cycle and is full in the share p of them scatters less, by 1 − p.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
 
 use dtof_options::rows::{percent, two_digits};
 use dtof_photons::warnings::greatest_divisor;
 
 use super::find::good_histograms::GoodHistograms;
-use super::find::observed::Trace;
+use super::find::observed::{Observed, Trace};
 use super::find::significance::{is_surely_less, median};
 
 /// A recording with more bins is judged by some of its histograms.
@@ -408,6 +408,8 @@ pub(super) fn full_counters(traces: &[Trace]) -> Option<String> {
 pub(super) fn wrapped_counters(traces: &[Trace]) -> Option<String> {
     /// Counters of 8, 10 and 12 bits. Of wider ones no real peak is so even that it tells.
     const FULL: [(u8, f64); 3] = [(8, 256.0), (10, 1024.0), (12, 4096.0)];
+    /// Some bins are nearly full before they begin again.
+    const NEARLY: f64 = 0.9;
     /// How often a counter may begin again.
     const TURNS: usize = 4;
     /// [`tears`] of what is torn, and of what is whole but for chance.
@@ -420,7 +422,7 @@ pub(super) fn wrapped_counters(traces: &[Trace]) -> Option<String> {
     const TELL: usize = 64;
     let counts = traces.iter().flat_map(|trace| &trace.counts);
     let highest = counts.copied().fold(0.0, f64::max);
-    let is_near = |(_, full): &(u8, f64)| (full / 2.0..*full).contains(&highest);
+    let is_near = |(_, full): &(u8, f64)| (NEARLY * full..*full).contains(&highest);
     let (bits, full) = FULL.into_iter().find(is_near)?;
     let as_counted = some(traces).map(|trace| (trace, tears(&trace.counts, full, 0)));
     let torn: Vec<(&Trace, f64)> = as_counted.filter(|torn| torn.1 > TORN).collect();
@@ -433,8 +435,8 @@ pub(super) fn wrapped_counters(traces: &[Trace]) -> Option<String> {
         && whole as f64 > MENDED * looked_at().count() as f64;
     has_wrapped.then(|| {
         format!(
-            "{} have a torn peak that is whole if some of its bins counted {full} more, so counters of {bits} bits began again \
-             at 0: record less light, or with wider counters",
+            "{} have a torn peak that is whole if some of its bins counted {full} more. If these are no surfaces a few bins apart, \
+             counters of {bits} bits began again at 0: record less light, or with wider counters",
             of_histograms(some, all)
         )
     })
@@ -710,37 +712,49 @@ pub(super) fn hardly_any_light(brightest: f64, cycles: u64) -> Option<String> {
     })
 }
 
-/// That one pixel is so much brighter than others that its photons say little about how long the recording lasted. `hot` ones
-/// say nothing.
-pub(super) fn sets_the_length(traces: &[Trace], hot: &[usize]) -> Option<String> {
+/// That so few pixels are so much brighter than the others of their capture that their photons say little about how long it
+/// lasted. `hot` ones say nothing.
+pub(super) fn sets_the_length(observed: &Observed, hot: &[usize]) -> Option<String> {
     /// So many times as bright as all but one in so many pixels.
     const TIMES: f64 = 10.0;
     const ONE_IN: usize = 50;
-    let mut photons = BTreeMap::<usize, f64>::new();
-    for trace in traces.iter().filter(|trace| !hot.contains(&trace.pixel)) {
-        *photons.entry(trace.pixel).or_default() += trace.counts.iter().sum::<f64>();
+    let pixels = observed.array.pixels() as usize;
+    let mut bright = Vec::new();
+    for (capture, histograms) in observed.captures.iter().enumerate() {
+        let numbers = (capture * pixels..).zip(histograms).enumerate();
+        let used = numbers
+            .filter(|(pixel, (number, _))| !hot.contains(pixel) && !observed.is_masked(*number));
+        let mut photons: Vec<(f64, usize)> = used
+            .map(|(_, (number, counts))| (counts.iter().sum::<u64>() as f64, number))
+            .collect();
+        photons.sort_by(|one, other| other.0.total_cmp(&one.0));
+        if let Some(&(others, _)) = photons.get(photons.len().div_ceil(ONE_IN)) {
+            let is_bright = |one: &&(f64, usize)| one.0 > TIMES * others;
+            let found = photons.iter().take_while(is_bright);
+            bright.extend(found.map(|&(photons, number)| (number, photons / others.max(1.0))));
+        }
     }
-    let mut photons: Vec<(f64, usize)> = photons
-        .into_iter()
-        .map(|(pixel, sum)| (sum, pixel))
-        .collect();
-    photons.sort_by(|one, other| other.0.total_cmp(&one.0));
-    let few = photons.len().div_ceil(ONE_IN);
-    let (&(brightest, pixel), &(others, _)) = photons.first().zip(photons.get(few))?;
-    (brightest > TIMES * others).then(|| {
-        format!(
+    let so = "the others seem dim and may have no events: --recorded-cycles says how many laser cycles there were";
+    match bright[..] {
+        [] => None,
+        [(pixel, times)] => Some(format!(
             "pixel {pixel} has {} times the photons of most others, and sets how long the recording is taken to have lasted, so \
-             the others seem dim and may have no events: --recorded-cycles says how many laser cycles there were, and \
-             --mask {pixel} leaves the pixel out",
-            two_digits(brightest / others.max(1.0))
-        )
-    })
+             {so}, and --mask {pixel} leaves the pixel out",
+            two_digits(times)
+        )),
+        _ => Some(format!(
+            "{} histograms have more than {TIMES} times the photons of most others, and set how long the recording is taken to \
+             have lasted, so {so}",
+            bright.len()
+        )),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::find::background::Level;
+    use crate::find::observed::Length;
     use dtof_core::Array;
     use dtof_theory::rates::bin_share;
     use proptest::prelude::*;
@@ -1078,66 +1092,76 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
 
-        /// Of 2 to 300 pixels, in up to three captures.
+        /// Of 2 to 300 pixels, in one of up to three captures.
         #[test]
-        fn a_pixel_that_sets_the_length_is_named(
-            pixels in 2_usize..300,
+        fn pixels_that_set_the_length_are_named(
+            pixels in 2_u32..300,
             captures in 1_usize..4,
-            bright in 0_usize..300,
-            times in 15.0..1e4_f64,
-            seed: u64,
+            bright in 0_usize..900,
+            times in 15_u64..10_000,
         ) {
-            let bright = bright % pixels;
-            let with = |times: f64, hot: &[usize]| {
-                let level = |place: usize, _| 10.0 * if place % pixels == bright { times } else { 1.0 };
-                let mut traces = recorded(captures * pixels, &level, &|_, n| n, seed);
-                traces.iter_mut().for_each(|trace| trace.pixel %= pixels);
-                sets_the_length(&traces, hot)
+            let all = captures * pixels as usize;
+            let bright = bright % all;
+            let with = |times: u64, hot: &[usize], masked: Option<&[u16]>| {
+                let of = |number: usize| vec![if number == bright { times } else { 1 }; 16];
+                let captures: Vec<Vec<Vec<u64>>> = (0..captures)
+                    .map(|capture| (0..pixels as usize).map(|pixel| of(capture * pixels as usize + pixel)).collect())
+                    .collect();
+                sets_the_length(&Observed { masked, ..observed(pixels, &captures) }, hot)
             };
-            prop_assert_eq!(with(8.0, &[]), None);
-            prop_assert_eq!(with(times, &[bright]), None);
-            let says = with(times, &[]).unwrap();
-            let start = format!("pixel {bright} has ");
-            prop_assert!(says.starts_with(&start), "{}", says);
+            prop_assert_eq!(with(10, &[], None), None);
+            prop_assert_eq!(with(times, &[bright % pixels as usize], None), None);
+            prop_assert_eq!(with(times, &[], Some(&[u16::try_from(bright).unwrap()])), None);
+            let says = with(times, &[], Some(&[])).unwrap();
+            let start = format!("pixel {bright} has {} times", two_digits(times as f64));
+            let end = format!("--mask {bright} leaves the pixel out");
+            prop_assert!(says.starts_with(&start) && says.ends_with(&end), "{}", says);
         }
     }
 
-    /// A peak that wraps in some pixels, and two surfaces close together that do not.
-    #[test]
-    fn counters_that_began_again_are_found() {
-        let mut rng = Pcg64::seed_from_u64(7);
-        let mut between = |low: f64, high: f64| {
-            rand_distr::Uniform::new(low, high)
-                .unwrap()
-                .sample(&mut rng)
-        };
-        let (mut missed, mut wrong) = (0, 0);
-        for (seed, bits) in (0..300).zip([8, 10, 12].into_iter().cycle()) {
-            let full = 2_f64.powi(bits);
-            let background = between(1.0, 40.0);
-            let place = |pixel: usize| 40.0 + (pixel % 9) as f64 / 9.0;
-            let peak = |light: f64, at: f64, sigma: f64, bin: usize| {
-                light * 2.5 * sigma * bin_share(u32::try_from(bin).unwrap(), at, sigma)
-            };
-            let (highest, sigma) = (full * between(1.5, 4.0), between(0.9, 2.0));
-            let wraps = |pixel: usize, bin: usize| {
-                let light = highest * (0.5 + (pixel % 4) as f64 / 6.0);
-                background + peak(light, place(pixel), sigma, bin)
-            };
-            let says = wrapped_counters(&recorded(32, &wraps, &|_, n| n % full, seed));
-            let cause = format!("counted {full} more, so counters of {bits} bits began again at 0");
-            missed += usize::from(!says.is_some_and(|says| says.contains(&cause)));
-            let (sigma, share) = (between(0.3, 2.0), between(0.3, 1.0));
-            let gap = sigma * between(2.0, 9.0);
-            let two = |pixel: usize, bin: usize| {
-                let light = (full - background) * (0.5 + 0.2 * (pixel * 7 % 32) as f64 / 31.0);
-                let behind = peak(light * share, place(pixel) + gap, sigma, bin);
-                background + peak(light, place(pixel), sigma, bin) + behind
-            };
-            let two = recorded(32, &two, &|_, n| n.min(full - 1.0), seed);
-            wrong += usize::from(wrapped_counters(&two).is_some());
+    fn observed(pixels: u32, captures: &[Vec<Vec<u64>>]) -> Observed<'_> {
+        Observed {
+            array: Array::new(pixels, 1).unwrap(),
+            captures,
+            masked: None,
+            length: Length::Unknown,
+            cycles: None,
+            bin_width_ps: 250.0,
+            truth_mm: None,
+            slant: None,
+            bias_mm: None,
+            offsets_mm: &[],
+            times: None,
         }
-        assert!(missed == 0 && wrong <= 15, "{missed} missed, {wrong} wrong");
+    }
+
+    /// Leaving out one of them would not help.
+    #[test]
+    fn several_bright_pixels_are_counted() {
+        let mut capture = vec![vec![1; 16]; 200];
+        for bright in [3, 50, 51] {
+            capture[bright].fill(40);
+        }
+        let says = sets_the_length(&observed(200, &[capture]), &[]).unwrap();
+        assert!(
+            says.starts_with("3 histograms have more than 10 times the photons"),
+            "{says}"
+        );
+        assert!(!says.contains("--mask"), "{says}");
+    }
+
+    /// Light of 100, 25 and 100 photons in the dark, by the formula.
+    #[test]
+    fn tears_are_squares_of_standard_deviations() {
+        let mut counts = [0.0; 11];
+        counts[4..7].copy_from_slice(&[100.0, 25.0, 100.0]);
+        let valley = 9375.0_f64.powi(2) / (62_500.0 + 1250.0 + 2.0e6 + 10_000.0);
+        let edge = 1e8 / (4e6 + 2e4 + 3.2 * 3.2 * (625.0 + 25.0));
+        let found = tears(&counts, 256.0, 0);
+        assert!((found - valley - 2.0 * edge).abs() < 1e-9, "{found}");
+        // With 256 more the middle one is a peak, which is too narrow for the edges.
+        assert!(tears(&counts, 256.0, 1) < found);
+        assert_eq!(tears(&[1.0, 2.0], 256.0, 4), 0.0);
     }
 
     /// One photon in 100,000 laser cycles is as dim as it gets.

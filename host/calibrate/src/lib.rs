@@ -91,7 +91,7 @@ pub struct CalibrationOptions {
     pub glass: Option<bool>,
     /// Bins for which the TDC is dead after a photon, if the user knows; 0 if it takes all.
     pub dead_time: Option<u16>,
-    /// First and last bin of the gate, if the user gives one: what lies beyond is not looked at.
+    /// First and last bin of the gate, if the user gives one, in place of that which is found.
     pub gate: Option<(u16, u16)>,
     /// Distance in millimetres, straight ahead, of a flat target that most of the pixels see. If the rays of the pixels are
     /// not known, the median pixel is taken to see it at this range.
@@ -192,7 +192,11 @@ impl AllHistograms {
         let mut counts = traces.iter().flat_map(|trace| &trace.counts);
         anyhow::ensure!(
             counts.any(|&count| count > 0.0),
-            "no photons, so nothing can be measured: all histograms are empty"
+            "no photons, so nothing can be measured: all histograms{} are empty",
+            match observed.masked {
+                Some([_, ..]) => " but those of pixels that are left out",
+                _ => "",
+            }
         );
         let has_cycles = observed.length.is_known();
         let full = audit::full_counters(&traces).or_else(|| audit::wrapped_counters(&traces));
@@ -208,7 +212,7 @@ impl AllHistograms {
                 audit::hardly_any_light(photons.fold(0.0, f64::max), cycles)
             }
             Length::Cycles(_) => None,
-            _ => audit::sets_the_length(&traces, hot),
+            _ => audit::sets_the_length(observed, hot),
         };
         let of_list = observed
             .times
@@ -271,7 +275,8 @@ pub fn calibrate_with(
     progress: Progress,
 ) -> Result<Calibration> {
     let mut all = AllHistograms::new(observed, &[], options)?;
-    if !all.pixels.hot.is_empty() && !observed.length.is_known() {
+    let keeps_all = observed.masked.is_some_and(<[u16]>::is_empty);
+    if !all.pixels.hot.is_empty() && !observed.length.is_known() && !keeps_all {
         // A hot pixel is the brightest, but does not show how long the recording lasted.
         all = AllHistograms::new(observed, &all.pixels.hot, options)?;
     }
@@ -306,12 +311,25 @@ pub fn calibrate_with(
     audit.cause = cause.or(uneven).or_else(|| audit::spike(&good, seen));
     let glass = nearest.glass();
     let bins = observed.bins();
-    let gate = settle::gate(
-        *range.end(),
-        glass.map_or(0, |glass| glass.end).max(*range.start()),
-    )?;
-    let hidden = hidden(&good, gate, glass);
-    let pulse = pulse::pulse(&windows(&good, gate.0, glass), options.seed);
+    let gate = match options.gate {
+        Some(gate) => settle::given_gate(gate, bins)?,
+        None => settle::gate(
+            *range.end(),
+            glass.map_or(0, |glass| glass.end).max(*range.start()),
+        )?,
+    };
+    let hidden = match options.gate {
+        Some(_) => 0.0,
+        None => hidden(&good, gate, glass),
+    };
+    let windows = match options.gate {
+        Some(gate) => windows(&good, gate, None),
+        // If no target stands behind the glass, the glass has the pulse of the same laser.
+        None => Some(windows(&good, gate, glass))
+            .filter(|windows| !windows.is_empty())
+            .unwrap_or_else(|| windows(&good, (0, u16::MAX), None)),
+    };
+    let pulse = pulse::pulse(&windows, options.seed);
     let used = UsedPulse::new(pulse.as_ref(), &options.known_pulse);
     let found = offset_of(&good, gate, used.window(), observed, options);
     let (mut offset, pixel_offsets) = found.unzip();
@@ -444,34 +462,31 @@ fn hidden(good: &GoodHistograms, gate: (u16, u16), glass: Option<&Glass>) -> f64
     hidden as f64 / good.peaks.len() as f64
 }
 
-/// One window for each histogram: its strongest peak behind the first bin of the gate. If there is
-/// none, the strongest peak of all, which may be crosstalk: it has the pulse of the same laser.
-fn windows(good: &GoodHistograms, first: u16, glass: Option<&Glass>) -> Vec<Window> {
-    let first = usize::from(first);
-    let strongest = |is_used: &dyn Fn(&peaks::Peak) -> bool| -> Vec<Window> {
-        let all = good.traces.iter().zip(&good.peaks).enumerate();
-        all.filter_map(|(index, (trace, peaks))| {
-            let strongest = (0..peaks.len())
-                .filter(|&at| is_used(&peaks[at]))
-                .max_by(|&one, &other| peaks[one].photons.total_cmp(&peaks[other].photons))?;
-            let before = strongest.checked_sub(1).map_or(0, |at| peaks[at].last + 1);
-            let after = peaks.get(strongest + 1);
-            let after = after.map_or(good.bins() - 1, |peak| peak.first - 1);
-            let peak = peaks[strongest];
-            let background = good.background(index, peak.top);
-            let bins = (before.min(peak.first), peak.top, after.max(peak.last));
-            let counts = (&trace.counts[..], &trace.live[..]);
-            Some(Window::new(counts, background, trace.cycles, bins))
-        })
-        .collect()
+/// One window for each histogram with a peak in the gate: around the strongest, behind the glass.
+fn windows(good: &GoodHistograms, gate: (u16, u16), glass: Option<&Glass>) -> Vec<Window> {
+    let is_used = |peak: &peaks::Peak| {
+        is_in(gate, peak) && glass.is_none_or(|glass| peak.top > glass.top + 1)
     };
-    let targets =
-        strongest(&|peak| peak.top >= first && glass.is_none_or(|glass| peak.top > glass.top + 1));
-    if targets.is_empty() {
-        strongest(&|_| true)
-    } else {
-        targets
-    }
+    let all = good.traces.iter().zip(&good.peaks).enumerate();
+    all.filter_map(|(index, (trace, peaks))| {
+        let strongest = (0..peaks.len())
+            .filter(|&at| is_used(&peaks[at]))
+            .max_by(|&one, &other| peaks[one].photons.total_cmp(&peaks[other].photons))?;
+        let before = strongest.checked_sub(1).map_or(0, |at| peaks[at].last + 1);
+        let after = peaks.get(strongest + 1);
+        let after = after.map_or(good.bins() - 1, |peak| peak.first - 1);
+        let peak = peaks[strongest];
+        let background = good.background(index, peak.top);
+        let bins = (before.min(peak.first), peak.top, after.max(peak.last));
+        let counts = (&trace.counts[..], &trace.live[..]);
+        Some(Window::new(counts, background, trace.cycles, bins))
+    })
+    .collect()
+}
+
+/// Whether a peak lies in a gate.
+fn is_in((first, last): (u16, u16), peak: &peaks::Peak) -> bool {
+    (usize::from(first)..=usize::from(last)).contains(&peak.top)
 }
 
 /// The range offset from the distance of the target, else from true distances. With it comes by how much the pixels
@@ -483,8 +498,7 @@ fn offset_of(
     observed: &Observed,
     options: &CalibrationOptions,
 ) -> Option<(Offset, Option<PixelOffsets>)> {
-    let first = usize::from(gate.0);
-    let has_peak = |peaks: &[peaks::Peak]| peaks.iter().any(|peak| peak.top >= first);
+    let has_peak = |peaks: &[peaks::Peak]| peaks.iter().any(|peak| is_in(gate, peak));
     let all = good.traces.iter().zip(&good.peaks);
     let with_peak = all.filter(|(_, peaks)| has_peak(peaks));
     let placed = with_peak.filter_map(|(trace, _)| {
@@ -580,7 +594,7 @@ mod tests {
         let observed = Observed {
             array: Array::new(8, 8).unwrap(),
             captures: &captures,
-            masked: &[],
+            masked: None,
             // Without laser cycles no dead time is sought, which would take longest.
             length: Length::Unknown,
             cycles: None,
@@ -631,7 +645,7 @@ mod tests {
             let observed = Observed {
                 array: Array::new(4, 2).unwrap(),
                 captures: &captures,
-                masked: &[],
+                masked: None,
                 length: Length::Unknown,
                 cycles: None,
                 bin_width_ps: 250.0,

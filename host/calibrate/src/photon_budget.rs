@@ -85,12 +85,14 @@ impl<'a> Replay<'a> {
         let (array, captures) = (observed.array, observed.captures);
         let pixels = array.pixels();
         let of_captures = (0..=u16::MAX).take(captures.len() * pixels as usize);
-        let hot: Vec<u16> = of_captures
-            .filter(|&pixel| hot.contains(&((u32::from(pixel) % pixels) as usize)))
-            .collect();
+        let is_left_out = |pixel: &u16| {
+            hot.contains(&((u32::from(*pixel) % pixels) as usize))
+                || observed.is_masked((*pixel).into())
+        };
+        let left_out: Vec<u16> = of_captures.filter(is_left_out).collect();
         let cycles = MAX_CYCLES.into();
         let mut photons =
-            RecordedHistograms::with_masked(array, captures, length, cycles, seed, &hot)?;
+            RecordedHistograms::with_masked(array, captures, length, cycles, seed, &left_out)?;
         let cycles = MAX_PHOTONS / photons.photons_per_cycle().max(1e-9);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let slice = photons.next_slice(cycles.clamp(1.0, MAX_CYCLES.into()) as u16)?;
@@ -99,6 +101,7 @@ impl<'a> Replay<'a> {
         // The range without the offset of the pixel.
         let with_truth = with_truth
             .enumerate()
+            .filter(|(place, _)| !observed.is_masked(*place))
             .filter_map(|(place, (pixel, truth))| {
                 let bias = observed.bias(place % pixels as usize);
                 Some((pixel, (*truth)? + bias - own(place).unwrap_or(0.0)))

@@ -71,7 +71,9 @@ pub fn rows(found: &Calibration) -> Vec<Row> {
         "gate",
         match (found.written_gate(), between) {
             (None, _) => "none needed".to_owned(),
-            (Some((first, last)), Some((low, high))) if first > 0 && low < high => {
+            (Some((first, last)), Some((low, high)))
+                if low < high && (low..=high).contains(&usize::from(first)) =>
+            {
                 format!("{first}..{last} (begins at {low} to {high})")
             }
             (Some((first, last)), _) => format!("{first}..{last}"),

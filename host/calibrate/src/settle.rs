@@ -69,6 +69,23 @@ pub fn gate(last: usize, first: usize) -> Result<(u16, u16)> {
     Ok((first, last))
 }
 
+/// A gate that the user gives.
+///
+/// # Errors
+/// Fails if it ends past the last of `bins` bins, or has fewer than 8.
+pub fn given_gate((first, last): (u16, u16), bins: usize) -> Result<(u16, u16)> {
+    let refused = |reason| Refused::value("gate", format_args!("{first}..{last}"), reason);
+    ensure!(
+        usize::from(last) < bins,
+        refused(format!("there are {bins} bins"))
+    );
+    ensure!(
+        first + 7 <= last,
+        refused("a gate has 8 bins or more".to_owned())
+    );
+    Ok((first, last))
+}
+
 /// The settings of the window rule, with window, minimum count and X of `budget` if there is one.
 ///
 /// # Errors

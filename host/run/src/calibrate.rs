@@ -1,9 +1,11 @@
 //! `calibrate`: the settings of a sensor from a recording.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 
 use super::given::{Given, TDC};
-use super::recording::{RECORDING, bin_width_warning, read_options, settings_of_file, warnings};
+use super::recording::{
+    RECORDING, bin_width_warning, mask_capture, read_options, settings_of_file, warnings,
+};
 use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate_with};
 use dtof_engine::settings::{SettingsFile, share};
 use dtof_options::Refused;
@@ -118,14 +120,18 @@ impl Options {
         options.cycles = Some(u64::MAX);
         let counts = counts(input, &options)?;
         self.given.suits(input, &counts.metadata)?;
-        let histograms = || counts.captures.iter().flatten();
-        self.check_sensor(
-            histograms().next().map_or(0, Vec::len),
-            histograms().count(),
+        let mut masked = self.given.options.sensor.masked.clone();
+        let pixels = counts.array.pixels();
+        mask_capture(
+            &mut masked,
+            requested.run.capture,
+            pixels,
+            counts.metadata.captures,
         )?;
+        let all = counts.captures.len() * pixels as usize;
+        masked::check(masked.as_deref().unwrap_or(&[]), all)?;
         let options = self.calibration(&requested);
-        let masked = self.masked();
-        let found = calibrate_counts(&requested, &counts, masked, &options, progress);
+        let found = calibrate_counts(&requested, &counts, masked.as_deref(), &options, progress);
         let found = found.with_context(|| input.to_string())?;
         let width = bin_width_warning(&counts.metadata);
         let metres = self.calibration.target_mm.and_then(in_metres);
@@ -133,58 +139,25 @@ impl Options {
         let warnings = warnings.chain(width).chain(metres).collect();
         let before = requested.or(settings_of_file(&counts.metadata, counts.array));
         Ok(CalibrateResult {
-            settings: self.settings(&found, before)?,
+            settings: with_mask(found.settings(before)?, masked.as_deref()),
             found,
             warnings,
         })
     }
-
-    /// Checks the gate and the pixels to leave out that are given.
-    ///
-    /// # Errors
-    /// Fails if there are not as many bins or pixels.
-    pub fn check_sensor(&self, bins: usize, pixels: usize) -> Result<()> {
-        if let Some((first, last)) = self.given.options.sensor.gate {
-            let reason = format!("there are {bins} bins");
-            ensure!(
-                usize::from(last) < bins,
-                Refused::value("gate", format_args!("{first}..{last}"), reason)
-            );
-        }
-        masked::check(self.masked(), pixels)
-    }
-
-    /// The pixels to leave out that are given.
-    #[must_use]
-    pub fn masked(&self) -> &[u16] {
-        self.given.options.sensor.masked.as_deref().unwrap_or(&[])
-    }
-
-    /// The settings that were `found` over those `before`, with the gate and the pixels to leave out that are given.
-    ///
-    /// # Errors
-    /// Fails if a number does not fit its format.
-    pub fn settings(&self, found: &Calibration, before: SettingsFile) -> Result<SettingsFile> {
-        let mut settings = found.settings(before)?;
-        let given = &self.given.options.sensor;
-        settings.sensor.gate = given.gate.or(settings.sensor.gate);
-        if let Some(masked) = &given.masked {
-            settings.sensor.masked =
-                Some(with_found(masked, &settings)).filter(|masked| !masked.is_empty());
-        }
-        Ok(settings)
-    }
 }
 
-/// The pixels to leave out: those that are given, beside those that were `found`. If none are given, none are.
-pub(super) fn with_found(given: &[u16], found: &SettingsFile) -> Vec<u16> {
+/// These settings with the pixels to leave out that are given, beside those that were found. If none are given, none are.
+#[must_use]
+pub fn with_mask(mut found: SettingsFile, given: Option<&[u16]>) -> SettingsFile {
+    let Some(given) = given else { return found };
     let mut masked = given.to_vec();
     if !masked.is_empty() {
         masked.extend(found.sensor.masked.iter().flatten());
         masked.sort_unstable();
         masked.dedup();
     }
-    masked
+    found.sensor.masked = Some(masked).filter(|masked| !masked.is_empty());
+    found
 }
 
 /// Whether there is a photon in any histogram.
@@ -200,7 +173,7 @@ pub(super) fn has_photons(counts: &Counts) -> bool {
 pub(super) fn calibrate_counts(
     requested: &SettingsFile,
     counts: &Counts,
-    masked: &[u16],
+    masked: Option<&[u16]>,
     options: &CalibrationOptions,
     progress: &mut dyn Progress,
 ) -> Result<Calibration> {

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, ensure};
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 
-use super::calibrate::{calibrate_counts, yes_or_no};
+use super::calibrate::{calibrate_counts, with_mask, yes_or_no};
 use super::given::{Given, SENSOR, TDC, of_given};
 use super::recording::{
     RECORDING, bin_width_warning, check_once_per_bin, mask_capture, read_options, settings_of_file,
@@ -240,7 +240,8 @@ impl Options {
         (callbacks.step)("reads the recording", 0.0)?;
         let counts = counts(&input, &first_cycles(&requested))?;
         mask_capture(
-            &mut requested,
+            &mut requested.sensor.masked,
+            requested.run.capture,
             counts.array.pixels(),
             counts.metadata.captures,
         )?;
@@ -292,14 +293,16 @@ impl Options {
                 gate: requested.sensor.gate,
                 ..CalibrationOptions::default()
             };
-            let masked = requested.sensor.masked.as_deref().unwrap_or(&[]);
-            let found = calibrate_counts(&requested, &counts, masked, &options, &mut ());
+            let masked = requested.sensor.masked.clone();
+            let counted = masked.as_deref();
+            let found = calibrate_counts(&requested, &counts, counted, &options, &mut ());
             let found = found.with_context(|| input.to_string())?;
             found.warnings().into_iter().for_each(callbacks.warning);
             if found.pulse.is_none() {
                 return Err(unknown_pulse(&input.to_string()).into());
             }
-            requested.or(found.settings(merged)?)
+            requested.sensor.masked = None;
+            with_mask(requested.or(found.settings(merged)?), masked.as_deref())
         };
         Ok(Subject {
             requested: with_short_exposures(requested),

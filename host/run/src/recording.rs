@@ -111,11 +111,12 @@ impl Given {
 /// # Errors
 /// Fails if an address is past those of all captures.
 pub(super) fn mask_capture(
-    requested: &mut SettingsFile,
+    masked: &mut Option<Vec<u16>>,
+    capture: Option<u32>,
     pixels: u32,
     captures: usize,
 ) -> Result<()> {
-    let (Some(capture), Some(addresses)) = (requested.run.capture, &requested.sensor.masked) else {
+    let (Some(capture), Some(addresses)) = (capture, &masked) else {
         return Ok(());
     };
     masked::check(addresses, captures * pixels as usize)?;
@@ -125,7 +126,7 @@ pub(super) fn mask_capture(
             u16::try_from(own).ok().filter(|_| own < pixels)
         };
         let own: Vec<u16> = addresses.iter().filter_map(of_capture).collect();
-        requested.sensor.masked = Some(own).filter(|own| !own.is_empty());
+        *masked = Some(own).filter(|own| !own.is_empty());
     }
     Ok(())
 }
@@ -211,10 +212,8 @@ mod tests {
     #[test]
     fn a_mask_of_another_capture_is_none() {
         let masked = |addresses: &[u16]| {
-            let mut requested = SettingsFile::default();
-            requested.run.capture = Some(1);
-            requested.sensor.masked = Some(addresses.to_vec());
-            mask_capture(&mut requested, 4, 3).map(|()| requested.sensor.masked)
+            let mut masked = Some(addresses.to_vec());
+            mask_capture(&mut masked, Some(1), 4, 3).map(|()| masked)
         };
         assert_eq!(masked(&[1, 5, 9]).unwrap(), Some(vec![1]));
         // As if the file had no other capture.

@@ -4,7 +4,7 @@
 
 use anyhow::{Result, ensure};
 
-use super::calibrate::{calibrate_counts, has_photons, with_found, yes_or_no};
+use super::calibrate::{calibrate_counts, has_photons, with_mask, yes_or_no};
 use super::depth_map::MapInput;
 use super::given::{FRAME, Given, SENSOR, TDC, of_given};
 use super::recording::{
@@ -192,7 +192,8 @@ impl Options {
         self.given.suits(input, recording.metadata())?;
         let mut requested = requested.clone();
         let captures = recording.metadata().captures;
-        mask_capture(&mut requested, recording.array().pixels(), captures)?;
+        let (capture, pixels) = (requested.run.capture, recording.array().pixels());
+        mask_capture(&mut requested.sensor.masked, capture, pixels, captures)?;
         let has_file = self.given.file.is_some() || self.given.text.is_some();
         ensure!(
             !has_file || self.glass.is_none(),
@@ -337,7 +338,7 @@ fn find(
     options.glass = glass;
     options.dead_time = requested.sensor.dead_time;
     options.gate = requested.sensor.gate;
-    let masked = requested.sensor.masked.as_deref().unwrap_or(&[]);
+    let masked = requested.sensor.masked.as_deref();
     let mut found = calibrate_counts(requested, &counts, masked, &options, &mut ())?;
     if requested.sensor.offsets_mm.is_some() {
         found.pixel_offsets = None;
@@ -362,9 +363,7 @@ fn find(
         settings.detection.false_alarm = Some(options.false_alarm);
     }
     // Pixels to leave out come on top of those that are found.
-    if let Some(masked) = &mut given.sensor.masked {
-        *masked = with_found(masked, &settings);
-    }
+    settings = with_mask(settings, given.sensor.masked.take().as_deref());
     let together = given.clone().or(settings.clone());
     if together.dead_time_obstacle().is_some() {
         settings.dead_time_of_sensor = settings.sensor.dead_time.take();
@@ -396,7 +395,8 @@ fn find(
         ("gate", "; --glass no keeps all bins"),
     ] {
         let is_left_out = |row: &&mut Row| row.0 == name && !row.1.starts_with("none");
-        let is_undone = name != "gate" || found.glass().is_some();
+        let is_undone = name != "gate"
+            || found.glass().is_some() && requested.sensor.gate == found.written_gate();
         let rows = rows.iter_mut().filter(is_left_out);
         rows.filter(|_| is_undone)
             .for_each(|row| row.1 += undone_by);

@@ -46,8 +46,8 @@ pub struct Observed<'a> {
     pub array: Array,
     /// Histograms: capture, then pixel, then bin.
     pub captures: &'a [Capture],
-    /// Pixels that are left out, numbered through all captures.
-    pub masked: &'a [u16],
+    /// Pixels that are left out, numbered through all captures. None, as said by the user: hot ones count, too.
+    pub masked: Option<&'a [u16]>,
     /// How long each capture lasted.
     pub length: Length,
     /// Laser cycles of each pixel of each capture, in the order of the pixels, where they differ.
@@ -136,11 +136,8 @@ impl Observed<'_> {
                 "capture {index} has {found} pixels, not {pixels}"
             );
             let others = capture.iter().enumerate();
-            let is_masked = |pixel: usize| {
-                let number = u16::try_from(index * pixels + pixel);
-                number.is_ok_and(|number| self.masked.contains(&number))
-            };
-            let others = others.filter(|(pixel, _)| !hot.contains(pixel) && !is_masked(*pixel));
+            let others = others.filter(|(pixel, _)| !hot.contains(pixel));
+            let others = others.filter(|(pixel, _)| !self.is_masked(index * pixels + pixel));
             let totals = others.map(|(_, counts)| counts.iter().sum::<u64>());
             let cycles = self.length.cycles(totals.max().unwrap_or(0));
             for (pixel, counts) in capture.iter().enumerate() {
@@ -156,7 +153,7 @@ impl Observed<'_> {
                     found == bins,
                     "capture {index}, pixel {pixel} has {found} bins, not {bins}"
                 );
-                if is_masked(pixel) {
+                if self.is_masked(number) {
                     continue;
                 }
                 let truth_mm = self.truth_mm.and_then(|truth| truth[number]);
@@ -171,6 +168,13 @@ impl Observed<'_> {
             }
         }
         Ok(traces)
+    }
+
+    /// Whether a pixel, numbered through all captures, is left out.
+    #[must_use]
+    pub fn is_masked(&self, number: usize) -> bool {
+        let masked = self.masked.unwrap_or(&[]);
+        u16::try_from(number).is_ok_and(|number| masked.contains(&number))
     }
 
     /// The range bias of a pixel in millimetres, less the offset that it has already: ranges without that offset are

@@ -65,7 +65,8 @@ impl Pixels {
             is_surely_more(pixel.photons, most, ONE_IN)
         };
         let is_hot = |&at: &usize| {
-            let neighbours = neighbours(array, at).map(|other| of[other].rate());
+            let neighbours = neighbours(array, at).filter(is_seen);
+            let neighbours = neighbours.map(|other| of[other].rate());
             is_brighter(&of[at], rate)
                 && is_brighter(&of[at], second_highest(neighbours))
                 && !all().any(|(trace, level)| trace.pixel == at && has_pulse(trace, level))

@@ -179,7 +179,7 @@ pub fn observed(
     Observed {
         array,
         captures,
-        masked: &[],
+        masked: None,
         length,
         cycles: None,
         bin_width_ps,

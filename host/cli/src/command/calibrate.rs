@@ -14,7 +14,7 @@ use dtof_calibrate::report::{self, MARKS};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::files::{MarkedFile, write_marked};
 use dtof_options::rows::aligned;
-use dtof_run::calibrate::Options;
+use dtof_run::calibrate::{Options, with_mask};
 
 use self::from_device::{DeviceArgs, FromDevice};
 use super::flags::Flags;
@@ -71,18 +71,16 @@ impl Calibrate {
                 let port = self.from_device.open(&options.given)?;
                 let device = &self.from_device;
                 let calibration = options.calibration(requested);
-                let calibrated = device.calibrate(
-                    (&name, port),
-                    requested,
-                    (options, &calibration),
-                    self.quiet,
-                );
+                let masked = options.given.options.sensor.masked.as_deref();
+                let calibrated =
+                    device.calibrate((&name, port), requested, (&calibration, masked), self.quiet);
                 let FromDevice {
                     found,
                     settings,
                     rows,
                 } = calibrated.with_context(|| name.clone())?;
-                let settings = options.settings(&found, requested.clone().or(settings))?;
+                let settings = found.settings(requested.clone().or(settings))?;
+                let settings = with_mask(settings, masked);
                 (found, settings, rows)
             }
         };

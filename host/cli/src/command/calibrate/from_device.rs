@@ -16,8 +16,8 @@ use dtof_options::Refused;
 use dtof_options::numbers::{MAX_INTEGER, integer};
 use dtof_options::progress::{Progress, shared};
 use dtof_options::rows::{Row, grouped};
+use dtof_photons::masked;
 use dtof_photons::open::BIN_WIDTH_PS;
-use dtof_run::calibrate::Options;
 use dtof_run::given::Given;
 
 use crate::command::device_options::HostOptions;
@@ -94,7 +94,7 @@ impl DeviceArgs {
         &self,
         (name, port): (&str, Box<dyn Port>),
         requested: &SettingsFile,
-        (options, calibration): (&Options, &CalibrationOptions),
+        (options, masked): (&CalibrationOptions, Option<&[u16]>),
         quiet: bool,
     ) -> Result<FromDevice> {
         let mut client = Client::new(port)?;
@@ -104,7 +104,7 @@ impl DeviceArgs {
         ensure!(pixels > 0, "the device has no pixels");
         let bins = client.bins();
         requested.check_bins(bins)?;
-        options.check_sensor(bins.into(), pixels.into())?;
+        masked::check(masked.unwrap_or(&[]), pixels.into())?;
         let array = array(pixels, requested.sensor.columns);
         let array = array.filter(|array| array.pixels() == u32::from(pixels));
         let array = array.ok_or_else(|| {
@@ -153,7 +153,7 @@ impl DeviceArgs {
         let observed = Observed {
             array,
             captures: &captures,
-            masked: options.masked(),
+            masked,
             length: Length::Cycles(median),
             cycles: Some(&collected.cycles),
             bin_width_ps: settings.bin_width_ps.to_num(),
@@ -164,7 +164,7 @@ impl DeviceArgs {
             times: None,
         };
         let mut bar = Bar::new(quiet);
-        let found = calibrate_with(&observed, calibration, &shared(&mut bar, "steps"))?;
+        let found = calibrate_with(&observed, options, &shared(&mut bar, "steps"))?;
         ensure!(
             found.pulse.is_some() || !interrupt::is_interrupted(),
             "ended too soon: no peak is bright enough to measure the pulse; nothing is written"
