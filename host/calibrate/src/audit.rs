@@ -8,11 +8,12 @@
 //! | the level of eighths of the range | a background that is not flat |
 //! | peaks of one bin at one place, where others are wider | no light that came back |
 //! | the first and the last bins | a TDC whose range is shorter |
+//! | bins that are empty between others | codes that a TDC never gives |
 //! | photons a laser cycle | a wrong number of laser cycles |
 //! | the brightest pixel, where they are not known | a pixel that says little of them |
 //!
 //! The first of the upper five that is found may be the cause of the others of them, and of what the search finds. The last
-//! three stand by themselves.
+//! four stand by themselves.
 //!
 //! Decisions rest on the scatter of photon counts: what is no count has another one. Let three neighbouring bins hold a, b
 //! and c photons, and n together. If their means lie on a straight line, each of the n photons adds 1, −2 or 1 to
@@ -43,6 +44,8 @@ const FEWEST: usize = 600;
 const GAUSSIAN: f64 = 10.0;
 /// The median of the square of a Gaussian number of variance 1.
 const MEDIAN: f64 = 0.4549;
+/// Its standard error, of one square.
+const OF_MEDIAN: f64 = 2.3;
 /// Photon counts have a mean between these.
 const COUNTS: [f64; 2] = [0.7, 1.4];
 /// So large a share of the bins has a cause: empty ones that photons would have filled, and full ones.
@@ -57,7 +60,7 @@ pub struct Scatter {
     pub mean: f64,
     /// The standard error of the mean.
     pub error: f64,
-    /// Its median, over that of a Gaussian.
+    /// The median of the triples of many photons, over that of a Gaussian; the mean if most have few.
     pub median: f64,
     /// The mean of n, the photons of three bins.
     pub photons: f64,
@@ -73,13 +76,15 @@ impl Scatter {
     }
 
     fn beside(histograms: &[&[f64]], is_beside: &[Vec<bool>]) -> Self {
-        let (mut tests, mut photons) = (Vec::new(), 0.0);
+        let (mut tests, mut bright, mut photons) = (Vec::new(), Vec::new(), 0.0);
         for (counts, is_beside) in histograms.iter().zip(is_beside) {
             for (bins, is_beside) in counts.windows(3).zip(is_beside.windows(3)) {
                 let n: f64 = bins.iter().sum();
                 if n > 0.0 && !is_beside.contains(&false) {
                     let bend = bins[0] - 2.0 * bins[1] + bins[2];
-                    tests.push(bend * bend / (2.0 * n));
+                    let test = bend * bend / (2.0 * n);
+                    tests.push(test);
+                    bright.extend((n >= GAUSSIAN).then_some(test));
                     photons += n;
                 }
             }
@@ -91,7 +96,10 @@ impl Scatter {
         Self {
             mean,
             error: squares.sum::<f64>().sqrt() / each,
-            median: median(tests) / MEDIAN,
+            median: match 2 * bright.len() > triples {
+                true => median(bright) / MEDIAN,
+                false => mean,
+            },
             photons: photons / each,
             triples,
         }
@@ -310,15 +318,18 @@ pub(super) fn no_counts(traces: &[Trace], has_cycles: bool, false_alarm: f64) ->
     let is_beside = beside_peaks(&histograms, line);
     let scatter = Scatter::beside(&histograms, &is_beside);
     let is_bright = scatter.photons >= GAUSSIAN;
-    let other = if is_bright {
-        scatter.median
-    } else {
-        scatter.mean
-    };
-    let (low, high) = (scatter.mean.min(other), scatter.mean.max(other));
     let [least, most] = COUNTS;
     let error = 2.0 * scatter.error;
-    let (is_more, is_less) = (low - error > most, high + error < least);
+    // A few peaks, or edges of an image, make a mean large. The error of the median of a square is as for a Gaussian.
+    let (low, high, low_error) = match is_bright {
+        true => (
+            scatter.mean.min(scatter.median),
+            scatter.median,
+            2.0 * OF_MEDIAN / (scatter.triples as f64).sqrt(),
+        ),
+        false => (scatter.mean, scatter.mean, error),
+    };
+    let (is_more, is_less) = (low - error > most, high + low_error < least);
     if scatter.triples < FEWEST || !is_more && !is_less {
         return None;
     }
@@ -348,7 +359,7 @@ pub(super) fn no_counts(traces: &[Trace], has_cycles: bool, false_alarm: f64) ->
     } else {
         0.0
     };
-    (high + error < least * (1.0 - full))
+    (high + low_error < least * (1.0 - full))
         .then(|| format!("{}. {}", differ(high), seen.less(has_cycles)))
 }
 
@@ -371,11 +382,13 @@ fn of_histograms(some: usize, all: usize) -> String {
 pub(super) fn full_counters(traces: &[Trace]) -> Option<String> {
     /// Chance does not make so high a count the highest of several bins.
     const HIGH: f64 = 64.0;
+    /// So many histograms are not full in exactly one bin each.
+    const FEW: usize = 8;
     let counts = traces.iter().flat_map(|trace| &trace.counts);
     let highest = counts.copied().fold(0.0, f64::max);
     let below = highest - f64::min(highest / 32.0, 16.0);
     // Photons differ from pixel to pixel: what has the same neighbours is a copy.
-    let (mut at, mut near, mut having) = (BTreeSet::new(), BTreeSet::new(), 0);
+    let (mut at, mut near, mut having, mut twice) = (BTreeSet::new(), BTreeSet::new(), 0, 0);
     for trace in traces {
         let counts = &trace.counts;
         for bin in (0..counts.len()).filter(|&bin| counts[bin] >= below) {
@@ -390,10 +403,18 @@ pub(super) fn full_counters(traces: &[Trace]) -> Option<String> {
             };
             set.insert(neighbours);
         }
-        having += usize::from(counts.contains(&highest));
+        let times = counts.iter().filter(|&&count| count >= highest).count();
+        having += usize::from(times > 0);
+        twice += usize::from(times > 1);
     }
     let is_full =
         highest >= HIGH && at.len() > near.len() + 3 && having > 1 && 100 * having >= traces.len();
+    if is_full && having == traces.len() && having > FEW && 50 * twice < having {
+        return Some(format!(
+            "the highest bin of each histogram has {highest}, so each was scaled, and these are no photon counts: save the \
+             counts as they were read"
+        ));
+    }
     is_full.then(|| {
         format!(
             "{} have a bin of {highest} and none has more, so their counters were full and their peaks are cut off: \
@@ -568,7 +589,7 @@ pub(super) fn uneven_background(
         parts.iter().filter(is_like).count()
     };
     let most_alike = parts.iter().map(like).max()?;
-    (parts.len() > PARTS / 2 && 2 * most_alike < parts.len()).then(|| {
+    (2 * parts.len() >= PARTS && 2 * most_alike < parts.len()).then(|| {
         let shares = parts.iter().map(|part| part.0);
         let (least, most) = shares.fold((f64::INFINITY, 0.0), |(least, most), share| (share.min(least), share.max(most)));
         let round = |share: f64| (100.0 * share).round();
@@ -586,6 +607,8 @@ pub(super) fn uneven_background(
 pub(super) fn spike(good: &GoodHistograms, gate: RangeInclusive<usize>) -> Option<String> {
     /// Fewer histograms may have a stuck bin of one pixel.
     const SHARE: f64 = 0.05;
+    /// More bins are no spikes.
+    const MOST: usize = 8;
     /// The bins beside a spike have less than this share of it together. A wide peak has as much in each.
     const BESIDE: f64 = 0.1;
     // Peaks that stand alone, the light of all of them and beside it, with its variance; and wide peaks.
@@ -614,27 +637,52 @@ pub(super) fn spike(good: &GoodHistograms, gate: RangeInclusive<usize>) -> Optio
             }
         }
     }
-    let (bin, &(number, of, sum, variance)) =
-        spikes.iter().enumerate().max_by_key(|(_, spike)| spike.0)?;
-    let elsewhere: usize = wide.iter().sum::<usize>() - wide[bin];
-    let others: usize = spikes.iter().map(|spike| spike.0).sum::<usize>() - number;
     let all = good.traces.len();
-    let is_spike = number > 1
-        && number as f64 >= SHARE * all as f64
-        && sum + 3.0 * variance.sqrt() < BESIDE * of
-        // A narrow pulse has such peaks everywhere.
-        && elsewhere > 2 * others;
-    is_spike.then(|| {
-        let last = good.bins() - 1;
-        let helps = match bin {
-            0..8 => format!("--gate {}..{last} leaves it out", bin + 1),
-            _ if bin + 8 > last => format!("--gate 0..{} leaves it out", bin - 1),
-            _ => format!("`counts[..., {bin}] = counts[..., {}]` removes it", bin - 1),
-        };
-        format!(
-            "{} have a spike at bin {bin} that is narrower than the pulse, so it is no light that came back: {helps}",
-            of_histograms(number, all)
-        )
+    let is_often = |number: usize| number > 1 && number as f64 >= SHARE * all as f64;
+    let is_narrow = |&(_, of, sum, variance): &(usize, f64, f64, f64)| {
+        sum + 3.0 * variance.sqrt() < BESIDE * of
+    };
+    let is_spike = |bin: &usize| is_often(spikes[*bin].0) && is_narrow(&spikes[*bin]);
+    let bins: Vec<usize> = (0..good.bins()).filter(is_spike).collect();
+    // A narrow pulse has such peaks everywhere.
+    let at = |bin: &usize| bins.contains(bin);
+    let elsewhere: usize = (0..wide.len())
+        .filter(|bin| !at(bin))
+        .map(|bin| wide[bin])
+        .sum();
+    let others: usize = (0..spikes.len())
+        .filter(|bin| !at(bin))
+        .map(|bin| spikes[bin].0)
+        .sum();
+    let &bin = bins.iter().max_by_key(|&&bin| spikes[bin].0)?;
+    if bins.len() > MOST || elsewhere <= 2 * others {
+        return None;
+    }
+    let last = good.bins() - 1;
+    let share = of_histograms(spikes[bin].0, all);
+    let why = "narrower than the pulse, so it is no light that came back";
+    let save = "leave it out when you save the recording";
+    Some(match bins[..] {
+        [bin @ 0..8] => format!(
+            "{share} have a spike at bin {bin}, {why}: --gate {}..{last} leaves it out",
+            bin + 1
+        ),
+        [bin] if bin + 8 > last => format!(
+            "{share} have a spike at bin {bin}, {why}: --gate 0..{} leaves it out",
+            bin - 1
+        ),
+        [bin] => format!(
+            "{share} have a spike at bin {bin}, {why}: {save}, as with `counts[..., {bin}] = counts[..., {}]`",
+            bin - 1
+        ),
+        _ => {
+            let more = bins
+                .iter()
+                .filter(|&&other| other != bin)
+                .map(usize::to_string);
+            let more = more.collect::<Vec<_>>().join(", ");
+            format!("{share} have a spike at bin {bin}, and others at {more}, {why}: {save}")
+        }
     })
 }
 
@@ -697,6 +745,40 @@ pub(super) fn range(traces: &[Trace], has_cycles: bool) -> (RangeInclusive<usize
     first += usize::from(first > 0 && is_below(first, PARTLY));
     last -= usize::from(last + 1 < bins && last > 0 && is_below(last, PARTLY));
     (first..=last, warning)
+}
+
+/// Codes that the TDC never gives: bins that are empty in all histograms, between some that are not. They would split a
+/// background or a pulse, so they get what the bins beside them have.
+pub(super) fn fill_missing_codes(traces: &mut [Trace]) -> Option<String> {
+    /// Chance leaves a bin empty once in so many.
+    const ONE_IN: f64 = 1e9;
+    let sums = sum(&traces
+        .iter()
+        .map(|trace| &trace.counts[..])
+        .collect::<Vec<_>>());
+    let missing: Vec<(usize, [usize; 2])> = (1..sums.len().saturating_sub(1))
+        .filter(|&bin| sums[bin] <= 0.0)
+        .filter_map(|bin| {
+            let before = sums[..bin].iter().rposition(|&sum| sum > 0.0)?;
+            let after = bin + sums[bin..].iter().position(|&sum| sum > 0.0)?;
+            let usual = f64::min(sums[before], sums[after]);
+            is_surely_less(0.0, usual, ONE_IN).then_some((bin, [before, after]))
+        })
+        .collect();
+    for trace in traces {
+        for (bin, beside) in &missing {
+            trace.counts[*bin] = beside.map(|bin| trace.counts[bin]).iter().sum::<f64>() / 2.0;
+        }
+    }
+    let (first, _) = missing.first()?;
+    let which = match missing.len() {
+        1 => format!("bin {first} is"),
+        number => format!("{number} bins, the first of them {first}, are"),
+    };
+    Some(format!(
+        "{which} empty in all histograms, between some that are not: the TDC never gives that code, and depths near it may be \
+         off by a bin"
+    ))
 }
 
 /// That a known number of laser cycles leaves far less light than any sensor is used with.
@@ -1078,11 +1160,35 @@ mod tests {
                 spike_of(mean, seed)
             };
             let says = light(1.0, 5.0 * signal).unwrap();
-            let text = format!("have a spike at bin {bin} that is narrower than the pulse");
+            let text = format!("have a spike at bin {bin}, narrower than the pulse");
             prop_assert!(says.contains(&text), "{}", says);
             prop_assert_eq!(light(1.0, 0.0), None);
             prop_assert_eq!(light(0.15, 0.0), None);
         }
+    }
+
+    /// One in each of some captures, at another bin each: none of them is a narrow pulse.
+    #[test]
+    fn spikes_at_several_bins_are_named_together() {
+        let light = |bins: usize| {
+            move |pixel: usize, at: usize| {
+                let place = 20.5 + (37 * pixel % 90) as f64;
+                let pulse = 300.0 * bin_share(u32::try_from(at).unwrap(), place, 1.0);
+                let is_spike = (0..bins).any(|spike| at == 5 + 12 * spike && pixel % bins == spike);
+                10.0 + pulse + if is_spike { 900.0 } else { 0.0 }
+            }
+        };
+        let says = spike_of(light(4), 1).unwrap();
+        let start = "25 % of the histograms have a spike at bin ";
+        assert!(
+            says.starts_with(start) && says.contains(", and others at "),
+            "{says}"
+        );
+        for bin in [5, 17, 29, 41] {
+            assert!(says.contains(&format!(" {bin}")), "{says}");
+        }
+        assert!(spike_of(light(8), 1).is_some());
+        assert_eq!(spike_of(light(9), 1), None);
     }
 
     fn spike_of(mean: impl Fn(usize, usize) -> f64, seed: u64) -> Option<String> {
@@ -1162,6 +1268,81 @@ mod tests {
         // With 256 more the middle one is a peak, which is too narrow for the edges.
         assert!(tears(&counts, 256.0, 1) < found);
         assert_eq!(tears(&[1.0, 2.0], 256.0, 4), 0.0);
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        /// Up to three in a row, not at the ends, and not by chance.
+        #[test]
+        fn codes_that_a_tdc_never_gives_are_filled(
+            background in 1.0..50.0_f64,
+            first in 1_usize..120,
+            number in 1_usize..4,
+            seed: u64,
+        ) {
+            let is_missing = |bin: usize| (first..first + number).contains(&bin);
+            let mean = |_, bin| if is_missing(bin) { 0.0 } else { background };
+            let before = recorded(32, &mean, &|_, n| n, seed);
+            let mut traces = before.clone();
+            let says = fill_missing_codes(&mut traces).unwrap();
+            prop_assert!(says.contains(&format!("{first}")), "{}", says);
+            for (trace, before) in traces.iter().zip(&before) {
+                let between = (before.counts[first - 1] + before.counts[first + number]) / 2.0;
+                for bin in 0..BINS {
+                    let expected = if is_missing(bin) { between } else { before.counts[bin] };
+                    prop_assert!((trace.counts[bin] - expected).abs() < 1e-9);
+                }
+            }
+            let mut ends = recorded(32, &|_, bin| if bin < first { 0.0 } else { background }, &|_, n| n, seed);
+            prop_assert_eq!(fill_missing_codes(&mut ends), None);
+            let mut dark = recorded(32, &|_, _| 0.1, &|_, n| n, seed);
+            prop_assert_eq!(fill_missing_codes(&mut dark), None);
+        }
+    }
+
+    /// Scaled to the same highest count each, or full in some.
+    #[test]
+    fn histograms_that_were_scaled_are_named() {
+        let light = scene(20.0, vec![(500.0, 60.5, 1.0)]);
+        let mut traces = recorded(32, &light, &|_, n| n, 1);
+        for trace in &mut traces {
+            let highest = trace.counts.iter().copied().fold(0.0, f64::max);
+            trace
+                .counts
+                .iter_mut()
+                .for_each(|count| *count = (*count * 255.0 / highest).round());
+        }
+        let says = full_counters(&traces).unwrap();
+        assert!(
+            says.starts_with("the highest bin of each histogram has 255, so each was scaled"),
+            "{says}"
+        );
+        traces[3].counts[5] = 254.0;
+        traces[3]
+            .counts
+            .iter_mut()
+            .for_each(|count| *count = count.min(254.0));
+        assert!(
+            full_counters(&traces)
+                .unwrap()
+                .contains("counters were full")
+        );
+    }
+
+    /// Distances with edges between surfaces: their bends are rare, and large.
+    #[test]
+    fn a_depth_image_is_no_histogram() {
+        let row =
+            |row: usize, bin: usize| [1500.0, 2200.0, 1800.0, 2600.0][(row + bin / 9 * 7) % 4];
+        let mut traces = recorded(48, &|_, _| 9.0, &|_, n| n, 1);
+        for trace in &mut traces {
+            for (bin, count) in trace.counts.iter_mut().enumerate() {
+                *count += row(trace.pixel, bin);
+            }
+        }
+        assert!(scatter(&traces).mean > 1.0, "{:?}", scatter(&traces));
+        assert!(said(&traces).unwrap().contains("or are distances"));
     }
 
     /// One photon in 100,000 laser cycles is as dim as it gets.

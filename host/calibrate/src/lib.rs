@@ -29,6 +29,7 @@ use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 use dtof_engine::settings::SettingsFile;
 use dtof_photons::MM_PER_PS;
+use dtof_photons::list_checks::ListChecks;
 use dtof_theory::progress::{self, Progress};
 use rayon::prelude::*;
 
@@ -205,6 +206,7 @@ impl AllHistograms {
             trace.counts.truncate(range.end() + 1);
             trace.live.truncate(range.end() + 1);
         }
+        let missing = audit::fill_missing_codes(&mut traces);
         let no_counts = audit::no_counts(&traces, has_cycles, options.false_alarm);
         let dim = match observed.length {
             Length::Cycles(cycles) if observed.times.is_none() => {
@@ -214,10 +216,9 @@ impl AllHistograms {
             Length::Cycles(_) => None,
             _ => audit::sets_the_length(observed, hot),
         };
-        let of_list = observed
-            .times
-            .into_iter()
-            .flat_map(|times| times.checks.warnings());
+        let checks = observed.times.map(|times| times.checks);
+        let together = checks.and_then(ListChecks::together_warning);
+        let wandering = checks.and_then(ListChecks::wandering_warning);
         let tdc = match observed.length {
             // Full counters look like a dead time.
             _ if full.is_some() && options.dead_time.is_none() => None,
@@ -244,12 +245,13 @@ impl AllHistograms {
             range,
             tdc,
             audit: Audit {
-                cause: full.or(no_counts),
+                cause: full.or(together).or(no_counts),
                 others: short
                     .filter(|_| options.gate.is_none())
                     .into_iter()
+                    .chain(missing)
                     .chain(dim)
-                    .chain(of_list)
+                    .chain(wandering)
                     .collect(),
             },
         })
@@ -306,6 +308,13 @@ pub fn calibrate_with(
         _ if uneven.is_some() && options.glass.is_none() => Nearest::NotCommon,
         Some(Tdc::OnePhotonIn { cycles, .. }) => with_glass(&good.corrected(cycles)),
         _ => with_glass(&good),
+    };
+    let nearest = match nearest {
+        // Beyond the gate that is given.
+        Nearest::Unclear(layer) | Nearest::Passing(layer) if !seen.contains(&layer.bin) => {
+            Nearest::NotCommon
+        }
+        nearest => nearest,
     };
     let cause = audit.cause.take();
     audit.cause = cause.or(uneven).or_else(|| audit::spike(&good, seen));

@@ -27,15 +27,21 @@ pub struct ListChecks {
 }
 
 impl ListChecks {
-    /// Each in words.
-    pub fn warnings(self) -> impl Iterator<Item = String> {
-        let together = self.together.map(|times| {
+    /// That photons come together.
+    #[must_use]
+    pub fn together_warning(self) -> Option<String> {
+        self.together.map(|times| {
             format!(
                 "photons of one pixel and laser cycle are {times:.1} times as often in the same bin as chance would have it: \
                  rain or other flashes, crosstalk between pixels, or photons that are listed twice. --once-per-bin counts them once"
             )
-        });
-        let wandering = self.wandering.map(|(some, all, bins)| {
+        })
+    }
+
+    /// That a peak wanders.
+    #[must_use]
+    pub fn wandering_warning(self) -> Option<String> {
+        self.wandering.map(|(some, all, bins)| {
             #[allow(
                 clippy::cast_possible_truncation,
                 clippy::cast_sign_loss,
@@ -47,8 +53,7 @@ impl ListChecks {
                  LiDAR, record with dither (docs/settings.md#dither); if it is a target that moves, take the events",
                 grouped(cycles)
             )
-        });
-        together.into_iter().chain(wandering)
+        })
     }
 }
 
@@ -392,14 +397,18 @@ mod tests {
             together: Some(4.26),
             wandering: Some((16, 36, -0.008)),
         };
-        let texts: Vec<String> = checks.warnings().collect();
+        let together = checks.together_warning().unwrap();
         assert!(
-            texts[0].contains(" are 4.3 times as often in the same bin"),
-            "{texts:?}"
+            together.contains(" are 4.3 times as often in the same bin"),
+            "{together}"
         );
         let wanders = "in 16 of 36 pixels a peak wanders through the range, by a bin in about 125 laser cycles";
-        assert!(texts[1].starts_with(wanders), "{texts:?}");
-        assert_eq!(ListChecks::default().warnings().count(), 0);
+        assert!(checks.wandering_warning().unwrap().starts_with(wanders));
+        let none = ListChecks::default();
+        assert_eq!(
+            (none.together_warning(), none.wandering_warning()),
+            (None, None)
+        );
     }
 
     /// Rows that are there twice.

@@ -109,6 +109,7 @@ mod tests {
             bins: 8,
             rebin: 1,
             columns: None,
+            once_per_bin: false,
         };
         let list = PhotonList::<CsvReader>::open(&Input::in_memory("a.csv", rows), shape, u64::MAX);
         // Pixel 3 has no photons.

@@ -61,6 +61,8 @@ pub struct ReadOptions {
     pub masked: Vec<u16>,
     /// Histograms: the bins of the run for which the TDC was blind after a photon.
     pub dead_time: u16,
+    /// Photon lists: photons of one pixel, laser cycle and bin count once in histograms of all of them.
+    pub once_per_bin: bool,
 }
 
 impl Default for ReadOptions {
@@ -78,6 +80,7 @@ impl Default for ReadOptions {
             seed: 1,
             masked: Vec::new(),
             dead_time: 0,
+            once_per_bin: false,
         }
     }
 }
@@ -401,6 +404,7 @@ fn list<R: PhotonReader + 'static>(input: &Input, options: &ReadOptions) -> Resu
         bins: options.bins.unwrap_or(LIST_BINS),
         rebin: options.rebin.max(1),
         columns: options.columns,
+        once_per_bin: options.once_per_bin,
     };
     let mut metadata =
         metadata(shape.bins.into(), None, options).with_context(|| input.to_string())?;

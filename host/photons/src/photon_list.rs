@@ -57,6 +57,8 @@ pub struct ListOptions {
     pub rebin: u16,
     /// Columns of the array; one row if left out.
     pub columns: Option<u32>,
+    /// Whether photons of one pixel, laser cycle and bin count once in histograms.
+    pub once_per_bin: bool,
 }
 
 /// A photon that has been checked.
@@ -346,8 +348,10 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
             ..ListTimes::default()
         };
         let mut watch = ListWatch::new(counts.len(), bins, self.cycles);
-        // The laser cycle of the last photon of each pixel.
+        // The laser cycle of the last photon of each pixel, and of each bin if they count once.
         let mut last = vec![u64::MAX; counts.len()];
+        let once = usize::from(self.rows.shape.once_per_bin);
+        let mut last_of_bins = vec![u64::MAX; once * counts.len() * bins];
         let quarter = self.cycles.div_ceil(4);
         while let Some(row) = self.rows.next()? {
             if row.cycle >= self.cycles {
@@ -356,13 +360,19 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
             let Some(histogram) = counts.get_mut(row.pixel()) else {
                 bail!("{} changed while it was read", self.input);
             };
-            histogram[usize::from(row.bin())] += 1;
+            let bin = usize::from(row.bin());
+            if let Some(last) = last_of_bins.get_mut(row.pixel() * bins + bin)
+                && std::mem::replace(last, row.cycle) == row.cycle
+            {
+                continue;
+            }
+            histogram[bin] += 1;
             #[allow(clippy::cast_possible_truncation, reason = "0 to 3")]
             let quarter = (row.cycle / quarter) as usize;
-            times.quarters[usize::from(row.bin())][quarter] += 1;
+            times.quarters[bin][quarter] += 1;
             let last = std::mem::replace(&mut last[row.pixel()], row.cycle);
             times.again += u64::from(last == row.cycle);
-            watch.photon(row.pixel(), row.cycle, row.bin().into());
+            watch.photon(row.pixel(), row.cycle, bin);
         }
         self.rows = Validator::open(&self.input, self.rows.shape, self.rows.expected)?;
         if self.times_as_cycles().is_none() {

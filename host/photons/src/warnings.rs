@@ -233,13 +233,22 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
             found = (value, Some(number));
         }
     }
-    let which = match found.1 {
-        None => return None,
-        Some(0) => "the first axis".to_owned(),
-        Some(number) => format!("axis {} of {}", number + 1, axes.len() + 1),
+    let number = found.1?;
+    let which = match number {
+        0 => "the first axis".to_owned(),
+        number => format!("axis {} of {}", number + 1, axes.len() + 1),
+    };
+    let names = ["captures", "rows", "columns"];
+    let says = match names.len().checked_sub(axes.len()) {
+        Some(unused) => {
+            let mut names = names[unused..].to_vec();
+            names.insert(number, "bins");
+            format!("if so: --axes {}", names.join(","))
+        }
+        None => "--axes says which is which".to_owned(),
     };
     Some(format!(
-        "{which} looks like the bins, and the last like pixels; --axes says which is which"
+        "{which} looks like the bins, and the last like pixels; {says}"
     ))
 }
 
@@ -479,27 +488,65 @@ mod tests {
         // The last axis has 3.83, so another needs 5.75.
         let uneven = [1500, 100, 100, 100, 100, 100, 100, 100];
         for (axes, axis, places, bins, which) in [
-            (&[8, 3][..], 0, 1, even, Some("the first axis")),
-            (&[3, 8], 1, 1, even, Some("axis 2 of 3")),
-            (&[2, 8, 3], 1, 1, even, Some("axis 2 of 4")),
-            (&[2, 3, 8], 2, 1, even, Some("axis 3 of 4")),
+            (
+                &[8, 3][..],
+                0,
+                1,
+                even,
+                Some(["the first axis", "bins,rows,columns"]),
+            ),
+            (
+                &[3, 8],
+                1,
+                1,
+                even,
+                Some(["axis 2 of 3", "rows,bins,columns"]),
+            ),
+            (
+                &[2, 8, 3],
+                1,
+                1,
+                even,
+                Some(["axis 2 of 4", "captures,bins,rows,columns"]),
+            ),
+            (
+                &[2, 3, 8],
+                2,
+                1,
+                even,
+                Some(["axis 3 of 4", "captures,rows,bins,columns"]),
+            ),
             // Too short for a histogram.
             (&[7, 3], 0, 1, even, None),
             // 99 of 199 pairs, and so 3.98 and 4.48.
             (&[8, 3], 0, 2, even, None),
-            (&[9, 3], 0, 2, even, Some("the first axis")),
+            (
+                &[9, 3],
+                0,
+                2,
+                even,
+                Some(["the first axis", "bins,rows,columns"]),
+            ),
             // 5.5 and 6.
             (&[11, 3], 0, 2, uneven, None),
-            (&[12, 3], 0, 2, uneven, Some("the first axis")),
+            (
+                &[12, 3],
+                0,
+                2,
+                uneven,
+                Some(["the first axis", "bins,rows,columns"]),
+            ),
             // The last axis has 8.
             (&[32, 3], 0, 1, [500, 0, 0, 0, 0, 0, 0, 0], None),
             // One pixel of a row may be hot.
             (&[16], 0, 1, even, None),
-            (&[16], 0, 2, even, Some("the first axis")),
+            (&[16], 0, 2, even, Some(["the first axis", "bins,columns"])),
         ] {
             let warning = swapped_axes(axes, &lit(axes, axis, places, &bins));
-            let whole = which.map(|which| {
-                format!("{which} looks like the bins, and the last like pixels; --axes says which is which")
+            let whole = which.map(|[which, names]| {
+                format!(
+                    "{which} looks like the bins, and the last like pixels; if so: --axes {names}"
+                )
             });
             assert_eq!(warning, whole, "{axes:?} {axis} {places} {bins:?}");
         }

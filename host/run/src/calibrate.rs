@@ -4,7 +4,8 @@ use anyhow::{Context, Result};
 
 use super::given::{Given, TDC};
 use super::recording::{
-    RECORDING, bin_width_warning, mask_capture, read_options, settings_of_file, warnings,
+    RECORDING, bin_width_warning, check_once_per_bin, mask_capture, read_options, settings_of_file,
+    warnings,
 };
 use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate_with};
 use dtof_engine::settings::{SettingsFile, share};
@@ -20,7 +21,7 @@ use dtof_photons::recorded::{RecordingLength, check_totals};
 const OWN: &[&str] = &["target_mm", "glass", "false_alarm", "seed"];
 
 /// What the user knows of the sensor.
-const SENSOR: &[&str] = &["gate", "masked", "sigma_bins"];
+const SENSOR: &[&str] = &["gate", "masked", "sigma_bins", "once_per_bin"];
 
 /// Where the pixels look.
 const RAYS: &[&str] = &["field_of_view_degrees", "calibration"];
@@ -120,6 +121,8 @@ impl Options {
         options.cycles = Some(u64::MAX);
         let counts = counts(input, &options)?;
         self.given.suits(input, &counts.metadata)?;
+        let is_once = requested.detection.once_per_bin == Some(true);
+        check_once_per_bin(is_once, counts.metadata.is_list)?;
         let mut masked = self.given.options.sensor.masked.clone();
         let pixels = counts.array.pixels();
         mask_capture(
@@ -184,10 +187,6 @@ pub(super) fn calibrate_counts(
         (None, None) => Length::Unknown,
     };
     let rays = requested.rays.slants(counts.array)?;
-    let mut times = counts.times.clone();
-    if let (Some(true), Some(times)) = (requested.detection.once_per_bin, &mut times) {
-        times.checks.together = None;
-    }
     let observed = Observed {
         array: counts.array,
         captures: &counts.captures,
@@ -199,7 +198,7 @@ pub(super) fn calibrate_counts(
         slant: rays.as_ref().map(|[slants, _]| &slants[..]),
         bias_mm: rays.as_ref().map(|[_, biases]| &biases[..]),
         offsets_mm: &requested.sensor.pixel_offsets_mm(),
-        times: times.as_ref(),
+        times: counts.times.as_ref(),
     };
     let mut found = calibrate_with(&observed, options, &shared(progress, "steps"))?;
     found.is_void = counts.metadata.looks_swapped;

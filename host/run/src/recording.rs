@@ -168,6 +168,7 @@ pub fn read_options(requested: &SettingsFile) -> ReadOptions {
             .dead_time
             .or(requested.dead_time_of_sensor)
             .unwrap_or(0),
+        once_per_bin: requested.detection.once_per_bin == Some(true),
     }
 }
 

@@ -338,6 +338,11 @@ class CalibrateOptions(RecordingOptions, total=False):
         "addresses, [3, 70], or 'none'; [] adds none",
         "Pixels to leave out, as 3,70, beside hot and dead ones that are found; none leaves out none",
     ]
+    once_per_bin: Annotated[
+        Switch,
+        "True or False",
+        "Photons of one laser cycle in one bin count once. For photons, not for histograms",
+    ]
     sigma_bins: Annotated[
         Number,
         "number above 0, bins",

@@ -269,6 +269,7 @@ flags! {
     KNOWN:
     gate Text("FIRST..LAST") => "First and last bin that may hold the peak, as 20..119 [default: found]";
     masked Text("PIXELS") => "Pixels to leave out, as 3,70, beside hot and dead ones that are found; none leaves out none";
+    once_per_bin Optional("YES") => "Photons of one laser cycle in one bin count once. For photons, not for histograms";
     sigma_bins Signed("S") => "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256 [default: \
         measured; without a peak that is bright enough that of --settings, else 1]";
 }

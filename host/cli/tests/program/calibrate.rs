@@ -617,6 +617,44 @@ fn a_recording_without_photons_is_refused_and_replayed() {
     assert_contains(&summary["warnings"].to_string(), "no photons");
 }
 
+/// Of two surfaces a gate chooses one: the target is that, and the pulse.
+#[test]
+fn a_gate_chooses_the_target() {
+    let scratch = Scratch::new();
+    let two = even(|pixel| {
+        let noise = |bin: usize| [4, 5, 6, 5][(pixel * 7 + bin * bin) % 4];
+        let mut counts: [u8; 32] = std::array::from_fn(noise);
+        for (at, times) in [(6, 3), (22, 1)] {
+            for (bin, light) in [(at - 1, 16), (at, 60), (at + 1, 16)] {
+                counts[bin] += light * times;
+            }
+        }
+        counts
+    });
+    scratch.file("two.npy", two);
+    for (gate, bin) in [("", 6.5), ("--gate 0..15", 6.5), ("--gate 14..31", 22.5)] {
+        scratch.printed(&format!(
+            "calibrate two.npy --bin-width-ps 250 --target-mm 1000 --glass no {gate} --out found.toml"
+        ));
+        let settings = scratch.read("found.toml");
+        let line = settings
+            .lines()
+            .find_map(|line| line.strip_prefix("offset_mm = "));
+        let offset: f64 = line
+            .unwrap()
+            .split_whitespace()
+            .next()
+            .unwrap()
+            .parse()
+            .unwrap();
+        let expected = 1000.0 - bin * 250.0 * 0.149_896_229;
+        assert!(
+            (offset - expected).abs() < 4.0,
+            "{gate}: {offset} {expected}"
+        );
+    }
+}
+
 /// A gate and pixels to leave out hold for the search, and are in its settings. A pixel that is left out does not set how long
 /// the recording lasted.
 #[test]
@@ -647,7 +685,7 @@ fn a_gate_and_a_mask_hold_for_the_search() {
     empty.all_refused(
         "calibrate",
         "
-        bright.npy --gate 10..32 --out a.toml | error: --gate 10..32: there are 32 bins
+        bright.npy --gate 10..32 --out a.toml | error: bright.npy: --gate 10..32: there are 32 bins
         bright.npy --mask 64 --out a.toml | error: --mask 64: there are 64 pixels
         ",
     );

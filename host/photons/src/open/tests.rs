@@ -171,7 +171,7 @@ fn what_looks_wrong_is_warned_of() {
             turned(),
             default(),
             Some(
-                "the first axis looks like the bins, and the last like pixels; --axes says which is which",
+                "the first axis looks like the bins, and the last like pixels; if so: --axes bins,rows,columns",
             ),
         ),
         (turned(), named, None),

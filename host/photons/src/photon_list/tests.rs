@@ -15,6 +15,7 @@ const SHAPE: ListOptions = ListOptions {
     bins: 128,
     rebin: 1,
     columns: None,
+    once_per_bin: false,
 };
 
 fn csv(photons: &[RawPhoton]) -> String {
@@ -65,7 +66,7 @@ proptest! {
         limit in prop_oneof![Just(u64::MAX), 1u64..3000],
         lengths in prop::collection::vec(1u16..900, 1..5),
     ) {
-        let shape = ListOptions { bins: 32, rebin, columns };
+        let shape = ListOptions { bins: 32, rebin, columns, ..SHAPE };
         let most = u64::from(32 * rebin);
         let mut last = 0;
         let photons = steps.iter().map(|&(pixel, wait, bin)| {
@@ -214,7 +215,7 @@ fn photons_that_cannot_be_are_refused_with_their_place() {
     let summed = ListOptions {
         bins: 64,
         rebin: 2,
-        columns: None,
+        ..SHAPE
     };
     assert_eq!(
         refused("0,1,127\n0,2,128\n", summed, u64::MAX),
@@ -396,4 +397,19 @@ fn dark_laser_cycles_need_no_memory() {
     assert_eq!(list.sparse_cycles(1 << 14), 66_000 - 256);
     let slice = list.next_slice(65_535).unwrap();
     assert!(slice.pixels[0].photons.capacity() < 10);
+}
+
+#[test]
+fn photons_of_one_bin_and_laser_cycle_count_once_if_asked_for() {
+    let rows = "0,0,5\n1,0,5\n0,0,5\n0,0,6\n0,1,5\n0,1,5\n0,1,5\n1,9,5\n";
+    for (once_per_bin, expected) in [(false, [5, 1, 2]), (true, [2, 1, 2])] {
+        let shape = ListOptions {
+            once_per_bin,
+            ..SHAPE
+        };
+        let input = Input::in_memory("a.csv", format!("pixel,cycle,bin\n{rows}"));
+        let mut list = PhotonList::<CsvReader>::open(&input, shape, u64::MAX).unwrap();
+        let (counts, _) = list.counts().unwrap();
+        assert_eq!([counts[0][5], counts[0][6], counts[1][5]], expected);
+    }
 }
