@@ -429,8 +429,6 @@ pub(super) fn full_counters(traces: &[Trace]) -> Option<String> {
 pub(super) fn wrapped_counters(traces: &[Trace]) -> Option<String> {
     /// Counters of 8, 10 and 12 bits. Of wider ones no real peak is so even that it tells.
     const FULL: [(u8, f64); 3] = [(8, 256.0), (10, 1024.0), (12, 4096.0)];
-    /// Some bins are nearly full before they begin again.
-    const NEARLY: f64 = 0.9;
     /// How often a counter may begin again.
     const TURNS: usize = 4;
     /// [`tears`] of what is torn, and of what is whole but for chance.
@@ -443,7 +441,7 @@ pub(super) fn wrapped_counters(traces: &[Trace]) -> Option<String> {
     const TELL: usize = 64;
     let counts = traces.iter().flat_map(|trace| &trace.counts);
     let highest = counts.copied().fold(0.0, f64::max);
-    let is_near = |(_, full): &(u8, f64)| (NEARLY * full..*full).contains(&highest);
+    let is_near = |(_, full): &(u8, f64)| (full / 2.0..*full).contains(&highest);
     let (bits, full) = FULL.into_iter().find(is_near)?;
     let as_counted = some(traces).map(|trace| (trace, tears(&trace.counts, full, 0)));
     let torn: Vec<(&Trace, f64)> = as_counted.filter(|torn| torn.1 > TORN).collect();
@@ -1223,6 +1221,45 @@ mod tests {
             let end = format!("--mask {bright} leaves the pixel out");
             prop_assert!(says.starts_with(&start) && says.ends_with(&end), "{}", says);
         }
+    }
+
+    /// A peak that wraps in some pixels, and two surfaces close together that do not.
+    #[test]
+    fn counters_that_began_again_are_found() {
+        let mut rng = Pcg64::seed_from_u64(7);
+        let mut between = |low: f64, high: f64| {
+            rand_distr::Uniform::new(low, high)
+                .unwrap()
+                .sample(&mut rng)
+        };
+        let (mut missed, mut wrong) = (0, 0);
+        for (seed, bits) in (0..300).zip([8, 10, 12].into_iter().cycle()) {
+            let full = 2_f64.powi(bits);
+            let background = between(1.0, 40.0);
+            let place = |pixel: usize| 40.0 + (pixel % 9) as f64 / 9.0;
+            let peak = |light: f64, at: f64, sigma: f64, bin: usize| {
+                light * 2.5 * sigma * bin_share(u32::try_from(bin).unwrap(), at, sigma)
+            };
+            let (highest, sigma) = (full * between(1.5, 4.0), between(0.9, 2.0));
+            let wraps = |pixel: usize, bin: usize| {
+                let light = highest * (0.5 + (pixel % 4) as f64 / 6.0);
+                background + peak(light, place(pixel), sigma, bin)
+            };
+            let says = wrapped_counters(&recorded(32, &wraps, &|_, n| n % full, seed));
+            let cause = format!("counters of {bits} bits began again at 0");
+            missed += usize::from(!says.is_some_and(|says| says.contains(&cause)));
+            let (sigma, share) = (between(0.3, 2.0), between(0.3, 1.0));
+            let gap = sigma * between(2.0, 9.0);
+            let bright = between(0.6, 0.95);
+            let two = |pixel: usize, bin: usize| {
+                let light = (full - background) * (bright - 0.2 * (pixel * 7 % 32) as f64 / 31.0);
+                let behind = peak(light * share, place(pixel) + gap, sigma, bin);
+                background + peak(light, place(pixel), sigma, bin) + behind
+            };
+            let two = recorded(32, &two, &|_, n| n.min(full - 1.0), seed);
+            wrong += usize::from(wrapped_counters(&two).is_some());
+        }
+        assert!(missed == 0 && wrong <= 20, "{missed} missed, {wrong} wrong");
     }
 
     fn observed(pixels: u32, captures: &[Vec<Vec<u64>>]) -> Observed<'_> {
