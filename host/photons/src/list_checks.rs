@@ -391,6 +391,39 @@ mod tests {
         assert_eq!(speed(&[]), None);
     }
 
+    proptest! {
+        /// As counted one by one.
+        #[test]
+        fn the_last_laser_cycles_of_a_bin_are_remembered(steps in prop::collection::vec(prop_oneof![3 => 0_u64..3, 1 => 0_u64..40], 1..80)) {
+            let (mut watched, mut cycle, mut cycles) = (Watched::default(), 0, Vec::new());
+            for step in steps {
+                cycle += step;
+                let recent = watched.photon(cycle);
+                for (lag, &photons) in recent.iter().enumerate() {
+                    let expected = cycles.iter().filter(|&&other| other + lag as u64 == cycle).count();
+                    prop_assert_eq!(usize::from(photons), expected, "{} of {:?}", lag, cycles);
+                }
+                cycles.push(cycle);
+            }
+        }
+    }
+
+    /// 180 ordered pairs of one laser cycle against 60 of two are within 6 standard deviations, 20.5 each; 200 are not.
+    #[test]
+    fn pairs_are_surely_too_many() {
+        let together = |same: u64, others: u64| {
+            let mut watch = ListWatch::new(1, 8, 1000);
+            (watch.same, watch.others[3]) = (same, others);
+            watch.checks().together
+        };
+        assert_eq!(together(90, 60), None);
+        assert_eq!(together(100, 60), Some(200.0 / 60.0));
+        // Fewer than 30, or less than 2.5 times as many.
+        assert_eq!(together(1000, 29), None);
+        assert_eq!(together(1250, 1000), None);
+        assert_eq!(together(1251, 1000), Some(2.502));
+    }
+
     #[test]
     fn the_words_have_the_numbers() {
         let checks = ListChecks {
