@@ -417,11 +417,31 @@ mod tests {
             watch.checks().together
         };
         assert_eq!(together(90, 60), None);
+        // 6 times 18.
+        assert_eq!(together(72, 36), None);
+        assert_eq!(together(73, 36), Some(146.0 / 36.0));
         assert_eq!(together(100, 60), Some(200.0 / 60.0));
         // Fewer than 30, or less than 2.5 times as many.
         assert_eq!(together(1000, 29), None);
+        assert_eq!(together(1000, 30), Some(2000.0 / 30.0));
         assert_eq!(together(1250, 1000), None);
         assert_eq!(together(1251, 1000), Some(2.502));
+    }
+
+    /// Two are enough, or the only one.
+    #[test]
+    fn one_pixel_of_several_may_be_wrong() {
+        let line: Vec<(u64, f64)> = (10..10 + IN_A_ROW as u64)
+            .map(|part| (part, 2.0 * part as f64))
+            .collect();
+        let wandering = |wander: usize, stay: usize| {
+            let mut watch = ListWatch::new(wander + stay, 64, 640);
+            watch.peaks[..wander].fill(line.clone());
+            watch.checks().wandering
+        };
+        assert_eq!(wandering(1, 1), None);
+        assert_eq!(wandering(2, 1), Some((2, 3, 0.2)));
+        assert_eq!(wandering(1, 0), Some((1, 1, 0.2)));
     }
 
     #[test]
