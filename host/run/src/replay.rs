@@ -34,9 +34,9 @@ const SEARCH: &[&str] = &["glass"];
 const RUN: &[&str] = &["cycles", "seed", "decide_once"];
 
 /// The options that were part of the search, so that what is found is for them.
-const SEARCHED_WITH: &[&str] = &["bins", "bin_width_ps", "sigma_bins"];
+const SEARCHED_WITH: &[&str] = &["bins", "bin_width_ps", "gate", "masked", "sigma_bins"];
 /// What a z that is found depends on.
-const OF_Z: &[&str] = &["gate", "window", "min_count", "l1", "l2", "x", "binning"];
+const OF_Z: &[&str] = &["window", "min_count", "l1", "l2", "x", "binning"];
 
 /// The options of a replay.
 #[derive(Clone, Debug, Default)]
