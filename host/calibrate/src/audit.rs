@@ -448,15 +448,15 @@ pub(super) fn wrapped_counters(traces: &[Trace]) -> Option<String> {
     let looked_at = || torn.iter().take(TELL);
     let is_whole = |(trace, _): &&(&Trace, f64)| tears(&trace.counts, full, TURNS) < WHOLE;
     let whole = looked_at().filter(is_whole).count();
-    let (all, some) = (some(traces).count(), torn.len());
-    let has_wrapped = some > 1
-        && some as f64 > SHARE * all as f64
+    let all = some(traces).count();
+    let has_wrapped = torn.len() > 1
+        && torn.len() as f64 > SHARE * all as f64
         && whole as f64 > MENDED * looked_at().count() as f64;
     has_wrapped.then(|| {
         format!(
             "{} have a torn peak that is whole if some of its bins counted {full} more. If these are no surfaces a few bins apart, \
              counters of {bits} bits began again at 0: record less light, or with wider counters",
-            of_histograms(some, all)
+            of_histograms(torn.len(), all)
         )
     })
 }

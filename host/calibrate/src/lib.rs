@@ -261,8 +261,9 @@ impl AllHistograms {
 /// Calibrates a sensor from a recording.
 ///
 /// # Errors
-/// Fails if the recording is empty or has no photon, if its histograms differ in size, if every pixel is hot or dead, if the crosstalk of the cover glass leaves no gate, or if so few false alarms cannot be
-/// simulated.
+/// Fails if the recording is empty or has no photon, or its histograms differ in size; if every pixel is hot or dead; if a
+/// gate is given that has fewer than 8 bins or ends past the last; if the crosstalk of the cover glass leaves no gate; or if
+/// so few false alarms cannot be simulated.
 pub fn calibrate(observed: &Observed, options: &CalibrationOptions) -> Result<Calibration> {
     calibrate_with(observed, options, progress::NONE)
 }

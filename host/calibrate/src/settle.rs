@@ -80,7 +80,7 @@ pub fn given_gate((first, last): (u16, u16), bins: usize) -> Result<(u16, u16)> 
         refused(format!("there are {bins} bins"))
     );
     ensure!(
-        first + 7 <= last,
+        last.checked_sub(first).is_some_and(|more| more >= 7),
         refused("a gate has 8 bins or more".to_owned())
     );
     Ok((first, last))
@@ -160,4 +160,26 @@ pub fn detection(
     detection.z = Some(z.max(MIN_Z).to_num());
     detection.exposures = exposures;
     Ok(detection)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_given_gate_has_eight_bins_that_are_there() {
+        for gate in [(0, 7), (120, 127), (0, 127)] {
+            assert_eq!(given_gate(gate, 128).unwrap(), gate);
+        }
+        for (gate, reason) in [
+            ((0, 6), "a gate has 8 bins or more"),
+            ((121, 127), "a gate has 8 bins or more"),
+            ((u16::MAX, 20), "a gate has 8 bins or more"),
+            ((0, 128), "there are 128 bins"),
+            ((0, u16::MAX), "there are 128 bins"),
+        ] {
+            let error = given_gate(gate, 128).unwrap_err().to_string();
+            assert!(error.ends_with(reason), "{gate:?}: {error}");
+        }
+    }
 }

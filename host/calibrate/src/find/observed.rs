@@ -46,7 +46,7 @@ pub struct Observed<'a> {
     pub array: Array,
     /// Histograms: capture, then pixel, then bin.
     pub captures: &'a [Capture],
-    /// Pixels that are left out, numbered through all captures. None, as said by the user: hot ones count, too.
+    /// Pixels that are left out, numbered through all captures. An empty list says that all are used, hot ones, too.
     pub masked: Option<&'a [u16]>,
     /// How long each capture lasted.
     pub length: Length,
@@ -104,7 +104,8 @@ impl Trace {
 }
 
 impl Observed<'_> {
-    /// All histograms but those of masked pixels. The `hot` pixels do not count where the brightest pixel gives the laser cycles.
+    /// All histograms but those of masked pixels. The `hot` pixels do not count where the brightest pixel gives the laser
+    /// cycles.
     ///
     /// # Errors
     /// Fails if there are no captures or too few bins, if captures or histograms differ in size, if a
