@@ -7,7 +7,7 @@
 mod platform;
 
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{Count24, Histogram, PixelConfig, RangeScale, checked};
+use dtof_core::{PixelConfig, RangeScale, Statistics, WholeHistogram, checked};
 
 // Checked at compile time: the paper's rule on 128 bins of 250 ps.
 const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().build());
@@ -15,10 +15,12 @@ const SCALE: RangeScale = checked!(RangeScale::new(U16F16::lit("250"), I24F8::ZE
 
 /// The range of the target, if there is one, in millimetres.
 fn range(counts: &[u32; 128]) -> Option<I24F8> {
-    let mut histogram = Histogram::<128, Count24>::new();
-    histogram.add_frame(counts, CONFIG.gate());
-    let detection = CONFIG.detect(&histogram)?;
-    Some(SCALE.range(detection.position()))
+    let (mut whole, mut statistics) = (WholeHistogram::<128>::new(), Statistics::new());
+    let mut range = None;
+    whole.decide(&CONFIG, counts, 1000, &mut statistics, |_, found| {
+        range = Some(SCALE.range(found.position()));
+    });
+    range
 }
 
 fn main() {

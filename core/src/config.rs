@@ -211,7 +211,8 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
     }
 
     /// Calls `echo` for each echo of a whole histogram of `cycles` laser cycles, at most
-    /// [`Self::echoes`], the highest peak first. [`Self::add_frame`] has filled it.
+    /// [`Self::echoes`], the highest peak first. [`Self::add_frame`] has filled it. For counts of a sensor there is
+    /// [`WholeHistogram`](crate::WholeHistogram).
     ///
     /// Without a dead time, the bins around all echoes but the last are empty after it, and
     /// `cycles` does not matter. With one that the rule weighs, returns whether a target may be hidden:

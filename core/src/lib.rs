@@ -25,6 +25,7 @@
 //! | `depth` | the place of the pulse in its bins, and its range |
 //! | `detect` | detection rules, thresholds, one decision |
 //! | `config`, `statistics`, `pixel` | one configuration and one statistics, many pixels |
+//! | `whole` | the decision on a whole histogram |
 //! | [`binning`] | blocks of pixels that decide together |
 //! | [`neighbours`] | pixels of an array that confirm each other |
 //! | [`events`] | results from events: running mean, dynamic depth, reflectivity |
@@ -122,6 +123,7 @@ pub mod pixel_processor;
 pub mod rule;
 mod statistics;
 mod units;
+mod whole;
 
 /// The fixed-point numbers of α, bin width and range.
 pub use fixed;
@@ -143,3 +145,4 @@ pub use statistics::Statistics;
 pub use units::{
     BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,
 };
+pub use whole::WholeHistogram;

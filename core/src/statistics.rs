@@ -27,7 +27,8 @@
 use core::ops::AddAssign;
 
 use crate::histogram::Histogram;
-use crate::histogram::counter::CounterWidth;
+use crate::histogram::counter::{CounterWidth, PhotonCount};
+use crate::histogram::gate::RangeGate;
 
 /// Counts of what pixels have done since they were made. Photons offered are
 /// `counted + excluded + saturated + rejected + gated_out + repeated` (short of 2³² losses of
@@ -63,7 +64,7 @@ pub struct Statistics {
     pub ended_full: u64,
     /// Decisions in which a gated bin was blind or had a photon in nearly all laser cycles, as
     /// [`Flags::PILE_UP`](crate::Flags::PILE_UP) says; or in more laser cycles than there were, so
-    /// that the counts contradict the dead time. A whole histogram with a full counter is one, too.
+    /// that the counts contradict the dead time.
     pub blind_looks: u64,
 }
 
@@ -98,6 +99,19 @@ impl Statistics {
             + self.repeated
     }
 
+    /// Adds the photons of a whole histogram: those in the `gate` as counted, the others as gated out.
+    #[inline(never)]
+    pub fn add_counts<const BINS: usize, C: PhotonCount>(
+        &mut self,
+        counts: &[C; BINS],
+        gate: &RangeGate<BINS>,
+    ) {
+        let bins = gate.bins();
+        let outside = photons(counts.get(..bins.start)) + photons(counts.get(bins.end..));
+        self.counted += photons(counts.get(bins));
+        self.gated_out += outside;
+    }
+
     /// Adds the photons of a histogram, and those outside the gate, as
     /// [`Histogram::add_frame`] returns them.
     #[inline(always)]
@@ -114,6 +128,12 @@ impl Statistics {
             self.gated_out += u64::from(gated_out);
         }
     }
+}
+
+#[inline(never)]
+fn photons<C: PhotonCount>(counts: Option<&[C]>) -> u64 {
+    let counts = counts.unwrap_or_default().iter();
+    counts.map(|&photons| u64::from(photons.into())).sum()
 }
 
 /// Adds those of other pixels.

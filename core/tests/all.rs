@@ -22,3 +22,4 @@ mod pixel;
 mod pixel_processor;
 mod proofs;
 mod quantities;
+mod whole;

@@ -12,7 +12,9 @@ mod pin;
 mod platform;
 
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{Count24, Histogram, PixelAddress, PixelConfig, RangeGate, RangeScale, checked};
+use dtof_core::{
+    PixelAddress, PixelConfig, RangeGate, RangeScale, Statistics, WholeHistogram, checked,
+};
 use dtof_sensors::dither::Dither;
 use dtof_sensors::tmf8829::{Config, Settings, Tmf8829, Zones};
 use dtof_sensors::{PhotonSink, Sensor, Target};
@@ -38,6 +40,8 @@ struct Zone {
 
 struct Seen {
     scale: RangeScale,
+    cycles: u64,
+    statistics: Statistics,
     zones: [Zone; 64],
 }
 
@@ -46,14 +50,22 @@ impl PhotonSink for Seen {
 
     fn end_laser_cycles(&mut self, _: u16) {}
 
-    fn begin_frame(&mut self, _: u32) {}
+    fn begin_frame(&mut self, cycles: u32) {
+        self.cycles = cycles.into();
+    }
 
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
-        let mut histogram = Histogram::<128, Count24>::new();
-        histogram.add_frame(counts, ZONE.gate());
-        let detection = ZONE.detect(&histogram);
+        let (mut whole, scale) = (WholeHistogram::<128>::new(), self.scale);
         let zone = &mut self.zones[usize::from(pixel.raw())];
-        zone.range = detection.map(|found| self.scale.range(found.position()));
+        whole.decide(
+            &ZONE,
+            counts,
+            self.cycles,
+            &mut self.statistics,
+            |_, found| {
+                zone.range = Some(scale.range(found.position()));
+            },
+        );
     }
 
     fn target(&mut self, pixel: PixelAddress, target: &Target) {
@@ -74,6 +86,8 @@ fn main() {
     };
     let mut sink = Seen {
         scale,
+        cycles: 0,
+        statistics: Statistics::new(),
         zones: [(); 64].map(|()| none()),
     };
     // As a main loop that a timer wakes each millisecond, and INT as well.

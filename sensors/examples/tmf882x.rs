@@ -12,7 +12,7 @@ mod pin;
 mod platform;
 
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{Count24, Histogram, PixelAddress, PixelConfig, RangeScale, checked};
+use dtof_core::{PixelAddress, PixelConfig, RangeScale, Statistics, WholeHistogram, checked};
 use dtof_sensors::dither::Dither;
 use dtof_sensors::tmf882x::{Config, Settings, Tmf882x};
 use dtof_sensors::{PhotonSink, Sensor};
@@ -28,6 +28,8 @@ const PROGRAM: &[u8] = &[];
 /// Takes whole histograms.
 struct Zones {
     scale: RangeScale,
+    cycles: u64,
+    statistics: Statistics,
     /// Millimetres of each zone.
     ranges: [Option<I24F8>; 9],
 }
@@ -37,14 +39,22 @@ impl PhotonSink for Zones {
 
     fn end_laser_cycles(&mut self, _: u16) {}
 
-    fn begin_frame(&mut self, _: u32) {}
+    fn begin_frame(&mut self, cycles: u32) {
+        self.cycles = cycles.into();
+    }
 
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
-        let mut histogram = Histogram::<128, Count24>::new();
-        histogram.add_frame(counts, ZONE.gate());
-        let detection = ZONE.detect(&histogram);
-        self.ranges[usize::from(pixel.raw())] =
-            detection.map(|found| self.scale.range(found.position()));
+        let (mut whole, scale) = (WholeHistogram::<128>::new(), self.scale);
+        let range = &mut self.ranges[usize::from(pixel.raw())];
+        whole.decide(
+            &ZONE,
+            counts,
+            self.cycles,
+            &mut self.statistics,
+            |_, found| {
+                *range = Some(scale.range(found.position()));
+            },
+        );
     }
 }
 
@@ -56,6 +66,8 @@ fn main() {
     let scale = RangeScale::new(bin_width, info.offset).expect("its ranges fit");
     let mut sink = Zones {
         scale,
+        cycles: 0,
+        statistics: Statistics::new(),
         ranges: [None; 9],
     };
     // A main loop would poll each millisecond and after each edge of INT.

@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 
 use dtof_core::fixed::types::U16F16;
-use dtof_core::{Count24, Histogram, PixelAddress, PixelConfig, RangeScale};
+use dtof_core::{PixelAddress, PixelConfig, RangeScale, Statistics, WholeHistogram};
 use dtof_sensors::dither::Dither;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorInfo};
 
@@ -52,10 +52,10 @@ impl PhotonSink<BINS> for Depth {
     fn begin_frame(&mut self, _: u32) {}
 
     fn histogram(&mut self, _: PixelAddress, counts: &[u32; BINS]) {
-        let mut histogram = Histogram::<BINS, Count24>::new();
-        histogram.add_frame(counts, self.config.gate());
-        let found = self.config.detect(&histogram);
-        self.millimetres = found.map(|found| self.scale.range(found.position()).round().to_num());
+        let (mut whole, mut statistics) = (WholeHistogram::<BINS>::new(), Statistics::new());
+        whole.decide(&self.config, counts, 5000, &mut statistics, |_, found| {
+            self.millimetres = Some(self.scale.range(found.position()).round().to_num());
+        });
     }
 }
 

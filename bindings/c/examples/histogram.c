@@ -29,7 +29,6 @@ static const int32_t offset_mm_q8 = -45952;
 static dtof_checked_config_t config;
 static dtof_statistics_t statistics;
 static dtof_scale_t scale;
-static dtof_histogram_t histogram;
 
 /* The counts of a set so far, and the packet that is due. */
 static uint32_t counts[CHANNELS][DTOF_BINS];
@@ -67,12 +66,8 @@ static dtof_status_t decide(uint16_t zone, uint64_t cycle)
 {
     dtof_event_t events[DTOF_ECHOES];
     size_t found = 0;
-    dtof_status_t status = dtof_histogram_fill(&histogram, sizeof histogram, &config, &statistics,
-                                               counts[zone + 1]);
-    if (status == DTOF_OK) {
-        status = dtof_histogram_detect(&histogram, &config, cycle, &statistics, zone, LASER_CYCLES,
-                                       events, &found);
-    }
+    dtof_status_t status = dtof_histogram_decide(&config, counts[zone + 1], zone, cycle, LASER_CYCLES,
+                                                 &statistics, events, &found);
     for (size_t i = 0; i < found && status == DTOF_OK; i++) {
         int32_t range_mm_q8;
         status = dtof_range(&scale, events[i].position_q8, &range_mm_q8);

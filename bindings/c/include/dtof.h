@@ -134,15 +134,6 @@
 // Its alignment.
 #define DTOF_ONCE_PER_BIN_ALIGN 4
 
-// Bytes of a dtof_histogram_t.
-#define DTOF_HISTOGRAM_SIZE (20 + (4 * DTOF_BINS))
-
-// The same in words of 32 bits.
-#define DTOF_HISTOGRAM_WORDS (DTOF_HISTOGRAM_SIZE / 4)
-
-// Its alignment.
-#define DTOF_HISTOGRAM_ALIGN 4
-
 // The most echoes of one histogram or exposure.
 #define DTOF_ECHOES 4
 
@@ -524,7 +515,7 @@ typedef struct dtof_counts_t {
     // one of 8 bits had lost a photon.
     uint64_t ended_full;
     // Decisions that left bins out, because the TDC was hardly ever live there, or all bins,
-    // because the counts contradict its dead time or a counter of a dtof_histogram_t is full.
+    // because the counts contradict its dead time.
     uint64_t blind_looks;
 } dtof_counts_t;
 
@@ -577,12 +568,6 @@ typedef struct dtof_event_t {
 typedef struct dtof_once_per_bin_t {
     uint32_t opaque[DTOF_ONCE_PER_BIN_WORDS];
 } dtof_once_per_bin_t;
-
-// A histogram of DTOF_BINS counters of 24 bits. Each call of dtof_histogram_fill initialises it
-// anew. One thread or interrupt at a time may use it.
-typedef struct dtof_histogram_t {
-    uint32_t opaque[DTOF_HISTOGRAM_WORDS];
-} dtof_histogram_t;
 
 // Packs the events of one stream. One thread or interrupt at a time may use it.
 typedef struct dtof_aer_encoder_t {
@@ -904,35 +889,24 @@ dtof_status_t dtof_pixel_count_once_per_bin(struct dtof_pixel_t *pixel,
                                             const uint16_t *codes,
                                             size_t number);
 
-// Fills a histogram with `counts`, the photons of DTOF_BINS bins, and adds them to `statistics`:
-// photons outside the gate as gated out, those above 16,777,215 in a bin as saturated. `size` is
-// `sizeof *histogram`.
+// Decides once on `counts`, the photons of DTOF_BINS bins in `exposure` laser cycles. X, L1 and L2 have no effect
+// here. `events` has room for DTOF_ECHOES events; `found` gets their number, at most the echoes of `config`. `pixel` and
+// `cycle` are copied into the events. A dead time weighs bins by `exposure`; an event holds 65,535 at most. Counts of 16,777,215 and more in a bin
+// are divided by a power of two, all of them and the laser cycles by the same. A peak at the end of the range gate that
+// is the slope of something outside is no event.
 //
-// Errors: DTOF_ERROR_SIZE if the library was built for another number of bins,
-// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
-// Threads: no other thread uses `histogram` or `statistics` during the call.
-dtof_status_t dtof_histogram_fill(struct dtof_histogram_t *histogram,
-                                  size_t size,
-                                  const struct dtof_checked_config_t *config,
-                                  struct dtof_statistics_t *statistics,
-                                  const uint32_t *counts);
-
-// Looks for events in a filled histogram. X, L1 and L2 have no effect here. `events` has room
-// for DTOF_ECHOES events; `found` gets their number, at most the echoes of `config`. `pixel` and
-// `cycle` are copied into the events. `exposure` is the number of laser cycles in the histogram, by
-// which a dead time weighs bins; an event holds 65,535 at most. `config` must be that of
-// dtof_histogram_fill. With several echoes, the bins around all but the last are emptied, so fill
-// the histogram again before the next call. With a dead time and the window rule they are not:
-// their photons stay in their counters, and are left out.
+// `statistics` get all photons, undivided, those outside the gate as gated out.
+//
+// It takes 4 · DTOF_BINS bytes of stack more than other functions.
 //
 // Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
-// Threads: no other thread uses `histogram` or `statistics` during the call.
-dtof_status_t dtof_histogram_detect(struct dtof_histogram_t *histogram,
-                                    const struct dtof_checked_config_t *config,
-                                    uint64_t cycle,
-                                    struct dtof_statistics_t *statistics,
+// Threads: no other thread uses `statistics` during the call.
+dtof_status_t dtof_histogram_decide(const struct dtof_checked_config_t *config,
+                                    const uint32_t *counts,
                                     uint16_t pixel,
+                                    uint64_t cycle,
                                     uint32_t exposure,
+                                    struct dtof_statistics_t *statistics,
                                     struct dtof_event_t *events,
                                     size_t *found);
 

@@ -52,7 +52,7 @@ pub struct dtof_counts_t {
     /// one of 8 bits had lost a photon.
     pub ended_full: u64,
     /// Decisions that left bins out, because the TDC was hardly ever live there, or all bins,
-    /// because the counts contradict its dead time or a counter of a dtof_histogram_t is full.
+    /// because the counts contradict its dead time.
     pub blind_looks: u64,
 }
 

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::{Count24, Histogram, PixelConfig, RangeScale};
+use dtof_core::{PixelConfig, RangeScale, Statistics, WholeHistogram};
 
 const PRINTED: &str = include_str!("../examples/histogram.out");
 
@@ -16,10 +16,12 @@ fn the_example_of_histograms_prints_what_rust_finds() {
         let peak = 25 + 5 * zone;
         let mut counts = [300u32; 128];
         (counts[peak], counts[peak + 1]) = (70_000, 30_000);
-        let mut histogram = Histogram::<128, Count24>::new();
-        config.add_frame(&mut histogram, &counts);
-        let found = config.detect(&histogram).unwrap();
-        let range = scale.range(found.position());
+        let (mut position, mut statistics) = (None, Statistics::new());
+        let mut whole = WholeHistogram::<128>::new();
+        whole.decide(&config, &counts, 549_888, &mut statistics, |_, found| {
+            position = Some(found.position());
+        });
+        let range = scale.range(position.unwrap());
         writeln!(zones, "zone {zone}: {} mm", range.round()).unwrap();
     }
     let dropped = "a packet is missing, the set is dropped\n";

@@ -124,6 +124,14 @@ impl DetectionRule for AnyRule {
     }
 
     #[inline(always)]
+    fn window_bins(&self) -> u16 {
+        match self {
+            Self::Window(rule) => rule.window_bins(),
+            Self::Paper(_) | Self::Average(_) => 1,
+        }
+    }
+
+    #[inline(always)]
     fn weighs_dead_time(&self) -> bool {
         matches!(self, Self::Window(_))
     }

@@ -28,6 +28,12 @@ pub trait DetectionRule: Copy {
         excluded: &ExcludedBins,
     ) -> Option<U24F8>;
 
+    /// The bins of the window that it tests; 1 if it tests the highest bin.
+    #[inline(always)]
+    fn window_bins(&self) -> u16 {
+        1
+    }
+
     /// Whether [`Self::detect_live`] decides for a TDC with a dead time.
     #[inline(always)]
     fn weighs_dead_time(&self) -> bool {

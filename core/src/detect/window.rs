@@ -298,6 +298,11 @@ impl DetectionRule for WindowRule {
     }
 
     #[inline(always)]
+    fn window_bins(&self) -> u16 {
+        self.width.into()
+    }
+
+    #[inline(always)]
     fn weighs_dead_time(&self) -> bool {
         true
     }

@@ -347,6 +347,33 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
         self.saturated
     }
 
+    /// Counts the photons of a whole histogram in place of what was counted before: those in the `gate`, and with
+    /// `keeps_before` those before it in their counters alone. Each is divided by 2 to the power of `shift`, and then fits.
+    #[inline(never)]
+    pub(crate) fn fill<C: PhotonCount>(
+        &mut self,
+        frame: &[C; BINS],
+        shift: u32,
+        gate: &RangeGate<BINS>,
+        keeps_before: bool,
+    ) {
+        let kept = if keeps_before { 0 } else { gate.first() }..=gate.last();
+        let (mut total, mut peak_key) = (0u32, 0);
+        for (bin, (counter, &photons)) in (0..).zip(self.counts.iter_mut().zip(frame)) {
+            let photons = photons.into() >> shift;
+            *counter = W::ZERO;
+            if photons > 0 && kept.contains(&bin) {
+                *counter = W::counter(photons);
+                if bin >= gate.first() {
+                    total = total.wrapping_add(photons);
+                    peak_key = Self::key(photons, bin.into()).max(peak_key);
+                }
+            }
+        }
+        (self.peak_key, self.total) = (peak_key, total);
+        (self.rejected, self.saturated) = (0, 0);
+    }
+
     /// Counts the photons of `codes` before bin `first`, which the gate leaves out, in their
     /// counters alone: not in the total, and not as a peak. They blind a TDC with a dead time all
     /// the same. A full counter stays full.

@@ -54,6 +54,7 @@ impl Sidecar<'_> {
     }
 
     /// Takes an event for which there is room. With dynamic depth only a change is sent.
+    #[inline(never)]
     pub(super) fn enqueue(&mut self, event: &DepthEvent) {
         let (time, word) = match &self.dynamic_depth {
             None => self.encoder.encode(event),

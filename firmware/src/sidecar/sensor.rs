@@ -1,8 +1,9 @@
 //! Photons and histograms of a sensor, which cannot wait.
 
-use dtof_core::{AnyRule, Count24, DepthEvent, Histogram, LaserCycle, PixelAddress, PixelConfig};
+use dtof_core::{DepthEvent, EchoNumber, LaserCycle, PixelAddress, WholeHistogram};
 use dtof_link::frame::Deframer;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
+use heapless::vec::Vec;
 
 use super::events::has_room_for_events;
 use super::{BINS, Sidecar};
@@ -134,30 +135,28 @@ impl Sidecar<'_> {
     /// Decides on a whole histogram.
     // Not inlined, to keep this off the stack while the histogram is sent.
     #[inline(never)]
-    fn decide_whole(
-        &mut self,
-        pixel: PixelAddress,
-        counts: &[u32; BINS],
-        config: &PixelConfig<BINS, AnyRule>,
-    ) {
+    fn decide_whole(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
+        let Some(config) = &self.config else {
+            return;
+        };
+        let statistics = &mut self.statistics;
+        if !has_room_for_events(&self.words, config.echoes().raw().into()) {
+            statistics.add_counts(counts, config.gate());
+            statistics.deferred += 1;
+            return;
+        }
         let cycle = LaserCycle::new(self.cycle.saturating_sub(1));
         let exposure = u16::try_from(self.frame_cycles).unwrap_or(u16::MAX);
-        let mut histogram = Histogram::<BINS, Count24>::new();
-        let gated_out = config.add_frame(&mut histogram, counts);
-        self.statistics.add_photons_of(&histogram, gated_out);
-        if has_room_for_events(&self.words, config.echoes().raw().into()) {
-            let mut events = 0;
-            let is_blind =
-                config.detect_echoes(&mut histogram, self.frame_cycles, |echo, detection| {
-                    let event = detection.event(pixel, cycle, exposure);
-                    self.enqueue(&DepthEvent { echo, ..event });
-                    events += 1;
-                });
-            self.statistics.blind_looks += u64::from(is_blind);
-            self.statistics.events += events;
-            self.statistics.expired += u64::from(events == 0);
-        } else {
-            self.statistics.deferred += 1;
+        let mut events = Vec::<DepthEvent, { EchoNumber::LAST.raw() as usize }>::new();
+        let mut whole = WholeHistogram::<BINS>::new();
+        let cycles = self.frame_cycles.into();
+        whole.decide(config, counts, cycles, statistics, |echo, detection| {
+            let event = detection.event(pixel, cycle, exposure);
+            // There is room for each echo.
+            let _ = events.push(DepthEvent { echo, ..event });
+        });
+        for event in &events {
+            self.enqueue(event);
         }
     }
 
@@ -258,15 +257,15 @@ impl PhotonSink for Sidecar<'_> {
     /// the histogram counts as deferred and is dropped: the next one is as good. Blocks
     /// and tracking do not apply.
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
-        let (true, Some(config)) = (self.takes_sensor(), self.config) else {
+        if !self.takes_sensor() {
             return;
-        };
+        }
         if usize::from(pixel.raw()) >= self.pixels.len() {
             let photons = counts.iter().map(|&count| u64::from(count));
             self.unaddressed += photons.sum::<u64>();
             return;
         }
-        self.decide_whole(pixel, counts, &config);
+        self.decide_whole(pixel, counts);
         self.drain();
         self.send_sensor_histogram(pixel, counts);
     }

@@ -21,9 +21,7 @@
 //! above its background. So a surface does not grow into pixels that do not see it. The photons of an event are always
 //! the pixel's own.
 //!
-//! Counts that do not fit their counters are divided by a power of two, all of a pixel by the same. They are then less
-//! noisy than Poisson numbers of their size, so there are no more false alarms. No depth is lost, and statistics count
-//! all photons; the photons of the event are divided, too.
+//! Of counts that do not fit their counters, the photons of the event are [divided](WholeHistogram) by a power of two.
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -32,9 +30,9 @@ use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{U4F12, U24F8};
 use dtof_core::rule::{ExcludedBins, LiveCounts};
 use dtof_core::{
-    AnyRule, Array, BinIndex, BinPosition, Count, CounterWidth, DepthEvent, Detection, EchoNumber,
-    Flags, Histogram, LaserCycle, Neighbours, PixelAddress, PixelConfig, RangeGate, Statistics,
-    WindowRule,
+    AnyRule, Array, BinIndex, BinPosition, Count, CounterWidth, DepthEvent, Detection,
+    DetectionRule, EchoNumber, Flags, Histogram, LaserCycle, Neighbours, PixelAddress, PixelConfig,
+    Statistics, WholeHistogram, WindowRule,
 };
 
 use super::Engine;
@@ -176,75 +174,52 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
 
     /// The decision on `counts` of so many laser cycles.
     fn decide(&self, counts: &[u64], cycles: u64) -> Decided<BINS, W> {
-        let config = &self.config;
-        let (most, most_cycles) = match config.weighs_dead_time() {
-            // Full counters and more laser cycles cannot be weighed.
-            true => (W::MAX - 1, LiveCounts::<BINS, W>::MAX_CYCLES.into()),
-            false => (W::MAX, u64::MAX),
-        };
+        // The sum of nine pixels may exceed 32 bits.
         let highest = counts.iter().copied().max().unwrap_or(0);
-        let fits =
-            |&shift: &u32| highest >> shift <= u64::from(most) && cycles >> shift <= most_cycles;
-        let shift = (0..64).find(fits).unwrap_or(63);
+        let shift = 32_u32.saturating_sub(highest.leading_zeros());
         let mut frame = [0_u32; BINS];
         for (count, photons) in frame.iter_mut().zip(counts) {
             *count = u32::try_from(photons >> shift).unwrap_or(u32::MAX);
         }
-        let all: u64 = counts.iter().sum();
-        let [first, last] = [config.gate().first(), config.gate().last()].map(usize::from);
-        let gated: u64 = counts[first..=last].iter().sum();
-        let mut statistics = Statistics::new();
-        (statistics.counted, statistics.gated_out) = (gated, all - gated);
-        let cycles = u32::try_from(cycles >> shift).unwrap_or(u32::MAX);
-        let (mut gate, mut echoes) = (*config.gate(), Vec::new());
-        loop {
-            let config = config.with_gate(gate);
-            let mut histogram = Histogram::<BINS, W>::new();
-            config.add_frame(&mut histogram, &frame);
-            echoes.clear();
-            let echo = |number, detection: &Detection| echoes.push((number, *detection));
-            let is_blind = config.detect_echoes(&mut histogram.clone(), cycles, echo);
-            // A slope with the highest bin may also hide a peak.
-            let highest = Some(histogram.peak().bin).filter(|_| histogram.total() > 0);
-            let bins = || echoes.iter().map(|(_, one): &(_, Detection)| one.peak.bin);
-            let ends = bins().min().or(highest).zip(bins().max().or(highest));
-            match ends.and_then(|ends| self.without_slope(counts, &gate, ends)) {
-                Some(Some(narrower)) => {
-                    gate = narrower;
-                    continue;
-                }
-                Some(None) => echoes.clear(),
-                None => {}
-            }
-            statistics.blind_looks = is_blind.into();
-            statistics.events = echoes.len() as u64;
-            return Decided {
-                confidence: confidence(&config, &histogram, cycles),
-                best: match echoes.first() {
-                    Some((_, detection)) => Some(detection.position()),
-                    None => self.best(gate, &histogram, cycles),
-                },
-                histogram,
-                statistics,
-                echoes,
-            };
+        let (mut whole, mut statistics) = (WholeHistogram::<BINS, W>::new(), Statistics::new());
+        let mut echoes = Vec::new();
+        whole.decide(
+            &self.config,
+            &frame,
+            cycles >> shift,
+            &mut statistics,
+            |number, echo| {
+                echoes.push((number, *echo));
+            },
+        );
+        let histogram = whole.photons(&self.config, &frame);
+        Decided {
+            confidence: confidence(&self.config, &whole, &histogram),
+            best: match echoes.first() {
+                Some((_, detection)) => Some(detection.position()),
+                None => self.best(&whole, &histogram),
+            },
+            histogram,
+            statistics,
+            echoes,
         }
     }
 
-    /// The peak of the best window in `gate`, if there is a photon.
+    /// The peak of the best window, if there is a photon.
     fn best(
         &self,
-        gate: RangeGate<BINS>,
+        whole: &WholeHistogram<BINS, W>,
         histogram: &Histogram<BINS, W>,
-        cycles: u32,
     ) -> Option<BinPosition> {
+        let gate = *whole.gate();
         if histogram.total() == 0 {
             return None;
         }
         let mut best = None;
         if self.config.weighs_dead_time() {
             let any_peak = self.any_peak.with_gate(gate);
-            any_peak.detect_echoes(&mut histogram.clone(), cycles, |number, detection| {
+            let mut histogram = histogram.clone();
+            any_peak.detect_echoes(&mut histogram, whole.cycles(), |number, detection| {
                 if number == EchoNumber::FIRST {
                     best = Some(detection.position());
                 }
@@ -365,55 +340,13 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
 
     /// The bins of the gate in the window around the bin of a peak.
     fn window(&self, peak: BinIndex) -> Range<usize> {
-        let (gate, reach) = (self.config.gate(), width(self.config.rule()) / 2);
+        let (gate, reach) = (
+            self.config.gate(),
+            usize::from(self.config.rule().window_bins()) / 2,
+        );
         let peak = usize::from(peak.raw());
         let first = peak.saturating_sub(reach).max(gate.first().into());
         first..(peak + reach + 1).min(usize::from(gate.last()) + 1)
-    }
-
-    /// If the nearest or the farthest peak in `gate` is the slope of something outside of it, the gate without that slope,
-    /// unless no photon is left. It is a slope if as many of the `counts` lie in the bins beside its window, and no bin from
-    /// the last one outside on up to the window has surely fewer than the mean of the window. The gate of a cover glass is for
-    /// short exposures: its tail shows in many laser cycles.
-    fn without_slope(
-        &self,
-        counts: &[u64],
-        gate: &RangeGate<BINS>,
-        (nearest, farthest): (BinIndex, BinIndex),
-    ) -> Option<Option<RangeGate<BINS>>> {
-        let of_settings = self.config.gate();
-        let [first, end] = [of_settings.first(), of_settings.last() + 1].map(usize::from);
-        let mean = |bins: Range<usize>| {
-            let number = bins.len() as f64;
-            counts[bins].iter().map(|&count| count as f64).sum::<f64>() / number
-        };
-        let falls_into = |window: Range<usize>, beside: Range<usize>, mut between: Range<usize>| {
-            let level = mean(window);
-            let is_filled =
-                |bin: usize| counts[bin] as f64 + 2.0 * (counts[bin] as f64).sqrt() >= level;
-            mean(beside) >= level && between.all(is_filled)
-        };
-        let width = width(self.config.rule());
-        let with_photons = |first: usize, last: usize| {
-            let [from, to] = [first, last].map(|bin| u16::try_from(bin).unwrap_or(u16::MAX));
-            let gate = RangeGate::new(from, to).ok()?;
-            counts[first..=last]
-                .iter()
-                .any(|&count| count > 0)
-                .then_some(gate)
-        };
-        let window = self.window(nearest);
-        let before = window.start.saturating_sub(width)..window.start;
-        if first > 0 && falls_into(window.clone(), before, first - 1..window.start) {
-            return Some(with_photons(window.end, gate.last().into()));
-        }
-        let window = self.window(farthest);
-        let behind = window.end..(window.end + width).min(counts.len());
-        if end < counts.len() && falls_into(window.clone(), behind, window.end..end + 1) {
-            let last = window.start.checked_sub(1);
-            return Some(last.and_then(|last| with_photons(gate.first().into(), last)));
-        }
-        None
     }
 }
 
@@ -556,27 +489,18 @@ fn sort(events: &mut [DepthEvent]) {
     events.sort_by_key(|event| (event.cycle, event.pixel));
 }
 
-/// Bins of the rule's window: 1 for rules that test the highest bin.
-#[must_use]
-pub fn width(rule: &AnyRule) -> usize {
-    match rule {
-        AnyRule::Window(rule) => rule.width().into(),
-        AnyRule::Paper(_) | AnyRule::Average(_) => 1,
-    }
-}
-
 /// The highest z with which the window rule would still report, whatever its minimum count: how many standard
 /// deviations the photons of the best window exceed what the background has there, with the rule's terms for the skew of
 /// small counts. Let the gate have `T` photons, and a window `S` of them and the share `p` of the live laser cycles of all
 /// bins. Without a target `S` is binomial; see [`WindowRule`](dtof_core::WindowRule). 0 without photons.
 fn confidence<const BINS: usize, W: CounterWidth>(
     config: &PixelConfig<BINS, AnyRule>,
+    whole: &WholeHistogram<BINS, W>,
     histogram: &Histogram<BINS, W>,
-    cycles: u32,
 ) -> f64 {
-    let (gate, none) = (config.gate(), ExcludedBins::NONE);
+    let (gate, none) = (whole.gate(), ExcludedBins::NONE);
     let weighed = match config.weighs_dead_time() {
-        true => LiveCounts::new(histogram, gate, &none, cycles, config.dead_time()),
+        true => LiveCounts::new(histogram, gate, &none, whole.cycles(), config.dead_time()),
         false => None,
     };
     let each = (gate.first()..=gate.last()).map(|bin| {
@@ -593,7 +517,7 @@ fn confidence<const BINS: usize, W: CounterWidth>(
     // Windows that contain the highest bin, or all of them where bins are weighed.
     // That of an empty histogram is bin 0.
     let peak = usize::from(histogram.peak().bin.raw().saturating_sub(gate.first()));
-    let width = width(config.rule());
+    let width = usize::from(config.rule().window_bins());
     let is_tested = |start: usize| weighed.is_some() || (start..start + width).contains(&peak);
     let mut best = 0.0;
     for (_, window) in (0..)

@@ -4,9 +4,11 @@
 //! in all laser cycles, and in the first half of them. If the two halves see different surfaces, something has moved.
 
 use anyhow::Result;
-use dtof_core::{Array, BinPosition, BlockLevel, Detection, EchoNumber, Flags, PixelAddress};
+use dtof_core::{
+    Array, BinPosition, BlockLevel, Detection, DetectionRule, EchoNumber, Flags, PixelAddress,
+};
 
-use dtof_engine::once::{OnceDecision, decide_once, width};
+use dtof_engine::once::{OnceDecision, decide_once};
 use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_photons::pixel_counts::PixelCounts;
 use dtof_photons::ranges::Ranges;
@@ -260,7 +262,10 @@ fn have_changed(
     // weights.
     let growth = |echo: Detection| {
         let [before, after] = halves.each_ref().map(|half| {
-            let (bin, reach) = (usize::from(echo.peak.bin.raw()), width(&settings.rule) / 2);
+            let (bin, reach) = (
+                usize::from(echo.peak.bin.raw()),
+                usize::from(settings.rule.window_bins()) / 2,
+            );
             let (first, last) = settings.gate.unwrap_or((0, u16::MAX));
             let gate = usize::from(first)..=usize::from(last);
             let histogram = half.histogram(place);

@@ -54,21 +54,6 @@ fn statistics() -> dtof_statistics_t {
     initialised(|statistics| unsafe { dtof_statistics_init(statistics) })
 }
 
-/// A histogram without photons.
-fn histogram() -> dtof_histogram_t {
-    let (size, counts) = (size_of::<dtof_histogram_t>(), [0; DTOF_BINS]);
-    // SAFETY: each pointer leads to an object of its type.
-    initialised(|histogram| unsafe {
-        dtof_histogram_fill(
-            histogram,
-            size,
-            &config(),
-            &mut statistics(),
-            counts.as_ptr(),
-        )
-    })
-}
-
 /// Bins of 250 ps.
 fn scale() -> dtof_scale_t {
     // SAFETY: the pointer leads to a scale.

@@ -11,8 +11,8 @@ use dtof_c::*;
 use proptest::prelude::*;
 
 use crate::{
-    OK, checked, config, decoder, encoder, exposure, histogram, link, once_per_bin, paper, pixel,
-    scale, statistics, zeroed,
+    OK, checked, config, decoder, encoder, exposure, link, once_per_bin, paper, pixel, scale,
+    statistics, zeroed,
 };
 
 /// Uninitialised memory.
@@ -37,7 +37,7 @@ impl<T> Room<T> {
 #[test]
 fn functions_write_to_uninitialised_memory() {
     let config = config();
-    let (mut settings, mut pixel, mut histogram) = (Room::new(), Room::new(), Room::new());
+    let (mut settings, mut pixel) = (Room::new(), Room::new());
     let (mut scale, mut range, mut link) = (Room::new(), Room::new(), Room::new());
     let (mut encoder, mut decoder, mut record) = (Room::new(), Room::new(), Room::new());
     let (mut length, mut state, mut counts) = (Room::new(), Room::new(), Room::new());
@@ -87,13 +87,9 @@ fn functions_write_to_uninitialised_memory() {
         let counts = counts.read();
         assert_eq!((counts.events, counts.repeated), (1, 19));
 
-        let size = DTOF_HISTOGRAM_SIZE;
-        let filled = dtof_histogram_fill(histogram.at(), size, &config, done, wide.as_ptr());
-        assert_eq!(filled, OK);
         let room = events.at().cast::<dtof_event_t>();
-        let found = length.at();
-        let at = histogram.at();
-        let decided = dtof_histogram_detect(at, &config, 0, done, 0, 1, room, found);
+        let (counts, found) = (wide.as_ptr(), length.at());
+        let decided = dtof_histogram_decide(&config, counts, 0, 0, 1, done, room, found);
         assert_eq!((decided, length.read()), (OK, 0));
 
         let mut length = Room::new();
@@ -179,7 +175,7 @@ type Call = fn(*mut u8) -> dtof_status_t;
 
 /// Each function that takes an initialised object: its name, the type, and a call.
 #[rustfmt::skip]
-const TAKES: [(&str, &str, Call); 40] = {
+const TAKES: [(&str, &str, Call); 37] = {
     const CODES: *const u16 = [0u16; DTOF_BINS].as_ptr();
     const COUNTS: *const u32 = [0u32; DTOF_BINS].as_ptr();
     const NO_LOOK: *mut dtof_look_t = ptr::null_mut();
@@ -208,11 +204,8 @@ const TAKES: [(&str, &str, Call); 40] = {
         ("dtof_pixel_take_event", "dtof_pixel_t", |p| dtof_pixel_take_event(p.cast(), &mut zeroed())),
         ("dtof_pixel_add_photons", "dtof_pixel_t", |p| dtof_pixel_add_photons(p.cast(), &mut statistics())),
         ("dtof_pixel_add_photons", "dtof_statistics_t", |p| dtof_pixel_add_photons(&pixel(0), p.cast())),
-        ("dtof_histogram_fill", "dtof_checked_config_t", |p| dtof_histogram_fill(&mut zeroed(), DTOF_HISTOGRAM_SIZE, p.cast(), &mut statistics(), COUNTS)),
-        ("dtof_histogram_fill", "dtof_statistics_t", |p| dtof_histogram_fill(&mut zeroed(), DTOF_HISTOGRAM_SIZE, &config(), p.cast(), COUNTS)),
-        ("dtof_histogram_detect", "dtof_histogram_t", |p| dtof_histogram_detect(p.cast(), &config(), 0, &mut statistics(), 0, 1, echoes().as_mut_ptr(), &mut 0)),
-        ("dtof_histogram_detect", "dtof_checked_config_t", |p| dtof_histogram_detect(&mut histogram(), p.cast(), 0, &mut statistics(), 0, 1, echoes().as_mut_ptr(), &mut 0)),
-        ("dtof_histogram_detect", "dtof_statistics_t", |p| dtof_histogram_detect(&mut histogram(), &config(), 0, p.cast(), 0, 1, echoes().as_mut_ptr(), &mut 0)),
+        ("dtof_histogram_decide", "dtof_checked_config_t", |p| dtof_histogram_decide(p.cast(), COUNTS, 0, 0, 1, &mut statistics(), echoes().as_mut_ptr(), &mut 0)),
+        ("dtof_histogram_decide", "dtof_statistics_t", |p| dtof_histogram_decide(&config(), COUNTS, 0, 0, 1, p.cast(), echoes().as_mut_ptr(), &mut 0)),
         ("dtof_aer_encode", "dtof_aer_encoder_t", |p| dtof_aer_encode(p.cast(), &event(), [0; 32].as_mut_ptr(), &mut 0)),
         ("dtof_aer_decode", "dtof_aer_decoder_t", |p| dtof_aer_decode(p.cast(), [0; 16].as_ptr(), &mut zeroed())),
         ("dtof_link_receive", "dtof_link_t", |p| dtof_link_receive(p.cast(), [0].as_ptr(), 1, 0, &mut 0)),
@@ -230,10 +223,7 @@ const TAKES: [(&str, &str, Call); 40] = {
 };
 
 /// Parameters that a function initialises, besides the functions named `..._init`.
-const INITIALISES: [(&str, &str); 2] = [
-    ("dtof_config_check", "dtof_checked_config_t"),
-    ("dtof_histogram_fill", "dtof_histogram_t"),
-];
+const INITIALISES: [(&str, &str); 1] = [("dtof_config_check", "dtof_checked_config_t")];
 
 /// An event whose fields are in range.
 const fn event() -> dtof_event_t {
@@ -267,7 +257,6 @@ fn an_object_without_the_tag_of_its_type_is_refused() {
         ("dtof_checked_config_t", Memory::with(config())),
         ("dtof_pixel_t", Memory::with(pixel(0))),
         ("dtof_once_per_bin_t", Memory::with(once_per_bin())),
-        ("dtof_histogram_t", Memory::with(histogram())),
         ("dtof_aer_encoder_t", Memory::with(encoder())),
         ("dtof_aer_decoder_t", Memory::with(decoder())),
         ("dtof_link_t", Memory::with(link())),
@@ -447,8 +436,8 @@ fn version_and_bins_are_those_of_the_build() {
 proptest! {
     /// A program may have overwritten all but the tags, or all bytes from one on.
     #[test]
-    fn any_bytes_are_a_pixel_a_histogram_a_scale_bins_and_statistics(
-        mut bytes in prop::collection::vec(any::<u8>(), DTOF_HISTOGRAM_SIZE - 4),
+    fn any_bytes_are_a_pixel_a_scale_bins_and_statistics(
+        mut bytes in prop::collection::vec(any::<u8>(), DTOF_PIXEL_SIZE - 4),
         ones in any::<bool>(),
         dead_time in prop_oneof![Just(0u16), Just(20), Just(u16::MAX)],
         code in any::<u16>(),
@@ -466,7 +455,6 @@ proptest! {
         }
         let mut memories = [
             Memory::with(pixel(0)),
-            Memory::with(histogram()),
             Memory::with(scale()),
             Memory::with(once_per_bin()),
             Memory::with(statistics()),
@@ -474,7 +462,7 @@ proptest! {
         for memory in &mut memories {
             memory.0[from..4 + bytes.len()].write_copy_of_slice(&bytes[from - 4..]);
         }
-        let [mut pixel, mut histogram, mut scale, mut bins, mut read] = memories;
+        let [mut pixel, mut scale, mut bins, mut read] = memories;
         let dead_time = if rule == DTOF_RULE_WINDOW { dead_time } else { 0 };
         let settings = dtof_config_t { rule, dead_time, tracking, echoes, ..paper() };
         let (config, mut done) = (checked(&settings).unwrap(), statistics());
@@ -496,8 +484,9 @@ proptest! {
             let room = body.as_mut_ptr();
             let _ = dtof_pixel_histogram_write(pixel.at(), 0, last, room, &mut 0);
             let first = events.as_mut_ptr();
-            let _ = dtof_histogram_detect(
-                histogram.at(), &config, last, &mut done, 0, exposure, first, &mut 0,
+            let counts = [u32::from(code); DTOF_BINS];
+            let _ = dtof_histogram_decide(
+                &config, counts.as_ptr(), 0, last, exposure, &mut done, first, &mut 0,
             );
             let _ = dtof_range(scale.at(), 0, &mut 0);
             let _ = dtof_statistics_read(read.at(), &mut zeroed());

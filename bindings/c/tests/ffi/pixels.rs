@@ -5,9 +5,9 @@ use core::ptr;
 use dtof_c::*;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
 use dtof_core::{
-    AnyRule, AsyncPixel, AverageRule, BinPosition, CentredWindow, Count, Count24, DepthEstimator,
-    DepthEvent, EchoNumber, Histogram, LaserCycle, OncePerBin, PaperRule, PixelAddress,
-    PixelConfig, RangeGate, RangeScale, Statistics, WindowRule, z_for,
+    AnyRule, AsyncPixel, AverageRule, BinPosition, CentredWindow, Count, DepthEstimator,
+    DepthEvent, EchoNumber, LaserCycle, OncePerBin, PaperRule, PixelAddress, PixelConfig,
+    RangeGate, RangeScale, Statistics, WholeHistogram, WindowRule, z_for,
 };
 use proptest::prelude::*;
 
@@ -222,30 +222,22 @@ proptest! {
         for (bin, photons) in pulses {
             counts[bin] += photons;
         }
-        let mut histogram = Histogram::<128, Count24>::new();
-        let gated_out = config.add_frame(&mut histogram, &counts);
         let mut statistics = Statistics::new();
-        statistics.add_photons_of(&histogram, gated_out);
         let mut expected = Vec::new();
         let held = u16::try_from(exposure).unwrap_or(u16::MAX);
-        let is_blind = config.detect_echoes(&mut histogram, exposure, |echo, detection| {
+        let mut whole = WholeHistogram::<128>::new();
+        whole.decide(&config, &counts, exposure.into(), &mut statistics, |echo, detection| {
             let event = detection.event(PixelAddress::new(9), LaserCycle::new(1 << 40), held);
             expected.push(plain(&DepthEvent { echo, ..event }));
         });
-        statistics.events += expected.len() as u64;
-        statistics.expired += u64::from(expected.is_empty());
-        statistics.blind_looks += u64::from(is_blind);
 
-        let (mut room, mut done) = (zeroed::<dtof_histogram_t>(), crate::statistics());
+        let mut done = crate::statistics();
         let (mut events, mut found) = ([dtof_event_t::default(); DTOF_ECHOES], 9);
-        let (size, first) = (size_of_val(&room), events.as_mut_ptr());
+        let (first, counts) = (events.as_mut_ptr(), counts.as_ptr());
         // SAFETY: each pointer leads to an object of its type.
         let status = unsafe {
-            let counts = counts.as_ptr();
-            let status = dtof_histogram_fill(&mut room, size, &checked, &mut done, counts);
-            prop_assert_eq!(status, OK);
-            dtof_histogram_detect(
-                &mut room, &checked, 1 << 40, &mut done, 9, exposure, first, &mut found,
+            dtof_histogram_decide(
+                &checked, counts, 9, 1 << 40, exposure, &mut done, first, &mut found,
             )
         };
         prop_assert_eq!(status, OK);

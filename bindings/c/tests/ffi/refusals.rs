@@ -8,9 +8,7 @@ use dtof_c::dtof_status_t::*;
 use dtof_c::*;
 use dtof_link::Refusal;
 
-use crate::{
-    OK, checked, config, histogram, link, once_per_bin, paper, pixel, scale, statistics, zeroed,
-};
+use crate::{OK, checked, config, link, once_per_bin, paper, pixel, scale, statistics, zeroed};
 
 #[test]
 fn each_setting_that_cannot_be_has_its_own_error() {
@@ -107,7 +105,7 @@ fn each_setting_that_cannot_be_has_its_own_error() {
 #[test]
 fn pointers_and_numbers_are_checked() {
     let (config, mut pixel, mut statistics) = (config(), pixel(0), statistics());
-    let (mut histogram, mut link) = (histogram(), link());
+    let mut link = link();
     let mut event = dtof_event_t::default();
     let (counts, wide, bytes) = ([0u16; 128], [0u32; 128], [0u8; 256]);
     let mut length = 0usize;
@@ -181,31 +179,23 @@ fn pointers_and_numbers_are_checked() {
             DTOF_ERROR_NULL
         );
 
-        let mut fill = |size, counts| {
-            dtof_histogram_fill(
-                &mut histogram,
-                size,
-                &config,
-                &mut crate::statistics(),
-                counts,
-            )
+        let mut events = [dtof_event_t::default(); DTOF_ECHOES];
+        let decide = |counts, events, found| {
+            let statistics = &mut crate::statistics();
+            dtof_histogram_decide(&config, counts, 0, 0, 1, statistics, events, found)
         };
-        assert_eq!(fill(DTOF_HISTOGRAM_SIZE, null()), DTOF_ERROR_NULL);
+        let (first, mut found) = (events.as_mut_ptr(), 0);
+        assert_eq!(decide(null(), first, &mut found), DTOF_ERROR_NULL);
         assert_eq!(
-            fill(DTOF_HISTOGRAM_SIZE / 2, wide.as_ptr()),
-            DTOF_ERROR_SIZE
+            decide(wide.as_ptr().wrapping_byte_add(1), first, &mut found),
+            DTOF_ERROR_ALIGNMENT
         );
-        let found = dtof_histogram_detect(
-            &mut histogram,
-            &config,
-            0,
-            &mut statistics,
-            0,
-            1,
-            null_mut(),
-            &mut length,
+        assert_eq!(
+            decide(wide.as_ptr(), null_mut(), &mut found),
+            DTOF_ERROR_NULL
         );
-        assert_eq!(found, DTOF_ERROR_NULL);
+        assert_eq!(decide(wide.as_ptr(), first, null_mut()), DTOF_ERROR_NULL);
+        assert_eq!(decide(wide.as_ptr(), first, &mut found), OK);
 
         let scale = scale();
         assert_eq!(dtof_range(&scale, 262_400, &mut 0), DTOF_ERROR_POSITION);

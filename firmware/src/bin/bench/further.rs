@@ -7,7 +7,7 @@ use dtof_core::fixed::types::U4F12;
 use dtof_core::neighbours::NeighbourRule;
 use dtof_core::{
     Array, AsyncPixel, BlockLevel, Count, EchoNumber, Flags, Histogram, LaserCycle, Look,
-    PixelAddress, PixelConfig, RangeGate, Statistics, WindowRule,
+    PixelAddress, PixelConfig, RangeGate, Statistics, WholeHistogram, WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -299,12 +299,17 @@ pub extern "C" fn look_of_block(further: &mut Further, cycle: u32) -> u32 {
 
 /// How many echoes there are among counts that come from elsewhere.
 pub extern "C" fn echoes(further: &mut Further, _: u32) -> u32 {
-    let (config, histogram) = (&further.config, &mut further.histogram);
-    config.add_frame(histogram, &further.foreign);
-    let mut echoes = 0;
-    config.detect_echoes(histogram, CYCLES.into(), |_, detection| {
-        core::hint::black_box(detection.depth.offset);
-        echoes += 1;
-    });
+    let (config, counts) = (&further.config, &further.foreign);
+    let (mut whole, mut echoes) = (WholeHistogram::<BINS>::new(), 0);
+    whole.decide(
+        config,
+        counts,
+        CYCLES.into(),
+        &mut further.statistics,
+        |_, detection| {
+            core::hint::black_box(detection.depth.offset);
+            echoes += 1;
+        },
+    );
     echoes
 }

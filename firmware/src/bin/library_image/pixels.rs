@@ -2,13 +2,13 @@
 
 use dtof_core::rule::z_for_levels;
 use dtof_core::{
-    AsyncPixel, Count8, Count10, Count16, Count20, Count24, CounterWidth, DetectionRule, Histogram,
-    OncePerBin, Statistics, z_for,
+    AsyncPixel, Count8, Count10, Count16, Count20, Count24, CounterWidth, Detection, DetectionRule,
+    EchoNumber, Histogram, OncePerBin, Statistics, WholeHistogram, z_for,
 };
 
 use crate::values::{
-    address, any_rule, average_rule, cycle, gate, half, keep, level, more, or_text, rule, settings,
-    some, values, window_rule, word,
+    address, any_rule, average_rule, byte, cycle, gate, half, keep, level, more, or_text, rule,
+    settings, some, values, window_rule, word,
 };
 
 pub fn all() {
@@ -79,6 +79,14 @@ fn pixels_with<const BINS: usize, W: CounterWidth, R: DetectionRule>(rule: R) {
     );
     let config = &config;
     let mut statistics = Statistics::default();
+    let (mut whole, cycles) = (WholeHistogram::<BINS, W>::new(), u64::from(word()) << 8);
+    let (bytes, halves) = (values::<u8, BINS>(byte), values::<u16, BINS>(half));
+    let words = values::<u32, BINS>(word);
+    let echo = |number: EchoNumber, detection: &Detection| keep((number, *detection));
+    whole.decide(config, &bytes, cycles, &mut statistics, echo);
+    whole.decide(config, &halves, cycles, &mut statistics, echo);
+    whole.decide(config, &words, cycles, &mut statistics, echo);
+    keep((*whole.gate(), whole.cycles(), whole.photons(config, &words)));
     let mut pixel = AsyncPixel::<BINS, W>::new(address());
     while more() {
         pixel.count(config, half());

@@ -195,10 +195,10 @@ fn without_photons_the_confidence_is_0_and_of_pixels_left_out_unknown() {
 fn counts_that_do_not_fit_a_counter_are_divided() {
     // 1024 bins have counters of 20 bits.
     let mut counts = vec![20; 1024];
-    counts[40] = (1 << 20) - 1;
+    counts[40] = (1 << 20) - 2;
     let (events, _) = decided(&settings(1024), line(1), &[counts.clone()]);
-    assert_eq!(events[0].peak_count.raw(), (1 << 20) - 1);
-    counts[40] += 3;
+    assert_eq!(events[0].peak_count.raw(), (1 << 20) - 2);
+    counts[40] += 2;
     let (events, engine) = decided(&settings(1024), line(1), &[counts.clone()]);
     assert_eq!((events.len(), events[0].peak_bin.raw()), (1, 40));
     assert_eq!(events[0].peak_count.raw(), counts[40] / 2);

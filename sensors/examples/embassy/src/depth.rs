@@ -1,7 +1,9 @@
 //! Depth events from a TMF8829 on any bus, pins and timer.
 
 use dtof_core::fixed::types::I24F8;
-use dtof_core::{Count24, Histogram, PixelAddress, PixelConfig, RangeGate, RangeScale, checked};
+use dtof_core::{
+    PixelAddress, PixelConfig, RangeGate, RangeScale, Statistics, WholeHistogram, checked,
+};
 use dtof_sensors::protocol::{AsyncBus, Timing};
 use dtof_sensors::tmf8829::{Config, Error, Settings, Tmf8829, Zones};
 use dtof_sensors::{PhotonSink, SensorFault, SensorInfo};
@@ -25,11 +27,11 @@ impl<F: FnMut(Report)> PhotonSink for Events<F> {
     fn end_laser_cycles(&mut self, _: u16) {}
     fn begin_frame(&mut self, _: u32) {}
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
-        let mut histogram = Histogram::<128, Count24>::new();
-        histogram.add_frame(counts, ZONE.gate());
-        if let Some(found) = ZONE.detect(&histogram) {
+        let (mut whole, mut statistics) = (WholeHistogram::<128>::new(), Statistics::new());
+        // Without a dead time the number of laser cycles does not matter.
+        whole.decide(&ZONE, counts, 0, &mut statistics, |_, found| {
             (self.0)(Ok((pixel, SCALE.range(found.position()))));
-        }
+        });
     }
 }
 
