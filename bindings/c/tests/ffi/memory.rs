@@ -444,7 +444,7 @@ proptest! {
         cycles in any::<u16>(),
         exposure in prop_oneof![any::<u32>(), 1..4000_u32],
         last in any::<u64>(),
-        from in prop_oneof![Just(4), 4..200_usize],
+        from in prop_oneof![Just(4), 4..DTOF_PIXEL_SIZE],
         (rule, tracking) in prop::sample::select(vec![
             (DTOF_RULE_PAPER, 0), (DTOF_RULE_AVERAGE, 0), (DTOF_RULE_WINDOW, 0), (DTOF_RULE_WINDOW, 1),
         ]),
