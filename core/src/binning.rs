@@ -166,6 +166,12 @@ impl Binning {
         self.link(pixel, BlockLevel::PIXEL)
     }
 
+    /// The number of the block of `level` that begins with the pixel `first`.
+    pub(crate) fn number_of(&self, level: BlockLevel, first: PixelAddress) -> Option<usize> {
+        let number = self.first_number(level.raw()) + self.array.block_of(first, level);
+        usize::try_from(number).ok()
+    }
+
     /// The block of the next level that one of `level` with the pixel `first` feeds.
     fn link(&self, first: PixelAddress, level: BlockLevel) -> BlockLink {
         if level >= self.levels {
@@ -190,21 +196,37 @@ impl Binning {
 
 /// A block of pixels: a pixel with counters of 16 bits that counts for several.
 #[derive(Clone, Debug)]
-pub struct Block<const BINS: usize> {
+pub struct Block<const BINS: usize, T = ()> {
     pixel: AsyncPixel<BINS, Count16>,
     link: BlockLink,
+    /// Of the program.
+    pub data: T,
 }
 
-impl<const BINS: usize> Block<BINS> {
+impl<const BINS: usize, T: Default> Block<BINS, T> {
     /// An empty block at the beginning of its first exposure.
     #[must_use]
-    pub const fn new(place: BlockPlace) -> Self {
+    pub fn new(place: BlockPlace) -> Self {
         Self {
             pixel: AsyncPixel::of_block(place.first, place.level),
             link: place.link,
+            data: T::default(),
         }
     }
+}
 
+/// Room for a block.
+impl<const BINS: usize, T: Default> Default for Block<BINS, T> {
+    fn default() -> Self {
+        Self::new(BlockPlace {
+            first: PixelAddress::new(0),
+            level: BlockLevel::saturating(1),
+            link: BlockLink::NONE,
+        })
+    }
+}
+
+impl<const BINS: usize, T> Block<BINS, T> {
     /// Ends `cycles` laser cycles at once, as [`AsyncPixel::end_laser_cycles_with`] does for a pixel.
     #[inline]
     pub fn end_laser_cycles_with<R: DetectionRule>(
@@ -250,23 +272,16 @@ impl<const BINS: usize> Block<BINS> {
     }
 }
 
-impl<const BINS: usize> AsMut<Self> for Block<BINS> {
-    fn as_mut(&mut self) -> &mut Self {
-        self
-    }
-}
-
 /// Counts a photon of a pixel with this link in the blocks that it reaches.
 #[inline]
-pub fn count_in_blocks<const BINS: usize, R: DetectionRule>(
-    blocks: &mut [impl AsMut<Block<BINS>>],
+pub fn count_in_blocks<const BINS: usize, R: DetectionRule, T>(
+    blocks: &mut [Block<BINS, T>],
     link: &BlockLink,
     config: &PixelConfig<BINS, R>,
     code: u16,
 ) {
     let mut next = link.block();
     while let Some(block) = next.and_then(|number| blocks.get_mut(number)) {
-        let block = block.as_mut();
         block.pixel.count_without_dead_time(config, code);
         next = block.link.block();
     }
@@ -275,8 +290,8 @@ pub fn count_in_blocks<const BINS: usize, R: DetectionRule>(
 /// Ends `cycles` laser cycles at once for all blocks, as
 /// [`AsyncPixel::end_laser_cycles`] does for a pixel. `statistics` are those of the blocks.
 /// Returns whether one of them has an event.
-pub fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule>(
-    blocks: &mut [impl AsMut<Block<BINS>>],
+pub fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule, T>(
+    blocks: &mut [Block<BINS, T>],
     config: &PixelConfig<BINS, R>,
     statistics: &mut Statistics,
     last: LaserCycle,
@@ -284,7 +299,6 @@ pub fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule>(
 ) -> bool {
     let mut fired = false;
     for block in blocks {
-        let block = block.as_mut();
         let look = block.end_laser_cycles_with(config, statistics, last, cycles, unobserved);
         fired |= look == Look::Event;
     }

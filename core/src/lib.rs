@@ -28,6 +28,7 @@
 //! | `whole` | the decision on a whole histogram |
 //! | [`binning`] | blocks of pixels that decide together |
 //! | [`neighbours`] | pixels of an array that confirm each other |
+//! | `pixel_array` | an array that is driven: photons in, events out |
 //! | [`events`] | results from events: running mean, dynamic depth, reflectivity |
 //! | `aer` | events as words |
 //! | [`pixel_processor`] | registers and words of a pixel in programmable logic |
@@ -38,9 +39,9 @@
 //!
 //! ## Many pixels
 //!
-//! Fill an array in place, with the crates `heapless` and `static_cell`. An array that is
-//! made first, as by `core::array::from_fn`, and then moved needs a stack frame of its size.
-//! On a Cortex-M4F, with pixels of 128 bins:
+//! [`PixelArray`] drives them: see the README above. Fill its room in place, with the crates `heapless` and
+//! `static_cell`, as there. An array that is made first, as by `core::array::from_fn`, and then moved needs a stack frame
+//! of its size. On a Cortex-M4F, with pixels of 128 bins:
 //!
 //! | pixels | frame at `opt-level` 3 or "s" | at 0 |
 //! |---|---|---|
@@ -49,21 +50,6 @@
 //!
 //! On a Cortex-M0+, `static_cell` needs a feature of `portable-atomic`: `critical-section` or
 //! `unsafe-assume-single-core`.
-//!
-//! ```rust
-//! use dtof_core::{AsyncPixel, PixelAddress};
-//! use heapless::Vec;
-//! use static_cell::ConstStaticCell;
-//!
-//! // Empty, so that it takes no flash.
-//! static PIXELS: ConstStaticCell<Vec<AsyncPixel<128>, 64>> = ConstStaticCell::new(Vec::new());
-//!
-//! let pixels = PIXELS.take();
-//! for address in 0..64 {
-//!     let _ = pixels.push(AsyncPixel::new(PixelAddress::new(address))); // there is room for 64
-//! }
-//! assert_eq!(pixels.len(), 64);
-//! ```
 //!
 //! ## Rules of the crate
 //!
@@ -119,6 +105,7 @@ mod histogram;
 pub mod neighbours;
 pub mod paper;
 mod pixel;
+mod pixel_array;
 pub mod pixel_processor;
 pub mod rule;
 mod statistics;
@@ -141,6 +128,7 @@ pub use histogram::counter::{Count8, Count10, Count16, Count20, Count24, Counter
 pub use histogram::gate::{GateError, RangeGate};
 pub use histogram::{Histogram, Peak};
 pub use pixel::{AsyncPixel, Look, OncePerBin};
+pub use pixel_array::{ArrayConfig, ArrayError, ArrayLosses, PixelArray, PixelPlace};
 pub use statistics::Statistics;
 pub use units::{
     BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,

@@ -99,6 +99,12 @@ impl NeighbourConfig {
         }
     }
 
+    /// The array.
+    #[must_use]
+    pub const fn array(&self) -> &Array {
+        &self.array
+    }
+
     /// The rule.
     #[must_use]
     pub const fn rule(&self) -> &NeighbourRule {

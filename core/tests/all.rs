@@ -19,6 +19,7 @@ mod gate;
 mod histogram;
 mod neighbours;
 mod pixel;
+mod pixel_array;
 mod pixel_processor;
 mod proofs;
 mod quantities;

@@ -79,11 +79,26 @@ fn of_core(photons: &[Vec<(u16, u16)>]) -> (Vec<DepthEvent>, Statistics) {
     (events, statistics)
 }
 
-/// Of a sensor that gives the photons of a laser cycle in up to three polls.
+/// Of a sensor that gives the photons of a laser cycle in up to three polls, pixel by pixel.
 #[test]
 fn a_sidecar_reports_what_pixels_of_the_core_report() {
-    let photons = photons(4_000);
-    let expected = of_core(&photons);
+    compare(&photons(4_000));
+}
+
+/// In the order of time, as pixels have them that share a TDC and its queue.
+#[test]
+fn the_order_of_a_shared_queue_changes_nothing() {
+    let mut photons = photons(4_000);
+    for photons in &mut photons {
+        photons.sort_by_key(|&(_, code)| code);
+    }
+    let mixed = |photons: &&Vec<(u16, u16)>| !photons.is_sorted_by_key(|photon| photon.0);
+    assert!(photons.iter().filter(mixed).count() > 2_000);
+    compare(&photons);
+}
+
+fn compare(photons: &[Vec<(u16, u16)>]) {
+    let expected = of_core(photons);
     assert!(expected.0.len() > 20 && expected.1.repeated > 500);
     assert!(expected.1.rejected > 100);
     let calls = photons.iter().flat_map(|photons| {

@@ -1,7 +1,7 @@
 //! Why a device refuses a configuration.
 
 use dtof_core::events::ZeroThresholdError;
-use dtof_core::{GateError, PixelConfigError, RangeScaleError, WindowWidthError};
+use dtof_core::{ArrayError, GateError, PixelConfigError, RangeScaleError, WindowWidthError};
 
 use crate::numbered::numbered;
 
@@ -70,6 +70,17 @@ impl From<PixelConfigError> for Refusal {
             PixelConfigError::XAboveL1 => Self::XAboveL1,
             PixelConfigError::L2NotAboveL1 => Self::L2NotAboveL1,
             PixelConfigError::NoLook => Self::NoLook,
+            _ => Self::Unknown,
+        }
+    }
+}
+
+impl From<ArrayError> for Refusal {
+    fn from(error: ArrayError) -> Self {
+        match error {
+            ArrayError::Pixels | ArrayError::Layout => Self::Pixels,
+            ArrayError::Blocks | ArrayError::NoLevel | ArrayError::OtherLooks => Self::Blocks,
+            ArrayError::BlocksAndNeighbours | ArrayError::NeighboursAndDeadTime => Self::Neighbours,
             _ => Self::Unknown,
         }
     }

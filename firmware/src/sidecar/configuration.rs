@@ -1,13 +1,11 @@
 //! Applies a configuration.
 
-use dtof_core::binning::{Binning, BlockLink};
 use dtof_core::neighbours::NeighbourConfig;
-use dtof_core::{AnyRule, Array, PixelAddress, PixelConfig, RangeGate, RangeScale};
+use dtof_core::{AnyRule, Array, ArrayConfig, PixelConfig, RangeGate, RangeScale};
 use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source, StopReason};
 use dtof_sensors::dither::Dither;
 
-use super::photons::BinsOfPixel;
-use super::{BINS, Block, Counters, Pixel, Sidecar};
+use super::{BINS, Counters, Sidecar};
 
 impl Sidecar<'_> {
     /// Applies the configuration in `body`: all pixels begin an exposure. The last configuration
@@ -34,7 +32,7 @@ impl Sidecar<'_> {
             // Bins that are not measured would count as bins without background.
             last = last.min(sensor.bins.saturating_sub(1));
         }
-        if requested.pixels == 0 || usize::from(requested.pixels) > self.pixels.capacity() {
+        if requested.pixels == 0 || usize::from(requested.pixels) > self.array.room() {
             return Err(Refusal::Pixels);
         }
         let dither = Dither::new(requested.dither_bins, requested.dither_seed);
@@ -67,63 +65,39 @@ impl Sidecar<'_> {
         let own = neighbours.map_or(requested.rule, |neighbours| {
             (*neighbours.rule().own()).into()
         });
-        let config = config_of(own)?;
-        if neighbours.is_some() && config.weighs_dead_time() {
-            return Err(Refusal::Neighbours);
+        let pixels = config_of(own)?;
+        let array = array_of(&requested).or(Array::new(requested.pixels.into(), 1));
+        let array = array.ok_or(Refusal::Pixels)?;
+        let mut config = ArrayConfig::new(array, pixels).first(requested.pixels.into())?;
+        if let Some(neighbours) = neighbours {
+            config = config
+                .neighbours(neighbours)
+                .map_err(|_| Refusal::Neighbours)?;
         }
-        let binning = match requested.binning {
-            None => None,
-            Some(binning) => Some((
-                self.blocks_of(&requested, binning)?,
-                config_of(requested.rule.of_blocks(binning.levels))?,
-                binning.patience,
-            )),
-        };
+        if let Some(AdaptiveBinning { levels, patience }) = requested.binning {
+            array_of(&requested).ok_or(Refusal::Blocks)?;
+            let blocks = config_of(requested.rule.of_blocks(levels))?;
+            config = config.blocks(levels, blocks, patience)?;
+        }
+        if requested.once_per_bin {
+            config = config.once_per_bin();
+        }
         let scale = RangeScale::new(requested.bin_width_ps, requested.offset_mm)?;
         let dynamic_depth = requested
             .dynamic_depth
             .map(|changes| changes.config(&scale));
         let dynamic_depth = dynamic_depth.transpose()?;
-        self.pixels.clear();
-        self.blocks.clear();
-        let blocks = binning.as_ref().map(|(blocks, ..)| blocks);
-        for address in (0..requested.pixels).map(PixelAddress::new) {
-            let link = blocks.map_or(BlockLink::NONE, |blocks| blocks.link_of(address));
-            // There is room: checked above.
-            let _ = self.pixels.push(Pixel::new(address, link));
-        }
-        for place in blocks.into_iter().flat_map(Binning::blocks) {
-            let _ = self.blocks.push(Block::new(place));
-        }
-        self.config = Some(config);
-        self.binning = binning.map(|(_, config, patience)| (config, patience));
-        self.neighbours = neighbours;
+        self.array.configure(&config)?;
         self.dynamic_depth = dynamic_depth;
         self.bin_width = requested.bin_width_ps;
         self.dither = dither;
         self.source = requested.source;
-        self.once_per_bin = requested.once_per_bin.then(BinsOfPixel::default);
         self.host_timeout_ms = requested.host_timeout_ms;
         self.stopping.get_or_insert(StopReason::Configuration);
         self.started = false;
         self.off = None;
-        self.restart_counts();
+        self.frame_cycles = 0;
         Ok(())
-    }
-
-    /// The requested blocks, if there is room for them.
-    fn blocks_of(
-        &self,
-        requested: &Configuration,
-        binning: AdaptiveBinning,
-    ) -> Result<Binning, Refusal> {
-        let array = array_of(requested).ok_or(Refusal::Blocks)?;
-        let blocks = Binning::new(array, binning.levels).ok_or(Refusal::Blocks)?;
-        let room = u32::try_from(self.blocks.capacity()).unwrap_or(u32::MAX);
-        if blocks.number_of_blocks() > room {
-            return Err(Refusal::Blocks);
-        }
-        Ok(blocks)
     }
 
     /// The requested neighbours.
@@ -135,9 +109,7 @@ impl Sidecar<'_> {
         let gives_histograms = self.sensor.is_some_and(|sensor| sensor.gives_histograms);
         let array = array_of(requested).ok_or(Refusal::Neighbours)?;
         match &requested.rule {
-            AnyRule::Window(rule)
-                if requested.binning.is_none() && !(of_sensor && gives_histograms) =>
-            {
+            AnyRule::Window(rule) if !(of_sensor && gives_histograms) => {
                 Ok(Some(NeighbourConfig::new(array, neighbours, rule)))
             }
             _ => Err(Refusal::Neighbours),

@@ -1,13 +1,12 @@
 //! Events on their way from the pixels' slots into messages.
 
-use dtof_core::{AerWord, BlockLevel, DepthEvent, EchoNumber};
+use dtof_core::{AerWord, DepthEvent, EchoNumber};
 use dtof_link::Source;
 use dtof_link::endpoint::BODY_BYTES;
 use dtof_link::message;
-use heapless::spsc::Queue;
 use heapless::vec::Vec;
 
-use super::{QUEUE, Sidecar};
+use super::Sidecar;
 
 /// Words in one message.
 const WORDS: usize = BODY_BYTES / AerWord::BYTES;
@@ -35,20 +34,10 @@ impl Sidecar<'_> {
         if self.holds_slots() {
             return;
         }
-        // From where there was no room for more, so that each pixel has its turn.
-        let turn = core::mem::take(&mut self.turn);
-        let slots = self.pixels.len() + self.blocks.len();
-        for index in (turn..slots).chain(0..turn) {
-            if !self.is_waiting(index) {
-                continue;
-            }
-            if !has_room_for_events(&self.words, 1) {
-                self.turn = index;
-                break;
-            }
-            if let Some(event) = self.acknowledge(index) {
-                self.enqueue(&event);
-            }
+        while self.room() > 0
+            && let Some(event) = self.array.next_event()
+        {
+            self.enqueue(&event);
         }
         self.send_words();
     }
@@ -59,14 +48,7 @@ impl Sidecar<'_> {
         let (time, word) = match &self.dynamic_depth {
             None => self.encoder.encode(event),
             Some(config) => {
-                let followed = if event.level == BlockLevel::PIXEL {
-                    let pixel = self.pixels.get_mut(usize::from(event.pixel.raw()));
-                    pixel.map(|pixel| &mut pixel.dynamic_depth)
-                } else {
-                    let mut blocks = self.blocks.iter_mut();
-                    let block = blocks.find(|block| block.is_of(event));
-                    block.map(|block| &mut block.dynamic_depth)
-                };
+                let followed = self.array.data_of(event);
                 // Dynamic depth follows the first of several echoes.
                 let followed = followed.filter(|_| event.echo == EchoNumber::FIRST);
                 let change = followed.and_then(|followed| followed.observe(config, event));
@@ -103,40 +85,11 @@ impl Sidecar<'_> {
 
     /// Whether every event before a request has become a message.
     pub(super) fn is_drained(&self) -> bool {
-        self.words.is_empty() && (self.holds_slots() || !self.has_waiting_events())
+        self.words.is_empty() && (self.holds_slots() || !self.array.has_event())
     }
 
-    /// Whether an event has not left its slot.
-    pub(super) fn has_waiting_events(&self) -> bool {
-        self.pixels.iter().any(|pixel| pixel.detector.has_event())
-            || self.blocks.iter().any(|block| block.detector.has_event())
+    /// Events for which there is room. Those at the same time may need one time word before them.
+    pub(super) fn room(&self) -> usize {
+        (self.words.capacity() - self.words.len()).saturating_sub(1)
     }
-
-    /// Whether the slot of a pixel, or after the pixels of a block, is full.
-    fn is_waiting(&self, index: usize) -> bool {
-        match self.pixels.get(index) {
-            Some(pixel) => pixel.detector.has_event(),
-            None => {
-                let block = self.blocks.get(index - self.pixels.len());
-                block.is_some_and(|block| block.detector.has_event())
-            }
-        }
-    }
-
-    /// Takes the event out of such a slot.
-    fn acknowledge(&mut self, index: usize) -> Option<DepthEvent> {
-        let pixels = self.pixels.len();
-        match self.pixels.get_mut(index) {
-            Some(pixel) => pixel.detector.take_event(),
-            None => {
-                let block = self.blocks.get_mut(index - pixels)?;
-                block.detector.take_event()
-            }
-        }
-    }
-}
-
-/// Events at the same time may need one time word before them.
-pub(super) fn has_room_for_events(words: &Queue<AerWord, QUEUE>, events: usize) -> bool {
-    words.capacity() - words.len() > events
 }

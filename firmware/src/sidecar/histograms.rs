@@ -17,9 +17,9 @@ impl Sidecar<'_> {
         let of_sensor = self.sensor.filter(|_| self.uses_sensor_histograms());
         let pixels = of_sensor.map_or(u16::MAX, |sensor| sensor.pixels);
         let pixel = PixelAddress::new(pixel);
-        let reason = if self.config.is_none() {
+        let reason = if self.array.config().is_none() {
             NoHistogram::NoConfiguration
-        } else if usize::from(pixel.raw()) >= self.pixels.len() || pixel.raw() >= pixels {
+        } else if self.array.pixel(pixel.raw().into()).is_none() || pixel.raw() >= pixels {
             NoHistogram::NoPixel
         } else {
             self.requested_histogram = Some(pixel);
@@ -61,16 +61,19 @@ impl Sidecar<'_> {
     // Not inlined, to keep its counts off the stack of callers.
     #[inline(never)]
     fn send_current_histogram_of(&mut self, pixel: PixelAddress) {
-        let Some(detector) = self.pixels.get(usize::from(pixel.raw())) else {
+        let number = pixel.raw().into();
+        let (Some(detector), Some(exposure)) =
+            (self.array.pixel(number), self.array.exposure(number))
+        else {
             return;
         };
         let head = HistogramHead {
             pixel,
             is_whole: false,
-            cycle: LaserCycle::new(self.cycle),
-            exposure: detector.detector.exposure().into(),
+            cycle: LaserCycle::new(self.array.cycles()),
+            exposure: exposure.into(),
         };
-        let counts = detector.detector.histogram().counts().map(Into::into);
+        let counts = detector.histogram().counts().map(Into::into);
         self.send_histogram(head, &counts);
     }
 
@@ -84,7 +87,7 @@ impl Sidecar<'_> {
             let head = HistogramHead {
                 pixel,
                 is_whole: true,
-                cycle: LaserCycle::new(self.cycle),
+                cycle: LaserCycle::new(self.array.cycles()),
                 exposure: self.frame_cycles,
             };
             self.send_histogram(head, counts);
@@ -93,7 +96,7 @@ impl Sidecar<'_> {
 
     /// Whether something goes before a histogram.
     fn events_wait(&self) -> bool {
-        self.answer.is_some() || !self.words.is_empty() || self.has_waiting_events()
+        self.answer.is_some() || !self.words.is_empty() || self.array.has_event()
     }
 
     /// Room for one message is left to events.

@@ -23,13 +23,10 @@ mod photons;
 mod records;
 mod sensor;
 
-use dtof_core::binning::{BlockLink, BlockPlace};
 use dtof_core::events::{DynamicDepthConfig, DynamicDepthPixel};
 use dtof_core::fixed::types::U16F16;
-use dtof_core::neighbours::{ArrayPixel, NeighbourConfig};
 use dtof_core::{
-    AerEncoder, AerWord, AnyRule, AsyncPixel, CounterWidth, DepthEvent, PixelAddress, PixelConfig,
-    Statistics,
+    AerEncoder, AerWord, AnyRule, CounterWidth, PixelAddress, PixelArray, PixelPlace, binning,
 };
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, Message};
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
@@ -41,7 +38,7 @@ use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::spsc::Queue;
 use heapless::vec::{Vec, VecView};
 
-use self::photons::{BinsOfPixel, Photons};
+use self::photons::Photons;
 
 /// Bins of every histogram.
 pub const BINS: usize = 128;
@@ -63,65 +60,14 @@ pub type Counters = dtof_core::Count8;
 #[cfg(not(feature = "count8"))]
 pub type Counters = dtof_core::Count10;
 
-/// A macropixel, and what its dynamic depth is compared with: room for one, which the
-/// caller of [`Sidecar::new`] provides.
-#[derive(Debug)]
-pub struct Pixel {
-    detector: AsyncPixel<BINS, Counters>,
-    feed: BlockLink,
-    dynamic_depth: DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>,
-}
+/// What the dynamic depth of a pixel or a block is compared with.
+type Followed = DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>;
 
-impl Pixel {
-    const fn new(address: PixelAddress, feed: BlockLink) -> Self {
-        Self {
-            detector: AsyncPixel::new(address),
-            feed,
-            dynamic_depth: DynamicDepthPixel::new(),
-        }
-    }
-}
+/// Room for a macropixel, which the caller of [`Sidecar::new`] provides.
+pub type Pixel = PixelPlace<BINS, Counters, Followed>;
 
-impl ArrayPixel<BINS, Counters> for Pixel {
-    fn pixel(&self) -> Option<&AsyncPixel<BINS, Counters>> {
-        Some(&self.detector)
-    }
-
-    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS, Counters>> {
-        Some(&mut self.detector)
-    }
-}
-
-/// The same for a block of pixels.
-#[derive(Debug)]
-pub struct Block {
-    detector: dtof_core::binning::Block<BINS>,
-    dynamic_depth: DynamicDepthPixel<{ DynamicDepth::MEAN_OF }>,
-}
-
-impl Block {
-    const fn new(place: BlockPlace) -> Self {
-        Self {
-            detector: dtof_core::binning::Block::new(place),
-            dynamic_depth: DynamicDepthPixel::new(),
-        }
-    }
-
-    /// Whether an event is one of this block.
-    fn is_of(&self, event: &DepthEvent) -> bool {
-        let place = (
-            self.detector.pixel().address(),
-            self.detector.pixel().level(),
-        );
-        place == (event.pixel, event.level)
-    }
-}
-
-impl AsMut<dtof_core::binning::Block<BINS>> for Block {
-    fn as_mut(&mut self) -> &mut dtof_core::binning::Block<BINS> {
-        &mut self.detector
-    }
-}
+/// Room for a block of pixels.
+pub type Block = binning::Block<BINS, Followed>;
 
 /// Macropixels of 128 bins that are served over a link.
 pub struct Sidecar<'a> {
@@ -131,22 +77,13 @@ pub struct Sidecar<'a> {
     wire: [u8; WIRE_BYTES],
     wire_length: usize,
     wire_sent: usize,
-    pixels: &'a mut VecView<Pixel>,
-    /// None without adaptive binning.
-    blocks: &'a mut VecView<Block>,
-    config: Option<PixelConfig<BINS, AnyRule>>,
-    /// That of the blocks, and laser cycles between ticks.
-    binning: Option<(PixelConfig<BINS, AnyRule>, u16)>,
-    /// Of the configuration in force, if neighbours confirm.
-    neighbours: Option<NeighbourConfig>,
+    array: PixelArray<'a, BINS, AnyRule, Counters, Followed>,
     /// Of the configuration in force: changes of depth are sent, not depth events.
     dynamic_depth: Option<DynamicDepthConfig>,
     /// Of the configuration in force, for sensors that measure times.
     bin_width: U16F16,
     dither: Dither,
     source: Source,
-    /// Of the configuration in force, if photons of one laser cycle in one bin count once.
-    once_per_bin: Option<BinsOfPixel>,
     sensor: Option<SensorInfo>,
     /// The sensor was told once to be off.
     has_steered: bool,
@@ -175,23 +112,10 @@ pub struct Sidecar<'a> {
     answer: Option<Answer>,
     encoder: AerEncoder,
     words: Queue<AerWord, QUEUE>,
-    cycle: u64,
     /// Laser cycles of the histograms that come whole.
     frame_cycles: u32,
-    /// Laser cycles since the pixels looked last: all look at once.
-    since_look: u16,
-    /// Laser cycles from the last tick of the blocks to the last look.
-    since_tick: u16,
-    /// What was done by all pixels, and with histograms that came whole. Photons of
-    /// exposures that have not ended are not among them.
-    statistics: Statistics,
-    /// The same of all blocks.
-    block_statistics: Statistics,
-    /// The pixel, or after the pixels the block, whose slot is emptied next.
-    turn: usize,
     /// The host waits for the histogram of this pixel.
     requested_histogram: Option<PixelAddress>,
-    unaddressed: u64,
     unknown: u32,
     sensor_errors: u32,
     sensor_fault: Option<SensorFault>,
@@ -209,9 +133,11 @@ impl<'a> Sidecar<'a> {
         blocks: &'a mut VecView<Block>,
         sensor: Option<SensorInfo>,
     ) -> Self {
-        pixels.clear();
-        blocks.clear();
-        let room = u16::try_from(pixels.capacity()).unwrap_or(u16::MAX);
+        // As many as there is room for.
+        while pixels.push(Pixel::new()).is_ok() {}
+        while blocks.push(Block::default()).is_ok() {}
+        let array = PixelArray::new(pixels, blocks);
+        let room = u16::try_from(array.room()).unwrap_or(u16::MAX);
         #[allow(clippy::cast_possible_truncation, reason = "128")]
         let greeting = greeting(BINS as u16, room);
         Self {
@@ -220,16 +146,11 @@ impl<'a> Sidecar<'a> {
             wire: [0; WIRE_BYTES],
             wire_length: 0,
             wire_sent: 0,
-            pixels,
-            blocks,
-            config: None,
-            binning: None,
-            neighbours: None,
+            array,
             dynamic_depth: None,
             bin_width: U16F16::ZERO,
             dither: Dither::OFF,
             source: Source::Link,
-            once_per_bin: None,
             sensor,
             has_steered: false,
             running: false,
@@ -247,19 +168,18 @@ impl<'a> Sidecar<'a> {
             answer: None,
             encoder: AerEncoder::new(),
             words: Queue::new(),
-            cycle: 0,
             frame_cycles: 0,
-            since_look: 0,
-            since_tick: 0,
-            statistics: Statistics::default(),
-            block_statistics: Statistics::default(),
-            turn: 0,
             requested_histogram: None,
-            unaddressed: 0,
             unknown: 0,
             sensor_errors: 0,
             sensor_fault: None,
         }
+    }
+
+    /// Leaves a pixel out from now on, for example one that is always hot: its photons do not count, in no block either, and
+    /// it decides nothing. The host learns of them as photons of pixels that do not exist.
+    pub fn leave_out(&mut self, pixel: PixelAddress) {
+        self.array.leave_out(pixel.raw().into());
     }
 
     /// Processes the bytes that `serial` has received, and sends as much as it takes.
@@ -328,11 +248,9 @@ impl<'a> Sidecar<'a> {
     /// more than some, so that it does not take long. `overrun` is what the serial
     /// port has lost so far.
     pub fn work(&mut self, overrun: u32) {
-        let is_long = self.neighbours.is_some()
-            || self
-                .config
-                .as_ref()
-                .is_some_and(|config| config.dead_time() > 0);
+        let config = self.array.config();
+        let is_long =
+            config.is_some_and(|config| config.has_neighbours() || config.pixels().dead_time() > 0);
         let mut looks = if is_long { LONG_LOOKS } else { LOOKS };
         loop {
             if let Some((kind, body)) = &self.answer {
@@ -385,7 +303,7 @@ impl<'a> Sidecar<'a> {
                 Ok(()) => (message::CONFIGURED, Vec::new()),
                 Err(refusal) => (message::REFUSED, Vec::from_array([refusal as u8])),
             }),
-            message::PHOTONS if self.config.is_some() && self.source == Source::Link => {
+            message::PHOTONS if self.array.config().is_some() && self.source == Source::Link => {
                 self.photons = Some(Photons::new(message.body));
                 None
             }
@@ -412,49 +330,26 @@ impl<'a> Sidecar<'a> {
         self.stopping.get_or_insert(reason);
         // Even if no sensor runs: the last host learns that its session is over.
         self.endpoint.set_stop_reason(reason);
-        self.pixels.clear();
-        self.blocks.clear();
-        self.config = None;
-        self.binning = None;
-        self.neighbours = None;
+        self.array.clear();
         self.dynamic_depth = None;
-        self.once_per_bin = None;
         self.source = Source::Link;
         self.photons = None;
         self.answer = None;
         self.requested_histogram = None;
         self.encoder = AerEncoder::new();
-        self.restart_counts();
+        self.frame_cycles = 0;
         while self.words.dequeue().is_some() {}
     }
 
-    fn restart_counts(&mut self) {
-        self.cycle = 0;
-        self.frame_cycles = 0;
-        self.since_look = 0;
-        self.since_tick = 0;
-        self.statistics = Statistics::default();
-        self.block_statistics = Statistics::default();
-        self.turn = 0;
-        self.unaddressed = 0;
-    }
-
     fn report(&self, overrun: u32) -> Report {
-        let (mut statistics, mut blocks) = (self.statistics, self.block_statistics);
-        for pixel in self.pixels.iter() {
-            pixel.detector.add_photons_to(&mut statistics);
-            // Those that were sent before the report.
-            statistics.events -= u64::from(pixel.detector.has_event());
-        }
-        for block in self.blocks.iter() {
-            block.detector.pixel().add_photons_to(&mut blocks);
-            blocks.events -= u64::from(block.detector.has_event());
-        }
+        // Events are those that were sent before the report.
+        let [statistics, blocks] = self.array.statistics();
+        let losses = self.array.losses();
         Report {
-            cycles: self.cycle,
+            cycles: self.array.cycles(),
             statistics,
             blocks,
-            unaddressed: self.unaddressed,
+            unaddressed: losses.unaddressed + losses.left_out,
             overrun,
             unknown: self.unknown,
             sensor_errors: self.sensor_errors,

@@ -1,11 +1,10 @@
 //! Photons and histograms of a sensor, which cannot wait.
 
-use dtof_core::{DepthEvent, EchoNumber, LaserCycle, PixelAddress, WholeHistogram};
+use dtof_core::{DepthEvent, EchoNumber, PixelAddress};
 use dtof_link::frame::Deframer;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::vec::Vec;
 
-use super::events::has_room_for_events;
 use super::{BINS, Sidecar};
 use dtof_link::message;
 use dtof_link::{Source, StopReason};
@@ -93,7 +92,7 @@ impl Sidecar<'_> {
             self.has_steered = true;
             sensor.stop();
         }
-        let is_configured = self.config.is_some() && self.source == Source::Sensor;
+        let is_configured = self.array.config().is_some() && self.source == Source::Sensor;
         let should_run = is_configured && self.off.is_none();
         if self.running && !(should_run && self.started) {
             self.sensor_stops = self.sensor_stops.saturating_add(1);
@@ -124,7 +123,7 @@ impl Sidecar<'_> {
     /// counts down, is not 0. So no decision is deferred. Call [`Self::poll_with`] between the calls.
     pub fn simulate(&mut self, sensor: &mut Simulated<'_>, left: &mut u64) {
         for _ in 0..UNPACED {
-            if *left == 0 || !self.takes_sensor() || self.has_waiting_events() {
+            if *left == 0 || !self.takes_sensor() || self.array.has_event() {
                 return;
             }
             *left -= 1;
@@ -136,24 +135,11 @@ impl Sidecar<'_> {
     // Not inlined, to keep this off the stack while the histogram is sent.
     #[inline(never)]
     fn decide_whole(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
-        let Some(config) = &self.config else {
-            return;
-        };
-        let statistics = &mut self.statistics;
-        if !has_room_for_events(&self.words, config.echoes().raw().into()) {
-            statistics.add_counts(counts, config.gate());
-            statistics.deferred += 1;
-            return;
-        }
-        let cycle = LaserCycle::new(self.cycle.saturating_sub(1));
-        let exposure = u16::try_from(self.frame_cycles).unwrap_or(u16::MAX);
         let mut events = Vec::<DepthEvent, { EchoNumber::LAST.raw() as usize }>::new();
-        let mut whole = WholeHistogram::<BINS>::new();
-        let cycles = self.frame_cycles.into();
-        whole.decide(config, counts, cycles, statistics, |echo, detection| {
-            let event = detection.event(pixel, cycle, exposure);
+        let room = self.room();
+        self.array.histogram(pixel, counts, room, |event| {
             // There is room for each echo.
-            let _ = events.push(DepthEvent { echo, ..event });
+            let _ = events.push(*event);
         });
         for event in &events {
             self.enqueue(event);
@@ -220,7 +206,7 @@ impl Sidecar<'_> {
     /// Whether photons of a sensor count. Those that come while a configuration
     /// waits for the last events of the one before belong to neither.
     fn takes_sensor(&self) -> bool {
-        self.config.is_some()
+        self.array.config().is_some()
             && self.source == Source::Sensor
             && self.off.is_none()
             && self.question() != Some(message::CONFIGURE)
@@ -231,7 +217,7 @@ impl Sidecar<'_> {
 impl PhotonSink for Sidecar<'_> {
     fn photon(&mut self, pixel: PixelAddress, code: u16) {
         if self.takes_sensor() {
-            self.count(pixel.raw().into(), code);
+            self.array.photon(pixel.raw().into(), code);
         }
     }
 
@@ -240,14 +226,14 @@ impl PhotonSink for Sidecar<'_> {
             return;
         }
         while cycles > 0 {
-            cycles -= self.end_laser_cycles_to_look(cycles);
+            cycles = self.end_laser_cycles_to_look(cycles);
         }
     }
 
     /// All histograms of the frame end with its last laser cycle.
     fn begin_frame(&mut self, cycles: u32) {
         if self.takes_sensor() {
-            self.cycle += u64::from(cycles);
+            self.array.begin_frame(cycles);
             self.frame_cycles = cycles;
         }
     }
@@ -258,11 +244,6 @@ impl PhotonSink for Sidecar<'_> {
     /// and tracking do not apply.
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
         if !self.takes_sensor() {
-            return;
-        }
-        if usize::from(pixel.raw()) >= self.pixels.len() {
-            let photons = counts.iter().map(|&count| u64::from(count));
-            self.unaddressed += photons.sum::<u64>();
             return;
         }
         self.decide_whole(pixel, counts);

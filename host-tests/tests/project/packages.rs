@@ -74,6 +74,10 @@ fn is_published(package: &Value) -> bool {
     package["publish"].is_null()
 }
 
+fn words(text: &str) -> usize {
+    text.split_whitespace().count()
+}
+
 /// The parts that a package lacks.
 fn lacking(package: &Value) -> Vec<&'static str> {
     let count = |key: &str| package[key].as_array().map_or(0, Vec::len);
@@ -100,9 +104,10 @@ fn lacking(package: &Value) -> Vec<&'static str> {
         ("keywords", (1..=5).contains(&count("keywords"))),
         ("library", builds("lib")),
         ("example", is_of_host(package) || builds("example")),
+        ("README of 150 words", words(&readme) >= least),
         (
-            "README of 150 to 350 words",
-            (least..=350).contains(&readme.split_whitespace().count()),
+            "README of 350 words beside its code",
+            readme.split("```").step_by(2).map(words).sum::<usize>() <= 350,
         ),
         ("oldest Rust and licence in it", readme.ends_with(&badges)),
         (

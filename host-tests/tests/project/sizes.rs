@@ -3,7 +3,7 @@
 use std::mem::size_of;
 
 use dtof_core::binning::Block;
-use dtof_core::{AsyncPixel, Count8, Count16, Count24, DepthEvent, Histogram};
+use dtof_core::{AsyncPixel, Count8, Count16, Count24, DepthEvent, Histogram, PixelPlace};
 
 #[test]
 fn a_macropixel_takes_what_the_documentation_says() {
@@ -19,6 +19,9 @@ fn a_macropixel_takes_what_the_documentation_says() {
     let statement = "macropixel of 128 bins takes 320 bytes, with 8-bit counters 192.";
     assert!(include_str!("../../../README.md").contains(statement));
     assert!(include_str!("../../../core/README.md").contains(statement));
+    // In an array that is driven: 12 bytes more.
+    assert_eq!(size_of::<PixelPlace<128>>(), 320 + 12);
+    assert!(include_str!("../../../core/README.md").contains("In an array it takes 12 more."));
     // A block: 4 bytes more.
     assert_eq!(size_of::<Block<128>>(), 128 * 2 + 64 + 4);
     assert_eq!(size_of::<DepthEvent>(), 28);

@@ -39,9 +39,11 @@ struct Member<const BINS: usize, W: CounterWidth> {
 }
 
 /// A block of a group.
-#[derive(Clone, Debug)]
-struct BlockMember<const BINS: usize> {
-    block: Block<BINS>,
+type BlockMember<const BINS: usize> = Block<BINS, OfBlock<BINS>>;
+
+/// What is kept beside a block.
+#[derive(Clone, Debug, Default)]
+struct OfBlock<const BINS: usize> {
     /// The photons of the last look, if it found no peak.
     without_peak: Option<u32>,
     /// The last decision, if it is kept.
@@ -180,25 +182,17 @@ impl<const BINS: usize, W: CounterWidth> Looks<BINS> for Member<BINS, W> {
     }
 }
 
-impl<const BINS: usize> BlockMember<BINS> {
-    /// The photons that it decides on: more whenever one comes.
-    fn photons(&self) -> u32 {
-        let histogram = self.block.pixel().histogram();
-        histogram.total().wrapping_add(histogram.saturated())
-    }
-}
-
-impl<const BINS: usize> AsMut<Block<BINS>> for BlockMember<BINS> {
-    fn as_mut(&mut self) -> &mut Block<BINS> {
-        &mut self.block
-    }
+/// The photons that a block decides on: more whenever one comes.
+fn photons<const BINS: usize>(block: &BlockMember<BINS>) -> u32 {
+    let histogram = block.pixel().histogram();
+    histogram.total().wrapping_add(histogram.saturated())
 }
 
 impl<const BINS: usize> Looks<BINS> for BlockMember<BINS> {
     fn idle_cycles(&self, configs: &Configs<BINS>) -> u16 {
-        let photons = self.photons();
-        let has_no_peak = photons == 0 || self.without_peak == Some(photons);
-        idle_cycles(self.block.pixel(), &configs.blocks, has_no_peak)
+        let photons = photons(self);
+        let has_no_peak = photons == 0 || self.data.without_peak == Some(photons);
+        idle_cycles(self.pixel(), &configs.blocks, has_no_peak)
     }
 
     fn end_laser_cycles(
@@ -208,23 +202,24 @@ impl<const BINS: usize> Looks<BINS> for BlockMember<BINS> {
         last: LaserCycle,
         cycles: u16,
     ) -> Look {
-        let (config, kept, statistics) = (&configs.blocks, &mut self.last, &mut done.blocks);
+        let (config, statistics) = (&configs.blocks, &mut done.blocks);
+        let mut kept = self.data.last.take();
         let observe = |input: &DecisionInput<'_, BINS, _>| {
-            if let Some(kept) = kept {
+            if let Some(kept) = &mut kept {
                 kept.record_input(input);
             }
         };
-        let block = &mut self.block;
-        let look = block.end_laser_cycles_with(config, statistics, last, cycles, observe);
+        let look = self.end_laser_cycles_with(config, statistics, last, cycles, observe);
         if look != Look::NotDue {
-            self.without_peak = (look == Look::NoPeak).then(|| self.photons());
+            self.data.without_peak = (look == Look::NoPeak).then(|| photons(self));
         }
-        if let Some(event) = self.block.take_event() {
-            if let Some(kept) = &mut self.last {
+        if let Some(event) = self.take_event() {
+            if let Some(kept) = &mut kept {
                 kept.record_event(event);
             }
             done.events.push(event);
         }
+        self.data.last = kept;
         look
     }
 }
@@ -301,13 +296,11 @@ impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
             let number = addresses.binary_search(&address).ok()?;
             Some(Member::new(number, address, Some(binning.link_of(local))))
         });
-        let blocks = binning.blocks().map(|place| BlockMember {
-            block: Block::new(BlockPlace {
+        let blocks = binning.blocks().map(|place| {
+            Block::new(BlockPlace {
                 first: pixels[usize::from(place.first.raw())],
                 ..place
-            }),
-            without_peak: None,
-            last: None,
+            })
         });
         Ok(Self {
             members: members.collect(),
@@ -417,7 +410,7 @@ impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
                 }
             }
             for block in &mut self.blocks {
-                block.block.tick();
+                block.tick();
             }
         }
     }
@@ -429,15 +422,15 @@ impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
             member.last = LastDecision::allocate(is_kept(member.pixel.address()));
         }
         for member in &mut self.blocks {
-            let address = member.block.pixel().address();
-            member.last = LastDecision::allocate(is_kept(address));
+            let address = member.pixel().address();
+            member.data.last = LastDecision::allocate(is_kept(address));
         }
     }
 
     /// The decisions that were kept.
     pub fn decisions(&self) -> impl Iterator<Item = Decision> {
         let of_members = self.members.iter().map(|member| &member.last);
-        let of_blocks = self.blocks.iter().map(|member| &member.last);
+        let of_blocks = self.blocks.iter().map(|member| &member.data.last);
         let all = of_members.chain(of_blocks).flatten();
         all.filter_map(|last| last.decision())
     }
@@ -448,7 +441,7 @@ impl<const BINS: usize, W: CounterWidth> Group<BINS, W> {
             member.pixel.add_photons_to(pixels);
         }
         for block in &self.blocks {
-            block.block.pixel().add_photons_to(blocks);
+            block.pixel().add_photons_to(blocks);
         }
     }
 }

@@ -5,8 +5,8 @@ use core::array;
 use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
 use dtof_core::{
-    AnyRule, Array, AsyncPixel, Count8, Count10, Count16, Count20, CounterWidth, Neighbours,
-    Statistics,
+    AnyRule, Array, ArrayConfig, AsyncPixel, Count8, Count10, Count16, Count20, CounterWidth,
+    Neighbours, PixelArray, PixelPlace, Statistics,
 };
 
 use crate::values::{
@@ -18,6 +18,12 @@ pub fn all() {
     blocks::<8>();
     blocks::<128>();
     blocks::<1024>();
+    driven::<8, Count10>();
+    driven::<128, Count8>();
+    driven::<128, Count10>();
+    driven::<1024, Count20>();
+    whole::<8>();
+    whole::<128>();
     neighbours::<8, Count10>();
     neighbours::<128, Count8>();
     neighbours::<128, Count10>();
@@ -47,7 +53,7 @@ fn blocks<const BINS: usize>() {
         return;
     };
     for place in binning.blocks() {
-        let mut blocks = [Block::new(place)];
+        let mut blocks: [Block<BINS>; 1] = [Block::new(place)];
         let mut statistics = Statistics::default();
         while more() {
             count_in_blocks(&mut blocks, &link, &config, half());
@@ -65,6 +71,93 @@ fn blocks<const BINS: usize>() {
         }
         keep(statistics);
     }
+}
+
+/// An array that is driven, of any shape, with blocks or neighbours or without.
+#[inline(never)]
+fn driven<const BINS: usize, W: CounterWidth>() {
+    let (Some(array), Some(around)) = (Array::new(word(), word()), Neighbours::new(byte())) else {
+        return;
+    };
+    let (Some(config), Some(rule)) = (
+        or_text(settings::<BINS, _>(any_rule()).build()),
+        window_rule(),
+    ) else {
+        return;
+    };
+    let mut config = ArrayConfig::new(array, config);
+    if more() {
+        let blocks = settings::<BINS, _>(any_rule().of_blocks(level()));
+        let Some(blocks) = or_text(blocks.build()) else {
+            return;
+        };
+        let Some(with) = or_text(config.blocks(level(), blocks, half())) else {
+            return;
+        };
+        config = with;
+    } else if more() {
+        let with = config.neighbours(NeighbourConfig::new(array, around, &rule));
+        let Some(with) = or_text(with) else {
+            return;
+        };
+        config = with;
+    }
+    if more() {
+        config = config.once_per_bin();
+    }
+    let Some(config) = or_text(config.first(word())) else {
+        return;
+    };
+    keep((config.has_neighbours(), *config.pixels()));
+    let mut places: [PixelPlace<BINS, W>; 3] = array::from_fn(|_| PixelPlace::new());
+    let mut blocks: [Block<BINS>; 2] = array::from_fn(|_| Block::default());
+    let mut driven = PixelArray::new(&mut places, &mut blocks);
+    while more() {
+        if more() {
+            keep(or_text(driven.configure(&config)));
+        }
+        driven.leave_out(usize::from(half()));
+        driven.photon(usize::from(half()), half());
+        keep(driven.end_laser_cycles(half()));
+        driven.lost(cycle().raw(), cycle().raw());
+        keep((driven.has_event(), driven.has_looked(), driven.cycles()));
+        if let Some(event) = driven.next_event() {
+            keep(driven.data_of(&event).is_some());
+            keep(event);
+        }
+        keep((
+            driven.exposure(usize::from(half())),
+            driven.room(),
+            *driven.losses(),
+        ));
+        keep(driven.pixel(usize::from(half())).map(AsyncPixel::exposure));
+        keep((driven.config().is_some(), driven.statistics()));
+        if more() {
+            driven.clear();
+        }
+    }
+}
+
+/// Whole histograms of one.
+#[inline(never)]
+fn whole<const BINS: usize>() {
+    let Some(config) = or_text(settings::<BINS, _>(any_rule()).build()) else {
+        return;
+    };
+    let Some(layout) = Array::new(word(), word()) else {
+        return;
+    };
+    let mut places: [PixelPlace<BINS>; 3] = array::from_fn(|_| PixelPlace::new());
+    let mut driven = PixelArray::new(&mut places, &mut []);
+    keep(or_text(driven.configure(&ArrayConfig::new(layout, config))));
+    while more() {
+        driven.begin_frame(word());
+        let counts = values::<u32, BINS>(word);
+        driven.histogram(address(), &counts, usize::from(half()), |event| {
+            keep(*event)
+        });
+    }
+    keep(driven.statistics());
 }
 
 /// Pixels with any addresses, of an array that may have more or fewer.

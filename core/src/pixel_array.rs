@@ -1,0 +1,759 @@
+//! An array of pixels that is driven: photons in, events out.
+//!
+//! It has the order of a laser cycle, so that a program has not: photons count in their pixel, and in the blocks that it
+//! feeds; every X laser cycles all pixels look, alone or with their [neighbours](crate::neighbours), then their
+//! [blocks](crate::binning); pixels that have stayed silent begin to feed their block. A pixel that is left out counts
+//! nothing and decides nothing.
+//!
+//! ```
+//! use dtof_core::fixed::types::U4F12;
+//! use dtof_core::binning::Block;
+//! use dtof_core::{
+//!     Array, ArrayConfig, BlockLevel, Count, PixelArray, PixelConfig, PixelPlace, WindowRule,
+//! };
+//!
+//! let rule = WindowRule::new(3, const { U4F12::lit("4.47") }, Count::saturating(5))?;
+//! let level = BlockLevel::new(1).unwrap();
+//! let pixels = PixelConfig::with_rule(rule).build()?;
+//! let blocks = PixelConfig::with_rule(rule.of_blocks(level)).build()?;
+//! let config = ArrayConfig::new(Array::new(4, 2).unwrap(), pixels).blocks(level, blocks, 400)?;
+//!
+//! let mut room: Vec<PixelPlace<128>> = (0..8).map(|_| PixelPlace::new()).collect();
+//! let mut block_room: Vec<Block<128>> = (0..2).map(|_| Block::default()).collect();
+//! let mut array = PixelArray::new(&mut room, &mut block_room);
+//! array.configure(&config)?;
+//! array.leave_out(7);
+//! let mut events = 0;
+//! for cycle in 0..500 {
+//!     for (pixel, code) in [(0, 60), (1, cycle % 128), (6, 60), (7, 60), (7, 60)] {
+//!         array.photon(pixel, code);
+//!     }
+//!     array.end_laser_cycles(1);
+//!     while let Some(event) = array.next_event() {
+//!         assert_eq!(event.peak_bin.raw(), 60);
+//!         events += 1;
+//!     }
+//! }
+//! assert!(events > 20);
+//! assert_eq!(array.losses().left_out, 2 * 500);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! The photons of a laser cycle may come in any order of pixels, as the queue of a shared TDC gives them.
+//!
+//! Cost: pixels are touched at looks only, so a laser cycle without a look takes 12 instructions for the whole array.
+//!
+//! Source: the order is the flow chart of the paper's section II-B, for all pixels at once. The rest is ours.
+
+use crate::array::Array;
+use crate::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
+use crate::check::impl_error;
+use crate::config::PixelConfig;
+use crate::detect::{DetectionRule, PaperRule};
+use crate::event::DepthEvent;
+use crate::histogram::counter::{Count10, CounterWidth, PhotonCount};
+use crate::neighbours::{ArrayPixel, NeighbourConfig, end_laser_cycles_of_array};
+use crate::pixel::{AsyncPixel, Look, OncePerBin};
+use crate::statistics::Statistics;
+use crate::units::{BlockLevel, LaserCycle, PixelAddress};
+use crate::whole::WholeHistogram;
+
+/// A pixel of an array: its room. A program may keep `data` beside it.
+#[derive(Clone, Debug)]
+pub struct PixelPlace<const BINS: usize, W: CounterWidth = Count10, T = ()> {
+    pixel: AsyncPixel<BINS, W>,
+    feed: BlockLink,
+    /// The low bits of the last laser cycle with a photon, and its latest bin, where photons count once per bin.
+    seen_in: u32,
+    latest: u16,
+    use_of: Use,
+    is_left_out: bool,
+    /// Of the program. A configuration sets it to the default.
+    pub data: T,
+}
+
+/// What a place is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Use {
+    /// No pixel.
+    Nothing,
+    /// A pixel that is left out.
+    LeftOut,
+    /// A pixel whose photons only count.
+    Plain,
+    /// A pixel with blocks, or whose photons count once per bin.
+    Further,
+}
+
+impl<const BINS: usize, W: CounterWidth, T: Default> PixelPlace<BINS, W, T> {
+    /// Room for a pixel. A photon there is one of no pixel until a configuration uses it.
+    #[must_use]
+    pub fn new() -> Self {
+        Self::of(PixelAddress::new(0), BlockLink::NONE, Use::Nothing)
+    }
+
+    #[inline(never)]
+    fn of(address: PixelAddress, feed: BlockLink, use_of: Use) -> Self {
+        Self {
+            pixel: AsyncPixel::new(address),
+            feed,
+            seen_in: 0,
+            latest: 0,
+            use_of,
+            is_left_out: false,
+            data: T::default(),
+        }
+    }
+}
+
+impl<const BINS: usize, W: CounterWidth, T: Default> Default for PixelPlace<BINS, W, T> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<const BINS: usize, W: CounterWidth, T> ArrayPixel<BINS, W> for PixelPlace<BINS, W, T> {
+    #[inline(always)]
+    fn pixel(&self) -> Option<&AsyncPixel<BINS, W>> {
+        self.use_of.counts().then_some(&self.pixel)
+    }
+
+    #[inline(always)]
+    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS, W>> {
+        self.use_of.counts().then_some(&mut self.pixel)
+    }
+}
+
+impl Use {
+    #[inline(always)]
+    const fn counts(self) -> bool {
+        matches!(self, Self::Plain | Self::Further)
+    }
+}
+
+/// How the pixels of an array operate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ArrayConfig<const BINS: usize, R: DetectionRule = PaperRule> {
+    layout: Array,
+    number: u32,
+    pixels: PixelConfig<BINS, R>,
+    together: Together<BINS, R>,
+    once_per_bin: bool,
+}
+
+/// How pixels decide together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Together<const BINS: usize, R: DetectionRule> {
+    Alone,
+    Blocks {
+        binning: Binning,
+        config: PixelConfig<BINS, R>,
+        patience: u16,
+    },
+    Neighbours(NeighbourConfig),
+}
+
+/// An array that cannot be driven so.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub enum ArrayError {
+    /// There is no room for so many pixels.
+    Pixels,
+    /// The layout has fewer pixels, or neighbours have another one.
+    Layout,
+    /// There is no room for the blocks.
+    Blocks,
+    /// Blocks have a level of 1 or more.
+    NoLevel,
+    /// Blocks look when pixels do.
+    OtherLooks,
+    /// Both blocks and neighbours.
+    BlocksAndNeighbours,
+    /// The rule weighs a dead time, which neighbours do not.
+    NeighboursAndDeadTime,
+}
+
+impl ArrayError {
+    /// The error in one line.
+    #[must_use]
+    pub const fn text(self) -> &'static str {
+        match self {
+            Self::Pixels => "there is no room for so many pixels",
+            Self::Layout => "the layout has fewer pixels, or neighbours have another one",
+            Self::Blocks => "there is no room for so many blocks",
+            Self::NoLevel => "blocks have at least level 1",
+            Self::OtherLooks => "X of the blocks must be that of the pixels",
+            Self::BlocksAndNeighbours => "pixels have blocks or neighbours, not both",
+            Self::NeighboursAndDeadTime => "neighbours do not weigh a dead time",
+        }
+    }
+}
+
+impl_error!(ArrayError);
+
+impl<const BINS: usize, R: DetectionRule> ArrayConfig<BINS, R> {
+    /// Pixels that decide alone.
+    #[must_use]
+    pub const fn new(layout: Array, pixels: PixelConfig<BINS, R>) -> Self {
+        Self {
+            layout,
+            number: layout.pixels(),
+            pixels,
+            together: Together::Alone,
+            once_per_bin: false,
+        }
+    }
+
+    /// The first `number` pixels of the layout only: its last rows are not full.
+    ///
+    /// # Errors
+    /// Fails if the layout has fewer.
+    pub const fn first(mut self, number: u32) -> Result<Self, ArrayError> {
+        if number > self.layout.pixels() {
+            return Err(ArrayError::Layout);
+        }
+        self.number = number;
+        Ok(self)
+    }
+
+    /// With [blocks](crate::binning) of the levels 1 to `levels`, and ticks every `patience` laser cycles, rounded up to
+    /// looks. `config` is that of the blocks.
+    ///
+    /// # Errors
+    /// Fails without levels, with another X, and with neighbours.
+    pub const fn blocks(
+        mut self,
+        levels: BlockLevel,
+        config: PixelConfig<BINS, R>,
+        patience: u16,
+    ) -> Result<Self, ArrayError> {
+        let Some(binning) = Binning::new(self.layout, levels) else {
+            return Err(ArrayError::NoLevel);
+        };
+        if config.x() != self.pixels.x() {
+            return Err(ArrayError::OtherLooks);
+        }
+        if self.has_neighbours() {
+            return Err(ArrayError::BlocksAndNeighbours);
+        }
+        self.together = Together::Blocks {
+            binning,
+            config,
+            patience,
+        };
+        Ok(self)
+    }
+
+    /// With [neighbours](crate::neighbours) that confirm. The rule of the pixels must be [`NeighbourRule::own`] of theirs, or
+    /// there may be half as many false alarms more.
+    ///
+    /// # Errors
+    /// Fails for another array, with blocks, and with a dead time that the rule weighs.
+    ///
+    /// [`NeighbourRule::own`]: crate::neighbours::NeighbourRule::own
+    pub fn neighbours(mut self, neighbours: NeighbourConfig) -> Result<Self, ArrayError> {
+        if *neighbours.array() != self.layout {
+            return Err(ArrayError::Layout);
+        }
+        if self.pixels.weighs_dead_time() {
+            return Err(ArrayError::NeighboursAndDeadTime);
+        }
+        if matches!(self.together, Together::Blocks { .. }) {
+            return Err(ArrayError::BlocksAndNeighbours);
+        }
+        self.together = Together::Neighbours(neighbours);
+        Ok(self)
+    }
+
+    /// Photons of one laser cycle in one bin count [once](OncePerBin). The photons of a pixel come together, or in the order
+    /// of time between those of others. A photon that comes later than one of a later bin, and not together with it, does
+    /// not count, because it may be a second one: see [`ArrayLosses::unordered`].
+    #[must_use]
+    pub const fn once_per_bin(mut self) -> Self {
+        self.once_per_bin = true;
+        self
+    }
+
+    /// How the pixels operate.
+    #[must_use]
+    pub const fn pixels(&self) -> &PixelConfig<BINS, R> {
+        &self.pixels
+    }
+
+    /// Whether neighbours confirm.
+    #[must_use]
+    pub const fn has_neighbours(&self) -> bool {
+        matches!(self.together, Together::Neighbours(_))
+    }
+
+    /// The place of a block among the blocks of the array.
+    fn place_of_block(&self, level: BlockLevel, first: PixelAddress) -> Option<usize> {
+        match &self.together {
+            Together::Blocks { binning, .. } => binning.number_of(level, first),
+            _ => None,
+        }
+    }
+}
+
+/// The bins in which a pixel has had photons one after another in this laser cycle.
+#[derive(Clone, Copy, Debug)]
+struct Seen {
+    pixel: usize,
+    bins: OncePerBin<{ OncePerBin::words(1024) }>,
+    /// The latest bin of its photons in this laser cycle that came before others.
+    latest: Option<u16>,
+}
+
+impl Seen {
+    const fn of(pixel: usize, latest: Option<u16>) -> Self {
+        Self {
+            pixel,
+            bins: OncePerBin::new(),
+            latest,
+        }
+    }
+
+    /// Whether no photon of the laser cycle was in this bin before.
+    fn is_first(&mut self, code: u16) -> bool {
+        self.latest.is_none_or(|latest| code > latest) && self.bins.is_first(code)
+    }
+}
+
+/// Photons that counted in no pixel, since the configuration.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "defmt", derive(defmt::Format))]
+#[non_exhaustive]
+pub struct ArrayLosses {
+    /// Of addresses without a pixel.
+    pub unaddressed: u64,
+    /// Of pixels that are left out.
+    pub left_out: u64,
+    /// Whose bin may have had one in the same laser cycle, because they came out of order. They are among the repeated ones
+    /// of the statistics.
+    pub unordered: u64,
+    /// That never came, as [`PixelArray::lost`] was told.
+    pub photons: u64,
+    /// Laser cycles whose photons never came.
+    pub laser_cycles: u64,
+}
+
+/// An array of pixels in the room that a program gives it.
+#[derive(Debug)]
+pub struct PixelArray<'a, const BINS: usize, R: DetectionRule, W: CounterWidth = Count10, T = ()> {
+    pixels: &'a mut [PixelPlace<BINS, W, T>],
+    blocks: &'a mut [Block<BINS, T>],
+    config: Option<ArrayConfig<BINS, R>>,
+    /// Of these rooms, those in use.
+    pixels_in_use: usize,
+    blocks_in_use: usize,
+    /// Laser cycles that have ended.
+    cycle: u64,
+    /// Those since the pixels looked last: all look at once.
+    since_look: u16,
+    /// Those from the last tick of the blocks to the last look.
+    since_tick: u16,
+    /// The pixel, or after the pixels the block, whose slot is emptied next.
+    turn: usize,
+    /// Events of pixels and of blocks that have left their slots.
+    taken: [u64; 2],
+    /// Of the pixel whose photons come now, where they count once per bin.
+    seen: Seen,
+    /// The laser cycles of the whole histograms that come now.
+    frame_cycles: u32,
+    statistics: Statistics,
+    block_statistics: Statistics,
+    losses: ArrayLosses,
+}
+
+impl<'a, const BINS: usize, R, W, T> PixelArray<'a, BINS, R, W, T>
+where
+    R: DetectionRule,
+    W: CounterWidth,
+    T: Default,
+{
+    /// An array without pixels, until a configuration. Without blocks `blocks` may be empty.
+    #[must_use]
+    pub fn new(pixels: &'a mut [PixelPlace<BINS, W, T>], blocks: &'a mut [Block<BINS, T>]) -> Self {
+        Self {
+            pixels,
+            blocks,
+            config: None,
+            pixels_in_use: 0,
+            blocks_in_use: 0,
+            cycle: 0,
+            since_look: 0,
+            since_tick: 0,
+            turn: 0,
+            taken: [0; 2],
+            seen: Seen::of(0, None),
+            frame_cycles: 0,
+            statistics: Statistics::new(),
+            block_statistics: Statistics::new(),
+            losses: ArrayLosses::default(),
+        }
+    }
+
+    /// All pixels begin, and all counts are 0.
+    ///
+    /// # Errors
+    /// Fails without room for that. The array stays as it was.
+    pub fn configure(&mut self, config: &ArrayConfig<BINS, R>) -> Result<(), ArrayError> {
+        let binning = match &config.together {
+            Together::Blocks { binning, .. } => Some(*binning),
+            _ => None,
+        };
+        let pixels = usize::try_from(config.number).unwrap_or(usize::MAX);
+        let blocks = binning.map_or(0, |binning| binning.number_of_blocks());
+        let blocks = usize::try_from(blocks).unwrap_or(usize::MAX);
+        if pixels > self.pixels.len() {
+            return Err(ArrayError::Pixels);
+        }
+        if blocks > self.blocks.len() {
+            return Err(ArrayError::Blocks);
+        }
+        self.clear();
+        let use_of = match binning.is_none() && !config.once_per_bin {
+            true => Use::Plain,
+            false => Use::Further,
+        };
+        let addresses = (0..=u16::MAX).map(PixelAddress::new);
+        for (place, address) in self.pixels.iter_mut().take(pixels).zip(addresses) {
+            let feed = binning.map_or(BlockLink::NONE, |binning| binning.link_of(address));
+            let is_left_out = place.is_left_out;
+            *place = PixelPlace::of(address, feed, use_of);
+            if is_left_out {
+                (place.is_left_out, place.use_of) = (true, Use::LeftOut);
+            }
+        }
+        for (block, place) in self
+            .blocks
+            .iter_mut()
+            .zip(binning.iter().flat_map(Binning::blocks))
+        {
+            *block = Block::new(place);
+        }
+        (self.pixels_in_use, self.blocks_in_use) = (pixels, blocks);
+        self.config = Some(*config);
+        Ok(())
+    }
+
+    /// The array has no pixels, until a configuration.
+    pub fn clear(&mut self) {
+        for place in self.pixels.iter_mut() {
+            place.use_of = Use::Nothing;
+        }
+        self.config = None;
+        (self.pixels_in_use, self.blocks_in_use) = (0, 0);
+        (self.cycle, self.since_look, self.since_tick) = (0, 0, 0);
+        (self.turn, self.taken, self.frame_cycles) = (0, [0; 2], 0);
+        (self.statistics, self.block_statistics) = (Statistics::new(), Statistics::new());
+        self.losses = ArrayLosses::default();
+    }
+}
+
+impl<const BINS: usize, R, W, T> PixelArray<'_, BINS, R, W, T>
+where
+    R: DetectionRule,
+    W: CounterWidth,
+{
+    /// Counts a photon of pixel number `pixel`, row · columns + column, with the TDC code `code` in the current laser cycle.
+    pub fn photon(&mut self, pixel: usize, code: u16) {
+        let use_of = self.pixels.get(pixel).map(|place| place.use_of);
+        if use_of != Some(Use::Plain) && !self.counts(pixel, code) {
+            return;
+        }
+        if let (Some(place), Some(config)) = (self.pixels.get_mut(pixel), &self.config) {
+            place.pixel.count(&config.pixels, code);
+            if let Together::Blocks { config, .. } = &config.together {
+                count_in_blocks(self.blocks, &place.feed, config, code);
+            }
+        }
+    }
+
+    /// Whether a photon counts that is not one of a plain pixel.
+    // Out of line: a photon that counts anyhow would take longer with it.
+    #[inline(never)]
+    fn counts(&mut self, pixel: usize, code: u16) -> bool {
+        let place = self.pixels.get_mut(pixel);
+        let (Some(place), Some(config)) = (place, &self.config) else {
+            self.losses.unaddressed += 1;
+            return false;
+        };
+        if !place.use_of.counts() {
+            match place.use_of {
+                Use::LeftOut => self.losses.left_out += 1,
+                _ => self.losses.unaddressed += 1,
+            }
+            return false;
+        }
+        if !config.once_per_bin || usize::from(code) >= BINS {
+            return true;
+        }
+        #[allow(clippy::cast_possible_truncation, reason = "the low bits")]
+        let now = (self.cycle as u32).wrapping_add(1);
+        if place.seen_in != now {
+            (place.seen_in, place.latest) = (now, code);
+            self.seen = Seen::of(pixel, None);
+        } else if self.seen.pixel != pixel {
+            self.seen = Seen::of(pixel, Some(place.latest));
+        }
+        if !self.seen.is_first(code) {
+            self.statistics.repeated += 1;
+            self.losses.unordered += u64::from(Some(code) < self.seen.latest);
+            return false;
+        }
+        place.latest = place.latest.max(code);
+        true
+    }
+
+    /// Ends `cycles` laser cycles, with photons or without, but none after a look. Returns how many are left: end these
+    /// after the events of that look are taken. An event that stays in its slot defers the next decision of its pixel.
+    #[inline]
+    pub fn end_laser_cycles(&mut self, cycles: u16) -> u16 {
+        let Some(config) = &self.config else {
+            return 0;
+        };
+        let to_look = config.pixels.x() - self.since_look;
+        if cycles < to_look {
+            self.since_look += cycles;
+            self.cycle += u64::from(cycles);
+            return 0;
+        }
+        self.cycle += u64::from(to_look);
+        self.since_look = 0;
+        self.look();
+        cycles - to_look
+    }
+
+    /// All pixels have ended X laser cycles, and look.
+    fn look(&mut self) {
+        // An event that was left has its turn before those that come now.
+        self.turn = self.next_slot(self.turn).unwrap_or(0);
+        let Some(config) = &self.config else {
+            return;
+        };
+        let (pixels, x) = (&config.pixels, config.pixels.x());
+        let last = LaserCycle::new(self.cycle - 1);
+        let places = self
+            .pixels
+            .get_mut(..self.pixels_in_use)
+            .unwrap_or_default();
+        if let Together::Neighbours(neighbours) = &config.together {
+            end_laser_cycles_of_array(places, pixels, neighbours, &mut self.statistics, last, x);
+        } else {
+            for place in places.iter_mut().filter(|place| place.use_of.counts()) {
+                let (pixel, statistics) = (&mut place.pixel, &mut self.statistics);
+                let look = pixel.end_laser_cycles(pixels, statistics, last, x);
+                // A pixel that has waited for another echo has reported, too.
+                if matches!(look, Look::Event | Look::Ended) {
+                    place.feed.reported();
+                }
+            }
+        }
+        if let Together::Blocks {
+            config, patience, ..
+        } = &config.together
+        {
+            let blocks = self
+                .blocks
+                .get_mut(..self.blocks_in_use)
+                .unwrap_or_default();
+            let statistics = &mut self.block_statistics;
+            end_laser_cycles_of_blocks(blocks, config, statistics, last, x);
+            self.since_tick = self.since_tick.saturating_add(x);
+            if self.since_tick >= *patience {
+                self.since_tick = 0;
+                for place in places {
+                    place.feed.tick(place.pixel.has_reported());
+                }
+                blocks.iter_mut().for_each(Block::tick);
+            }
+        }
+    }
+
+    /// Takes an event out of its slot: of the pixels by address, then of the blocks. Who does not take all goes on from there
+    /// later, so that each has its turn.
+    pub fn next_event(&mut self) -> Option<DepthEvent> {
+        let slot = self.next_slot(self.turn)?;
+        let event = match slot.checked_sub(self.pixels_in_use) {
+            None => {
+                self.taken[0] += 1;
+                self.pixels.get_mut(slot)?.pixel.take_event()
+            }
+            Some(block) => {
+                self.taken[1] += 1;
+                self.blocks.get_mut(block)?.take_event()
+            }
+        };
+        self.turn = slot + 1;
+        event
+    }
+
+    /// The next slot from `from` on with an event, or else the first.
+    #[inline(never)]
+    fn next_slot(&self, from: usize) -> Option<usize> {
+        if !self.has_event() {
+            return None;
+        }
+        let slots = self.pixels_in_use + self.blocks_in_use;
+        let mut slot = from;
+        for _ in 0..slots {
+            if slot >= slots {
+                slot = 0;
+            }
+            let has_event = match slot.checked_sub(self.pixels_in_use) {
+                None => self.pixels.get(slot).map(|place| place.pixel.has_event()),
+                Some(block) => self.blocks.get(block).map(Block::has_event),
+            };
+            if has_event == Some(true) {
+                return Some(slot);
+            }
+            slot += 1;
+        }
+        None
+    }
+
+    /// Whether an event waits in its slot.
+    #[inline]
+    #[must_use]
+    pub const fn has_event(&self) -> bool {
+        self.statistics.events != self.taken[0] || self.block_statistics.events != self.taken[1]
+    }
+
+    /// Whether the pixels have looked at the end of the last laser cycle, or have just been configured.
+    #[must_use]
+    pub const fn has_looked(&self) -> bool {
+        self.since_look == 0
+    }
+
+    /// A sensor has counted whole histograms for `cycles` laser cycles by itself: each comes by [`Self::histogram`].
+    pub fn begin_frame(&mut self, cycles: u32) {
+        self.cycle += u64::from(cycles);
+        self.frame_cycles = cycles;
+    }
+
+    /// Decides on the whole histogram of a pixel, alone, and calls `event` for each event, all of the last laser cycle of the
+    /// frame. Its exposure is the laser cycles of the frame, at most 65,535. Without `room` for the events of all echoes
+    /// the histogram is a deferred decision.
+    pub fn histogram<C: PhotonCount>(
+        &mut self,
+        pixel: PixelAddress,
+        counts: &[C; BINS],
+        room: usize,
+        mut event: impl FnMut(&DepthEvent),
+    ) {
+        let photons = || {
+            let counts = counts.iter().map(|&count| u64::from(count.into()));
+            counts.sum::<u64>()
+        };
+        let place = self.pixels.get(usize::from(pixel.raw()));
+        let use_of = place.map_or(Use::Nothing, |place| place.use_of);
+        if use_of == Use::LeftOut {
+            self.losses.left_out += photons();
+            return;
+        }
+        let Some(config) = self.config.as_ref().filter(|_| use_of != Use::Nothing) else {
+            self.losses.unaddressed += photons();
+            return;
+        };
+        let (config, statistics) = (&config.pixels, &mut self.statistics);
+        if room < usize::from(config.echoes().raw()) {
+            statistics.add_counts(counts, config.gate());
+            statistics.deferred += 1;
+            return;
+        }
+        let last = LaserCycle::new(self.cycle.saturating_sub(1));
+        let exposure = u16::try_from(self.frame_cycles).unwrap_or(u16::MAX);
+        let mut whole = WholeHistogram::<BINS>::new();
+        let cycles = self.frame_cycles.into();
+        whole.decide(config, counts, cycles, statistics, |echo, detection| {
+            let first = detection.event(pixel, last, exposure);
+            event(&DepthEvent { echo, ..first });
+            self.taken[0] += 1;
+        });
+    }
+
+    /// The queue of a TDC has lost `photons`, and all photons of `laser_cycles`. These laser cycles are numbered, but they
+    /// belong to no exposure. Photons that are lost in laser cycles that end as others do make peaks lower.
+    pub const fn lost(&mut self, photons: u64, laser_cycles: u64) {
+        self.losses.photons += photons;
+        self.losses.laser_cycles += laser_cycles;
+        self.cycle += laser_cycles;
+    }
+
+    /// Leaves a pixel out from now on, whatever the configuration: its photons count as left out, and it decides nothing.
+    pub fn leave_out(&mut self, pixel: usize) {
+        if let Some(place) = self.pixels.get_mut(pixel) {
+            place.is_left_out = true;
+            if place.use_of != Use::Nothing {
+                place.use_of = Use::LeftOut;
+            }
+        }
+    }
+
+    /// The program's data beside the pixel or the block of an event.
+    pub fn data_of(&mut self, event: &DepthEvent) -> Option<&mut T> {
+        if event.level == BlockLevel::PIXEL {
+            let place = self.pixels.get_mut(usize::from(event.pixel.raw()))?;
+            return Some(&mut place.data);
+        }
+        let place = self
+            .config
+            .as_ref()?
+            .place_of_block(event.level, event.pixel)?;
+        Some(&mut self.blocks.get_mut(place)?.data)
+    }
+
+    /// The configuration in force.
+    #[must_use]
+    pub const fn config(&self) -> Option<&ArrayConfig<BINS, R>> {
+        self.config.as_ref()
+    }
+
+    /// The pixels for which there is room.
+    #[must_use]
+    pub const fn room(&self) -> usize {
+        self.pixels.len()
+    }
+
+    /// A pixel. Its exposure is that of the last look: see [`Self::exposure`].
+    #[must_use]
+    pub fn pixel(&self, pixel: usize) -> Option<&AsyncPixel<BINS, W>> {
+        self.pixels.get(pixel)?.pixel()
+    }
+
+    /// The laser cycles of a pixel's exposure that have ended.
+    #[must_use]
+    pub fn exposure(&self, pixel: usize) -> Option<u16> {
+        let exposure = self.pixel(pixel)?.exposure();
+        Some(exposure.saturating_add(self.since_look))
+    }
+
+    /// Laser cycles that have ended since the configuration.
+    #[must_use]
+    pub const fn cycles(&self) -> u64 {
+        self.cycle
+    }
+
+    /// What counted in no pixel.
+    #[must_use]
+    pub const fn losses(&self) -> &ArrayLosses {
+        &self.losses
+    }
+
+    /// What the pixels have done so far, and what the blocks have, with the photons of exposures that have not ended. Events
+    /// are those that were taken.
+    #[must_use]
+    pub fn statistics(&self) -> [Statistics; 2] {
+        let (mut pixels, mut blocks) = (self.statistics, self.block_statistics);
+        for place in self.pixels.iter().take(self.pixels_in_use) {
+            place.pixel.add_photons_to(&mut pixels);
+        }
+        for block in self.blocks.iter().take(self.blocks_in_use) {
+            block.pixel().add_photons_to(&mut blocks);
+        }
+        [pixels.events, blocks.events] = self.taken;
+        [pixels, blocks]
+    }
+}

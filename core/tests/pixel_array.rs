@@ -1,0 +1,582 @@
+//! An array that is driven does what its parts do one by one, laser cycle by laser cycle.
+
+use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
+use dtof_core::fixed::types::U4F12;
+use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
+use dtof_core::{
+    Array, ArrayConfig, ArrayError, AsyncPixel, BlockLevel, Count, DepthEvent, EchoNumber,
+    LaserCycle, Look, Neighbours, PixelAddress, PixelArray, PixelConfig, PixelPlace, RangeGate,
+    Statistics, WindowRule,
+};
+use proptest::prelude::*;
+use rand_core::{Rng, SeedableRng};
+use rand_pcg::Pcg32;
+
+const BINS: usize = 32;
+type Config = PixelConfig<BINS, WindowRule>;
+type Place = PixelPlace<BINS>;
+
+#[derive(Clone, Copy, Debug)]
+enum Mode {
+    Alone,
+    Blocks(u8, u16),
+    Neighbours(Neighbours),
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Settings {
+    columns: u32,
+    rows: u32,
+    /// Pixels that the last row lacks.
+    missing: u32,
+    mode: Mode,
+    once_per_bin: bool,
+    left_out: u32,
+    x: u16,
+    echoes: u8,
+    dead_time: u16,
+    seed: u64,
+}
+
+impl Settings {
+    fn layout(&self) -> Array {
+        Array::new(self.columns, self.rows).unwrap()
+    }
+
+    fn number(&self) -> usize {
+        (self.columns * self.rows - self.missing) as usize
+    }
+
+    fn is_left_out(&self, pixel: usize) -> bool {
+        self.left_out >> pixel & 1 > 0
+    }
+
+    fn rule(&self) -> WindowRule {
+        WindowRule::new(2, U4F12::lit("3.5"), Count::saturating(4)).unwrap()
+    }
+
+    fn config(&self, rule: WindowRule) -> Config {
+        PixelConfig::with_rule(rule)
+            .x(self.x)
+            .l1(12)
+            .l2(90)
+            .gate(RangeGate::new(2, 29).unwrap())
+            .echoes(EchoNumber::new(self.echoes).unwrap(), 2)
+            .echo_wait(3)
+            .dead_time(self.dead_time)
+            .build()
+            .unwrap()
+    }
+
+    fn neighbours(&self) -> Option<NeighbourConfig> {
+        match self.mode {
+            Mode::Neighbours(neighbours) => Some(NeighbourConfig::new(
+                self.layout(),
+                neighbours,
+                &self.rule(),
+            )),
+            _ => None,
+        }
+    }
+
+    fn pixels(&self) -> Config {
+        let own = self.neighbours().map(|neighbours| *neighbours.rule().own());
+        self.config(own.unwrap_or(self.rule()))
+    }
+
+    fn blocks(&self) -> Option<(BlockLevel, Config, u16)> {
+        match self.mode {
+            Mode::Blocks(levels, patience) => {
+                let levels = BlockLevel::new(levels).unwrap();
+                Some((levels, self.config(self.rule().of_blocks(levels)), patience))
+            }
+            _ => None,
+        }
+    }
+}
+
+/// The parts, as a program had to drive them.
+struct Parts {
+    settings: Settings,
+    pixels: Vec<Option<AsyncPixel<BINS>>>,
+    links: Vec<BlockLink>,
+    blocks: Vec<Block<BINS>>,
+    seen: Vec<(usize, u16)>,
+    cycle: u64,
+    since_tick: u16,
+    turn: usize,
+    statistics: [Statistics; 2],
+    left_out: u64,
+}
+
+impl Parts {
+    fn new(settings: Settings) -> Self {
+        let binning = settings
+            .blocks()
+            .map(|(levels, ..)| Binning::new(settings.layout(), levels).unwrap());
+        let addresses = (0..settings.number()).map(|pixel| PixelAddress::new(pixel as u16));
+        let pixel = |address: PixelAddress| {
+            let is_left_out = settings.is_left_out(address.raw().into());
+            (!is_left_out).then(|| AsyncPixel::new(address))
+        };
+        let link = |address| binning.map_or(BlockLink::NONE, |binning| binning.link_of(address));
+        Self {
+            settings,
+            pixels: addresses.clone().map(pixel).collect(),
+            links: addresses.map(link).collect(),
+            blocks: binning
+                .iter()
+                .flat_map(Binning::blocks)
+                .map(Block::new)
+                .collect(),
+            seen: Vec::new(),
+            cycle: 0,
+            since_tick: 0,
+            turn: 0,
+            statistics: [Statistics::new(); 2],
+            left_out: 0,
+        }
+    }
+
+    fn photon(&mut self, number: usize, code: u16) {
+        let Some(pixel) = &mut self.pixels[number] else {
+            self.left_out += 1;
+            return;
+        };
+        if self.settings.once_per_bin && usize::from(code) < BINS {
+            if self.seen.contains(&(number, code)) {
+                self.statistics[0].repeated += 1;
+                return;
+            }
+            self.seen.push((number, code));
+        }
+        pixel.count(&self.settings.pixels(), code);
+        if let Some((_, config, _)) = self.settings.blocks() {
+            count_in_blocks(&mut self.blocks, &self.links[number], &config, code);
+        }
+    }
+
+    /// Returns whether the pixels have looked.
+    fn end_laser_cycle(&mut self) -> bool {
+        let (config, last) = (self.settings.pixels(), LaserCycle::new(self.cycle));
+        let [of_pixels, of_blocks] = &mut self.statistics;
+        self.seen.clear();
+        self.cycle += 1;
+        if let Some(neighbours) = self.settings.neighbours() {
+            let mut places: Vec<PlaceOf> = self.pixels.drain(..).map(PlaceOf).collect();
+            end_laser_cycles_of_array(&mut places, &config, &neighbours, of_pixels, last, 1);
+            self.pixels.extend(places.into_iter().map(|place| place.0));
+        } else {
+            for (pixel, link) in self.pixels.iter_mut().zip(&mut self.links) {
+                if let Some(pixel) = pixel {
+                    let look = pixel.end_laser_cycle(&config, of_pixels, last);
+                    if matches!(look, Look::Event | Look::Ended) {
+                        link.reported();
+                    }
+                }
+            }
+        }
+        let looks = self.cycle.is_multiple_of(self.settings.x.into());
+        if let Some((_, config, patience)) = self.settings.blocks() {
+            end_laser_cycles_of_blocks(&mut self.blocks, &config, of_blocks, last, 1);
+            if looks {
+                self.since_tick += self.settings.x;
+            }
+            if self.since_tick >= patience {
+                self.since_tick = 0;
+                for (pixel, link) in self.pixels.iter().zip(&mut self.links) {
+                    link.tick(pixel.as_ref().is_some_and(AsyncPixel::has_reported));
+                }
+                self.blocks.iter_mut().for_each(Block::tick);
+            }
+        }
+        looks
+    }
+
+    /// Takes up to `room` events. Who finds no room is the first later.
+    fn events(&mut self, room: usize) -> Vec<DepthEvent> {
+        let (mut events, pixels) = (Vec::new(), self.pixels.len());
+        let slots = pixels + self.blocks.len();
+        let turn = std::mem::take(&mut self.turn);
+        for slot in (turn..slots).chain(0..turn) {
+            let has_event = match slot.checked_sub(pixels) {
+                None => self.pixels[slot]
+                    .as_ref()
+                    .is_some_and(AsyncPixel::has_event),
+                Some(block) => self.blocks[block].has_event(),
+            };
+            if has_event && events.len() == room {
+                self.turn = slot;
+                break;
+            }
+            if has_event {
+                events.extend(match slot.checked_sub(pixels) {
+                    None => self.pixels[slot].as_mut().unwrap().take_event(),
+                    Some(block) => self.blocks[block].take_event(),
+                });
+            }
+        }
+        events
+    }
+}
+
+struct PlaceOf(Option<AsyncPixel<BINS>>);
+
+impl dtof_core::neighbours::ArrayPixel<BINS, dtof_core::Count10> for PlaceOf {
+    fn pixel(&self) -> Option<&AsyncPixel<BINS>> {
+        self.0.as_ref()
+    }
+
+    fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS>> {
+        self.0.as_mut()
+    }
+}
+
+fn settings() -> impl Strategy<Value = Settings> {
+    let mode = prop_oneof![
+        Just(Mode::Alone),
+        (1u8..=3, 8u16..60).prop_map(|(levels, patience)| Mode::Blocks(levels, patience)),
+        prop::sample::select(vec![Neighbours::Four, Neighbours::Eight]).prop_map(Mode::Neighbours),
+    ];
+    let left_out = prop_oneof![Just(0), any::<u32>().prop_map(|bits| bits & bits >> 7)];
+    let more = (
+        1u16..=8,
+        1u8..=2,
+        prop_oneof![2 => Just(0u16), 1 => 1u16..40],
+        any::<u64>(),
+    );
+    (
+        (1u32..=6, 1u32..=5),
+        0u32..3,
+        mode,
+        any::<bool>(),
+        left_out,
+        more,
+    )
+        .prop_map(
+            |(
+                (columns, rows),
+                missing,
+                mode,
+                once_per_bin,
+                left_out,
+                (x, echoes, dead_time, seed),
+            )| {
+                let alone_weighs = !matches!(mode, Mode::Neighbours(_));
+                Settings {
+                    columns,
+                    rows,
+                    missing: missing.min(columns - 1),
+                    mode,
+                    once_per_bin,
+                    left_out,
+                    x,
+                    echoes,
+                    dead_time: if alone_weighs { dead_time } else { 0 },
+                    seed,
+                }
+            },
+        )
+}
+
+/// The photons of a laser cycle in the order of a shared queue: background, a surface, and bursts in one bin.
+fn photons(rng: &mut Pcg32, settings: &Settings) -> Vec<(usize, u16)> {
+    let mut photons = Vec::new();
+    let below = |rng: &mut Pcg32, end: u32| rng.next_u32() % end;
+    for pixel in 0..settings.number() {
+        if below(rng, 3) == 0 {
+            photons.push((pixel, below(rng, BINS as u32 + 2) as u16));
+        }
+        // Some pixels see more.
+        if below(rng, 2 + 3 * (pixel as u32 % 5)) == 0 {
+            photons.push((pixel, (12 + pixel / 4) as u16));
+        }
+        if below(rng, 40) == 0 {
+            photons.extend([(pixel, 7); 5]);
+        }
+    }
+    for place in (1..photons.len()).rev() {
+        photons.swap(place, below(rng, place as u32 + 1) as usize);
+    }
+    // In the order of time, or pixel by pixel.
+    if settings.seed.is_multiple_of(2) {
+        photons.sort_by_key(|&(_, code)| code);
+    } else {
+        photons.sort_by_key(|&(pixel, _)| settings.number() - pixel);
+    }
+    photons
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    #[test]
+    fn the_array_does_what_its_parts_do(settings in settings()) {
+        let mut room: Vec<Place> = (0..31).map(|_| PixelPlace::new()).collect();
+        let mut block_room: Vec<Block<BINS>> = (0..40).map(|_| Block::default()).collect();
+        let mut array = PixelArray::new(&mut room, &mut block_room);
+        let mut config = ArrayConfig::new(settings.layout(), settings.pixels());
+        if let Some((levels, blocks, patience)) = settings.blocks() {
+            config = config.blocks(levels, blocks, patience).unwrap();
+        }
+        if let Some(neighbours) = settings.neighbours() {
+            config = config.neighbours(neighbours).unwrap();
+        }
+        if settings.once_per_bin {
+            config = config.once_per_bin();
+        }
+        let config = config.first(settings.number() as u32).unwrap();
+        // What was there before is gone.
+        array.configure(&ArrayConfig::new(settings.layout(), settings.pixels())).unwrap();
+        (0..400).for_each(|_| {
+            array.photon(0, 9);
+            array.end_laser_cycles(1);
+        });
+        // Before or after the configuration.
+        if settings.left_out.is_multiple_of(2) {
+            array.configure(&config).unwrap();
+        }
+        for pixel in (0..settings.number()).filter(|&pixel| settings.is_left_out(pixel)) {
+            array.leave_out(pixel);
+        }
+        if !settings.left_out.is_multiple_of(2) {
+            array.configure(&config).unwrap();
+        }
+        let mut parts = Parts::new(settings);
+        let mut rng = Pcg32::seed_from_u64(settings.seed);
+        let (mut found, mut unaddressed) = (0, 0);
+        for _ in 0..300 {
+            for (pixel, code) in photons(&mut rng, &settings) {
+                array.photon(pixel, code);
+                parts.photon(pixel, code);
+            }
+            array.photon(settings.number(), 3);
+            unaddressed += 1;
+            // Dark ones follow now and then.
+            let mut cycles = match rng.next_u32() % 4 {
+                0 => 1 + rng.next_u32() as u16 % 20,
+                _ => 1,
+            };
+            while cycles > 0 {
+                let left = array.end_laser_cycles(cycles);
+                let mut looked = false;
+                for _ in left..cycles {
+                    prop_assert!(!looked);
+                    looked = parts.end_laser_cycle();
+                }
+                prop_assert!(left == 0 || looked);
+                cycles = left;
+                // Most often all leave.
+                let room = match rng.next_u32() % 4 {
+                    0 => (rng.next_u32() % 3) as usize,
+                    _ => usize::MAX,
+                };
+                let events = parts.events(room);
+                for event in &events {
+                    prop_assert_eq!(array.next_event(), Some(*event));
+                }
+                if room == usize::MAX {
+                    prop_assert_eq!(array.next_event(), None);
+                    prop_assert!(!array.has_event());
+                }
+                found += events.len();
+            }
+            prop_assert_eq!(array.cycles(), parts.cycle);
+        }
+        let waiting = parts.pixels.iter().flatten().filter(|pixel| pixel.has_event()).count();
+        let blocks_waiting = parts.blocks.iter().filter(|block| block.has_event()).count();
+        for (number, pixel) in parts.pixels.iter().enumerate() {
+            let mine = array.pixel(number);
+            prop_assert_eq!(mine.is_some(), pixel.is_some());
+            if let (Some(mine), Some(pixel)) = (mine, pixel) {
+                prop_assert_eq!(array.exposure(number), Some(pixel.exposure()));
+                prop_assert_eq!(mine.histogram().counts(), pixel.histogram().counts());
+                pixel.add_photons_to(&mut parts.statistics[0]);
+            }
+        }
+        for block in &parts.blocks {
+            block.pixel().add_photons_to(&mut parts.statistics[1]);
+        }
+        parts.statistics[0].events -= waiting as u64;
+        parts.statistics[1].events -= blocks_waiting as u64;
+        prop_assert_eq!(array.statistics(), parts.statistics);
+        let losses = array.losses();
+        prop_assert_eq!((losses.left_out, losses.unaddressed), (parts.left_out, unaddressed));
+        let [pixels, blocks] = array.statistics();
+        prop_assert_eq!(found as u64, pixels.events + blocks.events);
+    }
+}
+
+#[test]
+fn a_place_takes_few_bytes_more_than_a_pixel() {
+    let more = size_of::<PixelPlace<128>>() - size_of::<AsyncPixel<128>>();
+    assert_eq!(
+        more,
+        12_usize.next_multiple_of(align_of::<AsyncPixel<128>>())
+    );
+}
+
+#[test]
+fn what_cannot_be_driven_is_refused() {
+    let settings = Settings {
+        columns: 4,
+        rows: 2,
+        missing: 0,
+        mode: Mode::Alone,
+        once_per_bin: false,
+        left_out: 0,
+        x: 4,
+        echoes: 1,
+        dead_time: 0,
+        seed: 0,
+    };
+    let config = ArrayConfig::new(settings.layout(), settings.pixels());
+    let level = BlockLevel::new(1).unwrap();
+    let neighbours = |array| NeighbourConfig::new(array, Neighbours::Eight, &settings.rule());
+    let eight = neighbours(settings.layout());
+    let with_blocks = config.blocks(level, settings.pixels(), 40).unwrap();
+    let with_neighbours = config.neighbours(eight).unwrap();
+    let of_x = |x| Settings { x, ..settings }.pixels();
+    let weighing = Settings {
+        dead_time: 5,
+        ..settings
+    }
+    .pixels();
+    let weighing = ArrayConfig::new(settings.layout(), weighing);
+    let refusals = [
+        (
+            with_blocks.neighbours(eight),
+            ArrayError::BlocksAndNeighbours,
+        ),
+        (
+            with_neighbours.blocks(level, settings.pixels(), 40),
+            ArrayError::BlocksAndNeighbours,
+        ),
+        (
+            weighing.neighbours(eight),
+            ArrayError::NeighboursAndDeadTime,
+        ),
+        (config.blocks(level, of_x(5), 40), ArrayError::OtherLooks),
+        (
+            config.blocks(BlockLevel::PIXEL, settings.pixels(), 40),
+            ArrayError::NoLevel,
+        ),
+        (config.first(9), ArrayError::Layout),
+    ];
+    for (refused, error) in refusals {
+        assert_eq!(refused, Err(error));
+        assert!(!error.text().is_empty());
+    }
+    let mut places: Vec<PixelPlace<BINS>> = (0..8).map(|_| PixelPlace::new()).collect();
+    let mut blocks: Vec<Block<BINS>> = vec![Block::default()];
+    let mut array = PixelArray::new(&mut places, &mut blocks);
+    array.configure(&config).unwrap();
+    array.photon(3, 7);
+    let larger = ArrayConfig::new(Array::new(3, 3).unwrap(), settings.pixels());
+    for (config, error) in [
+        (larger, ArrayError::Pixels),
+        (with_blocks, ArrayError::Blocks),
+    ] {
+        assert_eq!(array.configure(&config), Err(error));
+        // It goes on.
+        assert_eq!(array.pixel(3).unwrap().histogram().total(), 1);
+    }
+    array.clear();
+    assert!(array.pixel(3).is_none() && array.config().is_none());
+    array.photon(3, 7);
+    assert_eq!(
+        (array.end_laser_cycles(5), array.losses().unaddressed),
+        (0, 1)
+    );
+}
+
+proptest! {
+    /// In any other order no photon counts twice in a bin, and those that are left out for that are told.
+    #[test]
+    fn out_of_order_no_bin_counts_twice(
+        cycles in prop::collection::vec(prop::collection::vec((0..3_usize, 0..6_u16), 0..12), 1..8),
+    ) {
+        let config = PixelConfig::<BINS>::paper().build().unwrap();
+        let mut places: Vec<Place> = (0..3).map(|_| PixelPlace::new()).collect();
+        let mut array = PixelArray::new(&mut places, &mut []);
+        array.configure(&ArrayConfig::new(Array::new(3, 1).unwrap(), config).once_per_bin()).unwrap();
+        let (mut first, mut all) = ([[0; 6]; 3], 0);
+        for photons in &cycles {
+            for (pixel, bins) in first.iter_mut().enumerate() {
+                for (bin, count) in bins.iter_mut().enumerate() {
+                    *count += u32::from(photons.contains(&(pixel, bin as u16)));
+                }
+            }
+            photons.iter().for_each(|&(pixel, code)| array.photon(pixel, code));
+            all += photons.len() as u64;
+            array.end_laser_cycles(1);
+        }
+        let (mut missing, mut counted) = (0, 0);
+        for (pixel, bins) in first.iter().enumerate() {
+            for (bin, &expected) in bins.iter().enumerate() {
+                let count = array.pixel(pixel).unwrap().histogram().count(bin).unwrap();
+                prop_assert!(count <= expected);
+                missing += u64::from(expected - count);
+                counted += u64::from(count);
+            }
+        }
+        prop_assert!(missing <= array.losses().unordered);
+        prop_assert_eq!(array.statistics()[0].repeated, all - counted);
+    }
+}
+
+#[test]
+fn what_a_queue_has_lost_is_counted_and_numbered() {
+    let config = PixelConfig::<BINS>::paper().build().unwrap();
+    let mut places: Vec<PixelPlace<BINS>> = vec![PixelPlace::new()];
+    let mut array = PixelArray::new(&mut places, &mut []);
+    array
+        .configure(&ArrayConfig::new(Array::new(1, 1).unwrap(), config))
+        .unwrap();
+    for _ in 0..43 {
+        array.photon(0, 9);
+        array.end_laser_cycles(1);
+    }
+    array.lost(17, 1000);
+    array.photon(0, 9);
+    array.end_laser_cycles(1);
+    let event = array.next_event().unwrap();
+    // They belong to no exposure.
+    assert_eq!((event.exposure, event.cycle.raw()), (44, 1043));
+    assert_eq!(
+        (array.losses().photons, array.losses().laser_cycles),
+        (17, 1000)
+    );
+}
+
+#[test]
+fn a_whole_histogram_is_decided_on_at_once() {
+    let config = PixelConfig::<BINS>::paper().build().unwrap();
+    let mut places: Vec<PixelPlace<BINS>> = (0..3).map(|_| PixelPlace::new()).collect();
+    let mut array = PixelArray::new(&mut places, &mut []);
+    array
+        .configure(&ArrayConfig::new(Array::new(3, 1).unwrap(), config))
+        .unwrap();
+    array.leave_out(2);
+    let mut counts = [3u16; BINS];
+    counts[20] = 90;
+    array.begin_frame(100_000);
+    let mut events = Vec::new();
+    for (pixel, room) in [(0, 1), (1, 0), (2, 1), (3, 1)] {
+        array.histogram(PixelAddress::new(pixel), &counts, room, |event| {
+            events.push(*event);
+        });
+    }
+    let [event] = events[..] else {
+        panic!("{events:?}");
+    };
+    assert_eq!((event.pixel.raw(), event.peak_bin.raw()), (0, 20));
+    assert_eq!((event.cycle.raw(), event.exposure), (99_999, u16::MAX));
+    let ([statistics, _], photons) = (array.statistics(), 31 * 3 + 90);
+    assert_eq!((statistics.events, statistics.deferred), (1, 1));
+    assert_eq!(statistics.counted, 2 * photons);
+    assert_eq!(
+        (array.losses().left_out, array.losses().unaddressed),
+        (photons, photons)
+    );
+}
