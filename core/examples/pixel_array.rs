@@ -37,7 +37,7 @@ fn run(room: &mut [PixelPlace<128>], columns: u32) -> usize {
     array.configure(&config).expect("there is room");
     for _ in 0..44 {
         (0..pixels).for_each(|pixel| array.photon(pixel, 60));
-        array.end_laser_cycles(1);
+        array.end_laser_cycle();
     }
     core::iter::from_fn(|| array.next_event()).count()
 }

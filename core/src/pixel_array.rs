@@ -28,7 +28,7 @@
 //!     for (pixel, code) in [(0, 60), (1, cycle % 128), (6, 60), (7, 60), (7, 60)] {
 //!         array.photon(pixel, code);
 //!     }
-//!     array.end_laser_cycles(1);
+//!     array.end_laser_cycle();
 //!     while let Some(event) = array.next_event() {
 //!         assert_eq!(event.peak_bin.raw(), 60);
 //!         events += 1;
@@ -39,7 +39,8 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
-//! The photons of a laser cycle may come in any order of pixels, as the queue of a shared TDC gives them.
+//! The photons of a laser cycle may come in any order; where they count once per bin, pixel by pixel or in the order of
+//! time, as the queue of a shared TDC gives them: see [`ArrayConfig::once_per_bin`].
 //!
 //! Cost: pixels are touched at looks only, so a laser cycle without a look takes 12 instructions for the whole array.
 //!
@@ -218,7 +219,8 @@ impl<const BINS: usize, R: DetectionRule> ArrayConfig<BINS, R> {
     }
 
     /// With [blocks](crate::binning) of the levels 1 to `levels`, and ticks every `patience` laser cycles, rounded up to
-    /// looks. `config` is that of the blocks.
+    /// looks. `config` is that of the blocks: with a window rule, that of [`WindowRule::of_blocks`](
+    /// crate::WindowRule::of_blocks), or there are more false alarms.
     ///
     /// # Errors
     /// Fails without levels, with another X, and with neighbours.
@@ -375,7 +377,7 @@ where
     /// An array without pixels, until a configuration. Without blocks `blocks` may be empty.
     #[must_use]
     pub fn new(pixels: &'a mut [PixelPlace<BINS, W, T>], blocks: &'a mut [Block<BINS, T>]) -> Self {
-        Self {
+        let mut array = Self {
             pixels,
             blocks,
             config: None,
@@ -391,7 +393,30 @@ where
             statistics: Statistics::new(),
             block_statistics: Statistics::new(),
             losses: ArrayLosses::default(),
+        };
+        // The room may have been used before.
+        array.clear();
+        array
+    }
+
+    /// The pixels and blocks of a configuration, for which there is room.
+    ///
+    /// # Errors
+    /// Fails if there is none.
+    pub fn check(&self, config: &ArrayConfig<BINS, R>) -> Result<[usize; 2], ArrayError> {
+        let blocks = match &config.together {
+            Together::Blocks { binning, .. } => binning.number_of_blocks(),
+            _ => 0,
+        };
+        let [pixels, blocks] =
+            [config.number, blocks].map(|number| usize::try_from(number).unwrap_or(usize::MAX));
+        if pixels > self.pixels.len() {
+            return Err(ArrayError::Pixels);
         }
+        if blocks > self.blocks.len() {
+            return Err(ArrayError::Blocks);
+        }
+        Ok([pixels, blocks])
     }
 
     /// All pixels begin, and all counts are 0.
@@ -399,19 +424,11 @@ where
     /// # Errors
     /// Fails without room for that. The array stays as it was.
     pub fn configure(&mut self, config: &ArrayConfig<BINS, R>) -> Result<(), ArrayError> {
+        let [pixels, blocks] = self.check(config)?;
         let binning = match &config.together {
             Together::Blocks { binning, .. } => Some(*binning),
             _ => None,
         };
-        let pixels = usize::try_from(config.number).unwrap_or(usize::MAX);
-        let blocks = binning.map_or(0, |binning| binning.number_of_blocks());
-        let blocks = usize::try_from(blocks).unwrap_or(usize::MAX);
-        if pixels > self.pixels.len() {
-            return Err(ArrayError::Pixels);
-        }
-        if blocks > self.blocks.len() {
-            return Err(ArrayError::Blocks);
-        }
         self.clear();
         let use_of = match binning.is_none() && !config.once_per_bin {
             true => Use::Plain,
@@ -507,9 +524,17 @@ where
         true
     }
 
-    /// Ends `cycles` laser cycles, with photons or without, but none after a look. Returns how many are left: end these
-    /// after the events of that look are taken. An event that stays in its slot defers the next decision of its pixel.
+    /// Ends the current laser cycle, with photons or without. Take the events then: one that stays in its slot defers the
+    /// next decision of its pixel.
     #[inline]
+    pub fn end_laser_cycle(&mut self) {
+        let _ = self.end_laser_cycles(1);
+    }
+
+    /// Ends `cycles` laser cycles, but none after a look. Returns how many are left: end these after the events of that look
+    /// are taken.
+    #[inline]
+    #[must_use = "these laser cycles have not ended yet"]
     pub fn end_laser_cycles(&mut self, cycles: u16) -> u16 {
         let Some(config) = &self.config else {
             return 0;
@@ -534,7 +559,7 @@ where
             return;
         };
         let (pixels, x) = (&config.pixels, config.pixels.x());
-        let last = LaserCycle::new(self.cycle - 1);
+        let last = LaserCycle::new(self.cycle.saturating_sub(1));
         let places = self
             .pixels
             .get_mut(..self.pixels_in_use)
@@ -635,8 +660,8 @@ where
 
     /// Decides on the whole histogram of a pixel, alone, and calls `event` for each event, all of the last laser cycle of the
     /// frame. Its exposure is the laser cycles of the frame, at most 65,535. Without `room` for the events of all echoes
-    /// the histogram is a deferred decision.
-    pub fn histogram<C: PhotonCount>(
+    /// the histogram is a deferred decision. It is decided on in counters of `V`: 24 bits, or 20 for 512 bins and more.
+    pub fn histogram<V: CounterWidth, C: PhotonCount>(
         &mut self,
         pixel: PixelAddress,
         counts: &[C; BINS],
@@ -665,7 +690,7 @@ where
         }
         let last = LaserCycle::new(self.cycle.saturating_sub(1));
         let exposure = u16::try_from(self.frame_cycles).unwrap_or(u16::MAX);
-        let mut whole = WholeHistogram::<BINS>::new();
+        let mut whole = WholeHistogram::<BINS, V>::new();
         let cycles = self.frame_cycles.into();
         whole.decide(config, counts, cycles, statistics, |echo, detection| {
             let first = detection.event(pixel, last, exposure);
@@ -675,14 +700,15 @@ where
     }
 
     /// The queue of a TDC has lost `photons`, and all photons of `laser_cycles`. These laser cycles are numbered, but they
-    /// belong to no exposure. Photons that are lost in laser cycles that end as others do make peaks lower.
+    /// belong to no exposure. Call it between two laser cycles. Photons that are lost in laser cycles that end as others do make peaks lower.
     pub const fn lost(&mut self, photons: u64, laser_cycles: u64) {
-        self.losses.photons += photons;
-        self.losses.laser_cycles += laser_cycles;
-        self.cycle += laser_cycles;
+        self.losses.photons = self.losses.photons.saturating_add(photons);
+        self.losses.laser_cycles = self.losses.laser_cycles.saturating_add(laser_cycles);
+        self.cycle = self.cycle.saturating_add(laser_cycles);
     }
 
-    /// Leaves a pixel out from now on, whatever the configuration: its photons count as left out, and it decides nothing.
+    /// Leaves a pixel out from now on, whatever the configuration: its photons count as left out, and it decides nothing. An event
+    /// that waits in its slot still comes.
     pub fn leave_out(&mut self, pixel: usize) {
         if let Some(place) = self.pixels.get_mut(pixel) {
             place.is_left_out = true;

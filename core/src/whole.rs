@@ -1,7 +1,8 @@
 //! The decision on a whole histogram, as a sensor counts it: once, on all its photons.
 //!
 //! Counts that do not fit their counters are divided by a power of two, and the laser cycles by the same. They are
-//! then less noisy than Poisson numbers of their size, so that there are no more false alarms. No depth is lost.
+//! then less noisy than Poisson numbers of their size, so that there are no more false alarms. Bins with less than that
+//! power become empty, so a target much dimmer than another may be lost. The photons of an event are divided, too.
 //!
 //! What lies outside of the range gate may reach into it: the tail of a cover glass, or the edge of a bright surface. Its
 //! slope stands clear of the background at the end of the gate. So a peak at the end is no surface if as many photons
@@ -20,6 +21,9 @@
 //! assert_eq!((echoes[0].0, echoes[0].1.peak.bin.raw()), (EchoNumber::FIRST, 40));
 //! assert_eq!((statistics.events, statistics.counted), (1, 100_000_000 + 126 * 900));
 //! ```
+//!
+//! Cost: that of a decision, and of another one for each window of a slope that is left out: of a tail over all of 128
+//! bins 56 with a window of 3 bins, half a million instructions. Usual histograms have none, or two or three.
 //!
 //! Source: ours.
 
@@ -91,6 +95,7 @@ impl<const BINS: usize, W: CounterWidth> WholeHistogram<BINS, W> {
             self.gate = *gated.gate();
             self.fill(config, counts);
             let highest = self.histogram.peak().bin;
+            let is_empty = self.histogram.total() == 0;
             let mut found = [None; EchoNumber::LAST.raw() as usize];
             let (mut places, mut ends) = (found.iter_mut(), None);
             let is_blind = gated.detect_echoes(&mut self.histogram, self.cycles, |_, detection| {
@@ -103,7 +108,11 @@ impl<const BINS: usize, W: CounterWidth> WholeHistogram<BINS, W> {
             });
             // A slope with the highest bin may hide a peak.
             let ends = ends.unwrap_or([highest; 2]);
-            match self.slope(config, counts, ends) {
+            let slope = match is_empty {
+                true => None,
+                false => self.slope(config, counts, ends),
+            };
+            match slope {
                 Some(Some(narrower)) => {
                     gated = gated.with_gate(narrower);
                     continue;
@@ -170,7 +179,7 @@ impl<const BINS: usize, W: CounterWidth> WholeHistogram<BINS, W> {
         counts: &[C; BINS],
         [nearest, farthest]: [BinIndex; 2],
     ) -> Option<Option<RangeGate<BINS>>> {
-        let (given, width) = (config.gate(), config.rule().window_bins());
+        let (given, width) = (config.gate(), config.rule().window_bins().clamp(1, 255));
         let bins = RangeGate::<BINS>::full().last() + 1;
         let window = |peak: BinIndex| {
             let from = peak.raw().saturating_sub(width / 2).max(given.first());

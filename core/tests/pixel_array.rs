@@ -4,9 +4,9 @@ use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_c
 use dtof_core::fixed::types::U4F12;
 use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
 use dtof_core::{
-    Array, ArrayConfig, ArrayError, AsyncPixel, BlockLevel, Count, DepthEvent, EchoNumber,
-    LaserCycle, Look, Neighbours, PixelAddress, PixelArray, PixelConfig, PixelPlace, RangeGate,
-    Statistics, WindowRule,
+    Array, ArrayConfig, ArrayError, ArrayLosses, AsyncPixel, BlockLevel, Count, Count24,
+    DepthEvent, EchoNumber, LaserCycle, Look, Neighbours, PixelAddress, PixelArray, PixelConfig,
+    PixelPlace, RangeGate, Statistics, WindowRule,
 };
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -330,7 +330,7 @@ proptest! {
         array.configure(&ArrayConfig::new(settings.layout(), settings.pixels())).unwrap();
         (0..400).for_each(|_| {
             array.photon(0, 9);
-            array.end_laser_cycles(1);
+            array.end_laser_cycle();
         });
         // Before or after the configuration.
         if settings.left_out.is_multiple_of(2) {
@@ -402,6 +402,7 @@ proptest! {
         prop_assert_eq!(array.statistics(), parts.statistics);
         let losses = array.losses();
         prop_assert_eq!((losses.left_out, losses.unaddressed), (parts.left_out, unaddressed));
+        prop_assert_eq!(losses.unordered, 0);
         let [pixels, blocks] = array.statistics();
         prop_assert_eq!(found as u64, pixels.events + blocks.events);
     }
@@ -462,6 +463,10 @@ fn what_cannot_be_driven_is_refused() {
             ArrayError::NoLevel,
         ),
         (config.first(9), ArrayError::Layout),
+        (
+            config.neighbours(neighbours(Array::new(2, 4).unwrap())),
+            ArrayError::Layout,
+        ),
     ];
     for (refused, error) in refusals {
         assert_eq!(refused, Err(error));
@@ -509,7 +514,7 @@ proptest! {
             }
             photons.iter().for_each(|&(pixel, code)| array.photon(pixel, code));
             all += photons.len() as u64;
-            array.end_laser_cycles(1);
+            array.end_laser_cycle();
         }
         let (mut missing, mut counted) = (0, 0);
         for (pixel, bins) in first.iter().enumerate() {
@@ -535,11 +540,11 @@ fn what_a_queue_has_lost_is_counted_and_numbered() {
         .unwrap();
     for _ in 0..43 {
         array.photon(0, 9);
-        array.end_laser_cycles(1);
+        array.end_laser_cycle();
     }
     array.lost(17, 1000);
     array.photon(0, 9);
-    array.end_laser_cycles(1);
+    array.end_laser_cycle();
     let event = array.next_event().unwrap();
     // They belong to no exposure.
     assert_eq!((event.exposure, event.cycle.raw()), (44, 1043));
@@ -563,7 +568,7 @@ fn a_whole_histogram_is_decided_on_at_once() {
     array.begin_frame(100_000);
     let mut events = Vec::new();
     for (pixel, room) in [(0, 1), (1, 0), (2, 1), (3, 1)] {
-        array.histogram(PixelAddress::new(pixel), &counts, room, |event| {
+        array.histogram::<Count24, _>(PixelAddress::new(pixel), &counts, room, |event| {
             events.push(*event);
         });
     }
@@ -578,5 +583,119 @@ fn a_whole_histogram_is_decided_on_at_once() {
     assert_eq!(
         (array.losses().left_out, array.losses().unaddressed),
         (photons, photons)
+    );
+}
+
+/// What an array has done is gone with its configuration, and with the array.
+#[test]
+fn used_room_is_as_new() {
+    let settings = Settings {
+        columns: 2,
+        rows: 2,
+        missing: 0,
+        mode: Mode::Blocks(1, 40),
+        once_per_bin: true,
+        left_out: 0,
+        x: 4,
+        echoes: 1,
+        dead_time: 0,
+        seed: 0,
+    };
+    let (levels, blocks, patience) = settings.blocks().unwrap();
+    let config = ArrayConfig::new(settings.layout(), settings.pixels());
+    let config = config
+        .blocks(levels, blocks, patience)
+        .unwrap()
+        .once_per_bin();
+    let mut places: Vec<Place> = (0..5).map(|_| PixelPlace::new()).collect();
+    let mut room: Vec<Block<BINS>> = vec![Block::default()];
+    let mut array = PixelArray::new(&mut places, &mut room);
+    array.leave_out(3);
+    // There is no pixel yet.
+    array.photon(3, 9);
+    assert_eq!(array.losses().unaddressed, 1);
+    let run = |array: &mut PixelArray<'_, BINS, WindowRule>| {
+        array.configure(&config).unwrap();
+        assert_eq!(*array.losses(), ArrayLosses::default());
+        let mut events = Vec::new();
+        for cycle in 0..403 {
+            // Pixel 2 comes twice and out of order now and then.
+            for (pixel, code) in [(0, 12), (2, 20), (1, cycle % 32), (2, 19), (3, 12), (4, 12)] {
+                array.photon(pixel, code);
+            }
+            array.end_laser_cycle();
+            assert_eq!(array.has_looked(), cycle % 4 == 3);
+            // The last events stay.
+            if cycle < 380 {
+                events.extend(core::iter::from_fn(|| array.next_event()));
+            }
+        }
+        array.lost(3, 5);
+        let mut counts = [1u8; BINS];
+        counts[20] = 200;
+        array.begin_frame(100);
+        array.histogram::<Count24, _>(PixelAddress::new(0), &counts, 1, |event| {
+            events.push(*event);
+        });
+        assert!(events.len() > 10 && array.has_event());
+        assert_eq!(
+            (array.losses().left_out, array.losses().unaddressed),
+            (403, 403)
+        );
+        assert_eq!((array.losses().unordered, array.losses().photons), (403, 3));
+        (events, array.statistics())
+    };
+    let first = run(&mut array);
+    assert_eq!(run(&mut array), first);
+    // Another array in the same room.
+    let mut other = PixelArray::new(&mut places, &mut room);
+    other.photon(0, 9);
+    assert_eq!(other.losses().unaddressed, 1);
+    assert!(other.pixel(0).is_none() && !other.has_event());
+    assert_eq!(run(&mut other), first);
+}
+
+#[test]
+fn data_are_found_by_event() {
+    let settings = Settings {
+        columns: 3,
+        rows: 3,
+        missing: 0,
+        mode: Mode::Blocks(2, 8),
+        once_per_bin: false,
+        left_out: 0,
+        x: 4,
+        echoes: 1,
+        dead_time: 0,
+        seed: 0,
+    };
+    let (levels, blocks, patience) = settings.blocks().unwrap();
+    let config = ArrayConfig::new(settings.layout(), settings.pixels());
+    let config = config.blocks(levels, blocks, patience).unwrap();
+    let mut places: Vec<PixelPlace<BINS, dtof_core::Count10, u32>> =
+        (0..9).map(|_| PixelPlace::new()).collect();
+    let mut room: Vec<Block<BINS, u32>> = (0..5).map(|_| Block::default()).collect();
+    let mut array = PixelArray::new(&mut places, &mut room);
+    array.configure(&config).unwrap();
+    let mut of_levels = [0_u32; 3];
+    for cycle in 0..4000_usize {
+        // Pixels 4 and 8 are bright, the others too dim for themselves.
+        array.photon([4, 8][cycle % 2], 12);
+        if cycle % 12 == 0 {
+            array.photon([0, 1, 2, 3, 5, 6, 7][cycle / 12 % 7], 20);
+        }
+        array.end_laser_cycle();
+        while let Some(event) = array.next_event() {
+            let address = array.data_of(&event).unwrap();
+            // Each has one event after another.
+            let expected = u32::from(event.pixel.raw()) << 8 | u32::from(event.level.raw());
+            assert!(*address == 0 || *address == expected + 1);
+            *address = expected + 1;
+            of_levels[usize::from(event.level.raw())] += 1;
+        }
+    }
+    assert!(
+        of_levels[0] > 10 && of_levels[1] + of_levels[2] > 5,
+        "{of_levels:?}"
     );
 }

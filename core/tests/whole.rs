@@ -233,3 +233,18 @@ fn a_gap_makes_it_a_surface() {
         assert!(!is_surface || whole.gate().first() == 12);
     }
 }
+
+/// Photons before the gate are no slope of a gate without photons: it stays as it is, and nothing is found.
+#[test]
+fn an_empty_gate_stays() {
+    for (width, dead_time) in [(0, 0), (3, 0), (3, 1), (7, 0)] {
+        let gate = RangeGate::new(10, 63).unwrap();
+        let config = config(width, gate, 2, dead_time);
+        let mut counts = [0u32; BINS];
+        counts[..10].fill(300);
+        let (found, statistics, whole) = decide::<Count24>(&config, &counts, 10_000);
+        assert_eq!((found.len(), statistics.blind_looks), (0, 0));
+        assert_eq!(*whole.gate(), gate);
+        assert_eq!(whole.photons(&config, &counts).total(), 0);
+    }
+}

@@ -256,6 +256,21 @@ fn histograms_wait_for_events_and_nothing_waits_for_histograms() {
     assert!(*events > host.answers[answers].2);
 }
 
+/// A request that waits for events is answered if its pixel is left out meanwhile.
+#[test]
+fn a_pixel_that_is_left_out_has_no_histogram() {
+    let cycles = script::script(5_000, &mut Pcg32::seed_from_u64(1));
+    let (mut device, mut host) = configured::<8>(&CONFIGURATION);
+    let mut sensor = scripted(cycles.iter().cloned().map(Some));
+    host.run(&mut device, &mut sensor, 0..3_000, 0);
+    host.ask(message::HISTOGRAM_REQUEST, &[0, 0]);
+    host.run(&mut device, &mut sensor, 3_000..3_001, 1);
+    device.leave_out(PixelAddress::new(0));
+    host.run(&mut device, &mut sensor, 3_001..3_200, usize::MAX);
+    let refused = Err((PixelAddress::new(0), NoHistogram::NoPixel));
+    assert!(histograms(&host.answers) == [refused]);
+}
+
 proptest! {
     /// Two hosts that ask at other times see the same photons.
     #[test]

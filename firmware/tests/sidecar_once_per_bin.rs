@@ -206,3 +206,33 @@ fn a_sensor_that_gives_histograms_refuses_it() {
     };
     assert!(answer(&of_link).is_empty());
 }
+
+/// Photons of a pixel that is left out count nowhere but as those of no pixel.
+#[test]
+fn a_pixel_can_be_left_out() {
+    let requested = Configuration {
+        source: Source::Link,
+        ..requested()
+    };
+    let (mut device, mut host) = configured::<2>(&requested);
+    device.leave_out(PixelAddress::new(1));
+    for _ in 0..60 {
+        let tokens = [
+            Token::Photon { code: 70 },
+            Token::Advance { pixels: 1 },
+            Token::Photon { code: 70 },
+            Token::EndOfCycles { cycles: 1 },
+        ];
+        let mut body = Vec::new();
+        tokens
+            .iter()
+            .for_each(|token| body.extend_from_slice(&token.to_bytes()));
+        host.ask(message::PHOTONS, &body);
+        host.exchange(&mut device, 0);
+    }
+    let report = host.report(&mut device, 0);
+    assert_eq!(report.unaddressed, 60);
+    assert_eq!(report.statistics.photons(), 60);
+    assert!(!host.events.is_empty());
+    assert!(host.events.iter().all(|event| event.pixel.raw() == 0));
+}

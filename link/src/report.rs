@@ -15,7 +15,7 @@ pub struct Report {
     pub statistics: Statistics,
     /// Of all blocks of pixels. Their photons are those of pixels, counted again.
     pub blocks: Statistics,
-    /// Photons for pixels that the device does not have.
+    /// Photons for pixels that the device does not have, or that it leaves out.
     pub unaddressed: u64,
     /// Bytes that did not fit the receive queue.
     pub overrun: u32,

@@ -57,6 +57,7 @@ impl PhotonSink for Seen {
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
         let (mut whole, scale) = (WholeHistogram::<128>::new(), self.scale);
         let zone = &mut self.zones[usize::from(pixel.raw())];
+        zone.range = None;
         whole.decide(
             &ZONE,
             counts,

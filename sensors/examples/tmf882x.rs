@@ -46,6 +46,7 @@ impl PhotonSink for Zones {
     fn histogram(&mut self, pixel: PixelAddress, counts: &[u32; 128]) {
         let (mut whole, scale) = (WholeHistogram::<128>::new(), self.scale);
         let range = &mut self.ranges[usize::from(pixel.raw())];
+        *range = None;
         whole.decide(
             &ZONE,
             counts,

@@ -62,8 +62,8 @@ pub use self::fault::SensorFault;
 /// Where a sensor's photons go. `BINS` is the number of bins of its histograms; the drivers of this
 /// crate give 128.
 pub trait PhotonSink<const BINS: usize = 128> {
-    /// One photon of `pixel` in the present laser cycle. All photons of a pixel come one after another, in
-    /// any order of bins.
+    /// One photon of `pixel` in the present laser cycle. The photons of a pixel come one after
+    /// another, in any order of bins, or in the order of time between those of other pixels.
     fn photon(&mut self, pixel: PixelAddress, code: u16);
     /// The present laser cycle and `cycles - 1` empty ones after it have ended.
     fn end_laser_cycles(&mut self, cycles: u16);

@@ -119,10 +119,14 @@ fn address(path: &Path, name: &str) -> Result<u64> {
 fn memory(path: &Path, name: &str) -> Result<u64> {
     let bytes = fs::read(path).with_context(|| path.display().to_string())?;
     let file = object::File::parse(&*bytes)?;
-    let mut symbols = file.symbols();
-    let memory = symbols.find(|symbol| symbol.name().is_ok_and(|found| found.contains(name)));
-    let memory = memory.with_context(|| format!("no memory {name} in the image"))?;
-    Ok(memory.size())
+    // A table of the simulated scene has the same name.
+    let named = file
+        .symbols()
+        .filter(|symbol| symbol.name().is_ok_and(|found| found.contains(name)));
+    let sizes = named.map(|symbol| symbol.size());
+    sizes
+        .max()
+        .with_context(|| format!("no memory {name} in the image"))
 }
 
 /// The sizes of an image in bytes.

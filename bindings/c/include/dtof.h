@@ -891,9 +891,9 @@ dtof_status_t dtof_pixel_count_once_per_bin(struct dtof_pixel_t *pixel,
 
 // Decides once on `counts`, the photons of DTOF_BINS bins in `exposure` laser cycles. X, L1 and L2 have no effect
 // here. `events` has room for DTOF_ECHOES events; `found` gets their number, at most the echoes of `config`. `pixel` and
-// `cycle` are copied into the events. A dead time weighs bins by `exposure`; an event holds 65,535 at most. Counts of 16,777,215 and more in a bin
-// are divided by a power of two, all of them and the laser cycles by the same. A peak at the end of the range gate that
-// is the slope of something outside is no event.
+// `cycle` are copied into the events. A dead time weighs bins by `exposure`; an event holds 65,535 at most. Counts of
+// 16,777,215 and more in a bin are divided by a power of two, all of them and the laser cycles by the same. A peak at the
+// end of the range gate that is the slope of something outside is no event.
 //
 // `statistics` get all photons, undivided, those outside the gate as gated out.
 //

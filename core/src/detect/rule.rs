@@ -28,7 +28,7 @@ pub trait DetectionRule: Copy {
         excluded: &ExcludedBins,
     ) -> Option<U24F8>;
 
-    /// The bins of the window that it tests; 1 if it tests the highest bin.
+    /// The bins of the window that it tests, 1 to 255; 1 if it tests the highest bin.
     #[inline(always)]
     fn window_bins(&self) -> u16 {
         1

@@ -363,7 +363,7 @@ impl<const BINS: usize, W: CounterWidth> Histogram<BINS, W> {
             let photons = photons.into() >> shift;
             *counter = W::ZERO;
             if photons > 0 && kept.contains(&bin) {
-                *counter = W::counter(photons);
+                *counter = W::counter(photons.min(W::MAX));
                 if bin >= gate.first() {
                     total = total.wrapping_add(photons);
                     peak_key = Self::key(photons, bin.into()).max(peak_key);

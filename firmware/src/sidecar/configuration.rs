@@ -82,6 +82,7 @@ impl Sidecar<'_> {
         if requested.once_per_bin {
             config = config.once_per_bin();
         }
+        self.array.check(&config)?;
         let scale = RangeScale::new(requested.bin_width_ps, requested.offset_mm)?;
         let dynamic_depth = requested
             .dynamic_depth
@@ -109,7 +110,9 @@ impl Sidecar<'_> {
         let gives_histograms = self.sensor.is_some_and(|sensor| sensor.gives_histograms);
         let array = array_of(requested).ok_or(Refusal::Neighbours)?;
         match &requested.rule {
-            AnyRule::Window(rule) if !(of_sensor && gives_histograms) => {
+            AnyRule::Window(rule)
+                if requested.binning.is_none() && !(of_sensor && gives_histograms) =>
+            {
                 Ok(Some(NeighbourConfig::new(array, neighbours, rule)))
             }
             _ => Err(Refusal::Neighbours),

@@ -65,7 +65,9 @@ impl Sidecar<'_> {
         let (Some(detector), Some(exposure)) =
             (self.array.pixel(number), self.array.exposure(number))
         else {
-            return;
+            // It was left out meanwhile.
+            self.requested_histogram = None;
+            return self.answer_none(pixel, NoHistogram::NoPixel);
         };
         let head = HistogramHead {
             pixel,

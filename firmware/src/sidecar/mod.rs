@@ -133,6 +133,8 @@ impl<'a> Sidecar<'a> {
         blocks: &'a mut VecView<Block>,
         sensor: Option<SensorInfo>,
     ) -> Self {
+        pixels.clear();
+        blocks.clear();
         // As many as there is room for.
         while pixels.push(Pixel::new()).is_ok() {}
         while blocks.push(Block::default()).is_ok() {}

@@ -1,6 +1,6 @@
 //! Photons and histograms of a sensor, which cannot wait.
 
-use dtof_core::{DepthEvent, EchoNumber, PixelAddress};
+use dtof_core::{Count24, DepthEvent, EchoNumber, PixelAddress};
 use dtof_link::frame::Deframer;
 use embedded_io::{Read, ReadReady, Write, WriteReady};
 use heapless::vec::Vec;
@@ -137,10 +137,11 @@ impl Sidecar<'_> {
     fn decide_whole(&mut self, pixel: PixelAddress, counts: &[u32; BINS]) {
         let mut events = Vec::<DepthEvent, { EchoNumber::LAST.raw() as usize }>::new();
         let room = self.room();
-        self.array.histogram(pixel, counts, room, |event| {
-            // There is room for each echo.
-            let _ = events.push(*event);
-        });
+        self.array
+            .histogram::<Count24, _>(pixel, counts, room, |event| {
+                // There is room for each echo.
+                let _ = events.push(*event);
+            });
         for event in &events {
             self.enqueue(event);
         }

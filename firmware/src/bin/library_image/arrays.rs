@@ -5,8 +5,8 @@ use core::array;
 use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
 use dtof_core::{
-    AnyRule, Array, ArrayConfig, AsyncPixel, Count8, Count10, Count16, Count20, CounterWidth,
-    Neighbours, PixelArray, PixelPlace, Statistics,
+    AnyRule, Array, ArrayConfig, AsyncPixel, Count8, Count10, Count16, Count20, Count24,
+    CounterWidth, Neighbours, PixelArray, PixelPlace, Statistics,
 };
 
 use crate::values::{
@@ -22,8 +22,9 @@ pub fn all() {
     driven::<128, Count8>();
     driven::<128, Count10>();
     driven::<1024, Count20>();
-    whole::<8>();
-    whole::<128>();
+    whole::<8, Count24>();
+    whole::<128, Count24>();
+    whole::<1024, Count20>();
     neighbours::<8, Count10>();
     neighbours::<128, Count8>();
     neighbours::<128, Count10>();
@@ -140,7 +141,7 @@ fn driven<const BINS: usize, W: CounterWidth>() {
 
 /// Whole histograms of one.
 #[inline(never)]
-fn whole<const BINS: usize>() {
+fn whole<const BINS: usize, V: CounterWidth>() {
     let Some(config) = or_text(settings::<BINS, _>(any_rule()).build()) else {
         return;
     };
@@ -153,8 +154,8 @@ fn whole<const BINS: usize>() {
     while more() {
         driven.begin_frame(word());
         let counts = values::<u32, BINS>(word);
-        driven.histogram(address(), &counts, usize::from(half()), |event| {
-            keep(*event)
+        driven.histogram::<V, _>(address(), &counts, usize::from(half()), |event| {
+            keep(*event);
         });
     }
     keep(driven.statistics());
