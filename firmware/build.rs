@@ -68,7 +68,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The linker script of the board. If pixels have counters of 8 bits it takes 192 KiB, of which the
-/// stack needs at most 15.
+/// stack needs at most 10.
 fn mps2_an386(here: &str) -> Result<String, Box<dyn Error>> {
     let path = format!("{here}/memory/mps2-an386.x");
     if env::var_os("CARGO_FEATURE_COUNT8").is_none() {
@@ -76,7 +76,7 @@ fn mps2_an386(here: &str) -> Result<String, Box<dyn Error>> {
     }
     let mut script = fs::read_to_string(path)?;
     for (whole, small) in [
-        ("LENGTH = 19K", "LENGTH = 16K"),
+        ("LENGTH = 19K", "LENGTH = 10752"),
         (
             "LENGTH = 4M - LENGTH(STACK)",
             "LENGTH = 192K - LENGTH(STACK)",

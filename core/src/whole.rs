@@ -192,9 +192,7 @@ impl<const BINS: usize, W: CounterWidth> WholeHistogram<BINS, W> {
             && self.falls_into(counts, &near, before, given.first() - 1..near.start)
         {
             near.end..self.gate.last() + 1
-        } else if given.last() + 1 < bins
-            && self.falls_into(counts, &far, behind, far.end..given.last() + 2)
-        {
+        } else if self.falls_into(counts, &far, behind, far.end..given.last() + 2) {
             self.gate.first()..far.start
         } else {
             return None;
@@ -204,7 +202,8 @@ impl<const BINS: usize, W: CounterWidth> WholeHistogram<BINS, W> {
         Some(last.and_then(|last| RangeGate::new(left.start, last).ok()))
     }
 
-    /// Whether the bins `beside` a window have at least its mean, and each of the bins `between` may have.
+    /// Whether the bins `beside` a window have at least its mean, and each of the bins `between` may have: past the last bin
+    /// there is none.
     #[inline(never)]
     fn falls_into<C: PhotonCount>(
         &self,

@@ -610,6 +610,7 @@ fn used_room_is_as_new() {
     let mut places: Vec<Place> = (0..5).map(|_| PixelPlace::new()).collect();
     let mut room: Vec<Block<BINS>> = vec![Block::default()];
     let mut array = PixelArray::new(&mut places, &mut room);
+    assert_eq!(array.room(), 5);
     array.leave_out(3);
     // There is no pixel yet.
     array.photon(3, 9);

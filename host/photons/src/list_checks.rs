@@ -223,6 +223,21 @@ mod tests {
 
     const BINS: usize = 64;
 
+    /// A part ends with the first photon of the next.
+    #[test]
+    fn a_photon_is_of_the_part_of_its_laser_cycle() {
+        let mut watch = ListWatch::new(1, BINS, 100 * PARTS);
+        for cycle in 0..=203 {
+            watch.photon(0, cycle, 5);
+            let part = cycle / 100;
+            assert_eq!(watch.part, part);
+            let watched = watch.watched[5];
+            let of_part = cycle - 100 * part + 1;
+            assert_eq!(u64::from(watched.before), 100 * part);
+            assert_eq!(u64::from(watched.now), of_part);
+        }
+    }
+
     /// The photons of some pixels: pixel, laser cycle, bin.
     struct Photons {
         rng: Pcg64,
