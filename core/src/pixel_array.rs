@@ -55,7 +55,7 @@ use crate::event::DepthEvent;
 use crate::histogram::counter::{Count10, CounterWidth, PhotonCount};
 use crate::neighbours::{ArrayPixel, NeighbourConfig, end_laser_cycles_of_array};
 use crate::pixel::{AsyncPixel, Look, OncePerBin};
-use crate::statistics::Statistics;
+use crate::statistics::{Statistics, photons};
 use crate::units::{BlockLevel, LaserCycle, PixelAddress};
 use crate::whole::WholeHistogram;
 
@@ -289,10 +289,10 @@ impl<const BINS: usize, R: DetectionRule> ArrayConfig<BINS, R> {
         matches!(self.together, Together::Neighbours(_))
     }
 
-    /// The place of a block among the blocks of the array.
-    fn place_of_block(&self, level: BlockLevel, first: PixelAddress) -> Option<usize> {
+    /// The blocks, if there are some.
+    const fn binning(&self) -> Option<&Binning> {
         match &self.together {
-            Together::Blocks { binning, .. } => binning.number_of(level, first),
+            Together::Blocks { binning, .. } => Some(binning),
             _ => None,
         }
     }
@@ -404,10 +404,7 @@ where
     /// # Errors
     /// Fails if there is none.
     pub fn check(&self, config: &ArrayConfig<BINS, R>) -> Result<[usize; 2], ArrayError> {
-        let blocks = match &config.together {
-            Together::Blocks { binning, .. } => binning.number_of_blocks(),
-            _ => 0,
-        };
+        let blocks = config.binning().map_or(0, Binning::number_of_blocks);
         let [pixels, blocks] =
             [config.number, blocks].map(|number| usize::try_from(number).unwrap_or(usize::MAX));
         if pixels > self.pixels.len() {
@@ -425,10 +422,7 @@ where
     /// Fails without room for that. The array stays as it was.
     pub fn configure(&mut self, config: &ArrayConfig<BINS, R>) -> Result<(), ArrayError> {
         let [pixels, blocks] = self.check(config)?;
-        let binning = match &config.together {
-            Together::Blocks { binning, .. } => Some(*binning),
-            _ => None,
-        };
+        let binning = config.binning();
         self.clear();
         let use_of = match binning.is_none() && !config.once_per_bin {
             true => Use::Plain,
@@ -446,7 +440,7 @@ where
         for (block, place) in self
             .blocks
             .iter_mut()
-            .zip(binning.iter().flat_map(Binning::blocks))
+            .zip(binning.into_iter().flat_map(Binning::blocks))
         {
             *block = Block::new(place);
         }
@@ -668,18 +662,14 @@ where
         room: usize,
         mut event: impl FnMut(&DepthEvent),
     ) {
-        let photons = || {
-            let counts = counts.iter().map(|&count| u64::from(count.into()));
-            counts.sum::<u64>()
-        };
         let place = self.pixels.get(usize::from(pixel.raw()));
         let use_of = place.map_or(Use::Nothing, |place| place.use_of);
         if use_of == Use::LeftOut {
-            self.losses.left_out += photons();
+            self.losses.left_out += photons(Some(counts));
             return;
         }
         let Some(config) = self.config.as_ref().filter(|_| use_of != Use::Nothing) else {
-            self.losses.unaddressed += photons();
+            self.losses.unaddressed += photons(Some(counts));
             return;
         };
         let (config, statistics) = (&config.pixels, &mut self.statistics);
@@ -700,15 +690,16 @@ where
     }
 
     /// The queue of a TDC has lost `photons`, and all photons of `laser_cycles`. These laser cycles are numbered, but they
-    /// belong to no exposure. Call it between two laser cycles. Photons that are lost in laser cycles that end as others do make peaks lower.
+    /// belong to no exposure. Call it between two laser cycles. Photons that are lost in laser cycles that end as others do
+    /// make peaks lower.
     pub const fn lost(&mut self, photons: u64, laser_cycles: u64) {
         self.losses.photons = self.losses.photons.saturating_add(photons);
         self.losses.laser_cycles = self.losses.laser_cycles.saturating_add(laser_cycles);
         self.cycle = self.cycle.saturating_add(laser_cycles);
     }
 
-    /// Leaves a pixel out from now on, whatever the configuration: its photons count as left out, and it decides nothing. An event
-    /// that waits in its slot still comes.
+    /// Leaves a pixel out from now on, whatever the configuration: its photons count as left out, and it decides nothing.
+    /// An event that waits in its slot still comes.
     pub fn leave_out(&mut self, pixel: usize) {
         if let Some(place) = self.pixels.get_mut(pixel) {
             place.is_left_out = true;
@@ -724,10 +715,8 @@ where
             let place = self.pixels.get_mut(usize::from(event.pixel.raw()))?;
             return Some(&mut place.data);
         }
-        let place = self
-            .config
-            .as_ref()?
-            .place_of_block(event.level, event.pixel)?;
+        let binning = self.config.as_ref()?.binning()?;
+        let place = binning.number_of(event.level, event.pixel)?;
         Some(&mut self.blocks.get_mut(place)?.data)
     }
 
@@ -760,6 +749,12 @@ where
     #[must_use]
     pub const fn cycles(&self) -> u64 {
         self.cycle
+    }
+
+    /// Those of the last frame: see [`Self::begin_frame`].
+    #[must_use]
+    pub const fn frame_cycles(&self) -> u32 {
+        self.frame_cycles
     }
 
     /// What counted in no pixel.

@@ -130,8 +130,9 @@ impl Statistics {
     }
 }
 
+/// The photons of these bins.
 #[inline(never)]
-fn photons<C: PhotonCount>(counts: Option<&[C]>) -> u64 {
+pub(crate) fn photons<C: PhotonCount>(counts: Option<&[C]>) -> u64 {
     let counts = counts.unwrap_or_default().iter();
     counts.map(|&photons| u64::from(photons.into())).sum()
 }

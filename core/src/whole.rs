@@ -5,7 +5,7 @@
 //! power become empty, so a target much dimmer than another may be lost. The photons of an event are divided, too.
 //!
 //! What lies outside of the range gate may reach into it: the tail of a cover glass, or the edge of a bright surface. Its
-//! slope stands clear of the background at the end of the gate. So a peak at the end is no surface if as many photons
+//! slope exceeds the background at the end of the gate. So a peak at the end is no surface if as many photons
 //! lie in the bins beside its window, outside of it, and none of the bins between has surely fewer than the mean of the
 //! window. The gate is then narrowed past that slope, and decided on again.
 //!

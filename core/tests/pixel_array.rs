@@ -39,6 +39,21 @@ struct Settings {
 }
 
 impl Settings {
+    const fn usual(columns: u32, rows: u32, mode: Mode) -> Self {
+        Self {
+            columns,
+            rows,
+            missing: 0,
+            mode,
+            once_per_bin: false,
+            left_out: 0,
+            x: 4,
+            echoes: 1,
+            dead_time: 0,
+            seed: 0,
+        }
+    }
+
     fn layout(&self) -> Array {
         Array::new(self.columns, self.rows).unwrap()
     }
@@ -419,18 +434,7 @@ fn a_place_takes_few_bytes_more_than_a_pixel() {
 
 #[test]
 fn what_cannot_be_driven_is_refused() {
-    let settings = Settings {
-        columns: 4,
-        rows: 2,
-        missing: 0,
-        mode: Mode::Alone,
-        once_per_bin: false,
-        left_out: 0,
-        x: 4,
-        echoes: 1,
-        dead_time: 0,
-        seed: 0,
-    };
+    let settings = Settings::usual(4, 2, Mode::Alone);
     let config = ArrayConfig::new(settings.layout(), settings.pixels());
     let level = BlockLevel::new(1).unwrap();
     let neighbours = |array| NeighbourConfig::new(array, Neighbours::Eight, &settings.rule());
@@ -589,18 +593,7 @@ fn a_whole_histogram_is_decided_on_at_once() {
 /// What an array has done is gone with its configuration, and with the array.
 #[test]
 fn used_room_is_as_new() {
-    let settings = Settings {
-        columns: 2,
-        rows: 2,
-        missing: 0,
-        mode: Mode::Blocks(1, 40),
-        once_per_bin: true,
-        left_out: 0,
-        x: 4,
-        echoes: 1,
-        dead_time: 0,
-        seed: 0,
-    };
+    let settings = Settings::usual(2, 2, Mode::Blocks(1, 40));
     let (levels, blocks, patience) = settings.blocks().unwrap();
     let config = ArrayConfig::new(settings.layout(), settings.pixels());
     let config = config
@@ -658,18 +651,7 @@ fn used_room_is_as_new() {
 
 #[test]
 fn data_are_found_by_event() {
-    let settings = Settings {
-        columns: 3,
-        rows: 3,
-        missing: 0,
-        mode: Mode::Blocks(2, 8),
-        once_per_bin: false,
-        left_out: 0,
-        x: 4,
-        echoes: 1,
-        dead_time: 0,
-        seed: 0,
-    };
+    let settings = Settings::usual(3, 3, Mode::Blocks(2, 8));
     let (levels, blocks, patience) = settings.blocks().unwrap();
     let config = ArrayConfig::new(settings.layout(), settings.pixels());
     let config = config.blocks(levels, blocks, patience).unwrap();

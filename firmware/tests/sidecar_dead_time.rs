@@ -286,7 +286,7 @@ fn whole_histograms_are_weighed_by_their_laser_cycles() {
         if dead_time > 0 {
             let bins: Vec<u16> = expected.iter().map(|event| event.peak_bin.raw()).collect();
             assert_eq!(bins.is_empty(), blind_looks > 0, "{bins:?}");
-            // Chance stands clear, too, where it is counted 8,192 times.
+            // Noise exceeds the background, too, where it is counted 8,192 times.
             let sure = if cycles > 100_000 { 1 } else { bins.len() };
             assert!(bins.iter().take(sure).all(|bin| (70..=71).contains(bin)));
         }

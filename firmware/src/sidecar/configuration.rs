@@ -97,7 +97,6 @@ impl Sidecar<'_> {
         self.stopping.get_or_insert(StopReason::Configuration);
         self.started = false;
         self.off = None;
-        self.frame_cycles = 0;
         Ok(())
     }
 

@@ -90,7 +90,7 @@ impl Sidecar<'_> {
                 pixel,
                 is_whole: true,
                 cycle: LaserCycle::new(self.array.cycles()),
-                exposure: self.frame_cycles,
+                exposure: self.array.frame_cycles(),
             };
             self.send_histogram(head, counts);
         }

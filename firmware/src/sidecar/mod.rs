@@ -112,8 +112,6 @@ pub struct Sidecar<'a> {
     answer: Option<Answer>,
     encoder: AerEncoder,
     words: Queue<AerWord, QUEUE>,
-    /// Laser cycles of the histograms that come whole.
-    frame_cycles: u32,
     /// The host waits for the histogram of this pixel.
     requested_histogram: Option<PixelAddress>,
     unknown: u32,
@@ -170,7 +168,6 @@ impl<'a> Sidecar<'a> {
             answer: None,
             encoder: AerEncoder::new(),
             words: Queue::new(),
-            frame_cycles: 0,
             requested_histogram: None,
             unknown: 0,
             sensor_errors: 0,
@@ -339,7 +336,6 @@ impl<'a> Sidecar<'a> {
         self.answer = None;
         self.requested_histogram = None;
         self.encoder = AerEncoder::new();
-        self.frame_cycles = 0;
         while self.words.dequeue().is_some() {}
     }
 

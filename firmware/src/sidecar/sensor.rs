@@ -235,7 +235,6 @@ impl PhotonSink for Sidecar<'_> {
     fn begin_frame(&mut self, cycles: u32) {
         if self.takes_sensor() {
             self.array.begin_frame(cycles);
-            self.frame_cycles = cycles;
         }
     }
 

@@ -158,7 +158,7 @@ fn whole<const BINS: usize, V: CounterWidth>() {
             keep(*event);
         });
     }
-    keep(driven.statistics());
+    keep((driven.frame_cycles(), driven.statistics()));
 }
 
 /// Pixels with any addresses, of an array that may have more or fewer.
