@@ -65,8 +65,12 @@ fn decide<W: CounterWidth>(
 }
 
 /// The peaks of one gate, the highest first, and the highest bin.
-fn peaks(config: &Config, counts: &[u32; BINS], cycles: u32) -> (Vec<Detection>, Option<u16>) {
-    let mut histogram = Histogram::<BINS, Count24>::new();
+fn peaks<W: CounterWidth>(
+    config: &Config,
+    counts: &[u32; BINS],
+    cycles: u32,
+) -> (Vec<Detection>, Option<u16>) {
+    let mut histogram = Histogram::<BINS, W>::new();
     config.add_frame(&mut histogram, counts);
     let highest = (histogram.total() > 0).then_some(histogram.peak().bin.raw());
     let mut echoes = Vec::new();
@@ -97,7 +101,7 @@ fn without_slopes(
     let mut gate = given;
     loop {
         let config = config.with_gate(gate);
-        let (echoes, highest) = peaks(&config, counts, cycles);
+        let (echoes, highest) = peaks::<Count24>(&config, counts, cycles);
         let mut bins: Vec<u16> = echoes.iter().map(|echo| echo.peak.bin.raw()).collect();
         if bins.is_empty() {
             bins.extend(highest);
@@ -166,7 +170,7 @@ proptest! {
         match without_slopes(&config, width.max(1).into(), &counts, cycles) {
             None => prop_assert!(found.is_empty()),
             Some(left) => {
-                prop_assert_eq!(found, peaks(&left, &counts, cycles).0);
+                prop_assert_eq!(found, peaks::<Count24>(&left, &counts, cycles).0);
                 prop_assert_eq!(whole.gate(), left.gate());
                 let mut histogram = Histogram::<BINS, Count24>::new();
                 left.add_frame(&mut histogram, &counts);
@@ -196,7 +200,7 @@ proptest! {
         let divided = counts.map(|count| count.checked_shr(shift).unwrap_or(0));
         let left = u32::try_from(cycles >> shift).unwrap_or(u32::MAX);
         let (found, statistics, whole) = decide::<Count8>(&config, &counts, cycles);
-        prop_assert_eq!((found, whole.cycles()), (peaks(&config, &divided, left).0, left));
+        prop_assert_eq!((found, whole.cycles()), (peaks::<Count8>(&config, &divided, left).0, left));
         // No counter is full, so that none of its photons is lost.
         prop_assert_eq!((statistics.saturated, statistics.ended_full), (0, 0));
         prop_assert_eq!(whole.photons(&config, &counts).saturated(), 0);
@@ -246,5 +250,25 @@ fn an_empty_gate_stays() {
         assert_eq!((found.len(), statistics.blind_looks), (0, 0));
         assert_eq!(*whole.gate(), gate);
         assert_eq!(whole.photons(&config, &counts).total(), 0);
+    }
+}
+
+/// A fast laser: one photon in some millions of laser cycles is still a weight for the depth.
+#[test]
+fn few_photons_of_many_laser_cycles_have_their_depth() {
+    let config = config(5, RangeGate::full(), 1, 20);
+    for cycles in [1_000u64, 1_000_000, 80_000_000, 1 << 28] {
+        let mut counts = [0u32; BINS];
+        counts[40..43].copy_from_slice(&[10, 40, 30]);
+        let (found, _, _) = decide::<Count24>(&config, &counts, cycles);
+        assert_eq!(found.len(), 1);
+        let place =
+            256 * i32::from(found[0].peak.bin.raw()) + i32::from(found[0].depth.offset.raw());
+        // The centroid of bins 40 to 42, and half a bin.
+        let expected = 256 * 41 + 128 + 256 * (30 - 10) / 80;
+        assert!(
+            (place - expected).abs() <= 12,
+            "{cycles}: {place}, {expected}"
+        );
     }
 }

@@ -61,11 +61,14 @@ impl Rates {
 
     /// Relative to the highest bin. The same for all counters.
     #[inline(never)]
-    fn relative(light: &[u32; REACH], background: u32) -> Self {
-        let highest = u64::from(light.iter().fold(1, |highest, &light| highest.max(light)));
+    fn relative(light: &[u64; REACH], background: u64) -> Self {
+        let highest = light
+            .iter()
+            .fold(1, |highest: u64, &light| highest.max(light));
         #[allow(clippy::cast_possible_truncation, reason = "at most 1023")]
-        let relative = |light: u32| {
-            let relative = (u64::from(light) * u64::from(Count10::MAX) + highest / 2) / highest;
+        let relative = |light: u64| {
+            // 45 + 10 bits.
+            let relative = (light * u64::from(Count10::MAX) + highest / 2) / highest;
             relative as u16
         };
         let mut bins = [0; REACH];
@@ -111,9 +114,9 @@ impl Rates {
 }
 
 impl Counted {
-    /// The light a laser cycle in 1/2²⁴: up to 2³⁰.
+    /// The light a laser cycle in 1/2⁴⁰: up to 2⁴⁵.
     #[inline(never)]
-    pub(crate) fn light(self) -> u32 {
+    pub(crate) fn light(self) -> u64 {
         // In half cycles, so that the rest is at least 1.
         let whole = 2 * self.live.max(1);
         let mut rest = whole.saturating_sub(2 * self.photons).max(1);
@@ -122,22 +125,27 @@ impl Counted {
             rest *= 2;
             halvings += 1;
         }
-        // At most 1/3; 39 + 24 bits.
-        let y = ((whole - rest) << 24)
-            .checked_div(whole + rest)
-            .unwrap_or(0);
-        let square = (y * y) >> 24;
+        // At most 39 bits, which become 63, so that the quotient has 22 or more however dim the light is.
+        let above = whole - rest;
+        let bits = (above | 1).leading_zeros() - 1;
+        let quotient = (above << bits).checked_div(whole + rest).unwrap_or(0);
+        // At most 1/3.
+        let y = match bits.checked_sub(LIGHT_BITS) {
+            Some(less) => quotient >> less,
+            None => quotient << (LIGHT_BITS - bits),
+        };
+        let square = ((y >> 16) * (y >> 16)) >> 24;
         let third = (y * square) >> 24;
         let fifth = (third * square) >> 24;
         let seventh = (fifth * square) >> 24;
-        let logarithm = halvings * LN_2 + 2 * (y + third / 3 + fifth / 5 + seventh / 7);
-        // At most 39 · ln 2.
-        u32::try_from(logarithm).unwrap_or(u32::MAX)
+        halvings * LN_2 + 2 * (y + third / 3 + fifth / 5 + seventh / 7)
     }
 }
 
-/// ln 2 in 1/2²⁴.
-const LN_2: u64 = 11_629_080;
+/// Bits after the point of light.
+const LIGHT_BITS: u32 = 40;
+/// In 1/2⁴⁰.
+const LN_2: u64 = 762_123_384_786;
 
 #[cfg(test)]
 #[allow(clippy::unwrap_used, clippy::indexing_slicing, reason = "a test")]
@@ -149,14 +157,14 @@ mod tests {
 
     #[test]
     fn the_highest_bin_becomes_1023_and_the_others_are_rounded() {
-        for highest in [1, 2, 5, 1023, 1024, 1 << 24, 1 << 30] {
+        for highest in [1, 2, 5, 1023, 1024, 1 << 24, 1 << 30, 1 << 45] {
             for part in 0..=64 {
                 let mut light = [0; REACH];
                 light[3] = highest;
                 light[8] = highest / 64 * part;
                 let found = Rates::relative(&light, light[8] / 2);
-                let rounded = |light: u32| {
-                    let twice = u64::from(light) * 2 * 1023 / u64::from(highest);
+                let rounded = |light: u64| {
+                    let twice = light * 2 * 1023 / highest;
                     u16::try_from(twice.div_ceil(2)).unwrap()
                 };
                 assert_eq!(found.bins[3], 1023);
@@ -226,9 +234,10 @@ mod tests {
             ] {
                 let rest = (live as f64 - photons as f64).max(0.5);
                 let light = libm::log(live as f64 / rest);
-                let found = f64::from(Counted { photons, live }.light()) / f64::from(1 << 24);
+                let unit = 1.0 / (1u64 << 40) as f64;
+                let found = Counted { photons, live }.light() as f64 * unit;
                 // Rounded down ten times.
-                let most = light / 40_000.0 + 10.0 / f64::from(1 << 24);
+                let most = light / 40_000.0 + 10.0 * unit;
                 assert!(
                     (found - light).abs() <= most,
                     "{photons} of {live}: {found}, {light}"
