@@ -47,7 +47,8 @@ use crate::config::PixelConfig;
 use crate::detect::DetectionRule;
 use crate::event::DepthEvent;
 use crate::histogram::counter::Count16;
-use crate::pixel::{AsyncPixel, DecisionInput, Look, unobserved};
+use crate::pixel::{AsyncPixel, DecisionInput, Look};
+use crate::pixel_array::PixelData;
 use crate::statistics::Statistics;
 use crate::units::{BlockLevel, LaserCycle, PixelAddress};
 
@@ -203,7 +204,7 @@ pub struct Block<const BINS: usize, T = ()> {
     pub data: T,
 }
 
-impl<const BINS: usize, T: Default> Block<BINS, T> {
+impl<const BINS: usize, T: PixelData> Block<BINS, T> {
     /// An empty block at the beginning of its first exposure.
     #[must_use]
     pub fn new(place: BlockPlace) -> Self {
@@ -216,7 +217,7 @@ impl<const BINS: usize, T: Default> Block<BINS, T> {
 }
 
 /// Room for a block.
-impl<const BINS: usize, T: Default> Default for Block<BINS, T> {
+impl<const BINS: usize, T: PixelData> Default for Block<BINS, T> {
     fn default() -> Self {
         Self::new(BlockPlace {
             first: PixelAddress::new(0),
@@ -226,17 +227,18 @@ impl<const BINS: usize, T: Default> Default for Block<BINS, T> {
     }
 }
 
-impl<const BINS: usize, T> Block<BINS, T> {
-    /// Ends `cycles` laser cycles at once, as [`AsyncPixel::end_laser_cycles_with`] does for a pixel.
+impl<const BINS: usize, T: PixelData> Block<BINS, T> {
+    /// Ends `cycles` laser cycles at once, as [`AsyncPixel::end_laser_cycles`] does for a pixel.
     #[inline]
-    pub fn end_laser_cycles_with<R: DetectionRule>(
+    pub fn end_laser_cycles<R: DetectionRule>(
         &mut self,
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
         last: LaserCycle,
         cycles: u16,
-        observe: impl FnOnce(&DecisionInput<'_, BINS, Count16>),
     ) -> Look {
+        let data = &mut self.data;
+        let observe = |input: &DecisionInput<'_, BINS, Count16>| data.decides(input);
         let pixel = &mut self.pixel;
         let look = pixel.end_cycles::<R, false>(config, statistics, last, cycles, observe);
         // Also where it has waited for another echo, after a report.
@@ -274,7 +276,7 @@ impl<const BINS: usize, T> Block<BINS, T> {
 
 /// Counts a photon of a pixel with this link in the blocks that it reaches.
 #[inline]
-pub fn count_in_blocks<const BINS: usize, R: DetectionRule, T>(
+pub fn count_in_blocks<const BINS: usize, R: DetectionRule, T: PixelData>(
     blocks: &mut [Block<BINS, T>],
     link: &BlockLink,
     config: &PixelConfig<BINS, R>,
@@ -290,7 +292,7 @@ pub fn count_in_blocks<const BINS: usize, R: DetectionRule, T>(
 /// Ends `cycles` laser cycles at once for all blocks, as
 /// [`AsyncPixel::end_laser_cycles`] does for a pixel. `statistics` are those of the blocks.
 /// Returns whether one of them has an event.
-pub fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule, T>(
+pub fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule, T: PixelData>(
     blocks: &mut [Block<BINS, T>],
     config: &PixelConfig<BINS, R>,
     statistics: &mut Statistics,
@@ -299,7 +301,7 @@ pub fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule, T>(
 ) -> bool {
     let mut fired = false;
     for block in blocks {
-        let look = block.end_laser_cycles_with(config, statistics, last, cycles, unobserved);
+        let look = block.end_laser_cycles(config, statistics, last, cycles);
         fired |= look == Look::Event;
     }
     fired

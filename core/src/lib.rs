@@ -128,7 +128,9 @@ pub use histogram::counter::{Count8, Count10, Count16, Count20, Count24, Counter
 pub use histogram::gate::{GateError, RangeGate};
 pub use histogram::{Histogram, Peak};
 pub use pixel::{AsyncPixel, Look, OncePerBin};
-pub use pixel_array::{ArrayConfig, ArrayError, ArrayLosses, PixelArray, PixelPlace};
+pub use pixel_array::{
+    ArrayConfig, ArrayError, ArrayLosses, ArrayState, PixelArray, PixelData, PixelPlace,
+};
 pub use statistics::Statistics;
 pub use units::{
     BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,

@@ -57,7 +57,7 @@ use crate::config::PixelConfig;
 pub use crate::detect::NeighbourRule;
 use crate::detect::{Detection, DetectionRule, WindowRule};
 use crate::histogram::counter::CounterWidth;
-use crate::pixel::{AsyncPixel, Look, unobserved};
+use crate::pixel::{AsyncPixel, unobserved};
 use crate::statistics::Statistics;
 use crate::units::{LaserCycle, PixelAddress};
 
@@ -67,6 +67,18 @@ pub trait ArrayPixel<const BINS: usize, W: CounterWidth> {
     fn pixel(&self) -> Option<&AsyncPixel<BINS, W>>;
     /// The pixel, to change.
     fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS, W>>;
+    /// The [third step](AsyncPixel::end_look) of the pixel.
+    #[inline]
+    fn end_look<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        last: LaserCycle,
+    ) {
+        if let Some(pixel) = self.pixel_mut() {
+            pixel.end_look(config, statistics, last, unobserved);
+        }
+    }
 }
 
 impl<const BINS: usize, W: CounterWidth> ArrayPixel<BINS, W> for AsyncPixel<BINS, W> {
@@ -141,22 +153,76 @@ pub fn end_laser_cycles_of_array<const BINS: usize, W: CounterWidth, R: Detectio
     last: LaserCycle,
     cycles: u16,
 ) -> bool {
-    let (mut decides, mut fired) = (false, false);
-    for pixel in pixels.iter_mut().filter_map(ArrayPixel::pixel_mut) {
-        decides |= pixel.begin_look(config, statistics, cycles);
-    }
-    if !decides {
-        return false;
-    }
-    for number in 0..pixels.len() {
-        let detection = neighbours.decide(pixels, number, config);
-        let pixel = pixels.get_mut(number).and_then(ArrayPixel::pixel_mut);
-        if let (Some(pixel), Some(detection)) = (pixel, detection) {
-            pixel.keep_detection(last, &detection);
+    let before = statistics.events;
+    let look = ArrayLook {
+        config,
+        neighbours,
+        last,
+    };
+    look.end_laser_cycles(pixels, statistics, cycles, |pixels, look| {
+        look.decide_in_turn(pixels);
+    });
+    statistics.events > before
+}
+
+/// A look of all pixels.
+pub(crate) struct ArrayLook<'a, const BINS: usize, R: DetectionRule> {
+    pub(crate) config: &'a PixelConfig<BINS, R>,
+    pub(crate) neighbours: &'a NeighbourConfig,
+    pub(crate) last: LaserCycle,
+}
+
+impl<const BINS: usize, R: DetectionRule> ArrayLook<'_, BINS, R> {
+    /// The three steps. `decide` is the second.
+    #[inline(always)]
+    pub(crate) fn end_laser_cycles<W: CounterWidth, P: ArrayPixel<BINS, W>>(
+        &self,
+        pixels: &mut [P],
+        statistics: &mut Statistics,
+        cycles: u16,
+        decide: impl FnOnce(&mut [P], &Self),
+    ) {
+        let mut decides = false;
+        for pixel in pixels.iter_mut().filter_map(P::pixel_mut) {
+            decides |= pixel.begin_look(self.config, statistics, cycles);
+        }
+        if decides {
+            decide(pixels, self);
+            for pixel in pixels {
+                pixel.end_look(self.config, statistics, self.last);
+            }
         }
     }
-    for pixel in pixels.iter_mut().filter_map(ArrayPixel::pixel_mut) {
-        fired |= pixel.end_look(config, statistics, last, unobserved) == Look::Event;
+
+    /// The detection of a pixel.
+    pub(crate) fn decide<W: CounterWidth>(
+        &self,
+        pixels: &[impl ArrayPixel<BINS, W>],
+        number: usize,
+    ) -> Option<Detection> {
+        self.neighbours.decide(pixels, number, self.config)
     }
-    fired
+
+    /// Those of all pixels, one after another.
+    #[inline(always)]
+    pub(crate) fn decide_in_turn<W: CounterWidth>(&self, pixels: &mut [impl ArrayPixel<BINS, W>]) {
+        for number in 0..pixels.len() {
+            let detection = self.decide(pixels, number);
+            self.keep(pixels, detection.map(|detection| (number, detection)));
+        }
+    }
+
+    /// Keeps detections until all pixels have decided.
+    #[inline(always)]
+    pub(crate) fn keep<W: CounterWidth>(
+        &self,
+        pixels: &mut [impl ArrayPixel<BINS, W>],
+        found: impl IntoIterator<Item = (usize, Detection)>,
+    ) {
+        for (number, detection) in found {
+            if let Some(pixel) = pixels.get_mut(number).and_then(ArrayPixel::pixel_mut) {
+                pixel.keep_detection(self.last, &detection);
+            }
+        }
+    }
 }

@@ -50,11 +50,11 @@ use crate::array::Array;
 use crate::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use crate::check::impl_error;
 use crate::config::PixelConfig;
-use crate::detect::{DetectionRule, PaperRule};
+use crate::detect::{Detection, DetectionRule, PaperRule};
 use crate::event::DepthEvent;
 use crate::histogram::counter::{Count10, CounterWidth, PhotonCount};
-use crate::neighbours::{ArrayPixel, NeighbourConfig, end_laser_cycles_of_array};
-use crate::pixel::{AsyncPixel, Look, OncePerBin};
+use crate::neighbours::{ArrayLook, ArrayPixel, NeighbourConfig};
+use crate::pixel::{AsyncPixel, DecisionInput, Look, OncePerBin};
 use crate::statistics::{Statistics, photons};
 use crate::units::{BlockLevel, LaserCycle, PixelAddress};
 use crate::whole::WholeHistogram;
@@ -73,6 +73,16 @@ pub struct PixelPlace<const BINS: usize, W: CounterWidth = Count10, T = ()> {
     pub data: T,
 }
 
+/// What a program keeps beside a pixel or a block.
+pub trait PixelData: Default {
+    /// The pixel or the block reports an event, and then starts over: what the decision was made from.
+    #[inline(always)]
+    fn decides<const BINS: usize, W: CounterWidth>(&mut self, _input: &DecisionInput<'_, BINS, W>) {
+    }
+}
+
+impl PixelData for () {}
+
 /// What a place is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Use {
@@ -80,13 +90,13 @@ enum Use {
     Nothing,
     /// A pixel that is left out.
     LeftOut,
-    /// A pixel whose photons only count.
+    /// A pixel.
     Plain,
-    /// A pixel with blocks, or whose photons count once per bin.
-    Further,
+    /// A pixel whose photons count once per bin.
+    OncePerBin,
 }
 
-impl<const BINS: usize, W: CounterWidth, T: Default> PixelPlace<BINS, W, T> {
+impl<const BINS: usize, W: CounterWidth, T: PixelData> PixelPlace<BINS, W, T> {
     /// Room for a pixel. A photon there is one of no pixel until a configuration uses it.
     #[must_use]
     pub fn new() -> Self {
@@ -107,13 +117,15 @@ impl<const BINS: usize, W: CounterWidth, T: Default> PixelPlace<BINS, W, T> {
     }
 }
 
-impl<const BINS: usize, W: CounterWidth, T: Default> Default for PixelPlace<BINS, W, T> {
+impl<const BINS: usize, W: CounterWidth, T: PixelData> Default for PixelPlace<BINS, W, T> {
     fn default() -> Self {
         Self::new()
     }
 }
 
-impl<const BINS: usize, W: CounterWidth, T> ArrayPixel<BINS, W> for PixelPlace<BINS, W, T> {
+impl<const BINS: usize, W: CounterWidth, T: PixelData> ArrayPixel<BINS, W>
+    for PixelPlace<BINS, W, T>
+{
     #[inline(always)]
     fn pixel(&self) -> Option<&AsyncPixel<BINS, W>> {
         self.use_of.counts().then_some(&self.pixel)
@@ -123,12 +135,30 @@ impl<const BINS: usize, W: CounterWidth, T> ArrayPixel<BINS, W> for PixelPlace<B
     fn pixel_mut(&mut self) -> Option<&mut AsyncPixel<BINS, W>> {
         self.use_of.counts().then_some(&mut self.pixel)
     }
+
+    #[inline(always)]
+    fn end_look<R: DetectionRule>(
+        &mut self,
+        config: &PixelConfig<BINS, R>,
+        statistics: &mut Statistics,
+        last: LaserCycle,
+    ) {
+        let (pixel, data) = (&mut self.pixel, &mut self.data);
+        if self.use_of.counts() {
+            pixel.end_look(
+                config,
+                statistics,
+                last,
+                |input: &DecisionInput<'_, BINS, W>| data.decides(input),
+            );
+        }
+    }
 }
 
 impl Use {
     #[inline(always)]
     const fn counts(self) -> bool {
-        matches!(self, Self::Plain | Self::Further)
+        matches!(self, Self::Plain | Self::OncePerBin)
     }
 }
 
@@ -283,6 +313,13 @@ impl<const BINS: usize, R: DetectionRule> ArrayConfig<BINS, R> {
         &self.pixels
     }
 
+    /// The pixels and blocks for which it takes room.
+    #[must_use]
+    pub fn room(&self) -> [usize; 2] {
+        let blocks = self.binning().map_or(0, Binning::number_of_blocks);
+        [self.number, blocks].map(|number| usize::try_from(number).unwrap_or(usize::MAX))
+    }
+
     /// Whether neighbours confirm.
     #[must_use]
     pub const fn has_neighbours(&self) -> bool {
@@ -345,14 +382,22 @@ pub struct ArrayLosses {
 pub struct PixelArray<'a, const BINS: usize, R: DetectionRule, W: CounterWidth = Count10, T = ()> {
     pixels: &'a mut [PixelPlace<BINS, W, T>],
     blocks: &'a mut [Block<BINS, T>],
+    state: ArrayState<BINS, R>,
+}
+
+/// What an array is beside its pixels and blocks, for a program that does not have their room at hand all the time.
+#[derive(Clone, Debug)]
+pub struct ArrayState<const BINS: usize, R: DetectionRule> {
     config: Option<ArrayConfig<BINS, R>>,
-    /// Of these rooms, those in use.
+    /// Of the rooms, those in use.
     pixels_in_use: usize,
     blocks_in_use: usize,
     /// Laser cycles that have ended.
     cycle: u64,
-    /// Those since the pixels looked last: all look at once.
+    /// Those since the last look: all pixels look at once.
     since_look: u16,
+    /// Those up to the last look in which looks were left out, since they find nothing.
+    dark: u16,
     /// Those from the last tick of the blocks to the last look.
     since_tick: u16,
     /// The pixel, or after the pixels the block, whose slot is emptied next.
@@ -368,23 +413,17 @@ pub struct PixelArray<'a, const BINS: usize, R: DetectionRule, W: CounterWidth =
     losses: ArrayLosses,
 }
 
-impl<'a, const BINS: usize, R, W, T> PixelArray<'a, BINS, R, W, T>
-where
-    R: DetectionRule,
-    W: CounterWidth,
-    T: Default,
-{
-    /// An array without pixels, until a configuration. Without blocks `blocks` may be empty.
+impl<const BINS: usize, R: DetectionRule> ArrayState<BINS, R> {
+    /// Of an array without a configuration.
     #[must_use]
-    pub fn new(pixels: &'a mut [PixelPlace<BINS, W, T>], blocks: &'a mut [Block<BINS, T>]) -> Self {
-        let mut array = Self {
-            pixels,
-            blocks,
+    pub const fn new() -> Self {
+        Self {
             config: None,
             pixels_in_use: 0,
             blocks_in_use: 0,
             cycle: 0,
             since_look: 0,
+            dark: 0,
             since_tick: 0,
             turn: 0,
             taken: [0; 2],
@@ -392,11 +431,60 @@ where
             frame_cycles: 0,
             statistics: Statistics::new(),
             block_statistics: Statistics::new(),
-            losses: ArrayLosses::default(),
+            losses: ArrayLosses {
+                unaddressed: 0,
+                left_out: 0,
+                unordered: 0,
+                photons: 0,
+                laser_cycles: 0,
+            },
+        }
+    }
+}
+
+impl<const BINS: usize, R: DetectionRule> Default for ArrayState<BINS, R> {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+impl<'a, const BINS: usize, R, W, T> PixelArray<'a, BINS, R, W, T>
+where
+    R: DetectionRule,
+    W: CounterWidth,
+    T: PixelData,
+{
+    /// An array without pixels, until a configuration. Without blocks `blocks` may be empty.
+    #[must_use]
+    pub fn new(pixels: &'a mut [PixelPlace<BINS, W, T>], blocks: &'a mut [Block<BINS, T>]) -> Self {
+        let mut array = Self {
+            pixels,
+            blocks,
+            state: ArrayState::new(),
         };
         // The room may have been used before.
         array.clear();
         array
+    }
+
+    /// The array that [`Self::into_state`] took apart, in the same room.
+    #[must_use]
+    pub const fn resume(
+        pixels: &'a mut [PixelPlace<BINS, W, T>],
+        blocks: &'a mut [Block<BINS, T>],
+        state: ArrayState<BINS, R>,
+    ) -> Self {
+        Self {
+            pixels,
+            blocks,
+            state,
+        }
+    }
+
+    /// What is not in its pixels and blocks.
+    #[must_use]
+    pub fn into_state(self) -> ArrayState<BINS, R> {
+        self.state
     }
 
     /// The pixels and blocks of a configuration, for which there is room.
@@ -404,9 +492,7 @@ where
     /// # Errors
     /// Fails if there is none.
     pub fn check(&self, config: &ArrayConfig<BINS, R>) -> Result<[usize; 2], ArrayError> {
-        let blocks = config.binning().map_or(0, Binning::number_of_blocks);
-        let [pixels, blocks] =
-            [config.number, blocks].map(|number| usize::try_from(number).unwrap_or(usize::MAX));
+        let [pixels, blocks] = config.room();
         if pixels > self.pixels.len() {
             return Err(ArrayError::Pixels);
         }
@@ -424,9 +510,9 @@ where
         let [pixels, blocks] = self.check(config)?;
         let binning = config.binning();
         self.clear();
-        let use_of = match binning.is_none() && !config.once_per_bin {
-            true => Use::Plain,
-            false => Use::Further,
+        let use_of = match config.once_per_bin {
+            true => Use::OncePerBin,
+            false => Use::Plain,
         };
         let addresses = (0..=u16::MAX).map(PixelAddress::new);
         for (place, address) in self.pixels.iter_mut().take(pixels).zip(addresses) {
@@ -444,8 +530,8 @@ where
         {
             *block = Block::new(place);
         }
-        (self.pixels_in_use, self.blocks_in_use) = (pixels, blocks);
-        self.config = Some(*config);
+        (self.state.pixels_in_use, self.state.blocks_in_use) = (pixels, blocks);
+        self.state.config = Some(*config);
         Ok(())
     }
 
@@ -454,12 +540,7 @@ where
         for place in self.pixels.iter_mut() {
             place.use_of = Use::Nothing;
         }
-        self.config = None;
-        (self.pixels_in_use, self.blocks_in_use) = (0, 0);
-        (self.cycle, self.since_look, self.since_tick) = (0, 0, 0);
-        (self.turn, self.taken, self.frame_cycles) = (0, [0; 2], 0);
-        (self.statistics, self.block_statistics) = (Statistics::new(), Statistics::new());
-        self.losses = ArrayLosses::default();
+        self.state = ArrayState::new();
     }
 }
 
@@ -467,6 +548,7 @@ impl<const BINS: usize, R, W, T> PixelArray<'_, BINS, R, W, T>
 where
     R: DetectionRule,
     W: CounterWidth,
+    T: PixelData,
 {
     /// Counts a photon of pixel number `pixel`, row · columns + column, with the TDC code `code` in the current laser cycle.
     pub fn photon(&mut self, pixel: usize, code: u16) {
@@ -474,7 +556,7 @@ where
         if use_of != Some(Use::Plain) && !self.counts(pixel, code) {
             return;
         }
-        if let (Some(place), Some(config)) = (self.pixels.get_mut(pixel), &self.config) {
+        if let (Some(place), Some(config)) = (self.pixels.get_mut(pixel), &self.state.config) {
             place.pixel.count(&config.pixels, code);
             if let Together::Blocks { config, .. } = &config.together {
                 count_in_blocks(self.blocks, &place.feed, config, code);
@@ -486,32 +568,31 @@ where
     // Out of line: a photon that counts anyhow would take longer with it.
     #[inline(never)]
     fn counts(&mut self, pixel: usize, code: u16) -> bool {
-        let place = self.pixels.get_mut(pixel);
-        let (Some(place), Some(config)) = (place, &self.config) else {
-            self.losses.unaddressed += 1;
+        let Some(place) = self.pixels.get_mut(pixel) else {
+            self.state.losses.unaddressed += 1;
             return false;
         };
         if !place.use_of.counts() {
             match place.use_of {
-                Use::LeftOut => self.losses.left_out += 1,
-                _ => self.losses.unaddressed += 1,
+                Use::LeftOut => self.state.losses.left_out += 1,
+                _ => self.state.losses.unaddressed += 1,
             }
             return false;
         }
-        if !config.once_per_bin || usize::from(code) >= BINS {
+        if usize::from(code) >= BINS {
             return true;
         }
         #[allow(clippy::cast_possible_truncation, reason = "the low bits")]
-        let now = (self.cycle as u32).wrapping_add(1);
+        let now = (self.state.cycle as u32).wrapping_add(1);
         if place.seen_in != now {
             (place.seen_in, place.latest) = (now, code);
-            self.seen = Seen::of(pixel, None);
-        } else if self.seen.pixel != pixel {
-            self.seen = Seen::of(pixel, Some(place.latest));
+            self.state.seen = Seen::of(pixel, None);
+        } else if self.state.seen.pixel != pixel {
+            self.state.seen = Seen::of(pixel, Some(place.latest));
         }
-        if !self.seen.is_first(code) {
-            self.statistics.repeated += 1;
-            self.losses.unordered += u64::from(Some(code) < self.seen.latest);
+        if !self.state.seen.is_first(code) {
+            self.state.statistics.repeated += 1;
+            self.state.losses.unordered += u64::from(Some(code) < self.state.seen.latest);
             return false;
         }
         place.latest = place.latest.max(code);
@@ -525,45 +606,96 @@ where
         let _ = self.end_laser_cycles(1);
     }
 
-    /// Ends `cycles` laser cycles, but none after a look. Returns how many are left: end these after the events of that look
-    /// are taken.
+    /// Ends `cycles` laser cycles without further photons, but none after a look. Returns how many are left: end these after
+    /// the events of that look are taken. Looks that find nothing for want of a photon are left out.
     #[inline]
     #[must_use = "these laser cycles have not ended yet"]
     pub fn end_laser_cycles(&mut self, cycles: u16) -> u16 {
-        let Some(config) = &self.config else {
-            return 0;
-        };
-        let to_look = config.pixels.x() - self.since_look;
-        if cycles < to_look {
-            self.since_look += cycles;
-            self.cycle += u64::from(cycles);
-            return 0;
-        }
-        self.cycle += u64::from(to_look);
-        self.since_look = 0;
-        self.look();
-        cycles - to_look
+        self.end(cycles, |places, look| look.decide_in_turn(places))
     }
 
-    /// All pixels have ended X laser cycles, and look.
-    fn look(&mut self) {
+    /// The same, on the threads of a program. `decide` gets the number of pixels and a function that gives the detection of a
+    /// pixel, which takes by far the most time where neighbours confirm. It calls it for each, in any order, and returns
+    /// the pixels with a detection. Without neighbours it is not called.
+    #[must_use = "these laser cycles have not ended yet"]
+    pub fn end_laser_cycles_shared<I>(
+        &mut self,
+        cycles: u16,
+        decide: impl FnOnce(usize, &(dyn Fn(usize) -> Option<Detection> + Sync)) -> I,
+    ) -> u16
+    where
+        I: IntoIterator<Item = (usize, Detection)>,
+        R: Sync,
+        W: Sync,
+        T: Sync,
+    {
+        self.end(cycles, |places, look| {
+            let found = decide(places.len(), &|pixel| look.decide(places, pixel));
+            look.keep(places, found);
+        })
+    }
+
+    /// `decide` keeps the detections of all pixels that have neighbours.
+    #[inline(always)]
+    fn end(
+        &mut self,
+        cycles: u16,
+        decide: impl FnOnce(&mut [PixelPlace<BINS, W, T>], &ArrayLook<'_, BINS, R>),
+    ) -> u16 {
+        let Some(config) = &self.state.config else {
+            return 0;
+        };
+        let x = config.pixels.x();
+        let to_look = x - self.state.since_look;
+        if cycles < to_look {
+            self.state.since_look += cycles;
+            self.state.cycle += u64::from(cycles);
+            return 0;
+        }
+        self.state.cycle += u64::from(to_look);
+        self.state.since_look = 0;
+        let blind_looks = self.state.statistics.blind_looks;
+        self.look(decide);
+        let left = cycles - to_look;
+        if left < x || self.has_event() || self.state.statistics.blind_looks != blind_looks {
+            return left;
+        }
+        let dark = self.dark_cycles(left);
+        self.state.dark = dark;
+        self.state.cycle += u64::from(dark);
+        left - dark
+    }
+
+    /// All pixels look: X laser cycles after the last look, or later if looks were left out.
+    fn look(
+        &mut self,
+        decide: impl FnOnce(&mut [PixelPlace<BINS, W, T>], &ArrayLook<'_, BINS, R>),
+    ) {
         // An event that was left has its turn before those that come now.
-        self.turn = self.next_slot(self.turn).unwrap_or(0);
-        let Some(config) = &self.config else {
+        self.state.turn = self.next_slot(self.state.turn).unwrap_or(0);
+        let Some(config) = &self.state.config else {
             return;
         };
-        let (pixels, x) = (&config.pixels, config.pixels.x());
-        let last = LaserCycle::new(self.cycle.saturating_sub(1));
+        let pixels = &config.pixels;
+        let cycles = pixels.x() + core::mem::take(&mut self.state.dark);
+        let last = LaserCycle::new(self.state.cycle.saturating_sub(1));
         let places = self
             .pixels
-            .get_mut(..self.pixels_in_use)
+            .get_mut(..self.state.pixels_in_use)
             .unwrap_or_default();
+        let statistics = &mut self.state.statistics;
         if let Together::Neighbours(neighbours) = &config.together {
-            end_laser_cycles_of_array(places, pixels, neighbours, &mut self.statistics, last, x);
+            let look = ArrayLook {
+                config: pixels,
+                neighbours,
+                last,
+            };
+            look.end_laser_cycles(places, statistics, cycles, decide);
         } else {
             for place in places.iter_mut().filter(|place| place.use_of.counts()) {
-                let (pixel, statistics) = (&mut place.pixel, &mut self.statistics);
-                let look = pixel.end_laser_cycles(pixels, statistics, last, x);
+                let (pixel, data) = (&mut place.pixel, &mut place.data);
+                let observe = |input: &DecisionInput<'_, BINS, W>| data.decides(input);
+                let look = pixel.end_laser_cycles_with(pixels, statistics, last, cycles, observe);
                 // A pixel that has waited for another echo has reported, too.
                 if matches!(look, Look::Event | Look::Ended) {
                     place.feed.reported();
@@ -576,13 +708,13 @@ where
         {
             let blocks = self
                 .blocks
-                .get_mut(..self.blocks_in_use)
+                .get_mut(..self.state.blocks_in_use)
                 .unwrap_or_default();
-            let statistics = &mut self.block_statistics;
-            end_laser_cycles_of_blocks(blocks, config, statistics, last, x);
-            self.since_tick = self.since_tick.saturating_add(x);
-            if self.since_tick >= *patience {
-                self.since_tick = 0;
+            let statistics = &mut self.state.block_statistics;
+            end_laser_cycles_of_blocks(blocks, config, statistics, last, cycles);
+            self.state.since_tick = self.state.since_tick.saturating_add(cycles);
+            if self.state.since_tick >= *patience {
+                self.state.since_tick = 0;
                 for place in places {
                     place.feed.tick(place.pixel.has_reported());
                 }
@@ -591,21 +723,47 @@ where
         }
     }
 
+    /// Of the next `cycles` laser cycles, which have no photon, those up to the last look that finds nothing, before the next
+    /// tick. All pixels have just looked and found nothing.
+    #[inline(never)]
+    fn dark_cycles(&self, cycles: u16) -> u16 {
+        let Some(config) = &self.state.config else {
+            return 0;
+        };
+        let (pixels, x) = (&config.pixels, config.pixels.x());
+        let mut dark = cycles.min(u16::MAX - x);
+        for place in self.pixels.iter().take(self.state.pixels_in_use) {
+            if place.use_of.counts() {
+                dark = dark.min(place.pixel.dark_cycles(pixels, config.has_neighbours()));
+            }
+        }
+        if let Together::Blocks {
+            config, patience, ..
+        } = &config.together
+        {
+            dark = dark.min(patience.saturating_sub(self.state.since_tick + 1));
+            for block in self.blocks.iter().take(self.state.blocks_in_use) {
+                dark = dark.min(block.pixel().dark_cycles(config, false));
+            }
+        }
+        dark - dark % x
+    }
+
     /// Takes an event out of its slot: of the pixels by address, then of the blocks. Who does not take all goes on from there
     /// later, so that each has its turn.
     pub fn next_event(&mut self) -> Option<DepthEvent> {
-        let slot = self.next_slot(self.turn)?;
-        let event = match slot.checked_sub(self.pixels_in_use) {
+        let slot = self.next_slot(self.state.turn)?;
+        let event = match slot.checked_sub(self.state.pixels_in_use) {
             None => {
-                self.taken[0] += 1;
+                self.state.taken[0] += 1;
                 self.pixels.get_mut(slot)?.pixel.take_event()
             }
             Some(block) => {
-                self.taken[1] += 1;
+                self.state.taken[1] += 1;
                 self.blocks.get_mut(block)?.take_event()
             }
         };
-        self.turn = slot + 1;
+        self.state.turn = slot + 1;
         event
     }
 
@@ -615,13 +773,13 @@ where
         if !self.has_event() {
             return None;
         }
-        let slots = self.pixels_in_use + self.blocks_in_use;
+        let slots = self.state.pixels_in_use + self.state.blocks_in_use;
         let mut slot = from;
         for _ in 0..slots {
             if slot >= slots {
                 slot = 0;
             }
-            let has_event = match slot.checked_sub(self.pixels_in_use) {
+            let has_event = match slot.checked_sub(self.state.pixels_in_use) {
                 None => self.pixels.get(slot).map(|place| place.pixel.has_event()),
                 Some(block) => self.blocks.get(block).map(Block::has_event),
             };
@@ -637,19 +795,20 @@ where
     #[inline]
     #[must_use]
     pub const fn has_event(&self) -> bool {
-        self.statistics.events != self.taken[0] || self.block_statistics.events != self.taken[1]
+        self.state.statistics.events != self.state.taken[0]
+            || self.state.block_statistics.events != self.state.taken[1]
     }
 
     /// Whether the pixels have looked at the end of the last laser cycle, or have just been configured.
     #[must_use]
     pub const fn has_looked(&self) -> bool {
-        self.since_look == 0
+        self.state.since_look == 0
     }
 
     /// A sensor has counted whole histograms for `cycles` laser cycles by itself: each comes by [`Self::histogram`].
     pub fn begin_frame(&mut self, cycles: u32) {
-        self.cycle += u64::from(cycles);
-        self.frame_cycles = cycles;
+        self.state.cycle += u64::from(cycles);
+        self.state.frame_cycles = cycles;
     }
 
     /// Decides on the whole histogram of a pixel, alone, and calls `event` for each event, all of the last laser cycle of the
@@ -665,27 +824,32 @@ where
         let place = self.pixels.get(usize::from(pixel.raw()));
         let use_of = place.map_or(Use::Nothing, |place| place.use_of);
         if use_of == Use::LeftOut {
-            self.losses.left_out += photons(Some(counts));
+            self.state.losses.left_out += photons(Some(counts));
             return;
         }
-        let Some(config) = self.config.as_ref().filter(|_| use_of != Use::Nothing) else {
-            self.losses.unaddressed += photons(Some(counts));
+        let Some(config) = self
+            .state
+            .config
+            .as_ref()
+            .filter(|_| use_of != Use::Nothing)
+        else {
+            self.state.losses.unaddressed += photons(Some(counts));
             return;
         };
-        let (config, statistics) = (&config.pixels, &mut self.statistics);
+        let (config, statistics) = (&config.pixels, &mut self.state.statistics);
         if room < usize::from(config.echoes().raw()) {
             statistics.add_counts(counts, config.gate());
             statistics.deferred += 1;
             return;
         }
-        let last = LaserCycle::new(self.cycle.saturating_sub(1));
-        let exposure = u16::try_from(self.frame_cycles).unwrap_or(u16::MAX);
+        let last = LaserCycle::new(self.state.cycle.saturating_sub(1));
+        let exposure = u16::try_from(self.state.frame_cycles).unwrap_or(u16::MAX);
         let mut whole = WholeHistogram::<BINS, V>::new();
-        let cycles = self.frame_cycles.into();
+        let cycles = self.state.frame_cycles.into();
         whole.decide(config, counts, cycles, statistics, |echo, detection| {
             let first = detection.event(pixel, last, exposure);
             event(&DepthEvent { echo, ..first });
-            self.taken[0] += 1;
+            self.state.taken[0] += 1;
         });
     }
 
@@ -693,9 +857,10 @@ where
     /// belong to no exposure. Call it between two laser cycles. Photons that are lost in laser cycles that end as others do
     /// make peaks lower.
     pub const fn lost(&mut self, photons: u64, laser_cycles: u64) {
-        self.losses.photons = self.losses.photons.saturating_add(photons);
-        self.losses.laser_cycles = self.losses.laser_cycles.saturating_add(laser_cycles);
-        self.cycle = self.cycle.saturating_add(laser_cycles);
+        self.state.losses.photons = self.state.losses.photons.saturating_add(photons);
+        self.state.losses.laser_cycles =
+            self.state.losses.laser_cycles.saturating_add(laser_cycles);
+        self.state.cycle = self.state.cycle.saturating_add(laser_cycles);
     }
 
     /// Leaves a pixel out from now on, whatever the configuration: its photons count as left out, and it decides nothing.
@@ -715,7 +880,7 @@ where
             let place = self.pixels.get_mut(usize::from(event.pixel.raw()))?;
             return Some(&mut place.data);
         }
-        let binning = self.config.as_ref()?.binning()?;
+        let binning = self.state.config.as_ref()?.binning()?;
         let place = binning.number_of(event.level, event.pixel)?;
         Some(&mut self.blocks.get_mut(place)?.data)
     }
@@ -723,7 +888,7 @@ where
     /// The configuration in force.
     #[must_use]
     pub const fn config(&self) -> Option<&ArrayConfig<BINS, R>> {
-        self.config.as_ref()
+        self.state.config.as_ref()
     }
 
     /// The pixels for which there is room.
@@ -742,39 +907,49 @@ where
     #[must_use]
     pub fn exposure(&self, pixel: usize) -> Option<u16> {
         let exposure = self.pixel(pixel)?.exposure();
-        Some(exposure.saturating_add(self.since_look))
+        let since = self.state.dark.saturating_add(self.state.since_look);
+        Some(exposure.saturating_add(since))
+    }
+
+    /// Laser cycles up to and with the next look: the photons of these may come pixel by pixel, unless they count once per bin.
+    #[must_use]
+    pub const fn to_look(&self) -> u16 {
+        match &self.state.config {
+            Some(config) => config.pixels.x() - self.state.since_look,
+            None => 1,
+        }
     }
 
     /// Laser cycles that have ended since the configuration.
     #[must_use]
     pub const fn cycles(&self) -> u64 {
-        self.cycle
+        self.state.cycle
     }
 
     /// Those of the last frame: see [`Self::begin_frame`].
     #[must_use]
     pub const fn frame_cycles(&self) -> u32 {
-        self.frame_cycles
+        self.state.frame_cycles
     }
 
     /// What counted in no pixel.
     #[must_use]
     pub const fn losses(&self) -> &ArrayLosses {
-        &self.losses
+        &self.state.losses
     }
 
     /// What the pixels have done so far, and what the blocks have, with the photons of exposures that have not ended. Events
     /// are those that were taken.
     #[must_use]
     pub fn statistics(&self) -> [Statistics; 2] {
-        let (mut pixels, mut blocks) = (self.statistics, self.block_statistics);
-        for place in self.pixels.iter().take(self.pixels_in_use) {
+        let (mut pixels, mut blocks) = (self.state.statistics, self.state.block_statistics);
+        for place in self.pixels.iter().take(self.state.pixels_in_use) {
             place.pixel.add_photons_to(&mut pixels);
         }
-        for block in self.blocks.iter().take(self.blocks_in_use) {
+        for block in self.blocks.iter().take(self.state.blocks_in_use) {
             block.pixel().add_photons_to(&mut blocks);
         }
-        [pixels.events, blocks.events] = self.taken;
+        [pixels.events, blocks.events] = self.state.taken;
         [pixels, blocks]
     }
 }

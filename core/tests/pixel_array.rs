@@ -3,10 +3,11 @@
 use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::fixed::types::U4F12;
 use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
+use dtof_core::rule::DecisionInput;
 use dtof_core::{
-    Array, ArrayConfig, ArrayError, ArrayLosses, AsyncPixel, BlockLevel, Count, Count24,
-    DepthEvent, EchoNumber, LaserCycle, Look, Neighbours, PixelAddress, PixelArray, PixelConfig,
-    PixelPlace, RangeGate, Statistics, WindowRule,
+    Array, ArrayConfig, ArrayError, ArrayLosses, AsyncPixel, BlockLevel, Count, Count10, Count24,
+    CounterWidth, DepthEvent, EchoNumber, LaserCycle, Look, Neighbours, PixelAddress, PixelArray,
+    PixelConfig, PixelData, PixelPlace, RangeGate, Statistics, WindowRule,
 };
 use proptest::prelude::*;
 use rand_core::{Rng, SeedableRng};
@@ -107,6 +108,22 @@ impl Settings {
             }
             _ => None,
         }
+    }
+}
+
+impl Settings {
+    fn array(&self) -> ArrayConfig<BINS, WindowRule> {
+        let mut config = ArrayConfig::new(self.layout(), self.pixels());
+        if let Some((levels, blocks, patience)) = self.blocks() {
+            config = config.blocks(levels, blocks, patience).unwrap();
+        }
+        if let Some(neighbours) = self.neighbours() {
+            config = config.neighbours(neighbours).unwrap();
+        }
+        if self.once_per_bin {
+            config = config.once_per_bin();
+        }
+        config.first(self.number() as u32).unwrap()
     }
 }
 
@@ -237,7 +254,7 @@ impl Parts {
 
 struct PlaceOf(Option<AsyncPixel<BINS>>);
 
-impl dtof_core::neighbours::ArrayPixel<BINS, dtof_core::Count10> for PlaceOf {
+impl dtof_core::neighbours::ArrayPixel<BINS, Count10> for PlaceOf {
     fn pixel(&self) -> Option<&AsyncPixel<BINS>> {
         self.0.as_ref()
     }
@@ -330,17 +347,7 @@ proptest! {
         let mut room: Vec<Place> = (0..31).map(|_| PixelPlace::new()).collect();
         let mut block_room: Vec<Block<BINS>> = (0..40).map(|_| Block::default()).collect();
         let mut array = PixelArray::new(&mut room, &mut block_room);
-        let mut config = ArrayConfig::new(settings.layout(), settings.pixels());
-        if let Some((levels, blocks, patience)) = settings.blocks() {
-            config = config.blocks(levels, blocks, patience).unwrap();
-        }
-        if let Some(neighbours) = settings.neighbours() {
-            config = config.neighbours(neighbours).unwrap();
-        }
-        if settings.once_per_bin {
-            config = config.once_per_bin();
-        }
-        let config = config.first(settings.number() as u32).unwrap();
+        let config = settings.array();
         // What was there before is gone.
         array.configure(&ArrayConfig::new(settings.layout(), settings.pixels())).unwrap();
         (0..400).for_each(|_| {
@@ -368,15 +375,23 @@ proptest! {
             array.photon(settings.number(), 3);
             unaddressed += 1;
             // Dark ones follow now and then.
-            let mut cycles = match rng.next_u32() % 4 {
-                0 => 1 + rng.next_u32() as u16 % 20,
+            let mut cycles = match rng.next_u32() % 32 {
+                0 => 1 + rng.next_u32() as u16 % 200,
+                1..8 => 1 + rng.next_u32() as u16 % 20,
                 _ => 1,
             };
             while cycles > 0 {
-                let left = array.end_laser_cycles(cycles);
+                let is_shared = rng.next_u32() % 2 == 0;
+                let left = match is_shared {
+                    true => array.end_laser_cycles_shared(cycles, |pixels, decide| {
+                        // In another order.
+                        let numbers = (0..pixels).rev();
+                        numbers.filter_map(|pixel| Some((pixel, decide(pixel)?))).collect::<Vec<_>>()
+                    }),
+                    false => array.end_laser_cycles(cycles),
+                };
                 let mut looked = false;
                 for _ in left..cycles {
-                    prop_assert!(!looked);
                     looked = parts.end_laser_cycle();
                 }
                 prop_assert!(left == 0 || looked);
@@ -397,6 +412,10 @@ proptest! {
                 found += events.len();
             }
             prop_assert_eq!(array.cycles(), parts.cycle);
+            prop_assert_eq!(array.to_look(), settings.x - (parts.cycle % u64::from(settings.x)) as u16);
+            // Another room for what is beside the pixels.
+            let state = array.into_state();
+            array = PixelArray::resume(&mut room, &mut block_room, state);
         }
         let waiting = parts.pixels.iter().flatten().filter(|pixel| pixel.has_event()).count();
         let blocks_waiting = parts.blocks.iter().filter(|block| block.has_event()).count();
@@ -649,17 +668,64 @@ fn used_room_is_as_new() {
     assert_eq!(run(&mut other), first);
 }
 
+/// An exposure of 92 laser cycles, the first look from L2 on, takes one call, or two with ticks in between.
+#[test]
+fn dark_laser_cycles_take_few_looks() {
+    for (mode, calls_each) in [
+        (Mode::Alone, 1),
+        (Mode::Blocks(2, 60), 3),
+        (Mode::Neighbours(Neighbours::Four), 1),
+    ] {
+        let settings = Settings::usual(4, 4, mode);
+        let mut places: Vec<Place> = (0..16).map(|_| PixelPlace::new()).collect();
+        let mut room: Vec<Block<BINS>> = (0..5).map(|_| Block::default()).collect();
+        let mut array = PixelArray::new(&mut places, &mut room);
+        array.configure(&settings.array()).unwrap();
+        let (mut left, mut calls) = (92 * 100, 0);
+        while left > 0 {
+            left = array.end_laser_cycles(left);
+            calls += 1;
+        }
+        assert!(calls <= 100 * calls_each + 1, "{mode:?}: {calls}");
+        assert_eq!(array.statistics()[0].expired, 16 * 100);
+    }
+}
+
+/// The pixel and level of its events, and of the last decision the photons and laser cycles.
+#[derive(Clone, Copy, Default)]
+struct Beside {
+    address: u32,
+    decision: Option<(u32, u32)>,
+}
+
+impl PixelData for Beside {
+    fn decides<const BINS: usize, W: CounterWidth>(&mut self, input: &DecisionInput<'_, BINS, W>) {
+        assert_eq!(self.decision, None);
+        self.decision = Some((input.histogram.peak().count.raw(), input.cycles));
+    }
+}
+
 #[test]
 fn data_are_found_by_event() {
-    let settings = Settings::usual(3, 3, Mode::Blocks(2, 8));
-    let (levels, blocks, patience) = settings.blocks().unwrap();
-    let config = ArrayConfig::new(settings.layout(), settings.pixels());
-    let config = config.blocks(levels, blocks, patience).unwrap();
-    let mut places: Vec<PixelPlace<BINS, dtof_core::Count10, u32>> =
+    for mode in [Mode::Blocks(2, 8), Mode::Neighbours(Neighbours::Eight)] {
+        let of_levels = events_with_data(Settings::usual(3, 3, mode));
+        let blocks = of_levels[1] + of_levels[2];
+        let some = if matches!(mode, Mode::Blocks(..)) {
+            blocks > 5
+        } else {
+            blocks == 0
+        };
+        assert!(of_levels[0] > 10 && some, "{of_levels:?}");
+    }
+}
+
+/// Drives an array, and returns how many events of each level there were.
+fn events_with_data(settings: Settings) -> [u32; 3] {
+    let mut places: Vec<PixelPlace<BINS, Count10, Beside>> =
         (0..9).map(|_| PixelPlace::new()).collect();
-    let mut room: Vec<Block<BINS, u32>> = (0..5).map(|_| Block::default()).collect();
+    let mut room: Vec<Block<BINS, Beside>> = (0..5).map(|_| Block::default()).collect();
     let mut array = PixelArray::new(&mut places, &mut room);
-    array.configure(&config).unwrap();
+    array.configure(&settings.array()).unwrap();
     let mut of_levels = [0_u32; 3];
     for cycle in 0..4000_usize {
         // Pixels 4 and 8 are bright, the others too dim for themselves.
@@ -669,16 +735,16 @@ fn data_are_found_by_event() {
         }
         array.end_laser_cycle();
         while let Some(event) = array.next_event() {
-            let address = array.data_of(&event).unwrap();
+            let beside = array.data_of(&event).unwrap();
             // Each has one event after another.
             let expected = u32::from(event.pixel.raw()) << 8 | u32::from(event.level.raw());
-            assert!(*address == 0 || *address == expected + 1);
-            *address = expected + 1;
+            assert!(beside.address == 0 || beside.address == expected + 1);
+            beside.address = expected + 1;
+            let (highest, exposure) = beside.decision.take().unwrap();
+            assert_eq!(exposure, u32::from(event.exposure));
+            assert!(highest >= event.peak_count.raw());
             of_levels[usize::from(event.level.raw())] += 1;
         }
     }
-    assert!(
-        of_levels[0] > 10 && of_levels[1] + of_levels[2] > 5,
-        "{of_levels:?}"
-    );
+    of_levels
 }

@@ -132,6 +132,14 @@ impl DetectionRule for AnyRule {
     }
 
     #[inline(always)]
+    fn fewest_photons(&self) -> u32 {
+        match self {
+            Self::Window(rule) => rule.fewest_photons(),
+            Self::Paper(_) | Self::Average(_) => 1,
+        }
+    }
+
+    #[inline(always)]
     fn weighs_dead_time(&self) -> bool {
         matches!(self, Self::Window(_))
     }

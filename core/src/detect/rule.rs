@@ -34,6 +34,12 @@ pub trait DetectionRule: Copy {
         1
     }
 
+    /// The fewest photons of a detection, 1 or more.
+    #[inline(always)]
+    fn fewest_photons(&self) -> u32 {
+        1
+    }
+
     /// Whether [`Self::detect_live`] decides for a TDC with a dead time.
     #[inline(always)]
     fn weighs_dead_time(&self) -> bool {

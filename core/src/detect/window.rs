@@ -303,6 +303,11 @@ impl DetectionRule for WindowRule {
     }
 
     #[inline(always)]
+    fn fewest_photons(&self) -> u32 {
+        self.minimum_count.raw().max(1)
+    }
+
+    #[inline(always)]
     fn weighs_dead_time(&self) -> bool {
         true
     }

@@ -44,6 +44,7 @@ use crate::check::impl_error;
 use crate::depth::RangeScale;
 use crate::event::DepthEvent;
 use crate::flags::Flags;
+use crate::pixel_array::PixelData;
 use crate::units::{BinPosition, BlockLevel, LaserCycle, PixelAddress};
 
 /// The mean that a mean depth is compared with.
@@ -207,6 +208,8 @@ pub struct DynamicDepthPixel<const N: usize> {
     /// The flags of the same events, the newest first.
     flags: [Flags; N],
 }
+
+impl<const N: usize> PixelData for DynamicDepthPixel<N> {}
 
 impl<const N: usize> Default for DynamicDepthPixel<N> {
     fn default() -> Self {

@@ -139,4 +139,29 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
             config.l2()
         }
     }
+
+    /// The laser cycles from now on at whose looks the pixel finds nothing, if no photon comes. It has just looked and found
+    /// nothing, or was too early. A dead time is weighed by the laser cycles, and so are neighbours: then a later look may find
+    /// something in the same photons, unless they are too few. `asks_neighbours` is whether neighbours confirm.
+    #[must_use]
+    pub fn dark_cycles<R: DetectionRule>(
+        &self,
+        config: &PixelConfig<BINS, R>,
+        asks_neighbours: bool,
+    ) -> u16 {
+        let (photons, weighs) = (self.histogram.total(), self.weighs_dead_time(config));
+        let finds_none = if self.exposure <= config.l1() {
+            photons == 0 && !weighs
+        } else if weighs {
+            photons < config.rule().fewest_photons()
+        } else {
+            // A pixel asks for two in a window.
+            photons < 2 || !asks_neighbours
+        };
+        let last = match finds_none {
+            true => self.longest(config).saturating_sub(1).max(config.l1()),
+            false => config.l1(),
+        };
+        last.saturating_sub(self.exposure)
+    }
 }

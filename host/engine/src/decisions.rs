@@ -24,22 +24,22 @@ pub struct Decision {
 
 /// The last decision of a pixel or a block.
 #[derive(Clone, Debug)]
-pub struct LastDecision<const BINS: usize> {
+pub struct LastDecision {
     event: Option<DepthEvent>,
-    counts: [u32; BINS],
+    counts: Vec<u32>,
     cycles: u32,
     expected: Option<BinIndex>,
     excluded: ExcludedBins,
 }
 
-impl<const BINS: usize> LastDecision<BINS> {
+impl LastDecision {
     /// Allocates an empty decision, if it `is_kept`.
     #[must_use]
     pub fn allocate(is_kept: bool) -> Option<Box<Self>> {
         is_kept.then(|| {
             Box::new(Self {
                 event: None,
-                counts: [0; BINS],
+                counts: Vec::new(),
                 cycles: 0,
                 expected: None,
                 excluded: ExcludedBins::NONE,
@@ -49,10 +49,13 @@ impl<const BINS: usize> LastDecision<BINS> {
 
     /// Records the input of a decision.
     #[inline]
-    pub fn record_input<W: CounterWidth>(&mut self, input: &DecisionInput<'_, BINS, W>) {
-        for (kept, &count) in self.counts.iter_mut().zip(input.histogram.counts()) {
-            *kept = count.into();
-        }
+    pub fn record_input<const BINS: usize, W: CounterWidth>(
+        &mut self,
+        input: &DecisionInput<'_, BINS, W>,
+    ) {
+        let counts = input.histogram.counts().iter();
+        self.counts.clear();
+        self.counts.extend(counts.map(|&count| count.into()));
         self.cycles = input.cycles;
         self.expected = input.expected;
         self.excluded = input.excluded;
@@ -69,7 +72,7 @@ impl<const BINS: usize> LastDecision<BINS> {
     pub fn decision(&self) -> Option<Decision> {
         Some(Decision {
             event: self.event?,
-            counts: self.counts.to_vec(),
+            counts: self.counts.clone(),
             cycles: self.cycles,
             expected: self.expected,
             excluded: self.excluded,

@@ -10,8 +10,9 @@ use dtof_core::{
     RangeGate, Statistics,
 };
 
+use super::alone::sort;
 use super::decisions::{Decision, LastDecision};
-use super::group::sort;
+
 use crate::Engine;
 use crate::settings::Settings;
 use dtof_options::Refused;
@@ -33,7 +34,7 @@ pub struct FramePixel<const BINS: usize> {
     gated_out: u32,
     statistics: Statistics,
     /// The last decision, if it is kept.
-    last: Option<Box<LastDecision<BINS>>>,
+    last: Option<Box<LastDecision>>,
 }
 
 impl<const BINS: usize> FramePixel<BINS> {

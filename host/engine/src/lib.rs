@@ -1,14 +1,13 @@
 #![doc = include_str!("../README.md")]
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
+mod alone;
+mod array;
 pub mod bins;
 pub mod decisions;
 pub mod explain;
 pub mod frame;
-pub mod group;
 pub mod host;
-mod jump;
-mod neighbours;
 pub mod once;
 pub mod once_per_bin;
 mod parallel;

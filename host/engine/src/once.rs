@@ -36,8 +36,8 @@ use dtof_core::{
 };
 
 use super::Engine;
+use super::array::neighbour_rule;
 use super::decisions::Decision;
-use super::neighbours::check;
 use super::parallel::of_each;
 use crate::settings::Settings;
 use crate::with_widest;
@@ -88,7 +88,7 @@ pub fn decide_once(
         Refused::new("decide_once", "cannot be used with `binning`")
     );
     if settings.neighbours.is_some() {
-        check(settings)?;
+        neighbour_rule(settings)?;
     }
     let is_masked = |address: &PixelAddress| settings.masked.contains(&address.raw());
     let is_masked: Vec<bool> = addresses.iter().map(is_masked).collect();
@@ -164,10 +164,10 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
             self.decide(&counts, self.counts.cycles(place))
         };
         let Some(neighbours) = self.neighbours else {
-            return of_each(pixels, |place| end(place, alone(place)));
+            return of_each(pixels, 1, |place| end(place, alone(place)));
         };
-        let decided = of_each(pixels, alone);
-        of_each(pixels, |place| {
+        let decided = of_each(pixels, 1, alone);
+        of_each(pixels, 1, |place| {
             end(place, self.with_neighbours(neighbours, place, &decided))
         })
     }

@@ -25,11 +25,11 @@ pub fn of_parts<T: Send, R: Send>(
     results.into_iter().flatten().collect()
 }
 
-/// Calls `work` for each number below `items`.
-pub fn of_each<R: Send>(items: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
+/// Calls `work` for each number below `items`, in parts of at least `least`.
+pub fn of_each<R: Send>(items: usize, least: usize, work: impl Fn(usize) -> R + Sync) -> Vec<R> {
     let mut results: Vec<Option<R>> = Vec::new();
     results.resize_with(items, || None);
-    of_parts(&mut results, 1, |first, part| {
+    of_parts(&mut results, least, |first, part| {
         for (number, result) in (first..).zip(part) {
             *result = Some(work(number));
         }
@@ -71,7 +71,7 @@ mod tests {
                 let whole = &parts[..parts.len().saturating_sub(1)];
                 assert!(whole.iter().all(|&(_, length)| length >= least.max(1)));
             }
-            assert_eq!(of_each(items, |number| number), Vec::from_iter(0..items));
+            assert_eq!(of_each(items, 1, |number| number), Vec::from_iter(0..items));
         }
     }
 }

@@ -9,6 +9,8 @@ use proptest::option;
 use proptest::prelude::*;
 
 use super::*;
+use dtof_core::{DepthEvent, Statistics};
+use dtof_photons::source::Slice;
 
 const ARRAY: Array = Array::new(5, 4).unwrap();
 const BINS: u16 = 16;

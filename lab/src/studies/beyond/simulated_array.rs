@@ -2,11 +2,12 @@
 
 use super::setting::{BINS, X};
 use anyhow::Result;
-use dtof_core::{Array, Count10, DepthEvent, PixelAddress};
-use dtof_engine::group::{Configs, Group};
+use dtof_core::{Array, DepthEvent, PixelAddress};
+use dtof_engine::Engine;
+use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_events::last_events::LastEvents;
-use dtof_photons::source::{Photon, PixelPhotons};
+use dtof_photons::source::{Photon, PixelPhotons, Slice};
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
 use rand_distr::{Distribution, Normal, Poisson};
@@ -70,8 +71,7 @@ impl Law {
 /// An array and the engine that decides on its photons.
 pub struct SimulatedArray {
     laws: Vec<Law>,
-    configs: Configs<BINS>,
-    groups: Vec<Group<BINS, Count10>>,
+    engine: Box<dyn Engine>,
     cycle: u64,
 }
 
@@ -82,23 +82,9 @@ impl SimulatedArray {
             .take(array.pixels() as usize)
             .map(PixelAddress::new)
             .collect();
-        let groups = match settings.binning {
-            Some(binning) => Group::for_array(array, binning, &addresses)?,
-            None => {
-                let numbered = addresses.iter().enumerate();
-                numbered
-                    .map(|(number, &address)| Group::single(number, address))
-                    .collect()
-            }
-        };
         Ok(Self {
             laws: rates.iter().map(Law::new).collect::<Result<_>>()?,
-            configs: Configs {
-                pixels: settings.config()?,
-                blocks: settings.block_config()?,
-                patience: settings.binning.map_or(0, |binning| binning.patience),
-            },
-            groups,
+            engine: host_engine(settings, array, &addresses)?,
             cycle: 0,
         })
     }
@@ -135,11 +121,10 @@ impl SimulatedArray {
                 }
                 photons.push(of_pixel);
             }
-            let mut events = Vec::new();
-            for group in &mut self.groups {
-                events.extend(group.run(&self.configs, self.cycle, &photons).events);
-            }
-            events.sort_unstable_by_key(|event| (event.cycle, event.level, event.pixel));
+            let events = self.engine.run(&Slice {
+                first_cycle: self.cycle,
+                pixels: photons,
+            })?;
             events.iter().for_each(&mut visit);
             self.cycle += u64::from(SLICE);
         }

@@ -56,21 +56,17 @@ proptest! {
         all.photons.sort_by_key(|photon| photon.cycle);
         let (events, statistics) = one_by_one(&config, first, &all);
 
-        let configs = Configs { pixels: config, blocks: config, patience: 0 };
-        let mut group = Group::<16, Count10>::single(0, PixelAddress::new(3));
-        let (mut found, mut counted) = (Vec::new(), Statistics::new());
-        let mut begin = 0;
+        let mut engine = LoneEngine::<16, Count10>::new(config, &[PixelAddress::new(3)]);
+        let (mut found, mut begin) = (Vec::new(), 0);
         for length in slices.into_iter().chain([600]) {
             let end = (begin + length).min(600);
             let of_slice = all.photons.iter().filter(|photon| (begin..end).contains(&photon.cycle));
             let moved = of_slice.map(|photon| Photon { cycle: photon.cycle - begin, ..*photon });
-            let slice = PixelPhotons { cycles: end - begin, photons: moved.collect() };
-            let done = group.run(&configs, first + u64::from(begin), &[slice]);
-            found.extend(done.events);
-            counted += done.pixels;
+            let pixels = vec![PixelPhotons { cycles: end - begin, photons: moved.collect() }];
+            found.extend(engine.run(&Slice { first_cycle: first + u64::from(begin), pixels }).unwrap());
             begin = end;
         }
-        group.add_photons_to(&mut counted, &mut Statistics::new());
+        let counted = engine.statistics()[0];
         prop_assert_eq!(found, events);
         prop_assert_eq!(counted, statistics);
     }
