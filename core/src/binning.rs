@@ -10,32 +10,35 @@
 //! last tick begins to feed its block. It stops once it reports.
 //!
 //! ```
-//! use dtof_core::binning::{
-//!     Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks,
+//! use dtof_core::binning::Block;
+//! use dtof_core::{
+//!     Array, ArrayConfig, BlockLevel, PixelArray, PixelConfig, PixelPlace, checked,
 //! };
-//! use dtof_core::{Array, BlockLevel, LaserCycle, PixelAddress, PixelConfig, Statistics, checked};
 //!
 //! const CONFIG: PixelConfig<128> = checked!(PixelConfig::paper().build());
 //! let level = BlockLevel::new(1).unwrap();
-//! let binning = Binning::new(Array::new(2, 2).unwrap(), level).unwrap();
+//! let config = ArrayConfig::new(Array::new(2, 2).unwrap(), CONFIG).blocks(level, CONFIG, 4)?;
+//! let mut room: Vec<PixelPlace<128>> = (0..4).map(|_| PixelPlace::new()).collect();
+//! let mut blocks = [Block::default()];
+//! let mut array = PixelArray::new(&mut room, &mut blocks);
+//! array.configure(&config)?;
 //!
-//! let mut links: Vec<BlockLink> = (0..4).map(|pixel| binning.link_of(PixelAddress::new(pixel))).collect();
-//! let mut blocks: Vec<Block<128>> = binning.blocks().map(Block::new).collect();
-//! links.iter_mut().for_each(|link| link.tick(false)); // no pixel has reported: all feed
-//!
-//! let mut statistics = Statistics::default(); // of blocks
-//! for cycle in 0..44 {
-//!     // Each pixel has a photon in every fourth laser cycle.
-//!     count_in_blocks(&mut blocks, &links[cycle % 4], &CONFIG, 60);
-//!     end_laser_cycles_of_blocks(&mut blocks, &CONFIG, &mut statistics, LaserCycle::new(cycle as u64), 1);
+//! let _ = array.end_laser_cycles(4); // a tick: no pixel has reported, so all feed
+//! for cycle in 0..40 {
+//!     // Each pixel has a photon in every twelfth laser cycle.
+//!     if cycle % 3 == 0 {
+//!         array.photon(cycle / 3 % 4, 60);
+//!     }
+//!     array.end_laser_cycle();
 //! }
-//! let event = blocks[0].take_event().unwrap();
-//! assert_eq!((event.pixel, event.level, event.peak_count.raw()), (PixelAddress::new(0), level, 44));
+//! let event = array.next_event().unwrap();
+//! assert_eq!((event.pixel.raw(), event.level, event.peak_count.raw()), (0, level, 14));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
 //! Cost: a photon of a pixel that feeds is counted once more for each level that it reaches:
 //! on a Cortex-M4 31 instructions for the first and 18 for each other. A look of a block takes
-//! 244 with a window of 3 bins, that of a pixel 197. A block takes four bytes more than a
+//! 206 with a window of 3 bins, that of a pixel 197. A block takes four bytes more than a
 //! pixel; there are a third as many.
 //!
 //! The photons of an event of a block may be those of an event of a pixel as well: the two
@@ -47,8 +50,8 @@ use crate::config::PixelConfig;
 use crate::detect::DetectionRule;
 use crate::event::DepthEvent;
 use crate::histogram::counter::Count16;
-use crate::pixel::{AsyncPixel, DecisionInput, Look};
-use crate::pixel_array::PixelData;
+use crate::pixel::{AsyncPixel, Look};
+use crate::pixel_array::{PixelData, observer};
 use crate::statistics::Statistics;
 use crate::units::{BlockLevel, LaserCycle, PixelAddress};
 
@@ -237,9 +240,7 @@ impl<const BINS: usize, T: PixelData> Block<BINS, T> {
         last: LaserCycle,
         cycles: u16,
     ) -> Look {
-        let data = &mut self.data;
-        let observe = |input: &DecisionInput<'_, BINS, Count16>| data.decides(input);
-        let pixel = &mut self.pixel;
+        let (pixel, observe) = (&mut self.pixel, observer(&mut self.data));
         let look = pixel.end_cycles::<R, false>(config, statistics, last, cycles, observe);
         // Also where it has waited for another echo, after a report.
         if matches!(look, Look::Event | Look::Ended) {
@@ -292,7 +293,7 @@ pub fn count_in_blocks<const BINS: usize, R: DetectionRule, T: PixelData>(
 /// Ends `cycles` laser cycles at once for all blocks, as
 /// [`AsyncPixel::end_laser_cycles`] does for a pixel. `statistics` are those of the blocks.
 /// Returns whether one of them has an event.
-pub fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule, T: PixelData>(
+pub(crate) fn end_laser_cycles_of_blocks<const BINS: usize, R: DetectionRule, T: PixelData>(
     blocks: &mut [Block<BINS, T>],
     config: &PixelConfig<BINS, R>,
     statistics: &mut Statistics,

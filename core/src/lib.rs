@@ -79,7 +79,7 @@
 //! - **Dynamic depth**: events of changes of depth only, with a polarity.
 //! - **AER**: address-event representation; REQ and ACK are its handshake, REQ the paper's.
 
-#![no_std]
+#![cfg_attr(not(test), no_std)]
 #![cfg_attr(docsrs, feature(doc_cfg))]
 #![forbid(unsafe_code)]
 #![deny(
@@ -109,8 +109,25 @@ mod pixel_array;
 pub mod pixel_processor;
 pub mod rule;
 mod statistics;
+#[cfg(test)]
+#[allow(
+    clippy::cast_possible_truncation,
+    clippy::cast_possible_wrap,
+    clippy::cast_sign_loss,
+    clippy::disallowed_types,
+    clippy::expect_used,
+    clippy::float_arithmetic,
+    clippy::indexing_slicing,
+    clippy::panic,
+    clippy::unwrap_used,
+    reason = "tests"
+)]
+mod tests;
 mod units;
 mod whole;
+
+#[cfg(test)]
+extern crate self as dtof_core;
 
 /// The fixed-point numbers of α, bin width and range.
 pub use fixed;

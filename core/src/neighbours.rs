@@ -7,34 +7,31 @@
 //! [`Flags::CONFIRMED`](crate::Flags::CONFIRMED). [`NeighbourRule`] says what is promising and what is enough.
 //!
 //! All pixels of an array look at the same time, and decide on the same photons: none clears its histogram
-//! before all have decided. A look has three steps, each for all pixels: [`AsyncPixel::begin_look`],
-//! [`AsyncPixel::decide`] and [`AsyncPixel::end_look`]. [`end_laser_cycles_of_array`] does them one after another;
-//! a program may run the pixels of a step on several threads.
+//! before all have decided. [`PixelArray`](crate::PixelArray) sees to that.
 //!
 //! ```
-//! use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
+//! use dtof_core::neighbours::NeighbourConfig;
 //! use dtof_core::fixed::types::U4F12;
 //! use dtof_core::{
-//!     Array, AsyncPixel, Count, Flags, LaserCycle, Neighbours, PixelAddress, PixelConfig, Statistics,
-//!     WindowRule,
+//!     Array, ArrayConfig, Count, Flags, Neighbours, PixelArray, PixelConfig, PixelPlace, WindowRule,
 //! };
 //!
 //! let rule = WindowRule::new(3, const { U4F12::lit("4.47") }, Count::saturating(5))?;
-//! let neighbours = NeighbourConfig::new(Array::new(3, 3).unwrap(), Neighbours::Eight, &rule);
+//! let layout = Array::new(3, 3).unwrap();
+//! let neighbours = NeighbourConfig::new(layout, Neighbours::Eight, &rule);
 //! let config = PixelConfig::<128, WindowRule>::with_rule(*neighbours.rule().own()).build()?;
-//! let mut pixels: Vec<AsyncPixel<128>> = (0..9).map(|pixel| AsyncPixel::new(PixelAddress::new(pixel))).collect();
-//! let mut statistics = Statistics::default();
+//! let mut room: Vec<PixelPlace<128>> = (0..9).map(|_| PixelPlace::new()).collect();
+//! let mut array = PixelArray::new(&mut room, &mut []);
+//! array.configure(&ArrayConfig::new(layout, config).neighbours(neighbours)?)?;
 //!
 //! // Three photons a pixel of the same surface, and some background.
-//! for (pixel, background) in pixels.iter_mut().zip([3, 20, 35, 77, 90, 100, 101, 110, 120]) {
-//!     pixel.count_batch(&config, &[60, 60, 61, background, 127 - background]);
+//! for (pixel, background) in [3, 20, 35, 77, 90, 100, 101, 110, 120].into_iter().enumerate() {
+//!     [60, 60, 61, background, 127 - background].map(|code| array.photon(pixel, code));
 //! }
-//! for cycle in 0..44 {
-//!     let last = LaserCycle::new(cycle);
-//!     end_laser_cycles_of_array(&mut pixels, &config, &neighbours, &mut statistics, last, 1);
-//! }
-//! let event = pixels[4].take_event().unwrap();
-//! assert_eq!((event.pixel.raw(), event.peak_count.raw(), event.flags), (4, 3, Flags::CONFIRMED));
+//! (0..44).for_each(|_| array.end_laser_cycle());
+//! let events: Vec<_> = std::iter::from_fn(|| array.next_event()).collect();
+//! let event = events.iter().find(|event| event.pixel.raw() == 4).unwrap();
+//! assert_eq!((event.peak_count.raw(), event.flags), (3, Flags::CONFIRMED));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 //!
@@ -62,7 +59,7 @@ use crate::statistics::Statistics;
 use crate::units::{LaserCycle, PixelAddress};
 
 /// A place of an array: a pixel, or something with one, or without one because it is left out.
-pub trait ArrayPixel<const BINS: usize, W: CounterWidth> {
+pub(crate) trait ArrayPixel<const BINS: usize, W: CounterWidth> {
     /// The pixel, to read.
     fn pixel(&self) -> Option<&AsyncPixel<BINS, W>>;
     /// The pixel, to change.
@@ -81,6 +78,7 @@ pub trait ArrayPixel<const BINS: usize, W: CounterWidth> {
     }
 }
 
+#[cfg(test)]
 impl<const BINS: usize, W: CounterWidth> ArrayPixel<BINS, W> for AsyncPixel<BINS, W> {
     fn pixel(&self) -> Option<&Self> {
         Some(self)
@@ -126,8 +124,7 @@ impl NeighbourConfig {
     /// The second step of pixel `number` of `pixels`, row · columns + column: see [`AsyncPixel::decide`]. `pixels` are all
     /// places of the array in this order, or as many as there are of its first ones.
     #[inline]
-    #[must_use]
-    pub fn decide<const BINS: usize, W: CounterWidth, R: DetectionRule>(
+    pub(crate) fn decide<const BINS: usize, W: CounterWidth, R: DetectionRule>(
         &self,
         pixels: &[impl ArrayPixel<BINS, W>],
         number: usize,
@@ -139,30 +136,6 @@ impl NeighbourConfig {
         let around = around.filter_map(|address| pixels.get(usize::from(address.raw()))?.pixel());
         pixel.decide(config, &self.rule, around)
     }
-}
-
-/// Ends `cycles` laser cycles at once for all pixels of an array, the last of which is `last`, as
-/// [`AsyncPixel::end_laser_cycles`] does for one. `pixels` are all places of the array row by row, or as many as there are of
-/// its first ones. `config` must have the rule [`NeighbourRule::own`]: with the whole rule there may be half as many false
-/// alarms more. Returns whether one of them has a new event.
-pub fn end_laser_cycles_of_array<const BINS: usize, W: CounterWidth, R: DetectionRule>(
-    pixels: &mut [impl ArrayPixel<BINS, W>],
-    config: &PixelConfig<BINS, R>,
-    neighbours: &NeighbourConfig,
-    statistics: &mut Statistics,
-    last: LaserCycle,
-    cycles: u16,
-) -> bool {
-    let before = statistics.events;
-    let look = ArrayLook {
-        config,
-        neighbours,
-        last,
-    };
-    look.end_laser_cycles(pixels, statistics, cycles, |pixels, look| {
-        look.decide_in_turn(pixels);
-    });
-    statistics.events > before
 }
 
 /// A look of all pixels.

@@ -83,6 +83,14 @@ pub trait PixelData: Default {
 
 impl PixelData for () {}
 
+/// Tells these data what a decision was made from. One type, so that looks are compiled once.
+#[inline(always)]
+pub(crate) fn observer<const BINS: usize, W: CounterWidth, T: PixelData>(
+    data: &mut T,
+) -> impl FnOnce(&DecisionInput<'_, BINS, W>) {
+    |input| data.decides(input)
+}
+
 /// What a place is used for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Use {
@@ -143,14 +151,10 @@ impl<const BINS: usize, W: CounterWidth, T: PixelData> ArrayPixel<BINS, W>
         statistics: &mut Statistics,
         last: LaserCycle,
     ) {
-        let (pixel, data) = (&mut self.pixel, &mut self.data);
         if self.use_of.counts() {
-            pixel.end_look(
-                config,
-                statistics,
-                last,
-                |input: &DecisionInput<'_, BINS, W>| data.decides(input),
-            );
+            let data = &mut self.data;
+            self.pixel
+                .end_look(config, statistics, last, observer(data));
         }
     }
 }
@@ -667,6 +671,7 @@ where
     }
 
     /// All pixels look: X laser cycles after the last look, or later if looks were left out.
+    #[inline(never)]
     fn look(
         &mut self,
         decide: impl FnOnce(&mut [PixelPlace<BINS, W, T>], &ArrayLook<'_, BINS, R>),
@@ -693,8 +698,7 @@ where
             look.end_laser_cycles(places, statistics, cycles, decide);
         } else {
             for place in places.iter_mut().filter(|place| place.use_of.counts()) {
-                let (pixel, data) = (&mut place.pixel, &mut place.data);
-                let observe = |input: &DecisionInput<'_, BINS, W>| data.decides(input);
+                let (pixel, observe) = (&mut place.pixel, observer(&mut place.data));
                 let look = pixel.end_laser_cycles_with(pixels, statistics, last, cycles, observe);
                 // A pixel that has waited for another echo has reported, too.
                 if matches!(look, Look::Event | Look::Ended) {
@@ -746,7 +750,7 @@ where
                 dark = dark.min(block.pixel().dark_cycles(config, false));
             }
         }
-        dark - dark % x
+        dark - dark.checked_rem(x).unwrap_or(0)
     }
 
     /// Takes an event out of its slot: of the pixels by address, then of the blocks. Who does not take all goes on from there

@@ -171,7 +171,7 @@ impl<const BINS: usize, W: CounterWidth> WholeHistogram<BINS, W> {
     }
 
     /// If the nearest or the farthest peak is the slope of something outside of the gate of the configuration, the gate
-    /// without it, unless no photon is left.
+    /// without it, unless too few bins are left.
     #[inline(never)]
     fn slope<R: DetectionRule, C: PhotonCount>(
         &self,
@@ -197,8 +197,7 @@ impl<const BINS: usize, W: CounterWidth> WholeHistogram<BINS, W> {
         } else {
             return None;
         };
-        let has_photon = left.clone().any(|bin| self.sum(counts, bin..bin + 1) > 0);
-        let last = left.end.checked_sub(1).filter(|_| has_photon);
+        let last = left.end.checked_sub(1);
         Some(last.and_then(|last| RangeGate::new(left.start, last).ok()))
     }
 

@@ -9,7 +9,6 @@
 
 mod aer;
 mod array;
-mod binning;
 mod common;
 mod depth;
 mod detect;
@@ -17,9 +16,7 @@ mod events;
 mod excluded;
 mod gate;
 mod histogram;
-mod neighbours;
 mod pixel;
-mod pixel_array;
 mod pixel_processor;
 mod proofs;
 mod quantities;

@@ -129,10 +129,7 @@ fn without_slopes(
         } else {
             return Some(config);
         };
-        let photons: u32 = (left.0..left.1).map(|bin| counts[usize::from(bin)]).sum();
-        gate = RangeGate::new(left.0, left.1.checked_sub(1)?)
-            .ok()
-            .filter(|_| photons > 0)?;
+        gate = RangeGate::new(left.0, left.1.checked_sub(1)?).ok()?;
     }
 }
 

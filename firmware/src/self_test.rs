@@ -7,13 +7,13 @@
 
 use core::fmt::{self, Write};
 
-use dtof_core::binning::{Binning, Block, count_in_blocks, end_laser_cycles_of_blocks};
+use dtof_core::binning::Block;
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::paper::isqrt;
 use dtof_core::{
-    AerDecoder, AerEncoder, AerRecord, AerWord, Array, AsyncPixel, BlockLevel, Count, DepthEvent,
-    EchoNumber, LaserCycle, PaperRule, PixelAddress, PixelConfig, PixelConfigBuilder, RangeGate,
-    Statistics, WindowRule, checked,
+    AerDecoder, AerEncoder, AerRecord, AerWord, Array, ArrayConfig, AsyncPixel, BlockLevel, Count,
+    DepthEvent, EchoNumber, LaserCycle, PaperRule, PixelAddress, PixelArray, PixelConfig,
+    PixelConfigBuilder, PixelPlace, RangeGate, Statistics, WindowRule, checked,
 };
 
 /// The last line of a run that came to its end.
@@ -140,58 +140,37 @@ fn watched(
 fn block(out: &mut impl Write, encoder: &mut AerEncoder) -> fmt::Result {
     writeln!(out, "stream of a block")?;
     let levels = BlockLevel::saturating(1);
-    let (Ok(config), Ok(of_blocks), Some(binning)) = (
+    let (Ok(config), Ok(of_blocks), Some(layout)) = (
         windows(&WINDOW).l2(100).build(),
         windows(&WINDOW.of_blocks(levels)).l2(100).build(),
-        Array::new(2, 1).and_then(|array| Binning::new(array, levels)),
+        Array::new(2, 1),
     ) else {
         return writeln!(out, "no such block");
     };
-    let mut pixels = [0, 1].map(|address| {
-        let address = PixelAddress::new(address);
-        (AsyncPixel::<128>::new(address), binning.link_of(address))
-    });
-    let Some(place) = binning.blocks().next() else {
-        return writeln!(out, "no such block");
-    };
-    let mut blocks = [Block::<128>::new(place)];
-    let [mut statistics, mut of_block] = [Statistics::default(); 2];
+    let mut places: [PixelPlace<128>; 2] = [PixelPlace::new(), PixelPlace::new()];
+    let mut blocks: [Block<128>; 1] = [Block::default()];
+    let mut array = PixelArray::new(&mut places, &mut blocks);
+    let config = ArrayConfig::new(layout, config).blocks(levels, of_blocks, 40);
+    if let Err(error) = config.and_then(|config| array.configure(&config)) {
+        return writeln!(out, "{error}");
+    }
     let mut random = Random(1);
-    for cycle in 0..400 {
-        let now = LaserCycle::new(cycle);
-        for (pixel, link) in &mut pixels {
+    for _ in 0..400 {
+        for pixel in 0..2 {
             for (one_in, code) in [(24, 60), (8, random.below(128))] {
                 if random.below(one_in) == 0 {
-                    pixel.count(&config, code);
-                    count_in_blocks(&mut blocks, link, &of_blocks, code);
+                    array.photon(pixel, code);
                 }
             }
-            pixel.end_laser_cycle(&config, &mut statistics, now);
-            if let Some(event) = pixel.take_event() {
-                link.reported();
-                write_event(out, encoder, &event)?;
-            }
         }
-        if end_laser_cycles_of_blocks(&mut blocks, &of_blocks, &mut of_block, now, 1) {
-            for event in blocks.iter_mut().filter_map(Block::take_event) {
-                write_event(out, encoder, &event)?;
-            }
-        }
-        if cycle % 40 == 39 {
-            for (pixel, link) in &mut pixels {
-                link.tick(pixel.has_reported());
-            }
-            blocks.iter_mut().for_each(Block::tick);
+        array.end_laser_cycle();
+        while let Some(event) = array.next_event() {
+            write_event(out, encoder, &event)?;
         }
     }
-    for (pixel, _) in &pixels {
-        pixel.add_photons_to(&mut statistics);
-    }
-    for block in &blocks {
-        block.pixel().add_photons_to(&mut of_block);
-    }
-    writeln!(out, "{statistics:?}")?;
-    writeln!(out, "{of_block:?}")
+    let [pixels, blocks] = array.statistics();
+    writeln!(out, "{pixels:?}")?;
+    writeln!(out, "{blocks:?}")
 }
 
 /// An event, its words, and whether they come back as the event.

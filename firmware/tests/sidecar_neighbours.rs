@@ -2,10 +2,10 @@
 
 use crate::common::host::{CONFIGURATION, Call, configured, configured_with, scripted};
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
+use dtof_core::neighbours::NeighbourConfig;
 use dtof_core::{
-    AnyRule, Array, AsyncPixel, AverageRule, BlockLevel, Count, DepthEvent, EchoNumber, Flags,
-    LaserCycle, Neighbours, PixelAddress, PixelConfig, Statistics, WindowRule,
+    AnyRule, Array, ArrayConfig, AverageRule, BlockLevel, Count, DepthEvent, EchoNumber, Flags,
+    Neighbours, PixelArray, PixelConfig, PixelPlace, Statistics, WindowRule,
 };
 use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source, message};
 use dtof_sensors::SensorInfo;
@@ -58,21 +58,21 @@ fn of_core(photons: &[Vec<(u16, u16)>], neighbours: Neighbours) -> (Vec<DepthEve
         .echoes(requested.echoes, requested.echo_guard_bins)
         .echo_wait(requested.echo_wait);
     let config = config.build().unwrap();
-    let addresses = (0..19).map(PixelAddress::new);
-    let mut pixels: Vec<AsyncPixel<128>> = addresses.map(AsyncPixel::new).collect();
-    let (mut events, mut statistics) = (Vec::new(), Statistics::new());
-    for (cycle, photons) in (0..).zip(photons) {
+    let config = ArrayConfig::new(*rule.array(), config).neighbours(rule);
+    let mut places: Vec<PixelPlace<128>> = (0..19).map(|_| PixelPlace::new()).collect();
+    let mut array = PixelArray::new(&mut places, &mut []);
+    array
+        .configure(&config.unwrap().first(19).unwrap())
+        .unwrap();
+    let mut events = Vec::new();
+    for photons in photons {
         for &(pixel, code) in photons {
-            pixels[usize::from(pixel)].count(&config, code);
+            array.photon(pixel.into(), code);
         }
-        let last = LaserCycle::new(cycle);
-        end_laser_cycles_of_array(&mut pixels, &config, &rule, &mut statistics, last, 1);
-        events.extend(pixels.iter_mut().filter_map(AsyncPixel::take_event));
+        array.end_laser_cycle();
+        events.extend(std::iter::from_fn(|| array.next_event()));
     }
-    for pixel in &pixels {
-        pixel.add_photons_to(&mut statistics);
-    }
-    (events, statistics)
+    (events, array.statistics()[0])
 }
 
 #[test]

@@ -143,6 +143,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// The laser cycles from now on at whose looks the pixel finds nothing, if no photon comes. It has just looked and found
     /// nothing, or was too early. A dead time is weighed by the laser cycles, and so are neighbours: then a later look may find
     /// something in the same photons, unless they are too few. `asks_neighbours` is whether neighbours confirm.
+    #[inline(never)]
     #[must_use]
     pub fn dark_cycles<R: DetectionRule>(
         &self,

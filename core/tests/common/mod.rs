@@ -2,6 +2,6 @@
 
 pub mod light;
 pub mod live;
-pub mod neighbours;
 pub mod parallel;
+pub mod small;
 pub mod window;

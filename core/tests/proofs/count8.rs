@@ -11,8 +11,8 @@ use dtof_core::{
     Look, PaperRule, PixelAddress, PixelConfig, RangeGate, Statistics, WindowRule,
 };
 
-use super::{HISTOGRAMS, histogram};
 use crate::common::parallel;
+use crate::common::small::{HISTOGRAMS, histogram};
 
 /// More than all photons, so that they do not contradict a dead time.
 const CYCLES: u16 = 3000;

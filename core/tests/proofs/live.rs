@@ -13,9 +13,9 @@ use dtof_core::{
     WindowRule,
 };
 
-use super::{HISTOGRAMS, histogram};
 use crate::common::live::Exposure;
 use crate::common::parallel;
+use crate::common::small::{HISTOGRAMS, histogram};
 
 /// What came of some cases.
 #[derive(Clone, Copy, Debug, Default)]

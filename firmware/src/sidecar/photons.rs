@@ -63,6 +63,7 @@ impl Sidecar<'_> {
 
     /// Ends laser cycles as [`PixelArray::end_laser_cycles`](dtof_core::PixelArray::end_laser_cycles) does. Events of a look
     /// move on as far as there is room.
+    #[inline(never)]
     pub(super) fn end_laser_cycles_to_look(&mut self, cycles: u16) -> u16 {
         let left = self.array.end_laser_cycles(cycles);
         if self.array.has_looked() && self.array.has_event() {

@@ -1,10 +1,10 @@
 //! Tests of the engine and of sources of photons, with simulated photons.
 
 use dtof_core::fixed::types::U8F8;
-use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
+use dtof_core::neighbours::NeighbourConfig;
 use dtof_core::{
-    AnyRule, Array, AsyncPixel, AverageRule, BlockLevel, Count, DepthEvent, EchoNumber, Flags,
-    LaserCycle, Neighbours, PaperRule, PixelAddress, Statistics, WindowRule,
+    AnyRule, Array, ArrayConfig, AverageRule, BlockLevel, Count, DepthEvent, EchoNumber, Flags,
+    Neighbours, PaperRule, PixelAddress, PixelArray, PixelPlace, WindowRule,
 };
 use dtof_engine::decisions::Decision;
 use dtof_engine::explain::explain_decisions;
@@ -264,28 +264,25 @@ fn neighbours_confirm_as_in_the_core() {
         };
         let rule = NeighbourConfig::new(LARGE, neighbours, rule);
         let config = settings.config::<128>().unwrap();
-        let addresses = addresses.into_iter();
-        let mut pixels: Vec<AsyncPixel<128>> = addresses.map(AsyncPixel::new).collect();
-        let (mut expected, mut statistics) = (Vec::new(), Statistics::new());
+        let config = ArrayConfig::new(LARGE, config).neighbours(rule).unwrap();
+        let mut places: Vec<PixelPlace<128>> = Vec::new();
+        places.resize_with(addresses.len(), PixelPlace::new);
+        let mut array = PixelArray::new(&mut places, &mut []);
+        array.configure(&config).unwrap();
+        let mut expected = Vec::new();
         for slice in &slices {
             for cycle in 0..slice.pixels[0].cycles {
-                for (pixel, received) in pixels.iter_mut().zip(&slice.pixels) {
-                    let now = received
-                        .photons
-                        .iter()
-                        .filter(|photon| photon.cycle == cycle);
-                    now.for_each(|photon| pixel.count(&config, photon.code));
+                for (number, received) in slice.pixels.iter().enumerate() {
+                    let photons = received.photons.iter();
+                    let now = photons.filter(|photon| photon.cycle == cycle);
+                    now.for_each(|photon| array.photon(number, photon.code));
                 }
-                let last = LaserCycle::new(slice.first_cycle + u64::from(cycle));
-                end_laser_cycles_of_array(&mut pixels, &config, &rule, &mut statistics, last, 1);
-                expected.extend(pixels.iter_mut().filter_map(AsyncPixel::take_event));
+                array.end_laser_cycle();
+                expected.extend(std::iter::from_fn(|| array.next_event()));
             }
         }
         assert!(events == expected);
-        for pixel in &pixels {
-            pixel.add_photons_to(&mut statistics);
-        }
-        assert_eq!(engine.statistics(), [statistics, Statistics::new()]);
+        assert_eq!(engine.statistics(), array.statistics());
         let confirmed = events
             .iter()
             .filter(|event| event.flags.contains(Flags::CONFIRMED));

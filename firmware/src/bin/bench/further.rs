@@ -2,7 +2,7 @@
 //! are those of [`State`], in some exposures those of a second target, and with a dead time those
 //! that a TDC takes of a flat background.
 
-use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
+use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks};
 use dtof_core::fixed::types::U4F12;
 use dtof_core::neighbours::NeighbourRule;
 use dtof_core::{
@@ -252,9 +252,9 @@ impl Further {
 
     #[inline(always)]
     fn end_laser_cycle_of_block(&mut self, cycle: u32) -> bool {
-        let (blocks, statistics) = (self.blocks.get_mut(..1), &mut self.statistics);
-        let (blocks, cycle) = (blocks.unwrap_or_default(), LaserCycle::new(cycle.into()));
-        end_laser_cycles_of_blocks(blocks, &self.config, statistics, cycle, 1)
+        let [block, ..] = &mut self.blocks;
+        let (statistics, cycle) = (&mut self.statistics, LaserCycle::new(cycle.into()));
+        block.end_laser_cycles(&self.config, statistics, cycle, 1) == Look::Event
     }
 }
 

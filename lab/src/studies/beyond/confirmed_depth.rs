@@ -9,10 +9,11 @@ use crate::sweep::{Part, Point, Study, Tally, point};
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::neighbours::NeighbourConfig;
+use dtof_core::rule::DecisionInput;
 use dtof_core::{
-    Array, AsyncPixel, BinIndex, BinPosition, Count, DepthEstimator, DepthEvent, Flags, Histogram,
-    LaserCycle, Neighbours, Peak, PixelAddress, PixelConfig, RangeGate, Statistics, WindowRule,
-    z_for,
+    Array, ArrayConfig, BinIndex, BinPosition, Count, Count10, CounterWidth, DepthEstimator,
+    DepthEvent, Flags, Histogram, Neighbours, Peak, PixelArray, PixelConfig, PixelData, PixelPlace,
+    RangeGate, WindowRule, z_for,
 };
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette::{EVENTS, PAPER, Pen};
@@ -123,45 +124,48 @@ fn confirmed(
     neighbours: &NeighbourConfig,
     rng: &mut Pcg64,
 ) -> Option<(DepthEvent, BinPosition)> {
-    let mut pixels: Vec<AsyncPixel<BINS>> = (0..9)
-        .map(|number| AsyncPixel::new(PixelAddress::new(number)))
-        .collect();
-    let mut statistics = Statistics::new();
-    for cycle in 1..=L2 {
-        for (pixel, light) in pixels.iter_mut().zip(lights) {
-            pixel.count_batch(config, &light.draw(rng));
-            pixel.begin_look(config, &mut statistics, 1);
+    let config = ArrayConfig::new(*neighbours.array(), *config);
+    let config = config.neighbours(*neighbours).ok()?;
+    let mut places: [PixelPlace<BINS, Count10, Decided>; 9] = Default::default();
+    let mut array = PixelArray::new(&mut places, &mut []);
+    array.configure(&config).ok()?;
+    for _ in 1..=L2 {
+        for (number, light) in lights.iter().enumerate() {
+            let codes = light.draw(rng);
+            codes.iter().for_each(|&code| array.photon(number, code));
         }
-        let detections: Vec<_> = (0..9)
-            .map(|number| neighbours.decide(&pixels, number, config))
-            .collect();
-        let last = LaserCycle::new(cycle.into());
-        let mut own = None;
-        for (number, (pixel, detection)) in pixels.iter_mut().zip(&detections).enumerate() {
-            if let Some(detection) = detection {
-                pixel.keep_detection(last, detection);
-            }
-            pixel.end_look(config, &mut statistics, last, |input| {
-                if let Some(detection) = detection.as_ref().filter(|_| number == MIDDLE) {
-                    let about = detection.peak.bin.raw();
-                    own = Some(own_position(config, input.histogram, about));
-                }
-            });
-            if let Some(event) = pixel.take_event().filter(|_| number == MIDDLE) {
-                let is_confirmed = event.flags.contains(Flags::CONFIRMED);
-                return is_confirmed.then_some((event, own?));
+        array.end_laser_cycle();
+        while let Some(event) = array.next_event() {
+            let counts = std::mem::take(&mut array.data_of(&event)?.0);
+            if usize::from(event.pixel.raw()) == MIDDLE {
+                let own = own_position(config.pixels(), &counts, event.peak_bin.raw());
+                return event
+                    .flags
+                    .contains(Flags::CONFIRMED)
+                    .then_some((event, own));
             }
         }
     }
     None
 }
 
+/// The photons from which a pixel decided its last event.
+#[derive(Default)]
+struct Decided(Vec<u32>);
+
+impl PixelData for Decided {
+    fn decides<const B: usize, W: CounterWidth>(&mut self, input: &DecisionInput<'_, B, W>) {
+        let counts = input.histogram.counts().iter();
+        self.0 = counts.map(|&count| count.into()).collect();
+    }
+}
+
 /// Where the photons of one pixel are, of those within two bins of `about`.
-fn own_position(
-    config: &PixelConfig<BINS, WindowRule>,
-    histogram: &Histogram<BINS>,
-    about: u16,
-) -> BinPosition {
+fn own_position(config: &PixelConfig<BINS, WindowRule>, counts: &[u32], about: u16) -> BinPosition {
+    let mut histogram = Histogram::<BINS>::new();
+    for (bin, &count) in (0..).zip(counts) {
+        (0..count).for_each(|_| histogram.add(bin));
+    }
     let bins = about.saturating_sub(2)..=(about + 2).min(config.gate().last());
     let mut peak = Peak::default();
     for bin in bins {
@@ -175,7 +179,7 @@ fn own_position(
     }
     let depth = config
         .estimator()
-        .estimate(histogram, config.gate(), peak, U24F8::ZERO);
+        .estimate(&histogram, config.gate(), peak, U24F8::ZERO);
     BinPosition::of(peak.bin, depth.offset)
 }
 

@@ -10,9 +10,9 @@ use dtof_core::{
     LaserCycle, Neighbours, PixelAddress, PixelConfig, Statistics, WindowRule,
 };
 
-use super::{HISTOGRAMS, histogram};
-use crate::common::neighbours::{GUARD, Known, compare};
-use crate::common::parallel;
+use super::neighbours::formulas::{GUARD, Known, compare};
+use super::parallel;
+use super::small::{HISTOGRAMS, histogram};
 
 /// Of neighbours: nothing, the same surface, light over all bins, another surface, and brighter ones.
 const OTHERS: [[u32; 8]; 8] = [

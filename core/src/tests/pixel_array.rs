@@ -1,8 +1,9 @@
 //! An array that is driven does what its parts do one by one, laser cycle by laser cycle.
 
+use crate::tests::neighbours::end_laser_cycles_of_array;
 use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::fixed::types::U4F12;
-use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
+use dtof_core::neighbours::NeighbourConfig;
 use dtof_core::rule::DecisionInput;
 use dtof_core::{
     Array, ArrayConfig, ArrayError, ArrayLosses, AsyncPixel, BlockLevel, Count, Count10, Count24,

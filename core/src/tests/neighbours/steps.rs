@@ -1,7 +1,8 @@
 //! What a look of an array does: edges, pixels that are left out, order, losses.
 
+use crate::tests::neighbours::end_laser_cycles_of_array;
 use dtof_core::fixed::types::U4F12;
-use dtof_core::neighbours::{ArrayPixel, NeighbourConfig, end_laser_cycles_of_array};
+use dtof_core::neighbours::{ArrayPixel, NeighbourConfig};
 use dtof_core::{
     Array, AsyncPixel, Count, Count8, Count10, Count16, CounterWidth, DepthEvent, EchoNumber,
     Flags, LaserCycle, Look, Neighbours, PixelAddress, PixelConfig, RangeGate, Statistics,

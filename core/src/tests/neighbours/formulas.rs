@@ -6,7 +6,7 @@ use dtof_core::{
     Count, Count16, Detection, Flags, Histogram, Peak, PixelConfig, RangeGate, WindowRule,
 };
 
-use super::window::exceeds;
+use crate::tests::window::exceeds;
 
 /// Bins to either side of an echo that are left out.
 pub const GUARD: u16 = 3;

@@ -11,7 +11,7 @@ use dtof_core::{
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg64Mcg;
 
-use crate::common::neighbours::{GUARD, Known, compare};
+use super::formulas::{GUARD, Known, compare};
 
 const BINS: usize = 32;
 const SIDE: usize = 4;

@@ -9,7 +9,7 @@ use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64Mcg;
 
-use crate::common::light;
+use crate::tests::light;
 
 const BINS: usize = 128;
 const SIDE: u16 = 20;

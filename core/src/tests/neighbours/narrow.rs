@@ -1,7 +1,8 @@
 //! Counters of 8 bits beside those of 10, in pixels that confirm each other.
 
+use crate::tests::neighbours::end_laser_cycles_of_array;
 use dtof_core::fixed::types::U4F12;
-use dtof_core::neighbours::{NeighbourConfig, end_laser_cycles_of_array};
+use dtof_core::neighbours::NeighbourConfig;
 use dtof_core::{
     Array, AsyncPixel, Count, Count8, Count10, CounterWidth, EchoNumber, Flags, LaserCycle,
     Neighbours, PixelAddress, PixelConfig, Statistics, WindowRule,

@@ -1,0 +1,32 @@
+//! Pixels that confirm each other.
+
+mod false_alarms;
+pub mod formulas;
+mod model;
+mod narrow;
+mod steps;
+mod tables;
+
+use crate::neighbours::{ArrayLook, ArrayPixel, NeighbourConfig};
+use crate::{CounterWidth, LaserCycle, PixelConfig, Statistics, WindowRule};
+
+/// Ends laser cycles of pixels with neighbours. Returns whether one of them has a new event.
+pub fn end_laser_cycles_of_array<const BINS: usize, W: CounterWidth>(
+    pixels: &mut [impl ArrayPixel<BINS, W>],
+    config: &PixelConfig<BINS, WindowRule>,
+    neighbours: &NeighbourConfig,
+    statistics: &mut Statistics,
+    last: LaserCycle,
+    cycles: u16,
+) -> bool {
+    let before = statistics.events;
+    let look = ArrayLook {
+        config,
+        neighbours,
+        last,
+    };
+    look.end_laser_cycles(pixels, statistics, cycles, |pixels, look| {
+        look.decide_in_turn(pixels);
+    });
+    statistics.events > before
+}
