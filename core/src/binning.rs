@@ -50,8 +50,7 @@ use crate::config::PixelConfig;
 use crate::detect::DetectionRule;
 use crate::event::DepthEvent;
 use crate::histogram::counter::Count16;
-use crate::pixel::{AsyncPixel, Look};
-use crate::pixel_array::{PixelData, observer};
+use crate::pixel::{AsyncPixel, Look, PixelData, observer};
 use crate::statistics::Statistics;
 use crate::units::{BlockLevel, LaserCycle, PixelAddress};
 

@@ -144,10 +144,8 @@ pub use flags::Flags;
 pub use histogram::counter::{Count8, Count10, Count16, Count20, Count24, CounterWidth};
 pub use histogram::gate::{GateError, RangeGate};
 pub use histogram::{Histogram, Peak};
-pub use pixel::{AsyncPixel, Look, OncePerBin};
-pub use pixel_array::{
-    ArrayConfig, ArrayError, ArrayLosses, ArrayState, PixelArray, PixelData, PixelPlace,
-};
+pub use pixel::{AsyncPixel, Look, OncePerBin, PixelData};
+pub use pixel_array::{ArrayConfig, ArrayError, ArrayLosses, ArrayState, PixelArray, PixelPlace};
 pub use statistics::Statistics;
 pub use units::{
     BinIndex, BinPosition, BlockLevel, Count, EchoNumber, LaserCycle, PixelAddress, SubBinOffset,

@@ -49,6 +49,8 @@
 //! Source: ours. The field knows it as spatial pooling of neighbouring pixels in two stages: a low threshold chooses the
 //! pixels, a second one tests the pooled counts.
 
+use core::ops::AddAssign;
+
 use crate::array::{Array, Neighbours};
 use crate::config::PixelConfig;
 pub use crate::detect::NeighbourRule;
@@ -138,6 +140,25 @@ impl NeighbourConfig {
     }
 }
 
+/// The threads of a program, among which the pixels of an array are shared.
+pub trait Threads {
+    /// Does `work` with all parts of `items`, each of which begins at the number that it gets. Adds the results up.
+    fn each<P: Send, S: Send + Default + AddAssign>(
+        &self,
+        items: &mut [P],
+        work: impl Fn(usize, &mut [P]) -> S + Sync,
+    ) -> S;
+
+    /// Decides for each of `items`, by number, with all of them as they are; then does `work` with each and what was found.
+    /// Adds the results up.
+    fn decide<P: Send + Sync, D: Send + Sync, S: Send + Default + AddAssign>(
+        &self,
+        items: &mut [P],
+        decide: impl Fn(&[P], usize) -> Option<D> + Sync,
+        work: impl Fn(&mut P, Option<&D>, &mut S) + Sync,
+    ) -> S;
+}
+
 /// A look of all pixels.
 pub(crate) struct ArrayLook<'a, const BINS: usize, R: DetectionRule> {
     pub(crate) config: &'a PixelConfig<BINS, R>,
@@ -146,29 +167,65 @@ pub(crate) struct ArrayLook<'a, const BINS: usize, R: DetectionRule> {
 }
 
 impl<const BINS: usize, R: DetectionRule> ArrayLook<'_, BINS, R> {
-    /// The three steps. `decide` is the second.
-    #[inline(always)]
+    /// The three steps, one after another.
     pub(crate) fn end_laser_cycles<W: CounterWidth, P: ArrayPixel<BINS, W>>(
         &self,
         pixels: &mut [P],
         statistics: &mut Statistics,
         cycles: u16,
-        decide: impl FnOnce(&mut [P], &Self),
     ) {
         let mut decides = false;
         for pixel in pixels.iter_mut().filter_map(P::pixel_mut) {
             decides |= pixel.begin_look(self.config, statistics, cycles);
         }
         if decides {
-            decide(pixels, self);
+            self.decide_in_turn(pixels);
             for pixel in pixels {
                 pixel.end_look(self.config, statistics, self.last);
             }
         }
     }
 
+    /// The same on threads. First `count` counts the photons of each pixel, and gives those that are left out. Returns how
+    /// many these are.
+    pub(crate) fn end_laser_cycles_on<W: CounterWidth, P: ArrayPixel<BINS, W> + Send + Sync>(
+        &self,
+        threads: &impl Threads,
+        pixels: &mut [P],
+        statistics: &mut Statistics,
+        cycles: u16,
+        count: impl Fn(usize, &mut P) -> u64 + Sync,
+    ) -> u64
+    where
+        R: Sync,
+    {
+        let begun = threads.each(pixels, |first, pixels| {
+            let mut begun = Step::default();
+            for (number, pixel) in (first..).zip(pixels) {
+                begun.left_out += count(number, pixel);
+                if let Some(pixel) = pixel.pixel_mut() {
+                    begun.decides |= pixel.begin_look(self.config, &mut begun.statistics, cycles);
+                }
+            }
+            begun
+        });
+        *statistics += begun.statistics;
+        if !begun.decides {
+            return begun.left_out;
+        }
+        let decide = |pixels: &[P], number| self.decide(pixels, number);
+        let ended = threads.decide(pixels, decide, |pixel, found, ended: &mut Statistics| {
+            if let (Some(pixel), Some(detection)) = (pixel.pixel_mut(), found) {
+                pixel.keep_detection(self.last, detection);
+            }
+            pixel.end_look(self.config, ended, self.last);
+        });
+        *statistics += ended;
+        begun.left_out
+    }
+
     /// The detection of a pixel.
-    pub(crate) fn decide<W: CounterWidth>(
+    fn decide<W: CounterWidth>(
         &self,
         pixels: &[impl ArrayPixel<BINS, W>],
         number: usize,
@@ -177,25 +234,29 @@ impl<const BINS: usize, R: DetectionRule> ArrayLook<'_, BINS, R> {
     }
 
     /// Those of all pixels, one after another.
-    #[inline(always)]
-    pub(crate) fn decide_in_turn<W: CounterWidth>(&self, pixels: &mut [impl ArrayPixel<BINS, W>]) {
+    fn decide_in_turn<W: CounterWidth>(&self, pixels: &mut [impl ArrayPixel<BINS, W>]) {
         for number in 0..pixels.len() {
             let detection = self.decide(pixels, number);
-            self.keep(pixels, detection.map(|detection| (number, detection)));
-        }
-    }
-
-    /// Keeps detections until all pixels have decided.
-    #[inline(always)]
-    pub(crate) fn keep<W: CounterWidth>(
-        &self,
-        pixels: &mut [impl ArrayPixel<BINS, W>],
-        found: impl IntoIterator<Item = (usize, Detection)>,
-    ) {
-        for (number, detection) in found {
-            if let Some(pixel) = pixels.get_mut(number).and_then(ArrayPixel::pixel_mut) {
+            let pixel = pixels.get_mut(number).and_then(ArrayPixel::pixel_mut);
+            if let (Some(pixel), Some(detection)) = (pixel, detection) {
                 pixel.keep_detection(self.last, &detection);
             }
         }
+    }
+}
+
+/// What the first step did in a part of the pixels.
+#[derive(Default)]
+struct Step {
+    statistics: Statistics,
+    decides: bool,
+    left_out: u64,
+}
+
+impl AddAssign for Step {
+    fn add_assign(&mut self, other: Self) {
+        self.statistics += other.statistics;
+        self.decides |= other.decides;
+        self.left_out += other.left_out;
     }
 }

@@ -50,11 +50,11 @@ use crate::array::Array;
 use crate::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use crate::check::impl_error;
 use crate::config::PixelConfig;
-use crate::detect::{Detection, DetectionRule, PaperRule};
+use crate::detect::{DetectionRule, PaperRule};
 use crate::event::DepthEvent;
 use crate::histogram::counter::{Count10, CounterWidth, PhotonCount};
-use crate::neighbours::{ArrayLook, ArrayPixel, NeighbourConfig};
-use crate::pixel::{AsyncPixel, DecisionInput, Look, OncePerBin};
+use crate::neighbours::{ArrayLook, ArrayPixel, NeighbourConfig, Threads};
+use crate::pixel::{AsyncPixel, Look, OncePerBin, PixelData, observer};
 use crate::statistics::{Statistics, photons};
 use crate::units::{BlockLevel, LaserCycle, PixelAddress};
 use crate::whole::WholeHistogram;
@@ -71,24 +71,6 @@ pub struct PixelPlace<const BINS: usize, W: CounterWidth = Count10, T = ()> {
     is_left_out: bool,
     /// Of the program. A configuration sets it to the default.
     pub data: T,
-}
-
-/// What a program keeps beside a pixel or a block.
-pub trait PixelData: Default {
-    /// The pixel or the block reports an event, and then starts over: what the decision was made from.
-    #[inline(always)]
-    fn decides<const BINS: usize, W: CounterWidth>(&mut self, _input: &DecisionInput<'_, BINS, W>) {
-    }
-}
-
-impl PixelData for () {}
-
-/// Tells these data what a decision was made from. One type, so that looks are compiled once.
-#[inline(always)]
-pub(crate) fn observer<const BINS: usize, W: CounterWidth, T: PixelData>(
-    data: &mut T,
-) -> impl FnOnce(&DecisionInput<'_, BINS, W>) {
-    |input| data.decides(input)
 }
 
 /// What a place is used for.
@@ -615,36 +597,88 @@ where
     #[inline]
     #[must_use = "these laser cycles have not ended yet"]
     pub fn end_laser_cycles(&mut self, cycles: u16) -> u16 {
-        self.end(cycles, |places, look| look.decide_in_turn(places))
-    }
-
-    /// The same, on the threads of a program. `decide` gets the number of pixels and a function that gives the detection of a
-    /// pixel, which takes by far the most time where neighbours confirm. It calls it for each, in any order, and returns
-    /// the pixels with a detection. Without neighbours it is not called.
-    #[must_use = "these laser cycles have not ended yet"]
-    pub fn end_laser_cycles_shared<I>(
-        &mut self,
-        cycles: u16,
-        decide: impl FnOnce(usize, &(dyn Fn(usize) -> Option<Detection> + Sync)) -> I,
-    ) -> u16
-    where
-        I: IntoIterator<Item = (usize, Detection)>,
-        R: Sync,
-        W: Sync,
-        T: Sync,
-    {
-        self.end(cycles, |places, look| {
-            let found = decide(places.len(), &|pixel| look.decide(places, pixel));
-            look.keep(places, found);
+        self.end(cycles, |look, places, statistics, cycles| {
+            look.end_laser_cycles(places, statistics, cycles);
         })
     }
 
-    /// `decide` keeps the detections of all pixels that have neighbours.
+    /// The same on the threads of a program, after photons of these laser cycles up to the next look: `next` gives the next
+    /// code of a pixel, until there is none. Threads are worth it for neighbours, whose looks take by far the most time.
+    /// Photons that count once per bin must be those of the current laser cycle.
+    #[must_use = "these laser cycles have not ended yet"]
+    pub fn end_laser_cycles_on(
+        &mut self,
+        threads: &impl Threads,
+        cycles: u16,
+        next: impl Fn(usize, &mut T) -> Option<u16> + Sync,
+    ) -> u16
+    where
+        R: Sync,
+        PixelPlace<BINS, W, T>: Send + Sync,
+    {
+        let together = self.state.config.as_ref().is_some_and(|config| {
+            config.has_neighbours() && !config.once_per_bin && cycles >= self.to_look()
+        });
+        if !together {
+            self.photons_in_turn(&next);
+        }
+        let mut left_out = 0;
+        let left = self.end(cycles, |look, places, statistics, cycles| {
+            let count = |pixel, place: &mut PixelPlace<BINS, W, T>| {
+                let mut left_out = 0;
+                while together && let Some(code) = next(pixel, &mut place.data) {
+                    if place.use_of.counts() {
+                        place.pixel.count(look.config, code);
+                    } else {
+                        left_out += 1;
+                    }
+                }
+                left_out
+            };
+            left_out = look.end_laser_cycles_on(threads, places, statistics, cycles, count);
+        });
+        self.state.losses.left_out += left_out;
+        left
+    }
+
+    fn photons_in_turn(&mut self, next: impl Fn(usize, &mut T) -> Option<u16>) {
+        for pixel in 0..self.state.pixels_in_use {
+            let (Some(place), Some(config)) = (self.pixels.get_mut(pixel), &self.state.config)
+            else {
+                return;
+            };
+            if place.use_of == Use::Plain
+                && let Together::Blocks {
+                    config: of_blocks, ..
+                } = &config.together
+            {
+                while let Some(code) = next(pixel, &mut place.data) {
+                    place.pixel.count(&config.pixels, code);
+                    count_in_blocks(self.blocks, &place.feed, of_blocks, code);
+                }
+                continue;
+            }
+            let next = |places: &mut [PixelPlace<BINS, W, T>]| {
+                next(pixel, &mut places.get_mut(pixel)?.data)
+            };
+            while let Some(code) = next(self.pixels) {
+                self.photon(pixel, code);
+            }
+        }
+    }
+
+    /// The program's data beside the pixels.
+    pub fn data(&self) -> impl Iterator<Item = &T> {
+        let places = self.pixels.iter().take(self.state.pixels_in_use);
+        places.map(|place| &place.data)
+    }
+
+    /// `look` is that of pixels with neighbours.
     #[inline(always)]
     fn end(
         &mut self,
         cycles: u16,
-        decide: impl FnOnce(&mut [PixelPlace<BINS, W, T>], &ArrayLook<'_, BINS, R>),
+        look: impl FnOnce(&ArrayLook<'_, BINS, R>, &mut [PixelPlace<BINS, W, T>], &mut Statistics, u16),
     ) -> u16 {
         let Some(config) = &self.state.config else {
             return 0;
@@ -659,7 +693,7 @@ where
         self.state.cycle += u64::from(to_look);
         self.state.since_look = 0;
         let blind_looks = self.state.statistics.blind_looks;
-        self.look(decide);
+        self.look(look);
         let left = cycles - to_look;
         if left < x || self.has_event() || self.state.statistics.blind_looks != blind_looks {
             return left;
@@ -674,7 +708,12 @@ where
     #[inline(never)]
     fn look(
         &mut self,
-        decide: impl FnOnce(&mut [PixelPlace<BINS, W, T>], &ArrayLook<'_, BINS, R>),
+        of_neighbours: impl FnOnce(
+            &ArrayLook<'_, BINS, R>,
+            &mut [PixelPlace<BINS, W, T>],
+            &mut Statistics,
+            u16,
+        ),
     ) {
         // An event that was left has its turn before those that come now.
         self.state.turn = self.next_slot(self.state.turn).unwrap_or(0);
@@ -695,7 +734,7 @@ where
                 neighbours,
                 last,
             };
-            look.end_laser_cycles(places, statistics, cycles, decide);
+            of_neighbours(&look, places, statistics, cycles);
         } else {
             for place in places.iter_mut().filter(|place| place.use_of.counts()) {
                 let (pixel, observe) = (&mut place.pixel, observer(&mut place.data));

@@ -25,14 +25,14 @@
 //! is one in so many trials. With a share of more than half the neighbours hardly say anything, and `z₂` is `z₁`; so it is
 //! where `z₁` exceeds [`HIGHEST_Z`](crate::rule::HIGHEST_Z), the end of the table.
 //! Only one window is tried in a look, so that confirmed false alarms are fewer than their half:
-//! `core/tests/neighbours/false_alarms.rs` has the rates.
+//! `core/src/tests/neighbours/false_alarms.rs` has the rates.
 //!
 //! Bins that the pixel has left out, because their echo was reported, count in no neighbour. A neighbour that has left
 //! out bins at the window is not asked.
 //!
 //! Brightness is photons above the background a laser cycle. Brighter neighbours are left out because of surfaces that end.
 //! Their pixels would confirm any chance peak beside them. To leave out those with many photons only lowers the sum, so that `z₂` holds.
-//! `core/tests/neighbours/false_alarms.rs` has the false alarms there, and those of a single pixel whose
+//! `core/src/tests/neighbours/false_alarms.rs` has the false alarms there, and those of a single pixel whose
 //! neighbours all see a surface.
 //!
 //! The depth is that of the photons of all these pixels. The peak count is that of the pixel's own photons in the window,

@@ -44,7 +44,7 @@ use crate::check::impl_error;
 use crate::depth::RangeScale;
 use crate::event::DepthEvent;
 use crate::flags::Flags;
-use crate::pixel_array::PixelData;
+use crate::pixel::PixelData;
 use crate::units::{BinPosition, BlockLevel, LaserCycle, PixelAddress};
 
 /// The mean that a mean depth is compared with.

@@ -33,3 +33,21 @@ impl<'a, const BINS: usize, W: CounterWidth> DecisionInput<'a, BINS, W> {
         }
     }
 }
+
+/// What a program keeps beside a pixel or a block.
+pub trait PixelData: Default {
+    /// The pixel or the block reports an event, and then starts over: what the decision was made from.
+    #[inline(always)]
+    fn decides<const BINS: usize, W: CounterWidth>(&mut self, _input: &DecisionInput<'_, BINS, W>) {
+    }
+}
+
+impl PixelData for () {}
+
+/// Tells these data what a decision was made from. One type, so that looks are compiled once.
+#[inline(always)]
+pub(crate) fn observer<const BINS: usize, W: CounterWidth, T: PixelData>(
+    data: &mut T,
+) -> impl FnOnce(&DecisionInput<'_, BINS, W>) {
+    |input| data.decides(input)
+}

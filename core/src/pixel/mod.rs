@@ -43,7 +43,8 @@ mod look;
 mod once_per_bin;
 mod steps;
 
-pub use self::input::DecisionInput;
+pub(crate) use self::input::observer;
+pub use self::input::{DecisionInput, PixelData};
 pub use self::look::Look;
 use self::look::State;
 pub use self::once_per_bin::OncePerBin;

@@ -1,9 +1,12 @@
 //! An array that is driven does what its parts do one by one, laser cycle by laser cycle.
 
 use crate::tests::neighbours::end_laser_cycles_of_array;
+use std::ops::AddAssign;
+use std::sync::Mutex;
+
 use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::fixed::types::U4F12;
-use dtof_core::neighbours::NeighbourConfig;
+use dtof_core::neighbours::{NeighbourConfig, Threads};
 use dtof_core::rule::DecisionInput;
 use dtof_core::{
     Array, ArrayConfig, ArrayError, ArrayLosses, AsyncPixel, BlockLevel, Count, Count10, Count24,
@@ -340,6 +343,38 @@ fn photons(rng: &mut Pcg32, settings: &Settings) -> Vec<(usize, u16)> {
     photons
 }
 
+/// Small parts in another order.
+struct Backwards;
+
+impl Threads for Backwards {
+    fn each<P: Send, S: Send + Default + AddAssign>(
+        &self,
+        items: &mut [P],
+        work: impl Fn(usize, &mut [P]) -> S + Sync,
+    ) -> S {
+        let mut sum = S::default();
+        for (number, items) in items.chunks_mut(3).enumerate().rev() {
+            sum += work(3 * number, items);
+        }
+        sum
+    }
+
+    fn decide<P: Send + Sync, D: Send + Sync, S: Send + Default + AddAssign>(
+        &self,
+        items: &mut [P],
+        decide: impl Fn(&[P], usize) -> Option<D> + Sync,
+        work: impl Fn(&mut P, Option<&D>, &mut S) + Sync,
+    ) -> S {
+        let numbers = (0..items.len()).rev();
+        let found: Vec<Option<D>> = numbers.map(|number| decide(items, number)).collect();
+        let mut sum = S::default();
+        for (item, found) in items.iter_mut().rev().zip(&found) {
+            work(item, found.as_ref(), &mut sum);
+        }
+        sum
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
@@ -369,10 +404,18 @@ proptest! {
         let mut rng = Pcg32::seed_from_u64(settings.seed);
         let (mut found, mut unaddressed) = (0, 0);
         for _ in 0..300 {
-            for (pixel, code) in photons(&mut rng, &settings) {
-                array.photon(pixel, code);
-                parts.photon(pixel, code);
+            let codes = photons(&mut rng, &settings);
+            codes.iter().for_each(|&(pixel, code)| parts.photon(pixel, code));
+            let is_shared = rng.next_u32() % 2 == 0;
+            if !is_shared {
+                codes.iter().for_each(|&(pixel, code)| array.photon(pixel, code));
             }
+            let coming = Mutex::new(if is_shared { codes } else { Vec::new() });
+            let next = |pixel, _: &mut ()| {
+                let mut coming = coming.lock().unwrap();
+                let place = coming.iter().position(|photon| photon.0 == pixel)?;
+                Some(coming.remove(place).1)
+            };
             array.photon(settings.number(), 3);
             unaddressed += 1;
             // Dark ones follow now and then.
@@ -382,13 +425,8 @@ proptest! {
                 _ => 1,
             };
             while cycles > 0 {
-                let is_shared = rng.next_u32() % 2 == 0;
                 let left = match is_shared {
-                    true => array.end_laser_cycles_shared(cycles, |pixels, decide| {
-                        // In another order.
-                        let numbers = (0..pixels).rev();
-                        numbers.filter_map(|pixel| Some((pixel, decide(pixel)?))).collect::<Vec<_>>()
-                    }),
+                    true => array.end_laser_cycles_on(&Backwards, cycles, next),
                     false => array.end_laser_cycles(cycles),
                 };
                 let mut looked = false;

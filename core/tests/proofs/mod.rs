@@ -1,8 +1,8 @@
 //! The rules that are newer than the paper: whole spaces of small histograms against models written from the formulas.
 //!
 //! ```sh
-//! cargo test -p dtof-core --test all proofs:: -- --nocapture             # a share of the cases
-//! cargo test -p dtof-core --test all proofs:: -- --nocapture --ignored   # all of them, in minutes
+//! cargo test -p dtof-core proofs:: -- --nocapture             # a share of the cases
+//! cargo test -p dtof-core proofs:: -- --nocapture --ignored   # all of them, in minutes
 //! ```
 
 mod count8;

@@ -16,45 +16,56 @@ use dtof_link::AdaptiveBinning;
 use super::Engine;
 use super::alone::sort;
 use super::decisions::{self, Decision, LastDecision};
-use super::parallel::{of_each, of_parts};
+use super::parallel::{AllThreads, of_parts};
 use crate::settings::Settings;
 use dtof_options::Refused;
 use dtof_photons::source::Slice;
 
-/// Decisions with neighbours that are worth a thread.
-const DECISIONS: usize = 256;
-
-/// The last decision of a pixel or a block, if it is kept.
+/// A pixel or a block.
 #[derive(Debug, Default)]
-struct Kept(Option<Box<LastDecision>>);
+struct Member {
+    /// Its index among the pixels of the source, if it is one of these.
+    number: Option<usize>,
+    /// Its next photon of the slice.
+    next: usize,
+    /// The last decision, if it is kept.
+    last: Option<Box<LastDecision>>,
+}
 
-impl PixelData for Kept {
+impl PixelData for Member {
     fn decides<const BINS: usize, W: CounterWidth>(&mut self, input: &DecisionInput<'_, BINS, W>) {
-        if let Some(last) = &mut self.0 {
+        if let Some(last) = &mut self.last {
             last.record_input(input);
         }
     }
 }
 
-/// A pixel of the source.
-#[derive(Debug)]
-struct Member {
-    /// Its place in the array, and its index among the pixels of the source.
-    place: usize,
-    number: usize,
-    /// The next photon of the slice.
-    next: usize,
+impl Member {
+    /// Takes the code of its next photon, if that is before laser cycle `end` of the slice.
+    fn next(&mut self, slice: &Slice, end: u16) -> Option<u16> {
+        let photons = &slice.pixels[self.number?].photons;
+        let photon = photons.get(self.next).filter(|photon| photon.cycle < end)?;
+        self.next += 1;
+        Some(photon.code)
+    }
+
+    /// If its recording has `end` laser cycles of the slice or more, those before its next photon, or all.
+    fn dark(&self, slice: &Slice, end: u16) -> Option<u16> {
+        let received = &slice.pixels[self.number?];
+        let next = received.photons.get(self.next);
+        let dark = next.map_or(received.cycles, |photon| photon.cycle);
+        (received.cycles >= end).then_some(dark)
+    }
 }
 
 /// An array, and where its pixels are in that of the source.
 #[derive(Debug)]
 struct Part<const BINS: usize, W: CounterWidth> {
-    places: Vec<PixelPlace<BINS, W, Kept>>,
-    blocks: Vec<Block<BINS, Kept>>,
+    places: Vec<PixelPlace<BINS, W, Member>>,
+    blocks: Vec<Block<BINS, Member>>,
     state: ArrayState<BINS, AnyRule>,
     /// The address of each place.
     addresses: Vec<PixelAddress>,
-    members: Vec<Member>,
     statistics: [Statistics; 2],
 }
 
@@ -90,77 +101,81 @@ impl<const BINS: usize, W: CounterWidth> Part<BINS, W> {
         addresses: Vec<PixelAddress>,
         source: &[PixelAddress],
     ) -> Result<Self> {
-        let [pixels, blocks] = config.room();
-        let mut places: Vec<_> = (0..pixels).map(|_| PixelPlace::new()).collect();
-        let mut blocks: Vec<_> = (0..blocks).map(|_| Block::default()).collect();
+        let [pixels, number_of_blocks] = config.room();
+        let mut places: Vec<PixelPlace<BINS, W, Member>> = Vec::new();
+        places.resize_with(pixels, PixelPlace::new);
+        let mut blocks = Vec::new();
+        blocks.resize_with(number_of_blocks, Block::default);
         let mut array = PixelArray::new(&mut places, &mut blocks);
         array.configure(config)?;
-        let mut members = Vec::new();
+        let mut numbers = Vec::new();
         for (place, address) in addresses.iter().enumerate() {
-            match source.binary_search(address) {
-                Ok(number) => members.push(Member {
-                    place,
-                    number,
-                    next: 0,
-                }),
-                Err(_) => array.leave_out(place),
+            let number = source.binary_search(address).ok();
+            if number.is_none() {
+                array.leave_out(place);
             }
+            numbers.push(number);
         }
         let state = array.into_state();
+        for (place, number) in places.iter_mut().zip(numbers) {
+            place.data.number = number;
+        }
         Ok(Self {
             places,
             blocks,
             state,
             addresses,
-            members,
             statistics: [Statistics::new(); 2],
         })
     }
 
     /// Runs a slice. Events are taken at once.
     fn run(&mut self, slice: &Slice) -> Vec<DepthEvent> {
+        let (mut cycles, mut shortest) = (0, u16::MAX);
+        for member in self.places.iter_mut().map(|place| &mut place.data) {
+            member.next = 0;
+            if let Some(number) = member.number {
+                let recorded = slice.pixels[number].cycles;
+                (cycles, shortest) = (cycles.max(recorded), shortest.min(recorded));
+            }
+        }
         let state = std::mem::take(&mut self.state);
         let mut array = PixelArray::resume(&mut self.places, &mut self.blocks, state);
         // Numbers the laser cycles as the source does.
         array.lost(0, slice.first_cycle.saturating_sub(array.cycles()));
-        let mut cycles = 0;
-        for member in &mut self.members {
-            member.next = 0;
-            cycles = cycles.max(slice.pixels[member.number].cycles);
-        }
         let (mut events, mut from) = (Vec::new(), 0);
         while from < cycles {
-            // Up to the next look; if there are no photons then, up to the next one.
             let to = from + array.to_look().min(cycles - from);
-            let mut end = cycles;
-            for member in &mut self.members {
-                let received = &slice.pixels[member.number];
-                let mut next = received.photons.get(member.next);
-                while let Some(photon) = next.filter(|photon| photon.cycle < to) {
-                    array.photon(member.place, photon.code);
-                    member.next += 1;
-                    next = received.photons.get(member.next);
-                }
-                if received.cycles < to {
-                    // Its recording has ended.
-                    array.leave_out(member.place);
-                } else {
-                    end = end.min(next.map_or(received.cycles, |photon| photon.cycle));
+            if shortest < to {
+                // The last photons of a recording that ends before the look still count.
+                let ended = |(place, member): (usize, &Member)| {
+                    let received = &slice.pixels[member.number?];
+                    let left = received.photons.get(member.next..)?;
+                    (received.cycles < to).then_some((place, left))
+                };
+                let ended: Vec<_> = array.data().enumerate().filter_map(ended).collect();
+                for (place, photons) in ended {
+                    for photon in photons {
+                        array.photon(place, photon.code);
+                    }
+                    array.leave_out(place);
                 }
             }
-            let end = end.max(to);
+            // If there are no photons up to it, up to the next one.
+            let dark = |member: &Member| member.dark(slice, to);
+            let end = match array.data().filter_map(dark).any(|dark| dark < to) {
+                true => to,
+                false => array.data().filter_map(dark).min().unwrap_or(to),
+            };
             let mut left = end - from;
             while left > 0 {
-                left = array.end_laser_cycles_shared(left, |pixels, decide| {
-                    let found = of_each(pixels, DECISIONS, decide);
-                    let numbered = found.into_iter().enumerate();
-                    numbered.filter_map(|(pixel, found)| Some((pixel, found?)))
-                });
+                let next = |_, member: &mut Member| member.next(slice, to);
+                left = array.end_laser_cycles_on(&AllThreads, left, next);
                 while let Some(event) = array.next_event() {
-                    let kept = array.data_of(&event);
+                    let member = array.data_of(&event);
                     let pixel = self.addresses[usize::from(event.pixel.raw())];
                     let event = DepthEvent { pixel, ..event };
-                    if let Some(Kept(Some(last))) = kept {
+                    if let Some(last) = member.and_then(|member| member.last.as_mut()) {
                         last.record_event(event);
                     }
                     events.push(event);
@@ -173,8 +188,8 @@ impl<const BINS: usize, W: CounterWidth> Part<BINS, W> {
         events
     }
 
-    /// What is kept of the pixels and blocks, with the address of each.
-    fn kept(&mut self) -> impl Iterator<Item = (PixelAddress, &mut Kept)> {
+    /// The pixels and blocks, with the address of each.
+    fn members(&mut self) -> impl Iterator<Item = (PixelAddress, &mut Member)> {
         let addresses = &self.addresses;
         let places = addresses.iter().zip(&mut self.places);
         let places = places.map(|(&address, place)| (address, &mut place.data));
@@ -258,8 +273,8 @@ impl<const BINS: usize, W: CounterWidth> Engine for ArrayEngine<BINS, W> {
     }
 
     fn keep_decisions(&mut self, is_kept: &dyn Fn(PixelAddress) -> bool) {
-        for (address, kept) in self.parts.iter_mut().flat_map(Part::kept) {
-            *kept = Kept(LastDecision::allocate(is_kept(address)));
+        for (address, member) in self.parts.iter_mut().flat_map(Part::members) {
+            member.last = LastDecision::allocate(is_kept(address));
         }
     }
 
@@ -268,9 +283,8 @@ impl<const BINS: usize, W: CounterWidth> Engine for ArrayEngine<BINS, W> {
         for part in &self.parts {
             let of_pixels = part.places.iter().map(|place| &place.data);
             let of_blocks = part.blocks.iter().map(|block| &block.data);
-            let kept = of_pixels
-                .chain(of_blocks)
-                .filter_map(|kept| kept.0.as_ref());
+            let kept = of_pixels.chain(of_blocks);
+            let kept = kept.filter_map(|member| member.last.as_ref());
             all.extend(kept.filter_map(|last| last.decision()));
         }
         decisions::sort(&mut all);

@@ -1,6 +1,9 @@
 //! Work on all threads, with results in the order of its items. Engines are compiled for each number of bins; rayon, which
 //! hands out their work, is compiled once.
 
+use std::ops::AddAssign;
+
+use dtof_core::neighbours::Threads;
 use rayon::prelude::*;
 
 /// So many parts at most: a thread that is done takes another.
@@ -35,6 +38,44 @@ pub fn of_each<R: Send>(items: usize, least: usize, work: impl Fn(usize) -> R + 
         }
     });
     results.into_iter().flatten().collect()
+}
+
+/// All threads of this computer, for an array of the core.
+pub struct AllThreads;
+
+impl AllThreads {
+    /// Pixels that are worth a thread.
+    const PIXELS: usize = 256;
+}
+
+impl Threads for AllThreads {
+    fn each<P: Send, S: Send + Default + AddAssign>(
+        &self,
+        items: &mut [P],
+        work: impl Fn(usize, &mut [P]) -> S + Sync,
+    ) -> S {
+        let mut sum = S::default();
+        for part in of_parts(items, Self::PIXELS, work) {
+            sum += part;
+        }
+        sum
+    }
+
+    fn decide<P: Send + Sync, D: Send + Sync, S: Send + Default + AddAssign>(
+        &self,
+        items: &mut [P],
+        decide: impl Fn(&[P], usize) -> Option<D> + Sync,
+        work: impl Fn(&mut P, Option<&D>, &mut S) + Sync,
+    ) -> S {
+        let found = of_each(items.len(), Self::PIXELS, |number| decide(items, number));
+        self.each(items, |first, items| {
+            let mut sum = S::default();
+            for (item, found) in items.iter_mut().zip(&found[first..]) {
+                work(item, found.as_ref(), &mut sum);
+            }
+            sum
+        })
+    }
 }
 
 type Job<'a> = Box<dyn FnOnce() + Send + 'a>;

@@ -39,8 +39,8 @@ const RESUMED: [&str; 2] = ["panic_const_async_fn_resumed", "9panicking9panic_fm
 /// The functions of `library_image`, which together use all of dtof-core, dtof-link and dtof-sensors.
 const PARTS: &str = "events::units events::roots events::ranges events::words events::products events::texts
     events::processor histograms::gates histograms::trees histograms::thresholds histograms::histograms
-    histograms::excluded_bins histograms::live_counts pixels::pixels pixels::once_per_bin arrays::blocks
-    arrays::neighbours link::frames link::sessions link::configurations link::reports link::tokens
+    histograms::excluded_bins histograms::live_counts pixels::pixels pixels::once_per_bin arrays::layout
+    arrays::driven arrays::whole link::frames link::sessions link::configurations link::reports link::tokens
     link::whole_histograms link::reasons sensors::tdc7200 sensors::calibrations sensors::tmf882x
     sensors::tmf8829 sensors::photon_timer sensors::simulated sensors::dithers sensors::software_i2c
     awaited::tmf882x awaited::tmf8829 awaited::tmf8829_spi";

@@ -25,8 +25,6 @@ pub fn end_laser_cycles_of_array<const BINS: usize, W: CounterWidth>(
         neighbours,
         last,
     };
-    look.end_laser_cycles(pixels, statistics, cycles, |pixels, look| {
-        look.decide_in_turn(pixels);
-    });
+    look.end_laser_cycles(pixels, statistics, cycles);
     statistics.events > before
 }

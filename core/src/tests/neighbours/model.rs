@@ -1,4 +1,4 @@
-//! The decision against a float model, written from the formulas of the documentation. `core/tests/proofs/neighbours.rs` has
+//! The decision against a float model, written from the formulas of the documentation. `core/src/tests/proofs.rs` has
 //! all small histograms.
 
 use dtof_core::fixed::types::{U4F12, U8F8};

@@ -1,9 +1,10 @@
 //! Pixels of dtof-core that decide together.
 
 use core::array;
+use core::ops::AddAssign;
 
 use dtof_core::binning::Block;
-use dtof_core::neighbours::NeighbourConfig;
+use dtof_core::neighbours::{NeighbourConfig, Threads};
 use dtof_core::{
     AnyRule, Array, ArrayConfig, Count8, Count10, Count16, Count20, Count24, CounterWidth,
     Neighbours, PixelArray, PixelPlace,
@@ -93,10 +94,11 @@ fn driven<const BINS: usize, W: CounterWidth>() {
         driven.leave_out(usize::from(half()));
         driven.photon(usize::from(half()), half());
         keep((driven.to_look(), driven.end_laser_cycles(half())));
-        keep(driven.end_laser_cycles_shared(half(), |pixels, decide| {
-            let found = decide(usize::from(half()))?;
-            Some((pixels, found))
+        keep(driven.end_laser_cycles_on(&InTurn, half(), |pixel, _| {
+            keep(pixel);
+            more().then(half)
         }));
+        keep(driven.data().count());
         driven.lost(cycle().raw(), cycle().raw());
         keep((driven.has_event(), driven.has_looked(), driven.cycles()));
         if let Some(event) = driven.next_event() {
@@ -141,4 +143,33 @@ fn whole<const BINS: usize, V: CounterWidth>() {
         });
     }
     keep((driven.frame_cycles(), driven.statistics()));
+}
+
+/// One thread.
+struct InTurn;
+
+impl Threads for InTurn {
+    fn each<P: Send, S: Send + Default + AddAssign>(
+        &self,
+        items: &mut [P],
+        work: impl Fn(usize, &mut [P]) -> S + Sync,
+    ) -> S {
+        work(0, items)
+    }
+
+    fn decide<P: Send + Sync, D: Send + Sync, S: Send + Default + AddAssign>(
+        &self,
+        items: &mut [P],
+        decide: impl Fn(&[P], usize) -> Option<D> + Sync,
+        work: impl Fn(&mut P, Option<&D>, &mut S) + Sync,
+    ) -> S {
+        let mut sum = S::default();
+        for number in 0..items.len() {
+            let found = decide(items, number);
+            if let Some(item) = items.get_mut(number) {
+                work(item, found.as_ref(), &mut sum);
+            }
+        }
+        sum
+    }
 }
