@@ -417,7 +417,8 @@ proptest! {
                 Some(coming.remove(place).1)
             };
             array.photon(settings.number(), 3);
-            unaddressed += 1;
+            array.photon(31, 3);
+            unaddressed += 2;
             // Dark ones follow now and then.
             let mut cycles = match rng.next_u32() % 32 {
                 0 => 1 + rng.next_u32() as u16 % 200,
@@ -705,6 +706,73 @@ fn used_room_is_as_new() {
     assert_eq!(other.losses().unaddressed, 1);
     assert!(other.pixel(0).is_none() && !other.has_event());
     assert_eq!(run(&mut other), first);
+}
+
+/// All places of three photons, which are the fewest of a detection or one more, before and after L1: no look finds anything
+/// as long as the pixel says so.
+#[test]
+fn a_pixel_finds_nothing_as_long_as_it_is_dark() {
+    const FEW: usize = 16;
+    let (mut quiet, mut later) = (0, 0);
+    for (minimum, z, dead_time, width) in combinations(
+        &[2, 3, 4],
+        &[1.0, 2.5, 3.0, 3.2, 3.4, 3.6],
+        &[0, 1, 4, 9, u16::MAX],
+        &[1, 3],
+    ) {
+        let rule = WindowRule::new(width, U4F12::from_num(z), Count::saturating(minimum)).unwrap();
+        let config = PixelConfig::<FEW, WindowRule>::with_rule(rule)
+            .x(1)
+            .l1(4)
+            .l2(200);
+        let config = config.dead_time(dead_time).build().unwrap();
+        for place in 0..(FEW as u16).pow(3) {
+            let codes = [place % 16, place / 16 % 16, place / 256];
+            if !codes.is_sorted() {
+                continue;
+            }
+            let mut pixel = AsyncPixel::<FEW>::new(PixelAddress::new(0));
+            pixel.count_batch(&config, &codes);
+            let mut statistics = Statistics::new();
+            let mut dark = pixel.dark_cycles(&config, false);
+            for cycle in 0..210 {
+                let blind_looks = statistics.blind_looks;
+                let look = pixel.end_laser_cycle(&config, &mut statistics, LaserCycle::new(cycle));
+                if dark > 0 {
+                    assert!(matches!(look, Look::TooEarly | Look::NoPeak), "{look:?}");
+                    assert_eq!(statistics.blind_looks, blind_looks);
+                    quiet += 1;
+                } else if look == Look::Event {
+                    later += 1;
+                }
+                if look != Look::TooEarly && look != Look::NoPeak {
+                    break;
+                }
+                let is_quiet = look == Look::TooEarly || statistics.blind_looks == blind_looks;
+                dark = if is_quiet {
+                    pixel.dark_cycles(&config, false)
+                } else {
+                    0
+                };
+            }
+        }
+    }
+    assert!(quiet > 100_000 && later > 1_000, "{quiet} {later}");
+}
+
+/// All combinations.
+fn combinations<A: Copy, B: Copy, C: Copy, D: Copy>(
+    a: &[A],
+    b: &[B],
+    c: &[C],
+    d: &[D],
+) -> impl Iterator<Item = (A, B, C, D)> {
+    a.iter().flat_map(move |&a| {
+        b.iter().flat_map(move |&b| {
+            c.iter()
+                .flat_map(move |&c| d.iter().map(move |&d| (a, b, c, d)))
+        })
+    })
 }
 
 /// An exposure of 92 laser cycles, the first look from L2 on, takes one call, or two with ticks in between.
