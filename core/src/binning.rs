@@ -276,7 +276,7 @@ impl<const BINS: usize, T: PixelData> Block<BINS, T> {
 
 /// Counts a photon of a pixel with this link in the blocks that it reaches.
 #[inline]
-pub fn count_in_blocks<const BINS: usize, R: DetectionRule, T: PixelData>(
+pub fn count_in_blocks<const BINS: usize, R: DetectionRule, T>(
     blocks: &mut [Block<BINS, T>],
     link: &BlockLink,
     config: &PixelConfig<BINS, R>,

@@ -322,6 +322,17 @@ impl<const BINS: usize, R: DetectionRule> PixelConfig<BINS, R> {
         self.tracking.as_ref()
     }
 
+    /// The fewest photons of a detection by any of its rules.
+    pub(crate) fn fewest_photons(&self) -> u32 {
+        let fewest = self.rule.fewest_photons();
+        self.tracking.as_ref().map_or(fewest, |tracking| {
+            let tracking = [tracking.near(), tracking.far()];
+            tracking
+                .iter()
+                .fold(fewest, |fewest, rule| fewest.min(rule.fewest_photons()))
+        })
+    }
+
     /// The last echo that a pixel reports in an exposure.
     #[must_use]
     pub const fn echoes(&self) -> EchoNumber {

@@ -189,6 +189,8 @@ pub enum ArrayError {
     BlocksAndNeighbours,
     /// The rule weighs a dead time, which neighbours do not.
     NeighboursAndDeadTime,
+    /// The room is not that of the state.
+    OtherRoom,
 }
 
 impl ArrayError {
@@ -203,6 +205,7 @@ impl ArrayError {
             Self::OtherLooks => "X of the blocks must be that of the pixels",
             Self::BlocksAndNeighbours => "pixels have blocks or neighbours, not both",
             Self::NeighboursAndDeadTime => "neighbours do not weigh a dead time",
+            Self::OtherRoom => "the room has another size than that of the state",
         }
     }
 }
@@ -374,6 +377,8 @@ pub struct PixelArray<'a, const BINS: usize, R: DetectionRule, W: CounterWidth =
 /// What an array is beside its pixels and blocks, for a program that does not have their room at hand all the time.
 #[derive(Clone, Debug)]
 pub struct ArrayState<const BINS: usize, R: DetectionRule> {
+    /// The places for pixels and blocks.
+    room: [usize; 2],
     config: Option<ArrayConfig<BINS, R>>,
     /// Of the rooms, those in use.
     pixels_in_use: usize,
@@ -400,10 +405,11 @@ pub struct ArrayState<const BINS: usize, R: DetectionRule> {
 }
 
 impl<const BINS: usize, R: DetectionRule> ArrayState<BINS, R> {
-    /// Of an array without a configuration.
+    /// Of an array without room.
     #[must_use]
     pub const fn new() -> Self {
         Self {
+            room: [0; 2],
             config: None,
             pixels_in_use: 0,
             blocks_in_use: 0,
@@ -425,6 +431,11 @@ impl<const BINS: usize, R: DetectionRule> ArrayState<BINS, R> {
                 laser_cycles: 0,
             },
         }
+    }
+
+    /// Laser cycles have ended.
+    const fn pass(&mut self, cycles: u64) {
+        self.cycle = self.cycle.saturating_add(cycles);
     }
 }
 
@@ -454,17 +465,22 @@ where
     }
 
     /// The array that [`Self::into_state`] took apart, in the same room.
-    #[must_use]
+    ///
+    /// # Errors
+    /// Fails if the room has another size. Nothing tells another room of the same size.
     pub const fn resume(
         pixels: &'a mut [PixelPlace<BINS, W, T>],
         blocks: &'a mut [Block<BINS, T>],
         state: ArrayState<BINS, R>,
-    ) -> Self {
-        Self {
+    ) -> Result<Self, ArrayError> {
+        if pixels.len() != state.room[0] || blocks.len() != state.room[1] {
+            return Err(ArrayError::OtherRoom);
+        }
+        Ok(Self {
             pixels,
             blocks,
             state,
-        }
+        })
     }
 
     /// What is not in its pixels and blocks.
@@ -527,6 +543,7 @@ where
             place.use_of = Use::Nothing;
         }
         self.state = ArrayState::new();
+        self.state.room = [self.pixels.len(), self.blocks.len()];
     }
 }
 
@@ -592,8 +609,8 @@ where
         let _ = self.end_laser_cycles(1);
     }
 
-    /// Ends `cycles` laser cycles without further photons, but none after a look. Returns how many are left: end these after
-    /// the events of that look are taken. Looks that find nothing for want of a photon are left out.
+    /// Ends `cycles` laser cycles without further photons, up to and with the next look, and those after it whose looks find
+    /// nothing for want of a photon. Returns how many are left: end these after the events of that look are taken.
     #[inline]
     #[must_use = "these laser cycles have not ended yet"]
     pub fn end_laser_cycles(&mut self, cycles: u16) -> u16 {
@@ -602,9 +619,11 @@ where
         })
     }
 
-    /// The same on the threads of a program, after photons of these laser cycles up to the next look: `next` gives the next
-    /// code of a pixel, until there is none. Threads are worth it for neighbours, whose looks take by far the most time.
-    /// Photons that count once per bin must be those of the current laser cycle.
+    /// The same on the threads of a program, after it has counted photons: `next` gives the next code of a pixel, until there
+    /// is none. They are photons of these laser cycles up to [the next look](Self::to_look), or of the current laser cycle
+    /// where they count once per bin; laser cycles past that look have none. Without a configuration it takes none.
+    ///
+    /// Only pixels with neighbours, whose looks take by far the most time, are shared among the threads.
     #[must_use = "these laser cycles have not ended yet"]
     pub fn end_laser_cycles_on(
         &mut self,
@@ -647,6 +666,7 @@ where
             else {
                 return;
             };
+            // As in `photon`, for all photons of a pixel at once.
             if place.use_of == Use::Plain
                 && let Together::Blocks {
                     config: of_blocks, ..
@@ -668,9 +688,9 @@ where
     }
 
     /// The program's data beside the pixels.
-    pub fn data(&self) -> impl Iterator<Item = &T> {
-        let places = self.pixels.iter().take(self.state.pixels_in_use);
-        places.map(|place| &place.data)
+    pub fn data(&mut self) -> impl Iterator<Item = &mut T> {
+        let places = self.pixels.iter_mut().take(self.state.pixels_in_use);
+        places.map(|place| &mut place.data)
     }
 
     /// `look` is that of pixels with neighbours.
@@ -687,10 +707,10 @@ where
         let to_look = x - self.state.since_look;
         if cycles < to_look {
             self.state.since_look += cycles;
-            self.state.cycle += u64::from(cycles);
+            self.state.pass(cycles.into());
             return 0;
         }
-        self.state.cycle += u64::from(to_look);
+        self.state.pass(to_look.into());
         self.state.since_look = 0;
         let blind_looks = self.state.statistics.blind_looks;
         self.look(look);
@@ -700,7 +720,7 @@ where
         }
         let dark = self.dark_cycles(left);
         self.state.dark = dark;
-        self.state.cycle += u64::from(dark);
+        self.state.pass(dark.into());
         left - dark
     }
 
@@ -779,6 +799,9 @@ where
             if place.use_of.counts() {
                 dark = dark.min(place.pixel.dark_cycles(pixels, config.has_neighbours()));
             }
+            if dark < x {
+                return 0;
+            }
         }
         if let Together::Blocks {
             config, patience, ..
@@ -842,7 +865,8 @@ where
             || self.state.block_statistics.events != self.state.taken[1]
     }
 
-    /// Whether the pixels have looked at the end of the last laser cycle, or have just been configured.
+    /// Whether the pixels have looked at the end of the last laser cycle, or would have found nothing, or have just been
+    /// configured.
     #[must_use]
     pub const fn has_looked(&self) -> bool {
         self.state.since_look == 0
@@ -850,7 +874,7 @@ where
 
     /// A sensor has counted whole histograms for `cycles` laser cycles by itself: each comes by [`Self::histogram`].
     pub fn begin_frame(&mut self, cycles: u32) {
-        self.state.cycle += u64::from(cycles);
+        self.state.pass(cycles.into());
         self.state.frame_cycles = cycles;
     }
 
@@ -903,7 +927,7 @@ where
         self.state.losses.photons = self.state.losses.photons.saturating_add(photons);
         self.state.losses.laser_cycles =
             self.state.losses.laser_cycles.saturating_add(laser_cycles);
-        self.state.cycle = self.state.cycle.saturating_add(laser_cycles);
+        self.state.pass(laser_cycles);
     }
 
     /// Leaves a pixel out from now on, whatever the configuration: its photons count as left out, and it decides nothing.
@@ -940,7 +964,7 @@ where
         self.pixels.len()
     }
 
-    /// A pixel. Its exposure is that of the last look: see [`Self::exposure`].
+    /// A pixel. Its exposure is that of the last look that was not left out: see [`Self::exposure`].
     #[must_use]
     pub fn pixel(&self, pixel: usize) -> Option<&AsyncPixel<BINS, W>> {
         self.pixels.get(pixel)?.pixel()

@@ -135,7 +135,8 @@ impl DetectionRule for AnyRule {
     fn fewest_photons(&self) -> u32 {
         match self {
             Self::Window(rule) => rule.fewest_photons(),
-            Self::Paper(_) | Self::Average(_) => 1,
+            Self::Paper(rule) => rule.fewest_photons(),
+            Self::Average(rule) => rule.fewest_photons(),
         }
     }
 

@@ -36,9 +36,13 @@ impl<'a, const BINS: usize, W: CounterWidth> DecisionInput<'a, BINS, W> {
 
 /// What a program keeps beside a pixel or a block.
 pub trait PixelData: Default {
-    /// The pixel or the block reports an event, and then starts over: what the decision was made from.
+    /// The pixel or the block reports an event: what that was decided from. By default nothing. Not called for
+    /// [whole histograms](crate::PixelArray::histogram).
     #[inline(always)]
-    fn decides<const BINS: usize, W: CounterWidth>(&mut self, _input: &DecisionInput<'_, BINS, W>) {
+    fn decided_from<const BINS: usize, W: CounterWidth>(
+        &mut self,
+        _input: &DecisionInput<'_, BINS, W>,
+    ) {
     }
 }
 
@@ -49,5 +53,5 @@ impl PixelData for () {}
 pub(crate) fn observer<const BINS: usize, W: CounterWidth, T: PixelData>(
     data: &mut T,
 ) -> impl FnOnce(&DecisionInput<'_, BINS, W>) {
-    |input| data.decides(input)
+    |input| data.decided_from(input)
 }

@@ -140,9 +140,9 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         }
     }
 
-    /// The laser cycles from now on at whose looks the pixel finds nothing, if no photon comes. It has just looked and found
-    /// nothing, or was too early. A dead time is weighed by the laser cycles, and so are neighbours: then a later look may find
-    /// something in the same photons, unless they are too few. `asks_neighbours` is whether neighbours confirm.
+    /// The laser cycles from now on at whose looks the pixel finds nothing, if no photon comes. Its last look found nothing and
+    /// was not blind, or was too early. A dead time is weighed by the laser cycles, and so are neighbours, if
+    /// `asks_neighbours`: then a later look may find something in the same photons, unless they are too few.
     #[inline(never)]
     #[must_use]
     pub fn dark_cycles<R: DetectionRule>(
@@ -152,9 +152,9 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     ) -> u16 {
         let (photons, weighs) = (self.histogram.total(), self.weighs_dead_time(config));
         let finds_none = if self.exposure <= config.l1() {
-            photons == 0 && !weighs
+            photons == 0 && !weighs && !self.has_event()
         } else if weighs {
-            photons < config.rule().fewest_photons()
+            photons < config.fewest_photons()
         } else {
             // A pixel asks for two in a window.
             photons < 2 || !asks_neighbours

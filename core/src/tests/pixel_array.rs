@@ -7,7 +7,7 @@ use std::sync::Mutex;
 use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use dtof_core::fixed::types::U4F12;
 use dtof_core::neighbours::{NeighbourConfig, Threads};
-use dtof_core::rule::DecisionInput;
+use dtof_core::rule::{DecisionInput, Tracking};
 use dtof_core::{
     Array, ArrayConfig, ArrayError, ArrayLosses, AsyncPixel, BlockLevel, Count, Count10, Count24,
     CounterWidth, DepthEvent, EchoNumber, LaserCycle, Look, Neighbours, PixelAddress, PixelArray,
@@ -455,7 +455,7 @@ proptest! {
             prop_assert_eq!(array.to_look(), settings.x - (parts.cycle % u64::from(settings.x)) as u16);
             // Another room for what is beside the pixels.
             let state = array.into_state();
-            array = PixelArray::resume(&mut room, &mut block_room, state);
+            array = PixelArray::resume(&mut room, &mut block_room, state).unwrap();
         }
         let waiting = parts.pixels.iter().flatten().filter(|pixel| pixel.has_event()).count();
         let blocks_waiting = parts.blocks.iter().filter(|block| block.has_event()).count();
@@ -775,6 +775,59 @@ fn combinations<A: Copy, B: Copy, C: Copy, D: Copy>(
     })
 }
 
+/// A pixel that tracks may be decided on by a rule with a lower minimum, and an event that waits is counted at each look.
+#[test]
+fn a_dark_pixel_minds_its_tracking_and_its_event() {
+    let rule = |minimum| WindowRule::new(2, U4F12::lit("1"), Count::saturating(minimum)).unwrap();
+    let tracking = Tracking::new(rule(2), rule(9), 1);
+    let config = PixelConfig::with_rule(rule(9))
+        .x(4)
+        .l1(8)
+        .l2(100)
+        .dead_time(5);
+    let config = config.tracking(Some(tracking)).build().unwrap();
+    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress::new(0));
+    let mut statistics = Statistics::new();
+    pixel.count_batch(&config, &[3, 3, 20]);
+    for cycle in 0..12 {
+        let _ = pixel.end_laser_cycle(&config, &mut statistics, LaserCycle::new(cycle));
+    }
+    assert_eq!(pixel.dark_cycles(&config, false), 0);
+
+    let config = PixelConfig::with_rule(rule(4))
+        .x(4)
+        .l1(8)
+        .l2(100)
+        .build()
+        .unwrap();
+    let mut pixel = AsyncPixel::<BINS>::new(PixelAddress::new(0));
+    assert_eq!(pixel.dark_cycles(&config, false), 99);
+    pixel.count_batch(&config, &[3; 9]);
+    assert_eq!(pixel.dark_cycles(&config, false), 8);
+    let look = pixel.end_laser_cycles(&config, &mut statistics, LaserCycle::new(11), 12);
+    assert_eq!(look, Look::Event);
+    assert_eq!(pixel.dark_cycles(&config, false), 8);
+    let _ = pixel.take_event();
+    assert_eq!(pixel.dark_cycles(&config, false), 99);
+}
+
+#[test]
+fn another_room_is_refused() {
+    let settings = Settings::usual(2, 2, Mode::Blocks(1, 8));
+    let mut places: Vec<Place> = (0..4).map(|_| PixelPlace::new()).collect();
+    let mut room: Vec<Block<BINS>> = (0..1).map(|_| Block::default()).collect();
+    let mut array = PixelArray::new(&mut places, &mut room);
+    array.configure(&settings.array()).unwrap();
+    array.photon(0, 9);
+    let state = array.into_state();
+    let fewer = PixelArray::resume(&mut places[..3], &mut room, state.clone());
+    assert_eq!(fewer.map(|_| ()), Err(ArrayError::OtherRoom));
+    let none = PixelArray::resume(&mut places, &mut [], state.clone());
+    assert_eq!(none.map(|_| ()), Err(ArrayError::OtherRoom));
+    let array = PixelArray::resume(&mut places, &mut room, state).unwrap();
+    assert_eq!(array.statistics()[0].counted, 1);
+}
+
 /// An exposure of 92 laser cycles, the first look from L2 on, takes one call, or two with ticks in between.
 #[test]
 fn dark_laser_cycles_take_few_looks() {
@@ -806,7 +859,10 @@ struct Beside {
 }
 
 impl PixelData for Beside {
-    fn decides<const BINS: usize, W: CounterWidth>(&mut self, input: &DecisionInput<'_, BINS, W>) {
+    fn decided_from<const BINS: usize, W: CounterWidth>(
+        &mut self,
+        input: &DecisionInput<'_, BINS, W>,
+    ) {
         assert_eq!(self.decision, None);
         self.decision = Some((input.histogram.peak().count.raw(), input.cycles));
     }

@@ -31,7 +31,7 @@ pub const DEAD_TIME: f64 = 6970.64;
 /// The same with a dead time of all bins (`look; dead time; first photon only; no event`).
 pub const FIRST_PHOTON: f64 = 4165.06;
 /// The same for a block (`look; block; no event`).
-pub const BLOCK_LOOK: f64 = 242.22;
+pub const BLOCK_LOOK: f64 = 206.31;
 /// An exposure that L2 ends (`look at L2`).
 pub const EXPIRY: f64 = 108.0;
 /// An event with its peak and the depth from three bins (`kept peak; event and depth`), and its word

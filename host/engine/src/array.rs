@@ -33,7 +33,10 @@ struct Member {
 }
 
 impl PixelData for Member {
-    fn decides<const BINS: usize, W: CounterWidth>(&mut self, input: &DecisionInput<'_, BINS, W>) {
+    fn decided_from<const BINS: usize, W: CounterWidth>(
+        &mut self,
+        input: &DecisionInput<'_, BINS, W>,
+    ) {
         if let Some(last) = &mut self.last {
             last.record_input(input);
         }
@@ -130,7 +133,7 @@ impl<const BINS: usize, W: CounterWidth> Part<BINS, W> {
     }
 
     /// Runs a slice. Events are taken at once.
-    fn run(&mut self, slice: &Slice) -> Vec<DepthEvent> {
+    fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
         let (mut cycles, mut shortest) = (0, u16::MAX);
         for member in self.places.iter_mut().map(|place| &mut place.data) {
             member.next = 0;
@@ -140,7 +143,7 @@ impl<const BINS: usize, W: CounterWidth> Part<BINS, W> {
             }
         }
         let state = std::mem::take(&mut self.state);
-        let mut array = PixelArray::resume(&mut self.places, &mut self.blocks, state);
+        let mut array = PixelArray::resume(&mut self.places, &mut self.blocks, state)?;
         // Numbers the laser cycles as the source does.
         array.lost(0, slice.first_cycle.saturating_sub(array.cycles()));
         let (mut events, mut from) = (Vec::new(), 0);
@@ -148,10 +151,14 @@ impl<const BINS: usize, W: CounterWidth> Part<BINS, W> {
             let to = from + array.to_look().min(cycles - from);
             if shortest < to {
                 // The last photons of a recording that ends before the look still count.
-                let ended = |(place, member): (usize, &Member)| {
+                let ended = |(place, member): (usize, &mut Member)| {
                     let received = &slice.pixels[member.number?];
                     let left = received.photons.get(member.next..)?;
-                    (received.cycles < to).then_some((place, left))
+                    let has_ended = received.cycles < to;
+                    if has_ended {
+                        member.next = received.photons.len();
+                    }
+                    has_ended.then_some((place, left))
                 };
                 let ended: Vec<_> = array.data().enumerate().filter_map(ended).collect();
                 for (place, photons) in ended {
@@ -161,9 +168,10 @@ impl<const BINS: usize, W: CounterWidth> Part<BINS, W> {
                     array.leave_out(place);
                 }
             }
-            // If there are no photons up to it, up to the next one.
-            let dark = |member: &Member| member.dark(slice, to);
-            let end = match array.data().filter_map(dark).any(|dark| dark < to) {
+            // Without a photon before this look, all laser cycles before the next photon end.
+            let dark = |member: &mut Member| member.dark(slice, to);
+            let has_photon = array.data().filter_map(dark).any(|dark| dark < to);
+            let end = match has_photon {
                 true => to,
                 false => array.data().filter_map(dark).min().unwrap_or(to),
             };
@@ -185,7 +193,7 @@ impl<const BINS: usize, W: CounterWidth> Part<BINS, W> {
         }
         self.statistics = array.statistics();
         self.state = array.into_state();
-        events
+        Ok(events)
     }
 
     /// The pixels and blocks, with the address of each.
@@ -255,10 +263,17 @@ impl<const BINS: usize, W: CounterWidth> ArrayEngine<BINS, W> {
 
 impl<const BINS: usize, W: CounterWidth> Engine for ArrayEngine<BINS, W> {
     fn run(&mut self, slice: &Slice) -> Result<Vec<DepthEvent>> {
-        let events = of_parts(&mut self.parts, 1, |_, parts| -> Vec<DepthEvent> {
-            parts.iter_mut().flat_map(|part| part.run(slice)).collect()
+        let parts = of_parts(&mut self.parts, 1, |_, parts| -> Result<Vec<DepthEvent>> {
+            let mut events = Vec::new();
+            for part in parts {
+                events.extend(part.run(slice)?);
+            }
+            Ok(events)
         });
-        let mut events: Vec<DepthEvent> = events.into_iter().flatten().collect();
+        let mut events = Vec::new();
+        for of_part in parts {
+            events.extend(of_part?);
+        }
         sort(&mut events, slice.first_cycle);
         Ok(events)
     }

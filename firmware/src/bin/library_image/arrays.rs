@@ -119,7 +119,10 @@ fn driven<const BINS: usize, W: CounterWidth>() {
             driven.clear();
         }
         let state = driven.into_state();
-        driven = PixelArray::resume(&mut places, &mut blocks, state);
+        let Some(resumed) = or_text(PixelArray::resume(&mut places, &mut blocks, state)) else {
+            return;
+        };
+        driven = resumed;
     }
 }
 
@@ -163,12 +166,11 @@ impl Threads for InTurn {
         decide: impl Fn(&[P], usize) -> Option<D> + Sync,
         work: impl Fn(&mut P, Option<&D>, &mut S) + Sync,
     ) -> S {
+        // There are three places.
+        let found = [0, 1, 2].map(|number| decide(items, number));
         let mut sum = S::default();
-        for number in 0..items.len() {
-            let found = decide(items, number);
-            if let Some(item) = items.get_mut(number) {
-                work(item, found.as_ref(), &mut sum);
-            }
+        for (item, found) in items.iter_mut().zip(&found) {
+            work(item, found.as_ref(), &mut sum);
         }
         sum
     }

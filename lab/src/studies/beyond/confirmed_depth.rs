@@ -154,7 +154,7 @@ fn confirmed(
 struct Decided(Vec<u32>);
 
 impl PixelData for Decided {
-    fn decides<const B: usize, W: CounterWidth>(&mut self, input: &DecisionInput<'_, B, W>) {
+    fn decided_from<const B: usize, W: CounterWidth>(&mut self, input: &DecisionInput<'_, B, W>) {
         let counts = input.histogram.counts().iter();
         self.0 = counts.map(|&count| count.into()).collect();
     }
