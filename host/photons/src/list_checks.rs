@@ -489,6 +489,25 @@ mod tests {
         assert!(photons.checks(1).together.is_some());
     }
 
+    /// One pixel in nine; the same photons twice come together.
+    #[test]
+    fn of_a_large_array_some_pixels_tell() {
+        for (pixel, is_watched) in [
+            (0, true),
+            (9, true),
+            (1017, true),
+            (1, false),
+            (1016, false),
+        ] {
+            let mut watch = ListWatch::new(1024, 1024, 64_000);
+            for cycle in 0..64_000 {
+                watch.photon(pixel, cycle, (cycle * cycle % 61) as usize);
+                watch.photon(pixel, cycle, (cycle * cycle % 61) as usize);
+            }
+            assert_eq!(watch.checks().together.is_some(), is_watched, "{pixel}");
+        }
+    }
+
     #[test]
     fn many_pixels_are_watched_in_part() {
         let watch = ListWatch::new(65_536, 1024, 1000);
