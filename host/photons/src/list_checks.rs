@@ -197,7 +197,8 @@ fn speed(peaks: &[(u64, f64)]) -> Option<f64> {
         let number = peaks.len() as f64;
         let mean = |of: &dyn Fn(&(u64, f64)) -> f64| peaks.iter().map(of).sum::<f64>() / number;
         let (part, bin) = (mean(&|peak| peak.0 as f64), mean(&|peak| peak.1));
-        let covariance = mean(&|peak| (peak.0 as f64 - part) * (peak.1 - bin));
+        // The bins less their mean add up to 0, so that the parts need not be less theirs.
+        let covariance = mean(&|peak| peak.0 as f64 * (peak.1 - bin));
         let variance = mean(&|peak| (peak.0 as f64 - part).powi(2));
         let slope = covariance / variance;
         let is_line =
