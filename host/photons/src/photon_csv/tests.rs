@@ -144,7 +144,9 @@ proptest! {
             prop_assert_eq!(reader(&line).parse().unwrap(), photon);
         } else {
             let is_long = line.split(',').any(|field| field.len() > 19);
-            prop_assert!(is_long || reader(&line).parse().is_err());
+            // Only any row may have spaces beside its numbers.
+            let is_plain = !is_long && !line.contains(' ');
+            prop_assert!(!is_plain || reader(&line).parse().is_err());
         }
     }
 }
