@@ -47,7 +47,9 @@
 //! Source: the order is the flow chart of the paper's section II-B, for all pixels at once. The rest is ours.
 
 use crate::array::Array;
-use crate::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
+use crate::binning::{
+    Binning, Block, BlockLink, count_batch_in_blocks, count_in_blocks, end_laser_cycles_of_blocks,
+};
 use crate::check::impl_error;
 use crate::config::PixelConfig;
 use crate::detect::{DetectionRule, PaperRule};
@@ -348,6 +350,9 @@ impl Seen {
     }
 }
 
+/// Photons of a pixel that are counted at once.
+const AT_ONCE: usize = 16;
+
 /// Photons that counted in no pixel, since the configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -567,6 +572,20 @@ where
         }
     }
 
+    /// Counts photons of one pixel in the current laser cycle, as [`Self::photon`] does, in less time for each.
+    pub fn photons(&mut self, pixel: usize, codes: &[u16]) {
+        if let (Some(place), Some(config)) = (self.pixels.get_mut(pixel), &self.state.config)
+            && place.use_of == Use::Plain
+        {
+            place.pixel.count_batch(&config.pixels, codes);
+            if let Together::Blocks { config, .. } = &config.together {
+                count_batch_in_blocks(self.blocks, &place.feed, config, codes);
+            }
+        } else {
+            codes.iter().for_each(|&code| self.photon(pixel, code));
+        }
+    }
+
     /// Whether a photon counts that is not one of a plain pixel.
     // Out of line: a photon that counts anyhow would take longer with it.
     #[inline(never)]
@@ -619,9 +638,10 @@ where
         })
     }
 
-    /// The same on the threads of a program, after it has counted photons: `next` gives the next code of a pixel, until there
-    /// is none. They are photons of these laser cycles up to [the next look](Self::to_look), or of the current laser cycle
-    /// where they count once per bin; laser cycles past that look have none. Without a configuration it takes none.
+    /// The same on the threads of a program, after it has counted photons: `next` writes the next codes of a pixel and
+    /// returns how many these are; if there was room for more, they are the last. They are photons of these laser cycles up
+    /// to [the next look](Self::to_look), or of the current laser cycle where they count once per bin; laser cycles past that
+    /// look have none. Without a configuration it takes none.
     ///
     /// Only pixels with neighbours, whose looks take by far the most time, are shared among the threads.
     #[must_use = "these laser cycles have not ended yet"]
@@ -629,7 +649,7 @@ where
         &mut self,
         threads: &impl Threads,
         cycles: u16,
-        next: impl Fn(usize, &mut T) -> Option<u16> + Sync,
+        next: impl Fn(usize, &mut T, &mut [u16]) -> usize + Sync,
     ) -> u16
     where
         R: Sync,
@@ -644,15 +664,22 @@ where
         let mut left_out = 0;
         let left = self.end(cycles, |look, places, statistics, cycles| {
             let count = |pixel, place: &mut PixelPlace<BINS, W, T>| {
-                let mut left_out = 0;
-                while together && let Some(code) = next(pixel, &mut place.data) {
+                let (mut codes, mut left_out) = ([0; AT_ONCE], 0);
+                if !together {
+                    return left_out;
+                }
+                loop {
+                    let number = next(pixel, &mut place.data, &mut codes).min(AT_ONCE);
                     if place.use_of.counts() {
-                        place.pixel.count(look.config, code);
+                        let codes = codes.get(..number).unwrap_or_default();
+                        place.pixel.count_batch(look.config, codes);
                     } else {
-                        left_out += 1;
+                        left_out += number as u64;
+                    }
+                    if number < AT_ONCE {
+                        return left_out;
                     }
                 }
-                left_out
             };
             left_out = look.end_laser_cycles_on(threads, places, statistics, cycles, count);
         });
@@ -660,29 +687,18 @@ where
         left
     }
 
-    fn photons_in_turn(&mut self, next: impl Fn(usize, &mut T) -> Option<u16>) {
+    fn photons_in_turn(&mut self, next: impl Fn(usize, &mut T, &mut [u16]) -> usize) {
+        let mut codes = [0; AT_ONCE];
         for pixel in 0..self.state.pixels_in_use {
-            let (Some(place), Some(config)) = (self.pixels.get_mut(pixel), &self.state.config)
-            else {
-                return;
-            };
-            // As in `photon`, for all photons of a pixel at once.
-            if place.use_of == Use::Plain
-                && let Together::Blocks {
-                    config: of_blocks, ..
-                } = &config.together
-            {
-                while let Some(code) = next(pixel, &mut place.data) {
-                    place.pixel.count(&config.pixels, code);
-                    count_in_blocks(self.blocks, &place.feed, of_blocks, code);
+            loop {
+                let Some(place) = self.pixels.get_mut(pixel) else {
+                    return;
+                };
+                let number = next(pixel, &mut place.data, &mut codes).min(AT_ONCE);
+                self.photons(pixel, codes.get(..number).unwrap_or_default());
+                if number < AT_ONCE {
+                    break;
                 }
-                continue;
-            }
-            let next = |places: &mut [PixelPlace<BINS, W, T>]| {
-                next(pixel, &mut places.get_mut(pixel)?.data)
-            };
-            while let Some(code) = next(self.pixels) {
-                self.photon(pixel, code);
             }
         }
     }

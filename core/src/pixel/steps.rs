@@ -14,7 +14,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// The first step: ends `cycles` laser cycles. Returns whether this is a look that decides, after
     /// X laser cycles or more and past L1.
     #[inline]
-    pub fn begin_look<R: DetectionRule>(
+    pub(crate) fn begin_look<R: DetectionRule>(
         &mut self,
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
@@ -39,7 +39,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// The second step, once all neighbours have done the first: the detection, by the pixel's own photons or with
     /// those of its `neighbours`, at most 8. `config` must have the rule [`NeighbourRule::own`]. `None` if the first step was no look that decides, or the rule weighs a dead time.
     #[must_use]
-    pub fn decide<'a, R: DetectionRule>(
+    pub(crate) fn decide<'a, R: DetectionRule>(
         &'a self,
         config: &PixelConfig<BINS, R>,
         rule: &NeighbourRule,
@@ -84,7 +84,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// Keeps what the second step gave in the slot, until the third. Does nothing where the second step gives
     /// nothing: an event that waits is not lost.
     #[inline]
-    pub fn keep_detection(&mut self, cycle: LaserCycle, detection: &Detection) {
+    pub(crate) fn keep_detection(&mut self, cycle: LaserCycle, detection: &Detection) {
         let waits = self.state.contains(State::REQUESTING);
         if self.state.contains(State::DECIDES) && !waits {
             self.put(cycle, detection);
@@ -95,7 +95,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// The third step, once all neighbours have decided: reports, or does what else ends a look. Where the rule weighs
     /// a dead time, the pixel decides here, alone. `cycle` is the last laser cycle, `observe` is as in
     /// [`Self::end_laser_cycles_with`].
-    pub fn end_look<R: DetectionRule>(
+    pub(crate) fn end_look<R: DetectionRule>(
         &mut self,
         config: &PixelConfig<BINS, R>,
         statistics: &mut Statistics,
@@ -132,7 +132,7 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
     /// The length at which this exposure ends without another event: L2, or where the wait for the next echo is over.
     #[inline]
     #[must_use]
-    pub fn longest<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> u16 {
+    pub(crate) fn longest<R: DetectionRule>(&self, config: &PixelConfig<BINS, R>) -> u16 {
         if self.state.contains(State::HAS_ECHO) {
             self.longest_after_echo(config)
         } else {

@@ -328,7 +328,8 @@ fn photons(rng: &mut Pcg32, settings: &Settings) -> Vec<(usize, u16)> {
             photons.push((pixel, (12 + pixel / 4) as u16));
         }
         if below(rng, 40) == 0 {
-            photons.extend([(pixel, 7); 5]);
+            let burst = 1 + below(rng, 40) as usize;
+            photons.extend([(pixel, 7)].repeat(burst));
         }
     }
     for place in (1..photons.len()).rev() {
@@ -408,13 +409,24 @@ proptest! {
             codes.iter().for_each(|&(pixel, code)| parts.photon(pixel, code));
             let is_shared = rng.next_u32() % 2 == 0;
             if !is_shared {
-                codes.iter().for_each(|&(pixel, code)| array.photon(pixel, code));
+                // Each alone, or those that come one after another at once.
+                let at_once = rng.next_u32() % 2 == 0;
+                for codes in codes.chunk_by(|one, next| at_once && one.0 == next.0) {
+                    match codes {
+                        [(pixel, code)] => array.photon(*pixel, *code),
+                        [(pixel, _), ..] => {
+                            let codes: Vec<u16> = codes.iter().map(|photon| photon.1).collect();
+                            array.photons(*pixel, &codes);
+                        }
+                        [] => {}
+                    }
+                }
             }
             let coming = Mutex::new(if is_shared { codes } else { Vec::new() });
-            let next = |pixel, _: &mut ()| {
+            let next = |pixel, _: &mut (), codes: &mut [u16]| {
                 let mut coming = coming.lock().unwrap();
-                let place = coming.iter().position(|photon| photon.0 == pixel)?;
-                Some(coming.remove(place).1)
+                let of_pixel = coming.extract_if(.., |photon| photon.0 == pixel).take(codes.len());
+                codes.iter_mut().zip(of_pixel).map(|(code, photon)| *code = photon.1).count()
             };
             array.photon(settings.number(), 3);
             array.photon(31, 3);

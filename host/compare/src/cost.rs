@@ -11,34 +11,33 @@ use dtof_engine::settings::Settings;
 pub const PHOTON: f64 = 10.21;
 /// Counting it if it is the first of its bin in a laser cycle (`AsyncPixel::count_once_per_bin`).
 pub const ONCE_PER_BIN: f64 = 28.57;
-/// Asking whether it also counts in blocks (`count and count_in_blocks; feeds none`, less
-/// `AsyncPixel::count`).
-pub const FEED: f64 = 32.56 - 28.56;
-/// Counting it in a block (`count and count_in_blocks; 1 level`, less `feeds none`).
-pub const BLOCK_PHOTON: f64 = 58.99 - 32.56;
+/// Asking whether it also counts in blocks (`array with blocks; feeds none`, less `array`).
+pub const FEED: f64 = 58.57 - 55.57;
+/// Counting it in a block (`array with blocks; 1 level`, less `feeds none`).
+pub const BLOCK_PHOTON: f64 = 88.00 - 58.57;
 /// A look without an event with the paper's rule (`kept peak; no event`).
 pub const PAPER: f64 = 90.68;
 /// The same with the average of all bins (`average; no event`).
 pub const AVERAGE: f64 = 32.0;
 /// The same with tracking (`look; tracking; no event`).
-pub const TRACKING: f64 = 416.50;
-/// The same with 8 neighbours, whether it asks them or not (`look; 8 neighbours; no event`).
-pub const NEIGHBOURS: f64 = 926.15;
-/// A look of one step without neighbours (`look; window of 3; no event`).
-pub const LOOK: f64 = 196.72;
+pub const TRACKING: f64 = 414.50;
+/// The same in an array with 8 neighbours, whether it asks them or not (`look; array, 8 neighbours; no event`).
+pub const NEIGHBOURS: f64 = 1012.88;
+/// The same in an array without neighbours (`look; array; no event`).
+pub const LOOK: f64 = 186.20;
 /// The same with a dead time (`look; dead time of 20 bins; no event`).
-pub const DEAD_TIME: f64 = 6970.64;
+pub const DEAD_TIME: f64 = 6968.64;
 /// The same with a dead time of all bins (`look; dead time; first photon only; no event`).
-pub const FIRST_PHOTON: f64 = 4165.06;
+pub const FIRST_PHOTON: f64 = 4163.06;
 /// The same for a block (`look; block; no event`).
-pub const BLOCK_LOOK: f64 = 206.31;
+pub const BLOCK_LOOK: f64 = 168.79;
 /// An exposure that L2 ends (`look at L2`).
 pub const EXPIRY: f64 = 108.0;
 /// An event with its peak and the depth from three bins (`kept peak; event and depth`), and its word
 /// (`encode and to_le_bytes`).
 pub const EVENT: f64 = 517.0 + 46.0;
-/// The same event if 8 neighbours confirm it (`look; 8 neighbours; confirmed`), and its word.
-pub const CONFIRMED: f64 = 5350.36 + 46.0;
+/// The same event if 8 neighbours confirm it (`look; array, 8 neighbours; more for each confirmed`), and its word.
+pub const CONFIRMED: f64 = 3657.00 + 46.0;
 /// The depth from a centred window instead (`centred window, σ 1`, less `centroid`).
 pub const CENTRED: f64 = 135.84 - 68.0;
 

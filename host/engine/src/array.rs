@@ -44,12 +44,22 @@ impl PixelData for Member {
 }
 
 impl Member {
-    /// Takes the code of its next photon, if that is before laser cycle `end` of the slice.
-    fn next(&mut self, slice: &Slice, end: u16) -> Option<u16> {
-        let photons = &slice.pixels[self.number?].photons;
-        let photon = photons.get(self.next).filter(|photon| photon.cycle < end)?;
-        self.next += 1;
-        Some(photon.code)
+    /// Takes the codes of its next photons before laser cycle `end` of the slice. Returns how many these are.
+    fn next(&mut self, slice: &Slice, end: u16, codes: &mut [u16]) -> usize {
+        let photons = self
+            .number
+            .map(|number| &slice.pixels[number].photons[self.next..]);
+        let photons = photons.unwrap_or_default().iter();
+        let mut number = 0;
+        for (code, photon) in codes
+            .iter_mut()
+            .zip(photons.take_while(|photon| photon.cycle < end))
+        {
+            *code = photon.code;
+            number += 1;
+        }
+        self.next += number;
+        number
     }
 
     /// If its recording has `end` laser cycles of the slice or more, those before its next photon, or all.
@@ -177,7 +187,8 @@ impl<const BINS: usize, W: CounterWidth> Part<BINS, W> {
             };
             let mut left = end - from;
             while left > 0 {
-                let next = |_, member: &mut Member| member.next(slice, to);
+                let next =
+                    |_, member: &mut Member, codes: &mut [u16]| member.next(slice, to, codes);
                 left = array.end_laser_cycles_on(&AllThreads, left, next);
                 while let Some(event) = array.next_event() {
                     let member = array.data_of(&event);

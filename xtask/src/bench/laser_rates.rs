@@ -28,31 +28,31 @@ struct Load {
 const LOADS: [Load; 5] = [
     Load {
         what: "window of 3, nothing else on",
-        photon: "AsyncPixel::count",
-        look: "look; window of 3; no event",
+        photon: "array",
+        look: "look; array; no event",
         with_blocks: false,
     },
     Load {
         what: "silent, feeds blocks of two levels",
-        photon: "count and count_in_blocks; 2 levels",
-        look: "look; window of 3; no event",
+        photon: "array with blocks; 2 levels",
+        look: "look; array; no event",
         with_blocks: true,
     },
     Load {
         what: "tracks",
-        photon: "AsyncPixel::count",
+        photon: "array",
         look: "look; tracking; no event",
         with_blocks: false,
     },
     Load {
         what: "holds the first of two echoes",
-        photon: "AsyncPixel::count",
+        photon: "array",
         look: "look; two echoes; first held, no event",
         with_blocks: false,
     },
     Load {
         what: "all on: tracks, holds an echo, feeds no block",
-        photon: "count and count_in_blocks; feeds none",
+        photon: "array with blocks; feeds none",
         look: "look; two echoes, tracking; first held, no event",
         with_blocks: true,
     },
@@ -124,8 +124,8 @@ mod tests {
             hundredths,
         };
         let rows = [
-            row("photon,AsyncPixel::count,3", 3000),
-            row("decision,look; window of 3; no event,3", 4000),
+            row("photon,array,3", 3000),
+            row("decision,look; array; no event,3", 4000),
         ];
         // 30 and 40/4.
         assert_eq!(LOADS[0].a_laser_cycle(&rows, 4.0).unwrap(), 40.0);

@@ -194,9 +194,7 @@ fn compare(columns: u32, rows: u32, settings: Settings, cycles: u64, rng: &mut P
                 found.push(event);
             }
         }
-        let fired = end_laser_cycles_of_blocks(&mut blocks, &config, &mut of_blocks, now, 1);
-        let waiting = blocks.iter().filter(|block| block.has_event()).count();
-        assert_eq!(fired, waiting > 0);
+        end_laser_cycles_of_blocks(&mut blocks, &config, &mut of_blocks, now, 1);
         found.extend(blocks.iter_mut().filter_map(Block::take_event));
         if (cycle + 1).is_multiple_of(settings.patience) {
             pixels

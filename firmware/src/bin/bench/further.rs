@@ -1,13 +1,11 @@
-//! A pixel that tracks, has echoes, feeds blocks or has a dead time, and what it does. The photons
+//! A pixel that tracks, has echoes or has a dead time, and what it does. The photons
 //! are those of [`State`], in some exposures those of a second target, and with a dead time those
 //! that a TDC takes of a flat background.
 
-use dtof_core::binning::{Binning, Block, BlockLink, count_in_blocks};
 use dtof_core::fixed::types::U4F12;
-use dtof_core::neighbours::NeighbourRule;
 use dtof_core::{
-    Array, AsyncPixel, BlockLevel, Count, EchoNumber, Flags, Histogram, LaserCycle, Look,
-    PixelAddress, PixelConfig, RangeGate, Statistics, WholeHistogram, WindowRule,
+    AsyncPixel, Count, EchoNumber, Histogram, LaserCycle, Look, PixelAddress, PixelConfig,
+    RangeGate, Statistics, WholeHistogram, WindowRule,
 };
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -71,14 +69,10 @@ impl Features {
     }
 }
 
-/// All that operations read and change. The array has one pixel, so a block of each level.
+/// All that operations read and change.
 #[derive(Clone)]
 pub struct Further {
     pub pixel: AsyncPixel<BINS>,
-    neighbour: AsyncPixel<BINS>,
-    rule: NeighbourRule,
-    blocks: [Block<BINS>; 3],
-    link: BlockLink,
     /// A window of 3 bins, X = 4.
     config: PixelConfig<BINS, WindowRule>,
     statistics: Statistics,
@@ -90,14 +84,8 @@ pub struct Further {
 
 impl Further {
     pub fn new() -> Option<Self> {
-        let binning = Self::binning()?;
-        let mut blocks = binning.blocks().map(Block::new);
         Some(Self {
             pixel: AsyncPixel::new(PixelAddress::new(7)),
-            neighbour: AsyncPixel::new(PixelAddress::new(8)),
-            rule: NeighbourRule::new(&Self::window_rule()?),
-            blocks: [blocks.next()?, blocks.next()?, blocks.next()?],
-            link: binning.link_of(PixelAddress::new(0)),
             config: Self::config(Features::NONE)?,
             statistics: Statistics::default(),
             codes: [0; PHOTONS as usize],
@@ -106,16 +94,8 @@ impl Further {
         })
     }
 
-    fn binning() -> Option<Binning> {
-        Binning::new(Array::new(1, 1)?, BlockLevel::MAX)
-    }
-
-    fn window_rule() -> Option<WindowRule> {
-        WindowRule::new(3, const { U4F12::lit("4.4") }, Count::saturating(5)).ok()
-    }
-
     fn config(features: Features) -> Option<PixelConfig<BINS, WindowRule>> {
-        let rule = Self::window_rule()?;
+        let rule = WindowRule::new(3, const { U4F12::lit("4.4") }, Count::saturating(5)).ok()?;
         let tracking = rule.tracking(&RangeGate::<BINS>::full());
         let config = PixelConfig::with_rule(rule)
             .x(X)
@@ -128,22 +108,13 @@ impl Further {
         config.build().ok()
     }
 
-    /// An empty pixel and empty blocks, of which so many levels are fed.
-    pub fn empty(&mut self, features: Features, levels: usize) -> Option<()> {
+    /// An empty pixel.
+    pub fn empty(&mut self, features: Features) -> Option<()> {
         // In place: a second one would take much of the stack.
         self.pixel = AsyncPixel::new(self.pixel.address());
-        self.neighbour = AsyncPixel::new(self.neighbour.address());
-        let binning = Self::binning()?;
-        for (block, place) in self.blocks.iter_mut().zip(binning.blocks()) {
-            *block = Block::new(place);
-        }
-        self.link = binning.link_of(PixelAddress::new(0));
         self.statistics = Statistics::default();
         self.histogram.clear();
         self.config = Self::config(features)?;
-        self.link.tick(levels == 0);
-        let feeding = self.blocks.iter_mut().take(levels.saturating_sub(1));
-        feeding.for_each(Block::tick);
         Some(())
     }
 
@@ -167,43 +138,16 @@ impl Further {
         self.histogram.clear();
     }
 
-    /// Counts all photons, in the blocks as well, and lets the laser cycles up to the first
-    /// look pass but the last.
+    /// Counts all photons, and lets the laser cycles up to the first look pass but the last.
     pub fn until_first_look(&mut self) {
         self.pixel.count_batch(&self.config, &self.codes);
-        for &code in &self.codes {
-            count_in_blocks(&mut self.blocks, &self.link, &self.config, code);
-        }
         self.pass(0..CYCLES - 1);
-    }
-
-    /// The photons of a neighbour, and the rule of pixels that have some.
-    pub fn neighbours(&mut self) -> Option<()> {
-        let config = PixelConfig::with_rule(*self.rule.own()).x(X);
-        let config = config.l1(self.config.l1()).l2(self.config.l2());
-        self.config = config.build().ok()?;
-        self.neighbour.count_batch(&self.config, &self.codes);
-        let (neighbour, statistics) = (&mut self.neighbour, &mut self.statistics);
-        neighbour.begin_look(&self.config, statistics, CYCLES);
-        Some(())
-    }
-
-    /// A target that the pixel alone is not sure of: 9 more photons of 256, and 2 in each neighbour.
-    pub fn dim_target(&mut self) {
-        let (own, others) = ([60, 61, 60, 61, 60, 61, 60, 61, 60], [60, 61]);
-        self.pixel.count_batch(&self.config, &own);
-        self.neighbour.count_batch(&self.config, &others);
     }
 
     /// The first look, whose event the link takes. Whether there was one.
     pub fn reports(&mut self) -> bool {
         let _ = self.end_laser_cycle(u32::from(CYCLES) - 1);
         self.pixel.take_event().is_some()
-    }
-
-    /// The same of the block of level 1.
-    pub fn block_reports(&mut self) -> bool {
-        self.end_laser_cycle_of_block(u32::from(CYCLES) - 1)
     }
 
     /// Counts a long exposure, and lets its laser cycles pass up to the look but the last. Each bin
@@ -240,7 +184,6 @@ impl Further {
     fn pass(&mut self, cycles: core::ops::Range<u16>) {
         for cycle in cycles {
             let _ = self.end_laser_cycle(cycle.into());
-            let _ = self.end_laser_cycle_of_block(cycle.into());
         }
     }
 
@@ -249,52 +192,10 @@ impl Further {
         let cycle = LaserCycle::new(cycle.into());
         (self.pixel).end_laser_cycle(&self.config, &mut self.statistics, cycle)
     }
-
-    #[inline(always)]
-    fn end_laser_cycle_of_block(&mut self, cycle: u32) -> bool {
-        let [block, ..] = &mut self.blocks;
-        let (statistics, cycle) = (&mut self.statistics, LaserCycle::new(cycle.into()));
-        block.end_laser_cycles(&self.config, statistics, cycle, 1) == Look::Event
-    }
-}
-
-/// A photon of a pixel that feeds blocks.
-pub extern "C" fn count(further: &mut Further, index: u32) -> u32 {
-    if let Some(&code) = further.codes.get(index as usize) {
-        further.pixel.count(&further.config, code);
-        count_in_blocks(&mut further.blocks, &further.link, &further.config, code);
-    }
-    0
 }
 
 pub extern "C" fn look(further: &mut Further, cycle: u32) -> u32 {
     further.end_laser_cycle(cycle) as u32
-}
-
-/// A look in steps, with the pixel that has the photons of another exposure as each of 8 neighbours.
-pub extern "C" fn look_with_neighbours(further: &mut Further, cycle: u32) -> u32 {
-    let Further {
-        pixel,
-        neighbour,
-        config,
-        rule,
-        statistics,
-        ..
-    } = further;
-    let last = LaserCycle::new(cycle.into());
-    pixel.begin_look(config, statistics, 1);
-    // An event that the pixel is sure of would not be what the row says.
-    let detection = pixel.decide(config, rule, core::iter::repeat_n(&*neighbour, 8));
-    if let Some(detection) = detection
-        && detection.depth.flags.contains(Flags::CONFIRMED)
-    {
-        pixel.keep_detection(last, &detection);
-    }
-    pixel.end_look(config, statistics, last, |_| ()) as u32
-}
-
-pub extern "C" fn look_of_block(further: &mut Further, cycle: u32) -> u32 {
-    further.end_laser_cycle_of_block(cycle).into()
 }
 
 /// How many echoes there are among counts that come from elsewhere.

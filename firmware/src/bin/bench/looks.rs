@@ -1,12 +1,12 @@
-//! What blocks, tracking, several echoes and a dead time take: photons, looks, events, ends of
-//! exposures, and whole histograms. All with a window of 3 bins.
+//! What tracking, several echoes and a dead time take: looks, events, ends of exposures, and whole
+//! histograms. All with a window of 3 bins.
 
 use dtof_core::Look;
 
 use crate::counter::{Counter, Operation};
-use crate::further::{Features, Further, count, echoes, look, look_of_block, look_with_neighbours};
+use crate::further::{Features, Further, echoes, look};
 use crate::report;
-use crate::scene::{CYCLES, EXPOSURES, PHOTONS, State};
+use crate::scene::{CYCLES, EXPOSURES, State};
 
 /// Measures all, if it can.
 pub fn run(counter: &Counter, state: &mut State) -> bool {
@@ -14,30 +14,7 @@ pub fn run(counter: &Counter, state: &mut State) -> bool {
         return false;
     };
     counter.is_right_for(&mut further)
-        && photons(counter, state, &mut further).is_some()
         && ROWS.iter().all(|row| row.run(counter, state, &mut further))
-}
-
-/// Photons of a pixel, and in so many of its blocks as well.
-fn photons(counter: &Counter, state: &mut State, further: &mut Further) -> Option<()> {
-    let levels = [
-        "count and count_in_blocks; feeds none",
-        "count and count_in_blocks; 1 level",
-        "count and count_in_blocks; 2 levels",
-        "count and count_in_blocks; 3 levels",
-    ];
-    for (levels, variant) in levels.into_iter().enumerate() {
-        let mut total = 0;
-        for number in 0..EXPOSURES {
-            further.photons(state, number, 1);
-            further.empty(Features::NONE, levels)?;
-            for index in 0..PHOTONS {
-                total += counter.measure(count, further, index);
-            }
-        }
-        report::line("photon", variant, total, EXPOSURES * PHOTONS);
-    }
-    Some(())
 }
 
 /// Brings a pixel with such features to where the operation begins. `None` if exposure `number`
@@ -52,24 +29,8 @@ fn first<const TARGETS: u8>(
     features: Features,
 ) -> Option<()> {
     further.photons(state, number, TARGETS);
-    further.empty(features, 1)?;
+    further.empty(features)?;
     further.until_first_look();
-    Some(())
-}
-
-/// The same without a target, or with `TARGETS` a dim one, beside neighbours with another exposure.
-fn among_neighbours<const TARGETS: u8>(
-    further: &mut Further,
-    state: &mut State,
-    number: u32,
-    features: Features,
-) -> Option<()> {
-    first::<0>(further, state, number, features)?;
-    further.photons(state, number + EXPOSURES, 0);
-    further.neighbours()?;
-    if TARGETS > 0 {
-        further.dim_target();
-    }
     Some(())
 }
 
@@ -129,22 +90,9 @@ fn second_of_tracked(
     Some(())
 }
 
-/// The second look of a block, after one without an event.
-fn second_of_block(
-    further: &mut Further,
-    state: &mut State,
-    number: u32,
-    features: Features,
-) -> Option<()> {
-    first::<0>(further, state, number, features)?;
-    (!further.block_reports()).then_some(())?;
-    further.until_second_look();
-    Some(())
-}
-
 /// The first look of a long exposure to background alone.
 fn long(further: &mut Further, _: &mut State, number: u32, features: Features) -> Option<()> {
-    further.empty(features, 1)?;
+    further.empty(features)?;
     further.until_long_look(number);
     Some(())
 }
@@ -157,7 +105,7 @@ fn whole<const TARGETS: u8>(
     features: Features,
 ) -> Option<()> {
     further.photons(state, number, TARGETS);
-    further.empty(features, 0)?;
+    further.empty(features)?;
     further.arrive();
     Some(())
 }
@@ -187,17 +135,6 @@ const fn row(variant: &'static str, features: Features, prepare: Prepare, gives:
     }
 }
 
-const fn of_block(operation: &'static str, variant: &'static str, prepare: Prepare) -> Row {
-    Row {
-        operation,
-        variant,
-        features: Features::NONE.short(),
-        prepare,
-        way: look_of_block,
-        gives: 0,
-    }
-}
-
 const fn of_whole(variant: &'static str, prepare: Prepare, found: u32) -> Row {
     Row {
         operation: "decision",
@@ -218,17 +155,7 @@ const BOTH: Features = Features {
     ..ECHOES
 };
 
-const AMONG: Row = Row {
-    way: look_with_neighbours,
-    ..row(
-        "look; 8 neighbours; no event",
-        Features::NONE,
-        among_neighbours::<0>,
-        Look::NoPeak,
-    )
-};
-
-const ROWS: [Row; 21] = [
+const ROWS: [Row; 16] = [
     row(
         "look; window of 3; no event",
         PLAIN,
@@ -248,13 +175,6 @@ const ROWS: [Row; 21] = [
         after_event::<1>,
         Look::Event,
     ),
-    AMONG,
-    Row {
-        variant: "look; 8 neighbours; confirmed",
-        prepare: among_neighbours::<1>,
-        gives: Look::Event as u32,
-        ..AMONG
-    },
     row(
         "look; two echoes; no event",
         ECHOES,
@@ -287,11 +207,6 @@ const ROWS: [Row; 21] = [
         long,
         Look::NoPeak,
     ),
-    of_block("decision", "look; block; no event", first::<0>),
-    Row {
-        gives: 1,
-        ..of_block("decision", "look; block; event", first::<1>)
-    },
     row(
         "look at L2; tracking",
         TRACKS.short(),
@@ -304,7 +219,6 @@ const ROWS: [Row; 21] = [
         second::<1>,
         Look::Ended,
     ),
-    of_block("clear", "look at L2; block", second_of_block),
     of_whole("echoes of a whole histogram; none", whole::<0>, 0),
     of_whole("echoes of a whole histogram; one", whole::<1>, 1),
     of_whole("echoes of a whole histogram; two", whole::<2>, 2),

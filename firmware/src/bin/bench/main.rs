@@ -15,6 +15,7 @@ compile_error!("an image for a board: cargo xtask bench");
 #[cfg(feature = "pico")]
 use dtof_firmware as _;
 
+mod arrays;
 mod counter;
 mod decisions;
 mod further;
@@ -51,8 +52,12 @@ fn main() -> ! {
     windows::run(&counter, &mut state);
     products::run(&counter, &mut state);
     roots::run(&counter, &mut state);
+    if !arrays::run(&counter, &mut state) {
+        println!("arrays were not counted");
+        ExitCode::FAILURE.exit_process()
+    }
     if !looks::run(&counter, &mut state) {
-        println!("blocks, tracking and echoes were not counted");
+        println!("tracking and echoes were not counted");
         ExitCode::FAILURE.exit_process()
     }
     ExitCode::SUCCESS.exit_process()

@@ -94,10 +94,14 @@ fn driven<const BINS: usize, W: CounterWidth>() {
         driven.leave_out(usize::from(half()));
         driven.photon(usize::from(half()), half());
         keep((driven.to_look(), driven.end_laser_cycles(half())));
-        keep(driven.end_laser_cycles_on(&InTurn, half(), |pixel, _| {
-            keep(pixel);
-            more().then(half)
-        }));
+        driven.photons(usize::from(half()), &values::<u16, 3>(half));
+        keep(
+            driven.end_laser_cycles_on(&InTurn, half(), |pixel, _, codes| {
+                keep(pixel);
+                codes.fill_with(half);
+                usize::from(half())
+            }),
+        );
         keep(driven.data().count());
         driven.lost(cycle().raw(), cycle().raw());
         keep((driven.has_event(), driven.has_looked(), driven.cycles()));

@@ -35,7 +35,7 @@ fn counted(variant: &str) -> f64 {
 
 #[test]
 fn costs_are_the_counted_instructions() {
-    let feeds = "count and count_in_blocks; ";
+    let with_blocks = "array with blocks; ";
     for (cost, counted) in [
         (cost::PHOTON, counted("AsyncPixel::count_batch")),
         (
@@ -44,11 +44,12 @@ fn costs_are_the_counted_instructions() {
         ),
         (
             cost::FEED,
-            counted(&format!("{feeds}feeds none")) - counted("AsyncPixel::count"),
+            counted(&format!("{with_blocks}feeds none")) - counted("array"),
         ),
         (
             cost::BLOCK_PHOTON,
-            counted(&format!("{feeds}1 level")) - counted(&format!("{feeds}feeds none")),
+            counted(&format!("{with_blocks}1 level"))
+                - counted(&format!("{with_blocks}feeds none")),
         ),
         (cost::PAPER, counted("kept peak; no event")),
         (cost::AVERAGE, counted("average; no event")),
@@ -62,11 +63,15 @@ fn costs_are_the_counted_instructions() {
             cost::FIRST_PHOTON,
             counted("look; dead time; first photon only; no event"),
         ),
-        (cost::NEIGHBOURS, counted("look; 8 neighbours; no event")),
-        (cost::LOOK, counted("look; window of 3; no event")),
+        (
+            cost::NEIGHBOURS,
+            counted("look; array, 8 neighbours; no event"),
+        ),
+        (cost::LOOK, counted("look; array; no event")),
         (
             cost::CONFIRMED,
-            counted("look; 8 neighbours; confirmed") + counted("encode and to_le_bytes"),
+            counted("look; array, 8 neighbours; more for each confirmed")
+                + counted("encode and to_le_bytes"),
         ),
         (cost::EXPIRY, counted("look at L2")),
         (

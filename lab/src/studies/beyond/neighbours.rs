@@ -6,9 +6,9 @@ use crate::sweep::mean::{Measured, add_error};
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
 use anyhow::{Context, Result, ensure};
-use dtof_core::binning::{Block, BlockLink};
+use dtof_core::binning::Block;
 use dtof_core::rule::z_for_levels;
-use dtof_core::{AsyncPixel, Neighbours, RangeGate};
+use dtof_core::{Neighbours, PixelPlace, RangeGate};
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{Pen, STEPS};
 use dtof_engine::host::host_engine;
@@ -84,9 +84,9 @@ struct Way {
     photon: &'static str,
 }
 
-const PHOTON: &str = "AsyncPixel::count";
-const PHOTON_OF_BLOCKS: &str = "count and count_in_blocks; 2 levels";
-const LOOK: &str = "look; window of 3; no event";
+const PHOTON: &str = "array";
+const PHOTON_OF_BLOCKS: &str = "array with blocks; 2 levels";
+const LOOK: &str = "look; array; no event";
 
 const WAYS: [Way; 5] = [
     Way {
@@ -110,7 +110,7 @@ const WAYS: [Way; 5] = [
         neighbours: Some(Neighbours::Eight),
         blocks: None,
         pen: STEPS[2],
-        look: "look; 8 neighbours; no event",
+        look: "look; array, 8 neighbours; no event",
         photon: PHOTON,
     },
     Way {
@@ -184,7 +184,7 @@ impl Way {
 
     /// The bytes of a pixel and its part of the blocks.
     fn bytes(&self) -> f64 {
-        let pixel = size_of::<AsyncPixel<BINS>>() as f64;
+        let pixel = size_of::<PixelPlace<BINS>>() as f64;
         let (levels, _) = self.blocks.unwrap_or_default();
         if levels == 0 {
             return pixel;
@@ -192,7 +192,7 @@ impl Way {
         let blocks: f64 = (1..=i32::from(levels))
             .map(|level| 0.25f64.powi(level))
             .sum();
-        pixel + size_of::<BlockLink>() as f64 + blocks * size_of::<Block<BINS>>() as f64
+        pixel + blocks * size_of::<Block<BINS>>() as f64
     }
 }
 
@@ -379,8 +379,8 @@ fn results(part: &Part) -> Result<Results> {
         columns: 2,
         panels,
     };
-    let pixel = size_of::<AsyncPixel<BINS>>();
-    ensure!(pixel == 320, "a pixel takes {pixel} bytes here");
+    let pixel = size_of::<PixelPlace<BINS>>();
+    ensure!(pixel == 332, "a pixel takes {pixel} bytes here");
     Ok(Results {
         figures: vec![Figure::new("neighbours", &chart)?],
         values: [("table", table), ("costs", costs()?)].into(),
