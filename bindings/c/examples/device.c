@@ -23,22 +23,22 @@
 #include <dtof.h>
 
 #define PIXELS 64u
+/* Of 2 x 2, 4 x 4 and 8 x 8 pixels. */
+#define BLOCKS 21u
 #define BIN_WIDTH_PS_Q16 (250u << 16)
 #define LASER_HZ 1000u
 /* Bins for which the TDC is blind after a photon: none. */
 #define DEAD_TIME 0u
 
 static dtof_link_t link_to_host;
-static dtof_pixel_t pixels[PIXELS];
-static dtof_once_per_bin_t bins[PIXELS];
-static dtof_checked_config_t config;
-static dtof_statistics_t statistics;
+static dtof_place_t places[PIXELS];
+static dtof_block_t blocks[BLOCKS];
+static dtof_array_t array;
 static dtof_aer_encoder_t encoder;
 static dtof_report_t report;
 static int is_configured, sensor_runs;
-/* From the configuration: how long the host may be silent, and whether photons count once per bin. */
+/* From the configuration: how long the host may be silent. */
 static uint16_t host_timeout_ms;
-static uint8_t once_per_bin;
 
 /* Words that wait for the link. */
 static uint8_t words[15 * DTOF_WORD_BYTES];
@@ -104,13 +104,9 @@ static void stop_sensor(uint8_t reason)
 static dtof_status_t configure(const dtof_message_t *message)
 {
     dtof_device_config_t requested;
-    dtof_checked_config_t checked;
     dtof_scale_t scale;
     dtof_status_t status = dtof_device_config_read(message->body, message->length, DEAD_TIME,
                                                    &requested);
-    if (status == DTOF_OK && (requested.pixels == 0 || requested.pixels > PIXELS)) {
-        status = DTOF_ERROR_PIXELS;
-    }
     if (status == DTOF_OK && requested.source == DTOF_SOURCE_SENSOR
         && requested.bin_width_ps_q16 != BIN_WIDTH_PS_Q16) {
         status = DTOF_ERROR_BIN_WIDTH;
@@ -127,21 +123,13 @@ static dtof_status_t configure(const dtof_message_t *message)
         status = dtof_scale_init(&scale, requested.bin_width_ps_q16, requested.offset_mm_q8);
     }
     if (status == DTOF_OK) {
-        status = dtof_config_check(&requested.pixel, &checked);
+        status = dtof_array_configure(&array, &requested.pixel, &requested.layout);
     }
     if (status != DTOF_OK) {
         return status;
     }
     stop_sensor(DTOF_STOP_CONFIGURATION);
-    config = checked;
     host_timeout_ms = requested.host_timeout_ms;
-    once_per_bin = requested.once_per_bin;
-    for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
-        check("pixel", dtof_pixel_init(&pixels[pixel], sizeof pixels[pixel], pixel));
-        check("bins", dtof_once_per_bin_init(&bins[pixel], sizeof bins[pixel]));
-    }
-    check("statistics", dtof_statistics_init(&statistics));
-    report.cycles = 0;
     is_configured = 1;
     if (requested.source == DTOF_SOURCE_SENSOR) {
         start_sensor();
@@ -174,10 +162,11 @@ static void act(const dtof_message_t *message)
         memcpy(answer, message->body, answer_length);
         break;
     case DTOF_MESSAGE_STATISTICS_REQUEST: {
-        dtof_statistics_t done = statistics;
-        for (size_t pixel = 0; pixel < PIXELS && is_configured; pixel++) {
-            check("photons", dtof_pixel_add_photons(&pixels[pixel], &done));
-        }
+        dtof_statistics_t done;
+        dtof_losses_t losses;
+        check("statistics", dtof_array_statistics(&array, &done, NULL, &losses));
+        check("laser cycles", dtof_array_cycles(&array, &report.cycles));
+        report.unaddressed = losses.unaddressed;
         answer_kind = DTOF_MESSAGE_STATISTICS;
         answer_length = DTOF_REPORT_BYTES;
         check("report", dtof_report_write(&report, &done, &link_to_host, answer));
@@ -196,13 +185,14 @@ static void act(const dtof_message_t *message)
             break;
         }
         histogram_of = (uint16_t)(message->body[0] | message->body[1] << 8);
-        if (is_configured && histogram_of < PIXELS) {
+        answer_kind = DTOF_MESSAGE_HISTOGRAM;
+        if (is_configured
+            && dtof_array_histogram_write(&array, histogram_of, 0, answer, &answer_length)
+                   == DTOF_OK) {
             sends_histogram = 1;
-            histogram_part = 0;
-            has_answer = 0;
+            histogram_part = 1;
             break;
         }
-        answer_kind = DTOF_MESSAGE_HISTOGRAM;
         check("histogram",
               dtof_no_histogram_write(histogram_of, reason, answer, &answer_length));
         break;
@@ -220,7 +210,7 @@ static int next_part(void)
     }
     answer_kind = DTOF_MESSAGE_HISTOGRAM;
     check("histogram",
-          dtof_pixel_histogram_write(&pixels[histogram_of], histogram_part, report.cycles, answer,
+          dtof_array_histogram_write(&array, histogram_of, histogram_part, answer,
                                      &answer_length));
     histogram_part++;
     sends_histogram = has_answer = answer_length > 0;
@@ -238,26 +228,24 @@ static int offer(uint8_t kind, const uint8_t *body, size_t length)
     return 1;
 }
 
-/* Moves events from the pixels' slots to messages while there is room: 1 if none is left. An
- * event without room stays in its slot. */
+/* Moves events from their slots to messages while there is room: 1 if none is left. An event without
+ * room stays in its slot. */
 static int send_events(void)
 {
-    for (size_t pixel = 0; pixel < PIXELS && is_configured; pixel++) {
-        for (;;) {
-            dtof_event_t event;
-            size_t length;
-            if (filled + DTOF_EVENT_BYTES > sizeof words) {
-                if (!offer(DTOF_MESSAGE_EVENTS, words, filled)) {
-                    return 0;
-                }
-                filled = 0;
+    while (is_configured) {
+        dtof_event_t event;
+        size_t length;
+        if (filled + DTOF_EVENT_BYTES > sizeof words) {
+            if (!offer(DTOF_MESSAGE_EVENTS, words, filled)) {
+                return 0;
             }
-            if (dtof_pixel_take_event(&pixels[pixel], &event) != DTOF_OK) {
-                break;
-            }
-            check("event", dtof_aer_encode(&encoder, &event, words + filled, &length));
-            filled += length;
+            filled = 0;
         }
+        if (dtof_array_next_event(&array, &event) != DTOF_OK) {
+            break;
+        }
+        check("event", dtof_aer_encode(&encoder, &event, words + filled, &length));
+        filled += length;
     }
     if (filled > 0 && !offer(DTOF_MESSAGE_EVENTS, words, filled)) {
         return 0;
@@ -285,17 +273,6 @@ static void work(void)
     }
 }
 
-/* Counts a photon as the host has configured it. */
-static void count(uint16_t pixel, uint16_t code)
-{
-    if (once_per_bin) {
-        check("photon", dtof_pixel_count_once_per_bin(&pixels[pixel], &config, &bins[pixel],
-                                                      &statistics, &code, 1));
-    } else {
-        check("photon", dtof_pixel_count(&pixels[pixel], &config, code));
-    }
-}
-
 /* A laser cycle: a target in each pixel, two bins farther per row, and background. */
 static void simulate(void)
 {
@@ -306,13 +283,10 @@ static void simulate(void)
         code = (drawn >> 31) ? (uint16_t)(30 + 2 * (pixel / 8))
                              : (uint16_t)((drawn >> 16) % DTOF_BINS);
         if ((drawn >> 28) % 4 == 0) {
-            count(pixel, code);
+            check("photon", dtof_array_photon(&array, pixel, code));
         }
-        check("bins", dtof_once_per_bin_end_laser_cycle(&bins[pixel]));
     }
-    check("laser cycle", dtof_pixels_end_laser_cycles(pixels, PIXELS, report.cycles, &config,
-                                                     &statistics, 1, NULL));
-    report.cycles++;
+    check("laser cycle", dtof_array_end_laser_cycles(&array, 1, NULL));
 }
 
 /* A session has begun or ended: discards the state of the one before. */
@@ -379,7 +353,7 @@ int main(int arguments, char **argument)
         fail("usage", "device [PORT]");
     }
     check("link", dtof_link_init(&link_to_host, sizeof link_to_host, PIXELS));
-    check("statistics", dtof_statistics_init(&statistics));
+    check("array", dtof_array_init(&array, sizeof *places, places, PIXELS, blocks, BLOCKS));
     int host = connected((uint16_t)port);
     uint32_t simulated_ms = now_ms();
     for (;;) {

@@ -14,9 +14,8 @@
 #define BIN_WIDTH_PS 250u
 #define GENERATED_CYCLES 2000u
 
-static dtof_pixel_t pixels[PIXELS];
-static dtof_checked_config_t config;
-static dtof_statistics_t statistics;
+static dtof_place_t places[PIXELS];
+static dtof_array_t array;
 static dtof_aer_encoder_t encoder;
 
 /* The file, with the checksum and the number of its events. */
@@ -69,20 +68,18 @@ static void put_header(void)
 /* Ends laser cycles up to `next`, and writes the events. */
 static void end_laser_cycles(uint64_t *cycle, uint64_t next)
 {
-    for (; *cycle < next; ++*cycle) {
-        size_t fired;
-        check("laser cycle", dtof_pixels_end_laser_cycles(pixels, PIXELS, *cycle, &config,
-                                                         &statistics, 1, &fired));
-        for (size_t pixel = 0; fired > 0; pixel++) {
-            dtof_event_t event;
+    while (*cycle < next) {
+        uint64_t rest = next - *cycle;
+        uint16_t cycles = rest < UINT16_MAX ? (uint16_t)rest : UINT16_MAX, left;
+        dtof_event_t event;
+        check("laser cycles", dtof_array_end_laser_cycles(&array, cycles, &left));
+        *cycle += (uint64_t)(cycles - left);
+        while (dtof_array_next_event(&array, &event) == DTOF_OK) {
             uint8_t bytes[DTOF_EVENT_BYTES];
             size_t length;
-            if (dtof_pixel_take_event(&pixels[pixel], &event) == DTOF_OK) {
-                check("event", dtof_aer_encode(&encoder, &event, bytes, &length));
-                put(bytes, length);
-                events++;
-                fired--;
-            }
+            check("event", dtof_aer_encode(&encoder, &event, bytes, &length));
+            put(bytes, length);
+            events++;
         }
     }
 }
@@ -99,7 +96,7 @@ static void generate(void)
                 uint16_t code = photon == 0 ? (uint16_t)(20 + 3 * (pixel / 8) + (drawn >> 31))
                                             : (uint16_t)((drawn >> 16) % DTOF_BINS);
                 if ((drawn >> 8) % 8 == 0) {
-                    check("photon", dtof_pixel_count(&pixels[pixel], &config, code));
+                    check("photon", dtof_array_photon(&array, pixel, code));
                 }
             }
         }
@@ -132,7 +129,7 @@ static void read_photons(void)
             fail(place, "an earlier laser cycle than the line before");
         }
         end_laser_cycles(&cycle, at);
-        check("photon", dtof_pixel_count(&pixels[pixel], &config, (uint16_t)code));
+        check("photon", dtof_array_photon(&array, (uint16_t)pixel, (uint16_t)code));
     }
     if (ferror(stdin)) {
         fail("standard input", strerror(errno));
@@ -149,13 +146,11 @@ int main(int arguments, char **argument)
     file_name = argument[1];
 
     dtof_config_t settings;
+    dtof_layout_t layout = {.pixels = PIXELS};
     check("settings", dtof_config_paper(&settings));
-    check("settings", dtof_config_check(&settings, &config));
+    check("array", dtof_array_init(&array, sizeof *places, places, PIXELS, NULL, 0));
+    check("array", dtof_array_configure(&array, &settings, &layout));
     check("encoder", dtof_aer_encoder_init(&encoder));
-    check("statistics", dtof_statistics_init(&statistics));
-    for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
-        check("pixel", dtof_pixel_init(&pixels[pixel], sizeof pixels[pixel], pixel));
-    }
 
     /* Does not overwrite a file. */
     file = fopen(file_name, "wbx");
@@ -175,7 +170,9 @@ int main(int arguments, char **argument)
         fail(file_name, strerror(errno));
     }
 
+    dtof_statistics_t statistics;
     dtof_counts_t counts;
+    check("statistics", dtof_array_statistics(&array, &statistics, NULL, NULL));
     check("statistics", dtof_statistics_read(&statistics, &counts));
     printf("%s: %llu events; photons rejected %llu, saturated %llu; exposures without an event "
            "%llu\n",

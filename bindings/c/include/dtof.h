@@ -125,14 +125,26 @@
 // Its alignment.
 #define DTOF_PIXEL_ALIGN 4
 
-// Bytes of a dtof_once_per_bin_t.
-#define DTOF_ONCE_PER_BIN_SIZE (4 + (4 * ((DTOF_BINS + 31) / 32)))
+// Bytes of a dtof_place_t: other ones for each DTOF_BINS and DTOF_COUNTER_BITS.
+#define DTOF_PLACE_SIZE ((96 - (2 * DTOF_COUNTER_BITS)) + (((DTOF_COUNTER_BITS + 7) / 8) * DTOF_BINS))
 
-// The same in words of 32 bits.
-#define DTOF_ONCE_PER_BIN_WORDS (DTOF_ONCE_PER_BIN_SIZE / 4)
+// The same in words.
+#define DTOF_PLACE_WORDS (DTOF_PLACE_SIZE / 4)
+
+// Bytes of a dtof_block_t.
+#define DTOF_BLOCK_SIZE (68 + (2 * DTOF_BINS))
+
+// The same in words.
+#define DTOF_BLOCK_WORDS (DTOF_BLOCK_SIZE / 4)
+
+// Bytes of a dtof_array_t.
+#define DTOF_ARRAY_SIZE 792
+
+// The same in words of 64 bits.
+#define DTOF_ARRAY_WORDS (DTOF_ARRAY_SIZE / 8)
 
 // Its alignment.
-#define DTOF_ONCE_PER_BIN_ALIGN 4
+#define DTOF_ARRAY_ALIGN 8
 
 // The most echoes of one histogram or exposure.
 #define DTOF_ECHOES 4
@@ -381,7 +393,7 @@ enum dtof_status_t
     DTOF_ERROR_ZERO_THRESHOLD = 74,
     // The patience of adaptive binning is 0.
     DTOF_ERROR_PATIENCE = 75,
-    // There is no room for blocks of pixels. This library has none.
+    // There is no room for blocks of pixels, or their levels are not 1 to 3.
     DTOF_ERROR_BLOCKS = 76,
     // The host timeout is not 200 to 60,000 ms.
     DTOF_ERROR_HOST_TIMEOUT = 77,
@@ -391,7 +403,8 @@ enum dtof_status_t
     DTOF_ERROR_ONCE_PER_BIN = 79,
     // The laser cannot be dithered by so many bins.
     DTOF_ERROR_DITHER = 80,
-    // Neighbours confirm nothing here.
+    // Neighbours are not 4 or 8, or confirm nothing here: they need the window rule and photons, without
+    // blocks and without a dead time.
     DTOF_ERROR_NEIGHBOURS = 81,
 };
 #ifndef __cplusplus
@@ -501,7 +514,7 @@ typedef struct dtof_counts_t {
     uint64_t rejected;
     // Photons outside the range gate.
     uint64_t gated_out;
-    // Photons in a bin that had one in the same laser cycle, with dtof_pixel_count_once_per_bin.
+    // Photons in a bin that had one in the same laser cycle, where photons count once per bin.
     uint64_t repeated;
     // Events.
     uint64_t events;
@@ -561,13 +574,58 @@ typedef struct dtof_event_t {
     uint8_t flags;
 } dtof_event_t;
 
-// The bins of one pixel that have had a photon in the present laser cycle:
-// dtof_once_per_bin_init makes it. Each pixel whose photons count once per bin needs its own.
+// An array of pixels that is driven: photons in, events out. It orders what happens in a laser cycle, for
+// all pixels, for blocks of pixels that stay silent, and for neighbours that confirm. dtof_array_init makes
+// it, in room for its pixels and blocks that is yours.
 //
-// One thread or interrupt at a time may use it.
-typedef struct dtof_once_per_bin_t {
-    uint32_t opaque[DTOF_ONCE_PER_BIN_WORDS];
-} dtof_once_per_bin_t;
+// One thread or interrupt at a time may use an array and its room. It must not be copied.
+typedef struct dtof_array_t {
+    uint64_t opaque[DTOF_ARRAY_WORDS];
+} dtof_array_t;
+
+// Room for a pixel of an array, for dtof_array_init. Only that array uses it.
+typedef struct dtof_place_t {
+    uint32_t words[DTOF_PLACE_WORDS];
+} dtof_place_t;
+
+// Room for a block of pixels of an array, for dtof_array_init. Only that array uses it.
+typedef struct dtof_block_t {
+    uint32_t words[DTOF_BLOCK_WORDS];
+} dtof_block_t;
+
+// How many pixels an array has, and how they work together. All zero but `pixels`: they work alone.
+typedef struct dtof_layout_t {
+    // Pixels, numbered row by row: at least 1.
+    uint16_t pixels;
+    // Columns of the array; the last row may have fewer. 0: one row.
+    uint16_t columns;
+    // Blocks: every so many laser cycles pixels without an event begin to feed theirs. At least 1.
+    uint16_t patience;
+    // Levels of blocks, of 2, 4 and 8 pixels a side: 1 to 3; 0: no blocks.
+    uint8_t block_levels;
+    // Neighbours of a pixel that may confirm its event: 4 or 8; 0: none. They need the window rule,
+    // without a dead time and without blocks.
+    uint8_t neighbours;
+    // Not 0: photons of one laser cycle in one bin count once. Raindrops, which send many photons back in
+    // one laser cycle, are then hardly ever events. Targets with more than half a photon a laser cycle in a
+    // bin lose a fifth of their light or more.
+    uint8_t once_per_bin;
+} dtof_layout_t;
+
+// Photons that counted in no pixel, since the configuration.
+typedef struct dtof_losses_t {
+    // Of numbers without a pixel.
+    uint64_t unaddressed;
+    // Of pixels that are left out.
+    uint64_t left_out;
+    // Where photons count once per bin: those that came out of order, so that their bin may have had one.
+    // They are among the repeated ones.
+    uint64_t unordered;
+    // That never came, as dtof_array_lost was told.
+    uint64_t photons;
+    // Laser cycles whose photons never came.
+    uint64_t laser_cycles;
+} dtof_losses_t;
 
 // Packs the events of one stream. One thread or interrupt at a time may use it.
 typedef struct dtof_aer_encoder_t {
@@ -634,8 +692,10 @@ typedef struct dtof_link_state_t {
     uint8_t is_settled;
 } dtof_link_state_t;
 
-// The configuration that the host requests. Check `pixel` with dtof_config_check, and compare
-// the other fields with your device.
+// The configuration that the host requests. Give `pixel` and `layout` to dtof_array_configure, and compare
+// the other fields with your device. If your firmware has single pixels instead of an array, check `pixel` with
+// dtof_config_check, and refuse block_levels, neighbours and once_per_bin other than 0 with DTOF_ERROR_BLOCKS,
+// DTOF_ERROR_NEIGHBOURS and DTOF_ERROR_ONCE_PER_BIN. If your sensor gives histograms, refuse the last two.
 typedef struct dtof_device_config_t {
     // The settings of the pixels.
     struct dtof_config_t pixel;
@@ -643,18 +703,14 @@ typedef struct dtof_device_config_t {
     uint32_t bin_width_ps_q16;
     // The offset added to every range, in 1/256 mm.
     int32_t offset_mm_q8;
-    // The number of pixels, with addresses from 0.
-    uint16_t pixels;
+    // The pixels, and how they work together.
+    struct dtof_layout_t layout;
     // Switch the laser off after the host has been silent for this many milliseconds: 200 to
     // 60,000. 0 means never: refuse it with DTOF_ERROR_HOST_TIMEOUT, unless your laser may run
     // without a host.
     uint16_t host_timeout_ms;
     // DTOF_SOURCE_...
     uint8_t source;
-    // 1 if the host asks that photons of one laser cycle in one bin count once: count them with
-    // dtof_pixel_count_once_per_bin. If your sensor gives histograms, refuse it with
-    // DTOF_ERROR_ONCE_PER_BIN.
-    uint8_t once_per_bin;
     // The range S of the laser's dither, an even number of bins up to 254; 0 for none. Each laser cycle lasts
     // P - S/2 + s bins, where P is the mean and s a random number from 0 to S. Refuse it with DTOF_ERROR_DITHER
     // if it is more than your laser can.
@@ -828,20 +884,6 @@ dtof_status_t dtof_pixel_end_laser_cycles(struct dtof_pixel_t *pixel,
                                           uint16_t cycles,
                                           dtof_look_t *look);
 
-// Does the same for an array of `number` pixels, with fewer instructions per pixel. `fired` gets
-// the number of pixels with a new event in their slot; it may be null.
-//
-// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
-// DTOF_ERROR_NOT_INITIALISED.
-// Threads: no other thread uses the pixels or `statistics` during the call.
-dtof_status_t dtof_pixels_end_laser_cycles(struct dtof_pixel_t *pixels,
-                                           size_t number,
-                                           uint64_t last,
-                                           const struct dtof_checked_config_t *config,
-                                           struct dtof_statistics_t *statistics,
-                                           uint16_t cycles,
-                                           size_t *fired);
-
 // Takes the event from the slot, so that the pixel can report the next one. Until then the pixel
 // counts on and defers its decisions.
 //
@@ -859,35 +901,100 @@ dtof_status_t dtof_pixel_take_event(struct dtof_pixel_t *pixel,
 dtof_status_t dtof_pixel_add_photons(const struct dtof_pixel_t *pixel,
                                      struct dtof_statistics_t *statistics);
 
-// Initialises it at the beginning of a laser cycle. `size` is `sizeof *once_per_bin`.
+// Makes an array of room for `number` pixels and `number_of_blocks` blocks. It has no pixels until
+// dtof_array_configure. Of 8 x 8 pixels there are 16 blocks of level 1, 4 of level 2 and 1 of level 3. Without
+// blocks `blocks` may be null. `size` is `sizeof *pixels`. The room belongs to the array from now on: do not
+// read, write or copy it. Another dtof_array_init may have it again.
 //
-// Errors: DTOF_ERROR_SIZE if the library was built for another number of bins,
-// DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
-// Threads: no other thread uses `once_per_bin` during the call.
-dtof_status_t dtof_once_per_bin_init(struct dtof_once_per_bin_t *once_per_bin, size_t size);
+// Errors: DTOF_ERROR_SIZE if the library was built for other DTOF_BINS or DTOF_COUNTER_BITS,
+// DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
+// Threads: no other thread uses `array`, `pixels` or `blocks` during the call.
+dtof_status_t dtof_array_init(struct dtof_array_t *array,
+                              size_t size,
+                              struct dtof_place_t *pixels,
+                              size_t number,
+                              struct dtof_block_t *blocks,
+                              size_t number_of_blocks);
 
-// Ends a laser cycle, with photons or without. Call it for each pixel, beside
-// dtof_pixel_end_laser_cycles or dtof_pixels_end_laser_cycles.
+// All pixels begin, with all counts at 0. Blocks and neighbours decide by the rule of `settings`, too; its
+// false alarms are then those of all together.
+//
+// Errors: each of dtof_config_check, DTOF_ERROR_PIXELS and DTOF_ERROR_BLOCKS without room for so many,
+// DTOF_ERROR_BLOCKS for other levels, DTOF_ERROR_PATIENCE, DTOF_ERROR_NEIGHBOURS,
+// DTOF_ERROR_NOT_INITIALISED. After an error the array is unchanged.
+// Threads: no other thread uses `array` during the call.
+dtof_status_t dtof_array_configure(struct dtof_array_t *array,
+                                   const struct dtof_config_t *settings,
+                                   const struct dtof_layout_t *layout);
+
+// Leaves a pixel out from now on, whatever the configuration: its photons count as left out.
+//
+// Errors: DTOF_ERROR_PIXELS without room for it, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
+// DTOF_ERROR_NOT_INITIALISED.
+// Threads: no other thread uses `array` during the call.
+dtof_status_t dtof_array_leave_out(struct dtof_array_t *array, uint16_t pixel);
+
+// Counts a photon of pixel number `pixel` in the present laser cycle. `code` is its bin, as the TDC gives
+// it. dtof_array_statistics tells of a photon that does not count. The photons of a laser cycle may come in
+// any order; where they count once per bin, pixel by pixel or in the order of time.
 //
 // Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
-// Threads: no other thread uses `once_per_bin` during the call.
-dtof_status_t dtof_once_per_bin_end_laser_cycle(struct dtof_once_per_bin_t *once_per_bin);
+// Threads: no other thread uses `array` during the call.
+dtof_status_t dtof_array_photon(struct dtof_array_t *array,
+                                uint16_t pixel,
+                                uint16_t code);
 
-// Counts `number` photons of the present laser cycle as dtof_pixel_count_batch does, except those
-// in a bin that has had one: `statistics` counts them as repeated. The photons of a laser cycle may
-// come in several calls. Raindrops, which send many photons back in one laser cycle, are then
-// hardly ever events. Targets with more than half a photon a laser cycle in a bin lose a fifth
-// of their light or more.
+// Counts `number` photons of one pixel as dtof_array_photon does, in a third of the time.
 //
 // Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
 // DTOF_ERROR_NOT_INITIALISED. `codes` may be null if `number` is 0.
-// Threads: no other thread uses `pixel`, `once_per_bin` or `statistics` during the call.
-dtof_status_t dtof_pixel_count_once_per_bin(struct dtof_pixel_t *pixel,
-                                            const struct dtof_checked_config_t *config,
-                                            struct dtof_once_per_bin_t *once_per_bin,
-                                            struct dtof_statistics_t *statistics,
-                                            const uint16_t *codes,
-                                            size_t number);
+// Threads: no other thread uses `array` during the call.
+dtof_status_t dtof_array_photons(struct dtof_array_t *array,
+                                 uint16_t pixel,
+                                 const uint16_t *codes,
+                                 size_t number);
+
+// Ends `cycles` laser cycles: the present one, and after it those without a photon. It may stop after a
+// look. `left` gets how many are left: take the events, and call it again with these. It may be null if
+// `cycles` is 1.
+//
+// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+// Threads: no other thread uses `array` during the call.
+dtof_status_t dtof_array_end_laser_cycles(struct dtof_array_t *array,
+                                          uint16_t cycles,
+                                          uint16_t *left);
+
+// Takes the next event. An event that waits defers the next decision of its pixel.
+//
+// Errors: DTOF_ERROR_NO_EVENT if none waits, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
+// DTOF_ERROR_NOT_INITIALISED.
+// Threads: no other thread uses `array` during the call.
+dtof_status_t dtof_array_next_event(struct dtof_array_t *array, struct dtof_event_t *event);
+
+// The queue of a TDC has lost `photons`, and all photons of `laser_cycles`. These laser cycles are numbered,
+// but belong to no exposure. Call it between two laser cycles.
+//
+// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+// Threads: no other thread uses `array` during the call.
+dtof_status_t dtof_array_lost(struct dtof_array_t *array,
+                              uint64_t photons,
+                              uint64_t laser_cycles);
+
+// The laser cycles that have ended since the configuration.
+//
+// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+// Threads: no other thread changes `array` during the call.
+dtof_status_t dtof_array_cycles(const struct dtof_array_t *array, uint64_t *cycles);
+
+// What pixels and blocks have done so far, with the photons of exposures that have not ended, and what counted
+// in no pixel. `blocks` and `losses` may be null. The statistics need not be initialised.
+//
+// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+// Threads: no other thread changes `array` or uses the others during the call.
+dtof_status_t dtof_array_statistics(const struct dtof_array_t *array,
+                                    struct dtof_statistics_t *pixels,
+                                    struct dtof_statistics_t *blocks,
+                                    struct dtof_losses_t *losses);
 
 // Decides once on `counts`, the photons of DTOF_BINS bins in `exposure` laser cycles. X, L1 and L2 have no effect
 // here. `events` has room for DTOF_ECHOES events; `found` gets their number, at most the echoes of `config`. `pixel` and
@@ -1038,12 +1145,10 @@ dtof_status_t dtof_link_silent_ms(const struct dtof_link_t *link,
 dtof_status_t dtof_link_set_stop_reason(struct dtof_link_t *link,
                                         uint8_t reason);
 
-// Reads the body of CONFIGURE. Blocks of pixels, neighbours and dynamic depth are refused, as this library
-// has none of them. `sensor_dead_time` is that of dtof_sensor_write. The settings get it if the host
+// Reads the body of CONFIGURE. Dynamic depth is refused, as this library has none. `sensor_dead_time` is that of dtof_sensor_write. The settings get it if the host
 // leaves the dead time to the sensor and the rule can use it.
 //
-// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_BLOCKS, DTOF_ERROR_NEIGHBOURS,
-// DTOF_ERROR_DITHER if its range is odd, above 254 bins, or not 0 for photons of the link,
+// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_DITHER if its range is odd, above 254 bins, or not 0 for photons of the link,
 // DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
 // DTOF_ERROR_DEAD_TIME, DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT,
 // DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
@@ -1095,6 +1200,17 @@ dtof_status_t dtof_report_write(const struct dtof_report_t *report,
 dtof_status_t dtof_pixel_histogram_write(const struct dtof_pixel_t *pixel,
                                          size_t part,
                                          uint64_t cycles,
+                                         uint8_t *body,
+                                         size_t *length);
+
+// Writes a body of HISTOGRAM with the present exposure of a pixel of an array, as dtof_pixel_histogram_write does.
+//
+// Errors: DTOF_ERROR_PIXELS if there is no such pixel or it is left out, DTOF_ERROR_NULL,
+// DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+// Threads: no other thread changes `array` during the call.
+dtof_status_t dtof_array_histogram_write(const struct dtof_array_t *array,
+                                         uint16_t pixel,
+                                         size_t part,
                                          uint8_t *body,
                                          size_t *length);
 

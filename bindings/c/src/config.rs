@@ -191,17 +191,19 @@ pub unsafe extern "C" fn dtof_config_check(
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
-        let config = config_of(unsafe { data_ref(config)? })?;
+        let settings = unsafe { data_ref(config)? };
+        let config = config_with(settings, rule_of(settings)?)?;
         // SAFETY: the same promise.
         unsafe { initialise(checked, DTOF_CHECKED_CONFIG_SIZE, config) }
     })
 }
 
-fn config_of(settings: &dtof_config_t) -> Result<Config, dtof_status_t> {
+/// The rule that settings choose.
+pub(crate) fn rule_of(settings: &dtof_config_t) -> Result<AnyRule, dtof_status_t> {
     let count = Count::new(settings.minimum_count).filter(|count| count.raw() > 0);
     let count = count.ok_or(DTOF_ERROR_MINIMUM_COUNT)?;
     let alpha = U8F8::from_bits(settings.alpha_q8);
-    let rule: AnyRule = match settings.rule {
+    Ok(match settings.rule {
         DTOF_RULE_PAPER => PaperRule::new(alpha, count).into(),
         DTOF_RULE_AVERAGE => AverageRule::new(alpha, count).into(),
         DTOF_RULE_WINDOW => {
@@ -209,7 +211,14 @@ fn config_of(settings: &dtof_config_t) -> Result<Config, dtof_status_t> {
             WindowRule::new(settings.window, z, count)?.into()
         }
         _ => return Err(DTOF_ERROR_RULE),
-    };
+    })
+}
+
+/// The configuration of settings, with a rule that may be another one than theirs.
+pub(crate) fn config_with(
+    settings: &dtof_config_t,
+    rule: AnyRule,
+) -> Result<Config, dtof_status_t> {
     let estimator = match settings.estimator {
         DTOF_ESTIMATOR_CENTROID => DepthEstimator::Centroid3,
         DTOF_ESTIMATOR_CENTRED_WINDOW => {

@@ -5,10 +5,11 @@ use dtof_link::endpoint::BODY_BYTES;
 use dtof_link::{HistogramHead, NoHistogram};
 use heapless::Vec;
 
+use crate::array::dtof_array_t;
 use crate::memory::{array_mut, check, data_slice, object_ref, put, status};
 use crate::pixel::dtof_pixel_t;
 use crate::status::dtof_status_t;
-use crate::status::dtof_status_t::{DTOF_ERROR_LENGTH, DTOF_ERROR_REASON};
+use crate::status::dtof_status_t::{DTOF_ERROR_LENGTH, DTOF_ERROR_PIXELS, DTOF_ERROR_REASON};
 use crate::version::DTOF_BINS;
 
 /// There is no histogram: no configuration is in force.
@@ -48,6 +49,37 @@ pub unsafe extern "C" fn dtof_pixel_histogram_write(
             is_whole: false,
             cycle: LaserCycle::new(cycles),
             exposure: pixel.exposure().into(),
+        };
+        let counts = pixel.histogram().counts().map(u32::from);
+        // SAFETY: the same promise.
+        unsafe { part_of(head, &counts, part, body, length) }
+    })
+}
+
+/// Writes a body of HISTOGRAM with the present exposure of a pixel of an array, as dtof_pixel_histogram_write does.
+///
+/// Errors: DTOF_ERROR_PIXELS if there is no such pixel or it is left out, DTOF_ERROR_NULL,
+/// DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread changes `array` during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_array_histogram_write(
+    array: *const dtof_array_t,
+    pixel: u16,
+    part: usize,
+    body: *mut u8,
+    length: *mut usize,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let array = unsafe { object_ref(array)? };
+        let number = usize::from(pixel);
+        let of = array.pixel(number).zip(array.exposure(number));
+        let (pixel, exposure) = of.ok_or(DTOF_ERROR_PIXELS)?;
+        let head = HistogramHead {
+            pixel: pixel.address(),
+            is_whole: false,
+            cycle: LaserCycle::new(array.cycles()),
+            exposure: exposure.into(),
         };
         let counts = pixel.histogram().counts().map(u32::from);
         // SAFETY: the same promise.

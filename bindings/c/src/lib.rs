@@ -5,7 +5,7 @@
 //! checks its pointers and its numbers, calls `dtof-core` or `dtof-link`, and returns a
 //! [`dtof_status_t`].
 //!
-//! Not included: blocks of pixels, dynamic depth, running means, reflectivity, and custom rules.
+//! Not included: dynamic depth, running means, reflectivity, and custom rules.
 //!
 //! # Safety
 //!
@@ -25,8 +25,8 @@
 //! | `memory` | checks of pointers and objects |
 //! | `config` | settings, and the configuration built from them |
 //! | `event`, `statistics`, `range` | plain values, counts, millimetres |
-//! | `pixel`, `histogram` | pixels, and histograms counted by the sensor |
-//! | `once_per_bin` | photons of one laser cycle in one bin that count once |
+//! | `array` | an array that is driven, with blocks or neighbours |
+//! | `pixel`, `histogram` | single pixels, and histograms counted by the sensor |
 //! | `aer` | events as words of 16 bytes |
 //! | `link`, `records`, `histogram_message` | the device's end of the link, and the bodies of its messages |
 
@@ -44,13 +44,13 @@
 )]
 
 mod aer;
+mod array;
 mod config;
 mod event;
 mod histogram;
 mod histogram_message;
 mod link;
 mod memory;
-mod once_per_bin;
 mod pixel;
 mod range;
 mod records;
@@ -59,12 +59,12 @@ mod status;
 mod version;
 
 pub use aer::*;
+pub use array::*;
 pub use config::*;
 pub use event::*;
 pub use histogram::*;
 pub use histogram_message::*;
 pub use link::*;
-pub use once_per_bin::*;
 pub use pixel::*;
 pub use range::*;
 pub use records::*;

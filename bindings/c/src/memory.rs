@@ -1,10 +1,9 @@
 //! Checks pointers that come from C.
 //!
 //! Each opaque type of the header holds a tag and a Rust value. [`object`] names the value and
-//! checks at compile time that it fits. The opaque words are [`MaybeUninit`], because a value may
+//! checks at compile time that it fits. The opaque words are `MaybeUninit`, because a value may
 //! contain padding.
 
-use core::mem::MaybeUninit;
 use core::{hint, slice};
 
 use crate::status::dtof_status_t;
@@ -111,33 +110,6 @@ pub(crate) unsafe fn object_mut<'a, C: Object + 'a>(
     Ok(unsafe { &mut (*pointer.cast::<Tagged<C::Value>>()).value })
 }
 
-/// An array of `number` initialised objects, to write.
-///
-/// # Safety
-/// As [`object_mut`]'s, for `number` of them.
-#[inline(always)]
-pub(crate) unsafe fn objects_mut<'a, C: Object + 'a>(
-    pointer: *mut C,
-    number: usize,
-) -> Result<&'a mut [Tagged<C::Value>], dtof_status_t> {
-    const { assert!(size_of::<C>() == size_of::<Tagged<C::Value>>()) };
-    check_number::<C>(number)?;
-    if number == 0 {
-        return Ok(&mut []);
-    }
-    let objects = pointer.cast::<Tagged<C::Value>>();
-    check(objects)?;
-    // SAFETY: as in `object_ref`, for each of them, and not longer than memory is. Only the tags need
-    // be initialised.
-    let unchecked: &[Tagged<MaybeUninit<C::Value>>] =
-        unsafe { slice::from_raw_parts(objects.cast(), number) };
-    if unchecked.iter().any(|object| object.tag != C::TAG) {
-        return Err(refused(DTOF_ERROR_NOT_INITIALISED));
-    }
-    // SAFETY: the tags show that all were written, by the promise; not longer than memory is.
-    Ok(unsafe { slice::from_raw_parts_mut(objects, number) })
-}
-
 /// Writes a value to memory that need not be initialised.
 ///
 /// # Safety
@@ -211,6 +183,28 @@ pub(crate) unsafe fn array_mut<'a, T, const N: usize>(
     check(pointer)?;
     // SAFETY: neither null nor misaligned, and so memory of that length, by the promise.
     Ok(unsafe { &mut *pointer.cast() })
+}
+
+/// Room for `number` values, each of which is written. The room of none may be anything.
+///
+/// # Safety
+/// As [`put`]'s, for `number` of them, and what is returned is alone in using them.
+pub(crate) unsafe fn room<T>(
+    pointer: *mut T,
+    number: usize,
+    value: impl Fn() -> T,
+) -> Result<&'static mut [T], dtof_status_t> {
+    check_number::<T>(number)?;
+    if number == 0 {
+        return Ok(&mut []);
+    }
+    check(pointer)?;
+    for place in 0..number {
+        // SAFETY: neither null nor misaligned, and so writable memory of that length, by the promise.
+        unsafe { pointer.add(place).write(value()) };
+    }
+    // SAFETY: all were written; not longer than memory is; no one else uses them, by the promise.
+    Ok(unsafe { slice::from_raw_parts_mut(pointer, number) })
 }
 
 /// Turns a result into the status that C gets.

@@ -6,9 +6,7 @@ use dtof_core::{AsyncPixel, LaserCycle, Look, PixelAddress};
 
 use crate::config::dtof_checked_config_t;
 use crate::event::dtof_event_t;
-use crate::memory::{
-    check, data_slice, initialise, object, object_mut, object_ref, objects_mut, put, status,
-};
+use crate::memory::{check, data_slice, initialise, object, object_mut, object_ref, put, status};
 use crate::statistics::dtof_statistics_t;
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{DTOF_ERROR_LENGTH, DTOF_ERROR_NO_EVENT};
@@ -177,47 +175,6 @@ pub unsafe extern "C" fn dtof_pixel_end_laser_cycles(
         }
         // SAFETY: the same promise.
         unsafe { put(look, outcome.into()) }
-    })
-}
-
-/// Does the same for an array of `number` pixels, with fewer instructions per pixel. `fired` gets
-/// the number of pixels with a new event in their slot; it may be null.
-///
-/// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
-/// DTOF_ERROR_NOT_INITIALISED.
-/// Threads: no other thread uses the pixels or `statistics` during the call.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn dtof_pixels_end_laser_cycles(
-    pixels: *mut dtof_pixel_t,
-    number: usize,
-    last: u64,
-    config: *const dtof_checked_config_t,
-    statistics: *mut dtof_statistics_t,
-    cycles: u16,
-    fired: *mut usize,
-) -> dtof_status_t {
-    status(|| {
-        // SAFETY: the caller's promise, see the crate.
-        let (pixels, config) = unsafe { (objects_mut(pixels, number)?, object_ref(config)?) };
-        // SAFETY: the same promise.
-        let statistics = unsafe { object_mut(statistics)? };
-        // Checked before any pixel changes.
-        if !fired.is_null() {
-            check(fired)?;
-        }
-        let mut events = 0;
-        for pixel in pixels {
-            let look =
-                pixel
-                    .value
-                    .end_laser_cycles(config, statistics, LaserCycle::new(last), cycles);
-            events += usize::from(look == Look::Event);
-        }
-        if fired.is_null() {
-            return Ok(());
-        }
-        // SAFETY: the same promise.
-        unsafe { put(fired, events) }
     })
 }
 

@@ -2,9 +2,10 @@
 
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::paper::Threshold;
-use dtof_core::{AnyRule, DepthEstimator};
+use dtof_core::{AnyRule, DepthEstimator, Neighbours};
 use dtof_link::{Configuration, Refusal, Report, SensorRecord, Source};
 
+use crate::array::dtof_layout_t;
 use crate::config::{
     DTOF_ESTIMATOR_CENTRED_WINDOW, DTOF_ESTIMATOR_CENTROID, DTOF_RULE_AVERAGE, DTOF_RULE_PAPER,
     DTOF_RULE_WINDOW, dtof_config_t,
@@ -13,7 +14,7 @@ use crate::link::dtof_link_t;
 use crate::memory::{array_mut, data_ref, data_slice, object_ref, put, status};
 use crate::statistics::dtof_statistics_t;
 use crate::status::dtof_status_t;
-use crate::status::dtof_status_t::{DTOF_ERROR_BLOCKS, DTOF_ERROR_DITHER, DTOF_ERROR_NEIGHBOURS};
+use crate::status::dtof_status_t::DTOF_ERROR_DITHER;
 use crate::version::{DTOF_BINS, dtof_counter_bits};
 
 /// Bytes of the body of SENSOR.
@@ -31,8 +32,10 @@ pub const DTOF_SOURCE_LINK: u8 = 0;
 /// Photons come from the sensor.
 pub const DTOF_SOURCE_SENSOR: u8 = 1;
 
-/// The configuration that the host requests. Check `pixel` with dtof_config_check, and compare
-/// the other fields with your device.
+/// The configuration that the host requests. Give `pixel` and `layout` to dtof_array_configure, and compare
+/// the other fields with your device. If your firmware has single pixels instead of an array, check `pixel` with
+/// dtof_config_check, and refuse block_levels, neighbours and once_per_bin other than 0 with DTOF_ERROR_BLOCKS,
+/// DTOF_ERROR_NEIGHBOURS and DTOF_ERROR_ONCE_PER_BIN. If your sensor gives histograms, refuse the last two.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct dtof_device_config_t {
@@ -42,18 +45,14 @@ pub struct dtof_device_config_t {
     pub bin_width_ps_q16: u32,
     /// The offset added to every range, in 1/256 mm.
     pub offset_mm_q8: i32,
-    /// The number of pixels, with addresses from 0.
-    pub pixels: u16,
+    /// The pixels, and how they work together.
+    pub layout: dtof_layout_t,
     /// Switch the laser off after the host has been silent for this many milliseconds: 200 to
     /// 60,000. 0 means never: refuse it with DTOF_ERROR_HOST_TIMEOUT, unless your laser may run
     /// without a host.
     pub host_timeout_ms: u16,
     /// DTOF_SOURCE_...
     pub source: u8,
-    /// 1 if the host asks that photons of one laser cycle in one bin count once: count them with
-    /// dtof_pixel_count_once_per_bin. If your sensor gives histograms, refuse it with
-    /// DTOF_ERROR_ONCE_PER_BIN.
-    pub once_per_bin: u8,
     /// The range S of the laser's dither, an even number of bins up to 254; 0 for none. Each laser cycle lasts
     /// P - S/2 + s bins, where P is the mean and s a random number from 0 to S. Refuse it with DTOF_ERROR_DITHER
     /// if it is more than your laser can.
@@ -62,12 +61,10 @@ pub struct dtof_device_config_t {
     pub dither_seed: u64,
 }
 
-/// Reads the body of CONFIGURE. Blocks of pixels, neighbours and dynamic depth are refused, as this library
-/// has none of them. `sensor_dead_time` is that of dtof_sensor_write. The settings get it if the host
+/// Reads the body of CONFIGURE. Dynamic depth is refused, as this library has none. `sensor_dead_time` is that of dtof_sensor_write. The settings get it if the host
 /// leaves the dead time to the sensor and the rule can use it.
 ///
-/// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_BLOCKS, DTOF_ERROR_NEIGHBOURS,
-/// DTOF_ERROR_DITHER if its range is odd, above 254 bins, or not 0 for photons of the link,
+/// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_DITHER if its range is odd, above 254 bins, or not 0 for photons of the link,
 /// DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
 /// DTOF_ERROR_DEAD_TIME, DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT,
 /// DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
@@ -84,12 +81,6 @@ pub unsafe extern "C" fn dtof_device_config_read(
         // SAFETY: the caller's promise, see the crate.
         let body = unsafe { data_slice(body, length)? };
         let requested = Configuration::from_le_bytes(body)?;
-        if requested.binning.is_some() {
-            return Err(DTOF_ERROR_BLOCKS);
-        }
-        if requested.neighbours.is_some() {
-            return Err(DTOF_ERROR_NEIGHBOURS);
-        }
         let range = requested.dither_bins;
         let is_of_sensor = requested.source == Source::Sensor;
         if range > MOST_DITHER || !range.is_multiple_of(2) || (range > 0 && !is_of_sensor) {
@@ -104,19 +95,33 @@ pub unsafe extern "C" fn dtof_device_config_read(
             pixel: settings_of(&requested, dead_time),
             bin_width_ps_q16: requested.bin_width_ps.to_bits(),
             offset_mm_q8: requested.offset_mm.to_bits(),
-            pixels: requested.pixels,
+            layout: layout_of(&requested),
             host_timeout_ms: requested.host_timeout_ms,
             source: match requested.source {
                 Source::Link => DTOF_SOURCE_LINK,
                 Source::Sensor => DTOF_SOURCE_SENSOR,
             },
-            once_per_bin: requested.once_per_bin.into(),
             dither_bins: requested.dither_bins,
             dither_seed: requested.dither_seed,
         };
         // SAFETY: the same promise.
         unsafe { put(config, read) }
     })
+}
+
+/// The layout of the pixels in a configuration.
+fn layout_of(requested: &Configuration) -> dtof_layout_t {
+    let (levels, patience) = requested
+        .binning
+        .map_or((0, 0), |binning| (binning.levels.raw(), binning.patience));
+    dtof_layout_t {
+        pixels: requested.pixels,
+        columns: requested.columns,
+        patience,
+        block_levels: levels,
+        neighbours: requested.neighbours.map_or(0, Neighbours::raw),
+        once_per_bin: requested.once_per_bin.into(),
+    }
 }
 
 /// The settings of the pixels in a configuration.

@@ -38,7 +38,7 @@ pub struct dtof_counts_t {
     pub rejected: u64,
     /// Photons outside the range gate.
     pub gated_out: u64,
-    /// Photons in a bin that had one in the same laser cycle, with dtof_pixel_count_once_per_bin.
+    /// Photons in a bin that had one in the same laser cycle, where photons count once per bin.
     pub repeated: u64,
     /// Events.
     pub events: u64,

@@ -2,7 +2,9 @@
 
 use core::ffi::{CStr, c_char};
 
-use dtof_core::{AerError, GateError, PixelConfigError, RangeScaleError, WindowWidthError};
+use dtof_core::{
+    AerError, ArrayError, GateError, PixelConfigError, RangeScaleError, WindowWidthError,
+};
 use dtof_link::Refusal;
 
 /// The result of a function. All but DTOF_OK are errors: nothing was done.
@@ -98,7 +100,7 @@ pub enum dtof_status_t {
     DTOF_ERROR_ZERO_THRESHOLD = 74,
     /// The patience of adaptive binning is 0.
     DTOF_ERROR_PATIENCE = 75,
-    /// There is no room for blocks of pixels. This library has none.
+    /// There is no room for blocks of pixels, or their levels are not 1 to 3.
     DTOF_ERROR_BLOCKS = 76,
     /// The host timeout is not 200 to 60,000 ms.
     DTOF_ERROR_HOST_TIMEOUT = 77,
@@ -108,7 +110,8 @@ pub enum dtof_status_t {
     DTOF_ERROR_ONCE_PER_BIN = 79,
     /// The laser cannot be dithered by so many bins.
     DTOF_ERROR_DITHER = 80,
-    /// Neighbours confirm nothing here.
+    /// Neighbours are not 4 or 8, or confirm nothing here: they need the window rule and photons, without
+    /// blocks and without a dead time.
     DTOF_ERROR_NEIGHBOURS = 81,
 }
 
@@ -139,6 +142,19 @@ impl From<GateError> for dtof_status_t {
 impl From<WindowWidthError> for dtof_status_t {
     fn from(_: WindowWidthError) -> Self {
         DTOF_ERROR_WINDOW_WIDTH
+    }
+}
+
+impl From<ArrayError> for dtof_status_t {
+    fn from(error: ArrayError) -> Self {
+        match error {
+            ArrayError::Pixels | ArrayError::Layout => DTOF_ERROR_PIXELS,
+            ArrayError::Blocks | ArrayError::NoLevel => DTOF_ERROR_BLOCKS,
+            ArrayError::BlocksAndNeighbours | ArrayError::NeighboursAndDeadTime => {
+                DTOF_ERROR_NEIGHBOURS
+            }
+            _ => DTOF_ERROR_CONFIGURATION,
+        }
     }
 }
 

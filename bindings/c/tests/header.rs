@@ -15,7 +15,7 @@ const SOURCES: [&str; 13] = [
     "statistics",
     "range",
     "pixel",
-    "once_per_bin",
+    "array",
     "histogram",
     "aer",
     "link",

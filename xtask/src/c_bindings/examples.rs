@@ -39,7 +39,9 @@ pub fn check(root: &Path, host: &Path, target: &Path) -> Result<()> {
     }
     fs::create_dir_all(&folder)?;
     events(&dtof, host, &folder)?;
-    monitor(&dtof, host)?;
+    for (options, off) in TOGETHER {
+        monitor(&dtof, host, options, off)?;
+    }
     silence(&dtof, host)
 }
 
@@ -124,11 +126,23 @@ fn device(host: &Path) -> Result<(Child, String, Receiver<String>)> {
     Ok((device, port, lines))
 }
 
-/// A host watches the device for a second. The sensor is off before and after.
-fn monitor(dtof: &Path, host: &Path) -> Result<()> {
+/// How pixels decide: alone, with blocks, with neighbours. With these, some events are at the targets of the rows
+/// above and below, so many bins off.
+const TOGETHER: [(&[&str], u32); 3] = [
+    (&[], 0),
+    (&["--binning", "3", "--once-per-bin"], 0),
+    (
+        &["--rule", "window", "--window", "3", "--neighbours", "8"],
+        2,
+    ),
+];
+
+/// A host watches the device for a second, with such options. The sensor is off before and after.
+fn monitor(dtof: &Path, host: &Path, options: &[&str], off: u32) -> Result<()> {
     let (mut device, port, lines) = device(host)?;
     let mut watch = Command::new(dtof);
     watch.args(["monitor", "--seconds", "1", "--device", &port]);
+    watch.args(options);
     let watched = watch.stdin(Stdio::null()).output()?;
     if !watched.status.success() {
         device.kill()?;
@@ -147,7 +161,7 @@ fn monitor(dtof: &Path, host: &Path) -> Result<()> {
     ensure!(events.len() > 100, "monitor: only {} events", events.len());
     let right = |event: &&Vec<u32>| {
         // Laser cycle, pixel, exposure, highest bin.
-        matches!(event[..], [_, pixel, _, bin] if bin == 30 + 2 * (pixel / 8))
+        matches!(event[..], [_, pixel, _, bin] if bin.abs_diff(30 + 2 * (pixel / 8)) <= off)
     };
     let right = events.iter().filter(right).count();
     ensure!(
@@ -156,7 +170,8 @@ fn monitor(dtof: &Path, host: &Path) -> Result<()> {
         events.len()
     );
     println!(
-        "device: {} events, {right} of them at their target",
+        "device {}: {} events, {right} of them at their target",
+        options.join(" "),
         events.len()
     );
     Ok(())

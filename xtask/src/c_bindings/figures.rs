@@ -16,9 +16,8 @@ const TOLERANCE: u64 = 20;
 const MORE: u64 = 10;
 /// Rows that are mostly calls of the library, and how many. Each call checks pointers and passes
 /// in memory what Rust has in registers.
-const CALLS: [(&str, u64); 4] = [
+const CALLS: [(&str, u64); 3] = [
     ("one photon", 1),
-    ("look of one pixel; no event", 1),
     ("take and pack an event", 2),
     // 44 batches, and a share of 44 calls for all pixels.
     ("exposure of one of 16 pixels", 47),

@@ -2,66 +2,67 @@
 
 #include "operations.h"
 
-static dtof_pixel_t pixels[PIXELS];
-static dtof_checked_config_t config;
-static dtof_statistics_t statistics;
+static dtof_place_t places[PIXELS];
+static dtof_array_t array;
+static dtof_config_t config;
 static dtof_aer_encoder_t encoder;
 
 uint32_t pixel_bytes(void)
 {
-    return sizeof(dtof_pixel_t);
+    return sizeof(dtof_place_t);
 }
 
 uint32_t configure(const struct settings *settings)
 {
-    dtof_config_t pixel_settings;
-    if (dtof_statistics_init(&statistics) != DTOF_OK
-        || dtof_config_paper(&pixel_settings) != DTOF_OK) {
+    if (dtof_array_init(&array, sizeof *places, places, PIXELS, NULL, 0) != DTOF_OK
+        || dtof_config_paper(&config) != DTOF_OK) {
         return 1;
     }
-    pixel_settings.rule = (uint8_t)settings->rule;
-    pixel_settings.window = (uint8_t)settings->window;
-    pixel_settings.estimator = (uint8_t)settings->estimator;
-    pixel_settings.alpha_q8 = (uint16_t)settings->alpha_q8;
-    pixel_settings.z_q12 = (uint16_t)settings->z_q12;
-    pixel_settings.minimum_count = settings->minimum_count;
-    pixel_settings.x = (uint16_t)settings->x;
-    pixel_settings.l1 = (uint16_t)settings->l1;
-    pixel_settings.l2 = (uint16_t)settings->l2;
-    return dtof_config_check(&pixel_settings, &config);
+    config.rule = (uint8_t)settings->rule;
+    config.window = (uint8_t)settings->window;
+    config.estimator = (uint8_t)settings->estimator;
+    config.alpha_q8 = (uint16_t)settings->alpha_q8;
+    config.z_q12 = (uint16_t)settings->z_q12;
+    config.minimum_count = settings->minimum_count;
+    config.x = (uint16_t)settings->x;
+    config.l1 = (uint16_t)settings->l1;
+    config.l2 = (uint16_t)settings->l2;
+    return begin(0);
 }
 
 uint32_t begin(uint32_t number)
 {
-    for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
-        dtof_pixel_init(&pixels[pixel], sizeof pixels[pixel], pixel);
-    }
+    dtof_layout_t layout = {.pixels = PIXELS};
+    (void)number;
     dtof_aer_encoder_init(&encoder);
-    return number;
+    return dtof_array_configure(&array, &config, &layout);
 }
 
 uint32_t photon(uint32_t code)
 {
-    return dtof_pixel_count(&pixels[0], &config, (uint16_t)code);
+    return dtof_array_photon(&array, 0, (uint16_t)code);
 }
 
 uint32_t photons(uint32_t number)
 {
-    return dtof_pixel_count_batch(&pixels[number % PIXELS], &config, codes, PHOTONS);
+    return dtof_array_photons(&array, (uint16_t)(number % PIXELS), codes, PHOTONS);
 }
 
-uint32_t end_one(uint32_t cycle)
+uint32_t end(uint32_t cycle)
 {
-    dtof_look_t look;
-    dtof_pixel_end_laser_cycles(&pixels[0], &config, cycle, &statistics, 1, &look);
-    return look;
+    (void)cycle;
+    return dtof_array_end_laser_cycles(&array, 1, NULL);
 }
 
-uint32_t end_all(uint32_t cycle)
+uint32_t take(uint32_t number)
 {
-    size_t fired;
-    dtof_pixels_end_laser_cycles(pixels, PIXELS, cycle, &config, &statistics, 1, &fired);
-    return fired;
+    dtof_event_t event;
+    (void)number;
+    uint32_t events = 0;
+    while (dtof_array_next_event(&array, &event) == DTOF_OK) {
+        events++;
+    }
+    return events;
 }
 
 uint32_t pack(uint32_t number)
@@ -69,7 +70,7 @@ uint32_t pack(uint32_t number)
     dtof_event_t event;
     size_t length;
     (void)number;
-    if (dtof_pixel_take_event(&pixels[0], &event) != DTOF_OK
+    if (dtof_array_next_event(&array, &event) != DTOF_OK
         || dtof_aer_encode(&encoder, &event, packed, &length) != DTOF_OK) {
         return 0;
     }
@@ -81,10 +82,10 @@ uint32_t exposure(uint32_t number)
     for (uint32_t cycle = 0; cycle < 44; cycle++) {
         uint32_t first = 6 * cycle;
         uint32_t left = first < PHOTONS ? PHOTONS - first : 0;
-        for (uint32_t pixel = 0; pixel < PIXELS; pixel++) {
-            dtof_pixel_count_batch(&pixels[pixel], &config, codes + first, left < 6 ? left : 6);
+        for (uint16_t pixel = 0; pixel < PIXELS; pixel++) {
+            dtof_array_photons(&array, pixel, codes + first, left < 6 ? left : 6);
         }
-        end_all(cycle);
+        end(cycle);
     }
     return pack(number);
 }

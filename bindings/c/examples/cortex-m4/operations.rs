@@ -9,8 +9,8 @@ use core::mem::MaybeUninit;
 
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
-    AerEncoder, AnyRule, AsyncPixel, AverageRule, CentredWindow, Count, DepthEstimator, LaserCycle,
-    Look, PaperRule, PixelAddress, PixelConfig, Statistics, WindowRule,
+    AerEncoder, AnyRule, Array, ArrayConfig, AverageRule, CentredWindow, Count, DepthEstimator,
+    PaperRule, PixelArray, PixelConfig, PixelPlace, WindowRule,
 };
 
 const PIXELS: usize = 16;
@@ -36,18 +36,18 @@ unsafe extern "C" {
 }
 
 struct State {
-    pixels: [AsyncPixel<128>; PIXELS],
-    config: Option<PixelConfig<128, AnyRule>>,
-    statistics: Statistics,
+    array: PixelArray<'static, 128, AnyRule>,
+    config: Option<ArrayConfig<128, AnyRule>>,
     encoder: AerEncoder,
 }
 
-struct Shared(UnsafeCell<MaybeUninit<State>>);
+struct Shared<T>(UnsafeCell<MaybeUninit<T>>);
 
 // SAFETY: there is one thread, and no interrupt.
-unsafe impl Sync for Shared {}
+unsafe impl<T> Sync for Shared<T> {}
 
-static STATE: Shared = Shared(UnsafeCell::new(MaybeUninit::zeroed()));
+static PLACES: Shared<[PixelPlace<128>; PIXELS]> = Shared(UnsafeCell::new(MaybeUninit::uninit()));
+static STATE: Shared<State> = Shared(UnsafeCell::new(MaybeUninit::uninit()));
 
 fn state() -> &'static mut State {
     // SAFETY: there is one thread, and no operation calls another while it uses the state.
@@ -60,7 +60,7 @@ fn photons_of() -> &'static [u16; PHOTONS] {
     unsafe { &codes }
 }
 
-fn config_of(settings: &Settings) -> Option<PixelConfig<128, AnyRule>> {
+fn config_of(settings: &Settings) -> Option<ArrayConfig<128, AnyRule>> {
     let count = Count::new(settings.minimum_count)?;
     let alpha = U8F8::from_bits(settings.alpha_q8 as u16);
     let z = U4F12::from_bits(settings.z_q12 as u16);
@@ -79,12 +79,13 @@ fn config_of(settings: &Settings) -> Option<PixelConfig<128, AnyRule>> {
     };
     let config = PixelConfig::with_rule(rule).estimator(estimator);
     let [x, l1, l2] = [settings.x, settings.l1, settings.l2].map(|cycles| cycles as u16);
-    config.x(x).l1(l1).l2(l2).build().ok()
+    let config = config.x(x).l1(l1).l2(l2).build().ok()?;
+    Some(ArrayConfig::new(Array::new(PIXELS as u32, 1)?, config))
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn pixel_bytes() -> u32 {
-    size_of::<AsyncPixel<128>>() as u32
+    size_of::<PixelPlace<128>>() as u32
 }
 
 /// Must be called first.
@@ -95,76 +96,61 @@ extern "C" fn pixel_bytes() -> u32 {
 pub unsafe extern "C" fn configure(settings: *const Settings) -> u32 {
     // SAFETY: the caller's promise.
     let config = unsafe { settings.as_ref() }.and_then(config_of);
-    let is_none = config.is_none();
+    // SAFETY: there is one thread, and the array of an earlier call is gone.
+    let places = unsafe { &mut *PLACES.0.get() };
+    let places = places.write(core::array::from_fn(|_| PixelPlace::new()));
     // SAFETY: there is one thread.
     let state = unsafe { &mut *STATE.0.get() };
     state.write(State {
-        // `begin` gives them their addresses.
-        pixels: [const { AsyncPixel::new(PixelAddress::new(0)) }; PIXELS],
+        array: PixelArray::new(places, &mut []),
         config,
-        statistics: Statistics::new(),
         encoder: AerEncoder::new(),
     });
-    is_none.into()
+    begin(0)
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn begin(number: u32) -> u32 {
+extern "C" fn begin(_: u32) -> u32 {
     let state = state();
-    for (address, pixel) in (0..).zip(&mut state.pixels) {
-        *pixel = AsyncPixel::new(PixelAddress::new(address));
-    }
     state.encoder = AerEncoder::new();
-    number
+    let config = state.config.as_ref();
+    let configured = config.map(|config| state.array.configure(config));
+    (configured != Some(Ok(()))).into()
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn photon(code: u32) -> u32 {
-    let State { pixels, config, .. } = state();
-    if let Some(config) = config {
-        pixels[0].count(config, code as u16);
-    }
+    state().array.photon(0, code as u16);
     0
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn photons(number: u32) -> u32 {
-    let State { pixels, config, .. } = state();
-    if let Some(config) = config {
-        pixels[number as usize % PIXELS].count_batch(config, photons_of());
-    }
+    state()
+        .array
+        .photons(number as usize % PIXELS, photons_of());
     0
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn end_one(cycle: u32) -> u32 {
-    let state = state();
-    let Some(config) = &state.config else {
-        return 0;
-    };
-    let cycle = LaserCycle::new(cycle.into());
-    state.pixels[0].end_laser_cycle(config, &mut state.statistics, cycle) as u32
+extern "C" fn end(_: u32) -> u32 {
+    state().array.end_laser_cycle();
+    0
 }
 
 #[unsafe(no_mangle)]
-extern "C" fn end_all(cycle: u32) -> u32 {
-    let state = state();
-    let Some(config) = &state.config else {
-        return 0;
-    };
-    let mut fired = 0;
-    for pixel in &mut state.pixels {
-        let cycle = LaserCycle::new(cycle.into());
-        let look = pixel.end_laser_cycle(config, &mut state.statistics, cycle);
-        fired += u32::from(look == Look::Event);
+extern "C" fn take(_: u32) -> u32 {
+    let mut events = 0;
+    while state().array.next_event().is_some() {
+        events += 1;
     }
-    fired
+    events
 }
 
 #[unsafe(no_mangle)]
 extern "C" fn pack(_: u32) -> u32 {
     let state = state();
-    let Some(event) = state.pixels[0].take_event() else {
+    let Some(event) = state.array.next_event() else {
         return 0;
     };
     let (time, word) = state.encoder.encode(&event);
@@ -183,14 +169,11 @@ extern "C" fn pack(_: u32) -> u32 {
 extern "C" fn exposure(number: u32) -> u32 {
     let mut photons = photons_of().chunks(6);
     for cycle in 0..44 {
-        let State { pixels, config, .. } = state();
         let arrived = photons.next().unwrap_or_default();
-        if let Some(config) = config {
-            for pixel in pixels {
-                pixel.count_batch(config, arrived);
-            }
+        for pixel in 0..PIXELS {
+            state().array.photons(pixel, arrived);
         }
-        end_all(cycle);
+        end(cycle);
     }
     pack(number)
 }

@@ -1,11 +1,13 @@
 //! A device with the C functions and a host of `dtof-link`.
 
+use core::ptr::null_mut;
+
 use dtof_c::dtof_status_t::*;
 use dtof_c::*;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
 use dtof_core::{
-    AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule, PixelAddress,
-    WindowRule,
+    AnyRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, Neighbours, PaperRule,
+    PixelAddress, WindowRule,
 };
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
@@ -15,7 +17,8 @@ use dtof_link::{
     Source, StopReason,
 };
 
-use crate::{OK, checked, config, link, once_per_bin, pixel, statistics, zeroed};
+use crate::array::Driven;
+use crate::{OK, checked, config, link, paper, pixel, statistics, zeroed};
 
 /// A host, a device, and the wire between them.
 struct Pair {
@@ -204,10 +207,14 @@ fn the_hosts_configuration_becomes_settings() {
         },
         bin_width_ps_q16: 97 * 65536 + 32768,
         offset_mm_q8: -3200,
-        pixels: 9,
+        layout: dtof_layout_t {
+            pixels: 9,
+            columns: 3,
+            once_per_bin: 1,
+            ..dtof_layout_t::default()
+        },
         host_timeout_ms: 700,
         source: DTOF_SOURCE_SENSOR,
-        once_per_bin: 1,
         dither_bins: 128,
         dither_seed: u64::MAX - 5,
     };
@@ -283,24 +290,53 @@ fn the_host_says_whether_photons_count_once_per_bin() {
         (255, Err(DTOF_ERROR_CONFIGURATION)),
     ] {
         record[54] = byte;
-        assert_eq!(read(&record).map(|config| config.once_per_bin), expected);
+        let read = read(&record).map(|config| config.layout.once_per_bin);
+        assert_eq!(read, expected);
     }
+}
+
+#[test]
+fn the_host_says_how_pixels_work_together() {
+    let alone = Configuration {
+        once_per_bin: false,
+        dead_time: None,
+        ..configuration()
+    };
+    let layout = |configuration: Configuration| read(&configuration.to_le_bytes()).unwrap().layout;
+    let expected = dtof_layout_t {
+        pixels: 9,
+        columns: 3,
+        ..dtof_layout_t::default()
+    };
+    assert_eq!(layout(alone), expected);
+    let binning = Some(AdaptiveBinning {
+        levels: BlockLevel::saturating(2),
+        patience: 64,
+    });
+    let blocks = layout(Configuration { binning, ..alone });
+    assert_eq!((blocks.block_levels, blocks.patience), (2, 64));
+    let neighbours = Some(Neighbours::Eight);
+    let around = layout(Configuration {
+        neighbours,
+        ..alone
+    });
+    assert_eq!(
+        around,
+        dtof_layout_t {
+            neighbours: 8,
+            ..expected
+        }
+    );
 }
 
 #[test]
 fn unsupported_configurations_are_refused() {
     let good = configuration();
-    let binning = Some(AdaptiveBinning {
-        levels: BlockLevel::MAX,
-        patience: 64,
-    });
     let dynamic_depth = Some(DynamicDepth::default());
-    let blocks = Configuration { binning, ..good };
     let changes = Configuration {
         dynamic_depth,
         ..good
     };
-    assert_eq!(read(&blocks.to_le_bytes()), Err(DTOF_ERROR_BLOCKS));
     assert_eq!(read(&changes.to_le_bytes()), Err(DTOF_ERROR_CONFIGURATION));
     assert_eq!(
         read(&good.to_le_bytes()[1..]),
@@ -338,9 +374,16 @@ fn records_are_those_of_the_link() {
     let (mut done, codes) = (statistics(), [60u16; 8]);
     // SAFETY: each pointer leads to an object of its type.
     unsafe {
-        let (pixel, bins, first) = (&mut pixel(0), &mut once_per_bin(), codes.as_ptr());
-        let counted = dtof_pixel_count_once_per_bin(pixel, &config(), bins, &mut done, first, 8);
-        assert_eq!(counted, OK);
+        let mut driven = Driven::new();
+        let layout = dtof_layout_t {
+            pixels: 1,
+            once_per_bin: 1,
+            ..dtof_layout_t::default()
+        };
+        assert_eq!(driven.configure(&paper(), &layout), OK);
+        let (array, blocks, losses) = (&mut driven.array, null_mut(), null_mut());
+        assert_eq!(dtof_array_photons(array, 0, codes.as_ptr(), 8), OK);
+        assert_eq!(dtof_array_statistics(array, &mut done, blocks, losses), OK);
         let room = sensor.as_mut_ptr();
         let written = dtof_sensor_write(9, 100, 20, 40, 250 << 16, 1_000_000, -256, room);
         assert_eq!(written, OK);

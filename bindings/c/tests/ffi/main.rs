@@ -2,6 +2,7 @@
 
 #![allow(unsafe_code, reason = "C functions")]
 
+mod array;
 mod link;
 mod memory;
 mod pixels;
@@ -9,9 +10,9 @@ mod refusals;
 mod words;
 
 use core::mem::MaybeUninit;
+use core::ptr;
 
 use dtof_c::*;
-use dtof_link::HistogramPart;
 
 /// A static of a C program before anything has initialised it.
 fn zeroed<T>() -> T {
@@ -43,10 +44,11 @@ fn pixel(address: u16) -> dtof_pixel_t {
     initialised(|pixel| unsafe { dtof_pixel_init(pixel, size_of::<dtof_pixel_t>(), address) })
 }
 
-fn once_per_bin() -> dtof_once_per_bin_t {
-    let size = size_of::<dtof_once_per_bin_t>();
-    // SAFETY: the pointer leads to an object of its type.
-    initialised(|bins| unsafe { dtof_once_per_bin_init(bins, size) })
+/// An array with room for no pixel.
+fn array() -> dtof_array_t {
+    let (none, no_block) = (ptr::null_mut(), ptr::null_mut());
+    // SAFETY: the pointer leads to an array.
+    initialised(|array| unsafe { dtof_array_init(array, DTOF_PLACE_SIZE, none, 0, no_block, 0) })
 }
 
 fn statistics() -> dtof_statistics_t {
@@ -74,17 +76,6 @@ fn decoder() -> dtof_aer_decoder_t {
 fn link() -> dtof_link_t {
     // SAFETY: the pointer leads to a link.
     initialised(|link| unsafe { dtof_link_init(link, size_of::<dtof_link_t>(), 64) })
-}
-
-/// The laser cycles of a pixel's exposure.
-fn exposure(pixel: *const dtof_pixel_t) -> u32 {
-    let mut body = [0; DTOF_BODY_BYTES];
-    let (room, mut length) = (body.as_mut_ptr(), 0);
-    // SAFETY: the tests pass pixels; the other pointers lead to objects of their types.
-    let status = unsafe { dtof_pixel_histogram_write(pixel, 0, 0, room, &mut length) };
-    assert_eq!(status, OK);
-    let part = HistogramPart::from_le_bytes(&body[..length]);
-    part.unwrap().unwrap().head().exposure
 }
 
 const OK: dtof_status_t = dtof_status_t::DTOF_OK;

@@ -11,8 +11,7 @@ use dtof_c::*;
 use proptest::prelude::*;
 
 use crate::{
-    OK, checked, config, decoder, encoder, exposure, link, once_per_bin, paper, pixel, scale,
-    statistics, zeroed,
+    OK, array, checked, config, decoder, encoder, link, paper, pixel, scale, statistics, zeroed,
 };
 
 /// Uninitialised memory.
@@ -41,11 +40,13 @@ fn functions_write_to_uninitialised_memory() {
     let (mut scale, mut range, mut link) = (Room::new(), Room::new(), Room::new());
     let (mut encoder, mut decoder, mut record) = (Room::new(), Room::new(), Room::new());
     let (mut length, mut state, mut counts) = (Room::new(), Room::new(), Room::new());
-    let (mut silent, mut bins) = (Room::new(), Room::new());
+    let mut silent = Room::new();
     let mut wire = Room::<[u8; DTOF_WIRE_BYTES]>::new();
     let mut body = Room::<[u8; DTOF_BODY_BYTES]>::new();
     let mut events = Room::<[dtof_event_t; DTOF_ECHOES]>::new();
-    let (mut look, mut fired, mut session) = (Room::new(), Room::new(), Room::new());
+    let (mut look, mut session) = (Room::new(), Room::new());
+    let (mut array, mut left) = (Room::new(), Room::new());
+    let (mut places, mut block) = (Room::<[dtof_place_t; 2]>::new(), Room::new());
     let mut sensor = Room::<[u8; DTOF_SENSOR_BYTES]>::new();
     let mut report = Room::<[u8; DTOF_REPORT_BYTES]>::new();
     let mut done = Room::new();
@@ -67,25 +68,44 @@ fn functions_write_to_uninitialised_memory() {
             dtof_pixel_count_batch(pixel.at(), &config, first, number),
             OK
         );
-        assert_eq!(
-            dtof_once_per_bin_init(bins.at(), DTOF_ONCE_PER_BIN_SIZE),
-            OK
-        );
-        let (one, bins) = (pixel.at(), bins.at());
-        let counted = dtof_pixel_count_once_per_bin(one, &config, bins, done, first, number);
-        assert_eq!(counted, OK);
-        assert_eq!(dtof_once_per_bin_end_laser_cycle(bins), OK);
-        let last = 44;
-        let ended = dtof_pixel_end_laser_cycles(one, &config, 40, done, 40, look.at());
-        assert_eq!((ended, look.read()), (OK, dtof_look_t::DTOF_LOOK_TOO_EARLY));
-        let ended = dtof_pixels_end_laser_cycles(one, 1, last, &config, done, 4, fired.at());
-        assert_eq!((ended, fired.read()), (OK, 1));
+        let one = pixel.at();
+        let ended = dtof_pixel_end_laser_cycles(one, &config, 44, done, 44, look.at());
+        assert_eq!((ended, look.read()), (OK, dtof_look_t::DTOF_LOOK_EVENT));
         let mut event = Room::new();
         assert_eq!(dtof_pixel_take_event(one, event.at()), OK);
         assert_eq!(dtof_pixel_add_photons(one, done), OK);
         assert_eq!(dtof_statistics_read(done, counts.at()), OK);
         let counts = counts.read();
-        assert_eq!((counts.events, counts.repeated), (1, 19));
+        assert_eq!((counts.events, counts.counted), (1, 20));
+
+        let (at, room) = (array.at(), places.at().cast());
+        assert_eq!(
+            dtof_array_init(at, DTOF_PLACE_SIZE, room, 2, block.at(), 1),
+            OK
+        );
+        let layout = dtof_layout_t {
+            pixels: 2,
+            patience: 8,
+            block_levels: 1,
+            ..dtof_layout_t::default()
+        };
+        assert_eq!(dtof_array_configure(at, settings.at(), &layout), OK);
+        assert_eq!(dtof_array_photons(at, 1, first, number), OK);
+        for _ in 0..11 {
+            assert_eq!(dtof_array_end_laser_cycles(at, 4, left.at()), OK);
+        }
+        assert_eq!(left.read(), 0);
+        assert_eq!(dtof_array_next_event(at, event.at()), OK);
+        let (mut cycles, mut losses) = (Room::new(), Room::new());
+        assert_eq!(dtof_array_cycles(at, cycles.at()), OK);
+        assert_eq!(cycles.read(), 44);
+        let mut of_blocks = Room::new();
+        let read = dtof_array_statistics(at, done, of_blocks.at(), losses.at());
+        assert_eq!((read, losses.read()), (OK, dtof_losses_t::default()));
+        let (mut written, room) = (Room::new(), body.at().cast::<u8>());
+        let status = dtof_array_histogram_write(at, 1, 0, room, written.at());
+        assert_eq!(status, OK);
+        assert!(written.read() > 0);
 
         let room = events.at().cast::<dtof_event_t>();
         let (counts, found) = (wide.as_ptr(), length.at());
@@ -175,11 +195,11 @@ type Call = fn(*mut u8) -> dtof_status_t;
 
 /// Each function that takes an initialised object: its name, the type, and a call.
 #[rustfmt::skip]
-const TAKES: [(&str, &str, Call); 37] = {
+const TAKES: [(&str, &str, Call); 39] = {
     const CODES: *const u16 = [0u16; DTOF_BINS].as_ptr();
     const COUNTS: *const u32 = [0u32; DTOF_BINS].as_ptr();
     const NO_LOOK: *mut dtof_look_t = ptr::null_mut();
-    const NO_COUNT: *mut usize = ptr::null_mut();
+    const NO_LEFT: *mut u16 = ptr::null_mut();
     // SAFETY: all memory is long enough and aligned for each type.
     unsafe {[
         ("dtof_statistics_read", "dtof_statistics_t", |p| dtof_statistics_read(p.cast(), &mut zeroed())),
@@ -190,20 +210,22 @@ const TAKES: [(&str, &str, Call); 37] = {
         ("dtof_pixel_count_batch", "dtof_checked_config_t", |p| dtof_pixel_count_batch(&mut pixel(0), p.cast(), CODES, 1)),
         ("dtof_pixel_count_frame", "dtof_pixel_t", |p| dtof_pixel_count_frame(p.cast(), &config(), CODES)),
         ("dtof_pixel_count_frame", "dtof_checked_config_t", |p| dtof_pixel_count_frame(&mut pixel(0), p.cast(), CODES)),
-        ("dtof_once_per_bin_end_laser_cycle", "dtof_once_per_bin_t", |p| dtof_once_per_bin_end_laser_cycle(p.cast())),
-        ("dtof_pixel_count_once_per_bin", "dtof_pixel_t", |p| dtof_pixel_count_once_per_bin(p.cast(), &config(), &mut once_per_bin(), &mut statistics(), CODES, 1)),
-        ("dtof_pixel_count_once_per_bin", "dtof_checked_config_t", |p| dtof_pixel_count_once_per_bin(&mut pixel(0), p.cast(), &mut once_per_bin(), &mut statistics(), CODES, 1)),
-        ("dtof_pixel_count_once_per_bin", "dtof_once_per_bin_t", |p| dtof_pixel_count_once_per_bin(&mut pixel(0), &config(), p.cast(), &mut statistics(), CODES, 1)),
-        ("dtof_pixel_count_once_per_bin", "dtof_statistics_t", |p| dtof_pixel_count_once_per_bin(&mut pixel(0), &config(), &mut once_per_bin(), p.cast(), CODES, 1)),
         ("dtof_pixel_end_laser_cycles", "dtof_pixel_t", |p| dtof_pixel_end_laser_cycles(p.cast(), &config(), 0, &mut statistics(), 1, NO_LOOK)),
         ("dtof_pixel_end_laser_cycles", "dtof_checked_config_t", |p| dtof_pixel_end_laser_cycles(&mut pixel(0), p.cast(), 0, &mut statistics(), 1, NO_LOOK)),
         ("dtof_pixel_end_laser_cycles", "dtof_statistics_t", |p| dtof_pixel_end_laser_cycles(&mut pixel(0), &config(), 0, p.cast(), 1, NO_LOOK)),
-        ("dtof_pixels_end_laser_cycles", "dtof_pixel_t", |p| dtof_pixels_end_laser_cycles(p.cast(), 1, 0, &config(), &mut statistics(), 1, NO_COUNT)),
-        ("dtof_pixels_end_laser_cycles", "dtof_checked_config_t", |p| dtof_pixels_end_laser_cycles(&mut pixel(0), 1, 0, p.cast(), &mut statistics(), 1, NO_COUNT)),
-        ("dtof_pixels_end_laser_cycles", "dtof_statistics_t", |p| dtof_pixels_end_laser_cycles(&mut pixel(0), 1, 0, &config(), p.cast(), 1, NO_COUNT)),
         ("dtof_pixel_take_event", "dtof_pixel_t", |p| dtof_pixel_take_event(p.cast(), &mut zeroed())),
         ("dtof_pixel_add_photons", "dtof_pixel_t", |p| dtof_pixel_add_photons(p.cast(), &mut statistics())),
         ("dtof_pixel_add_photons", "dtof_statistics_t", |p| dtof_pixel_add_photons(&pixel(0), p.cast())),
+        ("dtof_array_configure", "dtof_array_t", |p| dtof_array_configure(p.cast(), &paper(), &zeroed())),
+        ("dtof_array_leave_out", "dtof_array_t", |p| dtof_array_leave_out(p.cast(), 0)),
+        ("dtof_array_photon", "dtof_array_t", |p| dtof_array_photon(p.cast(), 0, 0)),
+        ("dtof_array_photons", "dtof_array_t", |p| dtof_array_photons(p.cast(), 0, CODES, 1)),
+        ("dtof_array_end_laser_cycles", "dtof_array_t", |p| dtof_array_end_laser_cycles(p.cast(), 1, NO_LEFT)),
+        ("dtof_array_next_event", "dtof_array_t", |p| dtof_array_next_event(p.cast(), &mut zeroed())),
+        ("dtof_array_lost", "dtof_array_t", |p| dtof_array_lost(p.cast(), 1, 1)),
+        ("dtof_array_cycles", "dtof_array_t", |p| dtof_array_cycles(p.cast(), &mut 0)),
+        ("dtof_array_statistics", "dtof_array_t", |p| dtof_array_statistics(p.cast(), &mut zeroed(), &mut zeroed(), &mut zeroed())),
+        ("dtof_array_histogram_write", "dtof_array_t", |p| dtof_array_histogram_write(p.cast(), 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
         ("dtof_histogram_decide", "dtof_checked_config_t", |p| dtof_histogram_decide(p.cast(), COUNTS, 0, 0, 1, &mut statistics(), echoes().as_mut_ptr(), &mut 0)),
         ("dtof_histogram_decide", "dtof_statistics_t", |p| dtof_histogram_decide(&config(), COUNTS, 0, 0, 1, p.cast(), echoes().as_mut_ptr(), &mut 0)),
         ("dtof_aer_encode", "dtof_aer_encoder_t", |p| dtof_aer_encode(p.cast(), &event(), [0; 32].as_mut_ptr(), &mut 0)),
@@ -223,7 +245,10 @@ const TAKES: [(&str, &str, Call); 37] = {
 };
 
 /// Parameters that a function initialises, besides the functions named `..._init`.
-const INITIALISES: [(&str, &str); 1] = [("dtof_config_check", "dtof_checked_config_t")];
+const INITIALISES: [(&str, &str); 2] = [
+    ("dtof_config_check", "dtof_checked_config_t"),
+    ("dtof_array_statistics", "dtof_statistics_t"),
+];
 
 /// An event whose fields are in range.
 const fn event() -> dtof_event_t {
@@ -256,7 +281,7 @@ fn an_object_without_the_tag_of_its_type_is_refused() {
         ("dtof_scale_t", Memory::with(scale())),
         ("dtof_checked_config_t", Memory::with(config())),
         ("dtof_pixel_t", Memory::with(pixel(0))),
-        ("dtof_once_per_bin_t", Memory::with(once_per_bin())),
+        ("dtof_array_t", Memory::with(array())),
         ("dtof_aer_encoder_t", Memory::with(encoder())),
         ("dtof_aer_decoder_t", Memory::with(decoder())),
         ("dtof_link_t", Memory::with(link())),
@@ -302,26 +327,9 @@ fn every_object_of_the_header_is_checked() {
     assert_eq!(found, checked.chain(INITIALISES).collect());
 }
 
-#[test]
-fn one_pixel_without_a_tag_leaves_all_as_they_were() {
-    let (config, mut done, mut fired) = (config(), statistics(), 0);
-    let mut pixels = [pixel(0), zeroed(), pixel(2)];
-    let mut end = |pixels: &mut [dtof_pixel_t; 3]| {
-        let first = pixels.as_mut_ptr();
-        // SAFETY: each pointer leads to objects of its type.
-        unsafe { dtof_pixels_end_laser_cycles(first, 3, 0, &config, &mut done, 40, &mut fired) }
-    };
-    assert_eq!(end(&mut pixels), DTOF_ERROR_NOT_INITIALISED);
-    pixels[1] = pixel(1);
-    assert_eq!(end(&mut pixels), OK);
-    for pixel in &mut pixels {
-        assert_eq!(exposure(pixel), 40);
-    }
-}
-
 /// Pointers of the functions, each with the alignment of its type.
 #[rustfmt::skip]
-const POINTERS: [(usize, Call); 38] = {
+const POINTERS: [(usize, Call); 43] = {
     // SAFETY: the tests pass null and misaligned pointers only.
     unsafe {[
         (4, |p| dtof_config_paper(p.cast())),
@@ -333,12 +341,17 @@ const POINTERS: [(usize, Call); 38] = {
         (4, |p| dtof_range(p.cast(), 0, &mut 0)),
         (4, |p| dtof_range(&scale(), 0, p.cast())),
         (4, |p| dtof_pixel_init(p.cast(), DTOF_PIXEL_SIZE, 0)),
-        (4, |p| dtof_once_per_bin_init(p.cast(), DTOF_ONCE_PER_BIN_SIZE)),
-        (4, |p| dtof_once_per_bin_end_laser_cycle(p.cast())),
-        (4, |p| dtof_pixel_count_once_per_bin(p.cast(), &zeroed(), &mut zeroed(), &mut zeroed(), &0, 1)),
-        (4, |p| dtof_pixel_count_once_per_bin(&mut pixel(0), &config(), p.cast(), &mut zeroed(), &0, 1)),
-        (8, |p| dtof_pixel_count_once_per_bin(&mut pixel(0), &config(), &mut once_per_bin(), p.cast(), &0, 1)),
-        (2, |p| dtof_pixel_count_once_per_bin(&mut pixel(0), &config(), &mut once_per_bin(), &mut statistics(), p.cast(), 1)),
+        (8, |p| dtof_array_init(p.cast(), DTOF_PLACE_SIZE, ptr::null_mut(), 0, ptr::null_mut(), 0)),
+        (4, |p| dtof_array_init(&mut zeroed(), DTOF_PLACE_SIZE, p.cast(), 1, ptr::null_mut(), 0)),
+        (4, |p| dtof_array_init(&mut zeroed(), DTOF_PLACE_SIZE, ptr::null_mut(), 0, p.cast(), 1)),
+        (8, |p| dtof_array_configure(p.cast(), &paper(), &zeroed())),
+        (4, |p| dtof_array_configure(&mut array(), p.cast(), &zeroed())),
+        (2, |p| dtof_array_configure(&mut array(), &paper(), p.cast())),
+        (2, |p| dtof_array_photons(&mut array(), 0, p.cast(), 1)),
+        (2, |p| dtof_array_end_laser_cycles(&mut array(), 2, p.cast())),
+        (8, |p| dtof_array_next_event(&mut array(), p.cast())),
+        (8, |p| dtof_array_cycles(&array(), p.cast())),
+        (8, |p| dtof_array_statistics(&array(), p.cast(), &mut zeroed(), &mut zeroed())),
         (4, |p| dtof_pixel_take_event(p.cast(), &mut zeroed())),
         (8, |p| dtof_pixel_take_event(&mut pixel(0), p.cast())),
         (4, |p| dtof_pixel_add_photons(p.cast(), &mut zeroed())),
@@ -436,7 +449,7 @@ fn version_and_bins_are_those_of_the_build() {
 proptest! {
     /// A program may have overwritten all but the tags, or all bytes from one on.
     #[test]
-    fn any_bytes_are_a_pixel_a_scale_bins_and_statistics(
+    fn any_bytes_are_a_pixel_a_scale_and_statistics(
         mut bytes in prop::collection::vec(any::<u8>(), DTOF_PIXEL_SIZE - 4),
         ones in any::<bool>(),
         dead_time in prop_oneof![Just(0u16), Just(20), Just(u16::MAX)],
@@ -456,13 +469,12 @@ proptest! {
         let mut memories = [
             Memory::with(pixel(0)),
             Memory::with(scale()),
-            Memory::with(once_per_bin()),
             Memory::with(statistics()),
         ];
         for memory in &mut memories {
             memory.0[from..4 + bytes.len()].write_copy_of_slice(&bytes[from - 4..]);
         }
-        let [mut pixel, mut scale, mut bins, mut read] = memories;
+        let [mut pixel, mut scale, mut read] = memories;
         let dead_time = if rule == DTOF_RULE_WINDOW { dead_time } else { 0 };
         let settings = dtof_config_t { rule, dead_time, tracking, echoes, ..paper() };
         let (config, mut done) = (checked(&settings).unwrap(), statistics());
@@ -471,10 +483,6 @@ proptest! {
         // SAFETY: all memory is long enough and aligned for each type.
         unsafe {
             let _ = dtof_pixel_count(pixel.at(), &config, code);
-            let _ = dtof_pixel_count_once_per_bin(
-                pixel.at(), &config, bins.at(), &mut done, [code; 40].as_ptr(), 40,
-            );
-            let _ = dtof_once_per_bin_end_laser_cycle(bins.at());
             let _ = dtof_pixel_count_frame(pixel.at(), &config, [code; DTOF_BINS].as_ptr());
             let _ = dtof_pixel_end_laser_cycles(
                 pixel.at(), &config, last, &mut done, cycles, ptr::null_mut(),

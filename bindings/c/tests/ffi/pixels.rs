@@ -1,20 +1,18 @@
 //! Pixels and histograms give the same results as those of `dtof-core`.
 
-use core::ptr;
-
 use dtof_c::*;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
 use dtof_core::{
     AnyRule, AsyncPixel, AverageRule, BinPosition, CentredWindow, Count, DepthEstimator,
-    DepthEvent, EchoNumber, LaserCycle, OncePerBin, PaperRule, PixelAddress, PixelConfig,
-    RangeGate, RangeScale, Statistics, WholeHistogram, WindowRule, z_for,
+    DepthEvent, EchoNumber, LaserCycle, PaperRule, PixelAddress, PixelConfig, RangeGate,
+    RangeScale, Statistics, WholeHistogram, WindowRule, z_for,
 };
 use proptest::prelude::*;
 
-use crate::{OK, checked, exposure, once_per_bin, paper, pixel, statistics, zeroed};
+use crate::{OK, checked, paper, pixel, statistics, zeroed};
 
 /// Random settings, most of them valid.
-fn settings() -> impl Strategy<Value = dtof_config_t> {
+pub fn settings() -> impl Strategy<Value = dtof_config_t> {
     let rule = (0u8..3, 1u8..8, 256u16..2048, 4096u16..30000, 3u32..12);
     let depth = (0u8..2, 256u16..1025, 256u16..1025);
     let cycles = (1u16..8, 8u16..30, 40u16..200, 0u16..60, 60u16..128);
@@ -46,16 +44,22 @@ fn settings() -> impl Strategy<Value = dtof_config_t> {
     })
 }
 
-fn config_of(settings: &dtof_config_t) -> Option<PixelConfig<128, AnyRule>> {
+pub fn rule_of(settings: &dtof_config_t) -> Option<AnyRule> {
     let count = Count::new(settings.minimum_count)?;
     let alpha = U8F8::from_bits(settings.alpha_q8);
-    let rule: AnyRule = match settings.rule {
+    let z = U4F12::from_bits(settings.z_q12);
+    Some(match settings.rule {
         0 => PaperRule::new(alpha, count).into(),
-        1 => WindowRule::new(settings.window, U4F12::from_bits(settings.z_q12), count)
-            .ok()?
-            .into(),
+        1 => WindowRule::new(settings.window, z, count).ok()?.into(),
         _ => AverageRule::new(alpha, count).into(),
-    };
+    })
+}
+
+fn config_of(settings: &dtof_config_t) -> Option<PixelConfig<128, AnyRule>> {
+    config_with(settings, rule_of(settings)?)
+}
+
+pub fn config_with(settings: &dtof_config_t, rule: AnyRule) -> Option<PixelConfig<128, AnyRule>> {
     let estimator = if settings.estimator == 0 {
         DepthEstimator::Centroid3
     } else {
@@ -73,11 +77,11 @@ fn config_of(settings: &dtof_config_t) -> Option<PixelConfig<128, AnyRule>> {
     config.echo_wait(settings.echo_wait).build().ok()
 }
 
-fn plain(event: &DepthEvent) -> dtof_event_t {
+pub fn plain(event: &DepthEvent) -> dtof_event_t {
     event.into()
 }
 
-fn read(statistics: &dtof_statistics_t) -> [u64; 12] {
+pub fn read(statistics: &dtof_statistics_t) -> [u64; 12] {
     let mut counts = dtof_counts_t::default();
     // SAFETY: both pointers lead to objects of their types.
     assert_eq!(unsafe { dtof_statistics_read(statistics, &mut counts) }, OK);
@@ -97,7 +101,7 @@ fn read(statistics: &dtof_statistics_t) -> [u64; 12] {
     ]
 }
 
-fn numbers(of: &Statistics) -> [u64; 12] {
+pub fn numbers(of: &Statistics) -> [u64; 12] {
     let photons = [
         of.counted,
         of.excluded,
@@ -115,10 +119,10 @@ fn numbers(of: &Statistics) -> [u64; 12] {
 }
 
 /// Laser cycles of a pixel; under Miri each costs 0.1 s.
-const CYCLES: usize = if cfg!(miri) { 60 } else { 300 };
+pub const CYCLES: usize = if cfg!(miri) { 60 } else { 300 };
 
 /// The TDC codes of laser cycles: a pulse, background, and codes past the last bin.
-fn photons() -> impl Strategy<Value = Vec<Vec<u16>>> {
+pub fn photons() -> impl Strategy<Value = Vec<Vec<u16>>> {
     let code = prop_oneof![4 => 70u16..73, 1 => 100u16..102, 3 => 0u16..140];
     prop::collection::vec(prop::collection::vec(code, 0..3), CYCLES)
 }
@@ -129,8 +133,7 @@ proptest! {
         settings in settings(),
         photons in photons(),
         taken in prop::collection::vec(any::<bool>(), CYCLES),
-        way in 0u8..3,
-        split in 0usize..3,
+        in_batches in any::<bool>(),
     ) {
         let Some(config) = config_of(&settings) else {
             prop_assert!(checked(&settings).is_err());
@@ -139,29 +142,12 @@ proptest! {
         let checked = checked(&settings).unwrap();
         let (mut mine, mut done) = ([pixel(5), pixel(6)], statistics());
         let mut others = [5, 6].map(|address| AsyncPixel::<128>::new(PixelAddress::new(address)));
-        let mut my_bins = [once_per_bin(), once_per_bin()];
-        let mut other_bins = [OncePerBin::<4>::new(); 2];
         let mut statistics = Statistics::new();
         // SAFETY: each pointer leads to an object of its type.
         unsafe {
             for ((cycle, codes), taken) in (0..).zip(&photons).zip(taken) {
-                let bins = my_bins.iter_mut().zip(&mut other_bins);
-                for ((mine, other), (my_bins, other_bins)) in mine.iter_mut().zip(&mut others).zip(bins) {
-                    if way == 2 {
-                        let (before, after) = codes.split_at(split.min(codes.len()));
-                        for codes in [before, after] {
-                            let (first, number) = (codes.as_ptr(), codes.len());
-                            let status = dtof_pixel_count_once_per_bin(
-                                mine, &checked, my_bins, &mut done, first, number,
-                            );
-                            prop_assert_eq!(status, OK);
-                        }
-                        prop_assert_eq!(dtof_once_per_bin_end_laser_cycle(my_bins), OK);
-                        other.count_once_per_bin(&config, &mut statistics, other_bins, codes);
-                        other_bins.end_laser_cycle();
-                        continue;
-                    }
-                    if way == 1 {
+                for (mine, other) in mine.iter_mut().zip(&mut others) {
+                    if in_batches {
                         let (first, number) = (codes.as_ptr(), codes.len());
                         let status = dtof_pixel_count_batch(mine, &checked, first, number);
                         prop_assert_eq!(status, OK);
@@ -172,24 +158,13 @@ proptest! {
                     }
                     other.count_batch(&config, codes);
                 }
-                let (last, mut fired) = (LaserCycle::new(cycle), 9);
-                let looks = others
-                    .each_mut()
-                    .map(|other| other.end_laser_cycle(&config, &mut statistics, last));
-                if cycle % 2 == 0 {
-                    for (mine, look) in mine.iter_mut().zip(looks) {
-                        let mut outcome = dtof_look_t::DTOF_LOOK_NOT_DUE;
-                        let status = dtof_pixel_end_laser_cycles(
-                            mine, &checked, cycle, &mut done, 1, &mut outcome,
-                        );
-                        prop_assert_eq!((status, outcome), (OK, look.into()));
-                    }
-                } else {
-                    let status = dtof_pixels_end_laser_cycles(
-                        mine.as_mut_ptr(), 2, cycle, &checked, &mut done, 1, &mut fired,
+                for (mine, other) in mine.iter_mut().zip(&mut others) {
+                    let look = other.end_laser_cycle(&config, &mut statistics, LaserCycle::new(cycle));
+                    let mut outcome = dtof_look_t::DTOF_LOOK_NOT_DUE;
+                    let status = dtof_pixel_end_laser_cycles(
+                        mine, &checked, cycle, &mut done, 1, &mut outcome,
                     );
-                    let events = looks.iter().filter(|&&look| look == dtof_core::Look::Event);
-                    prop_assert_eq!((status, fired), (OK, events.count()));
+                    prop_assert_eq!((status, outcome), (OK, look.into()));
                 }
                 for (mine, other) in mine.iter_mut().zip(&mut others).filter(|_| taken) {
                     let mut event = dtof_event_t::default();
@@ -263,60 +238,6 @@ proptest! {
             prop_assert_eq!(range, scale.range(place).to_bits());
         }
     }
-}
-
-#[test]
-fn a_misaligned_pointer_to_the_number_of_events_leaves_the_pixels_as_they_were() {
-    let (config, mut done) = (crate::config(), statistics());
-    let (mut pixels, mut fired) = ([pixel(0), pixel(1)], [9usize; 2]);
-    let misaligned = fired.as_mut_ptr().wrapping_byte_add(1);
-    let first = pixels.as_mut_ptr();
-    // SAFETY: each pointer leads to objects of its type, or is null or misaligned.
-    unsafe {
-        let mut end =
-            |fired| dtof_pixels_end_laser_cycles(first, 2, 0, &config, &mut done, 40, fired);
-        assert_eq!(end(misaligned), dtof_status_t::DTOF_ERROR_ALIGNMENT);
-        assert_eq!([0, 1].map(|pixel| exposure(first.add(pixel))), [0; 2]);
-        assert_eq!(end(ptr::null_mut()), OK);
-        assert_eq!([0, 1].map(|pixel| exposure(first.add(pixel))), [40; 2]);
-    }
-    assert_eq!(fired, [9; 2]);
-    assert_eq!(read(&done), [0; 12]);
-}
-
-#[test]
-fn photons_of_one_laser_cycle_in_one_bin_count_once() {
-    let config = crate::config();
-    let (mut pixel, mut bins, mut done) = (pixel(0), once_per_bin(), statistics());
-    let mut count = |bins: &mut dtof_once_per_bin_t, codes: &[u16]| {
-        let (pixel, first, number) = (&mut pixel, codes.as_ptr(), codes.len());
-        // SAFETY: each pointer leads to an object of its type.
-        let status = unsafe {
-            dtof_pixel_count_once_per_bin(pixel, &config, bins, &mut done, first, number)
-        };
-        assert_eq!(status, OK);
-    };
-    // One laser cycle in two calls, and another one. Photons past the last bin are rejected.
-    count(&mut bins, &[60, 61, 60, 200, 200]);
-    count(&mut bins, &[60, 127, 0, 127]);
-    // SAFETY: the pointer leads to an object of its type.
-    assert_eq!(unsafe { dtof_once_per_bin_end_laser_cycle(&mut bins) }, OK);
-    count(&mut bins, &[60]);
-    // The bins of another pixel are its own.
-    count(&mut once_per_bin(), &[60]);
-    // SAFETY: both pointers lead to objects of their types.
-    assert_eq!(unsafe { dtof_pixel_add_photons(&pixel, &mut done) }, OK);
-    let [
-        counted,
-        excluded,
-        saturated,
-        rejected,
-        gated_out,
-        repeated,
-        ..,
-    ] = read(&done);
-    assert_eq!((counted, rejected, repeated), (6, 2, 3));
-    assert_eq!([excluded, saturated, gated_out], [0; 3]);
 }
 
 #[test]

@@ -8,7 +8,7 @@ use dtof_c::dtof_status_t::*;
 use dtof_c::*;
 use dtof_link::Refusal;
 
-use crate::{OK, checked, config, link, once_per_bin, paper, pixel, scale, statistics, zeroed};
+use crate::{OK, checked, config, link, paper, pixel, scale, statistics, zeroed};
 
 #[test]
 fn each_setting_that_cannot_be_has_its_own_error() {
@@ -136,19 +136,6 @@ fn pointers_and_numbers_are_checked() {
         assert_eq!(batch(null(), 0), OK);
         assert_eq!(batch(codes.wrapping_byte_add(1), 1), DTOF_ERROR_ALIGNMENT);
         assert_eq!(batch(codes, usize::MAX / 2), DTOF_ERROR_LENGTH);
-        let once = |codes, number| {
-            let (pixel, statistics) = (&mut crate::pixel(0), &mut crate::statistics());
-            let bins = &mut once_per_bin();
-            dtof_pixel_count_once_per_bin(pixel, &config, bins, statistics, codes, number)
-        };
-        assert_eq!(once(null(), 1), DTOF_ERROR_NULL);
-        assert_eq!(once(null(), 0), OK);
-        assert_eq!(once(codes.wrapping_byte_add(1), 1), DTOF_ERROR_ALIGNMENT);
-        assert_eq!(once(codes, usize::MAX / 2), DTOF_ERROR_LENGTH);
-        let mut bins = once_per_bin();
-        let size = DTOF_ONCE_PER_BIN_SIZE;
-        assert_eq!(dtof_once_per_bin_init(&mut bins, size - 4), DTOF_ERROR_SIZE);
-        assert_eq!(dtof_once_per_bin_init(&mut bins, size), OK);
         assert_eq!(
             dtof_pixel_count_frame(&mut pixel, &config, null()),
             DTOF_ERROR_NULL
@@ -158,13 +145,6 @@ fn pointers_and_numbers_are_checked() {
         };
         assert_eq!(end(null_mut(), null_mut()), DTOF_ERROR_NULL);
         assert_eq!(end(&mut statistics, null_mut()), OK);
-        let pixels = |number| {
-            let (pixel, statistics) = (null_mut(), &mut crate::statistics());
-            dtof_pixels_end_laser_cycles(pixel, number, 0, &config, statistics, 1, null_mut())
-        };
-        assert_eq!(pixels(1), DTOF_ERROR_NULL);
-        assert_eq!(pixels(0), OK);
-        assert_eq!(pixels(usize::MAX), DTOF_ERROR_LENGTH);
         assert_eq!(
             dtof_pixel_take_event(&mut pixel, null_mut()),
             DTOF_ERROR_NULL
