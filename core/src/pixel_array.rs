@@ -670,11 +670,10 @@ where
                 }
                 loop {
                     let number = next(pixel, &mut place.data, &mut codes).min(AT_ONCE);
-                    if place.use_of.counts() {
-                        let codes = codes.get(..number).unwrap_or_default();
-                        place.pixel.count_batch(look.config, codes);
-                    } else {
+                    if !place.use_of.counts() {
                         left_out += number as u64;
+                    } else if let Some(codes @ [_, ..]) = codes.get(..number) {
+                        place.pixel.count_batch(look.config, codes);
                     }
                     if number < AT_ONCE {
                         return left_out;
@@ -690,12 +689,11 @@ where
     fn photons_in_turn(&mut self, next: impl Fn(usize, &mut T, &mut [u16]) -> usize) {
         let mut codes = [0; AT_ONCE];
         for pixel in 0..self.state.pixels_in_use {
-            loop {
-                let Some(place) = self.pixels.get_mut(pixel) else {
-                    return;
-                };
+            while let Some(place) = self.pixels.get_mut(pixel) {
                 let number = next(pixel, &mut place.data, &mut codes).min(AT_ONCE);
-                self.photons(pixel, codes.get(..number).unwrap_or_default());
+                if let Some(codes @ [_, ..]) = codes.get(..number) {
+                    self.photons(pixel, codes);
+                }
                 if number < AT_ONCE {
                     break;
                 }
