@@ -20,16 +20,23 @@ const BLOCKS: usize = 15;
 /// An array and its room.
 pub struct Driven {
     pub array: dtof_array_t,
-    _places: Box<[dtof_place_t; PIXELS as usize]>,
-    _blocks: Box<[dtof_block_t; BLOCKS]>,
+    // A box must be alone in leading to what is in it.
+    places: *mut [dtof_place_t; PIXELS as usize],
+    blocks: *mut [dtof_block_t; BLOCKS],
+}
+
+impl Drop for Driven {
+    fn drop(&mut self) {
+        // SAFETY: both come from boxes, and the array is gone.
+        unsafe { drop((Box::from_raw(self.places), Box::from_raw(self.blocks))) };
+    }
 }
 
 impl Driven {
     pub fn new() -> Self {
-        let (mut places, mut blocks) = (Box::new(zeroed()), Box::new(zeroed()));
-        let room: *mut [dtof_place_t; PIXELS as usize] = &mut *places;
-        let block_room: *mut [dtof_block_t; BLOCKS] = &mut *blocks;
-        let (room, block_room) = (room.cast(), block_room.cast());
+        let places: *mut [dtof_place_t; PIXELS as usize] = Box::into_raw(Box::new(zeroed()));
+        let blocks: *mut [dtof_block_t; BLOCKS] = Box::into_raw(Box::new(zeroed()));
+        let (room, block_room) = (places.cast(), blocks.cast());
         let mut array = zeroed();
         let size = DTOF_PLACE_SIZE;
         // SAFETY: each pointer leads to room of its type.
@@ -38,8 +45,8 @@ impl Driven {
         assert_eq!(made, OK);
         Self {
             array,
-            _places: places,
-            _blocks: blocks,
+            places,
+            blocks,
         }
     }
 
