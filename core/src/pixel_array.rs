@@ -353,6 +353,25 @@ impl Seen {
 /// Photons of a pixel that are counted at once.
 const AT_ONCE: usize = 16;
 
+/// Counts the photons of a pixel: `next` writes the next codes and returns how many these are; if there was room for more,
+/// they are the last.
+fn in_batches<P>(
+    of: &mut P,
+    next: impl Fn(&mut P, &mut [u16]) -> usize,
+    mut count: impl FnMut(&mut P, &[u16]),
+) {
+    let mut codes = [0; AT_ONCE];
+    loop {
+        let number = next(of, &mut codes).min(AT_ONCE);
+        if let Some(codes @ [_, ..]) = codes.get(..number) {
+            count(of, codes);
+        }
+        if number < AT_ONCE {
+            return;
+        }
+    }
+}
+
 /// Photons that counted in no pixel, since the configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -664,21 +683,17 @@ where
         let mut left_out = 0;
         let left = self.end(cycles, |look, places, statistics, cycles| {
             let count = |pixel, place: &mut PixelPlace<BINS, W, T>| {
-                let (mut codes, mut left_out) = ([0; AT_ONCE], 0);
-                if !together {
-                    return left_out;
+                let mut left_out = 0;
+                if together {
+                    let next = |place: &mut PixelPlace<_, _, T>, codes: &mut [u16]| {
+                        next(pixel, &mut place.data, codes)
+                    };
+                    in_batches(place, next, |place, codes| match place.use_of.counts() {
+                        true => place.pixel.count_batch(look.config, codes),
+                        false => left_out += codes.len() as u64,
+                    });
                 }
-                loop {
-                    let number = next(pixel, &mut place.data, &mut codes).min(AT_ONCE);
-                    if !place.use_of.counts() {
-                        left_out += number as u64;
-                    } else if let Some(codes @ [_, ..]) = codes.get(..number) {
-                        place.pixel.count_batch(look.config, codes);
-                    }
-                    if number < AT_ONCE {
-                        return left_out;
-                    }
-                }
+                left_out
             };
             left_out = look.end_laser_cycles_on(threads, places, statistics, cycles, count);
         });
@@ -687,17 +702,12 @@ where
     }
 
     fn photons_in_turn(&mut self, next: impl Fn(usize, &mut T, &mut [u16]) -> usize) {
-        let mut codes = [0; AT_ONCE];
         for pixel in 0..self.state.pixels_in_use {
-            while let Some(place) = self.pixels.get_mut(pixel) {
-                let number = next(pixel, &mut place.data, &mut codes).min(AT_ONCE);
-                if let Some(codes @ [_, ..]) = codes.get(..number) {
-                    self.photons(pixel, codes);
-                }
-                if number < AT_ONCE {
-                    break;
-                }
-            }
+            let next = |array: &mut Self, codes: &mut [u16]| {
+                let place = array.pixels.get_mut(pixel);
+                place.map_or(0, |place| next(pixel, &mut place.data, codes))
+            };
+            in_batches(self, next, |array, codes| array.photons(pixel, codes));
         }
     }
 

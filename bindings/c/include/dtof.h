@@ -944,7 +944,8 @@ dtof_status_t dtof_array_photon(struct dtof_array_t *array,
                                 uint16_t pixel,
                                 uint16_t code);
 
-// Counts `number` photons of one pixel as dtof_array_photon does, in a third of the time.
+// Counts `number` photons of one pixel as dtof_array_photon does, in a sixth of the time unless
+// photons count once per bin.
 //
 // Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
 // DTOF_ERROR_NOT_INITIALISED. `codes` may be null if `number` is 0.
@@ -1145,11 +1146,12 @@ dtof_status_t dtof_link_silent_ms(const struct dtof_link_t *link,
 dtof_status_t dtof_link_set_stop_reason(struct dtof_link_t *link,
                                         uint8_t reason);
 
-// Reads the body of CONFIGURE. Dynamic depth is refused, as this library has none. `sensor_dead_time` is that of dtof_sensor_write. The settings get it if the host
-// leaves the dead time to the sensor and the rule can use it.
+// Reads the body of CONFIGURE. Dynamic depth is refused, as this library has none. `sensor_dead_time` is
+// that of dtof_sensor_write. The settings get it if the host leaves the dead time to the sensor and the
+// rule can use it.
 //
-// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_DITHER if its range is odd, above 254 bins, or not 0 for photons of the link,
-// DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
+// Errors: DTOF_ERROR_CONFIGURATION if the library does not know it, DTOF_ERROR_DITHER if its range is odd,
+// above 254 bins, or not 0 for photons of the link, DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_WINDOW_WIDTH, DTOF_ERROR_HALF_WIDTH,
 // DTOF_ERROR_DEAD_TIME, DTOF_ERROR_PATIENCE, DTOF_ERROR_HOST_TIMEOUT,
 // DTOF_ERROR_RESERVED_FIELD, DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
 // dtof_refusal_of gives the answer to the host for each.
@@ -1181,8 +1183,9 @@ dtof_status_t dtof_sensor_write(uint16_t pixels,
                                 uint8_t *body);
 
 // Writes the body of STATISTICS, DTOF_REPORT_BYTES. First send all waiting events: the host
-// compares the events in `statistics` with those it has received. Add the photons of present
-// exposures to a copy of the statistics, with dtof_pixel_add_photons.
+// compares the events in `statistics` with those it has received. Those of dtof_array_statistics
+// have the photons of present exposures; for single pixels add them to a copy, with
+// dtof_pixel_add_photons.
 //
 // Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
 // Threads: no other thread uses `link` or `statistics` during the call.

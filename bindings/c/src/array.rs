@@ -251,7 +251,8 @@ pub unsafe extern "C" fn dtof_array_photon(
     })
 }
 
-/// Counts `number` photons of one pixel as dtof_array_photon does, in a third of the time.
+/// Counts `number` photons of one pixel as dtof_array_photon does, in a sixth of the time unless
+/// photons count once per bin.
 ///
 /// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
 /// DTOF_ERROR_NOT_INITIALISED. `codes` may be null if `number` is 0.

@@ -7,7 +7,7 @@ use heapless::Vec;
 
 use crate::array::dtof_array_t;
 use crate::memory::{array_mut, check, data_slice, object_ref, put, status};
-use crate::pixel::dtof_pixel_t;
+use crate::pixel::{Pixel, dtof_pixel_t};
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{DTOF_ERROR_LENGTH, DTOF_ERROR_PIXELS, DTOF_ERROR_REASON};
 use crate::version::DTOF_BINS;
@@ -44,15 +44,9 @@ pub unsafe extern "C" fn dtof_pixel_histogram_write(
     status(|| {
         // SAFETY: the caller's promise, see the crate.
         let pixel = unsafe { object_ref(pixel)? };
-        let head = HistogramHead {
-            pixel: pixel.address(),
-            is_whole: false,
-            cycle: LaserCycle::new(cycles),
-            exposure: pixel.exposure().into(),
-        };
-        let counts = pixel.histogram().counts().map(u32::from);
+        let exposure = pixel.exposure();
         // SAFETY: the same promise.
-        unsafe { part_of(head, &counts, part, body, length) }
+        unsafe { part_of_pixel(pixel, exposure, cycles, part, body, length) }
     })
 }
 
@@ -75,15 +69,8 @@ pub unsafe extern "C" fn dtof_array_histogram_write(
         let number = usize::from(pixel);
         let of = array.pixel(number).zip(array.exposure(number));
         let (pixel, exposure) = of.ok_or(DTOF_ERROR_PIXELS)?;
-        let head = HistogramHead {
-            pixel: pixel.address(),
-            is_whole: false,
-            cycle: LaserCycle::new(array.cycles()),
-            exposure: exposure.into(),
-        };
-        let counts = pixel.histogram().counts().map(u32::from);
         // SAFETY: the same promise.
-        unsafe { part_of(head, &counts, part, body, length) }
+        unsafe { part_of_pixel(pixel, exposure, array.cycles(), part, body, length) }
     })
 }
 
@@ -134,6 +121,29 @@ pub unsafe extern "C" fn dtof_no_histogram_write(
         // SAFETY: the caller's promise, see the crate.
         unsafe { put_bytes(&reason.message(PixelAddress::new(pixel)), body, length) }
     })
+}
+
+/// The present exposure of a pixel.
+///
+/// # Safety
+/// As for every function that C calls: see the crate.
+unsafe fn part_of_pixel(
+    pixel: &Pixel,
+    exposure: u16,
+    cycles: u64,
+    part: usize,
+    body: *mut u8,
+    length: *mut usize,
+) -> Result<(), dtof_status_t> {
+    let head = HistogramHead {
+        pixel: pixel.address(),
+        is_whole: false,
+        cycle: LaserCycle::new(cycles),
+        exposure: exposure.into(),
+    };
+    let counts = pixel.histogram().counts().map(u32::from);
+    // SAFETY: the same promise.
+    unsafe { part_of(head, &counts, part, body, length) }
 }
 
 /// # Safety

@@ -29,7 +29,7 @@ pub struct dtof_pixel_t {
     opaque: [MaybeUninit<u32>; DTOF_PIXEL_WORDS],
 }
 
-type Pixel = AsyncPixel<DTOF_BINS, PixelCounters>;
+pub(crate) type Pixel = AsyncPixel<DTOF_BINS, PixelCounters>;
 
 object!(dtof_pixel_t, Pixel, tag 0xd8,
     size DTOF_PIXEL_SIZE, align DTOF_PIXEL_ALIGN, unused_below 1);
