@@ -904,7 +904,8 @@ dtof_status_t dtof_pixel_add_photons(const struct dtof_pixel_t *pixel,
 // Makes an array of room for `number` pixels and `number_of_blocks` blocks. It has no pixels until
 // dtof_array_configure. Of 8 x 8 pixels there are 16 blocks of level 1, 4 of level 2 and 1 of level 3. Without
 // blocks `blocks` may be null. `size` is `sizeof *pixels`. The room belongs to the array from now on: do not
-// read, write or copy it. Another dtof_array_init may have it again.
+// read, write or copy it. Another dtof_array_init may have it again; the earlier array must not be used after
+// that.
 //
 // Errors: DTOF_ERROR_SIZE if the library was built for other DTOF_BINS or DTOF_COUNTER_BITS,
 // DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.

@@ -11,7 +11,8 @@ use dtof_core::{
 use crate::config::{config_with, dtof_config_t, rule_of};
 use crate::event::dtof_event_t;
 use crate::memory::{
-    check, data_ref, data_slice, initialise, object, object_mut, object_ref, put, room, status,
+    check, check_array, data_ref, data_slice, initialise, object, object_mut, object_ref, put,
+    room, status,
 };
 use crate::statistics::{DTOF_STATISTICS_SIZE, dtof_statistics_t};
 use crate::status::dtof_status_t;
@@ -115,7 +116,8 @@ pub struct dtof_losses_t {
 /// Makes an array of room for `number` pixels and `number_of_blocks` blocks. It has no pixels until
 /// dtof_array_configure. Of 8 x 8 pixels there are 16 blocks of level 1, 4 of level 2 and 1 of level 3. Without
 /// blocks `blocks` may be null. `size` is `sizeof *pixels`. The room belongs to the array from now on: do not
-/// read, write or copy it. Another dtof_array_init may have it again.
+/// read, write or copy it. Another dtof_array_init may have it again; the earlier array must not be used after
+/// that.
 ///
 /// Errors: DTOF_ERROR_SIZE if the library was built for other DTOF_BINS or DTOF_COUNTER_BITS,
 /// DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
@@ -130,11 +132,13 @@ pub unsafe extern "C" fn dtof_array_init(
     number_of_blocks: usize,
 ) -> dtof_status_t {
     status(|| {
-        // Checked before the room is written.
-        check(array)?;
         if size != DTOF_PLACE_SIZE {
             return Err(DTOF_ERROR_SIZE);
         }
+        // Checked before the room is written, which another array may have.
+        check(array)?;
+        check_array(pixels, number)?;
+        check_array(blocks, number_of_blocks)?;
         // SAFETY: the caller's promise, see the crate: the room is the array's alone from now on.
         let pixels = unsafe { room(pixels.cast(), number, Place::new)? };
         // SAFETY: the same promise.
@@ -369,6 +373,14 @@ pub unsafe extern "C" fn dtof_array_statistics(
     status(|| {
         // SAFETY: the caller's promise, see the crate.
         let array = unsafe { object_ref(array)? };
+        // Checked before any is written.
+        check(pixels)?;
+        if !blocks.is_null() {
+            check(blocks)?;
+        }
+        if !losses.is_null() {
+            check(losses)?;
+        }
         let [of_pixels, of_blocks] = array.statistics();
         let write = |statistics: *mut dtof_statistics_t, value: Statistics| {
             // SAFETY: the same promise.

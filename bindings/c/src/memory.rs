@@ -67,12 +67,15 @@ pub(crate) fn check<T>(pointer: *const T) -> Result<(), dtof_status_t> {
     Ok(())
 }
 
-fn check_number<T>(number: usize) -> Result<(), dtof_status_t> {
+/// Fails if an array is longer than memory can hold, or its pointer is null or misaligned. That of an empty array may be
+/// anything.
+#[inline(always)]
+pub(crate) fn check_array<T>(pointer: *const T, number: usize) -> Result<(), dtof_status_t> {
     let bytes = number.checked_mul(size_of::<T>());
     if bytes.is_none_or(|bytes| isize::try_from(bytes).is_err()) {
         return Err(refused(DTOF_ERROR_LENGTH));
     }
-    Ok(())
+    if number == 0 { Ok(()) } else { check(pointer) }
 }
 
 /// The value of an initialised object, to read.
@@ -163,11 +166,10 @@ pub(crate) unsafe fn data_slice<'a, T>(
     pointer: *const T,
     number: usize,
 ) -> Result<&'a [T], dtof_status_t> {
-    check_number::<T>(number)?;
+    check_array(pointer, number)?;
     if number == 0 {
         return Ok(&[]);
     }
-    check(pointer)?;
     // SAFETY: as above, and not longer than memory is.
     Ok(unsafe { slice::from_raw_parts(pointer, number) })
 }
@@ -194,11 +196,10 @@ pub(crate) unsafe fn room<T>(
     number: usize,
     value: impl Fn() -> T,
 ) -> Result<&'static mut [T], dtof_status_t> {
-    check_number::<T>(number)?;
+    check_array(pointer, number)?;
     if number == 0 {
         return Ok(&mut []);
     }
-    check(pointer)?;
     for place in 0..number {
         // SAFETY: neither null nor misaligned, and so writable memory of that length, by the promise.
         unsafe { pointer.add(place).write(value()) };

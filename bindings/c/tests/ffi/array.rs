@@ -327,3 +327,59 @@ fn what_an_array_cannot_be_has_its_own_error() {
         );
     }
 }
+
+/// What a refused call would have written: nothing.
+#[test]
+fn after_an_error_all_is_as_it_was() {
+    let mut driven = Driven::new();
+    let layout = dtof_layout_t {
+        pixels: 2,
+        ..dtof_layout_t::default()
+    };
+    assert_eq!(driven.configure(&paper(), &layout), OK);
+    let room = driven.places.cast::<dtof_place_t>();
+    let codes = [60; 20];
+    // SAFETY: each pointer leads to an object of its type, is null or is misaligned.
+    unsafe {
+        let array = &raw mut driven.array;
+        assert_eq!(dtof_array_photons(array, 1, codes.as_ptr(), 20), OK);
+        // Room that an array has, and room that cannot be.
+        let (other, null) = (&mut zeroed(), ptr::null_mut::<dtof_block_t>());
+        let misaligned = driven.blocks.cast::<dtof_block_t>().wrapping_byte_add(1);
+        for (blocks, number, error) in [
+            (null, 1, DTOF_ERROR_NULL),
+            (misaligned, 1, DTOF_ERROR_ALIGNMENT),
+            (driven.blocks.cast(), usize::MAX, DTOF_ERROR_LENGTH),
+        ] {
+            let refused = dtof_array_init(other, DTOF_PLACE_SIZE, room, 2, blocks, number);
+            assert_eq!(refused, error);
+        }
+        // Statistics, with others that cannot be written.
+        let mut written = [statistics(), statistics()];
+        let [of_pixels, of_blocks] = &mut written;
+        let (blocks, losses) = (&raw mut *of_blocks, &mut dtof_losses_t::default());
+        let (blocks_off, losses_off) = (
+            blocks.wrapping_byte_add(1),
+            (&raw mut *losses).wrapping_byte_add(1),
+        );
+        let refused = dtof_array_statistics(array, of_pixels, blocks_off, losses);
+        assert_eq!(refused, DTOF_ERROR_ALIGNMENT);
+        let refused = dtof_array_statistics(array, of_pixels, blocks, losses_off);
+        assert_eq!(refused, DTOF_ERROR_ALIGNMENT);
+        assert_eq!(written.map(|written| read(&written)), [[0; 12]; 2]);
+        // A configuration for which there is no room.
+        let layout = dtof_layout_t {
+            pixels: PIXELS + 1,
+            ..layout
+        };
+        assert_eq!(
+            dtof_array_configure(array, &paper(), &layout),
+            DTOF_ERROR_PIXELS
+        );
+        for _ in 0..44 {
+            assert_eq!(dtof_array_end_laser_cycles(array, 1, ptr::null_mut()), OK);
+        }
+        let event = driven.next_event().unwrap();
+        assert_eq!((event.pixel, event.peak_bin, event.peak_count), (1, 60, 20));
+    }
+}
