@@ -393,7 +393,7 @@ enum dtof_status_t
     DTOF_ERROR_ZERO_THRESHOLD = 74,
     // The patience of adaptive binning is 0.
     DTOF_ERROR_PATIENCE = 75,
-    // There is no room for blocks of pixels, or their levels are not 1 to 3.
+    // There is no room for blocks of pixels, their levels are not 1 to 3, or there are no columns.
     DTOF_ERROR_BLOCKS = 76,
     // The host timeout is not 200 to 60,000 ms.
     DTOF_ERROR_HOST_TIMEOUT = 77,
@@ -403,8 +403,8 @@ enum dtof_status_t
     DTOF_ERROR_ONCE_PER_BIN = 79,
     // The laser cannot be dithered by so many bins.
     DTOF_ERROR_DITHER = 80,
-    // Neighbours are not 4 or 8, or confirm nothing here: they need the window rule and photons, without
-    // blocks and without a dead time.
+    // Neighbours are not 4 or 8, or confirm nothing here: they need columns, the window rule and photons,
+    // without blocks and without a dead time.
     DTOF_ERROR_NEIGHBOURS = 81,
 };
 #ifndef __cplusplus
@@ -597,7 +597,7 @@ typedef struct dtof_block_t {
 typedef struct dtof_layout_t {
     // Pixels, numbered row by row: at least 1.
     uint16_t pixels;
-    // Columns of the array; the last row may have fewer. 0: one row.
+    // Columns of the array; the last row may have fewer. 0: one row. Blocks and neighbours need columns.
     uint16_t columns;
     // Blocks: every so many laser cycles pixels without an event begin to feed theirs. At least 1.
     uint16_t patience;
@@ -921,7 +921,7 @@ dtof_status_t dtof_array_init(struct dtof_array_t *array,
 // false alarms are then those of all together.
 //
 // Errors: each of dtof_config_check, DTOF_ERROR_PIXELS and DTOF_ERROR_BLOCKS without room for so many,
-// DTOF_ERROR_BLOCKS for other levels, DTOF_ERROR_PATIENCE, DTOF_ERROR_NEIGHBOURS,
+// DTOF_ERROR_BLOCKS for other levels or without columns, DTOF_ERROR_PATIENCE, DTOF_ERROR_NEIGHBOURS,
 // DTOF_ERROR_NOT_INITIALISED. After an error the array is unchanged.
 // Threads: no other thread uses `array` during the call.
 dtof_status_t dtof_array_configure(struct dtof_array_t *array,

@@ -81,7 +81,7 @@ object!(dtof_array_t, PixelArray<'static, DTOF_BINS, AnyRule, PixelCounters>, ta
 pub struct dtof_layout_t {
     /// Pixels, numbered row by row: at least 1.
     pub pixels: u16,
-    /// Columns of the array; the last row may have fewer. 0: one row.
+    /// Columns of the array; the last row may have fewer. 0: one row. Blocks and neighbours need columns.
     pub columns: u16,
     /// Blocks: every so many laser cycles pixels without an event begin to feed theirs. At least 1.
     pub patience: u16,
@@ -152,7 +152,7 @@ pub unsafe extern "C" fn dtof_array_init(
 /// false alarms are then those of all together.
 ///
 /// Errors: each of dtof_config_check, DTOF_ERROR_PIXELS and DTOF_ERROR_BLOCKS without room for so many,
-/// DTOF_ERROR_BLOCKS for other levels, DTOF_ERROR_PATIENCE, DTOF_ERROR_NEIGHBOURS,
+/// DTOF_ERROR_BLOCKS for other levels or without columns, DTOF_ERROR_PATIENCE, DTOF_ERROR_NEIGHBOURS,
 /// DTOF_ERROR_NOT_INITIALISED. After an error the array is unchanged.
 /// Threads: no other thread uses `array` during the call.
 #[unsafe(no_mangle)]
@@ -185,7 +185,7 @@ fn array_config(
     let rule = rule_of(settings)?;
     let neighbours = match (layout.neighbours, &rule) {
         (0, _) => None,
-        (number, AnyRule::Window(rule)) => {
+        (number, AnyRule::Window(rule)) if layout.columns > 0 => {
             let neighbours = Neighbours::new(number).ok_or(DTOF_ERROR_NEIGHBOURS)?;
             Some(NeighbourConfig::new(shape, neighbours, rule))
         }
@@ -198,7 +198,8 @@ fn array_config(
         config = config.neighbours(neighbours)?;
     }
     if layout.block_levels > 0 {
-        let levels = BlockLevel::new(layout.block_levels).ok_or(DTOF_ERROR_BLOCKS)?;
+        let levels = BlockLevel::new(layout.block_levels).filter(|_| layout.columns > 0);
+        let levels = levels.ok_or(DTOF_ERROR_BLOCKS)?;
         if layout.patience == 0 {
             return Err(DTOF_ERROR_PATIENCE);
         }

@@ -100,7 +100,7 @@ pub enum dtof_status_t {
     DTOF_ERROR_ZERO_THRESHOLD = 74,
     /// The patience of adaptive binning is 0.
     DTOF_ERROR_PATIENCE = 75,
-    /// There is no room for blocks of pixels, or their levels are not 1 to 3.
+    /// There is no room for blocks of pixels, their levels are not 1 to 3, or there are no columns.
     DTOF_ERROR_BLOCKS = 76,
     /// The host timeout is not 200 to 60,000 ms.
     DTOF_ERROR_HOST_TIMEOUT = 77,
@@ -110,8 +110,8 @@ pub enum dtof_status_t {
     DTOF_ERROR_ONCE_PER_BIN = 79,
     /// The laser cannot be dithered by so many bins.
     DTOF_ERROR_DITHER = 80,
-    /// Neighbours are not 4 or 8, or confirm nothing here: they need the window rule and photons, without
-    /// blocks and without a dead time.
+    /// Neighbours are not 4 or 8, or confirm nothing here: they need columns, the window rule and photons,
+    /// without blocks and without a dead time.
     DTOF_ERROR_NEIGHBOURS = 81,
 }
 

@@ -282,6 +282,23 @@ fn what_an_array_cannot_be_has_its_own_error() {
             DTOF_ERROR_NEIGHBOURS,
         ),
         (dtof_config_t { x: 0, ..paper() }, alone, DTOF_ERROR_ZERO_X),
+        // Which pixels are beside each other is not known.
+        (
+            paper(),
+            dtof_layout_t {
+                columns: 0,
+                ..blocks(1)
+            },
+            DTOF_ERROR_BLOCKS,
+        ),
+        (
+            window,
+            dtof_layout_t {
+                columns: 0,
+                ..neighbours(8)
+            },
+            DTOF_ERROR_NEIGHBOURS,
+        ),
         // One row.
         (
             paper(),

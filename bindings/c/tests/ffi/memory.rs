@@ -85,6 +85,7 @@ fn functions_write_to_uninitialised_memory() {
         );
         let layout = dtof_layout_t {
             pixels: 2,
+            columns: 2,
             patience: 8,
             block_levels: 1,
             ..dtof_layout_t::default()
