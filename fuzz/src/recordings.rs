@@ -76,7 +76,7 @@ pub fn recordings(data: &[u8]) {
         Ok(all) => all,
         Err(error) => return is_one_line(&error),
     };
-    let counted: u64 = all.captures.iter().flatten().flatten().sum();
+    let counted: u64 = all.histograms.iter().flatten().sum();
     // Of a list the laser cycles that are read are counted, of histograms all.
     let left = if recording.metadata.is_list {
         0

@@ -236,7 +236,7 @@ fn window_rules_need_fewer_photons_than_the_papers() {
     let recorded = counts(&log, &ReadOptions::default()).unwrap();
     let mut photons = RecordedHistograms::new(
         recorded.array,
-        &recorded.captures,
+        &recorded.histograms,
         RecordingLength::PhotonsPerCycle(PHOTONS),
         CYCLES.into(),
         1,

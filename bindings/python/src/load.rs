@@ -1,6 +1,5 @@
 //! Recordings of every format as arrays.
 
-use anyhow::ensure;
 use dtof_photons::input::Input;
 use dtof_photons::open::counts;
 use dtof_run::recording::{read_options, warnings};
@@ -8,7 +7,7 @@ use dtof_run::replay::Options;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 
-use crate::error::{Keywords, checked, options_over};
+use crate::error::{Keywords, options_over};
 use crate::input::PyInput;
 use crate::work::work;
 
@@ -44,20 +43,13 @@ pub fn load<'py>(py: Python<'py>, input: PyInput, keywords: Keywords) -> PyResul
     })?;
     let side = |side: u32| side as usize;
     let shape = [
-        counts.captures.len(),
+        counts.captures(),
         side(counts.array.rows()),
         side(counts.array.columns()),
         counts.metadata.bins,
     ];
-    let all = counts.captures.iter().flatten().flatten();
+    let all = counts.histograms.iter().flatten();
     let bytes = 8 * shape.iter().product::<usize>();
-    checked(|| {
-        ensure!(
-            8 * all.clone().count() == bytes,
-            "captures of different sizes"
-        );
-        Ok(())
-    })?;
     let array = PyByteArray::new_with(py, bytes, |array| {
         for (place, count) in array.chunks_exact_mut(8).zip(all) {
             place.copy_from_slice(&count.to_le_bytes());

@@ -7,8 +7,9 @@ use dtof_core::fixed::types::U8F8;
 use dtof_core::{Array, PixelAddress};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::SettingsFile;
+use dtof_photons::histograms::Histograms;
 use dtof_photons::open::{ReadOptions, counts};
-use dtof_photons::recorded::{Capture, RecordedHistograms, RecordingLength};
+use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
 use dtof_photons::source::{PhotonSource, Slice};
 
 const ZONES: usize = 9;
@@ -20,7 +21,7 @@ const PHOTONS_PER_CYCLE: f64 = 0.5;
 /// 50 mm, photons per event, and the median error of single events.
 fn judged(
     found: &Calibration,
-    captures: &[Capture],
+    recorded: &Histograms,
     truth: &[f64],
     seed: u64,
 ) -> (usize, f64, f64) {
@@ -29,7 +30,7 @@ fn judged(
     let length = RecordingLength::PhotonsPerCycle(PHOTONS_PER_CYCLE);
     let array = Array::new(9, 1).unwrap();
     let mut photons =
-        RecordedHistograms::new(array, captures, length, CYCLES.into(), seed).unwrap();
+        RecordedHistograms::new(array, recorded, length, CYCLES.into(), seed).unwrap();
     let slice = photons.next_slice(CYCLES).unwrap();
     let centre = slice.pixels.chunks(ZONES).zip(truth);
     let centre = centre.filter(|(_, truth)| **truth > 29.9);
@@ -67,15 +68,14 @@ fn judged(
 /// The median error of an ideal estimate of the pulse from 13 photons, in millimetres: the Cramér-Rao
 /// bound for the pulse of the centre zone, with the slope from the captures before and after. The
 /// median over all captures.
-fn ideal_error(captures: &[Capture], truth: &[f64], mm_per_bin: f64) -> f64 {
-    let pulses: Vec<Vec<f64>> = captures
-        .iter()
-        .map(|zones| {
-            let mut sorted = zones[CENTRE].clone();
+fn ideal_error(recorded: &Histograms, truth: &[f64], mm_per_bin: f64) -> f64 {
+    let centres = (CENTRE..recorded.len()).step_by(ZONES);
+    let pulses: Vec<Vec<f64>> = centres
+        .map(|zone| {
+            let counts = recorded.histogram(zone);
+            let mut sorted = counts.clone();
             sorted.sort_unstable();
-            let above = zones[CENTRE]
-                .iter()
-                .map(|count| count.saturating_sub(sorted[50]));
+            let above = counts.iter().map(|count| count.saturating_sub(sorted[50]));
             let above: Vec<f64> = above.map(|count| count as f64).collect();
             let all: f64 = above.iter().sum();
             above.iter().map(|count| count / all).collect()
@@ -105,7 +105,7 @@ fn a_recording_with_distances_calibrates_itself() {
     let counts = counts(&log, &ReadOptions::default()).unwrap();
     let observed = Observed {
         array: Array::new(9, 1).unwrap(),
-        captures: &counts.captures,
+        histograms: &counts.histograms,
         masked: None,
         length: Length::PhotonsPerCycle(PHOTONS_PER_CYCLE),
         cycles: None,
@@ -154,7 +154,7 @@ fn a_recording_with_distances_calibrates_itself() {
     let truth = ground_truth(&log);
     // In other laser cycles than those that determined the minimum count.
     for seed in 2..12 {
-        let (distances, photons, error) = judged(&found, &counts.captures, &truth, seed);
+        let (distances, photons, error) = judged(&found, &counts.histograms, &truth, seed);
         tell(&format!(
             "{distances} distances, {photons:.1} photons an event, median error {error:.2} mm"
         ));
@@ -163,7 +163,7 @@ fn a_recording_with_distances_calibrates_itself() {
         assert!(error <= 3.0, "{error}");
     }
     let mm_per_bin = found.bin_width_ps * dtof_photons::MM_PER_PS;
-    let ideal = ideal_error(&counts.captures, &truth, mm_per_bin);
+    let ideal = ideal_error(&counts.histograms, &truth, mm_per_bin);
     tell(&format!(
         "an ideal estimator: {ideal:.2} mm from 13 photons"
     ));

@@ -6,6 +6,8 @@
 use std::io::Write;
 use std::path::PathBuf;
 
+use dtof_photons::open::Counts;
+
 /// Writes past the test harness, which hides the output of passing tests.
 pub fn tell(line: &str) {
     let mut out = std::io::stderr().lock();
@@ -38,4 +40,11 @@ pub fn ground_truth(log: &PathBuf) -> Vec<f64> {
     captures
         .map(|capture| capture["dist_to_plane"].as_f64().unwrap() * 1000.0)
         .collect()
+}
+
+/// The histograms of each capture.
+pub fn captures(recorded: &Counts) -> Vec<Vec<Vec<u64>>> {
+    let histograms: Vec<_> = recorded.histograms.iter().collect();
+    let captures = histograms.chunks(recorded.array.pixels() as usize);
+    captures.map(<[_]>::to_vec).collect()
 }

@@ -3,10 +3,11 @@
 
 use std::path::Path;
 
-use crate::capture_log::{log, tell};
+use crate::capture_log::{captures, log, tell};
 use dtof_core::{Array, DepthEvent, Neighbours, Statistics};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
+use dtof_photons::histograms::Histograms;
 use dtof_photons::open::{ReadOptions, counts};
 use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
 use dtof_photons::source::PhotonSource;
@@ -80,12 +81,12 @@ fn recording_is_decided_alike(name: &str, path: &Path) {
         for photons_per_cycle in [0.5, 4.0] {
             let file = SettingsFile::parse(&format!("[detection]\n{text}")).unwrap();
             let (mut narrow, mut wide) = (Vec::new(), Vec::new());
-            for capture in recorded.captures.iter().step_by(8) {
+            for capture in captures(&recorded).into_iter().step_by(8) {
                 let settings = file.settings(capture[0].len()).unwrap();
                 let pixels = u32::try_from(capture.len()).unwrap();
                 let array = Array::new(pixels, 1).unwrap();
                 let length = RecordingLength::PhotonsPerCycle(photons_per_cycle);
-                let captures = [capture.clone()];
+                let captures = Histograms::of(capture).unwrap();
                 for (bits, outcomes) in [(8, &mut narrow), (10, &mut wide)] {
                     let photons = RecordedHistograms::new(array, &captures, length, 4000, 1);
                     let photons = &mut photons.unwrap();

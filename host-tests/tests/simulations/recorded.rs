@@ -40,7 +40,7 @@ fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES
     let recorded = counts(log, &ReadOptions::default()).unwrap();
     let length = RecordingLength::PhotonsPerCycle(photons_per_cycle);
     let mut photons =
-        RecordedHistograms::new(recorded.array, &recorded.captures, length, 10_000, 1).unwrap();
+        RecordedHistograms::new(recorded.array, &recorded.histograms, length, 10_000, 1).unwrap();
     let mut engine = host_engine(&settings, photons.array(), &photons.addresses()).unwrap();
     let events = engine.run(&photons.next_slice(10_000).unwrap()).unwrap();
     let ranges = settings.ranges(photons.array()).unwrap();

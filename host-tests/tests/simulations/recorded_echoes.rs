@@ -3,7 +3,7 @@
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use crate::capture_log::{ground_truth, log, tell};
+use crate::capture_log::{captures, ground_truth, log, tell};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
     Array, Count, Count16, EchoNumber, Flags, Histogram, LaserCycle, PixelAddress, PixelConfig,
@@ -11,6 +11,7 @@ use dtof_core::{
 };
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
+use dtof_photons::histograms::Histograms;
 use dtof_photons::open::{Metadata, ReadOptions, counts};
 use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
 use dtof_photons::source::PhotonSource;
@@ -62,10 +63,11 @@ fn near_captures(log: &PathBuf, sigma: &str) -> Vec<(f64, Found)> {
     let recorded = counts(log, &ReadOptions::default()).unwrap();
     let length = RecordingLength::PhotonsPerCycle(4.0);
     let ranges = settings.ranges(Array::new(1, 1).unwrap()).unwrap();
-    let captures = truth.into_iter().zip(&recorded.captures);
+    let captures = captures(&recorded);
+    let captures = truth.into_iter().zip(&captures);
     let near = captures.filter(|(mm, _)| *mm < NEAR_MM);
     near.map(|(mm, capture)| {
-        let centre = [vec![capture[CENTRE].clone()]];
+        let centre = Histograms::of([capture[CENTRE].clone()]).unwrap();
         let one = Array::new(1, 1).unwrap();
         let mut photons = RecordedHistograms::new(one, &centre, length, CYCLES.into(), 1).unwrap();
         let mut engine = host_engine(&settings, one, &photons.addresses()).unwrap();
@@ -149,13 +151,13 @@ fn tmf8829() -> Option<(Metadata, Vec<Measured>)> {
     let recorded = counts(Path::new(path), &ReadOptions::default()).unwrap();
     // All columns of a row of histograms are the same: they belong to the first row of results.
     assert_eq!(recorded.array, Array::new(1, 16).unwrap());
-    assert_eq!(recorded.captures.len(), 26);
+    assert_eq!(recorded.captures(), 26);
     assert_eq!(recorded.metadata.gate, Some((0, 53)));
     let log: serde_json::Value =
         serde_json::from_reader(GzDecoder::new(File::open(path).unwrap())).unwrap();
     let frames = log["Result_Set"].as_array().unwrap();
     let mut all = Vec::new();
-    for (frame, capture) in frames.iter().zip(&recorded.captures) {
+    for (frame, capture) in frames.iter().zip(captures(&recorded)) {
         for (pixel, bins) in capture.iter().enumerate() {
             let bins = std::array::from_fn(|bin| u16::try_from(bins[bin]).unwrap());
             let peaks = &frame["results"][0][pixel]["peaks"];

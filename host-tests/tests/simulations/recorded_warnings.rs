@@ -1,9 +1,9 @@
 //! Warnings about recordings: none for a good recording.
 
-use crate::capture_log::{log, tell};
+use crate::capture_log::{captures, log, tell};
 use dtof_calibrate::Scatter;
+use dtof_photons::histograms::Histograms;
 use dtof_photons::open::{ReadOptions, counts};
-use dtof_photons::recorded::Capture;
 use dtof_photons::source::PhotonSource;
 use dtof_photons::warnings::{bins_may_be_first, swapped_axes};
 use dtof_simulate::scene::Scene;
@@ -24,20 +24,22 @@ fn recorded_photons_of_a_log_are_warned_of_when_turned_and_only_then() {
     let Some(log) = log() else { return };
     let recorded = counts(&log, &ReadOptions::default()).unwrap();
     assert_eq!(recorded.metadata.warnings, [""; 0]);
-    let pixels = recorded.captures.concat();
-    assert_eq!(swapped_axes(&[recorded.captures.len(), 9], &pixels), None);
-    for capture in &recorded.captures {
-        assert_eq!(swapped_axes(&[9], capture), None);
+    let (captures, pixels) = (self::captures(&recorded), recorded.histograms);
+    assert_eq!(swapped_axes(&[captures.len(), 9], &pixels), None);
+    for capture in &captures {
+        let capture = Histograms::of(capture.clone()).unwrap();
+        assert_eq!(swapped_axes(&[9], &capture), None);
     }
+    let pixels: Vec<Vec<u64>> = pixels.iter().collect();
     assert_scatter("TMF8820", &pixels, 0.99..1.05);
     // So many photons show how unequal the bins are.
-    let sums = over_captures(&recorded.captures);
+    let sums = over_captures(&captures);
     assert_scatter("TMF8820, captures summed", &sums, 1.5..4.0);
-    let sums = over_pixels(&recorded.captures);
+    let sums = over_pixels(&captures);
     assert_scatter("TMF8820, zones summed", &sums, 0.95..1.1);
     let (bins, turned) = bins_first(&pixels, 9);
     let rows = turned.len() / bins;
-    assert!(swapped_axes(&[bins, rows], &turned).is_some());
+    assert!(swapped_axes(&[bins, rows], &Histograms::of(turned).unwrap()).is_some());
     let beside = "../../shared/data/tmf8829_log/tmf8829_log.json.gz";
     let beside = Path::new(env!("CARGO_MANIFEST_DIR")).join(beside);
     if !beside.exists() {
@@ -46,8 +48,9 @@ fn recorded_photons_of_a_log_are_warned_of_when_turned_and_only_then() {
     }
     let recorded = counts(&beside, &ReadOptions::default()).unwrap();
     assert_eq!(recorded.metadata.warnings, [""; 0]);
-    let pixels = recorded.captures.concat();
+    let (captures, pixels) = (self::captures(&recorded), recorded.histograms);
     assert_eq!(swapped_axes(&[26, 16], &pixels), None);
+    let pixels = pixels.iter().collect();
     // The sensor leaves out the last ten bins.
     let measured = |histograms: Vec<Vec<u64>>| -> Vec<Vec<u64>> {
         histograms
@@ -56,11 +59,10 @@ fn recorded_photons_of_a_log_are_warned_of_when_turned_and_only_then() {
             .collect()
     };
     assert_scatter("TMF8829", &measured(pixels), 0.95..1.1);
-    let sums = over_captures(&recorded.captures);
+    let sums = over_captures(&captures);
     assert_scatter("TMF8829, frames summed", &measured(sums), 0.8..1.1);
     // Its columns are alike: the first stands for all.
-    let column: Vec<Capture> = recorded
-        .captures
+    let column: Vec<Vec<Vec<u64>>> = captures
         .iter()
         .map(|capture| capture.iter().step_by(16).cloned().collect())
         .collect();
@@ -78,14 +80,14 @@ fn summed<'a>(histograms: impl Iterator<Item = &'a Vec<u64>>) -> Vec<u64> {
         .unwrap()
 }
 
-fn over_pixels(captures: &[Capture]) -> Vec<Vec<u64>> {
+fn over_pixels(captures: &[Vec<Vec<u64>>]) -> Vec<Vec<u64>> {
     captures
         .iter()
         .map(|capture| summed(capture.iter()))
         .collect()
 }
 
-fn over_captures(captures: &[Capture]) -> Vec<Vec<u64>> {
+fn over_captures(captures: &[Vec<Vec<u64>>]) -> Vec<Vec<u64>> {
     (0..captures[0].len())
         .map(|pixel| summed(captures.iter().map(|capture| &capture[pixel])))
         .collect()
@@ -141,11 +143,12 @@ fn simulated_scenes_are_not_warned_of() {
         for laser_off in [false, true] {
             let (rows, columns, pixels) = histograms(&name, laser_off);
             assert_eq!(
-                swapped_axes(&[rows, columns], &pixels),
+                swapped_axes(&[rows, columns], &Histograms::of(pixels.clone()).unwrap()),
                 None,
                 "{name}, laser off: {laser_off}"
             );
             let (bins, turned) = bins_first(&pixels, columns);
+            let turned = Histograms::of(turned).unwrap();
             let axes = [bins, rows];
             let is_warned = swapped_axes(&axes, &turned).is_some()
                 || bins_may_be_first(&axes, &turned).is_some();

@@ -800,12 +800,12 @@ pub(super) fn sets_the_length(observed: &Observed, hot: &[usize]) -> Option<Stri
     const ONE_IN: usize = 50;
     let pixels = observed.array.pixels() as usize;
     let mut bright = Vec::new();
-    for (capture, histograms) in observed.captures.iter().enumerate() {
-        let numbers = (capture * pixels..).zip(histograms).enumerate();
+    for capture in 0..observed.captures() {
+        let numbers = capture * pixels..(capture + 1) * pixels;
         let used = numbers
-            .filter(|(pixel, (number, _))| !hot.contains(pixel) && !observed.is_masked(*number));
+            .filter(|number| !hot.contains(&(number % pixels)) && !observed.is_masked(*number));
         let mut photons: Vec<(f64, usize)> = used
-            .map(|(_, (number, counts))| (counts.iter().sum::<u64>() as f64, number))
+            .map(|number| (observed.photons(number) as f64, number))
             .collect();
         photons.sort_by(|one, other| other.0.total_cmp(&one.0));
         if let Some(&(others, _)) = photons.get(photons.len().div_ceil(ONE_IN)) {
@@ -836,6 +836,7 @@ mod tests {
     use crate::find::background::Level;
     use crate::find::observed::Length;
     use dtof_core::Array;
+    use dtof_photons::histograms::Histograms;
     use dtof_theory::rates::bin_share;
     use proptest::prelude::*;
     use rand_core::SeedableRng;
@@ -1208,10 +1209,8 @@ mod tests {
             let bright = bright % all;
             let with = |times: u64, hot: &[usize], masked: Option<&[u16]>| {
                 let of = |number: usize| vec![if number == bright { times } else { 1 }; 16];
-                let captures: Vec<Vec<Vec<u64>>> = (0..captures)
-                    .map(|capture| (0..pixels as usize).map(|pixel| of(capture * pixels as usize + pixel)).collect())
-                    .collect();
-                sets_the_length(&Observed { masked, ..observed(pixels, &captures) }, hot)
+                let histograms = Histograms::of((0..all).map(of)).unwrap();
+                sets_the_length(&Observed { masked, ..observed(pixels, &histograms) }, hot)
             };
             prop_assert_eq!(with(10, &[], None), None);
             prop_assert_eq!(with(times, &[bright % pixels as usize], None), None);
@@ -1262,10 +1261,10 @@ mod tests {
         assert!(missed == 0 && wrong <= 20, "{missed} missed, {wrong} wrong");
     }
 
-    fn observed(pixels: u32, captures: &[Vec<Vec<u64>>]) -> Observed<'_> {
+    fn observed(pixels: u32, histograms: &Histograms) -> Observed<'_> {
         Observed {
             array: Array::new(pixels, 1).unwrap(),
-            captures,
+            histograms,
             masked: None,
             length: Length::Unknown,
             cycles: None,
@@ -1285,7 +1284,8 @@ mod tests {
         for bright in [3, 50, 51] {
             capture[bright].fill(40);
         }
-        let says = sets_the_length(&observed(200, &[capture]), &[]).unwrap();
+        let histograms = Histograms::of(capture).unwrap();
+        let says = sets_the_length(&observed(200, &histograms), &[]).unwrap();
         assert!(
             says.starts_with("3 histograms have more than 10 times the photons"),
             "{says}"

@@ -405,7 +405,7 @@ pub fn calibrate_with(
         detection,
         photon_budget,
         mean: counts.iter().map(|count| count / cycles).collect(),
-        captures: observed.captures.len(),
+        captures: observed.captures(),
         array_pixels: observed.array.pixels() as usize,
         columns: observed.array.columns() as usize,
         pixels,
@@ -542,7 +542,7 @@ fn offset_of(
             .filter_map(|(_, position, truth)| Some((*position, (*truth)?)));
         offset::from_distances(&pairs.collect::<Vec<_>>(), observed.bin_width_ps)?
     };
-    if options.target_mm.is_none() && observed.captures.len() < 2 {
+    if options.target_mm.is_none() && observed.captures() < 2 {
         // Its surfaces may differ from their true distances, and not the pixels.
         return Some((offset, None));
     }
@@ -574,6 +574,7 @@ fn offset_of(
 mod tests {
     use super::*;
     use dtof_core::{Array, PixelAddress};
+    use dtof_photons::histograms::Histograms;
     use rand_distr::{Distribution, Poisson};
 
     /// What is found in one capture of a target at 1,200 mm, of 8x8 pixels of 56 mm a bin and these offsets, with
@@ -599,11 +600,11 @@ mod tests {
             });
             bins.collect()
         };
-        let captures = [(0..64).map(histogram).collect::<Vec<_>>()];
+        let histograms = Histograms::of((0..64).map(histogram)).unwrap();
         let slants: Vec<f64> = (0..64).map(slant).collect();
         let observed = Observed {
             array: Array::new(8, 8).unwrap(),
-            captures: &captures,
+            histograms: &histograms,
             masked: None,
             // Without laser cycles no dead time is sought, which would take longest.
             length: Length::Unknown,
@@ -643,18 +644,14 @@ mod tests {
         };
         let mm = |capture: usize, pixel: usize| 900.0 + 310.0 * capture as f64 + 7.0 * pixel as f64;
         let found = |captures: usize| {
-            let capture = |at: usize| {
-                (0..8)
-                    .map(|pixel| histogram(pixel, mm(at, pixel)))
-                    .collect()
-            };
             let truth: Vec<Option<f64>> = (0..captures * 8)
                 .map(|at| Some(mm(at / 8, at % 8)))
                 .collect();
-            let captures: Vec<Vec<Vec<u64>>> = (0..captures).map(capture).collect();
+            let all = (0..captures * 8).map(|at| histogram(at % 8, mm(at / 8, at % 8)));
+            let histograms = Histograms::of(all).unwrap();
             let observed = Observed {
                 array: Array::new(4, 2).unwrap(),
-                captures: &captures,
+                histograms: &histograms,
                 masked: None,
                 length: Length::Unknown,
                 cycles: None,

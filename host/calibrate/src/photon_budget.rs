@@ -82,9 +82,9 @@ impl<'a> Replay<'a> {
             Length::PhotonsPerCycle(rate) => RecordingLength::PhotonsPerCycle(rate),
             Length::Unknown => return Ok(None),
         };
-        let (array, captures) = (observed.array, observed.captures);
+        let (array, histograms) = (observed.array, observed.histograms);
         let pixels = array.pixels();
-        let of_captures = (0..=u16::MAX).take(captures.len() * pixels as usize);
+        let of_captures = (0..=u16::MAX).take(histograms.len());
         let is_left_out = |pixel: &u16| {
             hot.contains(&((u32::from(*pixel) % pixels) as usize))
                 || observed.is_masked((*pixel).into())
@@ -92,7 +92,7 @@ impl<'a> Replay<'a> {
         let left_out: Vec<u16> = of_captures.filter(is_left_out).collect();
         let cycles = MAX_CYCLES.into();
         let mut photons =
-            RecordedHistograms::with_masked(array, captures, length, cycles, seed, &left_out)?;
+            RecordedHistograms::with_masked(array, histograms, length, cycles, seed, &left_out)?;
         let cycles = MAX_PHOTONS / photons.photons_per_cycle().max(1e-9);
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let slice = photons.next_slice(cycles.clamp(1.0, MAX_CYCLES.into()) as u16)?;

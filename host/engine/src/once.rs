@@ -42,7 +42,7 @@ use super::parallel::of_each;
 use crate::settings::Settings;
 use crate::with_widest;
 use dtof_options::Refused;
-use dtof_photons::pixel_counts::PixelCounts;
+use dtof_photons::pixel_counts::{AllPhotons, PixelCounts};
 use dtof_photons::source::Slice;
 
 /// The decision of a pixel.
@@ -80,7 +80,7 @@ pub fn decide_once(
     settings: &Settings,
     array: Array,
     addresses: &[PixelAddress],
-    counts: &PixelCounts,
+    counts: &dyn AllPhotons,
     is_kept: impl Fn(PixelAddress) -> bool + Sync,
 ) -> Result<Vec<OnceDecision>> {
     ensure!(
@@ -133,7 +133,7 @@ struct Pixels<'a, const BINS: usize, W: CounterWidth> {
     /// Ascending.
     addresses: &'a [PixelAddress],
     is_masked: &'a [bool],
-    counts: &'a PixelCounts,
+    counts: &'a dyn AllPhotons,
     counters: PhantomData<W>,
 }
 
@@ -158,11 +158,8 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
                 kept: is_kept(self.addresses[place]).then(|| counts(&decided.histogram)),
             }
         };
-        let alone = |place: usize| {
-            let counts = self.counts.histogram(place).iter();
-            let counts: Vec<u64> = counts.map(|&count| count.into()).collect();
-            self.decide(&counts, self.counts.cycles(place))
-        };
+        let alone =
+            |place: usize| self.decide(&self.counts.histogram(place), self.counts.cycles(place));
         let Some(neighbours) = self.neighbours else {
             return of_each(pixels, 1, |place| end(place, alone(place)));
         };
@@ -248,15 +245,14 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
         if self.is_masked[place] {
             return decided;
         }
-        let own_counts = self.counts.histogram(place).iter();
-        let mut sum: Vec<u64> = own_counts.map(|&count| count.into()).collect();
+        let mut sum = self.counts.histogram(place);
         let mut asked = Vec::new();
         for other in self.array.neighbours(self.addresses[place], neighbours) {
             let other = self.addresses.binary_search(&other);
             if let Some(other) = other.ok().filter(|&other| !self.is_masked[other]) {
-                let counts = self.counts.histogram(other).iter();
-                for (sum, &count) in sum.iter_mut().zip(counts) {
-                    *sum += u64::from(count);
+                let counts = self.counts.histogram(other);
+                for (sum, count) in sum.iter_mut().zip(counts) {
+                    *sum = sum.saturating_add(count);
                 }
                 asked.push(&decided_alone[other].histogram);
             }

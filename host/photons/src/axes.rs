@@ -6,6 +6,7 @@ use std::str::FromStr;
 use anyhow::{Context, Result, ensure};
 use dtof_core::Array;
 
+use crate::histograms::Histograms;
 use dtof_options::rows::grouped;
 use dtof_options::{Named, Refused, named, named_values};
 
@@ -137,19 +138,33 @@ impl AxisLayout {
         self.bins.0
     }
 
-    /// The histograms of `elements`, in the order of addresses.
-    pub fn histograms(&self, elements: &[u64]) -> impl Iterator<Item = Vec<u64>> {
-        let pixels: usize = self.pixels.iter().map(|axis| axis.0).product();
-        (0..pixels).map(move |mut address| {
-            let mut first = 0;
+    /// Whether elements come histogram by histogram, in the order of addresses.
+    fn is_in_order(&self) -> bool {
+        let mut stride = 1;
+        let mut axes = [self.bins]
+            .into_iter()
+            .chain(self.pixels.iter().rev().copied());
+        axes.all(|(length, own)| {
+            let is_next = own == stride || length == 1;
+            stride *= length;
+            is_next
+        })
+    }
+
+    /// The histograms of an array whose `elements` have the order of its file.
+    #[must_use]
+    pub fn histograms(&self, elements: Histograms) -> Histograms {
+        if self.is_in_order() {
+            return elements;
+        }
+        let (_, stride) = self.bins;
+        elements.rearranged(|mut address, bin| {
+            let mut place = bin * stride;
             for (length, stride) in self.pixels.iter().rev() {
-                first += address % length * stride;
+                place += address % length * stride;
                 address /= length;
             }
-            let (bins, stride) = self.bins;
-            (0..bins)
-                .map(|bin| elements[first + bin * stride])
-                .collect()
+            place
         })
     }
 }
@@ -248,8 +263,13 @@ mod tests {
                     })
                     .collect();
                 let layout = AxisLayout::new(&shape, fortran, Some(&axes)).unwrap();
-                let histograms: Vec<_> = layout.histograms(&elements).collect();
-                assert_eq!(histograms, expected, "{names} {fortran}");
+                let mut in_file = Histograms::new(layout.bins());
+                in_file.extend(&elements);
+                let histograms = layout.histograms(in_file);
+                assert!(
+                    histograms.iter().eq(expected.iter().cloned()),
+                    "{names} {fortran}"
+                );
                 assert_eq!(layout.array, Array::new(4, 3).unwrap());
                 assert_eq!(layout.bins(), 8);
             }

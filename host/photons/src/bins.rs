@@ -7,6 +7,7 @@ use std::iter::repeat_n;
 
 use anyhow::{Result, ensure};
 
+use crate::histograms::Histograms;
 use dtof_options::Refused;
 use dtof_options::rows::{Row, grouped};
 
@@ -97,16 +98,21 @@ impl BinFit {
         (self.complete_sums() < self.run).then_some((0, last))
     }
 
-    /// The histogram of a run, and the photons that were cut off.
+    /// The histograms of a run, and the photons that were cut off.
     #[must_use]
-    pub fn apply(&self, recorded: Vec<u64>) -> (Vec<u64>, u64) {
-        if self.rebin == 1 && self.run == recorded.len() {
+    pub fn apply(&self, recorded: Histograms) -> (Histograms, u64) {
+        if self.rebin == 1 && self.run == recorded.bins() {
             return (recorded, 0);
         }
-        let sums = recorded.chunks(self.rebin).map(sum);
-        let sums: Vec<u64> = sums.chain(repeat_n(0, self.run)).collect();
-        let (kept, cut_off) = sums.split_at(self.run);
-        (kept.to_vec(), sum(cut_off))
+        let (mut all, mut all_cut_off) = (Histograms::new(self.run), 0_u64);
+        for histogram in recorded.iter() {
+            let sums = histogram.chunks(self.rebin).map(sum);
+            let sums: Vec<u64> = sums.chain(repeat_n(0, self.run)).collect();
+            let (kept, cut_off) = sums.split_at(self.run);
+            all.extend(kept);
+            all_cut_off = all_cut_off.saturating_add(sum(cut_off));
+        }
+        (all, all_cut_off)
     }
 
     /// The changes as a table; `cut_off` photons were cut off.
@@ -155,27 +161,34 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    /// The bins of one histogram in a run, and the photons that were cut off.
+    fn applied(fit: BinFit, recorded: &[u64]) -> (Vec<u64>, u64) {
+        let (of_run, cut_off) = fit.apply(Histograms::of([recorded.to_vec()]).unwrap());
+        assert_eq!(of_run.len(), 1);
+        (of_run.histogram(0), cut_off)
+    }
+
     #[test]
     fn bins_are_padded_summed_and_cut() {
         let counts: Vec<u64> = (1..=100).collect();
         let fit = |rebin, requested| BinFit::new(100, 100, rebin, requested).unwrap();
         let padded = fit(1, None);
         assert_eq!((padded.bins(), padded.gate()), (128, Some((0, 99))));
-        let (bins, cut_off) = padded.apply(counts.clone());
+        let (bins, cut_off) = applied(padded, &counts);
         assert_eq!((&bins[..100], cut_off), (&counts[..], 0));
         assert_eq!(bins[100..], [0; 28]);
         // 14 sums of 7, one of 2, one empty bin.
         let summed = fit(7, None);
         assert_eq!((summed.bins(), summed.gate()), (16, Some((0, 13))));
-        let (bins, _) = summed.apply(counts.clone());
+        let (bins, _) = applied(summed, &counts);
         assert_eq!((bins[0], bins[13], bins[14], bins[15]), (28, 665, 199, 0));
         let cut = fit(1, Some(64));
         assert_eq!((cut.bins(), cut.gate()), (64, None));
-        assert_eq!(cut.apply(counts).1, (65..=100).sum::<u64>());
+        assert_eq!(applied(cut, &counts).1, (65..=100).sum::<u64>());
         // As many bins as the recording has, but half of them are empty.
         let halved = BinFit::new(16, 16, 2, Some(16)).unwrap();
         assert_eq!(halved.gate(), Some((0, 7)));
-        assert_eq!(halved.apply(vec![3; 16]), ([[6; 8], [0; 8]].concat(), 0));
+        assert_eq!(applied(halved, &[3; 16]), ([[6; 8], [0; 8]].concat(), 0));
     }
 
     #[test]
@@ -266,7 +279,7 @@ mod tests {
             let requested = is_requested.then_some(1u16 << log2);
             let measured = counts.len() - unmeasured.min(counts.len());
             let Ok(fit) = BinFit::new(counts.len(), measured, rebin, requested) else { return Ok(()) };
-            let (bins, cut_off) = fit.apply(counts.clone());
+            let (bins, cut_off) = applied(fit, &counts);
             prop_assert_eq!(bins.len(), fit.bins());
             prop_assert_eq!(bins.iter().sum::<u64>() + cut_off, counts.iter().sum::<u64>());
             for (bin, count) in bins.iter().enumerate() {

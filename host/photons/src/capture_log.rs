@@ -103,8 +103,8 @@ mod tests {
     /// The type of a log, and the photons of its first bin.
     fn is_tmf8829(log: &CaptureLog) -> (bool, u64) {
         match log {
-            CaptureLog::Tmf8829(log) => (true, log.captures[0][0][0]),
-            CaptureLog::Tmf8820(log) => (false, log.captures[0][0][0]),
+            CaptureLog::Tmf8829(log) => (true, log.histograms.count(0, 0)),
+            CaptureLog::Tmf8820(log) => (false, log.histograms.count(0, 0)),
         }
     }
 

@@ -5,6 +5,7 @@ pub mod axes;
 mod bins;
 mod capture_log;
 pub mod geometry;
+pub mod histograms;
 pub mod input;
 pub mod list_checks;
 pub mod masked;

@@ -97,6 +97,7 @@ impl PhotonSource for Masked {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::histograms::Histograms;
     use crate::input::Input;
     use crate::photon_csv::CsvReader;
     use crate::photon_list::{ListOptions, PhotonList};
@@ -131,7 +132,8 @@ mod tests {
     fn histograms() -> Box<dyn PhotonSource> {
         let array = Array::new(3, 1).unwrap();
         let length = RecordingLength::Cycles(100);
-        let photons = RecordedHistograms::new(array, &[vec![vec![2; 8]; 3]], length, 100, 1);
+        let histograms = Histograms::of(vec![vec![2; 8]; 3]).unwrap();
+        let photons = RecordedHistograms::new(array, &histograms, length, 100, 1);
         Box::new(photons.unwrap())
     }
 

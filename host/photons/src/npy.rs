@@ -2,7 +2,7 @@
 //! also of floats.
 
 pub(crate) mod archive;
-mod header;
+pub(crate) mod header;
 pub(crate) mod histograms;
 pub mod numbers;
 pub(crate) mod records;

@@ -1,7 +1,6 @@
 //! Opens recordings of all formats.
 
 use std::borrow::Cow;
-use std::iter::repeat_with;
 use std::path::Path;
 
 use anyhow::{Context, Result, bail, ensure};
@@ -11,16 +10,17 @@ use dtof_core::fixed::types::{I24F8, U16F16};
 use crate::axes::Axes;
 use crate::bins::BinFit;
 use crate::capture_log::{self, CaptureLog};
+use crate::histograms::Histograms;
 use crate::input::Input;
-use crate::npy::histograms::Histograms;
+use crate::npy::histograms::ArrayHistograms;
 use crate::npy::records::{self, RecordReader};
-use crate::npy::{archive, histograms};
+use crate::npy::{archive, header, histograms};
 use crate::photon_csv::CsvReader;
 use crate::photon_list::{CountedSource, ListOptions, PhotonList, PhotonReader};
-use crate::pixel_counts::PixelCounts;
-use crate::recorded::{Capture, ListTimes, RecordedHistograms, RecordingLength};
+use crate::pixel_counts::RecordedCounts;
+use crate::recorded::{ListTimes, RecordedHistograms, RecordingLength};
 use crate::source::PhotonSource;
-use crate::{tmf8820, tmf8829, warnings};
+use crate::{tmf8820, warnings};
 use dtof_options::files::is_file;
 use dtof_options::rows::Row;
 use dtof_options::{Refused, plain};
@@ -100,9 +100,8 @@ pub struct Counts {
     pub array: Array,
     /// The names of its columns and rows.
     pub axis_names: [&'static str; 2],
-    /// Histograms that were recorded together, one a pixel. Captures follow each other in the
-    /// address space.
-    pub captures: Vec<Capture>,
+    /// A histogram of each pixel. Captures follow each other in the address space.
+    pub histograms: Histograms,
     /// Photon lists: what they tell beside the histograms.
     pub times: Option<ListTimes>,
     /// Laser cycles of the recording, if known, as for photon lists.
@@ -114,6 +113,12 @@ pub struct Counts {
 }
 
 impl Counts {
+    /// Captures: how often the array was recorded.
+    #[must_use]
+    pub fn captures(&self) -> usize {
+        self.histograms.len() / self.array.pixels() as usize
+    }
+
     /// The photons, each in a random laser cycle of the recording. For a photon list use [`open`]:
     /// its photons have laser cycles.
     ///
@@ -126,10 +131,10 @@ impl Counts {
         let cycles = options.cycles.unwrap_or(HISTOGRAM_CYCLES);
         let seed = options.seed;
         let (masked, dead_time) = (&options.masked, options.dead_time);
-        let (array, captures) = (self.array, &self.captures);
+        let (array, histograms) = (self.array, &self.histograms);
         let photons =
-            RecordedHistograms::with_masked(array, captures, length, cycles, seed, masked);
-        let photons = photons?.with_dead_time(&self.captures, masked, dead_time)?;
+            RecordedHistograms::with_masked(array, histograms, length, cycles, seed, masked);
+        let photons = photons?.with_dead_time(histograms, masked, dead_time)?;
         Ok(photons.with_axis_names(self.axis_names))
     }
 }
@@ -225,15 +230,15 @@ impl CheckedRecording {
     pub fn photons_and_counts(
         self,
         options: &ReadOptions,
-    ) -> Result<(Recording, Option<PixelCounts>)> {
+    ) -> Result<(Recording, Option<RecordedCounts>)> {
         match self.content {
             Content::Photons(photons, metadata) => Ok((Recording { photons, metadata }, None)),
             Content::Histograms(counts) => {
                 let photons = counts.photons(options);
                 let photons = photons.with_context(|| self.input.to_string())?;
-                let (captures, metadata) = (counts.captures, counts.metadata);
+                let (histograms, metadata) = (counts.histograms, counts.metadata);
                 let cycles = photons.cycles_left();
-                let all = PixelCounts::of_captures(&captures, metadata.bins, cycles);
+                let all = RecordedCounts { histograms, cycles };
                 let photons = Box::new(photons);
                 Ok((Recording { photons, metadata }, Some(all)))
             }
@@ -280,11 +285,11 @@ pub fn counts(input: impl Into<Input>, options: &ReadOptions) -> Result<Counts> 
 }
 
 fn counts_of(photons: &mut dyn CountedSource, metadata: Metadata) -> Result<Counts> {
-    let (counts, times) = photons.counts()?;
+    let (histograms, times) = photons.counts()?;
     Ok(Counts {
         array: photons.array(),
         axis_names: photons.axis_names(),
-        captures: vec![counts],
+        histograms,
         times: Some(times),
         cycles: Some(photons.cycles()),
         truth_mm: None,
@@ -297,11 +302,14 @@ fn read(input: &Input, options: &ReadOptions) -> Result<Content> {
         is_file(path).with_context(|| input.to_string())?;
     }
     let kind = input.file().map_or(Ok(Kind::Array), kind)?;
-    let has_records = match kind {
-        // Three columns that `axes` names are pixels.
-        Kind::Array => records::other_fields(input, options.axes.is_some())?,
+    let opened = match kind {
+        Kind::Array => Some(header::Array::open(input).with_context(|| input.to_string())?),
         _ => None,
     };
+    // Three columns that `axes` names are pixels.
+    let has_axes = options.axes.is_some();
+    let of_records = |array: &header::Array<_>| records::other_fields(&array.header, has_axes);
+    let has_records = opened.as_ref().and_then(of_records);
     let is_list = kind == Kind::Csv || has_records.is_some();
     check_options(input, options, kind, is_list)?;
     if let Some(others) = has_records {
@@ -313,11 +321,14 @@ fn read(input: &Input, options: &ReadOptions) -> Result<Content> {
         return Ok(content);
     }
     let (axes, name) = (options.axes.as_ref(), options.array.as_deref());
-    let mut content = match kind {
-        Kind::Csv => list::<CsvReader>(input, options)?,
-        Kind::Log => log(input.file().context("a log is a file")?, options)?,
-        Kind::Array => array(input, options, histograms::read(input, axes)?)?,
-        Kind::Archive => {
+    let mut content = match (kind, opened) {
+        (Kind::Csv, _) => list::<CsvReader>(input, options)?,
+        (Kind::Log, _) => log(input.file().context("a log is a file")?, options)?,
+        (_, Some(opened)) => {
+            let read = histograms::read(opened, axes).with_context(|| input.to_string())?;
+            array(input, options, read)?
+        }
+        (_, None) => {
             let path = input.file().context("an archive is a file")?;
             array(input, options, archive::read(path, name, axes)?)?
         }
@@ -325,8 +336,8 @@ fn read(input: &Input, options: &ReadOptions) -> Result<Content> {
     if let (Content::Histograms(counts), Some(RecordingLength::Cycles(cycles))) =
         (&mut content, options.length)
     {
-        let all = counts.captures.iter().flatten();
-        let highest = all.filter_map(|counts| counts.iter().max().copied());
+        let highest = counts.histograms.iter();
+        let highest = highest.filter_map(|counts| counts.into_iter().max());
         let warning = warnings::few_cycles(highest.collect(), cycles, options.rebin);
         counts.metadata.warnings.extend(warning);
     }
@@ -426,28 +437,18 @@ fn list<R: PhotonReader + 'static>(input: &Input, options: &ReadOptions) -> Resu
     Ok(Content::Photons(Box::new(photons), metadata))
 }
 
-fn array(input: &Input, options: &ReadOptions, read: Histograms) -> Result<Content> {
-    let Histograms {
+fn array(input: &Input, options: &ReadOptions, read: ArrayHistograms) -> Result<Content> {
+    let ArrayHistograms {
         layout,
         axes,
-        pixels,
+        histograms,
     } = read;
     let (mut swapped, mut perhaps) = (None, None);
     if options.axes.is_none() {
-        swapped = warnings::swapped_axes(&axes, &pixels);
-        perhaps = warnings::bins_may_be_first(&axes, &pixels).filter(|_| swapped.is_none());
+        swapped = warnings::swapped_axes(&axes, &histograms);
+        perhaps = warnings::bins_may_be_first(&axes, &histograms).filter(|_| swapped.is_none());
     }
-    let bins = layout.bins();
-    let mut pixels = pixels.into_iter();
-    let capture = || {
-        pixels
-            .by_ref()
-            .take(layout.array.pixels() as usize)
-            .collect()
-    };
-    let captures = repeat_with(capture).take_while(|capture: &Capture| !capture.is_empty());
-    let captures = captures.collect();
-    let counts = fit_bins(layout.array, captures, [bins, bins], None, options);
+    let counts = fit_bins(layout.array, histograms, layout.bins(), None, options);
     let mut counts = counts.with_context(|| input.to_string())?;
     counts.axis_names = layout.axis_names;
     counts.metadata.has_shape = layout.is_shape_known;
@@ -461,13 +462,12 @@ fn log(path: &Path, options: &ReadOptions) -> Result<Content> {
     let counts = match capture_log::read(path)? {
         CaptureLog::Tmf8820(log) => {
             let width = Some(log.bin_width_ps);
-            let bins = [tmf8820::BINS; 2];
-            let counts = fit_bins(log.array, log.captures, bins, width, options);
+            let counts = fit_bins(log.array, log.histograms, tmf8820::BINS, width, options);
             let mut counts = counts.with_context(in_file)?;
             counts.axis_names = log.axis_names;
             // Of the capture that is used.
             let first = options.capture.unwrap_or(0) * log.array.pixels();
-            let used = counts.captures.len() * log.array.pixels() as usize;
+            let used = counts.histograms.len();
             let truth = log.truth_mm.map(|all| {
                 let of_used = all.into_iter().skip(first as usize).take(used);
                 of_used.collect::<Vec<_>>()
@@ -478,8 +478,7 @@ fn log(path: &Path, options: &ReadOptions) -> Result<Content> {
         }
         CaptureLog::Tmf8829(log) => {
             let width = Some(log.bin_width_ps);
-            let bins = [tmf8829::BINS, log.measured_bins];
-            let counts = fit_bins(log.array, log.captures, bins, width, options);
+            let counts = fit_bins(log.array, log.histograms, log.measured_bins, width, options);
             let mut counts = counts.with_context(in_file)?;
             counts.metadata.offset_mm = Some(OFFSET_MM);
             if let (Some(shift), None) = (log.assumed_shift, options.bin_width_ps) {
@@ -496,16 +495,16 @@ fn log(path: &Path, options: &ReadOptions) -> Result<Content> {
     Ok(Content::Histograms(counts))
 }
 
-/// Histograms with the bins of a run, from `recorded` bins, the first `measured` of which were
-/// measured in full.
+/// Histograms with the bins of a run, from those of a recording, whose first `measured` bins were measured in full.
 fn fit_bins(
     array: Array,
-    mut captures: Vec<Capture>,
-    [recorded, measured]: [usize; 2],
+    mut histograms: Histograms,
+    measured: usize,
     width_ps: Option<U16F16>,
     options: &ReadOptions,
 ) -> Result<Counts> {
-    let all = captures.len();
+    let each = array.pixels() as usize;
+    let all = histograms.len() / each;
     if let Some(capture) = options.capture {
         let place = usize::try_from(capture)?;
         let reason = match all {
@@ -513,22 +512,15 @@ fn fit_bins(
             _ => format!("there are {all}, counted from 0"),
         };
         ensure!(place < all, Refused::value("capture", capture, reason));
-        captures = vec![captures.swap_remove(place)];
+        histograms = Histograms::of(histograms.iter().skip(place * each).take(each))?;
     }
+    let recorded = histograms.bins();
     let fit = BinFit::new(recorded, measured, options.rebin.into(), options.bins)?;
     let mut metadata = metadata(fit.bins(), width_ps, options)?;
-    let mut fit_one = |histogram| {
-        let (histogram, cut_off) = fit.apply(histogram);
-        metadata.cut_off = metadata.cut_off.saturating_add(cut_off);
-        histogram
-    };
-    let captures = captures.into_iter();
-    let captures: Vec<Capture> = captures
-        .map(|capture| capture.into_iter().map(&mut fit_one).collect())
-        .collect();
-    let histograms = captures.iter().flatten();
-    let empty =
-        warnings::empty_histograms(histograms.map(|bins| bins.iter().all(|&count| count == 0)));
+    let (histograms, cut_off) = fit.apply(histograms);
+    metadata.cut_off = cut_off;
+    let is_empty = |bins: Vec<u64>| bins.iter().all(|&count| count == 0);
+    let empty = warnings::empty_histograms(histograms.iter().map(is_empty));
     metadata.captures = all;
     metadata.gate = fit.gate();
     metadata.rows = fit.rows(metadata.cut_off);
@@ -543,7 +535,7 @@ fn fit_bins(
     Ok(Counts {
         array,
         axis_names: ["column", "row"],
-        captures,
+        histograms,
         times: None,
         cycles: None,
         truth_mm: None,

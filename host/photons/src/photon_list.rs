@@ -6,9 +6,10 @@
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{Array, PixelAddress};
 
+use crate::histograms::Histograms;
 use crate::input::Input;
 use crate::list_checks::ListWatch;
-use crate::recorded::{Capture, ListTimes};
+use crate::recorded::ListTimes;
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use crate::warnings::{greatest_divisor, times_as_cycles};
 use dtof_options::Refused;
@@ -45,7 +46,7 @@ pub trait CountedSource: PhotonSource {
     ///
     /// # Errors
     /// Fails if the file has changed since it was checked.
-    fn counts(&mut self) -> Result<(Capture, ListTimes)>;
+    fn counts(&mut self) -> Result<(Histograms, ListTimes)>;
 }
 
 /// The options of a photon list.
@@ -340,33 +341,35 @@ impl<R> PhotonList<R> {
 }
 
 impl<R: PhotonReader> CountedSource for PhotonList<R> {
-    fn counts(&mut self) -> Result<(Capture, ListTimes)> {
+    fn counts(&mut self) -> Result<(Histograms, ListTimes)> {
         let bins = self.rows.shape.bins.into();
-        let mut counts = vec![vec![0; bins]; self.array.pixels() as usize];
+        let pixels = self.array.pixels() as usize;
+        let mut counts = vec![0; pixels * bins];
         let mut times = ListTimes {
             quarters: vec![[0; 4]; bins],
             ..ListTimes::default()
         };
-        let mut watch = ListWatch::new(counts.len(), bins, self.cycles);
+        let mut watch = ListWatch::new(pixels, bins, self.cycles);
         // The laser cycle of the last photon of each pixel, and of each bin if they count once.
-        let mut last = vec![u64::MAX; counts.len()];
+        let mut last = vec![u64::MAX; pixels];
         let once = usize::from(self.rows.shape.once_per_bin);
-        let mut last_of_bins = vec![u64::MAX; once * counts.len() * bins];
+        let mut last_of_bins = vec![u64::MAX; once * counts.len()];
         let quarter = self.cycles.div_ceil(4);
         while let Some(row) = self.rows.next()? {
             if row.cycle >= self.cycles {
                 break;
             }
-            let Some(histogram) = counts.get_mut(row.pixel()) else {
+            let bin = usize::from(row.bin());
+            let place = row.pixel() * bins + bin;
+            let Some(count) = counts.get_mut(place) else {
                 bail!("{} changed while it was read", self.input);
             };
-            let bin = usize::from(row.bin());
-            if let Some(last) = last_of_bins.get_mut(row.pixel() * bins + bin)
+            if let Some(last) = last_of_bins.get_mut(place)
                 && std::mem::replace(last, row.cycle) == row.cycle
             {
                 continue;
             }
-            histogram[bin] += 1;
+            *count += 1;
             #[allow(clippy::cast_possible_truncation, reason = "0 to 3")]
             let quarter = (row.cycle / quarter) as usize;
             times.quarters[bin][quarter] += 1;
@@ -378,7 +381,9 @@ impl<R: PhotonReader> CountedSource for PhotonList<R> {
         if self.times_as_cycles().is_none() {
             times.checks = watch.checks();
         }
-        Ok((counts, times))
+        let mut histograms = Histograms::new(bins);
+        histograms.extend(&counts);
+        Ok((histograms, times))
     }
 }
 

@@ -4,10 +4,49 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::recorded::Capture;
+use crate::histograms::Histograms;
 use crate::source::Slice;
 
-/// A histogram of each pixel. It takes 4 bytes a bin, whatever the number of photons.
+/// All photons of some pixels.
+pub trait AllPhotons: Sync {
+    /// The histogram of pixel number `place`.
+    fn histogram(&self, place: usize) -> Vec<u64>;
+
+    /// The laser cycles of pixel number `place`.
+    fn cycles(&self, place: usize) -> u64;
+}
+
+/// Recorded histograms, and the laser cycles of each.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct RecordedCounts {
+    /// The histograms.
+    pub histograms: Histograms,
+    /// As many laser cycles.
+    pub cycles: Vec<u64>,
+}
+
+impl AllPhotons for RecordedCounts {
+    fn histogram(&self, place: usize) -> Vec<u64> {
+        self.histograms.histogram(place)
+    }
+
+    fn cycles(&self, place: usize) -> u64 {
+        self.cycles[place]
+    }
+}
+
+impl AllPhotons for PixelCounts {
+    fn histogram(&self, place: usize) -> Vec<u64> {
+        let counts = Self::histogram(self, place).iter();
+        counts.map(|&count| count.into()).collect()
+    }
+
+    fn cycles(&self, place: usize) -> u64 {
+        self.cycles[place]
+    }
+}
+
+/// A histogram of each pixel, of photons that come slice by slice. It takes 4 bytes a bin, whatever the number of photons.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct PixelCounts {
     bins: usize,
@@ -28,24 +67,6 @@ impl PixelCounts {
             cycles: vec![0; pixels],
             rejected: 0,
         }
-    }
-
-    /// The histograms of a recording, and the laser cycles of each. A histogram with a count past 32 bits is divided by a
-    /// power of two, and so are its laser cycles.
-    #[must_use]
-    pub fn of_captures(captures: &[Capture], bins: usize, cycles: Vec<u64>) -> Self {
-        let mut all = Self::new(cycles.len(), bins);
-        all.cycles = cycles;
-        let pixels = all.counts.chunks_mut(bins.max(1)).zip(&mut all.cycles);
-        for ((counts, cycles), histogram) in pixels.zip(captures.iter().flatten()) {
-            let highest = histogram.iter().copied().max().unwrap_or(0);
-            let shift = (64 - highest.leading_zeros()).saturating_sub(32);
-            for (count, photons) in counts.iter_mut().zip(histogram) {
-                *count = u32::try_from(photons >> shift).unwrap_or(u32::MAX);
-            }
-            *cycles >>= shift;
-        }
-        all
     }
 
     /// Adds the photons of the laser cycles `span` of a slice.
@@ -143,16 +164,6 @@ mod tests {
                 photons: photons.iter().map(photon).collect(),
             }],
         }
-    }
-
-    #[test]
-    fn a_count_past_32_bits_is_divided() {
-        let captures = vec![vec![vec![1 << 35, 16, 0, 7], vec![1, 2, 3, 4]]];
-        let counts = PixelCounts::of_captures(&captures, 4, vec![1 << 36; 2]);
-        assert_eq!(counts.histogram(0), [1 << 31, 1, 0, 0]);
-        assert_eq!(counts.histogram(1), [1, 2, 3, 4]);
-        assert_eq!((counts.cycles(0), counts.cycles(1)), (1 << 32, 1 << 36));
-        assert_eq!(counts.pixels(), 2);
     }
 
     proptest! {

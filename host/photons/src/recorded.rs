@@ -14,6 +14,8 @@ mod remaining;
 #[cfg(test)]
 mod tests;
 
+use std::iter::repeat_n;
+
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::{Array, PixelAddress};
 use rand_distr::uniform::{UniformInt, UniformSampler};
@@ -23,6 +25,7 @@ use rayon::prelude::*;
 
 use self::hits::Hits;
 use self::remaining::Remaining;
+use crate::histograms::Histograms;
 use crate::list_checks::ListChecks;
 use crate::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_options::Refused;
@@ -49,9 +52,6 @@ pub enum RecordingLength {
     /// Laser cycles.
     Cycles(u64),
 }
-
-/// The histograms of pixels that were recorded together, one a pixel.
-pub type Capture = Vec<Vec<u64>>;
 
 /// What a photon list tells beside its histograms.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -82,19 +82,19 @@ pub struct RecordedHistograms {
 }
 
 impl RecordedHistograms {
-    /// Replays `captures`, each of `array`, for at most `cycles` laser cycles.
+    /// Replays `histograms`, one of each pixel of `array` for each capture, for at most `cycles` laser cycles.
     ///
     /// # Errors
     /// Fails if there are no captures, pixels without a histogram, more pixels than addresses, or more photons
     /// than can be counted.
     pub fn new(
         array: Array,
-        captures: &[Capture],
+        histograms: &Histograms,
         length: RecordingLength,
         cycles: u64,
         seed: u64,
     ) -> Result<Self> {
-        Self::with_masked(array, captures, length, cycles, seed, &[])
+        Self::with_masked(array, histograms, length, cycles, seed, &[])
     }
 
     /// The same, with pixels that do not count for the length, such as hot ones. `masked` are their addresses.
@@ -103,30 +103,26 @@ impl RecordedHistograms {
     /// As for [`Self::new`].
     pub fn with_masked(
         array: Array,
-        captures: &[Capture],
+        histograms: &Histograms,
         length: RecordingLength,
         cycles: u64,
         seed: u64,
         masked: &[u16],
     ) -> Result<Self> {
-        ensure!(!captures.is_empty(), "no captures");
+        ensure!(!histograms.is_empty(), "no captures");
         let each = array.pixels() as usize;
-        let are_complete = captures.iter().all(|capture| capture.len() == each);
+        let are_complete = histograms.len().is_multiple_of(each);
         ensure!(are_complete, "a capture does not have {each} histograms");
-        let rows = u32::try_from(captures.len())?.saturating_mul(array.rows());
+        let rows = u32::try_from(histograms.len() / each)?.saturating_mul(array.rows());
         let all = Array::new(array.columns(), rows).context("more than 65,536 pixels")?;
-        let mut addresses = 0..=u16::MAX;
-        let (mut addressed, mut lengths) = (Vec::new(), Vec::new());
-        for (number, capture) in captures.iter().enumerate() {
-            // The totals end first, so that no address is taken and lost.
-            let totals = totals(capture, number * each)?.into_iter();
-            let pixels: Vec<(u64, u16)> = totals.zip(addresses.by_ref()).collect();
-            let unmasked = pixels
-                .iter()
-                .filter(|(_, address)| !masked.contains(address));
-            let brightest = unmasked.map(|&(total, _)| total).max().unwrap_or(0);
+        let totals = totals(histograms)?;
+        let is_masked = |pixel: usize| u16::try_from(pixel).is_ok_and(|own| masked.contains(&own));
+        let mut lengths = Vec::new();
+        for (capture, totals) in totals.chunks(each).enumerate() {
+            let unmasked = (capture * each..).zip(totals);
+            let unmasked = unmasked.filter(|(pixel, _)| !is_masked(*pixel));
+            let brightest = unmasked.map(|(_, &total)| total).max().unwrap_or(0);
             lengths.push(recorded_cycles(length, brightest)?);
-            addressed.push(pixels);
         }
         // A capture without photons does not make a replay longer.
         let longest = lengths.iter().flatten().copied().max();
@@ -134,19 +130,21 @@ impl RecordedHistograms {
         let lengths = lengths.iter().map(|length| length.unwrap_or(longest));
         let shortest = lengths.clone().min().unwrap_or(longest);
         let (mut pixels, mut photons_per_cycle) = (Vec::new(), 0.0);
-        for ((capture, addressed), recorded) in captures.iter().zip(addressed).zip(lengths) {
-            for ((total, address), counts) in addressed.into_iter().zip(capture) {
-                photons_per_cycle += mean(total, recorded);
-                pixels.push(RecordedPixel {
-                    remaining: Remaining::new(counts),
-                    hits: None,
-                    cycles_left: recorded,
-                    rng: pixel_rng(seed, PixelAddress::new(address)),
-                    chunk: PixelPhotons::default(),
-                    replayed_cycles: 0,
-                    replayed_photons: 0,
-                });
-            }
+        let lengths = lengths.flat_map(|length| repeat_n(length, each));
+        let addresses = (0..=u16::MAX).map(PixelAddress::new);
+        for (((address, counts), total), recorded) in
+            addresses.zip(histograms.iter()).zip(totals).zip(lengths)
+        {
+            photons_per_cycle += mean(total, recorded);
+            pixels.push(RecordedPixel {
+                remaining: Remaining::new(&counts),
+                hits: None,
+                cycles_left: recorded,
+                rng: pixel_rng(seed, address),
+                chunk: PixelPhotons::default(),
+                replayed_cycles: 0,
+                replayed_photons: 0,
+            });
         }
         ensure!(
             photons_per_cycle <= MOST_A_CYCLE,
@@ -165,7 +163,7 @@ impl RecordedHistograms {
         })
     }
 
-    /// The photons of a TDC that was blind for `dead_time` bins after each, as `captures` have them: no
+    /// The photons of a TDC that was blind for `dead_time` bins after each, as the same `histograms` have them: no
     /// laser cycle has a photon in the dead time of another. With 0 nothing changes.
     ///
     /// # Errors
@@ -173,16 +171,16 @@ impl RecordedHistograms {
     /// live.
     pub fn with_dead_time(
         mut self,
-        captures: &[Capture],
+        histograms: &Histograms,
         masked: &[u16],
         dead_time: u16,
     ) -> Result<Self> {
         if dead_time == 0 {
             return Ok(self);
         }
-        let pixels = self.pixels.iter_mut().zip(captures.iter().flatten());
+        let pixels = self.pixels.iter_mut().zip(histograms.iter());
         for (address, (pixel, counts)) in (0..=u16::MAX).zip(pixels) {
-            let hits = Hits::new(counts, dead_time);
+            let hits = Hits::new(&counts, dead_time);
             let cycles = pixel.cycles_left;
             if let Some((bin, live)) = hits.contradiction(cycles)
                 && !masked.contains(&address)
@@ -212,28 +210,18 @@ impl RecordedHistograms {
     }
 }
 
-/// Checks that the photons of each pixel can be counted.
+/// Photons of each pixel.
 ///
 /// # Errors
-/// Names the first pixel with more.
-pub fn check_totals(captures: &[Capture]) -> Result<()> {
-    let mut first = 0;
-    for capture in captures {
-        totals(capture, first)?;
-        first += capture.len();
-    }
-    Ok(())
-}
-
-/// Photons of each pixel of a capture, whose first pixel is `first`.
-fn totals(capture: &Capture, first: usize) -> Result<Vec<u64>> {
-    let add = |sum: u64, &count: &u64| sum.checked_add(count);
-    let total = |(pixel, counts): (usize, &Vec<u64>)| {
+/// Names the first pixel with more than can be counted.
+pub fn totals(histograms: &Histograms) -> Result<Vec<u64>> {
+    let add = |sum: u64, count: &u64| sum.checked_add(*count);
+    let total = |(pixel, counts): (usize, Vec<u64>)| {
         let total = counts.iter().try_fold(0, add);
         let total = total.filter(|&total| total <= MOST);
         total.with_context(|| format!("pixel {pixel} holds more than 2^40 photons"))
     };
-    (first..).zip(capture).map(total).collect()
+    histograms.iter().enumerate().map(total).collect()
 }
 
 /// Photons a laser cycle.

@@ -131,7 +131,9 @@ pub fn is_one_capture(source: &dyn PhotonSource) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::histograms::Histograms;
     use crate::recorded::{RecordedHistograms, RecordingLength};
+    use std::iter::repeat_n;
 
     fn array(columns: u32, rows: u32) -> Array {
         Array::new(columns, rows).unwrap()
@@ -275,8 +277,8 @@ mod tests {
             (2, 4, ["zone", "capture"], [false; 4], false),
         ] {
             let each = array(3, rows);
-            let capture = vec![vec![1; 8]; each.pixels() as usize];
-            let captures = vec![capture; captures];
+            let pixels = captures * each.pixels() as usize;
+            let captures = Histograms::of(repeat_n(vec![1; 8], pixels)).unwrap();
             let length = RecordingLength::Cycles(9);
             let source = RecordedHistograms::new(each, &captures, length, 9, 1).unwrap();
             let source = source.with_axis_names(names);

@@ -10,7 +10,7 @@ use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_sensors::tmf882x::{BIN_WIDTH_8X8_PS, BIN_WIDTH_PS, OFFSET_MM};
 use serde::Deserialize;
 
-use crate::recorded::Capture;
+use crate::histograms::Histograms;
 
 /// The centre of nine zones.
 const CENTRE: usize = 4;
@@ -28,8 +28,8 @@ pub struct Tmf8820Log {
     pub bin_width_ps: U16F16,
     /// Moves pulses to distances; not known of 8×8 zones.
     pub offset_mm: Option<I24F8>,
-    /// A histogram for each zone.
-    pub captures: Vec<Capture>,
+    /// A histogram for each zone, capture by capture.
+    pub histograms: Histograms,
     /// The true distance of each zone in millimetres. The log has it for centre zones, if at all.
     pub truth_mm: Option<Vec<Option<f64>>>,
 }
@@ -99,7 +99,7 @@ pub fn read(name: &str, text: impl Read) -> Result<Tmf8820Log> {
         axis_names,
         bin_width_ps,
         offset_mm,
-        captures: entries.into_iter().map(|entry| entry.hists).collect(),
+        histograms: Histograms::of(entries.into_iter().flat_map(|entry| entry.hists))?,
         truth_mm,
     })
 }
@@ -129,8 +129,8 @@ mod tests {
         assert_eq!(log.bin_width_ps, BIN_WIDTH_PS);
         assert_eq!(log.offset_mm, Some(OFFSET_MM));
         let zones = |first: u64| (first..first + 9).map(|count| vec![count; BINS]);
-        let captures: Vec<Capture> = [100, 200].map(|first| zones(first).collect()).into();
-        assert_eq!(log.captures, captures);
+        let captures = [100, 200].into_iter().flat_map(zones);
+        assert!(log.histograms.iter().eq(captures));
         let mut truth = vec![None; 18];
         truth[9 + 4] = Some(250.0);
         assert_eq!(log.truth_mm, Some(truth));
@@ -145,8 +145,8 @@ mod tests {
         assert_eq!(log.axis_names, ["column", "row"]);
         assert_eq!(log.bin_width_ps, BIN_WIDTH_8X8_PS);
         assert_eq!((log.offset_mm, log.truth_mm), (None, None));
-        assert_eq!(log.captures.len(), 2);
-        assert_eq!(log.captures[1][63], [63; BINS]);
+        assert_eq!(log.histograms.len(), 2 * 64);
+        assert_eq!(log.histograms.histogram(64 + 63), [63; BINS]);
     }
 
     #[test]

@@ -12,7 +12,7 @@ use dtof_core::fixed::types::U16F16;
 use dtof_sensors::tmf8829::FINEST_BIN_PS;
 use serde::Deserialize;
 
-use crate::recorded::Capture;
+use crate::histograms::Histograms;
 use crate::tmf8820::not_a_log;
 use dtof_options::rows::Row;
 
@@ -26,8 +26,8 @@ const BIN_SHIFT: u32 = 2;
 pub struct Tmf8829Log {
     /// Of one frame.
     pub array: Array,
-    /// The frames.
-    pub captures: Vec<Capture>,
+    /// A histogram for each pixel, frame by frame.
+    pub histograms: Histograms,
     /// Picoseconds a bin.
     pub bin_width_ps: U16F16,
     /// The bins that were measured in full, from the first on: all, if the log does not say.
@@ -105,15 +105,11 @@ fn parse_log(log: Log) -> Result<Tmf8829Log> {
     let mut all = frames.iter().flatten();
     let is_copied = columns > 1 && all.all(|row| row.iter().all(|pixel| *pixel == row[0]));
     let columns_kept = if is_copied { 1 } else { columns };
-    let captures: Vec<Capture> = frames
+    let pixels = frames
         .into_iter()
-        .map(|frame| {
-            let pixels = frame
-                .into_iter()
-                .flat_map(|row| row.into_iter().take(columns_kept));
-            pixels.map(|pixel| pixel.bin).collect()
-        })
-        .collect();
+        .flatten()
+        .flat_map(|row| row.into_iter().take(columns_kept));
+    let histograms = Histograms::of(pixels.map(|pixel| pixel.bin))?;
     let configuration = log.configuration.as_ref();
     let known_shift = configuration.and_then(|of| of.bin_shift);
     let shift = known_shift.unwrap_or(BIN_SHIFT);
@@ -130,7 +126,7 @@ fn parse_log(log: Log) -> Result<Tmf8829Log> {
     let array = Array::new(u32::try_from(columns_kept)?, u32::try_from(rows)?);
     Ok(Tmf8829Log {
         array: array.context("more than 65,536 pixels")?,
-        captures,
+        histograms,
         bin_width_ps: width.with_context(|| format!("bin_shift {shift}: bins are too wide"))?,
         measured_bins: measured.unwrap_or(BINS),
         assumed_shift: known_shift.is_none().then_some(shift),

@@ -8,6 +8,7 @@ use dtof_options::numbers::shortest;
 use dtof_options::rows::grouped;
 
 use crate::bins::{FEWEST, MOST_BINS};
+use crate::histograms::Histograms;
 
 /// No SPAD resolves a picosecond, so a narrower bin was probably given in nanoseconds.
 #[must_use]
@@ -130,10 +131,11 @@ struct Concentration {
 }
 
 impl Concentration {
-    fn along_last(pixels: &[Vec<u64>]) -> Self {
+    fn along_last(pixels: &Histograms) -> Self {
         let mut all = Self::default();
-        let lines = pixels.iter();
-        lines.for_each(|bins| all.add(bins.iter().copied(), 1.0));
+        pixels
+            .iter()
+            .for_each(|bins| all.add(bins.into_iter(), 1.0));
         all
     }
 
@@ -188,7 +190,7 @@ impl Concentration {
 /// # Panics
 /// Panics if an axis has no length, or if there are fewer pixels.
 #[must_use]
-pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
+pub fn swapped_axes(axes: &[usize], pixels: &Histograms) -> Option<String> {
     let mut along_last = Concentration::along_last(pixels);
     // If the last axis looks like bins in some pixels, bright ones among them make the others look so.
     let has_peaks = along_last.mean() >= LOOKS_LIKE_BINS;
@@ -200,7 +202,7 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
         .map(|bins| bins.iter().fold(0, |sum: u64, &n| sum.saturating_add(n)))
         .collect();
     let brightest = (0..pixels.len()).max_by_key(|&pixel| totals[pixel]);
-    let bins = pixels.first()?.len();
+    let bins = pixels.bins();
     // Odd, so that all are seen of a regular pattern.
     let step = (pixels.len() * bins / MOST_COUNTS) | 1;
     let mut apart = pixels.len();
@@ -222,7 +224,7 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
             places.add(line.iter().map(|&pixel| totals[pixel]), 1.0);
             let places_are = places.mean().max(1.0);
             for bin in (start % step..bins).step_by(step) {
-                let line = || line.iter().map(|&pixel| pixels[pixel][bin]);
+                let line = || line.iter().map(|&pixel| pixels.count(pixel, bin));
                 along.add(line(), 1.0);
                 beyond_places.add(line(), places_are);
             }
@@ -255,8 +257,8 @@ pub fn swapped_axes(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
 /// Warns of three axes of which the last two are equal and the first is longer, unless the last looks like the bins: perhaps
 /// bins, rows and columns. They were read as rows, columns and bins. `axes` are the lengths of the first two.
 #[must_use]
-pub fn bins_may_be_first(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
-    let bins = pixels.first()?.len();
+pub fn bins_may_be_first(axes: &[usize], pixels: &Histograms) -> Option<String> {
+    let bins = pixels.bins();
     let [rows, columns] = *axes else { return None };
     let may_be = columns == bins && bins >= FEWEST && rows > bins && rows <= MOST_BINS;
     (may_be && Concentration::along_last(pixels).mean() < LOOKS_LIKE_BINS).then(|| {
@@ -274,6 +276,14 @@ mod tests {
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, Poisson, Uniform};
     use rand_pcg::Pcg64;
+
+    fn swapped(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
+        swapped_axes(axes, &Histograms::of(pixels.to_vec()).unwrap())
+    }
+
+    fn first(axes: &[usize], pixels: &[Vec<u64>]) -> Option<String> {
+        bins_may_be_first(axes, &Histograms::of(pixels.to_vec()).unwrap())
+    }
 
     #[test]
     fn bins_below_a_picosecond_are_probably_in_nanoseconds() {
@@ -441,9 +451,7 @@ mod tests {
 
     #[test]
     fn a_square_behind_a_longer_axis_may_be_rows_and_columns() {
-        let even = |axes: &[usize], bins| {
-            bins_may_be_first(axes, &lit(axes, 0, axes[0], &vec![100; bins]))
-        };
+        let even = |axes: &[usize], bins| first(axes, &lit(axes, 0, axes[0], &vec![100; bins]));
         let line = "17x16x16: read as 17 rows of 16 columns with 16 bins; if the first axis is the bins: \
                     --axes bins,rows,columns, else --axes rows,columns,bins";
         assert_eq!(even(&[17, 16], 16).unwrap(), line);
@@ -462,10 +470,7 @@ mod tests {
         // The last axis looks like the bins.
         let mut sharp = [0; 16];
         sharp[3] = 100;
-        assert_eq!(
-            bins_may_be_first(&[17, 16], &vec![sharp.to_vec(); 17 * 16]),
-            None
-        );
+        assert_eq!(first(&[17, 16], &vec![sharp.to_vec(); 17 * 16]), None);
     }
 
     /// Pixels of which those in the first `places` along an axis have such histograms, and the others no photon.
@@ -542,7 +547,7 @@ mod tests {
             (&[16], 0, 1, even, None),
             (&[16], 0, 2, even, Some(["the first axis", "bins,columns"])),
         ] {
-            let warning = swapped_axes(axes, &lit(axes, axis, places, &bins));
+            let warning = swapped(axes, &lit(axes, axis, places, &bins));
             let whole = which.map(|[which, names]| {
                 format!(
                     "{which} looks like the bins, and the last like pixels; if so: --axes {names}"
@@ -557,7 +562,7 @@ mod tests {
     fn the_first_of_two_axes_that_look_alike_is_named() {
         let pixel = |pixel| vec![if pixel % 9 == 0 { 100 } else { 0 }; 8];
         let diagonal: Vec<_> = (0..64).map(pixel).collect();
-        let warning = swapped_axes(&[8, 8], &diagonal).unwrap();
+        let warning = swapped(&[8, 8], &diagonal).unwrap();
         assert!(warning.starts_with("the first axis "), "{warning}");
     }
 
@@ -593,7 +598,7 @@ mod tests {
             for hot in [0.0, 1e2, 1e4, 1e6] {
                 for axes in [&[8, 16][..], &[16, 8], &[16], &[128]] {
                     let pixels = counts(axes.iter().product(), background, pulse, hot);
-                    let warning = swapped_axes(axes, &pixels);
+                    let warning = swapped(axes, &pixels);
                     assert_eq!(warning, None, "{axes:?} {background} {pulse} {hot}");
                 }
             }
@@ -614,7 +619,7 @@ mod tests {
                 }
             };
             let pixels: Vec<Vec<u64>> = (0..32 * 16).map(pixel).collect();
-            assert_eq!(swapped_axes(&[32, 16], &pixels), None, "{lit}");
+            assert_eq!(swapped(&[32, 16], &pixels), None, "{lit}");
         }
         // More concentrated along the rows than along the bins.
         let mut bins = vec![5; 64];
@@ -628,13 +633,13 @@ mod tests {
                 }
             })
             .collect();
-        assert_eq!(swapped_axes(&[128, 16], &pixels), None);
+        assert_eq!(swapped(&[128, 16], &pixels), None);
     }
 
     #[test]
     fn few_photons_do_not_look_like_the_bins() {
         for photons in [0.0, 0.001, 0.01, 0.03, 0.1, 0.3] {
-            let warning = swapped_axes(&[16, 16], &counts(256, photons, 0.0, 0.0));
+            let warning = swapped(&[16, 16], &counts(256, photons, 0.0, 0.0));
             assert_eq!(warning, None, "{photons}");
         }
     }
@@ -642,7 +647,7 @@ mod tests {
     #[test]
     fn swapped_axes_are_warned_of() {
         let turned = bins_first(&counts(128, 5.0, 100.0, 0.0), 16);
-        let warning = swapped_axes(&[16, 8], &turned).unwrap();
+        let warning = swapped(&[16, 8], &turned).unwrap();
         assert!(warning.starts_with("the first axis looks like the bins"));
     }
 
@@ -673,12 +678,12 @@ mod tests {
         for bins in [64, 128, 256, 512] {
             for (sigma, slopes) in [(0.5, false), (0.5, true), (1.0, false), (1.0, true)] {
                 let pixels = wall(bins, sigma, slopes);
-                let right = swapped_axes(&[16, 16], &pixels);
+                let right = swapped(&[16, 16], &pixels);
                 assert_eq!(right, None, "{bins} {sigma} {slopes}");
                 let flat = (0..bins).flat_map(|bin| pixels.iter().map(move |bins| bins[bin]));
                 let flat: Vec<u64> = flat.collect();
                 let turned: Vec<Vec<u64>> = flat.chunks(16).map(<[u64]>::to_vec).collect();
-                let warning = swapped_axes(&[bins, 16], &turned);
+                let warning = swapped(&[bins, 16], &turned);
                 assert!(warning.is_some(), "{bins} {sigma} {slopes}");
             }
         }
@@ -723,13 +728,13 @@ mod tests {
                 let mut count = count;
                 pixels.into_iter().map(|pixel| pixel.into_iter().map(&mut count).collect()).collect()
             };
-            prop_assert_eq!(swapped_axes(&[rows, columns], &counts(some)), None);
+            prop_assert_eq!(swapped(&[rows, columns], &counts(some)), None);
             let right = counts(all);
-            prop_assert_eq!(swapped_axes(&[rows, columns], &right), None);
+            prop_assert_eq!(swapped(&[rows, columns], &right), None);
             let flat = (0..BINS).flat_map(|bin| right.iter().map(move |bins| bins[bin]));
             let flat: Vec<u64> = flat.collect();
             let turned: Vec<Vec<u64>> = flat.chunks(columns).map(<[u64]>::to_vec).collect();
-            let warning = swapped_axes(&[BINS, rows], &turned);
+            let warning = swapped(&[BINS, rows], &turned);
             prop_assert!(warning.is_some_and(|text| text.starts_with("the first axis looks like the bins")));
         }
     }

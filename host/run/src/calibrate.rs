@@ -15,7 +15,7 @@ use dtof_options::progress::{Progress, shared};
 use dtof_photons::input::Input;
 use dtof_photons::masked;
 use dtof_photons::open::{Counts, counts};
-use dtof_photons::recorded::{RecordingLength, check_totals};
+use dtof_photons::recorded::{RecordingLength, totals};
 
 /// Options of this job; keys of settings files with these names mean something else.
 const OWN: &[&str] = &["target_mm", "glass", "false_alarm", "seed"];
@@ -131,8 +131,7 @@ impl Options {
             pixels,
             counts.metadata.captures,
         )?;
-        let all = counts.captures.len() * pixels as usize;
-        masked::check(masked.as_deref().unwrap_or(&[]), all)?;
+        masked::check(masked.as_deref().unwrap_or(&[]), counts.histograms.len())?;
         let options = self.calibration(&requested);
         let found = calibrate_counts(&requested, &counts, masked.as_deref(), &options, progress);
         let found = found.with_context(|| input.to_string())?;
@@ -165,8 +164,8 @@ pub fn with_mask(mut found: SettingsFile, given: Option<&[u16]>) -> SettingsFile
 
 /// Whether there is a photon in any histogram.
 pub(super) fn has_photons(counts: &Counts) -> bool {
-    let mut all = counts.captures.iter().flatten().flatten();
-    all.any(|&count| count > 0)
+    let mut all = counts.histograms.iter().flatten();
+    all.any(|count| count > 0)
 }
 
 /// Calibrates the sensor of a recording that has been read, without the `masked` pixels.
@@ -180,7 +179,7 @@ pub(super) fn calibrate_counts(
     options: &CalibrationOptions,
     progress: &mut dyn Progress,
 ) -> Result<Calibration> {
-    check_totals(&counts.captures)?;
+    totals(&counts.histograms)?;
     let length = match (counts.cycles, read_options(requested).length) {
         (Some(cycles), _) | (None, Some(RecordingLength::Cycles(cycles))) => Length::Cycles(cycles),
         (None, Some(RecordingLength::PhotonsPerCycle(rate))) => Length::PhotonsPerCycle(rate),
@@ -189,7 +188,7 @@ pub(super) fn calibrate_counts(
     let rays = requested.rays.slants(counts.array)?;
     let observed = Observed {
         array: counts.array,
-        captures: &counts.captures,
+        histograms: &counts.histograms,
         masked,
         length,
         cycles: None,

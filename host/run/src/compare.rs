@@ -252,7 +252,7 @@ impl Options {
         warnings(&counts.metadata)
             .chain(width)
             .for_each(callbacks.warning);
-        let pixels = counts.array.pixels() as usize * counts.captures.len();
+        let pixels = counts.histograms.len();
         let truth = match (truth, &counts.truth_mm) {
             (Some(truth), _) => Some(Truth::read(truth, pixels)?),
             (None, ranges) => ranges.clone().map(Truth::Ranges),

@@ -10,7 +10,7 @@ use dtof_core::{
 
 use dtof_engine::once::{OnceDecision, decide_once};
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_photons::pixel_counts::PixelCounts;
+use dtof_photons::pixel_counts::{AllPhotons, PixelCounts, RecordedCounts};
 use dtof_photons::ranges::Ranges;
 use dtof_photons::source::Slice;
 
@@ -30,7 +30,7 @@ pub struct MapInput {
     /// The gate without that of a cover glass that was found: what moves in front may look like one.
     given_gate: Option<(u16, u16)>,
     /// All photons of recorded histograms.
-    counts: Option<PixelCounts>,
+    counts: Option<RecordedCounts>,
 }
 
 impl MapInput {
@@ -43,7 +43,7 @@ impl MapInput {
     pub fn new(
         requested: &SettingsFile,
         settings: &Settings,
-        counts: Option<PixelCounts>,
+        counts: Option<RecordedCounts>,
         given: &SettingsFile,
     ) -> Result<Option<Self>> {
         if settings.frame.is_some() {
@@ -111,7 +111,8 @@ impl RunCounts {
             .into_iter()
             .chain(has_other.then_some(&other))
         {
-            let decide = |half| decide_once(settings, array, addresses, half, |_| false);
+            let decide =
+                |half: &PixelCounts| decide_once(settings, array, addresses, half, |_| false);
             let [first, second] = self.halves.each_ref().map(decide);
             let (first, second) = (first?, second?);
             let pairs = first.iter().zip(&second).enumerate();
@@ -169,8 +170,10 @@ impl DepthMap {
         addresses: &[PixelAddress],
     ) -> Result<Option<Self>> {
         let settings = &input.settings;
-        let Some(counts) = input.counts.as_ref().or(run) else {
-            return Ok(None);
+        let counts: &dyn AllPhotons = match (&input.counts, run) {
+            (Some(recorded), _) => recorded,
+            (None, Some(run)) => run,
+            (None, None) => return Ok(None),
         };
         // Two echoes tell whether there is a second surface. The first is the same.
         let two = const { EchoNumber::new(2).unwrap() };

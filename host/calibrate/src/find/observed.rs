@@ -6,7 +6,8 @@ use anyhow::{Result, bail, ensure};
 use dtof_core::Array;
 
 use dtof_options::Refused;
-use dtof_photons::recorded::{Capture, ListTimes};
+use dtof_photons::histograms::Histograms;
+use dtof_photons::recorded::ListTimes;
 use dtof_theory::counts::dead_time;
 
 /// How long each capture lasted.
@@ -44,8 +45,8 @@ impl Length {
 pub struct Observed<'a> {
     /// The array of one capture.
     pub array: Array,
-    /// Histograms: capture, then pixel, then bin.
-    pub captures: &'a [Capture],
+    /// A histogram of each pixel, capture by capture.
+    pub histograms: &'a Histograms,
     /// Pixels that are left out, numbered through all captures. An empty list says that all are used, hot ones, too.
     pub masked: Option<&'a [u16]>,
     /// How long each capture lasted.
@@ -108,15 +109,19 @@ impl Observed<'_> {
     /// cycles.
     ///
     /// # Errors
-    /// Fails if there are no captures or too few bins, if captures or histograms differ in size, if a
+    /// Fails if there are no captures or too few bins, if a capture has other pixels than the array, if a
     /// pixel lasted no laser cycle, or if there is not one true distance for each histogram or one offset for each
     /// pixel.
     pub fn traces(&self, hot: &[usize]) -> Result<Vec<Trace>> {
         let pixels = self.array.pixels() as usize;
         let bins = self.bins();
-        ensure!(!self.captures.is_empty(), "no captures");
+        let all = self.histograms.len();
+        ensure!(all > 0, "no captures");
         ensure!(bins > 8, "{bins} bins are too few to calibrate by");
-        let all = self.captures.len() * pixels;
+        ensure!(
+            all.is_multiple_of(pixels),
+            "{all} histograms are no captures of {pixels} pixels"
+        );
         if let Some(truth) = self.truth_mm {
             let found = truth.len();
             ensure!(found == all, "{found} true distances for {all} histograms");
@@ -130,33 +135,24 @@ impl Observed<'_> {
             )
         );
         let mut traces = Vec::with_capacity(all);
-        for (index, capture) in self.captures.iter().enumerate() {
-            let found = capture.len();
-            ensure!(
-                found == pixels,
-                "capture {index} has {found} pixels, not {pixels}"
-            );
-            let others = capture.iter().enumerate();
-            let others = others.filter(|(pixel, _)| !hot.contains(pixel));
-            let others = others.filter(|(pixel, _)| !self.is_masked(index * pixels + pixel));
-            let totals = others.map(|(_, counts)| counts.iter().sum::<u64>());
+        for index in 0..self.captures() {
+            let first = index * pixels;
+            let others = (0..pixels).filter(|pixel| !hot.contains(pixel));
+            let others = others.filter(|pixel| !self.is_masked(first + pixel));
+            let totals = others.map(|pixel| self.photons(first + pixel));
             let cycles = self.length.cycles(totals.max().unwrap_or(0));
-            for (pixel, counts) in capture.iter().enumerate() {
-                let number = index * pixels + pixel;
+            for pixel in 0..pixels {
+                let number = first + pixel;
                 let own = self.cycles.map(|cycles| cycles.get(number).copied());
                 let cycles = match own {
                     None => cycles,
                     Some(Some(own @ 1..)) => own as f64,
                     Some(_) => bail!("capture {index}, pixel {pixel} lasted no laser cycle"),
                 };
-                let found = counts.len();
-                ensure!(
-                    found == bins,
-                    "capture {index}, pixel {pixel} has {found} bins, not {bins}"
-                );
                 if self.is_masked(number) {
                     continue;
                 }
+                let counts = self.histograms.histogram(number).into_iter();
                 let truth_mm = self.truth_mm.and_then(|truth| truth[number]);
                 let truth_mm = truth_mm.map(|truth| truth + self.bias(pixel));
                 traces.push(Trace {
@@ -164,7 +160,7 @@ impl Observed<'_> {
                     cycles,
                     truth_mm,
                     live: vec![1.0; bins],
-                    counts: counts.iter().map(|&count| count as f64).collect(),
+                    counts: counts.map(|count| count as f64).collect(),
                 });
             }
         }
@@ -186,10 +182,21 @@ impl Observed<'_> {
         self.bias_mm.map_or(0.0, |bias| bias[pixel]) - own
     }
 
-    /// Bins of a histogram; 0 if there is none.
+    /// Bins of a histogram.
     #[must_use]
-    pub fn bins(&self) -> usize {
-        let first = self.captures.first().and_then(|capture| capture.first());
-        first.map_or(0, Vec::len)
+    pub const fn bins(&self) -> usize {
+        self.histograms.bins()
+    }
+
+    /// Captures.
+    #[must_use]
+    pub fn captures(&self) -> usize {
+        self.histograms.len() / self.array.pixels() as usize
+    }
+
+    /// The photons of a pixel, numbered through all captures.
+    #[must_use]
+    pub fn photons(&self, number: usize) -> u64 {
+        self.histograms.histogram(number).iter().sum()
     }
 }

@@ -14,7 +14,7 @@ use dtof_core::rule::detect;
 use dtof_core::{Array, Count, DepthEstimator, RangeGate, WindowRule};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::SettingsFile;
-use dtof_photons::recorded::Capture;
+use dtof_photons::histograms::Histograms;
 use dtof_photons::source::{PhotonSource, Slice};
 use dtof_simulate::scene::Scene;
 use dtof_theory::looks::exposure::{Exposures, Looks};
@@ -142,7 +142,7 @@ impl Drawn {
     }
 
     /// The histograms of all pixels.
-    pub fn capture(&self, seed: u64) -> Capture {
+    pub fn capture(&self, seed: u64) -> Vec<Vec<u64>> {
         let mut capture = recorded(&self.scene, self.cycles, seed);
         for &pixel in &self.dead {
             capture[pixel].fill(0);
@@ -172,13 +172,13 @@ impl Drawn {
 /// Captures without truth, rays or earlier offsets.
 pub fn observed(
     array: Array,
-    captures: &[Capture],
+    captures: &Histograms,
     length: Length,
     bin_width_ps: f64,
 ) -> Observed<'_> {
     Observed {
         array,
-        captures,
+        histograms: captures,
         masked: None,
         length,
         cycles: None,
@@ -202,7 +202,7 @@ pub fn slices(mut photons: impl PhotonSource, cycles: u64, mut each: impl FnMut(
 }
 
 /// The histograms of all pixels of a scene.
-pub fn recorded(scene: &Scene, cycles: u64, seed: u64) -> Capture {
+pub fn recorded(scene: &Scene, cycles: u64, seed: u64) -> Vec<Vec<u64>> {
     let bins = usize::from(scene.bins);
     let mut capture = vec![vec![0; bins]; scene.array().unwrap().pixels() as usize];
     let photons = scene.photons(seed, cycles).unwrap();

@@ -6,7 +6,7 @@ use dtof_calibrate::{
     Calibration, CalibrationOptions, Change, Length, Nearest, RunPhotons, calibrate, glass_change,
 };
 use dtof_engine::settings::SettingsFile;
-use dtof_photons::recorded::Capture;
+use dtof_photons::histograms::Histograms;
 use dtof_simulate::scene::Scene;
 
 /// A wall, two nearer surfaces and the cover glass. A bin is 37.5 mm.
@@ -22,7 +22,7 @@ fn scene(background: f64, glass: f64, more: &str) -> Scene {
 }
 
 fn found(scene: &Scene, cycles: u64, seed: u64) -> Calibration {
-    let captures = [recorded(scene, cycles, seed)];
+    let captures = Histograms::of(recorded(scene, cycles, seed)).unwrap();
     let observed = observed(
         scene.array().unwrap(),
         &captures,
@@ -119,7 +119,7 @@ fn a_near_surface_after_pile_up_is_no_glass() {
         for counts in &mut capture {
             counts[..unmeasured].fill(0);
         }
-        let captures = [capture];
+        let captures = Histograms::of(capture).unwrap();
         let observed = observed(scene.array().unwrap(), &captures, Length::Unknown, 250.0);
         let found = calibrate(&observed, &CalibrationOptions::default()).unwrap();
         let found_top = found.glass().map(|glass| glass.top);
@@ -142,7 +142,7 @@ fn one_pixel_cannot_tell_a_glass_from_a_near_surface() {
 }
 
 /// All photons of a run, summed over pixels.
-fn summed(capture: &Capture) -> Vec<u64> {
+fn summed(capture: &[Vec<u64>]) -> Vec<u64> {
     let mut sums = vec![0; 128];
     for counts in capture {
         for (sum, count) in sums.iter_mut().zip(counts) {

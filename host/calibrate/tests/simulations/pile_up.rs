@@ -5,6 +5,7 @@ use crate::slow_or_quick;
 use dtof_calibrate::{Calibration, CalibrationOptions, Length, Tdc, calibrate};
 use dtof_core::Array;
 use dtof_engine::settings::SettingsFile;
+use dtof_photons::histograms::Histograms;
 use dtof_simulate::scene::Scene;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Poisson};
@@ -32,7 +33,7 @@ fn found(background: f64, more: &str, length: impl Fn(u64) -> Length) -> Calibra
 }
 
 fn found_in(scene: &Scene, length: impl Fn(u64) -> Length) -> Calibration {
-    let captures = [recorded(scene, 20_000, 4)];
+    let captures = Histograms::of(recorded(scene, 20_000, 4)).unwrap();
     let observed = observed(scene.array().unwrap(), &captures, length(20_000), 250.0);
     calibrate(&observed, &CalibrationOptions::default()).unwrap()
 }
@@ -111,7 +112,7 @@ fn of_a_thousand_laser_cycles_pile_up_shows() {
             (0..24).map(surface).collect::<String>()
         );
         let scene = Scene::parse(&text).unwrap();
-        let captures = [recorded(&scene, 1000, 2)];
+        let captures = Histograms::of(recorded(&scene, 1000, 2)).unwrap();
         let observed = observed(scene.array().unwrap(), &captures, Length::Unknown, 250.0);
         let found = calibrate(&observed, &CalibrationOptions::default()).unwrap();
         let Some(Tdc::OnePhotonIn { cycles, .. }) = found.tdc else {
@@ -156,8 +157,8 @@ fn flat_counts_of_many_bins_have_no_dead_time() {
             reason = "small numbers"
         )]
         let mut draw = || poisson.sample(&mut rng) as u64;
-        let histogram = |_| (0..bins).map(|_| draw()).collect();
-        let captures = [(0..pixels).map(histogram).collect::<Vec<Vec<u64>>>()];
+        let histogram = |_| (0..bins).map(|_| draw()).collect::<Vec<u64>>();
+        let captures = Histograms::of((0..pixels).map(histogram)).unwrap();
         let array = Array::new(pixels, 1).unwrap();
         [Length::Cycles(100_000), Length::Unknown]
             .into_iter()

@@ -3,7 +3,7 @@
 use dtof_calibrate::{CalibrationOptions, Length, Tdc, calibrate};
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{Array, CentredWindow, Count16, DepthEstimator, Histogram, RangeGate};
-use dtof_photons::recorded::Capture;
+use dtof_photons::histograms::Histograms;
 use dtof_theory::rates::bin_share;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Poisson, Uniform};
@@ -13,7 +13,7 @@ use super::drawn::observed;
 use super::slow_or_quick;
 
 /// 8×8 pixels before surfaces at random ranges, with at least 100 photons a peak, and a tail of this length in bins.
-fn draw(rng: &mut Pcg64, tail: f64) -> Capture {
+fn draw(rng: &mut Pcg64, tail: f64) -> Vec<Vec<u64>> {
     let mut between = |low: f64, high: f64| Uniform::new(low, high).unwrap().sample(rng);
     // A pulse with a tail rises within a bin.
     let (narrowest, widest) = if tail > 0.0 { (0.3, 0.6) } else { (0.6, 1.6) };
@@ -21,7 +21,7 @@ fn draw(rng: &mut Pcg64, tail: f64) -> Capture {
     let brightness = between(150.0, 3000.0);
     let flat = between(0.0, 1.0) < 0.5;
     let wall = between(20.0, 100.0);
-    let mut capture = Capture::new();
+    let mut capture = Vec::new();
     for _ in 0..64 {
         let at = if flat { wall } else { between(20.0, 100.0) };
         let signal = brightness * between(0.7, 1.4);
@@ -65,8 +65,8 @@ fn poisson(mean: f64, uniform: f64) -> u64 {
 }
 
 /// The window that events would find their depth with.
-fn window(capture: &Capture, seed: u64) -> CentredWindow {
-    let captures = [capture.clone()];
+fn window(capture: &[Vec<u64>], seed: u64) -> CentredWindow {
+    let captures = Histograms::of(capture.to_vec()).unwrap();
     let pixels = u32::try_from(capture.len()).unwrap();
     let array = match pixels {
         64 => Array::new(8, 8),
@@ -99,7 +99,7 @@ fn depth(counts: &[u64], window: CentredWindow) -> f64 {
 }
 
 /// The most that the depth of another pixel differs between two windows.
-fn moved(capture: &Capture, without: usize, one: CentredWindow, other: CentredWindow) -> f64 {
+fn moved(capture: &[Vec<u64>], without: usize, one: CentredWindow, other: CentredWindow) -> f64 {
     let others = capture
         .iter()
         .enumerate()
@@ -152,7 +152,7 @@ fn half_widths_are_unequal_only_if_the_pulse_is_skewed() {
 #[test]
 fn a_dead_time_that_is_given_holds() {
     let mut rng = Pcg64::seed_from_u64(13);
-    let captures = [draw(&mut rng, 0.0)];
+    let captures = Histograms::of(draw(&mut rng, 0.0)).unwrap();
     let array = Array::new(8, 8).unwrap();
     let observed = observed(array, &captures, Length::Cycles(100_000), 250.0);
     let found = |dead_time| {

@@ -4,12 +4,13 @@
 use crate::drawn::{Drawn, false_alarms, observed};
 use crate::slow_or_quick;
 use dtof_calibrate::{CalibrationOptions, Length, Nearest, Tdc, calibrate};
+use dtof_photons::histograms::Histograms;
 use rayon::prelude::*;
 
 /// The errors of the calibration by scene `number`, and a line about it.
 fn judge(number: u64) -> (Vec<String>, String) {
     let drawn = Drawn::new(number);
-    let captures = [drawn.capture(number)];
+    let captures = Histograms::of(drawn.capture(number)).unwrap();
     let observed = observed(
         drawn.scene.array().unwrap(),
         &captures,
@@ -144,7 +145,7 @@ fn random_scenes_are_calibrated_within_the_stated_limits() {
 fn a_wall_alone_is_a_wall() {
     let number = (0..100).find(|&number| Drawn::new(number).is_wall_alone());
     let drawn = Drawn::new(number.unwrap());
-    let captures = [drawn.capture(1)];
+    let captures = Histograms::of(drawn.capture(1)).unwrap();
     let observed = observed(
         drawn.scene.array().unwrap(),
         &captures,

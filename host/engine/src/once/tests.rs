@@ -1,4 +1,6 @@
 use dtof_core::{Count24, WindowRule};
+use dtof_photons::histograms::Histograms;
+use dtof_photons::pixel_counts::RecordedCounts;
 use dtof_photons::source::{Photon, PixelPhotons};
 use proptest::prelude::*;
 use rand_distr::{Distribution, Poisson, Uniform};
@@ -68,6 +70,14 @@ fn confidence(settings: &Settings, array: Array, histograms: &[Vec<u32>]) -> Vec
     let addresses = addresses(histograms.len());
     let decided = decide_once(settings, array, &addresses, &counts, |_| false).unwrap();
     decided.iter().map(|decision| decision.confidence).collect()
+}
+
+/// Histograms of so many laser cycles each.
+fn recorded(histograms: Vec<Vec<u64>>, cycles: u64) -> RecordedCounts {
+    RecordedCounts {
+        cycles: vec![cycles; histograms.len()],
+        histograms: Histograms::of(histograms).unwrap(),
+    }
 }
 
 fn line(pixels: usize) -> Array {
@@ -219,7 +229,6 @@ fn divided_counts_have_no_more_false_alarms() {
     let array = line(4000);
     let mut share = |mean: f64| {
         let poisson = Poisson::new(mean).unwrap();
-        let mut counts = PixelCounts::new(4000, 128);
         let pixels = (0..4000).map(|_| {
             let mut pixel: Vec<u64> = (0..128)
                 .map(|_| poisson.sample(&mut random) as u64)
@@ -228,11 +237,7 @@ fn divided_counts_have_no_more_false_alarms() {
             pixel[0] = if mean > 1000.0 { 1 << 32 } else { 0 };
             pixel
         });
-        counts.clone_from(&PixelCounts::of_captures(
-            &[pixels.collect()],
-            128,
-            vec![1 << 20; 4000],
-        ));
+        let counts = recorded(pixels.collect(), 1 << 20);
         let settings = Settings {
             gate: Some((1, 127)),
             rule: WindowRule::new(3, "3".parse().unwrap(), Count::saturating(5))
@@ -286,7 +291,7 @@ proptest! {
         counts[30] <<= many;
         let settings = Settings { gate: Some((10, 99)), dead_time, ..settings(128) };
         let has_photon = counts[10..=99].iter().any(|&count| count > 0);
-        let counts = PixelCounts::of_captures(&[vec![counts]], 128, vec![1000]);
+        let counts = recorded(vec![counts], 1000);
         let decided = decide_once(&settings, line(1), &addresses(1), &counts, |_| false).unwrap();
         let best = decided[0].best.map(|best| f64::from(best.raw()) / 256.0);
         prop_assert_eq!(best.is_some(), has_photon);
@@ -471,7 +476,7 @@ fn the_slope_of_what_lies_outside_of_the_gate_is_no_surface() {
             if is_mirrored {
                 histogram.reverse();
             }
-            let counts = PixelCounts::of_captures(&[vec![histogram]], 128, vec![1 << 20]);
+            let counts = recorded(vec![histogram], 1 << 20);
             let settings = Settings {
                 gate: Some(if is_mirrored { (0, 119) } else { (8, 127) }),
                 ..settings(128)

@@ -9,7 +9,7 @@ use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
 use super::header::Array;
-use super::histograms::{Histograms, read_array};
+use super::histograms::{self, ArrayHistograms};
 use crate::axes::Axes;
 use dtof_options::{Refused, plain};
 
@@ -17,11 +17,11 @@ use dtof_options::{Refused, plain};
 ///
 /// # Errors
 /// Returns what is wrong with the file, after its name.
-pub fn read(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histograms> {
+pub fn read(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<ArrayHistograms> {
     named(path, name, axes).with_context(|| path.display().to_string())
 }
 
-fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histograms> {
+fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<ArrayHistograms> {
     let mut file = BufReader::new(File::open(path)?);
     let start = file.fill_buf()?;
     ensure!(!start.is_empty(), "the file is empty");
@@ -75,7 +75,7 @@ fn named(path: &Path, name: Option<&str>, axes: Option<&Axes>) -> Result<Histogr
     let length = entry.size();
     let mut entry = BufReader::new(entry);
     let array = Array::read(&mut entry, length);
-    let histograms = array.and_then(|array| read_array(array, axes));
+    let histograms = array.and_then(|array| histograms::read(array, axes));
     // At the end of the data zip compares the checksum. It also refuses more data than the archive says.
     let checked = histograms.and_then(|histograms| {
         entry.read(&mut [0]).context("the archive is damaged")?;

@@ -8,6 +8,7 @@ use anyhow::{Context, Error, Result, anyhow, bail, ensure};
 
 use dtof_options::files::fill;
 
+use crate::axes::index_of;
 use crate::input::Input;
 
 /// The most bytes of a header. Those of numbers and of records of numbers are shorter.
@@ -138,27 +139,43 @@ impl Element {
         self.is_big_endian
     }
 
-    /// The value of these bytes; `None` if the type is neither an integer nor a float.
-    fn number(&self, bytes: &[u8]) -> Option<Number> {
-        let mut wide = [0; 8];
-        let unused = wide.len().checked_sub(bytes.len())?;
-        wide[..bytes.len()].copy_from_slice(bytes);
+    /// Gives the numbers in `bytes` to `take`, up to the first that it refuses. Returns `None` if the type is neither an
+    /// integer nor a float. The bytes of a number may be reversed.
+    fn numbers(
+        &self,
+        bytes: &mut [u8],
+        take: impl FnMut(Number) -> Result<(), String>,
+    ) -> Option<Result<(), String>> {
+        use Number::{Float, Integer};
         if self.is_big_endian {
-            wide[..bytes.len()].reverse();
+            let size = usize::try_from(self.size).ok()?.max(1);
+            bytes.chunks_mut(size).for_each(<[u8]>::reverse);
         }
-        let value = u64::from_le_bytes(wide);
-        Some(match (self.integer(), self.float()) {
-            (Some((_, false)), _) => Number::Integer(value.into()),
-            (Some((_, true)), _) => {
-                let bits = 8 * u32::try_from(unused).ok()?;
-                Number::Integer(((value << bits).cast_signed() >> bits).into())
-            }
-            (None, Some(8)) => Number::Float(f64::from_bits(value)),
-            (None, Some(2)) => Number::Float(half(u16::try_from(value).ok()?)),
-            (None, Some(_)) => Number::Float(f32::from_bits(u32::try_from(value).ok()?).into()),
-            (None, None) => return None,
+        Some(match (self.kind, self.size) {
+            ('u', 1) => each(bytes, |b| Integer(u8::from_le_bytes(b).into()), take),
+            ('u', 2) => each(bytes, |b| Integer(u16::from_le_bytes(b).into()), take),
+            ('u', 4) => each(bytes, |b| Integer(u32::from_le_bytes(b).into()), take),
+            ('u', 8) => each(bytes, |b| Integer(u64::from_le_bytes(b).into()), take),
+            ('i', 1) => each(bytes, |b| Integer(i8::from_le_bytes(b).into()), take),
+            ('i', 2) => each(bytes, |b| Integer(i16::from_le_bytes(b).into()), take),
+            ('i', 4) => each(bytes, |b| Integer(i32::from_le_bytes(b).into()), take),
+            ('i', 8) => each(bytes, |b| Integer(i64::from_le_bytes(b).into()), take),
+            ('f', 2) => each(bytes, |b| Float(half(u16::from_le_bytes(b))), take),
+            ('f', 4) => each(bytes, |b| Float(f32::from_le_bytes(b).into()), take),
+            ('f', 8) => each(bytes, |b| Float(f64::from_le_bytes(b)), take),
+            _ => return None,
         })
     }
+}
+
+/// Gives each number to `take`; its lowest byte comes first.
+fn each<const N: usize>(
+    bytes: &[u8],
+    number: impl Fn([u8; N]) -> Number,
+    take: impl FnMut(Number) -> Result<(), String>,
+) -> Result<(), String> {
+    let (numbers, _) = bytes.as_chunks();
+    numbers.iter().copied().map(number).try_for_each(take)
 }
 
 /// The value of a float of 16 bits (IEEE 754 binary16).
@@ -514,60 +531,71 @@ impl<'a> Literals<'a> {
     }
 }
 
-/// An array with elements of a single type.
+/// An array whose header has been read, and whose elements follow.
 pub struct Array<R: Read> {
-    /// Lengths of the axes.
-    pub shape: Vec<u64>,
-    /// Whether the first axis changes fastest.
-    pub fortran: bool,
-    /// The type of the elements.
-    pub element: Element,
-    /// The data.
+    /// The header.
+    pub header: Header,
+    /// The elements.
     file: R,
 }
+
+/// Elements that are converted at a time.
+const AT_ONCE: usize = 1 << 13;
 
 impl<R: Read> Array<R> {
     /// Reads the header of a file of `length` bytes.
     ///
     /// # Errors
-    /// Fails if it is not the header of an array with elements of a single type.
+    /// Those of [`Header::read`].
     pub fn read(mut file: R, length: u64) -> Result<Self> {
         let header = Header::read(&mut file, length)?;
-        let Elements::Plain(element) = header.elements else {
-            bail!("elements are records, not numbers");
-        };
-        let Header { shape, fortran, .. } = header;
-        Ok(Self {
-            shape,
-            fortran,
-            element,
-            file,
-        })
+        Ok(Self { header, file })
     }
 
-    /// Maps all elements with `each`, in the order of the file.
+    /// The type of the elements.
     ///
     /// # Errors
-    /// Fails if the elements are neither integers nor floats of 32 or 64 bits, if the file ends too
-    /// early, or if `each` fails.
+    /// Fails if they are records.
+    pub fn element(&self) -> Result<&Element> {
+        match &self.header.elements {
+            Elements::Plain(element) => Ok(element),
+            Elements::Records(_) => bail!("elements are records, not numbers"),
+        }
+    }
+
+    /// Gives `take` all elements as `convert` makes them, some at a time, in the order of the file.
+    ///
+    /// # Errors
+    /// Fails if the elements are neither integers nor floats of 16, 32 or 64 bits, if the file ends too early, or with what
+    /// `convert` says of an element, after its index.
     pub fn elements<T>(
         mut self,
-        mut each: impl FnMut(usize, Number) -> Result<T>,
-    ) -> Result<Vec<T>> {
-        let size = self.element.bytes().unwrap_or_default();
-        let mut bytes = [0; 8];
-        let bytes = bytes.get_mut(..usize::try_from(size)?);
-        let bytes = bytes.context("the elements are not plain numbers")?;
-        let count = usize::try_from(self.shape.iter().product::<u64>())?;
-        // The size in an archive may be wrong, too, so memory grows only with what is read.
-        let mut all = Vec::new();
-        for place in 0..count {
-            read_all(&mut self.file, bytes)?;
-            let number = self.element.number(bytes);
-            let number = number.context("the elements are not plain numbers")?;
-            all.push(each(place, number)?);
+        convert: impl Fn(Number) -> Result<T, String>,
+        mut take: impl FnMut(&[T]),
+    ) -> Result<()> {
+        let element = self.element()?.clone();
+        let size = usize::try_from(element.bytes().unwrap_or_default())?;
+        let Header { shape, fortran, .. } = &self.header;
+        let all = usize::try_from(shape.iter().product::<u64>())?;
+        // The size in an archive may be wrong, so memory grows only with what is read.
+        let (mut bytes, mut converted, mut done) = (Vec::new(), Vec::new(), 0);
+        while done < all {
+            bytes.resize(size * AT_ONCE.min(all - done), 0);
+            read_all(&mut self.file, &mut bytes)?;
+            converted.clear();
+            let result = element.numbers(&mut bytes, |number| {
+                converted.push(convert(number)?);
+                Ok(())
+            });
+            let result = result.context("the elements are not plain numbers")?;
+            result.map_err(|why| {
+                let place = done + converted.len();
+                anyhow!("element {} is {why}", index_of(place, shape, *fortran))
+            })?;
+            take(&converted);
+            done += converted.len();
         }
-        Ok(all)
+        Ok(())
     }
 }
 
@@ -575,7 +603,7 @@ impl Array<BufReader<Box<dyn Read>>> {
     /// Opens an `.npy` file, or an array in memory.
     ///
     /// # Errors
-    /// Fails if it is not the header of an array with elements of a single type.
+    /// Those of [`Header::read`].
     pub fn open(input: &Input) -> Result<Self> {
         let (file, length) = input.open()?;
         Self::read(BufReader::new(file), length)

@@ -2,50 +2,44 @@
 
 use std::io::Read;
 
-use anyhow::{Context, Result, anyhow, bail, ensure};
+use anyhow::{Result, bail, ensure};
 
-use super::header::{Array, Number};
-use crate::axes::{Axes, AxisLayout, index_of};
+use super::header::{Array, Header, Number};
+use crate::axes::{Axes, AxisLayout};
 use crate::bins::MOST_BINS;
-use crate::input::Input;
+use crate::histograms::Histograms;
 use dtof_options::Refused;
 
 /// The histograms of one array.
 #[derive(Clone, Debug)]
-pub struct Histograms {
+pub struct ArrayHistograms {
     /// The layout in the file.
     pub layout: AxisLayout,
     /// Lengths of the axes but the last.
     pub axes: Vec<usize>,
     /// One histogram a pixel, in the order of addresses.
-    pub pixels: Vec<Vec<u64>>,
+    pub histograms: Histograms,
 }
 
-/// Reads an `.npy` file, or an array in memory. The elements may be integers of any size or floats
-/// that are whole numbers, little- or big-endian, in C or Fortran order.
+/// Reads the elements of an array: integers of any size, or floats that are whole numbers, little- or big-endian, in C or
+/// Fortran order.
 ///
 /// # Errors
-/// Returns what is wrong with the file, after its name.
-pub fn read(input: &Input, axes: Option<&Axes>) -> Result<Histograms> {
-    let array = Array::open(input).and_then(|array| read_array(array, axes));
-    array.with_context(|| input.to_string())
-}
-
-/// Reads the elements of an array whose header has been read.
-pub(super) fn read_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Result<Histograms> {
-    let (shape, fortran) = (array.shape.clone(), array.fortran);
+/// Returns what is wrong with them.
+pub fn read<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Result<ArrayHistograms> {
+    let element = array.element()?;
+    let Header { shape, fortran, .. } = &array.header;
     match (&shape[..], axes) {
-        ([_, 3], None) if array.element.integer().is_none() => bail!(
-            "elements are {}: photons are rows of three integers: pixel, cycle and bin; convert them with \
-             .astype(numpy.int64)",
-            array.element
+        ([_, 3], None) if element.integer().is_none() => bail!(
+            "elements are {element}: photons are rows of three integers: pixel, cycle and bin; convert them with \
+             .astype(numpy.int64)"
         ),
         ([_, columns @ 4..8], None) => bail!(Refused::input(format!(
             "{columns} bins: must be from 8 to {MOST_BINS}; photons are rows of three: pixel, cycle and bin"
         ))),
         _ => {}
     }
-    let layout = AxisLayout::new(&shape, fortran, axes)?;
+    let layout = AxisLayout::new(shape, *fortran, axes)?;
     ensure!(
         layout.bins() <= MOST_BINS,
         Refused::input(format!(
@@ -54,24 +48,22 @@ pub(super) fn read_array<R: Read>(array: Array<R>, axes: Option<&Axes>) -> Resul
         ))
     );
     ensure!(
-        array.element.integer().is_some() || array.element.float().is_some(),
-        "elements are {}: must be integers, or floats that are whole numbers; convert them with \
-         .astype(numpy.uint32)",
-        array.element
+        element.integer().is_some() || element.float().is_some(),
+        "elements are {element}: must be integers, or floats that are whole numbers; convert them with \
+         .astype(numpy.uint32)"
     );
-    let counts = array.elements(|place, number| {
-        let count = match number {
-            Number::Integer(count) => unsigned(count),
-            Number::Float(count) => whole_count(count),
-        };
-        count.map_err(|why| anyhow!("element {} is {why}", index_of(place, &shape, fortran)))
-    })?;
-    Ok(Histograms {
-        axes: shape[..shape.len() - 1]
-            .iter()
-            .map(|&length| usize::try_from(length))
-            .collect::<Result<_, _>>()?,
-        pixels: layout.histograms(&counts).collect(),
+    let axes = shape[..shape.len() - 1].iter();
+    let axes = axes.map(|&length| usize::try_from(length));
+    let axes = axes.collect::<Result<_, _>>()?;
+    let count = |number| match number {
+        Number::Integer(count) => unsigned(count),
+        Number::Float(count) => whole_count(count),
+    };
+    let mut in_file = Histograms::new(layout.bins());
+    array.elements(count, |counts| in_file.extend(counts))?;
+    Ok(ArrayHistograms {
+        histograms: layout.histograms(in_file),
+        axes,
         layout,
     })
 }

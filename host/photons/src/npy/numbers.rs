@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result, bail, ensure};
 
-use super::header::{Array, Number};
+use super::header::{Array, Header, Number};
 use crate::input::Input;
 
 /// The numbers of a picture.
@@ -40,29 +40,31 @@ pub fn read(input: &Input) -> Result<Numbers> {
 
 fn numbers_of(input: &Input) -> Result<Numbers> {
     let array = Array::open(input)?;
-    let (shape, fortran) = (array.shape.clone(), array.fortran);
+    let Header { shape, fortran, .. } = array.header.clone();
     let count: u64 = shape.iter().product();
     ensure!(count > 0, "the array {shape:?} is empty");
     ensure!(
         count <= MOST_NUMBERS,
         "{count} elements: must be at most {MOST_NUMBERS}"
     );
-    let kind = match (array.element.integer(), array.element.float()) {
+    let element = array.element()?;
+    let kind = match (element.integer(), element.float()) {
         (_, Some(_)) => ElementKind::Float,
         (Some((1, false)), _) => ElementKind::Byte,
         (Some(_), _) => ElementKind::Integer,
         (None, None) => bail!(
-            "elements are {}: must be integers, or floats of 32 or 64 bits; convert them with \
-             .astype(numpy.float32)",
-            array.element
+            "elements are {element}: must be integers, or floats of 32 or 64 bits; convert them with \
+             .astype(numpy.float32)"
         ),
     };
-    let values = array.elements(|_, number| {
+    let mut values = Vec::new();
+    let value = |number| {
         Ok(match number {
             Number::Integer(value) => value as f64,
             Number::Float(value) => value,
         })
-    })?;
+    };
+    array.elements(value, |some| values.extend_from_slice(some))?;
     Ok(Numbers {
         element: kind,
         values: match fortran {

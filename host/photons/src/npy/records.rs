@@ -74,23 +74,15 @@ pub struct RecordReader {
 
 /// The fields that are ignored, if the elements are photons. Those of an array whose axes have names are not,
 /// unless they have fields.
-///
-/// # Errors
-/// Fails if it is not an `.npy` file; names it first.
-pub fn other_fields(input: &Input, has_axes: bool) -> Result<Option<Vec<String>>> {
-    let header = || {
-        let (file, length) = input.open()?;
-        Header::read(&mut BufReader::new(file), length)
+#[must_use]
+pub fn other_fields(header: &Header, has_axes: bool) -> Option<Vec<String>> {
+    let Elements::Records(fields) = &header.elements else {
+        return (is_triples(header) && !has_axes).then(Vec::new);
     };
-    let header = header().with_context(|| input.to_string())?;
-    let is_triples = is_triples(&header) && !has_axes;
-    let Elements::Records(fields) = header.elements else {
-        return Ok(is_triples.then(Vec::new));
-    };
-    let names = fields.into_iter().map(|field| field.name);
+    let names = fields.iter().map(|field| field.name.clone());
     // Padding has no name.
     let others = names.filter(|name| !name.is_empty() && !NAMES.contains(&name.as_str()));
-    Ok(Some(others.collect()))
+    Some(others.collect())
 }
 
 /// Whether it is an array of photons, a row each: the integers pixel, cycle and bin. No histogram has three bins.

@@ -1,13 +1,14 @@
 use std::io::{Cursor, Write};
 use std::sync::Arc;
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
-use super::histograms::Histograms;
+use super::header::{Array, Header};
+use super::histograms::ArrayHistograms;
 use super::numbers::ElementKind;
-use super::records::{RecordReader, other_fields};
+use super::records::{self, RecordReader};
 use super::{archive, header, histograms, numbers};
 use crate::axes::Axes;
 use crate::input::{Input, NpyArray};
@@ -32,6 +33,19 @@ fn with_header(header: Vec<u8>, data: &[u8]) -> Input {
         header,
         data: Box::new(data.to_vec()),
     }))
+}
+
+/// The histograms of an array.
+fn histograms_of(input: &Input, axes: Option<&Axes>) -> Result<ArrayHistograms> {
+    let read = Array::open(input).and_then(|array| histograms::read(array, axes));
+    read.with_context(|| input.to_string())
+}
+
+/// The fields of a list of photons that are not read.
+fn other_fields(input: &Input, has_axes: bool) -> Result<Option<Vec<String>>> {
+    let header: Result<Header> = Array::open(input).map(|array| array.header);
+    let header = header.with_context(|| input.to_string())?;
+    Ok(records::other_fields(&header, has_axes))
 }
 
 /// The line of an error.
@@ -107,8 +121,10 @@ fn numbers_of_every_type_are_read() {
         let picture = numbers::read(&array(descr, &[1, 1], bytes)).unwrap();
         assert_eq!(picture.values, [value], "{descr} {bytes:?}");
         assert_eq!((picture.element, &picture.shape[..]), (kind, &[1, 1][..]));
-        let counts = histograms::read(&array(descr, &[1], bytes), None);
-        let count = counts.ok().map(|counts| counts.pixels[0][0] as f64);
+        let counts = histograms_of(&array(descr, &[1], bytes), None);
+        let count = counts
+            .ok()
+            .map(|counts| counts.histograms.count(0, 0) as f64);
         let is_count = value >= 0.0 && value.fract() == 0.0;
         assert_eq!(count, is_count.then_some(value), "{descr} {bytes:?}");
     }
@@ -121,10 +137,10 @@ fn numbers_of_every_type_are_read() {
 /// Above 2^53 not all whole numbers are floats.
 #[test]
 fn floats_are_counts_up_to_the_last_that_is_exact() {
-    let read = |value: f64| histograms::read(&array("<f8", &[1], &value.to_le_bytes()), None);
+    let read = |value: f64| histograms_of(&array("<f8", &[1], &value.to_le_bytes()), None);
     let most = 2f64.powi(53);
-    assert_eq!(read(most).unwrap().pixels, [[1 << 53]]);
-    assert_eq!(read(-0.0).unwrap().pixels, [[0]]);
+    assert_eq!(read(most).unwrap().histograms.count(0, 0), 1 << 53);
+    assert_eq!(read(-0.0).unwrap().histograms.count(0, 0), 0);
     for (value, is) in [
         (
             most + 2.0,
@@ -148,8 +164,8 @@ fn the_order_in_the_file_makes_no_difference() {
     for input in [rows, columns] {
         let picture = numbers::read(&input).unwrap();
         assert_eq!(picture.values, [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]);
-        let histograms = histograms::read(&input, Some(&axes)).unwrap();
-        assert_eq!(histograms.pixels, [[0, 1, 2], [3, 4, 5]]);
+        let histograms = histograms_of(&input, Some(&axes)).unwrap();
+        assert!(histograms.histograms.iter().eq([[0, 1, 2], [3, 4, 5]]));
         assert_eq!(histograms.axes, [2]);
     }
     // 2 by 3 by 4, of which the last index is the slowest.
@@ -160,7 +176,7 @@ fn the_order_in_the_file_makes_no_difference() {
     assert!(picture.values.into_iter().eq((0..24).map(f64::from)));
     let negative = fortran("|i1", &[2, 2, 2], &[0, 0, 0, 0, 255, 0, 0, 0]);
     assert_eq!(
-        line(histograms::read(&negative, None)),
+        line(histograms_of(&negative, None)),
         "a.npy: element [0, 0, 1] is negative: -1"
     );
 }
@@ -206,12 +222,12 @@ fn what_holds_no_histograms_is_refused() {
         ("|u1", &[0, 8], 0, "the array [0, 8] is empty".to_owned()),
     ] {
         let input = array(descr, shape, &vec![0; bytes]);
-        assert_eq!(line(histograms::read(&input, None)), format!("a.npy: {message}"));
+        assert_eq!(line(histograms_of(&input, None)), format!("a.npy: {message}"));
     }
     // What is left to refuse depends on the run.
     for bins in [3, 8, 4096] {
         let input = array("|u1", &[2, bins as u64], &vec![0; 2 * bins]);
-        let read = histograms::read(&input, None).unwrap();
+        let read = histograms_of(&input, None).unwrap();
         assert_eq!(read.layout.bins(), bins);
     }
 }
@@ -382,7 +398,7 @@ fn zip(arrays: &[(&str, &[u8])], method: CompressionMethod) -> Vec<u8> {
 }
 
 /// Reads an archive. An error is without the name of the file.
-fn read_zip(bytes: &[u8], name: Option<&str>) -> Result<Histograms, String> {
+fn read_zip(bytes: &[u8], name: Option<&str>) -> Result<ArrayHistograms, String> {
     let file = tempfile::NamedTempFile::new().unwrap();
     std::fs::write(&file, bytes).unwrap();
     archive::read(file.path(), name, None).map_err(|error| {
@@ -405,16 +421,22 @@ fn an_array_of_an_archive_is_chosen_by_its_name() {
             &[("lit.npy", &lit), ("readme.txt", b"?"), ("dark.npy", &dark)],
             method,
         );
-        let read = |name| read_zip(&two, name).map(|read| read.pixels);
-        assert_eq!(read(Some("dark")), Ok(vec![vec![1; 8]]));
-        assert_eq!(read(Some("lit")), Ok(vec![vec![100; 8]]));
+        let read = |name| read_zip(&two, name).map(|read| read.histograms.histogram(0));
+        assert_eq!(read(Some("dark")), Ok(vec![1; 8]));
+        assert_eq!(read(Some("lit")), Ok(vec![100; 8]));
         let message = "2 arrays: choose one with array: dark, lit";
         assert_eq!(read(None), Err(message.to_owned()));
         let message = "no array \"grey\"; there is dark, lit";
         assert_eq!(read(Some("grey")), Err(message.to_owned()));
     }
     let one = zip(&[("lit.npy", &lit)], CompressionMethod::Stored);
-    assert_eq!(read_zip(&one, None).unwrap().pixels, [[100; 8]]);
+    assert!(
+        read_zip(&one, None)
+            .unwrap()
+            .histograms
+            .iter()
+            .eq([[100; 8]])
+    );
 }
 
 #[test]

@@ -77,7 +77,8 @@ fn histograms_keep_their_bins_and_all_is_said_of_them() {
     let pixels = bytes
         .chunks(8)
         .map(|bins| bins.iter().map(|&count| count.into()).collect());
-    assert_eq!(counts.captures, [pixels.collect::<Capture>()]);
+    assert_eq!(counts.histograms, Histograms::of(pixels).unwrap());
+    assert_eq!(counts.captures(), 1);
     assert_eq!((counts.cycles, counts.truth_mm), (None, None));
     assert_eq!(counts.metadata, plain_metadata());
 }
@@ -97,8 +98,9 @@ fn bins_and_captures_are_those_of_the_options() {
     let all = counts(input.clone(), &options).unwrap();
     assert_eq!(all.array, Array::new(2, 1).unwrap());
     assert_eq!(all.axis_names, ["column", "capture"]);
-    let capture = |count: u64| vec![vec![2 * count; 8]; 2];
-    assert_eq!(all.captures, [1, 2, 3].map(capture));
+    let pixels = [2, 2, 4, 4, 6, 6].map(|count| [count; 8]);
+    assert!(all.histograms.iter().eq(pixels));
+    assert_eq!(all.captures(), 3);
     let rows = |cut_off: &str| {
         vec![
             row("bins of the recording", "19"),
@@ -124,7 +126,7 @@ fn bins_and_captures_are_those_of_the_options() {
         ..options
     };
     let one = counts(input, &options).unwrap();
-    assert_eq!(one.captures, [capture(2)]);
+    assert!(one.histograms.iter().eq([[4; 8]; 2]));
     let capture = row("capture", "1 of 3, counted from 0");
     let expected = Metadata {
         cut_off: 3 * 2 * 2,
@@ -206,7 +208,7 @@ fn the_photons_of_a_list_are_counted_and_replayed() {
     let counts = counts(list(&photons), &options).unwrap();
     assert_eq!(counts.array, Array::new(3, 1).unwrap());
     assert_eq!(counts.axis_names, ["column", "row"]);
-    assert_eq!(counts.captures, [expected.clone()]);
+    assert!(counts.histograms.iter().eq(expected.clone()));
     assert_eq!((counts.cycles, &counts.truth_mm), (Some(201), &None));
     assert_eq!(counts.metadata, metadata);
 
@@ -215,7 +217,7 @@ fn the_photons_of_a_list_are_counted_and_replayed() {
         (checked.metadata(), checked.array()),
         (&metadata, counts.array)
     );
-    assert_eq!(checked.counts().unwrap().captures, [expected]);
+    assert!(checked.counts().unwrap().histograms.iter().eq(expected));
     let mut recording = checked.photons(&options).unwrap();
     assert_eq!(recording.metadata, metadata);
     let slice = recording.photons.next_slice(201).unwrap();
@@ -293,7 +295,10 @@ fn an_array_of_three_columns_is_a_list() {
     };
     let counts = counts(input, &options).unwrap();
     assert_eq!(counts.array, Array::new(3, 1).unwrap());
-    assert_eq!(counts.captures[0][1], [1, 4, 7, 10, 13, 16, 19, 22]);
+    assert_eq!(
+        counts.histograms.histogram(1),
+        [1, 4, 7, 10, 13, 16, 19, 22]
+    );
     assert!(!counts.metadata.is_list);
 }
 
@@ -303,10 +308,11 @@ fn files_are_told_by_their_names() {
     let default = ReadOptions::default();
     let (_folder, path) = file("LIST.CSV", "pixel,cycle,bin\n1,0,5\n");
     let list = counts(&path, &default).unwrap();
-    assert!(list.metadata.is_list && list.captures[0][1][5] == 1);
+    assert!(list.metadata.is_list && list.histograms.count(1, 5) == 1);
     let array = [header("|u1", &[2, 8], 128), vec![9; 16]].concat();
     let (_folder, path) = file("a.Npy", array);
-    assert_eq!(counts(&path, &default).unwrap().captures, [[[9; 8]; 2]]);
+    let read = counts(&path, &default).unwrap();
+    assert!(read.histograms.iter().eq([[9; 8]; 2]));
     for (name, expected) in [
         ("a.npz", "a.npz: not an .npz file as numpy.savez writes it"),
         (
@@ -530,10 +536,8 @@ fn a_log_gives_the_bin_width_the_offset_and_true_distances() {
     let all = of(None);
     assert_eq!(all.array, Array::new(9, 1).unwrap());
     assert_eq!(all.axis_names, ["zone", "capture"]);
-    assert_eq!(
-        all.captures,
-        [1, 2, 3].map(|count| vec![vec![count; 128]; 9])
-    );
+    let zones = [1, 2, 3].map(|count| [[count; 128]; 9]);
+    assert!(all.histograms.iter().eq(zones.as_flattened().to_vec()));
     let expected = Metadata {
         bins: 128,
         bin_width_ps: tmf882x::BIN_WIDTH_PS,
@@ -551,7 +555,7 @@ fn a_log_gives_the_bin_width_the_offset_and_true_distances() {
     // One capture has its own truth, or none.
     assert_eq!([of(Some(0)).truth_mm, of(Some(1)).truth_mm], [None, None]);
     let last = of(Some(2));
-    assert_eq!(last.captures, [vec![vec![3; 128]; 9]]);
+    assert!(last.histograms.iter().eq([[3; 128]; 9]));
     assert_eq!(last.truth_mm, truth(9, 4));
     let past = ReadOptions {
         capture: Some(3),
@@ -612,7 +616,7 @@ fn a_log_says_what_it_leaves_open_and_what_was_left_out() {
     let configuration = ", \"configuration\": {\"bin_shift\": 2, \"histogram_bins\": 218}";
     let (_folder, known) = tmf8829_log(configuration);
     let counts = counts(&known, &default()).unwrap();
-    assert_eq!(counts.captures, [[[5; 64]]]);
+    assert!(counts.histograms.iter().eq([[5; 64]]));
     assert_eq!(counts.axis_names, ["column", "row"]);
     // 54 bins of four, and one of two.
     assert_eq!(

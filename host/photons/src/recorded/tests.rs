@@ -1,5 +1,4 @@
 use std::convert::Infallible;
-use std::slice::from_ref;
 
 use super::*;
 use rand_core::TryRng;
@@ -23,11 +22,11 @@ impl<I: Iterator<Item = u64>> TryRng for Numbers<I> {
     }
 }
 
-/// A capture of pixels in a row.
-fn recorded(capture: Capture, cycles: u64, seed: u64) -> Result<RecordedHistograms> {
-    let array = Array::new(u32::try_from(capture.len())?, 1).unwrap();
+/// Pixels in a row.
+fn recorded(pixels: Vec<Vec<u64>>, cycles: u64, seed: u64) -> Result<RecordedHistograms> {
+    let array = Array::new(u32::try_from(pixels.len())?, 1).unwrap();
     let length = RecordingLength::Cycles(cycles);
-    RecordedHistograms::new(array, &[capture], length, u64::MAX, seed)
+    RecordedHistograms::new(array, &Histograms::of(pixels)?, length, u64::MAX, seed)
 }
 
 fn replay(counts: &[u64], cycles: u64) -> Vec<Photon> {
@@ -58,7 +57,7 @@ fn every_recorded_photon_is_used_exactly_once() {
 #[test]
 fn slices_of_any_length_hold_the_same_photons() {
     let photons = |dead_time: u16, lengths: &[u16]| {
-        let captures = [vec![vec![700; 8]], vec![vec![90; 8]]];
+        let captures = Histograms::of([700, 90].map(|count| vec![count; 8])).unwrap();
         let length = RecordingLength::PhotonsPerCycle(0.9);
         let array = Array::new(1, 1).unwrap();
         let source = RecordedHistograms::new(array, &captures, length, u64::MAX, 3).unwrap();
@@ -104,8 +103,9 @@ fn photons_in_the_dead_time_of_others_are_refused() {
     let array = Array::new(2, 1).unwrap();
     let captures = [[60, 40], [60, 41]].map(|[first, third]| {
         let right = vec![0, 100, 0, 0, 0, 0, 0, 0];
-        vec![right, vec![first, 0, third, 0, 0, 0, 0, 0]]
+        [right, vec![first, 0, third, 0, 0, 0, 0, 0]]
     });
+    let captures = Histograms::of(captures.into_iter().flatten()).unwrap();
     let refused = |masked: &[u16], dead_time| {
         let length = RecordingLength::Cycles(100);
         let source = RecordedHistograms::new(array, &captures, length, 100, 1).unwrap();
@@ -127,6 +127,7 @@ fn photons_in_the_dead_time_of_others_are_refused() {
 fn captures_follow_each_other() {
     let array = Array::new(3, 2).unwrap();
     let captures = [2, 6].map(|count| vec![vec![count; 8]; 6]);
+    let captures = Histograms::of(captures.into_iter().flatten()).unwrap();
     let length = RecordingLength::Cycles(50);
     let source = RecordedHistograms::new(array, &captures, length, 40, 1).unwrap();
     assert_eq!(source.axis_names(), ["column", "row"]);
@@ -188,23 +189,22 @@ fn equal_pixels_and_other_seeds_receive_other_photons() {
 fn a_capture_without_photons_is_as_long_as_the_longest_other() {
     let array = Array::new(1, 1).unwrap();
     let length = RecordingLength::PhotonsPerCycle(0.5);
-    let cycles = |captures: &[Capture], cycles| {
+    let captures =
+        |counts: &[u64]| Histograms::of(counts.iter().map(|&count| vec![count; 8])).unwrap();
+    let cycles = |captures: &Histograms, cycles| {
         let photons = RecordedHistograms::new(array, captures, length, cycles, 1).unwrap();
         (photons.cycles(), photons.recorded_cycles())
     };
-    let [dark, dim, bright] = [0, 5, 700].map(|count| vec![vec![count; 8]]);
-    let all = [dim.clone(), dark.clone(), bright];
+    let [all, only_dark, dim] = [&[5, 0, 700][..], &[0], &[5]].map(captures);
     assert_eq!(cycles(&all, u64::MAX), (11_200, Some((80, 11_200))));
     assert_eq!(cycles(&all, 100), (100, Some((80, 11_200))));
-    let only_dark = [dark];
     assert_eq!(
         cycles(&only_dark, u64::MAX),
         (10_000, Some((10_000, 10_000)))
     );
     assert_eq!(cycles(&only_dark, 300), (300, Some((300, 300))));
     // Neither do masked pixels show it.
-    let dim = from_ref(&dim);
-    let masked = RecordedHistograms::with_masked(array, dim, length, u64::MAX, 1, &[0]);
+    let masked = RecordedHistograms::with_masked(array, &dim, length, u64::MAX, 1, &[0]);
     assert_eq!(masked.unwrap().cycles(), 10_000);
 }
 
@@ -213,7 +213,7 @@ fn a_capture_without_photons_is_as_long_as_the_longest_other() {
 fn pixels_of_later_captures_have_the_next_addresses() {
     let array = Array::new(2, 1).unwrap();
     let length = RecordingLength::PhotonsPerCycle(1.0);
-    let captures = [[10, 20], [30, 40], [50, 60]].map(|pair| pair.map(|n| vec![n; 8]).to_vec());
+    let captures = Histograms::of([10, 20, 30, 40, 50, 60].map(|n| vec![n; 8])).unwrap();
     let photons = |masked: &[u16]| {
         RecordedHistograms::with_masked(array, &captures, length, u64::MAX, 1, masked).unwrap()
     };
@@ -230,7 +230,7 @@ fn pixels_of_later_captures_have_the_next_addresses() {
 fn what_cannot_be_counted_or_does_not_fit_into_memory_is_refused() {
     use RecordingLength::{Cycles, PhotonsPerCycle};
     let refused = |count, length| {
-        let captures = [vec![vec![count, 0, 0, 0, 0, 0, 0, count]]];
+        let captures = Histograms::of([vec![count, 0, 0, 0, 0, 0, 0, count]]).unwrap();
         let array = Array::new(1, 1).unwrap();
         let source = RecordedHistograms::new(array, &captures, length, u64::MAX, 1);
         source.err().map(|error| error.to_string())
@@ -274,21 +274,16 @@ fn photons_fall_evenly_over_the_laser_cycles_whatever_their_bin() {
 
 #[test]
 fn captures_that_no_array_holds_are_refused() {
-    let refused = |captures: &[Capture]| {
+    let refused = |pixels: usize| {
         let most = Array::new(256, 256).unwrap();
-        let refused = RecordedHistograms::new(most, captures, RecordingLength::Cycles(10), 10, 1);
+        let histograms = Histograms::of(repeat_n(vec![1; 8], pixels)).unwrap();
+        let refused =
+            RecordedHistograms::new(most, &histograms, RecordingLength::Cycles(10), 10, 1);
         refused.unwrap_err().to_string()
     };
-    let capture = vec![vec![1; 8]; 65_536];
-    assert_eq!(
-        refused(&[capture.clone(), capture]),
-        "more than 65,536 pixels"
-    );
-    assert_eq!(
-        refused(&[vec![]]),
-        "a capture does not have 65536 histograms"
-    );
-    assert_eq!(refused(&[]), "no captures");
+    assert_eq!(refused(2 * 65_536), "more than 65,536 pixels");
+    assert_eq!(refused(65_535), "a capture does not have 65536 histograms");
+    assert_eq!(refused(0), "no captures");
 }
 
 /// A hot pixel that is masked does not count for the length. Each of two captures has its own
@@ -296,8 +291,8 @@ fn captures_that_no_array_holds_are_refused() {
 #[test]
 fn masked_pixels_do_not_set_the_length() {
     let array = Array::new(3, 1).unwrap();
-    let row = |totals: [u64; 3]| totals.map(|total| vec![total; 8]).to_vec();
-    let captures = [row([10, 5000, 20]), row([40, 3, 7])];
+    let totals = [[10, 5000, 20], [40, 3, 7]].into_iter().flatten();
+    let captures = Histograms::of(totals.map(|total| vec![total; 8])).unwrap();
     let length = |masked: &[u16]| {
         let length = RecordingLength::PhotonsPerCycle(0.5);
         let source = RecordedHistograms::with_masked(array, &captures, length, u64::MAX, 1, masked);

@@ -238,7 +238,8 @@ fn recorded(root: &Path) -> Result<Option<Vec<Recorded>>> {
         &name,
         BufReader::new(File::open(&path).context(name.clone())?),
     )?;
-    let histograms = log.captures.iter().take(CAPTURES).flatten();
+    let pixels = log.array.pixels() as usize;
+    let histograms = log.histograms.iter().take(CAPTURES * pixels);
     let sums = histograms.map(|histogram| {
         let photons = histogram.iter().scan(0, |sum, photons| {
             *sum += photons;

@@ -16,6 +16,7 @@ use dtof_options::Refused;
 use dtof_options::numbers::{MAX_INTEGER, integer};
 use dtof_options::progress::{Progress, shared};
 use dtof_options::rows::{Row, grouped};
+use dtof_photons::histograms::Histograms;
 use dtof_photons::masked;
 use dtof_photons::open::BIN_WIDTH_PS;
 use dtof_run::given::Given;
@@ -149,10 +150,10 @@ impl DeviceArgs {
         cycles.sort_unstable();
         let median = cycles.get(cycles.len() / 2).copied().unwrap_or(0);
         let rays = requested.rays.slants(array)?;
-        let captures = [collected.histograms];
+        let histograms = Histograms::of(collected.histograms)?;
         let observed = Observed {
             array,
-            captures: &captures,
+            histograms: &histograms,
             masked,
             length: Length::Cycles(median),
             cycles: Some(&collected.cycles),

@@ -3,6 +3,7 @@ use dtof_core::neighbours::NeighbourRule;
 use dtof_core::{
     AnyRule, Array, BlockLevel, CentredWindow, DepthEstimator, EchoNumber, PixelConfig, RangeGate,
 };
+use dtof_photons::histograms::Histograms;
 use dtof_photons::ranges::Ranges;
 use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
 
@@ -180,7 +181,7 @@ fn ranges_that_cannot_be_are_refused_in_one_line() {
 #[test]
 fn the_offsets_of_one_capture_hold_for_each() {
     let array = Array::new(2, 3).unwrap();
-    let captures = [(); 3].map(|()| vec![vec![1; 8]; 6]);
+    let captures = Histograms::of(vec![vec![1; 8]; 3 * 6]).unwrap();
     let length = RecordingLength::Cycles(1);
     let source = RecordedHistograms::new(array, &captures, length, 1, 1).unwrap();
     let one = settings(OFFSETS).for_source(&source).unwrap();
