@@ -158,8 +158,7 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
                 kept: is_kept(self.addresses[place]).then(|| counts(&decided.histogram)),
             }
         };
-        let alone =
-            |place: usize| self.decide(&self.counts.histogram(place), self.counts.cycles(place));
+        let alone = |place: usize| self.decide(&self.sum_of(place, &[]), self.counts.cycles(place));
         let Some(neighbours) = self.neighbours else {
             return of_each(pixels, 1, |place| end(place, alone(place)));
         };
@@ -169,9 +168,18 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
         })
     }
 
-    /// The decision on `counts` of so many laser cycles.
-    fn decide(&self, counts: &[u64], cycles: u64) -> Decided<BINS, W> {
-        // The sum of nine pixels may exceed 32 bits.
+    /// The photons of a pixel and of others.
+    fn sum_of(&self, place: usize, others: &[usize]) -> [u64; BINS] {
+        let mut sum = [0; BINS];
+        self.counts.add_to(place, &mut sum);
+        for &other in others {
+            self.counts.add_to(other, &mut sum);
+        }
+        sum
+    }
+
+    /// The decision on `counts` of so many laser cycles, both divided by a power of two if a count has more than 32 bits.
+    fn decide(&self, counts: &[u64; BINS], cycles: u64) -> Decided<BINS, W> {
         let highest = counts.iter().copied().max().unwrap_or(0);
         let shift = 32_u32.saturating_sub(highest.leading_zeros());
         let mut frame = [0_u32; BINS];
@@ -245,18 +253,15 @@ impl<const BINS: usize, W: CounterWidth> Pixels<'_, BINS, W> {
         if self.is_masked[place] {
             return decided;
         }
-        let mut sum = self.counts.histogram(place);
-        let mut asked = Vec::new();
+        let (mut others, mut asked) = (Vec::new(), Vec::new());
         for other in self.array.neighbours(self.addresses[place], neighbours) {
             let other = self.addresses.binary_search(&other);
             if let Some(other) = other.ok().filter(|&other| !self.is_masked[other]) {
-                let counts = self.counts.histogram(other);
-                for (sum, count) in sum.iter_mut().zip(counts) {
-                    *sum = sum.saturating_add(count);
-                }
+                others.push(other);
                 asked.push(&decided_alone[other].histogram);
             }
         }
+        let sum = self.sum_of(place, &others);
         let all = self.decide(&sum, self.counts.cycles(place));
         let mut uses_sum = false;
         for (_, detection) in &mut decided.echoes {

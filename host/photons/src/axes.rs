@@ -157,15 +157,16 @@ impl AxisLayout {
         if self.is_in_order() {
             return elements;
         }
-        let (_, stride) = self.bins;
-        elements.rearranged(|mut address, bin| {
-            let mut place = bin * stride;
+        let first_of = |mut address| {
+            let mut first = 0;
             for (length, stride) in self.pixels.iter().rev() {
-                place += address % length * stride;
+                first += address % length * stride;
                 address /= length;
             }
-            place
-        })
+            first
+        };
+        let (_, stride) = self.bins;
+        elements.rearranged(first_of, stride)
     }
 }
 

@@ -9,11 +9,11 @@ use anyhow::{Result, ensure};
 /// ```
 /// use dtof_photons::histograms::Histograms;
 ///
-/// let mut histograms = Histograms::new(3);
-/// histograms.extend(&[0, 7, 1, 2, 300, 0]);
+/// let histograms = Histograms::of([vec![0, 7, 1], vec![2, 300, 0]])?;
 /// assert_eq!((histograms.len(), histograms.bins()), (2, 3));
 /// assert_eq!(histograms.histogram(1), [2, 300, 0]);
 /// assert_eq!(histograms.count(0, 1), 7);
+/// # Ok::<(), anyhow::Error>(())
 /// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Histograms {
@@ -33,7 +33,7 @@ enum Counts {
 impl Histograms {
     /// None yet, of `bins` bins each, at least 1.
     #[must_use]
-    pub fn new(bins: usize) -> Self {
+    pub(crate) fn new(bins: usize) -> Self {
         Self {
             bins: bins.max(1),
             counts: Counts::U8(Vec::new()),
@@ -43,13 +43,14 @@ impl Histograms {
     /// Histograms of as many bins as the first has.
     ///
     /// # Errors
-    /// Names the first that has another number of bins.
+    /// Names the first without bins, or with another number of bins.
     pub fn of(histograms: impl IntoIterator<Item = Vec<u64>>) -> Result<Self> {
         let mut histograms = histograms.into_iter().peekable();
         let bins = histograms.peek().map_or(0, Vec::len);
         let mut all = Self::new(bins);
         for (place, histogram) in histograms.enumerate() {
             let found = histogram.len();
+            ensure!(found > 0, "histogram {place} has no bins");
             ensure!(
                 found == bins,
                 "histogram {place} has {found} bins, not {bins}"
@@ -61,7 +62,7 @@ impl Histograms {
 
     /// Appends the counts of one histogram after another. The last may be continued by the next counts.
     #[allow(clippy::cast_possible_truncation, reason = "none is above the highest")]
-    pub fn extend(&mut self, counts: &[u64]) {
+    pub(crate) fn extend(&mut self, counts: &[u64]) {
         let highest = counts.iter().copied().max().unwrap_or(0);
         if highest > self.counts.highest() {
             self.counts = self.counts.widened_for(highest);
@@ -102,27 +103,50 @@ impl Histograms {
     /// The photons in a bin of pixel number `place`; 0 if there is none.
     #[must_use]
     pub fn count(&self, place: usize, bin: usize) -> u64 {
-        self.counts.get(place * self.bins + bin)
+        match place < self.len() && bin < self.bins {
+            true => self.counts.get(place * self.bins + bin),
+            false => 0,
+        }
+    }
+
+    /// Adds the histogram of pixel number `place` to `sum`. Sums saturate.
+    pub fn add_to(&self, place: usize, sum: &mut [u64]) {
+        let first = place.saturating_mul(self.bins);
+        let bins = first..first.saturating_add(self.bins);
+        match &self.counts {
+            Counts::U8(all) => add(sum, all.get(bins)),
+            Counts::U16(all) => add(sum, all.get(bins)),
+            Counts::U32(all) => add(sum, all.get(bins)),
+            Counts::U64(all) => add(sum, all.get(bins)),
+        }
     }
 
     /// All of them.
-    #[must_use]
-    pub fn iter(&self) -> impl ExactSizeIterator<Item = Vec<u64>> + Clone {
+    pub fn iter(&self) -> impl Iterator<Item = Vec<u64>> {
         (0..self.len()).map(|place| self.histogram(place))
     }
 
-    /// The same counts in another order: each bin of each pixel has the count at the place that `place_of` gives.
+    /// The same counts in another order: the first bin of each pixel has the count at the place that `first_of` gives, and
+    /// the next one that `stride` further on.
     #[must_use]
-    pub(crate) fn rearranged(&self, place_of: impl Fn(usize, usize) -> usize) -> Self {
+    pub(crate) fn rearranged(&self, first_of: impl Fn(usize) -> usize, stride: usize) -> Self {
         let mut all = Self::new(self.bins);
         let mut histogram = vec![0; self.bins];
         for pixel in 0..self.len() {
+            let first = first_of(pixel);
             for (bin, count) in histogram.iter_mut().enumerate() {
-                *count = self.counts.get(place_of(pixel, bin));
+                *count = self.counts.get(first + bin * stride);
             }
             all.extend(&histogram);
         }
         all
+    }
+}
+
+/// Adds counts to sums, which saturate.
+pub(crate) fn add<T: Copy + Into<u64>>(sum: &mut [u64], counts: Option<&[T]>) {
+    for (sum, &count) in sum.iter_mut().zip(counts.unwrap_or_default()) {
+        *sum = sum.saturating_add(count.into());
     }
 }
 
@@ -214,7 +238,16 @@ mod tests {
                     prop_assert_eq!(histograms.count(place, bin), expected);
                 }
             }
-            prop_assert_eq!(histograms.histogram(histograms.len() + 1), [0; 0]);
+            let mut sum = vec![u64::MAX - 5; bins];
+            (0..=histograms.len()).for_each(|place| histograms.add_to(place, &mut sum));
+            for (bin, sum) in sum.into_iter().enumerate() {
+                let in_bin = counts.chunks_exact(bins).map(|histogram| histogram[bin]);
+                prop_assert_eq!(sum, in_bin.fold(u64::MAX - 5, u64::saturating_add));
+            }
+            for past in [histograms.len(), usize::MAX] {
+                prop_assert_eq!(histograms.histogram(past), [0; 0]);
+                prop_assert_eq!((histograms.count(past, 0), histograms.count(0, bins)), (0, 0));
+            }
             let highest = counts.iter().copied().max().unwrap_or(0);
             let bytes = match &histograms.counts {
                 Counts::U8(_) => 1,
@@ -228,7 +261,7 @@ mod tests {
             match counts.len() % bins {
                 rest if rest == 0 || counts.len() < bins => {
                     let each = each.unwrap();
-                    prop_assert!(counts.is_empty() || each.iter().eq(counts.chunks(bins)));
+                    prop_assert!(each.iter().eq(counts.chunks(bins)));
                     prop_assert!(rest > 0 || counts.is_empty() || each == histograms);
                 }
                 rest => {
@@ -237,8 +270,19 @@ mod tests {
                 }
             }
             let last = histograms.len() * bins;
-            let backwards = histograms.rearranged(|place, bin| last - 1 - (place * bins + bin));
-            prop_assert!(backwards.iter().flatten().eq(counts[..last].iter().rev().copied()));
+            // Bin by bin in the file.
+            let turned = histograms.rearranged(|place| place, histograms.len());
+            let pixels = histograms.len();
+            let expected = (0..last).map(|at| counts[at % bins * pixels + at / bins]);
+            prop_assert!(turned.iter().flatten().eq(expected));
         }
+    }
+
+    #[test]
+    fn a_histogram_has_bins() {
+        let error = Histograms::of([vec![1], vec![]]).unwrap_err();
+        assert_eq!(error.to_string(), "histogram 1 has no bins");
+        let none = Histograms::of([]).unwrap();
+        assert!(none.is_empty() && none.iter().next().is_none());
     }
 }

@@ -512,7 +512,8 @@ fn fit_bins(
             _ => format!("there are {all}, counted from 0"),
         };
         ensure!(place < all, Refused::value("capture", capture, reason));
-        histograms = Histograms::of(histograms.iter().skip(place * each).take(each))?;
+        let pixels = place * each..(place + 1) * each;
+        histograms = Histograms::of(pixels.map(|pixel| histograms.histogram(pixel)))?;
     }
     let recorded = histograms.bins();
     let fit = BinFit::new(recorded, measured, options.rebin.into(), options.bins)?;

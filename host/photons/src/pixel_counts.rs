@@ -4,13 +4,13 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use crate::histograms::Histograms;
+use crate::histograms::{Histograms, add};
 use crate::source::Slice;
 
 /// All photons of some pixels.
 pub trait AllPhotons: Sync {
-    /// The histogram of pixel number `place`.
-    fn histogram(&self, place: usize) -> Vec<u64>;
+    /// Adds the histogram of pixel number `place` to `sum`. Sums saturate.
+    fn add_to(&self, place: usize, sum: &mut [u64]);
 
     /// The laser cycles of pixel number `place`.
     fn cycles(&self, place: usize) -> u64;
@@ -21,13 +21,13 @@ pub trait AllPhotons: Sync {
 pub struct RecordedCounts {
     /// The histograms.
     pub histograms: Histograms,
-    /// As many laser cycles.
+    /// The laser cycles of each histogram.
     pub cycles: Vec<u64>,
 }
 
 impl AllPhotons for RecordedCounts {
-    fn histogram(&self, place: usize) -> Vec<u64> {
-        self.histograms.histogram(place)
+    fn add_to(&self, place: usize, sum: &mut [u64]) {
+        self.histograms.add_to(place, sum);
     }
 
     fn cycles(&self, place: usize) -> u64 {
@@ -36,9 +36,8 @@ impl AllPhotons for RecordedCounts {
 }
 
 impl AllPhotons for PixelCounts {
-    fn histogram(&self, place: usize) -> Vec<u64> {
-        let counts = Self::histogram(self, place).iter();
-        counts.map(|&count| count.into()).collect()
+    fn add_to(&self, place: usize, sum: &mut [u64]) {
+        add(sum, Some(self.histogram(place)));
     }
 
     fn cycles(&self, place: usize) -> u64 {
@@ -164,6 +163,24 @@ mod tests {
                 photons: photons.iter().map(photon).collect(),
             }],
         }
+    }
+
+    /// Counts of more than 32 bits are added as they are.
+    #[test]
+    fn photons_of_pixels_add_up_exactly() {
+        let histograms = [[1 << 35, 16, 0], [5, 1, 1 << 40]].map(|bins| bins.to_vec());
+        let recorded = RecordedCounts {
+            histograms: Histograms::of(histograms).unwrap(),
+            cycles: vec![1 << 36, 7],
+        };
+        let mut counted = PixelCounts::new(1, 3);
+        counted.add(&slice(0, &[(0, 1), (3, 1), (9, 2)]));
+        let mut sum = [1, 0, 0];
+        (0..2).for_each(|place| recorded.add_to(place, &mut sum));
+        counted.add_to(0, &mut sum);
+        assert_eq!(sum, [(1 << 35) + 6, 19, (1 << 40) + 1]);
+        let all: [&dyn AllPhotons; 2] = [&recorded, &counted];
+        assert_eq!(all.map(|all| all.cycles(0)), [1 << 36, 10]);
     }
 
     proptest! {

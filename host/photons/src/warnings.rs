@@ -191,16 +191,16 @@ impl Concentration {
 /// Panics if an axis has no length, or if there are fewer pixels.
 #[must_use]
 pub fn swapped_axes(axes: &[usize], pixels: &Histograms) -> Option<String> {
-    let mut along_last = Concentration::along_last(pixels);
+    let (mut along_last, mut totals) = (Concentration::default(), Vec::new());
+    for bins in pixels.iter() {
+        totals.push(bins.iter().fold(0, |sum: u64, &n| sum.saturating_add(n)));
+        along_last.add(bins.into_iter(), 1.0);
+    }
     // If the last axis looks like bins in some pixels, bright ones among them make the others look so.
     let has_peaks = along_last.mean() >= LOOKS_LIKE_BINS;
     // Pixels without photons tell nothing.
     along_last.empty = 0.0;
     let of_last = along_last.of_lower_half();
-    let totals: Vec<u64> = pixels
-        .iter()
-        .map(|bins| bins.iter().fold(0, |sum: u64, &n| sum.saturating_add(n)))
-        .collect();
     let brightest = (0..pixels.len()).max_by_key(|&pixel| totals[pixel]);
     let bins = pixels.bins();
     // Odd, so that all are seen of a regular pattern.

@@ -15,7 +15,7 @@ use dtof_options::progress::{Progress, shared};
 use dtof_photons::input::Input;
 use dtof_photons::masked;
 use dtof_photons::open::{Counts, counts};
-use dtof_photons::recorded::{RecordingLength, totals};
+use dtof_photons::recorded::{RecordingLength, check_totals};
 
 /// Options of this job; keys of settings files with these names mean something else.
 const OWN: &[&str] = &["target_mm", "glass", "false_alarm", "seed"];
@@ -179,7 +179,7 @@ pub(super) fn calibrate_counts(
     options: &CalibrationOptions,
     progress: &mut dyn Progress,
 ) -> Result<Calibration> {
-    totals(&counts.histograms)?;
+    check_totals(&counts.histograms)?;
     let length = match (counts.cycles, read_options(requested).length) {
         (Some(cycles), _) | (None, Some(RecordingLength::Cycles(cycles))) => Length::Cycles(cycles),
         (None, Some(RecordingLength::PhotonsPerCycle(rate))) => Length::PhotonsPerCycle(rate),

@@ -200,3 +200,36 @@ impl Observed<'_> {
         self.histograms.histogram(number).iter().sum()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn histograms_of_no_whole_capture_are_refused() {
+        let refused = |histograms: Vec<Vec<u64>>| {
+            let observed = Observed {
+                array: Array::new(2, 2).unwrap(),
+                histograms: &Histograms::of(histograms).unwrap(),
+                masked: None,
+                length: Length::Unknown,
+                cycles: None,
+                bin_width_ps: 250.0,
+                truth_mm: None,
+                slant: None,
+                bias_mm: None,
+                offsets_mm: &[],
+                times: None,
+            };
+            observed.traces(&[]).err().map(|error| error.to_string())
+        };
+        for (pixels, bins, expected) in [
+            (8, 16, None),
+            (0, 16, Some("no captures")),
+            (6, 16, Some("6 histograms are no captures of 4 pixels")),
+            (4, 8, Some("8 bins are too few to calibrate by")),
+        ] {
+            assert_eq!(refused(vec![vec![1; bins]; pixels]).as_deref(), expected);
+        }
+    }
+}

@@ -258,6 +258,39 @@ fn divided_counts_have_no_more_false_alarms() {
     assert!(divided <= fits, "{divided} {fits}");
 }
 
+/// The first photon of each laser cycle, of 0.01 background photons a bin and a pulse: the laser cycles that are left say how
+/// bright a late bin is.
+#[test]
+fn counts_past_32_bits_and_their_laser_cycles_are_divided_alike() {
+    #[allow(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a number of photons"
+    )]
+    let decided = |times: u32| {
+        let cycles = 1_u64 << 33;
+        let mut left = cycles as f64;
+        let photons = (0..128).map(|bin| {
+            let count = (left * if bin == 90 { 0.05 } else { 0.01 }) as u64;
+            left -= count as f64;
+            count << times
+        });
+        let counts = recorded(vec![photons.collect()], cycles << times);
+        let settings = Settings {
+            dead_time: 128,
+            ..settings(128)
+        };
+        let decided = decide_once(&settings, line(1), &addresses(1), &counts, |_| false).unwrap();
+        let [decided] = decided.try_into().ok().unwrap();
+        (decided.echoes, decided.confidence.to_bits(), decided.best)
+    };
+    let fits = decided(0);
+    assert_eq!(fits.0[0].1.peak.bin.raw(), 90);
+    for times in 1..20 {
+        assert_eq!(decided(times), fits, "{times}");
+    }
+}
+
 proptest! {
     /// A decision on counts is the event of an engine, and the best window is that of the event.
     #[test]

@@ -603,7 +603,7 @@ impl Array<BufReader<Box<dyn Read>>> {
     /// Opens an `.npy` file, or an array in memory.
     ///
     /// # Errors
-    /// Those of [`Header::read`].
+    /// Fails if it cannot be opened, and with those of [`Header::read`].
     pub fn open(input: &Input) -> Result<Self> {
         let (file, length) = input.open()?;
         Self::read(BufReader::new(file), length)

@@ -40,14 +40,15 @@ pub fn read(input: &Input) -> Result<Numbers> {
 
 fn numbers_of(input: &Input) -> Result<Numbers> {
     let array = Array::open(input)?;
-    let Header { shape, fortran, .. } = array.header.clone();
+    let element = array.element()?;
+    let Header { shape, fortran, .. } = &array.header;
+    let (shape, fortran) = (shape.clone(), *fortran);
     let count: u64 = shape.iter().product();
     ensure!(count > 0, "the array {shape:?} is empty");
     ensure!(
         count <= MOST_NUMBERS,
         "{count} elements: must be at most {MOST_NUMBERS}"
     );
-    let element = array.element()?;
     let kind = match (element.integer(), element.float()) {
         (_, Some(_)) => ElementKind::Float,
         (Some((1, false)), _) => ElementKind::Byte,

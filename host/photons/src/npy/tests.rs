@@ -155,6 +155,23 @@ fn floats_are_counts_up_to_the_last_that_is_exact() {
     }
 }
 
+/// More elements than are converted at a time.
+#[test]
+fn elements_past_the_first_block_are_read_and_named() {
+    let mut bytes = vec![1; 3 * 4096];
+    bytes[2 * 4096 + 5] = 255;
+    let negative = histograms_of(&array("|i1", &[3, 4096], &bytes), None);
+    assert_eq!(line(negative), "a.npy: element [2, 5] is negative: -1");
+    let counts: Vec<u16> = (0..3 * 4096).map(|count| count * 5).collect();
+    let bytes: Vec<u8> = counts
+        .iter()
+        .flat_map(|count| count.to_be_bytes())
+        .collect();
+    let read = histograms_of(&array(">u2", &[3, 4096], &bytes), None).unwrap();
+    let expected = counts.into_iter().map(u64::from);
+    assert!(read.histograms.iter().flatten().eq(expected));
+}
+
 /// Two rows of three: 0 to 5 in C order.
 #[test]
 fn the_order_in_the_file_makes_no_difference() {
