@@ -203,7 +203,8 @@ fn array_config(
         if layout.patience == 0 {
             return Err(DTOF_ERROR_PATIENCE);
         }
-        if own.weighs_dead_time() {
+        // Blocks do not weigh a dead time. If only first photons count, their events say when it piles up.
+        if own.weighs_dead_time() && !own.is_first_photon_only() {
             return Err(DTOF_ERROR_DEAD_TIME);
         }
         let blocks = config_with(settings, rule.of_blocks(levels))?;

@@ -83,7 +83,8 @@ fn of_core(settings: &dtof_config_t, layout: &dtof_layout_t) -> Option<ArrayConf
     };
     let mut config = config.first(pixels).ok()?;
     if levels > BlockLevel::PIXEL {
-        if config.pixels().weighs_dead_time() {
+        let pixels = config.pixels();
+        if pixels.weighs_dead_time() && !pixels.is_first_photon_only() {
             return None;
         }
         let blocks = config_with(settings, rule.of_blocks(levels))?;
@@ -212,10 +213,11 @@ fn what_an_array_cannot_be_has_its_own_error() {
         rule: DTOF_RULE_WINDOW,
         ..paper()
     };
-    let dead = dtof_config_t {
-        dead_time: 20,
+    let dead_time = |dead_time| dtof_config_t {
+        dead_time,
         ..window
     };
+    let dead = dead_time(20);
     let alone = dtof_layout_t {
         pixels: 16,
         columns: 4,
@@ -238,6 +240,9 @@ fn what_an_array_cannot_be_has_its_own_error() {
         (paper(), pixels(21), DTOF_ERROR_PIXELS),
         (dead, blocks(0), OK),
         (dead, blocks(1), DTOF_ERROR_DEAD_TIME),
+        (dead_time(127), blocks(1), DTOF_ERROR_DEAD_TIME),
+        (dead_time(128), blocks(1), OK),
+        (dead_time(u16::MAX), blocks(1), OK),
         (paper(), blocks(1), OK),
         (paper(), blocks(2), OK),
         // Four of 2 x 2, one of 4 x 4 and one of 8 x 8 pixels.
