@@ -162,14 +162,15 @@ static void act(const dtof_message_t *message)
         memcpy(answer, message->body, answer_length);
         break;
     case DTOF_MESSAGE_STATISTICS_REQUEST: {
-        dtof_statistics_t done;
+        dtof_statistics_t of_pixels, of_blocks;
         dtof_losses_t losses;
-        check("statistics", dtof_array_statistics(&array, &done, NULL, &losses));
+        check("statistics", dtof_array_statistics(&array, &of_pixels, &of_blocks, &losses));
         check("laser cycles", dtof_array_cycles(&array, &report.cycles));
-        report.unaddressed = losses.unaddressed;
+        report.unaddressed = losses.unaddressed + losses.left_out;
         answer_kind = DTOF_MESSAGE_STATISTICS;
         answer_length = DTOF_REPORT_BYTES;
-        check("report", dtof_report_write(&report, &done, &link_to_host, answer));
+        check("report",
+              dtof_report_write(&report, &of_pixels, &of_blocks, &link_to_host, answer));
         break;
     }
     case DTOF_MESSAGE_SENSOR_REQUEST:
@@ -232,7 +233,7 @@ static int offer(uint8_t kind, const uint8_t *body, size_t length)
  * room stays in its slot. */
 static int send_events(void)
 {
-    while (is_configured) {
+    for (;;) {
         dtof_event_t event;
         size_t length;
         if (filled + DTOF_EVENT_BYTES > sizeof words) {
@@ -295,6 +296,7 @@ static void start_over(uint8_t session)
     stop_sensor(session == DTOF_SESSION_ENDED ? DTOF_STOP_END_OF_SESSION : DTOF_STOP_NEW_SESSION);
     is_configured = has_answer = sends_histogram = 0;
     filled = 0;
+    check("array", dtof_array_clear(&array));
     check("encoder", dtof_aer_encoder_init(&encoder));
 }
 

@@ -723,7 +723,7 @@ typedef struct dtof_device_config_t {
 typedef struct dtof_report_t {
     // Laser cycles that have ended since the configuration.
     uint64_t cycles;
-    // Photons with the address of a pixel that the device does not have.
+    // Photons of pixels that the device does not have, or that it leaves out: both of dtof_losses_t.
     uint64_t unaddressed;
     // Bytes lost before dtof_link_receive got them.
     uint32_t overrun;
@@ -903,9 +903,9 @@ dtof_status_t dtof_pixel_add_photons(const struct dtof_pixel_t *pixel,
 
 // Makes an array of room for `number` pixels and `number_of_blocks` blocks. It has no pixels until
 // dtof_array_configure. Of 8 x 8 pixels there are 16 blocks of level 1, 4 of level 2 and 1 of level 3. Without
-// blocks `blocks` may be null. `size` is `sizeof *pixels`. The room belongs to the array from now on: do not
-// read, write or copy it. Another dtof_array_init may have it again; the earlier array must not be used after
-// that.
+// blocks `blocks` may be null. `size` is `sizeof *pixels`. The room belongs to the array from now on, and lasts
+// as long as it: do not read, write, copy or free it. Another dtof_array_init may have it again, or a part of it.
+// After that the earlier array must not be used, unless dtof_array_init makes it anew.
 //
 // Errors: DTOF_ERROR_SIZE if the library was built for other DTOF_BINS or DTOF_COUNTER_BITS,
 // DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
@@ -927,6 +927,13 @@ dtof_status_t dtof_array_init(struct dtof_array_t *array,
 dtof_status_t dtof_array_configure(struct dtof_array_t *array,
                                    const struct dtof_config_t *settings,
                                    const struct dtof_layout_t *layout);
+
+// The array has no pixels until dtof_array_configure, and all counts are 0: a session has begun or ended. Pixels that
+// are left out stay so.
+//
+// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+// Threads: no other thread uses `array` during the call.
+dtof_status_t dtof_array_clear(struct dtof_array_t *array);
 
 // Leaves a pixel out from now on, whatever the configuration: its photons count as left out.
 //
@@ -1074,7 +1081,8 @@ dtof_status_t dtof_link_init(struct dtof_link_t *link, size_t size, uint16_t pix
 
 // Takes `length` received bytes. `now_ms` is a clock of milliseconds that may wrap. `session` gets
 // one of DTOF_SESSION_...: after DTOF_SESSION_BEGAN and DTOF_SESSION_ENDED switch the laser off,
-// and discard the configuration, events and statistics of the session before.
+// and discard the configuration, events and statistics of the session before, with
+// dtof_array_clear.
 //
 // Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
 // Threads: no other thread uses `link` during the call.
@@ -1184,14 +1192,15 @@ dtof_status_t dtof_sensor_write(uint16_t pixels,
                                 uint8_t *body);
 
 // Writes the body of STATISTICS, DTOF_REPORT_BYTES. First send all waiting events: the host
-// compares the events in `statistics` with those it has received. Those of dtof_array_statistics
-// have the photons of present exposures; for single pixels add them to a copy, with
-// dtof_pixel_add_photons.
+// compares the events in `statistics` and `blocks` with those it has received. `blocks` may be null.
+// Those of dtof_array_statistics have the photons of present exposures; for single pixels add them to
+// a copy, with dtof_pixel_add_photons.
 //
 // Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
-// Threads: no other thread uses `link` or `statistics` during the call.
+// Threads: no other thread uses `link`, `statistics` or `blocks` during the call.
 dtof_status_t dtof_report_write(const struct dtof_report_t *report,
                                 const struct dtof_statistics_t *statistics,
+                                const struct dtof_statistics_t *blocks,
                                 const struct dtof_link_t *link,
                                 uint8_t *body);
 

@@ -115,9 +115,9 @@ pub struct dtof_losses_t {
 
 /// Makes an array of room for `number` pixels and `number_of_blocks` blocks. It has no pixels until
 /// dtof_array_configure. Of 8 x 8 pixels there are 16 blocks of level 1, 4 of level 2 and 1 of level 3. Without
-/// blocks `blocks` may be null. `size` is `sizeof *pixels`. The room belongs to the array from now on: do not
-/// read, write or copy it. Another dtof_array_init may have it again; the earlier array must not be used after
-/// that.
+/// blocks `blocks` may be null. `size` is `sizeof *pixels`. The room belongs to the array from now on, and lasts
+/// as long as it: do not read, write, copy or free it. Another dtof_array_init may have it again, or a part of it.
+/// After that the earlier array must not be used, unless dtof_array_init makes it anew.
 ///
 /// Errors: DTOF_ERROR_SIZE if the library was built for other DTOF_BINS or DTOF_COUNTER_BITS,
 /// DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
@@ -167,6 +167,20 @@ pub unsafe extern "C" fn dtof_array_configure(
         // SAFETY: the same promise.
         let (settings, layout) = unsafe { (data_ref(settings)?, data_ref(layout)?) };
         array.configure(&array_config(settings, layout)?)?;
+        Ok(())
+    })
+}
+
+/// The array has no pixels until dtof_array_configure, and all counts are 0: a session has begun or ended. Pixels that
+/// are left out stay so.
+///
+/// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
+/// Threads: no other thread uses `array` during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_array_clear(array: *mut dtof_array_t) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        unsafe { object_mut(array)? }.clear();
         Ok(())
     })
 }

@@ -200,7 +200,8 @@ pub unsafe extern "C" fn dtof_link_init(
 
 /// Takes `length` received bytes. `now_ms` is a clock of milliseconds that may wrap. `session` gets
 /// one of DTOF_SESSION_...: after DTOF_SESSION_BEGAN and DTOF_SESSION_ENDED switch the laser off,
-/// and discard the configuration, events and statistics of the session before.
+/// and discard the configuration, events and statistics of the session before, with
+/// dtof_array_clear.
 ///
 /// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
 /// Threads: no other thread uses `link` during the call.

@@ -2,7 +2,7 @@
 
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::paper::Threshold;
-use dtof_core::{AnyRule, DepthEstimator, Neighbours};
+use dtof_core::{AnyRule, DepthEstimator, Neighbours, Statistics};
 use dtof_link::{Configuration, Refusal, Report, SensorRecord, Source};
 
 use crate::array::dtof_layout_t;
@@ -211,7 +211,7 @@ pub unsafe extern "C" fn dtof_sensor_write(
 pub struct dtof_report_t {
     /// Laser cycles that have ended since the configuration.
     pub cycles: u64,
-    /// Photons with the address of a pixel that the device does not have.
+    /// Photons of pixels that the device does not have, or that it leaves out: both of dtof_losses_t.
     pub unaddressed: u64,
     /// Bytes lost before dtof_link_receive got them.
     pub overrun: u32,
@@ -230,27 +230,35 @@ pub struct dtof_report_t {
 }
 
 /// Writes the body of STATISTICS, DTOF_REPORT_BYTES. First send all waiting events: the host
-/// compares the events in `statistics` with those it has received. Those of dtof_array_statistics
-/// have the photons of present exposures; for single pixels add them to a copy, with
-/// dtof_pixel_add_photons.
+/// compares the events in `statistics` and `blocks` with those it has received. `blocks` may be null.
+/// Those of dtof_array_statistics have the photons of present exposures; for single pixels add them to
+/// a copy, with dtof_pixel_add_photons.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_NOT_INITIALISED.
-/// Threads: no other thread uses `link` or `statistics` during the call.
+/// Threads: no other thread uses `link`, `statistics` or `blocks` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_report_write(
     report: *const dtof_report_t,
     statistics: *const dtof_statistics_t,
+    blocks: *const dtof_statistics_t,
     link: *const dtof_link_t,
     body: *mut u8,
 ) -> dtof_status_t {
     status(|| {
         // SAFETY: the caller's promise, see the crate.
         let (report, statistics) = unsafe { (data_ref(report)?, object_ref(statistics)?) };
+        let blocks = if blocks.is_null() {
+            &Statistics::new()
+        } else {
+            // SAFETY: the same promise.
+            unsafe { object_ref(blocks)? }
+        };
         // SAFETY: the same promise.
         let (link, body) = unsafe { (object_ref(link)?, array_mut::<_, DTOF_REPORT_BYTES>(body)?) };
         let record = Report {
             cycles: report.cycles,
             statistics: *statistics,
+            blocks: *blocks,
             unaddressed: report.unaddressed,
             overrun: report.overrun,
             unknown: report.unknown,
@@ -260,7 +268,6 @@ pub unsafe extern "C" fn dtof_report_write(
             sensor_stops: report.sensor_stops,
             stop_reason: report.stop_reason,
             link: *link.endpoint.counters(),
-            ..Report::default()
         };
         for (place, byte) in body.iter_mut().zip(record.to_le_bytes()) {
             *place = byte;

@@ -14,8 +14,8 @@ use crate::pixels::{CYCLES, config_with, numbers, photons, plain, read, rule_of,
 use crate::{OK, paper, statistics, zeroed};
 
 /// Room for pixels and blocks.
-const PIXELS: u16 = 20;
-const BLOCKS: usize = 15;
+pub const PIXELS: u16 = 20;
+pub const BLOCKS: usize = 15;
 
 /// An array and its room.
 pub struct Driven {
@@ -55,7 +55,7 @@ impl Driven {
         unsafe { dtof_array_configure(&mut self.array, settings, layout) }
     }
 
-    fn next_event(&mut self) -> Option<dtof_event_t> {
+    pub fn next_event(&mut self) -> Option<dtof_event_t> {
         let mut event = dtof_event_t::default();
         // SAFETY: each pointer leads to an object of its type.
         match unsafe { dtof_array_next_event(&mut self.array, &mut event) } {
@@ -189,17 +189,28 @@ proptest! {
             });
             prop_assert_eq!(dtof_array_cycles(array, &mut cycles), OK);
             prop_assert_eq!(cycles, other.cycles());
-            let (mut body, mut length) = ([0; DTOF_BODY_BYTES], 0);
             for pixel in 0..PIXELS + 3 {
-                let status = dtof_array_histogram_write(array, pixel, 0, body.as_mut_ptr(), &mut length);
                 let of_core = other.pixel(pixel.into());
-                prop_assert_eq!(status, if of_core.is_some() { OK } else { DTOF_ERROR_PIXELS });
-                if of_core.is_some() {
+                let (mut counts, mut head) = (Vec::new(), None);
+                for number in 0.. {
+                    let (mut body, mut length) = ([0; DTOF_BODY_BYTES], 9);
+                    let room = body.as_mut_ptr();
+                    let status = dtof_array_histogram_write(array, pixel, number, room, &mut length);
+                    prop_assert_eq!(status, if of_core.is_some() { OK } else { DTOF_ERROR_PIXELS });
+                    if status != OK || length == 0 {
+                        break;
+                    }
                     let part = HistogramPart::from_le_bytes(&body[..length]).unwrap().unwrap();
-                    let head = part.head();
+                    prop_assert_eq!(usize::from(part.first_bin()), counts.len());
+                    counts.extend(part.counts());
+                    head = Some(part.head());
+                }
+                prop_assert_eq!(head.is_some(), of_core.is_some());
+                if let (Some(head), Some(of_core)) = (head, of_core) {
                     let exposure = other.exposure(pixel.into()).map(u32::from);
                     prop_assert_eq!((head.pixel.raw(), Some(head.exposure)), (pixel, exposure));
                     prop_assert_eq!((head.cycle.raw(), head.is_whole), (cycles, false));
+                    prop_assert_eq!(counts, of_core.histogram().counts().map(u32::from));
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! A device with the C functions and a host of `dtof-link`.
 
-use core::ptr::null_mut;
+use core::ptr::{null, null_mut};
 
 use dtof_c::dtof_status_t::*;
 use dtof_c::*;
@@ -388,7 +388,10 @@ fn records_are_those_of_the_link() {
         let written = dtof_sensor_write(9, 100, 20, 40, 250 << 16, 1_000_000, -256, room);
         assert_eq!(written, OK);
         let room = body.as_mut_ptr();
-        assert_eq!(dtof_report_write(&report, &done, &pair.device, room), OK);
+        assert_eq!(
+            dtof_report_write(&report, &done, null(), &pair.device, room),
+            OK
+        );
     }
     let expected = SensorRecord {
         pixels: 9,

@@ -7,6 +7,7 @@ mod link;
 mod memory;
 mod pixels;
 mod refusals;
+mod report;
 mod words;
 
 use core::mem::MaybeUninit;

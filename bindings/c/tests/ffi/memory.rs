@@ -149,7 +149,7 @@ fn functions_write_to_uninitialised_memory() {
         assert_eq!(sensor.read()[..2], [1, 0]);
         let room = report.at();
         let of = dtof_report_t::default();
-        assert_eq!(dtof_report_write(&of, done, at, room.cast()), OK);
+        assert_eq!(dtof_report_write(&of, done, done, at, room.cast()), OK);
         assert_eq!(report.read()[..8], [0; 8]);
         let room = body.at().cast::<u8>();
         let mut length = Room::new();
@@ -196,11 +196,12 @@ type Call = fn(*mut u8) -> dtof_status_t;
 
 /// Each function that takes an initialised object: its name, the type, and a call.
 #[rustfmt::skip]
-const TAKES: [(&str, &str, Call); 39] = {
+const TAKES: [(&str, &str, Call); 41] = {
     const CODES: *const u16 = [0u16; DTOF_BINS].as_ptr();
     const COUNTS: *const u32 = [0u32; DTOF_BINS].as_ptr();
     const NO_LOOK: *mut dtof_look_t = ptr::null_mut();
     const NO_LEFT: *mut u16 = ptr::null_mut();
+    const NO_BLOCKS: *const dtof_statistics_t = ptr::null();
     // SAFETY: all memory is long enough and aligned for each type.
     unsafe {[
         ("dtof_statistics_read", "dtof_statistics_t", |p| dtof_statistics_read(p.cast(), &mut zeroed())),
@@ -218,6 +219,7 @@ const TAKES: [(&str, &str, Call); 39] = {
         ("dtof_pixel_add_photons", "dtof_pixel_t", |p| dtof_pixel_add_photons(p.cast(), &mut statistics())),
         ("dtof_pixel_add_photons", "dtof_statistics_t", |p| dtof_pixel_add_photons(&pixel(0), p.cast())),
         ("dtof_array_configure", "dtof_array_t", |p| dtof_array_configure(p.cast(), &paper(), &zeroed())),
+        ("dtof_array_clear", "dtof_array_t", |p| dtof_array_clear(p.cast())),
         ("dtof_array_leave_out", "dtof_array_t", |p| dtof_array_leave_out(p.cast(), 0)),
         ("dtof_array_photon", "dtof_array_t", |p| dtof_array_photon(p.cast(), 0, 0)),
         ("dtof_array_photons", "dtof_array_t", |p| dtof_array_photons(p.cast(), 0, CODES, 1)),
@@ -239,8 +241,9 @@ const TAKES: [(&str, &str, Call); 39] = {
         ("dtof_link_state", "dtof_link_t", |p| dtof_link_state(p.cast(), &mut zeroed())),
         ("dtof_link_silent_ms", "dtof_link_t", |p| dtof_link_silent_ms(p.cast(), 0, &mut 0)),
         ("dtof_link_set_stop_reason", "dtof_link_t", |p| dtof_link_set_stop_reason(p.cast(), DTOF_STOP_RESET)),
-        ("dtof_report_write", "dtof_statistics_t", |p| dtof_report_write(&zeroed(), p.cast(), &link(), [0; 256].as_mut_ptr())),
-        ("dtof_report_write", "dtof_link_t", |p| dtof_report_write(&zeroed(), &statistics(), p.cast(), [0; 256].as_mut_ptr())),
+        ("dtof_report_write", "dtof_statistics_t", |p| dtof_report_write(&zeroed(), p.cast(), NO_BLOCKS, &link(), [0; 256].as_mut_ptr())),
+        ("dtof_report_write", "dtof_statistics_t", |p| dtof_report_write(&zeroed(), &statistics(), p.cast(), &link(), [0; 256].as_mut_ptr())),
+        ("dtof_report_write", "dtof_link_t", |p| dtof_report_write(&zeroed(), &statistics(), NO_BLOCKS, p.cast(), [0; 256].as_mut_ptr())),
         ("dtof_pixel_histogram_write", "dtof_pixel_t", |p| dtof_pixel_histogram_write(p.cast(), 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
     ]}
 };
@@ -375,7 +378,7 @@ const POINTERS: [(usize, Call); 43] = {
         (8, |p| dtof_link_set_stop_reason(p.cast(), DTOF_STOP_RESET)),
         (4, |p| dtof_pixel_histogram_write(p.cast(), 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
         (4, |p| dtof_counts_write(p.cast(), 0, 0, 0, 0, [0; 244].as_mut_ptr(), &mut 0)),
-        (8, |p| dtof_report_write(p.cast(), &zeroed(), &zeroed(), [0; 256].as_mut_ptr())),
+        (8, |p| dtof_report_write(p.cast(), &zeroed(), &zeroed(), &zeroed(), [0; 256].as_mut_ptr())),
     ]}
 };
 
@@ -416,7 +419,7 @@ fn null_pointers_to_bytes_are_refused() {
             dtof_link_state(&link, ptr::null_mut()),
             dtof_link_silent_ms(&link, 0, ptr::null_mut()),
             dtof_sensor_write(1, 0, 0, 0, 0, 0, 0, none),
-            dtof_report_write(&zeroed(), &statistics(), &link, none),
+            dtof_report_write(&zeroed(), &statistics(), &statistics(), &link, none),
             dtof_device_config_read(none, 1, 0, &mut zeroed()),
             dtof_no_histogram_write(0, 1, none, &mut length),
             dtof_no_histogram_write(0, 1, room, ptr::null_mut()),
