@@ -47,15 +47,13 @@
 //! Source: the order is the flow chart of the paper's section II-B, for all pixels at once. The rest is ours.
 
 use crate::array::Array;
-use crate::binning::{
-    Binning, Block, BlockLink, count_batch_in_blocks, count_in_blocks, end_laser_cycles_of_blocks,
-};
+use crate::binning::{Binning, Block, BlockLink, count_in_blocks, end_laser_cycles_of_blocks};
 use crate::check::impl_error;
 use crate::config::PixelConfig;
 use crate::detect::{DetectionRule, PaperRule};
 use crate::event::DepthEvent;
 use crate::histogram::counter::{Count10, CounterWidth, PhotonCount};
-use crate::neighbours::{ArrayLook, ArrayPixel, NeighbourConfig, Threads};
+use crate::neighbours::{self, ArrayLook, ArrayPixel, NeighbourConfig, Threads};
 use crate::pixel::{AsyncPixel, Look, OncePerBin, PixelData, observer};
 use crate::statistics::{Statistics, photons};
 use crate::units::{BlockLevel, LaserCycle, PixelAddress};
@@ -151,26 +149,58 @@ impl Use {
 }
 
 /// How the pixels of an array operate.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ArrayConfig<const BINS: usize, R: DetectionRule = PaperRule> {
+#[derive(Debug)]
+pub struct ArrayConfig<
+    const BINS: usize,
+    R: DetectionRule = PaperRule,
+    W: CounterWidth = Count10,
+    T = (),
+> {
     layout: Array,
     number: u32,
     pixels: PixelConfig<BINS, R>,
-    together: Together<BINS, R>,
+    together: Together<BINS, R, W, T>,
     once_per_bin: bool,
 }
 
-/// How pixels decide together.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Together<const BINS: usize, R: DetectionRule> {
+/// How pixels decide together, with a pointer to the code of a look: a program that configures no blocks does not link
+/// theirs, and the same with neighbours.
+#[derive(Debug)]
+enum Together<const BINS: usize, R: DetectionRule, W: CounterWidth, T> {
     Alone,
     Blocks {
-        binning: Binning,
+        levels: BlockLevel,
         config: PixelConfig<BINS, R>,
         patience: u16,
+        look: LookOfBlocks<BINS, R, T>,
     },
-    Neighbours(NeighbourConfig),
+    Neighbours(NeighbourConfig, LookInTurn<BINS, R, W, T>),
 }
+
+/// [`end_laser_cycles_of_blocks`].
+type LookOfBlocks<const BINS: usize, R, T> =
+    fn(&mut [Block<BINS, T>], &PixelConfig<BINS, R>, &mut Statistics, LaserCycle, u16);
+
+/// [`neighbours::end_laser_cycles`] of places.
+type LookInTurn<const BINS: usize, R, W, T> =
+    fn(&ArrayLook<'_, BINS, R>, &mut [PixelPlace<BINS, W, T>], &mut Statistics, u16);
+
+// Derived, these would ask for data that can be copied.
+impl<const BINS: usize, R: DetectionRule, W: CounterWidth, T> Clone for ArrayConfig<BINS, R, W, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<const BINS: usize, R: DetectionRule, W: CounterWidth, T> Copy for ArrayConfig<BINS, R, W, T> {}
+
+impl<const BINS: usize, R: DetectionRule, W: CounterWidth, T> Clone for Together<BINS, R, W, T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<const BINS: usize, R: DetectionRule, W: CounterWidth, T> Copy for Together<BINS, R, W, T> {}
 
 /// An array that cannot be driven so.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -214,7 +244,12 @@ impl ArrayError {
 
 impl_error!(ArrayError);
 
-impl<const BINS: usize, R: DetectionRule> ArrayConfig<BINS, R> {
+impl<const BINS: usize, R, W, T> ArrayConfig<BINS, R, W, T>
+where
+    R: DetectionRule,
+    W: CounterWidth,
+    T: PixelData,
+{
     /// Pixels that decide alone.
     #[must_use]
     pub const fn new(layout: Array, pixels: PixelConfig<BINS, R>) -> Self {
@@ -251,9 +286,9 @@ impl<const BINS: usize, R: DetectionRule> ArrayConfig<BINS, R> {
         config: PixelConfig<BINS, R>,
         patience: u16,
     ) -> Result<Self, ArrayError> {
-        let Some(binning) = Binning::new(self.layout, levels) else {
+        if levels.raw() == 0 {
             return Err(ArrayError::NoLevel);
-        };
+        }
         if config.x() != self.pixels.x() {
             return Err(ArrayError::OtherLooks);
         }
@@ -261,9 +296,10 @@ impl<const BINS: usize, R: DetectionRule> ArrayConfig<BINS, R> {
             return Err(ArrayError::BlocksAndNeighbours);
         }
         self.together = Together::Blocks {
-            binning,
+            levels,
             config,
             patience,
+            look: end_laser_cycles_of_blocks,
         };
         Ok(self)
     }
@@ -285,7 +321,7 @@ impl<const BINS: usize, R: DetectionRule> ArrayConfig<BINS, R> {
         if matches!(self.together, Together::Blocks { .. }) {
             return Err(ArrayError::BlocksAndNeighbours);
         }
-        self.together = Together::Neighbours(neighbours);
+        self.together = Together::Neighbours(neighbours, neighbours::end_laser_cycles);
         Ok(self)
     }
 
@@ -307,20 +343,21 @@ impl<const BINS: usize, R: DetectionRule> ArrayConfig<BINS, R> {
     /// The pixels and blocks for which it takes room.
     #[must_use]
     pub fn room(&self) -> [usize; 2] {
-        let blocks = self.binning().map_or(0, Binning::number_of_blocks);
+        let blocks = self.binning();
+        let blocks = blocks.map_or(0, |binning| binning.number_of_blocks());
         [self.number, blocks].map(|number| usize::try_from(number).unwrap_or(usize::MAX))
     }
 
     /// Whether neighbours confirm.
     #[must_use]
     pub const fn has_neighbours(&self) -> bool {
-        matches!(self.together, Together::Neighbours(_))
+        matches!(self.together, Together::Neighbours(..))
     }
 
     /// The blocks, if there are some.
-    const fn binning(&self) -> Option<&Binning> {
-        match &self.together {
-            Together::Blocks { binning, .. } => Some(binning),
+    const fn binning(&self) -> Option<Binning> {
+        match self.together {
+            Together::Blocks { levels, .. } => Binning::new(self.layout, levels),
             _ => None,
         }
     }
@@ -372,6 +409,26 @@ fn in_batches<P>(
     }
 }
 
+/// A look of all pixels, each of which decides alone.
+// Out of line: with all that `look` does it would lack registers.
+#[inline(never)]
+fn end_laser_cycles_alone<const BINS: usize, R: DetectionRule, W: CounterWidth, T: PixelData>(
+    places: &mut [PixelPlace<BINS, W, T>],
+    config: &PixelConfig<BINS, R>,
+    statistics: &mut Statistics,
+    last: LaserCycle,
+    cycles: u16,
+) {
+    for place in places.iter_mut().filter(|place| place.use_of.counts()) {
+        let (pixel, observe) = (&mut place.pixel, observer(&mut place.data));
+        let look = pixel.end_laser_cycles_with(config, statistics, last, cycles, observe);
+        // A pixel that has waited for another echo has reported, too.
+        if matches!(look, Look::Event | Look::Ended) {
+            place.feed.reported();
+        }
+    }
+}
+
 /// Photons that counted in no pixel, since the configuration.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -395,15 +452,15 @@ pub struct ArrayLosses {
 pub struct PixelArray<'a, const BINS: usize, R: DetectionRule, W: CounterWidth = Count10, T = ()> {
     pixels: &'a mut [PixelPlace<BINS, W, T>],
     blocks: &'a mut [Block<BINS, T>],
-    state: ArrayState<BINS, R>,
+    state: ArrayState<BINS, R, W, T>,
 }
 
 /// What an array is beside its pixels and blocks, for a program that does not have their room at hand all the time.
 #[derive(Clone, Debug)]
-pub struct ArrayState<const BINS: usize, R: DetectionRule> {
+pub struct ArrayState<const BINS: usize, R: DetectionRule, W: CounterWidth = Count10, T = ()> {
     /// The places for pixels and blocks.
     room: [usize; 2],
-    config: Option<ArrayConfig<BINS, R>>,
+    config: Option<ArrayConfig<BINS, R, W, T>>,
     /// Of the rooms, those in use.
     pixels_in_use: usize,
     blocks_in_use: usize,
@@ -428,7 +485,7 @@ pub struct ArrayState<const BINS: usize, R: DetectionRule> {
     losses: ArrayLosses,
 }
 
-impl<const BINS: usize, R: DetectionRule> ArrayState<BINS, R> {
+impl<const BINS: usize, R: DetectionRule, W: CounterWidth, T> ArrayState<BINS, R, W, T> {
     /// Of an array without room.
     #[must_use]
     pub const fn new() -> Self {
@@ -463,7 +520,9 @@ impl<const BINS: usize, R: DetectionRule> ArrayState<BINS, R> {
     }
 }
 
-impl<const BINS: usize, R: DetectionRule> Default for ArrayState<BINS, R> {
+impl<const BINS: usize, R: DetectionRule, W: CounterWidth, T> Default
+    for ArrayState<BINS, R, W, T>
+{
     fn default() -> Self {
         Self::new()
     }
@@ -495,7 +554,7 @@ where
     pub const fn resume(
         pixels: &'a mut [PixelPlace<BINS, W, T>],
         blocks: &'a mut [Block<BINS, T>],
-        state: ArrayState<BINS, R>,
+        state: ArrayState<BINS, R, W, T>,
     ) -> Result<Self, ArrayError> {
         if pixels.len() != state.room[0] || blocks.len() != state.room[1] {
             return Err(ArrayError::OtherRoom);
@@ -509,7 +568,7 @@ where
 
     /// What is not in its pixels and blocks.
     #[must_use]
-    pub fn into_state(self) -> ArrayState<BINS, R> {
+    pub fn into_state(self) -> ArrayState<BINS, R, W, T> {
         self.state
     }
 
@@ -517,7 +576,7 @@ where
     ///
     /// # Errors
     /// Fails if there is none.
-    pub fn check(&self, config: &ArrayConfig<BINS, R>) -> Result<[usize; 2], ArrayError> {
+    pub fn check(&self, config: &ArrayConfig<BINS, R, W, T>) -> Result<[usize; 2], ArrayError> {
         let [pixels, blocks] = config.room();
         if pixels > self.pixels.len() {
             return Err(ArrayError::Pixels);
@@ -532,7 +591,7 @@ where
     ///
     /// # Errors
     /// Fails without room for that. The array stays as it was.
-    pub fn configure(&mut self, config: &ArrayConfig<BINS, R>) -> Result<(), ArrayError> {
+    pub fn configure(&mut self, config: &ArrayConfig<BINS, R, W, T>) -> Result<(), ArrayError> {
         let [pixels, blocks] = self.check(config)?;
         let binning = config.binning();
         self.clear();
@@ -552,7 +611,7 @@ where
         for (block, place) in self
             .blocks
             .iter_mut()
-            .zip(binning.into_iter().flat_map(Binning::blocks))
+            .zip(binning.iter().flat_map(Binning::blocks))
         {
             *block = Block::new(place);
         }
@@ -585,21 +644,21 @@ where
         }
         if let (Some(place), Some(config)) = (self.pixels.get_mut(pixel), &self.state.config) {
             place.pixel.count(&config.pixels, code);
+            // Not through a pointer: it is small, and a call would take a sixth longer.
             if let Together::Blocks { config, .. } = &config.together {
                 count_in_blocks(self.blocks, &place.feed, config, code);
             }
         }
     }
 
-    /// Counts photons of one pixel in the current laser cycle, as [`Self::photon`] does, in less time for each.
+    /// Counts photons of one pixel in the current laser cycle, as [`Self::photon`] does, in less time for each unless the
+    /// pixel feeds its block.
     pub fn photons(&mut self, pixel: usize, codes: &[u16]) {
         if let (Some(place), Some(config)) = (self.pixels.get_mut(pixel), &self.state.config)
             && place.use_of == Use::Plain
+            && place.feed.block().is_none()
         {
             place.pixel.count_batch(&config.pixels, codes);
-            if let Together::Blocks { config, .. } = &config.together {
-                count_batch_in_blocks(self.blocks, &place.feed, config, codes);
-            }
         } else {
             codes.iter().for_each(|&code| self.photon(pixel, code));
         }
@@ -652,8 +711,8 @@ where
     #[inline]
     #[must_use = "these laser cycles have not ended yet"]
     pub fn end_laser_cycles(&mut self, cycles: u16) -> u16 {
-        self.end(cycles, |look, places, statistics, cycles| {
-            look.end_laser_cycles(places, statistics, cycles);
+        self.end(cycles, |in_turn, look, places, statistics, cycles| {
+            in_turn(look, places, statistics, cycles);
         })
     }
 
@@ -681,7 +740,7 @@ where
             self.photons_in_turn(&next);
         }
         let mut left_out = 0;
-        let left = self.end(cycles, |look, places, statistics, cycles| {
+        let left = self.end(cycles, |_, look, places, statistics, cycles| {
             let count = |pixel, place: &mut PixelPlace<BINS, W, T>| {
                 let mut left_out = 0;
                 if together {
@@ -722,7 +781,13 @@ where
     fn end(
         &mut self,
         cycles: u16,
-        look: impl FnOnce(&ArrayLook<'_, BINS, R>, &mut [PixelPlace<BINS, W, T>], &mut Statistics, u16),
+        look: impl FnOnce(
+            LookInTurn<BINS, R, W, T>,
+            &ArrayLook<'_, BINS, R>,
+            &mut [PixelPlace<BINS, W, T>],
+            &mut Statistics,
+            u16,
+        ),
     ) -> u16 {
         let Some(config) = &self.state.config else {
             return 0;
@@ -753,6 +818,7 @@ where
     fn look(
         &mut self,
         of_neighbours: impl FnOnce(
+            LookInTurn<BINS, R, W, T>,
             &ArrayLook<'_, BINS, R>,
             &mut [PixelPlace<BINS, W, T>],
             &mut Statistics,
@@ -772,25 +838,21 @@ where
             .get_mut(..self.state.pixels_in_use)
             .unwrap_or_default();
         let statistics = &mut self.state.statistics;
-        if let Together::Neighbours(neighbours) = &config.together {
+        if let Together::Neighbours(neighbours, in_turn) = &config.together {
             let look = ArrayLook {
                 config: pixels,
                 neighbours,
                 last,
             };
-            of_neighbours(&look, places, statistics, cycles);
+            of_neighbours(*in_turn, &look, places, statistics, cycles);
         } else {
-            for place in places.iter_mut().filter(|place| place.use_of.counts()) {
-                let (pixel, observe) = (&mut place.pixel, observer(&mut place.data));
-                let look = pixel.end_laser_cycles_with(pixels, statistics, last, cycles, observe);
-                // A pixel that has waited for another echo has reported, too.
-                if matches!(look, Look::Event | Look::Ended) {
-                    place.feed.reported();
-                }
-            }
+            end_laser_cycles_alone(places, pixels, statistics, last, cycles);
         }
         if let Together::Blocks {
-            config, patience, ..
+            config,
+            patience,
+            look: look_of_blocks,
+            ..
         } = &config.together
         {
             let blocks = self
@@ -798,7 +860,7 @@ where
                 .get_mut(..self.state.blocks_in_use)
                 .unwrap_or_default();
             let statistics = &mut self.state.block_statistics;
-            end_laser_cycles_of_blocks(blocks, config, statistics, last, cycles);
+            look_of_blocks(blocks, config, statistics, last, cycles);
             self.state.since_tick = self.state.since_tick.saturating_add(cycles);
             if self.state.since_tick >= *patience {
                 self.state.since_tick = 0;
@@ -978,7 +1040,7 @@ where
 
     /// The configuration in force.
     #[must_use]
-    pub const fn config(&self) -> Option<&ArrayConfig<BINS, R>> {
+    pub const fn config(&self) -> Option<&ArrayConfig<BINS, R, W, T>> {
         self.state.config.as_ref()
     }
 

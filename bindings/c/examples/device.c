@@ -123,7 +123,7 @@ static dtof_status_t configure(const dtof_message_t *message)
         status = dtof_scale_init(&scale, requested.bin_width_ps_q16, requested.offset_mm_q8);
     }
     if (status == DTOF_OK) {
-        status = dtof_array_configure(&array, &requested.pixel, &requested.layout);
+        status = dtof_array_configure_layout(&array, &requested.pixel, &requested.layout);
     }
     if (status != DTOF_OK) {
         return status;

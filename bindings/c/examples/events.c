@@ -146,10 +146,9 @@ int main(int arguments, char **argument)
     file_name = argument[1];
 
     dtof_config_t settings;
-    dtof_layout_t layout = {.pixels = PIXELS};
     check("settings", dtof_config_paper(&settings));
     check("array", dtof_array_init(&array, sizeof *places, places, PIXELS, NULL, 0));
-    check("array", dtof_array_configure(&array, &settings, &layout));
+    check("array", dtof_array_configure(&array, &settings, PIXELS));
     check("encoder", dtof_aer_encoder_init(&encoder));
 
     /* Does not overwrite a file. */

@@ -593,7 +593,8 @@ typedef struct dtof_block_t {
     uint32_t words[DTOF_BLOCK_WORDS];
 } dtof_block_t;
 
-// How many pixels an array has, and how they work together. All zero but `pixels`: they work alone.
+// How many pixels an array has, and how they work together, for dtof_array_configure_layout. All zero but `pixels`: they
+// work alone.
 typedef struct dtof_layout_t {
     // Pixels, numbered row by row: at least 1.
     uint16_t pixels;
@@ -692,7 +693,7 @@ typedef struct dtof_link_state_t {
     uint8_t is_settled;
 } dtof_link_state_t;
 
-// The configuration that the host requests. Give `pixel` and `layout` to dtof_array_configure, and compare
+// The configuration that the host requests. Give `pixel` and `layout` to dtof_array_configure_layout, and compare
 // the other fields with your device. If your firmware has single pixels instead of an array, check `pixel` with
 // dtof_config_check, and refuse block_levels, neighbours and once_per_bin other than 0 with DTOF_ERROR_BLOCKS,
 // DTOF_ERROR_NEIGHBOURS and DTOF_ERROR_ONCE_PER_BIN. If your sensor gives histograms, refuse the last two.
@@ -917,16 +918,25 @@ dtof_status_t dtof_array_init(struct dtof_array_t *array,
                               struct dtof_block_t *blocks,
                               size_t number_of_blocks);
 
-// All pixels begin, with all counts at 0. Blocks and neighbours decide by the rule of `settings`, too; its
-// false alarms are then those of all together.
+// The first `pixels` pixels begin, with all counts at 0. They decide alone. A program without
+// dtof_array_configure_layout does not link the looks of blocks and neighbours.
 //
-// Errors: each of dtof_config_check, DTOF_ERROR_PIXELS and DTOF_ERROR_BLOCKS without room for so many,
-// DTOF_ERROR_BLOCKS for other levels or without columns, DTOF_ERROR_PATIENCE, DTOF_ERROR_NEIGHBOURS,
+// Errors: each of dtof_config_check, DTOF_ERROR_PIXELS for none and without room for so many,
 // DTOF_ERROR_NOT_INITIALISED. After an error the array is unchanged.
 // Threads: no other thread uses `array` during the call.
 dtof_status_t dtof_array_configure(struct dtof_array_t *array,
                                    const struct dtof_config_t *settings,
-                                   const struct dtof_layout_t *layout);
+                                   uint16_t pixels);
+
+// The same for pixels that may decide together. Blocks and neighbours decide by the rule of `settings`, too; its
+// false alarms are then those of all together.
+//
+// Errors: each of dtof_array_configure, DTOF_ERROR_BLOCKS for other levels, without columns or without room
+// for so many, DTOF_ERROR_PATIENCE, DTOF_ERROR_NEIGHBOURS. After an error the array is unchanged.
+// Threads: no other thread uses `array` during the call.
+dtof_status_t dtof_array_configure_layout(struct dtof_array_t *array,
+                                          const struct dtof_config_t *settings,
+                                          const struct dtof_layout_t *layout);
 
 // The array has no pixels until dtof_array_configure, and all counts are 0: a session has begun or ended. Pixels that
 // are left out stay so.
@@ -953,7 +963,7 @@ dtof_status_t dtof_array_photon(struct dtof_array_t *array,
                                 uint16_t code);
 
 // Counts `number` photons of one pixel as dtof_array_photon does, in a sixth of the time unless
-// photons count once per bin.
+// photons count once per bin or the pixel feeds a block.
 //
 // Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
 // DTOF_ERROR_NOT_INITIALISED. `codes` may be null if `number` is 0.

@@ -73,9 +73,10 @@ pub struct dtof_array_t {
 }
 
 object!(dtof_array_t, PixelArray<'static, DTOF_BINS, AnyRule, PixelCounters>, tag 0xdc,
-    size DTOF_ARRAY_SIZE, align DTOF_ARRAY_ALIGN, unused_below 56);
+    size DTOF_ARRAY_SIZE, align DTOF_ARRAY_ALIGN, unused_below 64);
 
-/// How many pixels an array has, and how they work together. All zero but `pixels`: they work alone.
+/// How many pixels an array has, and how they work together, for dtof_array_configure_layout. All zero but `pixels`: they
+/// work alone.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(C)]
 pub struct dtof_layout_t {
@@ -148,15 +149,38 @@ pub unsafe extern "C" fn dtof_array_init(
     })
 }
 
-/// All pixels begin, with all counts at 0. Blocks and neighbours decide by the rule of `settings`, too; its
-/// false alarms are then those of all together.
+/// The first `pixels` pixels begin, with all counts at 0. They decide alone. A program without
+/// dtof_array_configure_layout does not link the looks of blocks and neighbours.
 ///
-/// Errors: each of dtof_config_check, DTOF_ERROR_PIXELS and DTOF_ERROR_BLOCKS without room for so many,
-/// DTOF_ERROR_BLOCKS for other levels or without columns, DTOF_ERROR_PATIENCE, DTOF_ERROR_NEIGHBOURS,
+/// Errors: each of dtof_config_check, DTOF_ERROR_PIXELS for none and without room for so many,
 /// DTOF_ERROR_NOT_INITIALISED. After an error the array is unchanged.
 /// Threads: no other thread uses `array` during the call.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn dtof_array_configure(
+    array: *mut dtof_array_t,
+    settings: *const dtof_config_t,
+    pixels: u16,
+) -> dtof_status_t {
+    status(|| {
+        // SAFETY: the caller's promise, see the crate.
+        let array = unsafe { object_mut(array)? };
+        // SAFETY: the same promise.
+        let settings = unsafe { data_ref(settings)? };
+        let row = Array::new(pixels.into(), 1).ok_or(DTOF_ERROR_PIXELS)?;
+        let config = config_with(settings, rule_of(settings)?)?;
+        array.configure(&ArrayConfig::new(row, config))?;
+        Ok(())
+    })
+}
+
+/// The same for pixels that may decide together. Blocks and neighbours decide by the rule of `settings`, too; its
+/// false alarms are then those of all together.
+///
+/// Errors: each of dtof_array_configure, DTOF_ERROR_BLOCKS for other levels, without columns or without room
+/// for so many, DTOF_ERROR_PATIENCE, DTOF_ERROR_NEIGHBOURS. After an error the array is unchanged.
+/// Threads: no other thread uses `array` during the call.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn dtof_array_configure_layout(
     array: *mut dtof_array_t,
     settings: *const dtof_config_t,
     layout: *const dtof_layout_t,
@@ -185,11 +209,11 @@ pub unsafe extern "C" fn dtof_array_clear(array: *mut dtof_array_t) -> dtof_stat
     })
 }
 
-/// The configuration of an array.
+/// The configuration of an array with a layout.
 fn array_config(
     settings: &dtof_config_t,
     layout: &dtof_layout_t,
-) -> Result<ArrayConfig<DTOF_BINS, AnyRule>, dtof_status_t> {
+) -> Result<ArrayConfig<DTOF_BINS, AnyRule, PixelCounters>, dtof_status_t> {
     let pixels = u32::from(layout.pixels);
     let columns = match layout.columns {
         0 => pixels,
@@ -272,7 +296,7 @@ pub unsafe extern "C" fn dtof_array_photon(
 }
 
 /// Counts `number` photons of one pixel as dtof_array_photon does, in a sixth of the time unless
-/// photons count once per bin.
+/// photons count once per bin or the pixel feeds a block.
 ///
 /// Errors: DTOF_ERROR_LENGTH, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,
 /// DTOF_ERROR_NOT_INITIALISED. `codes` may be null if `number` is 0.

@@ -32,7 +32,7 @@ pub const DTOF_SOURCE_LINK: u8 = 0;
 /// Photons come from the sensor.
 pub const DTOF_SOURCE_SENSOR: u8 = 1;
 
-/// The configuration that the host requests. Give `pixel` and `layout` to dtof_array_configure, and compare
+/// The configuration that the host requests. Give `pixel` and `layout` to dtof_array_configure_layout, and compare
 /// the other fields with your device. If your firmware has single pixels instead of an array, check `pixel` with
 /// dtof_config_check, and refuse block_levels, neighbours and once_per_bin other than 0 with DTOF_ERROR_BLOCKS,
 /// DTOF_ERROR_NEIGHBOURS and DTOF_ERROR_ONCE_PER_BIN. If your sensor gives histograms, refuse the last two.

@@ -60,17 +60,6 @@ impl<const BINS: usize, W: CounterWidth> AsyncPixel<BINS, W> {
         }
     }
 
-    /// [`Self::count_batch`] where no dead time applies.
-    #[inline(never)]
-    pub(crate) fn count_batch_without_dead_time<R: DetectionRule>(
-        &mut self,
-        config: &PixelConfig<BINS, R>,
-        codes: &[u16],
-    ) {
-        let gated_out = self.histogram.add_gated_batch(codes, config.gate());
-        self.gated_out = self.gated_out.wrapping_add(gated_out);
-    }
-
     /// Counts a photon outside the gate: before it in its counter alone, if there is a dead time.
     // Out of line: few photons are, and the others take longer with it.
     #[cold]

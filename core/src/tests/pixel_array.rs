@@ -116,7 +116,7 @@ impl Settings {
 }
 
 impl Settings {
-    fn array(&self) -> ArrayConfig<BINS, WindowRule> {
+    fn array<T: PixelData>(&self) -> ArrayConfig<BINS, WindowRule, Count10, T> {
         let mut config = ArrayConfig::new(self.layout(), self.pixels());
         if let Some((levels, blocks, patience)) = self.blocks() {
             config = config.blocks(levels, blocks, patience).unwrap();
@@ -544,7 +544,7 @@ fn what_cannot_be_driven_is_refused() {
         ),
     ];
     for (refused, error) in refusals {
-        assert_eq!(refused, Err(error));
+        assert_eq!(refused.err(), Some(error));
         assert!(!error.text().is_empty());
     }
     let mut places: Vec<PixelPlace<BINS>> = (0..8).map(|_| PixelPlace::new()).collect();

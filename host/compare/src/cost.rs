@@ -22,22 +22,22 @@ pub const AVERAGE: f64 = 32.0;
 /// The same with tracking (`look; tracking; no event`).
 pub const TRACKING: f64 = 414.50;
 /// The same in an array with 8 neighbours, whether it asks them or not (`look; array, 8 neighbours; no event`).
-pub const NEIGHBOURS: f64 = 1012.88;
+pub const NEIGHBOURS: f64 = 1011.45;
 /// The same in an array without neighbours (`look; array; no event`).
-pub const LOOK: f64 = 186.20;
+pub const LOOK: f64 = 150.10;
 /// The same with a dead time (`look; dead time of 20 bins; no event`).
 pub const DEAD_TIME: f64 = 6968.64;
 /// The same with a dead time of all bins (`look; dead time; first photon only; no event`).
 pub const FIRST_PHOTON: f64 = 4163.06;
 /// The same for a block (`look; block; no event`).
-pub const BLOCK_LOOK: f64 = 168.79;
+pub const BLOCK_LOOK: f64 = 167.65;
 /// An exposure that L2 ends (`look at L2`).
 pub const EXPIRY: f64 = 108.0;
 /// An event with its peak and the depth from three bins (`kept peak; event and depth`), and its word
 /// (`encode and to_le_bytes`).
 pub const EVENT: f64 = 517.0 + 46.0;
 /// The same event if 8 neighbours confirm it (`look; array, 8 neighbours; more for each confirmed`), and its word.
-pub const CONFIRMED: f64 = 3657.00 + 46.0;
+pub const CONFIRMED: f64 = 3660.00 + 46.0;
 /// The depth from a centred window instead (`centred window, σ 1`, less `centroid`).
 pub const CENTRED: f64 = 135.84 - 68.0;
 

@@ -76,7 +76,7 @@ impl Member {
 struct Part<const BINS: usize, W: CounterWidth> {
     places: Vec<PixelPlace<BINS, W, Member>>,
     blocks: Vec<Block<BINS, Member>>,
-    state: ArrayState<BINS, AnyRule>,
+    state: ArrayState<BINS, AnyRule, W, Member>,
     /// The address of each place.
     addresses: Vec<PixelAddress>,
     statistics: [Statistics; 2],
@@ -110,7 +110,7 @@ pub fn neighbour_rule(settings: &Settings) -> Result<&WindowRule> {
 impl<const BINS: usize, W: CounterWidth> Part<BINS, W> {
     /// The pixels at `addresses`, of which those of the `source` exist. These ascend.
     fn new(
-        config: &ArrayConfig<BINS, AnyRule>,
+        config: &ArrayConfig<BINS, AnyRule, W, Member>,
         addresses: Vec<PixelAddress>,
         source: &[PixelAddress],
     ) -> Result<Self> {

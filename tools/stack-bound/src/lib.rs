@@ -49,7 +49,8 @@ pub fn of_image(path: &Path) -> Result<u64> {
         under_way: Vec::new(),
     };
     needs.resolve_defmt_rtt();
-    needs.resolve_usb_device();
+    needs.resolve(&USB_DEVICE, &[USB_CLASS]);
+    needs.resolve(&[PIXEL_ARRAY], &TOGETHER);
     let mut bound = 0;
     let mut handlers = 0;
     let mut nmi = 0;
@@ -107,6 +108,10 @@ const DEFMT_RTT: [(&str, u32); 3] = [
 const USB_DEVICE: [&str; 2] = ["usb_device6device", "USBCTRL_IRQ"];
 const USB_CLASS: &str = "UsbClass";
 
+/// The same of an array of pixels, which calls the code of blocks and of neighbours through pointers.
+const PIXEL_ARRAY: &str = "9dtof_core11pixel_array";
+const TOGETHER: [&str; 2] = ["9dtof_core7binning", "9dtof_core10neighbours"];
+
 /// A function, as far as the stack is concerned.
 #[derive(Debug, Default)]
 struct Function {
@@ -144,19 +149,22 @@ impl Needs {
         }
     }
 
-    /// Those of [`USB_DEVICE`] call functions of classes, of which an image has one.
-    fn resolve_usb_device(&mut self) {
-        let of_class = |(_, function): &(&u32, &Function)| function.name.contains(USB_CLASS);
-        let found = self.functions.iter().filter(of_class);
-        let class: Vec<u32> = found.map(|(&address, _)| address).collect();
-        if class.is_empty() {
+    /// Functions with one of `callers` in their names may call through pointers all of those with one of `called` in
+    /// theirs, if there are some.
+    fn resolve(&mut self, callers: &[&str], called: &[&str]) {
+        let has = |function: &Function, parts: &[&str]| {
+            parts.iter().any(|part| function.name.contains(part))
+        };
+        let found = self.functions.iter();
+        let found = found.filter(|(_, function)| has(function, called));
+        let found: Vec<u32> = found.map(|(&address, _)| address).collect();
+        if found.is_empty() {
             return;
         }
         for function in self.functions.values_mut() {
-            let is_it = |name: &&str| function.name.contains(*name);
-            if function.goes_anywhere > 0 && USB_DEVICE.iter().any(is_it) {
+            if function.goes_anywhere > 0 && has(function, callers) {
                 function.goes_anywhere = 0;
-                function.goes_to.extend(&class);
+                function.goes_to.extend(&found);
             }
         }
     }
@@ -350,27 +358,41 @@ mod tests {
     }
 
     #[test]
-    fn usb_device_calls_its_class() {
+    fn calls_through_pointers_go_to_functions_of_known_names() {
         let function = |name: &str, takes, goes_anywhere| Function {
             name: name.to_owned(),
             takes,
             goes_anywhere,
             ..Function::default()
         };
-        let poll = || function("_ZN10usb_device6device9UsbDevice4poll", 4, 3);
+        let poll = "_ZN10usb_device6device9UsbDevice4poll";
+        let look = "_ZN9dtof_core11pixel_array10PixelArray4look";
         let class = ["UsbClass4poll", "UsbClass10control_in"];
-        for (with_class, need) in [(true, Some(14)), (false, None)] {
+        let together = [
+            "_ZN9dtof_core7binning15count_in_blocks",
+            "_ZN9dtof_core10neighbours16end_laser_cycles",
+        ];
+        for (caller, called, need) in [
+            (poll, class, Some(14)),
+            (poll, ["other"; 2], None),
+            (look, together, Some(14)),
+            (look, class, None),
+            ("main", together, None),
+        ] {
+            let [first, second] = called;
+            let functions = [
+                (0, function(caller, 4, 3)),
+                (2, function(first, 6, 0)),
+                (4, function(second, 10, 0)),
+            ];
             let mut needs = Needs {
-                functions: [(0, poll())].into(),
+                functions: functions.into(),
                 known: BTreeMap::new(),
                 under_way: Vec::new(),
             };
-            if with_class {
-                needs.functions.insert(2, function(class[0], 6, 0));
-                needs.functions.insert(4, function(class[1], 10, 0));
-            }
-            needs.resolve_usb_device();
-            assert_eq!(needs.of(0).ok(), need);
+            needs.resolve(&USB_DEVICE, &[USB_CLASS]);
+            needs.resolve(&[PIXEL_ARRAY], &TOGETHER);
+            assert_eq!(needs.of(0).ok(), need, "{caller}");
         }
     }
 

@@ -32,10 +32,9 @@ uint32_t configure(const struct settings *settings)
 
 uint32_t begin(uint32_t number)
 {
-    dtof_layout_t layout = {.pixels = PIXELS};
     (void)number;
     dtof_aer_encoder_init(&encoder);
-    return dtof_array_configure(&array, &config, &layout);
+    return dtof_array_configure(&array, &config, PIXELS);
 }
 
 uint32_t photon(uint32_t code)

@@ -90,7 +90,7 @@ fn functions_write_to_uninitialised_memory() {
             block_levels: 1,
             ..dtof_layout_t::default()
         };
-        assert_eq!(dtof_array_configure(at, settings.at(), &layout), OK);
+        assert_eq!(dtof_array_configure_layout(at, settings.at(), &layout), OK);
         assert_eq!(dtof_array_photons(at, 1, first, number), OK);
         for _ in 0..11 {
             assert_eq!(dtof_array_end_laser_cycles(at, 4, left.at()), OK);
@@ -196,7 +196,7 @@ type Call = fn(*mut u8) -> dtof_status_t;
 
 /// Each function that takes an initialised object: its name, the type, and a call.
 #[rustfmt::skip]
-const TAKES: [(&str, &str, Call); 41] = {
+const TAKES: [(&str, &str, Call); 42] = {
     const CODES: *const u16 = [0u16; DTOF_BINS].as_ptr();
     const COUNTS: *const u32 = [0u32; DTOF_BINS].as_ptr();
     const NO_LOOK: *mut dtof_look_t = ptr::null_mut();
@@ -218,7 +218,8 @@ const TAKES: [(&str, &str, Call); 41] = {
         ("dtof_pixel_take_event", "dtof_pixel_t", |p| dtof_pixel_take_event(p.cast(), &mut zeroed())),
         ("dtof_pixel_add_photons", "dtof_pixel_t", |p| dtof_pixel_add_photons(p.cast(), &mut statistics())),
         ("dtof_pixel_add_photons", "dtof_statistics_t", |p| dtof_pixel_add_photons(&pixel(0), p.cast())),
-        ("dtof_array_configure", "dtof_array_t", |p| dtof_array_configure(p.cast(), &paper(), &zeroed())),
+        ("dtof_array_configure", "dtof_array_t", |p| dtof_array_configure(p.cast(), &paper(), 0)),
+        ("dtof_array_configure_layout", "dtof_array_t", |p| dtof_array_configure_layout(p.cast(), &paper(), &zeroed())),
         ("dtof_array_clear", "dtof_array_t", |p| dtof_array_clear(p.cast())),
         ("dtof_array_leave_out", "dtof_array_t", |p| dtof_array_leave_out(p.cast(), 0)),
         ("dtof_array_photon", "dtof_array_t", |p| dtof_array_photon(p.cast(), 0, 0)),
@@ -333,7 +334,7 @@ fn every_object_of_the_header_is_checked() {
 
 /// Pointers of the functions, each with the alignment of its type.
 #[rustfmt::skip]
-const POINTERS: [(usize, Call); 43] = {
+const POINTERS: [(usize, Call); 45] = {
     // SAFETY: the tests pass null and misaligned pointers only.
     unsafe {[
         (4, |p| dtof_config_paper(p.cast())),
@@ -348,9 +349,11 @@ const POINTERS: [(usize, Call); 43] = {
         (8, |p| dtof_array_init(p.cast(), DTOF_PLACE_SIZE, ptr::null_mut(), 0, ptr::null_mut(), 0)),
         (4, |p| dtof_array_init(&mut zeroed(), DTOF_PLACE_SIZE, p.cast(), 1, ptr::null_mut(), 0)),
         (4, |p| dtof_array_init(&mut zeroed(), DTOF_PLACE_SIZE, ptr::null_mut(), 0, p.cast(), 1)),
-        (8, |p| dtof_array_configure(p.cast(), &paper(), &zeroed())),
-        (4, |p| dtof_array_configure(&mut array(), p.cast(), &zeroed())),
-        (2, |p| dtof_array_configure(&mut array(), &paper(), p.cast())),
+        (8, |p| dtof_array_configure(p.cast(), &paper(), 0)),
+        (4, |p| dtof_array_configure(&mut array(), p.cast(), 0)),
+        (8, |p| dtof_array_configure_layout(p.cast(), &paper(), &zeroed())),
+        (4, |p| dtof_array_configure_layout(&mut array(), p.cast(), &zeroed())),
+        (2, |p| dtof_array_configure_layout(&mut array(), &paper(), p.cast())),
         (2, |p| dtof_array_photons(&mut array(), 0, p.cast(), 1)),
         (2, |p| dtof_array_end_laser_cycles(&mut array(), 2, p.cast())),
         (8, |p| dtof_array_next_event(&mut array(), p.cast())),

@@ -7,7 +7,7 @@ mod narrow;
 mod steps;
 mod tables;
 
-use crate::neighbours::{ArrayLook, ArrayPixel, NeighbourConfig};
+use crate::neighbours::{ArrayLook, ArrayPixel, NeighbourConfig, end_laser_cycles};
 use crate::{CounterWidth, LaserCycle, PixelConfig, Statistics, WindowRule};
 
 /// Ends laser cycles of pixels with neighbours. Returns whether one of them has a new event.
@@ -25,6 +25,6 @@ pub fn end_laser_cycles_of_array<const BINS: usize, W: CounterWidth>(
         neighbours,
         last,
     };
-    look.end_laser_cycles(pixels, statistics, cycles);
+    end_laser_cycles(&look, pixels, statistics, cycles);
     statistics.events > before
 }
