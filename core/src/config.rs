@@ -19,7 +19,7 @@
 //!     Count, DepthEstimator, PixelConfig, PixelConfigError, WindowRule, WindowWidthError,
 //! };
 //!
-//! let rule = WindowRule::new(3, const { U4F12::lit("4.47") }, Count::saturating(5))?;
+//! let rule = WindowRule::new(3, const { U4F12::lit("4.504") }, Count::saturating(5))?;
 //! let estimator = DepthEstimator::for_pulse(const { U8F8::lit("1") });
 //! let config = PixelConfig::<128, _>::with_rule(rule).estimator(estimator);
 //! assert!(config.l1(4).build().is_ok());

@@ -6,14 +6,16 @@
 //! nothing and decides nothing.
 //!
 //! ```
-//! use dtof_core::fixed::types::U4F12;
 //! use dtof_core::binning::Block;
+//! use dtof_core::rule::z_for_levels;
 //! use dtof_core::{
-//!     Array, ArrayConfig, BlockLevel, Count, PixelArray, PixelConfig, PixelPlace, WindowRule,
+//!     Array, ArrayConfig, BlockLevel, Count, PixelArray, PixelConfig, PixelPlace, RangeGate, WindowRule,
 //! };
 //!
-//! let rule = WindowRule::new(3, const { U4F12::lit("4.47") }, Count::saturating(5))?;
 //! let level = BlockLevel::new(1).unwrap();
+//! // One in 100 pixels has a false alarm in L2 laser cycles, its own or that of its block.
+//! let z = z_for_levels(100, &RangeGate::<128>::full(), 4, 40, 2000, level);
+//! let rule = WindowRule::new(3, z, Count::saturating(5))?;
 //! let pixels = PixelConfig::with_rule(rule).build()?;
 //! let blocks = PixelConfig::with_rule(rule.of_blocks(level)).build()?;
 //! let config = ArrayConfig::new(Array::new(4, 2).unwrap(), pixels).blocks(level, blocks, 400)?;
@@ -275,7 +277,8 @@ where
     }
 
     /// With [blocks](crate::binning) of the levels 1 to `levels`, and ticks every `patience` laser cycles, rounded up to
-    /// looks. `config` is that of the blocks: with a window rule, that of [`WindowRule::of_blocks`](
+    /// looks. `config` is that of the blocks. With a window rule its z is that of
+    /// [`z_for_levels`](crate::rule::z_for_levels), and that of the blocks' rule of [`WindowRule::of_blocks`](
     /// crate::WindowRule::of_blocks), or there are more false alarms.
     ///
     /// # Errors
@@ -342,10 +345,12 @@ where
 
     /// The pixels and blocks for which it takes room.
     #[must_use]
-    pub fn room(&self) -> [usize; 2] {
-        let blocks = self.binning();
-        let blocks = blocks.map_or(0, |binning| binning.number_of_blocks());
-        [self.number, blocks].map(|number| usize::try_from(number).unwrap_or(usize::MAX))
+    pub const fn room(&self) -> [usize; 2] {
+        let blocks = match self.binning() {
+            Some(binning) => binning.number_of_blocks(),
+            None => 0,
+        };
+        [self.number as usize, blocks as usize]
     }
 
     /// Whether neighbours confirm.
@@ -1017,7 +1022,8 @@ where
     }
 
     /// Leaves a pixel out from now on, whatever the configuration: its photons count as left out, and it decides nothing.
-    /// An event that waits in its slot still comes.
+    /// An event that waits in its slot still comes. Its place stays left out, in another array of the same room, too, until
+    /// the program puts a new [`PixelPlace`] there. Without room for the pixel nothing happens.
     pub fn leave_out(&mut self, pixel: usize) {
         if let Some(place) = self.pixels.get_mut(pixel) {
             place.is_left_out = true;

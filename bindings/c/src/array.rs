@@ -173,8 +173,9 @@ pub unsafe extern "C" fn dtof_array_configure(
     })
 }
 
-/// The same for pixels that may decide together. Blocks and neighbours decide by the rule of `settings`, too; its
-/// false alarms are then those of all together.
+/// The same for pixels that may decide together, by the rule of `settings`. With neighbours its false alarms are
+/// those of all together. With blocks they are if the z of the window rule is for as many levels, as that of
+/// `dtof tune --binning`: blocks get a higher one from it.
 ///
 /// Errors: each of dtof_array_configure, DTOF_ERROR_BLOCKS for other levels, without columns or without room
 /// for so many, DTOF_ERROR_PATIENCE, DTOF_ERROR_NEIGHBOURS. After an error the array is unchanged.

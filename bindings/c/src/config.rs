@@ -97,7 +97,8 @@ object!(dtof_checked_config_t, Config, tag 0xd6,
 
 /// Fills in the paper's settings: its rule with an alpha of 4 and at least 5 photons, its depth
 /// estimator, X = 4, L1 = 40, L2 = 2000, all bins, no dead time, one echo. The window rule gets
-/// z = 4.47 and a window of 3 bins, and the centred window 2.5 bins to either side.
+/// z = 4.504, with which one in 100 exposures of 128 bins has a false alarm, and a window of 3 bins, and the
+/// centred window 2.5 bins to either side.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT.
 /// Threads: no other thread uses `config` during the call.
@@ -107,7 +108,7 @@ pub unsafe extern "C" fn dtof_config_paper(config: *mut dtof_config_t) -> dtof_s
     let settings = dtof_config_t {
         minimum_count: 5,
         alpha_q8: const { U8F8::lit("4").to_bits() },
-        z_q12: const { U4F12::lit("4.47").to_bits() },
+        z_q12: const { U4F12::lit("4.504").to_bits() },
         x: 4,
         l1: 40,
         l2: 2000,
