@@ -59,22 +59,19 @@ fn photons(cycle: u16) -> Vec<(u16, u16)> {
 }
 
 /// A sidecar and its host.
-struct Rust {
-    sidecar: Sidecar<'static>,
+struct Rust<'a> {
+    sidecar: Sidecar<'a>,
     host: Endpoint,
     up: Deframer,
     down: Deframer,
 }
 
-impl Rust {
-    fn new() -> Self {
-        let pixels: heapless::Vec<Pixel, { PIXELS as usize }> = heapless::Vec::new();
-        let blocks: heapless::Vec<Block, BLOCKS> = heapless::Vec::new();
-        let mut sidecar = Sidecar::new(
-            Box::leak(Box::new(pixels)),
-            Box::leak(Box::new(blocks)),
-            None,
-        );
+impl<'a> Rust<'a> {
+    fn new(
+        pixels: &'a mut heapless::Vec<Pixel, { PIXELS as usize }>,
+        blocks: &'a mut heapless::Vec<Block, BLOCKS>,
+    ) -> Self {
+        let mut sidecar = Sidecar::new(pixels, blocks, None);
         sidecar.leave_out(PixelAddress::new(LEFT_OUT));
         let mut rust = Self {
             sidecar,
@@ -213,7 +210,8 @@ impl C {
 
 #[test]
 fn a_device_reports_what_a_sidecar_reports() {
-    let (mut rust, mut c) = (Rust::new(), C::new());
+    let (mut pixels, mut blocks) = (heapless::Vec::new(), heapless::Vec::new());
+    let (mut rust, mut c) = (Rust::new(&mut pixels, &mut blocks), C::new());
     for session in 1..3 {
         // Before the first configuration of a session there is nothing of the session before.
         assert_eq!(c.report(), Report::default());
