@@ -791,12 +791,14 @@ dtof_status_t dtof_config_for_pulse(struct dtof_config_t *config,
                                     uint16_t sigma_q8);
 
 // Sets the window rule's z for one false alarm in `one_in` exposures without a target: 100 for
-// 1 %. z depends on the gate, X, L1 and L2 of `config`, so set these before. z is 2.15 to 6.44.
+// 1 %. z depends on the gate, X, L1 and L2 of `config`, so set these before. z is 2.15 to 6.44. It is for
+// pixels alone or with neighbours; blocks of pixels need a higher one: see dtof_array_configure_layout.
 //
 // Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_ZERO_X,
 // DTOF_ERROR_GATE_PAST_LAST_BIN, DTOF_ERROR_GATE_TOO_NARROW.
 // Threads: no other thread uses `config` during the call.
-dtof_status_t dtof_config_false_alarms(struct dtof_config_t *config, uint32_t one_in);
+dtof_status_t dtof_config_false_alarms(struct dtof_config_t *config,
+                                       uint32_t one_in);
 
 // Checks settings and builds the configuration from them.
 //

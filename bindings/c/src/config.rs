@@ -156,7 +156,8 @@ pub unsafe extern "C" fn dtof_config_for_pulse(
 }
 
 /// Sets the window rule's z for one false alarm in `one_in` exposures without a target: 100 for
-/// 1 %. z depends on the gate, X, L1 and L2 of `config`, so set these before. z is 2.15 to 6.44.
+/// 1 %. z depends on the gate, X, L1 and L2 of `config`, so set these before. z is 2.15 to 6.44. It is for
+/// pixels alone or with neighbours; blocks of pixels need a higher one: see dtof_array_configure_layout.
 ///
 /// Errors: DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT, DTOF_ERROR_ZERO_X,
 /// DTOF_ERROR_GATE_PAST_LAST_BIN, DTOF_ERROR_GATE_TOO_NARROW.
