@@ -834,7 +834,6 @@ pub(super) fn sets_the_length(observed: &Observed, hot: &[usize]) -> Option<Stri
 mod tests {
     use super::*;
     use crate::find::background::Level;
-    use crate::find::observed::Length;
     use dtof_core::Array;
     use dtof_photons::histograms::Histograms;
     use dtof_theory::rates::bin_share;
@@ -1262,19 +1261,7 @@ mod tests {
     }
 
     fn observed(pixels: u32, histograms: &Histograms) -> Observed<'_> {
-        Observed {
-            array: Array::new(pixels, 1).unwrap(),
-            histograms,
-            masked: None,
-            length: Length::Unknown,
-            cycles: None,
-            bin_width_ps: 250.0,
-            truth_mm: None,
-            slant: None,
-            bias_mm: None,
-            offsets_mm: &[],
-            times: None,
-        }
+        Observed::plain(Array::new(pixels, 1).unwrap(), histograms)
     }
 
     /// Leaving out one of them would not help.

@@ -602,19 +602,11 @@ mod tests {
         };
         let histograms = Histograms::of((0..64).map(histogram)).unwrap();
         let slants: Vec<f64> = (0..64).map(slant).collect();
+        // Without laser cycles no dead time is sought, which would take longest.
         let observed = Observed {
-            array: Array::new(8, 8).unwrap(),
-            histograms: &histograms,
-            masked: None,
-            // Without laser cycles no dead time is sought, which would take longest.
-            length: Length::Unknown,
-            cycles: None,
             bin_width_ps,
-            truth_mm: None,
             slant: Some(&slants),
-            bias_mm: None,
-            offsets_mm: &[],
-            times: None,
+            ..Observed::plain(Array::new(8, 8).unwrap(), &histograms)
         };
         let all = AllHistograms::new(&observed, &[], &CalibrationOptions::default()).unwrap();
         let rate = all.pixels.background;
@@ -650,17 +642,8 @@ mod tests {
             let all = (0..captures * 8).map(|at| histogram(at % 8, mm(at / 8, at % 8)));
             let histograms = Histograms::of(all).unwrap();
             let observed = Observed {
-                array: Array::new(4, 2).unwrap(),
-                histograms: &histograms,
-                masked: None,
-                length: Length::Unknown,
-                cycles: None,
-                bin_width_ps: 250.0,
                 truth_mm: Some(&truth),
-                slant: None,
-                bias_mm: None,
-                offsets_mm: &[],
-                times: None,
+                ..Observed::plain(Array::new(4, 2).unwrap(), &histograms)
             };
             calibrate(&observed, &CalibrationOptions::default()).unwrap()
         };

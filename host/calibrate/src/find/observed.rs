@@ -202,25 +202,34 @@ impl Observed<'_> {
 }
 
 #[cfg(test)]
+impl<'a> Observed<'a> {
+    /// Histograms of which nothing else is known.
+    pub(crate) const fn plain(array: Array, histograms: &'a Histograms) -> Self {
+        Self {
+            array,
+            histograms,
+            masked: None,
+            length: Length::Unknown,
+            cycles: None,
+            bin_width_ps: 250.0,
+            truth_mm: None,
+            slant: None,
+            bias_mm: None,
+            offsets_mm: &[],
+            times: None,
+        }
+    }
+}
+
+#[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn histograms_of_no_whole_capture_are_refused() {
         let refused = |histograms: Vec<Vec<u64>>| {
-            let observed = Observed {
-                array: Array::new(2, 2).unwrap(),
-                histograms: &Histograms::of(histograms).unwrap(),
-                masked: None,
-                length: Length::Unknown,
-                cycles: None,
-                bin_width_ps: 250.0,
-                truth_mm: None,
-                slant: None,
-                bias_mm: None,
-                offsets_mm: &[],
-                times: None,
-            };
+            let histograms = Histograms::of(histograms).unwrap();
+            let observed = Observed::plain(Array::new(2, 2).unwrap(), &histograms);
             observed.traces(&[]).err().map(|error| error.to_string())
         };
         for (pixels, bins, expected) in [
