@@ -1,11 +1,13 @@
-//! The configuration that a host sends to a device.
+//! How an array operates: the settings of a host, the message to a device, and what pixels are built from.
 
 use dtof_core::events::Reference;
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16, U24F8};
+use dtof_core::neighbours::{NeighbourConfig, NeighbourRule};
 use dtof_core::paper::Threshold;
 use dtof_core::{
-    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, DetectionRule,
-    EchoNumber, Neighbours, PaperRule, WindowRule,
+    AnyRule, Array, ArrayConfig, AverageRule, BlockLevel, CentredWindow, Count, CounterWidth,
+    DepthEstimator, DetectionRule, EchoNumber, Neighbours, PaperRule, PixelConfig, PixelData,
+    RangeGate, WindowRule,
 };
 
 use crate::adaptive_binning::AdaptiveBinning;
@@ -22,9 +24,9 @@ pub enum Source {
     Sensor,
 }
 
-/// How the pixels of a device operate. Rule and estimator are valid by construction. The
-/// device checks the rest, which depends on its pixels and its sensor. `x`, `l1` and `l2` are the
-/// paper's names (section II-B).
+/// How the pixels of an array operate. Rule and estimator are valid by construction;
+/// [`Self::array_config`] and [`Self::device_config`] check the rest, and a device what depends on its sensor.
+/// `x`, `l1` and `l2` are the paper's names (section II-B).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Configuration {
@@ -106,6 +108,33 @@ const NOT_TRACKING: u8 = 0;
 const TRACKING: u8 = 1;
 
 impl Configuration {
+    /// One row of no pixels on 128 bins of 250 ps: the paper's rule with an alpha of 4 and at least 5 photons, its
+    /// estimator, looks every 4 laser cycles after more than 40 and up to 2000. The sensor says the dead time.
+    pub const DEFAULT: Self = Self {
+        rule: AnyRule::Paper(PaperRule::new(U8F8::lit("4"), Count::saturating(5))),
+        estimator: DepthEstimator::Centroid3,
+        x: 4,
+        l1: 40,
+        l2: 2000,
+        gate: (0, 127),
+        dead_time: None,
+        once_per_bin: false,
+        dither_bins: 0,
+        dither_seed: 0,
+        pixels: 0,
+        columns: 0,
+        binning: None,
+        neighbours: None,
+        tracking: false,
+        echoes: EchoNumber::FIRST,
+        echo_guard_bins: 4,
+        echo_wait: u8::MAX,
+        bin_width_ps: U16F16::lit("250"),
+        offset_mm: I24F8::ZERO,
+        source: Source::Sensor,
+        dynamic_depth: None,
+        host_timeout_ms: Self::HOST_TIMEOUT_MS,
+    };
     /// Bytes of the record.
     pub const BYTES: usize = 67;
     /// The range of the host timeout, in milliseconds. A host sends a frame every 50 ms.
@@ -235,6 +264,113 @@ impl Configuration {
             (None, Source::Sensor) if has_effect(of_sensor) => Ok(of_sensor),
             (None, _) => Ok(0),
         }
+    }
+
+    /// How each pixel operates, with histograms of `BINS` bins. `dead_time_of_sensor` is that of
+    /// [`Self::dead_time_in_force`]. With neighbours a pixel has half of the false alarms, they have the others.
+    ///
+    /// # Errors
+    /// Fails with the first setting that cannot be.
+    pub fn pixel_config<const BINS: usize>(
+        &self,
+        dead_time_of_sensor: u16,
+    ) -> Result<PixelConfig<BINS, AnyRule>, Refusal> {
+        let own = match self.neighbours {
+            None => self.rule,
+            Some(_) => (*NeighbourRule::new(self.rule_of_neighbours()?).own()).into(),
+        };
+        self.config_of(own, dead_time_of_sensor)
+    }
+
+    /// How the blocks of so many levels operate, as [`Self::pixel_config`].
+    ///
+    /// # Errors
+    /// Fails with the first setting that cannot be.
+    pub fn block_config<const BINS: usize>(
+        &self,
+        levels: BlockLevel,
+        dead_time_of_sensor: u16,
+    ) -> Result<PixelConfig<BINS, AnyRule>, Refusal> {
+        self.config_of(self.rule.of_blocks(levels), dead_time_of_sensor)
+    }
+
+    /// How the first `pixels` of an array operate, with their blocks or neighbours, as [`Self::pixel_config`].
+    /// [`Self::pixels`] and [`Self::columns`] are not used.
+    ///
+    /// # Errors
+    /// Fails with the first setting that cannot be.
+    pub fn array_config<const BINS: usize, W: CounterWidth, T: PixelData>(
+        &self,
+        layout: Array,
+        pixels: u32,
+        dead_time_of_sensor: u16,
+    ) -> Result<ArrayConfig<BINS, AnyRule, W, T>, Refusal> {
+        let own = self.pixel_config(dead_time_of_sensor)?;
+        let mut config = ArrayConfig::new(layout, own).first(pixels)?;
+        if let Some(neighbours) = self.neighbours {
+            let rule = self.rule_of_neighbours()?;
+            config = config.neighbours(NeighbourConfig::new(layout, neighbours, rule))?;
+        }
+        if let Some(AdaptiveBinning { levels, patience }) = self.binning {
+            let blocks = self.block_config(levels, dead_time_of_sensor)?;
+            config = config.blocks(levels, blocks, patience)?;
+        }
+        Ok(match self.once_per_bin {
+            true => config.once_per_bin(),
+            false => config,
+        })
+    }
+
+    /// The same for [`Self::pixels`] in rows of [`Self::columns`]. Without columns they are one row, which has neither
+    /// blocks nor neighbours.
+    ///
+    /// # Errors
+    /// Fails with the first setting that cannot be.
+    pub fn device_config<const BINS: usize, W: CounterWidth, T: PixelData>(
+        &self,
+        dead_time_of_sensor: u16,
+    ) -> Result<ArrayConfig<BINS, AnyRule, W, T>, Refusal> {
+        let pixels = u32::from(self.pixels);
+        let [columns, rows] = match u32::from(self.columns) {
+            0 if self.neighbours.is_some() => return Err(Refusal::Neighbours),
+            0 if self.binning.is_some() => return Err(Refusal::Blocks),
+            0 => [pixels, 1],
+            columns => [columns, pixels.div_ceil(columns)],
+        };
+        let layout = Array::new(columns, rows).ok_or(Refusal::Pixels)?;
+        self.array_config(layout, pixels, dead_time_of_sensor)
+    }
+
+    fn rule_of_neighbours(&self) -> Result<&WindowRule, Refusal> {
+        match &self.rule {
+            AnyRule::Window(rule) if self.binning.is_none() => Ok(rule),
+            _ => Err(Refusal::Neighbours),
+        }
+    }
+
+    fn config_of<const BINS: usize>(
+        &self,
+        rule: AnyRule,
+        dead_time_of_sensor: u16,
+    ) -> Result<PixelConfig<BINS, AnyRule>, Refusal> {
+        #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
+        let dead_time = self.dead_time_in_force(dead_time_of_sensor, BINS as u16)?;
+        let gate = RangeGate::new(self.gate.0, self.gate.1)?;
+        let tracking = rule.tracking(&gate).filter(|_| self.tracking);
+        if self.tracking && tracking.is_none() {
+            return Err(Refusal::Tracking);
+        }
+        let config = PixelConfig::with_rule(rule)
+            .x(self.x)
+            .l1(self.l1)
+            .l2(self.l2)
+            .gate(gate)
+            .estimator(self.estimator)
+            .dead_time(dead_time)
+            .tracking(tracking)
+            .echoes(self.echoes, self.echo_guard_bins)
+            .echo_wait(self.echo_wait);
+        Ok(config.build()?)
     }
 
     /// Reads the record. Fields of another rule, estimator or output are ignored, and the dead

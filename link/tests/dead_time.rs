@@ -1,9 +1,7 @@
 //! The dead time that a device applies: the table of `docs/link-format.md`.
 
-use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
-use dtof_core::{
-    AnyRule, AverageRule, BlockLevel, Count, DepthEstimator, EchoNumber, PaperRule, WindowRule,
-};
+use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::{AnyRule, AverageRule, BlockLevel, Count, PaperRule, WindowRule};
 use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source};
 
 const BINS: u16 = 128;
@@ -11,28 +9,9 @@ const BINS: u16 = 128;
 fn configuration(rule: AnyRule) -> Configuration {
     Configuration {
         rule,
-        estimator: DepthEstimator::Centroid3,
-        x: 4,
-        l1: 40,
-        l2: 2000,
-        gate: (0, 127),
-        dead_time: None,
-        once_per_bin: false,
-        dither_bins: 0,
-        dither_seed: 0,
         pixels: 64,
         columns: 8,
-        binning: None,
-        neighbours: None,
-        tracking: false,
-        echoes: EchoNumber::FIRST,
-        echo_guard_bins: 0,
-        echo_wait: u8::MAX,
-        bin_width_ps: U16F16::lit("250"),
-        offset_mm: I24F8::ZERO,
-        source: Source::Sensor,
-        dynamic_depth: None,
-        host_timeout_ms: Configuration::HOST_TIMEOUT_MS,
+        ..Configuration::DEFAULT
     }
 }
 

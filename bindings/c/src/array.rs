@@ -3,12 +3,13 @@
 use core::mem::MaybeUninit;
 
 use dtof_core::binning::Block;
-use dtof_core::neighbours::NeighbourConfig;
 use dtof_core::{
     AnyRule, Array, ArrayConfig, BlockLevel, Neighbours, PixelArray, PixelPlace, Statistics,
 };
 
-use crate::config::{config_with, dtof_config_t, rule_of};
+use dtof_link::{AdaptiveBinning, Configuration};
+
+use crate::config::{alone, dtof_config_t, requested};
 use crate::event::dtof_event_t;
 use crate::memory::{
     check, check_array, data_ref, data_slice, initialise, object, object_mut, object_ref, put,
@@ -17,8 +18,8 @@ use crate::memory::{
 use crate::statistics::{DTOF_STATISTICS_SIZE, dtof_statistics_t};
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{
-    DTOF_ERROR_BLOCKS, DTOF_ERROR_DEAD_TIME, DTOF_ERROR_NEIGHBOURS, DTOF_ERROR_NO_EVENT,
-    DTOF_ERROR_PATIENCE, DTOF_ERROR_PIXELS, DTOF_ERROR_SIZE,
+    DTOF_ERROR_BLOCKS, DTOF_ERROR_NEIGHBOURS, DTOF_ERROR_NO_EVENT, DTOF_ERROR_PATIENCE,
+    DTOF_ERROR_PIXELS, DTOF_ERROR_SIZE,
 };
 use crate::version::{DTOF_BINS, DTOF_COUNTER_BITS, PixelCounters};
 
@@ -167,8 +168,7 @@ pub unsafe extern "C" fn dtof_array_configure(
         // SAFETY: the same promise.
         let settings = unsafe { data_ref(settings)? };
         let row = Array::new(pixels.into(), 1).ok_or(DTOF_ERROR_PIXELS)?;
-        let config = config_with(settings, rule_of(settings)?)?;
-        array.configure(&ArrayConfig::new(row, config))?;
+        array.configure(&ArrayConfig::new(row, alone(settings)?))?;
         Ok(())
     })
 }
@@ -215,44 +215,27 @@ fn array_config(
     settings: &dtof_config_t,
     layout: &dtof_layout_t,
 ) -> Result<ArrayConfig<DTOF_BINS, AnyRule, PixelCounters>, dtof_status_t> {
-    let pixels = u32::from(layout.pixels);
-    let columns = match layout.columns {
-        0 => pixels,
-        columns => columns.into(),
+    let neighbours = match layout.neighbours {
+        0 => None,
+        number => Some(Neighbours::new(number).ok_or(DTOF_ERROR_NEIGHBOURS)?),
     };
-    let shape = Array::new(columns, pixels.div_ceil(columns.max(1))).ok_or(DTOF_ERROR_PIXELS)?;
-    let rule = rule_of(settings)?;
-    let neighbours = match (layout.neighbours, &rule) {
-        (0, _) => None,
-        (number, AnyRule::Window(rule)) if layout.columns > 0 => {
-            let neighbours = Neighbours::new(number).ok_or(DTOF_ERROR_NEIGHBOURS)?;
-            Some(NeighbourConfig::new(shape, neighbours, rule))
-        }
-        _ => return Err(DTOF_ERROR_NEIGHBOURS),
+    let binning = match layout.block_levels {
+        0 => None,
+        _ if layout.patience == 0 => return Err(DTOF_ERROR_PATIENCE),
+        levels => Some(AdaptiveBinning {
+            levels: BlockLevel::new(levels).ok_or(DTOF_ERROR_BLOCKS)?,
+            patience: layout.patience,
+        }),
     };
-    let own = neighbours.map_or(rule, |neighbours| (*neighbours.rule().own()).into());
-    let own = config_with(settings, own)?;
-    let mut config = ArrayConfig::new(shape, own).first(pixels)?;
-    if let Some(neighbours) = neighbours {
-        config = config.neighbours(neighbours)?;
-    }
-    if layout.block_levels > 0 {
-        let levels = BlockLevel::new(layout.block_levels).filter(|_| layout.columns > 0);
-        let levels = levels.ok_or(DTOF_ERROR_BLOCKS)?;
-        if layout.patience == 0 {
-            return Err(DTOF_ERROR_PATIENCE);
-        }
-        // Blocks do not weigh a dead time. If only first photons count, their events say when it piles up.
-        if own.weighs_dead_time() && !own.is_first_photon_only() {
-            return Err(DTOF_ERROR_DEAD_TIME);
-        }
-        let blocks = config_with(settings, rule.of_blocks(levels))?;
-        config = config.blocks(levels, blocks, layout.patience)?;
-    }
-    Ok(match layout.once_per_bin {
-        0 => config,
-        _ => config.once_per_bin(),
-    })
+    let requested = Configuration {
+        pixels: layout.pixels,
+        columns: layout.columns,
+        binning,
+        neighbours,
+        once_per_bin: layout.once_per_bin != 0,
+        ..requested(settings)?
+    };
+    Ok(requested.device_config(0)?)
 }
 
 /// Leaves a pixel out from now on, whatever the configuration: its photons count as left out.

@@ -7,12 +7,13 @@ use dtof_core::{
     AnyRule, AverageRule, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule, PixelConfig,
     RangeGate, WindowRule, z_for,
 };
+use dtof_link::Configuration;
 
 use crate::memory::{data_ref, initialise, object, put, status};
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{
-    DTOF_ERROR_DEAD_TIME, DTOF_ERROR_ECHOES, DTOF_ERROR_ESTIMATOR, DTOF_ERROR_HALF_WIDTH,
-    DTOF_ERROR_MINIMUM_COUNT, DTOF_ERROR_RULE, DTOF_ERROR_TRACKING, DTOF_ERROR_ZERO_X,
+    DTOF_ERROR_ECHOES, DTOF_ERROR_ESTIMATOR, DTOF_ERROR_HALF_WIDTH, DTOF_ERROR_MINIMUM_COUNT,
+    DTOF_ERROR_RULE, DTOF_ERROR_ZERO_X,
 };
 use crate::version::DTOF_BINS;
 
@@ -109,9 +110,9 @@ pub unsafe extern "C" fn dtof_config_paper(config: *mut dtof_config_t) -> dtof_s
         minimum_count: 5,
         alpha_q8: const { U8F8::lit("4").to_bits() },
         z_q12: const { U4F12::lit("4.504").to_bits() },
-        x: 4,
-        l1: 40,
-        l2: 2000,
+        x: Configuration::DEFAULT.x,
+        l1: Configuration::DEFAULT.l1,
+        l2: Configuration::DEFAULT.l2,
         gate_first: 0,
         gate_last: DTOF_BINS as u16 - 1,
         before_q8: const { U8F8::lit("2.5").to_bits() },
@@ -123,7 +124,7 @@ pub unsafe extern "C" fn dtof_config_paper(config: *mut dtof_config_t) -> dtof_s
         tracking: 0,
         echoes: 1,
         peel_reach: 0,
-        echo_wait: u8::MAX,
+        echo_wait: Configuration::DEFAULT.echo_wait,
     };
     // SAFETY: the caller's promise, see the crate.
     status(|| unsafe { put(config, settings) })
@@ -194,18 +195,18 @@ pub unsafe extern "C" fn dtof_config_check(
     status(|| {
         // SAFETY: the caller's promise, see the crate.
         let settings = unsafe { data_ref(config)? };
-        let config = config_with(settings, rule_of(settings)?)?;
+        let config = alone(settings)?;
         // SAFETY: the same promise.
         unsafe { initialise(checked, DTOF_CHECKED_CONFIG_SIZE, config) }
     })
 }
 
-/// The rule that settings choose.
-pub(crate) fn rule_of(settings: &dtof_config_t) -> Result<AnyRule, dtof_status_t> {
+/// The settings of pixels that decide alone, as a host would ask for them.
+pub(crate) fn requested(settings: &dtof_config_t) -> Result<Configuration, dtof_status_t> {
     let count = Count::new(settings.minimum_count).filter(|count| count.raw() > 0);
     let count = count.ok_or(DTOF_ERROR_MINIMUM_COUNT)?;
     let alpha = U8F8::from_bits(settings.alpha_q8);
-    Ok(match settings.rule {
+    let rule = match settings.rule {
         DTOF_RULE_PAPER => PaperRule::new(alpha, count).into(),
         DTOF_RULE_AVERAGE => AverageRule::new(alpha, count).into(),
         DTOF_RULE_WINDOW => {
@@ -213,14 +214,7 @@ pub(crate) fn rule_of(settings: &dtof_config_t) -> Result<AnyRule, dtof_status_t
             WindowRule::new(settings.window, z, count)?.into()
         }
         _ => return Err(DTOF_ERROR_RULE),
-    })
-}
-
-/// The configuration of settings, with a rule that may be another one than theirs.
-pub(crate) fn config_with(
-    settings: &dtof_config_t,
-    rule: AnyRule,
-) -> Result<Config, dtof_status_t> {
+    };
     let estimator = match settings.estimator {
         DTOF_ESTIMATOR_CENTROID => DepthEstimator::Centroid3,
         DTOF_ESTIMATOR_CENTRED_WINDOW => {
@@ -230,27 +224,23 @@ pub(crate) fn config_with(
         }
         _ => return Err(DTOF_ERROR_ESTIMATOR),
     };
-    let gate = RangeGate::new(settings.gate_first, settings.gate_last)?;
-    let tracking = if settings.tracking == 0 {
-        None
-    } else {
-        Some(rule.tracking(&gate).ok_or(DTOF_ERROR_TRACKING)?)
-    };
-    let echoes = EchoNumber::new(settings.echoes).ok_or(DTOF_ERROR_ECHOES)?;
-    let config = PixelConfig::with_rule(rule)
-        .x(settings.x)
-        .l1(settings.l1)
-        .l2(settings.l2)
-        .gate(gate)
-        .estimator(estimator)
-        .dead_time(settings.dead_time)
-        .tracking(tracking)
-        .echoes(echoes, settings.peel_reach)
-        .echo_wait(settings.echo_wait)
-        .build()?;
-    let is_short = config.dead_time() > 0 && !config.is_first_photon_only();
-    if is_short && !config.weighs_dead_time() {
-        return Err(DTOF_ERROR_DEAD_TIME);
-    }
-    Ok(config)
+    Ok(Configuration {
+        rule,
+        estimator,
+        x: settings.x,
+        l1: settings.l1,
+        l2: settings.l2,
+        gate: (settings.gate_first, settings.gate_last),
+        dead_time: Some(settings.dead_time),
+        tracking: settings.tracking != 0,
+        echoes: EchoNumber::new(settings.echoes).ok_or(DTOF_ERROR_ECHOES)?,
+        echo_guard_bins: settings.peel_reach,
+        echo_wait: settings.echo_wait,
+        ..Configuration::DEFAULT
+    })
+}
+
+/// The configuration of pixels that decide alone.
+pub(crate) fn alone(settings: &dtof_config_t) -> Result<Config, dtof_status_t> {
+    Ok(requested(settings)?.pixel_config(0)?)
 }

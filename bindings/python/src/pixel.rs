@@ -41,7 +41,7 @@ impl<const BINS: usize, W: CounterWidth> PixelOf<BINS, W> {
         Ok(Box::new(Self {
             config: settings.config()?,
             pixel: AsyncPixel::new(address),
-            bins: settings.once_per_bin.then(Bins::new),
+            bins: settings.configuration.once_per_bin.then(Bins::new),
             statistics: Statistics::new(),
         }))
     }
@@ -178,8 +178,8 @@ impl Pixel {
         let create = || {
             let settings = requested.settings(bins)?;
             let of_arrays = [
-                ("binning", settings.binning.is_some()),
-                ("neighbours", settings.neighbours.is_some()),
+                ("binning", settings.configuration.binning.is_some()),
+                ("neighbours", settings.configuration.neighbours.is_some()),
                 ("frame", settings.frame.is_some()),
                 ("masked", !settings.masked.is_empty()),
                 ("offsets_mm", !settings.offsets_mm.is_empty()),

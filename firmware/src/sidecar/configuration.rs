@@ -1,11 +1,10 @@
 //! Applies a configuration.
 
-use dtof_core::neighbours::NeighbourConfig;
-use dtof_core::{AnyRule, Array, ArrayConfig, PixelConfig, RangeGate, RangeScale};
-use dtof_link::{AdaptiveBinning, Configuration, Refusal, Source, StopReason};
+use dtof_core::RangeScale;
+use dtof_link::{Configuration, Refusal, Source, StopReason};
 use dtof_sensors::dither::Dither;
 
-use super::{BINS, Counters, Sidecar};
+use super::{Counters, Sidecar};
 
 impl Sidecar<'_> {
     /// Applies the configuration in `body`: all pixels begin an exposure. The last configuration
@@ -40,48 +39,17 @@ impl Sidecar<'_> {
         if dither.range() > u16::from(most_dither) {
             return Err(Refusal::Dither);
         }
-        let gate = RangeGate::new(first, last)?;
-        let of_sensor = self.sensor.map_or(0, |sensor| sensor.dead_time);
-        #[allow(clippy::cast_possible_truncation, reason = "128")]
-        let dead_time = requested.dead_time_in_force(of_sensor, BINS as u16)?;
-        let config_of = |rule: AnyRule| {
-            let tracking = rule.tracking(&gate).filter(|_| requested.tracking);
-            if requested.tracking && tracking.is_none() {
-                return Err(Refusal::Tracking);
-            }
-            let config = PixelConfig::with_rule(rule)
-                .x(requested.x)
-                .l1(requested.l1)
-                .l2(requested.l2)
-                .gate(gate)
-                .estimator(requested.estimator)
-                .dead_time(dead_time)
-                .tracking(tracking)
-                .echoes(requested.echoes, requested.echo_guard_bins)
-                .echo_wait(requested.echo_wait);
-            Ok(config.build()?)
+        let gives_histograms = self.sensor.is_some_and(|sensor| sensor.gives_histograms);
+        let of_histograms = gives_histograms && requested.source == Source::Sensor;
+        if requested.neighbours.is_some() && of_histograms {
+            return Err(Refusal::Neighbours);
+        }
+        let measured = Configuration {
+            gate: (first, last),
+            ..requested
         };
-        let neighbours = self.neighbours_of(&requested)?;
-        let own = neighbours.map_or(requested.rule, |neighbours| {
-            (*neighbours.rule().own()).into()
-        });
-        let pixels = config_of(own)?;
-        let array = array_of(&requested).or(Array::new(requested.pixels.into(), 1));
-        let array = array.ok_or(Refusal::Pixels)?;
-        let mut config = ArrayConfig::new(array, pixels).first(requested.pixels.into())?;
-        if let Some(neighbours) = neighbours {
-            config = config
-                .neighbours(neighbours)
-                .map_err(|_| Refusal::Neighbours)?;
-        }
-        if let Some(AdaptiveBinning { levels, patience }) = requested.binning {
-            array_of(&requested).ok_or(Refusal::Blocks)?;
-            let blocks = config_of(requested.rule.of_blocks(levels))?;
-            config = config.blocks(levels, blocks, patience)?;
-        }
-        if requested.once_per_bin {
-            config = config.once_per_bin();
-        }
+        let dead_time_of_sensor = self.sensor.map_or(0, |sensor| sensor.dead_time);
+        let config = measured.device_config(dead_time_of_sensor)?;
         self.array.check(&config)?;
         let scale = RangeScale::new(requested.bin_width_ps, requested.offset_mm)?;
         let dynamic_depth = requested
@@ -99,29 +67,4 @@ impl Sidecar<'_> {
         self.off = None;
         Ok(())
     }
-
-    /// The requested neighbours.
-    fn neighbours_of(&self, requested: &Configuration) -> Result<Option<NeighbourConfig>, Refusal> {
-        let Some(neighbours) = requested.neighbours else {
-            return Ok(None);
-        };
-        let of_sensor = requested.source == Source::Sensor;
-        let gives_histograms = self.sensor.is_some_and(|sensor| sensor.gives_histograms);
-        let array = array_of(requested).ok_or(Refusal::Neighbours)?;
-        match &requested.rule {
-            AnyRule::Window(rule)
-                if requested.binning.is_none() && !(of_sensor && gives_histograms) =>
-            {
-                Ok(Some(NeighbourConfig::new(array, neighbours, rule)))
-            }
-            _ => Err(Refusal::Neighbours),
-        }
-    }
-}
-
-/// The array of the requested pixels; `None` without columns. Its last row may not be full.
-fn array_of(requested: &Configuration) -> Option<Array> {
-    let (pixels, columns) = (u32::from(requested.pixels), requested.columns.into());
-    let rows = pixels.checked_div(columns)?;
-    Array::new(columns, rows + u32::from(rows * columns < pixels))
 }

@@ -3,44 +3,25 @@
 use std::ops::Range;
 
 use dtof_core::events::DynamicDepthEvent;
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use dtof_core::{
-    AerDecoder, AerRecord, AerWord, AnyRule, Count, DepthEstimator, DepthEvent, EchoNumber,
-    PaperRule, PixelAddress,
-};
+use dtof_core::fixed::types::U16F16;
+use dtof_core::{AerDecoder, AerRecord, AerWord, DepthEvent, PixelAddress};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_link::endpoint::Endpoint;
 use dtof_link::frame::{Deframer, FrameError, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
-use dtof_link::{Configuration, Report, Source};
+use dtof_link::{Configuration, Report};
 use dtof_sensors::dither::Dither;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo};
 
 /// A configuration that takes photons from the sensor.
 pub const CONFIGURATION: Configuration = Configuration {
-    rule: AnyRule::Paper(PaperRule::new(U8F8::lit("4"), Count::saturating(5))),
-    estimator: DepthEstimator::Centroid3,
-    x: 4,
     l1: 20,
     l2: 200,
-    gate: (0, 127),
-    dead_time: None,
-    once_per_bin: false,
-    dither_bins: 0,
-    dither_seed: 0,
     pixels: 8,
     columns: 8,
-    binning: None,
-    neighbours: None,
-    tracking: false,
-    echoes: EchoNumber::FIRST,
     echo_guard_bins: 0,
     echo_wait: 4,
-    bin_width_ps: U16F16::lit("250"),
-    offset_mm: I24F8::ZERO,
-    source: Source::Sensor,
-    dynamic_depth: None,
-    host_timeout_ms: Configuration::HOST_TIMEOUT_MS,
+    ..Configuration::DEFAULT
 };
 
 /// A device with room for so many pixels and no block.

@@ -4,7 +4,7 @@
 use crate::capture_log::{ground_truth, log, tell};
 use dtof_calibrate::{Calibration, CalibrationOptions, Length, Nearest, Observed, calibrate};
 use dtof_core::fixed::types::U8F8;
-use dtof_core::{Array, PixelAddress};
+use dtof_core::{Array, CentredWindow, DepthEstimator, PixelAddress};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::SettingsFile;
 use dtof_photons::histograms::Histograms;
@@ -143,12 +143,20 @@ fn a_recording_with_distances_calibrates_itself() {
         let before = || SettingsFile::parse(older).unwrap();
         let settings = found.settings(before()).unwrap();
         let settings = settings.settings(found.bins).unwrap();
-        assert_eq!(settings.half_widths, Some(asymmetric.window));
+        let of_window = DepthEstimator::CentredWindow;
+        assert_eq!(
+            settings.configuration.estimator,
+            of_window(asymmetric.window)
+        );
         let mut even = found.clone();
         even.detection.half_widths = None;
         let settings = even.settings(before()).unwrap();
         let settings = settings.settings(found.bins).unwrap();
-        assert_eq!((settings.half_widths, settings.centroid), (None, false));
+        let suits = settings
+            .sigma_bins
+            .map(CentredWindow::for_pulse)
+            .map(of_window);
+        assert_eq!(Some(settings.configuration.estimator), suits);
     }
 
     let truth = ground_truth(&log);

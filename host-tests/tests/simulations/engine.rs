@@ -118,8 +118,14 @@ fn compare(settings: &Settings, cycles: u64, tally: &mut Tally) {
     let addresses = photons.addresses();
     let mut engine = host_engine(settings, array, &addresses).unwrap();
     let configs = (settings.config().unwrap(), settings.block_config().unwrap());
-    let levels = settings.binning.map_or(0, |binning| binning.levels.raw());
-    let patience = settings.binning.map_or(1, |binning| binning.patience);
+    let levels = settings
+        .configuration
+        .binning
+        .map_or(0, |binning| binning.levels.raw());
+    let patience = settings
+        .configuration
+        .binning
+        .map_or(1, |binning| binning.patience);
     let mut array = BinnedArray::new(
         (array.columns(), array.rows()),
         levels.into(),
@@ -212,18 +218,16 @@ fn settings(levels: u8, tracking: bool, echoes: u8, seed: u64) -> Settings {
     let gate = RangeGate::<BINS>::full();
     let z: U4F12 = z_for_levels(100, &gate, 4, 40, 1000, levels);
     let patience = 100;
-    Settings {
-        rule: WindowRule::new(3, z, Count::saturating(5)).unwrap().into(),
-        l1: 40,
-        l2: 1000,
-        x: 4,
-        binning: (levels > BlockLevel::PIXEL).then_some(AdaptiveBinning { levels, patience }),
-        tracking,
-        echoes: EchoNumber::new(echoes).unwrap(),
-        // Of every other run.
-        echo_wait: seed.is_multiple_of(2).then_some(5),
-        ..Settings::static_scene(seed)
-    }
+    Settings::static_scene(seed).with(|with| {
+        with.rule = WindowRule::new(3, z, Count::saturating(5)).unwrap().into();
+        with.l1 = 40;
+        with.l2 = 1000;
+        with.x = 4;
+        with.binning = (levels > BlockLevel::PIXEL).then_some(AdaptiveBinning { levels, patience });
+        with.tracking = tracking;
+        with.echoes = EchoNumber::new(echoes).unwrap();
+        with.echo_wait = if seed.is_multiple_of(2) { 5 } else { u8::MAX };
+    })
 }
 
 #[test]

@@ -27,15 +27,15 @@ struct Zone {
 }
 
 fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES] {
-    let settings = Settings {
-        bins: tmf8820::BINS,
-        bin_width_ps: tmf882x::BIN_WIDTH_PS,
-        offset_mm: tmf882x::OFFSET_MM,
-        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(min_count.into())).into(),
-        l1: 40,
-        x: 4,
-        ..Settings::static_scene(1)
-    };
+    let settings = Settings::static_scene(1)
+        .with_bins(tmf8820::BINS)
+        .with(|with| {
+            with.bin_width_ps = tmf882x::BIN_WIDTH_PS;
+            with.offset_mm = tmf882x::OFFSET_MM;
+            with.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(min_count.into())).into();
+            with.l1 = 40;
+            with.x = 4;
+        });
     let truth = ground_truth(log);
     let recorded = counts(log, &ReadOptions::default()).unwrap();
     let length = RecordingLength::PhotonsPerCycle(photons_per_cycle);

@@ -45,20 +45,20 @@ fn median(ranges: &mut [f64]) -> f64 {
 /// The captures nearer than [`NEAR_MM`], at four photons per laser cycle: the truth and the echoes. The
 /// bins that are excluded around an echo depend on `sigma`, the width of the pulse in bins.
 fn near_captures(log: &PathBuf, sigma: &str) -> Vec<(f64, Found)> {
-    let settings = Settings {
-        bins: tmf8820::BINS,
-        bin_width_ps: tmf882x::BIN_WIDTH_PS,
-        offset_mm: tmf882x::OFFSET_MM,
-        rule: WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
-            .unwrap()
-            .into(),
-        sigma_bins: Some(sigma.parse::<U8F8>().unwrap()),
-        l1: 40,
-        l2: 2000,
-        x: 4,
-        echoes: two(),
-        ..Settings::static_scene(1)
-    };
+    let settings = Settings::static_scene(1)
+        .with_bins(tmf8820::BINS)
+        .for_pulse(sigma.parse::<U8F8>().unwrap())
+        .with(|with| {
+            with.bin_width_ps = tmf882x::BIN_WIDTH_PS;
+            with.offset_mm = tmf882x::OFFSET_MM;
+            with.rule = WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
+                .unwrap()
+                .into();
+            with.l1 = 40;
+            with.l2 = 2000;
+            with.x = 4;
+            with.echoes = two();
+        });
     let truth = ground_truth(log);
     let recorded = counts(log, &ReadOptions::default()).unwrap();
     let length = RecordingLength::PhotonsPerCycle(4.0);

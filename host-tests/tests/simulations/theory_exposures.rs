@@ -285,13 +285,13 @@ fn request(background: f64, signal: f64, l2: u16, allowed: f64) -> Request {
 
 /// The first event of each pixel that has one in its first exposure, from the engine.
 fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec<DepthEvent> {
-    let settings = Settings {
-        rule: PaperRule::new(tuned.alpha, Count::saturating(request.minimum_count.into())).into(),
-        l1: tuned.l1,
-        l2: request.l2,
-        x: request.x,
-        ..Settings::static_scene(11)
-    };
+    let settings = Settings::static_scene(11).with(|with| {
+        with.rule =
+            PaperRule::new(tuned.alpha, Count::saturating(request.minimum_count.into())).into();
+        with.l1 = tuned.l1;
+        with.l2 = request.l2;
+        with.x = request.x;
+    });
     let array = Array::new(side, side).unwrap();
     let pixels = (0..side * side).map(|pixel| {
         let rates = Rates {

@@ -97,9 +97,8 @@ fn mps2_an386_with_counters_of_8_bits_decides_as_this_computer() -> Result<()> {
         ..settings()
     };
     let with_neighbours = Settings {
-        neighbours: Neighbours::new(8),
         counter_bits: 8,
-        ..with_windows()
+        ..with_windows().with(|with| with.neighbours = Neighbours::new(8))
     };
     let array = Array::new(40, 20).unwrap();
     for settings in [settings, with_neighbours] {
@@ -305,56 +304,47 @@ fn log(image: &Path, bytes: Vec<u8>) -> Result<String> {
 
 /// Settings with many events.
 pub fn settings() -> Settings {
-    Settings {
-        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
-        l1: 20,
-        x: 4,
-        ..Settings::static_scene(1)
-    }
+    Settings::static_scene(1).with(|with| {
+        with.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into();
+        with.l1 = 20;
+        with.x = 4;
+    })
 }
 
 /// The other rule and the other estimator.
 fn with_windows() -> Settings {
-    Settings {
-        rule: WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
+    settings().for_pulse(U8F8::lit("0.55")).with(|with| {
+        with.rule = WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
             .unwrap()
-            .into(),
-        sigma_bins: Some(U8F8::lit("0.55")),
-        ..settings()
-    }
+            .into();
+    })
 }
 
 /// Blocks of three levels, tracking and two echoes as well.
 pub fn with_all() -> Settings {
-    Settings {
-        binning: Some(AdaptiveBinning {
+    with_windows().for_pulse(U8F8::lit("1")).with(|with| {
+        with.binning = Some(AdaptiveBinning {
             levels: BlockLevel::MAX,
             patience: 20,
-        }),
-        tracking: true,
-        echoes: EchoNumber::new(2).unwrap(),
-        echo_wait: Some(4),
-        sigma_bins: Some(U8F8::lit("1")),
-        l2: 300,
-        ..with_windows()
-    }
+        });
+        with.tracking = true;
+        with.echoes = EchoNumber::new(2).unwrap();
+        with.echo_wait = 4;
+        with.l2 = 300;
+    })
 }
 
 /// A TDC that is dead for 20 bins after each photon, with tracking and two echoes.
 pub fn with_dead_time() -> Settings {
-    Settings {
-        binning: None,
-        dead_time: 20,
-        ..with_all()
-    }
+    with_all().with(|with| {
+        with.binning = None;
+        with.dead_time = Some(20);
+    })
 }
 
 /// Blocks, and photons that count once per bin.
 pub fn once_per_bin() -> Settings {
-    Settings {
-        once_per_bin: true,
-        ..with_all()
-    }
+    with_all().with(|with| with.once_per_bin = true)
 }
 
 /// A board and this computer find the same events and counts in the demo's scene, for every rule and
@@ -391,7 +381,7 @@ pub fn decides_alike(
     let mut scene = demo::scene()?;
     scene.size = [array.columns(), array.rows()];
     // The photons of such a TDC.
-    let dead_time_bins = (settings.dead_time > 0).then_some(settings.dead_time);
+    let dead_time_bins = (settings.dead_time() > 0).then_some(settings.dead_time());
     scene.effects.tdc = dead_time_bins.map(|bins| Tdc {
         dead_time_bins: Some(bins),
         ..Tdc::default()
@@ -412,12 +402,12 @@ pub fn decides_alike(
     let [pixels, blocks] = statistics;
     ensure!(!events.is_empty(), "no events");
     ensure!(
-        settings.once_per_bin == (pixels.repeated > 0),
+        settings.configuration.once_per_bin == (pixels.repeated > 0),
         "{} photons in a bin that had one",
         pixels.repeated
     );
     ensure!(
-        settings.binning.is_some() == (blocks.events > 0),
+        settings.configuration.binning.is_some() == (blocks.events > 0),
         "{} events of blocks",
         blocks.events
     );
@@ -478,7 +468,7 @@ fn reports_unplugged(
     let sensor = client.sensor()?.context("no sensor")?;
     let mut settings_of_sensor = settings();
     if let Some(bin_width) = sensor.bin_width {
-        settings_of_sensor.bin_width_ps = bin_width;
+        settings_of_sensor.configuration.bin_width_ps = bin_width;
     }
     let task = Task {
         settings: &settings_of_sensor,

@@ -119,7 +119,7 @@ impl Bench {
         let mut settings = settings();
         let sensor = client.sensor()?.context("no sensor")?;
         if let Some(bin_width) = sensor.bin_width {
-            settings.bin_width_ps = bin_width;
+            settings.configuration.bin_width_ps = bin_width;
         }
         let task = Task {
             settings: &settings,

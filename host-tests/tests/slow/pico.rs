@@ -195,19 +195,17 @@ impl Timer {
 
 /// Settings without a decision within the laser cycles of a test.
 fn gathers() -> Settings {
-    Settings {
-        l1: 60_000,
-        l2: 65_000,
-        ..senses()
-    }
+    senses().with(|with| {
+        with.l1 = 60_000;
+        with.l2 = 65_000;
+    })
 }
 
 pub fn senses() -> Settings {
-    Settings {
-        bin_width_ps: U16F16::from_num(BIN_NS * 1000),
-        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
-        ..settings()
-    }
+    settings().with(|with| {
+        with.bin_width_ps = U16F16::from_num(BIN_NS * 1000);
+        with.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into();
+    })
 }
 
 #[test]
@@ -266,10 +264,11 @@ fn pico_dithers_its_laser_and_decides_as_this_computer() -> Result<()> {
         let cycles = photons(3, 90, 1500, &mut random);
         let dither = Dither::new(range, seed)?;
         let edges = dithered_edges(&cycles, PERIOD_NS, dither, &mut random);
-        let with_dither = |settings: Settings| Settings {
-            dither_bins: range,
-            dither_seed: seed,
-            ..settings
+        let with_dither = |settings: Settings| {
+            settings.with(|with| {
+                with.dither_bins = range;
+                with.dither_seed = seed;
+            })
         };
 
         let mut timer = Timer::start(&image, &edges, &with_dither(gathers()))?;
@@ -305,11 +304,10 @@ fn pico_starts_its_timer_again_when_a_state_machine_was_late() -> Result<()> {
     let image = image(&["photon-timer"], None)?;
     let mut board = Rp2040::start_with_fault(&image, "starve", 5.0, 1)?;
     let mut client = Client::new(board.connect()?)?;
-    let settings = Settings {
-        dither_bins: 128,
-        dither_seed: 7,
-        ..gathers()
-    };
+    let settings = gathers().with(|with| {
+        with.dither_bins = 128;
+        with.dither_seed = 7;
+    });
     let task = Task {
         settings: &settings,
         pixels: 1,
@@ -365,7 +363,7 @@ fn events(
 ) -> Result<[Vec<dtof_core::DepthEvent>; 2]> {
     let mut timer = Timer::start(image, edges, settings)?;
     // An exposure ends with as many dark laser cycles.
-    let all = u16::try_from(cycles.len())? + settings.l2 + 10;
+    let all = u16::try_from(cycles.len())? + settings.configuration.l2 + 10;
     let report = timer.wait(all.into())?;
     ensure!(report.statistics.deferred == 0 && report.sensor_errors == 0);
     let found = timer.client.synchronise()?;
@@ -409,11 +407,10 @@ fn pico_keeps_up_with_a_laser_and_counts_what_it_loses() -> Result<()> {
         let cycles = photons(hits, 90, 5000, &mut random);
         let period = BIN_NS * u64::from((125_000_000 + laser_hz / 2) / laser_hz);
         let dither = Dither::new(range, 3)?;
-        let settings = Settings {
-            dither_bins: range,
-            dither_seed: dither.seed(),
-            ..senses()
-        };
+        let settings = senses().with(|with| {
+            with.dither_bins = range;
+            with.dither_seed = dither.seed();
+        });
         let edges = dithered_edges(&cycles, period, dither, &mut random);
         let mut timer = Timer::start(&image, &edges, &settings)?;
         let report = timer.wait(if keeps_up { 5000 } else { 2000 })?;

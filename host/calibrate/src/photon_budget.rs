@@ -8,7 +8,7 @@
 
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
-use dtof_core::{AnyRule, Array, Count, PaperRule, PixelAddress, WindowRule};
+use dtof_core::{AnyRule, Array, Count, DepthEstimator, PaperRule, PixelAddress, WindowRule};
 
 use super::find::significance::median;
 use super::{Length, Observed, WindowDetection};
@@ -107,17 +107,17 @@ impl<'a> Replay<'a> {
                 Some((pixel, (*truth)? + bias - own(place).unwrap_or(0.0)))
             });
         let (pixels, truth): (Vec<_>, Vec<f64>) = with_truth.unzip();
-        let settings = Settings {
-            gate: Some(gate),
-            bin_width_ps: U16F16::checked_from_num(bin_width_ps).context("the bin width")?,
-            offset_mm: I24F8::checked_from_num(offset_mm).context("the offset")?,
-            sigma_bins: Some(detection.sigma_bins),
-            half_widths: detection.half_widths,
-            l1: detection.l1,
-            l2: detection.l2,
-            x: detection.x,
-            ..SettingsFile::default().settings(observed.bins())?
-        };
+        let bin_width_ps = U16F16::checked_from_num(bin_width_ps).context("the bin width")?;
+        let offset_mm = I24F8::checked_from_num(offset_mm).context("the offset")?;
+        let default = SettingsFile::default().settings(observed.bins())?;
+        let settings = default.for_pulse(detection.sigma_bins).with(|of_range| {
+            of_range.gate = gate;
+            (of_range.bin_width_ps, of_range.offset_mm) = (bin_width_ps, offset_mm);
+            (of_range.x, of_range.l1, of_range.l2) = (detection.x, detection.l1, detection.l2);
+            if let Some(window) = detection.half_widths {
+                of_range.estimator = DepthEstimator::CentredWindow(window);
+            }
+        });
         let slice = Slice {
             first_cycle: 0,
             pixels,
@@ -139,7 +139,8 @@ impl<'a> Replay<'a> {
         let windows = self.detection.window..=WindowRule::MAX_WIDTH;
         let part = Part::new(progress, windows.len() as u64)?;
         let paper = PaperRule::new(const { U8F8::lit("4") }, Count::saturating(least.into()));
-        let Some(paper) = self.replay(paper.into(), (1, least, self.settings.x))? else {
+        let Some(paper) = self.replay(paper.into(), (1, least, self.settings.configuration.x))?
+        else {
             return Ok(None);
         };
         let mut best: Option<PhotonBudget> = None;
@@ -180,14 +181,14 @@ impl<'a> Replay<'a> {
             self.replay(rule.into(), (window, minimum, x))
         };
         for minimum in first..=MAX_MIN_COUNT {
-            let found = with(minimum, self.settings.x)?;
+            let found = with(minimum, self.settings.configuration.x)?;
             if found.is_none_or(|found| best.is_some() && found.photons > budget) {
                 break;
             }
             best = found;
         }
         // The rest of the budget allows a larger X.
-        while let Some(last) = best.filter(|last| last.x < self.settings.l2 / 4) {
+        while let Some(last) = best.filter(|last| last.x < self.settings.configuration.l2 / 4) {
             let found = with(last.min_count, last.x + 1)?;
             if found.is_none_or(|found| found.photons > budget) {
                 break;
@@ -202,12 +203,10 @@ impl<'a> Replay<'a> {
         rule: AnyRule,
         (window, min_count, x): (u8, u16, u16),
     ) -> Result<Option<PhotonBudget>> {
-        let settings = Settings {
-            rule,
-            x,
-            l1: self.settings.l1.max(x),
-            ..self.settings.clone()
-        };
+        let settings = self.settings.clone().with(|faster| {
+            (faster.rule, faster.x) = (rule, x);
+            faster.l1 = faster.l1.max(x);
+        });
         let pixels = u16::try_from(self.truth.len())?;
         let array = Array::new(pixels.into(), 1).context("no pixels")?;
         let addresses: Vec<PixelAddress> = (0..pixels).map(PixelAddress::new).collect();

@@ -16,10 +16,11 @@ fn replay(file: &Path) -> Result<usize> {
     let mut recording = open(file, &ReadOptions::default())?;
     let settings = Settings {
         bins: recording.metadata.bins,
-        bin_width_ps: recording.metadata.bin_width_ps,
-        x: 4,
-        l1: 40,
-        ..Settings::static_scene(1)
+        ..Settings::static_scene(1).with(|with| {
+            with.bin_width_ps = recording.metadata.bin_width_ps;
+            with.x = 4;
+            with.l1 = 40;
+        })
     };
     let photons = recording.photons.as_mut();
     let ranges = settings.ranges(photons.array())?;

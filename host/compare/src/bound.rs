@@ -49,7 +49,8 @@ impl Bound {
             );
             Exposure::new(light, bins, signal, settings)?.run(ratio.evidence(), threshold, rng)
         };
-        let looks = u32::from(settings.l2) / u32::from(settings.x.max(1));
+        let looks =
+            u32::from(settings.configuration.l2) / u32::from(settings.configuration.x.max(1));
         let most = u16::try_from(MAX_LOOKS / looks.max(1)).unwrap_or(WITHOUT);
         let exposures = most.clamp(WITH, WITHOUT);
         let without = (0..exposures).into_par_iter();
@@ -100,7 +101,7 @@ struct Exposure {
 
 impl Exposure {
     fn new(light: &Light, bins: u32, signal: f64, settings: &Settings) -> Result<Self> {
-        let x = f64::from(settings.x.max(1));
+        let x = f64::from(settings.configuration.x.max(1));
         // Other positions in the bin change the mean by less than 1 %.
         let place = f64::from(bins / 2) + 0.25;
         let pulse = if signal > 0.0 {
@@ -113,9 +114,9 @@ impl Exposure {
             bin: Uniform::new(0, u16::try_from(bins)?)?,
             pulse,
             bins,
-            x: settings.x.max(1).into(),
-            l1: settings.l1.into(),
-            l2: settings.l2.into(),
+            x: settings.configuration.x.max(1).into(),
+            l1: settings.configuration.l1.into(),
+            l2: settings.configuration.l2.into(),
         })
     }
 

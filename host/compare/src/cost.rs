@@ -59,7 +59,7 @@ fn look(method: &Method, settings: &Settings) -> f64 {
         return 0.0;
     };
     match events.rule {
-        _ if events.weighs && usize::from(settings.dead_time) >= settings.bins => FIRST_PHOTON,
+        _ if events.weighs && usize::from(settings.dead_time()) >= settings.bins => FIRST_PHOTON,
         _ if events.weighs => DEAD_TIME,
         _ if events.tracking => TRACKING,
         Rule::Paper => PAPER,
@@ -85,9 +85,9 @@ pub fn instructions(
     let looks = if method.is_frames() {
         0.0
     } else {
-        all / f64::from(settings.x.max(1))
+        all / f64::from(settings.configuration.x.max(1))
     };
-    let has_blocks = settings.binning.is_some();
+    let has_blocks = settings.configuration.binning.is_some();
     let of_blocks: f64 = if has_blocks {
         let levels = i32::from(method.levels().raw());
         let each_pixel = (1.0 - 0.25f64.powi(levels)) / 3.0;
@@ -97,7 +97,7 @@ pub fn instructions(
     } else {
         0.0
     };
-    let depth = match settings.estimator() {
+    let depth = match settings.configuration.estimator {
         DepthEstimator::Centroid3 => 0.0,
         DepthEstimator::CentredWindow(_) => CENTRED,
     };
@@ -106,7 +106,7 @@ pub fn instructions(
     let event = method.neighbours().map_or(EVENT, |neighbours| {
         EVENT + f64::from(neighbours.raw()) / 8.0 * (CONFIRMED - EVENT)
     });
-    let photon = if settings.once_per_bin {
+    let photon = if settings.configuration.once_per_bin {
         ONCE_PER_BIN
     } else {
         PHOTON

@@ -172,7 +172,7 @@ impl<'a> Methods<'a> {
     fn trials(&self, light: &Light) -> Result<Vec<Trial>> {
         let methods = self.all.iter().enumerate();
         let trials = methods.flat_map(|(number, method)| {
-            let efforts = efforts(method, self.settings.l2, light).into_iter();
+            let efforts = efforts(method, self.settings.configuration.l2, light).into_iter();
             efforts.map(move |effort| self.trial(number, effort))
         });
         trials.collect()
@@ -223,7 +223,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     );
     let light = light(&surveyed, sigma, has_target);
 
-    let mut stresses = Stress::all(&light, settings.gate.map_or(0, |gate| gate.0));
+    let mut stresses = Stress::all(&light, settings.configuration.gate.0);
     // A stress that makes every pixel hot leaves none to compare.
     let is_hot = |stress: &Stress, pixel| stress.is_hot(pixel, array.columns());
     stresses.retain(|stress| surveyed.iter().any(|(pixel, _)| !is_hot(stress, *pixel)));
@@ -232,7 +232,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
     let all = Method::all(pulse, most_levels, has_neighbours, settings);
     let tried = all
         .iter()
-        .map(|method| efforts(method, settings.l2, &light).len());
+        .map(|method| efforts(method, settings.configuration.l2, &light).len());
     let (tried, under_stress_tried) = (tried.sum(), all.len() + 2);
     let rest = cost.rest(tried, under_stress_tried, stresses.len());
     let step = "finds thresholds of equal false alarms";
@@ -260,7 +260,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
 
     let frame = longest_frame(&methods.all, &outcomes);
     let frame_mm = frame.map(|frame| frame.figures.error_mm);
-    let frame_cycles = frame.map_or(settings.l2, |frame| frame.trial.effort);
+    let frame_cycles = frame.map_or(settings.configuration.l2, |frame| frame.trial.effort);
     let answer = choose(task, &methods.all, &outcomes, frame_mm)?;
     let trial = |choice: Option<Choice>| {
         let trial = choice.map(|choice| methods.trial(choice.method, choice.effort));
@@ -288,7 +288,7 @@ pub fn compare(task: &Task) -> Result<Comparison> {
         outcomes,
         bound,
         stressed,
-        l1: (settings.l1, task.why_l1.to_owned()),
+        l1: (settings.configuration.l1, task.why_l1.to_owned()),
         light,
         truth,
         sensor,
@@ -333,7 +333,7 @@ impl Cost {
 
 /// About `most` photons of the seed that is `nth_seed` after the first.
 fn photons(task: &Task, nth_seed: u64, most: f64) -> Result<Box<dyn PhotonSource>> {
-    let Settings { seed, l2, .. } = *task.settings;
+    let (seed, l2) = (task.settings.seed, task.settings.configuration.l2);
     limited((task.photons)(seed + nth_seed)?, most, l2)
 }
 
@@ -397,7 +397,7 @@ fn known_ranges(
     array: Array,
 ) -> Result<Truth> {
     let mm_per_bin = mm_per_bin(settings);
-    let offset = settings.offset_mm.to_num::<f64>();
+    let offset = settings.configuration.offset_mm.to_num::<f64>();
     let range = |address: PixelAddress, pixel: &PixelLight| {
         let own = settings.offsets_mm.get(usize::from(address.raw()));
         let own: f64 = own.map_or(0.0, |own| own.to_num());

@@ -1,9 +1,11 @@
 //! The methods that are compared: rule, depth estimator and name.
 
 use dtof_core::fixed::types::{U4F12, U8F8};
-use dtof_core::{AnyRule, AverageRule, BlockLevel, Count, Neighbours, PaperRule, WindowRule};
+use dtof_core::{
+    AnyRule, AverageRule, BlockLevel, Count, DepthEstimator, Neighbours, PaperRule, WindowRule,
+};
 use dtof_draw::palette::{self, Pen};
-use dtof_link::AdaptiveBinning;
+use dtof_link::{AdaptiveBinning, Configuration};
 
 use dtof_engine::settings::Settings;
 
@@ -139,14 +141,14 @@ impl Method {
             Self::events(name.clone(), window, palette::window(3)),
         ];
         let mut add = |name: &str, events, pen| methods.push(Self::events(name, events, pen));
-        if like.dead_time > 0 {
+        if like.dead_time() > 0 {
             let weighs = Events {
                 weighs: true,
                 ..window
             };
             add(&format!("{name}, dead time"), weighs, palette::window(4));
         }
-        if like.once_per_bin {
+        if like.configuration.once_per_bin {
             let once_per_bin = Events {
                 once_per_bin: true,
                 ..window
@@ -251,39 +253,44 @@ impl Method {
         threshold: f64,
         effort: u16,
     ) -> anyhow::Result<Settings> {
-        let settings = Settings {
-            centroid: self.centroid,
+        let window = like.depth_window().filter(|_| !self.centroid);
+        let configuration = Configuration {
+            estimator: window.map_or(DepthEstimator::Centroid3, DepthEstimator::CentredWindow),
             binning: None,
             neighbours: None,
             tracking: false,
-            frame: None,
-            dead_time: 0,
+            dead_time: Some(0),
             once_per_bin: false,
-            ..like.clone()
+            ..like.configuration
         };
-        Ok(match self.kind {
-            Kind::Frames => Settings {
-                frame: Some(effort),
-                ..settings
-            },
-            Kind::Events(events) => Settings {
-                rule: events.rule.with(threshold, effort)?,
-                binning: (!self.has_full_resolution()).then(|| AdaptiveBinning {
-                    levels: self.levels(),
-                    patience: events.patience.unwrap_or_else(|| patience_of(like)),
-                }),
-                neighbours: events.neighbours,
-                tracking: events.tracking,
-                dead_time: if events.weighs { like.dead_time } else { 0 },
-                once_per_bin: events.once_per_bin,
-                ..settings
-            },
+        let (configuration, frame) = match self.kind {
+            Kind::Frames => (configuration, Some(effort)),
+            Kind::Events(events) => {
+                let of_events = Configuration {
+                    rule: events.rule.with(threshold, effort)?,
+                    binning: (!self.has_full_resolution()).then(|| AdaptiveBinning {
+                        levels: self.levels(),
+                        patience: events.patience.unwrap_or_else(|| patience_of(like)),
+                    }),
+                    neighbours: events.neighbours,
+                    tracking: events.tracking,
+                    dead_time: Some(if events.weighs { like.dead_time() } else { 0 }),
+                    once_per_bin: events.once_per_bin,
+                    ..configuration
+                };
+                (of_events, None)
+            }
+        };
+        Ok(Settings {
+            configuration,
+            frame,
+            ..like.clone()
         })
     }
 }
 
 /// The patience of blocks in `settings`, or the default.
 fn patience_of(settings: &Settings) -> u16 {
-    let binning = settings.binning;
+    let binning = settings.configuration.binning;
     binning.map_or(AdaptiveBinning::PATIENCE, |binning| binning.patience)
 }

@@ -61,8 +61,8 @@ pub fn survey(
     let all = addresses.into_iter().zip(histograms).zip(cycles);
     let all = all.map(|((address, histogram), cycles)| {
         let mut counts: Vec<f64> = histogram.iter().map(|&count| count as f64).collect();
-        if settings.dead_time > 0 {
-            counts = arrived(&counts, cycles as f64, settings.dead_time.into());
+        if settings.dead_time() > 0 {
+            counts = arrived(&counts, cycles as f64, settings.dead_time().into());
         }
         let mut pixel = of_pixel(&counts[first..=last], cycles, sigma);
         pixel.position = pixel.position.map(|position| position + first as f64);

@@ -15,7 +15,7 @@ pub const WRONG_BEYOND_BINS: f64 = 3.0;
 
 /// The length of a bin in millimetres.
 pub fn mm_per_bin(settings: &Settings) -> f64 {
-    settings.bin_width_ps.to_num::<f64>() * MM_PER_PS
+    settings.configuration.bin_width_ps.to_num::<f64>() * MM_PER_PS
 }
 
 /// The first and the last bin of the gate, or of the histogram.
@@ -23,10 +23,8 @@ pub fn mm_per_bin(settings: &Settings) -> f64 {
 /// # Errors
 /// Fails if the gate does not lie in the histogram.
 pub fn first_and_last(settings: &Settings) -> Result<(usize, usize)> {
-    let (first, last) = match settings.gate {
-        Some((first, last)) => (first.into(), last.into()),
-        None => (0, settings.bins.saturating_sub(1)),
-    };
+    let (first, last) = settings.configuration.gate;
+    let (first, last) = (first.into(), last.into());
     ensure!(
         first <= last && last < settings.bins,
         "a gate from bin {first} to {last} of {} bins",
@@ -144,7 +142,7 @@ impl<'a> Tally<'a> {
             ranges: settings.ranges(array)?,
             mm_per_bin: mm_per_bin(settings),
             cycles,
-            has_neighbours: settings.neighbours.is_some(),
+            has_neighbours: settings.configuration.neighbours.is_some(),
             most: (MAX_KEPT / pixels.max(1)).clamp(8, 1024),
             pixels: vec![Reports::default(); pixels],
             stray: 0,
@@ -291,10 +289,7 @@ mod tests {
     /// The time of a pixel that has a target from laser cycle 5,000 to 6,000 and reports at these.
     fn time(reports: &[u64], neighbours: Option<Neighbours>) -> f64 {
         let array = Array::new(1, 1).unwrap();
-        let settings = Settings {
-            neighbours,
-            ..Settings::static_scene(1)
-        };
+        let settings = Settings::static_scene(1).with(|with| with.neighbours = neighbours);
         let event = |cycle: u64| DepthEvent {
             pixel: PixelAddress::new(0),
             level: BlockLevel::PIXEL,

@@ -110,7 +110,7 @@ fn exceeded<const BINS: usize>(
         })
         .collect::<Result<_>>()?;
     let bins = BINS as f64;
-    let photons = background * bins * f64::from(settings.l2);
+    let photons = background * bins * f64::from(settings.configuration.l2);
     #[allow(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -118,7 +118,7 @@ fn exceeded<const BINS: usize>(
     )]
     let exposures = (MAX_PHOTONS / photons.max(1.0)).min(MAX_EXPOSURES.into()) as u32;
     let exposures = exposures.max(MIN_EXPOSURES);
-    let each_look = background * bins * f64::from(settings.x);
+    let each_look = background * bins * f64::from(settings.configuration.x);
     let each_look = (each_look > 0.0)
         .then(|| Poisson::new(each_look))
         .transpose()?;
@@ -132,7 +132,7 @@ fn exceeded<const BINS: usize>(
         let mut fired = vec![0usize; ladders.len()];
         let mut cycles = 0u32;
         loop {
-            cycles += u32::from(settings.x.max(1));
+            cycles += u32::from(settings.configuration.x.max(1));
             let count = each_look.map_or(0.0, |photons| photons.sample(&mut rng));
             let mut made = 0.0;
             while made < count {
@@ -142,10 +142,10 @@ fn exceeded<const BINS: usize>(
                     histogram.add(code);
                 }
             }
-            if cycles >= u32::from(settings.l2) {
+            if cycles >= u32::from(settings.configuration.l2) {
                 break fired;
             }
-            if cycles <= u32::from(settings.l1) {
+            if cycles <= u32::from(settings.configuration.l1) {
                 continue;
             }
             for (ladder, fired) in ladders.iter().zip(&mut fired) {

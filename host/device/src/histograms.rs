@@ -129,18 +129,16 @@ struct Collecting<'a> {
 impl Collecting<'_> {
     fn configure(&mut self, source: Source) -> Result<()> {
         let highest = PaperRule::new(U8F8::MAX, Count::saturating(1023));
-        let settings = Settings {
-            rule: highest.into(),
-            gate: None,
+        let last_bin = u16::try_from(self.settings.bins)?.saturating_sub(1);
+        let settings = self.settings.clone().with(|device| {
+            device.rule = highest.into();
+            device.gate = (0, last_bin);
             // The rule does not weigh bins, and no event is used.
-            dead_time: 0,
+            device.dead_time = Some(0);
             // Every photon is counted.
-            once_per_bin: false,
-            x: X,
-            l1: X,
-            l2: self.l2,
-            ..self.settings.clone()
-        };
+            device.once_per_bin = false;
+            (device.x, device.l1, device.l2) = (X, X, self.l2);
+        });
         let task = Task {
             settings: &settings,
             pixels: self.pixels,

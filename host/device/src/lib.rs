@@ -80,41 +80,24 @@ impl Task<'_> {
     /// The configuration of a device that takes photons from `source`.
     ///
     /// # Errors
-    /// Fails if the settings have no bins, ask for frames or a single decision, or if a number does not fit.
+    /// Fails if the settings ask for frames or a single decision, or if the columns do not fit.
     pub fn configuration(&self, source: Source) -> Result<Configuration> {
         let settings = self.settings;
         check_looks(settings)?;
-        let last_bin = u16::try_from(settings.bins)?.checked_sub(1);
-        let last_bin = last_bin.context("the settings have no bins")?;
         // A laser that is not the device's is not its to dither. Without a dither the seed means nothing.
-        let (dither_bins, dither_seed) = match (source, settings.dither_bins) {
+        let (dither_bins, dither_seed) = match (source, settings.configuration.dither_bins) {
             (Source::Link, _) | (_, 0) => (0, 0),
-            (Source::Sensor, bins) => (bins, settings.dither_seed),
+            (Source::Sensor, bins) => (bins, settings.configuration.dither_seed),
         };
         Ok(Configuration {
-            rule: settings.rule,
-            estimator: settings.estimator(),
-            x: settings.x,
-            l1: settings.l1,
-            l2: settings.l2,
-            gate: settings.gate.unwrap_or((0, last_bin)),
-            dead_time: Some(settings.dead_time),
-            once_per_bin: settings.once_per_bin,
             dither_bins,
             dither_seed,
             pixels: self.pixels,
             columns: u16::try_from(self.columns)?,
-            binning: settings.binning,
-            neighbours: settings.neighbours,
-            tracking: settings.tracking,
-            echoes: settings.echoes,
-            echo_guard_bins: settings.echo_guard_bins(),
-            echo_wait: settings.echo_wait_times(),
-            bin_width_ps: settings.bin_width_ps,
-            offset_mm: settings.offset_mm,
             source,
             dynamic_depth: self.dynamic_depth,
             host_timeout_ms: self.host_timeout.milliseconds(),
+            ..settings.configuration
         })
     }
 }

@@ -43,13 +43,13 @@ pub fn array(pixels: u16, columns: Option<u32>) -> Option<Array> {
 /// Fails if there are both masked pixels and one of these.
 pub fn check_masked(settings: &Settings) -> Result<()> {
     ensure!(
-        settings.masked.is_empty() || settings.binning.is_none(),
+        settings.masked.is_empty() || settings.configuration.binning.is_none(),
         Refused::input(
             "the blocks of a device count masked pixels, too; leave out `masked` or `binning`"
         )
     );
     ensure!(
-        settings.masked.is_empty() || settings.neighbours.is_none(),
+        settings.masked.is_empty() || settings.configuration.neighbours.is_none(),
         Refused::input(
             "on a device masked pixels confirm their neighbours, too; leave out `masked` or `neighbours`"
         )

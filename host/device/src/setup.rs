@@ -181,8 +181,8 @@ impl Setup {
             #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
             bins: self.settings.bins as u32,
             array: self.array,
-            bin_width_ps: self.settings.bin_width_ps,
-            offset_mm: self.settings.offset_mm,
+            bin_width_ps: self.settings.configuration.bin_width_ps,
+            offset_mm: self.settings.configuration.offset_mm,
             offsets_mm: self.settings.pixel_offsets(),
             laser_millihertz: self.laser_millihertz,
             start_us: i64::try_from(start.as_micros()).unwrap_or(0),
@@ -232,8 +232,8 @@ mod tests {
             let setup = Setup::new(sensor, 10, 128, settings, 4).unwrap();
             // A recording says so, too.
             let recorded = SettingsFile::parse(&setup.toml().unwrap()).unwrap();
-            assert_eq!(recorded.sensor.gate, setup.settings.gate);
-            (setup.requested.sensor.gate, setup.settings.gate)
+            assert_eq!(recorded.sensor.gate, setup.settings.gate());
+            (setup.requested.sensor.gate, setup.settings.gate())
         };
         assert_eq!(gate(None, 128), (None, None));
         assert_eq!(gate(None, 117), (None, Some((0, 116))));
@@ -369,7 +369,7 @@ mod tests {
             let setup = setup(&text, of_sensor);
             let settings = &setup.settings;
             assert_eq!(
-                (settings.dead_time, settings.is_dead_time_of_sensor),
+                (settings.dead_time(), settings.is_dead_time_of_sensor),
                 used,
                 "{text}"
             );
@@ -379,7 +379,7 @@ mod tests {
             // Another rule, and what the sensor says is used or not.
             let requested = SettingsFile::parse(window).unwrap();
             let changed = setup.with_requested(requested).unwrap().settings;
-            assert_eq!(changed.dead_time, of_sensor.min(128));
+            assert_eq!(changed.dead_time(), of_sensor.min(128));
         }
     }
 }

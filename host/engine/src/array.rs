@@ -5,11 +5,10 @@
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::binning::Block;
-use dtof_core::neighbours::NeighbourConfig;
 use dtof_core::rule::DecisionInput;
 use dtof_core::{
-    AnyRule, Array, ArrayConfig, ArrayState, CounterWidth, DepthEvent, Neighbours, PixelAddress,
-    PixelArray, PixelData, PixelPlace, Statistics, WindowRule,
+    AnyRule, Array, ArrayConfig, ArrayState, CounterWidth, DepthEvent, PixelAddress, PixelArray,
+    PixelData, PixelPlace, Statistics, WindowRule,
 };
 use dtof_link::AdaptiveBinning;
 
@@ -93,11 +92,11 @@ pub struct ArrayEngine<const BINS: usize, W: CounterWidth> {
 /// # Errors
 /// Fails if neighbours cannot be used with the other settings.
 pub fn neighbour_rule(settings: &Settings) -> Result<&WindowRule> {
-    let AnyRule::Window(rule) = &settings.rule else {
+    let AnyRule::Window(rule) = &settings.configuration.rule else {
         return Err(Refused::new("neighbours", "is for `rule` window").into());
     };
     ensure!(
-        settings.binning.is_none(),
+        settings.configuration.binning.is_none(),
         Refused::new("neighbours", "cannot be used with `binning`")
     );
     ensure!(
@@ -231,7 +230,6 @@ impl<const BINS: usize, W: CounterWidth> ArrayEngine<BINS, W> {
         array: Array,
         source: &[PixelAddress],
     ) -> Result<Self> {
-        let (pixels, blocks) = (settings.config()?, settings.block_config()?);
         let top = binning.levels;
         let parts = (0..array.blocks(top)).map(|block| {
             let addresses = array.pixels_of(array.first_of(block, top), top);
@@ -243,8 +241,7 @@ impl<const BINS: usize, W: CounterWidth> ArrayEngine<BINS, W> {
             };
             let columns = u32::try_from(addresses.len())? / rows;
             let layout = Array::new(columns, rows).context("a block without pixels")?;
-            let config = ArrayConfig::new(layout, pixels).blocks(top, blocks, binning.patience)?;
-            Part::new(&config, addresses, source)
+            Part::new(&settings.array_config(layout)?, addresses, source)
         });
         Ok(Self {
             parts: parts.collect::<Result<_>>()?,
@@ -257,17 +254,18 @@ impl<const BINS: usize, W: CounterWidth> ArrayEngine<BINS, W> {
     /// Fails if the settings break a constraint.
     pub fn with_neighbours(
         settings: &Settings,
-        neighbours: Neighbours,
         array: Array,
         source: &[PixelAddress],
     ) -> Result<Self> {
-        let rule = neighbour_rule(settings)?;
-        let neighbours = NeighbourConfig::new(array, neighbours, rule);
-        let config = ArrayConfig::new(array, settings.config()?).neighbours(neighbours)?;
+        neighbour_rule(settings)?;
         let addresses = (0..=u16::MAX).map(PixelAddress::new);
         let addresses = addresses.take(usize::try_from(array.pixels())?).collect();
         Ok(Self {
-            parts: vec![Part::new(&config, addresses, source)?],
+            parts: vec![Part::new(
+                &settings.array_config(array)?,
+                addresses,
+                source,
+            )?],
         })
     }
 }

@@ -61,9 +61,9 @@ pub fn explain(
     let explanation = explanation.ok()??;
     // Complete histograms are not tracked or confirmed, and their first echo does not depend on others.
     let depends = !is_whole
-        && (settings.tracking
-            || settings.neighbours.is_some()
-            || settings.echoes != EchoNumber::FIRST);
+        && (settings.configuration.tracking
+            || settings.configuration.neighbours.is_some()
+            || settings.configuration.echoes != EchoNumber::FIRST);
     Some(match depends {
         false => explanation,
         true => Explanation {
@@ -362,15 +362,11 @@ mod tests {
         fn the_number_needed_is_the_first_that_is_reported(counts in counts(), which in 0..3, gate in 0..60_u16) {
             let alpha = U8F8::lit("4");
             let minimum = Count::saturating(5);
-            let settings = Settings {
-                rule: match which {
+            let settings = Settings::static_scene(0).with(|with| { with.rule = match which {
                     0 => PaperRule::new(alpha, minimum).into(),
                     1 => AverageRule::new(alpha, minimum).into(),
                     _ => WindowRule::new(3, "4.5".parse().unwrap(), minimum).unwrap().into(),
-                },
-                gate: Some((gate, 127)),
-                ..Settings::static_scene(0)
-            };
+                }; with.gate = (gate, 127); });
             let explanation = explain(&settings, &counts, 60, false).unwrap();
             let (bin, peak) = explanation.peak;
             let within = &counts[usize::from(gate)..];
@@ -410,20 +406,11 @@ mod tests {
         let counts: Vec<u32> = (0..128).map(|bin| u32::from(bin == 40) * 50).collect();
         let explained = |settings: Settings| explain(&settings, &counts, 60, false).unwrap();
         let window = WindowRule::new(3, "4.5".parse().unwrap(), Count::saturating(5)).unwrap();
-        let plain = Settings {
-            rule: window.into(),
-            ..Settings::static_scene(0)
-        };
+        let plain = Settings::static_scene(0).with(|with| with.rule = window.into());
         let first = explained(plain.clone());
         assert!(first.needed.is_some() && !first.depends);
-        let tracks = Settings {
-            tracking: true,
-            ..plain.clone()
-        };
-        let echoes = Settings {
-            echoes: EchoNumber::new(2).unwrap(),
-            ..plain
-        };
+        let tracks = plain.clone().with(|with| with.tracking = true);
+        let echoes = plain.with(|with| with.echoes = EchoNumber::new(2).unwrap());
         for settings in [tracks, echoes] {
             let explanation = explained(settings);
             assert_eq!(
@@ -453,15 +440,14 @@ mod tests {
         }
         let rule = WindowRule::new(3, "4.5".parse().unwrap(), Count::saturating(5)).unwrap();
         let explained = |gate| {
-            let settings = Settings {
-                rule: rule.into(),
-                dead_time: 20,
-                gate,
-                ..Settings::static_scene(0)
-            };
+            let settings = Settings::static_scene(0).with(|with| {
+                with.rule = rule.into();
+                with.dead_time = Some(20);
+                with.gate = gate;
+            });
             explain(&settings, &counts, 1000, false).unwrap()
         };
-        for gate in [None, Some((30, 127))] {
+        for gate in [(0, 127), (30, 127)] {
             let explanation = explained(gate);
             assert_eq!(explanation.peak, (60, counts[60]), "{gate:?}");
             let (first, last) = explanation.window.unwrap();
@@ -476,17 +462,16 @@ mod tests {
             );
         }
         // Without a detection it is that of all gated bins.
-        let explanation = explained(Some((70, 127)));
+        let explanation = explained((70, 127));
         assert_eq!(explanation.window, None);
         assert!(explanation.background.is_some());
         // A full counter before the gate: nothing is known.
         counts[3] = 1023;
-        let settings = Settings {
-            rule: rule.into(),
-            dead_time: 20,
-            gate: Some((30, 127)),
-            ..Settings::static_scene(0)
-        };
+        let settings = Settings::static_scene(0).with(|with| {
+            with.rule = rule.into();
+            with.dead_time = Some(20);
+            with.gate = (30, 127);
+        });
         let explanation = explain(&settings, &counts, 1000, false).unwrap();
         assert_eq!((explanation.window, explanation.background), (None, None));
     }

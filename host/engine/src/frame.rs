@@ -132,7 +132,7 @@ impl<const BINS: usize> FrameEngine<BINS> {
         let pixels = addresses.iter();
         Ok(Self {
             gate: settings.range_gate()?,
-            estimator: settings.estimator(),
+            estimator: settings.configuration.estimator,
             pixels: pixels
                 .map(|&address| FramePixel::new(address, 0, length))
                 .collect(),

@@ -42,10 +42,14 @@ fn asynchronous<const BINS: usize, W: CounterWidth + Sync + 'static>(
 ) -> Result<Box<dyn Engine>> {
     type Arrays<const BINS: usize, W> = ArrayEngine<BINS, W>;
     Ok(
-        match (settings.frame, settings.neighbours, settings.binning) {
+        match (
+            settings.frame,
+            settings.configuration.neighbours,
+            settings.configuration.binning,
+        ) {
             (Some(length), ..) => Box::new(FrameEngine::<BINS>::new(settings, length, addresses)?),
-            (None, Some(neighbours), _) => Box::new(Arrays::<BINS, W>::with_neighbours(
-                settings, neighbours, array, addresses,
+            (None, Some(_), _) => Box::new(Arrays::<BINS, W>::with_neighbours(
+                settings, array, addresses,
             )?),
             (None, None, Some(binning)) => Box::new(Arrays::<BINS, W>::with_blocks(
                 settings, binning, array, addresses,

@@ -84,10 +84,10 @@ pub fn decide_once(
     is_kept: impl Fn(PixelAddress) -> bool + Sync,
 ) -> Result<Vec<OnceDecision>> {
     ensure!(
-        settings.binning.is_none(),
+        settings.configuration.binning.is_none(),
         Refused::new("decide_once", "cannot be used with `binning`")
     );
-    if settings.neighbours.is_some() {
+    if settings.configuration.neighbours.is_some() {
         neighbour_rule(settings)?;
     }
     let is_masked = |address: &PixelAddress| settings.masked.contains(&address.raw());
@@ -96,7 +96,7 @@ pub fn decide_once(
         config: settings.config()?,
         any_peak: settings.any_peak().config()?,
         array,
-        neighbours: settings.neighbours,
+        neighbours: settings.configuration.neighbours,
         addresses,
         is_masked: &is_masked,
         counts,
@@ -108,18 +108,13 @@ pub fn decide_once(
 impl Settings {
     /// The same with a window rule that takes any peak.
     fn any_peak(&self) -> Self {
-        let rule = match self.rule {
-            AnyRule::Window(rule) => {
-                WindowRule::new(rule.width(), U4F12::ZERO, Count::saturating(1))
-                    .map_or(self.rule, AnyRule::Window)
+        self.clone().with(|any| {
+            if let AnyRule::Window(rule) = any.rule {
+                any.rule = WindowRule::new(rule.width(), U4F12::ZERO, Count::saturating(1))
+                    .map_or(any.rule, AnyRule::Window);
             }
-            rule => rule,
-        };
-        Self {
-            rule,
-            neighbours: None,
-            ..self.clone()
-        }
+            any.neighbours = None;
+        })
     }
 }
 

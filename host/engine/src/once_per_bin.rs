@@ -141,11 +141,10 @@ mod tests {
         let array = Array::new(2, 1).unwrap();
         let addresses = [0, 1].map(PixelAddress::new);
         let run = |once_per_bin, slices: &[Slice]| {
-            let settings = Settings {
-                once_per_bin,
-                l1: 40,
-                ..Settings::static_scene(1)
-            };
+            let settings = Settings::static_scene(1).with(|with| {
+                with.once_per_bin = once_per_bin;
+                with.l1 = 40;
+            });
             let mut engine = host_engine(&settings, array, &addresses).unwrap();
             let events = slices.iter().flat_map(|slice| engine.run(slice).unwrap());
             (events.collect::<Vec<_>>(), engine.statistics()[0])

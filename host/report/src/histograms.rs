@@ -51,14 +51,14 @@ impl Decisions<'_> {
         };
         let bins = self.settings.bins;
         let last = bins.saturating_sub(1);
-        let gate = self.settings.gate;
+        let gate = self.settings.gate();
         let data = json!({
             "bins": bins,
             "gate": gate.map_or([0, last], |(first, last)| [first.into(), last.into()]),
             "quadrants": looks.first().map(|look| look.quadrants),
             "every": kept.step,
             "count": count,
-            "deadTime": if self.settings.weighs_dead_time() { self.settings.dead_time } else { 0 },
+            "deadTime": if self.settings.weighs_dead_time() { self.settings.dead_time() } else { 0 },
             "packed": packed.base64(),
         });
         (data, packed.len())

@@ -102,11 +102,10 @@ impl RunCounts {
         addresses: &[PixelAddress],
     ) -> Result<Vec<bool>> {
         let mut contradicts = vec![false; addresses.len()];
-        let other = Settings {
-            gate: input.given_gate,
-            ..input.settings.clone()
-        };
-        let has_other = other.gate != input.settings.gate;
+        let all = (0, u16::try_from(input.settings.bins)?.saturating_sub(1));
+        let given_gate = input.given_gate.unwrap_or(all);
+        let other = input.settings.clone().with(|other| other.gate = given_gate);
+        let has_other = other != input.settings;
         for settings in [&input.settings]
             .into_iter()
             .chain(has_other.then_some(&other))
@@ -177,10 +176,8 @@ impl DepthMap {
         };
         // Two echoes tell whether there is a second surface. The first is the same.
         let two = const { EchoNumber::new(2).unwrap() };
-        let with_two = Settings {
-            echoes: settings.echoes.max(two),
-            ..settings.clone()
-        };
+        let echoes = settings.configuration.echoes;
+        let with_two = settings.clone().with(|with| with.echoes = echoes.max(two));
         let decided = decide_once(&with_two, array, addresses, counts, |_| false)?;
         let ranges = settings.ranges(array)?;
         let pixels = array.pixels() as usize;
@@ -188,7 +185,7 @@ impl DepthMap {
         let mut map = Self {
             positions: vec![None; pixels],
             depth_mm: empty(),
-            echoes_mm: (settings.echoes >= two).then(|| [empty(), empty()]),
+            echoes_mm: (echoes >= two).then(|| [empty(), empty()]),
             best_mm: empty(),
             confidence: empty(),
             flags: vec![0; pixels],
@@ -267,9 +264,9 @@ fn have_changed(
         let [before, after] = halves.each_ref().map(|half| {
             let (bin, reach) = (
                 usize::from(echo.peak.bin.raw()),
-                usize::from(settings.rule.window_bins()) / 2,
+                usize::from(settings.configuration.rule.window_bins()) / 2,
             );
-            let (first, last) = settings.gate.unwrap_or((0, u16::MAX));
+            let (first, last) = settings.gate().unwrap_or((0, u16::MAX));
             let gate = usize::from(first)..=usize::from(last);
             let histogram = half.histogram(place);
             let bins = (0..)

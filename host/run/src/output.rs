@@ -196,7 +196,7 @@ impl Output {
             Some(Echo::Strongest) => "the strongest of an exposure",
             Some(Echo::All) => "all",
         };
-        let several = settings.echoes > EchoNumber::FIRST;
+        let several = settings.configuration.echoes > EchoNumber::FIRST;
         several.then(|| ("echoes shown".to_owned(), text.to_owned()))
     }
 
@@ -405,8 +405,8 @@ pub fn header(settings: &Settings, source: &dyn PhotonSource) -> Result<aer_file
     Ok(aer_file::Header {
         bins: u32::try_from(settings.bins)?,
         array: source.array(),
-        bin_width_ps: settings.bin_width_ps,
-        offset_mm: settings.offset_mm,
+        bin_width_ps: settings.configuration.bin_width_ps,
+        offset_mm: settings.configuration.offset_mm,
         offsets_mm: settings.pixel_offsets(),
         laser_millihertz: source.laser_hz().map_or(0, |hz| hz.saturating_mul(1000)),
         start_us: 0,
@@ -416,8 +416,14 @@ pub fn header(settings: &Settings, source: &dyn PhotonSource) -> Result<aer_file
 /// The selection of one echo of each exposure, if a pixel reports several and not all are shown.
 fn selection(echo: Option<Echo>, settings: &Settings) -> Option<EchoSelection> {
     let echo = echo.unwrap_or(Echo::Strongest);
-    let several = settings.echoes > EchoNumber::FIRST && echo != Echo::All;
-    several.then(|| EchoSelection::new(echo, settings.echoes, settings.longest_exposure()))
+    let several = settings.configuration.echoes > EchoNumber::FIRST && echo != Echo::All;
+    several.then(|| {
+        EchoSelection::new(
+            echo,
+            settings.configuration.echoes,
+            settings.longest_exposure(),
+        )
+    })
 }
 
 /// Names of results, and the mark near the start of each.

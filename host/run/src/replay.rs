@@ -119,14 +119,14 @@ impl Replay {
     fn dim_targets(&self, summary: &Summary) -> Option<String> {
         let has_little = 2 * summary.pixels_with_depth
             < summary.pixels.saturating_sub(self.settings.masked.len());
-        let may_have = self.settings.neighbours.is_none() && self.settings.frame.is_none();
+        let may_have =
+            self.settings.configuration.neighbours.is_none() && self.settings.frame.is_none();
         if !has_little || !may_have || self.found.is_empty() {
             return None;
         }
-        let with_neighbours = Settings {
-            neighbours: Some(Neighbours::Eight),
-            ..self.settings.clone()
-        };
+        let with_neighbours = self.settings.clone();
+        let with_neighbours =
+            with_neighbours.with(|with| with.neighbours = Some(Neighbours::Eight));
         let (array, addresses) = (self.photons.array(), self.photons.addresses());
         let may_help = self.metadata.has_shape
             && array.columns().min(array.rows()) > 1
@@ -246,9 +246,10 @@ impl Options {
         let settings = settings.and_then(|settings| settings.for_source(photons.as_ref()));
         let settings = settings.map_err(|error| requested.add_file_name(error))?;
         let refused = |refused: Refused| anyhow::Error::from(refused).context(input.to_string());
-        let asks_neighbours = settings.neighbours.is_some() && settings.frame.is_none();
+        let asks_neighbours =
+            settings.configuration.neighbours.is_some() && settings.frame.is_none();
         let of_arrays = [
-            ("binning", settings.binning.is_some()),
+            ("binning", settings.configuration.binning.is_some()),
             ("neighbours", asks_neighbours),
         ];
         for (key, is_used) in of_arrays {
@@ -277,12 +278,12 @@ impl Options {
             metadata.is_list || options.length.is_some() || !settings.weighs_dead_time(),
             Refused::value(
                 "dead_time",
-                settings.dead_time,
+                settings.dead_time(),
                 "needs `recorded_cycles`: histograms are weighed by them"
             )
         );
         check_once_per_bin(settings.counts_once_per_bin(), metadata.is_list)?;
-        if let Some(binning) = settings.binning {
+        if let Some(binning) = settings.configuration.binning {
             let ([column, row], side) = (photons.axis_names(), 1 << binning.levels.raw());
             ensure!(
                 has_only_neighbours(photons.as_ref(), binning.levels),

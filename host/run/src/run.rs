@@ -166,11 +166,11 @@ pub fn run(
     for sink in &mut *sinks {
         sink.end(engine, map.as_ref());
     }
-    let x = settings.x.max(1);
+    let x = settings.configuration.x.max(1);
     let longest = match settings.frame {
         _ if settings.decide_once => u64::MAX, // They are not counted.
         Some(frame) => u64::from(frame.max(1)),
-        None => u64::from(settings.l2.div_ceil(x)) * u64::from(x),
+        None => u64::from(settings.configuration.l2.div_ceil(x)) * u64::from(x),
     };
     let expired_masked: u64 = masked.iter().map(|(_, cycles)| cycles / longest).sum();
     let mut summary = reported.summary(engine, source, settings);

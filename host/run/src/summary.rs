@@ -1,14 +1,13 @@
 //! The summary of a run: `summary.json`, and the same on the terminal and in
 //! the report.
 
-use dtof_core::fixed::types::U8F8;
-use dtof_core::paper::Threshold;
-use dtof_core::{AnyRule, DepthEstimator, Statistics};
-use serde::ser::SerializeMap;
+use dtof_core::{DepthEstimator, Statistics};
+use serde::ser::Error as _;
 use serde::{Serialize, Serializer};
+use serde_json::json;
 
 use crate::truth::AgainstTruth;
-use dtof_engine::settings::Settings;
+use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_options::rows::{Row, grouped};
 use dtof_photons::source::PhotonSource;
 
@@ -123,83 +122,43 @@ pub struct Summary {
     pub settings: Settings,
 }
 
-/// Writes settings by their keys in a settings file, and the estimator that follows from them.
+/// Writes settings by their keys in a settings file, those with a default also where they have it, and the estimator
+/// that follows from them.
 fn settings<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, S::Error> {
-    let mut map = serializer.serialize_map(None)?;
-    map.serialize_entry("bins", &settings.bins)?;
-    map.serialize_entry("bin_width_ps", &settings.bin_width_ps.to_num::<f64>())?;
-    map.serialize_entry("offset_mm", &settings.offset_mm.to_num::<f64>())?;
-    if !settings.offsets_mm.is_empty() {
-        let offsets: Vec<f64> = settings.offsets_mm.iter().map(|mm| mm.to_num()).collect();
-        map.serialize_entry("offsets_mm", &offsets)?;
-    }
-    map.serialize_entry("gate", &settings.gate)?;
-    if !settings.masked.is_empty() {
-        map.serialize_entry("masked", &settings.masked)?;
-    }
-    let mut with_alpha = |name: &str, threshold: &Threshold| {
-        map.serialize_entry("rule", name)?;
-        map.serialize_entry("alpha", &threshold.alpha().to_num::<f64>())?;
-        map.serialize_entry("min_count", &threshold.minimum_count().raw())
-    };
-    match &settings.rule {
-        AnyRule::Paper(rule) => with_alpha("paper", rule.threshold())?,
-        AnyRule::Average(rule) => with_alpha("average", rule.threshold())?,
-        AnyRule::Window(rule) => {
-            map.serialize_entry("rule", "window")?;
-            map.serialize_entry("window", &rule.width())?;
-            map.serialize_entry("z", &rule.z().to_num::<f64>())?;
-            map.serialize_entry("min_count", &rule.minimum_count().raw())?;
+    let configuration = &settings.configuration;
+    let mut keys = json!({
+        "gate": null,
+        "binning": 0,
+        "tracking": false,
+        "echoes": configuration.echoes.raw(),
+        "echo_wait": null,
+        "dead_time": settings.dead_time(),
+        "once_per_bin": false,
+        "counter_bits": settings.counter_bits,
+    });
+    let written = serde_json::to_value(SettingsFile::default().with_settings(settings));
+    let written = written.map_err(S::Error::custom)?;
+    let sections = written.as_object().into_iter().flatten();
+    for (key, value) in sections.filter_map(|(_, keys)| keys.as_object()).flatten() {
+        if !value.is_null() {
+            keys[key] = value.clone();
         }
     }
-    if let Some(sigma) = settings.sigma_bins {
-        map.serialize_entry("sigma_bins", &sigma.to_num::<f64>())?;
-    }
-    if let Some(window) = settings.half_widths {
-        let sides = [window.before(), window.after()].map(U8F8::to_num::<f64>);
-        map.serialize_entry("half_widths", &sides)?;
-    }
-    map.serialize_entry("l1", &settings.l1)?;
-    map.serialize_entry("l2", &settings.l2)?;
-    map.serialize_entry("x", &settings.x)?;
-    let levels = settings.binning.map_or(0, |binning| binning.levels.raw());
-    map.serialize_entry("binning", &levels)?;
-    if let Some(binning) = settings.binning {
-        map.serialize_entry("patience", &binning.patience)?;
-    }
-    if let Some(neighbours) = settings.neighbours {
-        map.serialize_entry("neighbours", &neighbours.raw())?;
-    }
-    map.serialize_entry("tracking", &settings.tracking)?;
-    map.serialize_entry("echoes", &settings.echoes.raw())?;
-    map.serialize_entry("echo_wait", &settings.echo_wait)?;
-    map.serialize_entry("dead_time", &settings.dead_time)?;
-    if settings.dead_time > 0 {
-        let source = match settings.is_dead_time_of_sensor {
-            true => "sensor",
-            false => "settings",
+    if settings.dead_time() > 0 {
+        keys["dead_time_from"] = match settings.is_dead_time_of_sensor {
+            true => "sensor".into(),
+            false => "settings".into(),
         };
-        map.serialize_entry("dead_time_from", source)?;
     }
-    map.serialize_entry("once_per_bin", &settings.once_per_bin)?;
-    map.serialize_entry("counter_bits", &settings.counter_bits)?;
-    if settings.dither_bins > 0 {
-        map.serialize_entry("dither_bins", &settings.dither_bins)?;
-        map.serialize_entry("dither_seed", &settings.dither_seed)?;
+    if configuration.dither_bins > 0 {
+        keys["dither_bins"] = configuration.dither_bins.into();
+        keys["dither_seed"] = configuration.dither_seed.into();
     }
-    if let Some(frame) = settings.frame {
-        map.serialize_entry("frame", &frame)?;
-    }
-    if settings.decide_once {
-        map.serialize_entry("decide_once", &true)?;
-    }
-    map.serialize_entry("seed", &settings.seed)?;
-    let estimator = match settings.estimator() {
-        DepthEstimator::Centroid3 => "centroid",
-        DepthEstimator::CentredWindow(_) => "centred-window",
+    keys["estimator"] = match configuration.estimator {
+        DepthEstimator::Centroid3 => "centroid".into(),
+        DepthEstimator::CentredWindow(_) => "centred-window".into(),
     };
-    map.serialize_entry("estimator", estimator)?;
-    map.end()
+    keys.serialize(serializer)
 }
 
 /// Writes rows as an object.
@@ -299,10 +258,10 @@ impl Summary {
         if let Some(options) = &self.dim_targets {
             rows.push(("dim targets".to_owned(), options.clone()));
         }
-        if self.settings.binning.is_some() {
+        if self.settings.configuration.binning.is_some() {
             rows.push(row("events of blocks", self.events_of_blocks));
         }
-        if self.settings.neighbours.is_some() && self.settings.frame.is_none() {
+        if self.settings.configuration.neighbours.is_some() && self.settings.frame.is_none() {
             rows.push(row(
                 "events that neighbours confirmed",
                 self.events_confirmed,
@@ -366,7 +325,7 @@ impl Summary {
             self.pixels_reporting,
             self.pixels
         );
-        if self.settings.binning.is_some() {
+        if self.settings.configuration.binning.is_some() {
             text += ", by themselves or in a block";
         }
         if self.is_map_longer() {

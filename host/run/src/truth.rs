@@ -228,9 +228,9 @@ impl<'a> SceneComparison<'a> {
             scene,
             array,
             ranges: settings.ranges(array)?,
-            behind_mm: behind_mm.filter(|_| settings.echoes > EchoNumber::FIRST),
-            first_bin: settings.gate.map_or(0, |(first, _)| first.into()),
-            last_bin: settings.gate.map_or(bins - 1, |(_, last)| last.into()),
+            behind_mm: behind_mm.filter(|_| settings.configuration.echoes > EchoNumber::FIRST),
+            first_bin: settings.gate().map_or(0, |(first, _)| first.into()),
+            last_bin: settings.gate().map_or(bins - 1, |(_, last)| last.into()),
             tallies: vec![Tally::new(array.pixels() as usize); scene.surfaces.len() + 1],
             false_peaks: vec![0; bins],
         })

@@ -46,37 +46,27 @@ fn rules() -> [AnyRule; 3] {
 }
 
 fn with_neighbours(neighbours: Neighbours) -> Settings {
-    Settings {
-        rule: rules()[2],
-        neighbours: Some(neighbours),
-        ..Settings::static_scene(0)
-    }
+    Settings::static_scene(0).with(|with| {
+        with.rule = rules()[2];
+        with.neighbours = Some(neighbours);
+    })
 }
 
 /// Settings that cover everything a decision depends on.
 fn all_settings() -> Vec<Settings> {
-    let plain = rules().map(|rule| Settings {
-        rule,
-        ..Settings::static_scene(0)
-    });
+    let plain = rules().map(|rule| Settings::static_scene(0).with(|with| with.rule = rule));
     let window = plain[2].clone();
-    let gated = plain.clone().map(|settings| Settings {
-        gate: Some((30, 119)),
-        ..settings
+    let gated = plain
+        .clone()
+        .map(|settings| settings.with(|with| with.gate = (30, 119)));
+    let echoes = plain.clone().map(|settings| {
+        settings.with(|with| {
+            with.echoes = EchoNumber::new(3).unwrap();
+            with.echo_wait = 4;
+        })
     });
-    let echoes = plain.clone().map(|settings| Settings {
-        echoes: EchoNumber::new(3).unwrap(),
-        echo_wait: Some(4),
-        ..settings
-    });
-    let tracking = Settings {
-        tracking: true,
-        ..window.clone()
-    };
-    let both = Settings {
-        tracking: true,
-        ..echoes[2].clone()
-    };
+    let tracking = window.clone().with(|with| with.tracking = true);
+    let both = echoes[2].clone().with(|with| with.tracking = true);
     let frames = Settings {
         frame: Some(500),
         ..window
@@ -113,7 +103,7 @@ fn counts_are_the_photons_of_the_exposure() {
     for settings in all_settings() {
         let (_, decisions, slices) = run(&settings, 100);
         let mut compared = 0;
-        let gate = settings.gate.unwrap_or((0, 127));
+        let gate = settings.gate().unwrap_or((0, 127));
         for decision in decisions {
             let event = decision.event;
             if event.level != BlockLevel::PIXEL {
@@ -196,9 +186,12 @@ fn an_explanation_agrees_with_the_event() {
                 (background - reported).abs() <= 0.5,
                 "{background} {event:?} {settings:?}"
             );
-            let is_window = matches!(settings.rule, AnyRule::Window(_)) && settings.frame.is_none();
+            let is_window = matches!(settings.configuration.rule, AnyRule::Window(_))
+                && settings.frame.is_none();
             assert_eq!(explained.window.is_some(), is_window);
-            if let (Some((first, last)), false) = (explained.window, settings.tracking) {
+            if let (Some((first, last)), false) =
+                (explained.window, settings.configuration.tracking)
+            {
                 assert!((first..=last).contains(&bin));
             }
             assert_eq!(counts.len(), 128);
@@ -259,7 +252,7 @@ fn neighbours_confirm_as_in_the_core() {
             .iter()
             .flat_map(|slice| engine.run(slice).unwrap())
             .collect();
-        let AnyRule::Window(rule) = &settings.rule else {
+        let AnyRule::Window(rule) = &settings.configuration.rule else {
             panic!("{settings:?}");
         };
         let rule = NeighbourConfig::new(LARGE, neighbours, rule);
@@ -316,22 +309,15 @@ fn neighbours_need_the_window_rule_and_no_dead_time() {
         engine.map(|_| ()).map_err(|error| format!("{error:#}"))
     };
     assert_eq!(refused(&good), Ok(()));
-    let paper = Settings {
-        rule: rules()[0],
-        ..good.clone()
-    };
+    let paper = good.clone().with(|with| with.rule = rules()[0]);
     let reason = refused(&paper).unwrap_err();
     assert!(reason.contains("is for"), "{reason}");
-    let blocks = Settings {
-        binning: demo::settings(3).unwrap().binning,
-        ..good.clone()
-    };
+    let blocks = good
+        .clone()
+        .with(|with| with.binning = demo::settings(3).unwrap().configuration.binning);
     let reason = refused(&blocks).unwrap_err();
     assert!(reason.contains("cannot be used with binning"), "{reason}");
-    let dead = Settings {
-        dead_time: 128,
-        ..good
-    };
+    let dead = good.with(|with| with.dead_time = Some(128));
     assert!(
         refused(&dead)
             .unwrap_err()

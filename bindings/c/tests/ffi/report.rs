@@ -3,8 +3,7 @@
 use core::ptr::null_mut;
 
 use dtof_c::*;
-use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
-use dtof_core::{AnyRule, BlockLevel, Count, DepthEstimator, EchoNumber, PaperRule, PixelAddress};
+use dtof_core::{BlockLevel, PixelAddress};
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_link::endpoint::{Endpoint, LinkCounters};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
@@ -16,32 +15,18 @@ use crate::{OK, link, zeroed};
 
 /// 16 pixels with blocks of four, and photons from the host.
 const CONFIGURATION: Configuration = Configuration {
-    rule: AnyRule::Paper(PaperRule::new(U8F8::lit("4"), Count::saturating(5))),
-    estimator: DepthEstimator::Centroid3,
-    x: 4,
     l1: 20,
     l2: 200,
-    gate: (0, 127),
-    dead_time: None,
-    once_per_bin: false,
-    dither_bins: 0,
-    dither_seed: 0,
     pixels: 16,
     columns: 4,
     binning: Some(AdaptiveBinning {
         levels: BlockLevel::saturating(1),
         patience: 8,
     }),
-    neighbours: None,
-    tracking: false,
-    echoes: EchoNumber::FIRST,
     echo_guard_bins: 0,
     echo_wait: 4,
-    bin_width_ps: U16F16::lit("250"),
-    offset_mm: I24F8::ZERO,
     source: Source::Link,
-    dynamic_depth: None,
-    host_timeout_ms: Configuration::HOST_TIMEOUT_MS,
+    ..Configuration::DEFAULT
 };
 const LEFT_OUT: u16 = 5;
 

@@ -32,12 +32,11 @@ fn client(name: &str) -> Client {
 
 /// Settings for the monitor's devices.
 fn settings() -> Settings {
-    Settings {
-        rule: PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into(),
-        l1: 40,
-        x: 4,
-        ..Settings::static_scene(0)
-    }
+    Settings::static_scene(0).with(|with| {
+        with.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into();
+        with.l1 = 40;
+        with.x = 4;
+    })
 }
 
 /// An output that accepts so many bytes, then is closed.

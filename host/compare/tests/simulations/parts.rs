@@ -108,10 +108,9 @@ fn rules_have_the_requested_false_alarms() {
         let scene = Scene::parse(&scene).unwrap();
         for &rule in rules {
             let threshold = found.of(rule, 0.01).unwrap();
-            let of_rule = Settings {
-                rule: rule.with(threshold, 5).unwrap(),
-                ..settings.clone()
-            };
+            let of_rule = settings
+                .clone()
+                .with(|with| with.rule = rule.with(threshold, 5).unwrap());
             let mut photons = scene.photons(7, scene.cycles).unwrap();
             let addresses = photons.addresses();
             let mut engine = host_engine(&of_rule, photons.array(), &addresses).unwrap();

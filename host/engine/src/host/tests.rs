@@ -1,6 +1,7 @@
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
-    AnyRule, AverageRule, BlockLevel, Count, EchoNumber, Neighbours, PaperRule, WindowRule,
+    AnyRule, AverageRule, BlockLevel, Count, DetectionRule, EchoNumber, Neighbours, PaperRule,
+    WindowRule,
 };
 use dtof_link::AdaptiveBinning;
 use dtof_photons::source::{Photon, PixelPhotons};
@@ -115,36 +116,34 @@ fn all_settings() -> impl Strategy<Value = Settings> {
         } else {
             (number, dead_time)
         };
+        // Only the window rule, and no block, weighs bins by less than all of a histogram.
+        let dead_time = match dead_time {
+            BINS => BINS,
+            _ if mode == 1 => 0,
+            dead_time => dead_time,
+        };
+        let plain = Settings::static_scene(1)
+            .with_bins(BINS.into())
+            .with(|with| {
+                with.rule = rule(number, minimum, level);
+                (with.x, with.l1, with.l2) = (x, l1, l1 + x + more);
+                with.tracking = tracks && number == 2 && mode != 3;
+                with.echoes = EchoNumber::new(echoes).unwrap();
+                with.echo_wait = echo_wait.unwrap_or(u8::MAX);
+                let is_weighed = with.rule.weighs_dead_time() || dead_time == BINS;
+                with.dead_time = Some(if is_weighed { dead_time } else { 0 });
+                with.gate = gate.unwrap_or(with.gate);
+            });
         let plain = Settings {
-            bins: BINS.into(),
-            rule: rule(number, minimum, level),
-            x,
-            l1,
-            l2: l1 + x + more,
-            tracking: tracks && number == 2 && mode != 3,
-            echoes: EchoNumber::new(echoes).unwrap(),
-            echo_wait,
-            dead_time,
-            gate,
             counter_bits,
-            ..Settings::static_scene(1)
+            ..plain
         };
         match mode {
-            1 => Settings {
-                binning: Some(AdaptiveBinning {
-                    levels: BlockLevel::saturating(levels),
-                    patience,
-                }),
-                ..plain
-            },
-            2 => Settings {
-                neighbours: Some(if eight {
-                    Neighbours::Eight
-                } else {
-                    Neighbours::Four
-                }),
-                ..plain
-            },
+            1 => plain.with(|with| {
+                let levels = BlockLevel::saturating(levels);
+                with.binning = Some(AdaptiveBinning { levels, patience });
+            }),
+            2 => plain.with(|with| with.neighbours = Neighbours::new(if eight { 8 } else { 4 })),
             3 => Settings {
                 frame: Some(frame),
                 ..plain
@@ -153,10 +152,7 @@ fn all_settings() -> impl Strategy<Value = Settings> {
                 decide_once: true,
                 ..plain
             },
-            5 => Settings {
-                once_per_bin: true,
-                ..plain
-            },
+            5 => plain.with(|with| with.once_per_bin = true),
             _ => plain,
         }
     })
@@ -207,23 +203,22 @@ proptest! {
 /// It ends between two looks, and the exposure would expire at the second.
 #[test]
 fn a_pixel_whose_recording_ends_takes_no_part_in_later_looks() {
-    let neighbours = Settings {
-        bins: BINS.into(),
-        rule: rule(2, 3, 2.0),
-        neighbours: Some(Neighbours::Four),
-        x: 6,
-        l1: 25,
-        l2: 55,
-        ..Settings::static_scene(1)
-    };
-    let binning = Settings {
-        neighbours: None,
-        binning: Some(AdaptiveBinning {
+    let neighbours = Settings::static_scene(1)
+        .with_bins(BINS.into())
+        .with(|with| {
+            with.rule = rule(2, 3, 2.0);
+            with.neighbours = Some(Neighbours::Four);
+            with.x = 6;
+            with.l1 = 25;
+            with.l2 = 55;
+        });
+    let binning = neighbours.clone().with(|with| {
+        with.neighbours = None;
+        with.binning = Some(AdaptiveBinning {
             levels: BlockLevel::saturating(2),
             patience: 20,
-        }),
-        ..neighbours.clone()
-    };
+        });
+    });
     for settings in [neighbours, binning] {
         for early in 0..130 {
             let mut ends = vec![300; 19];
@@ -246,14 +241,14 @@ fn exposures_without_photons_expire() {
         .into_iter()
         .flat_map(|level| (0..3).map(move |number| (number, level)));
     for (number, level) in counts {
-        let settings = Settings {
-            bins: BINS.into(),
-            rule: rule(number, 0, level),
-            x: 10,
-            l1: 40,
-            l2: 95,
-            ..Settings::static_scene(1)
-        };
+        let settings = Settings::static_scene(1)
+            .with_bins(BINS.into())
+            .with(|with| {
+                with.rule = rule(number, 0, level);
+                with.x = 10;
+                with.l1 = 40;
+                with.l2 = 95;
+            });
         let ends = vec![100_000; 19];
         let outcome = run(&settings, &[], &ends, &[u16::MAX]);
         let found = (outcome.events, outcome.statistics[0].expired);

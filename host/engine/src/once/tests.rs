@@ -11,11 +11,11 @@ use crate::host::host_engine;
 fn settings(bins: usize) -> Settings {
     let rule = WindowRule::new(3, "4".parse().unwrap(), Count::saturating(5)).unwrap();
     Settings {
-        bins,
-        rule: rule.into(),
-        sigma_bins: Some("1".parse().unwrap()),
         decide_once: true,
         ..Settings::static_scene(0)
+            .with_bins(bins)
+            .for_pulse("1".parse().unwrap())
+            .with(|with| with.rule = rule.into())
     }
 }
 
@@ -111,11 +111,7 @@ proptest! {
         if let Some(before) = first.checked_sub(1) {
             counts[usize::from(before)] = 0;
         }
-        let settings = Settings {
-            gate: Some((first, 127)),
-            echoes: EchoNumber::new(echoes).unwrap(),
-            ..settings(128)
-        };
+        let settings = settings(128).with(|with| { with.gate = (first, 127); with.echoes = EchoNumber::new(echoes).unwrap(); });
         let config = settings.config::<128>().unwrap();
         let mut histogram = Histogram::<128, Count24>::new();
         let all: [u32; 128] = counts.clone().try_into().unwrap();
@@ -184,8 +180,7 @@ fn the_confidence_is_that_of_the_formula() {
 fn without_photons_the_confidence_is_0_and_of_pixels_left_out_unknown() {
     let settings = Settings {
         masked: vec![1],
-        gate: Some((20, 127)),
-        ..settings(128)
+        ..settings(128).with(|with| with.gate = (20, 127))
     };
     let histograms = [vec![0; 128], vec![0; 128], wall(50)];
     let (events, engine) = decided(&settings, line(3), &histograms);
@@ -238,13 +233,12 @@ fn divided_counts_have_no_more_false_alarms() {
             pixel
         });
         let counts = recorded(pixels.collect(), 1 << 20);
-        let settings = Settings {
-            gate: Some((1, 127)),
-            rule: WindowRule::new(3, "3".parse().unwrap(), Count::saturating(5))
+        let settings = settings(128).with(|with| {
+            with.gate = (1, 127);
+            with.rule = WindowRule::new(3, "3".parse().unwrap(), Count::saturating(5))
                 .unwrap()
-                .into(),
-            ..settings(128)
-        };
+                .into();
+        });
         let decided = decide_once(&settings, array, &addresses(4000), &counts, |_| false).unwrap();
         decided
             .iter()
@@ -276,10 +270,7 @@ fn counts_past_32_bits_and_their_laser_cycles_are_divided_alike() {
             count << times
         });
         let counts = recorded(vec![photons.collect()], cycles << times);
-        let settings = Settings {
-            dead_time: 128,
-            ..settings(128)
-        };
+        let settings = settings(128).with(|with| with.dead_time = Some(128));
         let decided = decide_once(&settings, line(1), &addresses(1), &counts, |_| false).unwrap();
         let [decided] = decided.try_into().ok().unwrap();
         (decided.echoes, decided.confidence.to_bits(), decided.best)
@@ -297,7 +288,7 @@ proptest! {
     fn the_engine_decides_as_the_function_does(
         levels in prop::collection::vec(0_u32..60, 6), neighbours in prop::sample::select(vec![0, 4, 8]),
     ) {
-        let settings = Settings { neighbours: Neighbours::new(neighbours), ..settings(128) };
+        let settings = settings(128).with(|with| with.neighbours = Neighbours::new(neighbours));
         let pixels: Vec<Vec<u32>> = levels.iter().map(|&level| {
             let mut counts: Vec<u32> = (0..128).map(|bin| 20 + bin * level % 5).collect();
             counts[70] += level;
@@ -322,7 +313,7 @@ proptest! {
         mut counts in prop::collection::vec(0_u64..3, 128), many in 0_u32..40, dead_time in 0_u16..40,
     ) {
         counts[30] <<= many;
-        let settings = Settings { gate: Some((10, 99)), dead_time, ..settings(128) };
+        let settings = settings(128).with(|with| { with.gate = (10, 99); with.dead_time = Some(dead_time); });
         let has_photon = counts[10..=99].iter().any(|&count| count > 0);
         let counts = recorded(vec![counts], 1000);
         let decided = decide_once(&settings, line(1), &addresses(1), &counts, |_| false).unwrap();
@@ -357,10 +348,7 @@ fn around(middle: Vec<u32>) -> Vec<Vec<u32>> {
 
 #[test]
 fn the_confidence_is_of_the_sum_only_where_the_sum_was_used() {
-    let with = Settings {
-        neighbours: Neighbours::new(8),
-        ..settings(128)
-    };
+    let with = settings(128).with(|with| with.neighbours = Neighbours::new(8));
     let array = Array::new(3, 3).unwrap();
     let of_middle = |settings: &Settings, middle: &[u32]| {
         confidence(settings, array, &around(middle.to_vec()))[4]
@@ -379,10 +367,7 @@ fn the_confidence_is_of_the_sum_only_where_the_sum_was_used() {
 
 #[test]
 fn neighbours_confirm_a_surface_that_the_pixel_sees() {
-    let with = Settings {
-        neighbours: Neighbours::new(8),
-        ..settings(128)
-    };
+    let with = settings(128).with(|with| with.neighbours = Neighbours::new(8));
     let array = Array::new(3, 3).unwrap();
     let of_middle = |settings: &Settings, middle: Vec<u32>| {
         let (events, _) = decided(settings, array, &around(middle));
@@ -432,14 +417,10 @@ fn bright_neighbours_confirm_with_any_number_of_bins() {
         for (bin, more) in [(14, 100), (15, 200), (16, 100)] {
             dim[bin] += more;
         }
-        let alone = Settings {
-            gate: Some((0, 31)),
-            ..settings(bins)
-        };
-        let with = Settings {
-            neighbours: Neighbours::new(8),
-            ..alone.clone()
-        };
+        let alone = settings(bins).with(|with| with.gate = (0, 31));
+        let with = alone
+            .clone()
+            .with(|with| with.neighbours = Neighbours::new(8));
         let array = Array::new(3, 3).unwrap();
         let pixels = vec![dim; 9];
         assert!(decided(&alone, array, &pixels).0.is_empty());
@@ -458,7 +439,7 @@ fn what_needs_looks_is_refused() {
         refused.err().unwrap().to_string()
     };
     let blocks = with(|settings| {
-        settings.binning = Some(crate::settings::AdaptiveBinning {
+        settings.configuration.binning = Some(crate::settings::AdaptiveBinning {
             levels: dtof_core::BlockLevel::new(1).unwrap(),
             patience: 64,
         });
@@ -510,10 +491,8 @@ fn the_slope_of_what_lies_outside_of_the_gate_is_no_surface() {
                 histogram.reverse();
             }
             let counts = recorded(vec![histogram], 1 << 20);
-            let settings = Settings {
-                gate: Some(if is_mirrored { (0, 119) } else { (8, 127) }),
-                ..settings(128)
-            };
+            let settings = settings(128)
+                .with(|with| with.gate = if is_mirrored { (0, 119) } else { (8, 127) });
             let decided =
                 decide_once(&settings, line(1), &addresses(1), &counts, |_| false).unwrap();
             if let Some((_, echo)) = decided[0].echoes.first() {

@@ -1,13 +1,15 @@
 //! From the settings file to the settings of an engine: defaults, and the thresholds of rules.
 
 use anyhow::{Result, ensure};
-use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::paper::Threshold;
 use dtof_core::rule::{HIGHEST_Z, z_for_levels};
-use dtof_core::{AnyRule, Count8, EchoNumber, Neighbours, RangeGate};
+use dtof_core::{
+    AnyRule, CentredWindow, Count8, DepthEstimator, EchoNumber, Neighbours, RangeGate,
+};
+use dtof_link::{Configuration, Source};
 use dtof_theory::tune::window::one_in;
 
-use super::engine::{DEFAULT_L2, Settings, no_gate};
+use super::engine::{Settings, echo_guard_bins, no_gate};
 use super::{
     DetectionSettings, EstimatorName, RuleName, RunSettings, SensorSettings, SettingsFile,
 };
@@ -27,9 +29,10 @@ impl SettingsFile {
         let Self {
             sensor, detection, ..
         } = self;
-        let x = detection.x.unwrap_or(4);
-        let l1 = detection.l1.unwrap_or(40);
-        let l2 = detection.l2.unwrap_or(DEFAULT_L2);
+        let default = Configuration::DEFAULT;
+        let x = detection.x.unwrap_or(default.x);
+        let l1 = detection.l1.unwrap_or(default.l1);
+        let l2 = detection.l2.unwrap_or(default.l2);
         let decide_once = self.run.decide_once.unwrap_or(false);
         ensure!(
             !decide_once || self.run.frame.is_none(),
@@ -40,14 +43,13 @@ impl SettingsFile {
             true => (1, 0, 2),
             false => (x, l1, l2),
         };
+        // The engine refuses a number of bins that is not one.
+        #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
+        let last_bin = bins.clamp(8, 1024) as u16 - 1;
+        let gate = sensor.gate.unwrap_or((0, last_bin));
         let z_for = |share| {
-            // Only the number of bins within the gate matters here. The engine refuses an invalid
-            // number of bins.
-            #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
-            let last_bin = bins.clamp(8, 1024) as u16 - 1;
-            let (first, last) = sensor.gate.unwrap_or((0, last_bin));
-            let gate = RangeGate::<1024>::new(first, last)
-                .map_err(|error| no_gate((first, last), bins, &error))?;
+            let gate = RangeGate::<1024>::new(gate.0, gate.1)
+                .map_err(|error| no_gate(gate, bins, error))?;
             let (x, l1, l2) = looks;
             let z = z_for_levels(one_in(share), &gate, x, l1, l2, detection.levels());
             ensure!(
@@ -88,31 +90,39 @@ impl SettingsFile {
             counter_bits != 8 || is_frame || rule.fits::<Count8>(),
             Refused::new("min_count", "is more than counters of 8 bits hold")
         );
+        let suits = sensor.sigma_bins.map(CentredWindow::for_pulse);
+        let window = detection.half_widths.or(suits).filter(|_| !centroid);
         Ok(Settings {
+            configuration: Configuration {
+                rule,
+                estimator: window.map_or(default.estimator, DepthEstimator::CentredWindow),
+                x,
+                l1,
+                l2,
+                gate,
+                dead_time: Some(dead_time),
+                once_per_bin: detection.once_per_bin.unwrap_or(false),
+                dither_bins,
+                dither_seed,
+                binning: detection.blocks()?,
+                neighbours,
+                tracking: detection.tracking.unwrap_or(false),
+                echoes,
+                echo_guard_bins: sensor
+                    .sigma_bins
+                    .map_or(default.echo_guard_bins, echo_guard_bins),
+                echo_wait: echo_wait.unwrap_or(default.echo_wait),
+                bin_width_ps: sensor.bin_width_ps.unwrap_or(default.bin_width_ps),
+                offset_mm: sensor.offset_mm.unwrap_or(default.offset_mm),
+                source: Source::Link,
+                ..default
+            },
             bins,
-            bin_width_ps: sensor.bin_width_ps.unwrap_or(const { U16F16::lit("250") }),
-            offset_mm: sensor.offset_mm.unwrap_or(I24F8::ZERO),
             offsets_mm: sensor.offsets_mm.clone().unwrap_or_default(),
-            gate: sensor.gate,
             masked: sensor.masked.clone().unwrap_or_default(),
-            rule,
             sigma_bins: sensor.sigma_bins,
-            half_widths: detection.half_widths,
-            centroid,
-            l1,
-            l2,
-            x,
-            binning: detection.blocks()?,
-            neighbours,
-            tracking: detection.tracking.unwrap_or(false),
-            echoes,
-            echo_wait,
-            dead_time,
             is_dead_time_of_sensor: dead_time > 0 && sensor.dead_time.is_none(),
-            once_per_bin: detection.once_per_bin.unwrap_or(false),
             counter_bits,
-            dither_bins,
-            dither_seed,
             frame: self.run.frame,
             decide_once,
             seed: self.run.seed.unwrap_or(1),
@@ -123,23 +133,24 @@ impl SettingsFile {
     #[must_use]
     pub fn with_settings(&self, settings: &Settings) -> Self {
         let (masked, offsets_mm) = (&settings.masked, &settings.offsets_mm);
+        let configuration = &settings.configuration;
         Self {
             sensor: SensorSettings {
                 bins: u16::try_from(settings.bins).ok(),
-                bin_width_ps: Some(settings.bin_width_ps),
-                offset_mm: Some(settings.offset_mm),
+                bin_width_ps: Some(configuration.bin_width_ps),
+                offset_mm: Some(configuration.offset_mm),
                 offsets_mm: (!offsets_mm.is_empty()).then(|| offsets_mm.clone()),
-                gate: settings.gate,
+                gate: settings.gate(),
                 masked: (!masked.is_empty()).then(|| masked.clone()),
                 sigma_bins: settings.sigma_bins,
-                dead_time: match settings.dead_time {
+                dead_time: match settings.dead_time() {
                     // Written only if it overrides the sensor's.
                     0 => self.sensor.dead_time.filter(|&bins| bins == 0),
                     bins => Some(bins),
                 },
                 ..self.sensor.clone()
             },
-            detection: DetectionSettings::from_settings(settings),
+            detection: self.detection.with_settings(settings),
             rays: self.rays.clone(),
             run: RunSettings {
                 seed: Some(settings.seed),
@@ -196,8 +207,9 @@ impl SettingsFile {
 }
 
 impl DetectionSettings {
-    /// The detection section of `settings`.
-    fn from_settings(settings: &Settings) -> Self {
+    /// This section with what `settings` say. What its pulse or a default says is written only if this section does.
+    fn with_settings(&self, settings: &Settings) -> Self {
+        let configuration = &settings.configuration;
         let with_alpha = |name, threshold: &Threshold| {
             let detection = Self {
                 rule: Some(name),
@@ -206,7 +218,7 @@ impl DetectionSettings {
             };
             (detection, threshold.minimum_count())
         };
-        let (rule, minimum) = match settings.rule {
+        let (rule, minimum) = match configuration.rule {
             AnyRule::Paper(rule) => with_alpha(RuleName::Paper, rule.threshold()),
             AnyRule::Average(rule) => with_alpha(RuleName::Average, rule.threshold()),
             AnyRule::Window(rule) => {
@@ -219,28 +231,36 @@ impl DetectionSettings {
                 (detection, rule.minimum_count())
             }
         };
-        let binning = settings.binning;
-        let several = settings.echoes > EchoNumber::FIRST;
-        let half_widths = settings.half_widths.filter(|_| !settings.centroid);
-        let estimator = match (settings.centroid, half_widths) {
-            (true, _) => Some(EstimatorName::Centroid),
-            (false, Some(_)) => Some(EstimatorName::Window),
-            (false, None) => None,
+        let suits = settings.sigma_bins.map(CentredWindow::for_pulse);
+        let (estimator, half_widths) = match configuration.estimator {
+            DepthEstimator::Centroid3 => {
+                let asked = self.estimator == Some(EstimatorName::Centroid);
+                let centroid = asked || suits.is_some();
+                (centroid.then_some(EstimatorName::Centroid), None)
+            }
+            DepthEstimator::CentredWindow(window) => {
+                let asked = self.half_widths == Some(window) || suits != Some(window);
+                let window = asked.then_some(window);
+                (window.map(|_| EstimatorName::Window), window)
+            }
         };
+        let binning = configuration.binning;
+        let several = configuration.echoes > EchoNumber::FIRST;
+        let wait = Some(configuration.echo_wait).filter(|&wait| several && wait < u8::MAX);
         Self {
             min_count: u16::try_from(minimum.raw()).ok(),
             estimator,
             half_widths,
-            l1: Some(settings.l1),
-            l2: Some(settings.l2),
-            x: Some(settings.x),
+            l1: Some(configuration.l1),
+            l2: Some(configuration.l2),
+            x: Some(configuration.x),
             binning: binning.map(|binning| binning.levels.raw()),
             patience: binning.map(|binning| binning.patience),
-            neighbours: settings.neighbours.map(Neighbours::raw),
-            tracking: settings.tracking.then_some(true),
-            echoes: several.then(|| settings.echoes.raw()),
-            echo_wait: settings.echo_wait.filter(|_| several),
-            once_per_bin: settings.once_per_bin.then_some(true),
+            neighbours: configuration.neighbours.map(Neighbours::raw),
+            tracking: configuration.tracking.then_some(true),
+            echoes: several.then(|| configuration.echoes.raw()),
+            echo_wait: wait,
+            once_per_bin: configuration.once_per_bin.then_some(true),
             counter_bits: Some(settings.counter_bits).filter(|&bits| bits != 10),
             ..rule
         }

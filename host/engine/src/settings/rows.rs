@@ -14,12 +14,16 @@ impl Settings {
     #[must_use]
     pub fn rows(&self) -> Vec<Row> {
         let row = |name: &str, value: String| (name.to_owned(), value);
-        let gate = self.gate.map_or("none".to_owned(), |(first, last)| {
+        let configuration = &self.configuration;
+        let gate = self.gate().map_or("none".to_owned(), |(first, last)| {
             format!("{first}..{last}")
         });
         let mut rows = vec![
-            row("bins", format!("{} of {} ps", self.bins, self.bin_width_ps)),
-            row("range offset", format!("{} mm", self.offset_mm)),
+            row(
+                "bins",
+                format!("{} of {} ps", self.bins, configuration.bin_width_ps),
+            ),
+            row("range offset", format!("{} mm", configuration.offset_mm)),
             row("range gate", gate),
         ];
         if let (Some(low), Some(high)) =
@@ -36,13 +40,13 @@ impl Settings {
             }
             rows.push(row("pixels left out", text));
         }
-        if self.dither_bins > 0 {
-            let (half, seed) = (self.dither_bins / 2, self.dither_seed);
+        if configuration.dither_bins > 0 {
+            let (half, seed) = (configuration.dither_bins / 2, configuration.dither_seed);
             let text = format!("laser cycles are up to {half} bins longer or shorter, seed {seed}");
             rows.push(row("dither", text));
         }
         rows.extend(self.detection_rows());
-        if let Some(binning) = self.binning {
+        if let Some(binning) = configuration.binning {
             let side = 1 << binning.levels.raw();
             rows.push(row(
                 "adaptive binning",
@@ -52,17 +56,19 @@ impl Settings {
                 ),
             ));
         }
-        if self.tracking && !self.decide_once {
+        if configuration.tracking && !self.decide_once {
             let text = "half of the false alarms near the last event of a pixel";
             rows.push(row("tracking", text.to_owned()));
         }
-        if self.echoes > EchoNumber::FIRST {
-            let reach = self.echo_guard_bins();
-            let (most, wait) = (self.echoes, self.echo_wait);
-            let wait = wait.filter(|_| !self.decide_once);
-            let ends = wait.map_or(String::new(), |times| {
-                format!(", which ends after {times} times the laser cycles of the last")
-            });
+        if configuration.echoes > EchoNumber::FIRST {
+            let reach = configuration.echo_guard_bins;
+            let most = configuration.echoes;
+            let ends = match configuration.echo_wait {
+                times if times < u8::MAX && !self.decide_once => {
+                    format!(", which ends after {times} times the laser cycles of the last")
+                }
+                _ => String::new(),
+            };
             let text = format!("up to {most} an exposure{ends}; ±{reach} bins left out");
             rows.push(row("echoes", text));
         }
@@ -74,7 +80,7 @@ impl Settings {
                 "decisions",
                 format!(
                     "every {} laser cycles (X), in exposures longer than {} (L1) and shorter than {} (L2)",
-                    self.x, self.l1, self.l2
+                    configuration.x, configuration.l1, configuration.l2
                 ),
             ));
         }
@@ -107,7 +113,10 @@ impl Settings {
         if self.decide_once {
             return 1;
         }
-        let (x, l1) = (u64::from(self.x), u64::from(self.l1));
+        let (x, l1) = (
+            u64::from(self.configuration.x),
+            u64::from(self.configuration.l1),
+        );
         self.frame.map_or((l1 / x + 1) * x, u64::from)
     }
 
@@ -116,20 +125,20 @@ impl Settings {
     pub fn longest_exposure(&self) -> u16 {
         match self.decide_once {
             true => u16::MAX,
-            false => self.l2,
+            false => self.configuration.l2,
         }
     }
 
     /// Rule, or frame, estimator, and neighbours and dead time if there are any.
     fn detection_rows(&self) -> Vec<Row> {
         let decision = match self.frame {
-            None => ("threshold".to_owned(), threshold(&self.rule)),
+            None => ("threshold".to_owned(), threshold(&self.configuration.rule)),
             Some(length) => (
                 "frames".to_owned(),
                 format!("the highest bin of each {length} laser cycles"),
             ),
         };
-        let depth = match self.estimator() {
+        let depth = match self.configuration.estimator {
             DepthEstimator::Centroid3 => "centroid of 3 bins".to_owned(),
             DepthEstimator::CentredWindow(window) => {
                 let [before, after] = [window.before(), window.after()];
@@ -141,15 +150,19 @@ impl Settings {
             }
         };
         let mut rows = vec![decision, ("depth".to_owned(), depth)];
-        if let Some(neighbours) = self.neighbours.filter(|_| self.frame.is_none()) {
+        if let Some(neighbours) = self
+            .configuration
+            .neighbours
+            .filter(|_| self.frame.is_none())
+        {
             let text = format!(
                 "{} confirm; half of the false alarms of z for a pixel alone, half with neighbours",
                 neighbours.raw()
             );
             rows.push(("neighbours".to_owned(), text));
         }
-        if self.dead_time > 0 && self.frame.is_none() {
-            let bins = self.dead_time;
+        if self.dead_time() > 0 && self.frame.is_none() {
+            let bins = self.dead_time();
             let text = match usize::from(bins) >= self.bins {
                 true => "all bins after the first photon of a laser cycle".to_owned(),
                 false => format!("{bins} bins after each photon"),

@@ -95,12 +95,11 @@ impl State {
             "laserHz": header.map_or(0.0, |header| header.laser_millihertz as f64 / 1000.0),
         });
         if self.kind == Kind::Device {
-            let last_bin = u16::try_from(bins.max(1) - 1).unwrap_or(u16::MAX);
             let (file, gate, requested) = match &self.settings {
                 Some((file, settings)) => {
-                    let gate = settings.gate.unwrap_or((0, last_bin));
+                    let gate = Some(settings.configuration.gate);
                     let requested = file.sensor.dead_time;
-                    (&file.with_settings(settings), Some(gate), requested)
+                    (&file.with_settings(settings), gate, requested)
                 }
                 None => {
                     let sensor = &self.requested.sensor;
@@ -108,13 +107,13 @@ impl State {
                 }
             };
             // The dead time that is requested, so that the form does not take the sensor's as requested.
-            let used = self
-                .settings
-                .as_ref()
-                .map(|(_, settings)| json!([settings.dead_time, settings.is_dead_time_of_sensor]));
+            let used = self.settings.as_ref().map(|(_, settings)| {
+                json!([settings.dead_time(), settings.is_dead_time_of_sensor])
+            });
             source["deadTime"] = json!(used);
             let dither = self.settings.as_ref();
-            source["ditherBins"] = json!(dither.map(|(_, settings)| settings.dither_bins));
+            source["ditherBins"] =
+                json!(dither.map(|(_, settings)| settings.configuration.dither_bins));
             let sensor = SensorSettings {
                 dead_time: requested,
                 ..file.sensor.clone()

@@ -123,7 +123,7 @@ fn what_moves_before_a_gate_that_was_found_is_told() {
     let moves = run(1, [[600.0, 0.0], [0.0, 200.0]]);
     let still = run(2, [[600.0, 200.0]; 2]);
     let mut input = input("");
-    input.settings.gate = Some((60, 127));
+    input.settings.configuration.gate = (60, 127);
     for (given_gate, expected) in [(None, 8), (Some((60, 127)), 0)] {
         input.given_gate = given_gate;
         let map = decide(&input, &moves);
@@ -160,13 +160,16 @@ fn z_is_that_of_a_single_decision() {
         let mut given = SettingsFile::default();
         given.detection.false_alarm = false_alarm;
         let map = MapInput::new(requested, &settings, None, &given).unwrap();
-        map.unwrap().settings.rule
+        map.unwrap().settings.configuration.rule
     };
-    assert_eq!(of(&file, None), once.rule);
-    assert_ne!(of(&file, Some(0.0001)), once.rule);
+    assert_eq!(of(&file, None), once.configuration.rule);
+    assert_ne!(of(&file, Some(0.0001)), once.configuration.rule);
     let option = SettingsFile::parse("[detection]\nz = 5\n").unwrap();
     let merged = option.or(file);
-    assert_eq!(of(&merged, None), merged.settings(128).unwrap().rule);
+    assert_eq!(
+        of(&merged, None),
+        merged.settings(128).unwrap().configuration.rule
+    );
 }
 
 /// 8,000 pixels with two surfaces that stay, of any brightness: at most one in 1,000 recordings is flagged as moved.

@@ -175,11 +175,9 @@ impl Way {
         };
         let gate = RangeGate::<BINS>::full();
         let z = z_for_levels(ONE_IN, &gate, X, L1, L2, setting.levels);
-        Ok(Settings {
-            neighbours: self.neighbours,
-            l1: L1,
-            ..setting.settings(z)?
-        })
+        Ok(setting.settings(z)?.with(|with| {
+            (with.neighbours, with.l1) = (self.neighbours, L1);
+        }))
     }
 
     /// The bytes of a pixel and its part of the blocks.

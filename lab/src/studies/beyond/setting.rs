@@ -3,9 +3,9 @@
 
 use crate::sweep::{Point, PointTally, whole};
 use anyhow::{Context, Result};
-use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
+use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::rule::z_for_levels;
-use dtof_core::{BlockLevel, Count, EchoNumber, RangeGate, WindowRule};
+use dtof_core::{BlockLevel, Count, RangeGate, WindowRule};
 use dtof_engine::settings::{AdaptiveBinning, Settings};
 
 /// Bins of a histogram.
@@ -72,38 +72,17 @@ impl Setting {
 
     /// Settings of the engine with `z`.
     pub fn settings(&self, z: U4F12) -> Result<Settings> {
-        Ok(Settings {
-            bins: BINS,
-            bin_width_ps: const { U16F16::lit("250") },
-            offset_mm: I24F8::ZERO,
-            offsets_mm: Vec::new(),
-            gate: None,
-            masked: Vec::new(),
-            rule: WindowRule::new(3, z, Count::saturating(5))?.into(),
-            sigma_bins: Some(U8F8::from_num(SIGMA)),
-            half_widths: None,
-            centroid: false,
-            l1: L1,
-            l2: self.l2,
-            x: X,
-            binning: (self.levels != BlockLevel::PIXEL).then_some(AdaptiveBinning {
+        let rule = WindowRule::new(3, z, Count::saturating(5))?;
+        let settings = Settings::static_scene(0).for_pulse(U8F8::from_num(SIGMA));
+        Ok(settings.with(|with| {
+            with.rule = rule.into();
+            (with.x, with.l1, with.l2) = (X, L1, self.l2);
+            with.binning = (self.levels != BlockLevel::PIXEL).then_some(AdaptiveBinning {
                 levels: self.levels,
                 patience: self.patience,
-            }),
-            neighbours: None,
-            tracking: self.tracking,
-            echoes: EchoNumber::FIRST,
-            echo_wait: None,
-            dead_time: 0,
-            is_dead_time_of_sensor: false,
-            once_per_bin: false,
-            counter_bits: 10,
-            dither_bins: 0,
-            dither_seed: 0,
-            frame: None,
-            decide_once: false,
-            seed: 0,
-        })
+            });
+            with.tracking = self.tracking;
+        }))
     }
 }
 

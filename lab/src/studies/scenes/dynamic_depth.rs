@@ -135,7 +135,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
     let mut rules = Vec::new();
     for background in Background::ALL {
         let settings = System::of(point).settings(background, L1, seed);
-        let scale = RangeScale::new(settings.bin_width_ps, I24F8::ZERO)?;
+        let scale = RangeScale::new(settings.configuration.bin_width_ps, I24F8::ZERO)?;
         let mut ways = Vec::new();
         for (reference, name) in REFERENCES {
             let config = DynamicDepthConfig::new(U24F8::from_num(THRESHOLD_MM), &scale, reference)?;

@@ -128,14 +128,11 @@ impl System {
 
     /// Its settings with the background estimate `by`.
     pub fn settings(&self, by: Background, l1: u16, seed: u64) -> Settings {
-        Settings {
-            bins: self.bins.into(),
-            bin_width_ps: U16F16::from_num(self.bin_width_ps),
-            rule: by.rule(),
-            l1,
-            x: self.x,
-            ..Settings::static_scene(seed)
-        }
+        let settings = Settings::static_scene(seed).with_bins(self.bins.into());
+        settings.with(|system| {
+            system.bin_width_ps = U16F16::from_num(self.bin_width_ps);
+            (system.rule, system.l1, system.x) = (by.rule(), l1, self.x);
+        })
     }
 
     /// The scene of a file with a pulse of this standard deviation in bins.
@@ -172,11 +169,14 @@ mod tests {
     #[test]
     fn settings_are_the_papers() {
         let settings = PC.settings(PC.by, 100, 0);
-        assert_eq!((settings.bins, settings.l1), (8, 100));
-        assert_eq!((settings.l2, settings.x), (2000, 10));
-        assert!(matches!(settings.rule, AnyRule::Average(_)));
+        assert_eq!((settings.bins, settings.configuration.l1), (8, 100));
+        assert_eq!(
+            (settings.configuration.l2, settings.configuration.x),
+            (2000, 10)
+        );
+        assert!(matches!(settings.configuration.rule, AnyRule::Average(_)));
         let settings = FPGA.settings(FPGA.by, L1, 0);
-        assert_eq!((settings.bins, settings.x), (128, 4));
-        assert!(matches!(settings.rule, AnyRule::Paper(_)));
+        assert_eq!((settings.bins, settings.configuration.x), (128, 4));
+        assert!(matches!(settings.configuration.rule, AnyRule::Paper(_)));
     }
 }

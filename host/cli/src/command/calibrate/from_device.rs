@@ -157,7 +157,7 @@ impl DeviceArgs {
             masked,
             length: Length::Cycles(median),
             cycles: Some(&collected.cycles),
-            bin_width_ps: settings.bin_width_ps.to_num(),
+            bin_width_ps: settings.configuration.bin_width_ps.to_num(),
             truth_mm: None,
             slant: rays.as_ref().map(|[slants, _]| &slants[..]),
             bias_mm: rays.as_ref().map(|[_, biases]| &biases[..]),

@@ -14,7 +14,6 @@ use crate::device::{client, settings};
 use dtof_core::fixed::types::U16F16;
 use dtof_device::HostTimeout;
 use dtof_device::histograms::{Collected, SoFar, collect};
-use dtof_engine::settings::Settings;
 use dtof_photons::MM_PER_PS;
 
 fn number(toml: &str, key: &str) -> f64 {
@@ -81,10 +80,7 @@ fn the_sensor_on_the_desk_is_found_and_then_watched() {
 }
 
 fn collected(name: &str, bin_width_ps: U16F16, seconds: f64) -> Collected {
-    let settings = Settings {
-        bin_width_ps,
-        ..settings()
-    };
+    let settings = settings().with(|with| with.bin_width_ps = bin_width_ps);
     let length = Duration::from_secs_f64(seconds);
     let done = |so_far: &SoFar| so_far.elapsed >= length;
     let timeout = HostTimeout::default();

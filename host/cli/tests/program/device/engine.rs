@@ -33,13 +33,11 @@ fn settings() -> Settings {
 
 /// The same with the other rule and the other estimator.
 fn with_windows() -> Settings {
-    Settings {
-        rule: WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
+    settings().for_pulse(U8F8::lit("0.55")).with(|with| {
+        with.rule = WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
             .unwrap()
-            .into(),
-        sigma_bins: Some(U8F8::lit("0.55")),
-        ..settings()
-    }
+            .into();
+    })
 }
 
 /// Serves one connection after another, each with a new sidecar. A connection ends when the host is
@@ -78,18 +76,16 @@ fn events(engine: &mut dyn Engine, cycles: u64, dead_time: u16) -> anyhow::Resul
 
 /// Blocks of three levels, tracking and two echoes as well.
 fn with_all() -> Settings {
-    Settings {
-        binning: Some(AdaptiveBinning {
+    with_windows().for_pulse(U8F8::lit("1")).with(|with| {
+        with.binning = Some(AdaptiveBinning {
             levels: BlockLevel::saturating(3),
             patience: 50,
-        }),
-        tracking: true,
-        echoes: EchoNumber::new(2).unwrap(),
-        echo_wait: Some(4),
-        sigma_bins: Some(U8F8::lit("1")),
-        l2: 300,
-        ..with_windows()
-    }
+        });
+        with.tracking = true;
+        with.echoes = EchoNumber::new(2).unwrap();
+        with.echo_wait = 4;
+        with.l2 = 300;
+    })
 }
 
 fn addresses(pixels: u16) -> Vec<PixelAddress> {
@@ -109,8 +105,8 @@ fn same_events(
     client.reads_every = reads_every;
     let mut on_device = DeviceEngine::new(client, settings, ARRAY, &addresses(64)).unwrap();
     let mut on_host = host_engine(settings, ARRAY, &addresses(64)).unwrap();
-    let expected = events(on_host.as_mut(), cycles, settings.dead_time).unwrap();
-    let actual = events(&mut on_device, cycles, settings.dead_time).unwrap();
+    let expected = events(on_host.as_mut(), cycles, settings.dead_time()).unwrap();
+    let actual = events(&mut on_device, cycles, settings.dead_time()).unwrap();
     assert!(!expected.is_empty() && actual == expected);
     assert_eq!(on_device.statistics(), on_host.statistics());
     assert_eq!(on_device.report().cycles, cycles);
@@ -130,15 +126,13 @@ fn a_host_that_seldom_reads_gets_the_same_events() {
 
 #[test]
 fn every_rule_and_estimator_gives_the_same_events_on_a_device() {
-    let (plain, with_windows) = (settings(), with_windows());
+    let [plain, with_windows] = [settings(), with_windows()].map(|settings| settings.configuration);
     let mut events = Vec::new();
     for rule in [plain.rule, with_windows.rule] {
-        for sigma_bins in [plain.sigma_bins, with_windows.sigma_bins] {
-            let settings = Settings {
-                rule,
-                sigma_bins,
-                ..settings()
-            };
+        for estimator in [plain.estimator, with_windows.estimator] {
+            let settings = settings().with(|with| {
+                (with.rule, with.estimator) = (rule, estimator);
+            });
             events.push(same_events(&settings, 1_000, Duration::ZERO, 100_000));
         }
     }
@@ -164,38 +158,25 @@ fn blocks_tracking_and_echoes_are_the_same_on_a_device() {
 #[test]
 fn dead_times_and_photons_once_per_bin_are_the_same_on_a_device() {
     let all = with_all();
-    let without_blocks = Settings {
-        binning: None,
-        ..all.clone()
-    };
+    let without_blocks = all.clone().with(|with| with.binning = None);
     for dead_time in [1, 20, 128] {
-        let settings = Settings {
-            dead_time,
-            ..without_blocks.clone()
-        };
+        let settings = without_blocks
+            .clone()
+            .with(|with| with.dead_time = Some(dead_time));
         same_events(&settings, 2_000, Duration::ZERO, 50_000);
     }
     let every = same_events(&all, 1_000, Duration::ZERO, 100_000);
-    let once = Settings {
-        once_per_bin: true,
-        ..all
-    };
+    let once = all.with(|with| with.once_per_bin = true);
     let once = same_events(&once, 1_000, Duration::ZERO, 100_000);
     assert!(every != once);
 }
 
 #[test]
 fn neighbours_confirm_alike_on_a_device() {
-    let all = Settings {
-        binning: None,
-        ..with_all()
-    };
+    let all = with_all().with(|with| with.binning = None);
     let alone = same_events(&all, 1_000, Duration::ZERO, 100_000);
     for neighbours in [Neighbours::Four, Neighbours::Eight] {
-        let settings = Settings {
-            neighbours: Some(neighbours),
-            ..all.clone()
-        };
+        let settings = all.clone().with(|with| with.neighbours = Some(neighbours));
         let events = same_events(&settings, 1_000, Duration::ZERO, 100_000);
         let is_confirmed = |event: &DepthEvent| event.flags.contains(Flags::CONFIRMED);
         assert!(events.iter().any(is_confirmed) && !alone.iter().any(is_confirmed));
@@ -211,16 +192,16 @@ fn a_configuration_the_device_cannot_take_is_refused_with_its_reason() {
     };
     let mut settings = settings();
     assert_contains(&refused(&settings, 65), "does not have that many pixels");
-    settings.l2 = 100;
+    settings.configuration.l2 = 100;
     let reason = refused(&settings, 64);
     assert_contains(&reason, "refuses");
     assert_contains(&reason, "L2 must be greater than L1");
-    settings.l2 = 2_000;
-    settings.tracking = true;
+    settings.configuration.l2 = 2_000;
+    settings.configuration.tracking = true;
     assert_contains(&refused(&settings, 64), "tracking needs the window rule");
-    settings.tracking = false;
+    settings.configuration.tracking = false;
     // One column of 64 pixels has 32, 16 and 8 blocks.
-    settings.binning = with_all().binning;
+    settings.configuration.binning = with_all().configuration.binning;
     let column = DeviceEngine::new(
         client(&name),
         &settings,

@@ -100,7 +100,7 @@ fn settings_are_applied_or_refused_with_the_reason() {
         (Some((8, 120)), Some(60))
     );
     // Another program can start with the file.
-    assert_eq!(saved.settings(128).unwrap().l1, 60);
+    assert_eq!(saved.settings(128).unwrap().configuration.l1, 60);
 }
 
 #[test]

@@ -36,11 +36,10 @@ fn pixels_get_every_setting() {
 fn the_rule_of_a_pixel_depends_on_its_neighbours_and_that_of_a_block_on_its_level() {
     let rule = window_rule(5);
     let with = |keys| settings(&format!("rule = 'window'; window = 3; z = 4.5; {keys}"));
-    assert_eq!(with("").own_rule(), rule.into());
+    assert_eq!(with("").config::<128>().unwrap().rule(), &rule.into());
     let own = *NeighbourRule::new(&rule).own();
     let confirmed = with("neighbours = 8");
     assert_ne!(own, rule);
-    assert_eq!(confirmed.own_rule(), own.into());
     assert_eq!(confirmed.config::<128>().unwrap().rule(), &own.into());
     let of_blocks = rule.of_blocks(BlockLevel::new(2).unwrap());
     let blocks = with("binning = 2");
@@ -66,10 +65,7 @@ fn what_pixels_cannot_have_is_refused_in_one_line() {
         assert_eq!(error.to_string(), line, "{keys}");
     }
     // A file says this of its keys itself.
-    let tracking = Settings {
-        tracking: true,
-        ..Settings::static_scene(1)
-    };
+    let tracking = Settings::static_scene(1).with(|with| with.tracking = true);
     let error = tracking.config::<128>().unwrap_err();
     assert_eq!(error.to_string(), "tracking is for rule window");
 }
@@ -112,10 +108,10 @@ fn frames_count_all_photons_of_a_bin() {
 #[test]
 fn the_bins_around_an_echo_are_four_standard_deviations_of_the_pulse() {
     // Without a pulse 4 bins.
-    assert_eq!(settings("").echo_guard_bins(), 4);
+    assert_eq!(settings("").configuration.echo_guard_bins, 4);
     for (sigma, bins) in [("0.25", 1), ("0.8", 4), ("1", 4), ("1.3", 6), ("1.75", 7)] {
         let settings = settings(&format!("sigma_bins = {sigma}"));
-        assert_eq!(settings.echo_guard_bins(), bins, "{sigma}");
+        assert_eq!(settings.configuration.echo_guard_bins, bins, "{sigma}");
     }
 }
 
@@ -133,7 +129,7 @@ fn the_depth_window_is_the_one_asked_for_or_suits_the_pulse() {
         ("sigma_bins = 0.75; half_widths = [1, 4]", window("1", "4")),
         ("sigma_bins = 0.75; estimator = 'centroid'", centroid),
     ] {
-        assert_eq!(settings(text).estimator(), estimator, "{text}");
+        assert_eq!(settings(text).configuration.estimator, estimator, "{text}");
     }
 }
 

@@ -1,8 +1,10 @@
 use dtof_core::fixed::types::I24F8;
 use dtof_core::rule::z_for_levels;
 use dtof_core::{
-    AnyRule, AverageRule, BlockLevel, CentredWindow, EchoNumber, Neighbours, PaperRule, RangeGate,
+    AnyRule, AverageRule, BlockLevel, CentredWindow, DepthEstimator, EchoNumber, Neighbours,
+    PaperRule, RangeGate,
 };
+use dtof_link::{Configuration, Source};
 use proptest::prelude::*;
 use proptest::sample::subsequence;
 
@@ -15,44 +17,50 @@ fn paper(alpha: &str) -> AnyRule {
 
 #[test]
 fn everything_has_a_default() {
-    let defaults = Settings {
-        bins: 64,
-        rule: paper("4"),
-        l1: 40,
-        l2: 2000,
-        x: 4,
-        ..Settings::static_scene(1)
-    };
+    let defaults = Settings::static_scene(1).with_bins(64).with(|with| {
+        with.rule = paper("4");
+        with.l1 = 40;
+        with.l2 = 2000;
+        with.x = 4;
+    });
     assert_eq!(SettingsFile::default().settings(64).unwrap(), defaults);
 }
 
 #[test]
 fn every_key_is_a_setting() {
+    let sides = CentredWindow::with_sides("1.75".parse().unwrap(), "4".parse().unwrap());
     let expected = Settings {
+        configuration: Configuration {
+            rule: window_rule(6).into(),
+            estimator: DepthEstimator::CentredWindow(sides.unwrap()),
+            x: 2,
+            l1: 8,
+            l2: 1500,
+            gate: (12, 119),
+            dead_time: Some(20),
+            once_per_bin: true,
+            dither_bins: 64,
+            dither_seed: 9,
+            pixels: 0,
+            columns: 0,
+            binning: None,
+            neighbours: None,
+            tracking: true,
+            echoes: EchoNumber::new(3).unwrap(),
+            echo_guard_bins: 6,
+            echo_wait: 5,
+            bin_width_ps: "92.1".parse().unwrap(),
+            offset_mm: I24F8::lit("-179.5"),
+            source: Source::Link,
+            dynamic_depth: None,
+            host_timeout_ms: 3000,
+        },
         bins: 128,
-        bin_width_ps: "92.1".parse().unwrap(),
-        offset_mm: I24F8::lit("-179.5"),
         offsets_mm: vec![I24F8::lit("1.5"), I24F8::lit("-78.04"), I24F8::ZERO],
-        gate: Some((12, 119)),
         masked: vec![3, 70],
-        rule: window_rule(6).into(),
         sigma_bins: Some("1.3".parse().unwrap()),
-        half_widths: CentredWindow::with_sides("1.75".parse().unwrap(), "4".parse().unwrap()),
-        centroid: false,
-        l1: 8,
-        l2: 1500,
-        x: 2,
-        binning: None,
-        neighbours: None,
-        tracking: true,
-        echoes: EchoNumber::new(3).unwrap(),
-        echo_wait: Some(5),
-        dead_time: 20,
         is_dead_time_of_sensor: false,
-        once_per_bin: true,
         counter_bits: 8,
-        dither_bins: 64,
-        dither_seed: 9,
         frame: None,
         decide_once: false,
         seed: 7,
@@ -63,9 +71,9 @@ fn every_key_is_a_setting() {
         let levels = BlockLevel::new(levels).unwrap();
         Some(AdaptiveBinning { levels, patience })
     };
-    assert_eq!(settings("binning = 0").binning, None);
-    assert_eq!(settings("binning = 1").binning, blocks(1, 64));
-    let blocks_of_64 = settings("binning = 3; patience = 9").binning;
+    assert_eq!(settings("binning = 0").configuration.binning, None);
+    assert_eq!(settings("binning = 1").configuration.binning, blocks(1, 64));
+    let blocks_of_64 = settings("binning = 3; patience = 9").configuration.binning;
     assert_eq!(blocks_of_64, blocks(3, 9));
     for (number, expected) in [
         (0, None),
@@ -73,11 +81,12 @@ fn every_key_is_a_setting() {
         (8, Some(Neighbours::Eight)),
     ] {
         let keys = format!("rule = 'window'; window = 3; neighbours = {number}");
-        assert_eq!(settings(&keys).neighbours, expected);
+        assert_eq!(settings(&keys).configuration.neighbours, expected);
     }
     assert_eq!(settings("frame = 500").frame, Some(500));
     assert!(settings("decide_once = true").decide_once);
-    assert!(settings("sigma_bins = 1; estimator = 'centroid'").centroid);
+    let centroid = settings("sigma_bins = 1; estimator = 'centroid'").configuration;
+    assert_eq!(centroid.estimator, DepthEstimator::Centroid3);
 }
 
 #[test]
@@ -100,7 +109,7 @@ fn a_rule_has_the_numbers_asked_for_or_those_that_suit_the_pulse() {
             window(4),
         ),
     ] {
-        assert_eq!(settings(keys).rule, rule, "{keys}");
+        assert_eq!(settings(keys).configuration.rule, rule, "{keys}");
     }
 }
 
@@ -108,7 +117,7 @@ fn a_rule_has_the_numbers_asked_for_or_those_that_suit_the_pulse() {
 fn z_has_the_false_alarms_asked_for_in_the_bins_of_the_gate() {
     let z_of = |bins, keys: &str| {
         let settings = file(&format!("rule = 'window'; window = 3; {keys}")).settings(bins);
-        match settings.unwrap().rule {
+        match settings.unwrap().configuration.rule {
             AnyRule::Window(rule) => rule.z(),
             _ => panic!("another rule"),
         }
@@ -261,12 +270,16 @@ fn a_dead_time_is_that_of_the_settings_or_of_the_sensor() {
         let mut file = file(keys);
         file.dead_time_of_sensor = of_sensor;
         let settings = file.settings(128).unwrap();
-        let found = (settings.dead_time, settings.is_dead_time_of_sensor);
+        let found = (settings.dead_time(), settings.is_dead_time_of_sensor);
         assert_eq!(found, (dead_time, from_sensor), "{keys} {of_sensor:?}");
         let written = file.with_settings(&settings).to_toml().unwrap();
         let mut again = SettingsFile::parse(&written).unwrap();
         again.dead_time_of_sensor = of_sensor;
-        assert_eq!(again.settings(128).unwrap().dead_time, dead_time, "{keys}");
+        assert_eq!(
+            again.settings(128).unwrap().dead_time(),
+            dead_time,
+            "{keys}"
+        );
     }
 }
 
@@ -287,7 +300,14 @@ fn the_dither_of_a_laser_is_used_and_only_what_was_asked_for_is_written() {
             ..SettingsFile::default()
         });
         let settings = file.settings(128).unwrap();
-        assert_eq!((settings.dither_bins, settings.dither_seed), used, "{keys}");
+        assert_eq!(
+            (
+                settings.configuration.dither_bins,
+                settings.configuration.dither_seed
+            ),
+            used,
+            "{keys}"
+        );
         let written = file.with_settings(&settings);
         assert_eq!(written.dither_of_laser, of_laser);
         assert_eq!(written.settings(128).unwrap(), settings);
