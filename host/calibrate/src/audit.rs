@@ -754,12 +754,20 @@ pub(super) fn fill_missing_codes(traces: &mut [Trace]) -> Option<String> {
         .iter()
         .map(|trace| &trace.counts[..])
         .collect::<Vec<_>>());
+    // A pulse without background falls to nothing: it goes on as it fell from the bin beside.
+    let goes_on = |sum: f64, beside: Option<usize>| {
+        let beside = beside.and_then(|bin| sums.get(bin)).copied();
+        sum * beside.map_or(1.0, |beside| (sum / beside).min(1.0))
+    };
     let missing: Vec<(usize, [usize; 2])> = (1..sums.len().saturating_sub(1))
         .filter(|&bin| sums[bin] <= 0.0)
         .filter_map(|bin| {
             let before = sums[..bin].iter().rposition(|&sum| sum > 0.0)?;
             let after = bin + sums[bin..].iter().position(|&sum| sum > 0.0)?;
-            let usual = f64::min(sums[before], sums[after]);
+            let usual = f64::min(
+                goes_on(sums[before], before.checked_sub(1)),
+                goes_on(sums[after], Some(after + 1)),
+            );
             is_surely_less(0.0, usual, ONE_IN).then_some((bin, [before, after]))
         })
         .collect();
@@ -1322,6 +1330,19 @@ mod tests {
             prop_assert_eq!(fill_missing_codes(&mut ends), None);
             let mut dark = recorded(32, &|_, _| 0.1, &|_, n| n, seed);
             prop_assert_eq!(fill_missing_codes(&mut dark), None);
+        }
+
+        /// Nor where two pulses end.
+        #[test]
+        fn bins_between_pulses_are_no_missing_codes(
+            light in 1e2..1e4_f64,
+            sigma in 0.4..3.0_f64,
+            apart in 4.0..40.0_f64,
+            seed: u64,
+        ) {
+            let pulses = scene(0.0, vec![(light, 40.0, sigma), (light, 40.0 + apart, sigma)]);
+            let mut traces = recorded(16, &pulses, &|_, n| n, seed);
+            prop_assert_eq!(fill_missing_codes(&mut traces), None);
         }
     }
 
