@@ -10,6 +10,7 @@ mod find;
 mod input;
 mod load;
 mod maps;
+mod options;
 mod pixel;
 mod pixels;
 mod run;
@@ -25,6 +26,7 @@ fn _native(module: &Bound<PyModule>) -> PyResult<()> {
     module.add_class::<pixels::Pixels>()?;
     module.add_function(wrap_pyfunction!(run::replay, module)?)?;
     module.add_function(wrap_pyfunction!(run::check_options, module)?)?;
+    module.add_function(wrap_pyfunction!(options::keywords, module)?)?;
     module.add_function(wrap_pyfunction!(run::simulate, module)?)?;
     module.add_function(wrap_pyfunction!(load::load, module)?)?;
     module.add_function(wrap_pyfunction!(find::calibrate, module)?)?;

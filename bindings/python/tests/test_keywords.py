@@ -1,16 +1,17 @@
 """Keywords have types, ranges and help, and they are those of the program."""
 
 import inspect
+import os
 import re
 import subprocess
 import sys
-from typing import get_type_hints
 
 import numpy
 import pytest
 
 import dtof
-from dtof import _keywords
+from conftest import ROOT
+from dtof import _keywords, _native
 
 OTHERS = {
     "replay": "input out dynamic_depth threshold_mm reference echo no_csv quiet help",
@@ -43,20 +44,35 @@ def help_of(program, job):
 def test_keywords_are_the_options_of_the_program_with_their_help(program, job):
     of_program = help_of(program, job)
     expected = {name: text for name, text in of_program.items() if name not in OTHERS[job].split()}
-    kinds = get_type_hints(
-        getattr(_keywords, {"export": "Points"}.get(job, job.title()) + "Options"), include_extras=True
-    )
-    assert {name: kind.__metadata__[1] for name, kind in kinds.items()} == expected
+    keywords = _keywords.all_of(getattr(_keywords, {"export": "Points"}.get(job, job.title()) + "Options"))
+    assert {name: keyword.help for name, keyword in keywords.items()} == expected
     function = getattr(dtof, job)
     assert set(expected) <= set(inspect.signature(function).parameters)
-    for name, kind in kinds.items():
-        assert f"\n{name}: {kind.__metadata__[0]}\n" in function.__doc__
+    for name, keyword in keywords.items():
+        assert f"\n{name}: {keyword.values}\n" in function.__doc__
+
+
+def test_types_are_made_from_the_tables_of_the_options():
+    types = []
+    for options, keywords in _native.keywords():
+        of = {"PixelOptions": "``Pixel`` and ``Pixels``", "PointsOptions": "``points`` and ``export``"}
+        of = of.get(options, f"``{options.removesuffix('Options').lower()}``")
+        lines = "".join(f"    {name}: {kind}\n" for name, kind, _, _ in keywords)
+        types.append(f'class {options}(TypedDict, total=False):\n    """Of {of}."""\n\n{lines}')
+    file = ROOT / "bindings" / "python" / "python" / "dtof" / "_keywords.py"
+    text = file.read_text()
+    begin, end = text.index("test_keywords.py\n") + len("test_keywords.py\n"), text.index("# The end of these types.")
+    made = "\n\n" + "\n\n".join(types) + "\n\n"
+    if os.environ.get("DTOF_BLESS"):
+        file.write_text(text[:begin] + made + text[end:])
+    else:
+        assert text[begin:end] == made
 
 
 def test_ranges_are_those_of_the_program():
     tried = 0
-    for name, kind in get_type_hints(_keywords.ReplayOptions, include_extras=True).items():
-        ends = re.match(r"(whole )?number, (-?[\d.]+) to (-?[\d.]+)", kind.__metadata__[0])
+    for name, keyword in _keywords.all_of(_keywords.ReplayOptions).items():
+        ends = re.match(r"(whole )?number, (-?[\d.]+) to (-?[\d.]+)", keyword.values)
         if not ends:
             continue
         whole, low, high = ends.groups()

@@ -28,12 +28,13 @@ use anyhow::{Context, Result, ensure};
 use dtof_link::DynamicDepth;
 use tempfile::NamedTempFile;
 
-use dtof_engine::settings::{RaySettings, SettingsFile};
+use dtof_engine::settings::{RaySettings, SensorSettings, SettingsFile};
 use dtof_events::aer_file::{self, Event, EventKind, Header};
 use dtof_events::clock::LaserClock;
 use dtof_events::echoes::Echo;
 use dtof_events::histories::PixelHistories;
 use dtof_options::files::{destination, flush_to_disk, is_new_or_marked, temporary_file};
+use dtof_options::keys::{Key, Kind, names};
 use dtof_options::numbers::boolean;
 use dtof_options::progress::Progress;
 use dtof_options::rows::grouped;
@@ -129,12 +130,32 @@ pub struct ProjectionOptions {
 }
 
 impl dtof_options::Options for ProjectionOptions {
-    const KEYS: &'static [&'static [&'static str]] = &[&[
-        "field_of_view_degrees",
-        "calibration",
-        "laser_hz",
+    const KEYS: &'static [&'static [Key]] = &[&[
+    Key::of(RaySettings::KEYS, "field_of_view_degrees").with_help(
+        "Field of view in degrees from edge to edge [default: 60 along the longer side, with square \
+         pixels]",
+    ),
+    Key::of(RaySettings::KEYS, "calibration").with_help(
+        "TOML file with a direction and a range bias for each pixel; docs/export.md lists its keys",
+    ),
+    Key::of(SensorSettings::KEYS, "laser_hz").with_help(
+        "Laser cycles a second, if the file has none or is wrong [default: the file's, else 10000000 \
+         with a warning]",
+    ),
+    Key::new(
         "echo",
+        Kind::OneOf(names::<Echo>),
+        "ECHO",
+        "Depth events: echo of each exposure of a pixel or block [default: all; the strongest with \
+         --one-per-pixel]",
+    ),
+    Key::new(
         "one_per_pixel",
+        Kind::Switch,
+        "YES",
+        "CSV, PCD and PLY: one point a pixel, at the depth of depth-events.npy, in place of a point \
+         an event",
+    ),
     ]];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {

@@ -17,6 +17,7 @@
 #![deny(clippy::print_stderr, clippy::print_stdout)]
 
 pub mod files;
+pub mod keys;
 pub mod numbers;
 pub mod progress;
 pub mod rows;
@@ -26,6 +27,8 @@ use std::error::Error;
 use std::ffi::OsStr;
 use std::fmt::{self, Display, Formatter};
 use std::path::PathBuf;
+
+use keys::Key;
 
 /// An error about an option or an input: a key, a value and a reason.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -234,7 +237,7 @@ const OTHER_NAMES: [(&str, &str); 2] = [("masked", "mask"), ("field_of_view_degr
 /// The options of a job.
 pub trait Options: Default {
     /// The keys of all options, in groups.
-    const KEYS: &'static [&'static [&'static str]];
+    const KEYS: &'static [&'static [Key]];
 
     /// Sets one of [`Self::KEYS`].
     ///
@@ -266,14 +269,9 @@ pub fn read<O: Options>(
     let mut options = O::default();
     for (name, value) in given {
         let (name, value) = (name.as_ref(), value.as_ref());
-        let mut keys = O::KEYS.iter().copied().flatten().copied();
-        let key = keys.find(|key| option_name(key) == name);
-        let keys = O::KEYS
-            .iter()
-            .copied()
-            .flatten()
-            .map(|key| option_name(key));
-        let key = key.ok_or_else(|| Refused::unknown(name, None, keys))?;
+        let keys = || O::KEYS.iter().copied().flatten().map(|key| key.name);
+        let key = keys().find(|key| option_name(key) == name);
+        let key = key.ok_or_else(|| Refused::unknown(name, None, keys().map(option_name)))?;
         if value.is_empty() {
             return Err(Refused::new(key, "needs a value"));
         }
@@ -343,10 +341,7 @@ pub fn named<T: Named>(text: &str) -> Result<T, String> {
     let found = T::NAMES.iter().find(|(name, ..)| *name == text);
     found.map(|(_, value, _)| *value).ok_or_else(|| {
         let names: Vec<&str> = T::NAMES.iter().map(|(name, ..)| *name).collect();
-        match names.split_last() {
-            Some((last, names)) => format!("must be {} or {last}", names.join(", ")),
-            None => String::new(),
-        }
+        format!("must be {}", keys::any_of(&names))
     })
 }
 

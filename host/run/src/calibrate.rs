@@ -8,8 +8,11 @@ use super::recording::{
     warnings,
 };
 use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate_with};
-use dtof_engine::settings::{SettingsFile, share};
+use dtof_engine::settings::{
+    DetectionSettings, RaySettings, RunSettings, SensorSettings, SettingsFile, share,
+};
 use dtof_options::Refused;
+use dtof_options::keys::{Key, Kind};
 use dtof_options::numbers::{MAX_INTEGER, integer, within};
 use dtof_options::progress::{Progress, shared};
 use dtof_photons::input::Input;
@@ -18,13 +21,50 @@ use dtof_photons::open::{Counts, counts};
 use dtof_photons::recorded::{RecordingLength, check_totals};
 
 /// Options of this job; keys of settings files with these names mean something else.
-const OWN: &[&str] = &["target_mm", "glass", "false_alarm", "seed"];
+const OWN: &[Key] = &[
+    GLASS,
+    Key::new(
+        "target_mm",
+        Kind::Real(", 0 to 1000000"),
+        "MM",
+        "Distance in millimetres of a flat target that most pixels see: with --fov straight ahead, as \
+         a tape measures it, else along the ray of the median pixel",
+    ),
+    Key::of(DetectionSettings::KEYS, "false_alarm").with_help(
+        "Share of exposures without a target that end with an event, at most 0.1 [default: 0.01]",
+    ),
+    Key::of(RunSettings::KEYS, "seed").with_help("Seed of the simulation [default: 1]"),
+];
+
+/// Whether there is a cover glass, if the user knows.
+pub(super) const GLASS: Key = Key::new(
+    "glass",
+    Kind::YesOrNo,
+    "GLASS",
+    "Whether the nearest surface that most pixels see is a cover glass, which the gate then \
+         leaves out [default: if all pixels have it at one place and half of them see something \
+         behind it]",
+);
 
 /// What the user knows of the sensor.
-const SENSOR: &[&str] = &["gate", "masked", "sigma_bins", "once_per_bin"];
+const SENSOR: &[Key] = &[
+    Key::of(SensorSettings::KEYS, "gate").with_help(
+        "First and last bin that may hold the peak, as 20..119 [default: found]",
+    ),
+    Key::of(SensorSettings::KEYS, "masked").with_help(
+        "Pixels to leave out, as 3,70, beside hot and dead ones that are found; none leaves out none",
+    ),
+    Key::of(DetectionSettings::KEYS, "once_per_bin").with_help(
+        "Photons of one laser cycle in one bin count once. For photons, not for histograms",
+    ),
+    Key::of(SensorSettings::KEYS, "sigma_bins").with_help(
+        "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256 [default: measured; \
+         without a peak that is bright enough that of --settings, else 1]",
+    ),
+];
 
 /// Where the pixels look.
-const RAYS: &[&str] = &["field_of_view_degrees", "calibration"];
+const RAYS: &[Key] = RaySettings::KEYS;
 
 /// The options of a calibration.
 #[derive(Clone, Debug, Default)]
@@ -36,7 +76,7 @@ pub struct Options {
 }
 
 impl dtof_options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] = &[RECORDING, SENSOR, TDC, RAYS, OWN];
+    const KEYS: &'static [&'static [Key]] = &[RECORDING, SENSOR, TDC, RAYS, OWN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
@@ -91,7 +131,7 @@ impl Options {
         let older = older.cloned().unwrap_or_default();
         let mut requested = self.given.for_recording_over(older)?;
         for key in OWN {
-            requested.override_key(key);
+            requested.override_key(key.name);
         }
         Ok(requested)
     }

@@ -4,7 +4,7 @@ use anyhow::{Context, Result, ensure};
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 
-use super::calibrate::{calibrate_counts, with_mask, yes_or_no};
+use super::calibrate::{GLASS, calibrate_counts, with_mask, yes_or_no};
 use super::given::{Given, SENSOR, TDC, of_given};
 use super::recording::{
     RECORDING, bin_width_warning, check_once_per_bin, mask_capture, read_options, settings_of_file,
@@ -14,7 +14,10 @@ use super::simulate::settings_of_scene;
 use dtof_calibrate::CalibrationOptions;
 use dtof_compare::truth::Truth;
 use dtof_compare::{Comparison, Task, compare};
-use dtof_engine::settings::{RuleName, Settings, SettingsFile, share};
+use dtof_engine::settings::{
+    DetectionSettings, RuleName, RunSettings, Settings, SettingsFile, share,
+};
+use dtof_options::keys::{Key, Kind};
 use dtof_options::numbers::{MAX_INTEGER, integer, positive};
 use dtof_options::{Refused, plain};
 use dtof_photons::input::Input;
@@ -22,6 +25,35 @@ use dtof_photons::masked::Masked;
 use dtof_photons::open::{Counts, HISTOGRAM_CYCLES, ReadOptions, counts, open};
 use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
+
+/// How exact, and how sure.
+const ACCURACY: &[Key] = &[
+    Key::new(
+        "within",
+        Kind::Real(" above 0"),
+        "MM",
+        "Largest error of 68 % of the reports in millimetres [default: that of the longest frames]",
+    ),
+    Key::of(DetectionSettings::KEYS, "false_alarm").with_help(
+        "Share of exposures without a target that end with an event, at most 0.1 [default: 0.01]",
+    ),
+];
+/// What is compared.
+const RUN: &[Key] = &[
+    Key::of(DetectionSettings::KEYS, "once_per_bin").with_help(
+        "Also try photons of one laser cycle in one bin that count once. For photons, not for \
+         histograms",
+    ),
+    Key::of(RunSettings::KEYS, "cycles")
+        .with_help("Laser cycles to use at most [default: 10000 of a recording; the scene's]"),
+    // One more is the seed of a second run.
+    Key::new(
+        "seed",
+        Kind::Integer(0, MAX_INTEGER - 1),
+        "N",
+        "Seed of every random number [default: 1]",
+    ),
+];
 
 /// The options of a comparison.
 #[derive(Clone, Debug, Default)]
@@ -37,20 +69,13 @@ pub struct Options {
 }
 
 impl dtof_options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] = &[
-        &["within", "false_alarm", "glass"],
-        RECORDING,
-        SENSOR,
-        TDC,
-        &["once_per_bin", "cycles", "seed"],
-    ];
+    const KEYS: &'static [&'static [Key]] = &[ACCURACY, RECORDING, SENSOR, TDC, &[GLASS], RUN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
             "within" => self.within = Some(positive(text)?),
             "false_alarm" => self.false_alarm = Some(share(text)?),
             "glass" => self.glass = Some(yes_or_no(text)?),
-            // One more is the seed of a second run.
             "seed" => self.given.options.run.seed = Some(integer(0..=MAX_INTEGER - 1)(text)?),
             key => self.given.set(key, text)?,
         }
@@ -125,7 +150,8 @@ impl Options {
     pub fn requested(&self, is_scene: bool) -> Result<SettingsFile> {
         let mut requested = if is_scene {
             let reason = "is for recordings, not for a scene";
-            self.given.refuse(RECORDING, reason)?;
+            let names: Vec<_> = RECORDING.iter().map(|key| key.name).collect();
+            self.given.refuse(&names, reason)?;
             self.given.merged_with_looks()?
         } else {
             let file = self.given.read()?.with_looks();

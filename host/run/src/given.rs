@@ -4,17 +4,36 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
-use dtof_engine::settings::{DetectionSettings, SettingsFile};
+use dtof_engine::settings::{DetectionSettings, RunSettings, SensorSettings, SettingsFile};
+use dtof_options::keys::{Key, Kind};
 use dtof_options::{Options, Refused};
 
 /// The settings file, and options of the sensor that hold for any input.
-pub const SENSOR: &[&str] = &["settings", "gate", "masked", "sigma_bins"];
+pub const SENSOR: &[Key] = &[
+    SETTINGS,
+    Key::of(SensorSettings::KEYS, "gate"),
+    Key::of(SensorSettings::KEYS, "masked"),
+    Key::of(SensorSettings::KEYS, "sigma_bins"),
+];
 /// The dead time of a TDC.
-pub const TDC: &[&str] = &["dead_time"];
+pub const TDC: &[Key] = &[Key::of(SensorSettings::KEYS, "dead_time")];
 /// The dither of a laser that a device fires.
-pub const DITHER: &[&str] = &["dither_bins", "dither_seed"];
+pub const DITHER: &[Key] = &[
+    Key::of(SensorSettings::KEYS, "dither_bins"),
+    Key::of(SensorSettings::KEYS, "dither_seed"),
+];
 /// The option for a frame-based sensor instead of asynchronous pixels.
-pub const FRAME: &[&str] = &["frame"];
+pub const FRAME: &[Key] = &[Key::of(RunSettings::KEYS, "frame")];
+/// The option for a single decision of each pixel.
+pub const ONCE: &[Key] = &[Key::of(RunSettings::KEYS, "decide_once")];
+/// The option for the settings file.
+const SETTINGS: Key = Key::new(
+    "settings",
+    Kind::Settings,
+    "FILE",
+    "Settings file in TOML, such as every run writes; options override it. docs/settings.md lists \
+         its keys",
+);
 
 /// A settings file, and the options that override it.
 #[derive(Clone, Debug, Default)]
@@ -48,7 +67,7 @@ impl Given {
     pub fn check(&self) -> Result<(), Refused> {
         self.options.check()?;
         match self.given_event_option() {
-            Some(key) => self.refuse(FRAME, &format!("cannot be used with `{key}`")),
+            Some(key) => self.refuse(&["frame"], &format!("cannot be used with `{key}`")),
             None => Ok(()),
         }
     }
@@ -56,7 +75,7 @@ impl Given {
     /// An option that only pixels with events have, if one is given.
     fn given_event_option(&self) -> Option<&'static str> {
         let of_frames = ["estimator", "half_widths"];
-        let keys = DetectionSettings::KEYS.iter().copied();
+        let keys = DetectionSettings::KEYS.iter().map(|key| key.name);
         self.first_given(keys.filter(|key| !of_frames.contains(key)))
     }
 
@@ -117,6 +136,18 @@ macro_rules! of_given {
 }
 pub(crate) use of_given;
 
+/// The bins of a device, and its ranges.
+const DEVICE: &[Key] = &[
+    Key::of(SensorSettings::KEYS, "bin_width_ps").with_help(
+        "Width of a bin in picoseconds, rounded to 1/65536 [default: the device's, or 250 if it has \
+         none]",
+    ),
+    Key::of(SensorSettings::KEYS, "offset_mm").with_help(
+        "Millimetres added to every range, rounded to 1/256 [default: the device's]",
+    ),
+    Key::of(SensorSettings::KEYS, "offsets_mm"),
+];
+
 /// Options of the pixels of a device, or of a single pixel.
 #[derive(Clone, Debug, Default)]
 pub struct Operation {
@@ -125,13 +156,7 @@ pub struct Operation {
 }
 
 impl Options for Operation {
-    const KEYS: &'static [&'static [&'static str]] = &[
-        &["bin_width_ps", "offset_mm", "offsets_mm"],
-        SENSOR,
-        TDC,
-        DITHER,
-        DetectionSettings::KEYS,
-    ];
+    const KEYS: &'static [&'static [Key]] = &[DEVICE, SENSOR, TDC, DITHER, DetectionSettings::KEYS];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         self.given.set(key, text)

@@ -6,6 +6,7 @@ use dtof_core::fixed::types::U16F16;
 
 use super::given::Given;
 use dtof_engine::settings::{RunSettings, SensorSettings, SettingsFile};
+use dtof_options::keys::Key;
 use dtof_options::rows::grouped;
 use dtof_options::{Refused, plain};
 use dtof_photons::input::Input;
@@ -14,19 +15,19 @@ use dtof_photons::open::{BIN_WIDTH_PS, Metadata, ReadOptions};
 use dtof_photons::recorded::RecordingLength;
 
 /// The options that describe a recording.
-pub const RECORDING: &[&str] = &[
-    "axes",
-    "array",
-    "capture",
-    "columns",
-    "rebin",
-    "bins",
-    "bin_width_ps",
-    "offset_mm",
-    "offsets_mm",
-    "photons_per_cycle",
-    "recorded_cycles",
-    "laser_hz",
+pub const RECORDING: &[Key] = &[
+    Key::of(RunSettings::KEYS, "axes"),
+    Key::of(RunSettings::KEYS, "array"),
+    Key::of(RunSettings::KEYS, "capture"),
+    Key::of(SensorSettings::KEYS, "columns"),
+    Key::of(RunSettings::KEYS, "rebin"),
+    Key::of(SensorSettings::KEYS, "bins"),
+    Key::of(SensorSettings::KEYS, "bin_width_ps"),
+    Key::of(SensorSettings::KEYS, "offset_mm"),
+    Key::of(SensorSettings::KEYS, "offsets_mm"),
+    Key::of(RunSettings::KEYS, "photons_per_cycle"),
+    Key::of(RunSettings::KEYS, "recorded_cycles"),
+    Key::of(SensorSettings::KEYS, "laser_hz"),
 ];
 /// The options for the laser cycles of recorded histograms.
 const LENGTH: &[&str] = &["photons_per_cycle", "recorded_cycles"];

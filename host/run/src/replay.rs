@@ -4,9 +4,9 @@
 
 use anyhow::{Result, ensure};
 
-use super::calibrate::{calibrate_counts, has_photons, with_mask, yes_or_no};
+use super::calibrate::{GLASS, calibrate_counts, has_photons, with_mask, yes_or_no};
 use super::depth_map::MapInput;
-use super::given::{FRAME, Given, SENSOR, TDC, of_given};
+use super::given::{FRAME, Given, ONCE, SENSOR, TDC, of_given};
 use super::recording::{
     RECORDING, bin_width_warning, check_once_per_bin, mask_capture, read_options, settings_of_file,
 };
@@ -17,8 +17,11 @@ use dtof_calibrate::{Calibration, CalibrationOptions};
 use dtof_core::Neighbours;
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
-use dtof_engine::settings::{DEFAULT_L2, DetectionSettings, EstimatorName, Settings, SettingsFile};
+use dtof_engine::settings::{
+    DEFAULT_L2, DetectionSettings, EstimatorName, RunSettings, Settings, SettingsFile,
+};
 use dtof_events::clock::LaserClock;
+use dtof_options::keys::Key;
 use dtof_options::progress::Progress;
 use dtof_options::rows::Row;
 use dtof_options::{KeysOfFile, Refused, flag};
@@ -29,9 +32,12 @@ use dtof_photons::open::{CheckedRecording, Metadata, Recording, check};
 use dtof_photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
 
 /// What the user knows of the scene: an option of the search.
-const SEARCH: &[&str] = &["glass"];
+const SEARCH: &[Key] = &[GLASS];
 /// The options that settle which photons are replayed, and whether pixels decide once.
-const RUN: &[&str] = &["cycles", "seed", "decide_once"];
+const RUN: &[Key] = &[
+    Key::of(RunSettings::KEYS, "cycles"),
+    Key::of(RunSettings::KEYS, "seed"),
+];
 
 /// The options that were part of the search, so that what is found is for them.
 const SEARCHED_WITH: &[&str] = &["bins", "bin_width_ps", "gate", "masked", "sigma_bins"];
@@ -48,12 +54,13 @@ pub struct Options {
 }
 
 impl dtof_options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] = &[
+    const KEYS: &'static [&'static [Key]] = &[
         RECORDING,
         SENSOR,
         TDC,
         DetectionSettings::KEYS,
         FRAME,
+        ONCE,
         SEARCH,
         RUN,
     ];

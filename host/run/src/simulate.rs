@@ -5,18 +5,41 @@ use dtof_core::DepthEvent;
 use dtof_core::fixed::types::U16F16;
 
 use super::depth_map::MapInput;
-use super::given::{FRAME, Given, SENSOR, TDC, of_given};
+use super::given::{FRAME, Given, ONCE, SENSOR, TDC, of_given};
 use super::run::{RunResult, Sink, run};
 use super::truth::SceneComparison;
 use dtof_engine::Engine;
 use dtof_engine::settings::{
     DetectionSettings, RaySettings, RunSettings, SensorSettings, Settings, SettingsFile,
 };
+use dtof_options::keys::{Key, Kind};
 use dtof_options::numbers::{boolean, integer};
 use dtof_options::progress::Progress;
 use dtof_photons::masked::Masked;
 use dtof_photons::source::Slice;
 use dtof_simulate::scene::Scene;
+
+/// What is simulated.
+const ARRAY: &[Key] = &[
+    Key::new(
+        "array",
+        Kind::Integers("columns and rows, (64, 32)"),
+        "COLUMNSxROWS",
+        "Macropixels of the array [default: the file's]",
+    ),
+    Key::new(
+        "laser_off",
+        Kind::On,
+        "",
+        "Simulate without signal: photon-counts.svg is then a passive image",
+    ),
+];
+/// How long.
+const RUN: &[Key] = &[
+    Key::of(RunSettings::KEYS, "cycles")
+        .with_help("Laser cycles to simulate [default: the file's]"),
+    Key::of(RunSettings::KEYS, "seed").with_help("Seed of the simulated photons [default: 1]"),
+];
 
 /// The options of a simulation.
 #[derive(Clone, Debug, Default)]
@@ -30,13 +53,14 @@ pub struct Options {
 }
 
 impl dtof_options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] = &[
-        &["array", "laser_off"],
+    const KEYS: &'static [&'static [Key]] = &[
+        ARRAY,
         SENSOR,
         TDC,
         DetectionSettings::KEYS,
         FRAME,
-        &["cycles", "seed", "decide_once"],
+        ONCE,
+        RUN,
     ];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {

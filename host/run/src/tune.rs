@@ -7,7 +7,8 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use dtof_core::BlockLevel;
-use dtof_engine::settings::RuleName;
+use dtof_engine::settings::{DetectionSettings, RuleName};
+use dtof_options::keys::{Key, Kind};
 use dtof_options::numbers::{MAX_INTEGER, bins, integer, positive, shortest};
 use dtof_options::progress::{Progress, shared};
 use dtof_options::rows::significant;
@@ -87,24 +88,107 @@ impl Default for Options {
 }
 
 impl dtof_options::Options for Options {
-    const KEYS: &'static [&'static [&'static str]] = &[&[
-        "rule",
-        "background",
-        "signal",
-        "snr",
-        "sigma_bins",
-        "sigma_ps",
-        "bins",
-        "bin_width_ps",
-        "false_alarm",
-        "false_alarms_per_second",
-        "laser_hz",
-        "l1",
-        "l2",
-        "x",
-        "min_count",
-        "binning",
-        "seed",
+    const KEYS: &'static [&'static [Key]] = &[&[
+        Key::of(DetectionSettings::KEYS, "rule")
+            .with_help("Detection rule to tune [default: paper]"),
+        Key::new(
+            "background",
+            Kind::Real(" above 0"),
+            "B",
+            "Background photons a bin and laser cycle (B)",
+        ),
+        Key::new(
+            "signal",
+            Kind::Real(" above 0"),
+            "A",
+            "Signal photons a laser cycle (A)",
+        ),
+        Key::new(
+            "snr",
+            Kind::Real(" above 0"),
+            "SNR",
+            "Instead of --signal: SNR of the longest exposure, N·A / √(N·B) with N = L2",
+        ),
+        Key::new(
+            "sigma_bins",
+            Kind::Real(" above 0"),
+            "BINS",
+            "Standard deviation of the pulse in bins",
+        ),
+        Key::new(
+            "sigma_ps",
+            Kind::Real(" above 0"),
+            "PS",
+            "Instead of --sigma-bins: standard deviation of the pulse in picoseconds",
+        ),
+        Key::new(
+            "bins",
+            Kind::Integer(8, 1024),
+            "N",
+            "Bins of a histogram, a power of two from 8 to 1024 [default: 128]",
+        ),
+        Key::new(
+            "bin_width_ps",
+            Kind::Real(" above 0"),
+            "PS",
+            "Width of a bin in picoseconds [default: 250]",
+        ),
+        Key::new(
+            "false_alarm",
+            Kind::Real(" above 0"),
+            "SHARE",
+            "Share of exposures without a target that end with an event [default: 0.01]",
+        ),
+        Key::new(
+            "false_alarms_per_second",
+            Kind::Real(" above 0"),
+            "RATE",
+            "Instead of --false-alarm: false alarms of a pixel a second",
+        ),
+        Key::new(
+            "laser_hz",
+            Kind::Real(" above 0"),
+            "HZ",
+            "Laser cycles a second",
+        ),
+        Key::new(
+            "l1",
+            Kind::Integer(0, 65_535),
+            "N",
+            "Shortest exposure: pixels decide after more than N laser cycles [default: the one with the \
+         shortest time to an event]",
+        ),
+        Key::new(
+            "l2",
+            Kind::Integer(1, 65_535),
+            "N",
+            "Longest exposure: a pixel without an event starts over after N laser cycles [default: 2000]",
+        ),
+        Key::new(
+            "x",
+            Kind::Integer(1, 65_535),
+            "N",
+            "Laser cycles between two decisions [default: 4]",
+        ),
+        Key::new(
+            "min_count",
+            Kind::Integer(1, 1023),
+            "N",
+            "Fewest photons in a reported peak [default: 5]",
+        ),
+        Key::new(
+            "binning",
+            Kind::Integer(0, BlockLevel::MAX.raw() as u64),
+            "LEVELS",
+            "Window rule: levels of adaptive binning, 0 to 3; pixels and blocks share the false alarms \
+         [default: 0]",
+        ),
+        Key::new(
+            "seed",
+            Kind::Integer(0, MAX_INTEGER),
+            "N",
+            "Seed of the simulated exposures [default: 1]",
+        ),
     ]];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {

@@ -11,58 +11,9 @@ use serde::Serialize;
 use serde::ser::{Error as _, Serializer};
 
 use super::sections::{decimal, section};
-use dtof_options::numbers::{boolean, fixed, integer, real, shortest};
-use dtof_options::{NO_OPTION, Refused, named, named_values};
-
-/// Everything that is left out has a default. `x`, `l1` and `l2` are the paper's names of the interval
-/// between looks, and of the shortest and the longest exposure. A look is one check whether a pixel has
-/// an event.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct DetectionSettings {
-    /// The detection rule [default: paper]
-    pub rule: Option<RuleName>,
-    /// Rules paper and average: threshold in standard deviations, 0 to 255.996 in steps of 1/256 [default: 4]
-    #[serde(serialize_with = "decimal")]
-    pub alpha: Option<U8F8>,
-    /// Window rule: width in bins, 1 to 7 [default: from `sigma_bins`]
-    pub window: Option<u8>,
-    /// Window rule: threshold in standard deviations, 0 to 15.9998 in steps of 1/4096 [default: from
-    /// `false_alarm`]
-    #[serde(serialize_with = "decimal")]
-    pub z: Option<U4F12>,
-    /// Window rule: share of exposures with a false alarm, at most 0.1; instead of `z` [default: 0.01]
-    pub false_alarm: Option<f64>,
-    /// The depth estimator [default: window if `sigma_bins` or `half_widths` are known, else centroid]
-    pub estimator: Option<EstimatorName>,
-    /// Bins of the depth window before and after its centre, 1 to 4 each, in steps of 1/256 [default: from
-    /// `sigma_bins`]
-    #[serde(serialize_with = "two_numbers")]
-    pub half_widths: Option<CentredWindow>,
-    /// Minimum of photons in a peak, or in the window around it, 1 to 1023 [default: 5]
-    pub min_count: Option<u16>,
-    /// Laser cycles that a decision must exceed [default: 40]
-    pub l1: Option<u16>,
-    /// Laser cycles after which a pixel without an event starts over [default: 2000]
-    pub l2: Option<u16>,
-    /// Laser cycles between looks [default: 4]
-    pub x: Option<u16>,
-    /// Levels of adaptive binning, 0 to 3 [default: 0]
-    pub binning: Option<u8>,
-    /// Laser cycles without an event after which a pixel counts in its block, at least 1 [default: 64]
-    pub patience: Option<u16>,
-    /// Window rule: neighbours of a pixel that confirm what is not enough by itself, 0, 4 or 8 [default: 0]
-    pub neighbours: Option<u8>,
-    /// Window rule: a lower threshold near the last event, and a higher one elsewhere
-    pub tracking: Option<bool>,
-    /// Most echoes in an exposure, 1 to 4 [default: 1]
-    pub echoes: Option<u8>,
-    /// An exposure ends at this multiple of its length at the last echo, 2 to 254 [default: at L2]
-    pub echo_wait: Option<u8>,
-    /// Photons of one laser cycle in one bin count once
-    pub once_per_bin: Option<bool>,
-    /// Bits of a pixel's counters, 8 or 10 [default: 10]
-    pub counter_bits: Option<u8>,
-}
+use dtof_options::keys::{Key, Kind, Reader, boolean, choice, fixed, integer, named};
+use dtof_options::numbers::{self, real, shortest};
+use dtof_options::{NO_OPTION, Refused, named_values};
 
 named_values! {
     /// The rules.
@@ -91,26 +42,81 @@ named_values! {
 }
 
 section! {
+    /// Everything that is left out has a default. `x`, `l1` and `l2` are the paper's names of the interval
+    /// between looks, and of the shortest and the longest exposure. A look is one check whether a pixel has
+    /// an event.
     DetectionSettings:
-    rule = named, "paper, average or window";
-    alpha = fixed, "standard deviations, of rules paper and average";
-    window = integer(1..=WindowRule::MAX_WIDTH), "bins, of rule window";
-    z = fixed, "standard deviations, of rule window";
-    false_alarm = share, "share of exposures without a target, instead of z";
-    estimator = named, "centroid or window";
-    half_widths = half_widths, "bins before and after the place, of estimator window";
-    min_count = integer(1..=1023), "photons";
-    l1 = integer(0..=u16::MAX), "laser cycles that a decision must exceed";
-    l2 = integer(0..=u16::MAX), "laser cycles at which a pixel starts over";
-    x = integer(0..=u16::MAX), "laser cycles between looks";
-    binning = integer(0..=BlockLevel::MAX.raw()), "levels of blocks";
-    patience = integer(1..=u16::MAX), "laser cycles until a silent pixel counts in its block";
-    neighbours = neighbours, "pixels around a pixel that confirm it";
-    tracking = boolean, "expect the next event near the last";
-    echoes = integer(1..=EchoNumber::LAST.raw()), "of an exposure";
-    echo_wait = integer(2..=u8::MAX - 1), "times the laser cycles of the last echo";
-    once_per_bin = boolean, "photons of one laser cycle in one bin count once";
-    counter_bits = counter_bits, "of a pixel's counters";
+    rule: RuleName = named(), "RULE",
+        "Detection rule, which decides whether a peak is a target [default: paper]",
+        "paper, average or window";
+    #[serde(serialize_with = "decimal")]
+    alpha: U8F8 = fixed(), "ALPHA",
+        "Rules paper and average: threshold above the background in its standard deviations, 0 to 255.996, rounded \
+         to 1/256 [default: 4]",
+        "standard deviations, of rules paper and average";
+    window: u8 = integer(1, WindowRule::MAX_WIDTH as u64), "BINS",
+        "Window rule: bins in the window, 1 to 7 [default: from --sigma-bins]",
+        "bins, of rule window";
+    #[serde(serialize_with = "decimal")]
+    z: U4F12 = fixed(), "Z",
+        "Window rule: threshold of the photons in the window above the background in its standard deviations, 0 to \
+         15.9998, rounded to 1/4096 [default: from --false-alarm]",
+        "standard deviations, of rule window";
+    false_alarm: f64 = Reader::new(Kind::Real(" above 0"), |_, text| share(text)), "SHARE",
+        "Window rule, instead of --z: share of exposures without a target that end with an event, at most 0.1 \
+         [default: 0.01]",
+        "share of exposures without a target, instead of z";
+    estimator: EstimatorName = named(), "ESTIMATOR",
+        "Estimator of the position of a peak [default: window with --sigma-bins or --half-widths, else centroid]",
+        "centroid or window";
+    #[serde(serialize_with = "two_numbers")]
+    half_widths: CentredWindow = Reader::new(Kind::Numbers("two numbers, (1.75, 4)"), |_, text| half_widths(text)), "BEFORE,AFTER",
+        "Estimator window: bins before and after its centre, 1 to 4 each, rounded to 1/256. A longer part after \
+         suits a pulse that falls more slowly than it rises [default: from --sigma-bins]",
+        "bins before and after the place, of estimator window";
+    min_count: u16 = integer(1, 1023), "N",
+        "Fewest photons in a reported peak, or in the window around it [default: 5]",
+        "photons";
+    l1: u16 = integer(0, 65_535), "N",
+        "Shortest exposure: pixels decide after more than N laser cycles [default: 40]",
+        "laser cycles that a decision must exceed";
+    l2: u16 = integer(0, 65_535), "N",
+        "Longest exposure: a pixel without an event starts over after N laser cycles [default: 2000]",
+        "laser cycles at which a pixel starts over";
+    x: u16 = integer(0, 65_535), "N",
+        "Laser cycles between two decisions [default: 4]",
+        "laser cycles between looks";
+    binning: u8 = integer(0, BlockLevel::MAX.raw() as u64), "LEVELS",
+        "Levels of adaptive binning, 0 to 3: pixels without events also count in blocks, at level 1 of 2x2 pixels, \
+         at 2 of 4x4 and at 3 of 8x8 [default: 0]",
+        "levels of blocks";
+    patience: u16 = integer(1, 65_535), "N",
+        "Adaptive binning: laser cycles without an event after which a pixel also counts in its block [default: 64]",
+        "laser cycles until a silent pixel counts in its block";
+    neighbours: u8 = choice(&[0, 4, 8]), "N",
+        "Window rule: the 4 or 8 pixels around a pixel confirm what is not enough by itself. For arrays, without \
+         --binning [default: 0]",
+        "pixels around a pixel that confirm it";
+    tracking: bool = boolean(), "YES",
+        "Window rule: expect the next event of a pixel near its last, with a lower threshold there and a higher one \
+         elsewhere",
+        "expect the next event near the last";
+    echoes: u8 = integer(1, EchoNumber::LAST.raw() as u64), "N",
+        "Most echoes of a pixel in an exposure, 1 to 4. With 2 or more the exposure goes on until all are found or \
+         --echo-wait ends it [default: 1]",
+        "of an exposure";
+    echo_wait: u8 = integer(2, 254), "TIMES",
+        "Two or more echoes: an exposure ends at this multiple of its length at the last echo [default: it ends at \
+         L2]",
+        "times the laser cycles of the last echo";
+    once_per_bin: bool = boolean(), "YES",
+        "Photons of one laser cycle in one bin count once, so that raindrops are no targets. For photons, not for \
+         histograms",
+        "photons of one laser cycle in one bin count once";
+    counter_bits: u8 = choice(&[8, 10]), "N",
+        "Bits of a pixel's counters, 8 or 10. With 8 an exposure ends without an event once a counter passes 255. A \
+         device has one of both [default: 10]",
+        "of a pixel's counters";
 }
 
 impl DetectionSettings {
@@ -263,20 +269,6 @@ pub fn share(text: &str) -> Result<f64, String> {
     share.ok_or("must be a number above 0, at most 0.1".to_owned())
 }
 
-/// Reads a number of neighbours.
-fn neighbours(text: &str) -> Result<u8, String> {
-    let number = integer(0..=8)(text).ok();
-    let number = number.filter(|&number| number == 0 || Neighbours::new(number).is_some());
-    number.ok_or("must be 0, 4 or 8".to_owned())
-}
-
-/// Reads the width of counters.
-fn counter_bits(text: &str) -> Result<u8, String> {
-    let bits = integer(0..=u8::MAX)(text).ok();
-    let bits = bits.filter(|bits| [8, 10].contains(bits));
-    bits.ok_or("must be 8 or 10".to_owned())
-}
-
 /// Reads `BEFORE,AFTER`: the half widths of the depth window.
 ///
 /// # Errors
@@ -284,7 +276,7 @@ fn counter_bits(text: &str) -> Result<u8, String> {
 fn half_widths(text: &str) -> Result<CentredWindow, String> {
     let sides = text.split_once(',');
     let sides = sides.and_then(|(before, after)| {
-        let [before, after] = [before, after].map(|side| fixed::<U8F8>(side).ok());
+        let [before, after] = [before, after].map(|side| numbers::fixed::<U8F8>(side).ok());
         CentredWindow::with_sides(before?, after?)
     });
     sides.ok_or_else(|| "must be BEFORE,AFTER, each 1 to 4 bins, as 2,3.5".to_owned())

@@ -10,6 +10,7 @@ use toml::{Table, Value};
 
 use super::{DetectionSettings, RaySettings, RunSettings, SensorSettings};
 use dtof_options::files::read_text;
+use dtof_options::keys::{Key, Kind};
 use dtof_options::numbers::boolean;
 use dtof_options::{KeysOfFile, NO_OPTION, Refused};
 
@@ -17,29 +18,12 @@ use dtof_options::{KeysOfFile, NO_OPTION, Refused};
 pub const MARK: &str = "# dtof settings";
 
 /// The sections with their keys and comments, in the order in which they are written.
-pub(super) const SECTIONS: [(&str, &[&str], &[&str]); 4] = [
-    ("sensor", SensorSettings::KEYS, SensorSettings::COMMENTS),
-    (
-        "detection",
-        DetectionSettings::KEYS,
-        DetectionSettings::COMMENTS,
-    ),
-    ("rays", RaySettings::KEYS, RaySettings::COMMENTS),
-    ("run", RunSettings::KEYS, RunSettings::COMMENTS),
+pub(super) const SECTIONS: [(&str, &[Key]); 4] = [
+    ("sensor", SensorSettings::KEYS),
+    ("detection", DetectionSettings::KEYS),
+    ("rays", RaySettings::KEYS),
+    ("run", RunSettings::KEYS),
 ];
-
-/// The keys whose values are lists.
-const LISTS: [&str; 6] = [
-    "gate",
-    "offsets_mm",
-    "masked",
-    "glass_bins",
-    "half_widths",
-    "field_of_view_degrees",
-];
-
-/// The keys whose values are strings.
-const TEXTS: [&str; 5] = ["rule", "estimator", "calibration", "axes", "array"];
 
 /// A key of older files: `true` is a TDC of the first photon of a laser cycle.
 const ONE_HIT: &str = "one_hit_tdc";
@@ -85,9 +69,8 @@ impl SettingsFile {
         let mut file = Self::parse(text).map_err(|error| match error.downcast_ref() {
             Some(Refused { key: Some(key), .. }) => {
                 let sections = SECTIONS.iter().map(|(section, ..)| *section);
-                let keys = SECTIONS
-                    .iter()
-                    .flat_map(|(_, keys, _)| keys.iter().copied());
+                let keys = SECTIONS.iter().flat_map(|(_, keys)| keys.iter());
+                let keys = keys.map(|key| key.name);
                 let keys = sections.chain(keys).chain([&**key]);
                 let keys = keys.map(str::to_owned).collect();
                 let path = path.to_owned();
@@ -116,10 +99,10 @@ impl SettingsFile {
         })?;
         let mut file = Self::default();
         for (section, values) in &sections {
-            let Some((_, keys, _)) = SECTIONS.iter().find(|(name, ..)| name == section) else {
+            let Some((_, keys)) = SECTIONS.iter().find(|(name, ..)| name == section) else {
                 return Err(match section_of(section) {
                     Some(name) => Refused::new(section, format!("belongs in [{name}]")),
-                    None => Refused::unknown(section, None, SECTIONS.map(|(section, ..)| section)),
+                    None => Refused::unknown(section, None, SECTIONS.map(|(section, _)| section)),
                 }
                 .into());
             };
@@ -131,7 +114,9 @@ impl SettingsFile {
                 if section_of(key) != Some(section) {
                     return Err(match section_of(key) {
                         Some(name) => Refused::new(key, format!("belongs in [{name}]")),
-                        None => Refused::unknown(key, Some(section), keys.iter().copied()),
+                        None => {
+                            Refused::unknown(key, Some(section), keys.iter().map(|key| key.name))
+                        }
                     }
                     .into());
                 }
@@ -161,13 +146,14 @@ impl SettingsFile {
         let refused = |reason| Refused::value(key, &text, reason);
         let list = value.as_array();
         let is_text = value.is_str() || list.is_some_and(|list| list.iter().any(Value::is_str));
-        match (LISTS.contains(&key), list) {
+        let kind = key_of(key).map(|(_, key)| key.kind);
+        match (kind.is_some_and(Kind::is_list), list) {
             (true, None) => return Err(refused("must be a list".to_owned())),
             (false, Some(_)) => return Err(refused("must be one value".to_owned())),
             _ => {}
         }
         self.set(key, &text).map_err(refused)?;
-        match (TEXTS.contains(&key), is_text) {
+        match (kind.is_some_and(Kind::is_text), is_text) {
             (true, false) => Err(refused("must be in quotes".to_owned())),
             (false, true) => Err(refused("must not be in quotes".to_owned())),
             _ => Ok(()),
@@ -326,11 +312,11 @@ impl SettingsFile {
     pub fn to_toml(&self) -> Result<String> {
         let all = Table::try_from(self)?;
         let mut text = format!("{MARK}: `--settings FILE` takes them, options override them.\n");
-        for (section, keys, comments) in SECTIONS {
+        for (section, keys) in SECTIONS {
             let given = all.get(section).and_then(Value::as_table);
-            let lines = keys.iter().zip(comments).filter_map(|(key, comment)| {
-                let value = given?.get(*key)?;
-                Some((format!("{key} = {value}"), comment))
+            let lines = keys.iter().filter_map(|key| {
+                let value = given?.get(key.name)?;
+                Some((format!("{} = {value}", key.name), key.comment))
             });
             let lines: Vec<_> = lines.collect();
             if lines.is_empty() {
@@ -347,12 +333,18 @@ impl SettingsFile {
 
 /// The section in which a key stands.
 fn section_of(key: &str) -> Option<&'static str> {
-    if key == ONE_HIT {
-        return Some("sensor");
+    match key {
+        ONE_HIT => Some("sensor"),
+        key => key_of(key).map(|(section, _)| section),
     }
-    let mut sections = SECTIONS.iter();
-    let section = sections.find(|(_, keys, _)| keys.contains(&key));
-    section.map(|(section, ..)| *section)
+}
+
+/// A key, and the section in which it stands.
+pub(super) fn key_of(name: &str) -> Option<(&'static str, &'static Key)> {
+    let mut keys = SECTIONS
+        .iter()
+        .flat_map(|(section, keys)| keys.iter().map(move |key| (*section, key)));
+    keys.find(|(_, key)| key.name == name)
 }
 
 /// A TOML value as text, as an option has it. Elements of a list are separated by commas.

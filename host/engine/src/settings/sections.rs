@@ -12,21 +12,37 @@ use serde::Serialize;
 use serde::ser::{Error as _, Serializer};
 
 use dtof_options::NO_OPTION;
-use dtof_options::numbers::{
-    MAX_INTEGER, bins, boolean, fixed, integer, laser_hz, list, positive, real, shortest, within,
-};
+use dtof_options::keys::{Key, Kind, Reader, boolean, fixed, integer};
+use dtof_options::numbers::{self, MAX_INTEGER, bins, list, positive, real, shortest, within};
 use dtof_photons::axes::Axes;
 use dtof_photons::geometry::{FieldOfView, Rays, angles};
 
-/// Defines the keys of a section in the order in which they are written: how each is read, and its
-/// comment in the file.
+/// Defines a section: the table of its keys, in the order in which they are written. Each has its type and its values,
+/// the name of the value and the help for its flag, and its comment in the file.
 macro_rules! section {
-    ($section:ident: $($key:ident = $read:expr, $comment:literal;)+) => {
+    (
+        $(#[$of_section:meta])*
+        $section:ident:
+        $($(#[$of_key:meta])* $key:ident: $type:ty = $values:expr, $value:literal, $help:literal, $comment:literal;)+
+    ) => {
+        $(#[$of_section])*
+        #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+        pub struct $section {
+            $(#[doc = $help] $(#[$of_key])* pub $key: Option<$type>,)+
+        }
+
         impl $section {
             /// The keys of the section.
-            pub const KEYS: &'static [&'static str] = &[$(stringify!($key)),+];
-            /// The comment of each key.
-            pub(super) const COMMENTS: &'static [&'static str] = &[$($comment),+];
+            pub const KEYS: &'static [Key] = &[$({
+                const VALUES: Reader<$type> = $values;
+                Key {
+                    name: stringify!($key),
+                    kind: VALUES.kind,
+                    value: $value,
+                    help: $help,
+                    comment: $comment,
+                }
+            }),+];
 
             /// Sets one of [`Self::KEYS`].
             ///
@@ -34,7 +50,10 @@ macro_rules! section {
             /// Says what the value must be.
             pub(super) fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
                 match key {
-                    $(stringify!($key) => self.$key = Some($read(text)?),)+
+                    $(stringify!($key) => {
+                        const VALUES: Reader<$type> = $values;
+                        self.$key = Some(VALUES.read(text)?);
+                    })+
                     _ => return Err(NO_OPTION.to_owned()),
                 }
                 Ok(())
@@ -49,98 +68,64 @@ macro_rules! section {
 }
 pub(super) use section;
 
-/// `[sensor]`: what is known of a sensor.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct SensorSettings {
-    /// Laser cycles a second.
-    pub laser_hz: Option<u64>,
-    /// Columns of the array.
-    pub columns: Option<u32>,
-    /// Bins of a histogram.
-    pub bins: Option<u16>,
-    /// Picoseconds a bin.
-    #[serde(serialize_with = "decimal")]
-    pub bin_width_ps: Option<U16F16>,
-    /// Millimetres added to every range.
-    #[serde(serialize_with = "decimal")]
-    pub offset_mm: Option<I24F8>,
-    /// For each pixel, in the order of the addresses: millimetres added to that.
-    #[serde(serialize_with = "decimals")]
-    pub offsets_mm: Option<Vec<I24F8>>,
-    /// First and last bin that may hold the peak, both inclusive.
-    pub gate: Option<(u16, u16)>,
-    /// Addresses of hot and dead pixels. They neither decide nor count in a block.
-    pub masked: Option<Vec<u16>>,
-    /// Standard deviation of the pulse in bins.
-    #[serde(serialize_with = "decimal")]
-    pub sigma_bins: Option<U8F8>,
-    /// Bins for which the TDC is blind after a photon; as many as the histogram has, or more, if it
-    /// takes the first photon of a laser cycle only.
-    pub dead_time: Option<u16>,
-    /// By how many bins the longest laser cycle is longer than the shortest.
-    pub dither_bins: Option<u16>,
-    /// The seed of the laser cycles' lengths.
-    pub dither_seed: Option<u64>,
-    /// Background photons a bin and laser cycle of the median pixel.
-    pub background: Option<f64>,
-    /// Photons a laser cycle and pixel that the cover glass sends back, before the gate.
-    pub glass: Option<f64>,
-    /// The same for each bin before the gate, from bin 0 on.
-    pub glass_bins: Option<Vec<f64>>,
-}
-
-/// `[rays]`: where pixels look.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct RaySettings {
-    /// Horizontal and vertical angle from edge to edge of the array.
-    pub field_of_view_degrees: Option<[f64; 2]>,
-    /// A file with a ray and a bias for each pixel. A relative path starts at the settings file.
-    pub calibration: Option<PathBuf>,
-}
-
-/// `[run]`: what is replayed or simulated.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct RunSettings {
-    /// Laser cycles.
-    pub cycles: Option<u64>,
-    /// The seed of every random number.
-    pub seed: Option<u64>,
-    /// Recorded histograms: photons a laser cycle in the brightest pixel.
-    pub photons_per_cycle: Option<f64>,
-    /// Recorded histograms: laser cycles.
-    pub recorded_cycles: Option<u64>,
-    /// Laser cycles of a frame, if it is a frame-based sensor.
-    pub frame: Option<u16>,
-    /// Whether pixels decide once, on all photons.
-    pub decide_once: Option<bool>,
-    /// Recorded arrays: the meaning of each axis.
-    #[serde(serialize_with = "as_text")]
-    pub axes: Option<Axes>,
-    /// Archives: the name of the array.
-    pub array: Option<String>,
-    /// Recordings: the capture to use, counted from 0.
-    pub capture: Option<u32>,
-    /// Recordings: how many neighbouring bins are summed.
-    pub rebin: Option<u16>,
-}
-
 section! {
+    /// `[sensor]`: what is known of a sensor.
     SensorSettings:
-    laser_hz = laser_hz, "laser cycles a second";
-    columns = integer(1..=Array::MOST_PIXELS), "pixel = row * columns + column";
-    bins = bins, "of a histogram";
-    bin_width_ps = fixed, "picoseconds a bin";
-    offset_mm = fixed, "added to every range";
-    offsets_mm = offsets, "added to that, one for each pixel";
-    gate = gate, "first and last bin that may hold a peak";
-    masked = masked, "addresses of pixels that are left out";
-    sigma_bins = pulse, "standard deviation of the pulse";
-    dead_time = integer(0..=u16::MAX), "bins for which the TDC is blind after a photon";
-    dither_bins = dither, "by which the longest laser cycle is longer than the shortest";
-    dither_seed = integer(0..=MAX_INTEGER), "of the lengths of laser cycles";
-    background = rate, "photons a bin and laser cycle of the median pixel";
-    glass = rate, "photons a laser cycle and pixel of the cover glass";
-    glass_bins = rates, "the same for each bin before the gate";
+    laser_hz: u64 = integer(1, 1_000_000_000_000), "HZ",
+        "Laser cycles a second [default: unknown]",
+        "laser cycles a second";
+    columns: u32 = integer(1, Array::MOST_PIXELS as u64), "N",
+        "Photon lists: columns of the array, pixel = row × columns + column [default: one row]",
+        "pixel = row * columns + column";
+    bins: u16 = Reader::new(Kind::Integer(8, 1024), |_, text| bins(text)), "N",
+        "Number of bins after --rebin, a power of two from 8 to 1024. Longer histograms lose their last bins \
+         [default: the file's, or the next power of two; 128 for photon lists]",
+        "of a histogram";
+    #[serde(serialize_with = "decimal")]
+    bin_width_ps: U16F16 = fixed(), "PS",
+        "Width of a bin of the file in picoseconds, rounded to 1/65536 [default: 250; for logs the sensor's]",
+        "picoseconds a bin";
+    #[serde(serialize_with = "decimal")]
+    offset_mm: I24F8 = fixed(), "MM",
+        "Millimetres added to every range, rounded to 1/256 [default: 0; for logs the sensor's]",
+        "added to every range";
+    #[serde(serialize_with = "decimals")]
+    offsets_mm: Vec<I24F8> = Reader::new(Kind::Numbers("numbers, one a pixel"), |_, text| offsets(text)), "MM,MM,...",
+        "Millimetres added to --offset-mm for each pixel, in the order of the addresses, rounded to 1/256 [default: \
+         0]",
+        "added to that, one for each pixel";
+    gate: (u16, u16) = Reader::new(Kind::Integers("two bins, (20, 119)"), |_, text| gate(text)), "FIRST..LAST",
+        "First and last bin that may hold the peak, as 20..119 [default: all bins]",
+        "first and last bin that may hold a peak";
+    masked: Vec<u16> = Reader::new(Kind::Integers("addresses, [3, 70], or 'none'; [] adds none"), |_, text| masked(text)), "PIXELS",
+        "Pixels to leave out, such as hot and dead ones, as 3,70, beside those that are found; none leaves out none",
+        "addresses of pixels that are left out";
+    #[serde(serialize_with = "decimal")]
+    sigma_bins: U8F8 = Reader::new(Kind::Real(" above 0"), |_, text| pulse(text)), "S",
+        "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. It sets the window for the depth \
+         [default: the depth is the centroid of three bins]",
+        "standard deviation of the pulse";
+    dead_time: u16 = integer(0, 65_535), "BINS",
+        "Bins for which the TDC is blind after a photon, 0 to 65535. With all bins of a histogram it takes the \
+         first photon of a laser cycle only. Fewer are for the window rule without --binning [default: the \
+         sensor's, else 0]",
+        "bins for which the TDC is blind after a photon";
+    dither_bins: u16 = Reader::new(Kind::Integer(0, Dither::MOST as u64), |_, text| dither(text)), "BINS",
+        "Dither against other LiDARs: the longest laser cycle takes so many bins more than the shortest, an even \
+         number up to 254; 0 is off [default: 128, or as many as the sensor can]",
+        "by which the longest laser cycle is longer than the shortest";
+    dither_seed: u64 = integer(0, MAX_INTEGER), "N",
+        "Seed of the random lengths of laser cycles [default: from the clock]",
+        "of the lengths of laser cycles";
+    background: f64 = Reader::new(Kind::Real(", 0 to 1000000"), |_, text| rate(text)), "",
+        "Background photons a bin and laser cycle of the median pixel",
+        "photons a bin and laser cycle of the median pixel";
+    glass: f64 = Reader::new(Kind::Real(", 0 to 1000000"), |_, text| rate(text)), "",
+        "Photons a laser cycle and pixel that the cover glass sends back, before the gate",
+        "photons a laser cycle and pixel of the cover glass";
+    glass_bins: Vec<f64> = Reader::new(Kind::Numbers("numbers, one a bin"), |_, text| rates(text)), "",
+        "The same for each bin before the gate, from bin 0 on",
+        "the same for each bin before the gate";
 }
 
 impl SensorSettings {
@@ -165,7 +150,7 @@ pub const DITHER_BINS: u16 = 128;
 
 /// Reads the range of a dither.
 fn dither(text: &str) -> Result<u16, String> {
-    let range = integer(0..=Dither::MOST.into())(text)?;
+    let range = numbers::integer(0..=Dither::MOST.into())(text)?;
     match Dither::new(range, 0) {
         Ok(_) => Ok(range),
         Err(error) => Err(error.to_string()),
@@ -176,7 +161,7 @@ fn dither(text: &str) -> Result<u16, String> {
 fn gate(text: &str) -> Result<(u16, u16), String> {
     let ends = text.split_once("..").or_else(|| text.split_once(','));
     let ends = ends.and_then(|(first, last)| {
-        let bin = integer(0..=u16::MAX);
+        let bin = numbers::integer(0..=u16::MAX);
         Some((bin(first).ok()?, bin(last).ok()?))
     });
     let (first, last) = ends.ok_or("must be FIRST..LAST, as 20..119")?;
@@ -188,14 +173,14 @@ fn gate(text: &str) -> Result<(u16, u16), String> {
 
 /// Reads the offset of each pixel.
 fn offsets(text: &str) -> Result<Vec<I24F8>, String> {
-    list(text, &[','], fixed)
+    list(text, &[','], numbers::fixed)
 }
 
 /// Reads addresses; `none` leaves no pixel out, whatever a search finds.
 fn masked(text: &str) -> Result<Vec<u16>, String> {
     match text {
         "none" => Ok(Vec::new()),
-        text => list(text, &[','], integer(0..=u16::MAX)),
+        text => list(text, &[','], numbers::integer(0..=u16::MAX)),
     }
 }
 
@@ -207,7 +192,7 @@ fn pulse(text: &str) -> Result<U8F8, String> {
         Some(sigma) if sigma > f64::from(WIDEST) => Err(format!(
             "{range}; `rebin` 2 halves the pulse in bins, as does a TDC with wider bins"
         )),
-        Some(sigma) if sigma > 0.0 => fixed(text),
+        Some(sigma) if sigma > 0.0 => numbers::fixed(text),
         _ => Err(range),
     }
 }
@@ -222,19 +207,21 @@ fn rates(text: &str) -> Result<Vec<f64>, String> {
 }
 
 section! {
+    /// `[rays]`: where pixels look.
     RaySettings:
-    field_of_view_degrees = degrees, "horizontal, vertical";
-    calibration = file, "file with a ray for each pixel";
+    field_of_view_degrees: [f64; 2] = Reader::new(Kind::Numbers("two numbers, (60, 40)"), |_, text| degrees(text)), "HxV",
+        "Field of view in degrees from edge to edge, so that a flat target gives the offset of each pixel [default: \
+         unknown]",
+        "horizontal, vertical";
+    calibration: PathBuf = Reader::new(Kind::File, |_, text| Ok(text.into())), "FILE",
+        "Instead of --fov: TOML file with a direction for each pixel; docs/export.md lists its keys",
+        "file with a ray for each pixel";
 }
 
 /// Reads the angles of a field of view.
 fn degrees(text: &str) -> Result<[f64; 2], String> {
     let angles = angles(text).and_then(|angles| FieldOfView::new(angles).map(|_| angles));
     angles.map_err(|error| error.to_string())
-}
-
-fn file(text: &str) -> Result<PathBuf, String> {
-    Ok(text.into())
 }
 
 impl RaySettings {
@@ -275,21 +262,42 @@ impl RaySettings {
 }
 
 section! {
+    /// `[run]`: what is replayed or simulated.
     RunSettings:
-    cycles = integer(1..=MAX_INTEGER), "laser cycles";
-    seed = integer(0..=MAX_INTEGER), "of every random number";
-    photons_per_cycle = positive, "in the brightest pixel of a recording";
-    recorded_cycles = integer(1..=MAX_INTEGER), "laser cycles of a recording";
-    frame = integer(1..=u16::MAX), "laser cycles, of a frame-based sensor";
-    decide_once = boolean, "on all photons of a pixel";
-    axes = str::parse, "of a recorded array";
-    array = name, "of an archive";
-    capture = integer(0..=u16::MAX.into()), "to use of a recording, from 0";
-    rebin = integer(1..=512), "neighbouring bins that are added up";
-}
-
-fn name(text: &str) -> Result<String, String> {
-    Ok(text.to_owned())
+    cycles: u64 = integer(1, MAX_INTEGER), "N",
+        "Laser cycles to replay at most [default: all of a photon list and with --decide-once, else 10000]",
+        "laser cycles";
+    seed: u64 = integer(0, MAX_INTEGER), "N",
+        "Seed of the laser cycles that recorded photons get [default: 1]",
+        "of every random number";
+    photons_per_cycle: f64 = Reader::new(Kind::Real(" above 0"), |_, text| positive(text)), "R",
+        "Histograms: photons a laser cycle in the brightest unmasked pixel of each capture [default: 1]",
+        "in the brightest pixel of a recording";
+    recorded_cycles: u64 = integer(1, MAX_INTEGER), "N",
+        "Histograms: laser cycles of each capture",
+        "laser cycles of a recording";
+    frame: u16 = integer(1, 65_535), "N",
+        "Simulate a frame-based sensor for comparison: every N laser cycles each pixel reports its highest bin, if \
+         that is above the background",
+        "laser cycles, of a frame-based sensor";
+    decide_once: bool = boolean(), "YES",
+        "Events are the decisions of depth.npy, one a pixel on all of its photons, instead of asynchronous ones. \
+         Takes all laser cycles unless --cycles says less",
+        "on all photons of a pixel";
+    #[serde(serialize_with = "as_text")]
+    axes: Axes = Reader::new(Kind::Names("names of axes"), |_, text| text.parse()), "AXIS,AXIS,...",
+        "Arrays of histograms: meaning of each axis: captures, rows, columns or bins [default: the last is bins, \
+         the one before columns, all others are rows]",
+        "of a recorded array";
+    array: String = Reader::new(Kind::Text, |_, text| Ok(text.to_owned())), "NAME",
+        ".npz: name of the array [default: the only one]",
+        "of an archive";
+    capture: u32 = integer(0, 65_535), "N",
+        "Arrays with captures, and logs: the capture or frame to use, counted from 0 [default: all]",
+        "to use of a recording, from 0";
+    rebin: u16 = integer(1, 512), "K",
+        "Number of neighbouring bins to add up [default: 1]",
+        "neighbouring bins that are added up";
 }
 
 impl RunSettings {

@@ -8,8 +8,9 @@ mod rows;
 
 use dtof_core::{Count, WindowRule};
 
-use super::file::SECTIONS;
+use super::file::{SECTIONS, key_of};
 use super::{Settings, SettingsFile};
+use dtof_options::keys::Key;
 
 /// Every setting of pixels that decide alone with the window rule.
 const ALL: &str = "bin_width_ps = 92.1; offset_mm = -179.5; offsets_mm = [1.5, -78.04, 0.0]; gate = [12, 119];
@@ -31,8 +32,8 @@ fn toml(keys: &str) -> String {
             .filter(|line| !line.is_empty())
     };
     let key = |line: &str| line.split_once(" =").unwrap().0.to_owned();
-    let section = |(section, known, _): &(&str, &[&str], &[&str])| {
-        let own = lines().filter(|line| known.contains(&&*key(line)));
+    let section = |(section, known): &(&str, &[Key])| {
+        let own = lines().filter(|line| known.iter().any(|known| known.name == key(line)));
         format!("[{section}]\n{}\n", own.collect::<Vec<_>>().join("\n"))
     };
     let text: Vec<String> = SECTIONS.iter().map(section).collect();

@@ -83,10 +83,8 @@ fn every_key_takes_an_option_and_is_written_as_toml() {
         assert_eq!(file.keys().unwrap(), [key.to_owned()].into());
         tried.insert(key);
     }
-    let keys = SECTIONS
-        .iter()
-        .flat_map(|(_, keys, _)| keys.iter().copied());
-    assert_eq!(tried, keys.collect());
+    let keys = SECTIONS.iter().flat_map(|(_, keys)| keys.iter());
+    assert_eq!(tried, keys.map(|key| key.name).collect());
 }
 
 /// A key of older files: a TDC of the first photon of a laser cycle.
@@ -95,11 +93,8 @@ const HINT: &str = "`--settings FILE` takes them, options override them.";
 
 /// The section of a key, and its comment.
 fn section_of(key: &str) -> (&'static str, &'static str) {
-    let found = SECTIONS.iter().find_map(|(section, keys, comments)| {
-        let place = keys.iter().position(|other| *other == key)?;
-        Some((*section, comments[place]))
-    });
-    found.unwrap()
+    let (section, key) = key_of(key).unwrap();
+    (section, key.comment)
 }
 
 #[test]

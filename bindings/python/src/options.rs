@@ -1,0 +1,61 @@
+//! The keywords of each function, from the tables of the options.
+
+use dtof_export::ProjectionOptions;
+use dtof_options::keys::{Key, Kind};
+use dtof_options::{Options, option_name};
+use dtof_run::given::{DITHER, Operation};
+use dtof_run::recording::RECORDING;
+use dtof_run::{calibrate, compare, replay, simulate, tune};
+use pyo3::prelude::*;
+
+/// A keyword: its name, its type in Python, its values in words, and its help with the flags of the program.
+type Keyword = (&'static str, String, String, &'static str);
+
+/// The keywords of each function by the name of their type.
+#[pyfunction]
+pub fn keywords() -> Vec<(&'static str, Vec<Keyword>)> {
+    let is_in = |keys: &[Key], key: &Key| keys.iter().any(|other| other.name == key.name);
+    let loads = |key: &Key| is_in(RECORDING, key) || ["settings", "cycles"].contains(&key.name);
+    vec![
+        ("LoadOptions", of::<replay::Options>(loads)),
+        ("ReplayOptions", of::<replay::Options>(|_| true)),
+        ("SimulateOptions", of::<simulate::Options>(|_| true)),
+        ("CalibrateOptions", of::<calibrate::Options>(|_| true)),
+        ("CompareOptions", of::<compare::Options>(|_| true)),
+        ("TuneOptions", of::<tune::Options>(|_| true)),
+        // Pixels without a device have no laser.
+        ("PixelOptions", of::<Operation>(|key| !is_in(DITHER, key))),
+        ("PointsOptions", of::<ProjectionOptions>(|_| true)),
+    ]
+}
+
+fn of<O: Options>(has: impl Fn(&Key) -> bool) -> Vec<Keyword> {
+    let keys = O::KEYS.iter().copied().flatten().filter(|key| has(key));
+    let keyword = |key: &Key| {
+        let name = option_name(key.name);
+        (name, type_of(key.kind), key.kind.words(), key.help)
+    };
+    keys.map(keyword).collect()
+}
+
+fn type_of(kind: Kind) -> String {
+    match kind {
+        Kind::Integer(..) | Kind::Choice(_) => "Integer",
+        Kind::Fixed(_) | Kind::Real(_) => "Number",
+        Kind::Switch | Kind::On | Kind::YesOrNo => "Switch",
+        Kind::Integers(_) => "Integers",
+        Kind::Numbers(_) => "Numbers",
+        Kind::Names(_) => "Names",
+        Kind::Text => "Text",
+        Kind::File => "Path",
+        Kind::Settings => "Settings",
+        Kind::OneOf(names) => {
+            let names: Vec<String> = names()
+                .iter()
+                .map(|[name, _]| format!("{name:?}"))
+                .collect();
+            return format!("Optional[Literal[{}]]", names.join(", "));
+        }
+    }
+    .to_owned()
+}
