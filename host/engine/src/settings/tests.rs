@@ -1,5 +1,6 @@
 //! What settings are, for what a file says.
 
+mod document;
 mod engine;
 mod merged;
 mod read;

@@ -1,25 +1,30 @@
 // The settings form as text: keys of dtof.toml that can change while a device runs.
 
-const number32 = (min, step) => ({ type: "number", min, step });
+import { VALUES } from "./values.js";
+
 /** Section, key, label, input, the rules that use it, and the index in a list. */
 export const FIELDS = [
-  ["detection", "rule", "rule", ["paper", "average", "window"]],
-  ["detection", "alpha", "α, standard deviations", number32(0, "any"), ["paper", "average"]],
-  ["detection", "window", "window, bins", number32(1, 1), ["window"]],
-  ["detection", "z", "z, standard deviations", number32(0, "any"), ["window"]],
-  ["detection", "min_count", "fewest photons", number32(1, 1)],
-  ["detection", "x", "X, laser cycles", number32(0, 1)],
-  ["detection", "l1", "L1, laser cycles", number32(0, 1)],
-  ["detection", "l2", "L2, laser cycles", number32(0, 1)],
-  ["sensor", "gate", "gate, first", { type: "number", min: 0, step: 1 }, null, 0],
-  ["sensor", "gate", "gate, last", { type: "number", min: 0, step: 1 }, null, 1],
-  ["sensor", "sigma_bins", "pulse σ, bins", number32(0, "any")],
-  ["sensor", "dead_time", "TDC dead time, bins", number32(0, 1)],
-  ["detection", "estimator", "estimator", ["", "centroid", "window"]],
-  ["detection", "echoes", "echoes", number32(1, 1)],
-  ["detection", "binning", "levels of blocks", number32(0, 1)],
-  ["detection", "patience", "patience, laser cycles", number32(1, 1)],
-];
+  ["detection", "rule", "rule"],
+  ["detection", "alpha", "α, standard deviations", ["paper", "average"]],
+  ["detection", "window", "window, bins", ["window"]],
+  ["detection", "z", "z, standard deviations", ["window"]],
+  ["detection", "min_count", "fewest photons"],
+  ["detection", "x", "X, laser cycles"],
+  ["detection", "l1", "L1, laser cycles"],
+  ["detection", "l2", "L2, laser cycles"],
+  ["sensor", "gate", "gate, first", null, 0],
+  ["sensor", "gate", "gate, last", null, 1],
+  ["sensor", "sigma_bins", "pulse σ, bins"],
+  ["sensor", "dead_time", "TDC dead time, bins"],
+  ["detection", "estimator", "estimator"],
+  ["detection", "echoes", "echoes"],
+  ["detection", "binning", "levels of blocks"],
+  ["detection", "patience", "patience, laser cycles"],
+].map(([section, key, label, rules, at]) => {
+  // Without an estimator it is the one that suits the pulse.
+  const values = key === "estimator" ? ["", ...VALUES[key]] : VALUES[key];
+  return [section, key, label, values, rules, at];
+});
 /** Sensor keys that are sent unchanged if the form has no field for them. */
 const KEPT = ["masked", "sigma_bins", "dead_time"];
 
@@ -37,6 +42,12 @@ export function isUsed([, , , , rules], rule) {
 export function currentValue(settings, [section, key, , , , at]) {
   const value = key === "gate" ? settings?.gate : settings?.[section]?.[key];
   return (at === undefined ? value : value?.[at]) ?? "";
+}
+
+/** The value of a text in an input. */
+function valueOf(input, text) {
+  if (!Array.isArray(input)) return Number(text);
+  return typeof input.at(-1) === "string" ? text : JSON.parse(text);
 }
 
 /** Whether a gate has one end only, in the texts of fields by name. */
@@ -64,7 +75,7 @@ export function settingsText(current, texts) {
     const text = texts[nameOf(field)];
     if (key === "gate") continue;
     if (text === "" || !isUsed(field, rule)) delete settings[section][key];
-    else settings[section][key] = Array.isArray(input) ? text : Number(text);
+    else settings[section][key] = valueOf(input, text);
   }
   // A gate without ends has all bins.
   const gate = [texts["sensor.gate0"], texts["sensor.gate1"]];

@@ -19,7 +19,7 @@ macro_rules! module {
     };
 }
 
-const MODULES: [shared::Module; 11] = [
+const MODULES: [shared::Module; 12] = [
     module!("chosen.js"),
     module!("command.js"),
     module!("figures.js"),
@@ -31,6 +31,7 @@ const MODULES: [shared::Module; 11] = [
     module!("shortcuts.js"),
     module!("state.js"),
     module!("stream.js"),
+    module!("values.js"),
 ];
 
 static SCRIPT: LazyLock<String> = LazyLock::new(|| {
@@ -47,4 +48,48 @@ pub fn at(path: &str) -> Option<(&'static str, &'static str)> {
         "/page.js" => ("text/javascript; charset=utf-8", &SCRIPT),
         _ => return None,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use std::fmt::Display;
+    use std::{env, fs};
+
+    use dtof_engine::settings::{DetectionSettings, SensorSettings};
+    use dtof_options::keys::{Key, Kind};
+
+    /// The input of a key: names, or what a field for a number needs; that of one element if it is a list.
+    fn input(key: &Key) -> Option<String> {
+        let number =
+            |min: &dyn Display, step| format!("{{ type: \"number\", min: {min}, step: {step} }}");
+        Some(match key.kind {
+            Kind::Integer(first, _) => number(&first, "1"),
+            Kind::Integers(_) => number(&0, "1"),
+            Kind::Choice(numbers) => format!("{numbers:?}"),
+            Kind::Fixed(ends) => number(&ends()[0], "\"any\""),
+            Kind::Real(_) => number(&0, "\"any\""),
+            Kind::OneOf(names) => {
+                let names: Vec<&str> = names().iter().map(|[name, _]| *name).collect();
+                format!("{names:?}")
+            }
+            Kind::Switch => "[true, false]".to_owned(),
+            _ => return None,
+        })
+    }
+
+    #[test]
+    fn the_values_of_the_form_are_those_of_the_keys() {
+        let keys = SensorSettings::KEYS.iter().chain(DetectionSettings::KEYS);
+        let lines = keys.filter_map(|key| Some(format!("  {}: {},\n", key.name, input(key)?)));
+        let made = format!(
+            "// The values of settings, made from the tables of the options with DTOF_BLESS=1 cargo test -p dtof-live\n\n\
+             /** By key: names, or what a field for a number needs. */\nexport const VALUES = {{\n{}}};\n",
+            lines.collect::<String>()
+        );
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/page/values.js");
+        if env::var_os("DTOF_BLESS").is_some() {
+            fs::write(path, &made).unwrap();
+        }
+        assert_eq!(fs::read_to_string(path).unwrap(), made);
+    }
 }
