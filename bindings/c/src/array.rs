@@ -238,6 +238,21 @@ fn array_config(
     Ok(requested.device_config(0)?)
 }
 
+/// The layout of the pixels in a configuration.
+pub(crate) fn layout_of(requested: &Configuration) -> dtof_layout_t {
+    let (levels, patience) = requested
+        .binning
+        .map_or((0, 0), |binning| (binning.levels.raw(), binning.patience));
+    dtof_layout_t {
+        pixels: requested.pixels,
+        columns: requested.columns,
+        patience,
+        block_levels: levels,
+        neighbours: requested.neighbours.map_or(0, Neighbours::raw),
+        once_per_bin: requested.once_per_bin.into(),
+    }
+}
+
 /// Leaves a pixel out from now on, whatever the configuration: its photons count as left out.
 ///
 /// Errors: DTOF_ERROR_PIXELS without room for it, DTOF_ERROR_NULL, DTOF_ERROR_ALIGNMENT,

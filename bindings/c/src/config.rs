@@ -3,6 +3,7 @@
 use core::mem::MaybeUninit;
 
 use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::paper::Threshold;
 use dtof_core::{
     AnyRule, AverageRule, CentredWindow, Count, DepthEstimator, EchoNumber, PaperRule, PixelConfig,
     RangeGate, WindowRule, z_for,
@@ -238,6 +239,45 @@ pub(crate) fn requested(settings: &dtof_config_t) -> Result<Configuration, dtof_
         echo_wait: settings.echo_wait,
         ..Configuration::DEFAULT
     })
+}
+
+/// The settings of the pixels in a configuration.
+pub(crate) fn settings_of(requested: &Configuration, dead_time: u16) -> dtof_config_t {
+    let mut settings = dtof_config_t {
+        x: requested.x,
+        l1: requested.l1,
+        l2: requested.l2,
+        gate_first: requested.gate.0,
+        gate_last: requested.gate.1,
+        estimator: DTOF_ESTIMATOR_CENTROID,
+        dead_time,
+        tracking: requested.tracking.into(),
+        echoes: requested.echoes.raw(),
+        peel_reach: requested.echo_guard_bins,
+        echo_wait: requested.echo_wait,
+        ..dtof_config_t::default()
+    };
+    let mut with_alpha = |rule, threshold: &Threshold| {
+        settings.rule = rule;
+        settings.alpha_q8 = threshold.alpha().to_bits();
+        settings.minimum_count = threshold.minimum_count().raw();
+    };
+    match &requested.rule {
+        AnyRule::Paper(rule) => with_alpha(DTOF_RULE_PAPER, rule.threshold()),
+        AnyRule::Average(rule) => with_alpha(DTOF_RULE_AVERAGE, rule.threshold()),
+        AnyRule::Window(rule) => {
+            settings.rule = DTOF_RULE_WINDOW;
+            settings.window = rule.width();
+            settings.z_q12 = rule.z().to_bits();
+            settings.minimum_count = rule.minimum_count().raw();
+        }
+    }
+    if let DepthEstimator::CentredWindow(window) = &requested.estimator {
+        settings.estimator = DTOF_ESTIMATOR_CENTRED_WINDOW;
+        settings.before_q8 = window.before().to_bits();
+        settings.after_q8 = window.after().to_bits();
+    }
+    settings
 }
 
 /// The configuration of pixels that decide alone.

@@ -1,15 +1,11 @@
 //! The bodies of messages: configuration, sensor, statistics.
 
+use dtof_core::Statistics;
 use dtof_core::fixed::types::{I24F8, U16F16};
-use dtof_core::paper::Threshold;
-use dtof_core::{AnyRule, DepthEstimator, Neighbours, Statistics};
 use dtof_link::{Configuration, Refusal, Report, SensorRecord, Source};
 
-use crate::array::dtof_layout_t;
-use crate::config::{
-    DTOF_ESTIMATOR_CENTRED_WINDOW, DTOF_ESTIMATOR_CENTROID, DTOF_RULE_AVERAGE, DTOF_RULE_PAPER,
-    DTOF_RULE_WINDOW, dtof_config_t,
-};
+use crate::array::{dtof_layout_t, layout_of};
+use crate::config::{dtof_config_t, settings_of};
 use crate::link::dtof_link_t;
 use crate::memory::{array_mut, data_ref, data_slice, object_ref, put, status};
 use crate::statistics::dtof_statistics_t;
@@ -108,60 +104,6 @@ pub unsafe extern "C" fn dtof_device_config_read(
         // SAFETY: the same promise.
         unsafe { put(config, read) }
     })
-}
-
-/// The layout of the pixels in a configuration.
-fn layout_of(requested: &Configuration) -> dtof_layout_t {
-    let (levels, patience) = requested
-        .binning
-        .map_or((0, 0), |binning| (binning.levels.raw(), binning.patience));
-    dtof_layout_t {
-        pixels: requested.pixels,
-        columns: requested.columns,
-        patience,
-        block_levels: levels,
-        neighbours: requested.neighbours.map_or(0, Neighbours::raw),
-        once_per_bin: requested.once_per_bin.into(),
-    }
-}
-
-/// The settings of the pixels in a configuration.
-fn settings_of(requested: &Configuration, dead_time: u16) -> dtof_config_t {
-    let mut settings = dtof_config_t {
-        x: requested.x,
-        l1: requested.l1,
-        l2: requested.l2,
-        gate_first: requested.gate.0,
-        gate_last: requested.gate.1,
-        estimator: DTOF_ESTIMATOR_CENTROID,
-        dead_time,
-        tracking: requested.tracking.into(),
-        echoes: requested.echoes.raw(),
-        peel_reach: requested.echo_guard_bins,
-        echo_wait: requested.echo_wait,
-        ..dtof_config_t::default()
-    };
-    let mut with_alpha = |rule, threshold: &Threshold| {
-        settings.rule = rule;
-        settings.alpha_q8 = threshold.alpha().to_bits();
-        settings.minimum_count = threshold.minimum_count().raw();
-    };
-    match &requested.rule {
-        AnyRule::Paper(rule) => with_alpha(DTOF_RULE_PAPER, rule.threshold()),
-        AnyRule::Average(rule) => with_alpha(DTOF_RULE_AVERAGE, rule.threshold()),
-        AnyRule::Window(rule) => {
-            settings.rule = DTOF_RULE_WINDOW;
-            settings.window = rule.width();
-            settings.z_q12 = rule.z().to_bits();
-            settings.minimum_count = rule.minimum_count().raw();
-        }
-    }
-    if let DepthEstimator::CentredWindow(window) = &requested.estimator {
-        settings.estimator = DTOF_ESTIMATOR_CENTRED_WINDOW;
-        settings.before_q8 = window.before().to_bits();
-        settings.after_q8 = window.after().to_bits();
-    }
-    settings
 }
 
 /// Writes the body of SENSOR, DTOF_SENSOR_BYTES, which also has DTOF_COUNTER_BITS:

@@ -18,7 +18,8 @@ use dtof_core::Neighbours;
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{
-    DEFAULT_L2, DetectionSettings, EstimatorName, RunSettings, Settings, SettingsFile,
+    AdaptiveBinning, DEFAULT_L2, DetectionSettings, EstimatorName, RunSettings, Settings,
+    SettingsFile,
 };
 use dtof_events::clock::LaserClock;
 use dtof_options::keys::Key;
@@ -197,90 +198,32 @@ impl Options {
     pub fn open(&self, input: &Input, requested: &SettingsFile) -> Result<Replay> {
         let mut recording = check(input, &read_options(requested))?;
         self.given.suits(input, recording.metadata())?;
-        let mut requested = requested.clone();
+        let mut given = requested.clone();
         let captures = recording.metadata().captures;
-        let (capture, pixels) = (requested.run.capture, recording.array().pixels());
-        mask_capture(&mut requested.sensor.masked, capture, pixels, captures)?;
-        let has_file = self.given.file.is_some() || self.given.text.is_some();
-        ensure!(
-            !has_file || self.glass.is_none(),
-            Refused::new(
-                "glass",
-                "is for the search, which a settings file replaces: give `gate`"
-            )
-        );
-        let has_rule = requested.detection.rule.is_some();
-        let given = requested.clone();
-        let found = match has_file {
-            true => Ok((Vec::new(), Vec::new())),
-            false => find(&mut requested, &mut recording, self.glass),
-        };
+        let (capture, pixels) = (given.run.capture, recording.array().pixels());
+        mask_capture(&mut given.sensor.masked, capture, pixels, captures)?;
+        let mut requested = given.clone();
+        let (found, warnings) = self.search(&mut requested, &mut recording)?;
         let options = read_options(&requested);
         let (recording, counts) = recording.photons_and_counts(&options)?;
         let Recording {
             photons,
             mut metadata,
         } = recording;
-        let (found, warnings) = found.unwrap_or_else(|reason| {
-            let warning = format!("no settings were found: {reason:#}; the defaults are used");
-            (Vec::new(), vec![warning])
-        });
         metadata.warnings.extend(warnings);
         let requested = requested.or(settings_of_file(&metadata, photons.array()));
         // The search may have found another width in true distances.
         if requested.sensor.bin_width_ps == Some(metadata.bin_width_ps) {
             metadata.warnings.extend(bin_width_warning(&metadata));
         }
-        let detection = &requested.detection;
-        ensure!(
-            has_file || has_rule || detection.alpha.is_none() || detection.rule.is_none(),
-            Refused::new("alpha", "is for `rule` paper or average: say which")
-        );
-        if !has_file && requested.detection.rule.is_none() {
-            let detection = &requested.detection;
-            for (key, is_on) in [
-                ("neighbours", detection.neighbours.unwrap_or(0) > 0),
-                ("tracking", detection.tracking == Some(true)),
-                ("window", detection.window.is_some()),
-                ("z", detection.z.is_some()),
-                ("false_alarm", detection.false_alarm.is_some()),
-            ] {
-                let reason = "needs the window rule, but no settings were found in the recording: give `rule` window and `sigma_bins`";
-                ensure!(!is_on, Refused::new(key, reason));
-            }
+        if !self.has_file() {
+            check_rule(&given, &requested)?;
         }
         let settings = requested.settings(metadata.bins);
         let settings = settings.and_then(|settings| settings.for_source(photons.as_ref()));
         let settings = settings.map_err(|error| requested.add_file_name(error))?;
-        let refused = |refused: Refused| anyhow::Error::from(refused).context(input.to_string());
-        let asks_neighbours =
-            settings.configuration.neighbours.is_some() && settings.frame.is_none();
-        let of_arrays = [
-            ("binning", settings.configuration.binning.is_some()),
-            ("neighbours", asks_neighbours),
-        ];
-        for (key, is_used) in of_arrays {
-            ensure!(
-                metadata.has_shape || !is_used,
-                refused(Refused::new(
-                    key,
-                    match metadata.is_list {
-                        true => "needs the array: give `columns`",
-                        false =>
-                            "needs the array: say with `axes` which axes are captures, rows and columns",
-                    }
-                ))
-            );
-        }
-        if asks_neighbours {
-            ensure!(
-                is_one_capture(photons.as_ref()),
-                refused(Refused::new(
-                    "neighbours",
-                    "needs one capture of columns and rows: pixels of different captures are not neighbours"
-                ))
-            );
-        }
+        check_array(&settings, &metadata, photons.as_ref())
+            .map_err(|refused| anyhow::Error::from(refused).context(input.to_string()))?;
         ensure!(
             metadata.is_list || options.length.is_some() || !settings.weighs_dead_time(),
             Refused::value(
@@ -290,20 +233,6 @@ impl Options {
             )
         );
         check_once_per_bin(settings.counts_once_per_bin(), metadata.is_list)?;
-        if let Some(binning) = settings.configuration.binning {
-            let ([column, row], side) = (photons.axis_names(), 1 << binning.levels.raw());
-            ensure!(
-                has_only_neighbours(photons.as_ref(), binning.levels),
-                refused(Refused::value(
-                    "binning",
-                    binning.levels.raw(),
-                    format!(
-                        "blocks of {side}x{side} pixels would reach across captures; a {column} and \
-                         a {row} are not neighbours there"
-                    )
-                ))
-            );
-        }
         let photons = Masked::new(photons, &settings.masked)?;
         let photons = photons.with_laser_hz(requested.sensor.laser_hz);
         let engine = host_engine(&settings, photons.array(), &photons.addresses());
@@ -318,6 +247,89 @@ impl Options {
             found,
         })
     }
+
+    fn has_file(&self) -> bool {
+        self.given.file.is_some() || self.given.text.is_some()
+    }
+
+    /// Finds settings in the recording and puts them under `requested`, unless there is a settings file. Gives what was
+    /// found, one a row, and warnings.
+    ///
+    /// # Errors
+    /// Fails if an option is for the search and there is none.
+    fn search(
+        &self,
+        requested: &mut SettingsFile,
+        recording: &mut CheckedRecording,
+    ) -> Result<(Vec<Row>, Vec<String>)> {
+        if self.has_file() {
+            let reason = "is for the search, which a settings file replaces: give `gate`";
+            ensure!(self.glass.is_none(), Refused::new("glass", reason));
+            return Ok((Vec::new(), Vec::new()));
+        }
+        let found = find(requested, recording, self.glass);
+        Ok(found.unwrap_or_else(|reason| {
+            let warning = format!("no settings were found: {reason:#}; the defaults are used");
+            (Vec::new(), vec![warning])
+        }))
+    }
+}
+
+/// Checks that the options that were given are for the rule of a search.
+fn check_rule(given: &SettingsFile, requested: &SettingsFile) -> Result<(), Refused> {
+    let detection = &requested.detection;
+    if detection.rule.is_none() {
+        let reason = "needs the window rule, but no settings were found in the recording: give `rule` window and `sigma_bins`";
+        return match detection.of_window_rule() {
+            Some(key) => Err(Refused::new(key, reason)),
+            None => Ok(()),
+        };
+    }
+    match detection.alpha.is_some() && given.detection.rule.is_none() {
+        true => Err(Refused::new(
+            "alpha",
+            "is for `rule` paper or average: say which",
+        )),
+        false => Ok(()),
+    }
+}
+
+/// Checks that blocks and neighbours are pixels side by side.
+fn check_array(
+    settings: &Settings,
+    metadata: &Metadata,
+    photons: &dyn PhotonSource,
+) -> Result<(), Refused> {
+    let binning = settings.configuration.binning;
+    let asks_neighbours = settings.configuration.neighbours.is_some() && settings.frame.is_none();
+    for (key, is_used) in [
+        ("binning", binning.is_some()),
+        ("neighbours", asks_neighbours),
+    ] {
+        if is_used && !metadata.has_shape {
+            let reason = match metadata.is_list {
+                true => "needs the array: give `columns`",
+                false => {
+                    "needs the array: say with `axes` which axes are captures, rows and columns"
+                }
+            };
+            return Err(Refused::new(key, reason));
+        }
+    }
+    if asks_neighbours && !is_one_capture(photons) {
+        let reason = "needs one capture of columns and rows: pixels of different captures are not neighbours";
+        return Err(Refused::new("neighbours", reason));
+    }
+    if let Some(AdaptiveBinning { levels, .. }) = binning
+        && !has_only_neighbours(photons, levels)
+    {
+        let ([column, row], side) = (photons.axis_names(), 1 << levels.raw());
+        let reason = format!(
+            "blocks of {side}x{side} pixels would reach across captures; a {column} and a {row} are not neighbours there"
+        );
+        return Err(Refused::value("binning", levels.raw(), reason));
+    }
+    Ok(())
 }
 
 /// Finds the settings of the sensor in a recording, and puts them under those that were requested. Of a

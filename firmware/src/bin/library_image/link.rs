@@ -2,6 +2,7 @@
 
 use core::fmt::Display;
 
+use dtof_core::{Count10, Neighbours};
 use dtof_link::endpoint::{BODY_BYTES, Endpoint};
 use dtof_link::frame::{self, Deframer, WIRE_BYTES};
 use dtof_link::message::greeting;
@@ -103,9 +104,13 @@ fn configurations() {
         }),
         dynamic_depth: more().then_some(changes),
         echoes: echo(),
+        neighbours: more().then_some(Neighbours::Eight),
         ..read
     };
     keep(any.to_le_bytes());
+    keep(or_text(any.pixel_config::<128>(half())));
+    keep(or_text(any.block_config::<128>(level(), half())));
+    keep(or_text(any.device_config::<128, Count10, ()>(half())).is_some());
 }
 
 #[inline(never)]

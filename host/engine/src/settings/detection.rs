@@ -159,6 +159,20 @@ impl DetectionSettings {
         self.first_of(other)
     }
 
+    /// The first key that is set and that only the window rule has.
+    #[must_use]
+    pub fn of_window_rule(&self) -> Option<&'static str> {
+        let keys = [
+            ("window", self.window.is_some()),
+            ("z", self.z.is_some()),
+            ("false_alarm", self.false_alarm.is_some()),
+            ("neighbours", self.neighbours.unwrap_or(0) > 0),
+            ("tracking", self.tracking == Some(true)),
+        ];
+        let key = keys.iter().find(|(_, is_set)| *is_set);
+        key.map(|(key, _)| *key)
+    }
+
     /// The rule. `z_for` gives the z for a share of false alarms.
     ///
     /// # Errors
@@ -170,17 +184,10 @@ impl DetectionSettings {
     ) -> Result<AnyRule> {
         let minimum_count = Count::saturating(self.min_count.unwrap_or(5).into());
         let name = self.rule.unwrap_or(RuleName::Paper);
-        if name != RuleName::Window {
-            let of_window = [
-                ("window", self.window.is_some()),
-                ("z", self.z.is_some()),
-                ("false_alarm", self.false_alarm.is_some()),
-                ("neighbours", self.neighbours.unwrap_or(0) > 0),
-                ("tracking", self.tracking == Some(true)),
-            ];
-            if let Some((key, _)) = of_window.iter().find(|option| option.1) {
-                bail!(Refused::new(*key, "is for `rule` window"));
-            }
+        if name != RuleName::Window
+            && let Some(key) = self.of_window_rule()
+        {
+            bail!(Refused::new(key, "is for `rule` window"));
         }
         let alpha = self.alpha.unwrap_or(const { U8F8::lit("4") });
         Ok(match name {
@@ -246,17 +253,37 @@ impl DetectionSettings {
         Ok(neighbours)
     }
 
-    /// The last echo of an exposure, and how long a pixel waits for the next.
+    /// The last echo of an exposure.
     ///
     /// # Errors
     /// Fails if there is a wait without a second echo.
-    pub(super) fn several(&self) -> Result<(EchoNumber, Option<u8>)> {
+    pub(super) fn last_echo(&self) -> Result<EchoNumber> {
         let echoes = EchoNumber::new(self.echoes.unwrap_or(1)).unwrap_or(EchoNumber::FIRST);
         ensure!(
             echoes > EchoNumber::FIRST || self.echo_wait.is_none(),
             Refused::new("echo_wait", "is for `echoes` of 2 or more")
         );
-        Ok((echoes, self.echo_wait))
+        Ok(echoes)
+    }
+
+    /// The window of the depth: with these half widths, or as suits the pulse; `None` for the centroid.
+    ///
+    /// # Errors
+    /// Fails if the estimator needs what is not known, or has no window.
+    pub(super) fn depth_window(&self, sigma_bins: Option<U8F8>) -> Result<Option<CentredWindow>> {
+        let window = self.half_widths;
+        let suits = window.or(sigma_bins.map(CentredWindow::for_pulse));
+        match self.estimator {
+            Some(EstimatorName::Window) if suits.is_none() => {
+                let reason = "window needs `sigma_bins` or `half_widths`";
+                Err(Refused::new("estimator", reason).into())
+            }
+            Some(EstimatorName::Centroid) if window.is_some() => {
+                Err(Refused::new("half_widths", "is for `estimator` window").into())
+            }
+            Some(EstimatorName::Centroid) => Ok(None),
+            _ => Ok(suits),
+        }
     }
 }
 

@@ -1,10 +1,11 @@
 //! From the settings file to the settings of an engine: defaults, and the thresholds of rules.
 
 use anyhow::{Result, ensure};
+use dtof_core::fixed::types::U4F12;
 use dtof_core::paper::Threshold;
 use dtof_core::rule::{HIGHEST_Z, z_for_levels};
 use dtof_core::{
-    AnyRule, CentredWindow, Count8, DepthEstimator, EchoNumber, Neighbours, RangeGate,
+    AnyRule, BlockLevel, CentredWindow, Count8, DepthEstimator, EchoNumber, Neighbours, RangeGate,
 };
 use dtof_link::{Configuration, Source};
 use dtof_theory::tune::window::one_in;
@@ -26,107 +27,79 @@ impl SettingsFile {
     }
 
     fn resolved(&self, bins: usize) -> Result<Settings> {
-        let Self {
-            sensor, detection, ..
-        } = self;
-        let default = Configuration::DEFAULT;
-        let x = detection.x.unwrap_or(default.x);
-        let l1 = detection.l1.unwrap_or(default.l1);
-        let l2 = detection.l2.unwrap_or(default.l2);
-        let decide_once = self.run.decide_once.unwrap_or(false);
+        let Self { sensor, run, .. } = self;
+        let decide_once = run.decide_once.unwrap_or(false);
         ensure!(
-            !decide_once || self.run.frame.is_none(),
+            !decide_once || run.frame.is_none(),
             Refused::new("decide_once", "cannot be used with `frame`")
         );
-        // A single decision is a single look.
-        let looks = match decide_once {
-            true => (1, 0, 2),
-            false => (x, l1, l2),
-        };
-        // The engine refuses a number of bins that is not one.
-        #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
-        let last_bin = bins.clamp(8, 1024) as u16 - 1;
-        let gate = sensor.gate.unwrap_or((0, last_bin));
-        let z_for = |share| {
-            let gate = RangeGate::<1024>::new(gate.0, gate.1)
-                .map_err(|error| no_gate(gate, bins, error))?;
-            let (x, l1, l2) = looks;
-            let z = z_for_levels(one_in(share), &gate, x, l1, l2, detection.levels());
-            ensure!(
-                z < HIGHEST_Z,
-                Refused::value(
-                    "false_alarm",
-                    share,
-                    "there is no z for so few; `z` may be up to 15.9998"
-                )
-            );
-            Ok(z)
-        };
-        let (echoes, echo_wait) = detection.several()?;
-        let dead_time = self.dead_time(bins)?;
-        let neighbours = detection.confirming()?;
-        let is_frame = self.run.frame.is_some();
-        if neighbours.is_some() && dead_time > 0 && !is_frame {
-            let reason = "cannot be used with a dead time; `dead_time` 0 leaves it out";
-            return Err(Refused::new("neighbours", reason).into());
-        }
-        let requested = (sensor.dither_bins, sensor.dither_seed);
-        let (dither_bins, dither_seed) = self
-            .dither_of_laser
-            .unwrap_or((requested.0.unwrap_or(0), requested.1.unwrap_or(0)));
-        let has_window = sensor.sigma_bins.is_some() || detection.half_widths.is_some();
+        let configuration = self.configuration(bins, decide_once)?;
+        let counter_bits = self.detection.counter_bits.unwrap_or(10);
         ensure!(
-            detection.estimator != Some(EstimatorName::Window) || has_window,
-            Refused::new("estimator", "window needs `sigma_bins` or `half_widths`")
-        );
-        let centroid = detection.estimator == Some(EstimatorName::Centroid);
-        ensure!(
-            !centroid || detection.half_widths.is_none(),
-            Refused::new("half_widths", "is for `estimator` window")
-        );
-        let rule = detection.rule(sensor.sigma_bins, z_for)?;
-        let counter_bits = detection.counter_bits.unwrap_or(10);
-        ensure!(
-            counter_bits != 8 || is_frame || rule.fits::<Count8>(),
+            counter_bits != 8 || run.frame.is_some() || configuration.rule.fits::<Count8>(),
             Refused::new("min_count", "is more than counters of 8 bits hold")
         );
-        let suits = sensor.sigma_bins.map(CentredWindow::for_pulse);
-        let window = detection.half_widths.or(suits).filter(|_| !centroid);
         Ok(Settings {
-            configuration: Configuration {
-                rule,
-                estimator: window.map_or(default.estimator, DepthEstimator::CentredWindow),
-                x,
-                l1,
-                l2,
-                gate,
-                dead_time: Some(dead_time),
-                once_per_bin: detection.once_per_bin.unwrap_or(false),
-                dither_bins,
-                dither_seed,
-                binning: detection.blocks()?,
-                neighbours,
-                tracking: detection.tracking.unwrap_or(false),
-                echoes,
-                echo_guard_bins: sensor
-                    .sigma_bins
-                    .map_or(default.echo_guard_bins, echo_guard_bins),
-                echo_wait: echo_wait.unwrap_or(default.echo_wait),
-                bin_width_ps: sensor.bin_width_ps.unwrap_or(default.bin_width_ps),
-                offset_mm: sensor.offset_mm.unwrap_or(default.offset_mm),
-                source: Source::Link,
-                ..default
-            },
+            configuration,
             bins,
             offsets_mm: sensor.offsets_mm.clone().unwrap_or_default(),
             masked: sensor.masked.clone().unwrap_or_default(),
             sigma_bins: sensor.sigma_bins,
-            is_dead_time_of_sensor: dead_time > 0 && sensor.dead_time.is_none(),
+            is_dead_time_of_sensor: configuration.dead_time > Some(0) && sensor.dead_time.is_none(),
             counter_bits,
-            frame: self.run.frame,
+            frame: run.frame,
             decide_once,
-            seed: self.run.seed.unwrap_or(1),
+            seed: run.seed.unwrap_or(1),
         })
+    }
+
+    /// How an array of histograms with `bins` bins operates.
+    fn configuration(&self, bins: usize, decide_once: bool) -> Result<Configuration> {
+        let Self {
+            sensor, detection, ..
+        } = self;
+        let default = Configuration::DEFAULT;
+        // The engine refuses a number of bins that is not one.
+        #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
+        let last_bin = bins.clamp(8, 1024) as u16 - 1;
+        let mut configuration = Configuration {
+            x: detection.x.unwrap_or(default.x),
+            l1: detection.l1.unwrap_or(default.l1),
+            l2: detection.l2.unwrap_or(default.l2),
+            gate: sensor.gate.unwrap_or((0, last_bin)),
+            bin_width_ps: sensor.bin_width_ps.unwrap_or(default.bin_width_ps),
+            offset_mm: sensor.offset_mm.unwrap_or(default.offset_mm),
+            tracking: detection.tracking.unwrap_or(default.tracking),
+            once_per_bin: detection.once_per_bin.unwrap_or(default.once_per_bin),
+            echo_wait: detection.echo_wait.unwrap_or(default.echo_wait),
+            source: Source::Link,
+            ..default
+        };
+        if let Some(sigma) = sensor.sigma_bins {
+            configuration.echo_guard_bins = echo_guard_bins(sigma);
+        }
+        let requested = (sensor.dither_bins, sensor.dither_seed);
+        (configuration.dither_bins, configuration.dither_seed) = self
+            .dither_of_laser
+            .unwrap_or((requested.0.unwrap_or(0), requested.1.unwrap_or(0)));
+        configuration.echoes = detection.last_echo()?;
+        configuration.dead_time = Some(self.dead_time(bins)?);
+        configuration.neighbours = detection.confirming()?;
+        if configuration.neighbours.is_some()
+            && configuration.dead_time > Some(0)
+            && self.run.frame.is_none()
+        {
+            let reason = "cannot be used with a dead time; `dead_time` 0 leaves it out";
+            return Err(Refused::new("neighbours", reason).into());
+        }
+        if let Some(window) = detection.depth_window(sensor.sigma_bins)? {
+            configuration.estimator = DepthEstimator::CentredWindow(window);
+        }
+        configuration.rule = detection.rule(sensor.sigma_bins, |share| {
+            z_for_share(share, &configuration, bins, detection.levels(), decide_once)
+        })?;
+        configuration.binning = detection.blocks()?;
+        Ok(configuration)
     }
 
     /// A file with `settings`, and the rest of this one.
@@ -204,6 +177,36 @@ impl SettingsFile {
             }
         }
     }
+}
+
+/// The z for a share of exposures with a false alarm. A single decision is a single look.
+fn z_for_share(
+    share: f64,
+    configuration: &Configuration,
+    bins: usize,
+    levels: BlockLevel,
+    decide_once: bool,
+) -> Result<U4F12> {
+    let Configuration {
+        gate, x, l1, l2, ..
+    } = *configuration;
+    // Only the number of bins within the gate matters.
+    let range = RangeGate::<1024>::new(gate.0, gate.1);
+    let range = range.map_err(|error| no_gate(gate, bins, error))?;
+    let (x, l1, l2) = match decide_once {
+        true => (1, 0, 2),
+        false => (x, l1, l2),
+    };
+    let z = z_for_levels(one_in(share), &range, x, l1, l2, levels);
+    ensure!(
+        z < HIGHEST_Z,
+        Refused::value(
+            "false_alarm",
+            share,
+            "there is no z for so few; `z` may be up to 15.9998"
+        )
+    );
+    Ok(z)
 }
 
 impl DetectionSettings {
