@@ -109,7 +109,8 @@ const TRACKING: u8 = 1;
 
 impl Configuration {
     /// One row of no pixels on 128 bins of 250 ps: the paper's rule with an alpha of 4 and at least 5 photons, its
-    /// estimator, looks every 4 laser cycles after more than 40 and up to 2000. The sensor says the dead time.
+    /// estimator, looks every 4 laser cycles after more than 40 and up to 2000. The sensor says the dead time. A device refuses it
+    /// until it has pixels.
     pub const DEFAULT: Self = Self {
         rule: AnyRule::Paper(PaperRule::new(U8F8::lit("4"), Count::saturating(5))),
         estimator: DepthEstimator::Centroid3,

@@ -42,7 +42,7 @@ fn type_of(kind: Kind) -> String {
     match kind {
         Kind::Integer(..) | Kind::Choice(_) => "Integer",
         Kind::Fixed(_) | Kind::Real(_) => "Number",
-        Kind::Switch | Kind::On | Kind::YesOrNo => "Switch",
+        Kind::Switch | Kind::Flag | Kind::YesOrNo => "Switch",
         Kind::Integers(_) => "Integers",
         Kind::Numbers(_) => "Numbers",
         Kind::Names(_) => "Names",

@@ -14,14 +14,11 @@ use dtof_photons::open::{ReadOptions, open};
 /// Prints each event of the recording `file` and gives their number.
 fn replay(file: &Path) -> Result<usize> {
     let mut recording = open(file, &ReadOptions::default())?;
-    let settings = Settings {
-        bins: recording.metadata.bins,
-        ..Settings::static_scene(1).with(|with| {
-            with.bin_width_ps = recording.metadata.bin_width_ps;
-            with.x = 4;
-            with.l1 = 40;
-        })
-    };
+    let settings = Settings::static_scene(1).with_bins(recording.metadata.bins);
+    let settings = settings.with(|with| {
+        with.bin_width_ps = recording.metadata.bin_width_ps;
+        (with.x, with.l1) = (4, 40);
+    });
     let photons = recording.photons.as_mut();
     let ranges = settings.ranges(photons.array())?;
     let mut engine = host_engine(&settings, photons.array(), &photons.addresses())?;

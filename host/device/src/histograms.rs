@@ -129,10 +129,9 @@ struct Collecting<'a> {
 impl Collecting<'_> {
     fn configure(&mut self, source: Source) -> Result<()> {
         let highest = PaperRule::new(U8F8::MAX, Count::saturating(1023));
-        let last_bin = u16::try_from(self.settings.bins)?.saturating_sub(1);
-        let settings = self.settings.clone().with(|device| {
+        let settings = self.settings.clone().with_bins(self.settings.bins);
+        let settings = settings.with(|device| {
             device.rule = highest.into();
-            device.gate = (0, last_bin);
             // The rule does not weigh bins, and no event is used.
             device.dead_time = Some(0);
             // Every photon is counted.

@@ -90,6 +90,7 @@ impl Task<'_> {
             (Source::Sensor, bins) => (bins, settings.configuration.dither_seed),
         };
         Ok(Configuration {
+            dead_time: Some(settings.dead_time()),
             dither_bins,
             dither_seed,
             pixels: self.pixels,

@@ -231,6 +231,8 @@ impl<const BINS: usize, W: CounterWidth> ArrayEngine<BINS, W> {
         source: &[PixelAddress],
     ) -> Result<Self> {
         let top = binning.levels;
+        // Few blocks differ from the others: those at the edges.
+        let mut configs = Vec::new();
         let parts = (0..array.blocks(top)).map(|block| {
             let addresses = array.pixels_of(array.first_of(block, top), top);
             let addresses: Vec<PixelAddress> = addresses.collect();
@@ -241,7 +243,12 @@ impl<const BINS: usize, W: CounterWidth> ArrayEngine<BINS, W> {
             };
             let columns = u32::try_from(addresses.len())? / rows;
             let layout = Array::new(columns, rows).context("a block without pixels")?;
-            Part::new(&settings.array_config(layout)?, addresses, source)
+            if !configs.iter().any(|(of, _)| *of == layout) {
+                configs.push((layout, settings.array_config(layout)?));
+            }
+            let config = configs.iter().find(|(of, _)| *of == layout);
+            let (_, config) = config.context("a layout without a configuration")?;
+            Part::new(config, addresses, source)
         });
         Ok(Self {
             parts: parts.collect::<Result<_>>()?,

@@ -37,7 +37,7 @@ pub enum Kind {
     /// `true` or `false`; its flag needs no value.
     Switch,
     /// A flag without a value.
-    On,
+    Flag,
     /// `yes` or `no`.
     YesOrNo,
     /// A name, with its help.
@@ -132,7 +132,7 @@ impl Kind {
             Self::Choice(numbers) => any_of(numbers),
             Self::Fixed(ends) => format!("number, {}", ends().join(" to ")),
             Self::Real(range) => format!("number{range}"),
-            Self::Switch | Self::On | Self::YesOrNo => "True or False".to_owned(),
+            Self::Switch | Self::Flag | Self::YesOrNo => "True or False".to_owned(),
             Self::OneOf(names) => {
                 let names: Vec<_> = names().iter().map(|[name, _]| *name).collect();
                 any_of(&names)

@@ -105,7 +105,7 @@ impl RunCounts {
         let all = (0, u16::try_from(input.settings.bins)?.saturating_sub(1));
         let given_gate = input.given_gate.unwrap_or(all);
         let other = input.settings.clone().with(|other| other.gate = given_gate);
-        let has_other = other != input.settings;
+        let has_other = given_gate != input.settings.configuration.gate;
         for settings in [&input.settings]
             .into_iter()
             .chain(has_other.then_some(&other))

@@ -29,7 +29,7 @@ const ARRAY: &[Key] = &[
     ),
     Key::new(
         "laser_off",
-        Kind::On,
+        Kind::Flag,
         "",
         "Simulate without signal: photon-counts.svg is then a passive image",
     ),

@@ -1,7 +1,8 @@
 //! The summary of a run: `summary.json`, and the same on the terminal and in
 //! the report.
 
-use dtof_core::{DepthEstimator, Statistics};
+use dtof_core::fixed::types::U8F8;
+use dtof_core::{AnyRule, DepthEstimator, Statistics};
 use serde::ser::Error as _;
 use serde::{Serialize, Serializer};
 use serde_json::json;
@@ -143,6 +144,27 @@ fn settings<S: Serializer>(settings: &Settings, serializer: S) -> Result<S::Ok, 
         if !value.is_null() {
             keys[key] = value.clone();
         }
+    }
+    // Files have the fewest digits that are read as these numbers.
+    let mut exact = |key: &str, number: f64| keys[key] = number.into();
+    exact("bin_width_ps", configuration.bin_width_ps.to_num());
+    exact("offset_mm", configuration.offset_mm.to_num());
+    match &configuration.rule {
+        AnyRule::Paper(rule) => exact("alpha", rule.threshold().alpha().to_num()),
+        AnyRule::Average(rule) => exact("alpha", rule.threshold().alpha().to_num()),
+        AnyRule::Window(rule) => exact("z", rule.z().to_num()),
+    }
+    if let Some(sigma) = settings.sigma_bins {
+        exact("sigma_bins", sigma.to_num());
+    }
+    if let DepthEstimator::CentredWindow(window) = configuration.estimator
+        && keys.get("half_widths").is_some()
+    {
+        keys["half_widths"] = json!([window.before(), window.after()].map(U8F8::to_num::<f64>));
+    }
+    let offsets = settings.offsets_mm.iter().map(|mm| mm.to_num::<f64>());
+    if offsets.len() > 0 {
+        keys["offsets_mm"] = offsets.collect();
     }
     if settings.dead_time() > 0 {
         keys["dead_time_from"] = match settings.is_dead_time_of_sensor {

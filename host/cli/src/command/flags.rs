@@ -32,9 +32,9 @@ fn arg(key: &Key) -> Arg {
             .num_args(0..=1)
             .require_equals(true)
             .default_missing_value("true"),
-        Kind::On => arg.action(ArgAction::SetTrue),
+        Kind::Flag => arg.action(ArgAction::SetTrue),
         // Numbers below 0 are values, and are refused as such.
-        Kind::Fixed(_) | Kind::Real(_) | Kind::Numbers(_) => arg
+        Kind::Fixed(_) | Kind::Numbers(_) => arg
             .value_name(key.value)
             .value_parser(OsStringValueParser::new())
             .allow_hyphen_values(true),
@@ -48,7 +48,7 @@ fn arg(key: &Key) -> Arg {
 /// The text of an option, if it is given.
 fn text(key: &Key, matches: &ArgMatches) -> Option<OsString> {
     match key.kind {
-        Kind::On => matches.get_flag(key.name).then(|| "true".into()),
+        Kind::Flag => matches.get_flag(key.name).then(|| "true".into()),
         _ => matches.get_one(key.name).cloned(),
     }
 }

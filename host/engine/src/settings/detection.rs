@@ -2,14 +2,18 @@
 
 use anyhow::{Result, bail, ensure};
 use dtof_core::fixed::types::{U4F12, U8F8};
+use dtof_core::paper::Threshold;
+use dtof_core::rule::{HIGHEST_Z, z_for_levels};
 use dtof_core::{
-    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, EchoNumber, Neighbours, PaperRule,
-    WindowRule, WindowWidthError,
+    AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, Neighbours,
+    PaperRule, RangeGate, WindowRule, WindowWidthError,
 };
-use dtof_link::AdaptiveBinning;
+use dtof_link::{AdaptiveBinning, Configuration};
+use dtof_theory::tune::window::one_in;
 use serde::Serialize;
 use serde::ser::{Error as _, Serializer};
 
+use super::engine::{Settings, no_gate};
 use super::sections::{decimal, section};
 use dtof_options::keys::{Key, Kind, Reader, boolean, choice, fixed, integer, named};
 use dtof_options::numbers::{self, real, shortest};
@@ -62,7 +66,7 @@ section! {
         "Window rule: threshold of the photons in the window above the background in its standard deviations, 0 to \
          15.9998, rounded to 1/4096 [default: from --false-alarm]",
         "standard deviations, of rule window";
-    false_alarm: f64 = Reader::new(Kind::Real(" above 0"), |_, text| share(text)), "SHARE",
+    false_alarm: f64 = Reader::new(Kind::Real(" above 0, at most 0.1"), |_, text| share(text)), "SHARE",
         "Window rule, instead of --z: share of exposures without a target that end with an event, at most 0.1 \
          [default: 0.01]",
         "share of exposures without a target, instead of z";
@@ -171,6 +175,38 @@ impl DetectionSettings {
         ];
         let key = keys.iter().find(|(_, is_set)| *is_set);
         key.map(|(key, _)| *key)
+    }
+
+    /// `of_sensor` with the settings of this section. A single decision is a single look.
+    ///
+    /// # Errors
+    /// Fails if settings contradict each other.
+    pub(super) fn configuration(
+        &self,
+        of_sensor: Configuration,
+        sigma_bins: Option<U8F8>,
+        bins: usize,
+        decide_once: bool,
+    ) -> Result<Configuration> {
+        let mut configuration = Configuration {
+            x: self.x.unwrap_or(of_sensor.x),
+            l1: self.l1.unwrap_or(of_sensor.l1),
+            l2: self.l2.unwrap_or(of_sensor.l2),
+            echoes: self.last_echo()?,
+            echo_wait: self.echo_wait.unwrap_or(of_sensor.echo_wait),
+            neighbours: self.confirming()?,
+            tracking: self.tracking.unwrap_or(of_sensor.tracking),
+            once_per_bin: self.once_per_bin.unwrap_or(of_sensor.once_per_bin),
+            ..of_sensor
+        };
+        if let Some(window) = self.depth_window(sigma_bins)? {
+            configuration.estimator = DepthEstimator::CentredWindow(window);
+        }
+        configuration.rule = self.rule(sigma_bins, |share| {
+            z_for_share(share, &configuration, bins, self.levels(), decide_once)
+        })?;
+        configuration.binning = self.blocks()?;
+        Ok(configuration)
     }
 
     /// The rule. `z_for` gives the z for a share of false alarms.
@@ -285,6 +321,95 @@ impl DetectionSettings {
             _ => Ok(suits),
         }
     }
+
+    /// This section with what `settings` say. What its pulse or a default says is written only if this section does.
+    pub(super) fn with_settings(&self, settings: &Settings) -> Self {
+        let configuration = &settings.configuration;
+        let with_alpha = |name, threshold: &Threshold| {
+            let detection = Self {
+                rule: Some(name),
+                alpha: Some(threshold.alpha()),
+                ..Self::default()
+            };
+            (detection, threshold.minimum_count())
+        };
+        let (rule, minimum) = match configuration.rule {
+            AnyRule::Paper(rule) => with_alpha(RuleName::Paper, rule.threshold()),
+            AnyRule::Average(rule) => with_alpha(RuleName::Average, rule.threshold()),
+            AnyRule::Window(rule) => {
+                let detection = Self {
+                    rule: Some(RuleName::Window),
+                    window: Some(rule.width()),
+                    z: Some(rule.z()),
+                    ..Self::default()
+                };
+                (detection, rule.minimum_count())
+            }
+        };
+        let suits = settings.sigma_bins.map(CentredWindow::for_pulse);
+        let (estimator, half_widths) = match configuration.estimator {
+            DepthEstimator::Centroid3 => {
+                let asked = self.estimator == Some(EstimatorName::Centroid);
+                let centroid = asked || suits.is_some();
+                (centroid.then_some(EstimatorName::Centroid), None)
+            }
+            DepthEstimator::CentredWindow(window) => {
+                let asked = self.half_widths == Some(window) || suits != Some(window);
+                let window = asked.then_some(window);
+                (window.map(|_| EstimatorName::Window), window)
+            }
+        };
+        let binning = configuration.binning;
+        let several = configuration.echoes > EchoNumber::FIRST;
+        let wait = Some(configuration.echo_wait).filter(|&wait| several && wait < u8::MAX);
+        Self {
+            min_count: u16::try_from(minimum.raw()).ok(),
+            estimator,
+            half_widths,
+            l1: Some(configuration.l1),
+            l2: Some(configuration.l2),
+            x: Some(configuration.x),
+            binning: binning.map(|binning| binning.levels.raw()),
+            patience: binning.map(|binning| binning.patience),
+            neighbours: configuration.neighbours.map(Neighbours::raw),
+            tracking: configuration.tracking.then_some(true),
+            echoes: several.then(|| configuration.echoes.raw()),
+            echo_wait: wait,
+            once_per_bin: configuration.once_per_bin.then_some(true),
+            counter_bits: Some(settings.counter_bits).filter(|&bits| bits != 10),
+            ..rule
+        }
+    }
+}
+
+/// The z for a share of exposures with a false alarm. A single decision is a single look.
+fn z_for_share(
+    share: f64,
+    configuration: &Configuration,
+    bins: usize,
+    levels: BlockLevel,
+    decide_once: bool,
+) -> Result<U4F12> {
+    let Configuration {
+        gate, x, l1, l2, ..
+    } = *configuration;
+    // Only the number of bins within the gate matters.
+    let range = RangeGate::<1024>::new(gate.0, gate.1);
+    let range = range.map_err(|error| no_gate(gate, bins, error))?;
+    let (x, l1, l2) = match decide_once {
+        true => (1, 0, 2),
+        false => (x, l1, l2),
+    };
+    let z = z_for_levels(one_in(share), &range, x, l1, l2, levels);
+    ensure!(
+        z < HIGHEST_Z,
+        Refused::value(
+            "false_alarm",
+            share,
+            "there is no z for so few; `z` may be up to 15.9998"
+        )
+    );
+    Ok(z)
 }
 
 /// Reads a share of false alarms.

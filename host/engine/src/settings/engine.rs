@@ -194,9 +194,14 @@ impl Settings {
                 no_gate(self.configuration.gate, self.bins, refusal)
             }
             Refusal::Tracking => Refused::new("tracking", "is for `rule` window"),
-            Refusal::Neighbours => Refused::new("neighbours", refusal.to_string()),
-            Refusal::Blocks => Refused::new("binning", refusal.to_string()),
-            Refusal::DeadTime => Refused::new("dead_time", refusal.to_string()),
+            Refusal::Neighbours => Refused::new(
+                "neighbours",
+                "is for `rule` window, without `binning` and without a dead time",
+            ),
+            Refusal::Blocks => Refused::new("binning", "is for arrays of columns and rows"),
+            Refusal::DeadTime => {
+                Refused::new("dead_time", "is for `rule` window, without `binning`")
+            }
             other => Refused::input(other.to_string()),
         }
     }

@@ -1,19 +1,11 @@
-//! From the settings file to the settings of an engine: defaults, and the thresholds of rules.
+//! From the settings file to the settings of an engine, and back.
 
 use anyhow::{Result, ensure};
-use dtof_core::fixed::types::U4F12;
-use dtof_core::paper::Threshold;
-use dtof_core::rule::{HIGHEST_Z, z_for_levels};
-use dtof_core::{
-    AnyRule, BlockLevel, CentredWindow, Count8, DepthEstimator, EchoNumber, Neighbours, RangeGate,
-};
+use dtof_core::Count8;
 use dtof_link::{Configuration, Source};
-use dtof_theory::tune::window::one_in;
 
-use super::engine::{Settings, echo_guard_bins, no_gate};
-use super::{
-    DetectionSettings, EstimatorName, RuleName, RunSettings, SensorSettings, SettingsFile,
-};
+use super::engine::{Settings, echo_guard_bins};
+use super::{RuleName, RunSettings, SensorSettings, SettingsFile};
 use dtof_options::Refused;
 
 impl SettingsFile {
@@ -58,33 +50,29 @@ impl SettingsFile {
         let Self {
             sensor, detection, ..
         } = self;
-        let default = Configuration::DEFAULT;
         // The engine refuses a number of bins that is not one.
         #[allow(clippy::cast_possible_truncation, reason = "at most 1024")]
         let last_bin = bins.clamp(8, 1024) as u16 - 1;
-        let mut configuration = Configuration {
-            x: detection.x.unwrap_or(default.x),
-            l1: detection.l1.unwrap_or(default.l1),
-            l2: detection.l2.unwrap_or(default.l2),
+        let requested = (sensor.dither_bins, sensor.dither_seed);
+        let (dither_bins, dither_seed) = self
+            .dither_of_laser
+            .unwrap_or((requested.0.unwrap_or(0), requested.1.unwrap_or(0)));
+        let default = Configuration::DEFAULT;
+        let of_sensor = Configuration {
             gate: sensor.gate.unwrap_or((0, last_bin)),
+            dead_time: Some(self.dead_time(bins)?),
+            dither_bins,
+            dither_seed,
             bin_width_ps: sensor.bin_width_ps.unwrap_or(default.bin_width_ps),
             offset_mm: sensor.offset_mm.unwrap_or(default.offset_mm),
-            tracking: detection.tracking.unwrap_or(default.tracking),
-            once_per_bin: detection.once_per_bin.unwrap_or(default.once_per_bin),
-            echo_wait: detection.echo_wait.unwrap_or(default.echo_wait),
+            echo_guard_bins: sensor
+                .sigma_bins
+                .map_or(default.echo_guard_bins, echo_guard_bins),
             source: Source::Link,
             ..default
         };
-        if let Some(sigma) = sensor.sigma_bins {
-            configuration.echo_guard_bins = echo_guard_bins(sigma);
-        }
-        let requested = (sensor.dither_bins, sensor.dither_seed);
-        (configuration.dither_bins, configuration.dither_seed) = self
-            .dither_of_laser
-            .unwrap_or((requested.0.unwrap_or(0), requested.1.unwrap_or(0)));
-        configuration.echoes = detection.last_echo()?;
-        configuration.dead_time = Some(self.dead_time(bins)?);
-        configuration.neighbours = detection.confirming()?;
+        let configuration =
+            detection.configuration(of_sensor, sensor.sigma_bins, bins, decide_once)?;
         if configuration.neighbours.is_some()
             && configuration.dead_time > Some(0)
             && self.run.frame.is_none()
@@ -92,13 +80,6 @@ impl SettingsFile {
             let reason = "cannot be used with a dead time; `dead_time` 0 leaves it out";
             return Err(Refused::new("neighbours", reason).into());
         }
-        if let Some(window) = detection.depth_window(sensor.sigma_bins)? {
-            configuration.estimator = DepthEstimator::CentredWindow(window);
-        }
-        configuration.rule = detection.rule(sensor.sigma_bins, |share| {
-            z_for_share(share, &configuration, bins, detection.levels(), decide_once)
-        })?;
-        configuration.binning = detection.blocks()?;
         Ok(configuration)
     }
 
@@ -113,7 +94,9 @@ impl SettingsFile {
                 bin_width_ps: Some(configuration.bin_width_ps),
                 offset_mm: Some(configuration.offset_mm),
                 offsets_mm: (!offsets_mm.is_empty()).then(|| offsets_mm.clone()),
-                gate: settings.gate(),
+                gate: settings
+                    .gate()
+                    .or(self.sensor.gate.filter(|&gate| gate == configuration.gate)),
                 masked: (!masked.is_empty()).then(|| masked.clone()),
                 sigma_bins: settings.sigma_bins,
                 dead_time: match settings.dead_time() {
@@ -175,97 +158,6 @@ impl SettingsFile {
                 let is_used = obstacle.is_none() || !is_short(of_sensor);
                 Ok(if is_used { of_sensor.min(whole) } else { 0 })
             }
-        }
-    }
-}
-
-/// The z for a share of exposures with a false alarm. A single decision is a single look.
-fn z_for_share(
-    share: f64,
-    configuration: &Configuration,
-    bins: usize,
-    levels: BlockLevel,
-    decide_once: bool,
-) -> Result<U4F12> {
-    let Configuration {
-        gate, x, l1, l2, ..
-    } = *configuration;
-    // Only the number of bins within the gate matters.
-    let range = RangeGate::<1024>::new(gate.0, gate.1);
-    let range = range.map_err(|error| no_gate(gate, bins, error))?;
-    let (x, l1, l2) = match decide_once {
-        true => (1, 0, 2),
-        false => (x, l1, l2),
-    };
-    let z = z_for_levels(one_in(share), &range, x, l1, l2, levels);
-    ensure!(
-        z < HIGHEST_Z,
-        Refused::value(
-            "false_alarm",
-            share,
-            "there is no z for so few; `z` may be up to 15.9998"
-        )
-    );
-    Ok(z)
-}
-
-impl DetectionSettings {
-    /// This section with what `settings` say. What its pulse or a default says is written only if this section does.
-    fn with_settings(&self, settings: &Settings) -> Self {
-        let configuration = &settings.configuration;
-        let with_alpha = |name, threshold: &Threshold| {
-            let detection = Self {
-                rule: Some(name),
-                alpha: Some(threshold.alpha()),
-                ..Self::default()
-            };
-            (detection, threshold.minimum_count())
-        };
-        let (rule, minimum) = match configuration.rule {
-            AnyRule::Paper(rule) => with_alpha(RuleName::Paper, rule.threshold()),
-            AnyRule::Average(rule) => with_alpha(RuleName::Average, rule.threshold()),
-            AnyRule::Window(rule) => {
-                let detection = Self {
-                    rule: Some(RuleName::Window),
-                    window: Some(rule.width()),
-                    z: Some(rule.z()),
-                    ..Self::default()
-                };
-                (detection, rule.minimum_count())
-            }
-        };
-        let suits = settings.sigma_bins.map(CentredWindow::for_pulse);
-        let (estimator, half_widths) = match configuration.estimator {
-            DepthEstimator::Centroid3 => {
-                let asked = self.estimator == Some(EstimatorName::Centroid);
-                let centroid = asked || suits.is_some();
-                (centroid.then_some(EstimatorName::Centroid), None)
-            }
-            DepthEstimator::CentredWindow(window) => {
-                let asked = self.half_widths == Some(window) || suits != Some(window);
-                let window = asked.then_some(window);
-                (window.map(|_| EstimatorName::Window), window)
-            }
-        };
-        let binning = configuration.binning;
-        let several = configuration.echoes > EchoNumber::FIRST;
-        let wait = Some(configuration.echo_wait).filter(|&wait| several && wait < u8::MAX);
-        Self {
-            min_count: u16::try_from(minimum.raw()).ok(),
-            estimator,
-            half_widths,
-            l1: Some(configuration.l1),
-            l2: Some(configuration.l2),
-            x: Some(configuration.x),
-            binning: binning.map(|binning| binning.levels.raw()),
-            patience: binning.map(|binning| binning.patience),
-            neighbours: configuration.neighbours.map(Neighbours::raw),
-            tracking: configuration.tracking.then_some(true),
-            echoes: several.then(|| configuration.echoes.raw()),
-            echo_wait: wait,
-            once_per_bin: configuration.once_per_bin.then_some(true),
-            counter_bits: Some(settings.counter_bits).filter(|&bits| bits != 10),
-            ..rule
         }
     }
 }

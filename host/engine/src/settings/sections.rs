@@ -101,7 +101,7 @@ section! {
         "Pixels to leave out, such as hot and dead ones, as 3,70, beside those that are found; none leaves out none",
         "addresses of pixels that are left out";
     #[serde(serialize_with = "decimal")]
-    sigma_bins: U8F8 = Reader::new(Kind::Real(" above 0"), |_, text| pulse(text)), "S",
+    sigma_bins: U8F8 = Reader::new(Kind::Real(" above 0, at most 1.75"), |_, text| pulse(text)), "S",
         "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. It sets the window for the depth \
          [default: the depth is the centroid of three bins]",
         "standard deviation of the pulse";

@@ -44,12 +44,6 @@ export function currentValue(settings, [section, key, , , , at]) {
   return (at === undefined ? value : value?.[at]) ?? "";
 }
 
-/** The value of a text in an input. */
-function valueOf(input, text) {
-  if (!Array.isArray(input)) return Number(text);
-  return typeof input.at(-1) === "string" ? text : JSON.parse(text);
-}
-
 /** Whether a gate has one end only, in the texts of fields by name. */
 export function isHalfGate(texts) {
   return (texts["sensor.gate0"] === "") !== (texts["sensor.gate1"] === "");
@@ -75,7 +69,7 @@ export function settingsText(current, texts) {
     const text = texts[nameOf(field)];
     if (key === "gate") continue;
     if (text === "" || !isUsed(field, rule)) delete settings[section][key];
-    else settings[section][key] = valueOf(input, text);
+    else settings[section][key] = Array.isArray(input) ? text : Number(text);
   }
   // A gate without ends has all bins.
   const gate = [texts["sensor.gate0"], texts["sensor.gate1"]];

@@ -144,6 +144,7 @@ fn what_contradicts_the_file_is_refused() {
             --verbose | error: --verbose is unknown\n
             --mask 1,2,x,4 | error: --mask 1,2,x,4: x must be a whole number from 0 to 65535
             --rule= | error: --rule needs a value
+            --false-alarm --seed 5 | error: --false-alarm needs a value
             --alpha -x | error: --alpha -x: must be a number from 0 to 255.996
             --settings z4.toml --false-alarm 1e-30 | error: --false-alarm 0.000000000000000000000000000001: there is no z
             --settings list.toml | error: list.toml: axes is for arrays of histograms"

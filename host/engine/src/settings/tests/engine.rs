@@ -1,7 +1,8 @@
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::neighbours::NeighbourRule;
 use dtof_core::{
-    AnyRule, Array, BlockLevel, CentredWindow, DepthEstimator, EchoNumber, PixelConfig, RangeGate,
+    AnyRule, Array, BlockLevel, CentredWindow, DepthEstimator, EchoNumber, Neighbours, PixelConfig,
+    RangeGate,
 };
 use dtof_photons::histograms::Histograms;
 use dtof_photons::ranges::Ranges;
@@ -64,10 +65,41 @@ fn what_pixels_cannot_have_is_refused_in_one_line() {
         let error = settings(keys).config::<128>().unwrap_err();
         assert_eq!(error.to_string(), line, "{keys}");
     }
-    // A file says this of its keys itself.
-    let tracking = Settings::static_scene(1).with(|with| with.tracking = true);
-    let error = tracking.config::<128>().unwrap_err();
-    assert_eq!(error.to_string(), "tracking is for rule window");
+    // A file says these of its keys itself.
+    let scene = || Settings::static_scene(1);
+    for (settings, line) in [
+        (
+            scene().with(|with| with.tracking = true),
+            "tracking is for rule window",
+        ),
+        (
+            scene().with(|with| with.dead_time = Some(20)),
+            "dead_time is for rule window, without binning",
+        ),
+        (
+            scene().with(|with| with.neighbours = Neighbours::new(8)),
+            "neighbours is for rule window, without binning and without a dead time",
+        ),
+    ] {
+        let error = settings.config::<128>().unwrap_err();
+        assert_eq!(error.to_string(), line);
+    }
+}
+
+#[test]
+fn a_gate_of_all_bins_is_written_if_the_file_has_it() {
+    for (keys, gate) in [("", None), ("gate = [0, 127]", Some((0, 127)))] {
+        let file = file(keys);
+        let written = file.with_settings(&file.settings(128).unwrap());
+        assert_eq!(written.sensor.gate, gate);
+    }
+    assert_eq!(Settings::static_scene(1).with_bins(256).gate(), None);
+    assert!(
+        Settings::static_scene(1)
+            .with_bins(256)
+            .config::<256>()
+            .is_ok()
+    );
 }
 
 #[test]
