@@ -283,6 +283,18 @@ impl Configuration {
         self.config_of(own, dead_time_of_sensor)
     }
 
+    /// The same for pixels that decide alone, with less code: nothing of neighbours.
+    ///
+    /// # Errors
+    /// Fails with the first setting that cannot be.
+    #[inline]
+    pub fn lone_config<const BINS: usize>(
+        &self,
+        dead_time_of_sensor: u16,
+    ) -> Result<PixelConfig<BINS, AnyRule>, Refusal> {
+        self.config_with(self.rule, dead_time_of_sensor)
+    }
+
     /// How the blocks of so many levels operate, as [`Self::pixel_config`].
     ///
     /// # Errors
@@ -349,7 +361,21 @@ impl Configuration {
         }
     }
 
+    #[inline(never)]
     fn config_of<const BINS: usize>(
+        &self,
+        rule: AnyRule,
+        dead_time_of_sensor: u16,
+    ) -> Result<PixelConfig<BINS, AnyRule>, Refusal> {
+        self.config_with(rule, dead_time_of_sensor)
+    }
+
+    #[allow(
+        clippy::inline_always,
+        reason = "a program of lone pixels is 300 bytes smaller"
+    )]
+    #[inline(always)]
+    fn config_with<const BINS: usize>(
         &self,
         rule: AnyRule,
         dead_time_of_sensor: u16,

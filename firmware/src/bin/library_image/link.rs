@@ -108,6 +108,7 @@ fn configurations() {
         ..read
     };
     keep(any.to_le_bytes());
+    keep(or_text(any.lone_config::<128>(half())));
     keep(or_text(any.pixel_config::<128>(half())));
     keep(or_text(any.block_config::<128>(level(), half())));
     keep(or_text(any.device_config::<128, Count10, ()>(half())).is_some());
