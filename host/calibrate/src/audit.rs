@@ -28,7 +28,7 @@ use dtof_photons::warnings::greatest_divisor;
 
 use super::find::good_histograms::GoodHistograms;
 use super::find::observed::{Observed, Trace};
-use super::find::significance::{is_surely_less, median};
+use super::find::significance::{is_surely_less, median, quantile};
 
 /// A recording with more bins is judged by some of its histograms.
 const BINS: usize = 1 << 18;
@@ -755,9 +755,7 @@ pub(super) fn fill_missing_codes(traces: &mut [Trace]) -> Option<String> {
         .map(|trace| &trace.counts[..])
         .collect::<Vec<_>>());
     // A pulse falls ever faster from bin to bin, down to the background, which most bins have or exceed.
-    let mut sorted = sums.clone();
-    sorted.sort_by(f64::total_cmp);
-    let dark = sorted.get(sorted.len() / 5).copied().unwrap_or(0.0);
+    let dark = quantile(sums.iter().copied(), 0.2);
     let goes_on = |end: usize, step: isize| {
         let at = |steps: isize| {
             let bin = end.checked_add_signed(steps * step)?;

@@ -243,12 +243,12 @@ impl<const BINS: usize, W: CounterWidth> ArrayEngine<BINS, W> {
             };
             let columns = u32::try_from(addresses.len())? / rows;
             let layout = Array::new(columns, rows).context("a block without pixels")?;
-            if !configs.iter().any(|(of, _)| *of == layout) {
+            let known = configs.iter().position(|(of, _)| *of == layout);
+            let at = known.unwrap_or(configs.len());
+            if known.is_none() {
                 configs.push((layout, settings.array_config(layout)?));
             }
-            let config = configs.iter().find(|(of, _)| *of == layout);
-            let (_, config) = config.context("a layout without a configuration")?;
-            Part::new(config, addresses, source)
+            Part::new(&configs[at].1, addresses, source)
         });
         Ok(Self {
             parts: parts.collect::<Result<_>>()?,

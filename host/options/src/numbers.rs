@@ -33,12 +33,15 @@ where
     }
 }
 
-/// Reads laser cycles a second: up to 1 THz, so that 64 bits hold the rate in millihertz.
+/// The most laser cycles a second: 64 bits hold the rate in millihertz.
+pub const MAX_LASER_HZ: u64 = 1_000_000_000_000;
+
+/// Reads laser cycles a second, up to [`MAX_LASER_HZ`].
 ///
 /// # Errors
 /// Fails if it is not a whole number in that range.
 pub fn laser_hz(text: &str) -> Result<u64, String> {
-    integer(1..=1_000_000_000_000)(text)
+    integer(1..=MAX_LASER_HZ)(text)
 }
 
 /// Reads a number of bins.

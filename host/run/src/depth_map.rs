@@ -102,10 +102,9 @@ impl RunCounts {
         addresses: &[PixelAddress],
     ) -> Result<Vec<bool>> {
         let mut contradicts = vec![false; addresses.len()];
-        let all = (0, u16::try_from(input.settings.bins)?.saturating_sub(1));
-        let given_gate = input.given_gate.unwrap_or(all);
-        let other = input.settings.clone().with(|other| other.gate = given_gate);
-        let has_other = given_gate != input.settings.configuration.gate;
+        let all = input.settings.clone().with_bins(input.settings.bins);
+        let other = all.with(|other| other.gate = input.given_gate.unwrap_or(other.gate));
+        let has_other = other.configuration.gate != input.settings.configuration.gate;
         for settings in [&input.settings]
             .into_iter()
             .chain(has_other.then_some(&other))

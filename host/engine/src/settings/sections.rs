@@ -13,7 +13,9 @@ use serde::ser::{Error as _, Serializer};
 
 use dtof_options::NO_OPTION;
 use dtof_options::keys::{Key, Kind, Reader, boolean, fixed, integer};
-use dtof_options::numbers::{self, MAX_INTEGER, bins, list, positive, real, shortest, within};
+use dtof_options::numbers::{
+    self, MAX_INTEGER, MAX_LASER_HZ, bins, list, positive, real, shortest, within,
+};
 use dtof_photons::axes::Axes;
 use dtof_photons::geometry::{FieldOfView, Rays, angles};
 
@@ -71,7 +73,7 @@ pub(super) use section;
 section! {
     /// `[sensor]`: what is known of a sensor.
     SensorSettings:
-    laser_hz: u64 = integer(1, 1_000_000_000_000), "HZ",
+    laser_hz: u64 = integer(1, MAX_LASER_HZ), "HZ",
         "Laser cycles a second [default: unknown]",
         "laser cycles a second";
     columns: u32 = integer(1, Array::MOST_PIXELS as u64), "N",
