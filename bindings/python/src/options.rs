@@ -2,14 +2,14 @@
 
 use dtof_export::ProjectionOptions;
 use dtof_options::keys::{Key, Kind};
-use dtof_options::{Options, option_name};
+use dtof_options::{Options, option_name, with_names};
 use dtof_run::given::{DITHER, Operation};
 use dtof_run::recording::RECORDING;
 use dtof_run::{calibrate, compare, replay, simulate, tune};
 use pyo3::prelude::*;
 
-/// A keyword: its name, its type in Python, its values in words, and its help with the flags of the program.
-type Keyword = (&'static str, String, String, &'static str);
+/// A keyword: its name, its type in Python, its values in words, and its help.
+type Keyword = (&'static str, String, String, String);
 
 /// The keywords of each function by the name of their type.
 #[pyfunction]
@@ -33,7 +33,8 @@ fn of<O: Options>(has: impl Fn(&Key) -> bool) -> Vec<Keyword> {
     let keys = O::KEYS.iter().copied().flatten().filter(|key| has(key));
     let keyword = |key: &Key| {
         let name = option_name(key.name);
-        (name, type_of(key.kind), key.kind.words(), key.help)
+        let help = with_names(key.help, |key| option_name(key).to_owned());
+        (name, type_of(key.kind), key.kind.words(), help)
     };
     keys.map(keyword).collect()
 }
@@ -41,7 +42,7 @@ fn of<O: Options>(has: impl Fn(&Key) -> bool) -> Vec<Keyword> {
 fn type_of(kind: Kind) -> String {
     match kind {
         Kind::Integer(..) | Kind::Choice(_) => "Integer",
-        Kind::Fixed(_) | Kind::Real(_) => "Number",
+        Kind::Fixed(_) | Kind::Real(..) | Kind::AboveZero(_) => "Number",
         Kind::Switch | Kind::Flag | Kind::YesOrNo => "Switch",
         Kind::Integers(_) => "Integers",
         Kind::Numbers(_) => "Numbers",

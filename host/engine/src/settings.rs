@@ -14,7 +14,7 @@ mod sections;
 #[cfg(test)]
 mod tests;
 
-pub use detection::{DetectionSettings, EstimatorName, RuleName, share};
+pub use detection::{DetectionSettings, EstimatorName, FALSE_ALARM, RuleName};
 pub use engine::{AdaptiveBinning, DEFAULT_L2, Settings};
 pub use file::{MARK, SettingsFile};
 pub use sections::{DITHER_BINS, RaySettings, RunSettings, SensorSettings};

@@ -147,7 +147,7 @@ impl dtof_options::Options for ProjectionOptions {
         Kind::OneOf(names::<Echo>),
         "ECHO",
         "Depth events: echo of each exposure of a pixel or block [default: all; the strongest with \
-         --one-per-pixel]",
+         `one_per_pixel`]",
     ),
     Key::new(
         "one_per_pixel",

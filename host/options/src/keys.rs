@@ -17,7 +17,7 @@ pub struct Key {
     pub kind: Kind,
     /// The name of the value in the help of the program.
     pub value: &'static str,
-    /// What it does, its range and its default. Names of other options stand as flags.
+    /// What it does, its range and its default. Keys of other options stand in backticks.
     pub help: &'static str,
     /// The comment in a settings file.
     pub comment: &'static str,
@@ -32,8 +32,10 @@ pub enum Kind {
     Choice(&'static [u64]),
     /// A fixed-point number, between these ends.
     Fixed(fn() -> [String; 2]),
-    /// Another number: its range in words.
-    Real(&'static str),
+    /// A number from the first to the last.
+    Real(f64, f64),
+    /// A number above 0, up to this one.
+    AboveZero(f64),
     /// `true` or `false`; its flag needs no value.
     Switch,
     /// A flag without a value.
@@ -131,7 +133,9 @@ impl Kind {
             Self::Integer(first, last) => format!("whole number, {first} to {last}"),
             Self::Choice(numbers) => any_of(numbers),
             Self::Fixed(ends) => format!("number, {}", ends().join(" to ")),
-            Self::Real(range) => format!("number{range}"),
+            Self::Real(first, last) => format!("number, {first} to {last}"),
+            Self::AboveZero(f64::INFINITY) => "number above 0".to_owned(),
+            Self::AboveZero(last) => format!("number above 0, at most {last}"),
             Self::Switch | Self::Flag | Self::YesOrNo => "True or False".to_owned(),
             Self::OneOf(names) => {
                 let names: Vec<_> = names().iter().map(|[name, _]| *name).collect();
@@ -148,6 +152,25 @@ impl Kind {
     }
 }
 
+impl Kind {
+    /// Reads a number in the range of this kind.
+    ///
+    /// # Errors
+    /// Says what the number must be.
+    pub fn real(self, text: &str) -> Result<f64, String> {
+        let is_in_range = |number: &f64| match self {
+            Self::Real(first, last) => (first..=last).contains(number),
+            Self::AboveZero(last) => *number > 0.0 && *number <= last,
+            _ => true,
+        };
+        let number = numbers::real(text).filter(is_in_range);
+        number.ok_or_else(|| match self {
+            Self::Real(first, last) => format!("must be a number from {first} to {last}"),
+            kind => format!("must be a {}", kind.words()),
+        })
+    }
+}
+
 /// Values as "8 or 10" or "paper, average or window".
 pub(crate) fn any_of(values: &[impl Display]) -> String {
     let texts: Vec<String> = values.iter().map(ToString::to_string).collect();
@@ -159,6 +182,7 @@ pub(crate) fn any_of(values: &[impl Display]) -> String {
 }
 
 /// How the text of an option becomes a value.
+#[derive(Clone, Copy)]
 pub struct Reader<T> {
     /// The values.
     pub kind: Kind,
@@ -177,6 +201,14 @@ impl<T> Reader<T> {
     /// Says what it must be.
     pub fn read(&self, text: &str) -> Result<T, String> {
         (self.read)(self.kind, text)
+    }
+
+    /// [`Self::read`] as a function.
+    pub fn parser(self) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
+    where
+        T: Clone + Send + Sync,
+    {
+        move |text| self.read(text)
     }
 }
 
@@ -207,6 +239,27 @@ pub const fn choice<T: TryFrom<u64>>(numbers: &'static [u64]) -> Reader<T> {
     })
 }
 
+/// Numbers of bins that a histogram can have.
+#[must_use]
+pub const fn bins() -> Reader<u16> {
+    Reader::new(Kind::Integer(8, 1024), |_, text| numbers::bins(text))
+}
+
+/// Numbers from the first to the last.
+#[must_use]
+pub const fn real(first: f64, last: f64) -> Reader<f64> {
+    Reader::new(Kind::Real(first, last), Kind::real)
+}
+
+/// Numbers above 0, up to `last`.
+#[must_use]
+pub const fn above_zero(last: f64) -> Reader<f64> {
+    Reader::new(Kind::AboveZero(last), Kind::real)
+}
+
+/// Numbers above 0.
+pub const POSITIVE: Reader<f64> = above_zero(f64::INFINITY);
+
 /// Fixed-point numbers.
 #[must_use]
 pub const fn fixed<T: Fixed + FromStr>() -> Reader<T> {
@@ -222,6 +275,16 @@ pub const fn boolean() -> Reader<bool> {
     Reader::new(Kind::Switch, |_, text| numbers::boolean(text))
 }
 
+/// `yes` or `no`.
+#[must_use]
+pub const fn yes_or_no() -> Reader<bool> {
+    Reader::new(Kind::YesOrNo, |_, text| match text {
+        "yes" => Ok(true),
+        "no" => Ok(false),
+        _ => Err("must be yes or no".to_owned()),
+    })
+}
+
 /// Names.
 #[must_use]
 pub const fn named<T: Named>() -> Reader<T> {
@@ -233,4 +296,76 @@ pub const fn named<T: Named>() -> Reader<T> {
 pub fn names<T: Named>() -> Vec<[&'static str; 2]> {
     let names = T::NAMES.iter();
     names.map(|&(name, _, help)| [name, help]).collect()
+}
+
+/// Defines options: the table of their keys, in the order in which they are written. Each has its type and its values,
+/// the name of the value and the help for its flag, and its comment in a settings file, if it is in one.
+///
+/// ```
+/// use dtof_options::keys::{above_zero, integer};
+/// use dtof_options::options;
+///
+/// options! {
+///     /// A laser.
+///     #[derive(Default)]
+///     pub struct Laser {
+///         hz: u32 = integer(1, 80_000_000), "HZ", "Laser cycles a second";
+///         sigma_ps: f64 = above_zero(1e6), "PS", "Standard deviation of the pulse";
+///     }
+/// }
+/// let mut laser = Laser::default();
+/// laser.set("hz", "10e6")?;
+/// assert_eq!(laser.hz, Some(10_000_000));
+/// assert_eq!(Laser::KEYS[1].help, "Standard deviation of the pulse");
+/// # Ok::<(), String>(())
+/// ```
+#[macro_export]
+macro_rules! options {
+    (
+        $(#[$of_options:meta])*
+        pub struct $options:ident {$(
+            $(#[$of_key:meta])*
+            $key:ident: $type:ty = $values:expr, $value:literal, $help:literal $(, $comment:literal)?;
+        )+}
+    ) => {
+        $(#[$of_options])*
+        pub struct $options {
+            $(#[doc = $help] $(#[$of_key])* pub $key: Option<$type>,)+
+        }
+
+        impl $options {
+            /// The keys.
+            pub const KEYS: &'static [$crate::keys::Key] = &[$({
+                const VALUES: $crate::keys::Reader<$type> = $values;
+                $crate::keys::Key {
+                    name: stringify!($key),
+                    kind: VALUES.kind,
+                    value: $value,
+                    help: $help,
+                    comment: concat!($($comment)?),
+                }
+            }),+];
+
+            /// Sets one of [`Self::KEYS`].
+            ///
+            /// # Errors
+            /// Says what the value must be.
+            pub fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
+                match key {
+                    $(stringify!($key) => {
+                        const VALUES: $crate::keys::Reader<$type> = $values;
+                        self.$key = Some(VALUES.read(text)?);
+                    })+
+                    _ => return Err($crate::NO_OPTION.to_owned()),
+                }
+                Ok(())
+            }
+
+            /// Each key of `self`, or that of `other` if `self` lacks it.
+            #[must_use]
+            pub fn first_of(self, other: Self) -> Self {
+                Self { $($key: self.$key.or(other.$key)),+ }
+            }
+        }
+    };
 }

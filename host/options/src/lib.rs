@@ -128,13 +128,7 @@ impl Refused {
             (Some(key), None) => format!("{} ", named(key)),
             (Some(key), Some(value)) => format!("{} {}: ", named(key), shortened(value)),
         };
-        for (at, part) in self.reason.split('`').enumerate() {
-            match at % 2 {
-                0 => text += part,
-                _ if is_key(part) => text += &named(part),
-                _ => text += &format!("`{part}`"),
-            }
-        }
+        text += &with_names(&self.reason, named);
         if let Some(file) = from_file {
             text = format!("{}: {text}", file.path.display());
         }
@@ -187,6 +181,17 @@ fn shortened(value: &str) -> String {
 #[must_use]
 pub fn plain(name: impl Display) -> String {
     name.to_string().replace('`', "'")
+}
+
+/// A text with the name that `name` gives to each key in backticks.
+#[must_use]
+pub fn with_names(text: &str, mut name: impl FnMut(&str) -> String) -> String {
+    let named = |(at, part): (usize, &str)| match at % 2 {
+        0 => part.to_owned(),
+        _ if is_key(part) => name(part),
+        _ => format!("`{part}`"),
+    };
+    text.split('`').enumerate().map(named).collect()
 }
 
 fn is_key(text: &str) -> bool {

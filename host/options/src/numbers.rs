@@ -93,32 +93,11 @@ pub fn shortest<T: Fixed + FromStr>(number: T) -> String {
     texts.next().unwrap_or_else(|| format!("{exact:.all$}"))
 }
 
-/// Reads a number above 0.
-///
-/// # Errors
-/// Fails if it is not finite and above 0.
-pub fn positive(text: &str) -> Result<f64, String> {
-    real(text)
-        .filter(|number| *number > 0.0)
-        .ok_or("must be a number above 0".to_owned())
-}
-
 /// Reads a finite number.
 #[must_use]
 pub fn real(text: &str) -> Option<f64> {
     let number: f64 = plain(text)?.parse().ok()?;
     number.is_finite().then_some(number)
-}
-
-/// Reads a number in `range`.
-pub fn within(
-    range: RangeInclusive<f64>,
-) -> impl Fn(&str) -> Result<f64, String> + Clone + Send + Sync + 'static {
-    move |text| {
-        let number = real(text).filter(|number| range.contains(number));
-        let (min, max) = (range.start(), range.end());
-        number.ok_or_else(|| format!("must be a number from {min} to {max}"))
-    }
 }
 
 /// Reads `true` or `false`.
@@ -188,6 +167,7 @@ fn plain(text: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::keys::{self, POSITIVE, above_zero};
     use dtof_core::fixed::types::{I24F8, U4F12, U8F8, U16F16};
 
     #[test]
@@ -273,10 +253,24 @@ mod tests {
         let refused = |text| fixed::<U8F8>(text).unwrap_err();
         assert!(refused("256").starts_with("must be a number from 0"));
         assert!(refused("1e-3").contains("less than half"));
-        assert_eq!(positive("1e-300"), Ok(1e-300));
         assert_eq!(real("-2.5e-3"), Some(-2.5e-3));
+        assert_eq!(POSITIVE.read("1e-300"), Ok(1e-300));
         for text in ["0", "-1", "inf", "1e-350", "1e309"] {
-            assert_eq!(positive(text).unwrap_err(), "must be a number above 0");
+            assert_eq!(POSITIVE.read(text).unwrap_err(), "must be a number above 0");
+        }
+        let share = above_zero(0.1);
+        assert_eq!(share.read("0.1"), Ok(0.1));
+        assert_eq!(
+            share.read("0.11").unwrap_err(),
+            "must be a number above 0, at most 0.1"
+        );
+        let rate = keys::real(0.0, 1e6);
+        assert_eq!([rate.read("0"), rate.read("1e6")], [Ok(0.0), Ok(1e6)]);
+        for text in ["-1e-9", "1000001", "x"] {
+            assert_eq!(
+                rate.read(text).unwrap_err(),
+                "must be a number from 0 to 1000000"
+            );
         }
     }
 }

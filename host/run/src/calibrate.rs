@@ -9,11 +9,11 @@ use super::recording::{
 };
 use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate_with};
 use dtof_engine::settings::{
-    DetectionSettings, RaySettings, RunSettings, SensorSettings, SettingsFile, share,
+    DetectionSettings, FALSE_ALARM, RaySettings, SensorSettings, SettingsFile,
 };
 use dtof_options::Refused;
-use dtof_options::keys::{Key, Kind};
-use dtof_options::numbers::{MAX_INTEGER, integer, within};
+use dtof_options::keys::{Key, Reader, integer, real, yes_or_no};
+use dtof_options::numbers::MAX_INTEGER;
 use dtof_options::progress::{Progress, shared};
 use dtof_photons::input::Input;
 use dtof_photons::masked;
@@ -25,26 +25,35 @@ const OWN: &[Key] = &[
     GLASS,
     Key::new(
         "target_mm",
-        Kind::Real(", 0 to 1000000"),
+        TARGET_MM.kind,
         "MM",
-        "Distance in millimetres of a flat target that most pixels see: with --fov straight ahead, as \
+        "Distance in millimetres of a flat target that most pixels see: with `field_of_view_degrees` straight ahead, as \
          a tape measures it, else along the ray of the median pixel",
     ),
     Key::of(DetectionSettings::KEYS, "false_alarm").with_help(
         "Share of exposures without a target that end with an event, at most 0.1 [default: 0.01]",
     ),
-    Key::of(RunSettings::KEYS, "seed").with_help("Seed of the simulation [default: 1]"),
+    Key::new(
+        "seed",
+        SEED.kind,
+        "N",
+        "Seed of the simulation [default: 1]",
+    ),
 ];
+const TARGET_MM: Reader<f64> = real(0.0, 1e6);
+const SEED: Reader<u64> = integer(0, MAX_INTEGER);
 
 /// Whether there is a cover glass, if the user knows.
 pub(super) const GLASS: Key = Key::new(
     "glass",
-    Kind::YesOrNo,
+    IS_GLASS.kind,
     "GLASS",
     "Whether the nearest surface that most pixels see is a cover glass, which the gate then \
          leaves out [default: if all pixels have it at one place and half of them see something \
          behind it]",
 );
+
+pub(super) const IS_GLASS: Reader<bool> = yes_or_no();
 
 /// What the user knows of the sensor.
 const SENSOR: &[Key] = &[
@@ -59,7 +68,7 @@ const SENSOR: &[Key] = &[
     ),
     Key::of(SensorSettings::KEYS, "sigma_bins").with_help(
         "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256 [default: measured; \
-         without a peak that is bright enough that of --settings, else 1]",
+         without a peak that is bright enough that of `settings`, else 1]",
     ),
 ];
 
@@ -80,10 +89,10 @@ impl dtof_options::Options for Options {
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
-            "target_mm" => self.calibration.target_mm = Some(within(0.0..=1e6)(text)?),
-            "glass" => self.calibration.glass = Some(yes_or_no(text)?),
-            "false_alarm" => self.calibration.false_alarm = share(text)?,
-            "seed" => self.calibration.seed = integer(0..=MAX_INTEGER)(text)?,
+            "target_mm" => self.calibration.target_mm = Some(TARGET_MM.read(text)?),
+            "glass" => self.calibration.glass = Some(IS_GLASS.read(text)?),
+            "false_alarm" => self.calibration.false_alarm = FALSE_ALARM.read(text)?,
+            "seed" => self.calibration.seed = SEED.read(text)?,
             key => self.given.set(key, text)?,
         }
         Ok(())
@@ -102,14 +111,6 @@ fn in_metres(target_mm: f64) -> Option<String> {
             "a target at {target_mm} mm: --target-mm takes millimetres; {target_mm} m are {mm:.0}"
         )
     })
-}
-
-pub(super) fn yes_or_no(text: &str) -> Result<bool, String> {
-    match text {
-        "yes" => Ok(true),
-        "no" => Ok(false),
-        _ => Err("must be yes or no".to_owned()),
-    }
 }
 
 /// The result of a calibration.

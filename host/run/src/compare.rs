@@ -4,7 +4,7 @@ use anyhow::{Context, Result, ensure};
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 
-use super::calibrate::{GLASS, calibrate_counts, with_mask, yes_or_no};
+use super::calibrate::{GLASS, IS_GLASS, calibrate_counts, with_mask};
 use super::given::{Given, SENSOR, TDC, of_given};
 use super::recording::{
     RECORDING, bin_width_warning, check_once_per_bin, mask_capture, read_options, settings_of_file,
@@ -15,10 +15,10 @@ use dtof_calibrate::CalibrationOptions;
 use dtof_compare::truth::Truth;
 use dtof_compare::{Comparison, Task, compare};
 use dtof_engine::settings::{
-    DetectionSettings, RuleName, RunSettings, Settings, SettingsFile, share,
+    DetectionSettings, FALSE_ALARM, RuleName, RunSettings, Settings, SettingsFile,
 };
-use dtof_options::keys::{Key, Kind};
-use dtof_options::numbers::{MAX_INTEGER, integer, positive};
+use dtof_options::keys::{Key, POSITIVE, Reader, integer};
+use dtof_options::numbers::MAX_INTEGER;
 use dtof_options::{Refused, plain};
 use dtof_photons::input::Input;
 use dtof_photons::masked::Masked;
@@ -30,7 +30,7 @@ use dtof_simulate::scene::Scene;
 const ACCURACY: &[Key] = &[
     Key::new(
         "within",
-        Kind::Real(" above 0"),
+        WITHIN.kind,
         "MM",
         "Largest error of 68 % of the reports in millimetres [default: that of the longest frames]",
     ),
@@ -38,6 +38,7 @@ const ACCURACY: &[Key] = &[
         "Share of exposures without a target that end with an event, at most 0.1 [default: 0.01]",
     ),
 ];
+const WITHIN: Reader<f64> = POSITIVE;
 /// What is compared.
 const RUN: &[Key] = &[
     Key::of(DetectionSettings::KEYS, "once_per_bin").with_help(
@@ -46,14 +47,16 @@ const RUN: &[Key] = &[
     ),
     Key::of(RunSettings::KEYS, "cycles")
         .with_help("Laser cycles to use at most [default: 10000 of a recording; the scene's]"),
-    // One more is the seed of a second run.
     Key::new(
         "seed",
-        Kind::Integer(0, MAX_INTEGER - 1),
+        SEED.kind,
         "N",
         "Seed of every random number [default: 1]",
     ),
 ];
+
+/// One more is the seed of a second run.
+const SEED: Reader<u64> = integer(0, MAX_INTEGER - 1);
 
 /// The options of a comparison.
 #[derive(Clone, Debug, Default)]
@@ -73,10 +76,10 @@ impl dtof_options::Options for Options {
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
-            "within" => self.within = Some(positive(text)?),
-            "false_alarm" => self.false_alarm = Some(share(text)?),
-            "glass" => self.glass = Some(yes_or_no(text)?),
-            "seed" => self.given.options.run.seed = Some(integer(0..=MAX_INTEGER - 1)(text)?),
+            "within" => self.within = Some(WITHIN.read(text)?),
+            "false_alarm" => self.false_alarm = Some(FALSE_ALARM.read(text)?),
+            "glass" => self.glass = Some(IS_GLASS.read(text)?),
+            "seed" => self.given.options.run.seed = Some(SEED.read(text)?),
             key => self.given.set(key, text)?,
         }
         Ok(())

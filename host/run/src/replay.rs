@@ -4,7 +4,7 @@
 
 use anyhow::{Result, ensure};
 
-use super::calibrate::{GLASS, calibrate_counts, has_photons, with_mask, yes_or_no};
+use super::calibrate::{GLASS, IS_GLASS, calibrate_counts, has_photons, with_mask};
 use super::depth_map::MapInput;
 use super::given::{FRAME, Given, ONCE, SENSOR, TDC, of_given};
 use super::recording::{
@@ -68,7 +68,7 @@ impl dtof_options::Options for Options {
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {
-            "glass" => self.glass = Some(yes_or_no(text)?),
+            "glass" => self.glass = Some(IS_GLASS.read(text)?),
             key => self.given.set(key, text)?,
         }
         Ok(())

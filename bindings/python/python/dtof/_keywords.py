@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import inspect
 import os
-import re
 import textwrap
 from collections.abc import Iterable, Mapping
 from typing import (
@@ -280,11 +279,6 @@ class PointsOptions(TypedDict, total=False):
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-def _named(text: str) -> str:
-    """The text with the names of keywords in place of flags."""
-    return re.sub(r"--([a-z0-9-]+)", lambda flag: flag[1].replace("-", "_"), text)
-
-
 class Keyword(NamedTuple):
     """What is known of a keyword beside its type."""
 
@@ -295,7 +289,7 @@ class Keyword(NamedTuple):
 
 
 _ALL = {
-    options: {name: Keyword(values, _named(help)) for name, _, values, help in keywords}
+    options: {name: Keyword(values, help) for name, _, values, help in keywords}
     for options, keywords in _native.keywords()
 }
 

@@ -6,7 +6,7 @@ use clap::builder::{OsStringValueParser, PossibleValue, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use dtof_options::keys::{Key, Kind, names};
-use dtof_options::{Named, Options, flag, named, option_name};
+use dtof_options::{Named, Options, flag, named, option_name, with_names};
 
 /// The options of a job, read from flags.
 pub struct Flags<O>(pub O);
@@ -18,7 +18,7 @@ type Names = Vec<[&'static str; 2]>;
 fn arg(key: &Key) -> Arg {
     let arg = Arg::new(key.name)
         .long(flag(key.name)[2..].to_owned())
-        .help(key.help);
+        .help(with_names(key.help, flag));
     let hinted = |names: Names| {
         arg.clone()
             .value_name(key.value)

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use dtof::path;
-use dtof_options::numbers::within;
+use dtof_options::keys::real;
 use dtof_options::rows::Row;
 use dtof_photons::geometry::FieldOfView;
 use dtof_simulate::scene::{DepthAlong, DepthMap, Scene};
@@ -35,13 +35,13 @@ pub struct SceneOptions {
     fov: Option<FieldOfView>,
     /// Signal photons a laser cycle from a white surface at one metre [default: the scene file's,
     /// or 4]
-    #[arg(long, value_name = "PHOTONS", value_parser = within(0.0..=1_000_000.0), allow_hyphen_values = true)]
+    #[arg(long, value_name = "PHOTONS", value_parser = real(0.0, 1e6).parser(), allow_hyphen_values = true)]
     signal_at_one_metre: Option<f64>,
     /// Background photons a bin and laser cycle [default: the scene file's, or 0.02]
-    #[arg(long, value_name = "PHOTONS", value_parser = within(0.0..=100.0), allow_hyphen_values = true)]
+    #[arg(long, value_name = "PHOTONS", value_parser = real(0.0, 100.0).parser(), allow_hyphen_values = true)]
     background: Option<f64>,
     /// Standard deviation of the simulated pulse in bins [default: the scene file's, or 1]
-    #[arg(long, value_name = "BINS", value_parser = within(0.0..=1000.0), allow_hyphen_values = true)]
+    #[arg(long, value_name = "BINS", value_parser = real(0.0, 1000.0).parser(), allow_hyphen_values = true)]
     pulse_sigma_bins: Option<f64>,
 }
 

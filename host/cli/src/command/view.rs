@@ -9,7 +9,8 @@ use clap::Args;
 use dtof::{complain, interrupt, path};
 use dtof_live::{Device, Feed, Folder, Foxglove, Origin, Playback, Served, Terminal};
 use dtof_options::flag;
-use dtof_options::numbers::{integer, laser_hz, positive};
+use dtof_options::keys::POSITIVE;
+use dtof_options::numbers::{integer, laser_hz};
 
 use super::device_options::DeviceOptions;
 
@@ -22,7 +23,7 @@ pub struct View {
     #[arg(long, value_name = "DEVICE")]
     device: Option<String>,
     /// File: speed of playback relative to the recording [default: 1]
-    #[arg(long, value_name = "N", value_parser = positive, conflicts_with = "device")]
+    #[arg(long, value_name = "N", value_parser = POSITIVE.parser(), conflicts_with = "device")]
     speed: Option<f64>,
     /// File: laser cycles a second, if the file has none or is wrong [default: the file's, else 10 MHz]
     #[arg(long, value_name = "HZ", value_parser = laser_hz, conflicts_with = "device")]

@@ -14,10 +14,10 @@ use serde::Serialize;
 use serde::ser::{Error as _, Serializer};
 
 use super::engine::{Settings, no_gate};
-use super::sections::{decimal, section};
-use dtof_options::keys::{Key, Kind, Reader, boolean, choice, fixed, integer, named};
-use dtof_options::numbers::{self, real, shortest};
-use dtof_options::{NO_OPTION, Refused, named_values};
+use super::sections::decimal;
+use dtof_options::keys::{Kind, Reader, above_zero, boolean, choice, fixed, integer, named};
+use dtof_options::numbers::{self, shortest};
+use dtof_options::{Refused, named_values, options};
 
 named_values! {
     /// The rules.
@@ -45,82 +45,87 @@ named_values! {
     }
 }
 
-section! {
+/// Shares of exposures without a target that end with an event.
+pub const FALSE_ALARM: Reader<f64> = above_zero(0.1);
+
+options! {
     /// Everything that is left out has a default. `x`, `l1` and `l2` are the paper's names of the interval
     /// between looks, and of the shortest and the longest exposure. A look is one check whether a pixel has
     /// an event.
-    DetectionSettings:
-    rule: RuleName = named(), "RULE",
-        "Detection rule, which decides whether a peak is a target [default: paper]",
-        "paper, average or window";
-    #[serde(serialize_with = "decimal")]
-    alpha: U8F8 = fixed(), "ALPHA",
-        "Rules paper and average: threshold above the background in its standard deviations, 0 to 255.996, rounded \
-         to 1/256 [default: 4]",
-        "standard deviations, of rules paper and average";
-    window: u8 = integer(1, WindowRule::MAX_WIDTH as u64), "BINS",
-        "Window rule: bins in the window, 1 to 7 [default: from --sigma-bins]",
-        "bins, of rule window";
-    #[serde(serialize_with = "decimal")]
-    z: U4F12 = fixed(), "Z",
-        "Window rule: threshold of the photons in the window above the background in its standard deviations, 0 to \
-         15.9998, rounded to 1/4096 [default: from --false-alarm]",
-        "standard deviations, of rule window";
-    false_alarm: f64 = Reader::new(Kind::Real(" above 0, at most 0.1"), |_, text| share(text)), "SHARE",
-        "Window rule, instead of --z: share of exposures without a target that end with an event, at most 0.1 \
-         [default: 0.01]",
-        "share of exposures without a target, instead of z";
-    estimator: EstimatorName = named(), "ESTIMATOR",
-        "Estimator of the position of a peak [default: window with --sigma-bins or --half-widths, else centroid]",
-        "centroid or window";
-    #[serde(serialize_with = "two_numbers")]
-    half_widths: CentredWindow = Reader::new(Kind::Numbers("two numbers, (1.75, 4)"), |_, text| half_widths(text)), "BEFORE,AFTER",
-        "Estimator window: bins before and after its centre, 1 to 4 each, rounded to 1/256. A longer part after \
-         suits a pulse that falls more slowly than it rises [default: from --sigma-bins]",
-        "bins before and after the place, of estimator window";
-    min_count: u16 = integer(1, 1023), "N",
-        "Fewest photons in a reported peak, or in the window around it [default: 5]",
-        "photons";
-    l1: u16 = integer(0, 65_535), "N",
-        "Shortest exposure: pixels decide after more than N laser cycles [default: 40]",
-        "laser cycles that a decision must exceed";
-    l2: u16 = integer(0, 65_535), "N",
-        "Longest exposure: a pixel without an event starts over after N laser cycles [default: 2000]",
-        "laser cycles at which a pixel starts over";
-    x: u16 = integer(0, 65_535), "N",
-        "Laser cycles between two decisions [default: 4]",
-        "laser cycles between looks";
-    binning: u8 = integer(0, BlockLevel::MAX.raw() as u64), "LEVELS",
-        "Levels of adaptive binning, 0 to 3: pixels without events also count in blocks, at level 1 of 2x2 pixels, \
-         at 2 of 4x4 and at 3 of 8x8 [default: 0]",
-        "levels of blocks";
-    patience: u16 = integer(1, 65_535), "N",
-        "Adaptive binning: laser cycles without an event after which a pixel also counts in its block [default: 64]",
-        "laser cycles until a silent pixel counts in its block";
-    neighbours: u8 = choice(&[0, 4, 8]), "N",
-        "Window rule: the 4 or 8 pixels around a pixel confirm what is not enough by itself. For arrays, without \
-         --binning [default: 0]",
-        "pixels around a pixel that confirm it";
-    tracking: bool = boolean(), "YES",
-        "Window rule: expect the next event of a pixel near its last, with a lower threshold there and a higher one \
-         elsewhere",
-        "expect the next event near the last";
-    echoes: u8 = integer(1, EchoNumber::LAST.raw() as u64), "N",
-        "Most echoes of a pixel in an exposure, 1 to 4. With 2 or more the exposure goes on until all are found or \
-         --echo-wait ends it [default: 1]",
-        "of an exposure";
-    echo_wait: u8 = integer(2, 254), "TIMES",
-        "Two or more echoes: an exposure ends at this multiple of its length at the last echo [default: it ends at \
-         L2]",
-        "times the laser cycles of the last echo";
-    once_per_bin: bool = boolean(), "YES",
-        "Photons of one laser cycle in one bin count once, so that raindrops are no targets. For photons, not for \
-         histograms",
-        "photons of one laser cycle in one bin count once";
-    counter_bits: u8 = choice(&[8, 10]), "N",
-        "Bits of a pixel's counters, 8 or 10. With 8 an exposure ends without an event once a counter passes 255. A \
-         device has one of both [default: 10]",
-        "of a pixel's counters";
+    #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+    pub struct DetectionSettings {
+        rule: RuleName = named(), "RULE",
+            "Detection rule, which decides whether a peak is a target [default: paper]",
+            "paper, average or window";
+        #[serde(serialize_with = "decimal")]
+        alpha: U8F8 = fixed(), "ALPHA",
+            "Rules paper and average: threshold above the background in its standard deviations, 0 to 255.996, rounded \
+             to 1/256 [default: 4]",
+            "standard deviations, of rules paper and average";
+        window: u8 = integer(1, WindowRule::MAX_WIDTH as u64), "BINS",
+            "Window rule: bins in the window, 1 to 7 [default: from `sigma_bins`]",
+            "bins, of rule window";
+        #[serde(serialize_with = "decimal")]
+        z: U4F12 = fixed(), "Z",
+            "Window rule: threshold of the photons in the window above the background in its standard deviations, 0 to \
+             15.9998, rounded to 1/4096 [default: from `false_alarm`]",
+            "standard deviations, of rule window";
+        false_alarm: f64 = FALSE_ALARM, "SHARE",
+            "Window rule, instead of `z`: share of exposures without a target that end with an event, at most 0.1 \
+             [default: 0.01]",
+            "share of exposures without a target, instead of z";
+        estimator: EstimatorName = named(), "ESTIMATOR",
+            "Estimator of the position of a peak [default: window with `sigma_bins` or `half_widths`, else centroid]",
+            "centroid or window";
+        #[serde(serialize_with = "two_numbers")]
+        half_widths: CentredWindow = Reader::new(Kind::Numbers("two numbers, (1.75, 4)"), |_, text| half_widths(text)), "BEFORE,AFTER",
+            "Estimator window: bins before and after its centre, 1 to 4 each, rounded to 1/256. A longer part after \
+             suits a pulse that falls more slowly than it rises [default: from `sigma_bins`]",
+            "bins before and after the place, of estimator window";
+        min_count: u16 = integer(1, 1023), "N",
+            "Fewest photons in a reported peak, or in the window around it [default: 5]",
+            "photons";
+        l1: u16 = integer(0, 65_535), "N",
+            "Shortest exposure: pixels decide after more than N laser cycles [default: 40]",
+            "laser cycles that a decision must exceed";
+        l2: u16 = integer(0, 65_535), "N",
+            "Longest exposure: a pixel without an event starts over after N laser cycles [default: 2000]",
+            "laser cycles at which a pixel starts over";
+        x: u16 = integer(0, 65_535), "N",
+            "Laser cycles between two decisions [default: 4]",
+            "laser cycles between looks";
+        binning: u8 = integer(0, BlockLevel::MAX.raw() as u64), "LEVELS",
+            "Levels of adaptive binning, 0 to 3: pixels without events also count in blocks, at level 1 of 2x2 pixels, \
+             at 2 of 4x4 and at 3 of 8x8 [default: 0]",
+            "levels of blocks";
+        patience: u16 = integer(1, 65_535), "N",
+            "Adaptive binning: laser cycles without an event after which a pixel also counts in its block [default: 64]",
+            "laser cycles until a silent pixel counts in its block";
+        neighbours: u8 = choice(&[0, 4, 8]), "N",
+            "Window rule: the 4 or 8 pixels around a pixel confirm what is not enough by itself. For arrays, without \
+             `binning` [default: 0]",
+            "pixels around a pixel that confirm it";
+        tracking: bool = boolean(), "YES",
+            "Window rule: expect the next event of a pixel near its last, with a lower threshold there and a higher one \
+             elsewhere",
+            "expect the next event near the last";
+        echoes: u8 = integer(1, EchoNumber::LAST.raw() as u64), "N",
+            "Most echoes of a pixel in an exposure, 1 to 4. With 2 or more the exposure goes on until all are found or \
+             `echo_wait` ends it [default: 1]",
+            "of an exposure";
+        echo_wait: u8 = integer(2, 254), "TIMES",
+            "Two or more echoes: an exposure ends at this multiple of its length at the last echo [default: it ends at \
+             L2]",
+            "times the laser cycles of the last echo";
+        once_per_bin: bool = boolean(), "YES",
+            "Photons of one laser cycle in one bin count once, so that raindrops are no targets. For photons, not for \
+             histograms",
+            "photons of one laser cycle in one bin count once";
+        counter_bits: u8 = choice(&[8, 10]), "N",
+            "Bits of a pixel's counters, 8 or 10. With 8 an exposure ends without an event once a counter passes 255. A \
+             device has one of both [default: 10]",
+            "of a pixel's counters";
+    }
 }
 
 impl DetectionSettings {
@@ -410,15 +415,6 @@ fn z_for_share(
         )
     );
     Ok(z)
-}
-
-/// Reads a share of false alarms.
-///
-/// # Errors
-/// Fails if it is not above 0 and at most 0.1.
-pub fn share(text: &str) -> Result<f64, String> {
-    let share = real(text).filter(|&share| share > 0.0 && share <= 0.1);
-    share.ok_or("must be a number above 0, at most 0.1".to_owned())
 }
 
 /// Reads `BEFORE,AFTER`: the half widths of the depth window.

@@ -11,123 +11,72 @@ use dtof_sensors::dither::Dither;
 use serde::Serialize;
 use serde::ser::{Error as _, Serializer};
 
-use dtof_options::NO_OPTION;
-use dtof_options::keys::{Key, Kind, Reader, boolean, fixed, integer};
-use dtof_options::numbers::{
-    self, MAX_INTEGER, MAX_LASER_HZ, bins, list, positive, real, shortest, within,
-};
+use dtof_options::keys::{Kind, POSITIVE, Reader, bins, boolean, fixed, integer, real};
+use dtof_options::numbers::{self, MAX_INTEGER, MAX_LASER_HZ, list, shortest};
+use dtof_options::options;
 use dtof_photons::axes::Axes;
 use dtof_photons::geometry::{FieldOfView, Rays, angles};
 
-/// Defines a section: the table of its keys, in the order in which they are written. Each has its type and its values,
-/// the name of the value and the help for its flag, and its comment in the file.
-macro_rules! section {
-    (
-        $(#[$of_section:meta])*
-        $section:ident:
-        $($(#[$of_key:meta])* $key:ident: $type:ty = $values:expr, $value:literal, $help:literal, $comment:literal;)+
-    ) => {
-        $(#[$of_section])*
-        #[derive(Clone, Debug, Default, PartialEq, Serialize)]
-        pub struct $section {
-            $(#[doc = $help] $(#[$of_key])* pub $key: Option<$type>,)+
-        }
-
-        impl $section {
-            /// The keys of the section.
-            pub const KEYS: &'static [Key] = &[$({
-                const VALUES: Reader<$type> = $values;
-                Key {
-                    name: stringify!($key),
-                    kind: VALUES.kind,
-                    value: $value,
-                    help: $help,
-                    comment: $comment,
-                }
-            }),+];
-
-            /// Sets one of [`Self::KEYS`].
-            ///
-            /// # Errors
-            /// Says what the value must be.
-            pub(super) fn set(&mut self, key: &str, text: &str) -> Result<(), String> {
-                match key {
-                    $(stringify!($key) => {
-                        const VALUES: Reader<$type> = $values;
-                        self.$key = Some(VALUES.read(text)?);
-                    })+
-                    _ => return Err(NO_OPTION.to_owned()),
-                }
-                Ok(())
-            }
-
-            /// Each key of `self`, or that of `other` if `self` lacks it.
-            fn first_of(self, other: Self) -> Self {
-                Self { $($key: self.$key.or(other.$key)),+ }
-            }
-        }
-    };
-}
-pub(super) use section;
-
-section! {
+options! {
     /// `[sensor]`: what is known of a sensor.
-    SensorSettings:
-    laser_hz: u64 = integer(1, MAX_LASER_HZ), "HZ",
-        "Laser cycles a second [default: unknown]",
-        "laser cycles a second";
-    columns: u32 = integer(1, Array::MOST_PIXELS as u64), "N",
-        "Photon lists: columns of the array, pixel = row × columns + column [default: one row]",
-        "pixel = row * columns + column";
-    bins: u16 = Reader::new(Kind::Integer(8, 1024), |_, text| bins(text)), "N",
-        "Number of bins after --rebin, a power of two from 8 to 1024. Longer histograms lose their last bins \
-         [default: the file's, or the next power of two; 128 for photon lists]",
-        "of a histogram";
-    #[serde(serialize_with = "decimal")]
-    bin_width_ps: U16F16 = fixed(), "PS",
-        "Width of a bin of the file in picoseconds, rounded to 1/65536 [default: 250; for logs the sensor's]",
-        "picoseconds a bin";
-    #[serde(serialize_with = "decimal")]
-    offset_mm: I24F8 = fixed(), "MM",
-        "Millimetres added to every range, rounded to 1/256 [default: 0; for logs the sensor's]",
-        "added to every range";
-    #[serde(serialize_with = "decimals")]
-    offsets_mm: Vec<I24F8> = Reader::new(Kind::Numbers("numbers, one a pixel"), |_, text| offsets(text)), "MM,MM,...",
-        "Millimetres added to --offset-mm for each pixel, in the order of the addresses, rounded to 1/256 [default: \
-         0]",
-        "added to that, one for each pixel";
-    gate: (u16, u16) = Reader::new(Kind::Integers("two bins, (20, 119)"), |_, text| gate(text)), "FIRST..LAST",
-        "First and last bin that may hold the peak, as 20..119 [default: all bins]",
-        "first and last bin that may hold a peak";
-    masked: Vec<u16> = Reader::new(Kind::Integers("addresses, [3, 70], or 'none'; [] adds none"), |_, text| masked(text)), "PIXELS",
-        "Pixels to leave out, such as hot and dead ones, as 3,70, beside those that are found; none leaves out none",
-        "addresses of pixels that are left out";
-    #[serde(serialize_with = "decimal")]
-    sigma_bins: U8F8 = Reader::new(Kind::Real(" above 0, at most 1.75"), |_, text| pulse(text)), "S",
-        "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. It sets the window for the depth \
-         [default: the depth is the centroid of three bins]",
-        "standard deviation of the pulse";
-    dead_time: u16 = integer(0, 65_535), "BINS",
-        "Bins for which the TDC is blind after a photon, 0 to 65535. With all bins of a histogram it takes the \
-         first photon of a laser cycle only. Fewer are for the window rule without --binning [default: the \
-         sensor's, else 0]",
-        "bins for which the TDC is blind after a photon";
-    dither_bins: u16 = Reader::new(Kind::Integer(0, Dither::MOST as u64), |_, text| dither(text)), "BINS",
-        "Dither against other LiDARs: the longest laser cycle takes so many bins more than the shortest, an even \
-         number up to 254; 0 is off [default: 128, or as many as the sensor can]",
-        "by which the longest laser cycle is longer than the shortest";
-    dither_seed: u64 = integer(0, MAX_INTEGER), "N",
-        "Seed of the random lengths of laser cycles [default: from the clock]",
-        "of the lengths of laser cycles";
-    background: f64 = Reader::new(Kind::Real(", 0 to 1000000"), |_, text| rate(text)), "",
-        "Background photons a bin and laser cycle of the median pixel",
-        "photons a bin and laser cycle of the median pixel";
-    glass: f64 = Reader::new(Kind::Real(", 0 to 1000000"), |_, text| rate(text)), "",
-        "Photons a laser cycle and pixel that the cover glass sends back, before the gate",
-        "photons a laser cycle and pixel of the cover glass";
-    glass_bins: Vec<f64> = Reader::new(Kind::Numbers("numbers, one a bin"), |_, text| rates(text)), "",
-        "The same for each bin before the gate, from bin 0 on",
-        "the same for each bin before the gate";
+    #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+    pub struct SensorSettings {
+        laser_hz: u64 = integer(1, MAX_LASER_HZ), "HZ",
+            "Laser cycles a second [default: unknown]",
+            "laser cycles a second";
+        columns: u32 = integer(1, Array::MOST_PIXELS as u64), "N",
+            "Photon lists: columns of the array, pixel = row × columns + column [default: one row]",
+            "pixel = row * columns + column";
+        bins: u16 = bins(), "N",
+            "Number of bins after `rebin`, a power of two from 8 to 1024. Longer histograms lose their last bins \
+             [default: the file's, or the next power of two; 128 for photon lists]",
+            "of a histogram";
+        #[serde(serialize_with = "decimal")]
+        bin_width_ps: U16F16 = fixed(), "PS",
+            "Width of a bin of the file in picoseconds, rounded to 1/65536 [default: 250; for logs the sensor's]",
+            "picoseconds a bin";
+        #[serde(serialize_with = "decimal")]
+        offset_mm: I24F8 = fixed(), "MM",
+            "Millimetres added to every range, rounded to 1/256 [default: 0; for logs the sensor's]",
+            "added to every range";
+        #[serde(serialize_with = "decimals")]
+        offsets_mm: Vec<I24F8> = Reader::new(Kind::Numbers("numbers, one a pixel"), |_, text| offsets(text)), "MM,MM,...",
+            "Millimetres added to `offset_mm` for each pixel, in the order of the addresses, rounded to 1/256 [default: \
+             0]",
+            "added to that, one for each pixel";
+        gate: (u16, u16) = Reader::new(Kind::Integers("two bins, (20, 119)"), |_, text| gate(text)), "FIRST..LAST",
+            "First and last bin that may hold the peak, as 20..119 [default: all bins]",
+            "first and last bin that may hold a peak";
+        masked: Vec<u16> = Reader::new(Kind::Integers("addresses, [3, 70], or 'none'; [] adds none"), |_, text| masked(text)), "PIXELS",
+            "Pixels to leave out, such as hot and dead ones, as 3,70, beside those that are found; none leaves out none",
+            "addresses of pixels that are left out";
+        #[serde(serialize_with = "decimal")]
+        sigma_bins: U8F8 = Reader::new(Kind::AboveZero(WIDEST_PULSE), pulse), "S",
+            "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. It sets the window for the depth \
+             [default: the depth is the centroid of three bins]",
+            "standard deviation of the pulse";
+        dead_time: u16 = integer(0, 65_535), "BINS",
+            "Bins for which the TDC is blind after a photon, 0 to 65535. With all bins of a histogram it takes the \
+             first photon of a laser cycle only. Fewer are for the window rule without `binning` [default: the \
+             sensor's, else 0]",
+            "bins for which the TDC is blind after a photon";
+        dither_bins: u16 = Reader::new(Kind::Integer(0, Dither::MOST as u64), |_, text| dither(text)), "BINS",
+            "Dither against other LiDARs: the longest laser cycle takes so many bins more than the shortest, an even \
+             number up to 254; 0 is off [default: 128, or as many as the sensor can]",
+            "by which the longest laser cycle is longer than the shortest";
+        dither_seed: u64 = integer(0, MAX_INTEGER), "N",
+            "Seed of the random lengths of laser cycles [default: from the clock]",
+            "of the lengths of laser cycles";
+        background: f64 = RATE, "",
+            "Background photons a bin and laser cycle of the median pixel",
+            "photons a bin and laser cycle of the median pixel";
+        glass: f64 = RATE, "",
+            "Photons a laser cycle and pixel that the cover glass sends back, before the gate",
+            "photons a laser cycle and pixel of the cover glass";
+        glass_bins: Vec<f64> = Reader::new(Kind::Numbers("numbers, one a bin"), |_, text| rates(text)), "",
+            "The same for each bin before the gate, from bin 0 on",
+            "the same for each bin before the gate";
+    }
 }
 
 impl SensorSettings {
@@ -186,38 +135,40 @@ fn masked(text: &str) -> Result<Vec<u16>, String> {
     }
 }
 
+/// The widest pulse that a window for the depth suits, in bins.
+const WIDEST_PULSE: f64 = CentredWindow::WIDEST_PULSE.to_bits() as f64 / 256.0;
+
 /// Reads the standard deviation of a pulse in bins.
-fn pulse(text: &str) -> Result<U8F8, String> {
-    const WIDEST: U8F8 = CentredWindow::WIDEST_PULSE;
-    let range = format!("must be a number above 0, at most {WIDEST}");
-    match real(text) {
-        Some(sigma) if sigma > f64::from(WIDEST) => Err(format!(
-            "{range}; `rebin` 2 halves the pulse in bins, as does a TDC with wider bins"
-        )),
-        Some(sigma) if sigma > 0.0 => numbers::fixed(text),
-        _ => Err(range),
-    }
+fn pulse(kind: Kind, text: &str) -> Result<U8F8, String> {
+    let too_wide = |range| match numbers::real(text) {
+        Some(sigma) if sigma > WIDEST_PULSE => {
+            format!("{range}; `rebin` 2 halves the pulse in bins, as does a TDC with wider bins")
+        }
+        _ => range,
+    };
+    kind.real(text).map_err(too_wide)?;
+    numbers::fixed(text)
 }
 
-/// Reads photons a laser cycle.
-fn rate(text: &str) -> Result<f64, String> {
-    within(0.0..=1e6)(text)
-}
+/// Photons a laser cycle.
+const RATE: Reader<f64> = real(0.0, 1e6);
 
 fn rates(text: &str) -> Result<Vec<f64>, String> {
-    list(text, &[','], rate)
+    list(text, &[','], |text| RATE.read(text))
 }
 
-section! {
+options! {
     /// `[rays]`: where pixels look.
-    RaySettings:
-    field_of_view_degrees: [f64; 2] = Reader::new(Kind::Numbers("two numbers, (60, 40)"), |_, text| degrees(text)), "HxV",
-        "Field of view in degrees from edge to edge, so that a flat target gives the offset of each pixel [default: \
-         unknown]",
-        "horizontal, vertical";
-    calibration: PathBuf = Reader::new(Kind::File, |_, text| Ok(text.into())), "FILE",
-        "Instead of --fov: TOML file with a direction for each pixel; docs/export.md lists its keys",
-        "file with a ray for each pixel";
+    #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+    pub struct RaySettings {
+        field_of_view_degrees: [f64; 2] = Reader::new(Kind::Numbers("two numbers, (60, 40)"), |_, text| degrees(text)), "HxV",
+            "Field of view in degrees from edge to edge, so that a flat target gives the offset of each pixel [default: \
+             unknown]",
+            "horizontal, vertical";
+        calibration: PathBuf = Reader::new(Kind::File, |_, text| Ok(text.into())), "FILE",
+            "Instead of `field_of_view_degrees`: TOML file with a direction for each pixel; docs/export.md lists its keys",
+            "file with a ray for each pixel";
+    }
 }
 
 /// Reads the angles of a field of view.
@@ -263,43 +214,45 @@ impl RaySettings {
     }
 }
 
-section! {
+options! {
     /// `[run]`: what is replayed or simulated.
-    RunSettings:
-    cycles: u64 = integer(1, MAX_INTEGER), "N",
-        "Laser cycles to replay at most [default: all of a photon list and with --decide-once, else 10000]",
-        "laser cycles";
-    seed: u64 = integer(0, MAX_INTEGER), "N",
-        "Seed of the laser cycles that recorded photons get [default: 1]",
-        "of every random number";
-    photons_per_cycle: f64 = Reader::new(Kind::Real(" above 0"), |_, text| positive(text)), "R",
-        "Histograms: photons a laser cycle in the brightest unmasked pixel of each capture [default: 1]",
-        "in the brightest pixel of a recording";
-    recorded_cycles: u64 = integer(1, MAX_INTEGER), "N",
-        "Histograms: laser cycles of each capture",
-        "laser cycles of a recording";
-    frame: u16 = integer(1, 65_535), "N",
-        "Simulate a frame-based sensor for comparison: every N laser cycles each pixel reports its highest bin, if \
-         that is above the background",
-        "laser cycles, of a frame-based sensor";
-    decide_once: bool = boolean(), "YES",
-        "Events are the decisions of depth.npy, one a pixel on all of its photons, instead of asynchronous ones. \
-         Takes all laser cycles unless --cycles says less",
-        "on all photons of a pixel";
-    #[serde(serialize_with = "as_text")]
-    axes: Axes = Reader::new(Kind::Names("names of axes"), |_, text| text.parse()), "AXIS,AXIS,...",
-        "Arrays of histograms: meaning of each axis: captures, rows, columns or bins [default: the last is bins, \
-         the one before columns, all others are rows]",
-        "of a recorded array";
-    array: String = Reader::new(Kind::Text, |_, text| Ok(text.to_owned())), "NAME",
-        ".npz: name of the array [default: the only one]",
-        "of an archive";
-    capture: u32 = integer(0, 65_535), "N",
-        "Arrays with captures, and logs: the capture or frame to use, counted from 0 [default: all]",
-        "to use of a recording, from 0";
-    rebin: u16 = integer(1, 512), "K",
-        "Number of neighbouring bins to add up [default: 1]",
-        "neighbouring bins that are added up";
+    #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+    pub struct RunSettings {
+        cycles: u64 = integer(1, MAX_INTEGER), "N",
+            "Laser cycles to replay at most [default: all of a photon list and with `decide_once`, else 10000]",
+            "laser cycles";
+        seed: u64 = integer(0, MAX_INTEGER), "N",
+            "Seed of the laser cycles that recorded photons get [default: 1]",
+            "of every random number";
+        photons_per_cycle: f64 = POSITIVE, "R",
+            "Histograms: photons a laser cycle in the brightest unmasked pixel of each capture [default: 1]",
+            "in the brightest pixel of a recording";
+        recorded_cycles: u64 = integer(1, MAX_INTEGER), "N",
+            "Histograms: laser cycles of each capture",
+            "laser cycles of a recording";
+        frame: u16 = integer(1, 65_535), "N",
+            "Simulate a frame-based sensor for comparison: every N laser cycles each pixel reports its highest bin, if \
+             that is above the background",
+            "laser cycles, of a frame-based sensor";
+        decide_once: bool = boolean(), "YES",
+            "Events are the decisions of depth.npy, one a pixel on all of its photons, instead of asynchronous ones. \
+             Takes all laser cycles unless `cycles` says less",
+            "on all photons of a pixel";
+        #[serde(serialize_with = "as_text")]
+        axes: Axes = Reader::new(Kind::Names("names of axes"), |_, text| text.parse()), "AXIS,AXIS,...",
+            "Arrays of histograms: meaning of each axis: captures, rows, columns or bins [default: the last is bins, \
+             the one before columns, all others are rows]",
+            "of a recorded array";
+        array: String = Reader::new(Kind::Text, |_, text| Ok(text.to_owned())), "NAME",
+            ".npz: name of the array [default: the only one]",
+            "of an archive";
+        capture: u32 = integer(0, 65_535), "N",
+            "Arrays with captures, and logs: the capture or frame to use, counted from 0 [default: all]",
+            "to use of a recording, from 0";
+        rebin: u16 = integer(1, 512), "K",
+            "Number of neighbouring bins to add up [default: 1]",
+            "neighbouring bins that are added up";
+    }
 }
 
 impl RunSettings {

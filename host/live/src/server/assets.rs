@@ -66,7 +66,7 @@ mod tests {
             Kind::Integer(first, _) => number(&first, "1"),
             Kind::Integers(_) => number(&0, "1"),
             Kind::Fixed(ends) => number(&ends()[0], "\"any\""),
-            Kind::Real(_) => number(&0, "\"any\""),
+            Kind::Real(..) | Kind::AboveZero(_) => number(&0, "\"any\""),
             Kind::OneOf(names) => {
                 let names: Vec<&str> = names().iter().map(|[name, _]| *name).collect();
                 format!("{names:?}")

@@ -5,7 +5,7 @@ use dtof_options::numbers::shortest;
 use dtof_theory::progress::Progress;
 use dtof_theory::tune::{Request, average};
 
-use super::{Line, Options};
+use super::{Line, Options, counted, l1};
 
 impl Options {
     /// α and L1, what to expect of them, and the options for them.
@@ -17,12 +17,12 @@ impl Options {
         let tuned = average::tune(request, progress)?;
         let alpha = format!(
             "lowest for these false alarms; simulation: seed {}, {} exposures without a target",
-            self.seed, tuned.exposures
+            request.seed, tuned.exposures
         );
         let mut lines = vec![
             Line("alpha", tuned.alpha.to_num(), alpha),
-            self.l1(tuned.l1, &tuned.detections),
-            self.counted(tuned.false_alarms),
+            l1(request, tuned.l1, &tuned.detections),
+            counted(request, tuned.false_alarms),
         ];
         lines.extend(self.expected(request, &tuned.detections));
         let options = format!(

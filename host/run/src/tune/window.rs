@@ -7,7 +7,7 @@ use dtof_options::numbers::shortest;
 use dtof_theory::progress::Progress;
 use dtof_theory::tune::{Request, window};
 
-use super::{Line, Options, number};
+use super::{Line, Options, counted, l1, number};
 
 impl Options {
     /// z and L1, what to expect of them, and the options for them.
@@ -40,11 +40,11 @@ impl Options {
             lines.push(Line("half_width", window.after().to_num(), source));
         }
         lines.extend([
-            self.l1(tuned.l1, &tuned.detections),
-            self.counted(tuned.false_alarms),
+            l1(request, tuned.l1, &tuned.detections),
+            counted(request, tuned.false_alarms),
         ]);
         lines.extend(self.expected(request, &tuned.detections));
-        let binning = match self.binning {
+        let binning = match request.levels.raw() {
             0 => String::new(),
             levels => format!(" --binning {levels}"),
         };

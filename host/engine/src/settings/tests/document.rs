@@ -6,22 +6,6 @@ use dtof_options::{flag, option_name};
 
 use super::*;
 
-/// The help of a key, with keys in place of flags.
-fn meaning(help: &str) -> String {
-    let is_of_flag = |letter: char| letter.is_ascii_alphanumeric() || letter == '-';
-    let mut parts = help.split("--");
-    let mut text = parts.next().unwrap_or_default().to_owned();
-    for part in parts {
-        let end = part.find(|letter| !is_of_flag(letter));
-        let (name, rest) = part.split_at(end.unwrap_or(part.len()));
-        let keys = SECTIONS.iter().flat_map(|(_, keys)| keys.iter());
-        let mut keys = keys.filter(|key| flag(key.name)[2..] == *name);
-        let key = keys.next().expect(name).name;
-        text += &format!("`{key}`{rest}");
-    }
-    text
-}
-
 fn table(keys: &[Key]) -> String {
     let mut text = "| key | default | meaning |\n|---|---|---|\n".to_owned();
     for key in keys {
@@ -31,11 +15,11 @@ fn table(keys: &[Key]) -> String {
             (_, true) => String::new(),
             (_, false) => format!(" (`{}`)", flag(name)),
         };
-        let help = meaning(key.help);
-        let (help, default) = help
+        let (help, default) = key
+            .help
             .strip_suffix(']')
             .and_then(|help| help.split_once(" [default: "))
-            .unwrap_or((&help, ""));
+            .unwrap_or((key.help, ""));
         text += &format!("| `{name}`{other} | {default} | {help} |\n");
     }
     text
