@@ -166,6 +166,10 @@ def test_the_line_is_that_of_the_program(program, tmp_path):
     [
         ({"rule": "window", "window": 9}, "window 9: must be a whole number from 1 to 7"),
         ({"rule": "window", "z": 4, "false_alarm": 0.01}, "z cannot be used with false_alarm"),
+        ({"x": 50, "l1": 40}, "x 50: must not be greater than l1 40"),
+        ({"rule": "window", "window": 3, "neighbours": 8, "binning": 1}, "neighbours cannot be used with binning"),
+        ({"tracking": True}, "tracking is for rule window"),
+        ({"gate": (4, 9)}, "gate 4..9: with 16 bins: the range gate leaves fewer than 8 bins"),
         ({"alfa": 4}, "alfa is unknown; is it alpha?"),
         ({"rule": "window"}, "rule window needs window or sigma_bins"),
     ],

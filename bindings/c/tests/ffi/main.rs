@@ -5,6 +5,7 @@
 mod array;
 mod link;
 mod memory;
+mod mistakes;
 mod pixels;
 mod refusals;
 mod report;

@@ -1,6 +1,8 @@
 //! The same mistake as a flag, as a key of a settings file and as a keyword of Python is one error value.
-//! The tests of the Python package have its lines.
+//! The tests of the Python package have its lines, those of C the mistakes that a device can be sent.
 
+use anyhow::{Result, anyhow};
+use dtof_core::{Array, Count10};
 use dtof_engine::settings::SettingsFile;
 use dtof_options::Refused;
 use dtof_run::replay::Options;
@@ -18,7 +20,7 @@ struct Mistake {
     lines: [&'static str; 2],
 }
 
-const MISTAKES: [Mistake; 5] = [
+const MISTAKES: [Mistake; 9] = [
     // Out of range.
     Mistake {
         file: ["detection", "rule = 'window'\nwindow = 9"],
@@ -37,6 +39,53 @@ const MISTAKES: [Mistake; 5] = [
         lines: [
             "--z cannot be used with --false-alarm",
             "my.toml: z cannot be used with false_alarm",
+        ],
+    },
+    // Two that do not fit.
+    Mistake {
+        file: ["detection", "x = 50\nl1 = 40"],
+        flags: "--x 50 --l1 40",
+        keywords: &[("x", "50"), ("l1", "40")],
+        lines: [
+            "--x 50: must not be greater than --l1 40",
+            "my.toml: x 50: must not be greater than l1 40",
+        ],
+    },
+    Mistake {
+        file: [
+            "detection",
+            "rule = 'window'\nwindow = 3\nneighbours = 8\nbinning = 1",
+        ],
+        flags: "--rule window --window 3 --neighbours 8 --binning 1",
+        keywords: &[
+            ("rule", "window"),
+            ("window", "3"),
+            ("neighbours", "8"),
+            ("binning", "1"),
+        ],
+        lines: [
+            "--neighbours cannot be used with --binning",
+            "my.toml: neighbours cannot be used with binning",
+        ],
+    },
+    // For another rule.
+    Mistake {
+        file: ["detection", "tracking = true"],
+        flags: "--tracking",
+        keywords: &[("tracking", "true")],
+        lines: [
+            "--tracking is for --rule window",
+            "my.toml: tracking is for --rule window",
+        ],
+    },
+    // Too few bins.
+    Mistake {
+        file: ["sensor", "gate = [4, 9]"],
+        flags: "--gate 4..9",
+        keywords: &[("gate", "4,9")],
+        lines: [
+            "--gate 4..9: with 128 bins: the range gate leaves fewer than 8 bins",
+            "my.toml: gate 4..9: with 128 bins: the range gate leaves fewer than 8 bins",
         ],
     },
     // Unknown.
@@ -71,6 +120,14 @@ const MISTAKES: [Mistake; 5] = [
     },
 ];
 
+/// As before a replay: the settings, and an array of them.
+fn checked(file: &SettingsFile) -> Result<()> {
+    let settings = file.settings(128)?;
+    let array = Array::new(4, 4).ok_or_else(|| anyhow!("no array"))?;
+    let config = settings.array_config::<128, Count10, ()>(array);
+    config.map(drop)
+}
+
 #[test]
 fn a_mistake_is_one_error_however_it_is_made() {
     let scratch = Scratch::new();
@@ -95,14 +152,14 @@ fn a_mistake_is_one_error_however_it_is_made() {
         let line = refused(&format!("{replay} --settings my.toml"));
         assert_eq!(line, format!("error: {by_file}\n"));
         // Flag and file give the same value.
-        let of_file = SettingsFile::parse(&text).and_then(|file| file.settings(128).map(drop));
+        let of_file = SettingsFile::parse(&text).and_then(|file| checked(&file));
         let mut of_file = of_file.unwrap_err().downcast::<Refused>().unwrap();
         // A key is unknown in its section.
         of_file.reason = of_file.reason.replace(&format!(" in [{section}]"), "");
         let of_keywords = dtof_options::read::<Options>(mistake.keywords.iter().copied());
         let of_keywords = of_keywords
             .map_err(anyhow::Error::from)
-            .and_then(|options| options.requested()?.settings(128).map(drop));
+            .and_then(|options| checked(&options.requested()?));
         let of_keywords = of_keywords.unwrap_err().downcast::<Refused>().unwrap();
         assert_eq!(of_file, of_keywords);
     }
