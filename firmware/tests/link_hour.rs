@@ -5,7 +5,9 @@
 //! restarted or has begun another session. It says so to a host of the one before.
 
 use crate::common::host::deliver;
-use crate::common::session::{End, Line, Outcome, Plan, Script, WHOLE, check, script, session};
+use crate::common::session::{
+    End, Line, Plan, Script, SessionResult, WHOLE, check, script, session,
+};
 use dtof_link::endpoint::{Endpoint, LinkCounters, RETRANSMIT_MOST_MS};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use rand_core::Rng;
@@ -39,7 +41,7 @@ impl Totals {
     }
 
     /// Holds what came of a session against what should.
-    fn add(&mut self, line: &Line, script: &Script, outcome: &Outcome) {
+    fn add(&mut self, line: &Line, script: &Script, outcome: &SessionResult) {
         self.sessions += 1;
         self.events += outcome.events.len() as u64;
         self.add_counters(outcome.host.counters());

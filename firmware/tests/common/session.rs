@@ -110,7 +110,7 @@ pub enum End {
 }
 
 /// What came of a session.
-pub struct Outcome {
+pub struct SessionResult {
     pub session: u16,
     pub end: End,
     pub events: Vec<DepthEvent>,
@@ -121,7 +121,7 @@ pub struct Outcome {
 }
 
 /// Runs a session to its end.
-pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> Outcome {
+pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> SessionResult {
     let began = line.now;
     let mut host = Host::new(number, began);
     let mut wire = [0; WIRE_BYTES];
@@ -198,7 +198,7 @@ pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> Out
     };
     host.read(usize::MAX);
     assert!(host.changes.is_empty());
-    Outcome {
+    SessionResult {
         session: number,
         end,
         report,
@@ -210,7 +210,7 @@ pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> Out
 
 /// Everything of a session has arrived as it was.
 #[track_caller]
-pub fn check(script: &Script, outcome: &Outcome) {
+pub fn check(script: &Script, outcome: &SessionResult) {
     let Some(report) = outcome.report else {
         panic!("{:?}: {:?}", outcome.end, outcome.host.counters());
     };

@@ -94,7 +94,7 @@ fn explain_bins<const BINS: usize, W: CounterWidth>(
     }
     let peak = histogram::<BINS, W>(counts, config.gate()).peak();
     let bin = peak.bin.raw();
-    let input = DecisionInput {
+    let input = DecidedHistogram {
         rule: *config.rule(),
         gate: *config.gate(),
         counts: *counts,
@@ -137,7 +137,7 @@ fn all<const BINS: usize, W: CounterWidth>(
             };
             return Some(input.explain::<W>());
         }
-        let input = DecisionInput::new(config, decision, settings.frame.is_some())?;
+        let input = DecidedHistogram::new(config, decision, settings.frame.is_some())?;
         if decision.event.flags.contains(Flags::CONFIRMED) {
             // The peak is that of all pixels; its own photons were too few.
             return Some(Explanation {
@@ -234,7 +234,7 @@ impl<const BINS: usize> LiveInput<'_, BINS> {
 }
 
 /// A histogram and the configuration that decides on it.
-struct DecisionInput<const BINS: usize> {
+struct DecidedHistogram<const BINS: usize> {
     rule: AnyRule,
     gate: RangeGate<BINS>,
     counts: [u32; BINS],
@@ -246,7 +246,7 @@ struct DecisionInput<const BINS: usize> {
     at: u16,
 }
 
-impl<const BINS: usize> DecisionInput<BINS> {
+impl<const BINS: usize> DecidedHistogram<BINS> {
     /// The input of `decision`, by `config` or as a frame.
     fn new(
         config: &PixelConfig<BINS, AnyRule>,

@@ -2,8 +2,8 @@
 
 mod frame;
 mod pages;
+mod pending;
 mod pixels;
-mod slice;
 #[cfg(feature = "foxglove")]
 mod snapshot;
 #[cfg(test)]
@@ -25,10 +25,10 @@ use super::outputs::RecordingStatus;
 pub use frame::MOST_PIXELS;
 use pages::Pages;
 pub use pages::{MOST_EVENTS, MOST_PAGES, Page};
+use pending::PendingEvents;
 #[cfg(feature = "foxglove")]
-pub use pixels::Pixel;
+pub use pixels::PixelState;
 use pixels::Pixels;
-use slice::Slice;
 #[cfg(feature = "foxglove")]
 pub use snapshot::Snapshot;
 
@@ -106,7 +106,7 @@ struct State {
     pixels: Pixels,
     pages: Pages,
     /// Events for point clouds, if a client subscribes to them.
-    slice: Option<Slice>,
+    pending: Option<PendingEvents>,
     /// Events since the start, and events of masked pixels.
     events: u64,
     masked: u64,
@@ -150,7 +150,7 @@ impl Hub {
             },
             pixels: Pixels::default(),
             pages: Pages::default(),
-            slice: None,
+            pending: None,
             events: 0,
             masked: 0,
             rate: Rate {
@@ -220,8 +220,8 @@ impl Hub {
             let range_mm = range_mm as f32;
             state.pixels.add(event, range_mm, header.array);
             state.pages.add(event, range_mm, header.array);
-            if let Some(slice) = &mut state.slice {
-                slice.add(event);
+            if let Some(pending) = &mut state.pending {
+                pending.add(event);
             }
         }
     }
@@ -336,7 +336,7 @@ impl Hub {
     pub fn memory(&self) -> [usize; 3] {
         let state = self.state();
         let [pixels, histograms] = [state.pixels.len(), state.histograms.len()];
-        let events = state.pages.waiting() + state.slice.as_ref().map_or(0, Slice::len);
+        let events = state.pages.waiting() + state.pending.as_ref().map_or(0, PendingEvents::len);
         [pixels, events, histograms]
     }
 }
@@ -347,8 +347,8 @@ impl State {
         // Another device or other settings: earlier values do not hold.
         self.pixels = Pixels::new(header.array);
         self.pages.restart();
-        if let Some(slice) = &mut self.slice {
-            slice.restart(self.pixels.len());
+        if let Some(pending) = &mut self.pending {
+            pending.restart(self.pixels.len());
         }
         self.ranges = header.ranges().ok();
         self.header = Some(header);

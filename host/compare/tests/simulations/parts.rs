@@ -9,7 +9,7 @@ use dtof_compare::Figures;
 use dtof_compare::answer::answer;
 use dtof_compare::bound::Bound;
 use dtof_compare::cost;
-use dtof_compare::measure::{Outcome, Trial};
+use dtof_compare::measure::{Trial, TrialResult};
 use dtof_compare::method::{Kind, Method, Rule};
 use dtof_compare::stress::{Light, Stress, Stressed};
 use dtof_compare::thresholds::Thresholds;
@@ -236,8 +236,14 @@ fn the_slowest_pixels_of_the_answer_lie_between_those_of_its_trials() {
     assert_eq!(slowest([f64::INFINITY; 2]), f64::INFINITY);
 }
 
-fn outcome(method: usize, effort: u16, cycles: f64, error_mm: f64, instructions: f64) -> Outcome {
-    Outcome {
+fn outcome(
+    method: usize,
+    effort: u16,
+    cycles: f64,
+    error_mm: f64,
+    instructions: f64,
+) -> TrialResult {
+    TrialResult {
         trial: Trial {
             method,
             effort,
@@ -304,11 +310,11 @@ fn a_method_that_leaves_pixels_silent_is_not_taken() {
         .position(|method| !method.has_full_resolution());
     let blocks = blocks.unwrap();
     let frames = methods.len() - 1;
-    let silent = |mut outcome: Outcome, silent: f64| {
+    let silent = |mut outcome: TrialResult, silent: f64| {
         outcome.figures.silent = silent;
         outcome
     };
-    let taken = |all: &[Outcome], within_mm: f64| {
+    let taken = |all: &[TrialResult], within_mm: f64| {
         let choice = answer(&methods, all, within_mm).best;
         choice.map(|choice| (choice.method, choice.effort))
     };
@@ -368,7 +374,7 @@ fn blocks_are_an_answer_of_their_own() {
         outcome(eight, 5, 100.0, 9.0, 80.0),
         outcome(blocks, 5, 50.0, 9.0, 60.0),
     ];
-    let taken = |all: &[Outcome]| {
+    let taken = |all: &[TrialResult]| {
         let found = answer(&methods, all, 10.0);
         [found.best, found.fastest].map(|choice| choice.map(|choice| choice.method))
     };

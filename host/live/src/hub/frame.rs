@@ -9,7 +9,7 @@ use base64::engine::general_purpose::STANDARD as BASE64;
 use serde_json::json;
 
 use super::pages::{Page, Waiting};
-use super::pixels::Pixel;
+use super::pixels::PixelState;
 use super::{Kind, State};
 use dtof_device::PixelHistogram;
 use dtof_engine::explain::Explanation;
@@ -156,7 +156,7 @@ impl State {
 }
 
 #[allow(clippy::cast_possible_truncation, reason = "at most 65,536 pixels")]
-fn record(records: &mut Vec<u8>, number: usize, pixel: &Pixel) {
+fn record(records: &mut Vec<u8>, number: usize, pixel: &PixelState) {
     let before = records.len();
     records.extend((number as u16).to_le_bytes());
     records.extend([pixel.level_echo, pixel.flags]);

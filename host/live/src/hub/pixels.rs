@@ -10,7 +10,7 @@ const MEAN_OF: f32 = 8.0;
 
 /// State of a pixel.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Pixel {
+pub struct PixelState {
     /// Range in millimetres of its last event, or of its block's.
     pub range_mm: f32,
     /// Photons of the peak.
@@ -31,7 +31,7 @@ pub struct Pixel {
 /// All pixels of an array.
 #[derive(Debug, Default)]
 pub struct Pixels {
-    all: Vec<Pixel>,
+    all: Vec<PixelState>,
     changes: u64,
 }
 
@@ -39,7 +39,7 @@ impl Pixels {
     pub fn new(array: Array) -> Self {
         Self {
             // An array has at most 65,536 pixels.
-            all: vec![Pixel::default(); array.pixels() as usize],
+            all: vec![PixelState::default(); array.pixels() as usize],
             changes: 0,
         }
     }
@@ -48,7 +48,7 @@ impl Pixels {
         self.all.len()
     }
 
-    pub fn all(&self) -> &[Pixel] {
+    pub fn all(&self) -> &[PixelState] {
         &self.all
     }
 

@@ -1,7 +1,7 @@
 //! A snapshot of the state, for messages to Foxglove.
 
-use super::pixels::Pixel;
-use super::slice::Slice;
+use super::pending::PendingEvents;
+use super::pixels::PixelState;
 use super::{Connection, Hub, Losses};
 use dtof_engine::settings::RaySettings;
 use dtof_events::aer_file::{Event, Header};
@@ -31,7 +31,7 @@ pub struct Snapshot {
     pub statistics: Statistics,
     pub dropped: u64,
     /// All pixels, and the number of their last change.
-    pub pixels: Option<(Vec<Pixel>, u64)>,
+    pub pixels: Option<(Vec<PixelState>, u64)>,
 }
 
 impl Hub {
@@ -40,14 +40,14 @@ impl Hub {
     pub(crate) fn snapshot(&self, collects_events: bool, known_change: Option<u64>) -> Snapshot {
         let mut state = self.state();
         let state = &mut *state;
-        let (events, statistics, dropped) = match &mut state.slice {
-            Some(slice) => slice.take(),
+        let (events, statistics, dropped) = match &mut state.pending {
+            Some(pending) => pending.take(),
             None => <_>::default(),
         };
         if !collects_events {
-            state.slice = None;
-        } else if state.slice.is_none() {
-            state.slice = Some(Slice::new(state.pixels.len()));
+            state.pending = None;
+        } else if state.pending.is_none() {
+            state.pending = Some(PendingEvents::new(state.pixels.len()));
         }
         let file = match &state.settings {
             Some((file, _)) => file,

@@ -6,22 +6,24 @@ use anyhow::{Context, Result};
 
 use super::{Entry, Instructions, chosen};
 use crate::studies::methods::depth_error::{self, Estimator};
-use crate::studies::methods::time_to_detect::{self, Outcome};
+use crate::studies::methods::time_to_detect::{self, DetectionResult};
 use crate::sweep::Part;
 
 /// The rule for each pulse and background.
-pub(super) fn rules(counts: &Instructions, outcomes: &[Outcome]) -> Result<String> {
+pub(super) fn rules(counts: &Instructions, outcomes: &[DetectionResult]) -> Result<String> {
     let mut text = String::new();
     for sigma in time_to_detect::SIGMAS {
         for background in time_to_detect::BACKGROUNDS {
-            let is_here =
-                |outcome: &Outcome| outcome.sigma == sigma && outcome.background == background;
+            let is_here = |outcome: &DetectionResult| {
+                outcome.sigma == sigma && outcome.background == background
+            };
             let entries = super::rules(counts, outcomes, is_here)?;
             let chosen = chosen(&entries)?;
             let paper = entries.first().context("no rules")?;
-            let is_chosen =
-                |outcome: &&Outcome| is_here(outcome) && outcome.rule.label() == chosen.label;
-            let those: Vec<&Outcome> = outcomes.iter().filter(is_chosen).collect();
+            let is_chosen = |outcome: &&DetectionResult| {
+                is_here(outcome) && outcome.rule.label() == chosen.label
+            };
+            let those: Vec<&DetectionResult> = outcomes.iter().filter(is_chosen).collect();
             let first = those.first().context("no outcome")?;
             let signal = time_to_detect::signal(sigma, background);
             let cycles = those.iter().map(|outcome| outcome.cycles.value);

@@ -21,7 +21,7 @@ const DECISION: u64 = 17;
 
 /// What was looked at, and what came of it.
 #[derive(Clone, Debug, Default)]
-pub struct Outcome {
+pub struct ModelResult {
     pub photons: u64,
     pub cycles: u64,
     pub looks: u64,
@@ -44,7 +44,7 @@ pub struct Model {
     stops_at: u64,
     emptied_at: u64,
     /// What came of the runs before.
-    total: Outcome,
+    total: ModelResult,
     config: PixelConfig<128>,
     pixels: Vec<AsyncPixel<128>>,
     encoder: AerEncoder,
@@ -57,7 +57,7 @@ pub struct Model {
     before: Vec<Statistics>,
     strays: u64,
     /// What comes of this run.
-    outcome: Outcome,
+    outcome: ModelResult,
     /// Words that the link has yet to take, and the clock in which the laser cycle ended that
     /// brought the event.
     words: VecDeque<(AerWord, Option<u64>)>,
@@ -73,7 +73,7 @@ pub struct Model {
     bins: Reads,
 }
 
-impl Outcome {
+impl ModelResult {
     /// The photons, laser cycles, looks and statistics of both.
     fn add(&mut self, other: &Self) {
         self.photons += other.photons;
@@ -93,7 +93,7 @@ impl Model {
             starts_at: 0,
             stops_at: u64::MAX,
             emptied_at: 0,
-            total: Outcome::default(),
+            total: ModelResult::default(),
             register_values: scene.register_values()?,
             config: scene.config,
             pixels: pixels(scene),
@@ -104,7 +104,7 @@ impl Model {
             fired: 0,
             before: Vec::new(),
             strays: 0,
-            outcome: Outcome::default(),
+            outcome: ModelResult::default(),
             words: VecDeque::new(),
             looked: VecDeque::new(),
             taken: VecDeque::new(),
@@ -342,7 +342,7 @@ impl Model {
     pub fn end(
         mut self,
         reports: &mut Reports<impl FnMut() -> Result<(u64, Report)>>,
-    ) -> Result<Outcome> {
+    ) -> Result<ModelResult> {
         loop {
             match reports.next()? {
                 (_, Report::End(waits)) => {
@@ -356,7 +356,7 @@ impl Model {
         let waits = waits.map(AsyncPixel::address);
         ensure!(waits.is_none(), "the event of {waits:?} has not left");
         self.end_run()?;
-        Ok(Outcome {
+        Ok(ModelResult {
             bins_read: self.bins.compared,
             ..self.total
         })

@@ -7,7 +7,7 @@ use dtof_core::Array;
 use foxglove::messages::RawImage;
 
 use crate::foxglove::topics::Topic;
-use crate::hub::Pixel;
+use crate::hub::PixelState;
 use dtof_export::foxglove::{FRAME, Time, encoded};
 
 /// Rates are measured over this time.
@@ -17,7 +17,7 @@ const RATE: Duration = Duration::from_secs(1);
 #[derive(Default)]
 pub struct Images {
     array: Option<Array>,
-    pixels: Vec<Pixel>,
+    pixels: Vec<PixelState>,
     change: Option<u64>,
     /// Events of each pixel at the start of the second, and its time.
     counts: Option<(Vec<u32>, Instant)>,
@@ -41,7 +41,7 @@ impl Images {
     }
 
     /// Updates the pixels, if there are new ones, and the rates. Returns whether there are new pixels.
-    pub fn update(&mut self, new: Option<&(Vec<Pixel>, u64)>, has_subscriber: bool) -> bool {
+    pub fn update(&mut self, new: Option<&(Vec<PixelState>, u64)>, has_subscriber: bool) -> bool {
         if !has_subscriber {
             // Rates need counts of a whole second.
             (self.counts, self.has_new_rates) = (None, false);
@@ -84,7 +84,7 @@ impl Images {
             return Ok(None);
         };
         let (width, height) = (array.columns(), array.rows());
-        let value = |(number, pixel): (usize, &Pixel)| match topic {
+        let value = |(number, pixel): (usize, &PixelState)| match topic {
             Topic::Rate => self.rates.get(number).copied().unwrap_or(f32::NAN),
             // No event yet.
             _ if pixel.level_echo == 0 => f32::NAN,

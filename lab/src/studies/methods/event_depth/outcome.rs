@@ -23,7 +23,7 @@ pub struct DepthErrors {
 
 /// A rule in a scene.
 #[derive(Clone, Copy, Debug)]
-pub struct Outcome {
+pub struct EventDepthResult {
     /// Standard deviation of the pulse in bins.
     pub sigma: f64,
     /// Background photons a bin and laser cycle.
@@ -52,7 +52,7 @@ pub struct Outcome {
     pub excess: Measured,
 }
 
-impl Outcome {
+impl EventDepthResult {
     /// The index of the significantly better estimator, if there is one.
     #[must_use]
     pub fn better(&self) -> Option<usize> {
@@ -110,7 +110,7 @@ impl Outcome {
 ///
 /// # Errors
 /// Fails if `part` is of another study.
-pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
+pub fn outcomes(part: &Part) -> Result<Vec<EventDepthResult>> {
     let mut outcomes = Vec::new();
     for sigma in SIGMAS {
         for background in BACKGROUNDS {
@@ -122,7 +122,12 @@ pub fn outcomes(part: &Part) -> Result<Vec<Outcome>> {
                 let without: Vec<&PointTally> = all
                     .filter(|point| pixel.rule == Rule::Paper || point.is_at([scene[0]]))
                     .collect();
-                outcomes.push(Outcome::new((sigma, background), &pixel, &without, with));
+                outcomes.push(EventDepthResult::new(
+                    (sigma, background),
+                    &pixel,
+                    &without,
+                    with,
+                ));
             }
         }
     }
@@ -138,7 +143,7 @@ mod tests {
 
     /// 400 events in 1000 exposures, 40 of them elsewhere. The centre of mass is half a bin off to
     /// either side, the window `centred` / 256 bins too far.
-    fn outcome(centred: i64) -> Outcome {
+    fn outcome(centred: i64) -> EventDepthResult {
         let pixel = Pixel::new(Rule::Paper, 40, 0.05).unwrap();
         let mut with = tally([("exposures", 1000)]);
         let sums = [
@@ -158,7 +163,7 @@ mod tests {
             add_value(&mut with, "paper 40 excess", excess);
         }
         let without = tally([("exposures", 500), ("paper 40 events", 5)]).into();
-        Outcome::new((1.0, 0.05), &pixel, &[&without, &without], &with.into())
+        EventDepthResult::new((1.0, 0.05), &pixel, &[&without, &without], &with.into())
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The paper's claims on dynamic depth.
 
 use super::super::systems::Background;
-use super::outcome::{Outcome, REMOVED, SCENES, at_text, by_range, holding, on_pc, outcome};
+use super::outcome::{ChangeResult, REMOVED, SCENES, at_text, by_range, holding, on_pc, outcome};
 use super::{FPGA_SIGNAL, REFERENCES, SIGNALS};
 use crate::sweep::Part;
 use crate::sweep::mean::Measured;
@@ -13,7 +13,7 @@ use dtof_options::rows::grouped;
 const SILENT: f64 = 1e-4;
 
 /// The spans of a number of the car and of the fan over all signals, with both backgrounds.
-fn spans(part: &Part, digits: usize, of: impl Fn(&Outcome) -> f64) -> String {
+fn spans(part: &Part, digits: usize, of: impl Fn(&ChangeResult) -> f64) -> String {
     let texts = Background::ALL.map(|background| {
         let scenes = SCENES.map(|(fan, scene)| {
             let outcomes = on_pc(part, fan, background, 0);
@@ -26,7 +26,11 @@ fn spans(part: &Part, digits: usize, of: impl Fn(&Outcome) -> f64) -> String {
 }
 
 /// `text` of the car and of the fan at every signal.
-fn at_signals(part: &Part, background: Background, text: impl Fn(&Outcome) -> String) -> String {
+fn at_signals(
+    part: &Part,
+    background: Background,
+    text: impl Fn(&ChangeResult) -> String,
+) -> String {
     let scenes = SCENES.map(|(fan, scene)| {
         let outcomes = on_pc(part, fan, background, 0);
         let texts: Vec<String> = outcomes.iter().map(|(_, outcome)| text(outcome)).collect();
@@ -36,7 +40,7 @@ fn at_signals(part: &Part, background: Background, text: impl Fn(&Outcome) -> St
 }
 
 /// The same with both backgrounds.
-fn with_both(part: &Part, text: impl Fn(&Outcome) -> String) -> String {
+fn with_both(part: &Part, text: impl Fn(&ChangeResult) -> String) -> String {
     let backgrounds = Background::ALL.map(|background| {
         format!(
             "{}: {}",
@@ -70,7 +74,7 @@ fn times(measured: Measured) -> String {
 }
 
 /// The steps of the car that are found.
-fn motion(of: &Outcome) -> String {
+fn motion(of: &ChangeResult) -> String {
     let delay = if of.delay.value.is_nan() {
         String::new()
     } else {
@@ -86,20 +90,21 @@ fn motion(of: &Outcome) -> String {
 }
 
 pub fn claims(part: &Part) -> Result<Vec<Claim>> {
-    let from = |holds: fn(&Outcome) -> bool| {
+    let from = |holds: fn(&ChangeResult) -> bool| {
         Background::ALL.map(|background| holding(part, background, holds))
     };
     let removed = from(|of| of.removed.interval.0 > REMOVED);
-    let is_silent = |of: &Outcome| {
+    let is_silent = |of: &ChangeResult| {
         let share = Measured::share(of.still.changes, of.still.events);
         share.interval.1 < SILENT
     };
     let silent = from(is_silent);
-    let changes = |of: &Outcome| Measured::share(of.still.changes, of.still.events).value * 1000.0;
+    let changes =
+        |of: &ChangeResult| Measured::share(of.still.changes, of.still.events).value * 1000.0;
     let fpga = part.one([("fpga", 1.0)])?;
     let fpga = [0, 1].map(|way| outcome(fpga, Background::Quadrants, REFERENCES[way].1));
     let cars = [0, 1].map(|way| on_pc(part, 0.0, Background::Average, way));
-    let finds = |of: &Outcome| of.found.interval.0 > 0.9 && of.is_false.value < 0.5;
+    let finds = |of: &ChangeResult| of.found.interval.0 > 0.9 && of.is_false.value < 0.5;
     let [before, reported] = [0, 1].map(|way| {
         let mut outcomes = cars[way].iter().map(|car| &car.1).chain([&fpga[way]]);
         outcomes.any(finds)
@@ -111,7 +116,7 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
     let on_the_car = cars[0]
         .iter()
         .map(|(_, of)| percent(Measured::share(of.moving.changes, of.changes)));
-    let fewer = |of: &Outcome| of.still.a_frame(of.still.changes).interval.1 < 1.0;
+    let fewer = |of: &ChangeResult| of.still.a_frame(of.still.changes).interval.1 < 1.0;
     let redundant = from(fewer);
     let fewer_events = from(|of| of.still.a_frame(of.still.events).interval.1 < 1.0);
     let more = from(|of| of.moving.a_frame(of.moving.events).interval.0 > 2.0);

@@ -5,9 +5,9 @@ use std::collections::VecDeque;
 use dtof_events::aer_file::Event;
 use dtof_export::foxglove::{MOST_POINTS, Tally};
 
-/// Events since the last [`Slice::take`].
+/// Events since the last [`PendingEvents::take`].
 #[derive(Debug)]
-pub struct Slice {
+pub struct PendingEvents {
     /// The newest events, at most [`MOST_POINTS`].
     events: VecDeque<Event>,
     tally: Tally,
@@ -15,7 +15,7 @@ pub struct Slice {
     dropped: u64,
 }
 
-impl Slice {
+impl PendingEvents {
     /// No events, of an array of so many `pixels`.
     pub fn new(pixels: usize) -> Self {
         Self {
