@@ -258,6 +258,14 @@ impl Emulator {
         self.debugger.resume()
     }
 
+    /// The milliseconds that an image has counted, while it is stopped.
+    pub fn milliseconds(&mut self) -> Result<u32> {
+        let place = self.image.function("12MILLISECONDS")?;
+        let bytes = self.debugger.memory(place..place + 4)?;
+        let bytes = bytes.as_slice().try_into().context("no word")?;
+        Ok(u32::from_le_bytes(bytes))
+    }
+
     /// Plants a fault into an image that is stopped.
     pub fn plant(&mut self, what: Planted) -> Result<()> {
         const NO_MEMORY: u32 = 0x6000_0000;

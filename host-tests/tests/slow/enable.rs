@@ -113,8 +113,9 @@ impl Bench {
         Ok(())
     }
 
-    /// A host that has started the sensor. ENABLE was high at least once.
-    fn light(&mut self, host_timeout_ms: u16) -> Result<Client> {
+    /// A host that has started the sensor, and the milliseconds of the image between which it spoke last. ENABLE was high at
+    /// least once.
+    fn light(&mut self, host_timeout_ms: u16) -> Result<(Client, [u32; 2])> {
         let mut client = Client::new(self.emulator.connect()?)?;
         let mut settings = settings();
         let sensor = client.sensor()?.context("no sensor")?;
@@ -129,11 +130,21 @@ impl Bench {
             host_timeout: HostTimeout::from_milliseconds(host_timeout_ms).context("no timeout")?,
         };
         ensure!(!self.is_high()?, "ENABLE is high before a host asks for it");
+        let (asked, _) = self.now()?;
         client.configure(&task.configuration(Source::Sensor)?)?;
+        let (answered, _) = self.now()?;
         self.until("ENABLE never goes high", |bench| {
             Ok(bench.first_high()?.is_some())
         })?;
-        Ok(client)
+        Ok((client, [asked, answered]))
+    }
+
+    /// The milliseconds that the image has counted, and how much it has written until then.
+    fn now(&mut self) -> Result<(u32, usize)> {
+        self.emulator.interrupt()?;
+        let now = (self.emulator.milliseconds()?, self.written()?.len());
+        self.emulator.resume()?;
+        Ok(now)
     }
 
     /// Stops the image while ENABLE is high, and plants a fault. How much was written before.
@@ -174,23 +185,42 @@ impl Bench {
         let mut low_after = 0;
         self.until("ENABLE does not stay low", |bench| {
             let written = bench.written()?;
-            let (mut feeds, mut is_high) = (0, true);
-            for &what in &written[from..] {
-                match what {
-                    Written::Feed => feeds += 1,
-                    Written::Enable(level) => {
-                        if is_high {
-                            low_after = feeds;
-                        }
-                        is_high = level;
-                    }
-                    _ => {}
-                }
-            }
-            Ok(!is_high && feeds >= low_after + LONG_FEEDS)
+            let stays = stays_low(&written, from);
+            low_after = stays.map_or(0, |at| fed(&written[from..at]));
+            Ok(stays.is_some())
         })?;
         Ok(low_after)
     }
+
+    /// Waits until ENABLE has stayed low for long. Returns the milliseconds of the image between which it went low.
+    fn low_between(&mut self) -> Result<[u32; 2]> {
+        let start = Instant::now();
+        let mut seen = vec![self.now()?];
+        loop {
+            let written = self.written()?;
+            if let Some(at) = stays_low(&written, 0) {
+                let later = seen.partition_point(|&(_, length)| length <= at);
+                let [before, after] = [later.checked_sub(1), Some(later)]
+                    .map(|place| place.and_then(|place| seen.get(place)));
+                let (before, after) = before.zip(after).context("low at once, or never")?;
+                return Ok([before.0, after.0]);
+            }
+            ensure!(start.elapsed() < PATIENCE, "ENABLE does not stay low");
+            thread::sleep(Duration::from_millis(5));
+            seen.push(self.now()?);
+        }
+    }
+}
+
+/// Where ENABLE went low, from the write `from` on, if it has stayed so for long.
+fn stays_low(written: &[Written], from: usize) -> Option<usize> {
+    let high = written.iter().rposition(|of| *of == Written::Enable(true));
+    let begin = high.map_or(from, |high| from.max(high));
+    let low = begin
+        + written[begin..]
+            .iter()
+            .position(|of| *of == Written::Enable(false))?;
+    (fed(&written[low..]) >= LONG_FEEDS).then_some(low)
 }
 
 fn fed(written: &[Written]) -> usize {
@@ -223,7 +253,7 @@ fn enable_goes_low_and_stays_low_after_every_fault() -> Result<()> {
         (Planted::Overflow, StopReason::Fault),
     ] {
         let mut bench = Bench::start()?;
-        let mut client = bench.light(NEVER_MS)?;
+        let (mut client, _) = bench.light(NEVER_MS)?;
         let before = bench.plant(what)?;
         // The board has been reset, and has started again.
         bench.until("no reset", |bench| {
@@ -260,7 +290,7 @@ fn the_watchdog_is_not_fed_when_the_image_hangs_or_its_clock_stops() -> Result<(
     };
     for what in [Planted::Hang, Planted::Clock] {
         let mut bench = Bench::start()?;
-        let mut client = bench.light(NEVER_MS)?;
+        let (mut client, _) = bench.light(NEVER_MS)?;
         bench.until("the watchdog is not fed", |bench| {
             Ok(fed(&bench.written()?) > 10)
         })?;
@@ -290,17 +320,20 @@ fn enable_goes_low_when_the_host_ends_its_session_or_is_silent() -> Result<()> {
     drop(bench.light(NEVER_MS)?);
     let high = bench.first_high()?.context("never high")?;
     let ended = bench.goes_low(high)?;
-    ensure!(ended < usize::from(NEVER_MS) / 2, "low after {ended} ms");
+    ensure!(ended < usize::from(SILENCE_MS), "low after {ended} ms");
     let mut bench = Bench::start()?;
-    let _silent = bench.light(SILENCE_MS)?;
-    let high = bench.first_high()?.context("never high")?;
-    let silent = bench.goes_low(high)?;
-    // The host was last heard before ENABLE went high: on a busy computer the image takes half a second until then.
-    let about = usize::from(SILENCE_MS) / 2..usize::from(SILENCE_MS) * 3 / 2;
-    ensure!(about.contains(&silent), "low after {silent} ms");
+    let (_silent, heard) = bench.light(SILENCE_MS)?;
+    let low = bench.low_between()?;
+    // The host was last heard between the first two, and ENABLE went low between the others.
+    let [least, most] = [low[1] - heard[0], low[0].saturating_sub(heard[1])];
+    let silence = u32::from(SILENCE_MS);
+    ensure!(
+        least >= silence && most < silence * 3 / 2,
+        "the host was last heard between {heard:?} ms, ENABLE went low between {low:?}"
+    );
     println!(
         "stm32f405: ENABLE goes low and stays low when the session ends, after {ended} ms, and when the host is silent for \
-         {SILENCE_MS} ms, after {silent} ms"
+         {SILENCE_MS} ms, after {most} to {least} ms"
     );
     Ok(())
 }

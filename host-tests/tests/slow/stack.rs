@@ -62,7 +62,7 @@ impl Image {
         Ok(image)
     }
 
-    /// The address of the function with such a part in its name.
+    /// The address of the function or static with such a part in its name.
     pub fn function(&self, part: &str) -> Result<u64> {
         let mut found = self.symbols.iter().filter(|(name, _)| name.contains(part));
         let (_, address) = found
