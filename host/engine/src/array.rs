@@ -3,12 +3,12 @@
 //! Blocks of the highest level are independent of each other: each is an array, and runs on any thread. Neighbours make one
 //! array, whose decisions run on all threads.
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result};
 use dtof_core::binning::Block;
 use dtof_core::rule::DecisionInput;
 use dtof_core::{
     AnyRule, Array, ArrayConfig, ArrayState, CounterWidth, DepthEvent, PixelAddress, PixelArray,
-    PixelData, PixelPlace, Statistics, WindowRule,
+    PixelData, PixelPlace, Statistics,
 };
 use dtof_link::AdaptiveBinning;
 
@@ -17,7 +17,6 @@ use super::alone::sort;
 use super::decisions::{self, Decision, LastDecision};
 use super::parallel::{AllThreads, of_parts};
 use crate::settings::Settings;
-use dtof_options::Refused;
 use dtof_photons::source::Slice;
 
 /// A pixel or a block.
@@ -85,25 +84,6 @@ struct Part<const BINS: usize, W: CounterWidth> {
 #[derive(Debug)]
 pub struct ArrayEngine<const BINS: usize, W: CounterWidth> {
     parts: Vec<Part<BINS, W>>,
-}
-
-/// The rule for neighbours.
-///
-/// # Errors
-/// Fails if neighbours cannot be used with the other settings.
-pub fn neighbour_rule(settings: &Settings) -> Result<&WindowRule> {
-    let AnyRule::Window(rule) = &settings.configuration.rule else {
-        return Err(Refused::new("neighbours", "is for `rule` window").into());
-    };
-    ensure!(
-        settings.configuration.binning.is_none(),
-        Refused::new("neighbours", "cannot be used with `binning`")
-    );
-    ensure!(
-        !settings.weighs_dead_time(),
-        Refused::new("neighbours", "cannot be used with a dead time")
-    );
-    Ok(rule)
 }
 
 impl<const BINS: usize, W: CounterWidth> Part<BINS, W> {
@@ -264,7 +244,6 @@ impl<const BINS: usize, W: CounterWidth> ArrayEngine<BINS, W> {
         array: Array,
         source: &[PixelAddress],
     ) -> Result<Self> {
-        neighbour_rule(settings)?;
         let addresses = (0..=u16::MAX).map(PixelAddress::new);
         let addresses = addresses.take(usize::try_from(array.pixels())?).collect();
         Ok(Self {

@@ -36,7 +36,6 @@ use dtof_core::{
 };
 
 use super::Engine;
-use super::array::neighbour_rule;
 use super::decisions::Decision;
 use super::parallel::of_each;
 use crate::settings::Settings;
@@ -87,13 +86,10 @@ pub fn decide_once(
         settings.configuration.binning.is_none(),
         Refused::new("decide_once", "cannot be used with `binning`")
     );
-    if settings.configuration.neighbours.is_some() {
-        neighbour_rule(settings)?;
-    }
     let is_masked = |address: &PixelAddress| settings.masked.contains(&address.raw());
     let is_masked: Vec<bool> = addresses.iter().map(is_masked).collect();
     with_widest!(settings.bins, BINS, W => Pixels::<BINS, W> {
-        config: settings.config()?,
+        config: *settings.array_config::<BINS, W, ()>(array)?.pixels(),
         any_peak: settings.any_peak().config()?,
         array,
         neighbours: settings.configuration.neighbours,

@@ -194,10 +194,14 @@ impl Settings {
                 no_gate(self.configuration.gate, self.bins, refusal)
             }
             Refusal::Tracking => Refused::new("tracking", "is for `rule` window"),
-            Refusal::Neighbours => Refused::new(
-                "neighbours",
-                "is for `rule` window, without `binning` and without a dead time",
-            ),
+            Refusal::Neighbours => {
+                let reason = match (&self.configuration.rule, self.configuration.binning) {
+                    (AnyRule::Window(_), None) => "cannot be used with a dead time",
+                    (AnyRule::Window(_), Some(_)) => "cannot be used with `binning`",
+                    _ => "is for `rule` window",
+                };
+                Refused::new("neighbours", reason)
+            }
             Refusal::Blocks => Refused::new("binning", "is for arrays of columns and rows"),
             Refusal::DeadTime => {
                 Refused::new("dead_time", "is for `rule` window, without `binning`")

@@ -78,7 +78,7 @@ fn what_pixels_cannot_have_is_refused_in_one_line() {
         ),
         (
             scene().with(|with| with.neighbours = Neighbours::new(8)),
-            "neighbours is for rule window, without binning and without a dead time",
+            "neighbours is for rule window",
         ),
     ] {
         let error = settings.config::<128>().unwrap_err();
