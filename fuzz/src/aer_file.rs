@@ -3,9 +3,9 @@
 use std::fs;
 use std::io::Cursor;
 
-use dtof_events::aer_file::{Reader, Writer};
+use dtof_data::events::aer_file::{Reader, Writer};
+use dtof_data::options::Named;
 use dtof_export::{Format, Options, export};
-use dtof_options::Named;
 
 use crate::{folder, is_one_line};
 

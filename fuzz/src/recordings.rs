@@ -2,8 +2,8 @@
 
 use std::fs;
 
-use dtof_photons::input::Input as Recorded;
-use dtof_photons::open::{ReadOptions, counts, open};
+use dtof_data::photons::input::Input as Recorded;
+use dtof_data::photons::open::{ReadOptions, counts, open};
 
 use crate::{Input, folder, is_one_line};
 

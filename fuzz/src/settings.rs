@@ -3,8 +3,8 @@
 use std::fs;
 
 use dtof_core::Array;
+use dtof_data::photons::geometry::Rays;
 use dtof_engine::settings::SettingsFile;
-use dtof_photons::geometry::Rays;
 use dtof_simulate::scene::Scene;
 
 use crate::{folder, is_one_line};

@@ -13,11 +13,11 @@ use dtof_core::{
     AnyRule, AsyncPixel, CentredWindow, DepthEstimator, LaserCycle, PixelAddress, PixelConfig,
     RangeScale, Statistics,
 };
+use dtof_data::photons::open::{ReadOptions, counts};
+use dtof_data::photons::recorded::{RecordedHistograms, RecordingLength};
+use dtof_data::photons::source::{PhotonSource, Slice};
+use dtof_data::photons::tmf8820::BINS;
 use dtof_lab::studies::methods::passage::{Ladder, Passage, Rule, count_false};
-use dtof_photons::open::{ReadOptions, counts};
-use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
-use dtof_photons::source::{PhotonSource, Slice};
-use dtof_photons::tmf8820::BINS;
 use dtof_sensors::tmf882x;
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::random::trial_rng;

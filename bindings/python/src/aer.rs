@@ -4,12 +4,12 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail, ensure};
+use dtof_data::events::aer_file::{self, Event, Writer};
+use dtof_data::options::files::{destination, temporary_file};
+use dtof_data::options::progress::Progress;
+use dtof_data::options::{Refused, named};
 use dtof_engine::settings::SettingsFile;
-use dtof_events::aer_file::{self, Event, Writer};
 use dtof_export::{Format, ProjectionOptions};
-use dtof_options::files::{destination, temporary_file};
-use dtof_options::progress::Progress;
-use dtof_options::{Refused, named};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyByteArray;

@@ -5,8 +5,8 @@ use std::ffi::OsString;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 
+use dtof_data::options::{Options, option_name};
 use dtof_engine::settings::SettingsFile;
-use dtof_options::{Options, option_name};
 use dtof_run::given::Given;
 use pyo3::exceptions::PyValueError;
 use pyo3::{PyErr, PyResult};
@@ -21,7 +21,7 @@ pyo3::create_exception!(
 /// The exception for an error.
 pub fn raised(error: &anyhow::Error) -> PyErr {
     let keyword = |key: &str| option_name(key).to_owned();
-    let line = dtof_options::line(error, &keyword);
+    let line = dtof_data::options::line(error, &keyword);
     let line: Vec<&str> = line.lines().collect();
     Error::new_err(line.join(" "))
 }
@@ -33,7 +33,7 @@ pub fn catch_panics<T>(job: impl FnOnce() -> anyhow::Result<T>) -> anyhow::Resul
 
 /// The options of a job, from keywords and their values as texts.
 pub fn options<O: Options>(keywords: Keywords) -> PyResult<O> {
-    checked(|| Ok(dtof_options::read(keywords)?))
+    checked(|| Ok(dtof_data::options::read(keywords)?))
 }
 
 /// Jobs whose options override a settings file.

@@ -7,10 +7,10 @@ use dtof_core::{
     BinIndex, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle, PixelAddress,
     SubBinOffset,
 };
-use dtof_events::aer_file::{Event, Header};
-use dtof_events::events_csv::range_mm;
-use dtof_options::numbers::bins_of;
-use dtof_photons::ranges::{Ranges, RangesError};
+use dtof_data::events::aer_file::{Event, Header};
+use dtof_data::events::events_csv::range_mm;
+use dtof_data::options::numbers::bins_of;
+use dtof_data::photons::ranges::{Ranges, RangesError};
 use pyo3::prelude::*;
 
 /// Bytes of a record of `dtof.EVENT`: little-endian, with padding.

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use dtof_photons::input::{Input, NpyArray};
+use dtof_data::photons::input::{Input, NpyArray};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 

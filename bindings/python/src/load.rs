@@ -1,7 +1,7 @@
 //! Recordings of every format as arrays.
 
-use dtof_photons::input::Input;
-use dtof_photons::open::counts;
+use dtof_data::photons::input::Input;
+use dtof_data::photons::open::counts;
 use dtof_run::recording::{read_options, warnings};
 use dtof_run::replay::Options;
 use pyo3::prelude::*;

@@ -1,10 +1,10 @@
 //! Maps of pixels from events, and events as points.
 
 use dtof_core::EchoNumber;
+use dtof_data::events::aer_file::Event;
+use dtof_data::events::echoes::{Echo, EchoSelection};
+use dtof_data::events::histories::{PixelHistories, PixelHistory};
 use dtof_engine::settings::SettingsFile;
-use dtof_events::aer_file::Event;
-use dtof_events::echoes::{Echo, EchoSelection};
-use dtof_events::histories::{PixelHistories, PixelHistory};
 use dtof_export::ProjectionOptions;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;

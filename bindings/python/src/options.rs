@@ -1,8 +1,8 @@
 //! The keywords of each function, from the tables of the options.
 
+use dtof_data::options::keys::{Key, Kind};
+use dtof_data::options::{Options, option_name, with_names};
 use dtof_export::ProjectionOptions;
-use dtof_options::keys::{Key, Kind};
-use dtof_options::{Options, option_name, with_names};
 use dtof_run::given::{DITHER, Operation};
 use dtof_run::recording::RECORDING;
 use dtof_run::{calibrate, compare, replay, simulate, tune};

@@ -5,10 +5,10 @@ use dtof_core::{
     AnyRule, Array, AsyncPixel, Count8, Count10, CounterWidth, DepthEvent, LaserCycle, OncePerBin,
     PixelAddress, PixelConfig, Statistics,
 };
+use dtof_data::options::Refused;
+use dtof_data::photons::ranges::Ranges;
 use dtof_engine::settings::Settings;
 use dtof_engine::with_bins;
-use dtof_options::Refused;
-use dtof_photons::ranges::Ranges;
 use dtof_run::given::Operation;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;

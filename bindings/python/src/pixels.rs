@@ -4,13 +4,13 @@ use std::sync::{Mutex, PoisonError};
 
 use anyhow::{Context, Result, ensure};
 use dtof_core::{BlockLevel, EchoNumber, LaserCycle, PixelAddress};
+use dtof_data::options::Refused;
+use dtof_data::photons::masked::check;
+use dtof_data::photons::ranges::Ranges;
+use dtof_data::photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_options::Refused;
-use dtof_photons::masked::check;
-use dtof_photons::ranges::Ranges;
-use dtof_photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_run::Reported;
 use dtof_run::given::Operation;
 use dtof_run::output::header;

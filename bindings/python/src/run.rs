@@ -4,13 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result};
 use dtof_core::DepthEvent;
+use dtof_data::options::rows::grouped;
+use dtof_data::photons::input::Input;
+use dtof_data::photons::ranges::Ranges;
+use dtof_data::photons::source::{PhotonSource, Slice};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_options::rows::grouped;
-use dtof_photons::input::Input;
-use dtof_photons::ranges::Ranges;
-use dtof_photons::source::{PhotonSource, Slice};
 use dtof_run::depth_map::DepthMap;
 use dtof_run::output::header;
 use dtof_run::recording::warnings;

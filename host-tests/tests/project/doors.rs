@@ -74,10 +74,10 @@ const WRITES: [&str; 13] = [
 const WRITERS: [&str; 7] = [
     "bindings/python/src/aer.rs",
     "host/compare/src/page.rs",
+    "host/data/src/options/files.rs",
     "host/device/src/monitor/event_file.rs",
     "host/export/src/lib.rs",
     "host/live/src/outputs.rs",
-    "host/options/src/files.rs",
     "host/run/src/output.rs",
 ];
 

@@ -9,17 +9,15 @@ use std::process::Command;
 use serde_json::Value;
 
 /// In the order of publishing.
-const PUBLISHED: [&str; 18] = [
+const PUBLISHED: [&str; 16] = [
     "dtof-core",
     "dtof-draw",
     "dtof-link",
     "dtof-sensors",
     "dtof-theory",
-    "dtof-options",
-    "dtof-photons",
+    "dtof-data",
     "dtof-engine",
     "dtof-simulate",
-    "dtof-events",
     "dtof-export",
     "dtof-report",
     "dtof-calibrate",
@@ -36,7 +34,7 @@ fn is_of_host(package: &Value) -> bool {
 }
 
 /// The most bytes of a package before compression.
-const MOST_BYTES: u64 = 500_000;
+const MOST_BYTES: u64 = 1_000_000;
 
 fn root() -> PathBuf {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");

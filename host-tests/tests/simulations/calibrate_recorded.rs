@@ -5,12 +5,12 @@ use crate::capture_log::{ground_truth, log, tell};
 use dtof_calibrate::{Calibration, CalibrationOptions, Length, Nearest, Observed, calibrate};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Array, CentredWindow, DepthEstimator, PixelAddress};
+use dtof_data::photons::histograms::Histograms;
+use dtof_data::photons::open::{ReadOptions, counts};
+use dtof_data::photons::recorded::{RecordedHistograms, RecordingLength};
+use dtof_data::photons::source::{PhotonSource, Slice};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::SettingsFile;
-use dtof_photons::histograms::Histograms;
-use dtof_photons::open::{ReadOptions, counts};
-use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
-use dtof_photons::source::{PhotonSource, Slice};
 
 const ZONES: usize = 9;
 const CENTRE: usize = 4;
@@ -170,7 +170,7 @@ fn a_recording_with_distances_calibrates_itself() {
         assert!(photons <= 13.1, "{photons}");
         assert!(error <= 3.0, "{error}");
     }
-    let mm_per_bin = found.bin_width_ps * dtof_photons::MM_PER_PS;
+    let mm_per_bin = found.bin_width_ps * dtof_data::photons::MM_PER_PS;
     let ideal = ideal_error(&counts.histograms, &truth, mm_per_bin);
     tell(&format!(
         "an ideal estimator: {ideal:.2} mm from 13 photons"

@@ -6,7 +6,7 @@
 use std::io::Write;
 use std::path::PathBuf;
 
-use dtof_photons::open::Counts;
+use dtof_data::photons::open::Counts;
 
 /// Writes past the test harness, which hides the output of passing tests.
 pub fn tell(line: &str) {

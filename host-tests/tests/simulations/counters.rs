@@ -5,12 +5,12 @@ use std::path::Path;
 
 use crate::capture_log::{captures, log, tell};
 use dtof_core::{Array, DepthEvent, Neighbours, Statistics};
+use dtof_data::photons::histograms::Histograms;
+use dtof_data::photons::open::{ReadOptions, counts};
+use dtof_data::photons::recorded::{RecordedHistograms, RecordingLength};
+use dtof_data::photons::source::PhotonSource;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_photons::histograms::Histograms;
-use dtof_photons::open::{ReadOptions, counts};
-use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
-use dtof_photons::source::PhotonSource;
 use dtof_simulate::demo;
 
 /// The events and counts of pixels and blocks.

@@ -5,9 +5,9 @@
 
 use crate::slow_or_quick;
 use dtof_core::{Array, DepthEvent, Neighbours, PixelAddress};
+use dtof_data::photons::source::{Photon, PixelPhotons, Slice};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_photons::source::{Photon, PixelPhotons, Slice};
 use dtof_theory::random::pixel_rng;
 use rand_distr::{Distribution, Poisson};
 

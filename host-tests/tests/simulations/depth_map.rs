@@ -8,10 +8,10 @@ use crate::slow_or_quick;
 use dtof_core::fixed::types::U8F8;
 use dtof_core::rule::z_for_levels;
 use dtof_core::{BlockLevel, Count, DepthEvent, Neighbours, PixelAddress, RangeGate, WindowRule};
+use dtof_data::events::last_events::LastEvents;
+use dtof_data::photons::source::PhotonSource;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{AdaptiveBinning, Settings};
-use dtof_events::last_events::LastEvents;
-use dtof_photons::source::PhotonSource;
 use dtof_run::truth::SceneComparison;
 use dtof_simulate::scene::{DepthAlong, DepthMap, Scene};
 

@@ -12,11 +12,11 @@ use dtof_core::rule::z_for_levels;
 use dtof_core::{
     AnyRule, BlockLevel, Count, DepthEvent, EchoNumber, Flags, PixelConfig, RangeGate, WindowRule,
 };
+use dtof_data::photons::source::PhotonSource as _;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_host_tests::reference::{BinnedArray, EchoConfig, Reporter, Window};
 use dtof_link::AdaptiveBinning;
-use dtof_photons::source::PhotonSource as _;
 use dtof_simulate::scene::Scene;
 
 const BINS: usize = 128;

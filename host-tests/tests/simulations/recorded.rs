@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use crate::capture_log::{ground_truth, log, tell};
 use dtof_core::fixed::types::U8F8;
 use dtof_core::{Count, PaperRule};
+use dtof_data::photons::open::{ReadOptions, counts};
+use dtof_data::photons::recorded::{RecordedHistograms, RecordingLength};
+use dtof_data::photons::source::PhotonSource;
+use dtof_data::photons::tmf8820;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_photons::open::{ReadOptions, counts};
-use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
-use dtof_photons::source::PhotonSource;
-use dtof_photons::tmf8820;
 use dtof_sensors::tmf882x;
 
 const ZONES: usize = 9;

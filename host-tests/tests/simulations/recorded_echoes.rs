@@ -9,13 +9,13 @@ use dtof_core::{
     Array, Count, Count16, EchoNumber, Flags, Histogram, LaserCycle, PixelAddress, PixelConfig,
     RangeGate, RangeScale, WindowRule, z_for,
 };
+use dtof_data::photons::histograms::Histograms;
+use dtof_data::photons::open::{Metadata, ReadOptions, counts};
+use dtof_data::photons::recorded::{RecordedHistograms, RecordingLength};
+use dtof_data::photons::source::PhotonSource;
+use dtof_data::photons::tmf8820;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_photons::histograms::Histograms;
-use dtof_photons::open::{Metadata, ReadOptions, counts};
-use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
-use dtof_photons::source::PhotonSource;
-use dtof_photons::tmf8820;
 use dtof_sensors::tmf882x;
 use flate2::read::GzDecoder;
 

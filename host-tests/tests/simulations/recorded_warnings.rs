@@ -2,10 +2,10 @@
 
 use crate::capture_log::{captures, log, tell};
 use dtof_calibrate::Scatter;
-use dtof_photons::histograms::Histograms;
-use dtof_photons::open::{ReadOptions, counts};
-use dtof_photons::source::PhotonSource;
-use dtof_photons::warnings::{bins_may_be_first, swapped_axes};
+use dtof_data::photons::histograms::Histograms;
+use dtof_data::photons::open::{ReadOptions, counts};
+use dtof_data::photons::source::PhotonSource;
+use dtof_data::photons::warnings::{bins_may_be_first, swapped_axes};
 use dtof_simulate::scene::Scene;
 use std::ops::Range;
 use std::path::Path;

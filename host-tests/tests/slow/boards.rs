@@ -16,12 +16,12 @@ use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
     Array, BlockLevel, Count, EchoNumber, Neighbours, PaperRule, PixelAddress, WindowRule,
 };
+use dtof_data::photons::source::PhotonSource;
 use dtof_device::{Client, DeviceEngine, HostTimeout, Task, monitor};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_link::{AdaptiveBinning, FaultRecord, Source};
-use dtof_photons::source::PhotonSource;
 use dtof_simulate::demo;
 use dtof_simulate::effects::tdc::Tdc;
 

@@ -12,7 +12,7 @@ use std::process::{Command, Stdio};
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
-use dtof_photons::npy::header;
+use dtof_data::photons::npy::header;
 
 use crate::{dtof, enabled, python, root, succeed};
 

@@ -12,11 +12,11 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, ensure};
 use dtof_core::fixed::types::{U8F8, U16F16};
 use dtof_core::{Array, Count, PaperRule, PixelAddress};
+use dtof_data::photons::source::{Photon, PixelPhotons, Slice};
 use dtof_device::{Client, HostTimeout, Task};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_link::{FaultRecord, Report, Source};
-use dtof_photons::source::{Photon, PixelPhotons, Slice};
 use dtof_sensors::dither::Dither;
 use rand_core::{Rng, SeedableRng};
 use rand_pcg::Pcg32;
@@ -382,7 +382,7 @@ fn events(
         }],
     })?;
     let found = found.into_iter().map(|event| match event {
-        dtof_events::aer_file::Event::Depth(event) => Ok(event),
+        dtof_data::events::aer_file::Event::Depth(event) => Ok(event),
         other => anyhow::bail!("{other:?}"),
     });
     Ok([found.collect::<Result<_>>()?, expected])

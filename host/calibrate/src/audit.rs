@@ -23,8 +23,8 @@
 use std::collections::BTreeSet;
 use std::ops::{Range, RangeInclusive};
 
-use dtof_options::rows::{percent, two_digits};
-use dtof_photons::warnings::greatest_divisor;
+use dtof_data::options::rows::{percent, two_digits};
+use dtof_data::photons::warnings::greatest_divisor;
 
 use super::find::good_histograms::GoodHistograms;
 use super::find::observed::{Observed, Trace};
@@ -849,7 +849,7 @@ mod tests {
     use super::*;
     use crate::find::background::Level;
     use dtof_core::Array;
-    use dtof_photons::histograms::Histograms;
+    use dtof_data::photons::histograms::Histograms;
     use dtof_theory::rates::bin_share;
     use proptest::prelude::*;
     use rand_core::SeedableRng;

@@ -14,8 +14,8 @@ use dtof_theory::random::trial_rng;
 use dtof_theory::rates::Rates;
 use rayon::prelude::*;
 
+use dtof_data::options::Refused;
 use dtof_engine::with_bins;
-use dtof_options::Refused;
 
 /// About so many photons are drawn, in at least and at most so many exposures.
 const PHOTONS: f64 = 1.5e9;

@@ -27,9 +27,9 @@ use std::ops::RangeInclusive;
 use anyhow::Result;
 use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
+use dtof_data::photons::MM_PER_PS;
+use dtof_data::photons::list_checks::ListChecks;
 use dtof_engine::settings::SettingsFile;
-use dtof_photons::MM_PER_PS;
-use dtof_photons::list_checks::ListChecks;
 use dtof_theory::progress::{self, Progress};
 use rayon::prelude::*;
 
@@ -574,7 +574,7 @@ fn offset_of(
 mod tests {
     use super::*;
     use dtof_core::{Array, PixelAddress};
-    use dtof_photons::histograms::Histograms;
+    use dtof_data::photons::histograms::Histograms;
     use rand_distr::{Distribution, Poisson};
 
     /// What is found in one capture of a target at 1,200 mm, of 8x8 pixels of 56 mm a bin and these offsets, with

@@ -12,10 +12,10 @@ use dtof_core::{AnyRule, Array, Count, DepthEstimator, PaperRule, PixelAddress, 
 
 use super::find::significance::median;
 use super::{Length, Observed, WindowDetection};
+use dtof_data::photons::recorded::{RecordedHistograms, RecordingLength};
+use dtof_data::photons::source::{PhotonSource, Slice};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
-use dtof_photons::source::{PhotonSource, Slice};
 use dtof_theory::progress::{Part, Progress};
 
 /// The most laser cycles that are replayed, and the most photons.

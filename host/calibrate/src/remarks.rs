@@ -3,9 +3,9 @@
 use super::find::pile_up::MATTERS;
 use super::find::shape;
 use super::{Audit, Calibration, Length, Nearest, PulseSource, Tdc};
+use dtof_data::options::numbers::shortest;
+use dtof_data::options::rows::{Row, bins, grouped, percent, two_digits};
 use dtof_engine::settings::SettingsFile;
-use dtof_options::numbers::shortest;
-use dtof_options::rows::{Row, bins, grouped, percent, two_digits};
 
 /// From this share of lost photons on, far targets are missed or wrong although rates are corrected.
 const MOST_LOST: f64 = 0.75;

@@ -6,9 +6,9 @@ use dtof_draw::palette::{AVERAGE, EVENTS, PAPER, REFERENCE};
 use dtof_draw::picture::{Map, heat_map};
 
 use super::{Calibration, Layer, Length, Nearest, PixelOffsets, PulseSource, remarks};
+use dtof_data::options::numbers::shortest;
+use dtof_data::options::rows::{Row, grouped, percent, significant};
 use dtof_engine::settings::SettingsFile;
-use dtof_options::numbers::shortest;
-use dtof_options::rows::{Row, grouped, percent, significant};
 use dtof_report::{Figure, Section, still};
 
 /// Marks near the start of every settings file and of every report: such files may be replaced.

@@ -11,7 +11,7 @@ use super::find::pulse::Pulse;
 use super::photon_budget::PhotonBudget;
 use super::used_pulse::{PulseSource, UsedPulse};
 use super::{CalibrationOptions, WindowDetection};
-use dtof_options::Refused;
+use dtof_data::options::Refused;
 
 /// Laser cycles of an exposure, if counters can hold so much background.
 const L2: u16 = 2000;

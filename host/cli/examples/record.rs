@@ -5,8 +5,8 @@
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use dtof_photons::npy;
-use dtof_photons::source::PhotonSource;
+use dtof_data::photons::npy;
+use dtof_data::photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 
 /// The photons of the scene in `text`, as NumPy saves them: rows, columns, bins.

@@ -6,10 +6,10 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use dtof_data::photons::open::{ReadOptions, open};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_engine::slices::each_slice;
-use dtof_photons::open::{ReadOptions, open};
 
 /// Prints each event of the recording `file` and gives their number.
 fn replay(file: &Path) -> Result<usize> {

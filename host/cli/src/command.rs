@@ -21,7 +21,7 @@ use std::path::Path;
 
 use anyhow::{Result, ensure};
 use dtof::complain;
-use dtof_options::rows::{Row, aligned, grouped, printable};
+use dtof_data::options::rows::{Row, aligned, grouped, printable};
 use dtof_run::summary::Summary;
 
 /// Prints warnings, about `file` if there is one, on standard error, a line each, unless `quiet`.

@@ -15,8 +15,8 @@ use clap::Parser;
 use clap::builder::{OsStringValueParser, TypedValueParser};
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 
-use dtof_options::rows::printable;
-use dtof_options::{Refused, flag, plain};
+use dtof_data::options::rows::printable;
+use dtof_data::options::{Refused, flag, plain};
 
 /// Parses the command line and runs it.
 #[must_use]
@@ -33,7 +33,10 @@ pub fn run<C: Parser>(run: impl FnOnce(C) -> Result<()>) -> ExitCode {
             if let Some(error) = error.downcast_ref() {
                 return refuse(error, &C::command());
             }
-            complain(&format!("error: {}", dtof_options::line(&error, &flag)));
+            complain(&format!(
+                "error: {}",
+                dtof_data::options::line(&error, &flag)
+            ));
             ExitCode::FAILURE
         }
     }
@@ -153,7 +156,7 @@ fn key(arg: &str) -> String {
 /// Reads the name of a file or a folder. Refuses `-`, which often means standard input or output.
 #[must_use]
 pub fn path() -> impl TypedValueParser<Value = PathBuf> {
-    OsStringValueParser::new().try_map(|name| dtof_options::path(&name))
+    OsStringValueParser::new().try_map(|name| dtof_data::options::path(&name))
 }
 
 fn is_broken_pipe(error: &anyhow::Error) -> bool {

@@ -6,7 +6,7 @@ use anyhow::Result;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::interrupt::is_interrupted;
-use dtof_options::progress::Progress;
+use dtof_data::options::progress::Progress;
 
 /// A progress bar. It appears a second after the job begins, and only on a terminal.
 pub struct Bar {

@@ -29,10 +29,10 @@ use dtof_core::{Array, BlockLevel, PixelAddress};
 
 use answer::{Answer, Choice, answer, longest_frame};
 use bound::Bound;
+use dtof_data::options::Refused;
+use dtof_data::photons::source::{PhotonSource, has_only_neighbours};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_options::Refused;
-use dtof_photons::source::{PhotonSource, has_only_neighbours};
 use measure::{Trial, TrialResult, measure};
 use method::{Kind, Method, Rule};
 use selected::Selected;

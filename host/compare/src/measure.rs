@@ -10,11 +10,11 @@ use super::method::Method;
 use super::stress::Stress;
 use super::tally::{Figures, Tally, Watched};
 use super::truth::Truth;
+use dtof_data::photons::source::PhotonSource;
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_engine::slices::each_slice;
-use dtof_photons::source::PhotonSource;
 
 /// A method with its settings.
 #[derive(Clone, Debug)]

@@ -10,8 +10,8 @@ use dtof_draw::svg;
 use super::Comparison;
 use super::measure::TrialResult;
 use super::text::{HARDER, STRESS_NOTE};
+use dtof_data::options::files::{MarkedFile, may_replace, temporary_file, write_marked};
 use dtof_engine::settings::{self, SettingsFile};
-use dtof_options::files::{MarkedFile, may_replace, temporary_file, write_marked};
 use dtof_report::{Figure, Section, Table, capitalised, still};
 
 /// The page, which makes a folder complete.

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use anyhow::Result;
 use dtof_core::{Array, PixelAddress};
 
-use dtof_photons::source::{PhotonSource, Slice};
+use dtof_data::photons::source::{PhotonSource, Slice};
 
 /// A source with fewer pixels and fewer laser cycles.
 pub struct Selected {
@@ -94,7 +94,7 @@ impl PhotonSource for Selected {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_photons::masked::Masked;
+    use dtof_data::photons::masked::Masked;
     use dtof_simulate::demo;
 
     #[test]

@@ -8,7 +8,7 @@ use dtof_core::{Array, PixelAddress};
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, StandardUniform};
 use rand_pcg::Pcg64;
 
-use dtof_photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
+use dtof_data::photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
 use dtof_theory::random::pixel_rng;
 
 /// A change of the photons.

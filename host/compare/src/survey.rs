@@ -5,9 +5,9 @@ use dtof_core::PixelAddress;
 
 use super::stress::Light;
 use super::tally::first_and_last;
+use dtof_data::photons::source::PhotonSource;
 use dtof_engine::settings::Settings;
 use dtof_engine::slices::next_cycles;
-use dtof_photons::source::PhotonSource;
 use dtof_theory::counts::dead_time::arrived;
 
 /// There is a target if a window exceeds the background by so many standard deviations.

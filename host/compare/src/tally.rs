@@ -5,10 +5,10 @@ use dtof_core::{Array, BlockLevel, DepthEvent, PixelAddress};
 
 use super::stress::Stress;
 use super::truth::Truth;
+use dtof_data::events::events_csv::range_mm;
+use dtof_data::photons::MM_PER_PS;
+use dtof_data::photons::ranges::Ranges;
 use dtof_engine::settings::Settings;
-use dtof_events::events_csv::range_mm;
-use dtof_photons::MM_PER_PS;
-use dtof_photons::ranges::Ranges;
 
 /// A report with an error of more than so many bins is wrong.
 pub const WRONG_BEYOND_BINS: f64 = 3.0;

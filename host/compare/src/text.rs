@@ -4,7 +4,7 @@ use super::Comparison;
 use super::answer::{Answer, Choice};
 use super::measure::TrialResult;
 use super::method::Method;
-use dtof_options::rows::{Row, grouped, significant};
+use dtof_data::options::rows::{Row, grouped, significant};
 use dtof_report::capitalised;
 
 /// A method holds in harder conditions if its error grows at most by this factor, and the share of wrong

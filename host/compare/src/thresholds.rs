@@ -8,9 +8,9 @@ use rand_distr::{Distribution, Poisson, Uniform};
 use rayon::prelude::*;
 
 use super::method::Rule;
+use dtof_data::options::Refused;
 use dtof_engine::settings::Settings;
 use dtof_engine::with_bins;
-use dtof_options::Refused;
 use dtof_theory::random::pixel_rng;
 
 /// The most exposures; fewer if they have more than [`MAX_PHOTONS`] photons.

@@ -3,8 +3,8 @@
 use anyhow::{Result, ensure};
 use dtof_core::PixelAddress;
 
-use dtof_photons::input::Input;
-use dtof_photons::npy::numbers;
+use dtof_data::photons::input::Input;
+use dtof_data::photons::npy::numbers;
 use dtof_simulate::scene::Scene;
 
 /// The true ranges that reports are compared with.

@@ -16,8 +16,8 @@ use dtof_link::{Configuration, Refusal, Report, SensorRecord};
 use super::assembly::{Assembly, HistogramAnswer};
 use super::port::Port;
 use super::stopped::Stopped;
-use dtof_events::aer_file::Event;
-use dtof_options::Refused;
+use dtof_data::events::aer_file::Event;
+use dtof_data::options::Refused;
 use wait::Wait;
 
 /// A device that is silent for so long is gone.

@@ -4,7 +4,7 @@ use std::fmt;
 
 use dtof_link::Configuration;
 
-use dtof_options::numbers::real;
+use dtof_data::options::numbers::real;
 
 /// A device stops its sensor, and with it the laser, after the host has been silent for so long.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

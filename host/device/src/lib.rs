@@ -26,12 +26,12 @@ pub use port::Port;
 pub use setup::Setup;
 pub use stopped::Stopped;
 
+use dtof_data::events::aer_file::Event;
+use dtof_data::options::Refused;
+use dtof_data::photons::ranges::Ranges;
+use dtof_data::photons::source::Slice;
 use dtof_engine::Engine;
 use dtof_engine::settings::Settings;
-use dtof_events::aer_file::Event;
-use dtof_options::Refused;
-use dtof_photons::ranges::Ranges;
-use dtof_photons::source::Slice;
 
 /// How the pixels of a device operate.
 #[derive(Clone, Copy, Debug)]

@@ -12,11 +12,11 @@ use dtof_link::endpoint::LinkCounters;
 use dtof_link::{Report, Source};
 
 use crate::{Client, Stopped, Task};
+use dtof_data::events::aer_file::Event;
+use dtof_data::events::events_csv;
+use dtof_data::options::Refused;
+use dtof_data::photons::ranges::Ranges;
 use dtof_engine::settings::Settings;
-use dtof_events::aer_file::Event;
-use dtof_events::events_csv;
-use dtof_options::Refused;
-use dtof_photons::ranges::Ranges;
 pub use event_file::EventFile;
 use losses::{Losses, since};
 

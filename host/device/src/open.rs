@@ -9,7 +9,7 @@ use anyhow::{Context, Result, bail, ensure};
 use super::port::{PATIENCE, Port, STUCK, prompt};
 use super::qemu::Emulator;
 
-use dtof_options::Refused;
+use dtof_data::options::Refused;
 
 /// The speed of the boards' serial ports.
 const BAUD: u32 = 1_000_000;

@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use super::port::{self, Port};
 
-use dtof_options::{Refused, plain};
+use dtof_data::options::{Refused, plain};
 
 const QEMU: &str = "qemu-system-arm";
 

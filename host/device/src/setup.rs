@@ -10,12 +10,12 @@ use dtof_link::{DynamicDepth, SensorRecord};
 
 use super::monitor::array;
 use super::{Client, HostTimeout, Stopped, Task};
+use dtof_data::events::aer_file::Header;
+use dtof_data::events::clock::LaserClock;
+use dtof_data::options::Refused;
+use dtof_data::photons::masked;
 use dtof_engine::settings::Settings;
 use dtof_engine::settings::{DITHER_BINS, SensorSettings, SettingsFile};
-use dtof_events::aer_file::Header;
-use dtof_events::clock::LaserClock;
-use dtof_options::Refused;
-use dtof_photons::masked;
 
 /// How a device operates.
 #[derive(Clone, Debug)]

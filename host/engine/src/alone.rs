@@ -12,7 +12,7 @@ use dtof_core::{
 use super::Engine;
 use super::decisions::{Decision, LastDecision};
 use super::parallel::of_parts;
-use dtof_photons::source::{PixelPhotons, Slice};
+use dtof_data::photons::source::{PixelPhotons, Slice};
 
 #[derive(Debug)]
 struct LonePixel<const BINS: usize, W: CounterWidth> {

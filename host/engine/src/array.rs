@@ -17,7 +17,7 @@ use super::alone::sort;
 use super::decisions::{self, Decision, LastDecision};
 use super::parallel::{AllThreads, of_parts};
 use crate::settings::Settings;
-use dtof_photons::source::Slice;
+use dtof_data::photons::source::Slice;
 
 /// A pixel or a block.
 #[derive(Debug, Default)]

@@ -15,8 +15,8 @@ use super::decisions::{Decision, LastDecision};
 
 use crate::Engine;
 use crate::settings::Settings;
-use dtof_options::Refused;
-use dtof_photons::source::{Photon, Slice};
+use dtof_data::options::Refused;
+use dtof_data::photons::source::{Photon, Slice};
 
 /// Accepts any peak above the background.
 pub const ANY: PaperRule = PaperRule::new(U8F8::ZERO, Count::saturating(1));

@@ -18,7 +18,7 @@ use anyhow::Result;
 use dtof_core::{DepthEvent, PixelAddress, Statistics};
 
 use self::decisions::Decision;
-use dtof_photons::source::Slice;
+use dtof_data::photons::source::Slice;
 
 /// Turns photons into events. The same photons give the same events with any engine.
 pub trait Engine: Send {

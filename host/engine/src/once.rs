@@ -40,9 +40,9 @@ use super::decisions::Decision;
 use super::parallel::of_each;
 use crate::settings::Settings;
 use crate::with_widest;
-use dtof_options::Refused;
-use dtof_photons::pixel_counts::{AllPhotons, PixelCounts};
-use dtof_photons::source::Slice;
+use dtof_data::options::Refused;
+use dtof_data::photons::pixel_counts::{AllPhotons, PixelCounts};
+use dtof_data::photons::source::Slice;
 
 /// The decision of a pixel.
 #[derive(Clone, Debug)]

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use super::Engine;
 use super::decisions::Decision;
-use dtof_photons::source::{PixelPhotons, Slice};
+use dtof_data::photons::source::{PixelPhotons, Slice};
 
 /// Those of the widest histogram.
 type Bins = OncePerBin<{ OncePerBin::words(1024) }>;
@@ -93,7 +93,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     use dtof_core::Array;
-    use dtof_photons::source::Photon;
+    use dtof_data::photons::source::Photon;
 
     use super::*;
     use crate::host::host_engine;

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use anyhow::{Context, Result};
 
-use dtof_photons::source::{PhotonSource, Slice};
+use dtof_data::photons::source::{PhotonSource, Slice};
 
 /// The most laser cycles of a slice. It does not change events.
 const SLICE: u16 = 256;

@@ -7,8 +7,8 @@ use anyhow::Result;
 use super::Out;
 use super::points::Points;
 use super::projection::Projection;
-use dtof_events::aer_file::{Event, EventKind};
-use dtof_events::events_csv;
+use dtof_data::events::aer_file::{Event, EventKind};
+use dtof_data::events::events_csv;
 
 /// The columns before those of `events.csv`.
 pub(super) const COLUMNS: &str = "time_us,x_m,y_m,z_m";

@@ -1,8 +1,8 @@
 //! The depth map of a run as one event a pixel.
 
 use dtof_core::{BlockLevel, DepthEvent, PixelAddress};
-use dtof_events::aer_file::Event;
-use dtof_events::histories::PixelHistories;
+use dtof_data::events::aer_file::Event;
+use dtof_data::events::histories::PixelHistories;
 
 /// One event for each pixel that has a depth, and the depth of each pixel in millimetres; not a number without one.
 pub struct DepthMap {

@@ -6,11 +6,11 @@ use anyhow::{Result, bail, ensure};
 use dtof_core::EchoNumber;
 
 use super::Format;
-use dtof_events::aer_file::{self, Event, EventKind, Header};
-use dtof_events::clock::LaserClock;
-use dtof_events::echoes::{Echo, EchoSelection};
-use dtof_options::Refused;
-use dtof_options::progress::Progress;
+use dtof_data::events::aer_file::{self, Event, EventKind, Header};
+use dtof_data::events::clock::LaserClock;
+use dtof_data::events::echoes::{Echo, EchoSelection};
+use dtof_data::options::Refused;
+use dtof_data::options::progress::Progress;
 
 /// Selects `echo` of each exposure. A file does not give the length of exposures or the number of
 /// echoes, so the limits are the largest.

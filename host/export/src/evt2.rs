@@ -21,10 +21,10 @@ use dtof_core::events::{DynamicDepthConfig, DynamicDepthEvent, Polarity};
 
 use super::reorder::{Reorder, WAITING};
 use super::{Finished, Out, Sink};
-use dtof_events::aer_file::Event;
-use dtof_events::clock::LaserClock;
-use dtof_events::dynamic::DepthChanges;
-use dtof_events::echoes::Echo;
+use dtof_data::events::aer_file::Event;
+use dtof_data::events::clock::LaserClock;
+use dtof_data::events::dynamic::DepthChanges;
+use dtof_data::events::echoes::Echo;
 
 /// Columns and rows are sent in 11 bits.
 const MOST_SIDE: u32 = 1 << 11;

@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde_json::{Value, json};
 
 use super::points::fields;
-use dtof_events::aer_file::{Event, EventKind};
+use dtof_data::events::aer_file::{Event, EventKind};
 
 /// The most points of a message.
 pub const MOST_POINTS: usize = 1 << 16;
@@ -357,7 +357,7 @@ mod tests {
     #[test]
     fn a_slice_of_length_0_has_no_rate() {
         let mut tally = Tally::new(2);
-        let event = |pixel| Event::Depth(dtof_events::fixtures::event(pixel, 9, 60));
+        let event = |pixel| Event::Depth(dtof_data::events::fixtures::event(pixel, 9, 60));
         tally.add(&event(1), 0).unwrap();
         let error = tally.add(&event(2), 0).unwrap_err();
         assert_eq!(error.to_string(), "the array has no such pixel");

@@ -28,17 +28,18 @@ use anyhow::{Context, Result, ensure};
 use dtof_link::DynamicDepth;
 use tempfile::NamedTempFile;
 
+use dtof_data::events::aer_file::{self, Event, EventKind, Header};
+use dtof_data::events::clock::LaserClock;
+use dtof_data::events::echoes::Echo;
+use dtof_data::events::histories::PixelHistories;
+use dtof_data::named_values;
+use dtof_data::options::files::{destination, flush_to_disk, is_new_or_marked, temporary_file};
+use dtof_data::options::keys::{Key, Kind, names};
+use dtof_data::options::numbers::boolean;
+use dtof_data::options::progress::Progress;
+use dtof_data::options::rows::grouped;
+use dtof_data::options::{Refused, named};
 use dtof_engine::settings::{RaySettings, SensorSettings, SettingsFile};
-use dtof_events::aer_file::{self, Event, EventKind, Header};
-use dtof_events::clock::LaserClock;
-use dtof_events::echoes::Echo;
-use dtof_events::histories::PixelHistories;
-use dtof_options::files::{destination, flush_to_disk, is_new_or_marked, temporary_file};
-use dtof_options::keys::{Key, Kind, names};
-use dtof_options::numbers::boolean;
-use dtof_options::progress::Progress;
-use dtof_options::rows::grouped;
-use dtof_options::{Refused, named, named_values};
 
 use depth_map::{DepthMap, depth_map};
 use events::Survey;
@@ -129,7 +130,7 @@ pub struct ProjectionOptions {
     pub given: SettingsFile,
 }
 
-impl dtof_options::Options for ProjectionOptions {
+impl dtof_data::options::Options for ProjectionOptions {
     const KEYS: &'static [&'static [Key]] = &[&[
     Key::of(RaySettings::KEYS, "field_of_view_degrees").with_help(
         "Field of view in degrees from edge to edge [default: 60 along the longer side, with square \

@@ -14,7 +14,7 @@ use super::projection::Projection;
 use super::reorder::{Reorder, WAITING};
 use super::span::Span;
 use super::{Finished, Out, Sink, ros2};
-use dtof_events::aer_file::{Event, EventKind};
+use dtof_data::events::aer_file::{Event, EventKind};
 
 /// The length and the extent of slices.
 #[derive(Clone, Copy, Debug)]

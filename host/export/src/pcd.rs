@@ -1,7 +1,7 @@
 //! PCD: the point clouds of PCL, version 0.7, binary.
 
 use super::points::fields;
-use dtof_events::aer_file::EventKind;
+use dtof_data::events::aer_file::EventKind;
 
 /// The header of a file of `points` points.
 pub fn header(kind: EventKind, points: u64) -> String {

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::points::fields;
-use dtof_events::aer_file::EventKind;
+use dtof_data::events::aer_file::EventKind;
 
 /// The header of a file of `points` points.
 pub fn header(kind: EventKind, points: u64) -> String {

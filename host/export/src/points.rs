@@ -7,7 +7,7 @@ use foxglove::messages::packed_element_field::NumericType;
 
 use super::projection::Projection;
 use super::{Finished, Out, Sink};
-use dtof_events::aer_file::{Event, EventKind};
+use dtof_data::events::aer_file::{Event, EventKind};
 
 /// The type of a field, little-endian, and its name in each format.
 #[derive(Clone, Copy, Debug)]

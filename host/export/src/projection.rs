@@ -2,10 +2,10 @@
 
 use anyhow::{Context, Result};
 
-use dtof_events::aer_file::Event;
-use dtof_events::clock::LaserClock;
-use dtof_photons::geometry::Rays;
-use dtof_photons::ranges::Ranges;
+use dtof_data::events::aer_file::Event;
+use dtof_data::events::clock::LaserClock;
+use dtof_data::photons::geometry::Rays;
+use dtof_data::photons::ranges::Ranges;
 
 /// Turns an event into a point in space and time.
 pub struct Projection {

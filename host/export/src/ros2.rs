@@ -140,7 +140,7 @@ pub fn cloud(fields: &[Field], frame_id: &str, time_ns: u64, data: &[u8]) -> Res
 mod tests {
     use super::*;
     use crate::points::{BYTES, fields};
-    use dtof_events::aer_file::EventKind;
+    use dtof_data::events::aer_file::EventKind;
 
     /// Written from the definition and the rules of CDR: numbers lie at multiples of their size
     /// from the end of the first four bytes, strings end with a zero, which counts.

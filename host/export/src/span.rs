@@ -3,9 +3,9 @@
 use anyhow::{Result, ensure};
 
 use super::Format;
-use dtof_events::aer_file::Header;
-use dtof_events::clock::LaserClock;
-use dtof_options::Refused;
+use dtof_data::events::aer_file::Header;
+use dtof_data::events::clock::LaserClock;
+use dtof_data::options::Refused;
 
 /// Bits of an EVT2 time in microseconds.
 pub(super) const EVT2_BITS: u32 = 34;

@@ -12,11 +12,11 @@ use std::fs;
 use dtof_core::events::DynamicDepthEvent;
 use dtof_core::fixed::types::{I24F8, U16F16};
 use dtof_core::{Array, BinPosition, BlockLevel, DepthEvent, Flags, LaserCycle, PixelAddress};
-use dtof_events::fixtures;
+use dtof_data::events::fixtures;
 use tempfile::TempDir;
 
 use super::*;
-use dtof_options::Named;
+use dtof_data::options::Named;
 
 /// A bin is 266.8513 ps × 0.149896229 mm/ps = 40 mm, so the middle of bin 60 is at 60.5 × 40 mm + 80 mm = 2500 mm.
 fn header() -> Header {

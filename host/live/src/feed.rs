@@ -17,9 +17,9 @@ pub use playback::Playback;
 use super::Terminal;
 use super::hub::{Hub, Kind};
 use super::outputs::{Folder, Recorder};
+use dtof_data::options::rows::printable;
 use dtof_device::{HostTimeout, Port, Setup};
 use dtof_engine::settings::SettingsFile;
-use dtof_options::rows::printable;
 
 /// Takes the answer: what was done, or why not, in a line.
 pub type Answer = oneshot::Sender<Result<String, String>>;
@@ -171,7 +171,7 @@ impl FeedContext<'_> {
 
     /// Answers a command, with every option as its flag.
     fn reply(&self, answer: Answer, result: Result<String>) {
-        let flags = |error| anyhow!(dtof_options::line(&error, &self.terminal.name));
+        let flags = |error| anyhow!(dtof_data::options::line(&error, &self.terminal.name));
         reply(answer, result.map_err(flags));
     }
 }

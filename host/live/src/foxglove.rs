@@ -31,7 +31,7 @@ use frames::{Frame, Frames};
 use guard::Origins;
 use topics::Topic;
 
-use dtof_options::Refused;
+use dtof_data::options::Refused;
 
 /// Interval of frames.
 const EVERY: Duration = Duration::from_millis(100);

@@ -14,12 +14,12 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use dtof_data::events::aer_file::{Event, Header};
+use dtof_data::photons::ranges::Ranges;
 use dtof_device::{HistogramAnswer, Setup};
 use dtof_engine::explain::explain;
 use dtof_engine::settings::Settings;
 use dtof_engine::settings::SettingsFile;
-use dtof_events::aer_file::{Event, Header};
-use dtof_photons::ranges::Ranges;
 
 use super::outputs::RecordingStatus;
 pub use frame::MOST_PIXELS;

@@ -29,7 +29,7 @@ use std::thread;
 
 use anyhow::{Result, anyhow};
 
-use dtof_options::Refused;
+use dtof_data::options::Refused;
 
 pub use feed::{Device, Feed, Playback};
 pub use foxglove::{Foxglove, MOST_CLIENTS};

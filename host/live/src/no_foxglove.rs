@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use super::origin::Origin;
-use dtof_options::Refused;
+use dtof_data::options::Refused;
 
 /// Most clients at a time.
 pub const MOST_CLIENTS: usize = 0;

@@ -6,13 +6,13 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, bail};
 
+use dtof_data::events::aer_file::Event;
+use dtof_data::options::Refused;
+use dtof_data::options::files::temporary_file;
+use dtof_data::options::rows::grouped;
 use dtof_device::Setup;
 use dtof_device::monitor::EventFile;
 use dtof_engine::settings::SettingsFile;
-use dtof_events::aer_file::Event;
-use dtof_options::Refused;
-use dtof_options::files::temporary_file;
-use dtof_options::rows::grouped;
 
 /// Most files of a kind in a folder.
 const MOST: u32 = 9999;

@@ -7,10 +7,10 @@ use serde_json::{Value, json};
 use super::histograms::Decisions;
 use super::{FEW, capitalised, events, shared};
 use dtof_core::{Array, PixelAddress};
+use dtof_data::events::clock::LaserClock;
+use dtof_data::events::sample::Sample;
+use dtof_data::options::rows::grouped;
 use dtof_draw::picture;
-use dtof_events::clock::LaserClock;
-use dtof_events::sample::Sample;
-use dtof_options::rows::grouped;
 
 /// The fewest events of a page, even if figures leave no room for them.
 const MIN_EVENTS: usize = 4096;

@@ -3,7 +3,7 @@
 use dtof_core::{BlockLevel, EchoNumber, Flags};
 
 use super::packed::Packed;
-use dtof_events::sample::Sample;
+use dtof_data::events::sample::Sample;
 
 /// Flags, level and echo as one number, which is small for most events.
 pub(super) fn kind(level: BlockLevel, echo: EchoNumber, flags: Flags) -> u64 {

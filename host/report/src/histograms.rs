@@ -6,11 +6,11 @@ use dtof_core::Array;
 use serde_json::json;
 
 use super::packed::Packed;
+use dtof_data::events::events_csv::range_mm;
+use dtof_data::photons::ranges::Ranges;
 use dtof_engine::decisions::{Decision, KeptPixels};
 use dtof_engine::explain::{Explanation, explain_decisions};
 use dtof_engine::settings::Settings;
-use dtof_events::events_csv::range_mm;
-use dtof_photons::ranges::Ranges;
 
 /// The last decisions of a run.
 #[derive(Clone, Copy, Debug)]

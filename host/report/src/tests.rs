@@ -5,9 +5,9 @@ use base64::Engine as _;
 use dtof_core::{Array, BlockLevel, DepthEvent, EchoNumber, Flags, PixelAddress};
 
 use super::packed::tests::Reader;
-use dtof_events::events_csv::range_mm;
-use dtof_events::fixtures::{event, ranges};
-use dtof_events::sample::Sample;
+use dtof_data::events::events_csv::range_mm;
+use dtof_data::events::fixtures::{event, ranges};
+use dtof_data::events::sample::Sample;
 
 /// `count` events, one a laser cycle, of four pixels in turn.
 fn sample(limit: usize, count: u32) -> Sample {

@@ -1,7 +1,7 @@
 //! Whether targets are too bright for photons that count once per bin.
 
 use dtof_core::PixelAddress;
-use dtof_photons::pixel_counts::PixelCounts;
+use dtof_data::photons::pixel_counts::PixelCounts;
 
 /// Photons a bin and laser cycle above which the depth of a pulse suffers: a fifth of them is lost in its
 /// middle, and less at its sides.
@@ -34,7 +34,7 @@ pub(crate) fn bright_bins(counts: &PixelCounts, addresses: &[PixelAddress]) -> O
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_photons::source::{Photon, PixelPhotons, Slice};
+    use dtof_data::photons::source::{Photon, PixelPhotons, Slice};
 
     /// Pixels with so many photons in bin 5 in ten laser cycles, two slices each.
     fn warning(photons: [usize; 2]) -> Option<String> {

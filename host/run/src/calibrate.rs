@@ -8,17 +8,17 @@ use super::recording::{
     warnings,
 };
 use dtof_calibrate::{Calibration, CalibrationOptions, Length, Observed, calibrate_with};
+use dtof_data::options::Refused;
+use dtof_data::options::keys::{Key, Reader, integer, real, yes_or_no};
+use dtof_data::options::numbers::MAX_INTEGER;
+use dtof_data::options::progress::{Progress, shared};
+use dtof_data::photons::input::Input;
+use dtof_data::photons::masked;
+use dtof_data::photons::open::{Counts, counts};
+use dtof_data::photons::recorded::{RecordingLength, check_totals};
 use dtof_engine::settings::{
     DetectionSettings, FALSE_ALARM, RaySettings, SensorSettings, SettingsFile,
 };
-use dtof_options::Refused;
-use dtof_options::keys::{Key, Reader, integer, real, yes_or_no};
-use dtof_options::numbers::MAX_INTEGER;
-use dtof_options::progress::{Progress, shared};
-use dtof_photons::input::Input;
-use dtof_photons::masked;
-use dtof_photons::open::{Counts, counts};
-use dtof_photons::recorded::{RecordingLength, check_totals};
 
 /// Options of this job; keys of settings files with these names mean something else.
 const OWN: &[Key] = &[
@@ -84,7 +84,7 @@ pub struct Options {
     pub calibration: CalibrationOptions,
 }
 
-impl dtof_options::Options for Options {
+impl dtof_data::options::Options for Options {
     const KEYS: &'static [&'static [Key]] = &[RECORDING, SENSOR, TDC, RAYS, OWN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {

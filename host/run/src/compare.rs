@@ -14,16 +14,16 @@ use super::simulate::settings_of_scene;
 use dtof_calibrate::CalibrationOptions;
 use dtof_compare::truth::Truth;
 use dtof_compare::{Comparison, Task, compare};
+use dtof_data::options::keys::{Key, POSITIVE, Reader, integer};
+use dtof_data::options::numbers::MAX_INTEGER;
+use dtof_data::options::{Refused, plain};
+use dtof_data::photons::input::Input;
+use dtof_data::photons::masked::Masked;
+use dtof_data::photons::open::{Counts, HISTOGRAM_CYCLES, ReadOptions, counts, open};
+use dtof_data::photons::source::PhotonSource;
 use dtof_engine::settings::{
     DetectionSettings, FALSE_ALARM, RuleName, RunSettings, Settings, SettingsFile,
 };
-use dtof_options::keys::{Key, POSITIVE, Reader, integer};
-use dtof_options::numbers::MAX_INTEGER;
-use dtof_options::{Refused, plain};
-use dtof_photons::input::Input;
-use dtof_photons::masked::Masked;
-use dtof_photons::open::{Counts, HISTOGRAM_CYCLES, ReadOptions, counts, open};
-use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 
 /// How exact, and how sure.
@@ -71,7 +71,7 @@ pub struct Options {
     pub given: Given,
 }
 
-impl dtof_options::Options for Options {
+impl dtof_data::options::Options for Options {
     const KEYS: &'static [&'static [Key]] = &[ACCURACY, RECORDING, SENSOR, TDC, &[GLASS], RUN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {

@@ -8,11 +8,11 @@ use dtof_core::{
     Array, BinPosition, BlockLevel, Detection, DetectionRule, EchoNumber, Flags, PixelAddress,
 };
 
+use dtof_data::photons::pixel_counts::{AllPhotons, PixelCounts, RecordedCounts};
+use dtof_data::photons::ranges::Ranges;
+use dtof_data::photons::source::Slice;
 use dtof_engine::once::{OnceDecision, decide_once};
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_photons::pixel_counts::{AllPhotons, PixelCounts, RecordedCounts};
-use dtof_photons::ranges::Ranges;
-use dtof_photons::source::Slice;
 
 /// Two surfaces are more than so many bins apart.
 pub(crate) const SURFACE_BINS: u16 = 3;

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
+use dtof_data::options::keys::{Key, Kind};
+use dtof_data::options::{Options, Refused};
 use dtof_engine::settings::{DetectionSettings, RunSettings, SensorSettings, SettingsFile};
-use dtof_options::keys::{Key, Kind};
-use dtof_options::{Options, Refused};
 
 /// The settings file, and options of the sensor that hold for any input.
 pub const SENSOR: &[Key] = &[
@@ -129,7 +129,7 @@ macro_rules! of_given {
             self.given.file(key)
         }
 
-        fn check(&self) -> Result<(), dtof_options::Refused> {
+        fn check(&self) -> Result<(), dtof_data::options::Refused> {
             self.given.check()
         }
     };

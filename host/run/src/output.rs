@@ -21,23 +21,23 @@ use crate::depth_map::DepthMap;
 use crate::summary::{self, Summary};
 use age::LastAtBin;
 use changes::Changes;
+use dtof_data::events::aer_file;
+use dtof_data::events::echoes::{Echo, EchoSelection};
+use dtof_data::events::events_csv::{self, range_mm};
+use dtof_data::events::histories::PixelHistories;
+use dtof_data::events::sample::Sample;
+use dtof_data::options::files::{
+    PARTIAL, destination, flush_to_disk, is_same_file, keep_edited, may_replace, remove,
+    temporary_file,
+};
+use dtof_data::options::rows::Row;
+use dtof_data::photons::ranges::Ranges;
+use dtof_data::photons::source::{PhotonSource, Slice};
 use dtof_draw::svg;
 use dtof_engine::Engine;
 use dtof_engine::decisions::{Decision, KeptPixels};
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_events::aer_file;
-use dtof_events::echoes::{Echo, EchoSelection};
-use dtof_events::events_csv::{self, range_mm};
-use dtof_events::histories::PixelHistories;
-use dtof_events::sample::Sample;
 use dtof_link::DynamicDepth;
-use dtof_options::files::{
-    PARTIAL, destination, flush_to_disk, is_same_file, keep_edited, may_replace, remove,
-    temporary_file,
-};
-use dtof_options::rows::Row;
-use dtof_photons::ranges::Ranges;
-use dtof_photons::source::{PhotonSource, Slice};
 use dtof_report::{Cloud, Decisions, Figure, Section};
 use pictures::{Picture, pictures};
 

@@ -5,14 +5,14 @@ use dtof_core::Array;
 use dtof_core::fixed::types::U16F16;
 
 use super::given::Given;
+use dtof_data::options::keys::Key;
+use dtof_data::options::rows::grouped;
+use dtof_data::options::{Refused, plain};
+use dtof_data::photons::input::Input;
+use dtof_data::photons::masked;
+use dtof_data::photons::open::{BIN_WIDTH_PS, Metadata, ReadOptions};
+use dtof_data::photons::recorded::RecordingLength;
 use dtof_engine::settings::{RunSettings, SensorSettings, SettingsFile};
-use dtof_options::keys::Key;
-use dtof_options::rows::grouped;
-use dtof_options::{Refused, plain};
-use dtof_photons::input::Input;
-use dtof_photons::masked;
-use dtof_photons::open::{BIN_WIDTH_PS, Metadata, ReadOptions};
-use dtof_photons::recorded::RecordingLength;
 
 /// The options that describe a recording.
 pub const RECORDING: &[Key] = &[

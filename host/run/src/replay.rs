@@ -15,22 +15,22 @@ use super::summary::Summary;
 use dtof_calibrate::report::rows;
 use dtof_calibrate::{Calibration, CalibrationOptions};
 use dtof_core::Neighbours;
+use dtof_data::events::clock::LaserClock;
+use dtof_data::options::keys::Key;
+use dtof_data::options::progress::Progress;
+use dtof_data::options::rows::Row;
+use dtof_data::options::{KeysOfFile, Refused, flag};
+use dtof_data::photons::geometry::FieldOfView;
+use dtof_data::photons::input::Input;
+use dtof_data::photons::masked::Masked;
+use dtof_data::photons::open::{CheckedRecording, Metadata, Recording, check};
+use dtof_data::photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{
     AdaptiveBinning, DEFAULT_L2, DetectionSettings, EstimatorName, RunSettings, Settings,
     SettingsFile,
 };
-use dtof_events::clock::LaserClock;
-use dtof_options::keys::Key;
-use dtof_options::progress::Progress;
-use dtof_options::rows::Row;
-use dtof_options::{KeysOfFile, Refused, flag};
-use dtof_photons::geometry::FieldOfView;
-use dtof_photons::input::Input;
-use dtof_photons::masked::Masked;
-use dtof_photons::open::{CheckedRecording, Metadata, Recording, check};
-use dtof_photons::source::{PhotonSource, has_only_neighbours, is_one_capture};
 
 /// What the user knows of the scene: an option of the search.
 const SEARCH: &[Key] = &[GLASS];
@@ -54,7 +54,7 @@ pub struct Options {
     pub glass: Option<bool>,
 }
 
-impl dtof_options::Options for Options {
+impl dtof_data::options::Options for Options {
     const KEYS: &'static [&'static [Key]] = &[
         RECORDING,
         SENSOR,

@@ -9,14 +9,14 @@ use crate::bright::bright_bins;
 use crate::depth_map::{DepthMap, MapInput, RunCounts};
 use crate::glass::watch_glass;
 use crate::summary::{ALL_PHOTONS, Summary};
+use dtof_data::options::progress::Progress;
+use dtof_data::options::rows::grouped;
+use dtof_data::photons::pixel_counts::PixelCounts;
+use dtof_data::photons::source::{PhotonSource, PixelPhotons, Slice};
 use dtof_engine::Engine;
 use dtof_engine::once_per_bin::once_per_bin;
 use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_engine::slices::each_slice;
-use dtof_options::progress::Progress;
-use dtof_options::rows::grouped;
-use dtof_photons::pixel_counts::PixelCounts;
-use dtof_photons::source::{PhotonSource, PixelPhotons, Slice};
 
 /// Where the photons and the events of a run go.
 pub trait Sink {

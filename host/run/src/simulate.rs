@@ -8,15 +8,15 @@ use super::depth_map::MapInput;
 use super::given::{FRAME, Given, ONCE, SENSOR, TDC, of_given};
 use super::run::{RunResult, Sink, run};
 use super::truth::SceneComparison;
+use dtof_data::options::keys::{Key, Kind};
+use dtof_data::options::numbers::{boolean, integer};
+use dtof_data::options::progress::Progress;
+use dtof_data::photons::masked::Masked;
+use dtof_data::photons::source::Slice;
 use dtof_engine::Engine;
 use dtof_engine::settings::{
     DetectionSettings, RaySettings, RunSettings, SensorSettings, Settings, SettingsFile,
 };
-use dtof_options::keys::{Key, Kind};
-use dtof_options::numbers::{boolean, integer};
-use dtof_options::progress::Progress;
-use dtof_photons::masked::Masked;
-use dtof_photons::source::Slice;
 use dtof_simulate::scene::Scene;
 
 /// What is simulated.
@@ -52,7 +52,7 @@ pub struct Options {
     pub given: Given,
 }
 
-impl dtof_options::Options for Options {
+impl dtof_data::options::Options for Options {
     const KEYS: &'static [&'static [Key]] = &[
         ARRAY,
         SENSOR,

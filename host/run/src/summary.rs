@@ -8,9 +8,9 @@ use serde::{Serialize, Serializer};
 use serde_json::json;
 
 use crate::truth::AgainstTruth;
+use dtof_data::options::rows::{Row, grouped};
+use dtof_data::photons::source::PhotonSource;
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_options::rows::{Row, grouped};
-use dtof_photons::source::PhotonSource;
 
 /// Where depth comes from: one decision a pixel, on all photons.
 pub(crate) const ALL_PHOTONS: &str = "all photons";

@@ -7,10 +7,10 @@ use anyhow::Result;
 use dtof_core::{Array, DepthEvent, EchoNumber};
 use serde::Serialize;
 
+use dtof_data::events::events_csv::range_mm;
+use dtof_data::options::rows::{Row, bins, grouped};
+use dtof_data::photons::ranges::Ranges;
 use dtof_engine::settings::Settings;
-use dtof_events::events_csv::range_mm;
-use dtof_options::rows::{Row, bins, grouped};
-use dtof_photons::ranges::Ranges;
 use dtof_simulate::scene::{Hit, Scene};
 
 /// An event is a false alarm if its range lies farther from the truth than this many bins.

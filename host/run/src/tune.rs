@@ -7,14 +7,15 @@ use std::fmt::Write as _;
 
 use anyhow::Result;
 use dtof_core::BlockLevel;
+use dtof_data::option_table;
+use dtof_data::options::Refused;
+use dtof_data::options::keys::{Key, POSITIVE, bins, integer, named};
+use dtof_data::options::numbers::{MAX_INTEGER, shortest};
+use dtof_data::options::progress::{Progress, shared};
+use dtof_data::options::rows::significant;
+use dtof_data::photons::MM_PER_PS;
 use dtof_engine::settings::RuleName;
 use dtof_link::Configuration;
-use dtof_options::keys::{Key, POSITIVE, bins, integer, named};
-use dtof_options::numbers::{MAX_INTEGER, shortest};
-use dtof_options::progress::{Progress, shared};
-use dtof_options::rows::significant;
-use dtof_options::{Refused, options};
-use dtof_photons::MM_PER_PS;
 use dtof_theory::gaussian;
 use dtof_theory::looks::detections::Detections;
 use dtof_theory::looks::table::Table;
@@ -23,7 +24,7 @@ use dtof_theory::rates::{signal_for_snr, snr};
 use dtof_theory::tune::{FalseAlarmLimit, Request, Source, tune};
 use serde_json::json;
 
-options! {
+option_table! {
     /// The options of `tune`.
     #[derive(Clone, Debug, Default)]
     pub struct Options {
@@ -65,7 +66,7 @@ options! {
     }
 }
 
-impl dtof_options::Options for Options {
+impl dtof_data::options::Options for Options {
     const KEYS: &'static [&'static [Key]] = &[Self::KEYS];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {

@@ -6,7 +6,7 @@ use dtof_theory::rates::Rates;
 use rayon::prelude::*;
 
 use super::pixel::SimulatedPixel;
-use dtof_photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
+use dtof_data::photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
 
 /// The rates of a pixel in a laser cycle, for scenes that change: of the surface it sees, and of
 /// the one behind.

@@ -6,12 +6,12 @@ use dtof_core::{
     AnyRule, Array, ArrayConfig, AverageRule, BlockLevel, Count, DepthEvent, EchoNumber, Flags,
     Neighbours, PaperRule, PixelAddress, PixelArray, PixelPlace, WindowRule,
 };
+use dtof_data::photons::masked::Masked;
+use dtof_data::photons::source::{PhotonSource, Slice};
 use dtof_engine::decisions::Decision;
 use dtof_engine::explain::explain_decisions;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_photons::masked::Masked;
-use dtof_photons::source::{PhotonSource, Slice};
 
 use crate::demo;
 

@@ -15,9 +15,9 @@ use dtof_core::{Array, PixelAddress};
 use crate::effects::Effects;
 use crate::effects::limits::Timing;
 use crate::{RatesFn, SimulatedArray, SimulatedPixel};
-use dtof_photons::MM_PER_PS;
-use dtof_photons::geometry::FieldOfView;
-use dtof_photons::source::PhotonSource;
+use dtof_data::photons::MM_PER_PS;
+use dtof_data::photons::geometry::FieldOfView;
+use dtof_data::photons::source::PhotonSource;
 use dtof_theory::random::pixel_rng;
 use dtof_theory::rates::Rates;
 

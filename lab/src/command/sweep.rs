@@ -8,10 +8,10 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use dtof::path;
+use dtof_data::options::numbers::integer;
+use dtof_data::options::rows::grouped;
 use dtof_lab::studies;
 use dtof_lab::sweep::{self, Part};
-use dtof_options::numbers::integer;
-use dtof_options::rows::grouped;
 use indicatif::{ProgressBar, ProgressStyle};
 
 #[derive(Args)]

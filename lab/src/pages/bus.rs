@@ -5,7 +5,7 @@
 //! per slot on average. At the end of a slot, one of the pending events is transferred.
 
 use dtof_core::AerWord;
-use dtof_options::rows::grouped;
+use dtof_data::options::rows::grouped;
 
 /// Macropixels of the paper's array.
 const PIXELS: u16 = 64 * 32;

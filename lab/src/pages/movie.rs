@@ -10,14 +10,14 @@ use std::collections::{BTreeMap, HashMap};
 use anyhow::Result;
 use dtof_core::{Array, EchoNumber, PixelAddress};
 
+use dtof_data::events::events_csv::range_mm;
+use dtof_data::events::last_events::LastEvents;
+use dtof_data::options::rows::grouped;
+use dtof_data::photons::source::PhotonSource;
 use dtof_draw::palette;
 use dtof_draw::picture::{levels, span};
 use dtof_draw::svg::{Anchor, At, BOLD, EDGE, Svg, TEXT, TITLE, wrapped};
 use dtof_engine::host::host_engine;
-use dtof_events::events_csv::range_mm;
-use dtof_events::last_events::LastEvents;
-use dtof_options::rows::grouped;
-use dtof_photons::source::PhotonSource;
 use dtof_simulate::demo;
 
 /// Laser cycles shown, and the number of animation frames.

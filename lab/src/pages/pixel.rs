@@ -9,10 +9,10 @@ use dtof_core::{
     AsyncPixel, Count, Count10, LaserCycle, PaperRule, PixelAddress, PixelConfig, RangeScale,
     Statistics,
 };
+use dtof_data::options::rows::significant;
+use dtof_data::photons::source::{PhotonSource, PixelPhotons};
 use dtof_draw::palette::Colour;
 use dtof_draw::svg::{Anchor, At, BOLD, EDGE, Svg, TEXT, TITLE, wrapped};
-use dtof_options::rows::significant;
-use dtof_photons::source::{PhotonSource, PixelPhotons};
 use dtof_simulate::scene::Scene;
 
 /// A bright pixel and a dim one.

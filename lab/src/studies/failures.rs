@@ -18,9 +18,9 @@ use dtof_core::{
     AnyRule, AsyncPixel, AverageRule, Count, DepthEstimator, DepthEvent, Flags, LaserCycle, Look,
     OncePerBin, PaperRule, PixelAddress, PixelConfig, Statistics, WindowRule, z_for,
 };
+use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette::{self, Pen};
-use dtof_options::rows::grouped;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 

@@ -8,7 +8,7 @@ use anyhow::{Context, Result, bail, ensure};
 use serde::{Deserialize, Serialize};
 
 use super::{Point, Study, Tally};
-use dtof_options::files::{destination, temporary_file};
+use dtof_data::options::files::{destination, temporary_file};
 
 /// A point with the sum of its trials.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

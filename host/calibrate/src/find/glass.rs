@@ -16,7 +16,7 @@ use super::good_histograms::GoodHistograms;
 use super::peaks::Peak;
 use super::shape::{Fit, Window, best};
 use super::significance::median;
-use dtof_photons::recorded::ListTimes;
+use dtof_data::photons::recorded::ListTimes;
 
 /// Standard deviations with which a group shows the peak.
 const CLEAR: f64 = 5.0;

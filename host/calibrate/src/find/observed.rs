@@ -5,9 +5,9 @@ use std::ops::RangeInclusive;
 use anyhow::{Result, bail, ensure};
 use dtof_core::Array;
 
-use dtof_options::Refused;
-use dtof_photons::histograms::Histograms;
-use dtof_photons::recorded::ListTimes;
+use dtof_data::options::Refused;
+use dtof_data::photons::histograms::Histograms;
+use dtof_data::photons::recorded::ListTimes;
 use dtof_theory::counts::dead_time;
 
 /// How long each capture lasted.

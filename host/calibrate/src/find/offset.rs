@@ -9,8 +9,8 @@ use dtof_core::{BinPosition, CentredWindow, Count16, DepthEstimator, Histogram, 
 
 use super::observed::Trace;
 use super::significance::{median, quantile};
+use dtof_data::photons::MM_PER_PS;
 use dtof_engine::with_bins;
-use dtof_photons::MM_PER_PS;
 
 /// The most histograms that are fitted, evenly chosen.
 const MOST: usize = 400;

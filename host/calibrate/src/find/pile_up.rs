@@ -28,7 +28,7 @@ use std::ops::Range;
 use super::observed::Trace;
 use super::significance::{is_surely_more, median, quantile};
 
-use dtof_photons::recorded::ListTimes;
+use dtof_data::photons::recorded::ListTimes;
 use dtof_theory::counts::dead_time::{arrived, live};
 
 /// The ratio of likelihoods that decides, as a logarithm: 1000.

@@ -12,10 +12,10 @@ use dtof_calibrate::{Calibration, Length, Observed};
 use dtof_core::fixed::types::U4F12;
 use dtof_core::rule::detect;
 use dtof_core::{Array, Count, DepthEstimator, RangeGate, WindowRule};
+use dtof_data::photons::histograms::Histograms;
+use dtof_data::photons::source::{PhotonSource, Slice};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::SettingsFile;
-use dtof_photons::histograms::Histograms;
-use dtof_photons::source::{PhotonSource, Slice};
 use dtof_simulate::scene::Scene;
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::random::trial_rng;
@@ -52,7 +52,7 @@ impl Drawn {
             [[4, 4], [8, 8], [16, 8], [16, 16], [32, 16]][between(0.0, 5.0) as usize];
         let pixels = columns * rows;
         let bin_width_ps = between(60.0, 500.0).round();
-        let mm_per_bin = bin_width_ps * dtof_photons::MM_PER_PS;
+        let mm_per_bin = bin_width_ps * dtof_data::photons::MM_PER_PS;
         let background = log(&mut between, 0.002, 0.3);
         let sigma = between(0.5, 1.6);
         // Some have hot pixels, which produce most of the photons.

@@ -5,8 +5,8 @@ use crate::slow_or_quick;
 use dtof_calibrate::{
     Calibration, CalibrationOptions, Change, Length, Nearest, RunPhotons, calibrate, glass_change,
 };
+use dtof_data::photons::histograms::Histograms;
 use dtof_engine::settings::SettingsFile;
-use dtof_photons::histograms::Histograms;
 use dtof_simulate::scene::Scene;
 
 /// A wall, two nearer surfaces and the cover glass. A bin is 37.5 mm.

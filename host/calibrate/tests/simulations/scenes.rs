@@ -4,7 +4,7 @@
 use crate::drawn::{Drawn, false_alarms, observed};
 use crate::slow_or_quick;
 use dtof_calibrate::{CalibrationOptions, Length, Nearest, Tdc, calibrate};
-use dtof_photons::histograms::Histograms;
+use dtof_data::photons::histograms::Histograms;
 use rayon::prelude::*;
 
 /// The errors of the calibration by scene `number`, and a line about it.

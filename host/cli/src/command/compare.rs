@@ -9,8 +9,8 @@ use clap::Args;
 use dtof::path;
 use dtof::progress::Steps;
 use dtof_compare::page::{self, FILES};
-use dtof_options::rows::aligned;
-use dtof_photons::input::Input;
+use dtof_data::options::rows::aligned;
+use dtof_data::photons::input::Input;
 use dtof_run::compare::{Callbacks, CompareInput, CompareResult, Options};
 use dtof_simulate::scene::Scene;
 

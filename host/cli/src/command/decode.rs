@@ -6,7 +6,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 use clap::Args;
-use dtof_events::{aer_file, events_csv};
+use dtof_data::events::{aer_file, events_csv};
 
 #[derive(Args)]
 pub struct Decode {

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Parser;
 use dtof::path;
+use dtof_data::options::numbers::{MAX_INTEGER, integer};
 use dtof_engine::settings::{RunSettings, SettingsFile};
-use dtof_options::numbers::{MAX_INTEGER, integer};
 use dtof_run::simulate::{Simulation, array, settings_of_scene};
 use dtof_simulate::demo;
 

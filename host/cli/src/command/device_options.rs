@@ -4,10 +4,10 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use dtof_data::options::numbers::integer;
 use dtof_device::HostTimeout;
 use dtof_engine::settings::SettingsFile;
 use dtof_link::DynamicDepth;
-use dtof_options::numbers::integer;
 use dtof_run::given::Operation;
 
 use super::dynamic_depth;

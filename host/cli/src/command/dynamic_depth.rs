@@ -3,9 +3,9 @@
 use anyhow::{Result, bail};
 use clap::{Args, ValueEnum};
 use dtof_core::fixed::types::U24F8;
+use dtof_data::options::Refused;
+use dtof_data::options::numbers::fixed;
 use dtof_link::DynamicDepth;
-use dtof_options::Refused;
-use dtof_options::numbers::fixed;
 
 #[derive(Args, Default)]
 pub struct DynamicDepthFlags {

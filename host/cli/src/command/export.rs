@@ -7,12 +7,12 @@ use anyhow::{Result, bail};
 use clap::Args;
 use dtof::path;
 use dtof::progress::Bar;
+use dtof_data::events::aer_file::EventKind;
+use dtof_data::options::Refused;
+use dtof_data::options::numbers::integer;
+use dtof_data::options::rows::grouped;
 use dtof_engine::settings::SettingsFile;
-use dtof_events::aer_file::EventKind;
 use dtof_export::{Format, Options, ProjectionOptions, export};
-use dtof_options::Refused;
-use dtof_options::numbers::integer;
-use dtof_options::rows::grouped;
 
 use super::flags::{Flags, name};
 use super::{dynamic_depth, warn};

@@ -5,8 +5,8 @@ use std::ffi::{OsStr, OsString};
 use clap::builder::{OsStringValueParser, PossibleValue, TypedValueParser};
 use clap::error::ErrorKind;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
-use dtof_options::keys::{Key, Kind, names};
-use dtof_options::{Named, Options, flag, named, option_name, with_names};
+use dtof_data::options::keys::{Key, Kind, names};
+use dtof_data::options::{Named, Options, flag, named, option_name, with_names};
 
 /// The options of a job, read from flags.
 pub struct Flags<O>(pub O);
@@ -91,10 +91,10 @@ impl<O: Options> FromArgMatches for Flags<O> {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
         let given =
             keys::<O>().filter_map(|key| Some((option_name(key.name), text(key, matches)?)));
-        let refused = |refused: dtof_options::Refused| {
+        let refused = |refused: dtof_data::options::Refused| {
             Error::raw(ErrorKind::ValueValidation, refused.line(&flag))
         };
-        dtof_options::read(given).map(Self).map_err(refused)
+        dtof_data::options::read(given).map(Self).map_err(refused)
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {
@@ -111,8 +111,8 @@ pub fn name<T: Named + Send + Sync>() -> impl TypedValueParser<Value = T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use dtof_data::options::NO_OPTION;
     use dtof_export::ProjectionOptions;
-    use dtof_options::NO_OPTION;
     use dtof_run::given::Operation;
     use dtof_run::{calibrate, compare, replay, simulate, tune};
 

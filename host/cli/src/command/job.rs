@@ -5,12 +5,12 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use dtof::{interrupt, path};
+use dtof_data::events::echoes::Echo;
+use dtof_data::photons::source::PhotonSource;
 use dtof_device::{Client, DeviceEngine};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_events::echoes::Echo;
-use dtof_photons::source::PhotonSource;
 use dtof_run::output::Output;
 
 use super::dynamic_depth::DynamicDepthOptions;

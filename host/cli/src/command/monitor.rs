@@ -7,11 +7,11 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail, ensure};
 use clap::Args;
 use dtof::{interrupt, path};
+use dtof_data::options::Refused;
+use dtof_data::options::numbers::integer;
 use dtof_device::monitor::{EventFile, Outputs, monitor};
 use dtof_device::{Client, Setup};
 use dtof_engine::settings::SettingsFile;
-use dtof_options::Refused;
-use dtof_options::numbers::integer;
 
 use super::device_options::DeviceOptions;
 

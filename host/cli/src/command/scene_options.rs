@@ -5,9 +5,9 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result};
 use clap::Args;
 use dtof::path;
-use dtof_options::keys::real;
-use dtof_options::rows::Row;
-use dtof_photons::geometry::FieldOfView;
+use dtof_data::options::keys::real;
+use dtof_data::options::rows::Row;
+use dtof_data::photons::geometry::FieldOfView;
 use dtof_simulate::scene::{DepthAlong, DepthMap, Scene};
 
 use super::flags::name;

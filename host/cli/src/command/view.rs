@@ -7,10 +7,10 @@ use std::path::PathBuf;
 use anyhow::{Result, ensure};
 use clap::Args;
 use dtof::{complain, interrupt, path};
+use dtof_data::options::flag;
+use dtof_data::options::keys::POSITIVE;
+use dtof_data::options::numbers::{integer, laser_hz};
 use dtof_live::{Device, Feed, Folder, Foxglove, Origin, Playback, Served, Terminal};
-use dtof_options::flag;
-use dtof_options::keys::POSITIVE;
-use dtof_options::numbers::{integer, laser_hz};
 
 use super::device_options::DeviceOptions;
 

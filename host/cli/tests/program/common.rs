@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Output};
 use std::time::Duration;
 
-use dtof_photons::npy;
+use dtof_data::photons::npy;
 use tempfile::TempDir;
 
 /// The cells of each row of a table, `a | b | c`. A cell may hold `\n` for a line end.

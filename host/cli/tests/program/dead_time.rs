@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::PathBuf;
 
-use dtof_photons::source::PhotonSource;
+use dtof_data::photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 use serde_json::Value;
 

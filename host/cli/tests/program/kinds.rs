@@ -25,7 +25,7 @@ use std::path::Path;
 use std::process::Command;
 use std::sync::Mutex;
 
-use dtof_photons::MM_PER_PS;
+use dtof_data::photons::MM_PER_PS;
 use dtof_theory::counts::dead_time::arrived;
 use rand_core::SeedableRng;
 use rand_pcg::Pcg64;

@@ -5,8 +5,8 @@ use std::collections::BTreeMap;
 
 use crate::common::{Scratch, assert_contains, npy, succeeded};
 use dtof_core::{Array, PixelAddress};
-use dtof_photons::MM_PER_PS;
-use dtof_photons::geometry::{FieldOfView, Rays};
+use dtof_data::photons::MM_PER_PS;
+use dtof_data::photons::geometry::{FieldOfView, Rays};
 use rand_distr::{Distribution, Poisson};
 
 const PIXELS: usize = 64;

@@ -9,7 +9,7 @@ mod motion;
 mod other_lidar;
 mod plain;
 
-use dtof_photons::source::PhotonSource;
+use dtof_data::photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 
 /// Standard deviations on either side of the mean that leave out 0.1 % of a normal distribution.

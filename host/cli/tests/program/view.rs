@@ -24,8 +24,8 @@ use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use dtof::complain;
+use dtof_data::options::flag;
 use dtof_live::{Feed, Folder, Foxglove, Hub, Served, Terminal};
-use dtof_options::flag;
 
 /// A page that is served in this process until it is dropped.
 pub struct Live {

@@ -14,10 +14,10 @@ use dtof_compare::method::{Kind, Method, Rule};
 use dtof_compare::stress::{Light, Stress, Stressed};
 use dtof_compare::thresholds::Thresholds;
 use dtof_core::fixed::types::U8F8;
+use dtof_data::photons::source::PhotonSource;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_engine::settings::SettingsFile;
-use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 use dtof_theory::bounds::likelihood_ratio::information;
 

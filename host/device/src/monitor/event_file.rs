@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use anyhow::{Context, Result, ensure};
 use tempfile::NamedTempFile;
 
-use dtof_events::aer_file::{Event, Header, Writer};
-use dtof_options::files::{destination, flush_to_disk, temporary_file};
+use dtof_data::events::aer_file::{Event, Header, Writer};
+use dtof_data::options::files::{destination, flush_to_disk, temporary_file};
 
 /// An AER file that is being written. It has a temporary name until [`EventFile::finish`] moves it
 /// to its place. If it cannot be moved, the temporary file stays.

@@ -3,7 +3,7 @@ use proptest::prelude::*;
 use super::*;
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{Count, Count10, EchoNumber, PaperRule, RangeGate, WindowRule};
-use dtof_photons::source::Photon;
+use dtof_data::photons::source::Photon;
 
 /// The pixel laser cycle by laser cycle, as hardware would.
 fn one_by_one(

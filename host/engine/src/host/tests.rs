@@ -3,15 +3,15 @@ use dtof_core::{
     AnyRule, AverageRule, BlockLevel, Count, DetectionRule, EchoNumber, Neighbours, PaperRule,
     WindowRule,
 };
+use dtof_data::photons::source::{Photon, PixelPhotons};
 use dtof_link::AdaptiveBinning;
-use dtof_photons::source::{Photon, PixelPhotons};
 use proptest::collection::vec;
 use proptest::option;
 use proptest::prelude::*;
 
 use super::*;
 use dtof_core::{DepthEvent, Statistics};
-use dtof_photons::source::Slice;
+use dtof_data::photons::source::Slice;
 
 const ARRAY: Array = Array::new(5, 4).unwrap();
 const BINS: u16 = 16;

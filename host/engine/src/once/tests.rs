@@ -1,7 +1,7 @@
 use dtof_core::{Count24, WindowRule};
-use dtof_photons::histograms::Histograms;
-use dtof_photons::pixel_counts::RecordedCounts;
-use dtof_photons::source::{Photon, PixelPhotons};
+use dtof_data::photons::histograms::Histograms;
+use dtof_data::photons::pixel_counts::RecordedCounts;
+use dtof_data::photons::source::{Photon, PixelPhotons};
 use proptest::prelude::*;
 use rand_distr::{Distribution, Poisson, Uniform};
 

@@ -15,9 +15,11 @@ use serde::ser::{Error as _, Serializer};
 
 use super::engine::{Settings, no_gate};
 use super::sections::decimal;
-use dtof_options::keys::{Kind, Reader, above_zero, boolean, choice, fixed, integer, named};
-use dtof_options::numbers::{self, shortest};
-use dtof_options::{Refused, named_values, options};
+use dtof_data::named_values;
+use dtof_data::option_table;
+use dtof_data::options::Refused;
+use dtof_data::options::keys::{Kind, Reader, above_zero, boolean, choice, fixed, integer, named};
+use dtof_data::options::numbers::{self, shortest};
 
 named_values! {
     /// The rules.
@@ -48,7 +50,7 @@ named_values! {
 /// Shares of exposures without a target that end with an event.
 pub const FALSE_ALARM: Reader<f64> = above_zero(0.1);
 
-options! {
+option_table! {
     /// Everything that is left out has a default. `x`, `l1` and `l2` are the paper's names of the interval
     /// between looks, and of the shortest and the longest exposure. A look is one check whether a pixel has
     /// an event.

@@ -11,9 +11,9 @@ use dtof_core::{
 pub use dtof_link::AdaptiveBinning;
 use dtof_link::{Configuration, Refusal, Source};
 
-use dtof_options::Refused;
-use dtof_photons::ranges::{Ranges, RangesError};
-use dtof_photons::source::PhotonSource;
+use dtof_data::options::Refused;
+use dtof_data::photons::ranges::{Ranges, RangesError};
+use dtof_data::photons::source::PhotonSource;
 
 /// The default of L2 in laser cycles.
 pub const DEFAULT_L2: u16 = Configuration::DEFAULT.l2;

@@ -9,10 +9,10 @@ use serde::Serialize;
 use toml::{Table, Value};
 
 use super::{DetectionSettings, RaySettings, RunSettings, SensorSettings};
-use dtof_options::files::read_text;
-use dtof_options::keys::{Key, Kind};
-use dtof_options::numbers::boolean;
-use dtof_options::{KeysOfFile, NO_OPTION, Refused};
+use dtof_data::options::files::read_text;
+use dtof_data::options::keys::{Key, Kind};
+use dtof_data::options::numbers::boolean;
+use dtof_data::options::{KeysOfFile, NO_OPTION, Refused};
 
 /// The first line of every file that this program writes.
 pub const MARK: &str = "# dtof settings";
@@ -74,7 +74,7 @@ impl SettingsFile {
                 let keys = sections.chain(keys).chain([&**key]);
                 let keys = keys.map(str::to_owned).collect();
                 let path = path.to_owned();
-                dtof_options::add_file_name(error, Some(&KeysOfFile { path, keys }))
+                dtof_data::options::add_file_name(error, Some(&KeysOfFile { path, keys }))
             }
             _ => error.context(name()),
         })?;
@@ -240,7 +240,7 @@ impl SettingsFile {
     /// Adds the name of the file to `error`, if the file set the key it is about.
     #[must_use]
     pub fn add_file_name(&self, error: Error) -> Error {
-        dtof_options::add_file_name(error, self.file.as_ref())
+        dtof_data::options::add_file_name(error, self.file.as_ref())
     }
 
     /// These settings for pixels with looks: without `decide_once`, and without the z of a single decision.

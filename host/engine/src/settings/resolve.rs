@@ -6,7 +6,7 @@ use dtof_link::{Configuration, Source};
 
 use super::engine::{Settings, echo_guard_bins};
 use super::{RuleName, RunSettings, SensorSettings, SettingsFile};
-use dtof_options::Refused;
+use dtof_data::options::Refused;
 
 impl SettingsFile {
     /// The settings for histograms of `bins` bins.

@@ -2,7 +2,7 @@
 
 use dtof_core::paper::Threshold;
 use dtof_core::{AnyRule, DepthEstimator, EchoNumber};
-use dtof_options::rows::Row;
+use dtof_data::options::rows::Row;
 
 use super::engine::Settings;
 

@@ -11,13 +11,13 @@ use dtof_sensors::dither::Dither;
 use serde::Serialize;
 use serde::ser::{Error as _, Serializer};
 
-use dtof_options::keys::{Kind, POSITIVE, Reader, bins, boolean, fixed, integer, real};
-use dtof_options::numbers::{self, MAX_INTEGER, MAX_LASER_HZ, list, shortest};
-use dtof_options::options;
-use dtof_photons::axes::Axes;
-use dtof_photons::geometry::{FieldOfView, Rays, angles};
+use dtof_data::option_table;
+use dtof_data::options::keys::{Kind, POSITIVE, Reader, bins, boolean, fixed, integer, real};
+use dtof_data::options::numbers::{self, MAX_INTEGER, MAX_LASER_HZ, list, shortest};
+use dtof_data::photons::axes::Axes;
+use dtof_data::photons::geometry::{FieldOfView, Rays, angles};
 
-options! {
+option_table! {
     /// `[sensor]`: what is known of a sensor.
     #[derive(Clone, Debug, Default, PartialEq, Serialize)]
     pub struct SensorSettings {
@@ -157,7 +157,7 @@ fn rates(text: &str) -> Result<Vec<f64>, String> {
     list(text, &[','], |text| RATE.read(text))
 }
 
-options! {
+option_table! {
     /// `[rays]`: where pixels look.
     #[derive(Clone, Debug, Default, PartialEq, Serialize)]
     pub struct RaySettings {
@@ -214,7 +214,7 @@ impl RaySettings {
     }
 }
 
-options! {
+option_table! {
     /// `[run]`: what is replayed or simulated.
     #[derive(Clone, Debug, Default, PartialEq, Serialize)]
     pub struct RunSettings {

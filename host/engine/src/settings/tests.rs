@@ -11,7 +11,7 @@ use dtof_core::{Count, WindowRule};
 
 use super::file::{SECTIONS, key_of};
 use super::{Settings, SettingsFile};
-use dtof_options::keys::Key;
+use dtof_data::options::keys::Key;
 
 /// Every setting of pixels that decide alone with the window rule.
 const ALL: &str = "bin_width_ps = 92.1; offset_mm = -179.5; offsets_mm = [1.5, -78.04, 0.0]; gate = [12, 119];

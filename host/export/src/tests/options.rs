@@ -87,7 +87,7 @@ fn what_points_and_times_rest_on_is_said() {
 fn options_come_before_those_of_a_settings_file() {
     let file = "[sensor]\nlaser_hz = 5000\n[rays]\nfield_of_view_degrees = [50, 40]\n";
     let with_file = |given: &[(&str, &str)], file: &str| {
-        let given: ProjectionOptions = dtof_options::read(given.iter().copied()).unwrap();
+        let given: ProjectionOptions = dtof_data::options::read(given.iter().copied()).unwrap();
         let file = SettingsFile::parse_as(Path::new("own.toml"), file).unwrap();
         let options = given.options(file).unwrap();
         assert_eq!(options.settings.as_deref(), Some(Path::new("own.toml")));
@@ -146,7 +146,8 @@ fn options_that_cannot_be_are_refused() {
             "field_of_view_degrees cannot be used with calibration",
         ),
     ] {
-        let read: Result<ProjectionOptions, Refused> = dtof_options::read(given.iter().copied());
+        let read: Result<ProjectionOptions, Refused> =
+            dtof_data::options::read(given.iter().copied());
         assert_eq!(read.unwrap_err().to_string(), expected);
     }
 }

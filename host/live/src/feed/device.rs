@@ -7,9 +7,9 @@ use anyhow::{Result, anyhow};
 
 use super::session::{Session, with_restart_hint};
 use super::{Command, Device, FeedContext, PageRequest, reply};
+use dtof_data::options::Refused;
 use dtof_device::{Client, Stopped};
 use dtof_link::Refusal;
-use dtof_options::Refused;
 
 /// Interval of attempts to reach a device that is gone.
 const AGAIN: Duration = Duration::from_secs(1);
@@ -69,7 +69,7 @@ impl Device {
             };
             // The page shows keys, the terminal flags.
             reason = text(format!("{ended:#}"));
-            let on_terminal = text(dtof_options::line(&ended, &context.terminal.name));
+            let on_terminal = text(dtof_data::options::line(&ended, &context.terminal.name));
             context.hub.set_connection(state, &reason);
             if printed != on_terminal {
                 context.complain(&on_terminal);

@@ -9,8 +9,8 @@ use anyhow::{Context, Result, anyhow, ensure};
 
 use super::{Command, FeedContext, reply};
 use crate::hub::Playhead;
-use dtof_events::aer_file::{self, Event, Header, Reader};
-use dtof_events::clock::LaserClock;
+use dtof_data::events::aer_file::{self, Event, Header, Reader};
+use dtof_data::events::clock::LaserClock;
 
 /// Interval of batches.
 const EVERY: Duration = Duration::from_millis(20);

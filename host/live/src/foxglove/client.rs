@@ -20,7 +20,7 @@ use super::App;
 use super::frames::Frame;
 use super::protocol::{self, ClientMessage, NAMES, Severity, Subscription};
 use super::topics::Topic;
-use dtof_options::rows::{grouped, printable};
+use dtof_data::options::rows::{grouped, printable};
 
 /// Longest handshake.
 const HANDSHAKE: Duration = Duration::from_secs(5);

@@ -10,11 +10,11 @@ use anyhow::Result;
 
 use super::topics::{LossesMessage, Topic, named};
 use crate::hub::{Hub, Snapshot};
-use dtof_events::aer_file::{Event, EventKind};
+use dtof_data::events::aer_file::{Event, EventKind};
+use dtof_data::photons::ranges::Ranges;
 use dtof_export::foxglove::{Time, cloud};
 use dtof_export::points::record;
 use dtof_export::projection::Projection;
-use dtof_photons::ranges::Ranges;
 use images::Images;
 use log::StatusLog;
 use timing::Timing;

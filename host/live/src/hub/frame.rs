@@ -11,10 +11,10 @@ use serde_json::json;
 use super::pages::{Page, Waiting};
 use super::pixels::PixelState;
 use super::{Kind, State};
+use dtof_data::events::aer_file::Event;
 use dtof_device::PixelHistogram;
 use dtof_engine::explain::Explanation;
 use dtof_engine::settings::SensorSettings;
-use dtof_events::aer_file::Event;
 
 /// Most pixels in a frame. The others follow in the next.
 pub const MOST_PIXELS: usize = 4096;

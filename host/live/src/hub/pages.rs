@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use dtof_core::{Array, PixelAddress};
 
-use dtof_events::aer_file::Event;
+use dtof_data::events::aer_file::Event;
 
 /// Most pages that are open at a time.
 pub const MOST_PAGES: usize = 16;

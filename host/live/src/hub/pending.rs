@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use dtof_events::aer_file::Event;
+use dtof_data::events::aer_file::Event;
 use dtof_export::foxglove::{MOST_POINTS, Tally};
 
 /// Events since the last [`PendingEvents::take`].

@@ -2,8 +2,8 @@
 
 use dtof_core::{Array, EchoNumber};
 
-use dtof_events::aer_file::Event;
-use dtof_events::last_events::LastEvents;
+use dtof_data::events::aer_file::Event;
+use dtof_data::events::last_events::LastEvents;
 
 /// The running mean of the signal covers about so many events.
 const MEAN_OF: f32 = 8.0;

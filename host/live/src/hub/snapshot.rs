@@ -3,10 +3,10 @@
 use super::pending::PendingEvents;
 use super::pixels::PixelState;
 use super::{Connection, Hub, Losses};
+use dtof_data::events::aer_file::{Event, Header};
+use dtof_data::photons::ranges::Ranges;
 use dtof_engine::settings::RaySettings;
-use dtof_events::aer_file::{Event, Header};
 use dtof_export::foxglove::Statistics;
-use dtof_photons::ranges::Ranges;
 
 /// The current state.
 pub struct Snapshot {

@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use serde_json::Value;
 
 use super::*;
-use dtof_events::fixtures;
+use dtof_data::events::fixtures;
 
 const PIXELS: u16 = 10_000;
 

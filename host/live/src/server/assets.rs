@@ -55,8 +55,8 @@ mod tests {
     use std::fmt::Display;
     use std::{env, fs};
 
+    use dtof_data::options::keys::{Key, Kind};
     use dtof_engine::settings::{DetectionSettings, SensorSettings};
-    use dtof_options::keys::{Key, Kind};
 
     /// The input of a key: names, or what a field for a number needs; that of one element if it is a list.
     fn input(key: &Key) -> Option<String> {

@@ -16,7 +16,7 @@ use super::assets;
 use crate::feed::{Command, PageRequest};
 use crate::guard;
 use crate::hub::Hub;
-use dtof_options::rows::printable;
+use dtof_data::options::rows::printable;
 
 /// Most bytes of a body.
 const BODY: usize = 64 * 1024;

@@ -1,11 +1,11 @@
 use super::*;
 use dtof_core::BinIndex;
 use dtof_core::rule::ExcludedBins;
+use dtof_data::photons::source::PhotonSource;
 use dtof_engine::decisions::{Decision, KeptPixels};
 use dtof_engine::explain::explain_decisions;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_photons::source::PhotonSource;
 use dtof_simulate::demo;
 
 /// Runs the demo: its last decisions, the data for the script in at most `room` bytes, and their size.

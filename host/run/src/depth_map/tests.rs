@@ -1,5 +1,5 @@
 use dtof_core::Array;
-use dtof_photons::source::{Photon, PixelPhotons};
+use dtof_data::photons::source::{Photon, PixelPhotons};
 use dtof_theory::random::pixel_rng;
 use proptest::prelude::*;
 use rand_distr::{Distribution, Poisson};

@@ -56,7 +56,7 @@ fn bin(position: BinPosition) -> u16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_events::fixtures::event;
+    use dtof_data::events::fixtures::event;
 
     #[test]
     fn the_age_is_that_of_the_surface() {

@@ -10,12 +10,12 @@ use dtof_draw::chart::{Axis, Chart, Key, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{Colour, Mark, Pen};
 use dtof_link::DynamicDepth;
 
-use dtof_events::dynamic::DepthChanges;
-use dtof_events::echoes::Echo;
-use dtof_events::sample::Sample;
-use dtof_options::Refused;
-use dtof_options::rows::grouped;
-use dtof_photons::ranges::Ranges;
+use dtof_data::events::dynamic::DepthChanges;
+use dtof_data::events::echoes::Echo;
+use dtof_data::events::sample::Sample;
+use dtof_data::options::Refused;
+use dtof_data::options::rows::grouped;
+use dtof_data::photons::ranges::Ranges;
 
 /// The most changes of one direction that are drawn.
 const MAX_DRAWN: usize = 4096;
@@ -136,7 +136,7 @@ fn thousands(cycles: u64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_events::fixtures::{event, ranges};
+    use dtof_data::events::fixtures::{event, ranges};
 
     /// A pixel that sees bin 40, then bin 10 from laser cycle 1000 on, then 40 again; one that
     /// stays.

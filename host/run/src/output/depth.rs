@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use crate::depth_map::DepthMap;
 use dtof_core::Array;
-use dtof_photons::npy;
+use dtof_data::photons::npy;
 
 /// Millimetres of each pixel: 64-bit floats, rows by columns; not a number without a surface.
 pub const ARRAY: &str = "depth.npy";

@@ -3,8 +3,8 @@
 use anyhow::Result;
 
 use crate::depth_map::DepthMap;
+use dtof_data::events::histories::{PixelHistories, PixelHistory};
 use dtof_draw::picture::{Map, heat_map};
-use dtof_events::histories::{PixelHistories, PixelHistory};
 
 /// The depth, decided on all photons.
 pub const DEPTH: &str = "depth.svg";

@@ -1,7 +1,7 @@
 //! The average rule.
 
 use anyhow::Result;
-use dtof_options::numbers::shortest;
+use dtof_data::options::numbers::shortest;
 use dtof_theory::progress::Progress;
 use dtof_theory::tune::{Request, average};
 

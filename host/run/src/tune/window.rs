@@ -2,8 +2,8 @@
 
 use anyhow::{Result, ensure};
 use dtof_core::{CentredWindow, DepthEstimator};
-use dtof_options::Refused;
-use dtof_options::numbers::shortest;
+use dtof_data::options::Refused;
+use dtof_data::options::numbers::shortest;
 use dtof_theory::progress::Progress;
 use dtof_theory::tune::{Request, window};
 

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use serde::Deserialize;
 
 use super::limits::{LONGEST_PS, SHARE_OF_AFTERPULSES, Timing};
-use dtof_photons::range::within;
+use dtof_data::photons::range::within;
 
 /// Every avalanche has an afterpulse with this probability p, and so does an afterpulse: p / (1 -
 /// p) a photon in all. It comes after the SPAD has recharged.

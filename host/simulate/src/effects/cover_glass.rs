@@ -7,7 +7,7 @@ use rand_distr::{Distribution, Normal, Poisson};
 use rand_pcg::Pcg64;
 use serde::Deserialize;
 
-use dtof_photons::range::within;
+use dtof_data::photons::range::within;
 
 /// A second pulse of the same shape.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

@@ -8,7 +8,7 @@ use anyhow::Result;
 use serde::Deserialize;
 
 use super::limits::{LONGEST_PS, Timing};
-use dtof_photons::range::within;
+use dtof_data::photons::range::within;
 
 /// The dead time.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

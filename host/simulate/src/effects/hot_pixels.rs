@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 use serde::Deserialize;
 
 use super::limits::SHARE;
-use dtof_photons::range::within;
+use dtof_data::photons::range::within;
 
 /// Some pixels have a multiple of the background of the others.
 #[derive(Clone, Debug, PartialEq, Deserialize)]

@@ -6,7 +6,7 @@ use rand_pcg::Pcg64;
 use serde::Deserialize;
 
 use super::limits::{LONGEST_PS, Timing};
-use dtof_photons::range::within;
+use dtof_data::photons::range::within;
 
 /// Every time is measured with a normally distributed error; its variance adds
 /// to that of the pulse.

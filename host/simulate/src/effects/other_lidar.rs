@@ -9,7 +9,7 @@ use serde::Deserialize;
 
 use super::limits::Timing;
 use crate::stream::Stream;
-use dtof_photons::range::within;
+use dtof_data::photons::range::within;
 
 /// Standard deviations by which a photon is surely nearer to the place of its pulse.
 const REACH: f64 = 8.0;

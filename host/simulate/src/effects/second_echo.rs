@@ -6,8 +6,8 @@ use rand_pcg::Pcg64;
 use serde::Deserialize;
 
 use super::limits::{SHARE, Timing};
-use dtof_photons::MM_PER_PS;
-use dtof_photons::range::within;
+use dtof_data::photons::MM_PER_PS;
+use dtof_data::photons::range::within;
 
 /// A share of the signal photons comes from a surface behind the one a pixel
 /// sees.

@@ -7,7 +7,7 @@ use rand_pcg::Pcg64;
 use serde::Deserialize;
 
 use super::limits::SHARE;
-use dtof_photons::range::within;
+use dtof_data::photons::range::within;
 
 /// A share of the laser's photons is late by an exponentially distributed time. The mean position
 /// moves by `share * decay_bins`.

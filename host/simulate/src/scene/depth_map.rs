@@ -8,8 +8,8 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 
 use super::LineOfSight;
-use dtof_options::named_values;
-use dtof_photons::npy::numbers::{self, ElementKind, Numbers};
+use dtof_data::named_values;
+use dtof_data::photons::npy::numbers::{self, ElementKind, Numbers};
 
 /// The highest reflectivity of a sample, as of other surfaces.
 const MOST_REFLECTIVITY: f64 = 100.0;

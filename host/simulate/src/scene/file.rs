@@ -17,13 +17,13 @@ use crate::effects::other_lidar::OtherLidar;
 use crate::effects::second_echo::SecondEcho;
 use crate::effects::tail::Tail;
 use crate::effects::tdc::Tdc;
-use dtof_options::Refused;
-use dtof_options::files::read_text;
-use dtof_options::numbers::bins_of;
-use dtof_options::rows::printable;
-use dtof_photons::MM_PER_PS;
-use dtof_photons::geometry::FieldOfView;
-use dtof_photons::range::within;
+use dtof_data::options::Refused;
+use dtof_data::options::files::read_text;
+use dtof_data::options::numbers::bins_of;
+use dtof_data::options::rows::printable;
+use dtof_data::photons::MM_PER_PS;
+use dtof_data::photons::geometry::FieldOfView;
+use dtof_data::photons::range::within;
 use dtof_sensors::dither::Dither;
 
 #[derive(Deserialize)]

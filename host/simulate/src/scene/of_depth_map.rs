@@ -5,7 +5,7 @@ use anyhow::{Result, ensure};
 use super::Scene;
 use super::depth_map::DepthMap;
 use super::surface::{Brightness, Shape, Surface};
-use dtof_photons::geometry::FieldOfView;
+use dtof_data::photons::geometry::FieldOfView;
 
 /// Its name in reports.
 const NAME: &str = "depth map";

@@ -5,9 +5,9 @@ use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict};
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally};
 use anyhow::Result;
 use dtof_core::paper::ComparatorTree;
+use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::NEUTRAL;
-use dtof_options::rows::grouped;
 use dtof_theory::known_background;
 use rand_pcg::Pcg64;
 

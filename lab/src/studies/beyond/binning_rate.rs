@@ -147,7 +147,7 @@ fn results(part: &Part) -> Result<Results> {
         values: [
             ("least", format!("{least:.2}")),
             ("most", format!("{most:.2}")),
-            ("fewest", dtof_options::rows::grouped(fewest)),
+            ("fewest", dtof_data::options::rows::grouped(fewest)),
         ]
         .into(),
         tables: vec![("results/data/binning_rate.csv", csv)],

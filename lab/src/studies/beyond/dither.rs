@@ -9,10 +9,10 @@ use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, Point, Study, Tally, point, whole};
 use anyhow::Result;
 use dtof_core::{LaserCycle, Look, OncePerBin, Statistics};
+use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{Pen, REFERENCE, STEPS};
 use dtof_engine::settings::DITHER_BINS;
-use dtof_options::rows::grouped;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 

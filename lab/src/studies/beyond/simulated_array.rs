@@ -3,11 +3,11 @@
 use super::setting::{BINS, X};
 use anyhow::Result;
 use dtof_core::{Array, DepthEvent, PixelAddress};
+use dtof_data::events::last_events::LastEvents;
+use dtof_data::photons::source::{Photon, PixelPhotons, Slice};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_events::last_events::LastEvents;
-use dtof_photons::source::{Photon, PixelPhotons, Slice};
 use dtof_theory::rates::Rates;
 use rand_core::Rng;
 use rand_distr::{Distribution, Normal, Poisson};

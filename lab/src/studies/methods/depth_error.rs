@@ -11,9 +11,9 @@ use dtof_core::{
     BinPosition, Count, Count10, DepthEstimator, DetectionRule, Histogram, Peak, RangeGate,
     SubBinOffset, WindowRule,
 };
+use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{self, Pen};
-use dtof_options::rows::grouped;
 use dtof_theory::bounds::cramer_rao::Pulse;
 use dtof_theory::looks::exposure::{Exposures, Looks};
 use dtof_theory::rates::Rates;

@@ -21,8 +21,8 @@ use self::observed_pixel::{ObservedPixel, true_steps};
 use super::systems::{Background, FPGA_SIGMAS, L1, PC_SIGMA, System};
 use crate::sweep::mean::add;
 use crate::sweep::{Point, Study, Tally, grid, point};
+use dtof_data::photons::source::PhotonSource;
 use dtof_engine::host::host_engine;
-use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::{Brightness, Scene, Shape};
 
 /// Laser cycles handled at a time.

@@ -21,8 +21,8 @@ use super::ranks::rank_correlation;
 use super::systems::{self, Background, FPGA_SIGMAS, PC, PC_SIGMA, System};
 use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::{Point, Study, Tally, Trial, point};
+use dtof_data::photons::source::PhotonSource;
 use dtof_engine::host::host_engine;
-use dtof_photons::source::PhotonSource;
 use dtof_simulate::scene::{Brightness, Scene};
 
 const CYCLES: u64 = 10_000;

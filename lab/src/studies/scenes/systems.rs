@@ -22,8 +22,8 @@ use crate::sweep::Point;
 use anyhow::Result;
 use dtof_core::fixed::types::{U8F8, U16F16};
 use dtof_core::{AnyRule, AverageRule, Count, PaperRule};
+use dtof_data::photons::MM_PER_PS;
 use dtof_engine::settings::Settings;
-use dtof_photons::MM_PER_PS;
 use dtof_simulate::scene::Scene;
 
 /// Standard deviation of the PC's pulse in bins.

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::U8F8;
-use dtof_photons::tmf8820;
+use dtof_data::photons::tmf8820;
 
 use super::scene::{Bins, Events, Pixels, Recorded, Scene, config};
 

@@ -5,8 +5,8 @@ use std::process::Stdio;
 
 use crate::common::aer::{HEADER, events, file};
 use crate::common::{Scratch, assert_contains, names};
+use dtof_data::photons::open::{ReadOptions, open};
 use dtof_engine::settings::Settings;
-use dtof_photons::open::{ReadOptions, open};
 use dtof_run::output::Output;
 use dtof_run::summary::Summary;
 

@@ -3,8 +3,8 @@
 
 use anyhow::{Result, anyhow};
 use dtof_core::{Array, Count10};
+use dtof_data::options::Refused;
 use dtof_engine::settings::SettingsFile;
-use dtof_options::Refused;
 use dtof_run::replay::Options;
 
 use crate::common::Scratch;
@@ -156,7 +156,7 @@ fn a_mistake_is_one_error_however_it_is_made() {
         let mut of_file = of_file.unwrap_err().downcast::<Refused>().unwrap();
         // A key is unknown in its section.
         of_file.reason = of_file.reason.replace(&format!(" in [{section}]"), "");
-        let of_keywords = dtof_options::read::<Options>(mistake.keywords.iter().copied());
+        let of_keywords = dtof_data::options::read::<Options>(mistake.keywords.iter().copied());
         let of_keywords = of_keywords
             .map_err(anyhow::Error::from)
             .and_then(|options| checked(&options.requested()?));

@@ -6,8 +6,8 @@ use dtof_core::{
     Array, BinIndex, BinPosition, BlockLevel, Count, DepthEvent, EchoNumber, Flags, LaserCycle,
     PixelAddress, SubBinOffset,
 };
-use dtof_events::aer_file::{Event, Header};
-use dtof_events::fixtures::aer_file;
+use dtof_data::events::aer_file::{Event, Header};
+use dtof_data::events::fixtures::aer_file;
 
 /// 64 columns, 32 rows, 128 bins of 250 ps.
 pub const HEADER: Header = Header {

@@ -1,7 +1,7 @@
 //! The photons of a simulated sensor, for engines on this computer.
 
 use dtof_core::PixelAddress;
-use dtof_photons::source::{Photon, PixelPhotons, Slice};
+use dtof_data::photons::source::{Photon, PixelPhotons, Slice};
 use dtof_sensors::PhotonSink;
 
 /// The photons of each pixel, from laser cycle 0 of a slice on.

@@ -17,7 +17,7 @@ use crate::device::recording::recorded;
 use crate::device::wire::{Tap, Wire};
 use dtof_core::fixed::types::{U0F32, U8F24};
 use dtof_core::{DepthEvent, PixelAddress};
-use dtof_events::aer_file::Event;
+use dtof_data::events::aer_file::Event;
 use dtof_firmware::sidecar::{Block, Pixel, Sidecar};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_sensors::Sensor;

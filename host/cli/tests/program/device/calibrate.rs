@@ -12,9 +12,9 @@ use crate::device::wall_sensor::{
 };
 use crate::device::{client, settings};
 use dtof_core::fixed::types::U16F16;
+use dtof_data::photons::MM_PER_PS;
 use dtof_device::HostTimeout;
 use dtof_device::histograms::{Collected, SoFar, collect};
-use dtof_photons::MM_PER_PS;
 
 fn number(toml: &str, key: &str) -> f64 {
     let line = toml

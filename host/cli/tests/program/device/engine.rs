@@ -12,13 +12,13 @@ use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::{
     Array, BlockLevel, Count, DepthEvent, EchoNumber, Flags, Neighbours, PixelAddress, WindowRule,
 };
+use dtof_data::photons::source::PhotonSource;
 use dtof_device::{Client, DeviceEngine};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::AdaptiveBinning;
-use dtof_photons::source::PhotonSource;
 use dtof_simulate::demo;
 use dtof_simulate::effects::tdc::Tdc;
 

@@ -2,7 +2,7 @@
 
 use crate::common::aer::{HEADER, depth, dynamic, events, file};
 use crate::common::{Scratch, names};
-use dtof_events::aer_file::Event;
+use dtof_data::events::aer_file::Event;
 
 #[test]
 fn the_program_says_what_is_damaged_and_fails() {

@@ -7,7 +7,7 @@ use std::process::Stdio;
 
 use crate::common::aer::{HEADER, depth};
 use crate::common::{Scratch, peak_kb};
-use dtof_events::aer_file::Writer;
+use dtof_data::events::aer_file::Writer;
 
 const FORMATS: [&str; 6] = ["csv", "csv --echo strongest", "pcd", "ply", "mcap", "evt2"];
 

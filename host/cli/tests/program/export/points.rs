@@ -5,8 +5,8 @@ use std::fs;
 use crate::common::aer::{HEADER, depth, depth_event, dynamic, events, file};
 use crate::common::{Scratch, assert_contains, table};
 use dtof_core::{Array, BlockLevel, DepthEvent, EchoNumber, PixelAddress};
-use dtof_events::aer_file::Event;
-use dtof_photons::geometry::Rays;
+use dtof_data::events::aer_file::Event;
+use dtof_data::photons::geometry::Rays;
 
 #[test]
 fn csv_has_time_and_point_before_the_columns_of_decode() {

@@ -2,7 +2,7 @@
 
 use crate::common::Scratch;
 use crate::common::aer::{HEADER, depth, file};
-use dtof_events::aer_file::Header;
+use dtof_data::events::aer_file::Header;
 
 const EXPORT: &str = "export events.aer --format csv --out x.csv";
 

@@ -9,7 +9,7 @@ use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 
 use crate::common::{Scratch, assert_contains, npy, succeeded};
-use dtof_photons::npy::header;
+use dtof_data::photons::npy::header;
 
 fn array(name: &str) -> PathBuf {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/program/replay/numpy");

@@ -5,7 +5,7 @@ use std::fs::File;
 use std::process::Stdio;
 use std::time::{Duration, Instant};
 
-use dtof_photons::npy::header;
+use dtof_data::photons::npy::header;
 
 use crate::common::{Scratch, assert_contains, names, npy, table};
 

@@ -11,8 +11,8 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::Instant;
 
-use dtof_options::rows::grouped;
-use dtof_photons::npy::header;
+use dtof_data::options::rows::grouped;
+use dtof_data::photons::npy::header;
 
 use crate::common::{Scratch, npy, peak_kb};
 

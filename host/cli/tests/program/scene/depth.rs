@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dtof_core::PixelAddress;
-use dtof_photons::geometry::FieldOfView;
+use dtof_data::photons::geometry::FieldOfView;
 use dtof_simulate::scene::{DepthAlong, DepthMap, Scene};
 use proptest::prelude::*;
 

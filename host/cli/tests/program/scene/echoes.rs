@@ -40,7 +40,7 @@ fn maps_show_the_echo_that_is_asked_for_and_files_hold_all() {
         &report,
         &format!(
             "All {} events are shown.",
-            dtof_options::rows::grouped(events.len() as u64)
+            dtof_data::options::rows::grouped(events.len() as u64)
         ),
     );
     let (of_first, first, same) = shown("--echo first");
@@ -54,7 +54,7 @@ fn maps_show_the_echo_that_is_asked_for_and_files_hold_all() {
     assert!(exposures < events.len());
     let shown = format!(
         "All {} events are shown.",
-        dtof_options::rows::grouped(exposures as u64)
+        dtof_data::options::rows::grouped(exposures as u64)
     );
     assert_contains(&of_first, &shown);
     assert!(

@@ -1,7 +1,7 @@
 //! Events of a simulated scene against what its pixels saw.
 
 use crate::common::{Scratch, assert_contains};
-use dtof_options::rows::grouped;
+use dtof_data::options::rows::grouped;
 
 /// The printed line with `name`.
 #[track_caller]

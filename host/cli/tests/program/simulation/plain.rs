@@ -2,7 +2,7 @@
 //! nothing.
 
 use dtof_core::PixelAddress;
-use dtof_photons::source::PhotonSource;
+use dtof_data::photons::source::PhotonSource;
 use dtof_simulate::scene::Scene;
 use dtof_theory::random::pixel_rng;
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, Uniform};

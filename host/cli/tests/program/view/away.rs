@@ -8,7 +8,7 @@ use crate::common::{Scratch, assert_contains, names};
 use crate::view::device::{feed, plugged};
 use crate::view::http::{Stream, post};
 use crate::view::{Live, until};
-use dtof_events::aer_file::Reader;
+use dtof_data::events::aer_file::Reader;
 
 #[test]
 fn a_device_that_is_unplugged_comes_back_and_so_does_the_recording() {

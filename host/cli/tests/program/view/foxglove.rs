@@ -9,7 +9,7 @@ mod sent;
 use crate::common::Scratch;
 use crate::common::aer::{HEADER, depth, file};
 use client::Data;
-use dtof_events::aer_file::{Event, Header};
+use dtof_data::events::aer_file::{Event, Header};
 use dtof_live::{Feed, Playback};
 use protobuf::field;
 

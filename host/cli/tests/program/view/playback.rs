@@ -6,7 +6,7 @@ use crate::common::aer::{HEADER, depth, file};
 use crate::common::{Scratch, assert_contains};
 use crate::view::Live;
 use crate::view::http::{Stream, post};
-use dtof_events::aer_file::{Header, Reader};
+use dtof_data::events::aer_file::{Header, Reader};
 use dtof_live::{Feed, Playback};
 
 /// Ten events in a second: one laser cycle a millisecond.

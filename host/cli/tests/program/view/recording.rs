@@ -7,8 +7,8 @@ use std::time::{SystemTime, UNIX_EPOCH};
 use crate::common::{Scratch, assert_contains, names};
 use crate::view::http::{Stream, post};
 use crate::view::{Live, fast};
-use dtof_events::aer_file::Reader;
-use dtof_options::rows::grouped;
+use dtof_data::events::aer_file::Reader;
+use dtof_data::options::rows::grouped;
 
 fn now_us() -> i64 {
     let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap();

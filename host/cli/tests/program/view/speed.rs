@@ -12,10 +12,10 @@ use crate::view::{Live, device, fast};
 #[cfg(target_os = "linux")]
 use crate::view::{browser::Browser, until};
 #[cfg(target_os = "linux")]
-use dtof_events::aer_file::Reader;
-use dtof_live::{MOST_EVENTS, MOST_PIXELS};
+use dtof_data::events::aer_file::Reader;
 #[cfg(target_os = "linux")]
-use dtof_options::rows::grouped;
+use dtof_data::options::rows::grouped;
+use dtof_live::{MOST_EVENTS, MOST_PIXELS};
 #[cfg(target_os = "linux")]
 use serde_json::Value;
 

@@ -2,7 +2,7 @@
 
 use std::{env, fs};
 
-use dtof_options::{flag, option_name};
+use dtof_data::options::{flag, option_name};
 
 use super::*;
 

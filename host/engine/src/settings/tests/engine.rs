@@ -4,9 +4,9 @@ use dtof_core::{
     AnyRule, Array, BlockLevel, CentredWindow, DepthEstimator, EchoNumber, Neighbours, PixelConfig,
     RangeGate,
 };
-use dtof_photons::histograms::Histograms;
-use dtof_photons::ranges::Ranges;
-use dtof_photons::recorded::{RecordedHistograms, RecordingLength};
+use dtof_data::photons::histograms::Histograms;
+use dtof_data::photons::ranges::Ranges;
+use dtof_data::photons::recorded::{RecordedHistograms, RecordingLength};
 
 use super::*;
 

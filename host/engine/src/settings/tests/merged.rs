@@ -1,6 +1,6 @@
 use std::path::Path;
 
-use dtof_options::{flag, line};
+use dtof_data::options::{flag, line};
 
 use super::*;
 

@@ -3,7 +3,7 @@ use std::fs;
 use std::path::Path;
 
 use dtof_core::Array;
-use dtof_options::{flag, line};
+use dtof_data::options::{flag, line};
 
 use super::*;
 use crate::settings::{MARK, RaySettings, SensorSettings};

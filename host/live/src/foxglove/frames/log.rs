@@ -7,8 +7,8 @@ use foxglove::messages::log::Level;
 use super::Message;
 use crate::foxglove::topics::Topic;
 use crate::hub::{Connection, Snapshot};
+use dtof_data::options::rows::printable;
 use dtof_export::foxglove::{Time, encoded};
-use dtof_options::rows::printable;
 
 /// Writes lines when a state changes.
 #[derive(Default)]

@@ -3,8 +3,8 @@
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use crate::hub::Snapshot;
-use dtof_events::aer_file::Header;
-use dtof_events::clock::LaserClock;
+use dtof_data::events::aer_file::Header;
+use dtof_data::events::clock::LaserClock;
 
 /// Seconds since 1970 that no longer fit into a message.
 const END_S: u64 = 1 << 32;

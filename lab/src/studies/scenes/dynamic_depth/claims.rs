@@ -7,7 +7,7 @@ use crate::sweep::Part;
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Verdict, span};
 use anyhow::{Context, Result};
-use dtof_options::rows::grouped;
+use dtof_data::options::rows::grouped;
 
 /// Changes per event below which a wall counts as silent.
 const SILENT: f64 = 1e-4;

@@ -8,9 +8,9 @@ use crate::sweep::Part;
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use anyhow::Result;
+use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{EVENTS, NEUTRAL, PAPER, STEPS, frames};
-use dtof_options::rows::grouped;
 use std::fmt::Write as _;
 
 pub fn results(part: &Part) -> Result<Results> {

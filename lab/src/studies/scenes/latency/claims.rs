@@ -6,7 +6,7 @@ use crate::sweep::Part;
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Verdict};
 use anyhow::Result;
-use dtof_options::rows::grouped;
+use dtof_data::options::rows::grouped;
 
 /// The paper's latency, in microseconds.
 const PRINTED_US: f64 = 2.4;

@@ -7,7 +7,7 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Verdict, span};
 use crate::sweep::{Part, PointTally};
 use anyhow::Result;
-use dtof_options::rows::grouped;
+use dtof_data::options::rows::grouped;
 
 /// Surfaces of the file.
 const BRIGHTEST: &str = "white board";

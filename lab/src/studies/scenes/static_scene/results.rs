@@ -8,9 +8,9 @@ use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::{Part, PointTally};
 use anyhow::Result;
+use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::STEPS;
-use dtof_options::rows::grouped;
 use std::f64::consts::SQRT_2;
 
 /// A chart over the signal of every surface.

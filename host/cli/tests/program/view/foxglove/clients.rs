@@ -15,7 +15,7 @@ use crate::common::aer::{depth, file};
 use crate::common::{Scratch, assert_contains};
 use crate::view::http::{Stream, post};
 use crate::view::{Live, fast, until};
-use dtof_events::aer_file::{Header, Reader};
+use dtof_data::events::aer_file::{Header, Reader};
 use dtof_live::MOST_CLIENTS;
 
 #[test]
