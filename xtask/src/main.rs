@@ -74,6 +74,7 @@ cargo xtask <command>
   c-bindings [--bless]
                 build bindings/c and its examples, run them here and in QEMU, and compare
                 them with Rust; --bless writes the header and the figures of its README
+  stack FILE... print the most bytes of stack that Cortex-M images can need
   python FILE   install the packages of a requirements file in the build folder and print
                 the path of a Python that has them
   wheel         build the Python package and print the path of its wheel, which installs
@@ -192,6 +193,14 @@ fn run() -> Result<()> {
         }
         ("release", []) => release::release(root)?,
         ("sizes", []) => sizes::print(root)?,
+        ("stack", files) if !files.is_empty() => {
+            for file in files {
+                println!(
+                    "{:>8} {file}",
+                    xtask::stack_bound::of_image(Path::new(file))?
+                );
+            }
+        }
         ("check-image", []) => image::check(root, options.all)?,
         ("self-test", []) if options.bless => self_test::bless(root)?,
         ("self-test", []) => self_test::check(root)?,

@@ -53,7 +53,7 @@ pub fn print(root: &Path) -> Result<()> {
         }
         for (name, path) in sidecars {
             let Sizes { flash, ram } = Sizes::read(&path)?;
-            let stack = stack_bound::of_image(&path)?;
+            let stack = xtask::stack_bound::of_image(&path)?;
             println!("{name:<24} {flash:>8} {ram:>8} {stack:>8}");
             ensure!(
                 stack <= MOST_STACK,

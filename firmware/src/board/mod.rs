@@ -132,7 +132,7 @@ pub fn serve(
 
 /// Runs a sidecar with room for these pixels and blocks without end. Its report tells the host why
 /// the board has started.
-// Once in an image. Out of line LLVM calls a function through a register, which `stack-bound` cannot
+// Once in an image. Out of line LLVM calls a function through a register, which `xtask sizes` cannot
 // follow.
 #[inline(always)]
 pub fn run<B: Board>(

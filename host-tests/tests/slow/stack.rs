@@ -3,7 +3,7 @@
 //! Before `main`, cortex-m-rt paints the stack. The stack is lowest in RAM and grows downwards:
 //! everything above the lowest word that has lost its paint counts as used. Words that a function
 //! reserves but never writes keep their paint. So the tests compare the used bytes with the bound
-//! from the machine code (`stack_bound`).
+//! from the machine code (`xtask::stack_bound`).
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -83,7 +83,7 @@ impl Image {
 /// Compares the stack that runs of an image have used with the bound from its machine code.
 pub fn check(path: &Path, used: &[u64]) -> Result<()> {
     let used = used.iter().max().copied().unwrap_or_default();
-    let needed = stack_bound::of_image(path)?;
+    let needed = xtask::stack_bound::of_image(path)?;
     println!("{used} bytes of stack used at most, {needed} needed at most");
     ensure!(
         used <= needed,

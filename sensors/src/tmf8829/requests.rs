@@ -19,7 +19,7 @@ pub(super) const ADDRESS_BLOCK: u8 = 3;
 pub(super) const LAST_BLOCK: u8 = 5;
 
 impl<const CHUNK: usize> Tmf8829Protocol<'_, CHUNK> {
-    // Inlined into a main loop, its jump table would have backward branches, which `stack-bound`
+    // Inlined into a main loop, its jump table would have backward branches, which `xtask sizes`
     // does not follow.
     #[inline(never)]
     pub(super) fn next_request(&mut self, now_ms: u32) -> Request<'_> {

@@ -23,7 +23,7 @@ pub(super) enum Block {
 }
 
 impl<const CHUNK: usize> Tmf882xProtocol<'_, CHUNK> {
-    // Inlined into a main loop, its jump table would have backward branches, which `stack-bound`
+    // Inlined into a main loop, its jump table would have backward branches, which `xtask sizes`
     // does not follow.
     #[inline(never)]
     pub(super) fn next_request(&mut self, now_ms: u32) -> Request<'_> {

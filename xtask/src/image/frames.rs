@@ -52,7 +52,7 @@ pub fn check(root: &Path) -> Result<()> {
                 memory >= u64::from(arrays),
                 "{example} has no arrays of pixels"
             );
-            let (name, bytes) = stack_bound::largest_frame(&path)?;
+            let (name, bytes) = xtask::stack_bound::largest_frame(&path)?;
             println!("{target}, {profile}, {example}: the largest stack frame has {bytes} bytes");
             Ok((name, bytes))
         };

@@ -2,7 +2,7 @@
 //! table. As LLVM makes them; all else stays without a bound. Encodings: Armv6-M
 //! Architecture Reference Manual (DDI 0419), A6.7.
 
-use crate::thumb::Effect;
+use super::thumb::Effect;
 
 /// The effect of an instruction that sets the stack pointer, by those around it: `code` are
 /// the halfwords from address `start` on, `index` is that of the instruction.

@@ -1,0 +1,3 @@
+//! What tests need of the tools, too.
+
+pub mod stack_bound;
