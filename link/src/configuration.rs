@@ -280,19 +280,27 @@ impl Configuration {
             None => self.rule,
             Some(_) => (*NeighbourRule::new(self.rule_of_neighbours()?).own()).into(),
         };
-        self.config_of(own, dead_time_of_sensor)
+        let config = self.config_of(own, dead_time_of_sensor)?;
+        match self.neighbours {
+            Some(_) if config.weighs_dead_time() => Err(Refusal::Neighbours),
+            _ => Ok(config),
+        }
     }
 
-    /// The same for pixels that decide alone, with less code: nothing of neighbours.
+    /// The same for pixels that decide alone, with less code.
     ///
     /// # Errors
-    /// Fails with the first setting that cannot be.
+    /// Fails with the first setting that cannot be, such as blocks and neighbours.
     #[inline]
     pub fn lone_config<const BINS: usize>(
         &self,
         dead_time_of_sensor: u16,
     ) -> Result<PixelConfig<BINS, AnyRule>, Refusal> {
-        self.config_with(self.rule, dead_time_of_sensor)
+        match (self.neighbours, self.binning) {
+            (None, None) => self.config_with(self.rule, dead_time_of_sensor),
+            (None, Some(_)) => Err(Refusal::Blocks),
+            (Some(_), _) => Err(Refusal::Neighbours),
+        }
     }
 
     /// How the blocks of so many levels operate, as [`Self::pixel_config`].
@@ -325,6 +333,9 @@ impl Configuration {
             config = config.neighbours(NeighbourConfig::new(layout, neighbours, rule))?;
         }
         if let Some(AdaptiveBinning { levels, patience }) = self.binning {
+            if patience == 0 {
+                return Err(Refusal::Patience);
+            }
             let blocks = self.block_config(levels, dead_time_of_sensor)?;
             config = config.blocks(levels, blocks, patience)?;
         }

@@ -18,8 +18,8 @@ use crate::memory::{
 use crate::statistics::{DTOF_STATISTICS_SIZE, dtof_statistics_t};
 use crate::status::dtof_status_t;
 use crate::status::dtof_status_t::{
-    DTOF_ERROR_BLOCKS, DTOF_ERROR_NEIGHBOURS, DTOF_ERROR_NO_EVENT, DTOF_ERROR_PATIENCE,
-    DTOF_ERROR_PIXELS, DTOF_ERROR_SIZE,
+    DTOF_ERROR_BLOCKS, DTOF_ERROR_NEIGHBOURS, DTOF_ERROR_NO_EVENT, DTOF_ERROR_PIXELS,
+    DTOF_ERROR_SIZE,
 };
 use crate::version::{DTOF_BINS, DTOF_COUNTER_BITS, PixelCounters};
 
@@ -221,7 +221,6 @@ fn array_config(
     };
     let binning = match layout.block_levels {
         0 => None,
-        _ if layout.patience == 0 => return Err(DTOF_ERROR_PATIENCE),
         levels => Some(AdaptiveBinning {
             levels: BlockLevel::new(levels).ok_or(DTOF_ERROR_BLOCKS)?,
             patience: layout.patience,

@@ -89,7 +89,7 @@ pub fn decide_once(
     let is_masked = |address: &PixelAddress| settings.masked.contains(&address.raw());
     let is_masked: Vec<bool> = addresses.iter().map(is_masked).collect();
     with_widest!(settings.bins, BINS, W => Pixels::<BINS, W> {
-        config: *settings.array_config::<BINS, W, ()>(array)?.pixels(),
+        config: settings.config()?,
         any_peak: settings.any_peak().config()?,
         array,
         neighbours: settings.configuration.neighbours,

@@ -445,6 +445,16 @@ fn what_needs_looks_is_refused() {
         });
     });
     assert_eq!(blocks, "decide_once cannot be used with binning");
+    let dead = with(|settings| {
+        let window = WindowRule::new(3, U4F12::lit("4"), Count::saturating(5));
+        settings.configuration.rule = window.unwrap().into();
+        settings.configuration.neighbours = Neighbours::new(8);
+        settings.configuration.dead_time = Some(20);
+    });
+    assert!(
+        dead.starts_with("neighbours cannot be used with a dead time"),
+        "{dead}"
+    );
 }
 
 /// The tail of a bright pulse before the gate, or behind it: from a tenth of the noise of the background at the edge to a

@@ -201,7 +201,7 @@ impl DetectionSettings {
             l2: self.l2.unwrap_or(of_sensor.l2),
             echoes: self.last_echo()?,
             echo_wait: self.echo_wait.unwrap_or(of_sensor.echo_wait),
-            neighbours: self.confirming()?,
+            neighbours: self.neighbours.and_then(Neighbours::new),
             tracking: self.tracking.unwrap_or(of_sensor.tracking),
             once_per_bin: self.once_per_bin.unwrap_or(of_sensor.once_per_bin),
             ..of_sensor
@@ -281,19 +281,6 @@ impl DetectionSettings {
             levels,
             patience: self.patience.unwrap_or(AdaptiveBinning::PATIENCE),
         }))
-    }
-
-    /// The neighbours that confirm, if any do.
-    ///
-    /// # Errors
-    /// Fails if there are blocks, too.
-    pub(super) fn confirming(&self) -> Result<Option<Neighbours>> {
-        let neighbours = self.neighbours.and_then(Neighbours::new);
-        ensure!(
-            neighbours.is_none() || self.levels() == BlockLevel::PIXEL,
-            Refused::new("neighbours", "cannot be used with `binning`")
-        );
-        Ok(neighbours)
     }
 
     /// The last echo of an exposure.

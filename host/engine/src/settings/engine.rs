@@ -196,7 +196,9 @@ impl Settings {
             Refusal::Tracking => Refused::new("tracking", "is for `rule` window"),
             Refusal::Neighbours => {
                 let reason = match (&self.configuration.rule, self.configuration.binning) {
-                    (AnyRule::Window(_), None) => "cannot be used with a dead time",
+                    (AnyRule::Window(_), None) => {
+                        "cannot be used with a dead time; `dead_time` 0 leaves it out"
+                    }
                     (AnyRule::Window(_), Some(_)) => "cannot be used with `binning`",
                     _ => "is for `rule` window",
                 };

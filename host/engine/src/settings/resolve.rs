@@ -71,16 +71,7 @@ impl SettingsFile {
             source: Source::Link,
             ..default
         };
-        let configuration =
-            detection.configuration(of_sensor, sensor.sigma_bins, bins, decide_once)?;
-        if configuration.neighbours.is_some()
-            && configuration.dead_time > Some(0)
-            && self.run.frame.is_none()
-        {
-            let reason = "cannot be used with a dead time; `dead_time` 0 leaves it out";
-            return Err(Refused::new("neighbours", reason).into());
-        }
-        Ok(configuration)
+        detection.configuration(of_sensor, sensor.sigma_bins, bins, decide_once)
     }
 
     /// A file with `settings`, and the rest of this one.

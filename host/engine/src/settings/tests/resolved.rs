@@ -184,8 +184,9 @@ fn settings_that_contradict_each_other_are_refused_in_one_line() {
         dead_time = 20; rule = 'window'; window = 3; frame = 9 | dead_time 20: cannot be used with frame, unless it is 128 bins or more
         ",
     ) {
-        let error = file(keys).settings(128).unwrap_err();
-        assert_eq!(error.to_string(), line, "{keys}");
+        let file = file(keys);
+        let config = file.settings(128).and_then(|settings| settings.config::<128>());
+        assert_eq!(config.unwrap_err().to_string(), line, "{keys}");
     }
     // What these are taken with.
     for [keys] in table(
@@ -209,7 +210,41 @@ fn neighbours_need_a_sensor_without_a_dead_time() {
     let mut blind = file("rule = 'window'; window = 3; neighbours = 8");
     blind.dead_time_of_sensor = Some(20);
     let line = "neighbours cannot be used with a dead time; dead_time 0 leaves it out";
-    assert_eq!(blind.settings(128).unwrap_err().to_string(), line);
+    let config = blind.settings(128).unwrap().config::<128>();
+    assert_eq!(config.unwrap_err().to_string(), line);
+}
+
+/// A file is told what a device would refuse, and a dead time of the sensor is taken where a device takes it.
+#[test]
+fn a_dead_time_is_used_as_a_device_uses_it() {
+    for rule in ["paper", "average", "window"] {
+        for binning in [0, 1] {
+            for dead_time in [0, 1, 127, 128, 500] {
+                let text = format!("rule = '{rule}'; binning = {binning}");
+                let text = match rule {
+                    "window" => text + "; window = 3",
+                    _ => text,
+                };
+                let mut of_sensor = file(&text);
+                of_sensor.dead_time_of_sensor = Some(dead_time);
+                let settings = of_sensor.settings(128).unwrap();
+                let asked = Configuration {
+                    dead_time: None,
+                    source: Source::Sensor,
+                    ..settings.configuration
+                };
+                let in_force = asked.dead_time_in_force(dead_time.min(128), 128).unwrap();
+                assert_eq!(settings.dead_time(), in_force, "{text}, {dead_time}");
+                let given = Configuration {
+                    dead_time: Some(dead_time.min(128)),
+                    ..asked
+                };
+                let given = given.dead_time_in_force(0, 128).is_ok();
+                let taken = file(&format!("{text}; dead_time = {dead_time}")).settings(128);
+                assert_eq!(taken.is_ok(), given, "{text}, {dead_time}");
+            }
+        }
+    }
 }
 
 #[test]
