@@ -5,14 +5,14 @@ use std::collections::VecDeque;
 
 use crate::common::host::{Host, deliver, device};
 use crate::common::session::{
-    End, Line, Plan, Script, SessionResult, WHOLE, check, script, session,
+    End, Line, Plan, Script, SessionOutcome, WHOLE, check, script, session,
 };
 use dtof_link::endpoint::{BODY_BYTES, Endpoint, LinkCounters};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
 use dtof_link::message::{self, greeting};
 
 /// A device that was just switched on, and a script of so many laser cycles.
-fn run(seed: u64, cycles: usize, one_in: u32, plan: Plan) -> (Line, SessionResult) {
+fn run(seed: u64, cycles: usize, one_in: u32, plan: Plan) -> (Line, SessionOutcome) {
     let mut line = Line::new(seed);
     line.faults(one_in);
     let script = script(cycles, &mut line.rng);

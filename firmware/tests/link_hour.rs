@@ -6,7 +6,7 @@
 
 use crate::common::host::deliver;
 use crate::common::session::{
-    End, Line, Plan, Script, SessionResult, WHOLE, check, script, session,
+    End, Line, Plan, Script, SessionOutcome, WHOLE, check, script, session,
 };
 use dtof_link::endpoint::{Endpoint, LinkCounters, RETRANSMIT_MOST_MS};
 use dtof_link::frame::{Deframer, WIRE_BYTES};
@@ -41,7 +41,7 @@ impl Totals {
     }
 
     /// Holds what came of a session against what should.
-    fn add(&mut self, line: &Line, script: &Script, outcome: &SessionResult) {
+    fn add(&mut self, line: &Line, script: &Script, outcome: &SessionOutcome) {
         self.sessions += 1;
         self.events += outcome.events.len() as u64;
         self.add_counters(outcome.host.counters());

@@ -2,29 +2,29 @@
 
 use dtof_lab::pages::failures;
 use dtof_lab::studies::failures::rows::{Row, SECTIONS};
-use dtof_lab::studies::failures::{Case, FailureResult, Rule, STUDY, Verdict, Warning, outcomes};
+use dtof_lab::studies::failures::{Case, FailureOutcome, Rule, STUDY, Verdict, Warning, outcomes};
 use dtof_lab::sweep::{self, Part};
 use std::path::Path;
 
 /// The outcomes of the case whose name starts with `name`.
-fn of<'a>(all: &'a [(Case, Vec<FailureResult>)], name: &str) -> &'a [FailureResult] {
+fn of<'a>(all: &'a [(Case, Vec<FailureOutcome>)], name: &str) -> &'a [FailureOutcome] {
     let found = all.iter().find(|(case, _)| case.name.starts_with(name));
     &found.unwrap_or_else(|| panic!("no case {name}")).1
 }
 
-fn is_window(outcome: &FailureResult) -> bool {
+fn is_window(outcome: &FailureOutcome) -> bool {
     outcome.method.rule == Rule::Window
 }
 
 /// The lower end of the interval of false alarms.
-fn surely_false(outcome: &FailureResult) -> f64 {
+fn surely_false(outcome: &FailureOutcome) -> f64 {
     outcome.false_share.map_or(0.0, |share| share.interval.0)
 }
 
 #[test]
 fn a_few_seeds_show_what_fails_and_what_is_flagged() {
     let all = outcomes(&sweep::run_seeds(&STUDY, 0..5).unwrap()).unwrap();
-    let check = |names: &[&str], holds: fn(&FailureResult) -> bool| {
+    let check = |names: &[&str], holds: fn(&FailureOutcome) -> bool| {
         for name in names {
             for outcome in of(&all, name) {
                 assert!(holds(outcome), "{name}: {outcome:?}");
@@ -177,7 +177,7 @@ fn every_case_is_in_a_row_of_the_page() {
             panic!("{line}");
         };
         assert_eq!((name, row), (&*case.name, case.row.name));
-        let is_well = |outcome: &FailureResult| {
+        let is_well = |outcome: &FailureOutcome| {
             outcome.verdict == Verdict::Survives && outcome.warning == Warning::NotNeeded
         };
         let is_all_well = outcomes.iter().all(is_well);
@@ -189,7 +189,7 @@ fn every_case_is_in_a_row_of_the_page() {
             !outcomes.iter().any(|of| of.verdict != Verdict::Survives)
         );
         // Where no flag helps, the data explain why.
-        let is_silent = |outcome: &FailureResult| outcome.warning == Warning::Silent;
+        let is_silent = |outcome: &FailureOutcome| outcome.warning == Warning::Silent;
         assert_eq!(why.is_empty(), !outcomes.iter().any(is_silent), "{line}");
         assert_ne!(why, "not known", "{line}");
     }

@@ -34,18 +34,29 @@ fn of<O: Options>(has: impl Fn(&Key) -> bool) -> Vec<Keyword> {
     let keyword = |key: &Key| {
         let name = option_name(key.name);
         let help = with_names(key.help, |key| option_name(key).to_owned());
-        (name, type_of(key.kind), key.kind.words(), help)
+        (name, type_of(key.kind), words(key.kind), help)
     };
     keys.map(keyword).collect()
 }
 
+/// The values in Python's words.
+fn words(kind: Kind) -> String {
+    match kind {
+        Kind::Switch | Kind::Flag | Kind::YesOrNo => "True or False".to_owned(),
+        Kind::Settings => {
+            "file, text of several lines, dict of sections, or a result with settings".to_owned()
+        }
+        kind => kind.words(),
+    }
+}
+
 fn type_of(kind: Kind) -> String {
     match kind {
-        Kind::Integer(..) | Kind::Choice(_) => "Integer",
+        Kind::Integer(..) | Kind::PowerOfTwo(..) | Kind::Even(_) | Kind::Choice(_) => "Integer",
         Kind::Fixed(_) | Kind::Real(..) | Kind::AboveZero(_) => "Number",
         Kind::Switch | Kind::Flag | Kind::YesOrNo => "Switch",
         Kind::Integers(_) => "Integers",
-        Kind::Numbers(_) => "Numbers",
+        Kind::Numbers(_) | Kind::SignedNumbers(_) => "Numbers",
         Kind::Names(_) => "Names",
         Kind::Text => "Text",
         Kind::File => "Path",

@@ -110,7 +110,7 @@ pub enum End {
 }
 
 /// What came of a session.
-pub struct SessionResult {
+pub struct SessionOutcome {
     pub session: u16,
     pub end: End,
     pub events: Vec<DepthEvent>,
@@ -121,7 +121,7 @@ pub struct SessionResult {
 }
 
 /// Runs a session to its end.
-pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> SessionResult {
+pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> SessionOutcome {
     let began = line.now;
     let mut host = Host::new(number, began);
     let mut wire = [0; WIRE_BYTES];
@@ -198,7 +198,7 @@ pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> Ses
     };
     host.read(usize::MAX);
     assert!(host.changes.is_empty());
-    SessionResult {
+    SessionOutcome {
         session: number,
         end,
         report,
@@ -210,7 +210,7 @@ pub fn session(line: &mut Line, number: u16, script: &Script, plan: Plan) -> Ses
 
 /// Everything of a session has arrived as it was.
 #[track_caller]
-pub fn check(script: &Script, outcome: &SessionResult) {
+pub fn check(script: &Script, outcome: &SessionOutcome) {
     let Some(report) = outcome.report else {
         panic!("{:?}: {:?}", outcome.end, outcome.host.counters());
     };

@@ -54,10 +54,10 @@ fn are_the_same(name: &str, [narrow, wide]: &[Outcome; 2]) {
 fn the_demo_is_decided_alike() {
     let array = Array::new(16, 12).unwrap();
     let settings = demo::settings(1).unwrap();
-    let of_pixels = settings.clone().with(|with| with.binning = None);
+    let of_pixels = settings.clone().configured(|array| array.binning = None);
     let confirmed = of_pixels
         .clone()
-        .with(|with| with.neighbours = Neighbours::new(8));
+        .configured(|array| array.neighbours = Neighbours::new(8));
     for (name, settings) in [
         ("the demo", settings),
         ("the demo without blocks", of_pixels),

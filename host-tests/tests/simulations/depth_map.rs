@@ -122,12 +122,14 @@ fn blocks_report_its_walls_and_leave_pixels_their_events() {
         let z = z_for_levels(100, &gate, 4, 40, 2000, levels);
         let patience = AdaptiveBinning::PATIENCE;
         let is_alone = levels == BlockLevel::PIXEL;
-        Settings::static_scene(1).for_pulse(U8F8::ONE).with(|with| {
-            with.rule = WindowRule::new(3, z, Count::saturating(5)).unwrap().into();
-            with.x = 4;
-            with.l1 = 40;
-            with.binning = (!is_alone).then_some(AdaptiveBinning { levels, patience });
-        })
+        Settings::static_scene(1)
+            .for_pulse(U8F8::ONE)
+            .configured(|array| {
+                array.rule = WindowRule::new(3, z, Count::saturating(5)).unwrap().into();
+                array.x = 4;
+                array.l1 = 40;
+                array.binning = (!is_alone).then_some(AdaptiveBinning { levels, patience });
+            })
     };
     let (alone, with_blocks) = (BlockLevel::PIXEL, BlockLevel::saturating(2));
     let (alone, with_blocks) = (settings(alone), settings(with_blocks));
@@ -181,12 +183,14 @@ fn seen(scene: &Scene, neighbours: Option<Neighbours>) -> Seen {
         2000,
         BlockLevel::PIXEL,
     );
-    let settings = Settings::static_scene(1).for_pulse(U8F8::ONE).with(|with| {
-        with.rule = WindowRule::new(3, z, Count::saturating(5)).unwrap().into();
-        with.x = 4;
-        with.l1 = 40;
-        with.neighbours = neighbours;
-    });
+    let settings = Settings::static_scene(1)
+        .for_pulse(U8F8::ONE)
+        .configured(|array| {
+            array.rule = WindowRule::new(3, z, Count::saturating(5)).unwrap().into();
+            array.x = 4;
+            array.l1 = 40;
+            array.neighbours = neighbours;
+        });
     let mut first = vec![u64::MAX; scene.array().unwrap().pixels() as usize];
     let (mut right, mut wrong, mut squares) = (0, 0, 0.0);
     for event in events(scene, &settings) {

@@ -218,15 +218,16 @@ fn settings(levels: u8, tracking: bool, echoes: u8, seed: u64) -> Settings {
     let gate = RangeGate::<BINS>::full();
     let z: U4F12 = z_for_levels(100, &gate, 4, 40, 1000, levels);
     let patience = 100;
-    Settings::static_scene(seed).with(|with| {
-        with.rule = WindowRule::new(3, z, Count::saturating(5)).unwrap().into();
-        with.l1 = 40;
-        with.l2 = 1000;
-        with.x = 4;
-        with.binning = (levels > BlockLevel::PIXEL).then_some(AdaptiveBinning { levels, patience });
-        with.tracking = tracking;
-        with.echoes = EchoNumber::new(echoes).unwrap();
-        with.echo_wait = if seed.is_multiple_of(2) { 5 } else { u8::MAX };
+    Settings::static_scene(seed).configured(|array| {
+        array.rule = WindowRule::new(3, z, Count::saturating(5)).unwrap().into();
+        array.l1 = 40;
+        array.l2 = 1000;
+        array.x = 4;
+        array.binning =
+            (levels > BlockLevel::PIXEL).then_some(AdaptiveBinning { levels, patience });
+        array.tracking = tracking;
+        array.echoes = EchoNumber::new(echoes).unwrap();
+        array.echo_wait = if seed.is_multiple_of(2) { 5 } else { u8::MAX };
     })
 }
 

@@ -29,12 +29,12 @@ struct Zone {
 fn replay(log: &PathBuf, photons_per_cycle: f64, min_count: u16) -> [Zone; ZONES] {
     let settings = Settings::static_scene(1)
         .with_bins(tmf8820::BINS)
-        .with(|with| {
-            with.bin_width_ps = tmf882x::BIN_WIDTH_PS;
-            with.offset_mm = tmf882x::OFFSET_MM;
-            with.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(min_count.into())).into();
-            with.l1 = 40;
-            with.x = 4;
+        .configured(|array| {
+            array.bin_width_ps = tmf882x::BIN_WIDTH_PS;
+            array.offset_mm = tmf882x::OFFSET_MM;
+            array.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(min_count.into())).into();
+            array.l1 = 40;
+            array.x = 4;
         });
     let truth = ground_truth(log);
     let recorded = counts(log, &ReadOptions::default()).unwrap();

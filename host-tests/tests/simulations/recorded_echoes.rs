@@ -48,16 +48,16 @@ fn near_captures(log: &PathBuf, sigma: &str) -> Vec<(f64, Found)> {
     let settings = Settings::static_scene(1)
         .with_bins(tmf8820::BINS)
         .for_pulse(sigma.parse::<U8F8>().unwrap())
-        .with(|with| {
-            with.bin_width_ps = tmf882x::BIN_WIDTH_PS;
-            with.offset_mm = tmf882x::OFFSET_MM;
-            with.rule = WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
+        .configured(|array| {
+            array.bin_width_ps = tmf882x::BIN_WIDTH_PS;
+            array.offset_mm = tmf882x::OFFSET_MM;
+            array.rule = WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
                 .unwrap()
                 .into();
-            with.l1 = 40;
-            with.l2 = 2000;
-            with.x = 4;
-            with.echoes = two();
+            array.l1 = 40;
+            array.l2 = 2000;
+            array.x = 4;
+            array.echoes = two();
         });
     let truth = ground_truth(log);
     let recorded = counts(log, &ReadOptions::default()).unwrap();

@@ -285,12 +285,12 @@ fn request(background: f64, signal: f64, l2: u16, allowed: f64) -> Request {
 
 /// The first event of each pixel that has one in its first exposure, from the engine.
 fn first_events(request: &Request, tuned: &Tuned, signal: f64, side: u32) -> Vec<DepthEvent> {
-    let settings = Settings::static_scene(11).with(|with| {
-        with.rule =
+    let settings = Settings::static_scene(11).configured(|array| {
+        array.rule =
             PaperRule::new(tuned.alpha, Count::saturating(request.minimum_count.into())).into();
-        with.l1 = tuned.l1;
-        with.l2 = request.l2;
-        with.x = request.x;
+        array.l1 = tuned.l1;
+        array.l2 = request.l2;
+        array.x = request.x;
     });
     let array = Array::new(side, side).unwrap();
     let pixels = (0..side * side).map(|pixel| {

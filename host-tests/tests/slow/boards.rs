@@ -98,7 +98,7 @@ fn mps2_an386_with_counters_of_8_bits_decides_as_this_computer() -> Result<()> {
     };
     let with_neighbours = Settings {
         counter_bits: 8,
-        ..with_windows().with(|with| with.neighbours = Neighbours::new(8))
+        ..with_windows().configured(|array| array.neighbours = Neighbours::new(8))
     };
     let array = Array::new(40, 20).unwrap();
     for settings in [settings, with_neighbours] {
@@ -304,17 +304,17 @@ fn log(image: &Path, bytes: Vec<u8>) -> Result<String> {
 
 /// Settings with many events.
 pub fn settings() -> Settings {
-    Settings::static_scene(1).with(|with| {
-        with.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into();
-        with.l1 = 20;
-        with.x = 4;
+    Settings::static_scene(1).configured(|array| {
+        array.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into();
+        array.l1 = 20;
+        array.x = 4;
     })
 }
 
 /// The other rule and the other estimator.
 fn with_windows() -> Settings {
-    settings().for_pulse(U8F8::lit("0.55")).with(|with| {
-        with.rule = WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
+    settings().for_pulse(U8F8::lit("0.55")).configured(|array| {
+        array.rule = WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
             .unwrap()
             .into();
     })
@@ -322,29 +322,31 @@ fn with_windows() -> Settings {
 
 /// Blocks of three levels, tracking and two echoes as well.
 pub fn with_all() -> Settings {
-    with_windows().for_pulse(U8F8::lit("1")).with(|with| {
-        with.binning = Some(AdaptiveBinning {
-            levels: BlockLevel::MAX,
-            patience: 20,
-        });
-        with.tracking = true;
-        with.echoes = EchoNumber::new(2).unwrap();
-        with.echo_wait = 4;
-        with.l2 = 300;
-    })
+    with_windows()
+        .for_pulse(U8F8::lit("1"))
+        .configured(|array| {
+            array.binning = Some(AdaptiveBinning {
+                levels: BlockLevel::MAX,
+                patience: 20,
+            });
+            array.tracking = true;
+            array.echoes = EchoNumber::new(2).unwrap();
+            array.echo_wait = 4;
+            array.l2 = 300;
+        })
 }
 
 /// A TDC that is dead for 20 bins after each photon, with tracking and two echoes.
 pub fn with_dead_time() -> Settings {
-    with_all().with(|with| {
-        with.binning = None;
-        with.dead_time = Some(20);
+    with_all().configured(|array| {
+        array.binning = None;
+        array.dead_time = Some(20);
     })
 }
 
 /// Blocks, and photons that count once per bin.
 pub fn once_per_bin() -> Settings {
-    with_all().with(|with| with.once_per_bin = true)
+    with_all().configured(|array| array.once_per_bin = true)
 }
 
 /// A board and this computer find the same events and counts in the demo's scene, for every rule and

@@ -195,16 +195,16 @@ impl Timer {
 
 /// Settings without a decision within the laser cycles of a test.
 fn gathers() -> Settings {
-    senses().with(|with| {
-        with.l1 = 60_000;
-        with.l2 = 65_000;
+    senses().configured(|array| {
+        array.l1 = 60_000;
+        array.l2 = 65_000;
     })
 }
 
 pub fn senses() -> Settings {
-    settings().with(|with| {
-        with.bin_width_ps = U16F16::from_num(BIN_NS * 1000);
-        with.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into();
+    settings().configured(|array| {
+        array.bin_width_ps = U16F16::from_num(BIN_NS * 1000);
+        array.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into();
     })
 }
 
@@ -265,9 +265,9 @@ fn pico_dithers_its_laser_and_decides_as_this_computer() -> Result<()> {
         let dither = Dither::new(range, seed)?;
         let edges = dithered_edges(&cycles, PERIOD_NS, dither, &mut random);
         let with_dither = |settings: Settings| {
-            settings.with(|with| {
-                with.dither_bins = range;
-                with.dither_seed = seed;
+            settings.configured(|array| {
+                array.dither_bins = range;
+                array.dither_seed = seed;
             })
         };
 
@@ -304,9 +304,9 @@ fn pico_starts_its_timer_again_when_a_state_machine_was_late() -> Result<()> {
     let image = image(&["photon-timer"], None)?;
     let mut board = Rp2040::start_with_fault(&image, "starve", 5.0, 1)?;
     let mut client = Client::new(board.connect()?)?;
-    let settings = gathers().with(|with| {
-        with.dither_bins = 128;
-        with.dither_seed = 7;
+    let settings = gathers().configured(|array| {
+        array.dither_bins = 128;
+        array.dither_seed = 7;
     });
     let task = Task {
         settings: &settings,
@@ -407,9 +407,9 @@ fn pico_keeps_up_with_a_laser_and_counts_what_it_loses() -> Result<()> {
         let cycles = photons(hits, 90, 5000, &mut random);
         let period = BIN_NS * u64::from((125_000_000 + laser_hz / 2) / laser_hz);
         let dither = Dither::new(range, 3)?;
-        let settings = senses().with(|with| {
-            with.dither_bins = range;
-            with.dither_seed = dither.seed();
+        let settings = senses().configured(|array| {
+            array.dither_bins = range;
+            array.dither_seed = dither.seed();
         });
         let edges = dithered_edges(&cycles, period, dither, &mut random);
         let mut timer = Timer::start(&image, &edges, &settings)?;

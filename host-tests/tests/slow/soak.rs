@@ -277,7 +277,7 @@ fn a_hundred_million_photons_of_a_device_are_decided_on_alike() -> Result<()> {
         return Ok(());
     };
     let image = BOARD.image(&[])?;
-    let seldom = |settings: Settings| settings.with(|with| with.l1 = 100);
+    let seldom = |settings: Settings| settings.configured(|array| array.l1 = 100);
     let sensed = runs_alike("the paper's rule", &image, &seldom(settings()), 8_800_000)?;
     let photons = sensed.report.statistics.photons();
     ensure!(photons >= 100_000_000, "{photons} photons");
@@ -299,13 +299,13 @@ fn a_hundred_million_photons_are_decided_on_alike_by_the_newer_rules() -> Result
     let image = BOARD.image(&[])?;
     let narrow = BOARD.image(&["--count8"])?;
     let wide = WindowRule::new(7, U4F12::lit("4.5"), Count::saturating(5)).unwrap();
-    let with_neighbours = settings().with(|with| {
-        with.rule = wide.into();
-        with.neighbours = Neighbours::new(8);
+    let with_neighbours = settings().configured(|array| {
+        array.rule = wide.into();
+        array.neighbours = Neighbours::new(8);
     });
     let counters_of_8_bits = Settings {
         counter_bits: 8,
-        ..settings().with(|with| with.l1 = 1000)
+        ..settings().configured(|array| array.l1 = 1000)
     };
     let mut photons = 0;
     let mut run = |name, image, settings: &Settings, cycles| {

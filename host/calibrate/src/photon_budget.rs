@@ -110,14 +110,16 @@ impl<'a> Replay<'a> {
         let bin_width_ps = U16F16::checked_from_num(bin_width_ps).context("the bin width")?;
         let offset_mm = I24F8::checked_from_num(offset_mm).context("the offset")?;
         let default = SettingsFile::default().settings(observed.bins())?;
-        let settings = default.for_pulse(detection.sigma_bins).with(|of_range| {
-            of_range.gate = gate;
-            (of_range.bin_width_ps, of_range.offset_mm) = (bin_width_ps, offset_mm);
-            (of_range.x, of_range.l1, of_range.l2) = (detection.x, detection.l1, detection.l2);
-            if let Some(window) = detection.half_widths {
-                of_range.estimator = DepthEstimator::CentredWindow(window);
-            }
-        });
+        let settings = default
+            .for_pulse(detection.sigma_bins)
+            .configured(|of_range| {
+                of_range.gate = gate;
+                (of_range.bin_width_ps, of_range.offset_mm) = (bin_width_ps, offset_mm);
+                (of_range.x, of_range.l1, of_range.l2) = (detection.x, detection.l1, detection.l2);
+                if let Some(window) = detection.half_widths {
+                    of_range.estimator = DepthEstimator::CentredWindow(window);
+                }
+            });
         let slice = Slice {
             first_cycle: 0,
             pixels,
@@ -203,7 +205,7 @@ impl<'a> Replay<'a> {
         rule: AnyRule,
         (window, min_count, x): (u8, u16, u16),
     ) -> Result<Option<PhotonBudget>> {
-        let settings = self.settings.clone().with(|faster| {
+        let settings = self.settings.clone().configured(|faster| {
             (faster.rule, faster.x) = (rule, x);
             faster.l1 = faster.l1.max(x);
         });

@@ -15,9 +15,9 @@ use dtof_engine::slices::each_slice;
 fn replay(file: &Path) -> Result<usize> {
     let mut recording = open(file, &ReadOptions::default())?;
     let settings = Settings::static_scene(1).with_bins(recording.metadata.bins);
-    let settings = settings.with(|with| {
-        with.bin_width_ps = recording.metadata.bin_width_ps;
-        (with.x, with.l1) = (4, 40);
+    let settings = settings.configured(|array| {
+        array.bin_width_ps = recording.metadata.bin_width_ps;
+        (array.x, array.l1) = (4, 40);
     });
     let photons = recording.photons.as_mut();
     let ranges = settings.ranges(photons.array())?;

@@ -67,11 +67,22 @@ fn unknown(argument: &str, command: &clap::Command) -> Refused {
     let flags = command.get_arguments().filter(|arg| !arg.is_hide_set());
     let names = flags.filter_map(clap::Arg::get_long);
     let names: Vec<String> = names.map(|name| name.replace('-', "_")).collect();
-    let hint = match argument.starts_with('-') {
-        true => return Refused::unknown(argument, None, names.iter().map(String::as_str)),
-        false if command.get_positionals().next().is_some() => ": one file at a time",
-        false if names.iter().any(|name| name == "scene") => ": a scene is given by `scene`",
-        false => "",
+    if argument.starts_with('-') {
+        return Refused::unknown(argument, None, names.iter().map(String::as_str));
+    }
+    // The value of a switch is no argument of its own.
+    let given: Vec<String> = std::env::args().collect();
+    let switch = given.windows(2).find_map(|pair| match pair {
+        [flag, value] if flag.starts_with("--") && matches!(&**value, "true" | "false") => {
+            Some(format!(": write {flag}={value}"))
+        }
+        _ => None,
+    });
+    let hint = match &switch {
+        Some(hint) => hint,
+        None if command.get_positionals().next().is_some() => ": one file at a time",
+        None if names.iter().any(|name| name == "scene") => ": a scene is given by `scene`",
+        None => "",
     };
     Refused::input(format!("{} is not expected here{hint}", plain(argument)))
 }

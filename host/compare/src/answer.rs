@@ -1,7 +1,7 @@
 //! The method to take: the cheapest of those that are exact enough and nearly as fast as the fastest. One answer
 //! keeps every pixel; if blocks are faster, they are another.
 
-use super::measure::TrialResult;
+use super::measure::TrialOutcome;
 use super::method::Method;
 
 /// A method may take this many times the shortest time.
@@ -66,8 +66,8 @@ pub struct Answer {
 /// The longest frames that were measured: of L2, unless there are fewer laser cycles.
 pub(super) fn longest_frame<'a>(
     methods: &[Method],
-    outcomes: &'a [TrialResult],
-) -> Option<&'a TrialResult> {
+    outcomes: &'a [TrialOutcome],
+) -> Option<&'a TrialOutcome> {
     let frames = outcomes.iter().filter(|outcome| {
         methods
             .get(outcome.trial.method)
@@ -78,7 +78,7 @@ pub(super) fn longest_frame<'a>(
 
 /// Chooses among `outcomes`, in which those of each method are in order of effort.
 #[must_use]
-pub fn answer(methods: &[Method], outcomes: &[TrialResult], within_mm: f64) -> Answer {
+pub fn answer(methods: &[Method], outcomes: &[TrialOutcome], within_mm: f64) -> Answer {
     let frame_wrong = longest_frame(methods, outcomes).map_or(0.0, |frame| frame.figures.wrong);
     let events_of_all = outcomes.iter().filter(|outcome| {
         let method = methods.get(outcome.trial.method);
@@ -129,11 +129,11 @@ fn nearly_fastest<'a>(candidates: impl Iterator<Item = &'a Choice> + Clone) -> O
 
 /// Interpolates geometrically between the last trial that is not exact enough and the first that is. `None` if too many
 /// pixels are silent there; a higher least count only silences more.
-fn where_exact(trials: &[&TrialResult], limits: &Limits) -> Option<Choice> {
+fn where_exact(trials: &[&TrialOutcome], limits: &Limits) -> Option<Choice> {
     let within_mm = limits.within_mm;
     // The error of few reports may be small by chance.
-    let error = |outcome: &TrialResult| outcome.figures.error_mm * (1.0 + uncertainty(outcome));
-    let is_exact = |outcome: &&TrialResult| {
+    let error = |outcome: &TrialOutcome| outcome.figures.error_mm * (1.0 + uncertainty(outcome));
+    let is_exact = |outcome: &&TrialOutcome| {
         error(outcome) <= within_mm && outcome.figures.wrong <= limits.wrong
     };
     let first = trials.iter().position(is_exact)?;
@@ -147,12 +147,12 @@ fn where_exact(trials: &[&TrialResult], limits: &Limits) -> Option<Choice> {
         }
         _ => 1.0,
     };
-    let between = |of: fn(&TrialResult) -> f64| {
+    let between = |of: fn(&TrialOutcome) -> f64| {
         let from = before.map_or(of(exact), of);
         from * (of(exact) / from).powf(part)
     };
     let cycles = between(|outcome| outcome.figures.cycles);
-    let slow: fn(&TrialResult) -> f64 = |outcome| outcome.figures.slow_cycles;
+    let slow: fn(&TrialOutcome) -> f64 = |outcome| outcome.figures.slow_cycles;
     let slow_cycles = match between(slow) {
         cycles if cycles.is_finite() => cycles,
         // It reports in at most one of the trials.
@@ -183,6 +183,6 @@ fn where_exact(trials: &[&TrialResult], limits: &Limits) -> Option<Choice> {
 }
 
 /// The standard deviation of a mean over all reports, relative to that of one report.
-fn uncertainty(outcome: &TrialResult) -> f64 {
+fn uncertainty(outcome: &TrialOutcome) -> f64 {
     1.0 / (outcome.figures.reports.max(1) as f64).sqrt()
 }

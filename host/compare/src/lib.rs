@@ -33,7 +33,7 @@ use dtof_data::options::Refused;
 use dtof_data::photons::source::{PhotonSource, has_only_neighbours};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use measure::{Trial, TrialResult, measure};
+use measure::{Trial, TrialOutcome, measure};
 use method::{Kind, Method, Rule};
 use selected::Selected;
 use stress::{Light, Stress, Stressed};
@@ -92,12 +92,12 @@ pub struct Comparison {
     /// The threshold of each method that reports events.
     pub thresholds: Vec<Option<f64>>,
     /// All trials, by method and effort.
-    pub outcomes: Vec<TrialResult>,
+    pub outcomes: Vec<TrialOutcome>,
     /// The bound for a single pixel.
     pub bound: Option<Bound>,
     /// The methods with the lowest minimum count, and the longest frame, under each stress. The first is
     /// without stress.
-    pub stressed: Vec<(Stress, Vec<TrialResult>)>,
+    pub stressed: Vec<(Stress, Vec<TrialOutcome>)>,
     /// The error of the longest frames, of L2 or of fewer laser cycles if there are not as many, in millimetres.
     pub frame_mm: Option<f64>,
     /// The methods to take.
@@ -341,7 +341,7 @@ fn photons(task: &Task, nth_seed: u64, most: f64) -> Result<Box<dyn PhotonSource
 fn choose(
     task: &Task,
     methods: &[Method],
-    outcomes: &[TrialResult],
+    outcomes: &[TrialOutcome],
     frame_mm: Option<f64>,
 ) -> Result<Answer> {
     if let Some(within_mm) = task.within_mm {
@@ -374,7 +374,7 @@ fn under_stress(
     truth: &Truth,
     stress: &Stress,
     work: &Work,
-) -> Result<Vec<TrialResult>> {
+) -> Result<Vec<TrialOutcome>> {
     let source = photons(task, 1, STRESS_PHOTONS)?;
     let bins = u16::try_from(task.settings.bins)?;
     let mut source = Stressed::new(source, stress, bins, task.sigma, task.settings.seed);
@@ -383,7 +383,7 @@ fn under_stress(
 }
 
 /// Whether a trial has enough reports for its time and its error.
-fn is_measured(outcome: &TrialResult, cycles: u64) -> bool {
+fn is_measured(outcome: &TrialOutcome, cycles: u64) -> bool {
     let figures = &outcome.figures;
     figures.reports >= MIN_REPORTS && figures.cycles <= cycles as f64
 }

@@ -29,7 +29,7 @@ pub struct Trial {
 
 /// The outcome of a trial.
 #[derive(Clone, Debug)]
-pub struct TrialResult {
+pub struct TrialOutcome {
     /// The trial.
     pub trial: Trial,
     /// Times and errors.
@@ -57,7 +57,7 @@ pub fn measure(
     truth: &Truth,
     stress: &Stress,
     progress: &dyn Fn(f64) -> Result<()>,
-) -> Result<Vec<TrialResult>> {
+) -> Result<Vec<TrialOutcome>> {
     ensure!(
         trials.iter().all(|trial| trial.method < methods.len()),
         "a trial of a method that does not exist"
@@ -113,7 +113,7 @@ pub fn measure(
         } = running;
         let method = &methods[trial.method];
         let figures = tally.finish(&watched);
-        TrialResult {
+        TrialOutcome {
             instructions: instructions(
                 method,
                 &trial.settings,

@@ -8,7 +8,7 @@ use anyhow::{Context, Result, ensure};
 use dtof_draw::svg;
 
 use super::Comparison;
-use super::measure::TrialResult;
+use super::measure::TrialOutcome;
 use super::text::{HARDER, STRESS_NOTE};
 use dtof_data::options::files::{MarkedFile, may_replace, temporary_file, write_marked};
 use dtof_engine::settings::{self, SettingsFile};
@@ -52,7 +52,7 @@ impl Comparison {
         text
     }
 
-    fn line(&self, text: &mut String, before: &str, outcome: &TrialResult) {
+    fn line(&self, text: &mut String, before: &str, outcome: &TrialOutcome) {
         let figures = &outcome.figures;
         let threshold = self.thresholds[outcome.trial.method];
         let threshold = threshold.map_or(String::new(), |threshold| format!("{threshold:.4}"));

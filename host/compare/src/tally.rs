@@ -289,7 +289,7 @@ mod tests {
     /// The time of a pixel that has a target from laser cycle 5,000 to 6,000 and reports at these.
     fn time(reports: &[u64], neighbours: Option<Neighbours>) -> f64 {
         let array = Array::new(1, 1).unwrap();
-        let settings = Settings::static_scene(1).with(|with| with.neighbours = neighbours);
+        let settings = Settings::static_scene(1).configured(|array| array.neighbours = neighbours);
         let event = |cycle: u64| DepthEvent {
             pixel: PixelAddress::new(0),
             level: BlockLevel::PIXEL,

@@ -2,7 +2,7 @@
 
 use super::Comparison;
 use super::answer::{Answer, Choice};
-use super::measure::TrialResult;
+use super::measure::TrialOutcome;
 use super::method::Method;
 use dtof_data::options::rows::{Row, grouped, significant};
 use dtof_report::capitalised;
@@ -57,7 +57,7 @@ impl Comparison {
     }
 
     /// The trials of the method with this index.
-    pub(super) fn of(&self, number: usize) -> impl Iterator<Item = &TrialResult> {
+    pub(super) fn of(&self, number: usize) -> impl Iterator<Item = &TrialOutcome> {
         let outcomes = self.outcomes.iter();
         outcomes.filter(move |outcome| outcome.trial.method == number)
     }
@@ -146,7 +146,7 @@ impl Comparison {
     }
 
     /// The trials with events, of the methods that are `among` those to choose from.
-    fn events(&self, among: &dyn Fn(&Method) -> bool) -> impl Iterator<Item = &TrialResult> {
+    fn events(&self, among: &dyn Fn(&Method) -> bool) -> impl Iterator<Item = &TrialOutcome> {
         self.outcomes.iter().filter(move |outcome| {
             let method = &self.methods[outcome.trial.method];
             !method.is_frames() && among(method) && outcome.figures.cycles.is_finite()
@@ -154,7 +154,7 @@ impl Comparison {
     }
 
     /// The one of them with the smallest error.
-    fn most_exact(&self, among: &dyn Fn(&Method) -> bool) -> Option<&TrialResult> {
+    fn most_exact(&self, among: &dyn Fn(&Method) -> bool) -> Option<&TrialOutcome> {
         let all = self.events(among);
         all.min_by(|one, other| one.figures.error_mm.total_cmp(&other.figures.error_mm))
     }
@@ -172,7 +172,7 @@ impl Comparison {
         let Some(closest) = self.most_exact(among) else {
             return format!("{none}: none has enough reports");
         };
-        let of = |outcome: &TrialResult| {
+        let of = |outcome: &TrialOutcome| {
             let name = &self.methods[outcome.trial.method].name;
             let error = short(outcome.figures.error_mm);
             format!("{name} has {error} mm, but")
@@ -186,7 +186,7 @@ impl Comparison {
         let exact = self.events(among).filter(|outcome| {
             outcome.figures.error_mm <= within && outcome.figures.wrong <= limits.wrong
         });
-        let silent = |outcome: &&TrialResult| outcome.figures.silent;
+        let silent = |outcome: &&TrialOutcome| outcome.figures.silent;
         let speaking = exact.min_by(|one, other| silent(one).total_cmp(&silent(other)));
         match speaking {
             Some(speaking) if silent(&speaking) > limits.silent => format!(
@@ -333,7 +333,7 @@ impl Comparison {
         let methods = self.methods.iter().enumerate();
         let methods = methods.map(|(number, method)| (method.name.clone(), number, None));
         let rows = answers.chain(methods).map(|(name, method, effort)| {
-            let is_same = |outcome: &&TrialResult| {
+            let is_same = |outcome: &&TrialOutcome| {
                 let trial = &outcome.trial;
                 trial.method == method && effort.is_none_or(|effort| trial.effort == effort)
             };
@@ -385,7 +385,7 @@ impl Comparison {
     }
 
     /// A method without stress, on the photons that are then changed.
-    fn without_stress(&self, method: usize, effort: u16) -> Option<&TrialResult> {
+    fn without_stress(&self, method: usize, effort: u16) -> Option<&TrialOutcome> {
         let mut all = self.stressed.first()?.1.iter();
         all.find(|outcome| (outcome.trial.method, outcome.trial.effort) == (method, effort))
     }
@@ -403,7 +403,7 @@ impl Comparison {
     }
 
     /// Whether a method holds under stress: it reports, about as exact as without, and is rarely wrong.
-    pub(super) fn holds(&self, stressed: &TrialResult) -> bool {
+    pub(super) fn holds(&self, stressed: &TrialOutcome) -> bool {
         let without = self.without_stress(stressed.trial.method, stressed.trial.effort);
         let before = without.map_or(f64::INFINITY, |outcome| outcome.figures.error_mm);
         let figures = &stressed.figures;
@@ -436,7 +436,7 @@ mod tests {
     fn comparison(trials: &[(f64, u64, f64, f64)]) -> Comparison {
         let settings = Settings::static_scene(1);
         let methods = Method::all(U8F8::ONE, 0, false, &settings);
-        let outcome = |(effort, &(error_mm, reports, wrong, silent))| TrialResult {
+        let outcome = |(effort, &(error_mm, reports, wrong, silent))| TrialOutcome {
             trial: Trial {
                 method: 4,
                 effort,
@@ -453,7 +453,7 @@ mod tests {
             },
             instructions: 50.0,
         };
-        let outcomes: Vec<TrialResult> = (5..).zip(trials).map(outcome).collect();
+        let outcomes: Vec<TrialOutcome> = (5..).zip(trials).map(outcome).collect();
         Comparison {
             thresholds: vec![None; methods.len()],
             answer: answer(&methods, &outcomes, 10.0),

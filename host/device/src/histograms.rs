@@ -130,7 +130,7 @@ impl Collecting<'_> {
     fn configure(&mut self, source: Source) -> Result<()> {
         let highest = PaperRule::new(U8F8::MAX, Count::saturating(1023));
         let settings = self.settings.clone().with_bins(self.settings.bins);
-        let settings = settings.with(|device| {
+        let settings = settings.configured(|device| {
             device.rule = highest.into();
             // The rule does not weigh bins, and no event is used.
             device.dead_time = Some(0);

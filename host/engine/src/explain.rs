@@ -362,11 +362,11 @@ mod tests {
         fn the_number_needed_is_the_first_that_is_reported(counts in counts(), which in 0..3, gate in 0..60_u16) {
             let alpha = U8F8::lit("4");
             let minimum = Count::saturating(5);
-            let settings = Settings::static_scene(0).with(|with| { with.rule = match which {
+            let settings = Settings::static_scene(0).configured(|array| { array.rule = match which {
                     0 => PaperRule::new(alpha, minimum).into(),
                     1 => AverageRule::new(alpha, minimum).into(),
                     _ => WindowRule::new(3, "4.5".parse().unwrap(), minimum).unwrap().into(),
-                }; with.gate = (gate, 127); });
+                }; array.gate = (gate, 127); });
             let explanation = explain(&settings, &counts, 60, false).unwrap();
             let (bin, peak) = explanation.peak;
             let within = &counts[usize::from(gate)..];
@@ -406,11 +406,11 @@ mod tests {
         let counts: Vec<u32> = (0..128).map(|bin| u32::from(bin == 40) * 50).collect();
         let explained = |settings: Settings| explain(&settings, &counts, 60, false).unwrap();
         let window = WindowRule::new(3, "4.5".parse().unwrap(), Count::saturating(5)).unwrap();
-        let plain = Settings::static_scene(0).with(|with| with.rule = window.into());
+        let plain = Settings::static_scene(0).configured(|array| array.rule = window.into());
         let first = explained(plain.clone());
         assert!(first.needed.is_some() && !first.depends);
-        let tracks = plain.clone().with(|with| with.tracking = true);
-        let echoes = plain.with(|with| with.echoes = EchoNumber::new(2).unwrap());
+        let tracks = plain.clone().configured(|array| array.tracking = true);
+        let echoes = plain.configured(|array| array.echoes = EchoNumber::new(2).unwrap());
         for settings in [tracks, echoes] {
             let explanation = explained(settings);
             assert_eq!(
@@ -440,10 +440,10 @@ mod tests {
         }
         let rule = WindowRule::new(3, "4.5".parse().unwrap(), Count::saturating(5)).unwrap();
         let explained = |gate| {
-            let settings = Settings::static_scene(0).with(|with| {
-                with.rule = rule.into();
-                with.dead_time = Some(20);
-                with.gate = gate;
+            let settings = Settings::static_scene(0).configured(|array| {
+                array.rule = rule.into();
+                array.dead_time = Some(20);
+                array.gate = gate;
             });
             explain(&settings, &counts, 1000, false).unwrap()
         };
@@ -467,10 +467,10 @@ mod tests {
         assert!(explanation.background.is_some());
         // A full counter before the gate: nothing is known.
         counts[3] = 1023;
-        let settings = Settings::static_scene(0).with(|with| {
-            with.rule = rule.into();
-            with.dead_time = Some(20);
-            with.gate = (30, 127);
+        let settings = Settings::static_scene(0).configured(|array| {
+            array.rule = rule.into();
+            array.dead_time = Some(20);
+            array.gate = (30, 127);
         });
         let explanation = explain(&settings, &counts, 1000, false).unwrap();
         assert_eq!((explanation.window, explanation.background), (None, None));

@@ -104,7 +104,7 @@ pub fn decide_once(
 impl Settings {
     /// The same with a window rule that takes any peak.
     fn any_peak(&self) -> Self {
-        self.clone().with(|any| {
+        self.clone().configured(|any| {
             if let AnyRule::Window(rule) = any.rule {
                 any.rule = WindowRule::new(rule.width(), U4F12::ZERO, Count::saturating(1))
                     .map_or(any.rule, AnyRule::Window);

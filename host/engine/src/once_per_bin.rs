@@ -141,9 +141,9 @@ mod tests {
         let array = Array::new(2, 1).unwrap();
         let addresses = [0, 1].map(PixelAddress::new);
         let run = |once_per_bin, slices: &[Slice]| {
-            let settings = Settings::static_scene(1).with(|with| {
-                with.once_per_bin = once_per_bin;
-                with.l1 = 40;
+            let settings = Settings::static_scene(1).configured(|array| {
+                array.once_per_bin = once_per_bin;
+                array.l1 = 40;
             });
             let mut engine = host_engine(&settings, array, &addresses).unwrap();
             let events = slices.iter().flat_map(|slice| engine.run(slice).unwrap());

@@ -2,7 +2,7 @@
 
 use anyhow::{Context, Result};
 
-use super::given::{Given, TDC};
+use super::given::{Given, TDC_OF_ANY_RULE};
 use super::recording::{
     RECORDING, bin_width_warning, check_once_per_bin, mask_capture, read_options, settings_of_file,
     warnings,
@@ -85,7 +85,7 @@ pub struct Options {
 }
 
 impl dtof_data::options::Options for Options {
-    const KEYS: &'static [&'static [Key]] = &[RECORDING, SENSOR, TDC, RAYS, OWN];
+    const KEYS: &'static [&'static [Key]] = &[RECORDING, SENSOR, TDC_OF_ANY_RULE, RAYS, OWN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {

@@ -5,7 +5,7 @@ use dtof_core::CentredWindow;
 use dtof_core::fixed::types::U8F8;
 
 use super::calibrate::{GLASS, IS_GLASS, calibrate_counts, with_mask};
-use super::given::{Given, SENSOR, TDC, of_given};
+use super::given::{Given, SENSOR, TDC_OF_ANY_RULE, of_given};
 use super::recording::{
     RECORDING, bin_width_warning, check_once_per_bin, mask_capture, read_options, settings_of_file,
     warnings,
@@ -72,7 +72,8 @@ pub struct Options {
 }
 
 impl dtof_data::options::Options for Options {
-    const KEYS: &'static [&'static [Key]] = &[ACCURACY, RECORDING, SENSOR, TDC, &[GLASS], RUN];
+    const KEYS: &'static [&'static [Key]] =
+        &[ACCURACY, RECORDING, SENSOR, TDC_OF_ANY_RULE, &[GLASS], RUN];
 
     fn set(&mut self, key: &'static str, text: &str) -> Result<(), String> {
         match key {

@@ -103,7 +103,7 @@ impl RunCounts {
     ) -> Result<Vec<bool>> {
         let mut contradicts = vec![false; addresses.len()];
         let all = input.settings.clone().with_bins(input.settings.bins);
-        let other = all.with(|other| other.gate = input.given_gate.unwrap_or(other.gate));
+        let other = all.configured(|other| other.gate = input.given_gate.unwrap_or(other.gate));
         let has_other = other.configuration.gate != input.settings.configuration.gate;
         for settings in [&input.settings]
             .into_iter()
@@ -176,7 +176,9 @@ impl DepthMap {
         // Two echoes tell whether there is a second surface. The first is the same.
         let two = const { EchoNumber::new(2).unwrap() };
         let echoes = settings.configuration.echoes;
-        let with_two = settings.clone().with(|with| with.echoes = echoes.max(two));
+        let with_two = settings
+            .clone()
+            .configured(|array| array.echoes = echoes.max(two));
         let decided = decide_once(&with_two, array, addresses, counts, |_| false)?;
         let ranges = settings.ranges(array)?;
         let pixels = array.pixels() as usize;

@@ -17,6 +17,11 @@ pub const SENSOR: &[Key] = &[
 ];
 /// The dead time of a TDC.
 pub const TDC: &[Key] = &[Key::of(SensorSettings::KEYS, "dead_time")];
+/// The same for a job that chooses the rule.
+pub const TDC_OF_ANY_RULE: &[Key] = &[TDC[0].with_help(
+    "Bins for which the TDC is blind after a photon, 0 to 65535. With all bins of a histogram it takes the first photon \
+     of a laser cycle only [default: the sensor's, else 0]",
+)];
 /// The dither of a laser that a device fires.
 pub const DITHER: &[Key] = &[
     Key::of(SensorSettings::KEYS, "dither_bins"),

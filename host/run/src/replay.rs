@@ -34,10 +34,11 @@ use dtof_engine::settings::{
 
 /// What the user knows of the scene: an option of the search.
 const SEARCH: &[Key] = &[GLASS];
-/// The options that settle which photons are replayed, and whether pixels decide once.
+/// The options that settle which photons are replayed.
 const RUN: &[Key] = &[
     Key::of(RunSettings::KEYS, "cycles"),
-    Key::of(RunSettings::KEYS, "seed"),
+    Key::of(RunSettings::KEYS, "seed")
+        .with_help("Seed of the laser cycles that recorded photons get [default: 1]"),
 ];
 
 /// The options that were part of the search, so that what is found is for them.
@@ -134,7 +135,7 @@ impl Replay {
         }
         let with_neighbours = self.settings.clone();
         let with_neighbours =
-            with_neighbours.with(|with| with.neighbours = Some(Neighbours::Eight));
+            with_neighbours.configured(|array| array.neighbours = Some(Neighbours::Eight));
         let (array, addresses) = (self.photons.array(), self.photons.addresses());
         let may_help = self.metadata.has_shape
             && array.columns().min(array.rows()) > 1

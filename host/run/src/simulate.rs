@@ -23,7 +23,7 @@ use dtof_simulate::scene::Scene;
 const ARRAY: &[Key] = &[
     Key::new(
         "array",
-        Kind::Integers("columns and rows, (64, 32)"),
+        Kind::Integers("columns and rows, [64, 32]"),
         "COLUMNSxROWS",
         "Macropixels of the array [default: the file's]",
     ),

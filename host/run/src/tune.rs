@@ -9,7 +9,7 @@ use anyhow::Result;
 use dtof_core::BlockLevel;
 use dtof_data::option_table;
 use dtof_data::options::Refused;
-use dtof_data::options::keys::{Key, POSITIVE, bins, integer, named};
+use dtof_data::options::keys::{Key, POSITIVE, above_zero, bins, integer, named};
 use dtof_data::options::numbers::{MAX_INTEGER, shortest};
 use dtof_data::options::progress::{Progress, shared};
 use dtof_data::options::rows::significant;
@@ -43,7 +43,7 @@ option_table! {
             "Bins of a histogram, a power of two from 8 to 1024 [default: 128]";
         bin_width_ps: f64 = POSITIVE, "PS",
             "Width of a bin in picoseconds [default: 250]";
-        false_alarm: f64 = POSITIVE, "SHARE",
+        false_alarm: f64 = above_zero(1.0), "SHARE",
             "Share of exposures without a target that end with an event [default: 0.01]";
         false_alarms_per_second: f64 = POSITIVE, "RATE",
             "Instead of `false_alarm`: false alarms of a pixel a second";

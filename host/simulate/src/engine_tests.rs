@@ -46,27 +46,27 @@ fn rules() -> [AnyRule; 3] {
 }
 
 fn with_neighbours(neighbours: Neighbours) -> Settings {
-    Settings::static_scene(0).with(|with| {
-        with.rule = rules()[2];
-        with.neighbours = Some(neighbours);
+    Settings::static_scene(0).configured(|array| {
+        array.rule = rules()[2];
+        array.neighbours = Some(neighbours);
     })
 }
 
 /// Settings that cover everything a decision depends on.
 fn all_settings() -> Vec<Settings> {
-    let plain = rules().map(|rule| Settings::static_scene(0).with(|with| with.rule = rule));
+    let plain = rules().map(|rule| Settings::static_scene(0).configured(|array| array.rule = rule));
     let window = plain[2].clone();
     let gated = plain
         .clone()
-        .map(|settings| settings.with(|with| with.gate = (30, 119)));
+        .map(|settings| settings.configured(|array| array.gate = (30, 119)));
     let echoes = plain.clone().map(|settings| {
-        settings.with(|with| {
-            with.echoes = EchoNumber::new(3).unwrap();
-            with.echo_wait = 4;
+        settings.configured(|array| {
+            array.echoes = EchoNumber::new(3).unwrap();
+            array.echo_wait = 4;
         })
     });
-    let tracking = window.clone().with(|with| with.tracking = true);
-    let both = echoes[2].clone().with(|with| with.tracking = true);
+    let tracking = window.clone().configured(|array| array.tracking = true);
+    let both = echoes[2].clone().configured(|array| array.tracking = true);
     let frames = Settings {
         frame: Some(500),
         ..window
@@ -309,15 +309,15 @@ fn neighbours_need_the_window_rule_and_no_dead_time() {
         engine.map(|_| ()).map_err(|error| format!("{error:#}"))
     };
     assert_eq!(refused(&good), Ok(()));
-    let paper = good.clone().with(|with| with.rule = rules()[0]);
+    let paper = good.clone().configured(|array| array.rule = rules()[0]);
     let reason = refused(&paper).unwrap_err();
     assert!(reason.contains("is for"), "{reason}");
     let blocks = good
         .clone()
-        .with(|with| with.binning = demo::settings(3).unwrap().configuration.binning);
+        .configured(|array| array.binning = demo::settings(3).unwrap().configuration.binning);
     let reason = refused(&blocks).unwrap_err();
     assert!(reason.contains("cannot be used with binning"), "{reason}");
-    let dead = good.with(|with| with.dead_time = Some(128));
+    let dead = good.configured(|array| array.dead_time = Some(128));
     assert!(
         refused(&dead)
             .unwrap_err()

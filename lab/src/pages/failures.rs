@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use anyhow::{Result, ensure};
 
 use crate::studies::failures::rows::{self, Row, SECTIONS};
-use crate::studies::failures::{Case, FailureResult, Method, Rule, Verdict, Warning, outcomes};
+use crate::studies::failures::{Case, FailureOutcome, Method, Rule, Verdict, Warning, outcomes};
 use crate::sweep::Part;
 use crate::sweep::values::Values;
 use dtof_draw::palette::Mark;
@@ -37,7 +37,7 @@ pub fn table(part: &Part) -> Result<Values> {
 pub fn cases(part: &Part) -> Result<String> {
     let mut csv = "case,row,fails,holds,advice,why_no_flag\n".to_owned();
     for (case, outcomes) in &outcomes(part)? {
-        let all: Vec<&FailureResult> = outcomes.iter().collect();
+        let all: Vec<&FailureOutcome> = outcomes.iter().collect();
         let (fails, holds) = (failures(&all), survivors(&all));
         let Row {
             name,
@@ -58,13 +58,13 @@ pub fn cases(part: &Part) -> Result<String> {
 }
 
 /// The outcomes in all cases of `row`.
-fn of_row(outcomes: &[(Case, Vec<FailureResult>)], row: Row) -> Vec<&FailureResult> {
+fn of_row(outcomes: &[(Case, Vec<FailureOutcome>)], row: Row) -> Vec<&FailureOutcome> {
     let cases = outcomes.iter().filter(|(case, _)| case.row == row);
     cases.flat_map(|(_, outcomes)| outcomes).collect()
 }
 
 /// The worst outcome of `method`.
-fn worst<'a>(outcomes: &[&'a FailureResult], method: Method) -> Option<&'a FailureResult> {
+fn worst<'a>(outcomes: &[&'a FailureOutcome], method: Method) -> Option<&'a FailureOutcome> {
     let of_method = outcomes.iter().filter(|of| of.method == method);
     let worst = of_method.max_by(|a, b| {
         let by_size = number(a).0.total_cmp(&number(b).0);
@@ -73,13 +73,13 @@ fn worst<'a>(outcomes: &[&'a FailureResult], method: Method) -> Option<&'a Failu
     worst.copied()
 }
 
-const fn kind(outcome: &FailureResult) -> (Verdict, Warning) {
+const fn kind(outcome: &FailureOutcome) -> (Verdict, Warning) {
     (outcome.verdict, outcome.warning)
 }
 
 /// What fails and how, with the worst number of each kind. Empty if nothing does.
-fn failures(outcomes: &[&FailureResult]) -> String {
-    let mut worst: Vec<&FailureResult> = Method::all()
+fn failures(outcomes: &[&FailureOutcome]) -> String {
+    let mut worst: Vec<&FailureOutcome> = Method::all()
         .filter_map(|method| worst(outcomes, method))
         .filter(|of| kind(of) != (Verdict::Survives, Warning::NotNeeded))
         .collect();
@@ -106,7 +106,7 @@ fn failures(outcomes: &[&FailureResult]) -> String {
 }
 
 /// The number that tells why a method does not hold, and its text.
-fn number(outcome: &FailureResult) -> (f64, String) {
+fn number(outcome: &FailureOutcome) -> (f64, String) {
     let percent = |share: f64, what| {
         let digits = usize::from(share < 0.1);
         (share, format!("{:.digits$} % {what}", share * 100.0))
@@ -127,8 +127,8 @@ fn number(outcome: &FailureResult) -> (f64, String) {
 }
 
 /// The methods that survive every outcome.
-fn survivors(outcomes: &[&FailureResult]) -> String {
-    let survives = |of: &FailureResult| of.verdict == Verdict::Survives;
+fn survivors(outcomes: &[&FailureOutcome]) -> String {
+    let survives = |of: &FailureOutcome| of.verdict == Verdict::Survives;
     let methods = Method::all().filter(|method| worst(outcomes, *method).is_some_and(survives));
     names(&methods.collect::<Vec<_>>())
 }
@@ -201,7 +201,7 @@ pub fn picture(part: &Part) -> Result<String> {
 }
 
 /// Whether the title holds.
-fn holds(outcomes: &[(Case, Vec<FailureResult>)]) -> bool {
+fn holds(outcomes: &[(Case, Vec<FailureOutcome>)]) -> bool {
     let survived = |rule| {
         let all = outcomes.iter().flat_map(|(_, outcomes)| outcomes);
         let of_rule = all.filter(|of| of.method.rule == rule);
@@ -217,7 +217,7 @@ fn holds(outcomes: &[(Case, Vec<FailureResult>)]) -> bool {
         })
 }
 
-fn draw(outcomes: &[(Case, Vec<FailureResult>)]) -> String {
+fn draw(outcomes: &[(Case, Vec<FailureOutcome>)]) -> String {
     let mut svg = Svg::default();
     let lines = wrapped(FINDING, BOLD * TITLE.0, INNER);
     let mut y = svg.lines("ink title", (EDGE, EDGE), TITLE, Anchor::Start, &lines) + 8.0;
@@ -267,7 +267,7 @@ fn columns() -> [(f64, f64); 4] {
 }
 
 /// One mark, or two where the estimators differ.
-fn cell(svg: &mut Svg, outcomes: &[&FailureResult], rule: Rule, (x, y): (f64, f64)) {
+fn cell(svg: &mut Svg, outcomes: &[&FailureOutcome], rule: Rule, (x, y): (f64, f64)) {
     let kinds = [false, true].map(|is_centred| {
         let worst = worst(outcomes, Method { rule, is_centred });
         worst.map_or((Verdict::Survives, Warning::NotNeeded), kind)

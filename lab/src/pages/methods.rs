@@ -8,7 +8,7 @@ mod tables;
 use self::recorded::recorded;
 use crate::studies::methods::depth_error::Estimator;
 use crate::studies::methods::passage::Rule;
-use crate::studies::methods::time_to_detect::DetectionResult;
+use crate::studies::methods::time_to_detect::DetectionOutcome;
 use crate::studies::methods::{depth_error, time_to_detect};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::ends;
@@ -189,8 +189,8 @@ fn value(entries: &[Entry], label: &str) -> Result<f64> {
 /// Every rule over the outcomes that `of` selects.
 fn rules(
     counts: &Instructions,
-    outcomes: &[DetectionResult],
-    of: impl Fn(&DetectionResult) -> bool,
+    outcomes: &[DetectionOutcome],
+    of: impl Fn(&DetectionOutcome) -> bool,
 ) -> Result<Vec<Entry>> {
     let entry = |rule: Rule| {
         let those = outcomes
@@ -212,7 +212,7 @@ fn rules(
 const SUITED: &str = "best for the pulse";
 
 /// The fastest rule for each pulse, over its scenes.
-fn suited(counts: &Instructions, outcomes: &[DetectionResult]) -> Result<Entry> {
+fn suited(counts: &Instructions, outcomes: &[DetectionOutcome]) -> Result<Entry> {
     let (mut ratios, mut cost) = (Vec::new(), 0.0f64);
     for sigma in time_to_detect::SIGMAS {
         let entries = rules(counts, outcomes, |outcome| outcome.sigma == sigma)?;

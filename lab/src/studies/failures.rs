@@ -25,7 +25,7 @@ use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 
 pub use self::case::Case;
-pub use self::outcome::{FailureResult, Verdict, Warning, outcomes};
+pub use self::outcome::{FailureOutcome, Verdict, Warning, outcomes};
 
 /// Bins of a histogram.
 pub const BINS: usize = 128;
@@ -302,7 +302,7 @@ fn results(part: &Part) -> Result<Results> {
     })
 }
 
-fn csv(outcomes: &[(Case, Vec<FailureResult>)]) -> Result<String> {
+fn csv(outcomes: &[(Case, Vec<FailureOutcome>)]) -> Result<String> {
     let mut csv = "case,rule,estimator,events,false,false_low,false_high,without_event,cycles,error,mean_error,\
                    saturated,clipped,piled_up,other_surface,verdict,flag\n"
         .to_owned();

@@ -1,6 +1,7 @@
 //! The same mistake in a settings file of the host, in a configuration on the link and in C: one error value each.
 //! A flag and a keyword of Python have that of the file (the test `mistakes` of the program).
 
+use dtof_c::dtof_status_t::*;
 use dtof_c::*;
 use dtof_core::fixed::types::U4F12;
 use dtof_core::{AnyRule, Array, BlockLevel, Count, Count10, Neighbours, WindowRule};
@@ -19,6 +20,7 @@ struct Mistake {
     bytes: fn(&mut [u8]),
     c: fn(&mut dtof_config_t, &mut dtof_layout_t),
     refusal: Refusal,
+    status: dtof_status_t,
 }
 
 /// The width of the window in a configuration: `docs/link-format.md`.
@@ -38,6 +40,7 @@ const MISTAKES: [Mistake; 5] = [
         bytes: |bytes| bytes[WINDOW] = 9,
         c: |config, _| (config.rule, config.window) = (DTOF_RULE_WINDOW, 9),
         refusal: Refusal::WindowWidth,
+        status: DTOF_ERROR_WINDOW_WIDTH,
     },
     // Two that do not fit.
     Mistake {
@@ -47,6 +50,7 @@ const MISTAKES: [Mistake; 5] = [
         bytes: |_| {},
         c: |config, _| (config.x, config.l1) = (50, 40),
         refusal: Refusal::XAboveL1,
+        status: DTOF_ERROR_X_ABOVE_L1,
     },
     // Two that exclude each other.
     Mistake {
@@ -66,6 +70,7 @@ const MISTAKES: [Mistake; 5] = [
             (layout.neighbours, layout.block_levels, layout.patience) = (8, 1, 64);
         },
         refusal: Refusal::Neighbours,
+        status: DTOF_ERROR_NEIGHBOURS,
     },
     // For another rule.
     Mistake {
@@ -75,6 +80,7 @@ const MISTAKES: [Mistake; 5] = [
         bytes: |_| {},
         c: |config, _| config.tracking = 1,
         refusal: Refusal::Tracking,
+        status: DTOF_ERROR_TRACKING,
     },
     // Too few.
     Mistake {
@@ -84,6 +90,7 @@ const MISTAKES: [Mistake; 5] = [
         bytes: |_| {},
         c: |config, _| (config.gate_first, config.gate_last) = (4, 9),
         refusal: Refusal::GateTooNarrow,
+        status: DTOF_ERROR_GATE_TOO_NARROW,
     },
 ];
 
@@ -118,6 +125,6 @@ fn a_mistake_is_one_error_in_a_file_on_the_link_and_in_c() {
         };
         (mistake.c)(&mut settings, &mut layout);
         let status = Driven::new().configure(&settings, &layout);
-        assert_eq!(status, dtof_status_t::from(refused), "{}", mistake.line);
+        assert_eq!(status, mistake.status, "{}", mistake.line);
     }
 }

@@ -33,15 +33,23 @@ fn arg(key: &Key) -> Arg {
             .require_equals(true)
             .default_missing_value("true"),
         Kind::Flag => arg.action(ArgAction::SetTrue),
-        // Numbers below 0 are values, and are refused as such.
-        Kind::Fixed(_) | Kind::Numbers(_) => arg
+        // Numbers below 0 are values, and may be refused as such.
+        Kind::SignedNumbers(_) => arg
             .value_name(key.value)
-            .value_parser(OsStringValueParser::new())
+            .value_parser(OsStringValueParser::new().try_map(not_a_flag))
             .allow_hyphen_values(true),
         _ => arg
             .value_name(key.value)
             .value_parser(OsStringValueParser::new())
             .allow_negative_numbers(true),
+    }
+}
+
+/// The value, unless it is the next flag.
+fn not_a_flag(value: OsString) -> Result<OsString, &'static str> {
+    match value.as_encoded_bytes().starts_with(b"--") {
+        true => Err("needs a value before it"),
+        false => Ok(value),
     }
 }
 
@@ -116,23 +124,79 @@ mod tests {
     use dtof_run::given::Operation;
     use dtof_run::{calibrate, compare, replay, simulate, tune};
 
-    /// Each key is one that can be set; a whole number has the ends of its range, and no other.
+    /// Values of a kind: some that it takes, and some that it does not.
+    fn tried(kind: Kind) -> [Vec<String>; 2] {
+        let texts = |numbers: &[Option<u64>]| -> Vec<String> {
+            numbers.iter().flatten().map(u64::to_string).collect()
+        };
+        match kind {
+            Kind::Integer(first, last) | Kind::PowerOfTwo(first, last) => [
+                texts(&[Some(first), Some(last)]),
+                texts(&[first.checked_sub(1), last.checked_add(1)]),
+            ],
+            Kind::Even(last) => [
+                texts(&[Some(0), Some(last)]),
+                texts(&[Some(1), Some(last + 2)]),
+            ],
+            Kind::Choice(numbers) => {
+                let past = numbers.iter().flat_map(|number| number.checked_add(1));
+                let past = past.filter(|number| !numbers.contains(number));
+                [
+                    texts(&numbers.iter().copied().map(Some).collect::<Vec<_>>()),
+                    texts(&past.map(Some).collect::<Vec<_>>()),
+                ]
+            }
+            Kind::Real(first, last) => [
+                vec![first.to_string(), last.to_string()],
+                vec![(first - 1e-9).to_string(), (last + 1.0).to_string()],
+            ],
+            Kind::AboveZero(last) => [
+                vec![last.min(1e300).to_string()],
+                vec!["0".to_owned(), "-1".to_owned(), (last * 1.01).to_string()],
+            ],
+            Kind::Fixed(ends) => [ends().to_vec(), vec!["1e9".to_owned()]],
+            Kind::Switch | Kind::Flag => [vec!["true".to_owned()], vec!["yes".to_owned()]],
+            Kind::YesOrNo => [vec!["no".to_owned()], vec!["true".to_owned()]],
+            Kind::OneOf(names) => [
+                names().iter().map(|[name, _]| (*name).to_owned()).collect(),
+                vec!["best of all".to_owned()],
+            ],
+            _ => [Vec::new(), Vec::new()],
+        }
+    }
+
+    /// Each key is one that can be set, to what its kind says and no other. Its help names keys of the same job. It
+    /// takes no flag for its value.
     fn keys_of<O: Options>() {
         let mut seen = Vec::new();
+        let flags = || {
+            Flags::<O>::augment_args(Command::new("job"))
+                .arg(Arg::new("other").long("other").action(ArgAction::SetTrue))
+        };
         for key in keys::<O>() {
+            let _ = with_names(key.help, |other| {
+                let is_key = other == "settings" || keys::<O>().any(|key| key.name == other);
+                assert!(is_key, "{}: `{other}`", key.name);
+                String::new()
+            });
+            let line = ["job".to_owned(), flag(key.name), "--other".to_owned()];
+            let takes_none = matches!(key.kind, Kind::Flag | Kind::Switch);
+            assert_eq!(
+                flags().try_get_matches_from(line).is_ok(),
+                takes_none,
+                "{key:?}"
+            );
             let set = |text: &str| O::default().set(key.name, text);
             let is_file = O::default().file(key.name).is_some();
             assert!(is_file || set("\0") != Err(NO_OPTION.to_owned()), "{key:?}");
             assert!(!seen.contains(&key.name), "{key:?}");
             seen.push(key.name);
-            if let Kind::Integer(first, last) = key.kind {
-                let [low, high] = [first, last].map(|end| set(&end.to_string()));
-                // Some have further conditions, as a power of two.
-                assert!(low.is_ok() && high.is_ok(), "{key:?}");
-                let past = [first.checked_sub(1), last.checked_add(1)];
-                for past in past.into_iter().flatten() {
-                    assert!(set(&past.to_string()).is_err(), "{past}: {key:?}");
-                }
+            let [taken, refused] = tried(key.kind);
+            for text in taken {
+                assert_eq!(set(&text), Ok(()), "{text}: {key:?}");
+            }
+            for text in refused {
+                assert!(set(&text).is_err(), "{text}: {key:?}");
             }
         }
         assert_eq!(O::default().set("sed", "5"), Err(NO_OPTION.to_owned()));

@@ -32,10 +32,10 @@ fn client(name: &str) -> Client {
 
 /// Settings for the monitor's devices.
 fn settings() -> Settings {
-    Settings::static_scene(0).with(|with| {
-        with.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into();
-        with.l1 = 40;
-        with.x = 4;
+    Settings::static_scene(0).configured(|array| {
+        array.rule = PaperRule::new(U8F8::lit("4"), Count::saturating(5)).into();
+        array.l1 = 40;
+        array.x = 4;
     })
 }
 

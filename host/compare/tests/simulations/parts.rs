@@ -9,7 +9,7 @@ use dtof_compare::Figures;
 use dtof_compare::answer::answer;
 use dtof_compare::bound::Bound;
 use dtof_compare::cost;
-use dtof_compare::measure::{Trial, TrialResult};
+use dtof_compare::measure::{Trial, TrialOutcome};
 use dtof_compare::method::{Kind, Method, Rule};
 use dtof_compare::stress::{Light, Stress, Stressed};
 use dtof_compare::thresholds::Thresholds;
@@ -110,7 +110,7 @@ fn rules_have_the_requested_false_alarms() {
             let threshold = found.of(rule, 0.01).unwrap();
             let of_rule = settings
                 .clone()
-                .with(|with| with.rule = rule.with(threshold, 5).unwrap());
+                .configured(|array| array.rule = rule.with(threshold, 5).unwrap());
             let mut photons = scene.photons(7, scene.cycles).unwrap();
             let addresses = photons.addresses();
             let mut engine = host_engine(&of_rule, photons.array(), &addresses).unwrap();
@@ -242,8 +242,8 @@ fn outcome(
     cycles: f64,
     error_mm: f64,
     instructions: f64,
-) -> TrialResult {
-    TrialResult {
+) -> TrialOutcome {
+    TrialOutcome {
         trial: Trial {
             method,
             effort,
@@ -310,11 +310,11 @@ fn a_method_that_leaves_pixels_silent_is_not_taken() {
         .position(|method| !method.has_full_resolution());
     let blocks = blocks.unwrap();
     let frames = methods.len() - 1;
-    let silent = |mut outcome: TrialResult, silent: f64| {
+    let silent = |mut outcome: TrialOutcome, silent: f64| {
         outcome.figures.silent = silent;
         outcome
     };
-    let taken = |all: &[TrialResult], within_mm: f64| {
+    let taken = |all: &[TrialOutcome], within_mm: f64| {
         let choice = answer(&methods, all, within_mm).best;
         choice.map(|choice| (choice.method, choice.effort))
     };
@@ -374,7 +374,7 @@ fn blocks_are_an_answer_of_their_own() {
         outcome(eight, 5, 100.0, 9.0, 80.0),
         outcome(blocks, 5, 50.0, 9.0, 60.0),
     ];
-    let taken = |all: &[TrialResult]| {
+    let taken = |all: &[TrialOutcome]| {
         let found = answer(&methods, all, 10.0);
         [found.best, found.fastest].map(|choice| choice.map(|choice| choice.method))
     };

@@ -2,7 +2,7 @@
 //! on other photons of the same scene.
 
 use dtof_compare::answer::answer;
-use dtof_compare::measure::TrialResult;
+use dtof_compare::measure::TrialOutcome;
 use dtof_compare::truth::Truth;
 use dtof_compare::{Comparison, Task, compare};
 use dtof_data::photons::source::PhotonSource;
@@ -78,7 +78,7 @@ fn dim_pixels_are_not_left_silent() {
     let events = events.filter(|outcome| !found.methods[outcome.trial.method].is_frames());
     let (exact, others): (Vec<_>, Vec<_>) =
         events.partition(|outcome| outcome.figures.error_mm <= frame_mm);
-    let silent = |outcome: &&TrialResult| outcome.figures.silent;
+    let silent = |outcome: &&TrialOutcome| outcome.figures.silent;
     assert!(!exact.is_empty() && exact.iter().all(|outcome| silent(outcome) > 0.3));
     let least = others.iter().map(silent).fold(1.0, f64::min);
     let best = found.answer.best.unwrap();

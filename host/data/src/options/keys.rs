@@ -28,6 +28,10 @@ pub struct Key {
 pub enum Kind {
     /// A whole number from the first to the last.
     Integer(u64, u64),
+    /// A power of two from the first to the last.
+    PowerOfTwo(u64, u64),
+    /// An even number up to this one.
+    Even(u64),
     /// One of these whole numbers.
     Choice(&'static [u64]),
     /// A fixed-point number, between these ends.
@@ -44,10 +48,12 @@ pub enum Kind {
     YesOrNo,
     /// A name, with its help.
     OneOf(fn() -> Vec<[&'static str; 2]>),
-    /// Whole numbers: which, and an example in Python.
+    /// Whole numbers: which, and an example.
     Integers(&'static str),
-    /// Numbers: which, and an example in Python.
+    /// Numbers: which, and an example.
     Numbers(&'static str),
+    /// The same, which may be below 0.
+    SignedNumbers(&'static str),
     /// Names: which.
     Names(&'static str),
     /// A text.
@@ -114,7 +120,10 @@ impl Kind {
     /// Whether a settings file has it as a list.
     #[must_use]
     pub const fn is_list(self) -> bool {
-        matches!(self, Self::Integers(_) | Self::Numbers(_))
+        matches!(
+            self,
+            Self::Integers(_) | Self::Numbers(_) | Self::SignedNumbers(_)
+        )
     }
 
     /// Whether a settings file has it in quotes.
@@ -126,28 +135,30 @@ impl Kind {
         )
     }
 
-    /// The kind and the range in words, for Python.
+    /// The kind and the range in words.
     #[must_use]
     pub fn words(self) -> String {
         match self {
             Self::Integer(first, last) => format!("whole number, {first} to {last}"),
+            Self::PowerOfTwo(first, last) => format!("power of two, {first} to {last}"),
+            Self::Even(last) => format!("even number, 0 to {last}"),
             Self::Choice(numbers) => any_of(numbers),
             Self::Fixed(ends) => format!("number, {}", ends().join(" to ")),
             Self::Real(first, last) => format!("number, {first} to {last}"),
             Self::AboveZero(f64::INFINITY) => "number above 0".to_owned(),
             Self::AboveZero(last) => format!("number above 0, at most {last}"),
-            Self::Switch | Self::Flag | Self::YesOrNo => "True or False".to_owned(),
+            Self::Switch | Self::Flag | Self::YesOrNo => "true or false".to_owned(),
             Self::OneOf(names) => {
                 let names: Vec<_> = names().iter().map(|[name, _]| *name).collect();
                 any_of(&names)
             }
-            Self::Integers(words) | Self::Numbers(words) | Self::Names(words) => words.to_owned(),
+            Self::Integers(words)
+            | Self::Numbers(words)
+            | Self::SignedNumbers(words)
+            | Self::Names(words) => words.to_owned(),
             Self::Text => "text".to_owned(),
             Self::File => "file".to_owned(),
-            Self::Settings => {
-                "file, text of several lines, dict of sections, or a result with settings"
-                    .to_owned()
-            }
+            Self::Settings => "settings file".to_owned(),
         }
     }
 }
@@ -157,7 +168,7 @@ impl Kind {
     ///
     /// # Errors
     /// Says what the number must be.
-    pub fn real(self, text: &str) -> Result<f64, String> {
+    fn real(self, text: &str) -> Result<f64, String> {
         let is_in_range = |number: &f64| match self {
             Self::Real(first, last) => (first..=last).contains(number),
             Self::AboveZero(last) => *number > 0.0 && *number <= last,
@@ -182,7 +193,6 @@ pub(crate) fn any_of(values: &[impl Display]) -> String {
 }
 
 /// How the text of an option becomes a value.
-#[derive(Clone, Copy)]
 pub struct Reader<T> {
     /// The values.
     pub kind: Kind,
@@ -204,11 +214,9 @@ impl<T> Reader<T> {
     }
 
     /// [`Self::read`] as a function.
-    pub fn parser(self) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync
-    where
-        T: Clone + Send + Sync,
-    {
-        move |text| self.read(text)
+    pub fn parser(self) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync {
+        let Self { kind, read } = self;
+        move |text| read(kind, text)
     }
 }
 
@@ -242,7 +250,7 @@ pub const fn choice<T: TryFrom<u64>>(numbers: &'static [u64]) -> Reader<T> {
 /// Numbers of bins that a histogram can have.
 #[must_use]
 pub const fn bins() -> Reader<u16> {
-    Reader::new(Kind::Integer(8, 1024), |_, text| numbers::bins(text))
+    Reader::new(Kind::PowerOfTwo(8, 1024), |_, text| numbers::bins(text))
 }
 
 /// Numbers from the first to the last.

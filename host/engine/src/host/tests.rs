@@ -106,7 +106,7 @@ fn all_settings() -> impl Strategy<Value = Settings> {
         option::of(Just((3u16, 12u16))),
         prop_oneof![Just(8u8), Just(10u8)],
     );
-    let mode = (0u8..6, 1u8..=3, 0u16..300, any::<bool>(), 1u16..200);
+    let mode = (0u8..6, 1u8..=3, 1u16..300, any::<bool>(), 1u16..200);
     (looks, pixels, mode).prop_map(|((x, l1, more, level, minimum), pixels, mode)| {
         let (number, tracks, (echoes, echo_wait), dead_time, gate, counter_bits) = pixels;
         let (mode, levels, patience, eight, frame) = mode;
@@ -124,26 +124,27 @@ fn all_settings() -> impl Strategy<Value = Settings> {
         };
         let plain = Settings::static_scene(1)
             .with_bins(BINS.into())
-            .with(|with| {
-                with.rule = rule(number, minimum, level);
-                (with.x, with.l1, with.l2) = (x, l1, l1 + x + more);
-                with.tracking = tracks && number == 2 && mode != 3;
-                with.echoes = EchoNumber::new(echoes).unwrap();
-                with.echo_wait = echo_wait.unwrap_or(u8::MAX);
-                let is_weighed = with.rule.weighs_dead_time() || dead_time == BINS;
-                with.dead_time = Some(if is_weighed { dead_time } else { 0 });
-                with.gate = gate.unwrap_or(with.gate);
+            .configured(|array| {
+                array.rule = rule(number, minimum, level);
+                (array.x, array.l1, array.l2) = (x, l1, l1 + x + more);
+                array.tracking = tracks && number == 2 && mode != 3;
+                array.echoes = EchoNumber::new(echoes).unwrap();
+                array.echo_wait = echo_wait.unwrap_or(u8::MAX);
+                let is_weighed = array.rule.weighs_dead_time() || dead_time == BINS;
+                array.dead_time = Some(if is_weighed { dead_time } else { 0 });
+                array.gate = gate.unwrap_or(array.gate);
             });
         let plain = Settings {
             counter_bits,
             ..plain
         };
         match mode {
-            1 => plain.with(|with| {
+            1 => plain.configured(|array| {
                 let levels = BlockLevel::saturating(levels);
-                with.binning = Some(AdaptiveBinning { levels, patience });
+                array.binning = Some(AdaptiveBinning { levels, patience });
             }),
-            2 => plain.with(|with| with.neighbours = Neighbours::new(if eight { 8 } else { 4 })),
+            2 => plain
+                .configured(|array| array.neighbours = Neighbours::new(if eight { 8 } else { 4 })),
             3 => Settings {
                 frame: Some(frame),
                 ..plain
@@ -152,7 +153,7 @@ fn all_settings() -> impl Strategy<Value = Settings> {
                 decide_once: true,
                 ..plain
             },
-            5 => plain.with(|with| with.once_per_bin = true),
+            5 => plain.configured(|array| array.once_per_bin = true),
             _ => plain,
         }
     })
@@ -205,16 +206,16 @@ proptest! {
 fn a_pixel_whose_recording_ends_takes_no_part_in_later_looks() {
     let neighbours = Settings::static_scene(1)
         .with_bins(BINS.into())
-        .with(|with| {
-            with.rule = rule(2, 3, 2.0);
-            with.neighbours = Some(Neighbours::Four);
-            with.x = 6;
-            with.l1 = 25;
-            with.l2 = 55;
+        .configured(|array| {
+            array.rule = rule(2, 3, 2.0);
+            array.neighbours = Some(Neighbours::Four);
+            array.x = 6;
+            array.l1 = 25;
+            array.l2 = 55;
         });
-    let binning = neighbours.clone().with(|with| {
-        with.neighbours = None;
-        with.binning = Some(AdaptiveBinning {
+    let binning = neighbours.clone().configured(|array| {
+        array.neighbours = None;
+        array.binning = Some(AdaptiveBinning {
             levels: BlockLevel::saturating(2),
             patience: 20,
         });
@@ -243,11 +244,11 @@ fn exposures_without_photons_expire() {
     for (number, level) in counts {
         let settings = Settings::static_scene(1)
             .with_bins(BINS.into())
-            .with(|with| {
-                with.rule = rule(number, 0, level);
-                with.x = 10;
-                with.l1 = 40;
-                with.l2 = 95;
+            .configured(|array| {
+                array.rule = rule(number, 0, level);
+                array.x = 10;
+                array.l1 = 40;
+                array.l2 = 95;
             });
         let ends = vec![100_000; 19];
         let outcome = run(&settings, &[], &ends, &[u16::MAX]);

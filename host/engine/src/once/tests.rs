@@ -15,7 +15,7 @@ fn settings(bins: usize) -> Settings {
         ..Settings::static_scene(0)
             .with_bins(bins)
             .for_pulse("1".parse().unwrap())
-            .with(|with| with.rule = rule.into())
+            .configured(|array| array.rule = rule.into())
     }
 }
 
@@ -111,7 +111,7 @@ proptest! {
         if let Some(before) = first.checked_sub(1) {
             counts[usize::from(before)] = 0;
         }
-        let settings = settings(128).with(|with| { with.gate = (first, 127); with.echoes = EchoNumber::new(echoes).unwrap(); });
+        let settings = settings(128).configured(|array| { array.gate = (first, 127); array.echoes = EchoNumber::new(echoes).unwrap(); });
         let config = settings.config::<128>().unwrap();
         let mut histogram = Histogram::<128, Count24>::new();
         let all: [u32; 128] = counts.clone().try_into().unwrap();
@@ -180,7 +180,7 @@ fn the_confidence_is_that_of_the_formula() {
 fn without_photons_the_confidence_is_0_and_of_pixels_left_out_unknown() {
     let settings = Settings {
         masked: vec![1],
-        ..settings(128).with(|with| with.gate = (20, 127))
+        ..settings(128).configured(|array| array.gate = (20, 127))
     };
     let histograms = [vec![0; 128], vec![0; 128], wall(50)];
     let (events, engine) = decided(&settings, line(3), &histograms);
@@ -233,9 +233,9 @@ fn divided_counts_have_no_more_false_alarms() {
             pixel
         });
         let counts = recorded(pixels.collect(), 1 << 20);
-        let settings = settings(128).with(|with| {
-            with.gate = (1, 127);
-            with.rule = WindowRule::new(3, "3".parse().unwrap(), Count::saturating(5))
+        let settings = settings(128).configured(|array| {
+            array.gate = (1, 127);
+            array.rule = WindowRule::new(3, "3".parse().unwrap(), Count::saturating(5))
                 .unwrap()
                 .into();
         });
@@ -270,7 +270,7 @@ fn counts_past_32_bits_and_their_laser_cycles_are_divided_alike() {
             count << times
         });
         let counts = recorded(vec![photons.collect()], cycles << times);
-        let settings = settings(128).with(|with| with.dead_time = Some(128));
+        let settings = settings(128).configured(|array| array.dead_time = Some(128));
         let decided = decide_once(&settings, line(1), &addresses(1), &counts, |_| false).unwrap();
         let [decided] = decided.try_into().ok().unwrap();
         (decided.echoes, decided.confidence.to_bits(), decided.best)
@@ -288,7 +288,7 @@ proptest! {
     fn the_engine_decides_as_the_function_does(
         levels in prop::collection::vec(0_u32..60, 6), neighbours in prop::sample::select(vec![0, 4, 8]),
     ) {
-        let settings = settings(128).with(|with| with.neighbours = Neighbours::new(neighbours));
+        let settings = settings(128).configured(|array| array.neighbours = Neighbours::new(neighbours));
         let pixels: Vec<Vec<u32>> = levels.iter().map(|&level| {
             let mut counts: Vec<u32> = (0..128).map(|bin| 20 + bin * level % 5).collect();
             counts[70] += level;
@@ -313,7 +313,7 @@ proptest! {
         mut counts in prop::collection::vec(0_u64..3, 128), many in 0_u32..40, dead_time in 0_u16..40,
     ) {
         counts[30] <<= many;
-        let settings = settings(128).with(|with| { with.gate = (10, 99); with.dead_time = Some(dead_time); });
+        let settings = settings(128).configured(|array| { array.gate = (10, 99); array.dead_time = Some(dead_time); });
         let has_photon = counts[10..=99].iter().any(|&count| count > 0);
         let counts = recorded(vec![counts], 1000);
         let decided = decide_once(&settings, line(1), &addresses(1), &counts, |_| false).unwrap();
@@ -348,7 +348,7 @@ fn around(middle: Vec<u32>) -> Vec<Vec<u32>> {
 
 #[test]
 fn the_confidence_is_of_the_sum_only_where_the_sum_was_used() {
-    let with = settings(128).with(|with| with.neighbours = Neighbours::new(8));
+    let with = settings(128).configured(|array| array.neighbours = Neighbours::new(8));
     let array = Array::new(3, 3).unwrap();
     let of_middle = |settings: &Settings, middle: &[u32]| {
         confidence(settings, array, &around(middle.to_vec()))[4]
@@ -367,7 +367,7 @@ fn the_confidence_is_of_the_sum_only_where_the_sum_was_used() {
 
 #[test]
 fn neighbours_confirm_a_surface_that_the_pixel_sees() {
-    let with = settings(128).with(|with| with.neighbours = Neighbours::new(8));
+    let with = settings(128).configured(|array| array.neighbours = Neighbours::new(8));
     let array = Array::new(3, 3).unwrap();
     let of_middle = |settings: &Settings, middle: Vec<u32>| {
         let (events, _) = decided(settings, array, &around(middle));
@@ -417,10 +417,10 @@ fn bright_neighbours_confirm_with_any_number_of_bins() {
         for (bin, more) in [(14, 100), (15, 200), (16, 100)] {
             dim[bin] += more;
         }
-        let alone = settings(bins).with(|with| with.gate = (0, 31));
+        let alone = settings(bins).configured(|array| array.gate = (0, 31));
         let with = alone
             .clone()
-            .with(|with| with.neighbours = Neighbours::new(8));
+            .configured(|array| array.neighbours = Neighbours::new(8));
         let array = Array::new(3, 3).unwrap();
         let pixels = vec![dim; 9];
         assert!(decided(&alone, array, &pixels).0.is_empty());
@@ -502,7 +502,7 @@ fn the_slope_of_what_lies_outside_of_the_gate_is_no_surface() {
             }
             let counts = recorded(vec![histogram], 1 << 20);
             let settings = settings(128)
-                .with(|with| with.gate = if is_mirrored { (0, 119) } else { (8, 127) });
+                .configured(|array| array.gate = if is_mirrored { (0, 119) } else { (8, 127) });
             let decided =
                 decide_once(&settings, line(1), &addresses(1), &counts, |_| false).unwrap();
             if let Some((_, echo)) = decided[0].echoes.first() {

@@ -80,7 +80,7 @@ option_table! {
             "Estimator of the position of a peak [default: window with `sigma_bins` or `half_widths`, else centroid]",
             "centroid or window";
         #[serde(serialize_with = "two_numbers")]
-        half_widths: CentredWindow = Reader::new(Kind::Numbers("two numbers, (1.75, 4)"), |_, text| half_widths(text)), "BEFORE,AFTER",
+        half_widths: CentredWindow = HALF_WIDTHS, "BEFORE,AFTER",
             "Estimator window: bins before and after its centre, 1 to 4 each, rounded to 1/256. A longer part after \
              suits a pulse that falls more slowly than it rises [default: from `sigma_bins`]",
             "bins before and after the place, of estimator window";
@@ -93,7 +93,7 @@ option_table! {
         l2: u16 = integer(0, 65_535), "N",
             "Longest exposure: a pixel without an event starts over after N laser cycles [default: 2000]",
             "laser cycles at which a pixel starts over";
-        x: u16 = integer(0, 65_535), "N",
+        x: u16 = integer(1, 65_535), "N",
             "Laser cycles between two decisions [default: 4]",
             "laser cycles between looks";
         binning: u8 = integer(0, BlockLevel::MAX.raw() as u64), "LEVELS",
@@ -405,6 +405,11 @@ fn z_for_share(
     );
     Ok(z)
 }
+
+const HALF_WIDTHS: Reader<CentredWindow> =
+    Reader::new(Kind::Numbers("two numbers, [1.75, 4]"), |_, text| {
+        half_widths(text)
+    });
 
 /// Reads `BEFORE,AFTER`: the half widths of the depth window.
 ///

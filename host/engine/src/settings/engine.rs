@@ -79,9 +79,9 @@ impl Settings {
         self
     }
 
-    /// These settings with another configuration.
+    /// These settings with the configuration as `change` makes it.
     #[must_use]
-    pub fn with(mut self, change: impl FnOnce(&mut Configuration)) -> Self {
+    pub fn configured(mut self, change: impl FnOnce(&mut Configuration)) -> Self {
         change(&mut self.configuration);
         self
     }

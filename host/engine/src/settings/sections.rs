@@ -12,7 +12,9 @@ use serde::Serialize;
 use serde::ser::{Error as _, Serializer};
 
 use dtof_data::option_table;
-use dtof_data::options::keys::{Kind, POSITIVE, Reader, bins, boolean, fixed, integer, real};
+use dtof_data::options::keys::{
+    Kind, POSITIVE, Reader, above_zero, bins, boolean, fixed, integer, real,
+};
 use dtof_data::options::numbers::{self, MAX_INTEGER, MAX_LASER_HZ, list, shortest};
 use dtof_data::photons::axes::Axes;
 use dtof_data::photons::geometry::{FieldOfView, Rays, angles};
@@ -33,25 +35,26 @@ option_table! {
             "of a histogram";
         #[serde(serialize_with = "decimal")]
         bin_width_ps: U16F16 = fixed(), "PS",
-            "Width of a bin of the file in picoseconds, rounded to 1/65536 [default: 250; for logs the sensor's]",
-            "picoseconds a bin";
+            "Width of a bin of the file in picoseconds, rounded to 1/65536; in a settings file that of a bin after `rebin` \
+             [default: 250; for logs the sensor's]",
+            "picoseconds a bin, after rebin";
         #[serde(serialize_with = "decimal")]
         offset_mm: I24F8 = fixed(), "MM",
             "Millimetres added to every range, rounded to 1/256 [default: 0; for logs the sensor's]",
             "added to every range";
         #[serde(serialize_with = "decimals")]
-        offsets_mm: Vec<I24F8> = Reader::new(Kind::Numbers("numbers, one a pixel"), |_, text| offsets(text)), "MM,MM,...",
+        offsets_mm: Vec<I24F8> = OFFSETS, "MM,MM,...",
             "Millimetres added to `offset_mm` for each pixel, in the order of the addresses, rounded to 1/256 [default: \
              0]",
             "added to that, one for each pixel";
-        gate: (u16, u16) = Reader::new(Kind::Integers("two bins, (20, 119)"), |_, text| gate(text)), "FIRST..LAST",
+        gate: (u16, u16) = GATE, "FIRST..LAST",
             "First and last bin that may hold the peak, as 20..119 [default: all bins]",
             "first and last bin that may hold a peak";
-        masked: Vec<u16> = Reader::new(Kind::Integers("addresses, [3, 70], or 'none'; [] adds none"), |_, text| masked(text)), "PIXELS",
+        masked: Vec<u16> = MASKED, "PIXELS",
             "Pixels to leave out, such as hot and dead ones, as 3,70, beside those that are found; none leaves out none",
             "addresses of pixels that are left out";
         #[serde(serialize_with = "decimal")]
-        sigma_bins: U8F8 = Reader::new(Kind::AboveZero(WIDEST_PULSE), pulse), "S",
+        sigma_bins: U8F8 = PULSE, "S",
             "Standard deviation of the pulse in bins, at most 1.75, rounded to 1/256. It sets the window for the depth \
              [default: the depth is the centroid of three bins]",
             "standard deviation of the pulse";
@@ -60,7 +63,7 @@ option_table! {
              first photon of a laser cycle only. Fewer are for the window rule without `binning` [default: the \
              sensor's, else 0]",
             "bins for which the TDC is blind after a photon";
-        dither_bins: u16 = Reader::new(Kind::Integer(0, Dither::MOST as u64), |_, text| dither(text)), "BINS",
+        dither_bins: u16 = DITHER, "BINS",
             "Dither against other LiDARs: the longest laser cycle takes so many bins more than the shortest, an even \
              number up to 254; 0 is off [default: 128, or as many as the sensor can]",
             "by which the longest laser cycle is longer than the shortest";
@@ -73,7 +76,7 @@ option_table! {
         glass: f64 = RATE, "",
             "Photons a laser cycle and pixel that the cover glass sends back, before the gate",
             "photons a laser cycle and pixel of the cover glass";
-        glass_bins: Vec<f64> = Reader::new(Kind::Numbers("numbers, one a bin"), |_, text| rates(text)), "",
+        glass_bins: Vec<f64> = RATES, "",
             "The same for each bin before the gate, from bin 0 on",
             "the same for each bin before the gate";
     }
@@ -99,6 +102,8 @@ impl SensorSettings {
 /// `docs/results/methods.md`.
 pub const DITHER_BINS: u16 = 128;
 
+const DITHER: Reader<u16> = Reader::new(Kind::Even(Dither::MOST as u64), |_, text| dither(text));
+
 /// Reads the range of a dither.
 fn dither(text: &str) -> Result<u16, String> {
     let range = numbers::integer(0..=Dither::MOST.into())(text)?;
@@ -107,6 +112,9 @@ fn dither(text: &str) -> Result<u16, String> {
         Err(error) => Err(error.to_string()),
     }
 }
+
+const GATE: Reader<(u16, u16)> =
+    Reader::new(Kind::Integers("two bins, [20, 119]"), |_, text| gate(text));
 
 /// Reads the first and the last bin of a gate, as `20..119` or `20,119`.
 fn gate(text: &str) -> Result<(u16, u16), String> {
@@ -122,46 +130,50 @@ fn gate(text: &str) -> Result<(u16, u16), String> {
     Ok((first, last))
 }
 
-/// Reads the offset of each pixel.
-fn offsets(text: &str) -> Result<Vec<I24F8>, String> {
-    list(text, &[','], numbers::fixed)
-}
+/// The offset of each pixel.
+const OFFSETS: Reader<Vec<I24F8>> =
+    Reader::new(Kind::SignedNumbers("numbers, one a pixel"), |_, text| {
+        list(text, &[','], numbers::fixed)
+    });
 
-/// Reads addresses; `none` leaves no pixel out, whatever a search finds.
-fn masked(text: &str) -> Result<Vec<u16>, String> {
-    match text {
+/// Addresses; `none` leaves no pixel out, whatever a search finds.
+const MASKED: Reader<Vec<u16>> = Reader::new(
+    Kind::Integers("addresses, [3, 70], or 'none'; [] adds none"),
+    |_, text| match text {
         "none" => Ok(Vec::new()),
         text => list(text, &[','], numbers::integer(0..=u16::MAX)),
-    }
-}
+    },
+);
 
 /// The widest pulse that a window for the depth suits, in bins.
 const WIDEST_PULSE: f64 = CentredWindow::WIDEST_PULSE.to_bits() as f64 / 256.0;
 
+const PULSE: Reader<U8F8> = Reader::new(Kind::AboveZero(WIDEST_PULSE), |_, text| pulse(text));
+
 /// Reads the standard deviation of a pulse in bins.
-fn pulse(kind: Kind, text: &str) -> Result<U8F8, String> {
+fn pulse(text: &str) -> Result<U8F8, String> {
     let too_wide = |range| match numbers::real(text) {
         Some(sigma) if sigma > WIDEST_PULSE => {
             format!("{range}; `rebin` 2 halves the pulse in bins, as does a TDC with wider bins")
         }
         _ => range,
     };
-    kind.real(text).map_err(too_wide)?;
+    above_zero(WIDEST_PULSE).read(text).map_err(too_wide)?;
     numbers::fixed(text)
 }
 
 /// Photons a laser cycle.
 const RATE: Reader<f64> = real(0.0, 1e6);
 
-fn rates(text: &str) -> Result<Vec<f64>, String> {
+const RATES: Reader<Vec<f64>> = Reader::new(Kind::Numbers("numbers, one a bin"), |_, text| {
     list(text, &[','], |text| RATE.read(text))
-}
+});
 
 option_table! {
     /// `[rays]`: where pixels look.
     #[derive(Clone, Debug, Default, PartialEq, Serialize)]
     pub struct RaySettings {
-        field_of_view_degrees: [f64; 2] = Reader::new(Kind::Numbers("two numbers, (60, 40)"), |_, text| degrees(text)), "HxV",
+        field_of_view_degrees: [f64; 2] = DEGREES, "HxV",
             "Field of view in degrees from edge to edge, so that a flat target gives the offset of each pixel [default: \
              unknown]",
             "horizontal, vertical";
@@ -170,6 +182,10 @@ option_table! {
             "file with a ray for each pixel";
     }
 }
+
+const DEGREES: Reader<[f64; 2]> = Reader::new(Kind::Numbers("two numbers, [60, 40]"), |_, text| {
+    degrees(text)
+});
 
 /// Reads the angles of a field of view.
 fn degrees(text: &str) -> Result<[f64; 2], String> {
@@ -222,7 +238,7 @@ option_table! {
             "Laser cycles to replay at most [default: all of a photon list and with `decide_once`, else 10000]",
             "laser cycles";
         seed: u64 = integer(0, MAX_INTEGER), "N",
-            "Seed of the laser cycles that recorded photons get [default: 1]",
+            "Seed of every random number [default: 1]",
             "of every random number";
         photons_per_cycle: f64 = POSITIVE, "R",
             "Histograms: photons a laser cycle in the brightest unmasked pixel of each capture [default: 1]",

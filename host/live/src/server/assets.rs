@@ -59,32 +59,40 @@ mod tests {
     use dtof_engine::settings::{DetectionSettings, SensorSettings};
 
     /// The input of a key: names, or what a field for a number needs; that of one element if it is a list.
-    fn input(key: &Key) -> Option<String> {
+    fn input(key: &Key) -> String {
         let number =
             |min: &dyn Display, step| format!("{{ type: \"number\", min: {min}, step: {step} }}");
-        Some(match key.kind {
-            Kind::Integer(first, _) => number(&first, "1"),
-            Kind::Integers(_) => number(&0, "1"),
+        match key.kind {
+            Kind::Integer(first, _) | Kind::PowerOfTwo(first, _) => number(&first, "1"),
+            Kind::Even(_) | Kind::Integers(_) => number(&0, "1"),
             Kind::Fixed(ends) => number(&ends()[0], "\"any\""),
-            Kind::Real(..) | Kind::AboveZero(_) => number(&0, "\"any\""),
+            Kind::Real(first, _) => number(&first, "\"any\""),
+            Kind::AboveZero(_) => number(&0, "\"any\""),
             Kind::OneOf(names) => {
                 let names: Vec<&str> = names().iter().map(|[name, _]| *name).collect();
                 format!("{names:?}")
             }
-            _ => return None,
-        })
+            kind => panic!("{}: a form has no input for {kind:?}", key.name),
+        }
     }
 
     #[test]
     fn the_values_of_the_form_are_those_of_the_keys() {
         let form = include_str!("../page/form.js");
-        let keys = SensorSettings::KEYS.iter().chain(DetectionSettings::KEYS);
-        let keys = keys.filter(|key| form.contains(&format!("\", \"{}\", \"", key.name)));
-        let lines = keys.filter_map(|key| Some(format!("  {}: {},\n", key.name, input(key)?)));
+        let keys = || SensorSettings::KEYS.iter().chain(DetectionSettings::KEYS);
+        let (_, fields) = form.split_once("FIELDS = [\n").unwrap();
+        let (fields, _) = fields.split_once("].map(").unwrap();
+        let mut lines = String::new();
+        for name in fields.lines().map(|row| row.split('"').nth(3).unwrap()) {
+            let key = keys().find(|key| key.name == name).expect(name);
+            let line = format!("  {name}: {},\n", input(key));
+            if !lines.contains(&line) {
+                lines += &line;
+            }
+        }
         let made = format!(
             "// The values of settings, made from the tables of the options with DTOF_BLESS=1 cargo test -p dtof-live\n\n\
-             /** By key: names, or what a field for a number needs. */\nexport const VALUES = {{\n{}}};\n",
-            lines.collect::<String>()
+             /** By key: names, or what a field for a number needs. */\nexport const VALUES = {{\n{lines}}};\n"
         );
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/page/values.js");
         if env::var_os("DTOF_BLESS").is_some() {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use anyhow::{Context, Result};
 
-use crate::studies::methods::event_depth::{self, ESTIMATORS, EventDepthResult, FIRST_LOOKS};
+use crate::studies::methods::event_depth::{self, ESTIMATORS, EventDepthOutcome, FIRST_LOOKS};
 use crate::studies::methods::passage::Rule;
 use crate::sweep::Part;
 use crate::sweep::results::ends;
@@ -12,21 +12,21 @@ use crate::sweep::values::Values;
 
 /// Outcomes with the paper's rule, or with windows.
 fn of(
-    outcomes: &[EventDepthResult],
+    outcomes: &[EventDepthOutcome],
     is_paper: bool,
-) -> impl Iterator<Item = &EventDepthResult> + Clone {
+) -> impl Iterator<Item = &EventDepthOutcome> + Clone {
     let those = outcomes.iter();
     those.filter(move |outcome| (outcome.rule == Rule::Paper) == is_paper)
 }
 
 /// The number of outcomes in which this estimator is significantly better.
-fn better<'a>(outcomes: impl Iterator<Item = &'a EventDepthResult>, number: usize) -> usize {
+fn better<'a>(outcomes: impl Iterator<Item = &'a EventDepthOutcome>, number: usize) -> usize {
     let those = outcomes.filter(|outcome| outcome.better() == Some(number));
     those.count()
 }
 
 /// The range of the ratio of this estimator's error to that of the first.
-fn range<'a>(outcomes: impl Iterator<Item = &'a EventDepthResult>, number: usize) -> (f64, f64) {
+fn range<'a>(outcomes: impl Iterator<Item = &'a EventDepthOutcome>, number: usize) -> (f64, f64) {
     let ratios = outcomes.map(|outcome| {
         let [first, second] = [0, number].map(|number| outcome.errors[number].error.value);
         second / first
@@ -36,7 +36,7 @@ fn range<'a>(outcomes: impl Iterator<Item = &'a EventDepthResult>, number: usize
 
 /// The range of the ratio of this estimator's error to the bound.
 fn over_bound<'a>(
-    outcomes: impl Iterator<Item = &'a EventDepthResult>,
+    outcomes: impl Iterator<Item = &'a EventDepthOutcome>,
     number: usize,
 ) -> (f64, f64) {
     ends(outcomes.map(|outcome| outcome.errors[number].over_bound.value))
@@ -79,7 +79,7 @@ pub(super) fn section(values: &mut Values, part: &Part) -> Result<()> {
 fn table<'a>(
     text: &mut String,
     first_look: u32,
-    outcomes: impl Iterator<Item = &'a EventDepthResult>,
+    outcomes: impl Iterator<Item = &'a EventDepthOutcome>,
 ) -> Result<()> {
     write!(
         text,

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use anyhow::{Result, ensure};
 
 use crate::studies::beyond::dither::{
-    Counted, DEFAULT, DitherResult, MOST_FALSE, MOST_WRONG, RANGES, STRENGTHS, Scene, least_range,
+    Counted, DEFAULT, DitherOutcome, MOST_FALSE, MOST_WRONG, RANGES, STRENGTHS, Scene, least_range,
     outcome, undisturbed,
 };
 use crate::sweep::Part;
@@ -57,12 +57,12 @@ pub(super) fn section(values: &mut Values, part: &Part) -> Result<()> {
     Ok(())
 }
 
-fn percent(outcome: DitherResult, digits: usize) -> String {
+fn percent(outcome: DitherOutcome, digits: usize) -> String {
     format!("{:.digits$}", 100.0 * outcome.wrong.value)
 }
 
 /// With a target, without one, and without one in the dark.
-fn cell(of: impl Fn(Scene) -> Result<DitherResult>) -> Result<String> {
+fn cell(of: impl Fn(Scene) -> Result<DitherOutcome>) -> Result<String> {
     let [target, empty, dark] = [Scene::Target, Scene::Empty, Scene::Dark].map(of);
     Ok(format!(
         "{} · {} · {}",
@@ -73,7 +73,7 @@ fn cell(of: impl Fn(Scene) -> Result<DitherResult>) -> Result<String> {
 }
 
 /// Of a TDC of the first photon: laser cycles to an event, wrong events and, without a target, false alarms.
-fn first_cell(of: impl Fn(Scene) -> Result<DitherResult>) -> Result<String> {
+fn first_cell(of: impl Fn(Scene) -> Result<DitherOutcome>) -> Result<String> {
     let target = of(Scene::FirstPhoton)?;
     Ok(format!(
         "{:.0} · {} · {}",

@@ -6,24 +6,24 @@ use anyhow::{Context, Result};
 
 use super::{Entry, Instructions, chosen};
 use crate::studies::methods::depth_error::{self, Estimator};
-use crate::studies::methods::time_to_detect::{self, DetectionResult};
+use crate::studies::methods::time_to_detect::{self, DetectionOutcome};
 use crate::sweep::Part;
 
 /// The rule for each pulse and background.
-pub(super) fn rules(counts: &Instructions, outcomes: &[DetectionResult]) -> Result<String> {
+pub(super) fn rules(counts: &Instructions, outcomes: &[DetectionOutcome]) -> Result<String> {
     let mut text = String::new();
     for sigma in time_to_detect::SIGMAS {
         for background in time_to_detect::BACKGROUNDS {
-            let is_here = |outcome: &DetectionResult| {
+            let is_here = |outcome: &DetectionOutcome| {
                 outcome.sigma == sigma && outcome.background == background
             };
             let entries = super::rules(counts, outcomes, is_here)?;
             let chosen = chosen(&entries)?;
             let paper = entries.first().context("no rules")?;
-            let is_chosen = |outcome: &&DetectionResult| {
+            let is_chosen = |outcome: &&DetectionOutcome| {
                 is_here(outcome) && outcome.rule.label() == chosen.label
             };
-            let those: Vec<&DetectionResult> = outcomes.iter().filter(is_chosen).collect();
+            let those: Vec<&DetectionOutcome> = outcomes.iter().filter(is_chosen).collect();
             let first = those.first().context("no outcome")?;
             let signal = time_to_detect::signal(sigma, background);
             let cycles = those.iter().map(|outcome| outcome.cycles.value);

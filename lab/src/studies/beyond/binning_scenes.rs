@@ -160,7 +160,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 }
 
 /// A scene with this many levels.
-struct SceneResult {
+struct SceneOutcome {
     /// The share of wrong reports of single pixels.
     own_wrong: Measured,
     /// Pixels covered by reports of blocks, and the wrong share.
@@ -173,7 +173,7 @@ struct SceneResult {
     counts: Counts,
 }
 
-impl SceneResult {
+impl SceneOutcome {
     fn new(point: &PointTally, levels: f64) -> Self {
         let count = |levels: f64, verdict: &str, level: usize| {
             point.count(&format!("{levels} {verdict} {level}"))
@@ -205,7 +205,7 @@ fn results(part: &Part) -> Result<Results> {
     for (file, point) in SCENES.iter().zip(part.points()) {
         let (mut own, mut of_blocks) = (Vec::new(), Vec::new());
         for levels in LEVELS {
-            let outcome = SceneResult::new(point, levels);
+            let outcome = SceneOutcome::new(point, levels);
             own.push(outcome.own_wrong.at(levels));
             let wrong = outcome.blocks_wrong;
             if outcome.blocks >= MIN_REPORTS {
@@ -248,7 +248,7 @@ fn results(part: &Part) -> Result<Results> {
     }
     let wrong = |scene: usize, levels| -> Result<String> {
         let point = part.points().get(scene).context("no such scene")?;
-        Ok(percent(SceneResult::new(point, levels).blocks_wrong.value))
+        Ok(percent(SceneOutcome::new(point, levels).blocks_wrong.value))
     };
     let [slant, demo] = [wrong(SLANT, 2.0)?, wrong(DEMO, 2.0)?];
     let chart = Chart {
@@ -273,7 +273,7 @@ fn results(part: &Part) -> Result<Results> {
         panels,
     };
     let bright = part.points().get(BRIGHT).context("no such scene")?;
-    let bright = SceneResult::new(bright, 2.0);
+    let bright = SceneOutcome::new(bright, 2.0);
     let [all, wrong] = [&bright.counts[..], &bright.counts[1..]]
         .map(|counts| counts.iter().flatten().sum::<u64>());
     let cycles = SCENES.iter().map(|file| file.cycles - BEFORE).min();

@@ -238,7 +238,7 @@ fn exposure(case: &Case, counted: &[Counted], rng: &mut Pcg64, tally: &mut Tally
 
 /// The events of a pixel in a scene.
 #[derive(Clone, Copy, Debug)]
-pub struct DitherResult {
+pub struct DitherOutcome {
     /// With a target the share of wrong events. Without one every event is wrong: the share of exposures that
     /// end with an event.
     pub wrong: Measured,
@@ -257,7 +257,7 @@ pub fn outcome(
     counted: Counted,
     strength: f64,
     range: f64,
-) -> Result<DitherResult> {
+) -> Result<DitherOutcome> {
     let point = part.one([
         ("scene", scene.number()),
         ("strength", strength),
@@ -269,7 +269,7 @@ pub fn outcome(
     } else {
         "exposures".to_owned()
     };
-    Ok(DitherResult {
+    Ok(DitherOutcome {
         wrong: point.share(&format!("{name} wrong"), &trials),
         cycles: Measured::mean(point, name),
         exposures: point.count("exposures"),
@@ -280,7 +280,7 @@ pub fn outcome(
 ///
 /// # Errors
 /// As [`outcome`].
-pub fn undisturbed(part: &Part, scene: Scene, counted: Counted) -> Result<DitherResult> {
+pub fn undisturbed(part: &Part, scene: Scene, counted: Counted) -> Result<DitherOutcome> {
     outcome(part, scene, counted, ABSENT, 0.0)
 }
 

@@ -175,8 +175,8 @@ impl Way {
         };
         let gate = RangeGate::<BINS>::full();
         let z = z_for_levels(ONE_IN, &gate, X, L1, L2, setting.levels);
-        Ok(setting.settings(z)?.with(|with| {
-            (with.neighbours, with.l1) = (self.neighbours, L1);
+        Ok(setting.settings(z)?.configured(|array| {
+            (array.neighbours, array.l1) = (self.neighbours, L1);
         }))
     }
 

@@ -74,14 +74,14 @@ impl Setting {
     pub fn settings(&self, z: U4F12) -> Result<Settings> {
         let rule = WindowRule::new(3, z, Count::saturating(5))?;
         let settings = Settings::static_scene(0).for_pulse(U8F8::from_num(SIGMA));
-        Ok(settings.with(|with| {
-            with.rule = rule.into();
-            (with.x, with.l1, with.l2) = (X, L1, self.l2);
-            with.binning = (self.levels != BlockLevel::PIXEL).then_some(AdaptiveBinning {
+        Ok(settings.configured(|array| {
+            array.rule = rule.into();
+            (array.x, array.l1, array.l2) = (X, L1, self.l2);
+            array.binning = (self.levels != BlockLevel::PIXEL).then_some(AdaptiveBinning {
                 levels: self.levels,
                 patience: self.patience,
             });
-            with.tracking = self.tracking;
+            array.tracking = self.tracking;
         }))
     }
 }

@@ -76,7 +76,7 @@ impl Warning {
 
 /// A method in a case.
 #[derive(Clone, Copy, Debug)]
-pub struct FailureResult {
+pub struct FailureOutcome {
     /// The rule and the depth estimator.
     pub method: Method,
     /// Whether the case has a target.
@@ -113,7 +113,7 @@ pub struct FailureResult {
 ///
 /// # Errors
 /// Fails if `part` is of another study.
-pub fn outcomes(part: &Part) -> Result<Vec<(Case, Vec<FailureResult>)>> {
+pub fn outcomes(part: &Part) -> Result<Vec<(Case, Vec<FailureOutcome>)>> {
     let plain = part.one([("case", 0.0)])?;
     let of = |(case, point): (Case, &PointTally)| {
         let outcomes = Method::all().map(|method| outcome(&case, point, plain, method));
@@ -123,7 +123,7 @@ pub fn outcomes(part: &Part) -> Result<Vec<(Case, Vec<FailureResult>)>> {
     Ok(cases()?.into_iter().zip(part.points()).map(of).collect())
 }
 
-fn outcome(case: &Case, point: &PointTally, plain: &PointTally, method: Method) -> FailureResult {
+fn outcome(case: &Case, point: &PointTally, plain: &PointTally, method: Method) -> FailureOutcome {
     let name = method.name();
     let count = |what: &str| point.count(&format!("{name} {what}"));
     let (events, exposures) = (count("events"), point.count("exposures"));
@@ -163,7 +163,7 @@ fn outcome(case: &Case, point: &PointTally, plain: &PointTally, method: Method) 
         let of_events = if has_target { events } else { 0 };
         Warning::new(false_events, count("false flagged"), of_events, exposures)
     };
-    FailureResult {
+    FailureOutcome {
         method,
         has_target,
         events,

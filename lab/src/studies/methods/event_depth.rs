@@ -23,7 +23,7 @@ use rand_core::Rng;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 
-pub use self::outcome::{DepthErrors, EventDepthResult, outcomes};
+pub use self::outcome::{DepthErrors, EventDepthOutcome, outcomes};
 
 pub use crate::studies::methods::time_to_detect::{BACKGROUNDS, SIGMAS};
 
@@ -135,7 +135,7 @@ fn results(part: &Part) -> Result<Results> {
 }
 
 /// A panel for each rule and pulse, from the earlier first look.
-fn chart(outcomes: &[EventDepthResult]) -> Chart {
+fn chart(outcomes: &[EventDepthOutcome]) -> Chart {
     let pens = [PAPER, CENTRED];
     let early = || {
         let outcomes = outcomes.iter();
@@ -144,7 +144,7 @@ fn chart(outcomes: &[EventDepthResult]) -> Chart {
     let mut panels = Vec::new();
     for (is_paper, rule) in [(true, "paper's rule"), (false, "window rule")] {
         for sigma in SIGMAS {
-            let is_here = |outcome: &&EventDepthResult| {
+            let is_here = |outcome: &&EventDepthOutcome| {
                 (outcome.rule == Rule::Paper) == is_paper && outcome.sigma == sigma
             };
             let series = pens.into_iter().enumerate().map(|(number, pen)| {
@@ -182,7 +182,7 @@ fn chart(outcomes: &[EventDepthResult]) -> Chart {
     }
 }
 
-fn csv(outcomes: &[EventDepthResult]) -> Result<String> {
+fn csv(outcomes: &[EventDepthOutcome]) -> Result<String> {
     let mut csv = "first_look,sigma,background,rule,threshold,false_share,events,event_share,in_pulse,cycles,signal,\
                    estimator,error,low,high,bias,bias_low,bias_high,over_bound,better\n"
         .to_owned();

@@ -64,14 +64,14 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 }
 
 /// A rule with one threshold.
-struct RuleResult {
+struct RuleOutcome {
     rule: Rule,
     threshold: f64,
     /// False alarms per exposure at each background.
     shares: Vec<(f64, Measured)>,
 }
 
-impl RuleResult {
+impl RuleOutcome {
     /// The threshold with `requested` false alarms per exposure on average over the backgrounds, and
     /// its false alarms in separate exposures.
     fn new(ladder: &Ladder, part: &Part, requested: f64) -> Self {
@@ -137,9 +137,9 @@ fn results(part: &Part) -> Result<Results> {
     let exposures =
         |tested| anyhow::Ok(grouped(part.one([("tested", tested)])?.count("exposures")));
     for (requested, name) in TARGETS {
-        let outcomes: Vec<RuleResult> = ladders()
+        let outcomes: Vec<RuleOutcome> = ladders()
             .iter()
-            .map(|ladder| RuleResult::new(ladder, part, requested))
+            .map(|ladder| RuleOutcome::new(ladder, part, requested))
             .collect();
         for outcome in &outcomes {
             for (background, share) in &outcome.shares {
@@ -155,7 +155,7 @@ fn results(part: &Part) -> Result<Results> {
         // The paper's is the first of the rules.
         // The paper's rule with the quadrants and with the average, then the windows.
         let (papers, windows) = outcomes.split_at(2);
-        let worst = |outcomes: &[RuleResult]| {
+        let worst = |outcomes: &[RuleOutcome]| {
             let factors = outcomes
                 .iter()
                 .map(|outcome| outcome.worst_factor(requested));

@@ -121,7 +121,7 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 
 /// The result of a rule in a scene.
 #[derive(Clone, Copy, Debug)]
-pub struct DetectionResult {
+pub struct DetectionOutcome {
     /// Standard deviation of the pulse in bins.
     pub sigma: f64,
     /// Position of the pulse within its bin.
@@ -143,7 +143,7 @@ pub struct DetectionResult {
 ///
 /// # Errors
 /// Fails if `part` is of another study.
-pub fn outcomes(part: &Part) -> Result<Vec<DetectionResult>> {
+pub fn outcomes(part: &Part) -> Result<Vec<DetectionOutcome>> {
     let mut outcomes = Vec::new();
     for sigma in SIGMAS {
         for (within, place) in PLACES {
@@ -165,7 +165,7 @@ pub fn outcomes(part: &Part) -> Result<Vec<DetectionResult>> {
                     };
                     let points: Vec<&PointTally> = all.filter(is_known).collect();
                     let (threshold, cycles) = time(&ladder, &points, with_target);
-                    outcomes.push(DetectionResult {
+                    outcomes.push(DetectionOutcome {
                         sigma,
                         place,
                         background,
@@ -188,12 +188,12 @@ pub fn outcomes(part: &Part) -> Result<Vec<DetectionResult>> {
 }
 
 /// Whether an outcome is of `rule` with `sigma`, in tenths.
-fn is(outcome: &DetectionResult, sigma: f64, rule: Rule) -> bool {
+fn is(outcome: &DetectionOutcome, sigma: f64, rule: Rule) -> bool {
     (outcome.sigma - sigma).abs() < 0.01 && outcome.rule == rule
 }
 
 /// The mean ratio of a rule over backgrounds and positions of a pulse.
-fn mean_ratio(outcomes: &[DetectionResult], sigma: f64, rule: Rule) -> f64 {
+fn mean_ratio(outcomes: &[DetectionOutcome], sigma: f64, rule: Rule) -> f64 {
     let ratios = outcomes.iter().filter(|outcome| is(outcome, sigma, rule));
     let ratios: Vec<f64> = ratios.map(|outcome| outcome.ratio.value).collect();
     ratios.iter().sum::<f64>() / ratios.len().max(1) as f64
@@ -249,7 +249,7 @@ fn results(part: &Part) -> Result<Results> {
     })
 }
 
-fn csv(outcomes: &[DetectionResult]) -> Result<String> {
+fn csv(outcomes: &[DetectionOutcome]) -> Result<String> {
     let mut csv = "sigma,place,background,method,threshold,cycles,ratio,low,high\n".to_owned();
     for outcome in outcomes {
         writeln!(

@@ -129,7 +129,7 @@ impl System {
     /// Its settings with the background estimate `by`.
     pub fn settings(&self, by: Background, l1: u16, seed: u64) -> Settings {
         let settings = Settings::static_scene(seed).with_bins(self.bins.into());
-        settings.with(|system| {
+        settings.configured(|system| {
             system.bin_width_ps = U16F16::from_num(self.bin_width_ps);
             (system.rule, system.l1, system.x) = (by.rule(), l1, self.x);
         })

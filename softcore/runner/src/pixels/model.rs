@@ -21,7 +21,7 @@ const DECISION: u64 = 17;
 
 /// What was looked at, and what came of it.
 #[derive(Clone, Debug, Default)]
-pub struct ModelResult {
+pub struct ModelOutcome {
     pub photons: u64,
     pub cycles: u64,
     pub looks: u64,
@@ -44,7 +44,7 @@ pub struct Model {
     stops_at: u64,
     emptied_at: u64,
     /// What came of the runs before.
-    total: ModelResult,
+    total: ModelOutcome,
     config: PixelConfig<128>,
     pixels: Vec<AsyncPixel<128>>,
     encoder: AerEncoder,
@@ -57,7 +57,7 @@ pub struct Model {
     before: Vec<Statistics>,
     strays: u64,
     /// What comes of this run.
-    outcome: ModelResult,
+    outcome: ModelOutcome,
     /// Words that the link has yet to take, and the clock in which the laser cycle ended that
     /// brought the event.
     words: VecDeque<(AerWord, Option<u64>)>,
@@ -73,7 +73,7 @@ pub struct Model {
     bins: Reads,
 }
 
-impl ModelResult {
+impl ModelOutcome {
     /// The photons, laser cycles, looks and statistics of both.
     fn add(&mut self, other: &Self) {
         self.photons += other.photons;
@@ -93,7 +93,7 @@ impl Model {
             starts_at: 0,
             stops_at: u64::MAX,
             emptied_at: 0,
-            total: ModelResult::default(),
+            total: ModelOutcome::default(),
             register_values: scene.register_values()?,
             config: scene.config,
             pixels: pixels(scene),
@@ -104,7 +104,7 @@ impl Model {
             fired: 0,
             before: Vec::new(),
             strays: 0,
-            outcome: ModelResult::default(),
+            outcome: ModelOutcome::default(),
             words: VecDeque::new(),
             looked: VecDeque::new(),
             taken: VecDeque::new(),
@@ -342,7 +342,7 @@ impl Model {
     pub fn end(
         mut self,
         reports: &mut Reports<impl FnMut() -> Result<(u64, Report)>>,
-    ) -> Result<ModelResult> {
+    ) -> Result<ModelOutcome> {
         loop {
             match reports.next()? {
                 (_, Report::End(waits)) => {
@@ -356,7 +356,7 @@ impl Model {
         let waits = waits.map(AsyncPixel::address);
         ensure!(waits.is_none(), "the event of {waits:?} has not left");
         self.end_run()?;
-        Ok(ModelResult {
+        Ok(ModelOutcome {
             bins_read: self.bins.compared,
             ..self.total
         })

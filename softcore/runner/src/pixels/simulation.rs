@@ -7,11 +7,11 @@ use std::thread;
 use anyhow::{Context, Result, ensure};
 
 use super::command::Report;
-use super::model::{Model, ModelResult, Reports};
+use super::model::{Model, ModelOutcome, Reports};
 use super::scene::{Commands, Scene};
 
 /// Runs a scene in the simulation, and the same in `dtof-core`.
-pub fn simulate(simulator: &mut Command, scene: &Scene) -> Result<ModelResult> {
+pub fn simulate(simulator: &mut Command, scene: &Scene) -> Result<ModelOutcome> {
     let mut child = simulator
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())

@@ -7,7 +7,7 @@ use std::process::Command;
 use anyhow::{Context, Result, ensure};
 use dtof_softcore::stream;
 
-use super::model::ModelResult;
+use super::model::ModelOutcome;
 use super::row::Latency;
 use super::scene::{Bins, Events, Pixels, Scene};
 use super::simulation::simulate;
@@ -52,7 +52,7 @@ pub fn measure(root: &Path) -> Result<Vec<Latency>> {
     let mut all = Vec::new();
     for (program, packer) in PROGRAMS {
         let words = images.words(program);
-        let run = |rate: u32, link| -> Result<(Scene, ModelResult)> {
+        let run = |rate: u32, link| -> Result<(Scene, ModelOutcome)> {
             let scene = Scene {
                 name: format!("the system, {rate}/256 photons a clock, events packed by {packer}"),
                 pixels_log2: 2,

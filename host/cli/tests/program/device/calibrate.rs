@@ -80,7 +80,7 @@ fn the_sensor_on_the_desk_is_found_and_then_watched() {
 }
 
 fn collected(name: &str, bin_width_ps: U16F16, seconds: f64) -> Collected {
-    let settings = settings().with(|with| with.bin_width_ps = bin_width_ps);
+    let settings = settings().configured(|array| array.bin_width_ps = bin_width_ps);
     let length = Duration::from_secs_f64(seconds);
     let done = |so_far: &SoFar| so_far.elapsed >= length;
     let timeout = HostTimeout::default();

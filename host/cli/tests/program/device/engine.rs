@@ -33,8 +33,8 @@ fn settings() -> Settings {
 
 /// The same with the other rule and the other estimator.
 fn with_windows() -> Settings {
-    settings().for_pulse(U8F8::lit("0.55")).with(|with| {
-        with.rule = WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
+    settings().for_pulse(U8F8::lit("0.55")).configured(|array| {
+        array.rule = WindowRule::new(2, U4F12::lit("4.5"), Count::saturating(5))
             .unwrap()
             .into();
     })
@@ -76,16 +76,18 @@ fn events(engine: &mut dyn Engine, cycles: u64, dead_time: u16) -> anyhow::Resul
 
 /// Blocks of three levels, tracking and two echoes as well.
 fn with_all() -> Settings {
-    with_windows().for_pulse(U8F8::lit("1")).with(|with| {
-        with.binning = Some(AdaptiveBinning {
-            levels: BlockLevel::saturating(3),
-            patience: 50,
-        });
-        with.tracking = true;
-        with.echoes = EchoNumber::new(2).unwrap();
-        with.echo_wait = 4;
-        with.l2 = 300;
-    })
+    with_windows()
+        .for_pulse(U8F8::lit("1"))
+        .configured(|array| {
+            array.binning = Some(AdaptiveBinning {
+                levels: BlockLevel::saturating(3),
+                patience: 50,
+            });
+            array.tracking = true;
+            array.echoes = EchoNumber::new(2).unwrap();
+            array.echo_wait = 4;
+            array.l2 = 300;
+        })
 }
 
 fn addresses(pixels: u16) -> Vec<PixelAddress> {
@@ -130,8 +132,8 @@ fn every_rule_and_estimator_gives_the_same_events_on_a_device() {
     let mut events = Vec::new();
     for rule in [plain.rule, with_windows.rule] {
         for estimator in [plain.estimator, with_windows.estimator] {
-            let settings = settings().with(|with| {
-                (with.rule, with.estimator) = (rule, estimator);
+            let settings = settings().configured(|array| {
+                (array.rule, array.estimator) = (rule, estimator);
             });
             events.push(same_events(&settings, 1_000, Duration::ZERO, 100_000));
         }
@@ -158,25 +160,27 @@ fn blocks_tracking_and_echoes_are_the_same_on_a_device() {
 #[test]
 fn dead_times_and_photons_once_per_bin_are_the_same_on_a_device() {
     let all = with_all();
-    let without_blocks = all.clone().with(|with| with.binning = None);
+    let without_blocks = all.clone().configured(|array| array.binning = None);
     for dead_time in [1, 20, 128] {
         let settings = without_blocks
             .clone()
-            .with(|with| with.dead_time = Some(dead_time));
+            .configured(|array| array.dead_time = Some(dead_time));
         same_events(&settings, 2_000, Duration::ZERO, 50_000);
     }
     let every = same_events(&all, 1_000, Duration::ZERO, 100_000);
-    let once = all.with(|with| with.once_per_bin = true);
+    let once = all.configured(|array| array.once_per_bin = true);
     let once = same_events(&once, 1_000, Duration::ZERO, 100_000);
     assert!(every != once);
 }
 
 #[test]
 fn neighbours_confirm_alike_on_a_device() {
-    let all = with_all().with(|with| with.binning = None);
+    let all = with_all().configured(|array| array.binning = None);
     let alone = same_events(&all, 1_000, Duration::ZERO, 100_000);
     for neighbours in [Neighbours::Four, Neighbours::Eight] {
-        let settings = all.clone().with(|with| with.neighbours = Some(neighbours));
+        let settings = all
+            .clone()
+            .configured(|array| array.neighbours = Some(neighbours));
         let events = same_events(&settings, 1_000, Duration::ZERO, 100_000);
         let is_confirmed = |event: &DepthEvent| event.flags.contains(Flags::CONFIRMED);
         assert!(events.iter().any(is_confirmed) && !alone.iter().any(is_confirmed));

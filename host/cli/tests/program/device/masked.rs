@@ -35,14 +35,14 @@ fn events_of_masked_pixels_are_left_out_and_counted() {
     );
 
     // Blocks would count their photons.
-    let blocks = masked.clone().with(|with| {
-        with.binning = Some(AdaptiveBinning {
+    let blocks = masked.clone().configured(|array| {
+        array.binning = Some(AdaptiveBinning {
             levels: BlockLevel::saturating(1),
             patience: 64,
         });
     });
     // Neighbours would ask them.
-    let neighbours = masked.with(|with| with.neighbours = Some(Neighbours::Eight));
+    let neighbours = masked.configured(|array| array.neighbours = Some(Neighbours::Eight));
     for (settings, reason) in [
         (blocks, "leave out masked or binning"),
         (neighbours, "leave out masked or neighbours"),

@@ -17,11 +17,11 @@ fn paper(alpha: &str) -> AnyRule {
 
 #[test]
 fn everything_has_a_default() {
-    let defaults = Settings::static_scene(1).with_bins(64).with(|with| {
-        with.rule = paper("4");
-        with.l1 = 40;
-        with.l2 = 2000;
-        with.x = 4;
+    let defaults = Settings::static_scene(1).with_bins(64).configured(|array| {
+        array.rule = paper("4");
+        array.l1 = 40;
+        array.l2 = 2000;
+        array.x = 4;
     });
     assert_eq!(SettingsFile::default().settings(64).unwrap(), defaults);
 }

@@ -158,9 +158,9 @@ fn a_report_has_the_words_of_its_kind_of_sensor() {
 fn the_first_decision_is_at_the_first_look_after_l1() {
     for x in 1..=20 {
         for l1 in x..=60 {
-            let settings = Settings::static_scene(0).with(|with| {
-                with.x = x;
-                with.l1 = l1;
+            let settings = Settings::static_scene(0).configured(|array| {
+                array.x = x;
+                array.l1 = l1;
             });
             let mut looks = (1..).map(|look| look * u64::from(x));
             let first = looks.find(|&cycle| cycle > u64::from(l1));

@@ -23,7 +23,7 @@ pub struct DepthErrors {
 
 /// A rule in a scene.
 #[derive(Clone, Copy, Debug)]
-pub struct EventDepthResult {
+pub struct EventDepthOutcome {
     /// Standard deviation of the pulse in bins.
     pub sigma: f64,
     /// Background photons a bin and laser cycle.
@@ -52,7 +52,7 @@ pub struct EventDepthResult {
     pub excess: Measured,
 }
 
-impl EventDepthResult {
+impl EventDepthOutcome {
     /// The index of the significantly better estimator, if there is one.
     #[must_use]
     pub fn better(&self) -> Option<usize> {
@@ -110,7 +110,7 @@ impl EventDepthResult {
 ///
 /// # Errors
 /// Fails if `part` is of another study.
-pub fn outcomes(part: &Part) -> Result<Vec<EventDepthResult>> {
+pub fn outcomes(part: &Part) -> Result<Vec<EventDepthOutcome>> {
     let mut outcomes = Vec::new();
     for sigma in SIGMAS {
         for background in BACKGROUNDS {
@@ -122,7 +122,7 @@ pub fn outcomes(part: &Part) -> Result<Vec<EventDepthResult>> {
                 let without: Vec<&PointTally> = all
                     .filter(|point| pixel.rule == Rule::Paper || point.is_at([scene[0]]))
                     .collect();
-                outcomes.push(EventDepthResult::new(
+                outcomes.push(EventDepthOutcome::new(
                     (sigma, background),
                     &pixel,
                     &without,
@@ -143,7 +143,7 @@ mod tests {
 
     /// 400 events in 1000 exposures, 40 of them elsewhere. The centre of mass is half a bin off to
     /// either side, the window `centred` / 256 bins too far.
-    fn outcome(centred: i64) -> EventDepthResult {
+    fn outcome(centred: i64) -> EventDepthOutcome {
         let pixel = Pixel::new(Rule::Paper, 40, 0.05).unwrap();
         let mut with = tally([("exposures", 1000)]);
         let sums = [
@@ -163,7 +163,7 @@ mod tests {
             add_value(&mut with, "paper 40 excess", excess);
         }
         let without = tally([("exposures", 500), ("paper 40 events", 5)]).into();
-        EventDepthResult::new((1.0, 0.05), &pixel, &[&without, &without], &with.into())
+        EventDepthOutcome::new((1.0, 0.05), &pixel, &[&without, &without], &with.into())
     }
 
     #[test]

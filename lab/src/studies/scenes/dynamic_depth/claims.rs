@@ -1,7 +1,7 @@
 //! The paper's claims on dynamic depth.
 
 use super::super::systems::Background;
-use super::outcome::{ChangeResult, REMOVED, SCENES, at_text, by_range, holding, on_pc, outcome};
+use super::outcome::{ChangeOutcome, REMOVED, SCENES, at_text, by_range, holding, on_pc, outcome};
 use super::{FPGA_SIGNAL, REFERENCES, SIGNALS};
 use crate::sweep::Part;
 use crate::sweep::mean::Measured;
@@ -13,7 +13,7 @@ use dtof_data::options::rows::grouped;
 const SILENT: f64 = 1e-4;
 
 /// The spans of a number of the car and of the fan over all signals, with both backgrounds.
-fn spans(part: &Part, digits: usize, of: impl Fn(&ChangeResult) -> f64) -> String {
+fn spans(part: &Part, digits: usize, of: impl Fn(&ChangeOutcome) -> f64) -> String {
     let texts = Background::ALL.map(|background| {
         let scenes = SCENES.map(|(fan, scene)| {
             let outcomes = on_pc(part, fan, background, 0);
@@ -29,7 +29,7 @@ fn spans(part: &Part, digits: usize, of: impl Fn(&ChangeResult) -> f64) -> Strin
 fn at_signals(
     part: &Part,
     background: Background,
-    text: impl Fn(&ChangeResult) -> String,
+    text: impl Fn(&ChangeOutcome) -> String,
 ) -> String {
     let scenes = SCENES.map(|(fan, scene)| {
         let outcomes = on_pc(part, fan, background, 0);
@@ -40,7 +40,7 @@ fn at_signals(
 }
 
 /// The same with both backgrounds.
-fn with_both(part: &Part, text: impl Fn(&ChangeResult) -> String) -> String {
+fn with_both(part: &Part, text: impl Fn(&ChangeOutcome) -> String) -> String {
     let backgrounds = Background::ALL.map(|background| {
         format!(
             "{}: {}",
@@ -74,7 +74,7 @@ fn times(measured: Measured) -> String {
 }
 
 /// The steps of the car that are found.
-fn motion(of: &ChangeResult) -> String {
+fn motion(of: &ChangeOutcome) -> String {
     let delay = if of.delay.value.is_nan() {
         String::new()
     } else {
@@ -90,21 +90,21 @@ fn motion(of: &ChangeResult) -> String {
 }
 
 pub fn claims(part: &Part) -> Result<Vec<Claim>> {
-    let from = |holds: fn(&ChangeResult) -> bool| {
+    let from = |holds: fn(&ChangeOutcome) -> bool| {
         Background::ALL.map(|background| holding(part, background, holds))
     };
     let removed = from(|of| of.removed.interval.0 > REMOVED);
-    let is_silent = |of: &ChangeResult| {
+    let is_silent = |of: &ChangeOutcome| {
         let share = Measured::share(of.still.changes, of.still.events);
         share.interval.1 < SILENT
     };
     let silent = from(is_silent);
     let changes =
-        |of: &ChangeResult| Measured::share(of.still.changes, of.still.events).value * 1000.0;
+        |of: &ChangeOutcome| Measured::share(of.still.changes, of.still.events).value * 1000.0;
     let fpga = part.one([("fpga", 1.0)])?;
     let fpga = [0, 1].map(|way| outcome(fpga, Background::Quadrants, REFERENCES[way].1));
     let cars = [0, 1].map(|way| on_pc(part, 0.0, Background::Average, way));
-    let finds = |of: &ChangeResult| of.found.interval.0 > 0.9 && of.is_false.value < 0.5;
+    let finds = |of: &ChangeOutcome| of.found.interval.0 > 0.9 && of.is_false.value < 0.5;
     let [before, reported] = [0, 1].map(|way| {
         let mut outcomes = cars[way].iter().map(|car| &car.1).chain([&fpga[way]]);
         outcomes.any(finds)
@@ -116,7 +116,7 @@ pub fn claims(part: &Part) -> Result<Vec<Claim>> {
     let on_the_car = cars[0]
         .iter()
         .map(|(_, of)| percent(Measured::share(of.moving.changes, of.changes)));
-    let fewer = |of: &ChangeResult| of.still.a_frame(of.still.changes).interval.1 < 1.0;
+    let fewer = |of: &ChangeOutcome| of.still.a_frame(of.still.changes).interval.1 < 1.0;
     let redundant = from(fewer);
     let fewer_events = from(|of| of.still.a_frame(of.still.events).interval.1 < 1.0);
     let more = from(|of| of.moving.a_frame(of.moving.events).interval.0 > 2.0);

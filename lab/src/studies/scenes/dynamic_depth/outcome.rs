@@ -13,7 +13,7 @@ const RANGE: f64 = 5.0;
 pub const SCENES: [(f64, &str); 2] = [(0.0, "car"), (1.0, "fan")];
 
 /// The results of a method of change detection at a point.
-pub struct ChangeResult {
+pub struct ChangeOutcome {
     /// The share of events that do not cause a change.
     pub removed: Measured,
     /// The share of events that cause a change.
@@ -52,7 +52,7 @@ impl Surface {
     }
 }
 
-pub fn outcome(point: &PointTally, background: Background, reference: &str) -> ChangeResult {
+pub fn outcome(point: &PointTally, background: Background, reference: &str) -> ChangeOutcome {
     let name = name(background, reference);
     let count = |what: &str| point.count(&format!("{name} {what}"));
     let surface = |which: &str| Surface {
@@ -64,7 +64,7 @@ pub fn outcome(point: &PointTally, background: Background, reference: &str) -> C
     let delay = format!("{name} delay");
     let (still, moving) = (surface("still"), surface("moving"));
     let (events, changes) = (still.events + moving.events, count("changes"));
-    ChangeResult {
+    ChangeOutcome {
         removed: Measured::share(events - changes, events),
         left: Measured::share(changes, events),
         found: Measured::share(point.count(&format!("{delay} values")), count("steps")),
@@ -84,7 +84,7 @@ pub fn on_pc(
     fan: f64,
     background: Background,
     reference: usize,
-) -> Vec<(f64, ChangeResult)> {
+) -> Vec<(f64, ChangeOutcome)> {
     let points = part.at([("fpga", 0.0), ("fan", fan)]);
     let outcomes = points.map(|point| {
         let outcome = outcome(point, background, REFERENCES[reference].1);
@@ -97,7 +97,7 @@ pub fn on_pc(
 pub fn holding(
     part: &Part,
     background: Background,
-    holds: impl Fn(&ChangeResult) -> bool,
+    holds: impl Fn(&ChangeOutcome) -> bool,
 ) -> Vec<f64> {
     let [cars, fans] = SCENES.map(|(fan, _)| on_pc(part, fan, background, 0));
     let both = cars.iter().zip(&fans);

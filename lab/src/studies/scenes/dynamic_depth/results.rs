@@ -2,7 +2,7 @@
 
 use super::super::systems::Background;
 use super::claims::claims;
-use super::outcome::{ChangeResult, REMOVED, SCENES, at_text, holding, on_pc, outcome};
+use super::outcome::{ChangeOutcome, REMOVED, SCENES, at_text, holding, on_pc, outcome};
 use super::{REFERENCES, SIGNALS};
 use crate::sweep::Part;
 use crate::sweep::mean::Measured;
@@ -72,7 +72,7 @@ fn left(part: &Part) -> Result<Figure> {
 /// The reports of a pixel compared with the frames of a sensor that sees the same photons.
 fn a_frame(part: &Part) -> Result<Figure> {
     let cars = on_pc(part, 0.0, Background::Average, 0);
-    let dots = |of: fn(&ChangeResult) -> Measured| -> Vec<Dot> {
+    let dots = |of: fn(&ChangeOutcome) -> Measured| -> Vec<Dot> {
         let dots = cars.iter().map(|(signal, outcome)| of(outcome).at(*signal));
         dots.collect()
     };
