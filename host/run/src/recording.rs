@@ -66,7 +66,7 @@ impl Given {
                 || merged.sensor.bin_width_ps.is_none(),
             Refused::new(
                 "rebin",
-                "changes the bins that the settings file is for; leave one of them out"
+                "changes the bins that the settings file is for; give `bin_width_ps`, that of the recording, with it"
             )
         );
         if let Some(width) = width {

@@ -20,6 +20,7 @@ from typing import (
     TypeVar,
     Union,
     get_args,
+    get_origin,
     get_type_hints,
 )
 
@@ -321,6 +322,12 @@ def is_text(options: Any, name: str) -> bool:
     """Whether the value of an option may be a text."""
     kinds = get_args(get_type_hints(options).get(name, Text))
     return any(kind is str or str in map(type, get_args(kind)) for kind in kinds)
+
+
+def is_list(options: Any, name: str) -> bool:
+    """Whether the value of an option may be a list."""
+    kinds = get_args(get_type_hints(options).get(name, Names))
+    return any(get_origin(kind) is Iterable for kind in kinds)
 
 
 def kind_of(options: Any, name: str) -> str:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy
 
-from ._keywords import is_text, kind_of
+from ._keywords import is_list, is_text, kind_of
 from ._native import Error
 
 #: The name and the value of each option.
@@ -73,6 +73,11 @@ def _text(kinds: Any, key: str, value: Any) -> str:
         raise Error("mask: must be addresses of pixels, as numpy.flatnonzero gives them")
     if isinstance(value, (str, bytes)) and not is_text(kinds, key):
         raise Error(f"{key} {value!r}: is a text; must be: {kind_of(kinds, key)}")
+    if isinstance(value, numpy.ndarray) and value.ndim == 0:
+        value = value.item()
+    if isinstance(value, Iterable) and not isinstance(value, (str, bytes)) and not is_list(kinds, key):
+        if value := list(value):
+            raise Error(f"{key} {value}: is a list; must be: {kind_of(kinds, key)}")
     if key == "laser_off":
         return "true" if value else ""
     if key == "glass" and isinstance(value, (bool, numpy.bool_)):

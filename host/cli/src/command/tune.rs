@@ -23,7 +23,9 @@ impl Tune {
         let tuned = self.options.0.tune(&mut Bar::new(false))?;
         let mut out = io::stdout().lock();
         if self.json {
-            writeln!(out, "{}", serde_json::to_string_pretty(&tuned.json())?)?;
+            let mut found = tuned.json();
+            found["options"] = tuned.options().into();
+            writeln!(out, "{}", serde_json::to_string_pretty(&found)?)?;
         } else {
             out.write_all(tuned.text().as_bytes())?;
         }

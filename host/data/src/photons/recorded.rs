@@ -187,7 +187,8 @@ impl RecordedHistograms {
             {
                 let reason = format!(
                     "bin {bin} of pixel {address} has {} photons, but was live in {live} of {cycles} laser \
-                     cycles; give the laser cycles with `recorded_cycles`, or a shorter dead time",
+                     cycles; give the laser cycles with `recorded_cycles`, a shorter dead time, or leave the pixel out with \
+                     `masked` {address}",
                     counts[bin]
                 );
                 return Err(Refused::value("dead_time", dead_time, reason).into());

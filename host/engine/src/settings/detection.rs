@@ -421,7 +421,9 @@ fn half_widths(text: &str) -> Result<CentredWindow, String> {
         let [before, after] = [before, after].map(|side| numbers::fixed::<U8F8>(side).ok());
         CentredWindow::with_sides(before?, after?)
     });
-    sides.ok_or_else(|| "must be BEFORE,AFTER, each 1 to 4 bins, as 2,3.5".to_owned())
+    sides.ok_or_else(|| {
+        "must be BEFORE,AFTER, each 1 to 4 bins, as 2,3.5; in a file [2, 3.5]".to_owned()
+    })
 }
 
 /// Half widths as a list, with the fewest digits.

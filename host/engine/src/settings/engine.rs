@@ -172,17 +172,21 @@ impl Settings {
     /// The option that a refusal is about.
     fn refused(&self, refusal: Refusal) -> Refused {
         let Configuration { x, l1, l2, .. } = self.configuration;
+        let defaults = Configuration::DEFAULT;
+        let defaults = [("x", defaults.x), ("l1", defaults.l1), ("l2", defaults.l2)];
+        let default = |key, number| match defaults.contains(&(key, number)) {
+            true => format!("; {number} is the default of `{key}`"),
+            false => String::new(),
+        };
         match refusal {
             Refusal::ZeroX => Refused::value("x", x, "must be at least 1"),
             Refusal::XAboveL1 => {
-                Refused::value("x", x, format!("must not be greater than `l1` {l1}"))
+                let reason = format!("must not be greater than `l1` {l1}{}", default("x", x));
+                Refused::value("x", x, reason)
             }
             Refusal::L2NotAboveL1 => {
-                let default = match l2 {
-                    DEFAULT_L2 => "; 2000 is the default of `l2`",
-                    _ => "",
-                };
-                let reason = format!("must be greater than `l1` {l1}{default}");
+                let (of_l2, of_l1) = (default("l2", l2), default("l1", l1));
+                let reason = format!("must be greater than `l1` {l1}{of_l2}{of_l1}");
                 Refused::value("l2", l2, reason)
             }
             Refusal::NoLook => Refused::value(

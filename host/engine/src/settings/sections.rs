@@ -123,7 +123,7 @@ fn gate(text: &str) -> Result<(u16, u16), String> {
         let bin = numbers::integer(0..=u16::MAX);
         Some((bin(first).ok()?, bin(last).ok()?))
     });
-    let (first, last) = ends.ok_or("must be FIRST..LAST, as 20..119")?;
+    let (first, last) = ends.ok_or("must be FIRST..LAST, as 20..119; in a file [20, 119]")?;
     if first > last {
         return Err("the first bin must come before the last".to_owned());
     }
@@ -190,7 +190,7 @@ const DEGREES: Reader<[f64; 2]> = Reader::new(Kind::Numbers("two numbers, [60, 4
 /// Reads the angles of a field of view.
 fn degrees(text: &str) -> Result<[f64; 2], String> {
     let angles = angles(text).and_then(|angles| FieldOfView::new(angles).map(|_| angles));
-    angles.map_err(|error| error.to_string())
+    angles.map_err(|error| format!("{error}; in a file [60, 32.2]"))
 }
 
 impl RaySettings {

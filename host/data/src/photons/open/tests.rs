@@ -511,7 +511,7 @@ fn histograms_are_replayed_as_the_options_say() {
     assert_eq!(
         format!("{error:#}"),
         "a.npy: dead_time 7: bin 1 of pixel 0 has 10 photons, but was live in 9 of 19 laser cycles; give the laser cycles \
-         with recorded_cycles, or a shorter dead time"
+         with recorded_cycles, a shorter dead time, or leave the pixel out with masked 0"
     );
 }
 

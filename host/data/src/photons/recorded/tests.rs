@@ -116,7 +116,7 @@ fn photons_in_the_dead_time_of_others_are_refused() {
         refused(&[1], 2).as_deref(),
         Some(
             "dead_time 2: bin 2 of pixel 3 has 41 photons, but was live in 40 of 100 laser cycles; give the laser \
-             cycles with recorded_cycles, or a shorter dead time"
+             cycles with recorded_cycles, a shorter dead time, or leave the pixel out with masked 3"
         )
     );
     assert_eq!(refused(&[3], 2), None);

@@ -54,6 +54,8 @@ fn what_pixels_cannot_have_is_refused_in_one_line() {
     for [keys, line] in table(
         "
         x = 41            | x 41: must not be greater than l1 40
+        l1 = 3            | x 4: must not be greater than l1 3; 4 is the default of x
+        l2 = 30           | l2 30: must be greater than l1 40; 40 is the default of l1
         l1 = 2000         | l2 2000: must be greater than l1 2000; 2000 is the default of l2
         l1 = 50; l2 = 50  | l2 50: must be greater than l1 50
         x = 30; l2 = 60   | x 30: no multiple of it lies strictly between l1 40 and l2 60

@@ -124,7 +124,7 @@ fn a_value_that_cannot_be_is_refused_with_what_it_must_be() {
     for [key, texts, reason] in table(
         "
         bins          | 0 4 100 2048 x   | must be a power of two from 8 to 1024
-        gate          | 20 20..x ..20 2..3..4 | must be FIRST..LAST, as 20..119
+        gate          | 20 20..x ..20 2..3..4 | must be FIRST..LAST, as 20..119; in a file [20, 119]
         gate          | 119..20          | the first bin must come before the last
         masked        | -1 65536 x       | must be a whole number from 0 to 65535
         masked        | 1,70000,3        | 70000 must be a whole number from 0 to 65535
@@ -141,10 +141,10 @@ fn a_value_that_cannot_be_is_refused_with_what_it_must_be() {
         z             | -1 16 x          | must be a number from 0 to 15.9998
         false_alarm   | 0 -0.1 0.11 x    | must be a number above 0, at most 0.1
         estimator     | mean             | must be centroid or window
-        half_widths   | 2 2,4.01 4.01,2 0.99,4 4,0.99 2,3,4 x,2 | must be BEFORE,AFTER, each 1 to 4 bins, as 2,3.5
+        half_widths   | 2 2,4.01 4.01,2 0.99,4 4,0.99 2,3,4 x,2 | must be BEFORE,AFTER, each 1 to 4 bins, as 2,3.5; in a file [2, 3.5]
         neighbours    | 1 5 9 -4 x       | must be 0, 4 or 8
         counter_bits  | 0 9 16 x         | must be 8 or 10
-        field_of_view_degrees | 60 0x40 60x180 x | must be HORIZONTALxVERTICAL in degrees, as 60x32.2, each from 0.01 to 179
+        field_of_view_degrees | 60 0x40 60x180 x | must be HORIZONTALxVERTICAL in degrees, as 60x32.2, each from 0.01 to 179; in a file [60, 32.2]
         photons_per_cycle | 0 -1 inf     | must be a number above 0
         axes          | rows             | one axis must be the bins
         l_1           | 4                | is not an option here
@@ -178,9 +178,9 @@ fn a_toml_value_is_one_value_a_list_or_in_quotes_as_its_key_needs() {
         l1 = []            | l1 : must be one value
         bins = [8]         | bins 8: must be one value
         gate = 3           | gate 3: must be a list
-        gate = []          | gate : must be FIRST..LAST, as 20..119
-        gate = [3]         | gate 3: must be FIRST..LAST, as 20..119
-        gate = [[3], [9]]  | gate [3],[9]: must be FIRST..LAST, as 20..119
+        gate = []          | gate : must be FIRST..LAST, as 20..119; in a file [20, 119]
+        gate = [3]         | gate 3: must be FIRST..LAST, as 20..119; in a file [20, 119]
+        gate = [[3], [9]]  | gate [3],[9]: must be FIRST..LAST, as 20..119; in a file [20, 119]
         masked = 3         | masked 3: must be a list
         masked = ['']      | masked : must be a whole number from 0 to 65535
         masked = ['3']     | masked 3: must not be in quotes
