@@ -754,8 +754,15 @@ pub(super) fn fill_missing_codes(traces: &mut [Trace]) -> Option<String> {
         .iter()
         .map(|trace| &trace.counts[..])
         .collect::<Vec<_>>());
-    // A pulse falls ever faster from bin to bin, down to the background, which most bins have or exceed.
-    let dark = quantile(sums.iter().copied(), 0.2);
+    // A pulse falls ever faster from bin to bin, down to the background, which most bins have or exceed. The TDC may begin
+    // after the first bin, or end before the last.
+    let is_counted = |sum: &f64| *sum > 0.0;
+    let first = sums.iter().position(is_counted).unwrap_or(0);
+    let end = sums.iter().rposition(is_counted).map_or(0, |last| last + 1);
+    let dark = match 2 * (end - first) > sums.len() {
+        true => quantile(sums[first..end].iter().copied(), 0.2),
+        false => 0.0,
+    };
     let goes_on = |end: usize, step: isize| {
         let at = |steps: isize| {
             let bin = end.checked_add_signed(steps * step)?;
@@ -1360,11 +1367,12 @@ mod tests {
             sigma in 0.4..1.5_f64,
             place in 60.0..61.0_f64,
             beside in 3_usize..8,
+            begins in 0_usize..50,
             seed: u64,
         ) {
             let pulse = scene(background, vec![(light, place, sigma)]);
             let missing = 60 + beside;
-            let mean = |pixel, bin| if bin == missing { 0.0 } else { pulse(pixel, bin) };
+            let mean = |pixel, bin| if bin == missing || bin < begins { 0.0 } else { pulse(pixel, bin) };
             let mut traces = recorded(32, &mean, &|_, n| n, seed);
             let says = fill_missing_codes(&mut traces).unwrap();
             prop_assert!(says.starts_with(&format!("bin {missing} is")), "{}", says);
