@@ -21,9 +21,8 @@ pub const DEFAULT_L2: u16 = Configuration::DEFAULT.l2;
 /// Everything an engine and its output need beside the photons.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
-    /// How the array operates, as a device would be told. Its pixels and columns are those of the photons. The dead
-    /// time is given. Photons of one laser cycle in one bin count once only without [`Self::frame`], which has no
-    /// neighbours, and takes only gate and estimator from here.
+    /// How the array operates, as a device would be told. The dead time is given. Pixels and columns are 0, as the photons
+    /// say them. With [`Self::frame`] only gate and estimator are used.
     pub configuration: Configuration,
     /// Bins of a histogram: a power of two from 8 to 1024.
     pub bins: usize,
@@ -126,7 +125,7 @@ impl Settings {
         Ok(config.map_err(|refusal| self.refused(refusal))?)
     }
 
-    /// How an array operates, but for photons that count once per bin: the host leaves the others out itself.
+    /// How an array operates. Photons that do not count once per bin are left out before, so the array counts all.
     ///
     /// # Errors
     /// Fails if the settings break a constraint.
