@@ -117,7 +117,7 @@ def test_tune(program, rule):
     options = {"background": 0.05, "signal": 0.4, "sigma_bins": 0.8, "rule": rule}
     texts = [f"--{key.replace('_', '-')}={value}" for key, value in options.items()]
     found = dtof.tune(**options)
-    flags = found.pop("options")
+    flags = found["options"]
     assert found == json.loads(program("tune", "--json", *texts))
     assert flags == program("tune", *texts).splitlines()[-1]
     assert shlex.split(flags)[:2] == ["--rule", rule]
