@@ -34,7 +34,7 @@ fn arg(key: &Key) -> Arg {
             .default_missing_value("true"),
         Kind::Flag => arg.action(ArgAction::SetTrue),
         // Numbers below 0 are values, and may be refused as such.
-        Kind::SignedNumbers(_) => arg
+        Kind::Fixed(_) | Kind::SignedNumbers(_) => arg
             .value_name(key.value)
             .value_parser(OsStringValueParser::new().try_map(not_a_flag))
             .allow_hyphen_values(true),

@@ -90,7 +90,7 @@ fn settings_that_cannot_be_are_refused() {
         "replay --out out --input photons.csv",
         r#"
             --l1 100 --l2 100 | --l2 100: must be greater than --l1 100
-            --x 0 | --x 0: must be at least 1
+            --x 0 | --x 0: must be a whole number from 1 to 65535
             --x 50 | --x 50: must not be greater than l1 40
             --x 30 --l2 50 | --x 30: no multiple of it lies strictly between l1 40 and --l2 50
             --l2 65536 | 65536
