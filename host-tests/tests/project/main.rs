@@ -4,6 +4,7 @@ mod architecture;
 mod clocks;
 mod doors;
 mod eye_safety;
+mod lines;
 mod links;
 mod modules;
 mod packages;
