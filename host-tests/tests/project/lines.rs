@@ -47,7 +47,7 @@ fn counted() -> BTreeMap<String, usize> {
             .skip(1)
             .filter(|folder| *folder != Path::new(""));
         let package = above.find(has_manifest);
-        let folder = package.map_or_else(|| Path::new(path).parent().unwrap(), |package| package);
+        let folder = package.unwrap_or_else(|| Path::new(path).parent().unwrap());
         if !is_test(path) {
             *counted.entry(format!("{}/", folder.display())).or_default() += code(path, text);
         }

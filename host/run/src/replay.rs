@@ -43,6 +43,8 @@ const RUN: &[Key] = &[
 
 /// The options that were part of the search, so that what is found is for them.
 const SEARCHED_WITH: &[&str] = &["bins", "bin_width_ps", "gate", "masked", "sigma_bins"];
+/// What takes the place of a rule or an estimator that is found, under another key.
+const IN_PLACE: &[&str] = &["alpha", "estimator", "half_widths"];
 /// What a z that is found depends on.
 const OF_Z: &[&str] = &["window", "min_count", "l1", "l2", "x", "binning"];
 
@@ -422,7 +424,8 @@ fn find(
         rows.filter(|_| is_undone)
             .for_each(|row| row.1 += undone_by);
     }
-    let overridden = given_keys.intersection(&found_keys);
+    let replaces = |key: &&String| found_keys.contains(*key) || IN_PLACE.contains(&key.as_str());
+    let overridden = given_keys.iter().filter(replaces);
     let flags = overridden
         .filter(|key| !SEARCHED_WITH.contains(&key.as_str()))
         .map(|key| flag(key));

@@ -75,9 +75,9 @@ def _text(kinds: Any, key: str, value: Any) -> str:
         raise Error(f"{key} {value!r}: is a text; must be: {kind_of(kinds, key)}")
     if isinstance(value, numpy.ndarray) and value.ndim == 0:
         value = value.item()
-    if isinstance(value, Iterable) and not isinstance(value, (str, bytes)) and not is_list(kinds, key):
-        if value := list(value):
-            raise Error(f"{key} {value}: is a list; must be: {kind_of(kinds, key)}")
+    is_given_list = isinstance(value, Iterable) and not isinstance(value, (str, bytes))
+    if is_given_list and not is_list(kinds, key) and (value := list(value)):
+        raise Error(f"{key} {value}: is a list; must be: {kind_of(kinds, key)}")
     if key == "laser_off":
         return "true" if value else ""
     if key == "glass" and isinstance(value, (bool, numpy.bool_)):

@@ -242,9 +242,9 @@ fn options_override_what_is_found() {
             ("--counter-bits 8 --x 8", "for-z.toml", "--x"),
             ("--false-alarm 0.001 --l1 50", "for-z.toml", "--l1"),
             ("--z 6", "found.toml", of_z),
-            ("--estimator centroid", "found.toml", ""),
+            ("--estimator centroid", "found.toml", "--estimator"),
             ("--echoes 2 --echo-wait 4", "found.toml", ""),
-            ("--rule average --alpha 5", "found.toml", "--rule"),
+            ("--rule average --alpha 5", "found.toml", "--alpha, --rule"),
             ("--rule paper", "found.toml", "--rule"),
             ("--frame 200", "found.toml", ""),
         ] {
