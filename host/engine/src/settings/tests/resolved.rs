@@ -188,6 +188,13 @@ fn settings_that_contradict_each_other_are_refused_in_one_line() {
         let config = file.settings(128).and_then(|settings| settings.config::<128>());
         assert_eq!(config.unwrap_err().to_string(), line, "{keys}");
     }
+    // A frame does not use these: a file with another rule is refused nevertheless.
+    for keys in ["neighbours = 4", "tracking = true"] {
+        let file = file(&format!("rule = 'average'; {keys}; frame = 9"));
+        let error = file.settings(128).unwrap_err();
+        let (key, _) = keys.split_once(' ').unwrap();
+        assert_eq!(error.to_string(), format!("{key} is for rule window"));
+    }
     // What these are taken with.
     for [keys] in table(
         "
