@@ -71,10 +71,11 @@ fn unknown(argument: &str, command: &clap::Command) -> Refused {
         return Refused::unknown(argument, None, names.iter().map(String::as_str));
     }
     // The value of a switch is no argument of its own.
-    let given: Vec<String> = std::env::args().collect();
+    let given: Vec<_> = std::env::args_os().collect();
     let switch = given.windows(2).find_map(|pair| match pair {
-        [flag, value] if flag.starts_with("--") && matches!(&**value, "true" | "false") => {
-            Some(format!(": write {flag}={value}"))
+        [flag, value] if value == "true" || value == "false" => {
+            let flag = flag.to_str().filter(|flag| flag.starts_with("--"))?;
+            Some(format!(": write {flag}={}", value.display()))
         }
         _ => None,
     });

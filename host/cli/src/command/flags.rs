@@ -48,7 +48,7 @@ fn arg(key: &Key) -> Arg {
 /// The value, unless it is the next flag.
 fn not_a_flag(value: OsString) -> Result<OsString, &'static str> {
     match value.as_encoded_bytes().starts_with(b"--") {
-        true => Err("needs a value before it"),
+        true => Err("is a flag, not a value"),
         false => Ok(value),
     }
 }

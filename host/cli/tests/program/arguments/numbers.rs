@@ -165,3 +165,29 @@ fn a_recording_is_named_once() {
         scratch.refused(&scratch.run(line), &["cannot be used with", other]);
     }
 }
+
+/// A switch has its value behind `=`. Names of files need not be UTF-8.
+#[test]
+fn a_value_that_stands_alone_is_refused_with_how_to_write_it() {
+    let scratch = Scratch::new();
+    scratch.file("photons.csv", PHOTONS);
+    for line in [
+        "replay photons.csv --tracking true",
+        "replay --tracking true photons.csv",
+    ] {
+        scratch.refused(&scratch.run(line), &["write --tracking=true"]);
+    }
+    let line = "replay photons.csv --alpha --l1";
+    scratch.refused(
+        &scratch.run(line),
+        &["--alpha --l1: is a flag, not a value"],
+    );
+    #[cfg(unix)]
+    {
+        use std::os::unix::ffi::OsStrExt;
+        let mut command = scratch.command("replay photons.csv");
+        let name = std::ffi::OsStr::from_bytes(b"x\xff");
+        let output = command.arg(name).output().unwrap();
+        scratch.refused(&output, &["is not expected here: one file at a time"]);
+    }
+}
