@@ -169,7 +169,7 @@ impl Settings {
     }
 
     /// The option that a refusal is about.
-    fn refused(&self, refusal: Refusal) -> Refused {
+    pub(super) fn refused(&self, refusal: Refusal) -> Refused {
         let Configuration { x, l1, l2, .. } = self.configuration;
         let defaults = Configuration::DEFAULT;
         let defaults = [("x", defaults.x), ("l1", defaults.l1), ("l2", defaults.l2)];

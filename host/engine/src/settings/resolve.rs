@@ -2,7 +2,7 @@
 
 use anyhow::{Result, ensure};
 use dtof_core::Count8;
-use dtof_link::{Configuration, Source};
+use dtof_link::{Configuration, Refusal, Source};
 
 use super::engine::{Settings, echo_guard_bins};
 use super::{RuleName, RunSettings, SensorSettings, SettingsFile};
@@ -31,7 +31,7 @@ impl SettingsFile {
             counter_bits != 8 || run.frame.is_some() || configuration.rule.fits::<Count8>(),
             Refused::new("min_count", "is more than counters of 8 bits hold")
         );
-        Ok(Settings {
+        let settings = Settings {
             configuration,
             bins,
             offsets_mm: sensor.offsets_mm.clone().unwrap_or_default(),
@@ -42,7 +42,12 @@ impl SettingsFile {
             frame: run.frame,
             decide_once,
             seed: run.seed.unwrap_or(1),
-        })
+        };
+        // A frame builds no array, which would refuse both.
+        if configuration.neighbours.is_some() && configuration.binning.is_some() {
+            return Err(settings.refused(Refusal::Neighbours).into());
+        }
+        Ok(settings)
     }
 
     /// How an array of histograms with `bins` bins operates.

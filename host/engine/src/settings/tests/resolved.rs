@@ -195,6 +195,9 @@ fn settings_that_contradict_each_other_are_refused_in_one_line() {
         let (key, _) = keys.split_once(' ').unwrap();
         assert_eq!(error.to_string(), format!("{key} is for rule window"));
     }
+    let both = file("rule = 'window'; window = 3; neighbours = 8; binning = 1; frame = 9");
+    let error = both.settings(128).unwrap_err();
+    assert_eq!(error.to_string(), "neighbours cannot be used with binning");
     // What these are taken with.
     for [keys] in table(
         "
