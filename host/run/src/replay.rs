@@ -34,7 +34,7 @@ use dtof_engine::settings::{
 
 /// What the user knows of the scene: an option of the search.
 const SEARCH: &[Key] = &[GLASS];
-/// The options that settle which photons are replayed.
+/// The options that choose which photons are replayed.
 const RUN: &[Key] = &[
     Key::of(RunSettings::KEYS, "cycles"),
     Key::of(RunSettings::KEYS, "seed")
