@@ -641,6 +641,7 @@ fn a_whole_histogram_is_decided_on_at_once() {
     let mut counts = [3u16; BINS];
     counts[20] = 90;
     array.begin_frame(100_000);
+    assert_eq!(array.frame_cycles(), 100_000);
     let mut events = Vec::new();
     for (pixel, room) in [(0, 1), (1, 0), (2, 1), (3, 1)] {
         array.histogram::<Count24, _>(PixelAddress::new(pixel), &counts, room, |event| {
