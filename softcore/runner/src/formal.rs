@@ -13,7 +13,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 use lexopt::prelude::{Long, Short};
@@ -27,9 +27,6 @@ cargo softcore formal
 
 Proves properties of the pixel processor with Yosys and ABC, and that each proof fails with a
 fault in the Verilog.";
-
-/// Far more than any proof takes.
-const PATIENCE: Duration = Duration::from_secs(400);
 
 /// How a property is proved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -483,7 +480,7 @@ fn connections(text: &str) -> String {
 
 fn succeed(command: &mut Command) -> Result<ProgramRun> {
     let name = command.get_program().to_string_lossy().into_owned();
-    let ran = program::run(command, PATIENCE, None)
+    let ran = program::run(command, None)
         .with_context(|| format!("{name}: sudo apt-get install --yes yosys"))?;
     ensure!(ran.code == Some(0), "{name}: {}", ran.output());
     Ok(ran)

@@ -8,6 +8,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 
+/// How long a program may take that ends by itself: only one that hangs takes as long, even on a
+/// computer that does much else.
+const PATIENCE: Duration = Duration::from_secs(3600);
+
 /// The end of a program and its output.
 pub struct ProgramRun {
     /// Its exit code; `None` if it was ended.
@@ -45,11 +49,15 @@ impl ProgramRun {
     }
 }
 
-/// Runs a program and what it starts for so long; or until it has written a line, and so long
+/// Runs a program and what it starts to its end; or until it has written a line, and so long
 /// after that.
-pub fn run(
-    command: &mut Command,
+pub fn run(command: &mut Command, awaited: Option<(&str, Duration)>) -> Result<ProgramRun> {
+    run_for(PATIENCE, command, awaited)
+}
+
+fn run_for(
     most: Duration,
+    command: &mut Command,
     mut awaited: Option<(&str, Duration)>,
 ) -> Result<ProgramRun> {
     let name = command.get_program().to_string_lossy().into_owned();
@@ -138,15 +146,13 @@ fn text(bytes: &Mutex<Vec<u8>>) -> String {
 mod tests {
     use super::*;
 
-    const LONG: Duration = Duration::from_secs(60);
-
     #[test]
     fn ends_what_does_not_end_and_what_it_has_started() {
         let mut endless = Command::new("sh");
         endless.args(["-c", "echo begun; sleep 600 & sleep 600"]);
         let rest = Duration::from_millis(50);
-        for (most, awaited) in [(rest, None), (LONG, Some(("begun", rest)))] {
-            let ran = run(&mut endless, most, awaited).unwrap();
+        for (most, awaited) in [(rest, None), (PATIENCE, Some(("begun", rest)))] {
+            let ran = run_for(most, &mut endless, awaited).unwrap();
             assert!(ran.timed_out && ran.code.is_none());
             assert!(ran.output().ends_with("(took too long)"));
         }
@@ -156,7 +162,7 @@ mod tests {
     fn the_line_that_is_awaited_is_a_whole_one() {
         let mut shell = Command::new("sh");
         shell.args(["-c", "echo a line more; exit 1"]);
-        let ran = run(&mut shell, LONG, Some(("a line", Duration::ZERO))).unwrap();
+        let ran = run(&mut shell, Some(("a line", Duration::ZERO))).unwrap();
         assert_eq!((ran.code, ran.timed_out), (Some(1), false));
     }
 
@@ -164,7 +170,7 @@ mod tests {
     fn tells_both_outputs_and_the_code() {
         let mut shell = Command::new("sh");
         shell.args(["-c", "echo out; echo error >&2; exit 3"]);
-        let ran = run(&mut shell, LONG, None).unwrap();
+        let ran = run(&mut shell, None).unwrap();
         assert_eq!(
             (ran.code, &*ran.output, &*ran.errors),
             (Some(3), "out\n", "error\n")

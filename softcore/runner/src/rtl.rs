@@ -4,7 +4,6 @@ use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
@@ -40,9 +39,6 @@ impl Core {
     }
 }
 
-/// Far more than any run takes; the cycles are limited as well.
-const PATIENCE: Duration = Duration::from_secs(600);
-
 /// A core's testbench as a program.
 pub struct Simulator(PathBuf);
 
@@ -55,7 +51,7 @@ impl Simulator {
 
     /// Runs an image for so many cycles at most.
     pub fn run(&self, image: &Path, cycles: u64) -> Result<ProgramRun> {
-        program::run(&mut self.command(image, cycles), PATIENCE, None)
+        program::run(&mut self.command(image, cycles), None)
     }
 
     /// The same with photons.
@@ -64,7 +60,7 @@ impl Simulator {
         command.arg("--stream").arg(laser.photons);
         command.args(["--clocks-per-laser-cycle", &laser.clocks.to_string()]);
         command.args(["--acknowledge-after", &laser.wait.to_string()]);
-        program::run(&mut command, PATIENCE, None)
+        program::run(&mut command, None)
     }
 
     fn command(&self, image: &Path, cycles: u64) -> Command {
@@ -98,7 +94,7 @@ fn check_with(root: &Path, name: &str, data: &Path) -> Result<()> {
 
 fn run_with(root: &Path, name: &str, data: &Path) -> Result<ProgramRun> {
     let test = verilate(root, name, name, data, &[])?;
-    program::run(&mut Command::new(test), PATIENCE, None)
+    program::run(&mut Command::new(test), None)
 }
 
 /// Whether the pixel processor, wired to another clock as `docs/softcore.md` has it, does what
@@ -136,7 +132,7 @@ pub fn check_fifo(root: &Path) -> Result<()> {
         "read_verilog photon_fifo.v; synth_ice40 -top photon_fifo; \
          select -assert-count 4 t:SB_RAM40_4K; tee -o /dev/stdout stat",
     );
-    let ran = program::run(&mut yosys, PATIENCE, None)?;
+    let ran = program::run(&mut yosys, None)?;
     ensure!(
         ran.code == Some(0),
         "photon FIFO: not four block RAMs of an iCE40\n{}",
@@ -160,7 +156,7 @@ pub fn package_folder(root: &Path, package: &str) -> Result<PathBuf> {
     let python = python(root, "softcore/requirements.txt")?;
     let ask = format!("import {package}; print({package}.data_location)");
     let mut ask_python = Command::new(python);
-    let ran = program::run(ask_python.args(["-c", &ask]), PATIENCE, None)?;
+    let ran = program::run(ask_python.args(["-c", &ask]), None)?;
     ensure!(ran.code == Some(0), "{package}: {}", ran.output());
     Ok(ran.output.trim().into())
 }
@@ -212,7 +208,7 @@ pub fn verilate_in(
         .args(options)
         .arg("--Mdir")
         .arg(folder);
-    let ran = program::run(&mut verilator, PATIENCE, None)?;
+    let ran = program::run(&mut verilator, None)?;
     ensure!(
         ran.code == Some(0),
         "{list}: verilator fails\n{}",

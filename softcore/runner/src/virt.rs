@@ -8,8 +8,6 @@ use anyhow::Result;
 
 use crate::program::{self, ProgramRun};
 
-/// Whatever ends, ends in a fraction of this.
-const PATIENCE: Duration = Duration::from_secs(120);
 /// Long enough to see that a loop has no end.
 const A_MOMENT: Duration = Duration::from_secs(1);
 
@@ -28,5 +26,5 @@ pub fn run(image: &Path, isa: &str, last_line: Option<&str>) -> Result<ProgramRu
     qemu.args(["-machine", "virt", "-cpu", &processor, "-bios", "none"]);
     qemu.args(["-display", "none", "-monitor", "none", "-serial", "stdio"]);
     qemu.arg("-kernel").arg(image);
-    program::run(&mut qemu, PATIENCE, last_line.map(|line| (line, A_MOMENT)))
+    program::run(&mut qemu, last_line.map(|line| (line, A_MOMENT)))
 }

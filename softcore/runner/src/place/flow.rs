@@ -3,7 +3,6 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
 use anyhow::{Context, Result, ensure};
 
@@ -29,9 +28,6 @@ pub const SEEDS: [u32; 3] = [1, 2, 3];
 /// block RAMs. On a larger one the same design is slower, because its block RAMs lie farther
 /// apart.
 const PARTS: [&str; 3] = ["25k", "45k", "85k"];
-
-/// Far more than a step takes.
-const PATIENCE: Duration = Duration::from_secs(1800);
 
 /// What became of a design.
 pub struct Placements {
@@ -135,7 +131,7 @@ impl<'a> Flow<'a> {
             .env("YOWASP_CACHE_DIR", self.folder("cache")?)
             .current_dir(folder)
             .args(arguments);
-        let ran = program::run(&mut command, PATIENCE, None)?;
+        let ran = program::run(&mut command, None)?;
         ensure!(ran.code == Some(0), "{tool}: {}", ran.output());
         Ok(ran)
     }
