@@ -5,7 +5,7 @@ use std::fs;
 use dtof_core::Array;
 use dtof_data::photons::geometry::Rays;
 use dtof_engine::settings::SettingsFile;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 use crate::{folder, is_one_line};
 

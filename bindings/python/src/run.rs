@@ -11,13 +11,13 @@ use dtof_data::photons::source::{PhotonSource, Slice};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
+use dtof_light::scene::Scene;
 use dtof_run::depth_map::DepthMap;
 use dtof_run::output::header;
 use dtof_run::recording::warnings;
 use dtof_run::replay::Options;
 use dtof_run::simulate::Options as SimulateOptions;
 use dtof_run::{RunResult, Sink};
-use dtof_simulate::scene::Scene;
 use pyo3::prelude::*;
 use pyo3::types::PyByteArray;
 

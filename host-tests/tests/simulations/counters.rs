@@ -11,7 +11,7 @@ use dtof_data::photons::recorded::{RecordedHistograms, RecordingLength};
 use dtof_data::photons::source::PhotonSource;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_simulate::demo;
+use dtof_light::demo;
 
 /// The events and counts of pixels and blocks.
 type Outcome = (Vec<DepthEvent>, [Statistics; 2]);
@@ -53,7 +53,7 @@ fn are_the_same(name: &str, [narrow, wide]: &[Outcome; 2]) {
 #[test]
 fn the_demo_is_decided_alike() {
     let array = Array::new(16, 12).unwrap();
-    let settings = demo::settings(1).unwrap();
+    let settings = Settings::demo(1).unwrap();
     let of_pixels = settings.clone().configured(|array| array.binning = None);
     let confirmed = of_pixels
         .clone()

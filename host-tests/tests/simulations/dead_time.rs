@@ -8,8 +8,8 @@ use dtof_core::{
     AnyRule, Count, Count10, Count16, CounterWidth, DetectionRule, Histogram, PixelAddress,
     PixelConfig, RangeGate, WindowRule,
 };
+use dtof_data::random::pixel_rng;
 use dtof_host_tests::reference::{LiveHistogram, LiveTest};
-use dtof_theory::random::pixel_rng;
 use rand_core::Rng;
 
 use crate::slow_or_quick;

@@ -6,9 +6,9 @@
 use crate::slow_or_quick;
 use dtof_core::{Array, DepthEvent, Neighbours, PixelAddress};
 use dtof_data::photons::source::{Photon, PixelPhotons, Slice};
+use dtof_data::random::pixel_rng;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_theory::random::pixel_rng;
 use rand_distr::{Distribution, Poisson};
 
 const BINS: usize = 128;

@@ -12,8 +12,8 @@ use dtof_data::events::last_events::LastEvents;
 use dtof_data::photons::source::PhotonSource;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{AdaptiveBinning, Settings};
+use dtof_light::scene::{DepthAlong, DepthMap, Scene};
 use dtof_run::truth::SceneComparison;
-use dtof_simulate::scene::{DepthAlong, DepthMap, Scene};
 
 /// Its path. Prints a line if it is missing.
 fn vgroove() -> Option<PathBuf> {

@@ -16,8 +16,8 @@ use dtof_data::photons::source::PhotonSource as _;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_host_tests::reference::{BinnedArray, EchoConfig, Reporter, Window};
+use dtof_light::scene::Scene;
 use dtof_link::AdaptiveBinning;
-use dtof_simulate::scene::Scene;
 
 const BINS: usize = 128;
 

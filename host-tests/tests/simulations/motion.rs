@@ -9,7 +9,7 @@ use dtof_core::{
     AsyncPixel, Count, DepthEstimator, LaserCycle, PixelAddress, PixelConfig, RangeGate,
     Statistics, WindowRule, z_for,
 };
-use dtof_theory::rates::bin_share;
+use dtof_light::rates::bin_share;
 use rand_core::{Rng, SeedableRng};
 use rand_distr::{Distribution, Normal, Poisson};
 use rand_pcg::Pcg64;

@@ -11,10 +11,10 @@ use dtof_core::{
     AnyRule, AsyncPixel, AverageRule, Count, LaserCycle, Look, PaperRule, PixelAddress,
     PixelConfig, RangeGate, Statistics,
 };
+use dtof_data::random::pixel_rng;
 use dtof_host_tests::reference::{self, Background};
-use dtof_simulate::SimulatedPixel;
-use dtof_theory::random::pixel_rng;
-use dtof_theory::rates::Rates;
+use dtof_light::SimulatedPixel;
+use dtof_light::rates::Rates;
 use rand_core::Rng;
 
 /// The counts of one run.

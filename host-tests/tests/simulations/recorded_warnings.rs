@@ -6,7 +6,7 @@ use dtof_data::photons::histograms::Histograms;
 use dtof_data::photons::open::{ReadOptions, counts};
 use dtof_data::photons::source::PhotonSource;
 use dtof_data::photons::warnings::{bins_may_be_first, swapped_axes};
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 use std::ops::Range;
 use std::path::Path;
 

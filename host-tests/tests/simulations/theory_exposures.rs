@@ -6,20 +6,20 @@ use dtof_core::fixed::types::U8F8;
 use dtof_core::paper::Threshold;
 use dtof_core::{Array, BlockLevel, Count, DepthEvent, PaperRule, PixelAddress};
 use dtof_data::photons::source::PhotonSource;
+use dtof_data::random::{pixel_rng, trial_rng};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_simulate::{SimulatedArray, SimulatedPixel};
-use dtof_theory::counts::binomial::{alike, plausible};
-use dtof_theory::looks::exposure::{Exposures, Looks};
-use dtof_theory::looks::repeated_looks::{
+use dtof_light::counts::binomial::{alike, plausible};
+use dtof_light::looks::exposure::{Exposures, Looks};
+use dtof_light::looks::repeated_looks::{
     ALPHA_STEPS, FalseAlarms, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
 };
-use dtof_theory::looks::single_look::SingleLook;
-use dtof_theory::looks::table::{self, Estimate, MARGIN, Row, Table};
-use dtof_theory::progress::NONE;
-use dtof_theory::random::{pixel_rng, trial_rng};
-use dtof_theory::rates::Rates;
-use dtof_theory::tune::{FalseAlarmLimit, Request, Tuned, tune};
+use dtof_light::looks::single_look::SingleLook;
+use dtof_light::looks::table::{self, Estimate, MARGIN, Row, Table};
+use dtof_light::progress::NONE;
+use dtof_light::rates::Rates;
+use dtof_light::tune::{FalseAlarmLimit, Request, Tuned, tune};
+use dtof_light::{SimulatedArray, SimulatedPixel};
 
 /// The probability that a test fails by chance.
 const LEVEL: f64 = 1e-3;

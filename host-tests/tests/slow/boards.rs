@@ -21,9 +21,9 @@ use dtof_device::{Client, DeviceEngine, HostTimeout, Task, monitor};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
+use dtof_light::demo;
+use dtof_light::effects::tdc::Tdc;
 use dtof_link::{AdaptiveBinning, FaultRecord, Source};
-use dtof_simulate::demo;
-use dtof_simulate::effects::tdc::Tdc;
 
 use crate::emulator::{Board, Emulator, End, Laser, Overflow, QEMU};
 use crate::{dtof, enabled, histograms, root, skipped, stack, succeed, target_folder, version};

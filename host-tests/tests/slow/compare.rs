@@ -61,7 +61,7 @@ fn drawn(name: &str, arguments: &[&str]) -> Result<()> {
 #[test]
 fn the_chart_of_the_demo() -> Result<()> {
     match enabled("compare: the demo", &[]) {
-        Some(_alone) => drawn("demo", &["--scene", "host/simulate/src/demo.toml"]),
+        Some(_alone) => drawn("demo", &["--scene", "host/light/src/demo.toml"]),
         None => Ok(()),
     }
 }

@@ -857,7 +857,7 @@ mod tests {
     use crate::find::background::Level;
     use dtof_core::Array;
     use dtof_data::photons::histograms::Histograms;
-    use dtof_theory::rates::bin_share;
+    use dtof_light::rates::bin_share;
     use proptest::prelude::*;
     use rand_core::SeedableRng;
     use rand_distr::{Distribution, Poisson};

@@ -8,10 +8,10 @@ use anyhow::{Context, Result, ensure};
 use dtof_core::fixed::types::U4F12;
 use dtof_core::rule::detect;
 use dtof_core::{Count, DepthEstimator, Histogram, RangeGate, WindowRule};
-use dtof_theory::looks::exposure::{Exposures, Looks};
-use dtof_theory::progress::{Part, Progress};
-use dtof_theory::random::trial_rng;
-use dtof_theory::rates::Rates;
+use dtof_data::random::trial_rng;
+use dtof_light::looks::exposure::{Exposures, Looks};
+use dtof_light::progress::{Part, Progress};
+use dtof_light::rates::Rates;
 use rayon::prelude::*;
 
 use dtof_data::options::Refused;

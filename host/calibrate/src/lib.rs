@@ -30,7 +30,7 @@ use dtof_core::fixed::types::U8F8;
 use dtof_data::photons::MM_PER_PS;
 use dtof_data::photons::list_checks::ListChecks;
 use dtof_engine::settings::SettingsFile;
-use dtof_theory::progress::{self, Progress};
+use dtof_light::progress::{self, Progress};
 use rayon::prelude::*;
 
 pub use audit::{Audit, Scatter};
@@ -587,13 +587,12 @@ mod tests {
         let bin_width_ps = 373.6;
         let histogram = |pixel: usize| -> Vec<u64> {
             let address = PixelAddress::new(u16::try_from(pixel).unwrap());
-            let mut rng = dtof_theory::random::pixel_rng(seed, address);
+            let mut rng = dtof_data::random::pixel_rng(seed, address);
             // Ranges differ by half a bin, as those of a plane.
             let mm = 1200.0 * slant(pixel) - offsets[pixel];
             let position = mm / (bin_width_ps * MM_PER_PS);
             let bins = (0..128).map(|bin| {
-                let mean =
-                    background + signal * dtof_theory::rates::bin_share(bin, position, sigma);
+                let mean = background + signal * dtof_light::rates::bin_share(bin, position, sigma);
                 #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
                 let count = Poisson::new(mean).unwrap().sample(&mut rng) as u64;
                 count
@@ -629,7 +628,7 @@ mod tests {
         let histogram = |pixel: usize, mm: f64| -> Vec<u64> {
             let near = if pixel.is_multiple_of(2) { 40.0 } else { 0.0 };
             let position = (mm - near) / (250.0 * MM_PER_PS);
-            let photons = |bin| 5.0 + 800.0 * dtof_theory::rates::bin_share(bin, position, 0.9);
+            let photons = |bin| 5.0 + 800.0 * dtof_light::rates::bin_share(bin, position, 0.9);
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let counts = (0..128).map(|bin| photons(bin).round() as u64).collect();
             counts

@@ -16,7 +16,7 @@ use dtof_data::photons::recorded::{RecordedHistograms, RecordingLength};
 use dtof_data::photons::source::{PhotonSource, Slice};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::{Settings, SettingsFile};
-use dtof_theory::progress::{Part, Progress};
+use dtof_light::progress::{Part, Progress};
 
 /// The most laser cycles that are replayed, and the most photons.
 const MAX_CYCLES: u16 = 10_000;

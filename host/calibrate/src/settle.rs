@@ -3,8 +3,8 @@
 use anyhow::{Result, ensure};
 use dtof_core::fixed::types::U4F12;
 use dtof_core::{BlockLevel, WindowRule};
-use dtof_theory::progress::Progress;
-use dtof_theory::tune::{FalseAlarmLimit, Request, window};
+use dtof_light::progress::Progress;
+use dtof_light::tune::{FalseAlarmLimit, Request, window};
 
 use super::false_alarms;
 use super::find::pulse::Pulse;

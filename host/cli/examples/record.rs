@@ -7,7 +7,7 @@ use std::path::Path;
 use anyhow::{Context, Result, ensure};
 use dtof_data::photons::npy;
 use dtof_data::photons::source::PhotonSource;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 /// The photons of the scene in `text`, as NumPy saves them: rows, columns, bins.
 fn record(text: &str) -> Result<Vec<u8>> {

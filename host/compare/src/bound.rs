@@ -9,10 +9,10 @@ use rayon::prelude::*;
 
 use super::stress::{Light, count};
 use super::tally::{first_and_last, mm_per_bin};
+use dtof_data::random::pixel_rng;
 use dtof_engine::settings::Settings;
-use dtof_theory::bounds::cramer_rao::Pulse;
-use dtof_theory::bounds::likelihood_ratio::{Evidence, LikelihoodRatio};
-use dtof_theory::random::pixel_rng;
+use dtof_light::bounds::cramer_rao::Pulse;
+use dtof_light::bounds::likelihood_ratio::{Evidence, LikelihoodRatio};
 
 /// Exposures without a target, at most; fewer if they have more looks than [`MAX_LOOKS`].
 const WITHOUT: u16 = 10_000;

@@ -132,7 +132,7 @@ mod tests {
     use super::*;
     use dtof_core::Array;
     use dtof_engine::settings::Settings;
-    use dtof_simulate::demo;
+    use dtof_light::demo;
 
     #[test]
     fn a_trial_of_a_method_that_does_not_exist_is_refused() {

@@ -95,7 +95,7 @@ impl PhotonSource for Selected {
 mod tests {
     use super::*;
     use dtof_data::photons::masked::Masked;
-    use dtof_simulate::demo;
+    use dtof_light::demo;
 
     #[test]
     fn laser_rate_and_masked_photons_are_those_of_the_source() {

@@ -9,7 +9,7 @@ use rand_distr::{Bernoulli, Distribution, Normal, Poisson, StandardUniform};
 use rand_pcg::Pcg64;
 
 use dtof_data::photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
-use dtof_theory::random::pixel_rng;
+use dtof_data::random::pixel_rng;
 
 /// A change of the photons.
 #[derive(Clone, Debug, PartialEq)]

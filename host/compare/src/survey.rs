@@ -8,7 +8,7 @@ use super::tally::first_and_last;
 use dtof_data::photons::source::PhotonSource;
 use dtof_engine::settings::Settings;
 use dtof_engine::slices::next_cycles;
-use dtof_theory::counts::dead_time::arrived;
+use dtof_light::counts::dead_time::arrived;
 
 /// There is a target if a window exceeds the background by so many standard deviations.
 const CLEAR: f64 = 6.0;

@@ -9,9 +9,9 @@ use rayon::prelude::*;
 
 use super::method::Rule;
 use dtof_data::options::Refused;
+use dtof_data::random::pixel_rng;
 use dtof_engine::settings::Settings;
 use dtof_engine::with_bins;
-use dtof_theory::random::pixel_rng;
 
 /// The most exposures; fewer if they have more than [`MAX_PHOTONS`] photons.
 const MAX_EXPOSURES: u32 = 20_000;

@@ -5,7 +5,7 @@ use dtof_core::PixelAddress;
 
 use dtof_data::photons::input::Input;
 use dtof_data::photons::npy::numbers;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 /// The true ranges that reports are compared with.
 #[derive(Clone, Debug)]

@@ -4,3 +4,4 @@
 pub mod events;
 pub mod options;
 pub mod photons;
+pub mod random;

@@ -10,7 +10,7 @@
 //! ## What it does not know
 //!
 //! - It knows no engine and no events: `dtof-engine` decides on the photons.
-//! - It simulates no scene. `dtof-simulate` has another `PhotonSource`.
+//! - It simulates no scene. `dtof-light` has another `PhotonSource`.
 //! - It writes no files.
 //! - A histogram has no laser cycles. Each photon gets a random one, and a seed makes it repeatable.
 //! - A histogram of unknown length is assumed to have one photon a laser cycle in its brightest pixel.

@@ -24,7 +24,7 @@ use dtof_data::photons::source::PhotonSource;
 use dtof_engine::settings::{
     DetectionSettings, FALSE_ALARM, RuleName, RunSettings, Settings, SettingsFile,
 };
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 /// How exact, and how sure.
 const ACCURACY: &[Key] = &[

@@ -17,7 +17,7 @@ use dtof_engine::Engine;
 use dtof_engine::settings::{
     DetectionSettings, RaySettings, RunSettings, SensorSettings, Settings, SettingsFile,
 };
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 /// What is simulated.
 const ARRAY: &[Key] = &[

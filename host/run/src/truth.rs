@@ -11,7 +11,7 @@ use dtof_data::events::events_csv::range_mm;
 use dtof_data::options::rows::{Row, bins, grouped};
 use dtof_data::photons::ranges::Ranges;
 use dtof_engine::settings::Settings;
-use dtof_simulate::scene::{Hit, Scene};
+use dtof_light::scene::{Hit, Scene};
 
 /// An event is a false alarm if its range lies farther from the truth than this many bins.
 pub const FALSE_BEYOND_BINS: f64 = 3.0;

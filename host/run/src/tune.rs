@@ -15,13 +15,13 @@ use dtof_data::options::progress::{Progress, shared};
 use dtof_data::options::rows::significant;
 use dtof_data::photons::MM_PER_PS;
 use dtof_engine::settings::RuleName;
+use dtof_light::gaussian;
+use dtof_light::looks::detections::Detections;
+use dtof_light::looks::table::Table;
+use dtof_light::progress as theory;
+use dtof_light::rates::{signal_for_snr, snr};
+use dtof_light::tune::{FalseAlarmLimit, Request, Source, tune};
 use dtof_link::Configuration;
-use dtof_theory::gaussian;
-use dtof_theory::looks::detections::Detections;
-use dtof_theory::looks::table::Table;
-use dtof_theory::progress as theory;
-use dtof_theory::rates::{signal_for_snr, snr};
-use dtof_theory::tune::{FalseAlarmLimit, Request, Source, tune};
 use serde_json::json;
 
 option_table! {

@@ -18,7 +18,8 @@ use dtof_draw::palette;
 use dtof_draw::picture::{levels, span};
 use dtof_draw::svg::{Anchor, At, BOLD, EDGE, Svg, TEXT, TITLE, wrapped};
 use dtof_engine::host::host_engine;
-use dtof_simulate::demo;
+use dtof_engine::settings::Settings;
+use dtof_light::demo;
 
 /// Laser cycles shown, and the number of animation frames.
 const CYCLES: u16 = 2000;
@@ -58,7 +59,7 @@ struct Square {
 /// # Errors
 /// Fails if the scene of the demo cannot be simulated.
 pub fn demo() -> Result<String> {
-    let (scene, settings) = (demo::scene()?, demo::settings(1)?);
+    let (scene, settings) = (demo::scene()?, Settings::demo(1)?);
     let mut photons = scene.photons(settings.seed, CYCLES.into())?;
     let mut engine = host_engine(&settings, photons.array(), &photons.addresses())?;
     let slice = photons.next_slice(CYCLES)?;

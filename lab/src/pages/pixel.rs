@@ -13,7 +13,7 @@ use dtof_data::options::rows::significant;
 use dtof_data::photons::source::{PhotonSource, PixelPhotons};
 use dtof_draw::palette::Colour;
 use dtof_draw::svg::{Anchor, At, BOLD, EDGE, Svg, TEXT, TITLE, wrapped};
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 /// A bright pixel and a dim one.
 const SCENE: &str = "

@@ -345,9 +345,9 @@ mod tests {
     use super::*;
     use crate::studies::methods::passage::{Ladder, Passage, Rule as PassageRule, count_false};
     use crate::sweep::mean::Measured;
-    use dtof_theory::looks::exposure::{Exposures, Looks};
-    use dtof_theory::random::trial_rng;
-    use dtof_theory::rates::Rates;
+    use dtof_data::random::trial_rng;
+    use dtof_light::looks::exposure::{Exposures, Looks};
+    use dtof_light::rates::Rates;
 
     /// The step of the integer root lies between 3.98 and 4: no α between them has fewer false
     /// alarms. Random numbers independent of the study.

@@ -5,7 +5,7 @@
 
 use super::{PointTally, Tally};
 use dtof_draw::chart;
-use dtof_theory::counts::binomial;
+use dtof_light::counts::binomial;
 
 /// Standard deviations of an interval that holds 99 %.
 pub const Z_99: f64 = 2.575_829_303_548_9;

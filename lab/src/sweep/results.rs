@@ -5,7 +5,7 @@ use super::values::Values;
 use super::{Part, PointTally};
 use anyhow::{Context, Result};
 use dtof_draw::chart::{self, Chart};
-use dtof_theory::counts::poisson::Poisson;
+use dtof_light::counts::poisson::Poisson;
 use std::fmt;
 
 /// The results from all trials of a study.

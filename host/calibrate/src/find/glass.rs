@@ -360,7 +360,7 @@ fn glass(good: &GoodHistograms, peak: &Peak, l2: f64) -> Glass {
     let (sigma, fit) = gaussian(&template, peak);
     let model = |bin: usize| {
         let bin = u32::try_from(bin).unwrap_or(u32::MAX);
-        let share = dtof_theory::rates::bin_share(bin, fit.position, sigma);
+        let share = dtof_light::rates::bin_share(bin, fit.position, sigma);
         let cycles = template.sums[peak.top][2];
         fit.amplitude / cycles * share
     };

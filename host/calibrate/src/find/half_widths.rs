@@ -7,7 +7,7 @@
 
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{CentredWindow, Histogram, RangeGate};
-use dtof_theory::random::trial_rng;
+use dtof_data::random::trial_rng;
 use rand_distr::{Distribution, StandardUniform};
 
 use super::offset::place;
@@ -130,7 +130,7 @@ fn draw(draws: &mut Vec<Draw>, peak: &Window, each: usize, seed: (u64, u16)) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_theory::counts::normal;
+    use dtof_light::counts::normal;
 
     const SIGMA: f64 = 0.7;
 

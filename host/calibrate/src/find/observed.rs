@@ -8,7 +8,7 @@ use dtof_core::Array;
 use dtof_data::options::Refused;
 use dtof_data::photons::histograms::Histograms;
 use dtof_data::photons::recorded::ListTimes;
-use dtof_theory::counts::dead_time;
+use dtof_light::counts::dead_time;
 
 /// How long each capture lasted.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -140,7 +140,7 @@ mod tests {
 
     fn pulse(counts: &mut [f64], photons: f64, position: f64, sigma: f64) {
         for (bin, count) in (0u32..).zip(counts) {
-            *count += photons * dtof_theory::rates::bin_share(bin, position, sigma);
+            *count += photons * dtof_light::rates::bin_share(bin, position, sigma);
         }
     }
 

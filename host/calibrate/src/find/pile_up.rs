@@ -29,7 +29,7 @@ use super::observed::Trace;
 use super::significance::{is_surely_more, median, quantile};
 
 use dtof_data::photons::recorded::ListTimes;
-use dtof_theory::counts::dead_time::{arrived, live};
+use dtof_light::counts::dead_time::{arrived, live};
 
 /// The ratio of likelihoods that decides, as a logarithm: 1000.
 const DECIDES: f64 = 6.91;

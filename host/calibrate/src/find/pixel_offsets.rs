@@ -150,7 +150,7 @@ mod tests {
     use rand_distr::{Distribution, Normal};
 
     fn measured(offsets: &[f64], noise_mm: f64, captures: usize, seed: u64) -> Vec<Measured> {
-        let mut rng = dtof_theory::random::pixel_rng(seed, dtof_core::PixelAddress::new(0));
+        let mut rng = dtof_data::random::pixel_rng(seed, dtof_core::PixelAddress::new(0));
         let noise = Normal::new(0.0, noise_mm).unwrap();
         let of_capture = |_| {
             let all = offsets.iter().enumerate();

@@ -1,7 +1,7 @@
 //! The width of the laser's pulse: one σ for all peaks, by maximum likelihood.
 //!
 //! A bin of a peak holds `b + A·share` photons on average, where the share is the integral of a
-//! Gaussian over the bin ([`bin_share`](dtof_theory::rates::bin_share)). Each peak has an
+//! Gaussian over the bin ([`bin_share`](dtof_light::rates::bin_share)). Each peak has an
 //! amplitude and a position of its own, found by Fisher scoring for every σ that is tried. What
 //! they take away from the width of peaks with few photons is given back by Cox and Reid's
 //! term, half the logarithm of their information. The median of the σ of single peaks is tried

@@ -1,6 +1,6 @@
 //! A peak of one histogram, and the maximum-likelihood fit of a Gaussian.
 
-use dtof_theory::counts::normal;
+use dtof_light::counts::normal;
 
 /// The most steps of Fisher scoring; it converges before.
 const STEPS: usize = 30;
@@ -312,7 +312,7 @@ pub fn interval(windows: &[Window], sigma: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_theory::rates::bin_share;
+    use dtof_light::rates::bin_share;
 
     #[test]
     fn a_gaussian_without_noise_is_found_again() {

@@ -65,7 +65,7 @@ pub fn quantile(values: impl IntoIterator<Item = f64>, share: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use dtof_theory::counts::poisson::Poisson;
+    use dtof_light::counts::poisson::Poisson;
 
     #[test]
     fn the_bound_is_never_below_the_probability() {

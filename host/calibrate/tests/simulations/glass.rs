@@ -7,7 +7,7 @@ use dtof_calibrate::{
 };
 use dtof_data::photons::histograms::Histograms;
 use dtof_engine::settings::SettingsFile;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 /// A wall, two nearer surfaces and the cover glass. A bin is 37.5 mm.
 fn scene(background: f64, glass: f64, more: &str) -> Scene {

@@ -6,7 +6,7 @@ use dtof_calibrate::{Calibration, CalibrationOptions, Length, Tdc, calibrate};
 use dtof_core::Array;
 use dtof_data::photons::histograms::Histograms;
 use dtof_engine::settings::SettingsFile;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg32;

@@ -4,7 +4,7 @@ use dtof_calibrate::{CalibrationOptions, Length, Tdc, calibrate};
 use dtof_core::fixed::types::{U8F8, U24F8};
 use dtof_core::{Array, CentredWindow, Count16, DepthEstimator, Histogram, RangeGate};
 use dtof_data::photons::histograms::Histograms;
-use dtof_theory::rates::bin_share;
+use dtof_light::rates::bin_share;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Poisson, Uniform};
 use rand_pcg::Pcg64;

@@ -6,9 +6,9 @@ use anyhow::Result;
 use clap::Parser;
 use dtof::path;
 use dtof_data::options::numbers::{MAX_INTEGER, integer};
-use dtof_engine::settings::{RunSettings, SettingsFile};
+use dtof_engine::settings::{RunSettings, Settings, SettingsFile};
+use dtof_light::demo;
 use dtof_run::simulate::{Simulation, array, settings_of_scene};
-use dtof_simulate::demo;
 
 use super::dynamic_depth::DynamicDepthOptions;
 use super::job::{EngineOptions, ResultOptions};
@@ -37,7 +37,7 @@ pub struct Demo {
 
 impl Demo {
     pub fn run(&self) -> Result<()> {
-        let settings = demo::settings(self.seed)?;
+        let settings = Settings::demo(self.seed)?;
         let mut scene = demo::scene()?;
         if let Some(size) = self.array {
             scene.size = size;

@@ -8,7 +8,7 @@ use dtof::path;
 use dtof_data::options::keys::real;
 use dtof_data::options::rows::Row;
 use dtof_data::photons::geometry::FieldOfView;
-use dtof_simulate::scene::{DepthAlong, DepthMap, Scene};
+use dtof_light::scene::{DepthAlong, DepthMap, Scene};
 
 use super::flags::name;
 

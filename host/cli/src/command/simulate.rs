@@ -10,9 +10,9 @@ use dtof_data::options::rows::Row;
 use dtof_data::photons::geometry::FieldOfView;
 use dtof_data::photons::source::PhotonSource;
 use dtof_engine::settings::SettingsFile;
+use dtof_light::scene::Scene;
 use dtof_report::Section;
 use dtof_run::simulate::{Options, Simulation};
-use dtof_simulate::scene::Scene;
 
 use super::flags::Flags;
 use super::job::{EngineOptions, ResultOptions};

@@ -6,7 +6,7 @@ use std::path::Path;
 use crate::common::{Scratch, assert_contains, npy, succeeded};
 use dtof_core::PixelAddress;
 use dtof_data::photons::source::PhotonSource;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 /// A wall and a smaller one before it, behind a cover glass of `glass` photons.
 fn scene(background: f64, glass: f64) -> String {

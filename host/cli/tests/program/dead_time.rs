@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use dtof_data::photons::source::PhotonSource;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 use serde_json::Value;
 
 use crate::common::{Scratch, assert_contains, npy};

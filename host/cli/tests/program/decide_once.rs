@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use dtof_core::PixelAddress;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 use crate::common::{Scratch, assert_contains, npy};
 

@@ -26,7 +26,7 @@ use std::process::Command;
 use std::sync::Mutex;
 
 use dtof_data::photons::MM_PER_PS;
-use dtof_theory::counts::dead_time::arrived;
+use dtof_light::counts::dead_time::arrived;
 use rand_core::SeedableRng;
 use rand_pcg::Pcg64;
 

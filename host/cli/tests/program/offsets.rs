@@ -48,10 +48,10 @@ fn scene() -> Vec<f64> {
 fn recording(ranges: &[f64], too_near: &[f64], seed: u64) -> Vec<u8> {
     let mut bytes = Vec::new();
     for (pixel, (range, too_near)) in (0..).zip(ranges.iter().zip(too_near)) {
-        let mut rng = dtof_theory::random::pixel_rng(seed, PixelAddress::new(pixel));
+        let mut rng = dtof_data::random::pixel_rng(seed, PixelAddress::new(pixel));
         let position = (range - too_near) / MM_PER_BIN;
         for bin in 0..BINS {
-            let signal = 0.05 * dtof_theory::rates::bin_share(bin, position, 0.9);
+            let signal = 0.05 * dtof_light::rates::bin_share(bin, position, 0.9);
             let photons = Poisson::new(CYCLES * (0.002 + signal)).unwrap();
             #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
             let count = photons.sample(&mut rng) as u32;

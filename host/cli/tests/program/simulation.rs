@@ -10,7 +10,7 @@ mod other_lidar;
 mod plain;
 
 use dtof_data::photons::source::PhotonSource;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 /// Standard deviations on either side of the mean that leave out 0.1 % of a normal distribution.
 const DEVIATIONS: f64 = 3.290_527;

@@ -18,8 +18,8 @@ use dtof_data::photons::source::PhotonSource;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_engine::settings::SettingsFile;
-use dtof_simulate::scene::Scene;
-use dtof_theory::bounds::likelihood_ratio::information;
+use dtof_light::bounds::likelihood_ratio::information;
+use dtof_light::scene::Scene;
 
 /// The instructions of an operation in a table, at opt-level 3.
 fn counted(variant: &str) -> f64 {

@@ -7,7 +7,7 @@ use dtof_compare::truth::Truth;
 use dtof_compare::{Comparison, Task, compare};
 use dtof_data::photons::source::PhotonSource;
 use dtof_engine::settings::SettingsFile;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;

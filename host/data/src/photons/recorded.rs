@@ -29,7 +29,7 @@ use crate::options::Refused;
 use crate::photons::histograms::Histograms;
 use crate::photons::list_checks::ListChecks;
 use crate::photons::source::{Photon, PhotonSource, PixelPhotons, Slice};
-use dtof_theory::random::pixel_rng;
+use crate::random::pixel_rng;
 
 /// The most photons of a histogram, and the most laser cycles of a recording. Up to here, binomial
 /// numbers are exact to better than one in ten thousand.

@@ -220,7 +220,7 @@ fn counts_that_do_not_fit_a_counter_are_divided() {
     reason = "a number of photons"
 )]
 fn divided_counts_have_no_more_false_alarms() {
-    let mut random = dtof_theory::random::pixel_rng(5, PixelAddress::new(0));
+    let mut random = dtof_data::random::pixel_rng(5, PixelAddress::new(0));
     let array = line(4000);
     let mut share = |mean: f64| {
         let poisson = Poisson::new(mean).unwrap();
@@ -467,7 +467,7 @@ fn what_needs_looks_is_refused() {
 )]
 fn the_slope_of_what_lies_outside_of_the_gate_is_no_surface() {
     const DRAWS: u32 = 4000;
-    let mut random = dtof_theory::random::pixel_rng(6, PixelAddress::new(0));
+    let mut random = dtof_data::random::pixel_rng(6, PixelAddress::new(0));
     for has_target in [false, true] {
         let (mut seen, mut right) = (0, 0);
         for draw in 0..DRAWS {

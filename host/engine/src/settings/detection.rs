@@ -8,8 +8,8 @@ use dtof_core::{
     AnyRule, AverageRule, BlockLevel, CentredWindow, Count, DepthEstimator, EchoNumber, Neighbours,
     PaperRule, RangeGate, WindowRule, WindowWidthError,
 };
+use dtof_data::options::numbers::one_in;
 use dtof_link::{AdaptiveBinning, Configuration};
-use dtof_theory::tune::window::one_in;
 use serde::Serialize;
 use serde::ser::{Error as _, Serializer};
 

@@ -8,6 +8,27 @@ use super::engine::{Settings, echo_guard_bins};
 use super::{RuleName, RunSettings, SensorSettings, SettingsFile};
 use dtof_data::options::Refused;
 
+impl Settings {
+    /// The demo's: blocks of 4×4 pixels and two echoes, with the window rule and one false alarm in
+    /// a hundred exposures.
+    ///
+    /// # Errors
+    /// Never fails: the text is a part of the program.
+    pub fn demo(seed: u64) -> Result<Self> {
+        let mut file = SettingsFile::parse(
+            "[sensor]
+             sigma_bins = 1
+             [detection]
+             rule = 'window'
+             binning = 2
+             echoes = 2
+             echo_wait = 4",
+        )?;
+        file.run.seed = Some(seed);
+        file.settings(128)
+    }
+}
+
 impl SettingsFile {
     /// The settings for histograms of `bins` bins.
     ///

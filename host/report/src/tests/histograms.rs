@@ -6,11 +6,11 @@ use dtof_engine::decisions::{Decision, KeptPixels};
 use dtof_engine::explain::explain_decisions;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_simulate::demo;
+use dtof_light::demo;
 
 /// Runs the demo: its last decisions, the data for the script in at most `room` bytes, and their size.
 fn decisions_and_data(array: Array, room: usize) -> (Vec<Decision>, serde_json::Value, usize) {
-    let settings = demo::settings(1).unwrap();
+    let settings = Settings::demo(1).unwrap();
     let mut photons = demo::photons(array, 1, 2000).unwrap();
     let mut engine = host_engine(&settings, array, &photons.addresses()).unwrap();
     engine.keep_decisions(&|_| true);
@@ -31,7 +31,7 @@ fn decisions_and_data(array: Array, room: usize) -> (Vec<Decision>, serde_json::
 fn the_histogram_of_the_last_event_of_each_pixel_is_in_the_data() {
     let array = Array::new(16, 8).unwrap();
     let (all, data, bytes) = decisions_and_data(array, usize::MAX);
-    let settings = demo::settings(1).unwrap();
+    let settings = Settings::demo(1).unwrap();
     let explanations = explain_decisions(&settings, &all);
     assert_eq!(data["every"], 1);
     assert_eq!(data["gate"], serde_json::json!([0, 127]));
@@ -155,7 +155,7 @@ fn a_large_array_of_bright_pixels_stays_below_the_documented_size() {
 fn a_histogram_has_all_laser_cycles_of_a_long_exposure() {
     let array = Array::new(2, 1).unwrap();
     let (mut all, ..) = decisions_and_data(array, usize::MAX);
-    let settings = demo::settings(1).unwrap();
+    let settings = Settings::demo(1).unwrap();
     all.truncate(1);
     all[0].cycles = 200_000;
     all[0].event.exposure = u16::MAX;

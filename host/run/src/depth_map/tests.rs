@@ -1,6 +1,6 @@
 use dtof_core::Array;
 use dtof_data::photons::source::{Photon, PixelPhotons};
-use dtof_theory::random::pixel_rng;
+use dtof_data::random::pixel_rng;
 use proptest::prelude::*;
 use rand_distr::{Distribution, Poisson};
 

@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 use dtof_data::options::numbers::shortest;
-use dtof_theory::progress::Progress;
-use dtof_theory::tune::{Request, average};
+use dtof_light::progress::Progress;
+use dtof_light::tune::{Request, average};
 
 use super::{Line, Options, counted, l1};
 

@@ -4,8 +4,8 @@ use anyhow::{Result, ensure};
 use dtof_core::{CentredWindow, DepthEstimator};
 use dtof_data::options::Refused;
 use dtof_data::options::numbers::shortest;
-use dtof_theory::progress::Progress;
-use dtof_theory::tune::{Request, window};
+use dtof_light::progress::Progress;
+use dtof_light::tune::{Request, window};
 
 use super::{Line, Options, counted, l1, number};
 

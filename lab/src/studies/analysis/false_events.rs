@@ -11,10 +11,10 @@ use dtof_core::paper::Threshold;
 use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{NEUTRAL, alpha as pen};
-use dtof_theory::gaussian::false_positive_rate;
-use dtof_theory::looks::repeated_looks::{ALPHA_STEPS, FalseAlarms, MINIMUM_COUNT, alpha_bits};
-use dtof_theory::looks::single_look::SingleLook;
-use dtof_theory::looks::{repeated_looks, table};
+use dtof_light::gaussian::false_positive_rate;
+use dtof_light::looks::repeated_looks::{ALPHA_STEPS, FalseAlarms, MINIMUM_COUNT, alpha_bits};
+use dtof_light::looks::single_look::SingleLook;
+use dtof_light::looks::{repeated_looks, table};
 use rand_pcg::Pcg64;
 
 /// Exposures of a trial.

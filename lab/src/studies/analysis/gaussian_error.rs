@@ -9,8 +9,8 @@ use dtof_core::paper::isqrt;
 use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{STEPS, alpha as pen};
-use dtof_theory::gaussian::threshold;
-use dtof_theory::{gaussian as printed, known_background};
+use dtof_light::gaussian::threshold;
+use dtof_light::{gaussian as printed, known_background};
 use rand_pcg::Pcg64;
 
 /// Mean background counts a bin.

@@ -8,7 +8,7 @@ use dtof_core::paper::ComparatorTree;
 use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::NEUTRAL;
-use dtof_theory::known_background;
+use dtof_light::known_background;
 use rand_pcg::Pcg64;
 
 /// Mean background counts a bin (N·B): the paper's B = 0.05 at N = 2 to 2000.

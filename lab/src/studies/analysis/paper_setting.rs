@@ -5,8 +5,8 @@ use anyhow::Result;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 
-use dtof_theory::gaussian::MeanCounts;
-use dtof_theory::rates::{Reflection, peak_share, signal_mean};
+use dtof_light::gaussian::MeanCounts;
+use dtof_light::rates::{Reflection, peak_share, signal_mean};
 
 /// The pulse's bin and seven others (`M_B`).
 pub const BINS: usize = BINS_U32 as usize;

@@ -10,9 +10,9 @@ use dtof_core::paper::ComparatorTree;
 use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::STEPS;
-use dtof_theory::counts::binomial;
-use dtof_theory::gaussian::{false_positive_rate, threshold};
-use dtof_theory::known_background;
+use dtof_light::counts::binomial;
+use dtof_light::gaussian::{false_positive_rate, threshold};
+use dtof_light::known_background;
 use rand_pcg::Pcg64;
 
 /// Mean background counts a bin: the paper's B = 0.05 at N = 600, its rule of thumb

@@ -10,7 +10,7 @@ use anyhow::Result;
 use dtof_core::Array;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette::{Pen, STEPS};
-use dtof_theory::rates::Rates;
+use dtof_light::rates::Rates;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;

@@ -13,7 +13,7 @@ use dtof_data::photons::source::PhotonSource;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette::{EVENTS, PAPER};
 use dtof_engine::host::host_engine;
-use dtof_simulate::scene::{Scene, Shape};
+use dtof_light::scene::{Scene, Shape};
 use rand_core::Rng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -56,7 +56,7 @@ const SCENES: [File; 5] = [
     },
     File {
         name: "demo",
-        text: include_str!("../../../../host/simulate/src/demo.toml"),
+        text: include_str!("../../../../host/light/src/demo.toml"),
         light: 1.0,
         cycles: 4000,
     },

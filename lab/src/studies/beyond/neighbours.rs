@@ -15,7 +15,7 @@ use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{Pen, STEPS};
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 use rand_core::Rng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
@@ -56,7 +56,7 @@ const SCENES: [File; 7] = [
     },
     File {
         name: "demo",
-        text: include_str!("../../../../host/simulate/src/demo.toml"),
+        text: include_str!("../../../../host/light/src/demo.toml"),
         light: 1.0,
     },
     File {

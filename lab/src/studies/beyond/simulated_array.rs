@@ -8,7 +8,7 @@ use dtof_data::photons::source::{Photon, PixelPhotons, Slice};
 use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
-use dtof_theory::rates::Rates;
+use dtof_light::rates::Rates;
 use rand_core::Rng;
 use rand_distr::{Distribution, Normal, Poisson};
 use rand_pcg::Pcg64;

@@ -9,7 +9,7 @@ use anyhow::Result;
 use dtof_core::{Array, DepthEvent};
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{EVENTS, PAPER, REFERENCE};
-use dtof_theory::rates::Rates;
+use dtof_light::rates::Rates;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;

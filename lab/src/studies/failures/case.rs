@@ -8,11 +8,11 @@ use rand_pcg::Pcg64;
 use super::rows::{self, Row};
 use super::stray::{StrayLight, StrayPhotons};
 use super::{BINS, PERIOD, SIGMA};
-use dtof_simulate::SimulatedPixel;
-use dtof_simulate::effects::Effects;
-use dtof_simulate::effects::limits::Timing;
-use dtof_theory::random::pixel_rng;
-use dtof_theory::rates::Rates;
+use dtof_data::random::pixel_rng;
+use dtof_light::SimulatedPixel;
+use dtof_light::effects::Effects;
+use dtof_light::effects::limits::Timing;
+use dtof_light::rates::Rates;
 
 /// The plain scene: background photons a bin and laser cycle, signal photons a laser cycle, and
 /// their position in bins.

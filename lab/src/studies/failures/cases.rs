@@ -8,10 +8,10 @@ use super::L1;
 use super::case::{BACKGROUND, Case, PLACE, SIGNAL};
 use super::rows::{self, Row};
 use super::stray::StrayLight;
-use dtof_simulate::effects::Effects;
-use dtof_simulate::effects::cover_glass::CoverGlass;
-use dtof_simulate::effects::tail::Tail;
-use dtof_simulate::effects::tdc::Tdc;
+use dtof_light::effects::Effects;
+use dtof_light::effects::cover_glass::CoverGlass;
+use dtof_light::effects::tail::Tail;
+use dtof_light::effects::tdc::Tdc;
 
 /// A signal for which the window rule needs some 250 laser cycles.
 const WEAK: f64 = 0.12;

@@ -14,9 +14,9 @@ use dtof_core::{
 use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{self, Pen};
-use dtof_theory::bounds::cramer_rao::Pulse;
-use dtof_theory::looks::exposure::{Exposures, Looks};
-use dtof_theory::rates::Rates;
+use dtof_light::bounds::cramer_rao::Pulse;
+use dtof_light::looks::exposure::{Exposures, Looks};
+use dtof_light::rates::Rates;
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;

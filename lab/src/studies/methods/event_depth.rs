@@ -18,7 +18,7 @@ use dtof_core::{DepthEstimator, WindowRule};
 use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Series, Style};
 use dtof_draw::palette::{CENTRED, PAPER};
-use dtof_theory::rates::Rates;
+use dtof_light::rates::Rates;
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;

@@ -9,8 +9,8 @@ use anyhow::Result;
 use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::REFERENCE;
-use dtof_theory::looks::exposure::Exposures;
-use dtof_theory::rates::Rates;
+use dtof_light::looks::exposure::Exposures;
+use dtof_light::rates::Rates;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 

@@ -12,8 +12,8 @@ use dtof_core::{AnyRule, Count16, DetectionRule, Histogram, Peak, RangeGate};
 use rand_pcg::Pcg64;
 
 use crate::sweep::Tally;
-use dtof_theory::bounds::likelihood_ratio::{Evidence, LikelihoodRatio};
-use dtof_theory::looks::exposure::{Exposures, Looks};
+use dtof_light::bounds::likelihood_ratio::{Evidence, LikelihoodRatio};
+use dtof_light::looks::exposure::{Exposures, Looks};
 
 pub use self::ladder::Ladder;
 pub use self::rule::Rule;
@@ -164,8 +164,8 @@ pub(crate) mod tests {
     };
 
     use super::*;
-    use dtof_theory::random::trial_rng;
-    use dtof_theory::rates::Rates;
+    use dtof_data::random::trial_rng;
+    use dtof_light::rates::Rates;
 
     fn exposures(signal: f64) -> Exposures {
         let rates = Rates {

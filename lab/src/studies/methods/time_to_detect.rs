@@ -11,9 +11,9 @@ use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, point};
 use anyhow::Result;
 use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Panel, Series, Style};
-use dtof_theory::bounds::likelihood_ratio::{LikelihoodRatio, signal_for_information};
-use dtof_theory::looks::exposure::Exposures;
-use dtof_theory::rates::Rates;
+use dtof_light::bounds::likelihood_ratio::{LikelihoodRatio, signal_for_information};
+use dtof_light::looks::exposure::Exposures;
+use dtof_light::rates::Rates;
 use rand_pcg::Pcg64;
 use std::fmt::Write as _;
 

@@ -23,7 +23,7 @@ use crate::sweep::mean::add;
 use crate::sweep::{Point, Study, Tally, grid, point};
 use dtof_data::photons::source::PhotonSource;
 use dtof_engine::host::host_engine;
-use dtof_simulate::scene::{Brightness, Scene, Shape};
+use dtof_light::scene::{Brightness, Scene, Shape};
 
 /// Laser cycles handled at a time.
 const SLICE: u16 = 250;

@@ -29,7 +29,7 @@ use dtof_data::options::rows::grouped;
 use dtof_data::photons::MM_PER_PS;
 use dtof_draw::chart::{Axis, Chart, Panel, Point as Dot, Series, Style};
 use dtof_draw::palette::{self, STEPS};
-use dtof_theory::rates::bin_share;
+use dtof_light::rates::bin_share;
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 

@@ -16,11 +16,11 @@ use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, whole};
 use anyhow::Result;
 use dtof_core::{AsyncPixel, LaserCycle, PixelAddress, Statistics};
 use dtof_data::options::rows::grouped;
+use dtof_data::random::pixel_rng;
 use dtof_draw::chart::{Axis, Chart, Panel, Series, Style};
 use dtof_draw::palette::STEPS;
-use dtof_simulate::SimulatedPixel;
-use dtof_theory::random::pixel_rng;
-use dtof_theory::rates::{Rates, signal_for_snr};
+use dtof_light::SimulatedPixel;
+use dtof_light::rates::{Rates, signal_for_snr};
 use rand_core::Rng;
 use rand_pcg::Pcg64;
 

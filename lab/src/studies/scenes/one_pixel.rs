@@ -8,8 +8,8 @@ use dtof_core::{
 };
 use dtof_draw::palette::{self, Pen};
 use dtof_engine::frame::FramePixel;
-use dtof_simulate::SimulatedPixel;
-use dtof_theory::rates::Rates;
+use dtof_light::SimulatedPixel;
+use dtof_light::rates::Rates;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;
 

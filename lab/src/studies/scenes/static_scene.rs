@@ -23,7 +23,7 @@ use crate::sweep::mean::{add, add_error, add_value};
 use crate::sweep::{Point, Study, Tally, Trial, point};
 use dtof_data::photons::source::PhotonSource;
 use dtof_engine::host::host_engine;
-use dtof_simulate::scene::{Brightness, Scene};
+use dtof_light::scene::{Brightness, Scene};
 
 const CYCLES: u64 = 10_000;
 /// Laser cycles of a frame (L2).

@@ -24,7 +24,7 @@ use dtof_core::fixed::types::{U8F8, U16F16};
 use dtof_core::{AnyRule, AverageRule, Count, PaperRule};
 use dtof_data::photons::MM_PER_PS;
 use dtof_engine::settings::Settings;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 /// Standard deviation of the PC's pulse in bins.
 pub const PC_SIGMA: f64 = 0.33;

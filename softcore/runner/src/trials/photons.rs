@@ -1,9 +1,9 @@
 //! Simulated photons for the FIFO.
 
 use anyhow::Result;
-use dtof_simulate::SimulatedPixel;
+use dtof_light::SimulatedPixel;
+use dtof_light::rates::Rates;
 use dtof_softcore::stream::BINS;
-use dtof_theory::rates::Rates;
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::SeedableRng;
 

@@ -18,9 +18,9 @@ use dtof_engine::Engine;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 use dtof_firmware::sidecar::Sidecar;
+use dtof_light::demo;
+use dtof_light::effects::tdc::Tdc;
 use dtof_link::AdaptiveBinning;
-use dtof_simulate::demo;
-use dtof_simulate::effects::tdc::Tdc;
 
 const PIXELS: usize = 64;
 /// Number of blocks of 8x8 pixels in three levels.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::common::Scratch;
 use dtof_core::PixelAddress;
-use dtof_simulate::scene::{Scene, Shape};
+use dtof_light::scene::{Scene, Shape};
 
 /// Beyond this an event is false, as in the reports.
 const FALSE_BEYOND_BINS: f64 = 3.0;

@@ -3,7 +3,7 @@
 //! The numbers of each kind are such that its targets can be found. A test beside these generators checks that with a
 //! detector that knows where to look. The kinds differ in what may mislead the search for settings.
 
-use dtof_theory::rates::bin_share;
+use dtof_light::rates::bin_share;
 use rand_distr::{Binomial, Distribution, Poisson, Uniform};
 use rand_pcg::Pcg64;
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use dtof_core::PixelAddress;
 use dtof_data::photons::geometry::FieldOfView;
-use dtof_simulate::scene::{DepthAlong, DepthMap, Scene};
+use dtof_light::scene::{DepthAlong, DepthMap, Scene};
 use proptest::prelude::*;
 
 use crate::common::{Scratch, assert_contains, npy};

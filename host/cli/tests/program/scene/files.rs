@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::common::{Scratch, assert_contains};
 use dtof_core::PixelAddress;
-use dtof_simulate::scene::Scene;
+use dtof_light::scene::Scene;
 
 fn repository(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -24,7 +24,7 @@ fn the_demos_scene_and_settings_give_the_demos_events() {
     let scratch = Scratch::new();
     scratch.printed("demo --cycles 1000 --seed 7 --quiet");
     let settings = "--rule window --sigma-bins 1 --binning 2 --echoes 2 --echo-wait 4 --cycles 1000 --seed 7 --quiet";
-    let output = scratch.simulate(&repository("host/simulate/src/demo.toml"), settings);
+    let output = scratch.simulate(&repository("host/light/src/demo.toml"), settings);
     assert!(output.status.success() && output.stdout.is_empty() && output.stderr.is_empty());
     for name in ["events.csv", "events.aer", "depth-last.svg"] {
         let read = |folder| fs::read(scratch.path(folder).join(name)).unwrap();

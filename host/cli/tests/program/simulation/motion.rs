@@ -1,8 +1,8 @@
 //! Motion: what a scene says is true, and where the photons are.
 
 use dtof_core::PixelAddress;
-use dtof_simulate::demo;
-use dtof_simulate::scene::{Hit, Scene};
+use dtof_light::demo;
+use dtof_light::scene::{Hit, Scene};
 
 use super::{array, float, near_count, near_mean, pixel};
 

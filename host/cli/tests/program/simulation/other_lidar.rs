@@ -1,8 +1,8 @@
 //! The pulses of another LiDAR.
 
 use dtof_engine::settings::SettingsFile;
+use dtof_light::scene::Scene;
 use dtof_sensors::dither::Dither;
-use dtof_simulate::scene::Scene;
 
 use crate::common::{Scratch, succeeded};
 

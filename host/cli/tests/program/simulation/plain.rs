@@ -3,8 +3,8 @@
 
 use dtof_core::PixelAddress;
 use dtof_data::photons::source::PhotonSource;
-use dtof_simulate::scene::Scene;
-use dtof_theory::random::pixel_rng;
+use dtof_data::random::pixel_rng;
+use dtof_light::scene::Scene;
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, Uniform};
 
 use super::{Photons, array, pixel, sliced};

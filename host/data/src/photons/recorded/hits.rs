@@ -82,8 +82,8 @@ impl Hits {
 mod tests {
     use super::super::tests::Numbers;
     use super::*;
+    use crate::random::pixel_rng;
     use dtof_core::PixelAddress;
-    use dtof_theory::random::pixel_rng;
     use std::iter::repeat;
 
     /// Draws all laser cycles. Returns the photons of each.

@@ -124,8 +124,8 @@ impl Remaining {
 mod tests {
     use super::super::tests::Numbers;
     use super::*;
+    use crate::random::pixel_rng;
     use dtof_core::PixelAddress;
-    use dtof_theory::random::pixel_rng;
     use proptest::prelude::*;
     use std::iter::once;
 

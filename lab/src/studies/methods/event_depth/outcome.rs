@@ -7,7 +7,7 @@ use super::{BACKGROUNDS, ESTIMATORS, SIGMAS, pixels};
 use crate::studies::methods::passage::Rule;
 use crate::sweep::mean::Measured;
 use crate::sweep::{Part, PointTally};
-use dtof_theory::bounds::cramer_rao::Pulse;
+use dtof_light::bounds::cramer_rao::Pulse;
 
 /// The errors of an estimator on the events whose peak is in the pulse.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -7,8 +7,8 @@ use rand_pcg::Pcg64;
 
 use super::{BACKGROUNDS, FIRST_LOOKS};
 use crate::studies::methods::passage::{BINS, LOOKS, MINIMUM_COUNT, Rule};
-use dtof_theory::looks::exposure::Exposures;
-use dtof_theory::rates::Rates;
+use dtof_light::looks::exposure::Exposures;
+use dtof_light::rates::Rates;
 
 /// For each of [`FIRST_LOOKS`] and [`BACKGROUNDS`]: the smallest α, in steps of 1/16, with at most
 /// 1 % false alarms an exposure. No α has exactly 1 %, because integer counts make the share fall
@@ -146,7 +146,7 @@ mod tests {
     use super::super::estimators;
     use super::*;
     use crate::studies::methods::passage::tests::event as of_core;
-    use dtof_theory::random::trial_rng;
+    use dtof_data::random::trial_rng;
 
     const RATES: Rates = Rates {
         background: 0.05,

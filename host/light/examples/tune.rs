@@ -1,10 +1,10 @@
 //! Settings for a required rate of false alarms:
-//! `cargo run --release --package dtof-theory --example tune`.
+//! `cargo run --release --package dtof-light --example tune`.
 
 use dtof_core::BlockLevel;
-use dtof_theory::looks::table::Table;
-use dtof_theory::progress::NONE;
-use dtof_theory::tune::{FalseAlarmLimit, Request, tune};
+use dtof_light::looks::table::Table;
+use dtof_light::progress::NONE;
+use dtof_light::tune::{FalseAlarmLimit, Request, tune};
 
 fn main() -> anyhow::Result<()> {
     let request = Request {

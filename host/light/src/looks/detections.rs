@@ -5,8 +5,8 @@ use dtof_core::{AnyRule, BinPosition, DepthEstimator};
 
 use crate::looks::exposure::{Exposures, Looks};
 use crate::progress::Part;
-use crate::random::trial_rng;
 use crate::rates::Rates;
+use dtof_data::random::trial_rng;
 
 /// When a pixel looks, and how it decides.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use dtof_core::PixelAddress;
 use rand_pcg::Pcg64;
 
-use dtof_theory::random::pixel_rng;
+use dtof_data::random::pixel_rng;
 
 /// The effect that draws the numbers.
 #[derive(Clone, Copy, Debug)]

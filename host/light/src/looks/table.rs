@@ -8,7 +8,7 @@
 //! over the logarithms of three numbers: the mean background at the first look, the first
 //! look, and the ratio of last to first look. Between two α the larger share counts.
 //!
-//! `cargo lab figures` writes `theory/data/repeated_looks.csv` from the study `false-events`.
+//! `cargo lab figures` writes `host/light/data/repeated_looks.csv` from the study `false-events`.
 
 use std::fmt::Write;
 
@@ -22,7 +22,7 @@ use crate::counts::binomial;
 use crate::looks::repeated_looks::{
     ALPHA_STEPS, BINS, FalseAlarms, MINIMUM_COUNT, Point, RepeatedLooks, alpha_bits, single_looks,
 };
-use crate::random::trial_rng;
+use dtof_data::random::trial_rng;
 
 /// Mean background photons a bin at the first look.
 const FIRST_MEANS: [f64; 18] = [

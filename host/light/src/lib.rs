@@ -1,5 +1,25 @@
 #![doc = include_str!("../README.md")]
-//! ## Modules
+//! ## The model of scenes
+//!
+//! Background photons are Poisson distributed and spread evenly over the bins;
+//! signal photons are Poisson distributed and normally distributed around the
+//! pulse position (Eq. 1 to 3, one object). A signal photon outside the
+//! histogram is not detected.
+//!
+//! This is the plain model, used unless there are [`Effects`](effects::Effects). With effects, the
+//! same photons from the same random numbers take a longer path:
+//!
+//! ```text
+//! arrivals (f64, bins after the laser fires)
+//!   → light      second echo, cover glass, pulse tail, hot pixels
+//!   → SPAD       dead time, afterpulsing
+//!   → TDC        jitter, hits a laser cycle
+//!   → TDC codes
+//! ```
+//!
+//! Each effect has its own random numbers: switching one on does not change the others.
+
+//! ## Laws
 //!
 //! | module | contents | source |
 //! |---|---|---|
@@ -16,16 +36,25 @@
 //! | [`counts`] | Poisson, normal and binomial laws, and what a dead time hides | exact |
 //! | [`tune`] | settings for a required false-alarm rate | all of these |
 //! | [`progress`] | how far a long calculation is | |
-//! | [`random`] | random numbers of a pixel or a trial | |
 
+#![deny(clippy::print_stderr, clippy::print_stdout)]
 #![forbid(unsafe_code)]
 
+mod array;
 pub mod bounds;
 pub mod counts;
+pub mod demo;
+mod detector;
+pub mod effects;
 pub mod gaussian;
 pub mod known_background;
 pub mod looks;
+mod pixel;
 pub mod progress;
-pub mod random;
 pub mod rates;
+pub mod scene;
+mod stream;
 pub mod tune;
+
+pub use self::array::{RatesFn, SimulatedArray};
+pub use self::pixel::SimulatedPixel;

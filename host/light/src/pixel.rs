@@ -1,8 +1,8 @@
 //! One simulated pixel: the plain model, and the effects on top of it.
 
+use crate::rates::Rates;
 use anyhow::{Context, Result};
 use dtof_core::PixelAddress;
-use dtof_theory::rates::Rates;
 use rand_distr::{Bernoulli, Distribution, Normal, Poisson, Uniform};
 use rand_pcg::Pcg64;
 

@@ -14,12 +14,12 @@ use dtof_core::{Array, PixelAddress};
 
 use crate::effects::Effects;
 use crate::effects::limits::Timing;
+use crate::rates::Rates;
 use crate::{RatesFn, SimulatedArray, SimulatedPixel};
 use dtof_data::photons::MM_PER_PS;
 use dtof_data::photons::geometry::FieldOfView;
 use dtof_data::photons::source::PhotonSource;
-use dtof_theory::random::pixel_rng;
-use dtof_theory::rates::Rates;
+use dtof_data::random::pixel_rng;
 
 pub use depth_map::{DepthAlong, DepthMap};
 pub use surface::{Ball, Brightness, Fan, Plane, Rectangle, Shape, Surface};

@@ -19,8 +19,8 @@ use crate::counts::binomial;
 use crate::looks::detections::{DetectionSettings, Detections};
 use crate::looks::exposure::{Exposures, Looks};
 use crate::progress::{Part, Progress};
-use crate::random::trial_rng;
 use crate::rates::Rates;
+use dtof_data::random::trial_rng;
 
 /// Approximate photons of all simulated exposures, which take some seconds.
 const PHOTONS: f64 = 5e8;

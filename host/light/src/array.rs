@@ -1,8 +1,8 @@
 //! An array of simulated pixels.
 
+use crate::rates::Rates;
 use anyhow::{Result, ensure};
 use dtof_core::{Array, PixelAddress};
-use dtof_theory::rates::Rates;
 use rayon::prelude::*;
 
 use super::pixel::SimulatedPixel;

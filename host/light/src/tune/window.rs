@@ -9,6 +9,7 @@ use anyhow::{Result, ensure};
 use dtof_core::fixed::types::{U4F12, U8F8};
 use dtof_core::rule::{HIGHEST_Z, z_for_levels};
 use dtof_core::{Count, DepthEstimator, RangeGate, WindowRule};
+use dtof_data::options::numbers::one_in;
 
 use super::shortest::{false_alarms, shortest};
 use super::{Request, candidates, check};
@@ -39,13 +40,6 @@ pub struct Tuned {
     pub false_alarms: (u64, u64),
     /// Exposures simulated with the target.
     pub detections: Detections,
-}
-
-/// `1 / share`, rounded up and saturating: the argument of [`z_for_levels`].
-#[must_use]
-#[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
-pub fn one_in(share: f64) -> u32 {
-    (1.0 / share).ceil() as u32
 }
 
 /// Finds z and L1.

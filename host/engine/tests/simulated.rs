@@ -13,7 +13,7 @@ use dtof_engine::explain::explain_decisions;
 use dtof_engine::host::host_engine;
 use dtof_engine::settings::Settings;
 
-use crate::demo;
+use dtof_light::demo;
 
 const ARRAY: Array = Array::new(8, 4).unwrap();
 
@@ -75,7 +75,7 @@ fn all_settings() -> Vec<Settings> {
         tracking,
         both,
         frames,
-        demo::settings(3).unwrap(),
+        Settings::demo(3).unwrap(),
         with_neighbours(Neighbours::Four),
         with_neighbours(Neighbours::Eight),
     ];
@@ -130,7 +130,7 @@ fn counts_are_the_photons_of_the_exposure() {
 /// A block counts photons of silent pixels only.
 #[test]
 fn counts_of_a_block_are_those_its_event_tells() {
-    let settings = demo::settings(3).unwrap();
+    let settings = Settings::demo(3).unwrap();
     let (_, decisions, _) = run(&settings, 256);
     let blocks = decisions
         .iter()
@@ -146,7 +146,7 @@ fn counts_of_a_block_are_those_its_event_tells() {
 fn decisions_do_not_depend_on_slices_or_threads() {
     let neighbours = with_neighbours(Neighbours::Eight);
     for settings in [
-        demo::settings(3).unwrap(),
+        Settings::demo(3).unwrap(),
         Settings::static_scene(0),
         neighbours,
     ] {
@@ -314,7 +314,7 @@ fn neighbours_need_the_window_rule_and_no_dead_time() {
     assert!(reason.contains("is for"), "{reason}");
     let blocks = good
         .clone()
-        .configured(|array| array.binning = demo::settings(3).unwrap().configuration.binning);
+        .configured(|array| array.binning = Settings::demo(3).unwrap().configuration.binning);
     let reason = refused(&blocks).unwrap_err();
     assert!(reason.contains("cannot be used with binning"), "{reason}");
     let dead = good.configured(|array| array.dead_time = Some(128));

@@ -5,12 +5,12 @@
 
 use dtof_core::rule::detect;
 use dtof_core::{Count, DepthEstimator, Histogram, PaperRule, RangeGate};
-use dtof_theory::counts::binomial::plausible;
-use dtof_theory::gaussian::{self, MeanCounts};
-use dtof_theory::known_background;
-use dtof_theory::looks::single_look::SingleLook;
-use dtof_theory::random::trial_rng;
-use dtof_theory::rates::{bin_share, peak_share, signal_for_snr};
+use dtof_data::random::trial_rng;
+use dtof_light::counts::binomial::plausible;
+use dtof_light::gaussian::{self, MeanCounts};
+use dtof_light::known_background;
+use dtof_light::looks::single_look::SingleLook;
+use dtof_light::rates::{bin_share, peak_share, signal_for_snr};
 use rand_distr::{Distribution, Poisson};
 use rand_pcg::Pcg64;
 

@@ -16,7 +16,7 @@ use super::effects::second_echo::EchoDelay;
 use super::effects::tail::TailDelay;
 use super::effects::tdc::Tdc;
 use super::stream::Stream;
-use dtof_theory::rates::Rates;
+use crate::rates::Rates;
 
 /// A photon of the plain model.
 pub(super) enum Arrival {

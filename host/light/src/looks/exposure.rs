@@ -248,8 +248,8 @@ mod tests {
     use dtof_core::{AsyncPixel, LaserCycle, Look, PaperRule, PixelConfig, Statistics};
 
     use super::*;
-    use crate::random::trial_rng;
     use dtof_core::PixelAddress;
+    use dtof_data::random::trial_rng;
 
     #[test]
     fn looks_are_those_of_a_pixel() {
