@@ -5,7 +5,7 @@ use std::io::Cursor;
 
 use dtof_data::events::aer_file::{Reader, Writer};
 use dtof_data::options::Named;
-use dtof_export::{Format, Options, export};
+use dtof_run::export::{Format, Options, export};
 
 use crate::{folder, is_one_line};
 

@@ -9,7 +9,7 @@ use dtof_data::options::files::{destination, temporary_file};
 use dtof_data::options::progress::Progress;
 use dtof_data::options::{Refused, named};
 use dtof_engine::settings::SettingsFile;
-use dtof_export::{Format, ProjectionOptions};
+use dtof_run::export::{Format, ProjectionOptions};
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyByteArray;
@@ -89,7 +89,7 @@ pub fn export(
         let aer = temporary_file(&place.folder, ".dtof-")?.into_temp_path();
         write(&aer, &records, &array)?;
         let options = options.options(SettingsFile::default())?;
-        let done = dtof_export::export(&aer, &path, format, &options, &mut control)?;
+        let done = dtof_run::export::export(&aer, &path, format, &options, &mut control)?;
         ensure!(
             done.late == 0,
             "events are not in the order of their laser cycles"

@@ -54,7 +54,7 @@ macro_rules! over_settings {
 over_settings!(
     dtof_run::replay::Options,
     dtof_run::simulate::Options,
-    dtof_run::compare::Options,
+    dtof_run::compare::job::Options,
     dtof_run::given::Operation
 );
 

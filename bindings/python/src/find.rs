@@ -1,11 +1,12 @@
 //! Settings for a recording, a scene or a rate of false alarms.
 
-use dtof_calibrate::{remarks, report};
+use dtof_calibrate::remarks;
 use dtof_data::options::rows::Row;
 use dtof_data::photons::input::Input;
 use dtof_engine::settings::SettingsFile;
+use dtof_run::calibrate::report;
 use dtof_run::calibrate::{CalibrateResult, Options as CalibrateOptions};
-use dtof_run::compare::{Callbacks, CompareInput, CompareResult, Options as CompareOptions};
+use dtof_run::compare::job::{Callbacks, CompareInput, CompareResult, Options as CompareOptions};
 use dtof_run::tune::Options as TuneOptions;
 use pyo3::prelude::*;
 use std::sync::Mutex;

@@ -5,7 +5,7 @@ use dtof_data::events::aer_file::Event;
 use dtof_data::events::echoes::{Echo, EchoSelection};
 use dtof_data::events::histories::{PixelHistories, PixelHistory};
 use dtof_engine::settings::SettingsFile;
-use dtof_export::ProjectionOptions;
+use dtof_run::export::ProjectionOptions;
 use pyo3::prelude::*;
 use pyo3::pybacked::PyBackedBytes;
 use pyo3::types::PyByteArray;
@@ -73,7 +73,7 @@ pub fn points<'py>(
         };
         let events = select(events(&records, &header)?, echo);
         let options = options.options(SettingsFile::default())?;
-        dtof_export::points(&events, &header, &options)
+        dtof_run::export::points(&events, &header, &options)
     })?;
     Ok(PyByteArray::new(py, &points))
 }

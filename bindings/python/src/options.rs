@@ -2,7 +2,7 @@
 
 use dtof_data::options::keys::{Key, Kind};
 use dtof_data::options::{Options, option_name, with_names};
-use dtof_export::ProjectionOptions;
+use dtof_run::export::ProjectionOptions;
 use dtof_run::given::{DITHER, Operation};
 use dtof_run::recording::RECORDING;
 use dtof_run::{calibrate, compare, replay, simulate, tune};
@@ -21,7 +21,7 @@ pub fn keywords() -> Vec<(&'static str, Vec<Keyword>)> {
         ("ReplayOptions", of::<replay::Options>(|_| true)),
         ("SimulateOptions", of::<simulate::Options>(|_| true)),
         ("CalibrateOptions", of::<calibrate::Options>(|_| true)),
-        ("CompareOptions", of::<compare::Options>(|_| true)),
+        ("CompareOptions", of::<compare::job::Options>(|_| true)),
         ("TuneOptions", of::<tune::Options>(|_| true)),
         // Pixels without a device have no laser.
         ("PixelOptions", of::<Operation>(|key| !is_in(DITHER, key))),

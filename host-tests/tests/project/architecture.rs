@@ -241,7 +241,7 @@ fn libraries_and_python_do_without_what_only_the_program_needs() {
         let used = of_program.iter().filter(|name| all.contains(*name));
         used.cloned().collect::<Vec<_>>()
     };
-    for package in ["dtof-python", "dtof-run", "dtof-calibrate", "dtof-compare"] {
+    for package in ["dtof-python", "dtof-run", "dtof-calibrate"] {
         assert_eq!(used(package), [""; 0], "{package}");
     }
     assert_eq!(used("dtof-device"), ["serialport"]);

@@ -73,11 +73,11 @@ const WRITES: [&str; 13] = [
 /// The files that write results: below `--out`, or to a file that an option names.
 const WRITERS: [&str; 7] = [
     "bindings/python/src/aer.rs",
-    "host/compare/src/page.rs",
     "host/data/src/options/files.rs",
     "host/device/src/monitor/event_file.rs",
-    "host/export/src/lib.rs",
     "host/live/src/outputs.rs",
+    "host/run/src/compare/page.rs",
+    "host/run/src/export.rs",
     "host/run/src/output.rs",
 ];
 

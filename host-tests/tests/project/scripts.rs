@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use dtof_report::shared::{Module, bundle};
+use dtof_run::report::shared::{Module, bundle};
 
 /// The names of JavaScript and of browsers that the scripts use.
 const NAMES_OF_BROWSERS: &str = "Array BigInt Float32Array Float64Array Infinity JSON Map Math NaN Number Object Set \
@@ -21,7 +21,7 @@ fn host() -> PathBuf {
 /// Paths, below `host`, and texts of all scripts of both pages.
 fn scripts() -> Vec<(String, String)> {
     let mut scripts = Vec::new();
-    let mut folders = vec![host().join("report/src"), host().join("live/src")];
+    let mut folders = vec![host().join("run/src/report"), host().join("live/src")];
     while let Some(folder) = folders.pop() {
         for path in fs::read_dir(folder)
             .unwrap()
@@ -45,7 +45,7 @@ fn pages(scripts: &[(String, String)]) -> Vec<String> {
         .iter()
         .map(|(path, text)| (&path[..], &text[..]))
         .collect();
-    ["report/src/page/main.js", "live/src/page/main.js"]
+    ["run/src/report/page/main.js", "live/src/page/main.js"]
         .map(|main| bundle(main, &modules).unwrap_or_else(|error| panic!("{error}")))
         .into()
 }
@@ -71,12 +71,13 @@ fn every_script_is_a_module_and_imports_go_one_way() {
         );
         for import in imports(text) {
             let is_allowed = match path.split('/').collect::<Vec<_>>()[..] {
-                ["report", "src", "shared", _] => import.starts_with("./"),
-                ["report", "src", "page", _] => {
+                ["run", "src", "report", "shared", _] => import.starts_with("./"),
+                ["run", "src", "report", "page", _] => {
                     import.starts_with("./") || import.starts_with("../shared/")
                 }
                 ["live", "src", "page", _] => {
-                    import.starts_with("./") || import.starts_with("../../../report/src/shared/")
+                    import.starts_with("./")
+                        || import.starts_with("../../../run/src/report/shared/")
                 }
                 _ => false,
             };

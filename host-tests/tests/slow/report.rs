@@ -50,8 +50,8 @@ fn scripts_of_the_pages_pass_their_tests() -> Result<()> {
     };
     let mut node = Command::new(NODE);
     node.arg("--test");
-    for page in ["report", "live"] {
-        let folder = root().join("host").join(page).join("tests");
+    for package in ["run", "live"] {
+        let folder = root().join("host").join(package).join("tests");
         let mut files = Vec::new();
         for entry in fs::read_dir(&folder)? {
             files.push(entry?.path());

@@ -15,7 +15,6 @@ mod false_alarms;
 mod find;
 mod photon_budget;
 mod remarks;
-pub mod report;
 mod settle;
 mod used_pulse;
 mod watch;

@@ -40,7 +40,7 @@
 //! ## What it does not know
 //!
 //! - It knows no engine and no settings. It takes events from a simulation, a recording or a device alike.
-//! - It knows no camera and no time: `dtof-export` makes points in space and seconds of them.
+//! - It knows no camera and no time: `dtof_run::export` makes points in space and seconds of them.
 //! - It opens no files, but reads and writes any `Read` and `Write`.
 //! - An array has at most 65,536 pixels. `docs/aer-format.md` of the project defines the format.
 

@@ -1,7 +1,7 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { planOf } from "../../report/src/shared/looks.js";
+import { planOf } from "../../run/src/report/shared/looks.js";
 import { drawnText, histogramNote, lossName, placeText, rangesNote, speedsWith, stateOf, totalsOf } from "../src/page/notes.js";
 import { shortcutOf } from "../src/page/shortcuts.js";
 

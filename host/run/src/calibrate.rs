@@ -1,5 +1,7 @@
 //! `calibrate`: the settings of a sensor from a recording.
 
+pub mod report;
+
 use anyhow::{Context, Result};
 
 use super::given::{Given, TDC_OF_ANY_RULE};

@@ -18,6 +18,7 @@ use tempfile::NamedTempFile;
 
 use crate::Sink;
 use crate::depth_map::DepthMap;
+use crate::report::{Cloud, Decisions, Figure, Section};
 use crate::summary::{self, Summary};
 use age::LastAtBin;
 use changes::Changes;
@@ -38,7 +39,6 @@ use dtof_engine::Engine;
 use dtof_engine::decisions::{Decision, KeptPixels};
 use dtof_engine::settings::{Settings, SettingsFile};
 use dtof_link::DynamicDepth;
-use dtof_report::{Cloud, Decisions, Figure, Section};
 use pictures::{Picture, pictures};
 
 const CSV: &str = "events.csv";
@@ -224,7 +224,7 @@ impl Output {
         });
         let of_changes = changes.iter().map(|(svg, caption)| (svg, caption));
         // Few pixels are shown in a table, not in a map.
-        let few = self.maps.array.pixels() as usize <= dtof_report::FEW;
+        let few = self.maps.array.pixels() as usize <= crate::report::FEW;
         let figures = of_maps.filter(|_| !few).chain(of_changes);
         let figures: Vec<Figure> = figures
             .map(|(svg, caption)| Figure { svg, caption })
@@ -266,7 +266,7 @@ impl Output {
                 array: self.maps.array,
             }),
         };
-        let report = dtof_report::html(title, lead, &all, &figures, cloud);
+        let report = crate::report::html(title, lead, &all, &figures, cloud);
 
         let name = |file: &str| self.folder.join(file).display().to_string();
         let written = |content: &[u8], file: &'static str| -> Result<_> {
@@ -443,7 +443,7 @@ fn results() -> impl Iterator<Item = (&'static str, &'static str)> {
         (CSV, events_csv::HEADER),
         (AER, aer_file::MAGIC),
         (depth::TABLE, depth::HEADER),
-        (REPORT, dtof_report::MARK),
+        (REPORT, crate::report::MARK),
         (SUMMARY, summary::MARK),
     ])
 }

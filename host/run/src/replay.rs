@@ -12,7 +12,7 @@ use super::recording::{
 };
 use super::run::{RunResult, Sink, run};
 use super::summary::Summary;
-use dtof_calibrate::report::rows;
+use crate::calibrate::report::rows;
 use dtof_calibrate::{Calibration, CalibrationOptions};
 use dtof_core::Neighbours;
 use dtof_data::events::clock::LaserClock;

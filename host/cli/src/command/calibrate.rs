@@ -10,10 +10,10 @@ use clap::Args;
 use dtof::path;
 use dtof::progress::Bar;
 use dtof_calibrate::remarks;
-use dtof_calibrate::report::{self, MARKS};
 use dtof_data::options::files::{MarkedFile, write_marked};
 use dtof_data::options::rows::aligned;
 use dtof_engine::settings::SettingsFile;
+use dtof_run::calibrate::report::{self, MARKS};
 use dtof_run::calibrate::{Options, with_mask};
 
 use self::from_device::{DeviceArgs, FromDevice};

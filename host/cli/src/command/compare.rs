@@ -8,11 +8,11 @@ use anyhow::Result;
 use clap::Args;
 use dtof::path;
 use dtof::progress::Steps;
-use dtof_compare::page::{self, FILES};
 use dtof_data::options::rows::aligned;
 use dtof_data::photons::input::Input;
 use dtof_light::scene::Scene;
-use dtof_run::compare::{Callbacks, CompareInput, CompareResult, Options};
+use dtof_run::compare::job::{Callbacks, CompareInput, CompareResult, Options};
+use dtof_run::compare::page::{self, FILES};
 
 use super::flags::Flags;
 use super::job::Recorded;

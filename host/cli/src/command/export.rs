@@ -12,7 +12,7 @@ use dtof_data::options::Refused;
 use dtof_data::options::numbers::integer;
 use dtof_data::options::rows::grouped;
 use dtof_engine::settings::SettingsFile;
-use dtof_export::{Format, Options, ProjectionOptions, export};
+use dtof_run::export::{Format, Options, ProjectionOptions, export};
 
 use super::flags::{Flags, name};
 use super::{dynamic_depth, warn};

@@ -120,7 +120,7 @@ pub fn name<T: Named + Send + Sync>() -> impl TypedValueParser<Value = T> {
 mod tests {
     use super::*;
     use dtof_data::options::NO_OPTION;
-    use dtof_export::ProjectionOptions;
+    use dtof_run::export::ProjectionOptions;
     use dtof_run::given::Operation;
     use dtof_run::{calibrate, compare, replay, simulate, tune};
 
@@ -209,7 +209,7 @@ mod tests {
         keys_of::<replay::Options>();
         keys_of::<simulate::Options>();
         keys_of::<calibrate::Options>();
-        keys_of::<compare::Options>();
+        keys_of::<compare::job::Options>();
         keys_of::<tune::Options>();
     }
 }

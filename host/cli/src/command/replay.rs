@@ -7,10 +7,10 @@ use dtof::progress::Bar;
 use dtof_data::photons::input::Input;
 use dtof_data::photons::source::PhotonSource;
 use dtof_engine::settings::SettingsFile;
-use dtof_report::Section;
 use dtof_run::RunResult;
 use dtof_run::recording::warnings;
 use dtof_run::replay::Options;
+use dtof_run::report::Section;
 
 use super::flags::Flags;
 use super::job::{Recorded, ResultOptions};

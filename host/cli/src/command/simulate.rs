@@ -11,7 +11,7 @@ use dtof_data::photons::geometry::FieldOfView;
 use dtof_data::photons::source::PhotonSource;
 use dtof_engine::settings::SettingsFile;
 use dtof_light::scene::Scene;
-use dtof_report::Section;
+use dtof_run::report::Section;
 use dtof_run::simulate::{Options, Simulation};
 
 use super::flags::Flags;

@@ -1,4 +1,4 @@
-//! `dtof export`: what the program prints and refuses. `dtof-export` tests what is in the files, and so does the test
+//! `dtof export`: what the program prints and refuses. `dtof-run` tests what is in the files, and so does the test
 //! `readers` of `dtof-host-tests` with other projects' readers.
 
 mod damage;

@@ -9,7 +9,7 @@ use foxglove::messages::{Log, RawImage};
 use serde::Serialize;
 
 use dtof_device::monitor::losses;
-use dtof_export::foxglove::{Channel, Time};
+use dtof_run::export::foxglove::{Channel, Time};
 
 /// A topic that clients can subscribe to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use dtof_data::events::aer_file::Event;
-use dtof_export::foxglove::{MOST_POINTS, Tally};
+use dtof_run::export::foxglove::{MOST_POINTS, Tally};
 
 /// Events since the last [`PendingEvents::take`].
 #[derive(Debug)]
@@ -55,7 +55,7 @@ impl PendingEvents {
 
     /// Takes the events, the counts of all events, and the number of dropped ones.
     #[cfg(feature = "foxglove")]
-    pub fn take(&mut self) -> (Vec<Event>, dtof_export::foxglove::Statistics, u64) {
+    pub fn take(&mut self) -> (Vec<Event>, dtof_run::export::foxglove::Statistics, u64) {
         self.number += 1;
         let dropped = std::mem::take(&mut self.dropped);
         (self.events.drain(..).collect(), self.tally.take(), dropped)

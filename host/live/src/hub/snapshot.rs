@@ -6,7 +6,7 @@ use super::{Connection, Hub, Losses};
 use dtof_data::events::aer_file::{Event, Header};
 use dtof_data::photons::ranges::Ranges;
 use dtof_engine::settings::RaySettings;
-use dtof_export::foxglove::Statistics;
+use dtof_run::export::foxglove::Statistics;
 
 /// The current state.
 pub struct Snapshot {

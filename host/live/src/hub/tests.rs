@@ -185,7 +185,7 @@ fn the_newest_events_wait_for_subscribers_and_all_are_counted() {
     let snapshot = hub.snapshot(true, None);
     assert_eq!((snapshot.events.len(), snapshot.dropped), (3, 0));
     assert_eq!((snapshot.arrived, snapshot.masked), (6, 7));
-    let most = dtof_export::foxglove::MOST_POINTS;
+    let most = dtof_run::export::foxglove::MOST_POINTS;
     let many: Vec<Event> = (0..most as u64 + 5).map(|cycle| event(1, cycle)).collect();
     hub.add_events(&many);
     assert_eq!(hub.memory()[1], most);

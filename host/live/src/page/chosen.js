@@ -1,11 +1,11 @@
 // The chosen pixel of a live source, and the maps.
 
-import { pixelName } from "../../../report/src/shared/array.js";
-import { element } from "../../../report/src/shared/dom.js";
-import { drawHistogram } from "../../../report/src/shared/histogram.js";
-import { drawMap } from "../../../report/src/shared/maps.js";
-import { number } from "../../../report/src/shared/numbers.js";
-import { drawRanges, fillEvents } from "../../../report/src/shared/ranges.js";
+import { pixelName } from "../../../run/src/report/shared/array.js";
+import { element } from "../../../run/src/report/shared/dom.js";
+import { drawHistogram } from "../../../run/src/report/shared/histogram.js";
+import { drawMap } from "../../../run/src/report/shared/maps.js";
+import { number } from "../../../run/src/report/shared/numbers.js";
+import { drawRanges, fillEvents } from "../../../run/src/report/shared/ranges.js";
 import { histogramNote, rangesNote } from "./notes.js";
 import { span } from "./records.js";
 import { chosen, live, scene } from "./state.js";

@@ -1,6 +1,6 @@
 // Commands to the server, and what comes of them.
 
-import { element } from "../../../report/src/shared/dom.js";
+import { element } from "../../../run/src/report/shared/dom.js";
 
 let newsTimer = 0;
 /** Shows a line: what was done, or why not. */

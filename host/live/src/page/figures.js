@@ -1,7 +1,7 @@
 // Numbers: totals, losses and the state of the source.
 
-import { element } from "../../../report/src/shared/dom.js";
-import { number } from "../../../report/src/shared/numbers.js";
+import { element } from "../../../run/src/report/shared/dom.js";
+import { number } from "../../../run/src/report/shared/numbers.js";
 import { drawnText, lossName, placeText, speedsWith, stateOf, totalsOf } from "./notes.js";
 import { live } from "./state.js";
 

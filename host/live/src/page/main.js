@@ -1,10 +1,10 @@
 // Controls: choosing a pixel, pausing, recording, keys.
 
-import { neighbour, pixelAt } from "../../../report/src/shared/array.js";
-import { dark, element } from "../../../report/src/shared/dom.js";
-import { stepOf } from "../../../report/src/shared/keys.js";
-import { eventAt } from "../../../report/src/shared/projection.js";
-import { turnable } from "../../../report/src/shared/turn.js";
+import { neighbour, pixelAt } from "../../../run/src/report/shared/array.js";
+import { dark, element } from "../../../run/src/report/shared/dom.js";
+import { stepOf } from "../../../run/src/report/shared/keys.js";
+import { eventAt } from "../../../run/src/report/shared/projection.js";
+import { turnable } from "../../../run/src/report/shared/turn.js";
 import { command, send } from "./command.js";
 import { playback } from "./figures.js";
 import { shortcutOf } from "./shortcuts.js";

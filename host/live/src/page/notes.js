@@ -1,7 +1,7 @@
 // What the page says of a source, its events and its histograms.
 
-import { needsOf } from "../../../report/src/shared/looks.js";
-import { fixed, number } from "../../../report/src/shared/numbers.js";
+import { needsOf } from "../../../run/src/report/shared/looks.js";
+import { fixed, number } from "../../../run/src/report/shared/numbers.js";
 
 const STATES = {
   live: ["live", "good"], playing: ["playing", "good"], opening: ["opening", "still"],

@@ -1,6 +1,6 @@
 // The records of frames: little-endian numbers in base64, and the values by pixel that they change.
 
-import { level } from "../../../report/src/shared/numbers.js";
+import { level } from "../../../run/src/report/shared/numbers.js";
 
 /** Values by pixel, before the first event. */
 export function emptyPixels(count) {

@@ -1,6 +1,6 @@
 // The settings form.
 
-import { element } from "../../../report/src/shared/dom.js";
+import { element } from "../../../run/src/report/shared/dom.js";
 import { command, post } from "./command.js";
 import { FIELDS, currentValue, isHalfGate, isUsed, nameOf, settingsText } from "./form.js";
 import { live } from "./state.js";

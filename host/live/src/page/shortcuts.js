@@ -1,6 +1,6 @@
 // Keys of the whole page.
 
-import { isOfBrowser } from "../../../report/src/shared/keys.js";
+import { isOfBrowser } from "../../../run/src/report/shared/keys.js";
 
 /** The key as a shortcut, in lower case; nothing if it is the browser's, or is typed into a part of the page. */
 export function shortcutOf(event) {

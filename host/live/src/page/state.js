@@ -1,6 +1,6 @@
 // The page's state: the array, the last event of each pixel, the events of the chosen pixel.
 
-import { newView } from "../../../report/src/shared/turning.js";
+import { newView } from "../../../run/src/report/shared/turning.js";
 import { cloudOf, countsFrom, emptyPixels, eventsFrom } from "./records.js";
 
 /** Name, array and settings of the source, and values by pixel. */

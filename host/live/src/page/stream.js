@@ -1,8 +1,8 @@
 // The stream of frames: decoded as they come, drawn when the screen is ready.
 
-import { closest, pixelName } from "../../../report/src/shared/array.js";
-import { drawCloud } from "../../../report/src/shared/cloud.js";
-import { element, redrawing } from "../../../report/src/shared/dom.js";
+import { closest, pixelName } from "../../../run/src/report/shared/array.js";
+import { drawCloud } from "../../../run/src/report/shared/cloud.js";
+import { element, redrawing } from "../../../run/src/report/shared/dom.js";
 import { drawChosen, drawMaps } from "./chosen.js";
 import { post, tell } from "./command.js";
 import { showDrawn, showLosses, showPlayhead, showState, showTotals } from "./figures.js";

@@ -2,7 +2,7 @@
 
 use std::sync::LazyLock;
 
-use dtof_report::shared;
+use dtof_run::report::shared;
 
 const HTML: &str = include_str!("../page/index.html");
 

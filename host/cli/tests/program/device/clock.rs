@@ -16,10 +16,10 @@ use dtof_data::events::clock::LaserClock;
 use dtof_device::monitor::{EventFile, Outputs, monitor};
 use dtof_device::{Client, HostTimeout, Port, Setup};
 use dtof_engine::settings::SettingsFile;
-use dtof_export::{Format, Options, export};
 use dtof_firmware::sidecar::Sidecar;
 use dtof_link::DynamicDepth;
 use dtof_link::frame::{Deframer, WIRE_BYTES};
+use dtof_run::export::{Format, Options, export};
 use dtof_sensors::dither::Dither;
 use dtof_sensors::{PhotonSink, Polled, Sensor, SensorFault, SensorInfo, simulated};
 

@@ -8,7 +8,7 @@ use foxglove::messages::RawImage;
 
 use crate::foxglove::topics::Topic;
 use crate::hub::PixelState;
-use dtof_export::foxglove::{FRAME, Time, encoded};
+use dtof_run::export::foxglove::{FRAME, Time, encoded};
 
 /// Rates are measured over this time.
 const RATE: Duration = Duration::from_secs(1);

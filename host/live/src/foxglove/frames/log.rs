@@ -8,7 +8,7 @@ use super::Message;
 use crate::foxglove::topics::Topic;
 use crate::hub::{Connection, Snapshot};
 use dtof_data::options::rows::printable;
-use dtof_export::foxglove::{Time, encoded};
+use dtof_run::export::foxglove::{Time, encoded};
 
 /// Writes lines when a state changes.
 #[derive(Default)]

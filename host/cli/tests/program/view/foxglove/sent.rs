@@ -13,7 +13,7 @@ use crate::common::{Scratch, assert_contains};
 use crate::view::device::{feed, plugged};
 use crate::view::http::{Stream, post};
 use crate::view::{Live, until};
-use dtof_export::{Format, Options, export};
+use dtof_run::export::{Format, Options, export};
 
 const TOPICS: [&str; 7] = [
     "/events",

@@ -10,9 +10,9 @@ use dtof_draw::svg;
 use super::Comparison;
 use super::measure::TrialOutcome;
 use super::text::{HARDER, STRESS_NOTE};
+use crate::report::{Figure, Section, Table, capitalised, still};
 use dtof_data::options::files::{MarkedFile, may_replace, temporary_file, write_marked};
 use dtof_engine::settings::{self, SettingsFile};
-use dtof_report::{Figure, Section, Table, capitalised, still};
 
 /// The page, which makes a folder complete.
 const PAGE: &str = "report.html";
@@ -24,7 +24,7 @@ pub const FILES: [(&str, &str); 6] = [
     ("compare.svg", svg::MARK),
     ("methods.csv", TABLE_HEAD),
     ("stress.csv", STRESS_HEAD),
-    (PAGE, dtof_report::MARK),
+    (PAGE, crate::report::MARK),
 ];
 
 impl Comparison {

@@ -5,14 +5,6 @@ use std::path::Path;
 
 use crate::slow_or_quick;
 
-use dtof_compare::Figures;
-use dtof_compare::answer::answer;
-use dtof_compare::bound::Bound;
-use dtof_compare::cost;
-use dtof_compare::measure::{Trial, TrialOutcome};
-use dtof_compare::method::{Kind, Method, Rule};
-use dtof_compare::stress::{Light, Stress, Stressed};
-use dtof_compare::thresholds::Thresholds;
 use dtof_core::fixed::types::U8F8;
 use dtof_data::photons::source::PhotonSource;
 use dtof_engine::host::host_engine;
@@ -20,6 +12,14 @@ use dtof_engine::settings::Settings;
 use dtof_engine::settings::SettingsFile;
 use dtof_light::bounds::likelihood_ratio::information;
 use dtof_light::scene::Scene;
+use dtof_run::compare::Figures;
+use dtof_run::compare::answer::answer;
+use dtof_run::compare::bound::Bound;
+use dtof_run::compare::cost;
+use dtof_run::compare::measure::{Trial, TrialOutcome};
+use dtof_run::compare::method::{Kind, Method, Rule};
+use dtof_run::compare::stress::{Light, Stress, Stressed};
+use dtof_run::compare::thresholds::Thresholds;
 
 /// The instructions of an operation in a table, at opt-level 3.
 fn counted(variant: &str) -> f64 {

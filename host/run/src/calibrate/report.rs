@@ -5,14 +5,14 @@ use dtof_draw::chart::{Axis, Chart, Panel, Point, Series, Style, chart};
 use dtof_draw::palette::{AVERAGE, EVENTS, PAPER, REFERENCE};
 use dtof_draw::picture::{Map, heat_map};
 
-use super::{Calibration, Layer, Length, Nearest, PixelOffsets, PulseSource, remarks};
+use crate::report::{Figure, Section, still};
+use dtof_calibrate::{Calibration, Layer, Length, Nearest, PixelOffsets, PulseSource, remarks};
 use dtof_data::options::numbers::shortest;
 use dtof_data::options::rows::{Row, grouped, percent, significant};
 use dtof_engine::settings::SettingsFile;
-use dtof_report::{Figure, Section, still};
 
 /// Marks near the start of every settings file and of every report: such files may be replaced.
-pub const MARKS: [&str; 2] = [dtof_engine::settings::MARK, dtof_report::MARK];
+pub const MARKS: [&str; 2] = [dtof_engine::settings::MARK, crate::report::MARK];
 
 /// The most columns and rows of an array whose offsets are listed.
 const WIDEST: usize = 8;

@@ -4,7 +4,7 @@ use ::mcap::records::Record;
 use serde_json::{Value, json};
 
 use super::*;
-use crate::{mcap, points as points_of, ros2};
+use crate::export::{mcap, points as points_of, ros2};
 
 /// A message: topic, log time and data.
 type Message = (String, u64, Vec<u8>);

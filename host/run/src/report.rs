@@ -1,10 +1,43 @@
-#![doc = include_str!("../README.md")]
-#![deny(clippy::print_stderr, clippy::print_stdout)]
-
+//! One HTML page about a run: pictures, tables, and the events as a cloud to turn, with histograms of single pixels.
+//!
+//! The page is one file. It loads nothing, so it can be sent by mail and opened without a network. A content security
+//! policy names its only script by hash. All texts are escaped. Events are thinned evenly until the page has less than 5
+//! MB. `html` makes a page with events, `still` one without them and without a script.
+//!
+//! ## Example
+//!
+//! ```rust
+//! use dtof_draw::picture::{Map, heat_map};
+//! use dtof_run::report::{Figure, Section, still};
+//!
+//! let svg = heat_map(&Map {
+//!     title: "Two pixels see a wall",
+//!     unit: "m",
+//!     axis_names: ["column", "row"],
+//!     missing: "event",
+//!     columns: 2,
+//!     rows: 1,
+//!     values: &[Some(3.0), Some(3.01)],
+//! })?;
+//! let figures = [Figure { svg: &svg, caption: "Range of the last event" }];
+//! let rows = [("events".to_owned(), "48".to_owned())];
+//! let sections = [Section { heading: "Run", rows: &rows }];
+//! let page = still("Wall", "Simulated, 2,000 laser cycles", &sections, &[], &figures);
+//! assert!(page.contains("<h1>Wall</h1>") && page.contains("<td>48</td>"));
+//! assert!(!page.contains("<script"));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! ## What it does not know
+//!
+//! - It runs nothing and knows no scene. The caller has the events, the figures and the rows.
+//! - It writes no file. A page is a `String`.
+//! - It knows no comparison and no calibration; both make their pages with it.
+//! - A figure is placed in the page as it is: it must come from a source you trust.
 /// A JavaScript module of this folder. Paths of modules begin at `host`.
 macro_rules! module {
     ($path:literal) => {
-        (concat!("report/src/", $path), include_str!($path))
+        (concat!("run/src/report/", $path), include_str!($path))
     };
 }
 
@@ -62,7 +95,7 @@ pub struct Table<'a> {
 /// The mark near the start of every page.
 pub const MARK: &str = "<meta name=\"generator\" content=\"dtof\">";
 
-const OWN_STYLE: &str = include_str!("report.css");
+const OWN_STYLE: &str = include_str!("report/report.css");
 
 /// The size limit of a page in bytes. Larger ones are slow to open and to send.
 const MAX_PAGE: usize = 5_000_000;

@@ -4,8 +4,8 @@ use super::Comparison;
 use super::answer::{Answer, Choice};
 use super::measure::TrialOutcome;
 use super::method::Method;
+use crate::report::capitalised;
 use dtof_data::options::rows::{Row, grouped, significant};
-use dtof_report::capitalised;
 
 /// A method holds in harder conditions if its error grows at most by this factor, and the share of wrong
 /// reports is at most `HOLDS_WRONG`.

@@ -1,8 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { closest, holds, neighbour, pixelAt, pixelName } from "../src/shared/array.js";
-import { isOfBrowser, stepOf } from "../src/shared/keys.js";
+import { closest, holds, neighbour, pixelAt, pixelName } from "../src/report/shared/array.js";
+import { isOfBrowser, stepOf } from "../src/report/shared/keys.js";
 
 const array = { columns: 5, rows: 3, sides: ["column", "row"] };
 const all = [...Array(15).keys()];

@@ -1,10 +1,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { decisionOf, firstPixel, histogramNote, isKept, rangesNote } from "../src/page/decisions.js";
-import { decodeDecisions, decodeEvents, numbersOf } from "../src/page/decode.js";
-import { countUntil, eventOf, firstFrom, indicesOf, kindName } from "../src/page/events.js";
-import { emptyMap, mapUntil } from "../src/page/history.js";
+import { decisionOf, firstPixel, histogramNote, isKept, rangesNote } from "../src/report/page/decisions.js";
+import { decodeDecisions, decodeEvents, numbersOf } from "../src/report/page/decode.js";
+import { countUntil, eventOf, firstFrom, indicesOf, kindName } from "../src/report/page/events.js";
+import { emptyMap, mapUntil } from "../src/report/page/history.js";
 
 /** Numbers as the report packs them: digits of three bits, the lowest first, two a byte. */
 function packed(numbers) {

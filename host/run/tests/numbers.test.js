@@ -1,8 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { colours, palette } from "../src/shared/colours.js";
-import { capital, fixed, level, number, share, ticks, timeUnit } from "../src/shared/numbers.js";
+import { colours, palette } from "../src/report/shared/colours.js";
+import { capital, fixed, level, number, share, ticks, timeUnit } from "../src/report/shared/numbers.js";
 
 test("a share lies between 0 and 1 within the ends", () => {
   assert.equal(share(10, 10, 30), 0);

@@ -1,8 +1,8 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { liveOf, needsOf, planOf } from "../src/shared/looks.js";
-import { cellsOf, isDoubtful, remarks, spanOfRanges } from "../src/shared/pixel-events.js";
+import { liveOf, needsOf, planOf } from "../src/report/shared/looks.js";
+import { cellsOf, isDoubtful, remarks, spanOfRanges } from "../src/report/shared/pixel-events.js";
 
 const counts = [1, 2, 30, 4, 0, 0, 5, 0];
 const look = { peak: [2, 30], needed: 12, background: 1.5, quadrants: [0, 2, 4, 6, 8], window: null, dead_time: 0 };

@@ -139,7 +139,7 @@ pub fn cloud(fields: &[Field], frame_id: &str, time_ns: u64, data: &[u8]) -> Res
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::points::{BYTES, fields};
+    use crate::export::points::{BYTES, fields};
     use dtof_data::events::aer_file::EventKind;
 
     /// Written from the definition and the rules of CDR: numbers lie at multiples of their size

@@ -53,7 +53,7 @@ const MODULES: [shared::Module; 8] = [
 /// The only script of the page, without its tags; a module.
 pub(super) static SCRIPT: LazyLock<String> = LazyLock::new(|| {
     let modules = [&MODULES[..], &shared::MODULES].concat();
-    let script = shared::bundle("report/src/page/main.js", &modules);
+    let script = shared::bundle("run/src/report/page/main.js", &modules);
     format!("\n{}", script.expect("modules that fit together"))
 });
 

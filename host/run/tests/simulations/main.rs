@@ -3,7 +3,7 @@
 //! With `DTOF_SLOW` there are more rules and levels of light, which takes minutes:
 //!
 //! ```sh
-//! DTOF_SLOW=1 cargo test --package dtof-compare --test simulations
+//! DTOF_SLOW=1 cargo test --package dtof-run --test simulations
 //! ```
 
 mod parts;

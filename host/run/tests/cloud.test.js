@@ -1,10 +1,10 @@
 import assert from "node:assert/strict";
 import { test } from "node:test";
 
-import { palette } from "../src/shared/colours.js";
-import { axes, camera, eachPlace, eventAt, pointSize } from "../src/shared/projection.js";
-import { drawSquares } from "../src/shared/squares.js";
-import { drag, enlarge, look, newView, press, turn } from "../src/shared/turning.js";
+import { palette } from "../src/report/shared/colours.js";
+import { axes, camera, eachPlace, eventAt, pointSize } from "../src/report/shared/projection.js";
+import { drawSquares } from "../src/report/shared/squares.js";
+import { drag, enlarge, look, newView, press, turn } from "../src/report/shared/turning.js";
 
 /** A scene of events: pixel, level, range, laser cycle. */
 function sceneOf(columns, rows, rowsOfEvents, name = "front") {

@@ -1,13 +1,13 @@
 //! Twenty random scenes: the fastest method that a comparison recommends is mostly within a tenth of the fastest
 //! on other photons of the same scene.
 
-use dtof_compare::answer::answer;
-use dtof_compare::measure::TrialOutcome;
-use dtof_compare::truth::Truth;
-use dtof_compare::{Comparison, Task, compare};
 use dtof_data::photons::source::PhotonSource;
 use dtof_engine::settings::SettingsFile;
 use dtof_light::scene::Scene;
+use dtof_run::compare::answer::answer;
+use dtof_run::compare::measure::TrialOutcome;
+use dtof_run::compare::truth::Truth;
+use dtof_run::compare::{Comparison, Task, compare};
 use rand_core::SeedableRng;
 use rand_distr::{Distribution, Uniform};
 use rand_pcg::Pcg64;

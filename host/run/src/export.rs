@@ -1,10 +1,58 @@
-#![doc = include_str!("../README.md")]
+//! Depth events in formats that other programs read.
+//!
+//! | format | for |
+//! |---|---|
+//! | CSV | tables |
+//! | PCD, PLY | programs for point clouds and meshes |
+//! | MCAP | Foxglove |
+//! | ROS 2 | a bag of point clouds |
+//! | EVT2 | tools for event cameras |
+//!
+//! `export` turns an AER file into one of them. It reads the file twice and holds only a few events, so memory stays
+//! constant. The output appears under its name when it is whole. `points` gives points of events in memory.
+//!
+//! ## Example
+//!
+//! ```rust
+//! use dtof_core::fixed::types::{I24F8, U16F16};
+//! use dtof_core::{Array, Histogram, LaserCycle, PixelAddress, PixelConfig};
+//! use dtof_data::events::aer_file::{Event, Header};
+//! use dtof_run::export::{Options, points};
+//!
+//! // Nine photons in bin 60 of the only pixel of an array.
+//! let config = PixelConfig::<128>::paper().build()?;
+//! let mut histogram = Histogram::<128>::new();
+//! histogram.add_batch(&[60; 9]);
+//! let detection = config.detect(&histogram).expect("nine photons against none");
+//! let event = Event::Depth(detection.event(PixelAddress::new(0), LaserCycle::new(99), 100));
+//!
+//! let header = Header {
+//!     bins: 128,
+//!     array: Array::new(1, 1).unwrap(),
+//!     bin_width_ps: U16F16::lit("250"),
+//!     offset_mm: I24F8::ZERO,
+//!     offsets_mm: Vec::new(),
+//!     laser_millihertz: 10_000_000_000, // 10 MHz
+//!     start_us: 0,
+//! };
+//! // Records of 31 bytes, which begin with x, y and z in metres.
+//! let record = points([&event], &header, &Options::default())?;
+//! let z = f32::from_le_bytes(record[8..12].try_into()?);
+//! assert_eq!((z * 1000.0).round(), 2267.0); // straight ahead, 60.5 bins away
+//! # Ok::<(), anyhow::Error>(())
+//! ```
+//!
+//! ## What it does not know
+//!
+//! - It needs no photons and no device: events come from an AER file, or from the caller.
+//! - It draws nothing. [`report`](crate::report) and `dtof-live` do.
+//! - An AER file has no angles. Without a calibration file, pixels are those of a pinhole camera of 60 degrees.
+//! - If the laser rate is not known, times are for 10 MHz, and a warning says so.
+//! - EVT2 holds 2³⁴ microseconds and 2048 pixels a side. More is refused.
 //! ## From events to a file
 //!
 //! The AER file is read twice: to count the events up to its end or to where it is damaged, and to
 //! write them. `docs/export.md` describes each format.
-
-#![deny(clippy::print_stderr, clippy::print_stdout)]
 
 mod csv;
 mod depth_map;
