@@ -3,9 +3,10 @@
 use dtof_core::events::ZeroThresholdError;
 use dtof_core::fixed::types::{I24F8, U8F8, U16F16};
 use dtof_core::{
-    AsyncPixel, BinIndex, BinPosition, BlockLevel, CentredWindow, DepthEstimator, EchoNumber,
-    Flags, GateError, Histogram, LaserCycle, Look, PixelAddress, PixelConfig, PixelConfigError,
-    RangeGate, RangeScale, RangeScaleError, Statistics, SubBinOffset, WindowWidthError, checked,
+    ArrayError, AsyncPixel, BinIndex, BinPosition, BlockLevel, CentredWindow, DepthEstimator,
+    EchoNumber, Flags, GateError, Histogram, LaserCycle, Look, PixelAddress, PixelConfig,
+    PixelConfigError, RangeGate, RangeScale, RangeScaleError, Statistics, SubBinOffset,
+    WindowWidthError, checked,
 };
 
 #[test]
@@ -73,7 +74,18 @@ fn every_error_names_what_is_wrong() {
             "no multiple of X lies strictly between L1 and L2",
         ),
     ];
-    for (text, display, part) in texts {
+    let of_arrays = [
+        (ArrayError::Pixels, "no room for so many pixels"),
+        (ArrayError::Layout, "the layout has fewer pixels"),
+        (ArrayError::Blocks, "no room for so many blocks"),
+        (ArrayError::NoLevel, "at least level 1"),
+        (ArrayError::OtherLooks, "X of the blocks"),
+        (ArrayError::BlocksAndNeighbours, "blocks or neighbours"),
+        (ArrayError::NeighboursAndDeadTime, "weigh a dead time"),
+        (ArrayError::OtherRoom, "another size"),
+    ];
+    let of_arrays = of_arrays.map(|(error, part)| (error.text(), error.to_string(), part));
+    for (text, display, part) in texts.into_iter().chain(of_arrays) {
         assert!(text.contains(part), "{text}");
         assert_eq!(text, display);
     }
