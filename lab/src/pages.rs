@@ -8,7 +8,6 @@ mod bus;
 pub mod failures;
 pub mod methods;
 mod movie;
-mod pixel;
 mod timing;
 
 use crate::studies::beyond::dither;
@@ -186,7 +185,6 @@ pub fn documents(
     ];
     documents.extend(failures.map(|(path, content)| (path.into(), content)));
     documents.push(("figures/demo.svg".into(), movie::demo()?));
-    documents.push(("figures/pixel.svg".into(), pixel::pixel()?));
     documents.push(("figures/processing.svg".into(), timing::timing()));
     Ok(documents)
 }

@@ -19,7 +19,7 @@ const PATIENCE: Duration = Duration::from_secs(300);
 const KNOWN: &str = "version 7.2.";
 
 /// The folder of the runner for the Pico's images, with its packages.
-const RP2040: &str = "tools/rp2040";
+const RP2040: &str = "firmware/rp2040js";
 
 /// Installs the packages of the runner for the Pico's images, unless they are installed.
 pub fn install_rp2040js() -> Result<()> {

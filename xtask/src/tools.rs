@@ -36,7 +36,7 @@ pub const QEMU: Tool = tool("qemu-system-arm", Packages("qemu-system-arm"));
 pub const DEFMT_PRINT: Tool = tool("defmt-print", Crate("defmt-print"));
 pub const PROBE_RS: Tool = tool("probe-rs", LargeCrate("probe-rs-tools"));
 
-/// For the emulated Pico, with the packages of `tools/rp2040`, and for the tests of the pages' scripts.
+/// For the emulated Pico, with the packages of `firmware/rp2040js`, and for the tests of the pages' scripts.
 pub const NODE: Tool = tool("node", Packages("nodejs"));
 pub const NPM: Tool = tool("npm", Packages("npm"));
 

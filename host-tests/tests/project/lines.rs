@@ -41,7 +41,10 @@ fn counted() -> BTreeMap<String, usize> {
     files(&root(), &ENDS, &mut found);
     let mut counted = BTreeMap::new();
     for (path, text) in &found {
-        let has_manifest = |folder: &&Path| root().join(folder).join("Cargo.toml").exists();
+        let has_manifest = |folder: &&Path| {
+            let is_there = |name| root().join(folder).join(name).exists();
+            is_there("Cargo.toml") || is_there("package.json")
+        };
         let mut above = Path::new(path)
             .ancestors()
             .skip(1)

@@ -51,7 +51,7 @@ fn a_board_is_tested_and_its_results_are_one_file() -> Result<()> {
         .arg("--out")
         .arg(folder.path())
         .env("PATH", env::join_paths(paths)?)
-        .env("RUNNER", root().join("tools/rp2040/run.js"))
+        .env("RUNNER", root().join("firmware/rp2040js/run.js"))
         .env("PORT", port.to_string())
         .env("PID", &pid)
         .current_dir(root())

@@ -176,7 +176,7 @@ fn laser_record_and_resets_of_the_runner_are_right() -> Result<()> {
     succeed(
         Command::new(NODE)
             .arg("--test")
-            .current_dir(root().join("tools/rp2040")),
+            .current_dir(root().join("firmware/rp2040js")),
     )
 }
 

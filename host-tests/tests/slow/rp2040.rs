@@ -1,4 +1,4 @@
-//! Runs images of the Pico with `tools/rp2040`.
+//! Runs images of the Pico with `firmware/rp2040js`.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -66,7 +66,7 @@ pub fn install() -> Result<()> {
 }
 
 fn folder() -> PathBuf {
-    root().join("tools/rp2040")
+    root().join("firmware/rp2040js")
 }
 
 /// The emulator, ended when dropped.

@@ -13,7 +13,7 @@ ROWS = ROOT / "docs/results/data/python.csv"
 SPEEDS = ROOT / "docs/results/data/python_speed.csv"
 PAGE = ROOT / "docs/results/python.md"
 CHART = ROOT / "docs/figures/python.svg"
-PALETTE = ROOT / "draw/src/palette.css"
+PALETTE = ROOT / "host/draw/src/palette.css"
 
 
 @dataclass

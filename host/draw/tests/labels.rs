@@ -178,7 +178,7 @@ fn touching(svg: &str) -> Vec<String> {
 
 #[test]
 fn labels_of_the_kept_figures_touch_nothing() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/figures");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/figures");
     let mut charts = 0;
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap() {

@@ -184,5 +184,5 @@ test('without its package the runner says in one line how to install it', () => 
   files.forEach((name) => copyFileSync(join(here, name), join(folder, name)));
   const { status, stderr } = spawnSync('node', [join(folder, 'run.js'), 'image']);
   rmSync(folder, { recursive: true });
-  assert.deepEqual([status, String(stderr)], [1, 'error: rp2040js is missing: npm ci --prefix tools/rp2040\n']);
+  assert.deepEqual([status, String(stderr)], [1, 'error: rp2040js is missing: npm ci --prefix firmware/rp2040js\n']);
 });

@@ -10,7 +10,7 @@ import { milliseconds } from './pulses.js';
 const files = [import('./faults.js'), import('./machine.js')];
 const [{ FAULTS }, { Machine }] = await Promise.all(files).catch((error) => {
   const isMissing = error.code === 'ERR_MODULE_NOT_FOUND';
-  const reason = isMissing ? 'rp2040js is missing: npm ci --prefix tools/rp2040' : error.message;
+  const reason = isMissing ? 'rp2040js is missing: npm ci --prefix firmware/rp2040js' : error.message;
   process.stderr.write(`error: ${reason}\n`);
   process.exit(1);
 });
