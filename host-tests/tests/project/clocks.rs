@@ -56,9 +56,7 @@ const READERS: [(&str, usize, &str); 5] = [
 #[test]
 fn the_time_of_day_is_read_where_a_jump_does_no_harm() {
     let mut all = Vec::new();
-    for folder in [
-        "bindings", "core", "firmware", "host", "link", "sensors",
-    ] {
+    for folder in ["bindings", "core", "firmware", "host", "link", "sensors"] {
         let ends = ["rs", "py", "js", "html", "c", "h", "hpp"];
         files(&root().join(folder), &ends, &mut all);
     }
