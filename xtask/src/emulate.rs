@@ -6,7 +6,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::emulator;
-use crate::firmware::{Board, Build};
+use crate::firmware::{Board, Build, Emulator};
 use crate::tools::DEFMT_PRINT;
 
 /// The default TCP port of the serial port.
@@ -20,11 +20,11 @@ pub fn emulate(root: &Path, board: Board, port: Option<u16>, end: Option<&str>) 
         bail!("{reason}");
     }
     let image = board.build_for_emulator(root, Build::Sidecar, &[])?;
-    let mut command = emulator::command(board, &image, Some(port), end);
+    let mut command = emulator::command(board, &image, Some(port), end)?;
     println!("the serial port is tcp:127.0.0.1:{port}; Ctrl-C ends");
     println!("bytes that the board sends without a connection are lost");
     // rp2040js has no debug probe for the log.
-    let logs = board != Board::Pico;
+    let logs = !matches!(board.row().emulator, Emulator::Rp2040js);
     let decoded = logs && DEFMT_PRINT.is_installed();
     if decoded {
         command.stdout(Stdio::piped());

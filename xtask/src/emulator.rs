@@ -8,15 +8,12 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail};
 
-use crate::firmware::Board;
+use crate::firmware::{Board, Emulator};
 use crate::tools::{NODE, NPM, QEMU};
 use crate::{root, succeed};
 
 /// Far longer than an image runs.
 const PATIENCE: Duration = Duration::from_secs(300);
-
-/// The QEMU that runs `stm32f405`. QEMU 10, for instance, ends at a reset of the clocks.
-const KNOWN: &str = "version 7.2.";
 
 /// The folder of the runner for the Pico's images, with its packages.
 const RP2040: &str = "firmware/rp2040js";
@@ -37,27 +34,35 @@ pub fn install_rp2040js() -> Result<()> {
 
 /// The reason to skip the emulator of `board`, if there is one.
 pub fn cannot_run(board: Board) -> Result<Option<String>> {
-    match board {
-        Board::Pico => {
-            install_rp2040js()?;
-            return Ok(None);
+    let name = board.name();
+    match board.row().emulator {
+        Emulator::None => Ok(Some(format!(
+            "{name}: linked and not run: it has no emulator"
+        ))),
+        Emulator::Rp2040js => install_rp2040js().map(|()| None),
+        Emulator::Qemu { version, .. } => {
+            let found = QEMU.require()?;
+            Ok((!found.contains(version)).then(|| {
+                format!("SKIPPED: {name} is known to run in QEMU {version}x, this is {found}")
+            }))
         }
-        Board::Pico2 => return Ok(Some("pico2: linked and not run: it has no emulator".into())),
-        Board::Mps2An386 | Board::Stm32F405 => {}
     }
-    let version = QEMU.require()?;
-    let cannot = board == Board::Stm32F405 && !version.contains(KNOWN);
-    Ok(cannot.then(|| {
-        let board = board.name();
-        format!("SKIPPED: {board} is known to run in QEMU {KNOWN}x, this is {version}")
-    }))
 }
 
-/// The command that starts an image. In QEMU, `word` is its command line. [`cannot_run`] must have no reason.
-pub fn command(board: Board, image: &Path, port: Option<u16>, word: Option<&str>) -> Command {
-    match board {
-        Board::Pico => rp2040js(image, port),
-        Board::Mps2An386 | Board::Pico2 | Board::Stm32F405 => qemu(board, image, port, word),
+/// The command that starts an image. In QEMU, `word` is its command line.
+///
+/// # Errors
+/// Fails if the board has no emulator.
+pub fn command(
+    board: Board,
+    image: &Path,
+    port: Option<u16>,
+    word: Option<&str>,
+) -> Result<Command> {
+    match board.row().emulator {
+        Emulator::None => bail!("{} has no emulator", board.name()),
+        Emulator::Rp2040js => Ok(rp2040js(image, port)),
+        Emulator::Qemu { arguments, .. } => Ok(qemu(arguments, image, port, word)),
     }
 }
 
@@ -74,7 +79,7 @@ fn rp2040js(image: &Path, port: Option<u16>) -> Command {
     command
 }
 
-fn qemu(board: Board, image: &Path, port: Option<u16>, word: Option<&str>) -> Command {
+fn qemu(arguments: &[&str], image: &Path, port: Option<u16>, word: Option<&str>) -> Command {
     let uart = port.map_or_else(
         || "null".to_owned(),
         |port| format!("tcp:127.0.0.1:{port},server=on,wait=off,nodelay=on"),
@@ -86,12 +91,7 @@ fn qemu(board: Board, image: &Path, port: Option<u16>, word: Option<&str>) -> Co
     }
     let mut command = Command::new(QEMU.program);
     command.args(["-display", "none", "-monitor", "none"]);
-    if board == Board::Stm32F405 {
-        // The first serial port is USART1, ours is USART2.
-        command.args(["-machine", "netduinoplus2", "-serial", "null"]);
-    } else {
-        command.args(["-machine", "mps2-an386"]);
-    }
+    command.args(arguments);
     command.args(["-serial", &uart, "-semihosting-config", &semihosting]);
     command.arg("-kernel").arg(image);
     command.stdin(Stdio::null());
@@ -101,12 +101,8 @@ fn qemu(board: Board, image: &Path, port: Option<u16>, word: Option<&str>) -> Co
 /// Runs an image that ends, with additional arguments for the emulator. Returns its exit status and
 /// its output.
 pub fn run(board: Board, image: &Path, arguments: &[&str]) -> Result<(ExitStatus, String)> {
-    if board == Board::Pico {
-        install_rp2040js()?;
-    } else {
-        QEMU.require()?;
-    }
-    let mut command = command(board, image, None, None);
+    cannot_run(board)?;
+    let mut command = command(board, image, None, None)?;
     let program = command.get_program().display().to_string();
     let mut emulator = command
         .args(arguments)

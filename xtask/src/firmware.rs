@@ -14,6 +14,44 @@ use crate::{cargo, cargo_home, layout, target_folder, toolchain, uf2};
 const PROFILE: &str = "firmware";
 const SMALL_PROFILE: &str = "firmware-small";
 
+/// What sets a board apart.
+pub struct Row {
+    /// The name of the board and of its feature.
+    pub name: &'static str,
+    /// Its name for people.
+    pub full_name: &'static str,
+    /// The compilation target of its processor.
+    pub target: &'static str,
+    /// The family ID of its chip, if it takes images as files.
+    pub uf2_family: Option<u32>,
+    /// The name that probe-rs has for its controller; `None` if there is no such board, only an emulator.
+    pub chip: Option<&'static str>,
+    /// What runs its images on a computer.
+    pub emulator: Emulator,
+    /// The binary of its sidecar. Boards may share one.
+    pub sidecar: &'static str,
+    /// The sensors that its sidecar drives.
+    pub sensors: &'static [Sensor],
+    /// The most bytes of flash that its sidecar may take, without and with a sensor.
+    pub most_flash: Option<[u64; 2]>,
+    /// Its bytes of RAM that an image may take, with the reserve for the stack.
+    pub most_ram: Option<u64>,
+}
+
+/// What runs the images of a board on a computer.
+pub enum Emulator {
+    /// Nothing: they are linked and measured only.
+    None,
+    /// QEMU, with arguments; images have one more feature for it, and it is known to run in one version.
+    Qemu {
+        arguments: &'static [&'static str],
+        feature: Option<&'static str>,
+        version: &'static str,
+    },
+    /// rp2040js in Node.js.
+    Rp2040js,
+}
+
 /// A board.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Board {
@@ -26,51 +64,90 @@ pub enum Board {
 impl Board {
     pub const ALL: [Self; 4] = [Self::Mps2An386, Self::Pico, Self::Pico2, Self::Stm32F405];
 
-    /// The name of the board and of its feature.
-    pub fn name(self) -> &'static str {
+    /// What sets the board apart: a new board is a row here.
+    pub fn row(self) -> &'static Row {
         match self {
-            Self::Mps2An386 => "mps2-an386",
-            Self::Pico => "pico",
-            Self::Pico2 => "pico2",
-            Self::Stm32F405 => "stm32f405",
+            Self::Mps2An386 => &Row {
+                name: "mps2-an386",
+                full_name: "MPS2 AN386",
+                target: "thumbv7em-none-eabihf",
+                uf2_family: None,
+                chip: None,
+                emulator: Emulator::Qemu {
+                    arguments: &["-machine", "mps2-an386"],
+                    feature: None,
+                    version: "",
+                },
+                sidecar: "sidecar-mps2-an386",
+                sensors: &[],
+                most_flash: None,
+                most_ram: None,
+            },
+            Self::Pico => &Row {
+                name: "pico",
+                full_name: "Raspberry Pi Pico",
+                target: "thumbv6m-none-eabi",
+                uf2_family: Some(uf2::RP2040),
+                chip: Some("RP2040"),
+                emulator: Emulator::Rp2040js,
+                sidecar: "sidecar-pico",
+                sensors: &[Sensor::PhotonTimer],
+                most_flash: None,
+                most_ram: None,
+            },
+            Self::Pico2 => &Row {
+                name: "pico2",
+                full_name: "Raspberry Pi Pico 2",
+                target: "thumbv8m.main-none-eabihf",
+                uf2_family: Some(uf2::RP2350_ARM_S),
+                chip: Some("RP235x"),
+                emulator: Emulator::None,
+                sidecar: "sidecar-pico",
+                sensors: &[Sensor::PhotonTimer],
+                most_flash: None,
+                // All of its 520 KiB but 1 KiB for its boot ROM.
+                most_ram: Some(519 * 1024),
+            },
+            Self::Stm32F405 => &Row {
+                name: "stm32f405",
+                full_name: "STM32F405, STM32F407",
+                target: "thumbv7em-none-eabihf",
+                uf2_family: None,
+                // That of the Discovery.
+                chip: Some("STM32F407VGTx"),
+                emulator: Emulator::Qemu {
+                    // The first serial port is USART1, ours is USART2.
+                    arguments: &["-machine", "netduinoplus2", "-serial", "null"],
+                    // QEMU's has no PLL.
+                    feature: Some("pll-off"),
+                    // QEMU 10, for instance, ends at a reset of the clocks.
+                    version: "version 7.2.",
+                },
+                sidecar: "sidecar-stm32f405",
+                sensors: &[
+                    Sensor::Tdc7200,
+                    Sensor::Tmf8829,
+                    Sensor::Tmf8829Spi,
+                    Sensor::Tmf882x,
+                    Sensor::Tmf8828,
+                ],
+                // Decisions take most of it: they are compiled for the 10-bit counters of pixels, the 16-bit counters
+                // of blocks and, with a TMF8820/21/28, the 24-bit counters of its histograms. A driver stops its
+                // sensor after errors and tries a failed stop again.
+                most_flash: Some([84 * 1024, 105 * 1024]),
+                most_ram: Some(128 * 1024),
+            },
         }
     }
 
-    /// Its name for people.
-    pub fn full_name(self) -> &'static str {
-        match self {
-            Self::Mps2An386 => "MPS2 AN386",
-            Self::Pico => "Raspberry Pi Pico",
-            Self::Pico2 => "Raspberry Pi Pico 2",
-            Self::Stm32F405 => "STM32F405, STM32F407",
-        }
+    /// The name of the board and of its feature.
+    pub fn name(self) -> &'static str {
+        self.row().name
     }
 
     /// The compilation target of its processor.
     pub fn target(self) -> &'static str {
-        match self {
-            Self::Mps2An386 | Self::Stm32F405 => "thumbv7em-none-eabihf",
-            Self::Pico => "thumbv6m-none-eabi",
-            Self::Pico2 => "thumbv8m.main-none-eabihf",
-        }
-    }
-
-    /// The family ID of its chip, if it takes images as files.
-    pub fn uf2_family(self) -> Option<u32> {
-        match self {
-            Self::Mps2An386 | Self::Stm32F405 => None,
-            Self::Pico => Some(uf2::RP2040),
-            Self::Pico2 => Some(uf2::RP2350_ARM_S),
-        }
-    }
-
-    /// The binary of its sidecar. Both Picos have one.
-    fn sidecar(self) -> &'static str {
-        match self {
-            Self::Mps2An386 => "sidecar-mps2-an386",
-            Self::Pico | Self::Pico2 => "sidecar-pico",
-            Self::Stm32F405 => "sidecar-stm32f405",
-        }
+        self.row().target
     }
 
     fn named(name: &str) -> Result<Self> {
@@ -101,7 +178,7 @@ impl Board {
         self.link(root, what, &[], None)
     }
 
-    /// Builds an image for QEMU, whose `stm32f405` has no PLL.
+    /// Builds an image for the emulator of the board.
     pub fn build_for_emulator(
         self,
         root: &Path,
@@ -109,8 +186,8 @@ impl Board {
         choices: &[Choice],
     ) -> Result<PathBuf> {
         let mut features = features(what, choices)?;
-        if self == Self::Stm32F405 {
-            features.push("pll-off");
+        if let Emulator::Qemu { feature, .. } = self.row().emulator {
+            features.extend(feature);
         }
         self.link(root, what, &features, None)
     }
@@ -131,7 +208,7 @@ impl Board {
     ) -> Result<PathBuf> {
         let binary = match what {
             Build::SelfTest => "self-test",
-            _ => self.sidecar(),
+            _ => self.row().sidecar,
         };
         let board = [self.name()].into_iter();
         let features = board.chain(what.feature()).chain(more.iter().copied());
@@ -140,7 +217,7 @@ impl Board {
         if let Some(laser) = Laser::read(&image)? {
             eprintln!("{}", laser.text());
         }
-        if let Some(family) = self.uf2_family() {
+        if let Some(family) = self.row().uf2_family {
             let file = uf2::write(&image, family)?;
             eprintln!("to copy onto the board: {}", file.display());
         }
@@ -228,7 +305,7 @@ impl Build {
             ),
         };
         match build {
-            Self::With(sensor) if !Sensor::of(board).contains(&sensor) => {
+            Self::With(sensor) if !board.row().sensors.contains(&sensor) => {
                 bail!(
                     "{} has no {}: {}",
                     board.name(),
@@ -251,14 +328,14 @@ impl Build {
 
     /// The names of the images of a board.
     fn names(board: Board) -> String {
-        let sensors = Sensor::of(board).iter();
+        let sensors = board.row().sensors.iter();
         let mut names: Vec<&str> = sensors.map(|sensor| sensor.name()).collect();
         names.push("self-test");
         format!("it has {}", names.join(", "))
     }
 }
 
-/// The sensor of a real board.
+/// A sensor that a board may drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sensor {
     PhotonTimer,
@@ -272,21 +349,6 @@ pub enum Sensor {
 }
 
 impl Sensor {
-    /// The sensors of a board.
-    pub fn of(board: Board) -> &'static [Self] {
-        match board {
-            Board::Mps2An386 => &[],
-            Board::Pico | Board::Pico2 => &[Self::PhotonTimer],
-            Board::Stm32F405 => &[
-                Self::Tdc7200,
-                Self::Tmf8829,
-                Self::Tmf8829Spi,
-                Self::Tmf882x,
-                Self::Tmf8828,
-            ],
-        }
-    }
-
     fn feature(self) -> &'static str {
         match self {
             Self::PhotonTimer => "sensor-photon-timer",
@@ -377,7 +439,7 @@ fn link(
         lock.lock()?;
     }
     let mut cargo = cargo();
-    let sensors = Board::ALL.into_iter().flat_map(Sensor::of);
+    let sensors = Board::ALL.into_iter().flat_map(|board| board.row().sensors);
     for (variable, _) in sensors.filter_map(|sensor| sensor.image()) {
         cargo.env_remove(variable);
     }
@@ -433,7 +495,7 @@ fn compiler_flags(root: &Path) -> Result<String> {
 /// The name of the file that keeps an image. Those for speed and for size have names of their own: a run beside this one may
 /// build the other before this one is started.
 fn image_name(board: Board, binary: &str, features: &[&str], profile: &str) -> String {
-    let image = match binary == board.sidecar() {
+    let image = match binary == board.row().sidecar {
         true => format!("sidecar-{}", board.name()),
         false => binary.to_owned(),
     };
@@ -506,14 +568,14 @@ mod tests {
         let bench = |profile| image_name(board, "bench", &["pico", "bench"], profile);
         assert_eq!(bench(PROFILE), "bench+pico");
         assert_eq!(bench(SMALL_PROFILE), "bench+pico+small");
-        let sidecar = |features| image_name(board, board.sidecar(), features, PROFILE);
+        let sidecar = |features| image_name(board, board.row().sidecar, features, PROFILE);
         assert_eq!(sidecar(&["pico"]), "sidecar-pico");
         assert_eq!(sidecar(&["pico", "count8"]), "sidecar-pico+count8");
     }
 
     #[test]
     fn a_program_is_raw_bytes_that_fit() {
-        let sensors = Board::ALL.into_iter().flat_map(Sensor::of);
+        let sensors = Board::ALL.into_iter().flat_map(|board| board.row().sensors);
         let images = sensors.filter_map(|sensor| sensor.image());
         for most in images.map(|(_, most)| most) {
             assert!(check_program(&[0, 0x20, 0xff], most).is_ok());

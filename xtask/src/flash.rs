@@ -3,19 +3,15 @@
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use anyhow::{Context, Result, bail, ensure};
+use anyhow::{Context, Result, ensure};
 
 use crate::firmware::{Board, Build, Choice};
 use crate::tools::PROBE_RS;
 
-/// The probe-rs name of a board's controller: that of the Discovery.
+/// The probe-rs name of a board's controller.
 pub fn chip(board: Board) -> Result<&'static str> {
-    match board {
-        Board::Mps2An386 => bail!("{} is emulated only", board.name()),
-        Board::Pico => Ok("RP2040"),
-        Board::Pico2 => Ok("RP235x"),
-        Board::Stm32F405 => Ok("STM32F407VGTx"),
-    }
+    let chip = board.row().chip;
+    chip.with_context(|| format!("{} is emulated only", board.name()))
 }
 
 /// Writes an image to the board and shows its log until interrupted.

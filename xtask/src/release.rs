@@ -60,9 +60,9 @@ ARISING IN ANY WAY OUT OF THE USE OF THIS SOFTWARE, EVEN IF ADVISED OF THE POSSI
 fn images() -> impl Iterator<Item = (Board, Build)> {
     let boards = Board::ALL
         .into_iter()
-        .filter(|&board| board != Board::Mps2An386);
+        .filter(|board| board.row().chip.is_some());
     boards.flat_map(|board| {
-        let sensors = Sensor::of(board).iter().copied();
+        let sensors = board.row().sensors.iter().copied();
         let sensors = sensors.filter(|sensor| sensor.image().is_none());
         let sensors = sensors.map(move |sensor| (board, Build::With(sensor)));
         std::iter::once((board, Build::Sidecar)).chain(sensors)
@@ -76,14 +76,14 @@ fn row(name: &str, board: Board, build: Build) -> String {
         Build::With(Sensor::Tdc7200) => "of a TDC7200",
         _ => "simulated",
     };
-    let ending = if board.uf2_family().is_some() {
+    let ending = if board.row().uf2_family.is_some() {
         "uf2"
     } else {
         "elf"
     };
     format!(
         "| `{name}.{ending}` | {} | {photons} |\n",
-        board.full_name()
+        board.row().full_name
     )
 }
 
@@ -107,7 +107,7 @@ pub fn release(root: &Path) -> Result<()> {
         let name = name.with_context(|| image.display().to_string())?;
         readme.push_str(&row(name, board, build));
         copy(&image, &folder.join(format!("{name}.elf")))?;
-        if board.uf2_family().is_some() {
+        if board.row().uf2_family.is_some() {
             let name = format!("{name}.uf2");
             copy(&image.with_file_name(&name), &folder.join(&name))?;
         }

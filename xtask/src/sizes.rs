@@ -8,7 +8,7 @@ use object::elf::{SHF_ALLOC, SHT_NOBITS};
 use object::read::elf::{ElfFile32, SectionHeader};
 use object::{Object, ObjectSymbol};
 
-use crate::firmware::{Board, Build, Sensor};
+use crate::firmware::{Board, Build};
 use crate::layout;
 
 /// The macropixels and blocks that the sidecar has room for.
@@ -24,15 +24,6 @@ const ARRAYS: [(u64, u64); 7] = [
     (128, MOST_BLOCKS),
     (MOST_PIXELS, MOST_BLOCKS),
 ];
-/// The most that the sidecar may take of the STM32F405: 84 KiB of flash, 21 KiB more with the
-/// driver of a sensor, which stops its sensor after errors and tries a failed stop again, and its 128 KiB of RAM less the reserve for the stack. Decisions take most
-/// of the flash: they are compiled for the 10-bit counters of pixels, the 16-bit counters of blocks
-/// and, with a TMF8820/21/28, the 24-bit counters of its histograms.
-const MOST_FLASH: u64 = 84 * 1024;
-const MOST_FLASH_WITH_SENSOR: u64 = 105 * 1024;
-const MOST_RAM: u64 = 128 * 1024 - STACK_RESERVE;
-/// All of the 520 KiB of a Pico 2 but for the stack and 1 KiB, for its boot ROM.
-const MOST_RAM_OF_PICO2: u64 = 519 * 1024 - STACK_RESERVE;
 /// Bytes of RAM that each linker script reserves for the stack.
 const STACK_RESERVE: u64 = 19 * 1024;
 /// Bytes of the reserve that an image may need; the rest is for the report of a panic.
@@ -43,15 +34,12 @@ pub fn print(root: &Path) -> Result<()> {
     println!("{:<24} {:>8} {:>8} {:>8}", "image", "flash", "RAM", "stack");
     let mut of_pixels = None;
     for board in Board::ALL {
-        let mut sidecars = vec![(
-            format!("sidecar {}", board.name()),
-            board.build_bare(root, Build::Sidecar)?,
-        )];
-        for &sensor in Sensor::of(board) {
-            let image = board.build_bare(root, Build::With(sensor))?;
-            sidecars.push((format!("  with {}", sensor.name()), image));
+        let mut sidecars = vec![(format!("sidecar {}", board.name()), Build::Sidecar)];
+        for &sensor in board.row().sensors {
+            sidecars.push((format!("  with {}", sensor.name()), Build::With(sensor)));
         }
-        for (name, path) in sidecars {
+        for (name, what) in sidecars {
+            let path = board.build_bare(root, what)?;
             let Sizes { flash, ram } = Sizes::read(&path)?;
             let stack = xtask::stack_bound::of_image(&path)?;
             println!("{name:<24} {flash:>8} {ram:>8} {stack:>8}");
@@ -65,24 +53,15 @@ pub fn print(root: &Path) -> Result<()> {
                 left == STACK_RESERVE,
                 "its linker script gives the stack {left} bytes, not {STACK_RESERVE}"
             );
-            if board == Board::Pico2 {
-                ensure!(
-                    ram <= MOST_RAM_OF_PICO2,
-                    "more than {MOST_RAM_OF_PICO2} bytes of RAM"
-                );
+            if let Some(most) = board.row().most_ram.map(|all| all - STACK_RESERVE) {
+                ensure!(ram <= most, "more than {most} bytes of RAM");
             }
-            if board == Board::Stm32F405 {
-                // The first is the one without a sensor.
-                let most = if of_pixels.is_none() {
-                    MOST_FLASH
-                } else {
-                    MOST_FLASH_WITH_SENSOR
-                };
+            if let Some(most) = board.row().most_flash {
+                let most = most[usize::from(what != Build::Sidecar)];
                 ensure!(flash <= most, "more than {most} bytes of flash");
-                ensure!(ram <= MOST_RAM, "more than {MOST_RAM} bytes of RAM");
-                if of_pixels.is_none() {
-                    of_pixels = Some((ram, memory(&path, "PIXELS")?, memory(&path, "BLOCKS")?));
-                }
+            }
+            if (board, what) == (Board::Stm32F405, Build::Sidecar) {
+                of_pixels = Some((ram, memory(&path, "PIXELS")?, memory(&path, "BLOCKS")?));
             }
         }
         let name = format!("self-test {}", board.name());

@@ -109,6 +109,7 @@ def test_messages_name_keywords():
         ("--glass yes, --glass no; --fov HxV says", "glass=True, glass=False; fov=(H, V) says"),
         ("--bin-width-ps takes picoseconds", "bin_width_ps takes picoseconds"),
         ("a -- b --mask does not", "a -- b mask does not"),
+        ("--mask none keeps them", 'mask="none" keeps them'),
         ("--axes bins,rows,columns, else", 'axes="bins,rows,columns", else'),
     ]:
         assert _warn.with_keywords(text) == expected

@@ -141,6 +141,8 @@ pub struct Calibration {
     pub audit: Audit,
     /// Whether the recording is known to hold something else than histograms, so that nothing here means anything.
     pub is_void: bool,
+    /// Whether the user keeps hot pixels: they are left out of what is measured, not of the settings.
+    pub keeps_hot: bool,
     /// Background, hot and dead pixels.
     pub pixels: Pixels,
     /// The TDC, where laser cycles are known or the background shows it.
@@ -392,6 +394,7 @@ pub fn calibrate_with(
         bin_width_ps,
         audit,
         is_void: false,
+        keeps_hot: keeps_all,
         tdc,
         nearest,
         pulse,

@@ -129,7 +129,8 @@ impl Calibration {
     /// That so many pixels are hot that it may be the scene.
     fn many_hot(&self) -> Option<String> {
         let (hot, all) = (self.pixels.hot.len(), self.array_pixels);
-        (hot > 1 && hot as f64 > MOST_HOT * all as f64).then(|| {
+        let are_many = hot > 1 && hot as f64 > MOST_HOT * all as f64;
+        (are_many && !self.keeps_hot).then(|| {
             format!(
                 "{} of {} pixels are left out as hot: flat, and more than ten times as bright as others. --mask none keeps \
                  them",
@@ -319,4 +320,47 @@ pub fn remarks(found: &Calibration, settings: &SettingsFile) -> Vec<Row> {
         remark("offset", texts.join(" "));
     }
     remarks
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{CalibrationOptions, Observed, calibrate};
+    use dtof_core::{Array, PixelAddress};
+    use dtof_data::photons::histograms::Histograms;
+    use dtof_data::random::pixel_rng;
+    use rand_distr::{Distribution, Poisson};
+
+    /// Warnings about 8×8 pixels, of which so many are hot, none beside another.
+    fn warnings(hot: usize, masked: Option<&[u16]>) -> Vec<String> {
+        let histogram = |pixel: u16| {
+            let (row, column) = (pixel / 8, pixel % 8);
+            let number = usize::from(row / 2 * 4 + column / 2);
+            let is_hot = row % 2 == 0 && column % 2 == 0 && number < hot;
+            let photons = Poisson::new(if is_hot { 600.0 } else { 20.0 }).unwrap();
+            let mut rng = pixel_rng(1, PixelAddress::new(pixel));
+            #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
+            let histogram: Vec<u64> = (0..64).map(|_| photons.sample(&mut rng) as u64).collect();
+            histogram
+        };
+        let histograms = Histograms::of((0..64).map(histogram).collect::<Vec<_>>()).unwrap();
+        let observed = Observed {
+            masked,
+            ..Observed::plain(Array::new(8, 8).unwrap(), &histograms)
+        };
+        let found = calibrate(&observed, &CalibrationOptions::default()).unwrap();
+        assert_eq!(found.pixels.hot.len(), hot);
+        found.warnings()
+    }
+
+    #[test]
+    fn many_hot_pixels_are_warned_of_unless_they_are_kept() {
+        for (hot, is_warned) in [(0, false), (3, false), (4, true), (16, true)] {
+            let part = format!("{hot} of 64 pixels are left out as hot");
+            let is_in = |warnings: &[String]| warnings.iter().any(|line| line.starts_with(&part));
+            let found = warnings(hot, None);
+            assert_eq!(is_in(&found), is_warned, "{found:?}");
+            let kept = warnings(hot, Some(&[]));
+            assert!(!kept.iter().any(|line| line.contains("--mask")), "{kept:?}");
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! What becomes of depth events after the engine. The crate reads and writes AER files, writes CSV, and keeps a history of
+//! What becomes of depth events after the engine. The module reads and writes AER files, writes CSV, and keeps a history of
 //! each pixel for maps. It selects one echo out of several and finds changes of depth. A sample for reports stays small
 //! however many events there are.
 //!

@@ -2,10 +2,8 @@
 //! lists of photons (`.npy`, `.csv`) and logs of the sensors TMF8820, TMF8828 and TMF8829 (`.json`, `.json.gz`).
 //!
 //! `open::open` takes a file, or an array in memory, and gives a `PhotonSource`. Its photons come in slices of a few laser
-//! cycles, so memory does not grow with their number. `open::counts` gives histograms instead. The crate also has the rays
-//! of the pixels, from a field of view or a calibration file.
-//!
-//! The package opens with an example.
+//! cycles, so memory does not grow with their number. `open::counts` gives histograms instead. The module also has the
+//! rays of the pixels, from a field of view or a calibration file. The README of the package has an example.
 //!
 //! ## What it does not know
 //!

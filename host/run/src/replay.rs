@@ -418,8 +418,10 @@ fn find(
         ("gate", "; --glass no keeps all bins"),
     ] {
         let is_left_out = |row: &&mut Row| row.0 == name && !row.1.starts_with("none");
-        let is_undone = name != "gate"
-            || found.glass().is_some() && requested.sensor.gate == found.written_gate();
+        let is_undone = match name {
+            "gate" => found.glass().is_some() && requested.sensor.gate == found.written_gate(),
+            _ => !found.keeps_hot,
+        };
         let rows = rows.iter_mut().filter(is_left_out);
         rows.filter(|_| is_undone)
             .for_each(|row| row.1 += undone_by);

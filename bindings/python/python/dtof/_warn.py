@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 import warnings
 
-#: A flag, and perhaps a value: a number, a placeholder such as N or HxV, yes or no, names with commas.
+#: A flag, and perhaps a value: a number, a placeholder such as N or HxV, yes or no, none, names with commas.
 _FLAG = re.compile(
-    r"(?<![\w-])--([a-z][a-z0-9-]*)(?: (\d[\d.]*\b|[A-Z](?:xV)?\b|FILE\b|yes\b|no\b|[a-z]+(?:,[a-z]+)+))?"
+    r"(?<![\w-])--([a-z][a-z0-9-]*)(?: (\d[\d.]*\b|[A-Z](?:xV)?\b|FILE\b|yes\b|no\b|none\b|[a-z]+(?:,[a-z]+)+))?"
 )
 _SWITCH = {"yes": "True", "no": "False", "HxV": "(H, V)"}
 
@@ -23,7 +23,8 @@ def with_keywords(text: str) -> str:
         name, value = flag[1].replace("-", "_"), flag[2]
         if value is None:
             return name
-        return f'{name}="{value}"' if "," in value else f"{name}={_SWITCH.get(value, value)}"
+        is_text = "," in value or value == "none"
+        return f'{name}="{value}"' if is_text else f"{name}={_SWITCH.get(value, value)}"
 
     return _FLAG.sub(keyword, text)
 
