@@ -18,7 +18,7 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail, ensure};
 use lexopt::prelude::{Long, Short};
 
-use crate::pixels::Mutant;
+use crate::pixels::mutants::{self, Faults, Mutant};
 use crate::program::{self, ProgramRun};
 use crate::{root, target_folder};
 
@@ -45,7 +45,7 @@ struct Proof {
     sources: &'static [&'static str],
     claim: &'static str,
     engine: Engine,
-    faults: &'static [Mutant],
+    faults: &'static [Faults],
 }
 
 const PROOFS: [Proof; 10] = [
@@ -58,10 +58,9 @@ const PROOFS: [Proof; 10] = [
         ],
         claim: "every photon counts in its bin of both histograms, a look empties the spare one, readers see that",
         engine: Engine::Induction(5),
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "bin_counter",
-            from: "|| c_is_read && c_fresh;",
-            to: ";",
+            changes: &[("|| c_is_read && c_fresh;", ";")],
         }],
     },
     Proof {
@@ -69,10 +68,12 @@ const PROOFS: [Proof; 10] = [
         sources: &["rtl/pixels/decision.v"],
         claim: "background, root and comparison are the paper's formula",
         engine: Engine::Clocks(11),
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "decision",
-            from: "{2'd0, excess} > above[STEPS + 1]",
-            to: "{2'd0, excess} >= above[STEPS + 1]",
+            changes: &[(
+                "{2'd0, excess} > above[STEPS + 1]",
+                "{2'd0, excess} >= above[STEPS + 1]",
+            )],
         }],
     },
     Proof {
@@ -80,10 +81,12 @@ const PROOFS: [Proof; 10] = [
         sources: &["rtl/pixels/event_packer.v"],
         claim: "the offset is the centroid, rounded; words stay until taken; time words come when due",
         engine: Engine::Induction(3),
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "event_packer",
-            from: "remainder <= {2'd0, distance, 9'd0} + {9'd0, sum};",
-            to: "remainder <= {2'd0, distance, 9'd0};",
+            changes: &[(
+                "remainder <= {2'd0, distance, 9'd0} + {9'd0, sum};",
+                "remainder <= {2'd0, distance, 9'd0};",
+            )],
         }],
     },
     Proof {
@@ -91,10 +94,12 @@ const PROOFS: [Proof; 10] = [
         sources: &["rtl/pixels/event_queue.v"],
         claim: "what is put in leaves once, in order",
         engine: Engine::Reachability,
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "event_queue",
-            from: "if (put) next <= next + 1'b1;",
-            to: "if (put && !take) next <= next + 1'b1;",
+            changes: &[(
+                "if (put) next <= next + 1'b1;",
+                "if (put && !take) next <= next + 1'b1;",
+            )],
         }],
     },
     Proof {
@@ -106,10 +111,9 @@ const PROOFS: [Proof; 10] = [
         ],
         claim: "the neighbours are the counts at the look, though photons came since",
         engine: Engine::Clocks(7),
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "event_reader",
-            from: "t_ended - t_since",
-            to: "t_ended",
+            changes: &[("t_ended - t_since", "t_ended")],
         }],
     },
     Proof {
@@ -117,10 +121,12 @@ const PROOFS: [Proof; 10] = [
         sources: &["rtl/pixels/look_scan.v"],
         claim: "no macropixel has a second event before its first was taken",
         engine: Engine::Reachability,
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "look_scan",
-            from: "requesting_at_look <= requesting;",
-            to: "requesting_at_look <= 0;",
+            changes: &[(
+                "requesting_at_look <= requesting;",
+                "requesting_at_look <= 0;",
+            )],
         }],
     },
     Proof {
@@ -128,10 +134,12 @@ const PROOFS: [Proof; 10] = [
         sources: &["rtl/pixels/peak_keeper.v"],
         claim: "a look shows the peak, the maxima and the numbers of photons as they were when it passed",
         engine: Engine::Induction(3),
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "peak_keeper",
-            from: "f_valid && f_pixel == e_pixel ? f_next : states[e_pixel]",
-            to: "states[e_pixel]",
+            changes: &[(
+                "f_valid && f_pixel == e_pixel ? f_next : states[e_pixel]",
+                "states[e_pixel]",
+            )],
         }],
     },
     Proof {
@@ -144,63 +152,56 @@ const PROOFS: [Proof; 10] = [
         claim: "of photons in another clock each comes out once, in order and in its laser cycle, or is counted as lost; a reset ends",
         engine: Engine::Induction(3),
         faults: &[
-            // Not Gray code: several bits change at a time.
-            Mutant {
+            Faults {
                 file: "crossing_counter",
-                from: "gray <= then_ ^ then_ >> 1;",
-                to: "gray <= then_;",
+                changes: &[
+                    // Not Gray code: several bits change at a time.
+                    ("gray <= then_ ^ then_ >> 1;", "gray <= then_;"),
+                ],
             },
-            Mutant {
+            Faults {
                 file: "photon_crossing",
-                from: "wire has_room = !fill[DEPTH_LOG2];",
-                to: "wire has_room = 1;",
-            },
-            // An entry stays free; nothing comes out.
-            Mutant {
-                file: "photon_crossing",
-                from: "wire has_room = !fill[DEPTH_LOG2];",
-                to: "wire has_room = !fill[DEPTH_LOG2] && !(&fill[1:0]);",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: "assign waiting = next_seen != first;",
-                to: "assign waiting = 0;",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: "photon_valid && has_room && !has_pending;",
-                to: "photon_valid && has_room;",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: "photon_cycle_end && (!has_room || has_pending);",
-                to: "photon_cycle_end && !has_room;",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: "if (&pending) end_is_lost <= 1;",
-                to: "if (&pending) end_is_lost <= 0;",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: ".counts(photon_valid && !puts_photon)",
-                to: ".counts(photon_valid && !has_room)",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: "if (!waiting || reset) {cycle_end, valid} <= 0;",
-                to: "if (reset) {cycle_end, valid} <= 0;",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: ".clk(photon_clk), .reset(photon_reset), .counts(put)",
-                to: ".clk(photon_clk), .reset(1'b0), .counts(put)",
-            },
-            // A reset never ends.
-            Mutant {
-                file: "photon_crossing",
-                from: ".in(reset), .out(photon_reset)",
-                to: ".in(reset || photon_reset), .out(photon_reset)",
+                changes: &[
+                    ("wire has_room = !fill[DEPTH_LOG2];", "wire has_room = 1;"),
+                    // An entry stays free; nothing comes out.
+                    (
+                        "wire has_room = !fill[DEPTH_LOG2];",
+                        "wire has_room = !fill[DEPTH_LOG2] && !(&fill[1:0]);",
+                    ),
+                    (
+                        "assign waiting = next_seen != first;",
+                        "assign waiting = 0;",
+                    ),
+                    (
+                        "photon_valid && has_room && !has_pending;",
+                        "photon_valid && has_room;",
+                    ),
+                    (
+                        "photon_cycle_end && (!has_room || has_pending);",
+                        "photon_cycle_end && !has_room;",
+                    ),
+                    (
+                        "if (&pending) end_is_lost <= 1;",
+                        "if (&pending) end_is_lost <= 0;",
+                    ),
+                    (
+                        ".counts(photon_valid && !puts_photon)",
+                        ".counts(photon_valid && !has_room)",
+                    ),
+                    (
+                        "if (!waiting || reset) {cycle_end, valid} <= 0;",
+                        "if (reset) {cycle_end, valid} <= 0;",
+                    ),
+                    (
+                        ".clk(photon_clk), .reset(photon_reset), .counts(put)",
+                        ".clk(photon_clk), .reset(1'b0), .counts(put)",
+                    ),
+                    // A reset never ends.
+                    (
+                        ".in(reset), .out(photon_reset)",
+                        ".in(reset || photon_reset), .out(photon_reset)",
+                    ),
+                ],
             },
         ],
     },
@@ -214,60 +215,51 @@ const PROOFS: [Proof; 10] = [
         claim: "each photon counts once, in its laser cycle, and none while it stands still; a run leaves nothing; modules are joined bit for bit",
         engine: Engine::Induction(5),
         faults: &[
-            Mutant {
+            Faults {
                 file: "pixel_processor",
-                from: "is_stray = |(i_pixel >> PIXELS_LOG2);",
-                to: "is_stray = i_pixel[PIXELS_LOG2];",
+                changes: &[
+                    (
+                        "is_stray = |(i_pixel >> PIXELS_LOG2);",
+                        "is_stray = i_pixel[PIXELS_LOG2];",
+                    ),
+                    ("is_rejected = |i_code[15:7];", "is_rejected = i_code[7];"),
+                    (
+                        "if (running || reset) emptied <= 0;",
+                        "if (running) emptied <= 0;",
+                    ),
+                    ("a_look <= look;", "a_look <= look_begins;"),
+                    (
+                        "look_begins, expired_deferred, expired, deferred, found,",
+                        "look_begins, expired, expired_deferred, deferred, found,",
+                    ),
+                    (
+                        ".alpha(alpha), .minimum(minimum), .middle",
+                        ".alpha({1'b0, alpha[14:0]}), .minimum(minimum), .middle",
+                    ),
+                    (
+                        ".reset(stopped), .live(live), .gate_first",
+                        ".reset(reset), .live(live), .gate_first",
+                    ),
+                    (
+                        ".event_cycle_high(event_cycle[63:16])",
+                        ".event_cycle_high({1'b0, event_cycle[62:16]})",
+                    ),
+                    (
+                        ".full(full),\n        .background",
+                        ".full({1'b0, full[22:0]}),\n        .background",
+                    ),
+                    (
+                        ".in({scan_cycle, put_clipped,",
+                        ".in({1'b0, scan_cycle[62:0], put_clipped,",
+                    ),
+                ],
             },
-            Mutant {
-                file: "pixel_processor",
-                from: "is_rejected = |i_code[15:7];",
-                to: "is_rejected = i_code[7];",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: "if (running || reset) emptied <= 0;",
-                to: "if (running) emptied <= 0;",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: "a_look <= look;",
-                to: "a_look <= look_begins;",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: "look_begins, expired_deferred, expired, deferred, found,",
-                to: "look_begins, expired, expired_deferred, deferred, found,",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: ".alpha(alpha), .minimum(minimum), .middle",
-                to: ".alpha({1'b0, alpha[14:0]}), .minimum(minimum), .middle",
-            },
-            Mutant {
+            Faults {
                 file: "pixel_registers",
-                from: "{minimum, alpha} <= wb_dat_i[25:0];",
-                to: "{minimum, alpha} <= {1'b0, wb_dat_i[24:0]};",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: ".reset(stopped), .live(live), .gate_first",
-                to: ".reset(reset), .live(live), .gate_first",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: ".event_cycle_high(event_cycle[63:16])",
-                to: ".event_cycle_high({1'b0, event_cycle[62:16]})",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: ".full(full),\n        .background",
-                to: ".full({1'b0, full[22:0]}),\n        .background",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: ".in({scan_cycle, put_clipped,",
-                to: ".in({1'b0, scan_cycle[62:0], put_clipped,",
+                changes: &[(
+                    "{minimum, alpha} <= wb_dat_i[25:0];",
+                    "{minimum, alpha} <= {1'b0, wb_dat_i[24:0]};",
+                )],
             },
         ],
     },
@@ -277,50 +269,42 @@ const PROOFS: [Proof; 10] = [
         claim: "each half word leaves once, in order, whatever ACK does; photons and bus reach the pixel processor",
         engine: Engine::Induction(4),
         faults: &[
-            Mutant {
+            Faults {
                 file: "aer_port",
-                from: "left != 0 && !aer_req && !ack",
-                to: "left != 0 && !aer_req",
+                changes: &[
+                    ("left != 0 && !aer_req && !ack", "left != 0 && !aer_req"),
+                    ("aer_req && ack)", "aer_req)"),
+                    (
+                        "assign word_taken = word_valid && left == 0 && !ack;",
+                        "assign word_taken = word_valid && left <= 1 && !ack;",
+                    ),
+                    (
+                        "            aer_req <= 0;\n            left <= 0;",
+                        "            left <= 0;",
+                    ),
+                ],
             },
-            Mutant {
-                file: "aer_port",
-                from: "aer_req && ack)",
-                to: "aer_req)",
-            },
-            Mutant {
-                file: "aer_port",
-                from: "assign word_taken = word_valid && left == 0 && !ack;",
-                to: "assign word_taken = word_valid && left <= 1 && !ack;",
-            },
-            Mutant {
-                file: "aer_port",
-                from: "            aer_req <= 0;\n            left <= 0;",
-                to: "            left <= 0;",
-            },
-            Mutant {
+            Faults {
                 file: "system",
-                from: ".word_taken(port_taken && !event_valid)",
-                to: ".word_taken(port_taken)",
-            },
-            Mutant {
-                file: "system",
-                from: ".cycle_end(cycle_end)",
-                to: ".cycle_end(photon_cycle_end)",
-            },
-            Mutant {
-                file: "system",
-                from: ".photon_code({9'd0, code})",
-                to: ".photon_code({10'd0, code[5:0]})",
-            },
-            Mutant {
-                file: "system",
-                from: ".reset(in_reset),\n        .word_valid",
-                to: ".reset(1'b0),\n        .word_valid",
-            },
-            Mutant {
-                file: "system",
-                from: ".wb_adr(wb_adr),\n        .wb_dat_i",
-                to: ".wb_adr({2'd0, wb_adr[5:0]}),\n        .wb_dat_i",
+                changes: &[
+                    (
+                        ".word_taken(port_taken && !event_valid)",
+                        ".word_taken(port_taken)",
+                    ),
+                    (".cycle_end(cycle_end)", ".cycle_end(photon_cycle_end)"),
+                    (
+                        ".photon_code({9'd0, code})",
+                        ".photon_code({10'd0, code[5:0]})",
+                    ),
+                    (
+                        ".reset(in_reset),\n        .word_valid",
+                        ".reset(1'b0),\n        .word_valid",
+                    ),
+                    (
+                        ".wb_adr(wb_adr),\n        .wb_dat_i",
+                        ".wb_adr({2'd0, wb_adr[5:0]}),\n        .wb_dat_i",
+                    ),
+                ],
             },
         ],
     },
@@ -387,7 +371,8 @@ fn prove(root: &Path, proof: &Proof) -> Result<String> {
         }
     };
     let seconds = began.elapsed().as_secs_f32();
-    for fault in proof.faults {
+    let faults: Vec<Mutant> = mutants::each(proof.faults).collect();
+    for fault in &faults {
         let output = solve(root, proof, Some(fault), "orpos; bmc3 -F 60")?;
         ensure!(
             output.contains("was asserted in frame"),
@@ -396,12 +381,7 @@ fn prove(root: &Path, proof: &Proof) -> Result<String> {
             fault.to
         );
     }
-    let Proof {
-        name,
-        claim,
-        faults,
-        ..
-    } = proof;
+    let Proof { name, claim, .. } = proof;
     let number = faults.len();
     let faults = if number == 1 { "fault" } else { "faults" };
     Ok(format!(
@@ -494,7 +474,7 @@ mod tests {
     fn each_fault_has_its_place() {
         for proof in PROOFS {
             assert!(!proof.faults.is_empty(), "{}", proof.name);
-            for fault in proof.faults {
+            for fault in mutants::each(proof.faults) {
                 let is_of =
                     |source: &&&str| Path::new(source).file_stem() == Some(fault.file.as_ref());
                 let source = proof.sources.iter().find(is_of).unwrap();

@@ -2,7 +2,7 @@
 
 mod command;
 mod model;
-mod mutants;
+pub mod mutants;
 pub mod mutations;
 mod page;
 mod proof;
@@ -25,7 +25,6 @@ use crate::files;
 use crate::line::Line;
 use crate::rtl;
 
-pub use mutants::Mutant;
 use row::Proof;
 use simulation::simulate;
 
