@@ -6,8 +6,7 @@ use std::thread;
 
 use anyhow::{Context, Result, ensure};
 
-use super::command::Report;
-use super::model::{Model, ModelOutcome, Reports};
+use super::model::{Model, ModelOutcome};
 use super::scene::{Commands, Scene};
 
 /// Runs a scene in the simulation, and the same in `dtof-core`.
@@ -26,11 +25,10 @@ pub fn simulate(simulator: &mut Command, scene: &Scene) -> Result<ModelOutcome> 
         }
         input.flush()
     });
-    let mut reports = Reports::new(|| Report::read(&mut output));
-    let mut model = Model::new(scene)?;
+    let mut model = Model::new(scene, &mut output)?;
     let outcome = Commands::new(scene)?
-        .try_for_each(|command| model.clock(&command, &mut reports))
-        .and_then(|()| model.end(&mut reports));
+        .try_for_each(|command| model.clock(&command))
+        .and_then(|()| model.end());
     if outcome.is_err() {
         // It may wait to be read.
         let _ = child.kill();
