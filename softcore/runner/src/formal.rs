@@ -16,13 +16,12 @@ use std::thread;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
-use lexopt::prelude::{Long, Short};
 
 use crate::pixels::mutants::{self, Faults, Mutant};
-use crate::program::{self, ProgramRun};
-use crate::{root, target_folder};
+use crate::program;
+use crate::{folder, read, root};
 
-const HELP: &str = "\
+pub const HELP: &str = "\
 cargo softcore formal
 
 Proves properties of the pixel processor with Yosys and ABC, and that each proof fails with a
@@ -313,19 +312,14 @@ const PROOFS: [Proof; 10] = [
 /// Proves everything.
 pub fn run(mut parser: lexopt::Parser) -> Result<()> {
     if let Some(argument) = parser.next()? {
-        match argument {
-            Short('h') | Long("help") => println!("{HELP}"),
-            other => return Err(other.unexpected().into()),
-        }
-        return Ok(());
+        return Err(argument.unexpected().into());
     }
-    let root = &root().canonicalize()?;
     let all = Instant::now();
     // The longest of them last as long as all others.
     thread::scope(|scope| {
         let running: Vec<_> = PROOFS
             .iter()
-            .map(|proof| scope.spawn(move || prove(root, proof).with_context(|| proof.name)))
+            .map(|proof| scope.spawn(move || prove(proof).with_context(|| proof.name)))
             .collect();
         running
             .into_iter()
@@ -342,13 +336,16 @@ pub fn run(mut parser: lexopt::Parser) -> Result<()> {
 }
 
 /// Proves one, and that it fails with each of its faults.
-fn prove(root: &Path, proof: &Proof) -> Result<String> {
+fn prove(proof: &Proof) -> Result<String> {
     let began = Instant::now();
-    let depth = |frames: u32| -> Result<()> {
-        let output = solve(root, proof, None, &format!("bmc3 -F {frames}"))?;
-        let expected = format!("No output asserted in {frames} frames");
-        ensure!(output.contains(&expected), "an assertion fails: {output}");
+    let shows = |commands: &str, expected: &str| -> Result<()> {
+        let output = solve(proof, None, commands)?;
+        ensure!(output.contains(expected), "not shown: {output}");
         Ok(())
+    };
+    let depth = |frames: u32| {
+        let expected = format!("No output asserted in {frames} frames");
+        shows(&format!("bmc3 -F {frames}"), &expected)
     };
     let how = match proof.engine {
         Engine::Clocks(clocks) => {
@@ -357,23 +354,19 @@ fn prove(root: &Path, proof: &Proof) -> Result<String> {
         }
         Engine::Induction(clocks) => {
             depth(clocks + 1)?;
-            let output = solve(root, proof, None, &format!("orpos; ind -F {clocks}"))?;
-            ensure!(
-                output.contains("Networks are equivalent"),
-                "not shown: {output}"
-            );
+            let commands = format!("orpos; ind -F {clocks}");
+            shows(&commands, "Networks are equivalent")?;
             format!("by induction over {clocks} clocks")
         }
         Engine::Reachability => {
-            let output = solve(root, proof, None, "scorr; orpos; pdr")?;
-            ensure!(output.contains("Property proved"), "not shown: {output}");
+            shows("scorr; orpos; pdr", "Property proved")?;
             "for every state that can be".to_owned()
         }
     };
     let seconds = began.elapsed().as_secs_f32();
     let faults: Vec<Mutant> = mutants::each(proof.faults).collect();
     for fault in &faults {
-        let output = solve(root, proof, Some(fault), "orpos; bmc3 -F 60")?;
+        let output = solve(proof, Some(fault), "orpos; bmc3 -F 60")?;
         ensure!(
             output.contains("was asserted in frame"),
             "`{}` as `{}` is not found: {output}",
@@ -390,18 +383,13 @@ fn prove(root: &Path, proof: &Proof) -> Result<String> {
 }
 
 /// What ABC says of the circuit, with or without a fault.
-fn solve(root: &Path, proof: &Proof, fault: Option<&Mutant>, commands: &str) -> Result<String> {
-    let softcore = root.join("softcore");
-    let folder = target_folder(root).join("softcore/formal");
-    let folder = folder
-        .join(proof.name)
-        .join(if fault.is_some() { "fault" } else { "right" });
-    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+fn solve(proof: &Proof, fault: Option<&Mutant>, commands: &str) -> Result<String> {
+    let kind = if fault.is_some() { "fault" } else { "right" };
+    let folder = folder(&format!("formal/{}/{kind}", proof.name))?;
     let top = format!("formal/{}.sv", proof.name);
     let (mut files, mut joins, mut has_two_clocks) = (Vec::new(), String::new(), false);
     for source in proof.sources.iter().copied().chain([&*top]) {
-        let path = softcore.join(source);
-        let mut text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        let mut text = read(&root().join("softcore").join(source))?;
         if let Some(fault) = fault
             && Path::new(source).file_stem() == Some(fault.file.as_ref())
             && source != top
@@ -428,7 +416,7 @@ fn solve(root: &Path, proof: &Proof, fault: Option<&Mutant>, commands: &str) -> 
     );
     fs::write(folder.join("script.ys"), script)?;
     let mut yosys = Command::new("yosys");
-    let ran = succeed(yosys.current_dir(&folder).args(["-q", "-s", "script.ys"]))?;
+    let ran = program::succeed(yosys.current_dir(&folder).args(["-q", "-s", "script.ys"]))?;
     // Without it, the wrapper and the module would stand apart.
     ensure!(
         !ran.errors.contains("is used but has no driver"),
@@ -436,7 +424,7 @@ fn solve(root: &Path, proof: &Proof, fault: Option<&Mutant>, commands: &str) -> 
     );
     let mut abc = Command::new("yosys-abc");
     let commands = format!("read_aiger circuit.aig; fold; strash; {commands}");
-    Ok(succeed(abc.current_dir(&folder).args(["-q", &commands]))?.output)
+    Ok(program::succeed(abc.current_dir(&folder).args(["-q", &commands]))?.output)
 }
 
 /// The comments that join, as Yosys has it.
@@ -456,14 +444,6 @@ fn connections(text: &str) -> String {
         }
     }
     all
-}
-
-fn succeed(command: &mut Command) -> Result<ProgramRun> {
-    let name = command.get_program().to_string_lossy().into_owned();
-    let ran = program::run(command, None)
-        .with_context(|| format!("{name}: sudo apt-get install --yes yosys"))?;
-    ensure!(ran.code == Some(0), "{name}: {}", ran.output());
-    Ok(ran)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 /// How long a program may take that ends by itself: only one that hangs takes as long, even on a
 /// computer that does much else.
@@ -53,6 +53,14 @@ impl ProgramRun {
 /// after that.
 pub fn run(command: &mut Command, awaited: Option<(&str, Duration)>) -> Result<ProgramRun> {
     run_for(PATIENCE, command, awaited)
+}
+
+/// Runs a program that has to succeed.
+pub fn succeed(command: &mut Command) -> Result<ProgramRun> {
+    let ran = run(command, None)?;
+    let name = command.get_program().display();
+    ensure!(ran.code == Some(0), "{name}: {}", ran.output());
+    Ok(ran)
 }
 
 fn run_for(

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::vec;
 
 use anyhow::Result;
 use dtof_core::fixed::types::U8F8;
@@ -100,7 +101,30 @@ pub fn config(
     Ok(builder.dead_time(dead_time).build()?)
 }
 
+/// Clocks of a laser cycle of 10 MHz at [`MEGAHERTZ`](super::system::MEGAHERTZ): one or the other.
+const CLOCKS: [u64; 2] = [7, 8];
+
 impl Scene {
+    /// A photon a clock, some of them from a target, and a link that always takes a word.
+    pub fn new(name: &str, pixels_log2: u32, config: PixelConfig<128>) -> Self {
+        Self {
+            name: name.to_owned(),
+            pixels_log2,
+            config,
+            clocks: CLOCKS,
+            rate: 256,
+            bins: Bins::Target(100, 1),
+            pixels: Pixels::All,
+            link: 256,
+            events: Events::Link,
+            reads: None,
+            restarts: Vec::new(),
+            longest_run: 8192,
+            length: 0,
+            seed: 1,
+        }
+    }
+
     /// What the registers of the settings hold.
     pub fn register_values(&self) -> Result<Vec<u32>> {
         self.register_values_of(&self.config)
@@ -132,7 +156,7 @@ pub struct Commands {
     random: Pcg64Mcg,
     clock: u64,
     cycle_ends_at: u64,
-    settings: Vec<Access>,
+    settings: vec::IntoIter<Access>,
     turn: u8,
     /// The registers' values of all settings, by [`Scene::place_of`].
     values: Vec<Vec<u32>>,
@@ -154,7 +178,6 @@ enum Restart {
 impl Commands {
     pub fn new(scene: &Scene) -> Result<Self> {
         let mut settings = settings(&scene.register_values()?);
-        settings.reverse();
         if !scene.events.has_registers() {
             settings.clear();
         }
@@ -163,7 +186,7 @@ impl Commands {
             random: Pcg64Mcg::seed_from_u64(scene.seed),
             clock: 0,
             cycle_ends_at: REST,
-            settings,
+            settings: settings.into_iter(),
             turn: 0,
             values: (0..=scene.restarts.len())
                 .map(|run| scene.register_values_of(&scene.config_of(run)))
@@ -298,7 +321,7 @@ impl Iterator for Commands {
         }
         let mut command = Command::default();
         if clock < REST {
-            command.access = self.settings.pop();
+            command.access = self.settings.next();
             return Some(command);
         }
         if clock < end {
