@@ -226,8 +226,7 @@ fn in_qemu(isa: &str, expected: &str) -> Result<()> {
     let images = Images::build(isa, true)?;
     let run = |program, last_line| virt::run(&images.elf(program), isa, last_line);
     let stack = golden(&run("self-test", None)?, expected)?;
-    let bench = run("bench", None)?;
-    ensure!(bench.code == Some(0), "bench: {}", bench.output());
+    run("bench", None)?.succeeded("bench")?;
     for (program, message) in MUST_FAIL {
         // QEMU has no limit of its own.
         let is_endless = program == "endless-loop";
@@ -266,15 +265,13 @@ fn on_rtl(core: Core, expected: &str, measured: &mut Figures, stacks: &mut Stack
         let end = ran.errors.lines().last().unwrap_or_default();
         println!("{of}: {program} fails: {last} ({end})");
     }
-    let bench = run("bench", MOST_CYCLES)?;
-    ensure!(bench.code == Some(0), "bench: {}", bench.output());
+    let bench = run("bench", MOST_CYCLES)?.succeeded("bench")?;
     let rows = table::rows(&name(core), core.caches, &bench)?;
     let found = trials::run(&simulator, &images, &name(core), &rows)?;
     let (events, deferred) = found.slow;
     println!(
-        "{}: the host decides the same from the same photons and looks, each event word over REQ and ACK; \
-         with a slow link {events} events, {deferred} decisions put off",
-        core.name
+        "{of}: the host decides the same from the same photons and looks, each event word over REQ and ACK; \
+         with a slow link {events} events, {deferred} decisions put off"
     );
     measured.operations.extend(rows);
     measured.sustained_rates.extend(found.sustained);

@@ -38,6 +38,12 @@ impl ProgramRun {
         self.code.is_some_and(|code| code != 0)
     }
 
+    /// Fails if it did not succeed, with all that it said.
+    pub fn succeeded(self, name: &str) -> Result<Self> {
+        ensure!(self.code == Some(0), "{name}: {}", self.output());
+        Ok(self)
+    }
+
     /// All that it said, and how it ended.
     pub fn output(&self) -> String {
         let end = match self.code {
@@ -58,9 +64,7 @@ pub fn run(command: &mut Command, awaited: Option<(&str, Duration)>) -> Result<P
 /// Runs a program that has to succeed.
 pub fn succeed(command: &mut Command) -> Result<ProgramRun> {
     let ran = run(command, None)?;
-    let name = command.get_program().display();
-    ensure!(ran.code == Some(0), "{name}: {}", ran.output());
-    Ok(ran)
+    ran.succeeded(&command.get_program().to_string_lossy())
 }
 
 fn run_for(

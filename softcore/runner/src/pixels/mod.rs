@@ -8,7 +8,6 @@ pub mod mutations;
 mod proof;
 mod reads;
 mod scene;
-mod simulation;
 mod system;
 
 use std::collections::btree_map::{BTreeMap, Entry};
@@ -23,7 +22,7 @@ use crate::files::{self, Line};
 use crate::rtl;
 
 use figures::Proof;
-use simulation::simulate;
+use model::simulate;
 
 pub const HELP: &str = "\
 cargo softcore pixels [--photons N] [--check]

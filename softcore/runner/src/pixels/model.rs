@@ -1,7 +1,10 @@
 //! What the pixel processor has to do: `AsyncPixel`, fed with the same photons.
 
 use std::collections::VecDeque;
-use std::io::Read;
+use std::io::{BufReader, BufWriter, Read, Write};
+use std::mem;
+use std::process::{self, Stdio};
+use std::thread;
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::pixel_processor::ProcessorEvent;
@@ -11,7 +14,7 @@ use dtof_core::{
 
 use super::command::{Access, Command, Report, register};
 use super::reads::Reads;
-use super::scene::{Events, Scene};
+use super::scene::{Commands, Events, Scene};
 
 /// Looks whose events may wait.
 const REMEMBERED: usize = 4096;
@@ -35,8 +38,49 @@ pub struct ModelOutcome {
     pub latencies: Vec<u64>,
 }
 
+/// Runs a scene in the simulation, and the same in `dtof-core`.
+pub fn simulate(simulator: &mut process::Command, scene: &Scene) -> Result<ModelOutcome> {
+    let mut child = simulator
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .context("the simulation does not start")?;
+    let mut input = BufWriter::with_capacity(1 << 16, child.stdin.take().context("no input")?);
+    let mut output = BufReader::with_capacity(1 << 16, child.stdout.take().context("no output")?);
+    let commands = Commands::new(scene)?;
+    let writer = thread::spawn(move || -> std::io::Result<()> {
+        for command in commands {
+            command.write(&mut input)?;
+        }
+        input.flush()
+    });
+    let mut model = Model::new(scene, &mut output)?;
+    let outcome = Commands::new(scene)?
+        .try_for_each(|command| model.clock(&command))
+        .and_then(|()| model.end());
+    if outcome.is_err() {
+        // It may wait to be read.
+        let _ = child.kill();
+    }
+    let written = writer.join();
+    let status = child.wait()?;
+    let outcome = outcome.with_context(|| scene.name.clone())?;
+    ensure!(
+        scene.reads.is_none() || outcome.bins_read > 0,
+        "{}: no bins were compared",
+        scene.name
+    );
+    ensure!(status.success(), "{}: the simulation fails", scene.name);
+    ensure!(
+        matches!(written, Ok(Ok(()))),
+        "{}: commands are not read",
+        scene.name
+    );
+    Ok(outcome)
+}
+
 /// The model of a scene, and what the simulation tells.
-pub struct Model<R> {
+struct Model<R> {
     scene: Scene,
     reports: Reports<R>,
     clock: u64,
@@ -121,7 +165,7 @@ impl ModelOutcome {
 }
 
 impl<R: Read> Model<R> {
-    pub fn new(scene: &Scene, simulation: R) -> Result<Self> {
+    fn new(scene: &Scene, simulation: R) -> Result<Self> {
         Ok(Self {
             scene: scene.clone(),
             reports: Reports {
@@ -133,7 +177,7 @@ impl<R: Read> Model<R> {
             emptied_at: 0,
             run: Run::new(scene, 0, 0),
             total: ModelOutcome::default(),
-            register_values: scene.register_values()?,
+            register_values: scene.register_values(0)?,
             reads: Vec::new(),
             counts: Vec::new(),
             bins: Reads::default(),
@@ -141,7 +185,7 @@ impl<R: Read> Model<R> {
     }
 
     /// The next clock.
-    pub fn clock(&mut self, command: &Command) -> Result<()> {
+    fn clock(&mut self, command: &Command) -> Result<()> {
         self.start_or_stop(command)?;
         let (now, run) = (self.clock, &mut self.run);
         let runs = run.has(now);
@@ -239,7 +283,7 @@ impl<R: Read> Model<R> {
     fn look(&mut self) {
         let run = &mut self.run;
         let last = LaserCycle::new(run.outcome.cycles - 1);
-        let passed = std::mem::take(&mut run.since_look);
+        let passed = mem::take(&mut run.since_look);
         let statistics = &mut run.outcome.statistics;
         let events = statistics.events;
         run.before.clear();
@@ -339,7 +383,7 @@ impl<R: Read> Model<R> {
     }
 
     /// What is left when all photons have come.
-    pub fn end(mut self) -> Result<ModelOutcome> {
+    fn end(mut self) -> Result<ModelOutcome> {
         loop {
             match self.reports.next()? {
                 (_, Report::End(waits)) => {

@@ -13,7 +13,7 @@ use lexopt::prelude::Long;
 
 use super::mutants::{self, MUTANTS, Mutant};
 use super::scene::Scene;
-use super::{proof, simulation::simulate};
+use super::{model::simulate, proof};
 use crate::rtl::verilate_in;
 use crate::{folder, read, root};
 

@@ -125,14 +125,10 @@ impl Scene {
         }
     }
 
-    /// What the registers of the settings hold.
-    pub fn register_values(&self) -> Result<Vec<u32>> {
-        self.register_values_of(&self.config)
-    }
-
-    /// The same with other settings.
-    fn register_values_of(&self, config: &PixelConfig<128>) -> Result<Vec<u32>> {
-        register_values(config, self.events == Events::Link, self.pixels_log2)
+    /// What the registers hold in a run.
+    pub fn register_values(&self, run: usize) -> Result<Vec<u32>> {
+        let config = self.config_of(run);
+        register_values(&config, self.events == Events::Link, self.pixels_log2)
     }
 
     /// The settings of a run; each restart begins the next.
@@ -177,7 +173,11 @@ enum Restart {
 
 impl Commands {
     pub fn new(scene: &Scene) -> Result<Self> {
-        let mut settings = settings(&scene.register_values()?);
+        let runs = 0..=scene.restarts.len();
+        let values: Vec<_> = runs
+            .map(|run| scene.register_values(run))
+            .collect::<Result<_>>()?;
+        let mut settings = settings(&values[0]);
         if !scene.events.has_registers() {
             settings.clear();
         }
@@ -188,9 +188,7 @@ impl Commands {
             cycle_ends_at: REST,
             settings: settings.into_iter(),
             turn: 0,
-            values: (0..=scene.restarts.len())
-                .map(|run| scene.register_values_of(&scene.config_of(run)))
-                .collect::<Result<_>>()?,
+            values,
             run: 0,
             restart_at: REST + 1000,
             restart: VecDeque::new(),

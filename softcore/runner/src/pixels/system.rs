@@ -7,9 +7,8 @@ use anyhow::{Context, Result, ensure};
 use dtof_softcore::stream;
 
 use super::figures::Latency;
-use super::model::ModelOutcome;
+use super::model::{ModelOutcome, simulate};
 use super::scene::{Events, Scene};
-use super::simulation::simulate;
 use crate::image::Images;
 use crate::rtl::{package_folder, verilate};
 
