@@ -105,9 +105,7 @@ fn flat(elf: &[u8]) -> Result<Vec<u8>> {
 fn hexadecimal(bytes: &[u8]) -> String {
     let words = bytes.chunks(4).map(|bytes| {
         let mut word = [0; 4];
-        for (to, from) in word.iter_mut().zip(bytes) {
-            *to = *from;
-        }
+        word[..bytes.len()].copy_from_slice(bytes);
         format!("{:08x}\n", u32::from_le_bytes(word))
     });
     words.collect()

@@ -121,7 +121,7 @@ struct Options {
     qemu_only: bool,
     check: bool,
     /// All, if none is named.
-    cores: Vec<String>,
+    cores: Vec<Core>,
 }
 
 impl Options {
@@ -133,13 +133,10 @@ impl Options {
                 Long("check") => options.check = true,
                 Long("core") => {
                     let name = parser.value()?.string()?;
-                    let names = CORES.map(|core| core.name);
-                    ensure!(
-                        names.contains(&&*name),
-                        "no core `{name}`: {}",
-                        names.join(", ")
-                    );
-                    options.cores.push(name);
+                    let core = CORES.into_iter().find(|core| core.name == name);
+                    let names = CORES.map(|core| core.name).join(", ");
+                    let core = core.with_context(|| format!("no core `{name}`: {names}"))?;
+                    options.cores.push(core);
                 }
                 other => return Err(other.unexpected().into()),
             }
@@ -152,7 +149,7 @@ impl Options {
     }
 
     fn selects(&self, core: Core) -> bool {
-        self.cores.is_empty() || self.cores.iter().any(|name| name == core.name)
+        self.cores.is_empty() || self.cores.contains(&core)
     }
 }
 

@@ -3,13 +3,12 @@
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, mpsc};
-use std::thread;
+use std::sync::{Arc, Mutex};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use lexopt::ValueExt;
 use lexopt::prelude::Long;
+use rayon::prelude::*;
 
 use super::mutants::{self, MUTANTS, Mutant};
 use super::scene::Scene;
@@ -102,37 +101,30 @@ fn prove(sample: Option<usize>, only: Option<&str>) -> Result<()> {
     let built = &mut Built::default();
     let found = judge(&folder.join("none"), &none, &scenes, built)?;
     ensure!(found.is_none(), "without a fault: {found:?}");
-    let (next, chosen) = (&AtomicUsize::new(0), &chosen);
-    let (scenes, of) = (&scenes, &folder);
-    let mut survivors = 0;
-    thread::scope(|scope| -> Result<()> {
-        let (sender, results) = mpsc::channel();
-        for worker in 0..thread::available_parallelism().map_or(1, Into::into) {
-            let sender = sender.clone();
-            scope.spawn(move || {
-                let (folder, mut built) = (of.join(worker.to_string()), Built::default());
-                while let Some(&number) = chosen.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let fault = &faults[number];
-                    if sender
-                        .send((fault, judge(&folder, fault, scenes, &mut built)))
-                        .is_err()
-                    {
-                        break;
-                    }
-                }
-            });
-        }
-        drop(sender);
-        for (Fault { what, .. }, found) in results {
-            if let Some(by) = found.with_context(|| what.clone())? {
-                println!("{what}: {by}");
-            } else {
-                println!("{what}: NOT FOUND");
-                survivors += 1;
-            }
-        }
-        Ok(())
-    })?;
+    let workers = 0..rayon::current_num_threads();
+    let built: Vec<_> = workers.map(|_| Mutex::<Built>::default()).collect();
+    let find = |&number: &usize| {
+        let fault = &faults[number];
+        let worker = rayon::current_thread_index().unwrap_or_default();
+        let mut built = built[worker]
+            .lock()
+            .map_err(|_| anyhow!("a thread panics"))?;
+        let found = judge(&folder.join(worker.to_string()), fault, &scenes, &mut built);
+        let found = found.with_context(|| fault.what.clone())?;
+        println!(
+            "{}: {}",
+            fault.what,
+            found.as_deref().unwrap_or("NOT FOUND")
+        );
+        Ok(found.is_some())
+    };
+    // No worker keeps a share that another could take.
+    let found: Vec<bool> = chosen
+        .par_iter()
+        .with_max_len(1)
+        .map(find)
+        .collect::<Result<_>>()?;
+    let survivors = found.iter().filter(|&&is_found| !is_found).count();
     let all = chosen.len();
     ensure!(survivors == 0, "{survivors} of {all} faults are not found");
     println!("pixel processor: {all} faults, all found");

@@ -31,18 +31,13 @@ pub enum Kind {
 impl Kind {
     /// All, or those of one size and those without a size.
     pub fn all(size: Option<u32>) -> Vec<Self> {
-        let sizes = || {
-            let sizes = SIZES.into_iter();
-            sizes.filter(move |&of| size.is_none_or(|size| of == size))
-        };
-        let pixels = sizes().map(Self::Pixels);
-        let systems = sizes().map(Self::System);
-        let trees = LANES.map(Self::Tree);
-        pixels
-            .chain([Self::Processor])
-            .chain(systems)
-            .chain(trees)
-            .collect()
+        let mut all = SIZES.map(Self::Pixels).to_vec();
+        all.push(Self::Processor);
+        all.extend(SIZES.map(Self::System));
+        all.extend(LANES.map(Self::Tree));
+        let is_of = |of: u32| of == 0 || size.is_none_or(|size| of == size);
+        all.retain(|kind| is_of(kind.macropixels()));
+        all
     }
 
     /// Its name in the figures.
