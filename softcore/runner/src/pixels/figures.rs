@@ -13,13 +13,13 @@ const PAGE: &str = include_str!("../../pixels.md");
 pub const DOCUMENT: &str = "docs/results/bench/pixels.md";
 
 /// A scene in which the pixel processor did what `dtof-core` does.
-pub struct Proof {
+pub struct Simulated {
     pub scene: String,
     pub macropixels: u32,
     pub outcome: ModelOutcome,
 }
 
-impl Line for Proof {
+impl Line for Simulated {
     const FILE: &str = "docs/results/bench/pixels.csv";
     const HEADER: &str = "scene,macropixels,photons,laser cycles,looks,late,events,put off,exposures without an event,photons in full counters";
     // The same bits from the same seed.
@@ -40,7 +40,7 @@ impl Line for Proof {
     }
 }
 
-impl Proof {
+impl Simulated {
     /// What files and page have last: late looks, events, decisions put off, exposures without an
     /// event, photons that met a full counter.
     fn results(&self) -> [String; 5] {
@@ -97,9 +97,9 @@ impl Line for Latency {
 }
 
 /// The whole file.
-pub fn page(proofs: &[Proof], latencies: &[Latency]) -> String {
+pub fn page(simulated: &[Simulated], latencies: &[Latency]) -> String {
     let (mut scenes, mut times) = (String::new(), String::new());
-    for row in proofs {
+    for row in simulated {
         let of = &row.outcome;
         let between = of.cycles as f64 / of.looks.max(1) as f64;
         let _ = writeln!(
@@ -128,7 +128,7 @@ pub fn page(proofs: &[Proof], latencies: &[Latency]) -> String {
             micros.join(" | ")
         );
     }
-    let photons: u64 = proofs.iter().map(|row| row.outcome.photons).sum();
+    let photons: u64 = simulated.iter().map(|row| row.outcome.photons).sum();
     PAGE.replace("{photons}", &photons.to_string())
         .replace("{megahertz}", &MEGAHERTZ.to_string())
         .replace("{scenes}\n", &scenes)

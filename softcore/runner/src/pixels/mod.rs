@@ -5,9 +5,9 @@ mod figures;
 mod model;
 pub mod mutants;
 pub mod mutations;
-mod proof;
 mod reads;
 mod scene;
+mod scenes;
 mod system;
 
 use std::collections::btree_map::{BTreeMap, Entry};
@@ -21,7 +21,7 @@ use lexopt::prelude::Long;
 use crate::files::{self, Line};
 use crate::rtl;
 
-use figures::Proof;
+use figures::Simulated;
 use model::simulate;
 
 pub const HELP: &str = "\
@@ -46,21 +46,23 @@ pub fn run(mut parser: lexopt::Parser) -> Result<()> {
             other => return Err(other.unexpected().into()),
         }
     }
-    let proofs = prove(photons)?;
+    let results = run_all(photons)?;
     let latencies = system::measure()?;
     rtl::check("photon_crossing")?;
     rtl::check_two_clocks()?;
-    let page = figures::page(&proofs, &latencies);
+    let page = figures::page(&results, &latencies);
     println!("\n{page}");
     if checks {
         // Without the recording its scenes are missing, as was said.
-        let has_recorded = proofs.iter().any(|proof| proof.scene == proof::RECORDED);
-        let recorded = format!("{},", proof::RECORDED);
-        check(&proofs, |line| has_recorded || !line.starts_with(&recorded))?;
+        let has_recorded = results.iter().any(|of| of.scene == scenes::RECORDED);
+        let recorded = format!("{},", scenes::RECORDED);
+        check(&results, |line| {
+            has_recorded || !line.starts_with(&recorded)
+        })?;
         check(&latencies, |_| true)?;
     } else if photons == PHOTONS {
         files::write([
-            files::text(&proofs),
+            files::text(&results),
             files::text(&latencies),
             (figures::DOCUMENT, page),
         ])?;
@@ -69,10 +71,10 @@ pub fn run(mut parser: lexopt::Parser) -> Result<()> {
 }
 
 /// Runs every scene, with so many photons in all.
-fn prove(photons: u64) -> Result<Vec<Proof>> {
+fn run_all(photons: u64) -> Result<Vec<Simulated>> {
     let mut simulators = BTreeMap::new();
-    let mut proofs = Vec::new();
-    for scene in proof::scenes(photons)? {
+    let mut results = Vec::new();
+    for scene in scenes::all(photons)? {
         let log2 = scene.pixels_log2;
         let simulator = match simulators.entry(log2) {
             Entry::Occupied(built) => built.into_mut(),
@@ -94,15 +96,15 @@ fn prove(photons: u64) -> Result<Vec<Proof>> {
                 outcome.bins_read
             );
         }
-        proofs.push(Proof {
+        results.push(Simulated {
             scene: name,
             macropixels,
             outcome,
         });
     }
-    let photons: u64 = proofs.iter().map(|proof| proof.outcome.photons).sum();
+    let photons: u64 = results.iter().map(|of| of.outcome.photons).sum();
     println!("pixel processor: {photons} photons as dtof-core has them");
-    Ok(proofs)
+    Ok(results)
 }
 
 /// Compares what was measured with its file.

@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::mutants::{self, MUTANTS, Mutant};
 use super::scene::Scene;
-use super::{model::simulate, proof};
+use super::{model::simulate, scenes};
 use crate::rtl::verilate_in;
 use crate::{folder, read, root};
 
@@ -87,7 +87,7 @@ fn prove(sample: Option<usize>, only: Option<&str>) -> Result<()> {
         only.is_none_or(|text| file.contains(text) || what.contains(text))
     });
     ensure!(!chosen.is_empty(), "no faults to plant");
-    let scenes = proof::scenes(PHOTONS)?;
+    let scenes = scenes::all(PHOTONS)?;
     let folder = folder("mutants")?;
     // Where no input is held, all is right: a simulation that cannot run finds nothing.
     let held = faults.iter().find(|fault| fault.held.is_some());

@@ -30,7 +30,7 @@ const RATES: [(u32, &str); 4] = [
 ];
 
 /// The scenes, with about so many photons in all.
-pub fn scenes(photons: u64) -> Result<Vec<Scene>> {
+pub fn all(photons: u64) -> Result<Vec<Scene>> {
     let paper = config(PAPER, ALPHA, 5, WHOLE, false)?;
     let short = config([1, 1, 30], U8F8::lit("0.5"), 1, [3, 77], true)?;
     let bright = config([50, 400, 4000], U8F8::lit("2.25"), 20, WHOLE, true)?;
