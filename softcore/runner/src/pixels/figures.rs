@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use super::model::ModelOutcome;
-use super::system::MEGAHERTZ;
+use super::scene::MEGAHERTZ;
 use crate::files::Column::{self, Name, Percent, Unchecked};
 use crate::files::Line;
 

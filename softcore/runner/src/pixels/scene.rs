@@ -101,7 +101,11 @@ pub fn config(
     Ok(builder.dead_time(dead_time).build()?)
 }
 
-/// Clocks of a laser cycle of 10 MHz at [`MEGAHERTZ`](super::system::MEGAHERTZ): one or the other.
+/// A clock that place and route reaches for 4 and 16 macropixels in the whole system, and nearly
+/// for 64.
+pub const MEGAHERTZ: f64 = 75.0;
+
+/// Clocks of a laser cycle of 10 MHz at this clock: one or the other.
 const CLOCKS: [u64; 2] = [7, 8];
 
 impl Scene {

@@ -34,10 +34,6 @@ const LENGTH: u64 = 1_000_000;
 /// The chance that a slow receiver raises or lowers ACK in a clock, in 1/256.
 const SLOW: u32 = 8;
 
-/// A clock that place and route reaches for 4 and 16 macropixels in the whole system, and nearly
-/// for 64.
-pub const MEGAHERTZ: f64 = 75.0;
-
 /// Runs the system at several rates of photons, `length` clocks each.
 pub fn measure() -> Result<Vec<Latency>> {
     let processor = package_folder("vexriscv")?;
