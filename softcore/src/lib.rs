@@ -6,6 +6,9 @@
 
 #![no_std]
 
+#[cfg(all(feature = "image", not(target_arch = "riscv32")))]
+compile_error!("images are for soft-cores: cargo softcore");
+
 #[cfg(test)]
 extern crate std;
 

@@ -2,9 +2,14 @@
 
 use std::fmt::Write as _;
 
+use anyhow::Result;
+
+use crate::files::{self, Line};
 use crate::memory::Memory;
 use crate::table::{COLD, Row};
 use crate::trials::sustained::SustainedRate;
+
+const DOCUMENT: &str = "docs/results/bench/softcore.md";
 
 /// The page but for its tables, each of which stands where its name is in braces.
 const PAGE: &str = include_str!("../page.md");
@@ -20,12 +25,52 @@ const AGAINST: [&str; 5] = [
     "event: look to packed word",
 ];
 
-/// The whole file.
-pub fn text(rows: &[Row], photons: &[SustainedRate], memory: &[Memory]) -> String {
-    PAGE.replace("{cycles}\n", &cycles(rows))
-        .replace("{against}\n", &against(rows))
-        .replace("{rates}\n", &rates(photons))
-        .replace("{bytes}\n", &bytes(memory))
+/// The figures of all files.
+#[derive(Default)]
+pub struct Figures {
+    pub operations: Vec<Row>,
+    pub sustained_rates: Vec<SustainedRate>,
+    pub memory: Vec<Memory>,
+}
+
+impl Figures {
+    /// The whole page.
+    pub fn page(&self) -> String {
+        PAGE.replace("{cycles}\n", &cycles(&self.operations))
+            .replace("{against}\n", &against(&self.operations))
+            .replace("{rates}\n", &rates(&self.sustained_rates))
+            .replace("{bytes}\n", &bytes(&self.memory))
+    }
+
+    /// Writes the files and the page.
+    pub fn write(&self) -> Result<()> {
+        files::write([
+            files::text(&self.operations),
+            files::text(&self.sustained_rates),
+            files::text(&self.memory),
+            (DOCUMENT, self.page()),
+        ])
+    }
+
+    /// Compares with the files, but for lines of processors that are not selected.
+    pub fn check(&self, selects: impl Fn(&str) -> bool) -> Result<()> {
+        let command = "cargo softcore";
+        let checks = [
+            files::check(&self.operations, &selects, command),
+            files::check(&self.sustained_rates, &selects, command),
+            files::check(&self.memory, |_| true, command),
+        ];
+        // All differences are told.
+        checks.into_iter().collect::<Result<()>>()?;
+        println!(
+            "{}, {}, {}: {} lines as measured",
+            Row::FILE,
+            SustainedRate::FILE,
+            Memory::FILE,
+            self.operations.len() + self.sustained_rates.len() + self.memory.len()
+        );
+        Ok(())
+    }
 }
 
 /// The processors, each once.
@@ -147,25 +192,47 @@ mod tests {
     use std::fs;
 
     use super::*;
-    use crate::files::{DOCUMENT, Figures};
     use crate::root;
 
     fn committed() -> Figures {
-        Figures::read(&root()).unwrap()
+        Figures {
+            operations: files::lines().unwrap(),
+            sustained_rates: files::lines().unwrap(),
+            memory: files::lines().unwrap(),
+        }
     }
 
     #[test]
-    fn the_document_says_what_the_files_say() {
+    fn files_and_page_are_read_as_they_are_written() {
         let figures = committed();
-        let written = fs::read_to_string(root().join(DOCUMENT)).unwrap();
-        assert_eq!(
-            text(
-                &figures.operations,
-                &figures.sustained_rates,
-                &figures.memory
-            ),
-            written
-        );
+        for (file, text) in [
+            files::text(&figures.operations),
+            files::text(&figures.sustained_rates),
+            files::text(&figures.memory),
+            (DOCUMENT, figures.page()),
+        ] {
+            assert_eq!(
+                fs::read_to_string(root().join(file)).unwrap(),
+                text,
+                "{file}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_differs_from_the_files_is_told() {
+        let mut measured = committed();
+        measured.memory[0].stack = None;
+        assert!(measured.check(|_| true).is_ok());
+        measured.operations[0].cycles *= 1.11;
+        assert!(measured.check(|_| true).is_err());
+        let core = measured.operations[0].core.clone();
+        measured.operations.retain(|row| row.core != core);
+        measured.sustained_rates.retain(|row| row.core != core);
+        assert!(measured.check(|line| !line.starts_with(&core)).is_ok());
+        assert!(measured.check(|_| true).is_err());
+        measured.memory.pop();
+        assert!(measured.check(|line| !line.starts_with(&core)).is_err());
     }
 
     #[test]

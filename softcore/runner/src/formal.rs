@@ -16,13 +16,12 @@ use std::thread;
 use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
-use lexopt::prelude::{Long, Short};
 
-use crate::pixels::Mutant;
-use crate::program::{self, ProgramRun};
-use crate::{root, target_folder};
+use crate::pixels::mutants::{self, Faults, Mutant};
+use crate::program;
+use crate::{folder, read, root};
 
-const HELP: &str = "\
+pub const HELP: &str = "\
 cargo softcore formal
 
 Proves properties of the pixel processor with Yosys and ABC, and that each proof fails with a
@@ -45,7 +44,7 @@ struct Proof {
     sources: &'static [&'static str],
     claim: &'static str,
     engine: Engine,
-    faults: &'static [Mutant],
+    faults: &'static [Faults],
 }
 
 const PROOFS: [Proof; 10] = [
@@ -58,10 +57,9 @@ const PROOFS: [Proof; 10] = [
         ],
         claim: "every photon counts in its bin of both histograms, a look empties the spare one, readers see that",
         engine: Engine::Induction(5),
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "bin_counter",
-            from: "|| c_is_read && c_fresh;",
-            to: ";",
+            changes: &[("|| c_is_read && c_fresh;", ";")],
         }],
     },
     Proof {
@@ -69,10 +67,12 @@ const PROOFS: [Proof; 10] = [
         sources: &["rtl/pixels/decision.v"],
         claim: "background, root and comparison are the paper's formula",
         engine: Engine::Clocks(11),
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "decision",
-            from: "{2'd0, excess} > above[STEPS + 1]",
-            to: "{2'd0, excess} >= above[STEPS + 1]",
+            changes: &[(
+                "{2'd0, excess} > above[STEPS + 1]",
+                "{2'd0, excess} >= above[STEPS + 1]",
+            )],
         }],
     },
     Proof {
@@ -80,10 +80,12 @@ const PROOFS: [Proof; 10] = [
         sources: &["rtl/pixels/event_packer.v"],
         claim: "the offset is the centroid, rounded; words stay until taken; time words come when due",
         engine: Engine::Induction(3),
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "event_packer",
-            from: "remainder <= {2'd0, distance, 9'd0} + {9'd0, sum};",
-            to: "remainder <= {2'd0, distance, 9'd0};",
+            changes: &[(
+                "remainder <= {2'd0, distance, 9'd0} + {9'd0, sum};",
+                "remainder <= {2'd0, distance, 9'd0};",
+            )],
         }],
     },
     Proof {
@@ -91,10 +93,12 @@ const PROOFS: [Proof; 10] = [
         sources: &["rtl/pixels/event_queue.v"],
         claim: "what is put in leaves once, in order",
         engine: Engine::Reachability,
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "event_queue",
-            from: "if (put) next <= next + 1'b1;",
-            to: "if (put && !take) next <= next + 1'b1;",
+            changes: &[(
+                "if (put) next <= next + 1'b1;",
+                "if (put && !take) next <= next + 1'b1;",
+            )],
         }],
     },
     Proof {
@@ -106,10 +110,9 @@ const PROOFS: [Proof; 10] = [
         ],
         claim: "the neighbours are the counts at the look, though photons came since",
         engine: Engine::Clocks(7),
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "event_reader",
-            from: "t_ended - t_since",
-            to: "t_ended",
+            changes: &[("t_ended - t_since", "t_ended")],
         }],
     },
     Proof {
@@ -117,10 +120,12 @@ const PROOFS: [Proof; 10] = [
         sources: &["rtl/pixels/look_scan.v"],
         claim: "no macropixel has a second event before its first was taken",
         engine: Engine::Reachability,
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "look_scan",
-            from: "requesting_at_look <= requesting;",
-            to: "requesting_at_look <= 0;",
+            changes: &[(
+                "requesting_at_look <= requesting;",
+                "requesting_at_look <= 0;",
+            )],
         }],
     },
     Proof {
@@ -128,10 +133,12 @@ const PROOFS: [Proof; 10] = [
         sources: &["rtl/pixels/peak_keeper.v"],
         claim: "a look shows the peak, the maxima and the numbers of photons as they were when it passed",
         engine: Engine::Induction(3),
-        faults: &[Mutant {
+        faults: &[Faults {
             file: "peak_keeper",
-            from: "f_valid && f_pixel == e_pixel ? f_next : states[e_pixel]",
-            to: "states[e_pixel]",
+            changes: &[(
+                "f_valid && f_pixel == e_pixel ? f_next : states[e_pixel]",
+                "states[e_pixel]",
+            )],
         }],
     },
     Proof {
@@ -144,63 +151,56 @@ const PROOFS: [Proof; 10] = [
         claim: "of photons in another clock each comes out once, in order and in its laser cycle, or is counted as lost; a reset ends",
         engine: Engine::Induction(3),
         faults: &[
-            // Not Gray code: several bits change at a time.
-            Mutant {
+            Faults {
                 file: "crossing_counter",
-                from: "gray <= then_ ^ then_ >> 1;",
-                to: "gray <= then_;",
+                changes: &[
+                    // Not Gray code: several bits change at a time.
+                    ("gray <= then_ ^ then_ >> 1;", "gray <= then_;"),
+                ],
             },
-            Mutant {
+            Faults {
                 file: "photon_crossing",
-                from: "wire has_room = !fill[DEPTH_LOG2];",
-                to: "wire has_room = 1;",
-            },
-            // An entry stays free; nothing comes out.
-            Mutant {
-                file: "photon_crossing",
-                from: "wire has_room = !fill[DEPTH_LOG2];",
-                to: "wire has_room = !fill[DEPTH_LOG2] && !(&fill[1:0]);",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: "assign waiting = next_seen != first;",
-                to: "assign waiting = 0;",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: "photon_valid && has_room && !has_pending;",
-                to: "photon_valid && has_room;",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: "photon_cycle_end && (!has_room || has_pending);",
-                to: "photon_cycle_end && !has_room;",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: "if (&pending) end_is_lost <= 1;",
-                to: "if (&pending) end_is_lost <= 0;",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: ".counts(photon_valid && !puts_photon)",
-                to: ".counts(photon_valid && !has_room)",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: "if (!waiting || reset) {cycle_end, valid} <= 0;",
-                to: "if (reset) {cycle_end, valid} <= 0;",
-            },
-            Mutant {
-                file: "photon_crossing",
-                from: ".clk(photon_clk), .reset(photon_reset), .counts(put)",
-                to: ".clk(photon_clk), .reset(1'b0), .counts(put)",
-            },
-            // A reset never ends.
-            Mutant {
-                file: "photon_crossing",
-                from: ".in(reset), .out(photon_reset)",
-                to: ".in(reset || photon_reset), .out(photon_reset)",
+                changes: &[
+                    ("wire has_room = !fill[DEPTH_LOG2];", "wire has_room = 1;"),
+                    // An entry stays free; nothing comes out.
+                    (
+                        "wire has_room = !fill[DEPTH_LOG2];",
+                        "wire has_room = !fill[DEPTH_LOG2] && !(&fill[1:0]);",
+                    ),
+                    (
+                        "assign waiting = next_seen != first;",
+                        "assign waiting = 0;",
+                    ),
+                    (
+                        "photon_valid && has_room && !has_pending;",
+                        "photon_valid && has_room;",
+                    ),
+                    (
+                        "photon_cycle_end && (!has_room || has_pending);",
+                        "photon_cycle_end && !has_room;",
+                    ),
+                    (
+                        "if (&pending) end_is_lost <= 1;",
+                        "if (&pending) end_is_lost <= 0;",
+                    ),
+                    (
+                        ".counts(photon_valid && !puts_photon)",
+                        ".counts(photon_valid && !has_room)",
+                    ),
+                    (
+                        "if (!waiting || reset) {cycle_end, valid} <= 0;",
+                        "if (reset) {cycle_end, valid} <= 0;",
+                    ),
+                    (
+                        ".clk(photon_clk), .reset(photon_reset), .counts(put)",
+                        ".clk(photon_clk), .reset(1'b0), .counts(put)",
+                    ),
+                    // A reset never ends.
+                    (
+                        ".in(reset), .out(photon_reset)",
+                        ".in(reset || photon_reset), .out(photon_reset)",
+                    ),
+                ],
             },
         ],
     },
@@ -214,60 +214,51 @@ const PROOFS: [Proof; 10] = [
         claim: "each photon counts once, in its laser cycle, and none while it stands still; a run leaves nothing; modules are joined bit for bit",
         engine: Engine::Induction(5),
         faults: &[
-            Mutant {
+            Faults {
                 file: "pixel_processor",
-                from: "is_stray = |(i_pixel >> PIXELS_LOG2);",
-                to: "is_stray = i_pixel[PIXELS_LOG2];",
+                changes: &[
+                    (
+                        "is_stray = |(i_pixel >> PIXELS_LOG2);",
+                        "is_stray = i_pixel[PIXELS_LOG2];",
+                    ),
+                    ("is_rejected = |i_code[15:7];", "is_rejected = i_code[7];"),
+                    (
+                        "if (running || reset) emptied <= 0;",
+                        "if (running) emptied <= 0;",
+                    ),
+                    ("a_look <= look;", "a_look <= look_begins;"),
+                    (
+                        "look_begins, expired_deferred, expired, deferred, found,",
+                        "look_begins, expired, expired_deferred, deferred, found,",
+                    ),
+                    (
+                        ".alpha(alpha), .minimum(minimum), .middle",
+                        ".alpha({1'b0, alpha[14:0]}), .minimum(minimum), .middle",
+                    ),
+                    (
+                        ".reset(stopped), .live(live), .gate_first",
+                        ".reset(reset), .live(live), .gate_first",
+                    ),
+                    (
+                        ".event_cycle_high(event_cycle[63:16])",
+                        ".event_cycle_high({1'b0, event_cycle[62:16]})",
+                    ),
+                    (
+                        ".full(full),\n        .background",
+                        ".full({1'b0, full[22:0]}),\n        .background",
+                    ),
+                    (
+                        ".in({scan_cycle, put_clipped,",
+                        ".in({1'b0, scan_cycle[62:0], put_clipped,",
+                    ),
+                ],
             },
-            Mutant {
-                file: "pixel_processor",
-                from: "is_rejected = |i_code[15:7];",
-                to: "is_rejected = i_code[7];",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: "if (running || reset) emptied <= 0;",
-                to: "if (running) emptied <= 0;",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: "a_look <= look;",
-                to: "a_look <= look_begins;",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: "look_begins, expired_deferred, expired, deferred, found,",
-                to: "look_begins, expired, expired_deferred, deferred, found,",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: ".alpha(alpha), .minimum(minimum), .middle",
-                to: ".alpha({1'b0, alpha[14:0]}), .minimum(minimum), .middle",
-            },
-            Mutant {
+            Faults {
                 file: "pixel_registers",
-                from: "{minimum, alpha} <= wb_dat_i[25:0];",
-                to: "{minimum, alpha} <= {1'b0, wb_dat_i[24:0]};",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: ".reset(stopped), .live(live), .gate_first",
-                to: ".reset(reset), .live(live), .gate_first",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: ".event_cycle_high(event_cycle[63:16])",
-                to: ".event_cycle_high({1'b0, event_cycle[62:16]})",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: ".full(full),\n        .background",
-                to: ".full({1'b0, full[22:0]}),\n        .background",
-            },
-            Mutant {
-                file: "pixel_processor",
-                from: ".in({scan_cycle, put_clipped,",
-                to: ".in({1'b0, scan_cycle[62:0], put_clipped,",
+                changes: &[(
+                    "{minimum, alpha} <= wb_dat_i[25:0];",
+                    "{minimum, alpha} <= {1'b0, wb_dat_i[24:0]};",
+                )],
             },
         ],
     },
@@ -277,50 +268,42 @@ const PROOFS: [Proof; 10] = [
         claim: "each half word leaves once, in order, whatever ACK does; photons and bus reach the pixel processor",
         engine: Engine::Induction(4),
         faults: &[
-            Mutant {
+            Faults {
                 file: "aer_port",
-                from: "left != 0 && !aer_req && !ack",
-                to: "left != 0 && !aer_req",
+                changes: &[
+                    ("left != 0 && !aer_req && !ack", "left != 0 && !aer_req"),
+                    ("aer_req && ack)", "aer_req)"),
+                    (
+                        "assign word_taken = word_valid && left == 0 && !ack;",
+                        "assign word_taken = word_valid && left <= 1 && !ack;",
+                    ),
+                    (
+                        "            aer_req <= 0;\n            left <= 0;",
+                        "            left <= 0;",
+                    ),
+                ],
             },
-            Mutant {
-                file: "aer_port",
-                from: "aer_req && ack)",
-                to: "aer_req)",
-            },
-            Mutant {
-                file: "aer_port",
-                from: "assign word_taken = word_valid && left == 0 && !ack;",
-                to: "assign word_taken = word_valid && left <= 1 && !ack;",
-            },
-            Mutant {
-                file: "aer_port",
-                from: "            aer_req <= 0;\n            left <= 0;",
-                to: "            left <= 0;",
-            },
-            Mutant {
+            Faults {
                 file: "system",
-                from: ".word_taken(port_taken && !event_valid)",
-                to: ".word_taken(port_taken)",
-            },
-            Mutant {
-                file: "system",
-                from: ".cycle_end(cycle_end)",
-                to: ".cycle_end(photon_cycle_end)",
-            },
-            Mutant {
-                file: "system",
-                from: ".photon_code({9'd0, code})",
-                to: ".photon_code({10'd0, code[5:0]})",
-            },
-            Mutant {
-                file: "system",
-                from: ".reset(in_reset),\n        .word_valid",
-                to: ".reset(1'b0),\n        .word_valid",
-            },
-            Mutant {
-                file: "system",
-                from: ".wb_adr(wb_adr),\n        .wb_dat_i",
-                to: ".wb_adr({2'd0, wb_adr[5:0]}),\n        .wb_dat_i",
+                changes: &[
+                    (
+                        ".word_taken(port_taken && !event_valid)",
+                        ".word_taken(port_taken)",
+                    ),
+                    (".cycle_end(cycle_end)", ".cycle_end(photon_cycle_end)"),
+                    (
+                        ".photon_code({9'd0, code})",
+                        ".photon_code({10'd0, code[5:0]})",
+                    ),
+                    (
+                        ".reset(in_reset),\n        .word_valid",
+                        ".reset(1'b0),\n        .word_valid",
+                    ),
+                    (
+                        ".wb_adr(wb_adr),\n        .wb_dat_i",
+                        ".wb_adr({2'd0, wb_adr[5:0]}),\n        .wb_dat_i",
+                    ),
+                ],
             },
         ],
     },
@@ -329,19 +312,14 @@ const PROOFS: [Proof; 10] = [
 /// Proves everything.
 pub fn run(mut parser: lexopt::Parser) -> Result<()> {
     if let Some(argument) = parser.next()? {
-        match argument {
-            Short('h') | Long("help") => println!("{HELP}"),
-            other => return Err(other.unexpected().into()),
-        }
-        return Ok(());
+        return Err(argument.unexpected().into());
     }
-    let root = &root().canonicalize()?;
     let all = Instant::now();
     // The longest of them last as long as all others.
     thread::scope(|scope| {
         let running: Vec<_> = PROOFS
             .iter()
-            .map(|proof| scope.spawn(move || prove(root, proof).with_context(|| proof.name)))
+            .map(|proof| scope.spawn(move || prove(proof).with_context(|| proof.name)))
             .collect();
         running
             .into_iter()
@@ -358,13 +336,16 @@ pub fn run(mut parser: lexopt::Parser) -> Result<()> {
 }
 
 /// Proves one, and that it fails with each of its faults.
-fn prove(root: &Path, proof: &Proof) -> Result<String> {
+fn prove(proof: &Proof) -> Result<String> {
     let began = Instant::now();
-    let depth = |frames: u32| -> Result<()> {
-        let output = solve(root, proof, None, &format!("bmc3 -F {frames}"))?;
-        let expected = format!("No output asserted in {frames} frames");
-        ensure!(output.contains(&expected), "an assertion fails: {output}");
+    let shows = |commands: &str, expected: &str| -> Result<()> {
+        let output = solve(proof, None, commands)?;
+        ensure!(output.contains(expected), "not shown: {output}");
         Ok(())
+    };
+    let depth = |frames: u32| {
+        let expected = format!("No output asserted in {frames} frames");
+        shows(&format!("bmc3 -F {frames}"), &expected)
     };
     let how = match proof.engine {
         Engine::Clocks(clocks) => {
@@ -373,22 +354,19 @@ fn prove(root: &Path, proof: &Proof) -> Result<String> {
         }
         Engine::Induction(clocks) => {
             depth(clocks + 1)?;
-            let output = solve(root, proof, None, &format!("orpos; ind -F {clocks}"))?;
-            ensure!(
-                output.contains("Networks are equivalent"),
-                "not shown: {output}"
-            );
+            let commands = format!("orpos; ind -F {clocks}");
+            shows(&commands, "Networks are equivalent")?;
             format!("by induction over {clocks} clocks")
         }
         Engine::Reachability => {
-            let output = solve(root, proof, None, "scorr; orpos; pdr")?;
-            ensure!(output.contains("Property proved"), "not shown: {output}");
+            shows("scorr; orpos; pdr", "Property proved")?;
             "for every state that can be".to_owned()
         }
     };
     let seconds = began.elapsed().as_secs_f32();
-    for fault in proof.faults {
-        let output = solve(root, proof, Some(fault), "orpos; bmc3 -F 60")?;
+    let faults: Vec<Mutant> = mutants::each(proof.faults).collect();
+    for fault in &faults {
+        let output = solve(proof, Some(fault), "orpos; bmc3 -F 60")?;
         ensure!(
             output.contains("was asserted in frame"),
             "`{}` as `{}` is not found: {output}",
@@ -396,12 +374,7 @@ fn prove(root: &Path, proof: &Proof) -> Result<String> {
             fault.to
         );
     }
-    let Proof {
-        name,
-        claim,
-        faults,
-        ..
-    } = proof;
+    let Proof { name, claim, .. } = proof;
     let number = faults.len();
     let faults = if number == 1 { "fault" } else { "faults" };
     Ok(format!(
@@ -410,18 +383,13 @@ fn prove(root: &Path, proof: &Proof) -> Result<String> {
 }
 
 /// What ABC says of the circuit, with or without a fault.
-fn solve(root: &Path, proof: &Proof, fault: Option<&Mutant>, commands: &str) -> Result<String> {
-    let softcore = root.join("softcore");
-    let folder = target_folder(root).join("softcore/formal");
-    let folder = folder
-        .join(proof.name)
-        .join(if fault.is_some() { "fault" } else { "right" });
-    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+fn solve(proof: &Proof, fault: Option<&Mutant>, commands: &str) -> Result<String> {
+    let kind = if fault.is_some() { "fault" } else { "right" };
+    let folder = folder(&format!("formal/{}/{kind}", proof.name))?;
     let top = format!("formal/{}.sv", proof.name);
     let (mut files, mut joins, mut has_two_clocks) = (Vec::new(), String::new(), false);
     for source in proof.sources.iter().copied().chain([&*top]) {
-        let path = softcore.join(source);
-        let mut text = fs::read_to_string(&path).with_context(|| path.display().to_string())?;
+        let mut text = read(&root().join("softcore").join(source))?;
         if let Some(fault) = fault
             && Path::new(source).file_stem() == Some(fault.file.as_ref())
             && source != top
@@ -448,7 +416,7 @@ fn solve(root: &Path, proof: &Proof, fault: Option<&Mutant>, commands: &str) -> 
     );
     fs::write(folder.join("script.ys"), script)?;
     let mut yosys = Command::new("yosys");
-    let ran = succeed(yosys.current_dir(&folder).args(["-q", "-s", "script.ys"]))?;
+    let ran = program::succeed(yosys.current_dir(&folder).args(["-q", "-s", "script.ys"]))?;
     // Without it, the wrapper and the module would stand apart.
     ensure!(
         !ran.errors.contains("is used but has no driver"),
@@ -456,7 +424,7 @@ fn solve(root: &Path, proof: &Proof, fault: Option<&Mutant>, commands: &str) -> 
     );
     let mut abc = Command::new("yosys-abc");
     let commands = format!("read_aiger circuit.aig; fold; strash; {commands}");
-    Ok(succeed(abc.current_dir(&folder).args(["-q", &commands]))?.output)
+    Ok(program::succeed(abc.current_dir(&folder).args(["-q", &commands]))?.output)
 }
 
 /// The comments that join, as Yosys has it.
@@ -478,14 +446,6 @@ fn connections(text: &str) -> String {
     all
 }
 
-fn succeed(command: &mut Command) -> Result<ProgramRun> {
-    let name = command.get_program().to_string_lossy().into_owned();
-    let ran = program::run(command, None)
-        .with_context(|| format!("{name}: sudo apt-get install --yes yosys"))?;
-    ensure!(ran.code == Some(0), "{name}: {}", ran.output());
-    Ok(ran)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -494,7 +454,7 @@ mod tests {
     fn each_fault_has_its_place() {
         for proof in PROOFS {
             assert!(!proof.faults.is_empty(), "{}", proof.name);
-            for fault in proof.faults {
+            for fault in mutants::each(proof.faults) {
                 let is_of =
                     |source: &&&str| Path::new(source).file_stem() == Some(fault.file.as_ref());
                 let source = proof.sources.iter().find(is_of).unwrap();

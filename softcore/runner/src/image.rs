@@ -1,16 +1,14 @@
 //! The images of `softcore/`: built, and made what a testbench loads.
 
-use std::env;
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 use object::elf::{SHF_ALLOC, SHF_WRITE, SHT_NOBITS};
 use object::read::elf::{ElfFile32, SectionHeader};
 use object::{Object, ObjectSegment};
 
-use crate::target_folder;
+use crate::{cargo, folder, target_folder};
 
 const PROFILE: &str = "firmware";
 
@@ -35,12 +33,11 @@ pub struct Images {
 
 impl Images {
     /// Builds them for `isa` (`rv32i`, say), for QEMU's `virt` or for the testbench.
-    pub fn build(root: &Path, isa: &str, virt: bool) -> Result<Self> {
+    pub fn build(isa: &str, virt: bool) -> Result<Self> {
         let letters = isa.strip_prefix("rv").context("no RISC-V")?;
         let target = format!("riscv{letters}-unknown-none-elf");
-        let target_folder = target_folder(root);
-        let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-        cargo.current_dir(root);
+        let target_folder = target_folder();
+        let mut cargo = cargo();
         cargo.args(["build", "--locked", "--quiet", "--package", "dtof-softcore"]);
         cargo.args(["--bins", "--target", &target, "--profile", PROFILE]);
         cargo.args(["--features", if virt { "image,virt" } else { "image" }]);
@@ -50,11 +47,7 @@ impl Images {
 
         // The other machine's images would take their place.
         let machine = if virt { "virt" } else { "testbench" };
-        let folder = target_folder
-            .join("softcore/images")
-            .join(machine)
-            .join(isa);
-        fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+        let folder = folder(&format!("images/{machine}/{isa}"))?;
         for program in PROGRAMS {
             let built = target_folder.join(&target).join(PROFILE).join(program);
             let bytes = fs::read(&built).with_context(|| built.display().to_string())?;
@@ -112,9 +105,7 @@ fn flat(elf: &[u8]) -> Result<Vec<u8>> {
 fn hexadecimal(bytes: &[u8]) -> String {
     let words = bytes.chunks(4).map(|bytes| {
         let mut word = [0; 4];
-        for (to, from) in word.iter_mut().zip(bytes) {
-            *to = *from;
-        }
+        word[..bytes.len()].copy_from_slice(bytes);
         format!("{:08x}\n", u32::from_le_bytes(word))
     });
     words.collect()

@@ -5,7 +5,6 @@ mod document;
 mod files;
 mod formal;
 mod image;
-mod line;
 mod memory;
 mod pixels;
 mod place;
@@ -16,20 +15,20 @@ mod trials;
 mod virt;
 
 use std::env;
+use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::ExitCode;
+use std::process::{Command, ExitCode};
 
 use anyhow::{Context, Result, ensure};
 use lexopt::ValueExt;
-use lexopt::prelude::{Long, Short};
+use lexopt::prelude::Long;
 
-use files::Figures;
+use document::Figures;
 use image::Images;
 use memory::{Memory, Stacks};
 use program::ProgramRun;
 use rtl::{CORES, Core, Simulator};
-use trials::{Cycles, Trials};
 
 const HELP: &str = "\
 cargo softcore [--qemu-only] [--core NAME]... [--check]
@@ -82,22 +81,32 @@ fn last_words(core: &str, program: &str) -> &'static str {
 /// The line of the trap handler.
 const ILLEGAL: &str = "trap: illegal instruction";
 
+type Run = fn(lexopt::Parser) -> Result<()>;
+
+/// The words that may come first, the help of each, and what it does.
+const COMMANDS: [(&str, &str, Run); 4] = [
+    ("place", place::HELP, place::run),
+    ("pixels", pixels::HELP, pixels::run),
+    ("formal", formal::HELP, formal::run),
+    ("mutations", pixels::mutations::HELP, pixels::mutations::run),
+];
+
 fn main() -> ExitCode {
-    let mut arguments = env::args_os().skip(1).peekable();
-    let mut named = |name| arguments.next_if(|first| first == name).is_some();
-    let run = if named("place") {
-        place::run
-    } else if named("pixels") {
-        pixels::run
-    } else if named("formal") {
-        formal::run
-    } else if named("mutations") {
-        pixels::mutations::run
-    } else {
-        measure
+    let mut arguments: Vec<OsString> = env::args_os().skip(1).collect();
+    let first = arguments.first().cloned().unwrap_or_default();
+    let named = COMMANDS.into_iter().find(|&(name, ..)| first == name);
+    let (help, run) = match named {
+        Some((_, help, run)) => {
+            arguments.remove(0);
+            (help, run)
+        }
+        None => (HELP, measure as Run),
     };
-    let done = run(lexopt::Parser::from_args(arguments));
-    match done {
+    if arguments.iter().any(|of| of == "-h" || of == "--help") {
+        println!("{help}");
+        return ExitCode::SUCCESS;
+    }
+    match run(lexopt::Parser::from_args(arguments)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("error: {error:#}");
@@ -106,27 +115,17 @@ fn main() -> ExitCode {
     }
 }
 
-/// The command without a word.
-fn measure(parser: lexopt::Parser) -> Result<()> {
-    if let Some(options) = Options::parse(parser)? {
-        return run(&options);
-    }
-    println!("{HELP}");
-    Ok(())
-}
-
 /// The options of the command line.
 #[derive(Debug, Default, PartialEq, Eq)]
 struct Options {
     qemu_only: bool,
     check: bool,
     /// All, if none is named.
-    cores: Vec<String>,
+    cores: Vec<Core>,
 }
 
 impl Options {
-    /// `None` if help is asked for.
-    fn parse(mut parser: lexopt::Parser) -> Result<Option<Self>> {
+    fn parse(mut parser: lexopt::Parser) -> Result<Self> {
         let mut options = Self::default();
         while let Some(argument) = parser.next()? {
             match argument {
@@ -134,15 +133,11 @@ impl Options {
                 Long("check") => options.check = true,
                 Long("core") => {
                     let name = parser.value()?.string()?;
-                    let names = CORES.map(|core| core.name);
-                    ensure!(
-                        names.contains(&&*name),
-                        "no core `{name}`: {}",
-                        names.join(", ")
-                    );
-                    options.cores.push(name);
+                    let core = CORES.into_iter().find(|core| core.name == name);
+                    let names = CORES.map(|core| core.name).join(", ");
+                    let core = core.with_context(|| format!("no core `{name}`: {names}"))?;
+                    options.cores.push(core);
                 }
-                Short('h') | Long("help") => return Ok(None),
                 other => return Err(other.unexpected().into()),
             }
         }
@@ -150,64 +145,72 @@ impl Options {
             !options.qemu_only || options.cores.is_empty() && !options.check,
             "QEMU counts no cycles: --qemu-only stands alone"
         );
-        Ok(Some(options))
+        Ok(options)
     }
 
     fn selects(&self, core: Core) -> bool {
-        self.cores.is_empty() || self.cores.iter().any(|name| name == core.name)
+        self.cores.is_empty() || self.cores.contains(&core)
     }
 }
 
-/// Builds and runs.
-fn run(options: &Options) -> Result<()> {
-    let root = &root().canonicalize()?;
-    let expected = fs::read_to_string(root.join(EXPECTED)).context(EXPECTED)?;
+/// The command without a word.
+fn measure(parser: lexopt::Parser) -> Result<()> {
+    let options = Options::parse(parser)?;
+    let expected = fs::read_to_string(root().join(EXPECTED)).context(EXPECTED)?;
     for isa in ISAS {
-        in_qemu(root, isa, &expected).with_context(|| format!("QEMU, {isa}"))?;
+        in_qemu(isa, &expected).with_context(|| format!("QEMU, {isa}"))?;
     }
     if options.qemu_only {
         return Ok(());
     }
 
-    rtl::check_fifo(root)?;
+    rtl::check_fifo()?;
     let (mut measured, mut stacks) = (Figures::default(), Stacks::new());
     for core in CORES.into_iter().filter(|&core| options.selects(core)) {
-        let (figures, stack) = on_rtl(root, core, &expected).with_context(|| core.name)?;
-        measured.operations.extend(figures.operations);
-        measured.sustained_rates.extend(figures.sustained_rates);
-        stacks.extend(stack);
+        on_rtl(core, &expected, &mut measured, &mut stacks).with_context(|| core.name)?;
     }
-    measured.memory = Memory::of_all(root, &stacks)?;
-    println!(
-        "\n{}",
-        document::text(
-            &measured.operations,
-            &measured.sustained_rates,
-            &measured.memory
-        )
-    );
+    measured.memory = Memory::of_all(&stacks)?;
+    println!("\n{}", measured.page());
     if options.check {
-        let selected = |of: &str| {
-            let core = CORES.into_iter().find(|&core| name(core) == of);
-            core.is_none_or(|core| options.selects(core))
-        };
-        Figures::read(root)?.only(selected).check(&measured)?;
+        let is_of = |core, line: &str| line.starts_with(&format!("{},", name(core)));
+        let mut left_out = CORES.to_vec();
+        left_out.retain(|&core| !options.selects(core));
+        measured.check(|line| !left_out.iter().any(|&core| is_of(core, line)))?;
     } else if options.cores.is_empty() {
-        measured.write(root)?;
-        place::write_page(root)?;
+        measured.write()?;
+        place::write_page()?;
     }
     Ok(())
 }
 
 /// The folder of the workspace.
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+fn root() -> &'static Path {
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    here.ancestors().nth(2).unwrap_or(here)
 }
 
 /// Where cargo builds.
-fn target_folder(root: &Path) -> PathBuf {
-    let folder = env::var_os("CARGO_TARGET_DIR").map_or_else(|| "target".into(), PathBuf::from);
-    root.join(folder)
+fn target_folder() -> PathBuf {
+    root().join(env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into()))
+}
+
+/// A folder of this command there, made if need be.
+fn folder(name: &str) -> Result<PathBuf> {
+    let folder = target_folder().join("softcore").join(name);
+    fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
+    Ok(folder)
+}
+
+/// Cargo, in the workspace.
+fn cargo() -> Command {
+    let mut cargo = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    cargo.current_dir(root());
+    cargo
+}
+
+/// A file's text.
+fn read(path: &Path) -> Result<String> {
+    fs::read_to_string(path).with_context(|| path.display().to_string())
 }
 
 /// Core and instruction set as the files have them.
@@ -216,12 +219,11 @@ fn name(core: Core) -> String {
 }
 
 /// The golden vectors and what must fail, in the emulator.
-fn in_qemu(root: &Path, isa: &str, expected: &str) -> Result<()> {
-    let images = Images::build(root, isa, true)?;
+fn in_qemu(isa: &str, expected: &str) -> Result<()> {
+    let images = Images::build(isa, true)?;
     let run = |program, last_line| virt::run(&images.elf(program), isa, last_line);
     let stack = golden(&run("self-test", None)?, expected)?;
-    let bench = run("bench", None)?;
-    ensure!(bench.code == Some(0), "bench: {}", bench.output());
+    run("bench", None)?.succeeded("bench")?;
     for (program, message) in MUST_FAIL {
         // QEMU has no limit of its own.
         let is_endless = program == "endless-loop";
@@ -241,9 +243,9 @@ fn in_qemu(root: &Path, isa: &str, expected: &str) -> Result<()> {
 }
 
 /// Everything on one processor.
-fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<(Figures, Stacks)> {
-    let images = Images::build(root, core.isa, false)?;
-    let simulator = Simulator::build(root, core)?;
+fn on_rtl(core: Core, expected: &str, measured: &mut Figures, stacks: &mut Stacks) -> Result<()> {
+    let images = Images::build(core.isa, false)?;
+    let simulator = Simulator::build(core)?;
     let run = |program, cycles| simulator.run(&images.flat(program), cycles);
     let stack = golden(&run("self-test", MOST_CYCLES)?, expected)?;
     let lines = expected.lines().count();
@@ -260,31 +262,19 @@ fn on_rtl(root: &Path, core: Core, expected: &str) -> Result<(Figures, Stacks)> 
         let end = ran.errors.lines().last().unwrap_or_default();
         println!("{of}: {program} fails: {last} ({end})");
     }
-    let bench = run("bench", MOST_CYCLES)?;
-    ensure!(bench.code == Some(0), "bench: {}", bench.output());
+    let bench = run("bench", MOST_CYCLES)?.succeeded("bench")?;
     let rows = table::rows(&name(core), core.caches, &bench)?;
-    let trials = Trials {
-        simulator: &simulator,
-        image: &|pixels| images.flat(&format!("stream-{pixels}")),
-        folder: &target_folder(root).join("softcore"),
-        core: &name(core),
-        cycles: Cycles::of(&rows).context("no rows of a count and a look")?,
-    };
-    let found = trials.run()?;
+    let found = trials::run(&simulator, &images, &name(core), &rows)?;
     let (events, deferred) = found.slow;
     println!(
-        "{}: the host decides the same from the same photons and looks, each event word over REQ and ACK; \
-         with a slow link {events} events, {deferred} decisions put off",
-        core.name
+        "{of}: the host decides the same from the same photons and looks, each event word over REQ and ACK; \
+         with a slow link {events} events, {deferred} decisions put off"
     );
-    let stacks = found.stack.into_iter();
-    let stacks = stacks.map(|(pixels, stack)| (isa, pixels, stack));
-    let figures = Figures {
-        operations: rows,
-        sustained_rates: found.sustained,
-        memory: Vec::new(),
-    };
-    Ok((figures, stacks.collect()))
+    measured.operations.extend(rows);
+    measured.sustained_rates.extend(found.sustained);
+    let found = found.stack.into_iter();
+    stacks.extend(found.map(|(pixels, stack)| (isa, pixels, stack)));
+    Ok(())
 }
 
 /// Whether a run printed the golden vectors; the bytes of stack it used.
@@ -325,13 +315,12 @@ mod tests {
     fn reads_what_is_asked_for() {
         let parse = |arguments: &[&str]| Options::parse(lexopt::Parser::from_args(arguments));
         let options = parse(&["--core", "picorv32", "--check", "--core=vexriscv"]);
-        let options = options.unwrap().unwrap();
+        let options = options.unwrap();
         assert!(options.check && !options.qemu_only);
         let selected = CORES.into_iter().filter(|&core| options.selects(core));
         let names: Vec<&str> = selected.map(|core| core.name).collect();
         assert_eq!(names, ["vexriscv", "picorv32"]);
         assert!(CORES.iter().all(|&core| Options::default().selects(core)));
-        assert_eq!(parse(&["--help"]).unwrap(), None);
         for wrong in [
             &["--core"][..],
             &["--core", "z80"],

@@ -1,13 +1,11 @@
 //! Bytes of the programs that take photons from the FIFO.
 
-use std::path::Path;
-
 use anyhow::Result;
 
 use crate::ISAS;
+use crate::files::Column::{self, Name, Percent, PercentIfMeasured};
+use crate::files::{Cells, Line, ReadLine};
 use crate::image::{Images, Sizes};
-use crate::line::Column::{self, Name, Percent};
-use crate::line::Line;
 
 /// Macropixels of the programs.
 pub const MACROPIXELS: [u8; 3] = [1, 4, 64];
@@ -27,10 +25,10 @@ pub type Stacks = Vec<(&'static str, u8, u64)>;
 
 impl Memory {
     /// Builds and measures all programs.
-    pub fn of_all(root: &Path, stacks: &Stacks) -> Result<Vec<Self>> {
+    pub fn of_all(stacks: &Stacks) -> Result<Vec<Self>> {
         let mut all = Vec::new();
         for isa in ISAS {
-            let images = Images::build(root, isa, false)?;
+            let images = Images::build(isa, false)?;
             for macropixels in MACROPIXELS {
                 let stacks = stacks
                     .iter()
@@ -63,27 +61,29 @@ impl Memory {
 impl Line for Memory {
     const FILE: &str = "docs/results/bench/softcore-bytes.csv";
     const HEADER: &str = "isa,macropixels,code and constants,data,stack";
-    const COLUMNS: &[Column] = &[Name, Name, Percent(2.0), Percent(2.0), Percent(10.0)];
+    const COLUMNS: &[Column] = &[
+        Name,
+        Name,
+        Percent(2.0),
+        Percent(2.0),
+        PercentIfMeasured(10.0),
+    ];
 
     fn csv(&self) -> String {
         self.cells().join(",")
     }
+}
 
-    fn of(words: &[&str]) -> Option<Self> {
-        let &[isa, macropixels, code, data, stack] = words else {
-            return None;
-        };
+impl ReadLine for Memory {
+    fn of(cells: &mut Cells<'_>) -> Option<Self> {
         Some(Self {
-            isa: isa.to_owned(),
-            macropixels: macropixels.parse().ok()?,
+            isa: cells.read()?,
+            macropixels: cells.read()?,
             sizes: Sizes {
-                code: code.parse().ok()?,
-                data: data.parse().ok()?,
+                code: cells.read()?,
+                data: cells.read()?,
             },
-            stack: (!stack.is_empty())
-                .then(|| stack.parse())
-                .transpose()
-                .ok()?,
+            stack: cells.optional()?,
         })
     }
 }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 
 /// How long a program may take that ends by itself: only one that hangs takes as long, even on a
 /// computer that does much else.
@@ -38,6 +38,12 @@ impl ProgramRun {
         self.code.is_some_and(|code| code != 0)
     }
 
+    /// Fails if it did not succeed, with all that it said.
+    pub fn succeeded(self, name: &str) -> Result<Self> {
+        ensure!(self.code == Some(0), "{name}: {}", self.output());
+        Ok(self)
+    }
+
     /// All that it said, and how it ended.
     pub fn output(&self) -> String {
         let end = match self.code {
@@ -53,6 +59,12 @@ impl ProgramRun {
 /// after that.
 pub fn run(command: &mut Command, awaited: Option<(&str, Duration)>) -> Result<ProgramRun> {
     run_for(PATIENCE, command, awaited)
+}
+
+/// Runs a program that has to succeed.
+pub fn succeed(command: &mut Command) -> Result<ProgramRun> {
+    let ran = run(command, None)?;
+    ran.succeeded(&command.get_program().to_string_lossy())
 }
 
 fn run_for(

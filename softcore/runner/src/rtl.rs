@@ -1,6 +1,5 @@
 //! The processors' own Verilog in the testbench of `softcore/`.
 
-use std::env;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
@@ -8,7 +7,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, ensure};
 
 use crate::program::{self, ProgramRun};
-use crate::target_folder;
+use crate::{cargo, folder, root};
 
 /// A processor as it is configured in `softcore/rtl`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,22 +30,15 @@ const fn core(name: &'static str, isa: &'static str, caches: bool) -> Core {
     Core { name, isa, caches }
 }
 
-impl Core {
-    /// The Python package with its Verilog.
-    fn package(self) -> String {
-        let (processor, _) = self.name.split_once('-').unwrap_or((self.name, ""));
-        format!("pythondata_cpu_{processor}")
-    }
-}
-
 /// A core's testbench as a program.
 pub struct Simulator(PathBuf);
 
 impl Simulator {
     /// Builds it, from the package index first if need be.
-    pub fn build(root: &Path, core: Core) -> Result<Self> {
-        let data = package_folder(root, &core.package())?;
-        verilate(root, core.name, core.name, &data, &[]).map(Self)
+    pub fn build(core: Core) -> Result<Self> {
+        let (processor, _) = core.name.split_once('-').unwrap_or((core.name, ""));
+        let data = package_folder(processor)?;
+        verilate(core.name, core.name, &data, &[]).map(Self)
     }
 
     /// Runs an image for so many cycles at most.
@@ -54,12 +46,19 @@ impl Simulator {
         program::run(&mut self.command(image, cycles), None)
     }
 
-    /// The same with photons.
-    pub fn stream(&self, image: &Path, cycles: u64, laser: &Laser) -> Result<ProgramRun> {
+    /// The same with photons, of a laser whose cycles have so many clocks, and a link that answers
+    /// after so many.
+    pub fn stream(
+        &self,
+        image: &Path,
+        cycles: u64,
+        photons: &Path,
+        [laser_cycle, wait]: [u64; 2],
+    ) -> Result<ProgramRun> {
         let mut command = self.command(image, cycles);
-        command.arg("--stream").arg(laser.photons);
-        command.args(["--clocks-per-laser-cycle", &laser.clocks.to_string()]);
-        command.args(["--acknowledge-after", &laser.wait.to_string()]);
+        command.arg("--stream").arg(photons);
+        command.args(["--clocks-per-laser-cycle", &laser_cycle.to_string()]);
+        command.args(["--acknowledge-after", &wait.to_string()]);
         program::run(&mut command, None)
     }
 
@@ -70,74 +69,54 @@ impl Simulator {
     }
 }
 
-/// The sender of photons and the taker of events.
-pub struct Laser<'a> {
-    /// Lines `laser cycle, macropixel, TDC code`.
-    pub photons: &'a Path,
-    /// Clock cycles of a laser cycle.
-    pub clocks: u64,
-    /// Clock cycles until the link answers.
-    pub wait: u64,
-}
-
 /// Builds and runs the simulation of a module that is compared with a model there.
-pub fn check(root: &Path, name: &str) -> Result<()> {
-    check_with(root, name, Path::new(""))
+pub fn check(name: &str) -> Result<()> {
+    check_with(name, Path::new(""))
 }
 
-fn check_with(root: &Path, name: &str, data: &Path) -> Result<()> {
-    let ran = run_with(root, name, data)?;
-    ensure!(ran.code == Some(0), ran.output());
-    print!("{}", ran.output);
+fn check_with(name: &str, data: &Path) -> Result<()> {
+    let test = verilate(name, name, data, &[])?;
+    print!("{}", program::succeed(&mut Command::new(test))?.output);
     Ok(())
-}
-
-fn run_with(root: &Path, name: &str, data: &Path) -> Result<ProgramRun> {
-    let test = verilate(root, name, name, data, &[])?;
-    program::run(&mut Command::new(test), None)
 }
 
 /// Whether the pixel processor, wired to another clock as `docs/softcore.md` has it, does what
 /// one does that has the clock of the photons, and does not if code and macropixel are exchanged.
-pub fn check_two_clocks(root: &Path) -> Result<()> {
-    let document = fs::read_to_string(root.join("docs/softcore.md"))?;
+pub fn check_two_clocks() -> Result<()> {
+    let document = fs::read_to_string(root().join("docs/softcore.md"))?;
     let wiring = document
         .split_once("### Photons from another clock domain")
         .and_then(|(_, rest)| rest.split_once("```verilog\n"))
         .and_then(|(_, rest)| rest.split_once("```"))
         .context("docs/softcore.md has no wiring")?
         .0;
-    let folder = target_folder(root).join("softcore/wiring");
-    fs::create_dir_all(&folder)?;
+    let folder = folder("wiring")?;
     let right = "{tdc_pixel, tdc_code}";
     ensure!(wiring.contains(right), "docs/softcore.md: no {right}");
     let wrong = wiring.replace(right, "{tdc_code, tdc_pixel}");
     fs::write(folder.join("wiring.v"), wrong)?;
-    let ran = run_with(root, "two_clocks", &folder)?;
+    let test = verilate("two_clocks", "two_clocks", &folder, &[])?;
+    let ran = program::run(&mut Command::new(test), None)?;
     let is_seen = ran.code == Some(1) && ran.output.contains("other words");
     ensure!(is_seen, "wrong wiring: {}", ran.output());
     fs::write(folder.join("wiring.v"), wiring)?;
-    check_with(root, "two_clocks", &folder)
+    check_with("two_clocks", &folder)
 }
 
 /// Whether the FIFO does with random words what a model of it does, and its memory is
 /// block RAM and nothing else: of an iCE40, whose blocks have 4096 bits, that is four for
 /// its 512 words of 32.
-pub fn check_fifo(root: &Path) -> Result<()> {
-    check(root, "photon_fifo")?;
+pub fn check_fifo() -> Result<()> {
+    check("photon_fifo")?;
 
     let mut yosys = Command::new("yosys");
-    yosys.current_dir(root.join("softcore/rtl"));
+    yosys.current_dir(root().join("softcore/rtl"));
     yosys.args(["-q", "-p"]).arg(
         "read_verilog photon_fifo.v; synth_ice40 -top photon_fifo; \
          select -assert-count 4 t:SB_RAM40_4K; tee -o /dev/stdout stat",
     );
-    let ran = program::run(&mut yosys, None)?;
-    ensure!(
-        ran.code == Some(0),
-        "photon FIFO: not four block RAMs of an iCE40\n{}",
-        ran.output()
-    );
+    let ran = program::succeed(&mut yosys);
+    let ran = ran.context("photon FIFO: not four block RAMs of an iCE40")?;
     let cells = |name| {
         let mut lines = ran.output.lines();
         let line = lines.find(|line| line.trim_start().starts_with(name));
@@ -152,20 +131,19 @@ pub fn check_fifo(root: &Path) -> Result<()> {
 }
 
 /// The folder of a processor's Verilog, from the package index first if need be.
-pub fn package_folder(root: &Path, package: &str) -> Result<PathBuf> {
-    let python = python(root, "softcore/requirements.txt")?;
+pub fn package_folder(processor: &str) -> Result<PathBuf> {
+    let python = python("softcore/requirements.txt")?;
+    let package = format!("pythondata_cpu_{processor}");
     let ask = format!("import {package}; print({package}.data_location)");
-    let mut ask_python = Command::new(python);
-    let ran = program::run(ask_python.args(["-c", &ask]), None)?;
-    ensure!(ran.code == Some(0), "{package}: {}", ran.output());
-    Ok(ran.output.trim().into())
+    let ran = program::succeed(Command::new(python).args(["-c", &ask]));
+    Ok(ran.context(package)?.output.trim().into())
 }
 
 /// A Python that has the packages of a file.
-pub fn python(root: &Path, requirements: &str) -> Result<PathBuf> {
-    let mut xtask = Command::new(env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+pub fn python(requirements: &str) -> Result<PathBuf> {
+    let mut xtask = cargo();
     xtask.args(["--locked", "xtask", "python", requirements]);
-    let output = xtask.current_dir(root).stderr(Stdio::inherit()).output();
+    let output = xtask.stderr(Stdio::inherit()).output();
     let output = output.context("cargo does not start")?;
     ensure!(
         output.status.success(),
@@ -176,15 +154,14 @@ pub fn python(root: &Path, requirements: &str) -> Result<PathBuf> {
 
 /// Builds the simulation that `softcore/sim/LIST.f` lists in a folder `name`, with `data` the
 /// processor's files, and says where it is.
-pub fn verilate(
-    root: &Path,
-    list: &str,
-    name: &str,
-    data: &Path,
-    options: &[&str],
-) -> Result<PathBuf> {
-    let folder = target_folder(root).join("softcore").join(name);
-    verilate_in(&root.join("softcore"), list, &folder, data, options)
+pub fn verilate(list: &str, name: &str, data: &Path, options: &[&str]) -> Result<PathBuf> {
+    verilate_in(
+        &root().join("softcore"),
+        list,
+        &folder(name)?,
+        data,
+        options,
+    )
 }
 
 /// The same of a copy of `softcore`, in any folder.
@@ -195,7 +172,6 @@ pub fn verilate_in(
     data: &Path,
     options: &[&str],
 ) -> Result<PathBuf> {
-    fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let mut verilator = Command::new("verilator");
     verilator
         .env("SOFTCORE", softcore)
@@ -208,11 +184,6 @@ pub fn verilate_in(
         .args(options)
         .arg("--Mdir")
         .arg(folder);
-    let ran = program::run(&mut verilator, None)?;
-    ensure!(
-        ran.code == Some(0),
-        "{list}: verilator fails\n{}",
-        ran.output()
-    );
+    program::succeed(&mut verilator).with_context(|| list.to_owned())?;
     Ok(folder.join("sim"))
 }

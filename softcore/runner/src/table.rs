@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, ensure};
 
-use crate::line::Column::{self, Name, Percent, Unchecked};
-use crate::line::Line;
+use crate::files::Column::{self, Name, Percent, Unchecked};
+use crate::files::{Cells, Line, ReadLine};
 use crate::program::ProgramRun;
 
 /// The first operation of the bench: a call that does nothing, taken off the others.
@@ -110,21 +110,18 @@ pub fn rows(core: &str, caches: bool, ran: &ProgramRun) -> Result<Vec<Row>> {
 fn totals(lines: &str) -> Result<BTreeMap<u64, (Counts, u64)>> {
     let mut totals = BTreeMap::<u64, (Counts, u64)>::new();
     let mut begun: Option<(u64, Counts)> = None;
-    for line in lines.lines() {
-        let Some(rest) = line.strip_prefix("mark ") else {
-            continue;
-        };
-        let (number, counts) = mark(rest).with_context(|| format!("what is `{line}`?"))?;
+    for mark in marks(lines) {
+        let (number, counts) = mark?;
         match begun.take() {
             None => {
                 ensure!(
                     number % 2 == 1,
-                    "`{line}` ends an operation that did not begin"
+                    "mark {number} ends an operation that did not begin"
                 );
                 begun = Some((number, counts));
             }
             Some((before, start)) => {
-                ensure!(number == before + 1, "`{line}` does not end {before}");
+                ensure!(number == before + 1, "mark {number} does not end {before}");
                 let (total, times) = totals.entry(before / 2).or_default();
                 for ((total, count), start) in total.iter_mut().zip(counts).zip(start) {
                     *total += count - start;
@@ -135,6 +132,12 @@ fn totals(lines: &str) -> Result<BTreeMap<u64, (Counts, u64)>> {
     }
     ensure!(begun.is_none(), "the last operation does not end");
     Ok(totals)
+}
+
+/// The marks of a run.
+pub fn marks(lines: &str) -> impl Iterator<Item = Result<(u64, Counts)>> {
+    let marks = lines.lines().filter_map(|line| line.strip_prefix("mark "));
+    marks.map(|rest| mark(rest).with_context(|| format!("what is `mark {rest}`?")))
 }
 
 /// The rest of `mark N cycle C instructions I code C data D`.
@@ -172,20 +175,17 @@ impl Line for Row {
         let counts = counts.map(|count| format!("{count:.2}")).join(",");
         format!("{},{},{counts}", self.core, self.operation)
     }
+}
 
-    fn of(words: &[&str]) -> Option<Self> {
-        let (&[core, isa, operation], counts) = words.split_first_chunk()?;
-        let counts: Result<Vec<f64>, _> = counts.iter().map(|text| text.parse()).collect();
-        let [cycles, instructions, code_lines, data_lines] = counts.ok()?[..] else {
-            return None;
-        };
+impl ReadLine for Row {
+    fn of(cells: &mut Cells<'_>) -> Option<Self> {
         Some(Self {
-            core: format!("{core},{isa}"),
-            operation: operation.to_owned(),
-            cycles,
-            instructions,
-            code_lines,
-            data_lines,
+            core: cells.core()?,
+            operation: cells.read()?,
+            cycles: cells.read()?,
+            instructions: cells.read()?,
+            code_lines: cells.read()?,
+            data_lines: cells.read()?,
         })
     }
 }

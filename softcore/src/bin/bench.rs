@@ -5,9 +5,6 @@
 #![no_std]
 #![no_main]
 
-#[cfg(not(target_arch = "riscv32"))]
-compile_error!("an image for a soft-core: cargo softcore");
-
 #[path = "../../../firmware/src/bin/bench/scene.rs"]
 #[allow(dead_code, reason = "not every operation is measured here")]
 mod scene;

@@ -3,9 +3,6 @@
 #![no_std]
 #![no_main]
 
-#[cfg(not(target_arch = "riscv32"))]
-compile_error!("an image for a soft-core: cargo softcore");
-
 use core::arch::asm;
 
 use dtof_softcore::{println, program};

@@ -3,9 +3,6 @@
 #![no_std]
 #![no_main]
 
-#[cfg(not(target_arch = "riscv32"))]
-compile_error!("an image for a soft-core: cargo softcore");
-
 /// The program, which does not end.
 fn run() -> bool {
     dtof_softcore::pixels::run(dtof_softcore::pixels::Packer::Program)

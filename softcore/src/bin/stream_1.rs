@@ -3,7 +3,4 @@
 #![no_std]
 #![no_main]
 
-#[cfg(not(target_arch = "riscv32"))]
-compile_error!("an image for a soft-core: cargo softcore");
-
 dtof_softcore::stream_program!(1);

@@ -114,35 +114,30 @@ pub fn register_values(
     packs: bool,
     pixels_log2: u32,
 ) -> Result<Vec<u32>> {
-    let mut register_values = vec![1 | u32::from(packs) << 1];
-    register_values.extend(ProcessorSettings::of(config)?.registers());
-    register_values.push(1 << pixels_log2);
-    Ok(register_values)
+    let mut values = vec![1 | u32::from(packs) << 1];
+    values.extend(ProcessorSettings::of(config)?.registers());
+    values.push(1 << pixels_log2);
+    Ok(values)
 }
 
 /// The accesses that configure the pixel processor so, from its reset on. Once it runs, what is
 /// written changes nothing.
 pub fn settings(register_values: &[u32]) -> Vec<Access> {
-    let written = register_values
-        .split_last()
-        .map_or(register_values, |(_, written)| written);
-    let mut accesses: Vec<Access> = (register::CONTROL..)
-        .zip(written)
-        .skip(1)
+    let written = (register::CONTROL..register::SIZE).zip(register_values);
+    let mut right: Vec<Access> = written
+        .clone()
         .map(|(address, &data)| Access::Write(address, data))
         .collect();
-    let read_all = (register::CONTROL..=register::SIZE).map(Access::Read);
-    accesses.extend(
-        written
-            .first()
-            .map(|&run| Access::Write(register::CONTROL, run)),
-    );
-    accesses.extend(read_all.clone());
-    let others = (register::CONTROL..).zip(written);
+    // `CONTROL` is the last: it starts.
+    right.rotate_left(1);
     // It still runs.
-    accesses.extend(
-        others.map(|(address, &data)| Access::Write(address, !data | u32::from(address == 0))),
-    );
-    accesses.extend(read_all);
-    accesses
+    let wrong =
+        written.map(|(address, &data)| Access::Write(address, !data | u32::from(address == 0)));
+    let read_all = (register::CONTROL..=register::SIZE).map(Access::Read);
+    right
+        .into_iter()
+        .chain(read_all.clone())
+        .chain(wrong)
+        .chain(read_all)
+        .collect()
 }

@@ -1,6 +1,10 @@
 //! What the pixel processor has to do: `AsyncPixel`, fed with the same photons.
 
 use std::collections::VecDeque;
+use std::io::{BufReader, BufWriter, Read, Write};
+use std::mem;
+use std::process::{self, Stdio};
+use std::thread;
 
 use anyhow::{Context, Result, bail, ensure};
 use dtof_core::pixel_processor::ProcessorEvent;
@@ -10,7 +14,7 @@ use dtof_core::{
 
 use super::command::{Access, Command, Report, register};
 use super::reads::Reads;
-use super::scene::{Events, Scene};
+use super::scene::{Commands, Events, Scene};
 
 /// Looks whose events may wait.
 const REMEMBERED: usize = 4096;
@@ -34,21 +38,74 @@ pub struct ModelOutcome {
     pub latencies: Vec<u64>,
 }
 
-/// The macropixels, and what they wait for.
-pub struct Model {
+/// Runs a scene in the simulation, and the same in `dtof-core`.
+pub fn simulate(simulator: &mut process::Command, scene: &Scene) -> Result<ModelOutcome> {
+    let mut child = simulator
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .context("the simulation does not start")?;
+    let mut input = BufWriter::with_capacity(1 << 16, child.stdin.take().context("no input")?);
+    let mut output = BufReader::with_capacity(1 << 16, child.stdout.take().context("no output")?);
+    let commands = Commands::new(scene)?;
+    let writer = thread::spawn(move || -> std::io::Result<()> {
+        for command in commands {
+            command.write(&mut input)?;
+        }
+        input.flush()
+    });
+    let mut model = Model::new(scene, &mut output)?;
+    let outcome = Commands::new(scene)?
+        .try_for_each(|command| model.clock(&command))
+        .and_then(|()| model.end());
+    if outcome.is_err() {
+        // It may wait to be read.
+        let _ = child.kill();
+    }
+    let written = writer.join();
+    let status = child.wait()?;
+    let outcome = outcome.with_context(|| scene.name.clone())?;
+    ensure!(
+        scene.reads.is_none() || outcome.bins_read > 0,
+        "{}: no bins were compared",
+        scene.name
+    );
+    ensure!(status.success(), "{}: the simulation fails", scene.name);
+    ensure!(
+        matches!(written, Ok(Ok(()))),
+        "{}: commands are not read",
+        scene.name
+    );
+    Ok(outcome)
+}
+
+/// The model of a scene, and what the simulation tells.
+struct Model<R> {
     scene: Scene,
+    reports: Reports<R>,
+    clock: u64,
     /// Times that it was started, after the first.
-    run: usize,
-    /// The clocks in which it runs: the first, one past the last. It is empty in the last one.
-    starts_at: u64,
-    stops_at: u64,
+    runs: usize,
+    /// The clock by which it is empty after the last stop.
     emptied_at: u64,
+    run: Run,
     /// What came of the runs before.
     total: ModelOutcome,
+    /// What the registers of the settings hold.
+    register_values: Vec<u32>,
+    reads: Vec<u32>,
+    counts: Vec<u32>,
+    bins: Reads,
+}
+
+/// The macropixels from a start to the next, and what they wait for.
+struct Run {
+    /// The clocks in which it runs: the first, one past the last.
+    starts_at: u64,
+    stops_at: u64,
     config: PixelConfig<128>,
     pixels: Vec<AsyncPixel<128>>,
     encoder: AerEncoder,
-    clock: u64,
     since_look: u16,
     /// The clock of the last look, and the events that it brought.
     looked_at: u64,
@@ -56,7 +113,7 @@ pub struct Model {
     /// The counts of the last look, before each macropixel.
     before: Vec<Statistics>,
     strays: u64,
-    /// What comes of this run.
+    /// What comes of it.
     outcome: ModelOutcome,
     /// Words that the link has yet to take, and the clock in which the laser cycle ended that
     /// brought the event.
@@ -65,12 +122,34 @@ pub struct Model {
     looked: VecDeque<(u64, u64)>,
     /// Events that the program is to take.
     taken: VecDeque<DepthEvent>,
-    events: Events,
-    /// What the registers of the settings hold.
-    register_values: Vec<u32>,
-    reads: Vec<u32>,
-    counts: Vec<u32>,
-    bins: Reads,
+}
+
+impl Run {
+    /// One that starts in a clock, with macropixels that have had no photon.
+    fn new(scene: &Scene, number: usize, starts_at: u64) -> Self {
+        let pixel = |address| AsyncPixel::new(PixelAddress::new(address));
+        Self {
+            starts_at,
+            stops_at: u64::MAX,
+            config: scene.config_of(number),
+            pixels: (0..1 << scene.pixels_log2).map(pixel).collect(),
+            encoder: AerEncoder::new(),
+            since_look: 0,
+            looked_at: 0,
+            fired: 0,
+            before: Vec::new(),
+            strays: 0,
+            outcome: ModelOutcome::default(),
+            words: VecDeque::new(),
+            looked: VecDeque::new(),
+            taken: VecDeque::new(),
+        }
+    }
+
+    /// Whether it runs in a clock: photons of it count.
+    const fn has(&self, clock: u64) -> bool {
+        self.starts_at <= clock && clock < self.stops_at
+    }
 }
 
 impl ModelOutcome {
@@ -85,125 +164,94 @@ impl ModelOutcome {
     }
 }
 
-impl Model {
-    pub fn new(scene: &Scene) -> Result<Self> {
+impl<R: Read> Model<R> {
+    fn new(scene: &Scene, simulation: R) -> Result<Self> {
         Ok(Self {
             scene: scene.clone(),
-            run: 0,
-            starts_at: 0,
-            stops_at: u64::MAX,
-            emptied_at: 0,
-            total: ModelOutcome::default(),
-            register_values: scene.register_values()?,
-            config: scene.config,
-            pixels: pixels(scene),
-            encoder: AerEncoder::new(),
+            reports: Reports {
+                from: simulation,
+                waiting: None,
+            },
             clock: 0,
-            since_look: 0,
-            looked_at: 0,
-            fired: 0,
-            before: Vec::new(),
-            strays: 0,
-            outcome: ModelOutcome::default(),
-            words: VecDeque::new(),
-            looked: VecDeque::new(),
-            taken: VecDeque::new(),
-            events: scene.events,
+            runs: 0,
+            emptied_at: 0,
+            run: Run::new(scene, 0, 0),
+            total: ModelOutcome::default(),
+            register_values: scene.register_values(0)?,
             reads: Vec::new(),
             counts: Vec::new(),
             bins: Reads::default(),
         })
     }
 
-    /// The next clock; `reports` has what the simulation reported before a given clock.
-    pub fn clock(
-        &mut self,
-        command: &Command,
-        reports: &mut Reports<impl FnMut() -> Result<(u64, Report)>>,
-    ) -> Result<()> {
-        self.start_or_stop(command, reports)?;
-        let runs = self.runs(self.clock);
+    /// The next clock.
+    fn clock(&mut self, command: &Command) -> Result<()> {
+        self.start_or_stop(command)?;
+        let (now, run) = (self.clock, &mut self.run);
+        let runs = run.has(now);
         if let Some((pixel, code)) = command.photon.filter(|_| runs) {
-            self.outcome.photons += 1;
-            match self.pixels.get_mut(usize::from(pixel)) {
-                Some(pixel) => pixel.count(&self.config, code),
-                None => self.strays += 1,
+            run.outcome.photons += 1;
+            match run.pixels.get_mut(usize::from(pixel)) {
+                Some(pixel) => pixel.count(&run.config, code),
+                None => run.strays += 1,
             }
         }
-        self.bins.clock(self.clock, command, &self.pixels);
+        self.bins.clock(now, command, &run.pixels);
         if command.cycle_ends && runs {
-            self.outcome.cycles += 1;
+            run.outcome.cycles += 1;
         }
         // Where it is the last clock that runs, no look begins any more.
-        if command.cycle_ends && runs && self.runs(self.clock + 1) {
-            self.since_look = self.since_look.saturating_add(1);
+        if command.cycle_ends && runs && run.has(now + 1) {
+            run.since_look = run.since_look.saturating_add(1);
+            let is_due = run.since_look >= run.config.x();
             // The system has a register at its pins.
-            let at = self.clock + 1 + u64::from(self.events == Events::System);
-            let looks = self.apply_until(at, reports)?;
-            let is_due = self.since_look >= self.config.x();
+            let at = now + 1 + u64::from(self.scene.events == Events::System);
+            let looks = self.apply_until(at)?;
             ensure!(is_due || !looks, "clock {at}: a look that is not due");
             if looks {
-                self.looked_at = at;
+                self.run.looked_at = at;
                 self.look();
             } else if is_due {
                 let longest = self.longest_look();
                 ensure!(
-                    at < self.looked_at + longest,
+                    at < self.run.looked_at + longest,
                     "clock {at}: no look, {longest} clocks after the last one"
                 );
-                self.outcome.late += 1;
+                self.run.outcome.late += 1;
             }
         }
         self.clock += 1;
         Ok(())
     }
 
-    /// Whether it runs in a clock: photons of it count.
-    const fn runs(&self, clock: u64) -> bool {
-        self.starts_at <= clock && clock < self.stops_at
-    }
-
     /// What the clock brings to the register that starts and stops.
-    fn start_or_stop(
-        &mut self,
-        command: &Command,
-        reports: &mut Reports<impl FnMut() -> Result<(u64, Report)>>,
-    ) -> Result<()> {
+    fn start_or_stop(&mut self, command: &Command) -> Result<()> {
         if self.scene.restarts.is_empty() {
             return Ok(());
         }
+        let (now, run) = (self.clock, &mut self.run);
         // The next clock is the first of those in which it empties itself.
-        let (now, empties) = (self.clock, self.pixels.len() as u64 + 1);
+        let empties = run.pixels.len() as u64 + 1;
         if command.reset {
-            self.stops_at = now + 1;
-            self.emptied_at = self.stops_at + empties;
+            run.stops_at = now + 1;
+            self.emptied_at = run.stops_at + empties;
         }
         match command.access {
             Some(Access::Write(register::CONTROL, 0)) => {
-                if self.runs(now + 1) {
+                if run.has(now + 1) {
                     self.emptied_at = now + 2 + empties;
                 }
-                self.stops_at = now + 2;
+                run.stops_at = now + 2;
             }
             // The settings at the beginning, which come to rest before the photons, are no restart.
-            Some(Access::Write(register::CONTROL, _)) if self.stops_at < u64::MAX => {
-                while let Some((clock, report)) = reports.next_until(now)? {
+            Some(Access::Write(register::CONTROL, _)) if run.stops_at < u64::MAX => {
+                while let Some((clock, report)) = self.reports.next_until(now)? {
                     self.apply(clock, report)?;
                 }
                 self.end_run()?;
-                self.run += 1;
-                self.config = self.scene.config_of(self.run);
-                self.pixels = pixels(&self.scene);
-                self.encoder = AerEncoder::new();
-                self.since_look = 0;
-                self.looked_at = 0;
-                self.fired = 0;
-                self.before.clear();
-                self.words.clear();
-                self.looked.clear();
-                self.taken.clear();
-                self.starts_at = self.emptied_at.max(now + 2);
-                self.stops_at = u64::MAX;
+                self.runs += 1;
+                let starts_at = self.emptied_at.max(now + 2);
+                self.run = Run::new(&self.scene, self.runs, starts_at);
             }
             _ => {}
         }
@@ -211,12 +259,8 @@ impl Model {
     }
 
     /// Everything up to a look in clock `at`; whether there is one.
-    fn apply_until(
-        &mut self,
-        at: u64,
-        reports: &mut Reports<impl FnMut() -> Result<(u64, Report)>>,
-    ) -> Result<bool> {
-        while let Some((clock, report)) = reports.next_until(at)? {
+    fn apply_until(&mut self, at: u64) -> Result<bool> {
+        while let Some((clock, report)) = self.reports.next_until(at)? {
             match report {
                 Report::Look => {
                     ensure!(
@@ -233,62 +277,62 @@ impl Model {
 
     /// Clocks that a look keeps the next one waiting at most.
     fn longest_look(&self) -> u64 {
-        self.pixels.len() as u64 + self.fired + 18
+        self.run.pixels.len() as u64 + self.run.fired + 18
     }
 
     fn look(&mut self) {
-        let last = LaserCycle::new(self.outcome.cycles - 1);
-        let passed = std::mem::take(&mut self.since_look);
-        let events = self.outcome.statistics.events;
-        self.before.clear();
-        for pixel in &mut self.pixels {
-            self.before.push(self.outcome.statistics);
-            let _ =
-                pixel.end_laser_cycles(&self.config, &mut self.outcome.statistics, last, passed);
+        let run = &mut self.run;
+        let last = LaserCycle::new(run.outcome.cycles - 1);
+        let passed = mem::take(&mut run.since_look);
+        let statistics = &mut run.outcome.statistics;
+        let events = statistics.events;
+        run.before.clear();
+        for pixel in &mut run.pixels {
+            run.before.push(*statistics);
+            let _ = pixel.end_laser_cycles(&run.config, statistics, last, passed);
         }
-        self.fired = self.outcome.statistics.events - events;
-        self.bins.look(self.clock, &self.pixels);
-        self.outcome.looks += 1;
-        self.looked.push_back((last.raw(), self.clock));
-        if self.looked.len() > REMEMBERED {
-            self.looked.pop_front();
+        run.fired = statistics.events - events;
+        self.bins.look(self.clock, &run.pixels);
+        run.outcome.looks += 1;
+        run.looked.push_back((last.raw(), self.clock));
+        if run.looked.len() > REMEMBERED {
+            run.looked.pop_front();
         }
     }
 
     fn apply(&mut self, clock: u64, report: Report) -> Result<()> {
+        let run = &mut self.run;
         match report {
             Report::Leaves(pixel) => {
-                ensure!(clock < self.stops_at, "clock {clock}: an event leaves");
-                let pixel = self
-                    .pixels
-                    .get_mut(usize::from(pixel))
-                    .context("no such macropixel")?;
+                ensure!(clock < run.stops_at, "clock {clock}: an event leaves");
+                let pixel = run.pixels.get_mut(usize::from(pixel));
+                let pixel = pixel.context("no such macropixel")?;
                 let event = pixel.take_event();
                 let event = event.with_context(|| format!("clock {clock}: no event waits"))?;
-                if self.events == Events::Link || self.events == Events::System {
-                    let (time, word) = self.encoder.encode(&event);
-                    let mut looked = self.looked.iter().rev();
+                if matches!(self.scene.events, Events::Link | Events::System) {
+                    let (time, word) = run.encoder.encode(&event);
+                    let mut looked = run.looked.iter().rev();
                     let looked = looked.find(|(cycle, _)| *cycle == event.cycle.raw());
                     let ended = looked.map(|&(_, clock)| clock);
                     let time = time.map(|time| (time, None));
-                    self.words.extend(time.into_iter().chain([(word, ended)]));
+                    run.words.extend(time.into_iter().chain([(word, ended)]));
                 } else {
-                    self.taken.push_back(event);
+                    run.taken.push_back(event);
                     self.compare_reads(clock)?;
                 }
             }
             Report::Word(word) => {
                 ensure!(
-                    clock <= self.stops_at,
+                    clock <= run.stops_at,
                     "clock {clock}: a word after the stop"
                 );
-                let (expected, ended) = self.words.pop_front().unzip();
+                let (expected, ended) = run.words.pop_front().unzip();
                 ensure!(
                     expected == Some(word),
                     "clock {clock}: {word:x?}, not {expected:x?}"
                 );
                 let latency = ended.flatten().map(|ended| clock - ended);
-                self.outcome.latencies.extend(latency);
+                run.outcome.latencies.extend(latency);
             }
             Report::Read(address, data) if address >= register::COUNTS => self.counts.push(data),
             Report::Read(address, data) if address >= register::HISTOGRAM => {
@@ -298,8 +342,8 @@ impl Model {
                 let expected = self.register_values.get(usize::try_from(address)?).copied();
                 // Whether it runs yet is in the model only where it is started again.
                 let known = if address == 0 { 3 } else { u32::MAX };
-                let (runs, is_told) = (self.runs(clock - 1), data >> 2 & 1 == 1);
-                let was_stopped = self.run > 0 || self.stops_at < u64::MAX;
+                let (runs, is_told) = (run.has(clock - 1), data >> 2 & 1 == 1);
+                let was_stopped = self.runs > 0 || run.stops_at < u64::MAX;
                 if address == register::CONTROL && was_stopped {
                     ensure!(
                         runs == is_told,
@@ -325,7 +369,7 @@ impl Model {
 
     /// The event that the program has read, as it is taken.
     fn compare_reads(&mut self, clock: u64) -> Result<()> {
-        let event = self.taken.pop_front().context("no event")?;
+        let event = self.run.taken.pop_front().context("no event")?;
         let &[1, a, b, c, d, e, f, g] = &*self.reads else {
             bail!("clock {clock}: an event is taken that was not read");
         };
@@ -339,20 +383,17 @@ impl Model {
     }
 
     /// What is left when all photons have come.
-    pub fn end(
-        mut self,
-        reports: &mut Reports<impl FnMut() -> Result<(u64, Report)>>,
-    ) -> Result<ModelOutcome> {
+    fn end(mut self) -> Result<ModelOutcome> {
         loop {
-            match reports.next()? {
+            match self.reports.next()? {
                 (_, Report::End(waits)) => {
-                    ensure!(!waits && self.words.is_empty(), "words wait");
+                    ensure!(!waits && self.run.words.is_empty(), "words wait");
                     break;
                 }
                 (clock, report) => self.apply(clock, report)?,
             }
         }
-        let waits = self.pixels.iter().find(|pixel| pixel.has_event());
+        let waits = self.run.pixels.iter().find(|pixel| pixel.has_event());
         let waits = waits.map(AsyncPixel::address);
         ensure!(waits.is_none(), "the event of {waits:?} has not left");
         self.end_run()?;
@@ -364,12 +405,13 @@ impl Model {
 
     /// What is left when a run has ended, and its counts if the testbench has read them.
     fn end_run(&mut self) -> Result<()> {
-        let mut all = self.outcome.statistics;
+        let run = &mut self.run;
+        let mut all = run.outcome.statistics;
         // A stop ends the last look: what macropixels had not decided does not count.
-        let decides_at = self.looked_at + DECISION;
-        let decided = usize::try_from(self.stops_at.saturating_sub(decides_at))?;
-        let seen = *self.before.get(decided).unwrap_or(&all);
-        for pixel in &self.pixels {
+        let decides_at = run.looked_at + DECISION;
+        let decided = usize::try_from(run.stops_at.saturating_sub(decides_at))?;
+        let seen = *run.before.get(decided).unwrap_or(&all);
+        for pixel in &run.pixels {
             pixel.add_photons_to(&mut all);
         }
         let expected = [
@@ -377,61 +419,44 @@ impl Model {
             seen.saturated,
             all.rejected,
             all.gated_out,
-            self.strays,
+            run.strays,
             seen.events,
             seen.deferred,
             seen.expired,
             seen.expired_deferred,
-            self.outcome.looks,
-            self.outcome.late,
-            self.outcome.cycles,
+            run.outcome.looks,
+            run.outcome.late,
+            run.outcome.cycles,
         ];
         let (pairs, _) = self.counts.as_chunks::<2>();
         let counts: Vec<u64> = pairs
             .iter()
             .map(|&[low, high]| u64::from(low) | u64::from(high) << 32)
             .collect();
-        let is_read = self.stops_at == u64::MAX && self.events.has_registers();
+        let is_read = run.stops_at == u64::MAX && self.scene.events.has_registers();
         ensure!(
             counts.is_empty() && !is_read || counts == expected,
             "counts {counts:?}, not {expected:?}"
         );
-        ensure!(
-            all.photons() + self.strays == self.outcome.photons,
-            "photons"
-        );
-        self.strays = 0;
+        ensure!(all.photons() + run.strays == run.outcome.photons, "photons");
         self.counts.clear();
-        self.outcome.statistics = all;
-        self.total.add(&std::mem::take(&mut self.outcome));
+        run.outcome.statistics = all;
+        self.total.add(&run.outcome);
         Ok(())
     }
 }
 
-/// The macropixels, which have had no photon.
-fn pixels(scene: &Scene) -> Vec<AsyncPixel<128>> {
-    let pixel = |address| AsyncPixel::new(PixelAddress::new(address));
-    (0..1 << scene.pixels_log2).map(pixel).collect()
-}
-
 /// What the simulation tells, one at a time.
-pub struct Reports<F> {
-    read: F,
+struct Reports<R> {
+    from: R,
     waiting: Option<(u64, Report)>,
 }
 
-impl<F: FnMut() -> Result<(u64, Report)>> Reports<F> {
-    pub const fn new(read: F) -> Self {
-        Self {
-            read,
-            waiting: None,
-        }
-    }
-
-    pub fn next(&mut self) -> Result<(u64, Report)> {
+impl<R: Read> Reports<R> {
+    fn next(&mut self) -> Result<(u64, Report)> {
         match self.waiting.take() {
-            Some(reports) => Ok(reports),
-            None => (self.read)(),
+            Some(report) => Ok(report),
+            None => Report::read(&mut self.from),
         }
     }
 

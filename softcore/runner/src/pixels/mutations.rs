@@ -3,19 +3,18 @@
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, mpsc};
-use std::thread;
+use std::sync::{Arc, Mutex};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, anyhow, ensure};
 use lexopt::ValueExt;
-use lexopt::prelude::{Long, Short};
+use lexopt::prelude::Long;
+use rayon::prelude::*;
 
-use super::mutants::{MUTANTS, Mutant};
+use super::mutants::{self, MUTANTS, Mutant};
 use super::scene::Scene;
-use super::{proof, simulation::simulate};
+use super::{model::simulate, scenes};
 use crate::rtl::verilate_in;
-use crate::target_folder;
+use crate::{folder, read, root};
 
 /// Photons of a run, by which every fault has shown.
 const PHOTONS: u64 = 1_000_000;
@@ -53,7 +52,7 @@ struct Fault {
     held: Option<usize>,
 }
 
-const HELP: &str = "\
+pub const HELP: &str = "\
 cargo softcore mutations [--sample N] [--only TEXT]
 
 Plants faults in copies of the pixel processor's Verilog, one at a time, and runs the scenes of
@@ -70,30 +69,26 @@ pub fn run(mut parser: lexopt::Parser) -> Result<()> {
         match argument {
             Long("sample") => sample = Some(parser.value()?.parse()?),
             Long("only") => only = Some(parser.value()?.string()?),
-            Short('h') | Long("help") => {
-                println!("{HELP}");
-                return Ok(());
-            }
             other => return Err(other.unexpected().into()),
         }
     }
-    prove(&crate::root().canonicalize()?, sample, only.as_deref())
+    prove(sample, only.as_deref())
 }
 
 /// Puts each fault into a copy of the Verilog, all of them or a sample, and fails if the
 /// scenes do not find one.
-fn prove(root: &Path, sample: Option<usize>, only: Option<&str>) -> Result<()> {
-    let faults = &faults(root)?;
+fn prove(sample: Option<usize>, only: Option<&str>) -> Result<()> {
+    let faults = &faults()?;
     let all = faults.len();
     let mut chosen: Vec<usize> =
-        sample.map_or_else(|| (0..all).collect(), |many| sampled(root, many, all));
+        sample.map_or_else(|| (0..all).collect(), |many| sampled(many, all));
     chosen.retain(|&number| {
         let Fault { what, file, .. } = &faults[number];
         only.is_none_or(|text| file.contains(text) || what.contains(text))
     });
     ensure!(!chosen.is_empty(), "no faults to plant");
-    let scenes = proof::scenes(root, PHOTONS)?;
-    let folder = target_folder(root).join("softcore/mutants");
+    let scenes = scenes::all(PHOTONS)?;
+    let folder = folder("mutants")?;
     // Where no input is held, all is right: a simulation that cannot run finds nothing.
     let held = faults.iter().find(|fault| fault.held.is_some());
     let held = held.context("no inputs")?;
@@ -103,45 +98,33 @@ fn prove(root: &Path, sample: Option<usize>, only: Option<&str>) -> Result<()> {
         text: Arc::clone(&held.text),
         held: None,
     };
-    let found = judge(
-        root,
-        &folder.join("none"),
-        &none,
-        &scenes,
-        &mut Built::default(),
-    )?;
+    let built = &mut Built::default();
+    let found = judge(&folder.join("none"), &none, &scenes, built)?;
     ensure!(found.is_none(), "without a fault: {found:?}");
-    let (next, chosen) = (&AtomicUsize::new(0), &chosen);
-    let (scenes, of) = (&scenes, &folder);
-    let mut survivors = 0;
-    thread::scope(|scope| -> Result<()> {
-        let (sender, results) = mpsc::channel();
-        for worker in 0..thread::available_parallelism().map_or(1, Into::into) {
-            let sender = sender.clone();
-            scope.spawn(move || {
-                let (folder, mut built) = (of.join(worker.to_string()), Built::default());
-                while let Some(&number) = chosen.get(next.fetch_add(1, Ordering::Relaxed)) {
-                    let fault = &faults[number];
-                    if sender
-                        .send((fault, judge(root, &folder, fault, scenes, &mut built)))
-                        .is_err()
-                    {
-                        break;
-                    }
-                }
-            });
-        }
-        drop(sender);
-        for (Fault { what, .. }, found) in results {
-            if let Some(by) = found.with_context(|| what.clone())? {
-                println!("{what}: {by}");
-            } else {
-                println!("{what}: NOT FOUND");
-                survivors += 1;
-            }
-        }
-        Ok(())
-    })?;
+    let workers = 0..rayon::current_num_threads();
+    let built: Vec<_> = workers.map(|_| Mutex::<Built>::default()).collect();
+    let find = |&number: &usize| {
+        let fault = &faults[number];
+        let worker = rayon::current_thread_index().unwrap_or_default();
+        let mut built = built[worker]
+            .lock()
+            .map_err(|_| anyhow!("a thread panics"))?;
+        let found = judge(&folder.join(worker.to_string()), fault, &scenes, &mut built);
+        let found = found.with_context(|| fault.what.clone())?;
+        println!(
+            "{}: {}",
+            fault.what,
+            found.as_deref().unwrap_or("NOT FOUND")
+        );
+        Ok(found.is_some())
+    };
+    // No worker keeps a share that another could take.
+    let found: Vec<bool> = chosen
+        .par_iter()
+        .with_max_len(1)
+        .map(find)
+        .collect::<Result<_>>()?;
+    let survivors = found.iter().filter(|&&is_found| !is_found).count();
     let all = chosen.len();
     ensure!(survivors == 0, "{survivors} of {all} faults are not found");
     println!("pixel processor: {all} faults, all found");
@@ -149,23 +132,20 @@ fn prove(root: &Path, sample: Option<usize>, only: Option<&str>) -> Result<()> {
 }
 
 /// All faults: those of the list, and each input held at 0.
-fn faults(root: &Path) -> Result<Vec<Fault>> {
-    let read = |name: &str| {
-        let path = root.join("softcore").join(PIXELS).join(name);
-        fs::read_to_string(&path).with_context(|| path.display().to_string())
-    };
+fn faults() -> Result<Vec<Fault>> {
+    let verilog = |name: &str| read(&root().join("softcore").join(PIXELS).join(name));
     let mut all = Vec::new();
-    for mutant in &MUTANTS {
+    for mutant in mutants::each(MUTANTS) {
         let file = format!("{}.v", mutant.file);
         let Mutant { from, to, .. } = mutant;
         all.push(Fault {
             what: format!("{}: `{from}` as `{to}`", mutant.file),
-            text: mutant.apply(&read(&file)?)?.into(),
+            text: mutant.apply(&verilog(&file)?)?.into(),
             file,
             held: None,
         });
     }
-    let text = read(TOP)?;
+    let text = verilog(TOP)?;
     let mut connections = Vec::new();
     let mut start = 0;
     for line in text.split_inclusive('\n') {
@@ -173,7 +153,7 @@ fn faults(root: &Path) -> Result<Vec<Fault>> {
         let (module, end) = (words.next().unwrap_or_default(), start + line.len());
         let is_instance = line.trim_end().ends_with(" (") && module != "module" && module != ")";
         if is_instance {
-            let of_module = inputs(&read(&format!("{module}.v"))?);
+            let of_module = inputs(&verilog(&format!("{module}.v"))?);
             let ports = text[end..].split("\n    );").next().unwrap_or_default();
             for (at, _) in ports.match_indices('.') {
                 let Some((name, rest)) = ports[at + 1..].split_once('(') else {
@@ -236,9 +216,9 @@ fn argument(text: &str) -> usize {
 }
 
 /// So many, others with each commit.
-fn sampled(root: &Path, many: usize, all: usize) -> Vec<usize> {
+fn sampled(many: usize, all: usize) -> Vec<usize> {
     let head = Command::new("git")
-        .current_dir(root)
+        .current_dir(root())
         .args(["rev-parse", "HEAD"])
         .output();
     // Without a history, the first ones.
@@ -259,7 +239,6 @@ struct Built {
 
 /// What finds a fault, if anything does.
 fn judge(
-    root: &Path,
     folder: &Path,
     fault: &Fault,
     scenes: &[Scene],
@@ -268,7 +247,7 @@ fn judge(
     let softcore = folder.join("softcore");
     if built.text != fault.text {
         *built = Built::default();
-        copy(root, &softcore)?;
+        copy(&softcore)?;
         let file = softcore.join(PIXELS).join(&fault.file);
         fs::write(&file, &*fault.text).with_context(|| file.display().to_string())?;
         built.text = Arc::clone(&fault.text);
@@ -298,9 +277,9 @@ fn judge(
 }
 
 /// A copy of what the simulation is built from.
-fn copy(root: &Path, softcore: &Path) -> Result<()> {
+fn copy(softcore: &Path) -> Result<()> {
     for part in [PIXELS, "sim"] {
-        let (from, to) = (root.join("softcore").join(part), softcore.join(part));
+        let (from, to) = (root().join("softcore").join(part), softcore.join(part));
         fs::create_dir_all(&to).with_context(|| to.display().to_string())?;
         for file in fs::read_dir(&from).with_context(|| from.display().to_string())? {
             let file = file?;
@@ -316,25 +295,26 @@ mod tests {
 
     #[test]
     fn each_fault_has_its_place() {
-        let folder = crate::root().join("softcore/rtl/pixels");
-        for (number, mutant) in MUTANTS.iter().enumerate() {
+        let folder = root().join("softcore/rtl/pixels");
+        let mutants: Vec<Mutant> = mutants::each(MUTANTS).collect();
+        for (number, mutant) in mutants.iter().enumerate() {
             let text = fs::read_to_string(folder.join(mutant.file).with_extension("v")).unwrap();
             assert_ne!(mutant.apply(&text).unwrap(), text, "{mutant:?}");
-            let others = &MUTANTS[..number];
+            let others = &mutants[..number];
             assert!(!others.contains(mutant), "twice: {mutant:?}");
         }
-        let page = crate::root().join("docs/softcore.md");
-        let told = format!("plants {} faults", MUTANTS.len());
+        let page = root().join("docs/softcore.md");
+        let told = format!("plants {} faults", mutants.len());
         assert!(fs::read_to_string(page).unwrap().contains(&told), "{told}");
-        assert!(MUTANTS[0].apply("").is_err());
-        let twice = MUTANTS[0].from.repeat(2);
-        assert!(MUTANTS[0].apply(&twice).is_err());
+        assert!(mutants[0].apply("").is_err());
+        let twice = mutants[0].from.repeat(2);
+        assert!(mutants[0].apply(&twice).is_err());
     }
 
     #[test]
     fn each_input_is_held() {
-        let faults = faults(&crate::root()).unwrap();
-        let held = &faults[MUTANTS.len()..];
+        let faults = faults().unwrap();
+        let held = &faults[mutants::each(MUTANTS).count()..];
         for what in [
             "event_queue: its in is 0",
             "look_scan: its reset is 0",
@@ -343,19 +323,18 @@ mod tests {
             let fault = held.iter().find(|fault| fault.what == what);
             assert!(fault.is_some(), "{what}");
         }
-        let page = fs::read_to_string(crate::root().join("docs/softcore.md")).unwrap();
+        let page = fs::read_to_string(root().join("docs/softcore.md")).unwrap();
         let told = format!("of {} inputs", held.len());
         assert!(page.contains(&told), "{told}");
     }
 
     #[test]
     fn a_sample_has_no_fault_twice() {
-        let root = crate::root();
-        let mut sample = sampled(&root, 9, 100);
+        let mut sample = sampled(9, 100);
         assert_eq!(sample.len(), 9);
         sample.sort_unstable();
         sample.dedup();
         assert_eq!(sample.len(), 9);
-        assert_eq!(sampled(&root, 1000, 100).len(), 100);
+        assert_eq!(sampled(1000, 100).len(), 100);
     }
 }

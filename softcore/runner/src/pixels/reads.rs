@@ -40,59 +40,48 @@ pub struct Reads {
 impl Reads {
     /// What a clock brings, after its photon was counted.
     pub fn clock(&mut self, clock: u64, command: &Command, pixels: &[AsyncPixel<128>]) {
-        while self
-            .recent
-            .front()
-            .is_some_and(|&(at, ..)| at + UNTIL_COUNTED < clock)
-        {
+        let is_old = |&(at, ..): &(u64, u8, u16)| at + UNTIL_COUNTED < clock;
+        while self.recent.front().is_some_and(is_old) {
             self.recent.pop_front();
         }
-        self.recent
-            .extend(command.photon.map(|(pixel, code)| (clock, pixel, code)));
-        let count = |eight: &Eight, bin: usize| {
-            pixels
-                .get(eight.pixel)
-                .and_then(|pixel| pixel.histogram().count(eight.first + bin))
-        };
+        let photon = command.photon.map(|(pixel, code)| (clock, pixel, code));
+        self.recent.extend(photon);
+        let count = |pixel: usize, bin| pixels.get(pixel)?.histogram().count(bin);
         match command.access {
             Some(Access::Write(register::HISTOGRAM, address)) => {
                 let address = address as usize;
-                let mut eight = Eight {
-                    pixel: address >> 4,
-                    first: (address & 15) * 8,
-                    requested_at: clock,
-                    expected: None,
+                let (pixel, first) = (address >> 4, (address & 15) * 8);
+                let range = |bin| {
+                    let now = count(pixel, bin)?;
+                    let is_of_bin = |&&(_, of, code): &&(u64, u8, u16)| {
+                        (usize::from(of), usize::from(code)) == (pixel, bin)
+                    };
+                    let on_way = self.recent.iter().filter(is_of_bin).count();
+                    Some(now.saturating_sub(u32::try_from(on_way).ok()?)..=now)
                 };
                 let had_time = |&ended: &u64| ended == 0 || ended + UNTIL_ENDED < clock;
-                if self.ended.get(eight.pixel).is_none_or(had_time) {
-                    let ranges = (0..8).filter_map(|bin| {
-                        let now = count(&eight, bin)?;
-                        let of_bin = |&&(_, pixel, code): &&(u64, u8, u16)| {
-                            (usize::from(pixel), usize::from(code))
-                                == (eight.pixel, eight.first + bin)
-                        };
-                        let on_way =
-                            u32::try_from(self.recent.iter().filter(of_bin).count()).ok()?;
-                        Some(now.saturating_sub(on_way)..=now)
-                    });
-                    eight.expected = Some(ranges.collect());
-                }
-                self.requests.push_back(eight);
+                let is_known = self.ended.get(pixel).is_none_or(had_time);
+                let expected = is_known.then(|| (first..first + 8).filter_map(range).collect());
+                self.requests.push_back(Eight {
+                    pixel,
+                    first,
+                    requested_at: clock,
+                    expected,
+                });
             }
             // They were there when the program asked before.
             Some(Access::Read(register::BINS)) => {
-                if let Some(mut eight) = self.requests.pop_back() {
-                    let ended = self
-                        .ended
-                        .get(eight.pixel)
-                        .is_some_and(|&ended| ended >= eight.requested_at);
-                    let ranges = eight.expected.take().filter(|_| !ended);
-                    let until = |(bin, range): (usize, RangeInclusive<u32>)| {
-                        Some(*range.start()..=count(&eight, bin)?)
-                    };
-                    eight.expected = ranges
-                        .map(|ranges| ranges.into_iter().enumerate().filter_map(until).collect());
-                    self.requests.push_back(eight);
+                let Some(eight) = self.requests.back_mut() else {
+                    return;
+                };
+                let ended = self.ended.get(eight.pixel);
+                if ended.is_some_and(|&ended| ended >= eight.requested_at) {
+                    eight.expected = None;
+                }
+                for (bin, range) in (eight.first..).zip(eight.expected.iter_mut().flatten()) {
+                    if let Some(now) = count(eight.pixel, bin) {
+                        *range = *range.start()..=now;
+                    }
                 }
             }
             _ => {}

@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::sync::Arc;
+use std::vec;
 
 use anyhow::Result;
 use dtof_core::fixed::types::U8F8;
@@ -100,15 +101,38 @@ pub fn config(
     Ok(builder.dead_time(dead_time).build()?)
 }
 
+/// A clock that place and route reaches for 4 and 16 macropixels in the whole system, and nearly
+/// for 64.
+pub const MEGAHERTZ: f64 = 75.0;
+
+/// Clocks of a laser cycle of 10 MHz at this clock: one or the other.
+const CLOCKS: [u64; 2] = [7, 8];
+
 impl Scene {
-    /// What the registers of the settings hold.
-    pub fn register_values(&self) -> Result<Vec<u32>> {
-        self.register_values_of(&self.config)
+    /// A photon a clock, some of them from a target, and a link that always takes a word.
+    pub fn new(name: &str, pixels_log2: u32, config: PixelConfig<128>) -> Self {
+        Self {
+            name: name.to_owned(),
+            pixels_log2,
+            config,
+            clocks: CLOCKS,
+            rate: 256,
+            bins: Bins::Target(100, 1),
+            pixels: Pixels::All,
+            link: 256,
+            events: Events::Link,
+            reads: None,
+            restarts: Vec::new(),
+            longest_run: 8192,
+            length: 0,
+            seed: 1,
+        }
     }
 
-    /// The same with other settings.
-    fn register_values_of(&self, config: &PixelConfig<128>) -> Result<Vec<u32>> {
-        register_values(config, self.events == Events::Link, self.pixels_log2)
+    /// What the registers hold in a run.
+    pub fn register_values(&self, run: usize) -> Result<Vec<u32>> {
+        let config = self.config_of(run);
+        register_values(&config, self.events == Events::Link, self.pixels_log2)
     }
 
     /// The settings of a run; each restart begins the next.
@@ -132,7 +156,7 @@ pub struct Commands {
     random: Pcg64Mcg,
     clock: u64,
     cycle_ends_at: u64,
-    settings: Vec<Access>,
+    settings: vec::IntoIter<Access>,
     turn: u8,
     /// The registers' values of all settings, by [`Scene::place_of`].
     values: Vec<Vec<u32>>,
@@ -153,8 +177,11 @@ enum Restart {
 
 impl Commands {
     pub fn new(scene: &Scene) -> Result<Self> {
-        let mut settings = settings(&scene.register_values()?);
-        settings.reverse();
+        let runs = 0..=scene.restarts.len();
+        let values: Vec<_> = runs
+            .map(|run| scene.register_values(run))
+            .collect::<Result<_>>()?;
+        let mut settings = settings(&values[0]);
         if !scene.events.has_registers() {
             settings.clear();
         }
@@ -163,11 +190,9 @@ impl Commands {
             random: Pcg64Mcg::seed_from_u64(scene.seed),
             clock: 0,
             cycle_ends_at: REST,
-            settings,
+            settings: settings.into_iter(),
             turn: 0,
-            values: (0..=scene.restarts.len())
-                .map(|run| scene.register_values_of(&scene.config_of(run)))
-                .collect::<Result<_>>()?,
+            values,
             run: 0,
             restart_at: REST + 1000,
             restart: VecDeque::new(),
@@ -298,7 +323,7 @@ impl Iterator for Commands {
         }
         let mut command = Command::default();
         if clock < REST {
-            command.access = self.settings.pop();
+            command.access = self.settings.next();
             return Some(command);
         }
         if clock < end {

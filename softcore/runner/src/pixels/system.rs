@@ -1,16 +1,14 @@
 //! How long an event takes in the whole system, from the end of the laser cycle that decides to
 //! REQ at the AER port.
 
-use std::path::Path;
 use std::process::Command;
 
 use anyhow::{Context, Result, ensure};
 use dtof_softcore::stream;
 
-use super::model::ModelOutcome;
-use super::row::Latency;
-use super::scene::{Bins, Events, Pixels, Scene};
-use super::simulation::simulate;
+use super::figures::Latency;
+use super::model::{ModelOutcome, simulate};
+use super::scene::{Events, Scene};
 use crate::image::Images;
 use crate::rtl::{package_folder, verilate};
 
@@ -36,38 +34,24 @@ const LENGTH: u64 = 1_000_000;
 /// The chance that a slow receiver raises or lowers ACK in a clock, in 1/256.
 const SLOW: u32 = 8;
 
-/// A clock that place and route reaches for 4 and 16 macropixels in the whole system, and nearly
-/// for 64.
-pub const MEGAHERTZ: f64 = 75.0;
-
-/// Clocks of a laser cycle of 10 MHz at this clock: one or the other.
-const CLOCKS: [u64; 2] = [7, 8];
-
 /// Runs the system at several rates of photons, `length` clocks each.
-pub fn measure(root: &Path) -> Result<Vec<Latency>> {
-    let processor = package_folder(root, "pythondata_cpu_vexriscv")?;
+pub fn measure() -> Result<Vec<Latency>> {
+    let processor = package_folder("vexriscv")?;
     // Its RAM and its macropixels are those it has by itself.
-    let simulator = verilate(root, "system", "system", &processor, &[])?;
-    let images = Images::build(root, "rv32im", false)?;
+    let simulator = verilate("system", "system", &processor, &[])?;
+    let images = Images::build("rv32im", false)?;
     let mut all = Vec::new();
     for (program, packer) in PROGRAMS {
         let words = images.words(program);
         let run = |rate: u32, link| -> Result<(Scene, ModelOutcome)> {
             let scene = Scene {
                 name: format!("the system, {rate}/256 photons a clock, events packed by {packer}"),
-                pixels_log2: 2,
-                config: stream::config()?,
-                clocks: CLOCKS,
                 rate,
-                bins: Bins::Target(100, 1),
-                pixels: Pixels::All,
                 link,
                 events: Events::System,
-                reads: None,
-                restarts: Vec::new(),
-                longest_run: 0,
                 length: LENGTH,
                 seed: rate.into(),
+                ..Scene::new("", 2, stream::config()?)
             };
             let mut command = Command::new(&simulator);
             command.arg(format!("+ram={}", words.display()));
@@ -92,7 +76,7 @@ pub fn measure(root: &Path) -> Result<Vec<Latency>> {
                     .with_context(|| format!("{}: no events", scene.name))
             };
             let latency = Latency {
-                packer: packer.to_owned(),
+                packer,
                 photons: u64::from(rate) * 1000 / 256,
                 clocks: LENGTH,
                 events: sorted.len() as u64,

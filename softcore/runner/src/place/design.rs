@@ -1,9 +1,10 @@
 //! What is placed: the Verilog of each design, and what it is of.
 
 use std::fs;
-use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
+
+use crate::root;
 
 /// Macropixels of the pixel processor.
 pub const SIZES: [u32; 3] = [4, 16, 64];
@@ -30,19 +31,13 @@ pub enum Kind {
 impl Kind {
     /// All, or those of one size and those without a size.
     pub fn all(size: Option<u32>) -> Vec<Self> {
-        let sizes = || {
-            SIZES
-                .into_iter()
-                .filter(move |&of| size.is_none_or(|size| of == size))
-        };
-        let pixels = sizes().map(Self::Pixels);
-        let systems = sizes().map(Self::System);
-        let trees = LANES.map(Self::Tree);
-        pixels
-            .chain([Self::Processor])
-            .chain(systems)
-            .chain(trees)
-            .collect()
+        let mut all = SIZES.map(Self::Pixels).to_vec();
+        all.push(Self::Processor);
+        all.extend(SIZES.map(Self::System));
+        all.extend(LANES.map(Self::Tree));
+        let is_of = |of: u32| of == 0 || size.is_none_or(|size| of == size);
+        all.retain(|kind| is_of(kind.macropixels()));
+        all
     }
 
     /// Its name in the figures.
@@ -96,7 +91,7 @@ impl Kind {
     }
 
     /// Its Verilog of the workspace.
-    pub fn sources(self, root: &Path) -> Result<Vec<String>> {
+    pub fn sources(self) -> Result<Vec<String>> {
         let (top, _) = self.top();
         let own: &[&str] = match self {
             Self::Pixels(_) => &[],
@@ -107,7 +102,7 @@ impl Kind {
         let own = own.iter().map(|name| format!("softcore/rtl/{name}.v"));
         let mut sources: Vec<String> = own.collect();
         if self.macropixels() != 0 {
-            sources.extend(verilog_in(root, PIXELS)?);
+            sources.extend(verilog_in(PIXELS)?);
         }
         sources.push(format!("softcore/rtl/place/{top}.v"));
         Ok(sources)
@@ -115,9 +110,9 @@ impl Kind {
 }
 
 /// All Verilog of a folder, by name.
-fn verilog_in(root: &Path, folder: &str) -> Result<Vec<String>> {
+fn verilog_in(folder: &str) -> Result<Vec<String>> {
     let mut found = Vec::new();
-    for entry in fs::read_dir(root.join(folder)).context(folder.to_owned())? {
+    for entry in fs::read_dir(root().join(folder)).context(folder.to_owned())? {
         let name = entry?.file_name().to_string_lossy().into_owned();
         if name.ends_with(".v") {
             found.push(format!("{folder}/{name}"));
@@ -131,7 +126,6 @@ fn verilog_in(root: &Path, folder: &str) -> Result<Vec<String>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::root;
 
     #[test]
     fn a_size_leaves_out_the_others() {
@@ -148,15 +142,14 @@ mod tests {
 
     #[test]
     fn a_design_has_its_own_files_and_a_folder_without_any_is_told() {
-        let root = root();
         for kind in [Kind::Processor, Kind::Tree(8)] {
-            for source in kind.sources(&root).unwrap() {
-                assert!(root.join(&source).is_file(), "{source}");
+            for source in kind.sources().unwrap() {
+                assert!(root().join(&source).is_file(), "{source}");
             }
         }
-        let places = verilog_in(&root, "softcore/rtl/place").unwrap();
+        let places = verilog_in("softcore/rtl/place").unwrap();
         assert!(places.is_sorted() && places.len() == 4);
-        assert!(verilog_in(&root, "softcore/src").is_err());
-        assert!(verilog_in(&root, "softcore/rtl/none").is_err());
+        assert!(verilog_in("softcore/src").is_err());
+        assert!(verilog_in("softcore/rtl/none").is_err());
     }
 }

@@ -1,6 +1,5 @@
 //! Yosys and nextpnr, which are Python packages.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -10,13 +9,10 @@ use super::design::Kind;
 use super::report::{self, Placed};
 use crate::program::{self, ProgramRun};
 use crate::rtl;
-use crate::target_folder;
+use crate::{folder, read, root};
 
 /// The packages, with versions and hashes.
 const REQUIREMENTS: &str = "softcore/place/requirements.txt";
-
-/// The package of `VexRiscv`.
-const PROCESSOR: &str = "pythondata_cpu_vexriscv";
 
 /// The clock that `docs/softcore.md` assumes, at which placement and routing aim, in MHz.
 const GOAL: &str = "100";
@@ -39,25 +35,22 @@ pub struct Placements {
 }
 
 /// The tools, installed.
-pub struct Flow<'a> {
-    root: &'a Path,
+pub struct Flow {
     python: PathBuf,
     /// The folder with the file of `VexRiscv`.
     processor: PathBuf,
 }
 
-impl<'a> Flow<'a> {
+impl Flow {
     /// Installs what is missing.
-    pub fn install(root: &'a Path) -> Result<Self> {
-        let processor = rtl::package_folder(root, PROCESSOR)?;
+    pub fn install() -> Result<Self> {
         let flow = Self {
-            root,
-            python: rtl::python(root, REQUIREMENTS)?,
-            processor,
+            processor: rtl::package_folder("vexriscv")?,
+            python: rtl::python(REQUIREMENTS)?,
         };
         // The first run of each makes machine code of it, which is kept.
         for tool in [YOSYS, NEXTPNR] {
-            let folder = flow.folder("versions")?;
+            let folder = folder("place/versions")?;
             let ran = flow.run(tool, &folder, &["--version".to_owned()])?;
             println!("{}", [ran.output, ran.errors].concat().trim());
         }
@@ -67,10 +60,10 @@ impl<'a> Flow<'a> {
     /// Synthesis of a design, and its placement and routing once a seed, on the smallest part
     /// that takes it.
     pub fn place(&self, kind: Kind) -> Result<Placements> {
-        let folder = self.folder(&kind.folder())?;
-        let script = script(kind, &kind.sources(self.root)?);
+        let folder = folder(&format!("place/{}", kind.folder()))?;
+        let script = script(kind, &kind.sources()?);
         self.run(YOSYS, &folder, &["-q".into(), "-p".into(), script])?;
-        let netlist = fs::read_to_string(folder.join(NETLIST)).context(NETLIST)?;
+        let netlist = read(&folder.join(NETLIST))?;
         let registers = match kind.has_pins() {
             true => 0,
             false => report::port_bits(&netlist, kind.top().0)?,
@@ -97,9 +90,7 @@ impl<'a> Flow<'a> {
         let mut all = Vec::new();
         for seed in SEEDS {
             self.run(NEXTPNR, folder, &options(kind, part, seed))?;
-            let report = folder.join(file(seed));
-            let report =
-                fs::read_to_string(&report).with_context(|| report.display().to_string())?;
+            let report = read(&folder.join(file(seed)))?;
             all.push(Placed::of(&report).with_context(|| format!("seed {seed}"))?);
         }
         let used: Vec<_> = all.iter().map(|placed| placed.used).collect();
@@ -110,15 +101,9 @@ impl<'a> Flow<'a> {
         Ok(all)
     }
 
-    fn folder(&self, name: &str) -> Result<PathBuf> {
-        let folder = target_folder(self.root).join("softcore/place").join(name);
-        fs::create_dir_all(&folder).with_context(|| folder.display().to_string())?;
-        Ok(folder)
-    }
-
     /// Runs a tool. It sees three folders, under the same names everywhere.
     fn run(&self, tool: &str, folder: &Path, arguments: &[String]) -> Result<ProgramRun> {
-        let softcore = self.root.join("softcore");
+        let softcore = root().join("softcore");
         let mounts = [
             ("/softcore", &*softcore),
             ("/processor", &self.processor),
@@ -128,12 +113,10 @@ impl<'a> Flow<'a> {
         let mut command = Command::new(self.python.with_file_name(tool));
         command
             .env("YOWASP_MOUNT", mounts.join(":"))
-            .env("YOWASP_CACHE_DIR", self.folder("cache")?)
+            .env("YOWASP_CACHE_DIR", crate::folder("place/cache")?)
             .current_dir(folder)
             .args(arguments);
-        let ran = program::run(&mut command, None)?;
-        ensure!(ran.code == Some(0), "{tool}: {}", ran.output());
-        Ok(ran)
+        program::succeed(&mut command)
     }
 }
 
@@ -161,32 +144,16 @@ fn script(kind: Kind, sources: &[String]) -> String {
     )
 }
 
-/// Those of nextpnr.
+/// Those of nextpnr. A clock below the goal is no failure: how fast it is, is the question.
 fn options(kind: Kind, part: &str, seed: u32) -> Vec<String> {
-    let (part, seed_text) = (format!("--{part}"), seed.to_string());
-    let report = format!("/work/{}", file(seed));
-    let mut options = vec![
-        &part,
-        "--package",
-        "CABGA381",
-        "--speed",
-        "6",
-        "--freq",
-        GOAL,
-        "--seed",
-        &seed_text,
-        "--json",
-        "/work/netlist.json",
-        "--report",
-        &report,
-        // How fast it is, is the question.
-        "--timing-allow-fail",
-        "--quiet",
-    ];
-    if !kind.has_pins() {
-        options.push("--out-of-context");
-    }
-    options.into_iter().map(str::to_owned).collect()
+    let report = file(seed);
+    let options = format!(
+        "--{part} --package CABGA381 --speed 6 --freq {GOAL} --seed {seed} \
+         --json /work/{NETLIST} --report /work/{report} --timing-allow-fail --quiet"
+    );
+    let no_pins = (!kind.has_pins()).then_some("--out-of-context");
+    let options = options.split(' ').chain(no_pins);
+    options.map(str::to_owned).collect()
 }
 
 /// The file of a report.

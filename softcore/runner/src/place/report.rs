@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, bail, ensure};
 use serde::Deserialize;
+use serde_json::Value;
 
 /// `--report` of nextpnr, its `docs/report.md`, as far as it is used here. Times in ns.
 #[derive(Debug, Deserialize)]
@@ -62,26 +63,12 @@ pub struct Used {
 
 /// The bits of all ports of a netlist's module but for the clock.
 pub fn port_bits(netlist: &str, module: &str) -> Result<u64> {
-    #[derive(Deserialize)]
-    struct Netlist {
-        modules: BTreeMap<String, Module>,
-    }
-    #[derive(Deserialize)]
-    struct Module {
-        ports: BTreeMap<String, Port>,
-    }
-    #[derive(Deserialize)]
-    struct Port {
-        bits: Vec<serde_json::Value>,
-    }
-
-    let netlist: Netlist = serde_json::from_str(netlist).context("the netlist of Yosys")?;
-    let module = netlist
-        .modules
-        .get(module)
-        .with_context(|| format!("no {module}"))?;
-    let ports = module.ports.iter().filter(|(name, _)| *name != "clk");
-    let bits: usize = ports.map(|(_, port)| port.bits.len()).sum();
+    let netlist: Value = serde_json::from_str(netlist).context("the netlist of Yosys")?;
+    let ports = netlist["modules"][module]["ports"].as_object();
+    let ports = ports.with_context(|| format!("no {module}"))?.iter();
+    let bits = ports.filter(|(name, _)| *name != "clk");
+    let bits = bits.map(|(_, port)| Some(port["bits"].as_array()?.len()));
+    let bits: usize = bits.sum::<Option<_>>().context("a port without bits")?;
     Ok(bits.try_into()?)
 }
 

@@ -12,9 +12,9 @@ use dtof_core::{Count, Count10, RangeGate};
 use rand_pcg::Pcg64;
 use rand_pcg::rand_core::{Rng, SeedableRng};
 
+use crate::folder;
 use crate::program;
 use crate::rtl;
-use crate::target_folder;
 
 const BINS: usize = 128;
 /// The largest count of 10 bits.
@@ -30,21 +30,17 @@ struct Question {
 }
 
 /// Whether the tree with so many lanes decides as the model; the clocks it takes.
-pub fn check(root: &Path, lanes: u32) -> Result<u64> {
+pub fn check(lanes: u32) -> Result<u64> {
     let name = format!("comparator_tree-{lanes}");
     let parameter = format!("-GLANES={lanes}");
     let defined = format!("-DLANES={lanes}");
     let options = [&*parameter, "-CFLAGS", &defined];
-    let simulation = rtl::verilate(root, "comparator_tree", &name, Path::new(""), &options)?;
+    let simulation = rtl::verilate("comparator_tree", &name, Path::new(""), &options)?;
     let questions = questions();
-    let file = target_folder(root)
-        .join("softcore")
-        .join(&name)
-        .join("histograms");
+    let file = folder(&name)?.join("histograms");
     let lines: String = questions.iter().map(line).collect();
     fs::write(&file, lines).with_context(|| file.display().to_string())?;
-    let ran = program::run(Command::new(simulation).arg(&file), None)?;
-    ensure!(ran.code == Some(0), ran.output());
+    let ran = program::succeed(Command::new(simulation).arg(&file))?;
     let (clocks, events) = compare(&questions, &ran.output)?;
     println!(
         "{name}: {} decisions as the model, {events} events, {clocks} clocks each",

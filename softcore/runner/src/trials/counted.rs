@@ -6,6 +6,7 @@ use dtof_softcore::stream::FEW;
 use super::events;
 use super::photons::Photon;
 use crate::program::ProgramRun;
+use crate::table;
 
 /// The report of the testbench and the program on a run.
 pub struct Counted {
@@ -64,10 +65,7 @@ impl Counted {
         let words = ran.output.lines();
         let words = words.filter_map(|line| line.strip_prefix("event "));
         let words = words.map(|word| u128::from_str_radix(word, 16));
-        let marks = ran.errors.lines().filter_map(|line| {
-            let number = line.strip_prefix("mark ")?.split(' ').next();
-            Some(number.unwrap_or_default().parse())
-        });
+        let marks = table::marks(&ran.errors).map(|mark| anyhow::Ok(u32::try_from(mark?.0)?));
         Ok(Self {
             cycles,
             looks: count("looks")?,
@@ -81,7 +79,7 @@ impl Counted {
             fill,
             lowest,
             words: words.collect::<Result<_, _>>()?,
-            marks: marks.collect::<Result<_, _>>()?,
+            marks: marks.collect::<Result<_>>()?,
         })
     }
 

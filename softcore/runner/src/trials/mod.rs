@@ -8,12 +8,14 @@ pub mod sustained;
 
 use std::fmt::Write as _;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::{Context, Result, ensure};
 
+use crate::folder;
+use crate::image::Images;
 use crate::memory::MACROPIXELS;
-use crate::rtl::{Laser, Simulator};
+use crate::rtl::Simulator;
 use crate::table::Row;
 use counted::Counted;
 use photons::{PER_PHOTON, Photon, Photons, photons};
@@ -40,44 +42,6 @@ const RATES: [u32; 3] = [1, 2, 4];
 const CERTAIN: u32 = 1500;
 const CERTAIN_RATE: u32 = PER_PHOTON / 50;
 
-/// Clock cycles that a processor takes.
-#[derive(Clone, Copy, Debug)]
-pub struct Cycles {
-    /// For a photon alone.
-    count: u64,
-    /// For a look without an event.
-    look: u64,
-}
-
-impl Cycles {
-    /// The counts of the bench.
-    pub fn of(rows: &[Row]) -> Option<Self> {
-        let of = |operation| {
-            let row = rows.iter().find(|row| row.operation == operation);
-            #[allow(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "few, and not negative"
-            )]
-            row.map(|row| row.cycles as u64)
-        };
-        Some(Self {
-            count: of("photon: AsyncPixel::count")?,
-            look: of("decision: look; no event")?,
-        })
-    }
-}
-
-/// The set-up for trying photons on a processor.
-pub struct Trials<'a> {
-    pub simulator: &'a Simulator,
-    /// The path of the image `stream-N`.
-    pub image: &'a dyn Fn(u8) -> PathBuf,
-    pub folder: &'a Path,
-    pub core: &'a str,
-    pub cycles: Cycles,
-}
-
 /// The results of the trials.
 pub struct Found {
     pub sustained: Vec<SustainedRate>,
@@ -103,68 +67,94 @@ struct Run {
     strays: bool,
 }
 
-impl Trials<'_> {
-    /// The highest rate, found by halving, and what comes of parts of it; and runs in which
-    /// events are certain, the last with a slow link and photons of macropixels that
-    /// there are not.
-    pub fn run(&self) -> Result<Found> {
-        let at = |rate, length| Run {
-            pixels: PIXELS,
-            rate,
-            signal: SIGNAL,
-            length,
-            clocks: CLOCKS,
-            wait: 0,
-            strays: false,
-        };
-        // More than that it cannot count.
-        let most = u64::from(PER_PHOTON) * CLOCKS / self.cycles.count.max(1);
-        let (mut highest, mut failed) = (0, u32::try_from(most)?);
-        while failed - highest > (highest / PARTS).max(1) {
-            let rate = highest.midpoint(failed);
-            let (counted, _) = self.stream(&at(rate, cycles(rate)))?;
-            if counted.is_sustained() {
-                highest = rate;
-            } else {
-                failed = rate;
-            }
-        }
-        ensure!(highest >= RATES[2], "no rate is sustained");
-        let mut sustained = Vec::new();
-        for part in RATES {
-            let run = at(highest / part, cycles(highest));
-            let counted = self.checked(&run)?;
-            ensure!(counted.is_sustained(), "a lower rate is not sustained");
-            let tenths = counted.cycles * u64::from(PIXELS) * 10;
-            sustained.push(SustainedRate {
-                core: self.core.to_owned(),
-                rate: run.rate,
-                between_looks: tenths.div_ceil(counted.looks.max(1)) as f64 / 10.0,
-                photons: counted.photons,
-                events: counted.events,
-                expired: counted.expired,
-                fill: counted.fill,
-            });
-        }
-        let mut stack = Vec::new();
-        for pixels in MACROPIXELS {
-            let counted = self.certain(pixels, false)?;
-            stack.push((pixels, counted.stack));
-        }
-        let slow = self.certain(PIXELS, true)?;
-        ensure!(slow.deferred > 0, "a slow link puts nothing off");
-        Ok(Found {
-            sustained,
-            stack,
-            slow: (slow.events, slow.deferred),
-        })
-    }
+/// What photons are tried on.
+struct Trials<'a> {
+    simulator: &'a Simulator,
+    images: &'a Images,
+    /// The file of the photons.
+    file: PathBuf,
+    /// Clock cycles of a look without an event.
+    look: u64,
+}
 
+/// The highest rate, found by halving, and what comes of parts of it; and runs in which
+/// events are certain, the last with a slow link and photons of macropixels that
+/// there are not. The bench has found the `rows` of the core.
+pub fn run(simulator: &Simulator, images: &Images, core: &str, rows: &[Row]) -> Result<Found> {
+    let cycles_of = |operation| {
+        let row = rows.iter().find(|row| row.operation == operation);
+        #[allow(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "few, and not negative"
+        )]
+        let cycles = row.map(|row| row.cycles as u64);
+        cycles.with_context(|| format!("no row `{operation}`"))
+    };
+    let trials = Trials {
+        simulator,
+        images,
+        file: folder("")?.join("photons.txt"),
+        look: cycles_of("decision: look; no event")?,
+    };
+    let at = |rate, length| Run {
+        pixels: PIXELS,
+        rate,
+        signal: SIGNAL,
+        length,
+        clocks: CLOCKS,
+        wait: 0,
+        strays: false,
+    };
+    // More than that it cannot count.
+    let most = u64::from(PER_PHOTON) * CLOCKS / cycles_of("photon: AsyncPixel::count")?.max(1);
+    let (mut highest, mut failed) = (0, u32::try_from(most)?);
+    while failed - highest > (highest / PARTS).max(1) {
+        let rate = highest.midpoint(failed);
+        let (counted, _) = trials.stream(&at(rate, cycles(rate)))?;
+        if counted.is_sustained() {
+            highest = rate;
+        } else {
+            failed = rate;
+        }
+    }
+    ensure!(highest >= RATES[2], "no rate is sustained");
+    let mut sustained = Vec::new();
+    for part in RATES {
+        let run = at(highest / part, cycles(highest));
+        let counted = trials.checked(&run)?;
+        ensure!(counted.is_sustained(), "a lower rate is not sustained");
+        let tenths = counted.cycles * u64::from(PIXELS) * 10;
+        sustained.push(SustainedRate {
+            core: core.to_owned(),
+            rate: run.rate,
+            between_looks: tenths.div_ceil(counted.looks.max(1)) as f64 / 10.0,
+            photons: counted.photons,
+            events: counted.events,
+            expired: counted.expired,
+            fill: counted.fill,
+        });
+    }
+    let mut stack = Vec::new();
+    for pixels in MACROPIXELS {
+        let counted = trials.certain(pixels, false)?;
+        stack.push((pixels, counted.stack));
+    }
+    let slow = trials.certain(PIXELS, true)?;
+    ensure!(slow.deferred > 0, "a slow link puts nothing off");
+    Ok(Found {
+        sustained,
+        stack,
+        slow: (slow.events, slow.deferred),
+    })
+}
+
+impl Trials<'_> {
     /// A run with a laser so slow that every macropixel is looked at in time and fires; or
     /// would, if `is_slow`, for a link that takes a quarter of the run for a word.
     fn certain(&self, pixels: u8, is_slow: bool) -> Result<Counted> {
         // A look at each macropixel in 20 laser cycles.
-        let clocks = (u64::from(pixels) * self.cycles.look / 20).max(CLOCKS);
+        let clocks = (u64::from(pixels) * self.look / 20).max(CLOCKS);
         let run = Run {
             pixels,
             rate: CERTAIN_RATE * u32::from(pixels),
@@ -202,18 +192,14 @@ impl Trials<'_> {
                 strays += 1;
             }
         }
-        let file = self.folder.join("photons.txt");
-        fs::write(&file, text).with_context(|| file.display().to_string())?;
-        let laser = Laser {
-            photons: &file,
-            clocks: run.clocks,
-            wait: run.wait,
-        };
+        let file = &self.file;
+        fs::write(file, text).with_context(|| file.display().to_string())?;
         // The last photons take as long as the rest at most, and then the bit-serial
         // processor divides for each digit of the report; and words that are left wait.
         let limit = 2 * u64::from(run.length) * run.clocks + 50_000_000 + 10 * run.wait;
-        let image = (self.image)(run.pixels);
-        let ran = self.simulator.stream(&image, limit, &laser)?;
+        let image = self.images.flat(&format!("stream-{}", run.pixels));
+        let link = [run.clocks, run.wait];
+        let ran = self.simulator.stream(&image, limit, file, link)?;
         let counted = Counted::read(&ran).with_context(|| format!("{run:?}\n{}", ran.output()))?;
         let found = counted.strays;
         ensure!(found == strays, "{run:?}: {found} strays of {strays}");

@@ -1,8 +1,8 @@
 //! A rate that a processor sustains, as the file has it.
 
 use super::photons::UNIT;
-use crate::line::Column::{self, Name, Percent, Unchecked};
-use crate::line::Line;
+use crate::files::Column::{self, Name, Percent, Unchecked};
+use crate::files::{Cells, Line, ReadLine};
 
 /// The results of a run at one rate.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,20 +42,20 @@ impl Line for SustainedRate {
         let counts = counts.map(|count| count.to_string()).join(",");
         format!("{core},{rate:.5},{between:.1},{counts}")
     }
+}
 
-    fn of(words: &[&str]) -> Option<Self> {
-        let &[core, isa, rate, between, photons, events, expired, fill] = words else {
-            return None;
-        };
-        let rate = rate.replacen('.', "", 1);
+impl ReadLine for SustainedRate {
+    fn of(cells: &mut Cells<'_>) -> Option<Self> {
+        let core = cells.core()?;
+        let rate = cells.read::<String>()?.replacen('.', "", 1);
         Some(Self {
-            core: format!("{core},{isa}"),
+            core,
             rate: (rate.len() == 6).then(|| rate.parse().ok())??,
-            between_looks: between.parse().ok()?,
-            photons: photons.parse().ok()?,
-            events: events.parse().ok()?,
-            expired: expired.parse().ok()?,
-            fill: fill.parse().ok()?,
+            between_looks: cells.read()?,
+            photons: cells.read()?,
+            events: cells.read()?,
+            expired: cells.read()?,
+            fill: cells.read()?,
         })
     }
 }

@@ -3,12 +3,14 @@
 use std::env;
 use std::fs::File;
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use dtof_core::fixed::types::U8F8;
 use dtof_data::photons::tmf8820;
+
+use crate::root;
 
 use super::scene::{Bins, Events, Pixels, Recorded, Scene, config};
 
@@ -28,7 +30,7 @@ const RATES: [(u32, &str); 4] = [
 ];
 
 /// The scenes, with about so many photons in all.
-pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
+pub fn all(photons: u64) -> Result<Vec<Scene>> {
     let paper = config(PAPER, ALPHA, 5, WHOLE, false)?;
     let short = config([1, 1, 30], U8F8::lit("0.5"), 1, [3, 77], true)?;
     let bright = config([50, 400, 4000], U8F8::lit("2.25"), 20, WHOLE, true)?;
@@ -40,21 +42,9 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
     let steep = config(PAPER, U8F8::lit("140"), 5, WHOLE, false)?;
     let many = config([4, 40, 4000], U8F8::lit("2"), 700, WHOLE, false)?;
     let each = photons / 17;
-    let scene = |name: &str, pixels_log2, config| Scene {
-        name: name.to_owned(),
-        pixels_log2,
-        config,
-        clocks: [7, 8],
-        rate: 256,
-        bins: Bins::Target(100, 1),
-        pixels: Pixels::All,
-        link: 256,
-        events: Events::Link,
-        reads: None,
-        restarts: Vec::new(),
-        longest_run: 8192,
+    let scene = |name, pixels_log2, config| Scene {
         length: each,
-        seed: 1,
+        ..Scene::new(name, pixels_log2, config)
     };
     let mut scenes = Vec::new();
     for (rate, name) in RATES {
@@ -174,7 +164,7 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
             ..scene("the program reads full counters", 2, brighter)
         },
     ]);
-    if let Some(histograms) = recorded(root)? {
+    if let Some(histograms) = recorded()? {
         let histograms = Arc::new(histograms);
         for (pixels_log2, rate) in [(2, 256), (4, 100)] {
             scenes.push(Scene {
@@ -224,8 +214,8 @@ pub fn scenes(root: &Path, photons: u64) -> Result<Vec<Scene>> {
 
 /// A public capture log of a TMF8820, beside the workspace or where `TMF8820_LOG` says: the
 /// histograms of its first captures.
-fn recorded(root: &Path) -> Result<Option<Vec<Recorded>>> {
-    let beside = root.join("../shared/data/tmf8820_plane_gt/distance_data.json");
+fn recorded() -> Result<Option<Vec<Recorded>>> {
+    let beside = root().join("../shared/data/tmf8820_plane_gt/distance_data.json");
     let named = env::var_os("TMF8820_LOG").map(PathBuf::from);
     let Some(path) = named.or_else(|| Some(beside).filter(|path| path.exists())) else {
         println!(
