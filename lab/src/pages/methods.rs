@@ -259,7 +259,7 @@ pub fn documents(
     dither: &Part,
 ) -> Result<Vec<(PathBuf, String)>> {
     let counts = Instructions(instructions);
-    let outcomes = time_to_detect::outcomes(time)?;
+    let outcomes = time_to_detect::outcomes(time);
     let photon = counts.of("photon", "AsyncPixel::count_batch")?;
     let mut all_rules = rules(&counts, &outcomes, |_| true)?;
     all_rules.push(suited(&counts, &outcomes)?);

@@ -1,6 +1,7 @@
 //! False alarms of the paper's rule with its estimated background, at one look and over an
 //! exposure: the data that `dtof tune` interpolates.
 
+use crate::sweep::charts::joined_key;
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Claim, Comparison, Figure, Results, Verdict, ends};
 use crate::sweep::{self, Part, Point, PointTally, Study, Tally};
@@ -226,7 +227,7 @@ fn chart(part: &Part, last: u32) -> Result<Chart> {
     } else {
         let text = "One α cannot hold the rate of false alarms: it changes with the background";
         let key = vec![
-            Key::new(NEUTRAL, Style::JoinedDots, "simulated"),
+            joined_key(NEUTRAL, "simulated"),
             Key::new(NEUTRAL, Style::Dashed, "Eq. 10"),
         ];
         (text, key)

@@ -114,7 +114,7 @@ pub struct FailureOutcome {
 /// # Errors
 /// Fails if `part` is of another study.
 pub fn outcomes(part: &Part) -> Result<Vec<(Case, Vec<FailureOutcome>)>> {
-    let plain = part.one([("case", 0.0)])?;
+    let plain = part.one([("case", 0.0)]);
     let of = |(case, point): (Case, &PointTally)| {
         let outcomes = Method::all().map(|method| outcome(&case, point, plain, method));
         let outcomes = outcomes.collect();

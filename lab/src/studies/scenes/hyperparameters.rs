@@ -15,6 +15,7 @@ mod claims;
 mod setting;
 
 use self::setting::{Setting, error, false_share};
+use crate::sweep::charts::panel;
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
 use crate::sweep::values::Values;
@@ -182,10 +183,8 @@ fn table(part: &Part) -> String {
 fn figures(part: &Part) -> Result<Vec<Figure>> {
     let [_, setting] = Setting::at_low_background(part, true);
     let dots = |points: Vec<&PointTally>, of: fn(&PointTally) -> Measured| -> Vec<Dot> {
-        let points = points.into_iter();
-        points
-            .map(|point| of(point).at(point.parameter("snr")))
-            .collect()
+        let dot = |point: &PointTally| of(point).at(point.parameter("snr"));
+        points.into_iter().map(dot).collect()
     };
     let joined = |name: String, pen, points| Series::named(name, pen, Style::JoinedDots, points);
     let backgrounds = [(false, "two quadrants"), (true, "average of all bins")];
@@ -198,10 +197,7 @@ fn figures(part: &Part) -> Result<Vec<Figure>> {
                 let points = dots(setting.by_snr(4, 20), false_share);
                 joined(format!("σ {} bins", setting.sigma), pen, points)
             });
-        Panel {
-            title: title.to_owned(),
-            series: series.collect(),
-        }
+        panel(title, series)
     });
     // Compared point by point, at equal pulse and SNR.
     let more = [0, 1].into_iter().all(|pulse| {
