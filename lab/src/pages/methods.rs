@@ -248,8 +248,8 @@ fn estimators(
 /// The documents below `docs`: the table and its figures.
 ///
 /// # Errors
-/// Fails if an instruction count is missing, a part is of another study, or the file of recorded
-/// photons has another format.
+/// Fails if an instruction count is missing, the file of recorded photons has another format, or the
+/// data no longer support a title.
 pub fn documents(
     instructions: &str,
     recorded_rules: &str,

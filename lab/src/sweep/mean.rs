@@ -147,6 +147,13 @@ impl Measured {
         Self::plus_minus(value, value * share(self).hypot(share(other)))
     }
 
+    /// Value and half of the interval with `digits` decimals, as text.
+    #[must_use]
+    pub fn with_half(&self, digits: usize) -> String {
+        let half = (self.interval.1 - self.interval.0) / 2.0;
+        format!("{:.digits$} ±{half:.digits$}", self.value)
+    }
+
     /// Value and interval with `digits` decimals, as text.
     #[must_use]
     pub fn text(&self, digits: usize) -> String {

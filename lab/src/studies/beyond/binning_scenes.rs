@@ -200,17 +200,15 @@ fn results(part: &Part) -> Result<Results> {
             panels.push(panel(file.name, series));
         }
     }
-    let wrong = |scene: usize, levels| -> Result<String> {
-        let point = part.points().get(scene).context("no such scene")?;
-        Ok(percent(SceneOutcome::new(point, levels).blocks_wrong.value))
-    };
-    let [slant, demo] = [wrong(SLANT, 2.0)?, wrong(OF_DEMO, 2.0)?];
+    let of = |scene: usize, levels| SceneOutcome::new(&part.points()[scene], levels);
+    let wrong = |scene, levels| percent(of(scene, levels).blocks_wrong.value);
+    let [slant, demo] = [SLANT, OF_DEMO].map(|scene| wrong(scene, 2.0));
     let chart = Chart {
         finding: format!(
             "Of what two levels of blocks report {slant} % is wrong on a dim tilted wall, {demo} % in the demo's \
              scene; of three levels {} and {} %",
-            wrong(SLANT, 3.0)?,
-            wrong(OF_DEMO, 3.0)?
+            wrong(SLANT, 3.0),
+            wrong(OF_DEMO, 3.0)
         ),
         holds: least_kept >= 0.95,
         note: format!(
@@ -226,8 +224,7 @@ fn results(part: &Part) -> Result<Results> {
         columns: 3,
         panels,
     };
-    let bright = part.points().get(BRIGHT).context("no such scene")?;
-    let bright = SceneOutcome::new(bright, 2.0);
+    let bright = of(BRIGHT, 2.0);
     let [all, wrong] = [&bright.counts[..], &bright.counts[1..]]
         .map(|counts| counts.iter().flatten().sum::<u64>());
     let cycles = SCENES.iter().map(|(_, cycles)| cycles - BEFORE).min();

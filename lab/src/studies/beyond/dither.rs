@@ -406,7 +406,8 @@ fn csv(part: &Part) -> Result<String> {
         .to_owned();
     for scene in Scene::ALL {
         for &counted in scene.counted() {
-            let mut row = |strength, range| {
+            for point in part.at([("scene", scene.number())]) {
+                let [strength, range] = ["strength", "range"].map(|name| point.parameter(name));
                 let outcome = outcome(part, scene, counted, strength, range);
                 writeln!(
                     csv,
@@ -417,13 +418,6 @@ fn csv(part: &Part) -> Result<String> {
                     outcome.wrong.cells(5),
                     outcome.cycles.cells(2),
                 )?;
-                anyhow::Ok(())
-            };
-            row(ABSENT, 0.0)?;
-            for strength in STRENGTHS {
-                for range in RANGES {
-                    row(strength, range)?;
-                }
             }
         }
     }

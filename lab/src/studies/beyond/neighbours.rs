@@ -293,7 +293,7 @@ fn results(part: &Part) -> Result<Results> {
         }
         panels.push(panel(file.name, series));
     }
-    let dim = part.points().get(DIM_WALL).context("no such scene")?;
+    let dim = &part.points()[DIM_WALL];
     let of = |way: usize, share| time(dim, &WAYS[way], share);
     let alone = of(ALONE, 0.9);
     let times = |way| {

@@ -18,7 +18,6 @@ use self::setting::{Setting, error, false_share};
 use crate::sweep::charts::panel;
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
-use crate::sweep::values::Values;
 use crate::sweep::{Part, Point, PointTally, Study, Tally, grid, tally, whole};
 use anyhow::Result;
 use dtof_core::fixed::types::U8F8;
@@ -146,12 +145,14 @@ fn trial(point: &Point, rng: &mut Pcg64) -> Result<Tally> {
 }
 
 fn results(part: &Part) -> Result<Results> {
-    let mut values = Values::from([("pixels", grouped(part.seed_count()))]);
-    values.set("table", table(part));
     Ok(Results {
         figures: figures(part)?,
         claims: claims::claims(part),
-        values,
+        values: [
+            ("pixels", grouped(part.seed_count())),
+            ("table", table(part)),
+        ]
+        .into(),
         ..Results::default()
     })
 }
@@ -163,11 +164,7 @@ fn table(part: &Part) -> String {
         for setting in Setting::at_low_background(part, is_average) {
             let shares = setting.by_snr(4, 20).into_iter().map(|point| {
                 let share = false_share(point).times(100.0);
-                format!(
-                    "{:.1} ±{:.1}",
-                    share.value,
-                    (share.interval.1 - share.interval.0) / 2.0
-                )
+                share.with_half(1)
             });
             let cells: Vec<String> = shares.collect();
             rows += &format!(

@@ -109,7 +109,7 @@ impl EventDepthOutcome {
 /// Every rule in every scene, by first look, pulse and background.
 ///
 /// # Errors
-/// Fails if `part` is of another study.
+/// Fails if a threshold is out of range.
 pub fn outcomes(part: &Part) -> Result<Vec<EventDepthOutcome>> {
     let mut outcomes = Vec::new();
     for sigma in SIGMAS {

@@ -1,13 +1,13 @@
 //! The figures and the table.
 
-use super::super::systems::Background;
+use super::super::systems::{Background, System};
 use super::claims::claims;
 use super::outcome::{ChangeOutcome, REMOVED, SCENES, at_text, holding, on_pc, outcome};
 use super::{REFERENCES, SIGNALS};
-use crate::sweep::Part;
 use crate::sweep::charts::{joined, joined_key, panel};
 use crate::sweep::mean::Measured;
 use crate::sweep::results::{Figure, Results};
+use crate::sweep::{Part, whole};
 use anyhow::Result;
 use dtof_data::options::rows::grouped;
 use dtof_draw::chart::{Axis, Chart, Key, Panel, Point as Dot, Series, Style};
@@ -104,16 +104,8 @@ fn csv(part: &Part) -> Result<String> {
                    delay_cycles,false,false_from,false_to,still_pixels,still_frames,still_events,still_changes\n"
         .to_owned();
     for point in part.points() {
-        let system = if point.is_at([("fpga", 1.0)]) {
-            "FPGA"
-        } else {
-            "PC"
-        };
-        let scene = if point.is_at([("fan", 1.0)]) {
-            "fan"
-        } else {
-            "car"
-        };
+        let system = System::of(&point.parameters).name;
+        let (_, scene) = SCENES[usize::from(whole(&point.parameters, "fan"))];
         for background in Background::ALL {
             for (_, reference) in REFERENCES {
                 let of = outcome(point, background, reference);
